@@ -1,0 +1,37 @@
+"""Every way bowdenfit can refuse: sentences with a remedy, never a bare traceback."""
+
+
+class BowdenfitError(Exception):
+    """Base of all errors a user can cause or meet; its text is complete sentences with a remedy."""
+
+    exit_code = 1
+
+
+class DatasetError(BowdenfitError):
+    """A table cannot be read as measurements: names the file, and row, column and value where they exist."""
+
+    exit_code = 2
+
+
+class DescriptionError(BowdenfitError):
+    """The description of the cable (`cable.toml`, or an option that stands for it) is wrong or incomplete."""
+
+    exit_code = 2
+
+
+class UsageError(BowdenfitError):
+    """The request itself cannot be met: an option with an impossible value, or a question the fit cannot answer."""
+
+    exit_code = 2
+
+
+class StoreError(BowdenfitError):
+    """A results folder exists already, is missing, is damaged, or belongs to other inputs."""
+
+    exit_code = 2
+
+
+class ConvergenceError(BowdenfitError):
+    """A solver or sampler stopped without an answer that can be used at all."""
+
+    exit_code = 3

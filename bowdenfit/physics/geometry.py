@@ -1,0 +1,95 @@
+"""Wrap angle against cable length: the Gaussian curve, in the coordinates that data can see and in the printed ones."""
+
+import jax.numpy as jnp
+from jax import Array
+from jaxtyping import Float
+
+
+def gaussian_wrap_angle(
+    length: Float[Array, "*batch"], A: Float[Array, "*#batch"], B: Float[Array, "*#batch"], C: Float[Array, "*#batch"]
+) -> Float[Array, "*batch"]:
+    r"""The curve as papers print it.
+
+    .. math:: \theta(l) = A \exp\left(-\left(\frac{l - B}{C}\right)^2\right)
+
+    For comparing with printed coefficients only: on data that never reach the peak (A, B, C) is a ridge with
+    condition number near 3e4; fit with `log_quadratic_wrap_angle` instead.
+
+    Args:
+        length: Cable length [mm].
+        A: Wrap angle at the peak [rad].
+        B: Length at the peak [mm].
+        C: Length over which the angle falls to 1/e of the peak [mm].
+
+    Returns:
+        Wrap angle [rad].
+
+    References:
+        On-body paper, equation 8.
+    """
+    return A * jnp.exp(-(((length - B) / C) ** 2))
+
+
+def log_quadratic_wrap_angle(
+    z: Float[Array, "*batch"], a: Float[Array, "*#batch"], b: Float[Array, "*#batch"], c: Float[Array, "*#batch"]
+) -> Float[Array, "*batch"]:
+    r"""The same Gaussian, centered on the measured range, where its coefficients are nearly uncorrelated.
+
+    .. math:: \log \theta = a + b z - c z^2, \quad z = \frac{l - l_\text{mid}}{l_\text{half}}, \quad c \ge 0
+
+    At c = 0 the curve is an exponential of the length, which is where data far from the peak may send it.
+
+    Args:
+        z: Cable length, 0 in the middle of the measured range and +-1 at its ends [1].
+        a: Logarithm of the wrap angle in the middle [log rad].
+        b: Slope of that logarithm [1].
+        c: Curvature of that logarithm [1].
+
+    Returns:
+        Wrap angle [rad].
+
+    References:
+        On-body paper, equation 8, in other coordinates.
+    """
+    return jnp.exp(a + b * z - c * z**2)
+
+
+def gaussian_coefficients(
+    a: Float[Array, "*batch"],
+    b: Float[Array, "*batch"],
+    c: Float[Array, "*batch"],
+    middle: float,
+    half_width: float,
+) -> tuple[Float[Array, "*batch"], Float[Array, "*batch"], Float[Array, "*batch"]]:
+    r"""A, B and C of the printed curve from the log-quadratic coefficients.
+
+    .. math::
+        C = \frac{l_\text{half}}{\sqrt{c}}, \quad B = l_\text{mid} + l_\text{half}\frac{b}{2c}, \quad
+        \log A = a + \frac{b^2}{4c}
+
+    All three go to infinity as c goes to 0; callers must say so instead of printing the number.
+
+    Args:
+        a: Logarithm of the wrap angle in the middle [log rad].
+        b: Slope [1].
+        c: Curvature [1].
+        middle: Middle of the measured range [mm].
+        half_width: Half the measured range [mm].
+
+    Returns:
+        A [rad], B [mm], C [mm].
+    """
+    return jnp.exp(a + b**2 / (4 * c)), middle + half_width * b / (2 * c), half_width / jnp.sqrt(c)
+
+
+def log_quadratic_coefficients(
+    A: Float[Array, "*batch"],
+    B: Float[Array, "*batch"],
+    C: Float[Array, "*batch"],
+    middle: float,
+    half_width: float,
+) -> tuple[Float[Array, "*batch"], Float[Array, "*batch"], Float[Array, "*batch"]]:
+    """Inverse of `gaussian_coefficients`: from printed A [rad], B [mm], C [mm] to a, b, c."""
+    c = (half_width / C) ** 2
+    b = 2 * c * (B - middle) / half_width
+    return jnp.log(A) - b**2 / (4 * c), b, c

@@ -1,0 +1,16 @@
+"""Names of array types; jaxtyping checks the shapes while testing, and costs nothing in use.
+
+Only NumPy types live here, so that reading and checking tables never waits for JAX to load. Functions of JAX arrays
+write `Float[Array, "..."]` themselves.
+"""
+
+from typing import TypeAlias
+
+import numpy as np
+from jaxtyping import Bool, Float, Int
+
+Vector: TypeAlias = Float[np.ndarray, " rows"]
+Flags: TypeAlias = Bool[np.ndarray, " rows"]
+Labels: TypeAlias = Int[np.ndarray, " rows"]
+Matrix: TypeAlias = Float[np.ndarray, "rows columns"]
+Draws: TypeAlias = Float[np.ndarray, "chain draw"]

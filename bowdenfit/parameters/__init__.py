@@ -1,0 +1,1 @@
+"""Parameters, declared once: name, unit, symbol, prior and meaning."""

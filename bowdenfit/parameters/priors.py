@@ -1,0 +1,130 @@
+"""Priors as maps from a standard normal onto their support.
+
+Each prior is two functions, `constrain` and its inverse `unconstrain`. In the coordinates z every prior is the standard
+normal, whatever it is in physical units, so that no Jacobian, bound or density has to be written anywhere else.
+A prior's hyperparameters may be arrays, so that parameters with priors of one kind are mapped in one operation.
+"""
+
+from dataclasses import dataclass
+from typing import Protocol, TypeAlias, runtime_checkable
+
+import jax.numpy as jnp
+from jax import Array
+from jax.scipy.special import erf, erfinv, ndtr, ndtri
+from jaxtyping import Float
+
+Real: TypeAlias = float | Float[Array, "*any"]
+
+
+@runtime_checkable
+class Prior(Protocol):
+    """What the parameter space needs of a prior."""
+
+    def constrain(self, z: Float[Array, "*any"]) -> Float[Array, "*any"]:
+        """Quantile of Phi(z): from the standard normal to the parameter."""
+        ...
+
+    def unconstrain(self, value: Float[Array, "*any"]) -> Float[Array, "*any"]:
+        """Inverse of `constrain`."""
+        ...
+
+
+@dataclass(frozen=True)
+class Normal:
+    """Normal(mean, sd): a quantity of either sign."""
+
+    mean: Real
+    sd: Real
+
+    def constrain(self, z: Float[Array, "*any"]) -> Float[Array, "*any"]:
+        """Mean + sd z"""
+        return self.mean + self.sd * z
+
+    def unconstrain(self, value: Float[Array, "*any"]) -> Float[Array, "*any"]:
+        """(value - mean) / sd"""
+        return (value - self.mean) / self.sd
+
+
+@dataclass(frozen=True)
+class LogNormal:
+    """LogNormal: a positive quantity known to a factor; `median` and the sd of its natural logarithm."""
+
+    median: Real
+    log_sd: Real
+
+    def constrain(self, z: Float[Array, "*any"]) -> Float[Array, "*any"]:
+        """Median exp(log_sd z)"""
+        return self.median * jnp.exp(self.log_sd * z)
+
+    def unconstrain(self, value: Float[Array, "*any"]) -> Float[Array, "*any"]:
+        """log(value / median) / log_sd"""
+        return jnp.log(value / self.median) / self.log_sd
+
+
+@dataclass(frozen=True)
+class HalfNormal:
+    """HalfNormal(sd): a scale, zero allowed and small values not discouraged."""
+
+    sd: Real
+
+    def constrain(self, z: Float[Array, "*any"]) -> Float[Array, "*any"]:
+        """Upper half of a normal: through erf below the median and through the survival function above it."""
+        below, above = _split(z)
+        low = jnp.sqrt(2.0) * erfinv(ndtr(below))
+        high = -ndtri(ndtr(-above) / 2)
+        return self.sd * jnp.where(z < 0, low, high)
+
+    def unconstrain(self, value: Float[Array, "*any"]) -> Float[Array, "*any"]:
+        """Standard normal quantile of 2 Phi(value / sd) - 1."""
+        x = value / self.sd
+        tail = 2 * ndtr(-x)
+        return jnp.where(tail < 0.5, -ndtri(jnp.minimum(tail, 0.5)), ndtri(erf(x / jnp.sqrt(2.0))))
+
+
+@dataclass(frozen=True)
+class Uniform:
+    """Uniform(low, high): only the limits are known."""
+
+    low: Real
+    high: Real
+
+    def constrain(self, z: Float[Array, "*any"]) -> Float[Array, "*any"]:
+        """Low + (high - low) Phi(z), from the nearer end."""
+        width = self.high - self.low
+        return jnp.where(z < 0, self.low + width * ndtr(z), self.high - width * ndtr(-z))
+
+    def unconstrain(self, value: Float[Array, "*any"]) -> Float[Array, "*any"]:
+        """Standard normal quantile of the fraction of the range."""
+        fraction = (value - self.low) / (self.high - self.low)
+        return jnp.where(fraction < 0.5, ndtri(fraction), -ndtri(1 - fraction))
+
+
+@dataclass(frozen=True)
+class TruncatedNormal:
+    """Normal(mean, sd) cut off at 0: a coefficient measured separately, value and standard deviation."""
+
+    mean: Real
+    sd: Real
+
+    def constrain(self, z: Float[Array, "*any"]) -> Float[Array, "*any"]:
+        """Quantile of the truncated normal, from the nearer tail."""
+        ratio = self.mean / self.sd
+        below, above = _split(z)
+        low = ndtri(ndtr(-ratio) + ndtr(ratio) * ndtr(below))
+        high = -ndtri(ndtr(ratio) * ndtr(-above))
+        return self.mean + self.sd * jnp.where(z < 0, low, high)
+
+    def unconstrain(self, value: Float[Array, "*any"]) -> Float[Array, "*any"]:
+        """Standard normal quantile of the truncated distribution function."""
+        ratio, u = self.mean / self.sd, (value - self.mean) / self.sd
+        below, above = ndtr(-ratio), ndtr(ratio)
+        upper = ndtr(-u) / above
+        return jnp.where(upper < 0.5, -ndtri(jnp.minimum(upper, 0.5)), ndtri((ndtr(u) - below) / above))
+
+
+def _split(z: Float[Array, "*any"]) -> tuple[Float[Array, "*any"], Float[Array, "*any"]]:
+    """Z for the lower and for the upper branch of a quantile, each harmless where the other branch is taken.
+
+    (A plain minimum or maximum would halve the derivative at z = 0, where least squares starts.)
+    """
+    return jnp.where(z < 0, z, -1.0), jnp.where(z < 0, 1.0, z)

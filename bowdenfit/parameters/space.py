@@ -1,0 +1,116 @@
+"""The parameters of one model: which are free, which fixed, and the way between z and named values."""
+
+from collections.abc import Mapping
+from dataclasses import dataclass, fields
+from functools import cached_property
+from typing import Any, Literal
+
+import jax.numpy as jnp
+import numpy as np
+from jax import Array
+from jaxtyping import Float
+
+from bowdenfit.errors import DescriptionError
+from bowdenfit.parameters.priors import Prior
+
+Role = Literal["friction", "curve", "angle", "noise", "sensor"]
+
+
+@dataclass(frozen=True)
+class Parameter:
+    """One unknown of the model, declared once for fit, tables, figures and report.
+
+    Args:
+        name: Unique machine-readable name.
+        symbol: The same for figures, in matplotlib's math notation.
+        meaning: One phrase for tables and reports.
+        role: What it belongs to; decides how it is treated in least squares and where it is shown.
+        prior: Prior in internal units.
+        prior_text: The prior as people read it, in the shown unit.
+        unit: Unit in which it is shown ("1" where there is none).
+        shown_scale: Shown value over internal value.
+        fixed: Value [internal unit] where it is held fixed, else None.
+    """
+
+    name: str
+    symbol: str
+    meaning: str
+    role: Role
+    prior: Prior
+    prior_text: str
+    unit: str = "1"
+    shown_scale: float = 1.0
+    fixed: float | None = None
+
+    @property
+    def label(self) -> str:
+        """Symbol and unit for an axis."""
+        return self.symbol if self.unit == "1" else f"{self.symbol} ({self.unit})"
+
+
+@dataclass(frozen=True)
+class ParameterSpace:
+    """All parameters of a model, and the map from z (free parameters, standard normal) to named values."""
+
+    parameters: tuple[Parameter, ...]
+
+    def __post_init__(self) -> None:
+        names = [p.name for p in self.parameters]
+        for name in names:
+            if names.count(name) > 1:
+                raise DescriptionError(
+                    f"Two parameters are both called {name!r}; "
+                    "rename the friction coefficient or the angle column in cable.toml."
+                )
+
+    @cached_property
+    def free(self) -> tuple[Parameter, ...]:
+        """The parameters that are inferred, in the order of z."""
+        return tuple(p for p in self.parameters if p.fixed is None)
+
+    @cached_property
+    def fixed(self) -> tuple[Parameter, ...]:
+        """The parameters that are held at a value."""
+        return tuple(p for p in self.parameters if p.fixed is not None)
+
+    @property
+    def size(self) -> int:
+        """Number of free parameters."""
+        return len(self.free)
+
+    @cached_property
+    def index(self) -> dict[str, int]:
+        """Position of each free parameter in z."""
+        return {p.name: i for i, p in enumerate(self.free)}
+
+    @cached_property
+    def _groups(self) -> tuple[tuple[np.ndarray, Prior], ...]:
+        """Free parameters by kind of prior: positions, and one prior with array hyperparameters."""
+        kinds: dict[type, list[int]] = {}
+        for i, parameter in enumerate(self.free):
+            kinds.setdefault(type(parameter.prior), []).append(i)
+        return tuple(
+            (np.array(where), _stacked(kind, [self.free[i].prior for i in where])) for kind, where in kinds.items()
+        )
+
+    def vector(self, z: Float[Array, " free"]) -> Float[Array, " free"]:
+        """Values of the free parameters [internal units] at z."""
+        if not self._groups:
+            return z
+        order = np.argsort(np.concatenate([where for where, _ in self._groups]))
+        return jnp.concatenate([prior.constrain(z[where]) for where, prior in self._groups])[order]
+
+    def constrain(self, z: Float[Array, " free"]) -> dict[str, Array]:
+        """Named values of all parameters, fixed ones included [internal units], at z."""
+        vector = self.vector(z)
+        values = {p.name: vector[i] for i, p in enumerate(self.free)}
+        return values | {p.name: jnp.asarray(p.fixed, dtype=z.dtype) for p in self.fixed}
+
+    def unconstrain(self, values: Mapping[str, Any]) -> Float[Array, " free"]:
+        """Z at named values [internal units]."""
+        return jnp.stack([p.prior.unconstrain(jnp.asarray(values[p.name], dtype=float)) for p in self.free])
+
+
+def _stacked(kind: type, priors: list[Any]) -> Prior:
+    """One prior of the given kind whose hyperparameters are the arrays of those of several."""
+    return kind(**{field.name: np.array([getattr(p, field.name) for p in priors]) for field in fields(kind)})

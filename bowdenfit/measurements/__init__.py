@@ -1,0 +1,1 @@
+"""From files to validated arrays in N, mm, rad and s."""

@@ -1,0 +1,93 @@
+"""Units, at the border only: whatever a table is written in becomes N, mm, rad and s here and nowhere else."""
+
+from functools import cache
+from typing import TYPE_CHECKING
+
+from bowdenfit.errors import DatasetError
+
+if TYPE_CHECKING:
+    import pint
+
+INTERNAL_UNITS = {"force": "N", "length": "mm", "angle": "rad", "time": "s", "velocity": "mm/s", "ratio": "1"}
+_EXAMPLES = {
+    "force": "N, kN, lbf, kgf",
+    "length": "mm, cm, m, inch",
+    "angle": "deg, rad, turn",
+    "time": "s, ms",
+    "velocity": "mm/s, m/s",
+    "ratio": "%, 1",
+}
+
+
+@cache
+def _registry() -> "pint.UnitRegistry":
+    """Pint's registry, made at the first conversion (it takes a fifth of a second)."""
+    import pint
+
+    return pint.UnitRegistry(cache_folder=None)
+
+
+def is_unit(text: str) -> bool:
+    """Whether `text` is a unit that pint reads."""
+    try:
+        _parsed(text)
+    except DatasetError:
+        return False
+    return True
+
+
+def dimension_of(unit: str) -> str:
+    """Which of the kinds of quantity in `INTERNAL_UNITS` a unit measures, or "other"."""
+    parsed = _parsed(unit)
+    for dimension, internal in INTERNAL_UNITS.items():
+        if _same_kind(parsed, _parsed(internal)):
+            return dimension
+    return "other"
+
+
+def conversion_factor(unit: str, dimension: str, to: str | None = None) -> float:
+    """Factor from `unit` to the internal unit of `dimension` (or to another unit of the same kind).
+
+    Args:
+        unit: Unit as written by the user, anything pint reads.
+        dimension: One of `INTERNAL_UNITS`.
+        to: Target unit, the internal one if omitted.
+
+    Raises:
+        DatasetError: The unit is unknown, or measures something else.
+    """
+    parsed, target = _parsed(unit), _parsed(to or INTERNAL_UNITS[dimension])
+    if not _same_kind(parsed, target):
+        hint = " (kg is a mass: for the weight of that mass write kgf)" if unit.strip() in {"kg", "g", "lb"} else ""
+        raise DatasetError(
+            f"the unit {unit!r} does not measure {'a ' if dimension != 'angle' else 'an '}{dimension}{hint}; "
+            f"use one such as {_EXAMPLES.get(dimension, to)}"
+        )
+    return float(_registry().Quantity(1.0, parsed).to(target).magnitude)
+
+
+def route_conversion_factor(unit: str, to: str) -> float:
+    """Factor between two units of the route variable, whatever it measures.
+
+    Raises:
+        DatasetError: A unit is unknown, or the two measure different things.
+    """
+    parsed, target = _parsed(unit), _parsed(to)
+    if not _same_kind(parsed, target):
+        raise DatasetError(f"the unit {unit!r} cannot be converted to {to!r}, the unit of [route] in cable.toml")
+    return float(_registry().Quantity(1.0, parsed).to(target).magnitude)
+
+
+@cache
+def _parsed(unit: str) -> "pint.Unit":
+    text = unit.strip()
+    try:
+        return _registry().parse_units("dimensionless" if text in {"1", "-", ""} else text)
+    except Exception as error:  # pint raises many kinds: tokenizer, attribute, value and assertion errors
+        raise DatasetError(f"the unit {unit!r} is not known; use one such as N, lbf, mm, inch, deg, rad, %") from error
+
+
+def _same_kind(a: "pint.Unit", b: "pint.Unit") -> bool:
+    """Same dimension; and an angle is not a ratio, although both are without dimension."""
+    root_a, root_b = (_registry().Quantity(1.0, unit).to_root_units().units for unit in (a, b))
+    return bool(root_a == root_b)

@@ -1,0 +1,193 @@
+"""A data set: the description and the tables of one folder, read together and checked against each other."""
+
+import hashlib
+from collections.abc import Sequence
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+
+from bowdenfit.description import Contact, Description, Table, load_description, parse_description
+from bowdenfit.errors import DatasetError, DescriptionError
+from bowdenfit.measurements.columns import ColumnSource
+from bowdenfit.measurements.tables import (
+    EfficiencyTable,
+    ForceTable,
+    Measurements,
+    Route,
+    read_angles,
+    read_efficiencies,
+    read_forces,
+)
+
+DESCRIPTION_FILE = "cable.toml"
+
+
+@dataclass(frozen=True)
+class Dataset:
+    """A description with its measurements.
+
+    Args:
+        description: What was said about the cable.
+        measurements: What was measured on it.
+        sha256: Checksum of every file that was read, by file name.
+    """
+
+    description: Description
+    measurements: Measurements
+    sha256: dict[str, str]
+
+
+def load_dataset(path: Path, overrides: Sequence[str] = ()) -> Dataset:
+    """Read a folder with `cable.toml` and tables, or the `cable.toml` itself.
+
+    Args:
+        path: Folder, or description file.
+        overrides: Settings that replace those of the description, such as `friction.mu1.fixed=0.1`.
+
+    Raises:
+        DescriptionError: The description is missing or wrong.
+        DatasetError: A table is missing or wrong, or does not fit the description.
+    """
+    if path.suffix.lower() not in {".toml", ""} and path.is_file():
+        raise DescriptionError(
+            f"{path.name} is a table without a description; say the angle it was measured at, such as "
+            f"--wrap-angle 180deg, or write a cable.toml beside it with `bowdenfit init`."
+        )
+    file = path if path.suffix == ".toml" else path / DESCRIPTION_FILE
+    return read_dataset(load_description(file, overrides), file.parent, {file.name: _sha256(file)})
+
+
+def single_table_dataset(path: Path, wrap_angle: tuple[float, str], overrides: Sequence[str] = ()) -> Dataset:
+    """A data set from one table of a cable with one contact at one known wrap angle.
+
+    Args:
+        path: Table of forces or of efficiencies.
+        wrap_angle: The angle and its unit.
+        overrides: Not available here; a description is needed for them.
+
+    Raises:
+        UsageError, DatasetError: The angle or the table is wrong.
+    """
+    if overrides:
+        raise DescriptionError("--set changes a cable.toml; a single table has none: write one with `bowdenfit init`.")
+    from bowdenfit.measurements.readers import read_csv
+
+    kind = "efficiencies" if any("efficiency" in h.lower() for h in read_csv(path).header) else "forces"
+    angle = {"value": wrap_angle[0], "unit": wrap_angle[1]}
+    description = parse_description(
+        {
+            "name": path.stem,
+            "source": path.name,
+            "contact": [{"name": "cable", "friction": "mu", "wrap_angle": angle}],
+            "tables": {kind: {"file": path.name}},
+        },
+        "--wrap-angle",
+    )
+    return read_dataset(description, path.parent, {})
+
+
+def read_dataset(description: Description, folder: Path, sha256: dict[str, str]) -> Dataset:
+    """Read the tables that a description names.
+
+    Args:
+        description: The description.
+        folder: Where its files are.
+        sha256: Checksums of what has been read so far.
+
+    Raises:
+        DatasetError: A table is missing or wrong, or does not fit the description.
+    """
+    tables = description.tables
+    route = Route(description.route.variable, description.route.unit) if description.route else None
+    own = description.angle_columns
+    remarks: list[str] = []
+    angles = efficiencies = forces = None
+    checksums = dict(sha256)
+    if tables.angles is not None and route is not None:
+        (path,) = _paths(tables.angles, folder, "angles", one=True)
+        limit = tables.angles.detection_limit
+        columns = [c.wrap_angle.column for c in description.curved if c.wrap_angle.column]
+        angles = read_angles(path, route, columns, limit.to("angle") if limit else None, _sources(tables.angles))
+        checksums[path.name] = _sha256(path)
+    if tables.efficiencies is not None:
+        (path,) = _paths(tables.efficiencies, folder, "efficiencies", one=True)
+        efficiencies = read_efficiencies(path, route, own, _sources(tables.efficiencies))
+        checksums[path.name] = _sha256(path)
+    if tables.forces is not None:
+        paths = _paths(tables.forces, folder, "forces")
+        forces, force_remarks = read_forces(paths, route, own, _sources(tables.forces))
+        remarks += force_remarks
+        checksums |= {
+            p.relative_to(folder).as_posix() if p.is_relative_to(folder) else p.name: _sha256(p) for p in paths
+        }
+    measurements = Measurements(angles, efficiencies, forces, tuple(remarks))
+    _check(description, measurements)
+    return Dataset(description, measurements, checksums)
+
+
+def _paths(table: Table, folder: Path, kind: str, one: bool = False) -> list[Path]:
+    """The files of a table; patterns are expanded in sorted order."""
+    named = [table.file] if table.file else [table.files] if isinstance(table.files, str) else list(table.files or ())
+    paths: list[Path] = []
+    for name in named:
+        if name is None:
+            continue
+        matches = sorted(folder.glob(name)) if any(c in name for c in "*?[") else [folder / name]
+        if not matches:
+            raise DatasetError(f"no file in {folder} matches {name!r}, which cable.toml names for the table {kind}.")
+        paths += matches
+    if one and len(paths) != 1:
+        raise DatasetError(f"the table {kind} must be one file; cable.toml names {len(paths)}.")
+    return paths
+
+
+def _sources(table: Table) -> dict[str, ColumnSource]:
+    return {name: ColumnSource(column.name, column.unit) for name, column in table.columns.items()}
+
+
+def _sha256(path: Path) -> str:
+    with path.open("rb") as file:
+        return hashlib.file_digest(file, "sha256").hexdigest()
+
+
+def _check(description: Description, measurements: Measurements) -> None:
+    """Every row of every table can be given a wrap angle in every contact."""
+    for table in (measurements.efficiencies, measurements.forces):
+        if table is None:
+            continue
+        for contact in description.contact:
+            if contact.wrap_angle.constant is None:
+                _check_contact(description, measurements, contact, table)
+
+
+def _check_contact(
+    description: Description, measurements: Measurements, contact: Contact, table: EfficiencyTable | ForceTable
+) -> None:
+    column = contact.wrap_angle.column or ""
+    own, _ = table.own.column(column)
+    if not contact.wrap_angle.curve:
+        missing = np.flatnonzero(np.isnan(own))
+        if len(missing) == len(own):
+            raise DatasetError(
+                f"{table.origin.files[0]} has no column {column!r}, the wrap angle of the contact {contact.name!r}; "
+                f"add it (as {column}_deg), or give the contact a constant angle or a curve in cable.toml."
+            )
+        if len(missing):
+            raise DatasetError(
+                f"{table.origin.place(int(missing[0]))}, column {column!r}: the cell is blank, but the contact "
+                f"{contact.name!r} has no curve that could stand in for it; fill in the measured angle."
+            )
+        return
+    route = description.route
+    assert route is not None and measurements.angles is not None  # the description guarantees both
+    outside = np.isnan(own) & ((table.route < route.range[0]) | (table.route > route.range[1]))
+    for i in np.flatnonzero(outside):
+        at = np.flatnonzero(measurements.angles.route == table.route[i])
+        if not len(at):
+            raise DatasetError(
+                f"{table.origin.place(int(i))}, column {route.variable!r}: {table.route[i]:g} {route.unit} lies outside "
+                f"the range {route.range[0]:g} to {route.range[1]:g} {route.unit} where the angle curves hold, and the "
+                f"angle table has no row there; measure the wrap angles at that {route.variable.replace('_', ' ')}, "
+                "or write them into this row."
+            )

@@ -1,0 +1,468 @@
+"""The description of a cable, `cable.toml`, as frozen models; the only place where defaults are written."""
+
+import difflib
+import tomllib
+from collections.abc import Mapping, Sequence
+from pathlib import Path
+from typing import Annotated, Any, Literal
+
+from pydantic import BaseModel, ConfigDict, Field, ValidationError, field_validator, model_validator
+
+from bowdenfit.errors import DatasetError, DescriptionError
+from bowdenfit.measurements.units import conversion_factor, route_conversion_factor
+
+SCHEMA = 1
+Positive = Annotated[float, Field(gt=0, allow_inf_nan=False)]
+NonNegative = Annotated[float, Field(ge=0, allow_inf_nan=False)]
+Finite = Annotated[float, Field(allow_inf_nan=False)]
+Geometry = Literal["continuous", "published"]
+Undetected = Literal["censored", "zero", "dropped"]
+
+
+class _Frozen(BaseModel):
+    model_config = ConfigDict(frozen=True, extra="forbid", strict=False)
+
+
+class QuantityValue(_Frozen):
+    """A number with its unit, and its standard deviation where it is known."""
+
+    value: Finite
+    unit: str
+    sd: Positive | None = None
+
+    def to(self, dimension: str) -> float:
+        """Value in the internal unit of a kind of quantity."""
+        return self.value * conversion_factor(self.unit, dimension)
+
+    def sd_to(self, dimension: str) -> float | None:
+        """Standard deviation in the internal unit."""
+        return None if self.sd is None else self.sd * conversion_factor(self.unit, dimension)
+
+
+class LogNormalPrior(_Frozen):
+    """Positive, known to a factor."""
+
+    median: Positive
+    log_sd: Positive
+
+
+class NormalPrior(_Frozen):
+    """Of either sign."""
+
+    mean: Finite
+    sd: Positive
+
+
+class HalfNormalPrior(_Frozen):
+    """A scale."""
+
+    sd: Positive
+
+
+class UniformPrior(_Frozen):
+    """Between limits."""
+
+    low: Finite
+    high: Finite
+
+    @model_validator(mode="after")
+    def _ordered(self) -> "UniformPrior":
+        if not self.low < self.high:
+            raise ValueError("low must be below high")
+        return self
+
+
+class PriorChoice(_Frozen):
+    """Exactly one kind of prior."""
+
+    lognormal: LogNormalPrior | None = None
+    normal: NormalPrior | None = None
+    half_normal: HalfNormalPrior | None = None
+    uniform: UniformPrior | None = None
+
+    @model_validator(mode="after")
+    def _one(self) -> "PriorChoice":
+        if len(self.model_fields_set) != 1:
+            raise ValueError("write exactly one of lognormal, normal, half_normal, uniform")
+        return self
+
+
+class Measured(_Frozen):
+    """A value measured separately, with its standard deviation; a Normal cut off at 0."""
+
+    value: NonNegative
+    sd: Positive
+
+
+class ParameterSetting(_Frozen):
+    """What the user says of one parameter: measured separately, another prior, or fixed. Numbers in the shown unit."""
+
+    measured: Measured | None = None
+    prior: PriorChoice | None = None
+    fixed: Finite | None = None
+
+    @model_validator(mode="after")
+    def _one(self) -> "ParameterSetting":
+        if len(self.model_fields_set) != 1:
+            raise ValueError("write exactly one of measured, prior, fixed")
+        return self
+
+
+class FrictionSetting(ParameterSetting):
+    """The same for a friction coefficient, which cannot be negative."""
+
+    fixed: NonNegative | None = None
+
+
+class Route(_Frozen):
+    """What the design question varies: a column of the tables, and where the angle curves hold."""
+
+    variable: str = "cable_length"
+    unit: str = "mm"
+    range: tuple[Finite, Finite]
+    choices: tuple[Finite, ...] = ()
+
+    @model_validator(mode="after")
+    def _ordered(self) -> "Route":
+        if not self.range[0] < self.range[1]:
+            raise ValueError("range must be [lowest, highest]")
+        outside = [c for c in self.choices if not self.range[0] <= c <= self.range[1]]
+        if outside:
+            raise ValueError(f"choices must lie inside range; {outside[0]:g} does not")
+        return self
+
+    @property
+    def middle(self) -> float:
+        """Middle of the range."""
+        return (self.range[0] + self.range[1]) / 2
+
+    @property
+    def half_width(self) -> float:
+        """Half the range."""
+        return (self.range[1] - self.range[0]) / 2
+
+    @property
+    def label(self) -> str:
+        """Name and unit for an axis or a heading."""
+        return f"{self.variable.replace('_', ' ').capitalize()} ({self.unit})"
+
+
+class WrapAngle(_Frozen):
+    """Where a contact's wrap angle comes from: a curve through the angle table, each row, or a constant."""
+
+    curve: str | None = None
+    column: str | None = None
+    published_range: tuple[Finite, Finite] | None = None
+    nominal: QuantityValue | None = None
+    value: NonNegative | None = None
+    unit: str | None = None
+    sd: Positive | None = None
+
+    @model_validator(mode="after")
+    def _one_source(self) -> "WrapAngle":
+        if (self.value is None) == (self.column is None):
+            raise ValueError(
+                'write either { value = 45, unit = "deg" } or { column = "..." }, with curve where it has one'
+            )
+        if self.value is not None and (self.unit is None or self.curve is not None):
+            raise ValueError('a constant wrap angle needs a unit and no curve, such as { value = 45, unit = "deg" }')
+        if self.column is not None and (self.unit is not None or self.sd is not None):
+            raise ValueError("unit and sd belong to a constant angle; a column carries its unit in its heading")
+        if self.published_range is not None and self.curve is None:
+            raise ValueError("published_range belongs to a curve")
+        if self.nominal is not None and self.curve is not None:
+            raise ValueError("nominal belongs to an angle measured in each row, without a curve")
+        return self
+
+    @property
+    def constant(self) -> QuantityValue | None:
+        """The constant angle, if it is one."""
+        if self.value is None or self.unit is None:
+            return None
+        return QuantityValue(value=self.value, unit=self.unit, sd=self.sd)
+
+
+class Contact(_Frozen):
+    """One place where rope rubs."""
+
+    name: str
+    friction: str
+    law: str = "capstan"
+    wrap_angle: WrapAngle
+
+
+class ColumnMap(_Frozen):
+    """Where a quantity stands in a file."""
+
+    name: str
+    unit: str | None = None
+
+
+class Table(_Frozen):
+    """One table: its file or files, and columns that do not carry the usual names."""
+
+    file: str | None = None
+    files: str | tuple[str, ...] | None = None
+    columns: dict[str, ColumnMap] = {}
+
+    @model_validator(mode="after")
+    def _one_source(self) -> "Table":
+        if (self.file is None) == (self.files is None):
+            raise ValueError('write either file = "name.csv" or files = "folder/*.csv"')
+        return self
+
+
+class AngleTableSettings(Table):
+    """The table of wrap angles; how angles too small to detect enter the fit."""
+
+    detection_limit: QuantityValue | None = None
+    undetected: Undetected = "censored"
+
+
+class Tables(_Frozen):
+    """The tables of a data set."""
+
+    angles: AngleTableSettings | None = None
+    efficiencies: Table | None = None
+    forces: Table | None = None
+
+    @model_validator(mode="after")
+    def _some(self) -> "Tables":
+        if not self.model_fields_set:
+            raise ValueError('name at least one table, such as efficiencies = { file = "efficiencies.csv" }')
+        return self
+
+
+class Sensors(_Frozen):
+    """What the data sheets of the load cells say."""
+
+    force_noise: QuantityValue | None = None
+    gain_error_sd: Positive | None = None
+
+
+class SamplerSettings(_Frozen):
+    """How long and how carefully the posterior is sampled."""
+
+    n_ensembles: Annotated[int, Field(ge=2)] = 4
+    n_walkers: Annotated[int, Field(ge=16, multiple_of=2)] = 256
+    max_steps: Annotated[int, Field(ge=200)] = 12000
+    target_r_hat: Annotated[float, Field(gt=1)] = 1.01
+    target_ess: Annotated[int, Field(ge=100)] = 1000
+
+
+class PriorDefaults(_Frozen):
+    """The weak priors of everything the user says nothing of; angles in degrees, forces in N."""
+
+    friction: LogNormalPrior = LogNormalPrior(median=0.12, log_sd=0.7)
+    curve_level_sd: Positive = 1.5
+    curve_level_degrees_without_data: Positive = 30.0
+    curve_slope_sd: Positive = 3.0
+    curve_curvature_sd: Positive = 0.5
+    angle_noise_degrees: Positive = 5.0
+    run_scatter: Positive = 0.02
+    force_noise_newtons: Positive = 2.0
+
+
+class Description(_Frozen):
+    """Everything said about a cable and its measurements, defaults filled in."""
+
+    schema_: Annotated[int, Field(alias="schema", ge=1, le=SCHEMA)] = SCHEMA
+    name: str
+    source: str = ""
+    license: str = ""
+    geometry: Geometry = "continuous"
+    route: Route | None = None
+    contact: Annotated[tuple[Contact, ...], Field(min_length=1)]
+    friction: dict[str, FrictionSetting] = {}
+    prior: dict[str, ParameterSetting] = {}
+    tables: Tables
+    sensors: Sensors = Sensors()
+    sampler: SamplerSettings = SamplerSettings()
+
+    model_config = ConfigDict(frozen=True, extra="forbid", populate_by_name=True)
+
+    @field_validator("contact")
+    @classmethod
+    def _distinct(cls, contacts: tuple[Contact, ...]) -> tuple[Contact, ...]:
+        for names, what in (
+            ([c.name for c in contacts], "name"),
+            ([c.wrap_angle.column for c in contacts if c.wrap_angle.curve], "curve's column"),
+        ):
+            twice = [n for n in names if names.count(n) > 1]
+            if twice:
+                raise ValueError(f"two contacts have the same {what}, {twice[0]!r}")
+        return contacts
+
+    @model_validator(mode="after")
+    def _consistent(self) -> "Description":
+        used = [c.friction for c in self.contact]
+        for name in self.friction:
+            if name not in used:
+                raise ValueError(f"[friction.{name}] belongs to no contact{nearest(name, used)}")
+        curved = [c for c in self.contact if c.wrap_angle.curve]
+        if curved and self.route is None:
+            raise ValueError(
+                f"the contact {curved[0].name!r} has a curve, so a [route] is needed: variable, unit, range"
+            )
+        if curved and self.tables.angles is None:
+            raise ValueError(
+                f"no table has the column {curved[0].wrap_angle.column!r} of the contact {curved[0].name!r}: "
+                'name one under [tables], angles = { file = "angles.csv" }'
+            )
+        if self.tables.angles is not None and not curved:
+            raise ValueError("[tables] has angles, but no contact has a curve that they could determine")
+        if self.geometry == "published" and not curved:
+            raise ValueError('geometry = "published" needs contacts with a curve')
+        return self
+
+    @property
+    def coefficients(self) -> tuple[str, ...]:
+        """Names of the friction coefficients, each once, in order of the contacts."""
+        return tuple(dict.fromkeys(c.friction for c in self.contact))
+
+    @property
+    def curved(self) -> tuple[Contact, ...]:
+        """Contacts whose wrap angle is a curve."""
+        return tuple(c for c in self.contact if c.wrap_angle.curve)
+
+    @property
+    def angle_columns(self) -> tuple[str, ...]:
+        """Columns in which rows may carry their own wrap angle."""
+        return tuple(dict.fromkeys(c.wrap_angle.column for c in self.contact if c.wrap_angle.column))
+
+    def to_json(self) -> dict[str, Any]:
+        """The resolved description as plain data."""
+        return self.model_dump(mode="json", by_alias=True)
+
+
+def nearest(name: str, known: Sequence[str]) -> str:
+    """ "; did you mean ...?" with the nearest known name, or what there is."""
+    near = difflib.get_close_matches(name, list(known), n=1, cutoff=0.5)
+    return f"; did you mean {near[0]!r}?" if near else f"; known here: {', '.join(known)}"
+
+
+def load_description(path: Path, overrides: Sequence[str] = ()) -> Description:
+    """Read `cable.toml`.
+
+    Args:
+        path: The file.
+        overrides: Settings from the command line, such as `friction.mu1.fixed=0.1`.
+
+    Raises:
+        DescriptionError: The file is missing or no TOML, a key is unknown, or a value is impossible.
+    """
+    try:
+        raw = tomllib.loads(path.read_text(encoding="utf-8-sig"))
+    except FileNotFoundError:
+        raise DescriptionError(
+            f"{path} does not exist; name a folder that holds a cable.toml, or write one with `bowdenfit init FOLDER`."
+        ) from None
+    except (tomllib.TOMLDecodeError, UnicodeDecodeError) as error:
+        raise DescriptionError(f"{path.name} is not valid TOML: {error}.") from None
+    except OSError as error:
+        raise DescriptionError(f"{path} cannot be read ({error.strerror}).") from None
+    for override in overrides:
+        _set(raw, override)
+    return parse_description(raw, path.name)
+
+
+def parse_description(raw: Mapping[str, Any], file: str = "cable.toml") -> Description:
+    """A description from plain data, with errors that name the key.
+
+    Raises:
+        DescriptionError: A key is unknown, or a value is missing or impossible.
+    """
+    try:
+        description = Description.model_validate(dict(raw))
+    except ValidationError as error:
+        raise DescriptionError(_explained(error, file)) from None
+    _check_units(description, file)
+    return description
+
+
+def _check_units(description: Description, file: str) -> None:
+    """Every unit in the description has the right dimension."""
+    quantities = [(f"contact {c.name!r}, wrap_angle", c.wrap_angle.constant, "angle") for c in description.contact]
+    quantities += [(f"contact {c.name!r}, nominal", c.wrap_angle.nominal, "angle") for c in description.contact]
+    quantities.append(("sensors, force_noise", description.sensors.force_noise, "force"))
+    if description.tables.angles:
+        quantities.append(("tables, angles, detection_limit", description.tables.angles.detection_limit, "angle"))
+    for where, quantity, dimension in quantities:
+        if quantity is None:
+            continue
+        try:
+            quantity.to(dimension)
+        except DatasetError as error:
+            raise DescriptionError(f"{file}, {where}: {error}.") from None
+        if dimension == "angle" and not 0 <= quantity.to("angle") <= 34.91:
+            raise DescriptionError(
+                f"{file}, {where}: {quantity.value:g} {quantity.unit} is not between 0 and 2000 deg."
+            )
+    if description.route is not None:
+        try:
+            route_conversion_factor(description.route.unit, description.route.unit)
+        except DatasetError as error:
+            raise DescriptionError(f"{file}, route, unit: {error}.") from None
+
+
+def _set(raw: dict[str, Any], override: str) -> None:
+    key, separator, text = override.partition("=")
+    if not separator or not key.strip():
+        raise DescriptionError(f"--set {override!r} is not of the form key=value, such as friction.mu1.fixed=0.1.")
+    try:
+        value = tomllib.loads(f"value = {text.strip()}")["value"]
+    except tomllib.TOMLDecodeError:
+        value = text.strip()
+    node: Any = raw
+    *parents, last = key.strip().split(".")
+    for depth, part in enumerate(parents):
+        node = (
+            node[int(part)]
+            if isinstance(node, list) and part.isdigit() and int(part) < len(node)
+            else (node.setdefault(part, {}) if isinstance(node, dict) else None)
+        )
+        if not isinstance(node, dict | list):
+            raise DescriptionError(f"--set {override!r}: {'.'.join(parents[: depth + 1])} has no keys below it.")
+    if parents[:1] in (["friction"], ["prior"]) and len(parents) == 2 and last in ParameterSetting.model_fields:
+        node.clear()  # measured, prior and fixed exclude one another: the command line wins
+    if isinstance(node, list):
+        raise DescriptionError(f"--set {override!r}: {key} is a list; name an entry by its number, from 0.")
+    node[last] = value
+
+
+def _explained(error: ValidationError, file: str) -> str:
+    """The first thing that is wrong, as a sentence."""
+    first = next((e for e in error.errors() if e["type"] == "extra_forbidden"), error.errors()[0])
+    where = [str(part) for part in first["loc"]]
+    place = f"{file}, {'.'.join(where)}" if where else file
+    if first["type"] == "extra_forbidden":
+        return f"{file}: unknown key {'.'.join(where)!r}{nearest(where[-1], _siblings(where[:-1]))}."
+    if first["type"] == "missing":
+        return f"{file}: the key {'.'.join(where)!r} is missing; `bowdenfit init` writes a template that has it."
+    message = first["msg"].removeprefix("Value error, ")
+    if where == ["schema"]:
+        message = f"schema {first['input']} is newer than this program, which reads up to {SCHEMA}; update bowdenfit"
+    shown = f" (found {first['input']!r})" if not isinstance(first["input"], dict | list) and where else ""
+    return f"{place}: {message[:1].lower() + message[1:]}{shown}."
+
+
+def _siblings(path: Sequence[str]) -> list[str]:
+    """Keys that are known at a place in the description."""
+    model: Any = Description
+    for part in path:
+        if isinstance(model, type) and issubclass(model, BaseModel) and part in model.model_fields:
+            model = _models_in(model.model_fields[part].annotation)
+    if not (isinstance(model, type) and issubclass(model, BaseModel)):
+        return []
+    return [field.alias or name for name, field in model.model_fields.items()]
+
+
+def _models_in(annotation: Any) -> Any:
+    """The first model inside an annotation such as `tuple[Contact, ...]` or `Route | None`."""
+    if isinstance(annotation, type) and issubclass(annotation, BaseModel):
+        return annotation
+    for argument in getattr(annotation, "__args__", ()):
+        found = _models_in(argument)
+        if found is not None:
+            return found
+    return None

@@ -1,0 +1,221 @@
+"""From a data set to a model: the cable, its parameters and one term for each table."""
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import Any, Protocol
+
+import numpy as np
+from jax import Array
+
+from bowdenfit.dataset import Dataset
+from bowdenfit.description import (
+    Description,
+    HalfNormalPrior,
+    LogNormalPrior,
+    NormalPrior,
+    ParameterSetting,
+    PriorDefaults,
+    nearest,
+)
+from bowdenfit.errors import DescriptionError
+from bowdenfit.measurements.tables import Measurements
+from bowdenfit.models.angles import angles_term
+from bowdenfit.models.cable import ANGLE_NOISE, Cable, constant_angle_name, make_cable
+from bowdenfit.models.efficiencies import efficiencies_term
+from bowdenfit.models.forces import force_terms
+from bowdenfit.models.scatter import FORCE_NOISE, GAIN_ERROR, RUN_SCATTER
+from bowdenfit.parameters.priors import HalfNormal, LogNormal, Normal, Prior, TruncatedNormal, Uniform
+from bowdenfit.parameters.space import Parameter, ParameterSpace
+
+
+class Term(Protocol):
+    """One table against one cable: what inference, predictions and reports need of it."""
+
+    cable: Cable
+    data: dict[str, Any]
+    labels: tuple[str, ...]
+    name: str
+    unit: str
+    noise: str  # the noise scale that its residuals are standardized by
+
+    def log_likelihood(self, values: Mapping[str, Array], data: Mapping[str, Any]) -> Array:
+        """Log likelihood of each reading."""
+        ...
+
+    def residuals(self, values: Mapping[str, Array], data: Mapping[str, Any]) -> Array:
+        """Standardized residuals of the same likelihood."""
+        ...
+
+    def expected(self, values: Mapping[str, Array], data: Mapping[str, Any]) -> Array:
+        """Expected readings in the term's unit."""
+        ...
+
+    def simulate(self, values: Mapping[str, Array], data: Mapping[str, Any], key: Array) -> Array:
+        """Readings drawn at given parameters, in the term's unit."""
+        ...
+
+    def observed(self) -> np.ndarray:
+        """Readings in the term's unit."""
+        ...
+
+
+@dataclass(frozen=True)
+class Model:
+    """Everything inference needs: the cable, the parameters, and the terms of the likelihood."""
+
+    cable: Cable
+    space: ParameterSpace
+    terms: tuple[Term, ...]
+
+    @property
+    def description(self) -> Description:
+        """What was said about the cable."""
+        return self.cable.description
+
+
+def build_model(dataset: Dataset) -> Model:
+    """The model of a data set.
+
+    Raises:
+        DescriptionError: A curve family, contact law or parameter that the description names is unknown.
+    """
+    description, measurements = dataset.description, dataset.measurements
+    cable = make_cable(description, measurements)
+    terms: list[Term] = []
+    if measurements.angles is not None:
+        terms.append(angles_term(cable, measurements.angles))
+    if measurements.efficiencies is not None:
+        terms.append(efficiencies_term(cable, measurements.efficiencies, measurements.angles))
+    if measurements.forces is not None:
+        terms += force_terms(cable, measurements.forces, measurements.angles)
+    return Model(cable, _space(description, measurements, cable), tuple(terms))
+
+
+def _space(description: Description, measurements: Measurements, cable: Cable) -> ParameterSpace:
+    defaults = PriorDefaults()
+    parameters = [_friction(description, name, defaults.friction) for name in description.coefficients]
+    if measurements.angles is not None:
+        for column, curve in cable.curves.items():
+            angle = measurements.angles.column(column)[0]
+            parameters += curve.parameters(angle[np.isfinite(angle) & _in_range(description, measurements)], defaults)
+    parameters += _uncertain_constants(description)
+    parameters += _noise(description, measurements, defaults)
+    known = [p.name for p in parameters]
+    for name in description.prior:
+        if name not in known or name in description.coefficients:
+            hint = f"; friction coefficients belong under [friction.{name}]" if name in known else nearest(name, known)
+            raise DescriptionError(f"cable.toml, prior.{name}: no such parameter{hint}.")
+    settings = {**description.friction, **description.prior}
+    return ParameterSpace(tuple(_set(p, settings[p.name]) if p.name in settings else p for p in parameters))
+
+
+def _in_range(description: Description, measurements: Measurements) -> np.ndarray:
+    assert measurements.angles is not None and description.route is not None  # called with both
+    low, high = description.route.range
+    return (measurements.angles.route >= low) & (measurements.angles.route <= high)
+
+
+def _friction(description: Description, name: str, prior: LogNormalPrior) -> Parameter:
+    contacts = " and ".join(c.name for c in description.contact if c.friction == name)
+    stem = name.rstrip("0123456789").rstrip("_")
+    subscript = name[len(stem) :].strip("_")
+    symbol = (
+        rf"$\mu_{{{subscript}}}$"
+        if stem == "mu" and subscript
+        else r"$\mu$"
+        if name == "mu"
+        else rf"$\mu_\mathrm{{{name}}}$"
+    )
+    return Parameter(
+        name, symbol.replace("_", " ") if " " in name else symbol, f"friction coefficient, {contacts}", "friction",
+        LogNormal(prior.median, prior.log_sd), f"LogNormal({prior.median:g}, {prior.log_sd:g})",
+    )  # fmt: skip
+
+
+def _uncertain_constants(description: Description) -> list[Parameter]:
+    """Constant wrap angles with a standard deviation: one value for all rows, so one parameter each."""
+    parameters = []
+    for contact in description.contact:
+        constant = contact.wrap_angle.constant
+        if constant is None or constant.sd is None:
+            continue
+        value, sd = constant.to("angle"), constant.sd_to("angle") or 0.0
+        parameters.append(
+            Parameter(
+                constant_angle_name(contact),
+                rf"$\theta_\mathrm{{{contact.name.replace(' ', chr(92) + ' ')}}}$",
+                f"wrap angle, {contact.name}",
+                "angle",
+                TruncatedNormal(value, sd),
+                f"Normal({np.rad2deg(value):.4g}, {np.rad2deg(sd):.3g}) deg, cut off at 0",
+                "deg",
+                float(np.rad2deg(1.0)),
+            )
+        )
+    return parameters
+
+
+def _noise(description: Description, measurements: Measurements, defaults: PriorDefaults) -> list[Parameter]:
+    parameters, degree = [], float(np.rad2deg(1.0))
+    if measurements.angles is not None:
+        sd = defaults.angle_noise_degrees
+        parameters.append(
+            Parameter(ANGLE_NOISE, r"$\sigma_\theta$", "standard deviation of an angle reading", "noise",
+                      HalfNormal(sd / degree), f"HalfNormal({sd:g} deg)", "deg", degree)
+        )  # fmt: skip
+    parameters.append(
+        Parameter(RUN_SCATTER, r"$\tau$", "scatter of the log ratio from one mounting of the cable to the next", "noise",
+                  HalfNormal(defaults.run_scatter), f"HalfNormal({defaults.run_scatter:g})")
+    )  # fmt: skip
+    if measurements.forces is not None:
+        stated = description.sensors.force_noise
+        scale = defaults.force_noise_newtons
+        prior: Prior = HalfNormal(scale)
+        text, fixed = f"HalfNormal({scale:g} N)", None
+        if stated is not None and stated.sd is not None:
+            prior = TruncatedNormal(stated.to("force"), stated.sd_to("force") or 0.0)
+            text = f"Normal({stated.to('force'):g}, {stated.sd_to('force'):g}) N, cut off at 0"
+        elif stated is not None:
+            fixed, text = stated.to("force"), "fixed (data sheet)"
+        parameters.append(
+            Parameter(FORCE_NOISE, r"$\sigma_F$", "standard deviation of a force reading", "noise", prior, text, "N",
+                      fixed=fixed)
+        )  # fmt: skip
+    gain = description.sensors.gain_error_sd
+    if gain is not None:
+        parameters.append(
+            Parameter(GAIN_ERROR, "$g$", "relative gain error between the two load cells", "sensor",
+                      Normal(0.0, gain), f"Normal(0, {gain:g})")
+        )  # fmt: skip
+    return parameters
+
+
+def _set(parameter: Parameter, setting: ParameterSetting) -> Parameter:
+    """The parameter as the user wants it; numbers are in its shown unit."""
+    scale, unit = parameter.shown_scale, "" if parameter.unit == "1" else f" {parameter.unit}"
+    fields = {**parameter.__dict__, "fixed": None}
+    if setting.fixed is not None:
+        return Parameter(**{**fields, "fixed": setting.fixed / scale, "prior_text": "fixed"})
+    if setting.measured is not None:
+        value, sd = setting.measured.value, setting.measured.sd
+        text = f"measured {value:g} +- {sd:g}{unit}"
+        return Parameter(**{**fields, "prior": TruncatedNormal(value / scale, sd / scale), "prior_text": text})
+    assert setting.prior is not None  # a setting has exactly one of the three
+    prior, text = _chosen(setting.prior.lognormal or setting.prior.normal or setting.prior.half_normal, scale, unit)
+    if setting.prior.uniform is not None:
+        low, high = setting.prior.uniform.low, setting.prior.uniform.high
+        prior, text = Uniform(low / scale, high / scale), f"Uniform({low:g}, {high:g}){unit}"
+    return Parameter(**{**fields, "prior": prior, "prior_text": text})
+
+
+def _chosen(
+    spec: LogNormalPrior | NormalPrior | HalfNormalPrior | None, scale: float, unit: str
+) -> tuple[Prior | None, str]:
+    match spec:
+        case LogNormalPrior(median=median, log_sd=log_sd):
+            return LogNormal(median / scale, log_sd), f"LogNormal({median:g}{unit}, {log_sd:g})"
+        case NormalPrior(mean=mean, sd=sd):
+            return Normal(mean / scale, sd / scale), f"Normal({mean:g}, {sd:g}){unit}"
+        case HalfNormalPrior(sd=sd):
+            return HalfNormal(sd / scale), f"HalfNormal({sd:g}{unit})"
+    return None, ""

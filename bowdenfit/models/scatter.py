@@ -1,0 +1,5 @@
+"""Names of the parameters that several kinds of table share."""
+
+RUN_SCATTER = "tau"
+FORCE_NOISE = "sigma_F"
+GAIN_ERROR = "gain_error"

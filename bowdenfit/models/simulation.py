@@ -1,0 +1,173 @@
+"""A bench on the computer: tables of a cable whose coefficients are known, for testing and for planning."""
+
+from collections.abc import Mapping
+from dataclasses import dataclass, replace
+
+import jax
+import jax.numpy as jnp
+import numpy as np
+
+from bowdenfit.dataset import Dataset
+from bowdenfit.description import Description
+from bowdenfit.errors import UsageError
+from bowdenfit.measurements.tables import (
+    AngleTable,
+    EfficiencyTable,
+    ForceTable,
+    Measurements,
+    OwnAngles,
+    Provenance,
+)
+from bowdenfit.models.build import build_model
+from bowdenfit.models.cable import ANGLE_NOISE, Cable
+from bowdenfit.models.scatter import FORCE_NOISE, GAIN_ERROR, RUN_SCATTER
+from bowdenfit.physics.friction import capstan_output_force
+
+
+@dataclass(frozen=True)
+class Design:
+    """What is measured: at which lengths, and for forces at which input forces.
+
+    Args:
+        angles: Route values at which wrap angles are read.
+        efficiencies: Route values at which an efficiency is measured.
+        runs: Route value of each force run.
+        input_forces: Input forces of every stroke of a run [N].
+        strokes: +1 pulling, -1 return, in order.
+        own_angles: Wrap angle of each run [rad], by column of a contact without a curve.
+    """
+
+    angles: tuple[float, ...] = ()
+    efficiencies: tuple[float, ...] = ()
+    runs: tuple[float, ...] = ()
+    input_forces: tuple[float, ...] = ()
+    strokes: tuple[int, ...] = (1, -1)
+    own_angles: Mapping[str, tuple[float, ...]] | None = None
+
+
+def empty_tables(description: Description, design: Design) -> Measurements:
+    """Tables of the design's shape with unremarkable readings, from which the model's parameters can be declared."""
+    tables = description.tables
+    columns = tuple(c.wrap_angle.column or "" for c in description.curved)
+    angles = efficiencies = forces = None
+    if tables.angles is not None:
+        shape = (len(design.angles), len(columns))
+        origin = _origin(tables.angles.file or "angles.csv", len(design.angles))
+        angles = AngleTable(
+            np.array(design.angles), columns, np.full(shape, np.deg2rad(30)), np.full(shape, np.nan), origin
+        )
+    if tables.efficiencies is not None:
+        n = len(design.efficiencies)
+        own, origin = _no_own_angles(description, n), _origin(tables.efficiencies.file or "efficiencies.csv", n)
+        efficiencies = EfficiencyTable(np.array(design.efficiencies), np.full(n, 0.8), np.zeros(n), own, origin)
+    if tables.forces is not None:
+        forces = _force_rows(description, design)
+    return Measurements(angles, efficiencies, forces)
+
+
+def _force_rows(description: Description, design: Design) -> ForceTable:
+    per_run = len(design.strokes) * len(design.input_forces)
+    run = np.repeat(np.arange(len(design.runs)), per_run)
+    stroke = np.tile(np.repeat(design.strokes, len(design.input_forces)), len(design.runs))
+    force = np.tile(design.input_forces, len(design.runs) * len(design.strokes))
+    names = description.angle_columns
+    own = _no_own_angles(description, len(run))
+    for k, name in enumerate(names):
+        if design.own_angles and name in design.own_angles:
+            own.angle[:, k] = np.asarray(design.own_angles[name])[run]
+    route = np.asarray(design.runs, dtype=float)[run]
+    labels = tuple(str(i + 1) for i in range(len(design.runs)))
+    return ForceTable(route, force, 0.8 * force, run, labels, stroke.astype(int), own, _origin("forces.csv", len(run)))
+
+
+def _no_own_angles(description: Description, n: int) -> OwnAngles:
+    names = description.angle_columns
+    return OwnAngles(names, np.full((n, len(names)), np.nan), np.full((n, len(names)), np.nan))
+
+
+def _origin(file: str, n: int) -> Provenance:
+    return Provenance((file,), np.zeros(n, dtype=int), np.arange(2, n + 2))
+
+
+def true_values(
+    description: Description, tables: Measurements, truth: Mapping[str, float], key: jax.Array
+) -> dict[str, float]:
+    """True value of every parameter [internal units]: as given in shown units, else drawn from its prior.
+
+    Raises:
+        UsageError: A name in `truth` is no parameter.
+    """
+    space = build_model(Dataset(description, tables, {})).space
+    unknown = [name for name in truth if name not in {p.name for p in space.parameters}]
+    if unknown:
+        known = ", ".join(p.name for p in space.parameters)
+        raise UsageError(f"{unknown[0]!r} is no parameter of this cable; its parameters are {known}.")
+    drawn = np.asarray(space.vector(jax.random.normal(key, (space.size,)))) if space.size else np.zeros(0)
+    values = {p.name: float(v) for p, v in zip(space.free, drawn, strict=True)}
+    values |= {p.name: float(p.fixed or 0.0) for p in space.fixed}
+    return values | {p.name: truth[p.name] / p.shown_scale for p in space.parameters if p.name in truth}
+
+
+def simulate(
+    description: Description, design: Design, values: Mapping[str, float], key: jax.Array, noise: bool = True
+) -> Dataset:
+    """Tables as a bench would give them.
+
+    Args:
+        description: The cable.
+        design: What is measured.
+        values: True value of every parameter [internal units].
+        key: Random key.
+        noise: Whether readings scatter; without noise every reading is what the model expects.
+    """
+    tables = empty_tables(description, design)
+    cable = build_model(Dataset(description, tables, {})).cable
+    named = {name: jnp.asarray(value, dtype=float) for name, value in values.items()}
+    keys, scale = jax.random.split(key, 3), 1.0 if noise else 0.0
+    angles = tables.angles and _simulated_angles(cable, tables.angles, named, keys[0], scale)
+    efficiencies = tables.efficiencies and _simulated_efficiencies(cable, tables.efficiencies, named, keys[1], scale)
+    forces = tables.forces and _simulated_forces(cable, tables.forces, named, keys[2], scale)
+    return Dataset(description, Measurements(angles, efficiencies, forces), {})
+
+
+def _simulated_angles(
+    cable: Cable, table: AngleTable, values: Mapping[str, jax.Array], key: jax.Array, scale: float
+) -> AngleTable:
+    route = jnp.asarray(table.route)
+    theta = jnp.stack([curve.wrap_angle(values, route) for curve in cable.curves.values()], axis=-1)
+    reading = np.asarray(theta + scale * values[ANGLE_NOISE] * jax.random.normal(key, theta.shape))
+    settings = cable.description.tables.angles
+    limit = settings.detection_limit.to("angle") if settings and settings.detection_limit else 0.0
+    undetected = reading < limit
+    return replace(
+        table, angle=np.where(undetected, np.nan, np.maximum(reading, 0.0)), limit=np.where(undetected, limit, np.nan)
+    )
+
+
+def _simulated_efficiencies(
+    cable: Cable, table: EfficiencyTable, values: Mapping[str, jax.Array], key: jax.Array, scale: float
+) -> EfficiencyTable:
+    exponent = cable.exponent_at(values, jnp.asarray(table.route)) + values.get(GAIN_ERROR, 0.0)
+    mounting = scale * values[RUN_SCATTER] * jax.random.normal(key, exponent.shape)
+    return replace(table, efficiency=np.asarray(jnp.exp(-(exponent + mounting))))
+
+
+def _simulated_forces(
+    cable: Cable, table: ForceTable, values: Mapping[str, jax.Array], key: jax.Array, scale: float
+) -> ForceTable:
+    of_run, of_input, of_output = jax.random.split(key, 3)
+    route = jnp.asarray(np.nan_to_num(table.route))
+    angles = cable.wrap_angles(values, route)
+    for k, contact in enumerate(cable.description.contact):
+        own, _ = table.own.column(contact.wrap_angle.column or "")
+        angles = angles.at[:, k].set(jnp.where(np.isnan(own), angles[:, k], np.nan_to_num(own)))
+    mounting = scale * values[RUN_SCATTER] * jax.random.normal(of_run, (len(table.run_names),))
+    exponent = cable.friction_exponent(values, angles) + mounting[table.run]
+    stroke, force = jnp.asarray(table.stroke, dtype=float), jnp.asarray(table.input_force)
+    output = capstan_output_force(force, exponent, stroke) * jnp.exp(-values.get(GAIN_ERROR, 0.0))
+    noise = scale * values[FORCE_NOISE]
+    return replace(
+        table,
+        input_force=np.asarray(force + noise * jax.random.normal(of_input, force.shape)),
+        output_force=np.asarray(output + noise * jax.random.normal(of_output, force.shape)),
+    )

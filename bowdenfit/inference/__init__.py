@@ -1,0 +1,1 @@
+"""From a model and its data to estimates: least squares, ensembles of walkers, and whether to trust them."""

@@ -1,0 +1,25 @@
+"""Compiling ahead of time, with what makes it quick for functions this small."""
+
+from collections.abc import Callable
+from typing import Any
+
+import jax
+
+# XLA's newer fusion emitters take twice as long to compile the small elementwise functions here, which then run no
+# faster; measured on two cores by scripts/benchmark_fit.py.
+_OPTIONS = {"xla_cpu_use_fusion_emitters": False, "xla_cpu_parallel_codegen_split_count": 2}
+_RUN_ONCE = _OPTIONS | {"xla_backend_optimization_level": 0}
+
+
+def compiled(function: Callable[..., Any], *shapes: Any, run_once: bool = False) -> Callable[..., Any]:
+    """`function` compiled for arguments of the given shapes.
+
+    Args:
+        function: Function of arrays.
+        shapes: Example arguments or their shapes.
+        run_once: Whether compiling costs more than running, so that optimization does not pay.
+    """
+    lowered = jax.jit(function).lower(*shapes)
+    if jax.default_backend() != "cpu":
+        return lowered.compile()
+    return lowered.compile(compiler_options=_RUN_ONCE if run_once else _OPTIONS)

@@ -1,0 +1,201 @@
+"""Sampling with emcee: several independent ensembles of walkers, started apart, run until they agree.
+
+Moves: differential evolution, and now and then its mode-jumping variant. Not `DESnookerMove`: the one in emcee 3.1.6
+does not sample the density it is given, and every ensemble agrees on the wrong answer.
+"""
+
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import emcee
+import numpy as np
+
+from bowdenfit.description import SamplerSettings
+from bowdenfit.inference.diagnostics import Diagnostics, diagnose, shortfalls
+from bowdenfit.inference.least_squares import MaximumPosterior
+from bowdenfit.inference.posterior import Posterior
+
+THIN = 10  # steps from one stored state to the next
+_BLOCK = 20  # stored states between two reports
+_FIRST_LOOK = 120  # stored states before the first look
+_KEPT_PER_WALKER = 20  # draws that are kept of each walker, spread over the second half of its path
+
+Moves = Sequence[tuple[emcee.moves.RedBlueMove, float]]
+
+
+@dataclass(frozen=True)
+class Progress:
+    """Where sampling stands, for a progress bar; R-hat and effective sample size once they have been looked at."""
+
+    steps: int
+    max_steps: int
+    r_hat: float | None
+    ess: float | None
+
+
+@dataclass(frozen=True)
+class Chain:
+    """Draws of the posterior after burn-in.
+
+    Args:
+        z: Draws in z, (ensemble x walker, draw, parameter).
+        quantities: Named derived quantities of every draw, (ensemble x walker, draw).
+        diagnostics: Of parameters and derived quantities.
+        n_ensembles: Number of independent ensembles.
+        steps: Steps taken by each walker.
+        acceptance: Mean fraction of accepted proposals.
+        reasons: Why the draws should not be trusted; empty if they may.
+    """
+
+    z: np.ndarray
+    quantities: dict[str, np.ndarray]
+    diagnostics: dict[str, Diagnostics]
+    n_ensembles: int
+    steps: int
+    acceptance: float
+    reasons: tuple[str, ...]
+
+
+class SideBySide(emcee.moves.RedBlueMove):
+    """Independent ensembles moved side by side: proposals stay within an ensemble, evaluations are shared.
+
+    Each ensemble is split in two at random; the walkers of one half get emcee's own proposal from the other half of
+    their ensemble. All ensembles' proposals are evaluated in one call, which is why this is several times quicker than
+    one sampler after the other.
+
+    Args:
+        move: The proposal.
+        n_ensembles: Number of ensembles; walkers are ordered by ensemble.
+    """
+
+    def __init__(self, move: emcee.moves.RedBlueMove, n_ensembles: int) -> None:
+        super().__init__()
+        self.move, self.n_ensembles = move, n_ensembles
+
+    def propose(self, model: Any, state: emcee.State) -> tuple[emcee.State, np.ndarray]:
+        """One step of every walker."""
+        n_walkers = len(state.coords) // self.n_ensembles
+        self.move.setup(state.coords)
+        order = np.stack([model.random.permutation(n_walkers) + e * n_walkers for e in range(self.n_ensembles)])
+        accepted = np.zeros(len(state.coords), dtype=bool)
+        for moving, resting in ((order[:, ::2], order[:, 1::2]), (order[:, 1::2], order[:, ::2])):
+            pairs = zip(moving, resting, strict=True)
+            proposed = [self.move.get_proposal(state.coords[m], [state.coords[r]], model.random) for m, r in pairs]
+            coords, factors = (np.concatenate(part) for part in zip(*proposed, strict=True))
+            log_density, _ = model.compute_log_prob_fn(coords)
+            which = moving.ravel()
+            better = factors + log_density - state.log_prob[which] > np.log(model.random.uniform(size=len(which)))
+            state.coords[which[better]] = coords[better]
+            state.log_prob[which[better]] = log_density[better]
+            accepted[which] = better
+        return state, accepted
+
+
+def default_moves() -> Moves:
+    """Stretch moves find the bulk quickly, differential evolution mixes best there, gamma 1 jumps between modes."""
+    return [(emcee.moves.StretchMove(), 0.3), (emcee.moves.DEMove(), 0.6), (emcee.moves.DEMove(gamma0=1.0), 0.1)]
+
+
+def starting_points(start: MaximumPosterior, settings: SamplerSettings, generator: np.random.Generator) -> np.ndarray:
+    """Over-dispersed starts, (ensemble, walker, parameter): each ensemble has a center of its own."""
+    root = np.linalg.cholesky(start.covariance)
+    centers = generator.standard_normal((settings.n_ensembles, 1, len(start.z)))
+    walkers = generator.standard_normal((settings.n_ensembles, settings.n_walkers, len(start.z)))
+    return start.z + (centers + walkers) @ root.T
+
+
+def sample(
+    posterior: Posterior,
+    log_density: Callable[[np.ndarray, Any], Any],
+    start: MaximumPosterior,
+    settings: SamplerSettings,
+    seed: int,
+    quantities: Callable[[np.ndarray], Mapping[str, np.ndarray]],
+    checkpoint: Path | None = None,
+    resume: bool = False,
+    report: Callable[[Progress], None] | None = None,
+    moves: Moves | None = None,
+) -> Chain:
+    """Sample until converged, or until the stated maximum of steps.
+
+    Args:
+        posterior: The posterior.
+        log_density: Its compiled log density for batches of half of all walkers.
+        start: Center and covariance of the start.
+        settings: Ensembles, walkers, maximum of steps and targets.
+        seed: Seed of everything random here.
+        quantities: Derived quantities of many z; they must converge too.
+        checkpoint: HDF5 file that every stored state is written to.
+        resume: Go on from the states in `checkpoint`.
+        report: Called after every block.
+        moves: Proposals and their weights; `default_moves()` if omitted.
+    """
+    points = starting_points(start, settings, np.random.default_rng([seed, 0])).reshape(-1, len(start.z))
+    backend = _backend(checkpoint, resume, points.shape)
+    sampler = emcee.EnsembleSampler(
+        *points.shape,
+        _in_halves(log_density, posterior.data, len(points) // 2),
+        vectorize=True,
+        backend=backend,
+        moves=[(SideBySide(move, settings.n_ensembles), weight) for move, weight in moves or default_moves()],
+    )
+    generator = np.random.RandomState(np.random.MT19937(np.random.SeedSequence([seed, 1])))
+    state = None if backend.iteration else emcee.State(points, random_state=generator.get_state())
+    limit = max(settings.max_steps // THIN, 2)
+    target = min(max(_FIRST_LOOK, int(backend.iteration)), limit)
+    seen: tuple[float | None, float | None] = (None, None)
+    while True:
+        while (missing := target - int(backend.iteration)) > 0:
+            sampler.run_mcmc(state, min(missing, _BLOCK), thin_by=THIN, skip_initial_state_check=True)
+            state = None
+            if report is not None:
+                report(Progress(int(backend.iteration) * THIN, settings.max_steps, *seen))
+        chain = _summarized(posterior, backend, settings, quantities)
+        seen = _worst(chain)
+        if report is not None:
+            report(Progress(chain.steps, settings.max_steps, *seen))
+        if not chain.reasons or target >= limit:
+            return chain
+        target = min(target + target // 3, limit)
+
+
+def _backend(checkpoint: Path | None, resume: bool, shape: tuple[int, ...]) -> emcee.backends.Backend:
+    backend = emcee.backends.Backend() if checkpoint is None else emcee.backends.HDFBackend(str(checkpoint))
+    if checkpoint is None or not (resume and checkpoint.exists() and backend.initialized):
+        backend.reset(*shape)
+    return backend
+
+
+def _in_halves(log_density: Callable[..., Any], data: Any, half: int) -> Callable[[np.ndarray], np.ndarray]:
+    """Log density in batches of half of all walkers, so that one compiled shape serves the start and every step."""
+
+    def evaluate(z: np.ndarray) -> np.ndarray:
+        return np.concatenate([np.asarray(log_density(part, data)) for part in z.reshape(-1, half, z.shape[1])])
+
+    return evaluate
+
+
+def _summarized(
+    posterior: Posterior,
+    backend: emcee.backends.Backend,
+    settings: SamplerSettings,
+    quantities: Callable[[np.ndarray], Mapping[str, np.ndarray]],
+) -> Chain:
+    """Draws from the second half of every walker's path, with their diagnostics."""
+    stored = int(backend.iteration)
+    kept = np.unique(np.linspace(stored // 2, stored - 1, _KEPT_PER_WALKER).round().astype(int))
+    z = np.asarray(backend.get_chain()[kept]).transpose(1, 0, 2)
+    derived = {k: np.asarray(q).reshape(z.shape[:2]) for k, q in quantities(z.reshape(-1, z.shape[-1])).items()}
+    draws = {p.name: z[..., i] for i, p in enumerate(posterior.model.space.free)} | derived
+    diagnostics = {name: diagnose(values, settings.n_ensembles) for name, values in draws.items()}
+    reasons = shortfalls(diagnostics, settings.target_r_hat, settings.target_ess)
+    acceptance = float(np.mean(backend.accepted)) / stored
+    return Chain(z, derived, diagnostics, settings.n_ensembles, stored * THIN, acceptance, reasons)
+
+
+def _worst(chain: Chain) -> tuple[float, float]:
+    """Highest R-hat and lowest effective sample size of all quantities."""
+    diagnostics = chain.diagnostics.values()
+    return max(d.r_hat for d in diagnostics), min(min(d.ess_bulk, d.ess_tail) for d in diagnostics)

@@ -1,0 +1,235 @@
+"""Least squares of the residuals that the likelihood is made of: classical estimates, and the sampler's start.
+
+Without priors the estimates are those a published curve fit gives; what runs to an end of its range, or has no influence
+on any residual, is reported as not identified. With priors (z itself as further residuals) they are the maximum of the
+posterior at the noise scales' prior medians.
+"""
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import Any
+
+import jax
+import jax.numpy as jnp
+import numpy as np
+import optimistix as optx
+from jax import Array
+
+from bowdenfit.errors import ConvergenceError
+from bowdenfit.inference.compilation import compiled
+from bowdenfit.inference.posterior import Posterior
+from bowdenfit.parameters.priors import HalfNormal, LogNormal, TruncatedNormal, Uniform
+from bowdenfit.parameters.space import Parameter
+
+LOWER_END = -38.0  # z at which a quantile reaches the lower end of its support in double precision
+_SUSPECT = -2.0  # below this z an estimate may be on its way to the lower end
+_SINGULAR = 1e-8  # singular values below this fraction of the largest carry no information
+_FAR = 50.0  # standard error in units of the prior's sd beyond which data say nothing of a parameter
+
+_FREEDOM = 0.5  # degrees of freedom below which the scatter of a table cannot be estimated
+
+Solution = dict[str, Any]
+Objective = Callable[..., Solution]
+
+
+@dataclass(frozen=True)
+class Estimate:
+    """Least-squares estimate of one parameter, in its shown unit.
+
+    Args:
+        value: Estimate; NaN where not identified.
+        standard_error: From the Jacobian; NaN where not identified.
+        identified: Whether the data determine it.
+        remark: Why not, or that it is fixed; empty otherwise.
+    """
+
+    value: float
+    standard_error: float
+    identified: bool
+    remark: str = ""
+
+
+@dataclass(frozen=True)
+class LeastSquares:
+    """Classical least squares without priors.
+
+    Args:
+        estimates: By parameter name; noise scales are not among them.
+        residual_sd: Standard deviation of the residuals by table, in the shown unit of the table's noise scale; NaN
+            without degrees of freedom.
+        readings: Expected readings of each table at the solution, in the table's unit.
+        condition_number: Of the Jacobian with columns in units of the prior's sd, identified parameters only.
+        sum_of_squares: Of the standardized residuals.
+        z: Solution in z (noise scales at their prior median).
+        converged: Whether the solver met its tolerance.
+        message: What it said.
+    """
+
+    estimates: dict[str, Estimate]
+    residual_sd: dict[str, float]
+    readings: dict[str, np.ndarray]
+    condition_number: float
+    sum_of_squares: float
+    z: np.ndarray
+    converged: bool
+    message: str
+
+
+@dataclass(frozen=True)
+class MaximumPosterior:
+    """Where the samplers start: maximum of the posterior at given noise scales, and its Gauss-Newton covariance in z."""
+
+    z: np.ndarray
+    covariance: np.ndarray
+
+
+def make_objective(posterior: Posterior) -> Objective:
+    """One compiled solve for every use: which parameters are pinned and whether priors count are arguments."""
+    space = posterior.model.space
+
+    def residuals(free: Array, args: Any) -> tuple[Array, dict[str, Array]]:
+        pinned, pin, weight, data = args
+        z = jnp.where(pinned, pin, free)
+        by_term = posterior.residuals(z, data)
+        return jnp.concatenate([*by_term.values(), weight * z]), by_term
+
+    def solve(start: Array, pinned: Array, pin: Array, weight: Array, data: Any) -> dict[str, Any]:
+        args = (pinned, pin, weight, data)
+        solver = optx.LevenbergMarquardt(rtol=1e-10, atol=1e-12)
+        solution = optx.least_squares(residuals, solver, start, args, has_aux=True, max_steps=500, throw=False)
+        z = jnp.where(pinned, pin, solution.value)
+        values, slope = jax.jvp(space.vector, (z,), (jnp.ones_like(z),))
+        jacobian, by_term = jax.jacfwd(residuals, has_aux=True)(solution.value, args)
+        succeeded = solution.result == optx.RESULTS.successful
+        named = space.constrain(z)
+        terms = zip(posterior.model.terms, data, strict=True)
+        found = {"z": z, "values": values, "slope": slope, "residuals": by_term}
+        found["readings"] = {term.name: term.expected(named, d) for term, d in terms}
+        return found | {"jacobian": jacobian[: -z.shape[0]], "succeeded": succeeded}
+
+    vector, flags = jax.ShapeDtypeStruct((space.size,), jnp.float64), jax.ShapeDtypeStruct((space.size,), jnp.bool_)
+    return compiled(solve, vector, flags, vector, vector, posterior.data, run_once=True)
+
+
+def maximum_posterior(posterior: Posterior, objective: Objective) -> MaximumPosterior:
+    """Maximum of the posterior with the noise scales at their prior medians.
+
+    Raises:
+        ConvergenceError: The residuals are not finite at the start.
+    """
+    noise = _noise(posterior)
+    n = len(noise)
+    found = _solve(posterior, objective, np.zeros(n), noise, np.zeros(n), np.where(noise, 0.0, 1.0))
+    if not all(np.all(np.isfinite(r)) for r in found["residuals"].values()):
+        raise ConvergenceError(
+            "the model cannot be computed at the prior medians; the usual cause is a prior or a fixed value that is "
+            "orders of magnitude off: check the units under [friction] and [prior]."
+        )
+    # The prior of each z has unit information; a noise scale gets that alone, its residuals say nothing here.
+    information = found["jacobian"].T @ found["jacobian"] + np.eye(n)
+    return MaximumPosterior(found["z"], np.linalg.inv(information))
+
+
+def least_squares(posterior: Posterior, objective: Objective, start: np.ndarray) -> LeastSquares:
+    """Least squares without priors, from the maximum of the posterior.
+
+    The weights of the tables against each other are the prior medians of the noise scales; the standard errors use the
+    scatter that is left (sandwich form), table by table.
+
+    Args:
+        posterior: The posterior.
+        objective: Its compiled solve.
+        start: z to start from.
+    """
+    parameters, noise = posterior.model.space.free, _noise(posterior)
+    nothing = np.zeros(len(noise))
+    found = _solve(posterior, objective, start, noise, nothing, nothing)
+    at_end = np.zeros_like(noise)
+    for i in np.flatnonzero(_may_end(parameters) & ~noise & (found["z"] < _SUSPECT)):
+        trial_end = at_end | (np.arange(len(noise)) == i)
+        pin = np.where(trial_end, LOWER_END, 0.0)
+        trial = _solve(posterior, objective, found["z"], noise | trial_end, pin, nothing)
+        if _sum_of_squares(trial) <= _sum_of_squares(found) * (1 + 1e-7) + 1e-14:
+            at_end, found = trial_end, trial
+    return _summarized(posterior, found, noise, at_end)
+
+
+def _solve(
+    posterior: Posterior,
+    objective: Objective,
+    start: np.ndarray,
+    pinned: np.ndarray,
+    pin: np.ndarray,
+    weight: np.ndarray,
+) -> Solution:
+    return jax.tree.map(np.asarray, objective(start, pinned, pin, weight, posterior.data))
+
+
+def _sum_of_squares(found: Solution) -> float:
+    return float(sum(np.sum(r**2) for r in found["residuals"].values()))
+
+
+def _noise(posterior: Posterior) -> np.ndarray:
+    """Which free parameters are noise scales, held at their prior median in least squares."""
+    return np.array([p.role == "noise" for p in posterior.model.space.free], dtype=bool)
+
+
+def _may_end(parameters: tuple[Parameter, ...]) -> np.ndarray:
+    """Which parameters have a lower end that an estimate can run to."""
+    ending = (LogNormal, HalfNormal, TruncatedNormal, Uniform)
+    return np.array([isinstance(p.prior, ending) for p in parameters], dtype=bool)
+
+
+def _summarized(posterior: Posterior, found: Solution, noise: np.ndarray, at_end: np.ndarray) -> LeastSquares:
+    space = posterior.model.space
+    active = np.flatnonzero(~noise & ~at_end)
+    u, s, vt = np.linalg.svd(found["jacobian"][:, active], full_matrices=True)
+    informed = np.zeros(len(active), dtype=bool)
+    informed[: len(s)] = s > _SINGULAR * max(s.max(initial=0.0), 1e-30)
+    s, u = s[informed[: len(s)]], u[:, : len(active)][:, informed[: u.shape[1]]]
+    in_order = {term.name: found["residuals"][term.name] for term in posterior.model.terms}  # JAX sorts by key
+    scale, residual_sd = _scatter(in_order, np.sum(u**2, axis=1))
+    root = vt[informed].T / s
+    error = np.sqrt(np.sum((root @ (u.T * scale)) ** 2, axis=1))
+    undetermined = np.sum(vt[~informed] ** 2, axis=0) > 1e-6
+    lost = undetermined | (np.abs(found["z"][active]) > _FAR) | (np.sqrt(np.sum(root**2, axis=1)) > _FAR)
+    estimates: dict[str, Estimate] = {}
+    for i, p in enumerate(space.free):
+        value = float(found["values"][i] * p.shown_scale)
+        if noise[i]:
+            continue
+        if at_end[i]:
+            remark = f"no finite minimum: runs to its lower end, {value:.3g}"
+            estimates[p.name] = Estimate(np.nan, np.nan, False, remark)
+        elif lost[np.searchsorted(active, i)]:
+            estimates[p.name] = Estimate(np.nan, np.nan, False, "the measurements do not determine it")
+        else:
+            sd = abs(found["slope"][i] * error[np.searchsorted(active, i)]) * p.shown_scale
+            estimates[p.name] = Estimate(value, float(sd), True)
+    for p in space.fixed:
+        estimates[p.name] = Estimate((p.fixed or 0.0) * p.shown_scale, np.nan, True, "fixed")
+    condition = (float(s[0] / s[-1]) if informed.all() else float("inf")) if len(active) else 1.0
+    message = "" if found["succeeded"] else "the solver stopped before it met its tolerance"
+    total = _sum_of_squares(found)
+    scales = {p.name: v * p.shown_scale for p, v in zip(space.free, found["values"], strict=True)}
+    scales |= {p.name: (p.fixed or 0.0) * p.shown_scale for p in space.fixed}
+    residual_sd = {t.name: residual_sd[t.name] * float(scales[t.noise]) for t in posterior.model.terms}
+    readings = found["readings"]
+    return LeastSquares(
+        estimates, residual_sd, readings, condition, total, found["z"], bool(found["succeeded"]), message
+    )
+
+
+def _scatter(residuals: dict[str, np.ndarray], leverage: np.ndarray) -> tuple[np.ndarray, dict[str, float]]:
+    """Scatter of the standardized residuals of each table about the fit: for each residual, and by table.
+
+    A table whose residuals are all used up by parameters has no scatter of its own; its weight stands.
+    """
+    scale, by_table, start = np.ones(len(leverage)), {}, 0
+    for name, values in residuals.items():
+        rows = slice(start, start + len(values))
+        freedom = np.count_nonzero(values) - leverage[rows].sum()
+        spread = float(np.sqrt(np.sum(values**2) / freedom)) if freedom > _FREEDOM else float("nan")
+        scale[rows] = spread if np.isfinite(spread) else 1.0
+        by_table[name], start = spread, rows.stop
+    return scale, by_table

@@ -1,0 +1,104 @@
+"""Everything that each draw of the posterior implies: named values, curves, replicated readings."""
+
+from collections.abc import Callable, Mapping
+from typing import Any
+
+import jax
+import jax.numpy as jnp
+import numpy as np
+from jax import Array
+from jaxtyping import Float
+
+from bowdenfit.inference.compilation import compiled
+from bowdenfit.inference.posterior import Posterior
+from bowdenfit.models.build import Model
+
+BATCH = 1024
+Function = Callable[[Float[Array, " free"]], Any]
+
+
+def for_each_draw(function: Function, size: int, batch: int = BATCH) -> Callable[[np.ndarray], Any]:
+    """`function` of one z, compiled for a batch, to be applied to any number of z (rows)."""
+    program = compiled(jax.vmap(function), jax.ShapeDtypeStruct((batch, size), jnp.float64))
+
+    def apply(z: np.ndarray) -> Any:
+        parts = []
+        for start in range(0, len(z), batch):
+            part = z[start : start + batch]
+            padded = np.concatenate([part, np.repeat(part[-1:], batch - len(part), axis=0)])
+            parts.append(jax.tree.map(lambda x, n=len(part): np.asarray(x)[:n], program(padded)))
+        return jax.tree.map(lambda *x: np.concatenate(x), *parts)
+
+    return apply
+
+
+def named_values(model: Model) -> Callable[[Float[Array, " free"]], dict[str, Array]]:
+    """Function of z: free parameters and derived curve coefficients by name, in the units they are shown in."""
+
+    def values_of(z: Float[Array, " free"]) -> dict[str, Array]:
+        values = model.space.constrain(z)
+        shown = {p.name: values[p.name] * p.shown_scale for p in model.space.free}
+        for curve in model.cable.curves.values():
+            shown |= curve.derived(values)
+        return shown
+
+    return values_of
+
+
+def derived_units(model: Model) -> dict[str, tuple[str, str]]:
+    """Unit and symbol of every derived curve coefficient, by name."""
+    return {name: unit for curve in model.cable.curves.values() for name, unit in curve.derived_units().items()}
+
+
+def replicate(posterior: Posterior, z: np.ndarray, seed: int) -> dict[str, dict[str, np.ndarray]]:
+    """Named values, log likelihood of every reading, expected and replicated readings of every draw.
+
+    Args:
+        posterior: The posterior.
+        z: Draws, one a row.
+        seed: Seed of the replicated noise.
+
+    Returns:
+        By group ("values", "log_likelihood", "expected", "replicated") and name: arrays over draws and readings.
+    """
+    model = posterior.model
+    names, key = named_values(model), jax.random.key(seed % 2**32)
+
+    def implied(z_and_number: Float[Array, " free_and_one"]) -> dict[str, Mapping[str, Array]]:
+        z, number = z_and_number[:-1], z_and_number[-1].astype(jnp.uint32)
+        keys = jax.random.split(jax.random.fold_in(key, number), max(len(model.terms), 1))
+        values = model.space.constrain(z)
+        terms = list(zip(model.terms, posterior.data, keys, strict=False))
+        return {
+            "values": names(z),
+            "log_likelihood": {t.name: t.log_likelihood(values, d) for t, d, _ in terms},
+            "expected": {t.name: t.expected(values, d) for t, d, _ in terms},
+            "replicated": {t.name: t.simulate(values, d, key) for t, d, key in terms},
+        }
+
+    numbered = np.column_stack([z, np.arange(len(z), dtype=float)])
+    return for_each_draw(implied, model.space.size + 1)(numbered)
+
+
+def curves_of(model: Model, route: np.ndarray) -> Callable[[Float[Array, " free"]], dict[str, Array]]:
+    """Function of z: wrap angle of every curved contact [deg] and the efficiency [1] at route values."""
+    at = jnp.asarray(route, dtype=float)
+
+    def implied(z: Float[Array, " free"]) -> dict[str, Array]:
+        values = model.space.constrain(z)
+        angles = {name: jnp.rad2deg(curve.wrap_angle(values, at)) for name, curve in model.cable.curves.items()}
+        return angles | {"efficiency": jnp.exp(-model.cable.exponent_at(values, at))}
+
+    return implied
+
+
+def efficiency_at(model: Model, z: np.ndarray, route: np.ndarray) -> np.ndarray:
+    """Efficiency of every draw (rows) at route values (columns).
+
+    Args:
+        model: The model.
+        z: Draws, one a row.
+        route: Route values; any one number where the cable has no route.
+    """
+    curves = curves_of(model, np.atleast_1d(np.asarray(route, dtype=float)))
+    return for_each_draw(lambda one: curves(one)["efficiency"], model.space.size)(z)

@@ -1,0 +1,192 @@
+"""The printed summary (`summary.txt`): verdict, coefficients, measured beside predicted, the design answer."""
+
+import textwrap
+from typing import Any
+
+import numpy as np
+
+from bowdenfit.results.fit import Fit
+
+WIDTH = 110
+_RESTS_ON_PRIOR = 0.2  # contraction below which a parameter is said to rest on its prior alone
+
+
+def summary_text(fit: Fit) -> str:
+    """The summary of a fit for people."""
+    page = fit.summary()
+    blocks = [_title(fit), _verdict(fit, page), _coefficients(page), _rests_on_prior(page), _curves(fit, page)]
+    blocks += [_scatter(page), _measured(fit, page), _answer(fit), _origin(fit, page)]
+    return "\n\n".join(block for block in blocks if block) + "\n"
+
+
+def _title(fit: Fit) -> str:
+    description = fit.dataset.description
+    tables = fit.dataset.measurements
+    counts = []
+    if tables.angles is not None:
+        undetected = int(np.isnan(tables.angles.angle).sum())
+        how = {"censored": "entered as below the detection limit", "zero": "entered as 0", "dropped": "left out"}
+        settings = description.tables.angles
+        way = "zero" if description.geometry == "published" else settings.undetected if settings else "censored"
+        counts.append(
+            f"{np.isfinite(tables.angles.angle).sum()} wrap angles and {undetected} too small to detect ({how[way]})"
+        )
+    if tables.efficiencies is not None:
+        counts.append(f"{len(tables.efficiencies.efficiency)} efficiencies")
+    if tables.forces is not None:
+        counts.append(f"{len(tables.forces.run)} force readings in {len(tables.forces.run_names)} runs")
+    line = f"{fit.name}\n{'=' * len(fit.name)}"
+    fitted = _filled(f"Fitted to {_listed(counts)}; {description.geometry} geometry.")
+    remarks = [_filled(remark) for remark in tables.remarks]
+    return "\n".join([line, fitted, *remarks])
+
+
+def _verdict(fit: Fit, page: dict[str, Any]) -> str:
+    if fit.posterior is None:
+        state = "least squares only; no intervals, no design answer" if fit.converged else "not to be trusted"
+    else:
+        state = "converged" if fit.converged else "NOT CONVERGED; do not use these numbers"
+        sampler = page["sampler"]
+        state += f" ({sampler['ensembles']} ensembles of {sampler['walkers']} walkers, {sampler['steps']} steps)"
+    lines = [f"Verdict: {state}."]
+    lines += [_filled(f"- {reason}", indent="  ") for reason in fit.reasons]
+    return "\n".join(lines)
+
+
+def _coefficients(page: dict[str, Any]) -> str:
+    heads = ("parameter", "median", "90 % interval", "mean +- sd", "least squares +- s.e.", "prior", "unit")
+    rows = []
+    for name, p in page["parameters"].items():
+        drawn = "median" in p
+        median, interval, moments = "", "", ""
+        if drawn:
+            digits = _digits(p["sd"])
+            median, interval = f"{p['median']:.{digits}f}", f"{p['q05']:.{digits}f} to {p['q95']:.{digits}f}"
+            moments = f"{p['mean']:.{digits}f} +- {p['sd']:.{digits}f}"
+        unit = "" if p["unit"] == "1" else p["unit"]
+        rows.append((name, median, interval, moments, _least_squares(p), p["prior"], unit))
+    keep = [i for i in range(len(heads)) if i in (0, 4, 5) or any(row[i] for row in rows)]
+    return _table([heads[i] for i in keep], [[row[i] for i in keep] for row in rows]) + _not_identified(page)
+
+
+def _least_squares(p: dict[str, Any]) -> str:
+    estimate = p.get("least_squares")
+    if "fixed" in p:
+        return f"{p['fixed']:.4g} (fixed)"
+    if estimate is None:
+        return ""
+    if not estimate["identified"]:
+        return "not identified"
+    digits = _digits(estimate["standard_error"] or abs(estimate["value"]) / 1000)
+    return f"{estimate['value']:.{digits}f} +- {estimate['standard_error']:.{digits}f}"
+
+
+def _not_identified(page: dict[str, Any]) -> str:
+    notes = [
+        _filled(f"{name} is not identified by least squares: {p['least_squares']['remark']}.")
+        for name, p in page["parameters"].items()
+        if p.get("least_squares") and not p["least_squares"]["identified"]
+    ]
+    condition = page["least_squares"]["condition_number"]
+    shown = "infinite" if condition is None else f"{condition:.3g}"
+    return "\n" + "\n".join([*notes, f"Condition number of the least-squares problem: {shown}."])
+
+
+def _rests_on_prior(page: dict[str, Any]) -> str:
+    names = [
+        n
+        for n, p in page["parameters"].items()
+        if p.get("contraction") is not None and p["contraction"] < _RESTS_ON_PRIOR
+    ]
+    if not names:
+        return ""
+    verb = "rests" if len(names) == 1 else "rest"
+    return _filled(f"Hardly informed by the measurements: {_listed(names)} {verb} on the prior almost alone.")
+
+
+def _curves(fit: Fit, page: dict[str, Any]) -> str:
+    if not page["curves"] or fit.posterior is None:
+        return ""
+    lines = ["Curve coefficients of the Gaussian A exp(-((l - B)/C)^2), median (90 % interval):"]
+    for name, c in page["curves"].items():
+        interval = f"({c['q05']:.4g} to {c['q95']:.4g}) {c['unit']}"
+        far = c["q95"] is None or c["q95"] > 20 * c["median"]
+        note = "   no upper limit: the data allow an exponential, where it runs to infinity" if far else ""
+        shown = f"({c['q05']:.4g} upward) {c['unit']}" if far else interval
+        lines.append(f"  {name:<30} {c['median']:>9.4g} {shown}{note}")
+    return "\n".join(lines)
+
+
+def _scatter(page: dict[str, Any]) -> str:
+    units = {"wrap_angle": "deg", "efficiency": "% of the force", "run_efficiency": "% of the force"}
+    parts = []
+    for term, sd in page["least_squares"]["residual_sd"].items():
+        if sd is not None and term in units:
+            value = f"{sd:.2f} {units[term]}" if term == "wrap_angle" else f"{100 * sd:.2f} {units[term]}"
+            parts.append(f"{term.replace('_', ' ')} {value}")
+    return f"Residual standard deviation of least squares: {_listed(parts)}." if parts else ""
+
+
+def _measured(fit: Fit, page: dict[str, Any]) -> str:
+    if not page["measured"]:
+        return ""
+    drawn = fit.posterior is not None
+    heads = ["measured at", "measured", "predicted", *(["90 % interval"] if drawn else []), "measured/predicted - 1"]
+    rows = []
+    for row in page["measured"]:
+        interval = [f"{row['q05']:.2%} to {row['q95']:.2%}"] if drawn else []
+        what = "run " if row["table"] == "run_efficiency" else ""
+        rows.append(
+            [
+                what + row["label"],
+                f"{row['measured']:.2%}",
+                f"{row['predicted']:.2%}",
+                *interval,
+                f"{row['relative_error']:+.2%}",
+            ]
+        )
+    return "Efficiency, measured and predicted\n" + _table(heads, rows)
+
+
+def _answer(fit: Fit) -> str:
+    if fit.posterior is None or fit.dataset.description.route is None:
+        return ""
+    sentences = [
+        part for line in fit.optimal_length().lines() for part in ([_filled(line)] if "  " not in line else [line])
+    ]
+    return "\n".join(sentences)
+
+
+def _origin(fit: Fit, page: dict[str, Any]) -> str:
+    versions = ", ".join(f"{name} {version}" for name, version in page["versions"].items())
+    return _filled(f"Seed {page['seed']}; {versions}.")
+
+
+def _digits(scale: float) -> int:
+    """Decimals that show a quantity of this uncertainty to two significant digits of it."""
+    if not np.isfinite(scale) or scale <= 0:
+        return 4
+    return int(np.clip(1 - np.floor(np.log10(scale)), 0, 8))
+
+
+def _listed(parts: list[str]) -> str:
+    return ", ".join(parts[:-1]) + " and " + parts[-1] if len(parts) > 1 else "".join(parts)
+
+
+def _filled(text: str, indent: str = "") -> str:
+    return textwrap.fill(
+        text, WIDTH, initial_indent=indent, subsequent_indent=indent + ("  " if text.startswith("- ") else "")
+    )
+
+
+def _table(heads: list[str] | tuple[str, ...], rows: list[list[str]] | list[tuple[str, ...]]) -> str:
+    """Columns, the first left and the others right aligned, except the prior, which reads better left aligned."""
+    widths = [max(len(str(row[i])) for row in [heads, *rows]) for i in range(len(heads))]
+    left = {i for i, head in enumerate(heads) if i == 0 or head in {"prior", "unit"}}
+    lines = [
+        "  ".join(
+            f"{cell:<{w}}" if i in left else f"{cell:>{w}}" for i, (cell, w) in enumerate(zip(row, widths, strict=True))
+        ).rstrip()
+        for row in [heads, *rows]
+    ]
+    return "\n".join([lines[0], "-" * len(lines[0]), *lines[1:]])

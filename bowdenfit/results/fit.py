@@ -1,0 +1,313 @@
+"""A finished fit: what was fitted to what, the draws, and the answers that follow from them."""
+
+from collections.abc import Iterable
+from dataclasses import dataclass, field
+from functools import cached_property
+from pathlib import Path
+from typing import Any
+
+import jax
+import numpy as np
+
+from bowdenfit.dataset import Dataset
+from bowdenfit.errors import UsageError
+from bowdenfit.inference.diagnostics import Diagnostics
+from bowdenfit.inference.least_squares import LeastSquares
+from bowdenfit.models.build import Model, build_model
+from bowdenfit.predictions.draws import curves_of, for_each_draw
+from bowdenfit.predictions.optimal_length import (
+    Choice,
+    Window,
+    at_edge,
+    best_window,
+    rank_choices,
+    route_grid,
+)
+
+OPTIMAL_LENGTH, OPTIMAL_EFFICIENCY = "optimal_length", "optimal_efficiency"
+
+
+@dataclass(frozen=True)
+class Interval:
+    """A quantity with its uncertainty: moments and the 5 % and 95 % quantiles of its draws."""
+
+    mean: float
+    sd: float
+    median: float
+    q05: float
+    q95: float
+
+    @classmethod
+    def of(cls, draws: np.ndarray) -> "Interval":
+        """Of draws of any shape."""
+        q05, median, q95 = (float(q) for q in np.quantile(draws, (0.05, 0.5, 0.95)))
+        return cls(float(np.mean(draws)), float(np.std(draws)), median, q05, q95)
+
+
+@dataclass(frozen=True)
+class OptimalLength:
+    """The design answer.
+
+    Args:
+        variable: Name of the route variable.
+        unit: Its unit.
+        length: Route value of highest efficiency.
+        efficiency: Efficiency there.
+        at_edge: Share of draws whose optimum lies at an end of the range.
+        window: Route values that are good enough.
+        choices: What can be bought, in the order of the description.
+    """
+
+    variable: str
+    unit: str
+    length: Interval
+    efficiency: Interval
+    at_edge: float
+    window: Window
+    choices: tuple[Choice, ...]
+
+    @property
+    def best_choice(self) -> Choice | None:
+        """The choice with the least expected regret."""
+        return min(self.choices, key=lambda c: c.expected_regret, default=None)
+
+    def __str__(self) -> str:
+        return "\n".join(self.lines())
+
+    def lines(self) -> list[str]:
+        """The answer in sentences and a small table."""
+        what, unit, length, eta = self.variable.replace("_", " "), self.unit, self.length, self.efficiency
+        lines = [
+            f"Best {what}: {length.median:.1f} {unit} (90 % interval {length.q05:.1f} to {length.q95:.1f} {unit}), "
+            f"efficiency there {eta.median:.1%} ({eta.q05:.1%} to {eta.q95:.1%})."
+        ]
+        if self.at_edge > 0.005:
+            lines.append(
+                f"In {self.at_edge:.0%} of the draws the optimum lies at an end of the range: a better {what} may lie "
+                "outside what was measured."
+            )
+        window = self.window
+        if np.isfinite(window.start):
+            lines.append(
+                f"Any {what} from {window.start:.0f} to {window.stop:.0f} {unit} is within {window.within:.0%} of the "
+                f"best with at least {window.probability:.0%} probability."
+            )
+        else:
+            lines.append(
+                f"No single {what} is within {window.within:.0%} of the best with {window.probability:.0%} probability; "
+                "more measurements are needed."
+            )
+        if self.choices:
+            lines += [
+                "",
+                f"{what.capitalize() + ' (' + unit + ')':>20}  {'P(best)':>8}  {'expected loss of efficiency':>28}",
+            ]
+            lines += [
+                f"{c.length:>20g}  {c.probability_best:>8.1%}  {100 * c.expected_regret:>21.2f} points"
+                for c in self.choices
+            ]
+        return lines
+
+    def _repr_html_(self) -> str:
+        from bowdenfit.results.html import design_answer
+
+        return design_answer(self)
+
+
+@dataclass(frozen=True)
+class Posterior:
+    """Draws of a fit; every array has the walkers (ordered by ensemble) first, then the draws of each.
+
+    Args:
+        z: In the coordinates of the sampler, with parameters last.
+        values: Parameters and derived curve coefficients, in shown units.
+        optimum: Optimal length and efficiency; empty without a route.
+        log_likelihood: Of every reading, by table, readings last.
+        expected: Expected readings.
+        replicated: Readings drawn anew.
+        prior: Draws of the parameters from the prior, one row.
+        diagnostics: Of parameters and optimum.
+        n_ensembles: Number of independent ensembles.
+        steps: Steps of every walker.
+        acceptance: Mean fraction of accepted proposals.
+    """
+
+    z: np.ndarray
+    values: dict[str, np.ndarray]
+    optimum: dict[str, np.ndarray]
+    log_likelihood: dict[str, np.ndarray]
+    expected: dict[str, np.ndarray]
+    replicated: dict[str, np.ndarray]
+    prior: dict[str, np.ndarray]
+    diagnostics: dict[str, Diagnostics]
+    n_ensembles: int
+    steps: int
+    acceptance: float
+
+    @property
+    def flat_z(self) -> np.ndarray:
+        """All draws, one a row."""
+        return self.z.reshape(-1, self.z.shape[-1])
+
+
+@dataclass(frozen=True)
+class Provenance:
+    """How a fit came about.
+
+    Args:
+        seed: Seed of everything random.
+        versions: Of bowdenfit, Python and the libraries that computed.
+        stage_times: Seconds by stage.
+        created: Date and time, UTC.
+    """
+
+    seed: int
+    versions: dict[str, str]
+    stage_times: dict[str, float] = field(default_factory=dict)
+    created: str = ""
+
+
+@dataclass(frozen=True)
+class Fit:
+    """What was found for one data set.
+
+    Args:
+        dataset: What was fitted.
+        least_squares: Classical estimates.
+        posterior: Draws, or None where only least squares was asked for.
+        converged: Whether the answers may be trusted.
+        reasons: Why not.
+        provenance: Seed, versions, times.
+    """
+
+    dataset: Dataset
+    least_squares: LeastSquares
+    posterior: Posterior | None
+    converged: bool
+    reasons: tuple[str, ...]
+    provenance: Provenance
+
+    @classmethod
+    def load(cls, path: str | Path) -> "Fit":
+        """A fit from its results folder, bit for bit as it was saved."""
+        from bowdenfit.results.store import load
+
+        return load(Path(path))
+
+    def save(self, path: str | Path, force: bool = False) -> None:
+        """Write the results folder (without figures and summary text, which `bowdenfit.fit(output=...)` adds)."""
+        from bowdenfit.results.store import save
+
+        save(self, Path(path), force)
+
+    @cached_property
+    def model(self) -> Model:
+        """The model that was fitted."""
+        return build_model(self.dataset)
+
+    @property
+    def name(self) -> str:
+        """Name of the cable."""
+        return self.dataset.description.name
+
+    def parameter(self, name: str) -> Interval:
+        """A parameter's value and uncertainty, in the unit it is shown in.
+
+        Raises:
+            UsageError: There is no such parameter, or no posterior.
+        """
+        values = self._drawn().values
+        if name not in values:
+            raise UsageError(f"there is no parameter {name!r}; there are {', '.join(values)}.")
+        return Interval.of(values[name])
+
+    @cached_property
+    def _curves(self) -> dict[str, np.ndarray]:
+        """Efficiency and wrap angles of every draw on the grid of the route."""
+        with jax.enable_x64(True):
+            curves = curves_of(self.model, route_grid(self.model))
+            return for_each_draw(curves, self.model.space.size)(self._drawn().flat_z)
+
+    def curves(self) -> tuple[np.ndarray, dict[str, np.ndarray]]:
+        """Route values, and by name the efficiency [1] and wrap angles [deg] of every draw (rows) there."""
+        self._needs_route()
+        return route_grid(self.model), self._curves
+
+    def efficiency(self, lengths: float | Iterable[float] | None = None) -> list[Interval]:
+        """Efficiency at values of the route variable, with intervals.
+
+        Args:
+            lengths: Route values; the description's choices if omitted.
+
+        Raises:
+            UsageError: There is no posterior.
+        """
+        return [Interval.of(column) for column in self.efficiency_draws(lengths).T]
+
+    def efficiency_draws(self, lengths: float | Iterable[float] | None = None) -> np.ndarray:
+        """Efficiency of every draw (rows) at values of the route variable (columns); see `efficiency`."""
+        from bowdenfit.predictions.draws import efficiency_at
+
+        route = self.dataset.description.route
+        if lengths is None:
+            lengths = route.choices if route else 0.0
+        wanted = np.atleast_1d(np.asarray(lengths, dtype=float))
+        with jax.enable_x64(True):
+            return efficiency_at(self.model, self._drawn().flat_z, wanted)
+
+    def optimal_length(self) -> OptimalLength:
+        """The design answer: which length is best, how sure that is, and what the choices cost.
+
+        Raises:
+            UsageError: The description has no route to vary, or there is no posterior.
+        """
+        self._needs_route()
+        return self._optimal_length
+
+    @cached_property
+    def _optimal_length(self) -> OptimalLength:
+        drawn, route = self._drawn(), self.dataset.description.route
+        assert route is not None  # checked by the caller
+        lengths, best = drawn.optimum[OPTIMAL_LENGTH].ravel(), drawn.optimum[OPTIMAL_EFFICIENCY].ravel()
+        grid, curves = self.curves()
+        choices = np.asarray(route.choices)
+        ranked = rank_choices(choices, self.efficiency_draws(choices)) if len(choices) else ()
+        return OptimalLength(
+            route.variable,
+            route.unit,
+            Interval.of(lengths),
+            Interval.of(best),
+            float(at_edge(lengths, route.range).mean()),
+            best_window(grid, curves["efficiency"], best),
+            ranked,
+        )
+
+    def summary(self) -> dict[str, Any]:
+        """Everything on one page, for programs (the contents of summary.json)."""
+        from bowdenfit.results.summary import summarize
+
+        return summarize(self)
+
+    def __repr__(self) -> str:
+        state = "converged" if self.converged else "NOT converged" if self.posterior else "least squares only"
+        return f"<bowdenfit.Fit {self.name!r}: {self.model.space.size} parameters, {state}>"
+
+    def _repr_html_(self) -> str:
+        from bowdenfit.results.html import fit_page
+
+        return fit_page(self)
+
+    def _drawn(self) -> Posterior:
+        if self.posterior is None:
+            raise UsageError(
+                "this fit has no posterior, because it was made without MCMC; fit again without --no-mcmc for intervals."
+            )
+        return self.posterior
+
+    def _needs_route(self) -> None:
+        self._drawn()
+        if self.dataset.description.route is None:
+            raise UsageError(
+                "the description has no [route], so there is no length to choose; add [route] with variable, unit and "
+                "range, and angles measured along it, to cable.toml."
+            )

@@ -1,0 +1,361 @@
+"""The results folder: written whole, under temporary names that are renamed; read back bit for bit.
+
+`fit.json` is written last, so a folder that has it is complete. A folder with `chain.h5` alone is an interrupted fit.
+"""
+
+import json
+import os
+import shutil
+import warnings
+from collections.abc import Callable, Iterator, Mapping
+from contextlib import contextmanager
+from dataclasses import asdict, fields
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from bowdenfit.dataset import Dataset
+from bowdenfit.description import parse_description
+from bowdenfit.errors import StoreError
+from bowdenfit.inference.diagnostics import Diagnostics
+from bowdenfit.inference.least_squares import Estimate, LeastSquares
+from bowdenfit.measurements.tables import (
+    AngleTable,
+    EfficiencyTable,
+    ForceTable,
+    Measurements,
+    OwnAngles,
+)
+from bowdenfit.measurements.tables import (
+    Provenance as RowProvenance,
+)
+from bowdenfit.results.fit import Fit, Posterior, Provenance
+from bowdenfit.results.summary import summarize
+
+if TYPE_CHECKING:
+    import xarray
+
+SCHEMA = 1
+FIT, SUMMARY, POSTERIOR, CHAIN = "fit.json", "summary.json", "posterior.nc", "chain.h5"
+_OWN_FILES = (FIT, SUMMARY, POSTERIOR, CHAIN, "summary.txt")
+_OWN_FOLDERS = ("figures",)
+_WHOLE_NUMBERS = {"run", "stroke", "file", "row"}
+_PARTS = {"own": OwnAngles, "origin": RowProvenance}
+_TABLES = {"angles": AngleTable, "efficiencies": EfficiencyTable, "forces": ForceTable}
+Migration = Callable[[dict[str, Any]], dict[str, Any]]
+MIGRATIONS: Mapping[int, Migration] = {}  # from schema N to N + 1
+
+
+@contextmanager
+def written_whole(path: Path) -> Iterator[Path]:
+    """A temporary name beside `path` to write to; it becomes `path` only if nothing went wrong."""
+    temporary = path.with_name(f".{path.name}.partial")
+    try:
+        yield temporary
+        os.replace(temporary, path)  # noqa: PTH105  (Path.replace says the same; this is the usual word for it)
+    finally:
+        temporary.unlink(missing_ok=True)
+
+
+def write_text(path: Path, text: str) -> None:
+    """Write a text file whole."""
+    with written_whole(path) as temporary:
+        temporary.write_text(text, encoding="utf-8")
+
+
+def save(fit: Fit, folder: Path, force: bool = False) -> None:
+    """Write fit.json, summary.json and posterior.nc.
+
+    Args:
+        fit: The fit.
+        folder: Where to; made if missing.
+        force: Whether a finished fit there may be replaced.
+
+    Raises:
+        StoreError: The folder holds a finished fit already, or cannot be written.
+    """
+    if not force and (folder / FIT).exists():
+        raise StoreError(f"{folder} holds a finished fit already; add --force (force=True) to replace it.")
+    try:
+        folder.mkdir(parents=True, exist_ok=True)
+        if fit.posterior is not None:
+            _write_posterior(fit, folder / POSTERIOR)
+        else:
+            (folder / POSTERIOR).unlink(missing_ok=True)
+        write_text(folder / SUMMARY, json.dumps(summarize(fit), indent=1) + "\n")
+        write_text(folder / FIT, json.dumps(_fit_page(fit), indent=1) + "\n")
+    except OSError as error:
+        raise StoreError(f"{folder} cannot be written ({error.strerror}); name another with --output.") from None
+
+
+def refuse_to_overwrite(folder: Path) -> None:
+    """Stop before anything is computed if the results would have no place.
+
+    Raises:
+        StoreError: The folder holds something already.
+    """
+    if (folder / FIT).exists():
+        raise StoreError(
+            f"{folder} holds a finished fit already; add --force to replace it, or name another with --output."
+        )
+    if (folder / CHAIN).exists():
+        raise StoreError(f"{folder} holds an interrupted fit; go on with --resume, or start over with --force.")
+    if folder.exists() and (not folder.is_dir() or any(folder.iterdir())):
+        raise StoreError(f"{folder} exists and is no results folder; name another with --output.")
+
+
+def clear(folder: Path) -> None:
+    """Remove what an earlier fit wrote, and nothing else; the mark of a finished fit goes first."""
+    for name in _OWN_FILES:
+        (folder / name).unlink(missing_ok=True)
+    for name in _OWN_FOLDERS:
+        if (folder / name).is_dir():
+            shutil.rmtree(folder / name)
+
+
+def start_checkpoint(path: Path, fingerprint: Mapping[str, Any]) -> None:
+    """Make the sampler's checkpoint, which carries what it was started for.
+
+    Raises:
+        StoreError: The folder cannot be written.
+    """
+    import h5py
+
+    try:
+        path.parent.mkdir(parents=True, exist_ok=True)
+        with h5py.File(path, "w") as file:
+            file.attrs["fingerprint"] = json.dumps(fingerprint)
+    except OSError as error:
+        raise StoreError(f"{path.parent} cannot be written ({error}); name another folder with --output.") from None
+
+
+def read_checkpoint(folder: Path) -> dict[str, Any]:
+    """What the checkpoint in a folder was started for.
+
+    Raises:
+        StoreError: There is no checkpoint, or it is damaged.
+    """
+    import h5py
+
+    path = folder / CHAIN
+    if not path.exists():
+        raise StoreError(f"{folder} holds no checkpoint (chain.h5) to resume from; fit without --resume.")
+    try:
+        with h5py.File(path, "r") as file:
+            return dict(json.loads(str(file.attrs["fingerprint"])))
+    except (OSError, KeyError, json.JSONDecodeError):
+        raise StoreError(f"{path} is damaged and cannot be resumed; start over with --force.") from None
+
+
+def load(folder: Path) -> Fit:
+    """Read a results folder.
+
+    Raises:
+        StoreError: It is missing, unfinished, damaged, or of a newer schema.
+    """
+    page = _migrated(_read_page(folder), folder)
+    try:
+        dataset = Dataset(parse_description(page["description"]), _measurements(page["measurements"]), page["sha256"])
+        squares = _least_squares(page["least_squares"])
+        posterior = _read_posterior(folder / POSTERIOR, page["posterior"]) if page["posterior"] else None
+        verdict = page["verdict"]
+        provenance = Provenance(**page["provenance"])
+    except (KeyError, TypeError, ValueError, OSError) as error:
+        raise StoreError(
+            f"{folder} is damaged ({type(error).__name__}: {error}); fit again, or restore the folder from a copy."
+        ) from error
+    return Fit(dataset, squares, posterior, verdict["converged"], tuple(verdict["reasons"]), provenance)
+
+
+def _read_page(folder: Path) -> dict[str, Any]:
+    try:
+        return json.loads((folder / FIT).read_text(encoding="utf-8"))
+    except FileNotFoundError:
+        if (folder / CHAIN).exists():
+            raise StoreError(
+                f"{folder} holds an interrupted fit; finish it with `bowdenfit fit ... --resume`."
+            ) from None
+        what = "is no results folder (it has no fit.json)" if folder.is_dir() else "does not exist"
+        raise StoreError(f"{folder} {what}; name a folder that `bowdenfit fit` wrote, such as fits/NAME.") from None
+    except (json.JSONDecodeError, UnicodeDecodeError):
+        raise StoreError(f"{folder / FIT} is damaged; fit again, or restore the folder from a copy.") from None
+
+
+def _migrated(page: dict[str, Any], folder: Path) -> dict[str, Any]:
+    while page.get("schema", SCHEMA) < SCHEMA:
+        page = MIGRATIONS[page["schema"]](page)
+    if page.get("schema", SCHEMA) > SCHEMA:
+        raise StoreError(f"{folder} was written by a newer bowdenfit (schema {page['schema']}); update bowdenfit.")
+    return page
+
+
+def _fit_page(fit: Fit) -> dict[str, Any]:
+    posterior = fit.posterior
+    return {
+        "schema": SCHEMA,
+        "description": fit.dataset.description.to_json(),
+        "sha256": fit.dataset.sha256,
+        "verdict": {"converged": fit.converged, "reasons": list(fit.reasons)},
+        "least_squares": _to_plain(asdict(fit.least_squares)),
+        "posterior": {
+            "n_ensembles": posterior.n_ensembles,
+            "steps": posterior.steps,
+            "acceptance": posterior.acceptance,
+            "diagnostics": _to_plain({name: asdict(d) for name, d in posterior.diagnostics.items()}),
+        }
+        if posterior
+        else None,
+        "provenance": asdict(fit.provenance),
+        "measurements": _to_plain(asdict(fit.dataset.measurements)),
+    }
+
+
+def _to_plain(data: Any) -> Any:
+    """Arrays as lists; NaN as None, infinity as the word for it, so that the file is standard JSON."""
+    if isinstance(data, dict):
+        return {key: _to_plain(value) for key, value in data.items()}
+    if isinstance(data, np.ndarray):
+        return _to_plain(data.tolist())
+    if isinstance(data, list | tuple):
+        return [_to_plain(value) for value in data]
+    if isinstance(data, float) and not np.isfinite(data):
+        return None if np.isnan(data) else "Infinity" if data > 0 else "-Infinity"
+    return data
+
+
+def _number(value: Any) -> float:
+    return float("nan") if value is None else float(value)
+
+
+def _array(value: list) -> np.ndarray:
+    return np.array(
+        [[_number(x) for x in row] if isinstance(row, list) else _number(row) for row in value], dtype=float
+    )
+
+
+def _measurements(page: Mapping[str, Any]) -> Measurements:
+    tables = {name: _table(kind, page[name]) if page[name] else None for name, kind in _TABLES.items()}
+    return Measurements(**tables, remarks=tuple(page["remarks"]))
+
+
+def _table(kind: type, page: Mapping[str, Any]) -> Any:
+    values: dict[str, Any] = {}
+    for column in fields(kind):
+        value = page[column.name]
+        if column.name in _PARTS:
+            values[column.name] = _table(_PARTS[column.name], value)
+        elif column.name in {"names", "files", "run_names"}:
+            values[column.name] = tuple(value)
+        elif column.name in _WHOLE_NUMBERS:
+            values[column.name] = np.array(value, dtype=int)
+        else:
+            values[column.name] = _array(value)
+    if kind is OwnAngles and not values["names"]:
+        values |= {name: values[name].reshape(len(page[name]), 0) for name in ("angle", "sd")}
+    return kind(**values)
+
+
+def _least_squares(page: Mapping[str, Any]) -> LeastSquares:
+    estimates = {
+        name: Estimate(_number(e["value"]), _number(e["standard_error"]), e["identified"], e["remark"])
+        for name, e in page["estimates"].items()
+    }
+    return LeastSquares(
+        estimates,
+        {name: _number(value) for name, value in page["residual_sd"].items()},
+        {name: _array(value) for name, value in page["readings"].items()},
+        _number(page["condition_number"]),
+        _number(page["sum_of_squares"]),
+        _array(page["z"]),
+        page["converged"],
+        page["message"],
+    )
+
+
+def _write_posterior(fit: Fit, path: Path) -> None:
+    """posterior.nc, an ArviZ DataTree."""
+    posterior = fit.posterior
+    assert posterior is not None  # the caller asked
+    log_prior = -0.5 * np.sum(posterior.z**2 + np.log(2 * np.pi), axis=-1)
+    log_likelihood = sum(
+        (np.sum(part, axis=-1) for part in posterior.log_likelihood.values()), np.zeros_like(log_prior)
+    )
+    with warnings.catch_warnings():
+        # Each walker is a chain, because flattening walkers into few chains would inflate effective sample sizes.
+        warnings.filterwarnings("ignore", "Found chain dimension to be longer", UserWarning)
+        tree = _tree(fit, posterior, log_likelihood, log_prior)
+    labels = _labels(fit)
+    for group in ("posterior", "prior"):
+        for name in tree[group].data_vars:
+            tree[group][name].attrs |= labels[str(name)]
+    with written_whole(path) as temporary:
+        tree.to_netcdf(temporary, engine="h5netcdf")
+
+
+def _tree(fit: Fit, posterior: Posterior, log_likelihood: np.ndarray, log_prior: np.ndarray) -> "xarray.DataTree":
+    import arviz_base
+
+    free = [p.name for p in fit.model.space.free]
+    observed = {term.name: term.observed() for term in fit.model.terms}
+    return arviz_base.from_dict(
+        {
+            "posterior": {**posterior.values, **posterior.optimum},
+            "unconstrained_posterior": {name: posterior.z[..., i] for i, name in enumerate(free)},
+            "sample_stats": {"lp": log_prior + log_likelihood},
+            "log_likelihood": posterior.log_likelihood,
+            "posterior_predictive": posterior.replicated,
+            "predictions": {f"expected_{name}": value for name, value in posterior.expected.items()},
+            "prior": posterior.prior,
+            "observed_data": observed,
+        },
+        coords={f"{term.name}_reading": list(term.labels) for term in fit.model.terms},
+        dims={
+            f"{prefix}{term.name}": [f"{term.name}_reading"] for term in fit.model.terms for prefix in ("", "expected_")
+        },
+        attrs={"/": {"provenance": json.dumps(asdict(fit.provenance)), "name": fit.name}},
+    )
+
+
+def _labels(fit: Fit) -> dict[str, dict[str, str]]:
+    """Unit, symbol and meaning of every variable in the posterior."""
+    from bowdenfit.predictions.draws import derived_units
+
+    route = fit.dataset.description.route
+    labels = {p.name: {"units": p.unit, "symbol": p.symbol, "long_name": p.meaning} for p in fit.model.space.free}
+    labels |= {name: {"units": unit, "symbol": symbol} for name, (unit, symbol) in derived_units(fit.model).items()}
+    if route is not None:
+        labels["optimal_length"] = {"units": route.unit, "symbol": "$l^*$", "long_name": f"optimal {route.variable}"}
+        labels["optimal_efficiency"] = {"units": "1", "symbol": r"$\eta^*$", "long_name": "efficiency at the optimum"}
+    return labels
+
+
+def _read_posterior(path: Path, page: Mapping[str, Any]) -> Posterior:
+    import xarray
+
+    if not path.exists():
+        raise StoreError(f"{path} is missing; fit again, or restore the folder from a copy.")
+    with xarray.open_datatree(path, engine="h5netcdf") as tree:
+        groups = {
+            group: {str(name): np.asarray(tree[group][name].values) for name in tree[group].data_vars}
+            for group in tree.children
+        }
+    optimum = {
+        name: groups["posterior"].pop(name)
+        for name in ("optimal_length", "optimal_efficiency")
+        if name in groups["posterior"]
+    }
+    z = groups["unconstrained_posterior"]
+    return Posterior(
+        np.stack(list(z.values()), axis=-1),
+        groups["posterior"],
+        optimum,
+        groups["log_likelihood"],
+        {name.removeprefix("expected_"): value for name, value in groups["predictions"].items()},
+        groups["posterior_predictive"],
+        {name: value for name, value in groups["prior"].items()},
+        {name: Diagnostics(**{k: _number(v) for k, v in d.items()}) for name, d in page["diagnostics"].items()},
+        page["n_ensembles"],
+        page["steps"],
+        page["acceptance"],
+    )

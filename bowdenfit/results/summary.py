@@ -1,0 +1,137 @@
+"""The one page that programs read: `summary.json`; people's versions are made from the same numbers."""
+
+from dataclasses import asdict
+from typing import Any
+
+import numpy as np
+
+from bowdenfit.results.fit import Fit, Interval
+
+SCHEMA = 1
+
+
+def summarize(fit: Fit) -> dict[str, Any]:
+    """Summary of a fit as plain data; NaN where a number does not exist is None.
+
+    Args:
+        fit: The fit.
+    """
+    page: dict[str, Any] = {
+        "schema": SCHEMA,
+        "name": fit.name,
+        "geometry": fit.dataset.description.geometry,
+        "verdict": {"converged": fit.converged, "reasons": list(fit.reasons)},
+        "parameters": {p.name: _parameter(fit, p.name) for p in fit.model.space.parameters},
+        "curves": {name: _curve_coefficient(fit, name) for name in curve_coefficients(fit)},
+        "least_squares": {
+            "residual_sd": fit.least_squares.residual_sd,
+            "condition_number": fit.least_squares.condition_number,
+            "sum_of_squares": fit.least_squares.sum_of_squares,
+            "converged": fit.least_squares.converged,
+        },
+        "measured": measured_against_predicted(fit),
+        "seed": fit.provenance.seed,
+        "versions": dict(fit.provenance.versions),
+    }
+    if fit.posterior is not None:
+        page["sampler"] = {
+            "ensembles": fit.posterior.n_ensembles,
+            "walkers": len(fit.posterior.z) // fit.posterior.n_ensembles,
+            "steps": fit.posterior.steps,
+            "acceptance": fit.posterior.acceptance,
+        }
+        if fit.dataset.description.route is not None:
+            page["optimal"] = _optimal(fit)
+    return _plain(page)
+
+
+def _parameter(fit: Fit, name: str) -> dict[str, Any]:
+    parameter = next(p for p in fit.model.space.parameters if p.name == name)
+    row: dict[str, Any] = {"unit": parameter.unit, "meaning": parameter.meaning, "prior": parameter.prior_text}
+    if parameter.fixed is not None:
+        row["fixed"] = parameter.fixed * parameter.shown_scale
+    if name in fit.least_squares.estimates:
+        row["least_squares"] = asdict(fit.least_squares.estimates[name])
+    if fit.posterior is not None and name in fit.posterior.values:
+        draws, diagnostics = fit.posterior.values[name], fit.posterior.diagnostics[name]
+        row |= asdict(Interval.of(draws)) | {
+            "ess_bulk": diagnostics.ess_bulk,
+            "ess_tail": diagnostics.ess_tail,
+            "r_hat": diagnostics.r_hat,
+            "mcse_mean": float(np.std(draws) / np.sqrt(max(diagnostics.ess_bulk, 1.0))),
+            "contraction": contraction(fit, name),
+        }
+    return row
+
+
+def contraction(fit: Fit, name: str) -> float:
+    """How much narrower the posterior is than the prior, in z: 1 where data decide, 0 where the prior alone speaks."""
+    assert fit.posterior is not None  # callers ask only where there are draws
+    return float(1 - np.var(fit.posterior.z[..., fit.model.space.index[name]]))
+
+
+def curve_coefficients(fit: Fit) -> dict[str, tuple[str, str]]:
+    """Unit and symbol of each derived curve coefficient."""
+    from bowdenfit.predictions.draws import derived_units
+
+    return derived_units(fit.model)
+
+
+def _curve_coefficient(fit: Fit, name: str) -> dict[str, Any]:
+    row: dict[str, Any] = {"unit": curve_coefficients(fit)[name][0]}
+    if fit.posterior is not None:
+        q05, median, q95 = np.quantile(fit.posterior.values[name], (0.05, 0.5, 0.95))
+        row |= {"median": float(median), "q05": float(q05), "q95": float(q95)}
+    return row
+
+
+def measured_against_predicted(fit: Fit) -> list[dict[str, Any]]:
+    """Every measured efficiency beside what the fit says of it (as section 3.2 of the on-body paper does).
+
+    The relative error is measured over predicted, less 1. Without draws the prediction is least squares'.
+    """
+    rows = []
+    for term in fit.model.terms:
+        if term.name not in {"efficiency", "run_efficiency"}:
+            continue
+        observed = term.observed()
+        for i, label in enumerate(term.labels):
+            row: dict[str, Any] = {"table": term.name, "label": label, "measured": float(observed[i])}
+            if fit.posterior is not None:
+                expected = Interval.of(fit.posterior.expected[term.name][..., i])
+                replicated = fit.posterior.replicated[term.name][..., i]
+                row |= {"predicted": expected.median, "q05": expected.q05, "q95": expected.q95}
+                row["predictive_q05"], row["predictive_q95"] = (float(q) for q in np.quantile(replicated, (0.05, 0.95)))
+            else:
+                row["predicted"] = float(fit.least_squares.readings[term.name][i])
+            row["relative_error"] = row["measured"] / row["predicted"] - 1
+            rows.append(row)
+    return rows
+
+
+def _optimal(fit: Fit) -> dict[str, Any]:
+    answer = fit.optimal_length()
+    return {
+        "route": answer.variable,
+        "unit": answer.unit,
+        "length": asdict(answer.length) | {"at_edge": answer.at_edge},
+        "efficiency": asdict(answer.efficiency),
+        "window": {
+            "within": answer.window.within,
+            "probability": answer.window.probability,
+            "from": answer.window.start,
+            "to": answer.window.stop,
+        },
+        "choices": [asdict(choice) for choice in answer.choices],
+    }
+
+
+def _plain(data: Any) -> Any:
+    """Plain data for JSON: NumPy numbers as Python's, and None for what is not a finite number."""
+    if isinstance(data, dict):
+        return {key: _plain(value) for key, value in data.items()}
+    if isinstance(data, list | tuple):
+        return [_plain(value) for value in data]
+    if isinstance(data, np.generic):
+        data = data.item()
+    return None if isinstance(data, float) and not np.isfinite(data) else data

@@ -336,7 +336,7 @@ class Description(_Frozen):
 
 
 def nearest(name: str, known: Sequence[str]) -> str:
-    """ "; did you mean ...?" with the nearest known name, or what there is."""
+    """The nearest known name as a question, or what there is."""
     near = difflib.get_close_matches(name, list(known), n=1, cutoff=0.5)
     return f"; did you mean {near[0]!r}?" if near else f"; known here: {', '.join(known)}"
 

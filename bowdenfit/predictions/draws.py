@@ -26,8 +26,9 @@ def for_each_draw(function: Function, size: int, batch: int = BATCH) -> Callable
         for start in range(0, len(z), batch):
             part = z[start : start + batch]
             padded = np.concatenate([part, np.repeat(part[-1:], batch - len(part), axis=0)])
-            parts.append(jax.tree.map(lambda x, n=len(part): np.asarray(x)[:n], program(padded)))
-        return jax.tree.map(lambda *x: np.concatenate(x), *parts)
+            parts.append(jax.tree.map(np.asarray, program(padded)))
+        whole = jax.tree.map(lambda *x: np.concatenate(x), *parts)
+        return jax.tree.map(lambda x: x[: len(z)], whole)
 
     return apply
 

@@ -133,4 +133,5 @@ def _forces(table: ForceTable) -> str:
         if (table.stroke == stroke).any()
     )
     low, high = table.input_force.min(), table.input_force.max()
-    return f"  {files}: {len(table.run)} force readings in {len(table.run_names)} runs ({counts}), input {low:.4g} to {high:.4g} N"
+    readings = f"{len(table.run)} force readings in {len(table.run_names)} runs"
+    return f"  {files}: {readings} ({counts}), input {low:.4g} to {high:.4g} N"

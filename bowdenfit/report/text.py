@@ -15,7 +15,7 @@ def summary_text(fit: Fit) -> str:
     """The summary of a fit for people."""
     page = fit.summary()
     blocks = [_title(fit), _verdict(fit, page), _coefficients(page), _rests_on_prior(page), _curves(fit, page)]
-    blocks += [_scatter(page), _measured(fit, page), _answer(fit), _origin(fit, page)]
+    blocks += [_scatter(page), _measured(fit, page), _answer(fit), _origin(page)]
     return "\n\n".join(block for block in blocks if block) + "\n"
 
 
@@ -157,7 +157,7 @@ def _answer(fit: Fit) -> str:
     return "\n".join(sentences)
 
 
-def _origin(fit: Fit, page: dict[str, Any]) -> str:
+def _origin(page: dict[str, Any]) -> str:
     versions = ", ".join(f"{name} {version}" for name, version in page["versions"].items())
     return _filled(f"Seed {page['seed']}; {versions}.")
 

@@ -353,7 +353,7 @@ def _read_posterior(path: Path, page: Mapping[str, Any]) -> Posterior:
         groups["log_likelihood"],
         {name.removeprefix("expected_"): value for name, value in groups["predictions"].items()},
         groups["posterior_predictive"],
-        {name: value for name, value in groups["prior"].items()},
+        groups["prior"],
         {name: Diagnostics(**{k: _number(v) for k, v in d.items()}) for name, d in page["diagnostics"].items()},
         page["n_ensembles"],
         page["steps"],

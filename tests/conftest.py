@@ -1,0 +1,32 @@
+"""Settings of every test: 64-bit floats, strict promotion of types, and shapes checked at run time."""
+
+from pathlib import Path
+
+import pytest
+from jaxtyping import install_import_hook
+
+with install_import_hook("bowdenfit", "beartype.beartype"):
+    import bowdenfit.inference.posterior
+    import bowdenfit.models.build
+    import bowdenfit.physics.friction
+    import bowdenfit.physics.geometry
+    import bowdenfit.predictions.draws  # noqa: F401
+
+import jax
+
+jax.config.update("jax_enable_x64", True)
+jax.config.update("jax_numpy_dtype_promotion", "standard")
+
+ROOT = Path(__file__).parent.parent
+
+
+@pytest.fixture(scope="session")
+def on_body() -> Path:
+    """The data set of the on-body exoskeleton paper."""
+    return ROOT / "datasets" / "on-body-exoskeleton"
+
+
+@pytest.fixture(scope="session")
+def bench() -> Path:
+    """The plan of the synthetic bench."""
+    return ROOT / "datasets" / "synthetic-bench" / "bench.toml"

@@ -286,7 +286,7 @@ class Description(_Frozen):
     def _distinct(cls, contacts: tuple[Contact, ...]) -> tuple[Contact, ...]:
         for names, what in (
             ([c.name for c in contacts], "name"),
-            ([c.wrap_angle.column for c in contacts if c.wrap_angle.curve], "curve's column"),
+            ([c.wrap_angle.column or "" for c in contacts if c.wrap_angle.curve], "curve's column"),
         ):
             twice = [n for n in names if names.count(n) > 1]
             if twice:

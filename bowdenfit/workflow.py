@@ -149,14 +149,15 @@ def _fit(
     with watch.stage("least squares"):
         start = maximum_posterior(density, objective)
         squares = least_squares(density, objective, start.z)
-    posterior, reasons = None, () if squares.converged else (squares.message,)
+    posterior = None
+    reasons: tuple[str, ...] = () if squares.converged else (squares.message,)
     if mcmc:
         chain = _sampled(density, start, seed, folder, resume, progress, watch)
         with watch.stage("replicate"):
             posterior = _posterior(density, chain, seed)
         reasons = chain.reasons
     provenance = Provenance(seed, _versions(), watch.seconds, datetime.now(UTC).isoformat(timespec="seconds"))
-    return Fit(data, squares, posterior, not reasons, tuple(reasons), provenance)
+    return Fit(data, squares, posterior, not reasons, reasons, provenance)
 
 
 def _sampled(

@@ -7,8 +7,8 @@ import jax
 
 # XLA's newer fusion emitters take twice as long to compile the small elementwise functions here, which then run no
 # faster; measured on two cores by scripts/benchmark_fit.py.
-_OPTIONS = {"xla_cpu_use_fusion_emitters": False, "xla_cpu_parallel_codegen_split_count": 2}
-_RUN_ONCE = _OPTIONS | {"xla_backend_optimization_level": 0}
+_OPTIONS: dict[str, Any] = {"xla_cpu_use_fusion_emitters": False, "xla_cpu_parallel_codegen_split_count": 2}
+_RUN_ONCE: dict[str, Any] = _OPTIONS | {"xla_backend_optimization_level": 0}
 
 
 def compiled(function: Callable[..., Any], *shapes: Any, run_once: bool = False) -> Callable[..., Any]:

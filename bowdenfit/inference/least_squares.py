@@ -87,7 +87,7 @@ def make_objective(posterior: Posterior) -> Objective:
     """One compiled solve for every use: which parameters are pinned and whether priors count are arguments."""
     space = posterior.model.space
 
-    def residuals(free: Array, args: Any) -> tuple[Array, dict[str, Array]]:
+    def residuals(free: Array, args: Any) -> tuple[Any, Any]:
         pinned, pin, weight, data = args
         z = jnp.where(pinned, pin, free)
         by_term = posterior.residuals(z, data)
@@ -95,8 +95,8 @@ def make_objective(posterior: Posterior) -> Objective:
 
     def solve(start: Array, pinned: Array, pin: Array, weight: Array, data: Any) -> dict[str, Any]:
         args = (pinned, pin, weight, data)
-        solver = optx.LevenbergMarquardt(rtol=1e-10, atol=1e-12)
-        solution = optx.least_squares(residuals, solver, start, args, has_aux=True, max_steps=500, throw=False)
+        solver: optx.LevenbergMarquardt = optx.LevenbergMarquardt(rtol=1e-10, atol=1e-12)
+        solution: optx.Solution = optx.least_squares(residuals, solver, start, args, has_aux=True, max_steps=500, throw=False)
         z = jnp.where(pinned, pin, solution.value)
         values, slope = jax.jvp(space.vector, (z,), (jnp.ones_like(z),))
         jacobian, by_term = jax.jacfwd(residuals, has_aux=True)(solution.value, args)

@@ -79,7 +79,7 @@ def angles_term(cable: Cable, table: AngleTable) -> AnglesTerm:
     """The term of an angle table, with undetected angles entering as the description says."""
     description = cable.description
     settings, route, published = description.tables.angles, description.route, description.geometry == "published"
-    assert settings is not None and route is not None  # noqa: PT018  # an angle table is read only with both
+    assert settings is not None and route is not None  # an angle table is read only with both
     readings: list[tuple[float, float, str]] = []
     routes: dict[str, np.ndarray] = {}
     for contact in description.curved:

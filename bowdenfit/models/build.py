@@ -31,12 +31,35 @@ from bowdenfit.parameters.space import Parameter, ParameterSpace
 class Term(Protocol):
     """One table against one cable: what inference, predictions and reports need of it."""
 
-    cable: Cable
-    data: dict[str, Any]
-    labels: tuple[str, ...]
-    name: str
-    unit: str
-    noise: str  # the noise scale that its residuals are standardized by
+    @property
+    def cable(self) -> Cable:
+        """The cable."""
+        ...
+
+    @property
+    def data(self) -> dict[str, Any]:
+        """Arrays that its functions take."""
+        ...
+
+    @property
+    def labels(self) -> tuple[str, ...]:
+        """Each reading in words."""
+        ...
+
+    @property
+    def name(self) -> str:
+        """Name of its readings in results."""
+        ...
+
+    @property
+    def unit(self) -> str:
+        """Unit of its readings in results."""
+        ...
+
+    @property
+    def noise(self) -> str:
+        """The noise scale that its residuals are standardized by."""
+        ...
 
     def log_likelihood(self, values: Mapping[str, Array], data: Mapping[str, Any]) -> Array:
         """Log likelihood of each reading."""

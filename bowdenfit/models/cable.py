@@ -3,6 +3,7 @@
 from collections.abc import Mapping
 from dataclasses import dataclass
 from functools import cached_property
+from typing import TypeVar
 
 import jax.numpy as jnp
 import numpy as np
@@ -16,6 +17,7 @@ from bowdenfit.models.curves import CURVES, Curve
 from bowdenfit.models.laws import CONTACT_LAWS, ContactLaw
 
 ANGLE_NOISE = "sigma_theta"
+Entry = TypeVar("Entry")
 
 
 @dataclass(frozen=True)
@@ -199,8 +201,8 @@ def make_cable(description: Description, measurements: Measurements) -> Cable:
     return cable
 
 
-def _lookup(registry: Mapping, name: str | None, what: str, contact: Contact):  # noqa: ANN202
-    if name not in registry:
+def _lookup(registry: Mapping[str, Entry], name: str | None, what: str, contact: Contact) -> Entry:
+    if name is None or name not in registry:
         raise DescriptionError(
             f"cable.toml, contact {contact.name!r}: the {what} {name!r} is unknown{nearest(str(name), list(registry))}."
         )

@@ -1,5 +1,6 @@
 """How results show themselves in a notebook: small tables without styling of their own."""
 
+from collections.abc import Sequence
 from html import escape
 from typing import TYPE_CHECKING
 
@@ -41,7 +42,7 @@ def fit_page(fit: "Fit") -> str:
     return f"<h4>{escape(fit.name)}</h4><p>{escape(verdict)}</p>{table(heads, rows)}{answer}"
 
 
-def table(heads: tuple[str, ...], rows: list[tuple[str, ...]]) -> str:
+def table(heads: Sequence[str], rows: Sequence[Sequence[str]]) -> str:
     """An HTML table."""
     head = "".join(f"<th>{escape(cell)}</th>" for cell in heads)
     body = "".join("<tr>" + "".join(f"<td>{escape(cell)}</td>" for cell in row) + "</tr>" for row in rows)

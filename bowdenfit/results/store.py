@@ -30,7 +30,7 @@ from bowdenfit.measurements.tables import (
 from bowdenfit.measurements.tables import (
     Provenance as RowProvenance,
 )
-from bowdenfit.results.fit import Fit, Posterior, Provenance
+from bowdenfit.results.fit import OPTIMAL_EFFICIENCY, OPTIMAL_LENGTH, Fit, Posterior, Provenance
 from bowdenfit.results.summary import summarize
 
 if TYPE_CHECKING:
@@ -287,8 +287,8 @@ def _write_posterior(fit: Fit, path: Path) -> None:
         tree = _tree(fit, posterior, log_likelihood, log_prior)
     labels = _labels(fit)
     for group in ("posterior", "prior"):
-        for name in tree[group].data_vars:
-            tree[group][name].attrs |= labels[str(name)]
+        for name in map(str, tree[group].data_vars):
+            tree[group][name].attrs |= labels[name]
     with written_whole(path) as temporary:
         tree.to_netcdf(temporary, engine="h5netcdf")
 
@@ -325,8 +325,8 @@ def _labels(fit: Fit) -> dict[str, dict[str, str]]:
     labels = {p.name: {"units": p.unit, "symbol": p.symbol, "long_name": p.meaning} for p in fit.model.space.free}
     labels |= {name: {"units": unit, "symbol": symbol} for name, (unit, symbol) in derived_units(fit.model).items()}
     if route is not None:
-        labels["optimal_length"] = {"units": route.unit, "symbol": "$l^*$", "long_name": f"optimal {route.variable}"}
-        labels["optimal_efficiency"] = {"units": "1", "symbol": r"$\eta^*$", "long_name": "efficiency at the optimum"}
+        labels[OPTIMAL_LENGTH] = {"units": route.unit, "symbol": "$l^*$", "long_name": f"optimal {route.variable}"}
+        labels[OPTIMAL_EFFICIENCY] = {"units": "1", "symbol": r"$\eta^*$", "long_name": "efficiency at the optimum"}
     return labels
 
 
@@ -337,14 +337,11 @@ def _read_posterior(path: Path, page: Mapping[str, Any]) -> Posterior:
         raise StoreError(f"{path} is missing; fit again, or restore the folder from a copy.")
     with xarray.open_datatree(path, engine="h5netcdf") as tree:
         groups = {
-            group: {str(name): np.asarray(tree[group][name].values) for name in tree[group].data_vars}
+            group: {name: np.asarray(tree[group][name].values) for name in map(str, tree[group].data_vars)}
             for group in tree.children
         }
-    optimum = {
-        name: groups["posterior"].pop(name)
-        for name in ("optimal_length", "optimal_efficiency")
-        if name in groups["posterior"]
-    }
+    names = [name for name in (OPTIMAL_LENGTH, OPTIMAL_EFFICIENCY) if name in groups["posterior"]]
+    optimum = {name: groups["posterior"].pop(name) for name in names}
     z = groups["unconstrained_posterior"]
     return Posterior(
         np.stack(list(z.values()), axis=-1),

@@ -185,7 +185,7 @@ def fit(
             resume=resume,
             force=force,
             figures=figures,
-            draw_in_background=True,
+            in_background=True,
             progress=progress,
             remember_compilations=True,
             **_reading(**options),
@@ -200,11 +200,13 @@ def _interruptible(folder: Path) -> Iterator[None]:
     """Say where the checkpoint is when the user (or the system) stops a fit."""
     import signal
 
+    from bowdenfit.results.folder import CHAIN
+
     signal.signal(signal.SIGTERM, lambda *_: signal.raise_signal(signal.SIGINT))
     try:
         yield
     except KeyboardInterrupt:
-        if (folder / "chain.h5").exists():
+        if (folder / CHAIN).exists():
             click.echo(
                 f"\nInterrupted; the checkpoint is kept in {folder}: run the same command with --resume.", err=True
             )

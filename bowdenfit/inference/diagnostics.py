@@ -31,6 +31,11 @@ class Diagnostics:
     drift: float
 
 
+def diagnose_all(draws: Mapping[str, Draws], n_ensembles: int) -> dict[str, Diagnostics]:
+    """Diagnostics of several quantities by name; see `diagnose`."""
+    return {name: diagnose(values, n_ensembles) for name, values in draws.items()}
+
+
 def diagnose(draws: Draws, n_ensembles: int) -> Diagnostics:
     """Diagnostics of one quantity.
 

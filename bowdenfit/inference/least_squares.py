@@ -96,7 +96,9 @@ def make_objective(posterior: Posterior) -> Objective:
     def solve(start: Array, pinned: Array, pin: Array, weight: Array, data: Any) -> dict[str, Any]:
         args = (pinned, pin, weight, data)
         solver: optx.LevenbergMarquardt = optx.LevenbergMarquardt(rtol=1e-10, atol=1e-12)
-        solution: optx.Solution = optx.least_squares(residuals, solver, start, args, has_aux=True, max_steps=500, throw=False)
+        solution: optx.Solution = optx.least_squares(
+            residuals, solver, start, args, has_aux=True, max_steps=500, throw=False
+        )
         z = jnp.where(pinned, pin, solution.value)
         values, slope = jax.jvp(space.vector, (z,), (jnp.ones_like(z),))
         jacobian, by_term = jax.jacfwd(residuals, has_aux=True)(solution.value, args)

@@ -2,7 +2,7 @@
 
 from collections.abc import Mapping
 from dataclasses import dataclass
-from typing import Any, Protocol
+from typing import Any, Protocol, runtime_checkable
 
 import numpy as np
 from jax import Array
@@ -28,6 +28,7 @@ from bowdenfit.parameters.priors import HalfNormal, LogNormal, Normal, Prior, Tr
 from bowdenfit.parameters.space import Parameter, ParameterSpace
 
 
+@runtime_checkable
 class Term(Protocol):
     """One table against one cable: what inference, predictions and reports need of it."""
 

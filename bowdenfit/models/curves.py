@@ -5,7 +5,7 @@ A new family is one class here or in a file beside it, and one line in `CURVES`;
 
 from collections.abc import Mapping
 from types import MappingProxyType
-from typing import Protocol
+from typing import Protocol, runtime_checkable
 
 import jax.numpy as jnp
 import numpy as np
@@ -19,6 +19,7 @@ from bowdenfit.physics.geometry import gaussian_coefficients, log_quadratic_wrap
 from bowdenfit.types import Vector
 
 
+@runtime_checkable
 class Curve(Protocol):
     """What a curve family must offer; an instance is the curve of one contact."""
 

@@ -191,4 +191,11 @@ def _sliding(
         "scatter": np.bincount(run, within),
         "log_weights": np.bincount(row_run, np.log(weight)),
     }
-    return SlidingForcesTerm(cable, data, tuple(table.run_names[i] for i in runs))
+    return SlidingForcesTerm(cable, data, tuple(_run_label(cable, table, i) for i in runs))
+
+
+def _run_label(cable: Cable, table: ForceTable, run: int) -> str:
+    """Name of a run, with its route value where it has just one."""
+    route, at = cable.description.route, np.unique(table.route[table.run == run])
+    where = f" ({at[0]:g} {route.unit})" if route is not None and len(at) == 1 else ""
+    return f"{table.run_names[run]}{where}"

@@ -6,12 +6,13 @@ A new law is one class here or in a file beside it, and one line in `CONTACT_LAW
 from collections.abc import Mapping
 from dataclasses import dataclass
 from types import MappingProxyType
-from typing import Protocol
+from typing import Protocol, runtime_checkable
 
 from jax import Array
 from jaxtyping import Float
 
 
+@runtime_checkable
 class ContactLaw(Protocol):
     """What a contact law must offer. Contacts are in series, so their contributions add."""
 

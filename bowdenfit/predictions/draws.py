@@ -51,19 +51,18 @@ def derived_units(model: Model) -> dict[str, tuple[str, str]]:
     return {name: unit for curve in model.cable.curves.values() for name, unit in curve.derived_units().items()}
 
 
-def replicate(posterior: Posterior, z: np.ndarray, seed: int) -> dict[str, dict[str, np.ndarray]]:
-    """Named values, log likelihood of every reading, expected and replicated readings of every draw.
+def replicator(posterior: Posterior, seed: int) -> Callable[[np.ndarray], dict[str, dict[str, np.ndarray]]]:
+    """Compiled function of draws (rows): what each draw implies for every reading.
+
+    Its answer has, by group ("values", "log_likelihood", "expected", "replicated") and name, arrays over draws and
+    readings: named values, log likelihood of every reading, expected readings, and readings drawn anew.
 
     Args:
         posterior: The posterior.
-        z: Draws, one a row.
-        seed: Seed of the replicated noise.
-
-    Returns:
-        By group ("values", "log_likelihood", "expected", "replicated") and name: arrays over draws and readings.
+        seed: Seed of the readings drawn anew.
     """
     model = posterior.model
-    names, key = named_values(model), jax.random.key(seed % 2**32)
+    names, key = named_values(model), jax.random.key(seed)
 
     def implied(z_and_number: Float[Array, " free_and_one"]) -> dict[str, Mapping[str, Array]]:
         z, number = z_and_number[:-1], z_and_number[-1].astype(jnp.uint32)
@@ -77,8 +76,8 @@ def replicate(posterior: Posterior, z: np.ndarray, seed: int) -> dict[str, dict[
             "replicated": {t.name: t.simulate(values, d, key) for t, d, key in terms},
         }
 
-    numbered = np.column_stack([z, np.arange(len(z), dtype=float)])
-    return for_each_draw(implied, model.space.size + 1)(numbered)
+    program = for_each_draw(implied, model.space.size + 1)
+    return lambda z: program(np.column_stack([z, np.arange(len(z), dtype=float)]))
 
 
 def curves_of(model: Model, route: np.ndarray) -> Callable[[Float[Array, " free"]], dict[str, Array]]:

@@ -12,6 +12,7 @@ from bowdenfit.predictions.optimal_length import route_grid
 from bowdenfit.results.fit import OPTIMAL_EFFICIENCY, OPTIMAL_LENGTH, Fit, OptimalLength
 
 BAND_QUANTILES = (0.05, 0.25, 0.5, 0.75, 0.95)
+_BAND_DRAWS = 5000  # enough for a line's width of accuracy
 
 
 @dataclass(frozen=True)
@@ -147,7 +148,8 @@ def figure_data(fit: Fit) -> FigureData:
 def _bands(fit: Fit, model: Model) -> dict[str, Band]:
     if fit.posterior is not None:
         grid, curves = fit.curves()
-        return {name: Band(grid, np.quantile(draws, BAND_QUANTILES, axis=0)) for name, draws in curves.items()}
+        every = max(1, len(fit.posterior.flat_z) // _BAND_DRAWS)
+        return {name: Band(grid, np.quantile(d[::every], BAND_QUANTILES, axis=0)) for name, d in curves.items()}
     grid = route_grid(model)
     with jax.enable_x64(True):
         curves = jax.jit(curves_of(model, grid))(jnp.asarray(fit.least_squares.z))

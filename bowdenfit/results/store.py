@@ -1,17 +1,10 @@
-"""The results folder: written whole, under temporary names that are renamed; read back bit for bit.
-
-`fit.json` is written last, so a folder that has it is complete. A folder with `chain.h5` alone is an interrupted fit.
-"""
+"""A fit to its results folder, and back bit for bit."""
 
 import json
-import os
-import shutil
-import warnings
-from collections.abc import Callable, Iterator, Mapping
-from contextlib import contextmanager
+from collections.abc import Callable, Mapping
 from dataclasses import asdict, fields
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 
@@ -30,16 +23,13 @@ from bowdenfit.measurements.tables import (
 from bowdenfit.measurements.tables import (
     Provenance as RowProvenance,
 )
+from bowdenfit.predictions.draws import derived_units
 from bowdenfit.results.fit import OPTIMAL_EFFICIENCY, OPTIMAL_LENGTH, Fit, Posterior, Provenance
+from bowdenfit.results.folder import CHAIN, FIT, POSTERIOR, SUMMARY, write_text
+from bowdenfit.results.netcdf import EXPECTED, Coordinates, Groups, read_groups, write_groups
 from bowdenfit.results.summary import summarize
 
-if TYPE_CHECKING:
-    import xarray
-
 SCHEMA = 1
-FIT, SUMMARY, POSTERIOR, CHAIN = "fit.json", "summary.json", "posterior.nc", "chain.h5"
-_OWN_FILES = (FIT, SUMMARY, POSTERIOR, CHAIN, "summary.txt")
-_OWN_FOLDERS = ("figures",)
 _WHOLE_NUMBERS = {"run", "stroke", "file", "row"}
 _PARTS = {"own": OwnAngles, "origin": RowProvenance}
 _TABLES = {"angles": AngleTable, "efficiencies": EfficiencyTable, "forces": ForceTable}
@@ -47,30 +37,14 @@ Migration = Callable[[dict[str, Any]], dict[str, Any]]
 MIGRATIONS: Mapping[int, Migration] = {}  # from schema N to N + 1
 
 
-@contextmanager
-def written_whole(path: Path) -> Iterator[Path]:
-    """A temporary name beside `path` to write to; it becomes `path` only if nothing went wrong."""
-    temporary = path.with_name(f".{path.name}.partial")
-    try:
-        yield temporary
-        os.replace(temporary, path)  # noqa: PTH105  (Path.replace says the same; this is the usual word for it)
-    finally:
-        temporary.unlink(missing_ok=True)
-
-
-def write_text(path: Path, text: str) -> None:
-    """Write a text file whole."""
-    with written_whole(path) as temporary:
-        temporary.write_text(text, encoding="utf-8")
-
-
-def save(fit: Fit, folder: Path, force: bool = False) -> None:
-    """Write fit.json, summary.json and posterior.nc.
+def save(fit: Fit, folder: Path, force: bool = False, write: Callable[..., Any] = write_groups) -> None:
+    """Write posterior.nc, summary.json and, last, fit.json.
 
     Args:
         fit: The fit.
         folder: Where to; made if missing.
         force: Whether a finished fit there may be replaced.
+        write: What writes posterior.nc; `write_groups`, or something that has another process do it.
 
     Raises:
         StoreError: The folder holds a finished fit already, or cannot be written.
@@ -79,73 +53,13 @@ def save(fit: Fit, folder: Path, force: bool = False) -> None:
         raise StoreError(f"{folder} holds a finished fit already; add --force (force=True) to replace it.")
     try:
         folder.mkdir(parents=True, exist_ok=True)
+        (folder / POSTERIOR).unlink(missing_ok=True)
         if fit.posterior is not None:
-            _write_posterior(fit, folder / POSTERIOR)
-        else:
-            (folder / POSTERIOR).unlink(missing_ok=True)
+            write(folder / POSTERIOR, *posterior_groups(fit), variable_attributes(fit))
         write_text(folder / SUMMARY, json.dumps(summarize(fit), indent=1) + "\n")
         write_text(folder / FIT, json.dumps(_fit_page(fit), indent=1) + "\n")
     except OSError as error:
         raise StoreError(f"{folder} cannot be written ({error.strerror}); name another with --output.") from None
-
-
-def refuse_to_overwrite(folder: Path) -> None:
-    """Stop before anything is computed if the results would have no place.
-
-    Raises:
-        StoreError: The folder holds something already.
-    """
-    if (folder / FIT).exists():
-        raise StoreError(
-            f"{folder} holds a finished fit already; add --force to replace it, or name another with --output."
-        )
-    if (folder / CHAIN).exists():
-        raise StoreError(f"{folder} holds an interrupted fit; go on with --resume, or start over with --force.")
-    if folder.exists() and (not folder.is_dir() or any(folder.iterdir())):
-        raise StoreError(f"{folder} exists and is no results folder; name another with --output.")
-
-
-def clear(folder: Path) -> None:
-    """Remove what an earlier fit wrote, and nothing else; the mark of a finished fit goes first."""
-    for name in _OWN_FILES:
-        (folder / name).unlink(missing_ok=True)
-    for name in _OWN_FOLDERS:
-        if (folder / name).is_dir():
-            shutil.rmtree(folder / name)
-
-
-def start_checkpoint(path: Path, fingerprint: Mapping[str, Any]) -> None:
-    """Make the sampler's checkpoint, which carries what it was started for.
-
-    Raises:
-        StoreError: The folder cannot be written.
-    """
-    import h5py
-
-    try:
-        path.parent.mkdir(parents=True, exist_ok=True)
-        with h5py.File(path, "w") as file:
-            file.attrs["fingerprint"] = json.dumps(fingerprint)
-    except OSError as error:
-        raise StoreError(f"{path.parent} cannot be written ({error}); name another folder with --output.") from None
-
-
-def read_checkpoint(folder: Path) -> dict[str, Any]:
-    """What the checkpoint in a folder was started for.
-
-    Raises:
-        StoreError: There is no checkpoint, or it is damaged.
-    """
-    import h5py
-
-    path = folder / CHAIN
-    if not path.exists():
-        raise StoreError(f"{folder} holds no checkpoint (chain.h5) to resume from; fit without --resume.")
-    try:
-        with h5py.File(path, "r") as file:
-            return dict(json.loads(str(file.attrs["fingerprint"])))
-    except (OSError, KeyError, json.JSONDecodeError):
-        raise StoreError(f"{path} is damaged and cannot be resumed; start over with --force.") from None
 
 
 def load(folder: Path) -> Fit:
@@ -158,7 +72,7 @@ def load(folder: Path) -> Fit:
     try:
         dataset = Dataset(parse_description(page["description"]), _measurements(page["measurements"]), page["sha256"])
         squares = _least_squares(page["least_squares"])
-        posterior = _read_posterior(folder / POSTERIOR, page["posterior"]) if page["posterior"] else None
+        posterior = _posterior(folder / POSTERIOR, page["posterior"]) if page["posterior"] else None
         verdict = page["verdict"]
         provenance = Provenance(**page["provenance"])
     except (KeyError, TypeError, ValueError, OSError) as error:
@@ -273,54 +187,28 @@ def _least_squares(page: Mapping[str, Any]) -> LeastSquares:
     )
 
 
-def _write_posterior(fit: Fit, path: Path) -> None:
-    """posterior.nc, an ArviZ DataTree."""
-    posterior = fit.posterior
+def posterior_groups(fit: Fit) -> tuple[Groups, Coordinates, dict[str, str]]:
+    """Contents of posterior.nc as plain data: groups of variables, the readings' labels, and attributes."""
+    posterior, space = fit.posterior, fit.model.space
     assert posterior is not None  # the caller asked
     log_prior = -0.5 * np.sum(posterior.z**2 + np.log(2 * np.pi), axis=-1)
-    log_likelihood = sum(
-        (np.sum(part, axis=-1) for part in posterior.log_likelihood.values()), np.zeros_like(log_prior)
-    )
-    with warnings.catch_warnings():
-        # Each walker is a chain, because flattening walkers into few chains would inflate effective sample sizes.
-        warnings.filterwarnings("ignore", "Found chain dimension to be longer", UserWarning)
-        tree = _tree(fit, posterior, log_likelihood, log_prior)
-    labels = _labels(fit)
-    for group in ("posterior", "prior"):
-        for name in map(str, tree[group].data_vars):
-            tree[group][name].attrs |= labels[name]
-    with written_whole(path) as temporary:
-        tree.to_netcdf(temporary, engine="h5netcdf")
+    log_likelihood = [np.sum(part, axis=-1) for part in posterior.log_likelihood.values()]
+    groups = {
+        "posterior": posterior.values | posterior.optimum,
+        "unconstrained_posterior": {p.name: posterior.z[..., i] for i, p in enumerate(space.free)},
+        "sample_stats": {"lp": sum(log_likelihood, log_prior)},
+        "log_likelihood": posterior.log_likelihood,
+        "posterior_predictive": posterior.replicated,
+        "predictions": {f"{EXPECTED}{name}": value for name, value in posterior.expected.items()},
+        "prior": posterior.prior,
+        "observed_data": {term.name: term.observed() for term in fit.model.terms},
+    }
+    labels = {term.name: term.labels for term in fit.model.terms}
+    return groups, labels, {"provenance": json.dumps(asdict(fit.provenance)), "name": fit.name}
 
 
-def _tree(fit: Fit, posterior: Posterior, log_likelihood: np.ndarray, log_prior: np.ndarray) -> "xarray.DataTree":
-    import arviz_base
-
-    free = [p.name for p in fit.model.space.free]
-    observed = {term.name: term.observed() for term in fit.model.terms}
-    return arviz_base.from_dict(
-        {
-            "posterior": {**posterior.values, **posterior.optimum},
-            "unconstrained_posterior": {name: posterior.z[..., i] for i, name in enumerate(free)},
-            "sample_stats": {"lp": log_prior + log_likelihood},
-            "log_likelihood": posterior.log_likelihood,
-            "posterior_predictive": posterior.replicated,
-            "predictions": {f"expected_{name}": value for name, value in posterior.expected.items()},
-            "prior": posterior.prior,
-            "observed_data": observed,
-        },
-        coords={f"{term.name}_reading": list(term.labels) for term in fit.model.terms},
-        dims={
-            f"{prefix}{term.name}": [f"{term.name}_reading"] for term in fit.model.terms for prefix in ("", "expected_")
-        },
-        attrs={"/": {"provenance": json.dumps(asdict(fit.provenance)), "name": fit.name}},
-    )
-
-
-def _labels(fit: Fit) -> dict[str, dict[str, str]]:
+def variable_attributes(fit: Fit) -> dict[str, dict[str, str]]:
     """Unit, symbol and meaning of every variable in the posterior."""
-    from bowdenfit.predictions.draws import derived_units
-
     route = fit.dataset.description.route
     labels = {p.name: {"units": p.unit, "symbol": p.symbol, "long_name": p.meaning} for p in fit.model.space.free}
     labels |= {name: {"units": unit, "symbol": symbol} for name, (unit, symbol) in derived_units(fit.model).items()}
@@ -330,25 +218,18 @@ def _labels(fit: Fit) -> dict[str, dict[str, str]]:
     return labels
 
 
-def _read_posterior(path: Path, page: Mapping[str, Any]) -> Posterior:
-    import xarray
-
+def _posterior(path: Path, page: Mapping[str, Any]) -> Posterior:
     if not path.exists():
         raise StoreError(f"{path} is missing; fit again, or restore the folder from a copy.")
-    with xarray.open_datatree(path, engine="h5netcdf") as tree:
-        groups = {
-            group: {name: np.asarray(tree[group][name].values) for name in map(str, tree[group].data_vars)}
-            for group in tree.children
-        }
-    names = [name for name in (OPTIMAL_LENGTH, OPTIMAL_EFFICIENCY) if name in groups["posterior"]]
-    optimum = {name: groups["posterior"].pop(name) for name in names}
-    z = groups["unconstrained_posterior"]
+    groups = read_groups(path)
+    values, z = groups["posterior"], groups["unconstrained_posterior"]
+    optimum = {name: values.pop(name) for name in (OPTIMAL_LENGTH, OPTIMAL_EFFICIENCY) if name in values}
     return Posterior(
         np.stack(list(z.values()), axis=-1),
-        groups["posterior"],
+        values,
         optimum,
         groups["log_likelihood"],
-        {name.removeprefix("expected_"): value for name, value in groups["predictions"].items()},
+        {name.removeprefix(EXPECTED): value for name, value in groups["predictions"].items()},
         groups["posterior_predictive"],
         groups["prior"],
         {name: Diagnostics(**{k: _number(v) for k, v in d.items()}) for name, d in page["diagnostics"].items()},

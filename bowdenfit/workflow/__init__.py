@@ -1,46 +1,20 @@
 """The verbs that the command line and notebooks share: fit, load, check, simulate, plot."""
 
-import platform
 import secrets
-import time
-from collections.abc import Callable, Iterator, Mapping, Sequence
-from concurrent.futures import ProcessPoolExecutor
-from contextlib import contextmanager
-from dataclasses import dataclass, field
-from datetime import UTC, datetime
-from multiprocessing import get_context
+from collections.abc import Callable, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from bowdenfit.dataset import Dataset, load_dataset, single_table_dataset
 from bowdenfit.errors import StoreError, UsageError
+from bowdenfit.workflow.background import Assistants, assistants, draw_share
 
 if TYPE_CHECKING:
-    import numpy as np
-
-    from bowdenfit.inference.ensemble import Chain, Progress
+    from bowdenfit.inference.ensemble import Progress
     from bowdenfit.results.figure_data import FigureData
-    from bowdenfit.results.fit import Fit, Posterior
+    from bowdenfit.results.fit import Fit
 
-VERSIONED = ("bowdenfit", "jax", "optimistix", "emcee", "arviz-stats", "numpy", "scipy")
-PRIOR_DRAWS = 4096
 _LARGEST_SEED = 2**31 - 1
-
-
-@dataclass
-class Stopwatch:
-    """Seconds spent in each stage of a fit."""
-
-    seconds: dict[str, float] = field(default_factory=dict)
-
-    @contextmanager
-    def stage(self, name: str) -> Iterator[None]:
-        """Time what runs inside."""
-        start = time.perf_counter()
-        try:
-            yield
-        finally:
-            self.seconds[name] = self.seconds.get(name, 0.0) + time.perf_counter() - start
 
 
 def read(
@@ -84,7 +58,7 @@ def fit(
     resume: bool = False,
     force: bool = False,
     figures: bool = True,
-    draw_in_background: bool = False,
+    in_background: bool = False,
     remember_compilations: bool = False,
     progress: "Callable[[Progress], None] | None" = None,
     **reading: Any,
@@ -99,8 +73,8 @@ def fit(
         resume: Go on with an interrupted or unconverged fit in `output`.
         force: Replace a fit in `output`.
         figures: Whether to draw figures into `output`.
-        draw_in_background: Whether a second process may be started for the figures; the calling program must then guard
-            its start with `if __name__ == "__main__"`.
+        in_background: Whether other processes may be started for statistics, files and figures, which is quicker; the
+            calling program must then guard its start with `if __name__ == "__main__"`.
         remember_compilations: Whether JAX may keep compiled programs in the user's cache folder, so that a second fit of
             the same shape compiles nothing; this is a setting of the whole process.
         progress: Called while sampling.
@@ -109,117 +83,39 @@ def fit(
     Raises:
         BowdenfitError: What is wrong, in a sentence; nothing is written then.
     """
-    watch, folder = Stopwatch(), Path(output) if output is not None else None
-    with watch.stage("read"):
-        data = read(dataset, **reading)
-        seed = _prepared(folder, data, mcmc, seed, resume, force)
-    with _drawing(folder if figures else None, draw_in_background) as draw:
-        with watch.stage("import JAX"):
-            import jax
+    folder = Path(output) if output is not None else None
+    data = read(dataset, **reading)
+    seed = _prepared(folder, data, mcmc, seed, resume, force)
+    with assistants(in_background) as helpers:
+        import jax
 
-            if remember_compilations:
-                _remember_compilations()
+        from bowdenfit.workflow.fitting import Stopwatch, run
+
+        if remember_compilations:
+            _remember_compilations()
+        watch = Stopwatch()
         with jax.enable_x64(True):
-            found = _fit(data, folder, mcmc, seed, resume, progress, watch)
+            found = run(data, folder, mcmc, seed, resume, progress, watch, helpers)
             if folder is not None:
-                with watch.stage("write"):
-                    _write(found, folder)
-                with watch.stage("figures"):
-                    draw(found)
+                _write(found, folder, figures, helpers)
     return found
 
 
-def _fit(
-    data: Dataset,
-    folder: Path | None,
-    mcmc: bool,
-    seed: int,
-    resume: bool,
-    progress: "Callable[[Progress], None] | None",
-    watch: Stopwatch,
-) -> "Fit":
-    with watch.stage("import JAX"):
-        from bowdenfit.inference.least_squares import least_squares, make_objective, maximum_posterior
-        from bowdenfit.inference.posterior import Posterior as Density
-        from bowdenfit.models.build import build_model
-        from bowdenfit.results.fit import Fit, Provenance
-    with watch.stage("compile least squares"):
-        density = Density(build_model(data))
-        objective = make_objective(density)
-    with watch.stage("least squares"):
-        start = maximum_posterior(density, objective)
-        squares = least_squares(density, objective, start.z)
-    posterior = None
-    reasons: tuple[str, ...] = () if squares.converged else (squares.message,)
-    if mcmc:
-        chain = _sampled(density, start, seed, folder, resume, progress, watch)
-        with watch.stage("replicate"):
-            posterior = _posterior(density, chain, seed)
-        reasons = chain.reasons
-    provenance = Provenance(seed, _versions(), watch.seconds, datetime.now(UTC).isoformat(timespec="seconds"))
-    return Fit(data, squares, posterior, not reasons, reasons, provenance)
+def _write(found: "Fit", folder: Path, figures: bool, helpers: Assistants) -> None:
+    """All files of the results folder; figures are drawn while the others are written."""
+    from bowdenfit.report.text import summary_text
+    from bowdenfit.results.folder import FIGURES, SUMMARY_TEXT, write_text
+    from bowdenfit.results.netcdf import write_groups
+    from bowdenfit.results.store import save
 
-
-def _sampled(
-    density: Any,
-    start: Any,
-    seed: int,
-    folder: Path | None,
-    resume: bool,
-    progress: "Callable[[Progress], None] | None",
-    watch: Stopwatch,
-) -> "Chain":
-
-    with watch.stage("import emcee and ArviZ"):
-        from bowdenfit.inference.ensemble import sample
-    from bowdenfit.predictions.draws import for_each_draw
-    from bowdenfit.predictions.optimal_length import optimum_of
-    from bowdenfit.results.fit import OPTIMAL_EFFICIENCY, OPTIMAL_LENGTH
-    from bowdenfit.results.store import CHAIN
-
-    model, settings = density.model, density.model.description.sampler
-    with watch.stage("compile the posterior"):
-        log_density = density.batched_log_density(settings.n_ensembles * settings.n_walkers // 2)
-        optimum = for_each_draw(optimum_of(model), model.space.size) if model.description.route else None
-
-    def quantities(z: "np.ndarray") -> Mapping[str, "np.ndarray"]:
-        if optimum is None:
-            return {}
-        return dict(zip((OPTIMAL_LENGTH, OPTIMAL_EFFICIENCY), optimum(z), strict=True))
-
-    checkpoint = folder / CHAIN if folder is not None else None
-    with watch.stage("sample"):
-        return sample(density, log_density, start, settings, seed, quantities, checkpoint, resume, progress)
-
-
-def _posterior(density: Any, chain: "Chain", seed: int) -> "Posterior":
-    import numpy as np
-
-    from bowdenfit.predictions.draws import replicate
-    from bowdenfit.results.fit import Posterior
-
-    space, shape = density.model.space, chain.z.shape[:2]
-    prior_z = np.random.default_rng([seed, 2]).standard_normal((PRIOR_DRAWS, space.size))
-    drawn = chain.z.reshape(-1, space.size)
-    implied = replicate(density, np.concatenate([drawn, prior_z]), seed)
-
-    def of_posterior(group: str) -> dict[str, np.ndarray]:
-        return {name: v[: len(drawn)].reshape(*shape, *v.shape[1:]) for name, v in implied[group].items()}
-
-    prior = {p.name: implied["values"][p.name][len(drawn) :][None] for p in space.free}
-    return Posterior(
-        chain.z,
-        of_posterior("values"),
-        chain.quantities,
-        of_posterior("log_likelihood"),
-        of_posterior("expected"),
-        of_posterior("replicated"),
-        prior,
-        chain.diagnostics,
-        chain.n_ensembles,
-        chain.steps,
-        chain.acceptance,
-    )
+    drawings = []
+    if figures:
+        data, n = _figure_data(found), helpers.n_drawing
+        drawings = [helpers.drawing.submit(draw_share, data, folder / FIGURES, share, n) for share in range(n)]
+    save(found, folder, force=True, write=lambda *args: helpers.statistics.submit(write_groups, *args).result())
+    write_text(folder / SUMMARY_TEXT, summary_text(found))
+    for drawing in drawings:
+        drawing.result()
 
 
 def _fingerprint(data: Dataset, seed: int) -> dict[str, Any]:
@@ -234,7 +130,7 @@ def _prepared(folder: Path | None, data: Dataset, mcmc: bool, seed: int | None, 
     """Check the output folder, start or check the checkpoint, and return the seed."""
     if resume and (folder is None or not mcmc):
         raise UsageError("--resume needs the results folder of a fit with MCMC; name it with --output.")
-    from bowdenfit.results.store import CHAIN, clear, read_checkpoint, refuse_to_overwrite, start_checkpoint
+    from bowdenfit.results.folder import CHAIN, clear, read_checkpoint, refuse_to_overwrite, start_checkpoint
 
     if resume and folder is not None:
         before = read_checkpoint(folder)
@@ -254,42 +150,6 @@ def _prepared(folder: Path | None, data: Dataset, mcmc: bool, seed: int | None, 
         if mcmc:
             start_checkpoint(folder / CHAIN, _fingerprint(data, seed))
     return seed
-
-
-def _write(found: "Fit", folder: Path) -> None:
-    from bowdenfit.report.text import summary_text
-    from bowdenfit.results.store import save, write_text
-
-    save(found, folder, force=True)
-    write_text(folder / "summary.txt", summary_text(found))
-
-
-@contextmanager
-def _drawing(folder: Path | None, in_background: bool) -> "Iterator[Callable[[Fit], None]]":
-    """A function that draws the figures of a fit into a folder.
-
-    In the background a second process loads matplotlib while this one computes. Only a program that guards its start
-    may ask for that (a started process imports the main module again), so the command line does and the library not.
-    """
-    if folder is None:
-        yield lambda _: None
-        return
-    from bowdenfit.plots.gallery import draw_all
-
-    if not in_background:
-        yield lambda found: draw_all(_figure_data(found), folder / "figures")
-        return
-    with ProcessPoolExecutor(1, get_context("spawn"), initializer=_ready_to_draw) as pool:
-        pool.submit(len, ())  # starts the process
-        yield lambda found: pool.submit(draw_all, _figure_data(found), folder / "figures").result()
-
-
-def _ready_to_draw() -> None:
-    """Load what drawing needs; an interrupt is the parent's to handle."""
-    import signal
-
-    signal.signal(signal.SIGINT, signal.SIG_IGN)
-    import bowdenfit.plots.gallery  # noqa: F401
 
 
 def plot(found: "Fit", folder: str | Path) -> list[Path]:
@@ -389,15 +249,3 @@ def simulate(
     if output is not None:
         write(plan, dataset, truth, Path(output), seed)
     return dataset
-
-
-def _versions() -> dict[str, str]:
-    from importlib.metadata import PackageNotFoundError, version
-
-    def of(package: str) -> str:
-        try:
-            return version(package)
-        except PackageNotFoundError:
-            return "(not installed)"
-
-    return {package: of(package) for package in VERSIONED} | {"python": platform.python_version()}

@@ -6,7 +6,6 @@ from typing import Any
 
 import jax
 import jax.numpy as jnp
-import numpy as np
 from jax import Array
 from jaxtyping import Float
 
@@ -32,7 +31,7 @@ class Posterior:
             )
 
     @cached_property
-    def data(self) -> tuple[dict[str, np.ndarray], ...]:
+    def data(self) -> tuple[dict[str, Any], ...]:
         """Data of all terms, in their order."""
         return tuple(term.data for term in self.model.terms)
 

@@ -14,19 +14,20 @@ from bowdenfit.inference.posterior import Posterior
 from bowdenfit.models.build import Model
 
 BATCH = 1024
-Function = Callable[[Float[Array, " free"]], Any]
+Function = Callable[..., Any]
 
 
-def for_each_draw(function: Function, size: int, batch: int = BATCH) -> Callable[[np.ndarray], Any]:
-    """`function` of one z, compiled for a batch, to be applied to any number of z (rows)."""
-    program = compiled(jax.vmap(function), jax.ShapeDtypeStruct((batch, size), jnp.float64))
+def for_each_draw(function: Function, size: int, *data: Any) -> Callable[[np.ndarray], Any]:
+    """`function` of one z (and of data that are the same for all), compiled to be applied to any number of z (rows)."""
+    over_rows = jax.vmap(function, in_axes=(0, *(None for _ in data)))
+    program = compiled(over_rows, jax.ShapeDtypeStruct((BATCH, size), jnp.float64), *data)
 
     def apply(z: np.ndarray) -> Any:
         parts = []
-        for start in range(0, len(z), batch):
-            part = z[start : start + batch]
-            padded = np.concatenate([part, np.repeat(part[-1:], batch - len(part), axis=0)])
-            parts.append(jax.tree.map(np.asarray, program(padded)))
+        for start in range(0, len(z), BATCH):
+            part = z[start : start + BATCH]
+            padded = np.concatenate([part, np.repeat(part[-1:], BATCH - len(part), axis=0)])
+            parts.append(jax.tree.map(np.asarray, program(padded, *data)))
         whole = jax.tree.map(lambda *x: np.concatenate(x), *parts)
         return jax.tree.map(lambda x: x[: len(z)], whole)
 
@@ -64,11 +65,11 @@ def replicator(posterior: Posterior, seed: int) -> Callable[[np.ndarray], dict[s
     model = posterior.model
     names, key = named_values(model), jax.random.key(seed)
 
-    def implied(z_and_number: Float[Array, " free_and_one"]) -> dict[str, Mapping[str, Array]]:
+    def implied(z_and_number: Float[Array, " free_and_one"], data: Any) -> dict[str, Mapping[str, Array]]:
         z, number = z_and_number[:-1], z_and_number[-1].astype(jnp.uint32)
         keys = jax.random.split(jax.random.fold_in(key, number), max(len(model.terms), 1))
         values = model.space.constrain(z)
-        terms = list(zip(model.terms, posterior.data, keys, strict=False))
+        terms = list(zip(model.terms, data, keys, strict=False))
         return {
             "values": names(z),
             "log_likelihood": {t.name: t.log_likelihood(values, d) for t, d, _ in terms},
@@ -76,7 +77,7 @@ def replicator(posterior: Posterior, seed: int) -> Callable[[np.ndarray], dict[s
             "replicated": {t.name: t.simulate(values, d, key) for t, d, key in terms},
         }
 
-    program = for_each_draw(implied, model.space.size + 1)
+    program = for_each_draw(implied, model.space.size + 1, posterior.data)
     return lambda z: program(np.column_stack([z, np.arange(len(z), dtype=float)]))
 
 

@@ -50,12 +50,19 @@ def refuse_to_overwrite(folder: Path) -> None:
         raise StoreError(f"{folder} exists and is no results folder; name another with --output.")
 
 
-def clear(folder: Path) -> None:
-    """Remove what an earlier fit wrote, and nothing else; the mark of a finished fit goes first."""
+def clear(folder: Path) -> bool:
+    """Remove what an earlier fit wrote, and nothing else; the mark of a finished fit goes first.
+
+    Returns:
+        Whether it was a results folder.
+    """
+    if not (folder / FIT).exists() and not (folder / CHAIN).exists():
+        return False
     for name in (FIT, SUMMARY, SUMMARY_TEXT, POSTERIOR, CHAIN):
         (folder / name).unlink(missing_ok=True)
     if (folder / FIGURES).is_dir():
         shutil.rmtree(folder / FIGURES)
+    return True
 
 
 def start_checkpoint(path: Path, fingerprint: Mapping[str, Any]) -> None:

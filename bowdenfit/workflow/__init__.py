@@ -144,9 +144,8 @@ def _prepared(folder: Path | None, data: Dataset, mcmc: bool, seed: int | None, 
         return int(before["seed"])
     seed = secrets.randbelow(_LARGEST_SEED) if seed is None else seed
     if folder is not None:
-        if force:
-            clear(folder)
-        refuse_to_overwrite(folder)
+        if not (force and clear(folder)):
+            refuse_to_overwrite(folder)
         if mcmc:
             start_checkpoint(folder / CHAIN, _fingerprint(data, seed))
     return seed

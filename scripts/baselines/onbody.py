@@ -1,0 +1,87 @@
+"""What both baselines share: the on-body tables read plainly, the effective sample size, and the report.
+
+Nothing here uses bowdenfit: the baselines are what a user would write who has the model and no package for it.
+"""
+
+import csv
+import json
+import time
+from collections.abc import Callable
+from pathlib import Path
+
+import numpy as np
+
+DATASET = Path(__file__).resolve().parents[2] / "datasets" / "on-body-exoskeleton"
+MIDDLE, HALF_WIDTH = 480.0, 50.0  # of the 430 to 530 mm that the curves hold over
+LIMIT = np.deg2rad(10.0)  # angles below it were too small to detect
+EDGE = np.deg2rad(45.0)  # wrap angle of the bracket edge
+CURVES = ("free_sheath_angle_deg", "squeezed_sheath_angle_deg")
+NAMES = ("mu1", "mu2", "mu3", *(f"{c[:-4]}_{x}" for c in CURVES for x in "abc"), "sigma_theta", "tau")
+TARGET = 1000  # effective draws of every parameter
+
+FRICTION = (np.log(0.12), 0.7)
+LEVEL_SD, SLOPE_SD, CURVATURE_SD = 1.5, 3.0, 0.5
+ANGLE_NOISE, SCATTER = np.deg2rad(5.0), 0.02
+
+
+def tables() -> dict:
+    """Detected and undetected angles of both curves, and the four efficiencies; angles in rad, lengths as z."""
+    angles, efficiencies = (_rows(DATASET / name) for name in ("angles.csv", "efficiencies.csv"))
+    data: dict = {"curves": [_curve(angles, column) for column in CURVES]}
+    length = np.array([float(row["cable_length_mm"]) for row in efficiencies])
+    data["z"] = (length - MIDDLE) / HALF_WIDTH
+    data["own"] = length > MIDDLE + HALF_WIDTH  # a row past the curves has the angles measured there
+    measured = {float(row["cable_length_mm"]): row for row in angles}
+    data["angles"] = np.array(
+        [[np.deg2rad(float(measured[x][c])) if x > MIDDLE + HALF_WIDTH else 0.0 for c in CURVES] for x in length]
+    )
+    data["loss"] = -np.log([float(row["efficiency_percent"]) / 100 for row in efficiencies])
+    return data
+
+
+def _rows(path: Path) -> list[dict[str, str]]:
+    with path.open(encoding="utf-8") as file:
+        return list(csv.DictReader(line for line in file if not line.startswith("#")))
+
+
+def _curve(rows: list[dict[str, str]], column: str) -> dict:
+    within = [row for row in rows if abs(float(row["cable_length_mm"]) - MIDDLE) <= HALF_WIDTH]
+    z = np.array([(float(row["cable_length_mm"]) - MIDDLE) / HALF_WIDTH for row in within])
+    seen = np.array([not row[column].startswith("<") for row in within])
+    angle = np.deg2rad([float(row[column]) for row in within if not row[column].startswith("<")])
+    return {"z": z[seen], "angle": angle, "z_undetected": z[~seen], "level": np.log(np.median(angle))}
+
+
+def smallest_ess(draws: np.ndarray) -> float:
+    """Bulk effective sample size of the worst parameter.
+
+    Args:
+        draws: (chain, draw, parameter).
+    """
+    from arviz_stats.base import array_stats
+
+    sizes = [array_stats.ess(draws[..., i], method="bulk", chain_axis=0, draw_axis=1) for i in range(draws.shape[-1])]
+    return float(min(sizes))
+
+
+def report(run: Callable[[int], np.ndarray]) -> None:
+    """Run a sampler twice, first cold and then with everything imported and compiled, and print what came out.
+
+    Args:
+        run: From a seed to draws (chain, draw, parameter) with at least `TARGET` effective ones.
+    """
+    draws = run(1)
+    ready_at = time.monotonic()
+    start = time.perf_counter()
+    again = run(2)
+    seconds = time.perf_counter() - start
+    mu = np.concatenate([draws[..., :3].reshape(-1, 3), again[..., :3].reshape(-1, 3)])
+    page = {
+        "ready_at": ready_at,  # on the clock that all processes of the machine share
+        "ess": smallest_ess(draws),
+        "sampling_seconds": seconds,
+        "sampling_ess": smallest_ess(again),
+        "mean": mu.mean(axis=0).tolist(),
+        "sd": mu.std(axis=0).tolist(),
+    }
+    print(json.dumps(page))

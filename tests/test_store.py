@@ -167,7 +167,11 @@ def test_resume_tops_up_a_finished_fit(saved, on_body, tmp_path):
     fit, folder = saved
     copy = shutil.copytree(folder, tmp_path / "copy")
     more = bf.fit(
-        on_body, output=copy, figures=False, resume=True, settings=(*QUICK, "sampler.max_steps=600", "sampler.target_ess=100000")
+        on_body,
+        output=copy,
+        figures=False,
+        resume=True,
+        settings=(*QUICK, "sampler.max_steps=600", "sampler.target_ess=100000"),
     )
     assert (more.posterior.steps, fit.posterior.steps) == (600, 400)
     assert not more.converged

@@ -144,6 +144,8 @@ def sample(
         backend=backend,
         moves=[(SideBySide(move, settings.n_ensembles), weight) for move, weight in moves or default_moves()],
     )
+    # emcee's wrapper prints a traceback of whatever stops an evaluation, the user's interrupt included.
+    sampler.log_prob_fn = _in_halves(log_density, posterior.data, len(points) // 2)
     generator = np.random.RandomState(np.random.MT19937(np.random.SeedSequence([seed, 1])))
     state = None if backend.iteration else emcee.State(points, random_state=generator.get_state())
     limit = max(settings.max_steps // THIN, 2)

@@ -14,7 +14,9 @@ from bowdenfit.description import (
     LogNormalPrior,
     NormalPrior,
     ParameterSetting,
+    PriorChoice,
     PriorDefaults,
+    QuantityValue,
     nearest,
 )
 from bowdenfit.errors import DescriptionError
@@ -183,35 +185,33 @@ def _noise(description: Description, measurements: Measurements, defaults: Prior
     parameters, degree = [], float(np.rad2deg(1.0))
     if measurements.angles is not None:
         sd = defaults.angle_noise_degrees
-        parameters.append(
-            Parameter(ANGLE_NOISE, r"$\sigma_\theta$", "standard deviation of an angle reading", "noise",
-                      HalfNormal(sd / degree), f"HalfNormal({sd:g} deg)", "deg", degree)
-        )  # fmt: skip
-    parameters.append(
-        Parameter(RUN_SCATTER, r"$\tau$", "scatter of the log ratio from one mounting of the cable to the next", "noise",
-                  HalfNormal(defaults.run_scatter), f"HalfNormal({defaults.run_scatter:g})")
-    )  # fmt: skip
+        meaning, prior = "standard deviation of an angle reading", HalfNormal(sd / degree)
+        text = f"HalfNormal({sd:g} deg)"
+        parameters.append(Parameter(ANGLE_NOISE, r"$\sigma_\theta$", meaning, "noise", prior, text, "deg", degree))
+    if measurements.efficiencies is not None or measurements.forces is not None:
+        meaning, prior = "scatter of the log ratio from mounting to mounting", HalfNormal(defaults.run_scatter)
+        text = f"HalfNormal({defaults.run_scatter:g})"
+        parameters.append(Parameter(RUN_SCATTER, r"$\tau$", meaning, "noise", prior, text))
     if measurements.forces is not None:
-        stated = description.sensors.force_noise
-        scale = defaults.force_noise_newtons
-        prior: Prior = HalfNormal(scale)
-        text, fixed = f"HalfNormal({scale:g} N)", None
-        if stated is not None and stated.sd is not None:
-            prior = TruncatedNormal(stated.to("force"), stated.sd_to("force") or 0.0)
-            text = f"Normal({stated.to('force'):g}, {stated.sd_to('force'):g}) N, cut off at 0"
-        elif stated is not None:
-            fixed, text = stated.to("force"), "fixed (data sheet)"
-        parameters.append(
-            Parameter(FORCE_NOISE, r"$\sigma_F$", "standard deviation of a force reading", "noise", prior, text, "N",
-                      fixed=fixed)
-        )  # fmt: skip
+        parameters.append(_force_noise(description.sensors.force_noise, defaults.force_noise_newtons))
     gain = description.sensors.gain_error_sd
     if gain is not None:
-        parameters.append(
-            Parameter(GAIN_ERROR, "$g$", "relative gain error between the two load cells", "sensor",
-                      Normal(0.0, gain), f"Normal(0, {gain:g})")
-        )  # fmt: skip
+        meaning = "relative gain error between the two load cells"
+        parameters.append(Parameter(GAIN_ERROR, "$g$", meaning, "sensor", Normal(0.0, gain), f"Normal(0, {gain:g})"))
     return parameters
+
+
+def _force_noise(stated: QuantityValue | None, scale: float) -> Parameter:
+    """Noise of a force reading: free, or as the data sheet says, with its standard deviation or without."""
+    prior: Prior = HalfNormal(scale)
+    text, fixed = f"HalfNormal({scale:g} N)", None
+    if stated is not None and stated.sd is not None:
+        prior = TruncatedNormal(stated.to("force"), stated.sd_to("force") or 0.0)
+        text = f"Normal({stated.to('force'):g}, {stated.sd_to('force'):g}) N, cut off at 0"
+    elif stated is not None:
+        fixed, text = stated.to("force"), "fixed (data sheet)"
+    meaning = "standard deviation of a force reading"
+    return Parameter(FORCE_NOISE, r"$\sigma_F$", meaning, "noise", prior, text, "N", fixed=fixed)
 
 
 def _set(parameter: Parameter, setting: ParameterSetting) -> Parameter:
@@ -225,6 +225,7 @@ def _set(parameter: Parameter, setting: ParameterSetting) -> Parameter:
         text = f"measured {value:g} +- {sd:g}{unit}"
         return Parameter(**{**fields, "prior": TruncatedNormal(value / scale, sd / scale), "prior_text": text})
     assert setting.prior is not None  # a setting has exactly one of the three
+    _check_support(parameter, setting.prior)
     prior, text = _chosen(setting.prior.lognormal or setting.prior.normal or setting.prior.half_normal, scale, unit)
     if setting.prior.uniform is not None:
         low, high = setting.prior.uniform.low, setting.prior.uniform.high
@@ -243,3 +244,13 @@ def _chosen(
         case HalfNormalPrior(sd=sd):
             return HalfNormal(sd / scale), f"HalfNormal({sd:g}{unit})"
     return None, ""
+
+
+def _check_support(parameter: Parameter, choice: PriorChoice) -> None:
+    """A parameter that cannot be negative must not be given a prior that can be."""
+    may_be_negative = choice.normal is not None or (choice.uniform is not None and choice.uniform.low < 0)
+    if may_be_negative and not isinstance(parameter.prior, Normal):
+        raise DescriptionError(
+            f"cable.toml: {parameter.name} cannot be negative, but its prior can; use lognormal, half_normal, a uniform "
+            "from 0 upward, or measured = { value = ..., sd = ... }."
+        )

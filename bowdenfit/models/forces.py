@@ -191,7 +191,7 @@ def _sliding(
         "scatter": np.bincount(run, within),
         "log_weights": np.bincount(row_run, np.log(weight)),
     }
-    return SlidingForcesTerm(cable, data, tuple(_run_label(cable, table, i) for i in runs))
+    return SlidingForcesTerm(cable, data, tuple(_run_label(cable, table, int(run)) for run in runs))
 
 
 def _run_label(cable: Cable, table: ForceTable, run: int) -> str:

@@ -8,6 +8,7 @@ import numpy as np
 from bowdenfit.results.fit import Fit
 
 WIDTH = 110
+_UNLIMITED = 2000.0  # an angle in degrees or a length in mm beyond which a curve coefficient is no longer a finding
 _RESTS_ON_PRIOR = 0.2  # contraction below which a parameter is said to rest on its prior alone
 
 
@@ -23,14 +24,9 @@ def _title(fit: Fit) -> str:
     description = fit.dataset.description
     tables = fit.dataset.measurements
     counts = []
-    if tables.angles is not None:
-        undetected = int(np.isnan(tables.angles.angle).sum())
-        how = {"censored": "entered as below the detection limit", "zero": "entered as 0", "dropped": "left out"}
-        settings = description.tables.angles
-        way = "zero" if description.geometry == "published" else settings.undetected if settings else "censored"
-        counts.append(
-            f"{np.isfinite(tables.angles.angle).sum()} wrap angles and {undetected} too small to detect ({how[way]})"
-        )
+    for term in fit.model.terms:
+        if term.name == "wrap_angle":
+            counts += _angle_counts(fit, len(term.data["angle"]), len(term.data["limit"]))
     if tables.efficiencies is not None:
         counts.append(f"{len(tables.efficiencies.efficiency)} efficiencies")
     if tables.forces is not None:
@@ -39,6 +35,19 @@ def _title(fit: Fit) -> str:
     fitted = _filled(f"Fitted to {_listed(counts)}; {description.geometry} geometry.")
     remarks = [_filled(remark) for remark in tables.remarks]
     return "\n".join([line, fitted, *remarks])
+
+
+def _angle_counts(fit: Fit, entered: int, censored: int) -> list[str]:
+    """How many readings the curves were fitted to, and how those too small to detect entered."""
+    settings, published = fit.dataset.description.tables.angles, fit.dataset.description.geometry == "published"
+    way = "zero" if published or settings is None else settings.undetected
+    how = {
+        "censored": "",
+        "zero": ", those too small to detect taken as 0",
+        "dropped": ", those too small to detect left out",
+    }
+    below = f" and {censored} too small to detect (known to be below the limit)" if censored else how[way]
+    return [f"{entered} wrap angles{below}"]
 
 
 def _verdict(fit: Fit, page: dict[str, Any]) -> str:
@@ -107,13 +116,16 @@ def _rests_on_prior(page: dict[str, Any]) -> str:
 def _curves(fit: Fit, page: dict[str, Any]) -> str:
     if not page["curves"] or fit.posterior is None:
         return ""
-    lines = ["Curve coefficients of the Gaussian A exp(-((l - B)/C)^2), median (90 % interval):"]
+    lines = ["Gaussian curves A exp(-((l - B)/C)^2), median (90 % interval):"]
     for name, c in page["curves"].items():
-        interval = f"({c['q05']:.4g} to {c['q95']:.4g}) {c['unit']}"
-        far = c["q95"] is None or c["q95"] > 20 * c["median"]
-        note = "   no upper limit: the data allow an exponential, where it runs to infinity" if far else ""
-        shown = f"({c['q05']:.4g} upward) {c['unit']}" if far else interval
-        lines.append(f"  {name:<30} {c['median']:>9.4g} {shown}{note}")
+        unlimited = any(c[q] is None or abs(c[q]) > _UNLIMITED for q in ("q05", "median", "q95"))
+        interval = (
+            f"{c['median']:.4g} ({c['q05']:.4g} to {c['q95']:.4g}) {c['unit']}" if not unlimited else "not limited"
+        )
+        lines.append(f"  {name:<30} {interval}")
+    if any(line.endswith("not limited") for line in lines):
+        note = "Not limited: the data also allow an exponential, at which A, B and C are infinite; a, b and c above say it all."
+        lines.append(_filled(note, indent="  "))
     return "\n".join(lines)
 
 

@@ -46,7 +46,10 @@ def test_imports_load_nothing_heavy(code, heavy):
 
 
 def test_importing_changes_no_global_setting():
-    code = "import jax; before = dict(jax.config.values); import bowdenfit; bowdenfit.fit; print(before == dict(jax.config.values))"
+    code = (
+        "import jax; before = dict(jax.config.values); import bowdenfit; bowdenfit.fit; "
+        "print(before == dict(jax.config.values))"
+    )
     found = subprocess.run([sys.executable, "-c", code], cwd=ROOT, capture_output=True, text=True, check=True)
     assert found.stdout.strip() == "True"
 

@@ -1,15 +1,18 @@
 """From column headings to named quantities: `input_force_N`, `input_force [N]` and `Input force (N)` are one column."""
 
 import difflib
+import math
 import re
 from collections.abc import Mapping
 from dataclasses import dataclass
 
 from bowdenfit.errors import DatasetError
+from bowdenfit.measurements.quoting import listed, shown
 from bowdenfit.measurements.readers import Cell, RawTable
 from bowdenfit.measurements.units import conversion_factor, is_unit, route_conversion_factor
 
 _BRACKETED = re.compile(r"^(?P<name>.*?)[\s_]*[\[(](?P<unit>[^\])]*)[\])]\s*$")
+_LONGEST_HEADING = 200
 
 
 @dataclass(frozen=True)
@@ -44,13 +47,31 @@ class Column:
     factor: float
     unit: str | None
 
+    def value(self, cell: Cell) -> float:
+        """The number in one of the cells, in the internal unit.
+
+        Raises:
+            DatasetError: The cell is blank, is text, or is not finite.
+        """
+        value = cell.number() * self.factor
+        if not math.isfinite(value):
+            raise cell.refuse(f"{cell.shown} is too large for a number; correct the value or the unit.")
+        return value
+
     def numbers(self) -> list[float]:
-        """All values in the internal unit; every cell must hold one."""
-        return [cell.number() * self.factor for cell in self.cells]
+        """All values in the internal unit; every cell must hold one.
+
+        Raises:
+            DatasetError: A cell is blank, is text, or is not finite.
+        """
+        return [self.value(cell) for cell in self.cells]
 
 
 def find_columns(
-    table: RawTable, wanted: tuple[Quantity, ...], sources: Mapping[str, ColumnSource] | None = None
+    table: RawTable,
+    wanted: tuple[Quantity, ...],
+    sources: Mapping[str, ColumnSource] | None = None,
+    unused: tuple[str, ...] = (),
 ) -> dict[str, Column]:
     """The wanted quantities that the table has.
 
@@ -58,12 +79,14 @@ def find_columns(
         table: The file.
         wanted: What to look for.
         sources: Columns the user has named explicitly; these are not searched for.
+        unused: Names that the user may give a column although nothing reads it.
 
     Raises:
         DatasetError: A heading fits two quantities or two headings fit one; a unit is missing, unknown or of the
-            wrong dimension; a named column is not there.
+            wrong dimension; a named column is not there, or is named for what the table cannot have.
     """
-    sources = sources or {}
+    sources = {name: ColumnSource(_one_space(source.name), source.unit) for name, source in (sources or {}).items()}
+    _check_sources(table, [*(quantity.name for quantity in wanted), *unused], sources)
     found: dict[str, Column] = {}
     taken = {source.name for source in sources.values()}
     for heading in table.header:
@@ -73,13 +96,13 @@ def find_columns(
         if len(readings) > 1:
             names = " and ".join(quantity.name for quantity, _ in readings)
             raise DatasetError(
-                f"{table.file}: the column {heading!r} can be read as {names}; rename it, or say which under columns "
+                f"{table.file}: the column {shown(heading)} can be read as {names}; rename it, or say which under columns "
                 f'in cable.toml: columns = {{ {readings[0][0].name} = {{ name = "{heading}", unit = ... }} }}.'
             )
         for quantity, unit in readings:
             if quantity.name in found:
                 raise DatasetError(
-                    f"{table.file}: the columns {found[quantity.name].heading!r} and {heading!r} both look like "
+                    f"{table.file}: the columns {shown(found[quantity.name].heading)} and {shown(heading)} both look like "
                     f"{quantity.name}; rename one, or say which under columns in cable.toml: "
                     f'columns = {{ {quantity.name} = {{ name = "{heading}" }} }}.'
                 )
@@ -99,7 +122,7 @@ def require(table: RawTable, found: Mapping[str, Column], name: str, example: st
     if name in found:
         return found[name]
     raise DatasetError(
-        f"{table.file} has no column {name}{_nearest(name, table.header)}; it has {', '.join(map(repr, table.header))}. "
+        f"{table.file} has no column {name}{_nearest(name, table.header)}; it has {listed(table.header)}. "
         f"Name the column {example}, or map it in cable.toml: columns = {{ {name} = {{ name = ..., unit = ... }} }}."
     )
 
@@ -107,23 +130,29 @@ def require(table: RawTable, found: Mapping[str, Column], name: str, example: st
 def _nearest(name: str, header: tuple[str, ...]) -> str:
     near = difflib.get_close_matches(name, [_plain(h) for h in header], n=1, cutoff=0.7)
     match = next((h for h in header if near and _plain(h) == near[0]), None)
-    return f" (is it {match!r}?)" if match else ""
+    return f" (is it {shown(match)}?)" if match else ""
 
 
 def _plain(heading: str) -> str:
     """Heading in lower case with underscores for anything between words."""
-    return re.sub(r"[^0-9a-z]+", "_", heading.strip().lower()).strip("_")
+    return re.sub(r"[\W_]+", "_", heading.lower()).strip("_")
+
+
+def _one_space(heading: str) -> str:
+    """Heading as `read_csv` keeps it, with one space for any run of spaces and line breaks."""
+    return " ".join(heading.split())
 
 
 def _readings(heading: str, wanted: tuple[Quantity, ...]) -> list[tuple[Quantity, str | None]]:
     """Every quantity that the heading can mean, with the unit written in it; exact names win over name and unit."""
-    exact = [(q, None) for q in wanted if _plain(heading) == _plain(q.name)]
-    if exact:
-        return list(exact)
+    if len(heading) > _LONGEST_HEADING:
+        return []
     match = _BRACKETED.match(heading)
-    if match:
-        return [(q, match["unit"].strip() or None) for q in wanted if _plain(match["name"]) == _plain(q.name)]
-    return [(q, unit) for q in wanted if (unit := _suffix(heading, q.name)) is not None]
+    name, unit = (match["name"], match["unit"].strip() or None) if match else (heading, None)
+    exact = [(q, unit) for q in wanted if _plain(name) == _plain(q.name)]
+    whole = [(q, None) for q in wanted if _plain(heading) == _plain(q.name)]
+    named = exact or whole or [(q, unit) for q in wanted if (unit := _suffix(heading, q.name)) is not None]
+    return [(q, unit) for q, unit in named if not (q.dimension == "text" and unit and is_unit(unit))]
 
 
 def _suffix(heading: str, name: str) -> str | None:
@@ -146,7 +175,7 @@ def _column(table: RawTable, heading: str, quantity: Quantity, unit: str | None)
         return Column(heading, cells, 1.0, None)
     if unit is None:
         raise DatasetError(
-            f"{table.file}: the column {heading!r} does not say its unit; rename it to "
+            f"{table.file}: the column {shown(heading)} does not say its unit; rename it to "
             f"{quantity.name}_{quantity.to or _usual(quantity.dimension)} (or the unit it is in), or give the unit in "
             f'cable.toml: columns = {{ {quantity.name} = {{ name = "{heading}", unit = ... }} }}.'
         )
@@ -156,7 +185,7 @@ def _column(table: RawTable, heading: str, quantity: Quantity, unit: str | None)
         else:
             factor = 1.0 if quantity.dimension == "text" else conversion_factor(unit, quantity.dimension, quantity.to)
     except DatasetError as error:
-        raise DatasetError(f"{table.file}, row 1, column {heading!r}: {error}.") from None
+        raise DatasetError(f"{table.file}, row {table.header_row}, column {shown(heading)}: {error}.") from None
     return Column(heading, cells, factor, unit)
 
 
@@ -164,13 +193,30 @@ def _usual(dimension: str) -> str:
     return {"force": "N", "angle": "deg", "length": "mm", "velocity": "mm/s", "time": "s"}.get(dimension, "mm")
 
 
+def _check_sources(table: RawTable, known: list[str], sources: Mapping[str, ColumnSource]) -> None:
+    """Every column that cable.toml names is one of the file's, and serves one known quantity."""
+    serves: dict[str, str] = {}
+    for name, source in sources.items():
+        if name not in known:
+            near = difflib.get_close_matches(name, known, n=1, cutoff=0.5)
+            hint = f"did you mean {near[0]}?" if near else f"it can have {', '.join(known)}."
+            raise DatasetError(
+                f"cable.toml names a column for {shown(name)}, which {table.file} cannot have under columns; {hint}"
+            )
+        if source.name not in table.header:
+            raise DatasetError(
+                f"{table.file} has no column {shown(source.name)}, which cable.toml names for {name}; "
+                f"its columns are {listed(table.header)}."
+            )
+        if source.name in serves:
+            raise DatasetError(
+                f"cable.toml names the column {shown(source.name)} of {table.file} for both {serves[source.name]} and "
+                f"{name}; correct one of them."
+            )
+        serves[source.name] = name
+
+
 def _named_column(table: RawTable, quantity: Quantity, source: ColumnSource) -> Column:
-    if source.name not in table.header:
-        raise DatasetError(
-            f"{table.file} has no column {source.name!r}, which cable.toml names for {quantity.name}; "
-            f"its columns are {', '.join(map(repr, table.header))}."
-        )
-    readings = _readings(source.name, (quantity,))
-    match = _BRACKETED.match(source.name)
-    written = next((unit for _, unit in readings if unit), match["unit"].strip() if match else None)
-    return _column(table, source.name, quantity, source.unit or written)
+    match = _BRACKETED.match(source.name[:_LONGEST_HEADING])
+    written = next((unit for _, unit in _readings(source.name, (quantity,)) if unit), None)
+    return _column(table, source.name, quantity, source.unit or written or (match and match["unit"].strip()) or None)

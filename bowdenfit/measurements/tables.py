@@ -1,6 +1,6 @@
 """The tables as validated arrays: one frozen class a kind of table, one function that reads it."""
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -10,12 +10,13 @@ from bowdenfit.measurements.columns import Column, ColumnSource, Quantity, find_
 from bowdenfit.measurements.readers import Cell, RawTable, read_csv
 from bowdenfit.types import Labels, Matrix, Vector
 
-LARGEST_ANGLE = np.deg2rad(2000.0)
+LARGEST_ANGLE = float(np.deg2rad(2000.0)) * (1 + 1e-12)
 _STROKES = {
-    **dict.fromkeys(("pull", "pulling", "+1", "1", "1.0"), 1),
+    **dict.fromkeys(("pull", "pulling", "+1", "1", "+1.0", "1.0"), 1),
     **dict.fromkeys(("return", "returning", "release", "-1", "-1.0"), -1),
     **dict.fromkeys(("hold", "0", "0.0"), 0),
 }
+_UNUSED = ("time", "velocity", "position")  # columns that a force table may have and that nothing reads
 
 
 @dataclass(frozen=True)
@@ -178,37 +179,35 @@ def read_angles(
     found = find_columns(table, (route.quantity(), *(Quantity(c, "angle") for c in contacts)), sources)
     route_column = require(table, found, route.variable, f"{route.variable}_{route.unit}")
     columns = [require(table, found, name, f"{name}_deg") for name in contacts]
-    cells = [[_angle_or_limit(cell, c.factor, detection_limit) for cell in c.cells] for c in columns]
+    cells = [[_angle_or_limit(cell, c, detection_limit) for cell in c.cells] for c in columns]
     pairs = np.array(cells, dtype=float).reshape(len(columns), len(table.rows), 2)
     return AngleTable(
-        np.array(route_column.numbers()), tuple(contacts), pairs[..., 0].T, pairs[..., 1].T, Provenance.of(table)
+        _rounded(route_column.numbers()), tuple(contacts), pairs[..., 0].T, pairs[..., 1].T, Provenance.of(table)
     )
 
 
-def _angle_or_limit(cell: Cell, factor: float, detection_limit: float | None) -> tuple[float, float]:
+def _angle_or_limit(cell: Cell, column: Column, detection_limit: float | None) -> tuple[float, float]:
     written = cell.limit()
     if written is None and not cell.blank:
-        return _angle(cell, factor), np.nan
-    limit = written * factor if written is not None else detection_limit
+        return _angle(cell, column), np.nan
+    limit = written * column.factor if written is not None else detection_limit
     if limit is None:
         raise cell.refuse(
             "the cell is blank, which means too small to detect, but no detection limit is known; write <10 (the "
             'limit) in the cell, or set detection_limit = { value = 10, unit = "deg" } for the table in cable.toml.'
         )
     if not 0 < limit <= LARGEST_ANGLE:
-        raise cell.refuse(f"{cell.text.strip()!r} is not a possible detection limit; it lies between 0 and 2000 deg.")
+        raise cell.refuse(f"{cell.shown} is not a possible detection limit; write one between 0 and 2000 deg.")
     return np.nan, limit
 
 
-def _angle(cell: Cell, factor: float) -> float:
-    angle = cell.number() * factor
+def _angle(cell: Cell, column: Column) -> float:
+    angle = column.value(cell)
     if angle < 0:
-        raise cell.refuse(
-            f"{cell.text.strip()} is negative; wrap angles add up without sign, so write the absolute value."
-        )
+        raise cell.refuse(f"{cell.shown} is negative; wrap angles add up without sign, so write the absolute value.")
     if angle > LARGEST_ANGLE:
         raise cell.refuse(
-            f"{cell.text.strip()} is more than 2000 deg ({np.rad2deg(angle):.0f} deg); check the unit of the column."
+            f"{cell.shown} is more than 2000 deg ({np.rad2deg(angle):.5g} deg); check the unit of the column."
         )
     return angle
 
@@ -232,28 +231,53 @@ def read_efficiencies(
     found = find_columns(table, (*names, *_optional(route, contacts)), sources)
     column = require(table, found, "efficiency", "efficiency (0 to 1) or efficiency_percent")
     spread = found.get("efficiency_sd")
-    sd = [_positive(cell, spread.factor) if not cell.blank else 0.0 for cell in spread.cells] if spread else None
+    efficiency = [_efficiency(cell, column) for cell in column.cells]
+    pairs = zip(spread.cells, column.cells, strict=True) if spread else ()
+    sd = [0.0 if cell.blank else _efficiency_sd(cell, spread, beside, column) for cell, beside in pairs if spread]
     return EfficiencyTable(
         _route_values(table, found, route),
-        np.array([_efficiency(cell, column) for cell in column.cells]),
-        np.zeros(len(table.rows)) if sd is None else np.array(sd),
+        np.array(efficiency),
+        np.array(sd) if spread else np.zeros(len(table.rows)),
         _own_angles(table, found, contacts),
         Provenance.of(table),
     )
 
 
-def _efficiency(cell: Cell, column: Column) -> float:
+def _ratio(cell: Cell, column: Column) -> float:
+    """A number, or a percentage where the heading or the cell says so."""
     percentage = cell.percentage()
-    value = cell.number() * column.factor if percentage is None else percentage
+    return column.value(cell) if percentage is None else percentage
+
+
+def _in_percent(cell: Cell, column: Column) -> bool:
+    return column.factor != 1 or cell.percentage() is not None
+
+
+def _efficiency(cell: Cell, column: Column) -> float:
+    value = _ratio(cell, column)
     if value <= 0:
-        raise cell.refuse(f"an efficiency of {cell.text.strip()} is not possible; it is output force over input force.")
+        raise cell.refuse(f"an efficiency of {cell.shown} is not possible; it is output force over input force.")
     if value > 1:
         usual = (
-            "if it is in percent, name the column efficiency_percent"
-            if column.unit is None
-            else "the usual cause is that input and output force were swapped"
+            "the usual cause is that input and output force were swapped"
+            if _in_percent(cell, column)
+            else "if it is in percent, name the column efficiency_percent"
         )
-        raise cell.refuse(f"an efficiency of {cell.text.strip()} is above 1; {usual}.")
+        raise cell.refuse(f"an efficiency of {cell.shown} is above 1; {usual}.")
+    return value
+
+
+def _efficiency_sd(cell: Cell, column: Column, efficiency: Cell, efficiency_column: Column) -> float:
+    value = _ratio(cell, column)
+    if not 0 < value <= 1:
+        raise cell.refuse(
+            f"a standard deviation of {cell.shown} is not possible for an efficiency; write one up to 1 (100 %)."
+        )
+    if _in_percent(efficiency, efficiency_column) and not _in_percent(cell, column):
+        raise cell.refuse(
+            f"{cell.shown} does not say whether it is in percent as the efficiency beside it is; name the column "
+            "efficiency_sd_percent, or write 1 % for 0.01."
+        )
     return value
 
 
@@ -316,9 +340,9 @@ def _read_force_file(
     table = read_csv(path)
     forces = (Quantity("input_force", "force"), Quantity("output_force", "force"))
     labels = (Quantity("run", "text"), Quantity("stroke", "text"))
-    found = find_columns(table, (*forces, *labels, *_optional(route, contacts)), sources)
+    found = find_columns(table, (*forces, *labels, *_optional(route, contacts)), sources, _UNUSED)
     columns = [require(table, found, q.name, f"{q.name}_N") for q in forces]
-    input_force, output_force = (np.array([_positive(cell, c.factor) for cell in c.cells]) for c in columns)
+    input_force, output_force = (np.array([_force(cell, c) for cell in c.cells]) for c in columns)
     own = _own_angles(table, found, contacts)
     route_values = _route_values(table, found, route)
     remarks = []
@@ -347,20 +371,22 @@ def _runs(column: Column | None, route: Vector, own: OwnAngles) -> tuple[Labels,
 def _strokes(found: Mapping[str, Column], n_rows: int) -> Labels:
     if "stroke" not in found:
         return np.ones(n_rows, dtype=int)
-    cells = found["stroke"].cells
-    for cell in cells:
-        if cell.text.strip().lower() not in _STROKES:
+    strokes = []
+    for cell in found["stroke"].cells:
+        text = cell.text.strip().lower().replace("\u2212", "-").replace(",", ".")
+        if text not in _STROKES:
             raise cell.refuse(
-                f"{cell.text.strip()!r} is no stroke; write pull (+1), return (-1) or hold (0, read while nothing slides)."
+                f"{cell.shown} is no stroke; write pull (+1), return (-1) or hold (0, read while nothing slides)."
             )
-    return np.array([_STROKES[cell.text.strip().lower()] for cell in cells])
+        strokes.append(_STROKES[text])
+    return np.array(strokes)
 
 
-def _positive(cell: Cell, factor: float) -> float:
-    value = cell.number() * factor
+def _force(cell: Cell, column: Column) -> float:
+    value = column.value(cell)
     if value <= 0:
         raise cell.refuse(
-            f"{cell.text.strip()} is not positive; the usual cause is the sign convention of the load cell or a "
+            f"{cell.shown} is not positive; the usual cause is the sign convention of the load cell or a "
             "reading before tension was on: write tension as positive and leave slack readings out."
         )
     return value
@@ -375,7 +401,12 @@ def _optional(route: Route | None, contacts: Sequence[str]) -> tuple[Quantity, .
 def _route_values(table: RawTable, found: Mapping[str, Column], route: Route | None) -> Vector:
     if route is None:
         return np.full(len(table.rows), np.nan)
-    return np.array(require(table, found, route.variable, f"{route.variable}_{route.unit}").numbers())
+    return _rounded(require(table, found, route.variable, f"{route.variable}_{route.unit}").numbers())
+
+
+def _rounded(values: Iterable[float]) -> Vector:
+    """Values to 12 digits, so that one length is one number whatever unit each table gives it in."""
+    return np.array([float(f"{value:.12g}") for value in values])
 
 
 def _own_angles(table: RawTable, found: Mapping[str, Column], contacts: Sequence[str]) -> OwnAngles:
@@ -384,5 +415,13 @@ def _own_angles(table: RawTable, found: Mapping[str, Column], contacts: Sequence
     for k, name in enumerate(contacts):
         for target, column in ((angle, found.get(name)), (sd, found.get(f"{name}_sd"))):
             if column is not None:
-                target[:, k] = [np.nan if cell.blank else _angle(cell, column.factor) for cell in column.cells]
+                target[:, k] = [np.nan if cell.blank else _own_angle(cell, column) for cell in column.cells]
     return OwnAngles(tuple(contacts), angle, sd)
+
+
+def _own_angle(cell: Cell, column: Column) -> float:
+    if cell.limit() is not None:
+        raise cell.refuse(
+            f"{cell.shown} is no measured angle; leave the cell blank where the contact has a curve, or write the angle."
+        )
+    return _angle(cell, column)

@@ -1,9 +1,11 @@
 """Units, at the border only: whatever a table is written in becomes N, mm, rad and s here and nowhere else."""
 
+import re
 from functools import cache
 from typing import TYPE_CHECKING
 
 from bowdenfit.errors import DatasetError
+from bowdenfit.measurements.quoting import shown
 
 if TYPE_CHECKING:
     import pint
@@ -17,6 +19,9 @@ _EXAMPLES = {
     "velocity": "mm/s, m/s",
     "ratio": "%, 1",
 }
+# Names with products, quotients and small powers. Pint would compute whatever else it is given, such as 9**9**9.
+_WRITTEN = re.compile(r"[\w°%‰/*^().·\s-]{1,40}")
+_NO_UNIT = re.compile(r"\d\d|%%|(?:\*\*|\^)[\s(-]*\d[\s)]*(?:\*\*|\^)")
 
 
 @cache
@@ -60,7 +65,7 @@ def conversion_factor(unit: str, dimension: str, to: str | None = None) -> float
     if not _same_kind(parsed, target):
         hint = " (kg is a mass: for the weight of that mass write kgf)" if unit.strip() in {"kg", "g", "lb"} else ""
         raise DatasetError(
-            f"the unit {unit!r} does not measure {'a ' if dimension != 'angle' else 'an '}{dimension}{hint}; "
+            f"the unit {shown(unit)} does not measure {'a ' if dimension != 'angle' else 'an '}{dimension}{hint}; "
             f"use one such as {_EXAMPLES.get(dimension, to)}"
         )
     return float(_registry().Quantity(1.0, parsed).to(target).magnitude)
@@ -74,17 +79,26 @@ def route_conversion_factor(unit: str, to: str) -> float:
     """
     parsed, target = _parsed(unit), _parsed(to)
     if not _same_kind(parsed, target):
-        raise DatasetError(f"the unit {unit!r} cannot be converted to {to!r}, the unit of [route] in cable.toml")
+        raise DatasetError(f"the unit {shown(unit)} cannot be converted to {to!r}, the unit of [route] in cable.toml")
     return float(_registry().Quantity(1.0, parsed).to(target).magnitude)
 
 
 @cache
 def _parsed(unit: str) -> "pint.Unit":
-    text = unit.strip()
+    text = unit.strip().replace("º", "°")  # the ordinal sign of Spanish and Italian keyboards
+    unknown = f"the unit {shown(unit)} is not known; use one such as N, lbf, mm, inch, deg, rad, %"
+    if text in {"1", "-", ""}:
+        text = "dimensionless"
+    if not _WRITTEN.fullmatch(text) or _NO_UNIT.search(text):
+        raise DatasetError(unknown)
     try:
-        return _registry().parse_units("dimensionless" if text in {"1", "-", ""} else text)
+        parsed = _registry().parse_units(text)
+        zero = _registry().Quantity(0.0, parsed).to_root_units().magnitude
     except Exception as error:  # pint raises many kinds: tokenizer, attribute, value and assertion errors
-        raise DatasetError(f"the unit {unit!r} is not known; use one such as N, lbf, mm, inch, deg, rad, %") from error
+        raise DatasetError(unknown) from error
+    if zero != 0:
+        raise DatasetError(f"the unit {shown(unit)} does not count from zero (dB and degC do not); use one that does")
+    return parsed
 
 
 def _same_kind(a: "pint.Unit", b: "pint.Unit") -> bool:

@@ -9,22 +9,27 @@ from dataclasses import dataclass
 from typing import Protocol, TypeAlias, runtime_checkable
 
 import jax.numpy as jnp
+import numpy as np
 from jax import Array
 from jax.scipy.special import erf, erfinv, ndtr, ndtri
+from jax.scipy.stats import norm
 from jaxtyping import Float
 
-Real: TypeAlias = float | Float[Array, "*any"]
+_NEAR_ZERO = 1e-4  # below this a truncated normal's quantile is better computed from three terms of its series
+
+Numbers: TypeAlias = Array | np.ndarray
+Real: TypeAlias = float | Float[Numbers, "*any"]
 
 
 @runtime_checkable
 class Prior(Protocol):
     """What the parameter space needs of a prior."""
 
-    def constrain(self, z: Float[Array, "*any"]) -> Float[Array, "*any"]:
+    def constrain(self, z: Float[Numbers, "*any"]) -> Float[Numbers, "*any"]:
         """Quantile of Phi(z): from the standard normal to the parameter."""
         ...
 
-    def unconstrain(self, value: Float[Array, "*any"]) -> Float[Array, "*any"]:
+    def unconstrain(self, value: Float[Numbers, "*any"]) -> Float[Numbers, "*any"]:
         """Inverse of `constrain`."""
         ...
 
@@ -36,11 +41,11 @@ class Normal:
     mean: Real
     sd: Real
 
-    def constrain(self, z: Float[Array, "*any"]) -> Float[Array, "*any"]:
+    def constrain(self, z: Float[Numbers, "*any"]) -> Float[Numbers, "*any"]:
         """Mean + sd z"""
         return self.mean + self.sd * z
 
-    def unconstrain(self, value: Float[Array, "*any"]) -> Float[Array, "*any"]:
+    def unconstrain(self, value: Float[Numbers, "*any"]) -> Float[Numbers, "*any"]:
         """(value - mean) / sd"""
         return (value - self.mean) / self.sd
 
@@ -52,11 +57,11 @@ class LogNormal:
     median: Real
     log_sd: Real
 
-    def constrain(self, z: Float[Array, "*any"]) -> Float[Array, "*any"]:
+    def constrain(self, z: Float[Numbers, "*any"]) -> Float[Numbers, "*any"]:
         """Median exp(log_sd z)"""
         return self.median * jnp.exp(self.log_sd * z)
 
-    def unconstrain(self, value: Float[Array, "*any"]) -> Float[Array, "*any"]:
+    def unconstrain(self, value: Float[Numbers, "*any"]) -> Float[Numbers, "*any"]:
         """log(value / median) / log_sd"""
         return jnp.log(value / self.median) / self.log_sd
 
@@ -67,14 +72,14 @@ class HalfNormal:
 
     sd: Real
 
-    def constrain(self, z: Float[Array, "*any"]) -> Float[Array, "*any"]:
+    def constrain(self, z: Float[Numbers, "*any"]) -> Float[Numbers, "*any"]:
         """Upper half of a normal: through erf below the median and through the survival function above it."""
         below, above = _split(z)
         low = jnp.sqrt(2.0) * erfinv(ndtr(below))
         high = -ndtri(ndtr(-above) / 2)
         return self.sd * jnp.where(z < 0, low, high)
 
-    def unconstrain(self, value: Float[Array, "*any"]) -> Float[Array, "*any"]:
+    def unconstrain(self, value: Float[Numbers, "*any"]) -> Float[Numbers, "*any"]:
         """Standard normal quantile of 2 Phi(value / sd) - 1."""
         x = value / self.sd
         tail = 2 * ndtr(-x)
@@ -88,12 +93,12 @@ class Uniform:
     low: Real
     high: Real
 
-    def constrain(self, z: Float[Array, "*any"]) -> Float[Array, "*any"]:
+    def constrain(self, z: Float[Numbers, "*any"]) -> Float[Numbers, "*any"]:
         """Low + (high - low) Phi(z), from the nearer end."""
         width = self.high - self.low
         return jnp.where(z < 0, self.low + width * ndtr(z), self.high - width * ndtr(-z))
 
-    def unconstrain(self, value: Float[Array, "*any"]) -> Float[Array, "*any"]:
+    def unconstrain(self, value: Float[Numbers, "*any"]) -> Float[Numbers, "*any"]:
         """Standard normal quantile of the fraction of the range."""
         fraction = (value - self.low) / (self.high - self.low)
         return jnp.where(fraction < 0.5, ndtri(fraction), -ndtri(1 - fraction))
@@ -106,23 +111,30 @@ class TruncatedNormal:
     mean: Real
     sd: Real
 
-    def constrain(self, z: Float[Array, "*any"]) -> Float[Array, "*any"]:
-        """Quantile of the truncated normal, from the nearer tail."""
+    def constrain(self, z: Float[Numbers, "*any"]) -> Float[Numbers, "*any"]:
+        """Quantile of the truncated normal, from the nearer tail; next to 0, where digits cancel, its series."""
         ratio = self.mean / self.sd
         below, above = _split(z)
-        low = ndtri(ndtr(-ratio) + ndtr(ratio) * ndtr(below))
-        high = -ndtri(ndtr(ratio) * ndtr(-above))
-        return self.mean + self.sd * jnp.where(z < 0, low, high)
+        per_density = ndtr(ratio) * jnp.exp(jnp.minimum(-norm.logpdf(ratio), 700.0))  # inf would spoil derivatives
+        step = per_density * ndtr(below)
+        near = step * (1 + ratio) < _NEAR_ZERO
+        step = jnp.where(near, step, 0.0)
+        series = step - ratio * step**2 / 2 + (2 * ratio**2 + 1) * step**3 / 6
+        low = ratio + ndtri(ndtr(-ratio) + ndtr(ratio) * ndtr(jnp.where(near, -1.0, below)))
+        high = ratio - ndtri(ndtr(ratio) * ndtr(-above))
+        return self.sd * jnp.where(z < 0, jnp.where(near, series, low), high)
 
-    def unconstrain(self, value: Float[Array, "*any"]) -> Float[Array, "*any"]:
+    def unconstrain(self, value: Float[Numbers, "*any"]) -> Float[Numbers, "*any"]:
         """Standard normal quantile of the truncated distribution function."""
-        ratio, u = self.mean / self.sd, (value - self.mean) / self.sd
-        below, above = ndtr(-ratio), ndtr(ratio)
-        upper = ndtr(-u) / above
-        return jnp.where(upper < 0.5, -ndtri(jnp.minimum(upper, 0.5)), ndtri((ndtr(u) - below) / above))
+        ratio, x = self.mean / self.sd, value / self.sd
+        above = ndtr(ratio)
+        upper = ndtr(ratio - x) / above
+        series = jnp.exp(norm.logpdf(ratio)) * (x + ratio * x**2 / 2 + (ratio**2 - 1) * x**3 / 6)
+        lower = jnp.where(x * (1 + ratio) < _NEAR_ZERO, series, ndtr(x - ratio) - ndtr(-ratio)) / above
+        return jnp.where(upper < 0.5, -ndtri(jnp.minimum(upper, 0.5)), ndtri(jnp.minimum(lower, 0.5)))
 
 
-def _split(z: Float[Array, "*any"]) -> tuple[Float[Array, "*any"], Float[Array, "*any"]]:
+def _split(z: Float[Numbers, "*any"]) -> tuple[Float[Numbers, "*any"], Float[Numbers, "*any"]]:
     """Z for the lower and for the upper branch of a quantile, each harmless where the other branch is taken.
 
     (A plain minimum or maximum would halve the derivative at z = 0, where least squares starts.)

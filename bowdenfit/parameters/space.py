@@ -108,7 +108,9 @@ class ParameterSpace:
 
     def unconstrain(self, values: Mapping[str, Any]) -> Float[Array, " free"]:
         """Z at named values [internal units]."""
-        return jnp.stack([p.prior.unconstrain(jnp.asarray(values[p.name], dtype=float)) for p in self.free])
+        return jnp.array(
+            [p.prior.unconstrain(jnp.asarray(values[p.name], dtype=float)) for p in self.free], dtype=float
+        )
 
 
 def _stacked(kind: type, priors: list[Any]) -> Prior:

@@ -34,35 +34,36 @@ def write_text(path: Path, text: str) -> None:
         temporary.write_text(text, encoding="utf-8")
 
 
-def refuse_to_overwrite(folder: Path) -> None:
+def refuse_to_overwrite(folder: Path, force: bool) -> None:
     """Stop before anything is computed if the results would have no place.
+
+    Args:
+        folder: The results folder.
+        force: Whether an earlier fit there may be replaced.
 
     Raises:
         StoreError: The folder holds something already.
     """
     if (folder / FIT).exists():
+        if force:
+            return
         raise StoreError(
             f"{folder} holds a finished fit already; add --force to replace it, or name another with --output."
         )
     if (folder / CHAIN).exists():
+        if force:
+            return
         raise StoreError(f"{folder} holds an interrupted fit; go on with --resume, or start over with --force.")
     if folder.exists() and (not folder.is_dir() or any(folder.iterdir())):
         raise StoreError(f"{folder} exists and is no results folder; name another with --output.")
 
 
-def clear(folder: Path) -> bool:
-    """Remove what an earlier fit wrote, and nothing else; the mark of a finished fit goes first.
-
-    Returns:
-        Whether it was a results folder.
-    """
-    if not (folder / FIT).exists() and not (folder / CHAIN).exists():
-        return False
+def clear(folder: Path) -> None:
+    """Remove what an earlier fit wrote, and nothing else; the mark of a finished fit goes first."""
     for name in (FIT, SUMMARY, SUMMARY_TEXT, POSTERIOR, CHAIN):
         (folder / name).unlink(missing_ok=True)
     if (folder / FIGURES).is_dir():
         shutil.rmtree(folder / FIGURES)
-    return True
 
 
 def start_checkpoint(path: Path, fingerprint: Mapping[str, Any]) -> None:

@@ -37,14 +37,13 @@ Migration = Callable[[dict[str, Any]], dict[str, Any]]
 MIGRATIONS: Mapping[int, Migration] = {}  # from schema N to N + 1
 
 
-def save(fit: Fit, folder: Path, force: bool = False, write: Callable[..., Any] = write_groups) -> None:
+def save(fit: Fit, folder: Path, force: bool = False) -> None:
     """Write posterior.nc, summary.json and, last, fit.json.
 
     Args:
         fit: The fit.
         folder: Where to; made if missing.
         force: Whether a finished fit there may be replaced.
-        write: What writes posterior.nc; `write_groups`, or something that has another process do it.
 
     Raises:
         StoreError: The folder holds a finished fit already, or cannot be written.
@@ -55,7 +54,7 @@ def save(fit: Fit, folder: Path, force: bool = False, write: Callable[..., Any] 
         folder.mkdir(parents=True, exist_ok=True)
         (folder / POSTERIOR).unlink(missing_ok=True)
         if fit.posterior is not None:
-            write(folder / POSTERIOR, *posterior_groups(fit), variable_attributes(fit))
+            write_groups(folder / POSTERIOR, *posterior_groups(fit), variable_attributes(fit))
         write_text(folder / SUMMARY, json.dumps(summarize(fit), indent=1) + "\n")
         write_text(folder / FIT, json.dumps(_fit_page(fit), indent=1) + "\n")
     except OSError as error:

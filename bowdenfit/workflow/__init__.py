@@ -2,16 +2,18 @@
 
 import secrets
 from collections.abc import Callable, Sequence
+from concurrent.futures import Executor
+from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from bowdenfit.dataset import Dataset, load_dataset, single_table_dataset
 from bowdenfit.errors import StoreError, UsageError
-from bowdenfit.workflow.background import Assistants, assistants, draw_share
+from bowdenfit.results.folder import CHAIN, clear, read_checkpoint, refuse_to_overwrite, start_checkpoint
+from bowdenfit.workflow.background import draftsman, draw
 
 if TYPE_CHECKING:
     from bowdenfit.inference.ensemble import Progress
-    from bowdenfit.results.figure_data import FigureData
     from bowdenfit.results.fit import Fit
 
 _LARGEST_SEED = 2**31 - 1
@@ -73,8 +75,8 @@ def fit(
         resume: Go on with an interrupted or unconverged fit in `output`.
         force: Replace a fit in `output`.
         figures: Whether to draw figures into `output`.
-        in_background: Whether other processes may be started for statistics, files and figures, which is quicker; the
-            calling program must then guard its start with `if __name__ == "__main__"`.
+        in_background: Whether another process may be started for the figures, which is quicker; the calling program
+            must then guard its start with `if __name__ == "__main__"`.
         remember_compilations: Whether JAX may keep compiled programs in the user's cache folder, so that a second fit of
             the same shape compiles nothing; this is a setting of the whole process.
         progress: Called while sampling.
@@ -85,37 +87,36 @@ def fit(
     """
     folder = Path(output) if output is not None else None
     data = read(dataset, **reading)
-    seed = _prepared(folder, data, mcmc, seed, resume, force)
-    with assistants(in_background) as helpers:
+    seed = _checked(folder, data, mcmc, seed, resume, force)
+    with draftsman(in_background and figures and folder is not None) as drawing:
         import jax
 
         from bowdenfit.workflow.fitting import Stopwatch, run
 
         if remember_compilations:
             _remember_compilations()
-        watch = Stopwatch()
         with jax.enable_x64(True):
-            found = run(data, folder, mcmc, seed, resume, progress, watch, helpers)
+            begin = partial(_begun, folder, data, seed, resume)
+            found = run(data, begin, mcmc, seed, resume, progress, Stopwatch())
             if folder is not None:
-                _write(found, folder, figures, helpers)
+                _write(found, folder, figures, drawing)
     return found
 
 
-def _write(found: "Fit", folder: Path, figures: bool, helpers: Assistants) -> None:
+def _write(found: "Fit", folder: Path, figures: bool, drawing: Executor) -> None:
     """All files of the results folder; figures are drawn while the others are written."""
     from bowdenfit.report.text import summary_text
+    from bowdenfit.results.figure_data import figure_data
     from bowdenfit.results.folder import FIGURES, SUMMARY_TEXT, write_text
-    from bowdenfit.results.netcdf import write_groups
     from bowdenfit.results.store import save
 
-    drawings = []
-    if figures:
-        data, n = _figure_data(found), helpers.n_drawing
-        drawings = [helpers.drawing.submit(draw_share, data, folder / FIGURES, share, n) for share in range(n)]
-    save(found, folder, force=True, write=lambda *args: helpers.statistics.submit(write_groups, *args).result())
+    if found.posterior is None:
+        clear(folder)
+    drawn = drawing.submit(draw, figure_data(found), folder / FIGURES) if figures else None
+    save(found, folder, force=True)
     write_text(folder / SUMMARY_TEXT, summary_text(found))
-    for drawing in drawings:
-        drawing.result()
+    if drawn is not None:
+        drawn.result()
 
 
 def _fingerprint(data: Dataset, seed: int) -> dict[str, Any]:
@@ -126,29 +127,33 @@ def _fingerprint(data: Dataset, seed: int) -> dict[str, Any]:
     return {"description": description, "sha256": data.sha256, "seed": seed}
 
 
-def _prepared(folder: Path | None, data: Dataset, mcmc: bool, seed: int | None, resume: bool, force: bool) -> int:
-    """Check the output folder, start or check the checkpoint, and return the seed."""
+def _checked(folder: Path | None, data: Dataset, mcmc: bool, seed: int | None, resume: bool, force: bool) -> int:
+    """The seed, once it is clear that the results have a place, or that the checkpoint there belongs to this fit."""
     if resume and (folder is None or not mcmc):
         raise UsageError("--resume needs the results folder of a fit with MCMC; name it with --output.")
-    from bowdenfit.results.folder import CHAIN, clear, read_checkpoint, refuse_to_overwrite, start_checkpoint
+    if folder is None or not resume:
+        if folder is not None:
+            refuse_to_overwrite(folder, force)
+        return secrets.randbelow(_LARGEST_SEED) if seed is None else seed
+    before = read_checkpoint(folder)
+    now = _fingerprint(data, before["seed"] if seed is None else seed)
+    changed = [key for key in now if now[key] != before[key]]
+    if changed:
+        what = {"description": "the description", "sha256": "an input file", "seed": "the seed"}[changed[-1]]
+        raise StoreError(
+            f"{folder} cannot be resumed because {what} changed since; undo the change, or start over with --force."
+        )
+    return int(before["seed"])
 
-    if resume and folder is not None:
-        before = read_checkpoint(folder)
-        now = _fingerprint(data, before["seed"] if seed is None else seed)
-        changed = [key for key in now if now[key] != before[key]]
-        if changed:
-            what = {"description": "the description", "sha256": "an input file", "seed": "the seed"}[changed[-1]]
-            raise StoreError(
-                f"{folder} cannot be resumed because {what} changed since; undo the change, or start over with --force."
-            )
-        return int(before["seed"])
-    seed = secrets.randbelow(_LARGEST_SEED) if seed is None else seed
-    if folder is not None:
-        if not (force and clear(folder)):
-            refuse_to_overwrite(folder)
-        if mcmc:
-            start_checkpoint(folder / CHAIN, _fingerprint(data, seed))
-    return seed
+
+def _begun(folder: Path | None, data: Dataset, seed: int, resume: bool) -> Path | None:
+    """The checkpoint to sample into, in a folder cleared of what was there; nothing is touched before this."""
+    if folder is None:
+        return None
+    if not resume:
+        clear(folder)
+        start_checkpoint(folder / CHAIN, _fingerprint(data, seed))
+    return folder / CHAIN
 
 
 def plot(found: "Fit", folder: str | Path) -> list[Path]:
@@ -161,15 +166,9 @@ def plot(found: "Fit", folder: str | Path) -> list[Path]:
     Returns:
         The files written.
     """
-    from bowdenfit.plots.gallery import draw_all
-
-    return draw_all(_figure_data(found), Path(folder))
-
-
-def _figure_data(found: "Fit") -> "FigureData":
     from bowdenfit.results.figure_data import figure_data
 
-    return figure_data(found)
+    return draw(figure_data(found), Path(folder))
 
 
 def load(path: str | Path) -> "Fit":

@@ -1,25 +1,19 @@
-"""Other processes and threads that take work off a fit: statistics, files and figures need no model and no JAX."""
+"""What runs beside a fit: libraries are loaded while XLA compiles, figures are drawn while files are written."""
 
 import signal
 from collections.abc import Callable, Iterator
 from concurrent.futures import Executor, Future, ProcessPoolExecutor
 from contextlib import contextmanager
-from dataclasses import dataclass
 from importlib import import_module
 from multiprocessing import get_context
 from pathlib import Path
 from threading import Thread
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
-STATISTICS = (
-    "arviz_stats.base",
-    "arviz_base",
-    "h5netcdf",
-    "bowdenfit.inference.diagnostics",
-    "bowdenfit.results.netcdf",
-)
-DRAWING = ("bowdenfit.plots.gallery",)
-_DRAFTSMEN = 2
+if TYPE_CHECKING:
+    from bowdenfit.results.figure_data import FigureData
+
+_DRAWING = "bowdenfit.plots.gallery"
 
 
 class Inline(Executor):
@@ -32,54 +26,32 @@ class Inline(Executor):
         return job
 
 
-@dataclass(frozen=True)
-class Assistants:
-    """Who does what beside the fit itself.
-
-    Args:
-        statistics: Diagnostics and posterior.nc, which need ArviZ.
-        drawing: Figures, which need matplotlib.
-        n_drawing: How many figures can be drawn at a time.
-    """
-
-    statistics: Executor
-    drawing: Executor
-    n_drawing: int
-
-
 @contextmanager
-def assistants(in_background: bool) -> Iterator[Assistants]:
-    """Assistants in other processes, which load their libraries while this one computes, or here and now.
+def draftsman(in_background: bool) -> Iterator[Executor]:
+    """Who draws the figures: a process that loads matplotlib while this one computes, or this one, here and now.
 
     A started process imports the main module again, so only a program that guards its start may ask for the background:
     the command line does, the library does not unless told to.
     """
     if not in_background:
-        yield Assistants(Inline(), Inline(), 1)
+        yield Inline()
         return
-    start = get_context("spawn")
-    with (
-        ProcessPoolExecutor(1, start, initializer=_ready, initargs=(STATISTICS,)) as statistics,
-        ProcessPoolExecutor(_DRAFTSMEN, start, initializer=_ready, initargs=(DRAWING,)) as drawing,
-    ):
-        for pool, n in ((statistics, 1), (drawing, _DRAFTSMEN)):
-            for _ in range(n):
-                pool.submit(len, ())  # a process starts with its first job
-        yield Assistants(statistics, drawing, _DRAFTSMEN)
+    with ProcessPoolExecutor(1, get_context("spawn"), initializer=_ready) as pool:
+        pool.submit(len, ())  # the process starts with its first job
+        yield pool
 
 
-def draw_share(data: Any, folder: Path, share: int, of: int) -> None:
-    """Draw every so manieth figure of a fit; all shares together are all figures."""
-    from bowdenfit.plots.gallery import FIGURES, draw_all
+def draw(data: "FigureData", folder: Path) -> list[Path]:
+    """Draw all figures that apply; loads matplotlib, and no model."""
+    from bowdenfit.plots.gallery import draw_all
 
-    draw_all(data, folder, names=tuple(FIGURES)[share::of])
+    return draw_all(data, folder)
 
 
-def _ready(modules: tuple[str, ...]) -> None:
-    """Load what the jobs need; an interrupt is the parent's to handle."""
+def _ready() -> None:
+    """Load what drawing needs; an interrupt is the parent's to handle."""
     signal.signal(signal.SIGINT, signal.SIG_IGN)
-    for module in modules:
-        import_module(module)
+    import_module(_DRAWING)
 
 
 def load_ahead(*modules: str) -> None:

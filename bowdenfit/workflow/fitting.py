@@ -14,15 +14,13 @@ import jax
 import numpy as np
 
 from bowdenfit.dataset import Dataset
-from bowdenfit.inference.diagnostics import diagnose_all
 from bowdenfit.inference.least_squares import MaximumPosterior, least_squares, make_objective, maximum_posterior
 from bowdenfit.inference.posterior import Posterior as Density
 from bowdenfit.models.build import Model, build_model
 from bowdenfit.predictions.draws import for_each_draw, replicator
 from bowdenfit.predictions.optimal_length import optimum_of
 from bowdenfit.results.fit import OPTIMAL_EFFICIENCY, OPTIMAL_LENGTH, Fit, Posterior, Provenance
-from bowdenfit.results.folder import CHAIN
-from bowdenfit.workflow.background import Assistants, load_ahead
+from bowdenfit.workflow.background import load_ahead
 
 VERSIONED = ("bowdenfit", "jax", "optimistix", "emcee", "arviz-stats", "numpy", "scipy")
 PRIOR_DRAWS = 4096
@@ -61,19 +59,28 @@ class Compiled:
 
 def run(
     data: Dataset,
-    folder: Path | None,
+    begin: Callable[[], Path | None],
     mcmc: bool,
     seed: int,
     resume: bool,
     progress: Callable[..., None] | None,
     watch: Stopwatch,
-    helpers: Assistants,
 ) -> Fit:
-    """Least squares, and the posterior if `mcmc`; see `bowdenfit.workflow.fit`."""
+    """Least squares, and the posterior if `mcmc`; see `bowdenfit.workflow.fit`.
+
+    Args:
+        data: What is fitted.
+        begin: Called when sampling starts; gives the checkpoint to write, if any.
+        mcmc: Whether to sample.
+        seed: Seed.
+        resume: Whether the checkpoint has states to go on from.
+        progress: Called while sampling.
+        watch: Records the stages' times.
+    """
     density = Density(build_model(data))
     with ThreadPoolExecutor(1) as thread:
         if mcmc:
-            load_ahead("scipy.stats", "emcee")
+            load_ahead("scipy.stats", "emcee", "arviz_stats.base", "arviz_base")
             programs = thread.submit(_compiled, density, seed)
         with watch.stage("compile least squares"):
             objective = make_objective(density)
@@ -85,7 +92,7 @@ def run(
             return Fit(data, squares, None, not reasons, reasons, provenance(seed, watch))
         with watch.stage("compile the posterior"):
             compiled = programs.result()
-    posterior, reasons = _sampled(density, compiled, start, seed, folder, resume, progress, watch, helpers)
+    posterior, reasons = _sampled(density, compiled, start, seed, begin, resume, progress, watch)
     return Fit(data, squares, posterior, not reasons, reasons, provenance(seed, watch))
 
 
@@ -102,11 +109,10 @@ def _sampled(
     compiled: Compiled,
     start: MaximumPosterior,
     seed: int,
-    folder: Path | None,
+    begin: Callable[[], Path | None],
     resume: bool,
     progress: Callable[..., None] | None,
     watch: Stopwatch,
-    helpers: Assistants,
 ) -> tuple[Posterior, tuple[str, ...]]:
     with watch.stage("import emcee"):
         from bowdenfit.inference.ensemble import sample
@@ -116,7 +122,6 @@ def _sampled(
             return {}
         return dict(zip((OPTIMAL_LENGTH, OPTIMAL_EFFICIENCY), compiled.optimum(z), strict=True))
 
-    checkpoint = folder / CHAIN if folder is not None else None
     with watch.stage("sample"):
         chain = sample(
             density,
@@ -125,10 +130,9 @@ def _sampled(
             density.model.description.sampler,
             seed,
             quantities,
-            checkpoint,
+            begin(),
             resume,
             progress,
-            diagnose=lambda *args: helpers.statistics.submit(diagnose_all, *args).result(),
         )
     with watch.stage("replicate"):
         values, groups, prior = _implied(density.model, compiled, chain.z, seed)

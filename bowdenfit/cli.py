@@ -138,10 +138,10 @@ def check(dataset: Path, **options: Any) -> None:
 
     DATASET is a folder with cable.toml and tables, or one table with --wrap-angle.
     """
+    from bowdenfit import workflow
     from bowdenfit.report.check import check_text
-    from bowdenfit.workflow import read
 
-    click.echo(check_text(read(dataset, **_reading(**options))), nl=False)
+    click.echo(check_text(workflow.check(dataset, **_reading(**options))), nl=False)
 
 
 @bowdenfit.command(short_help="Fit a data set: coefficients, uncertainty, design answer, figures.")

@@ -336,9 +336,9 @@ class Description(_Frozen):
 
 
 def nearest(name: str, known: Sequence[str]) -> str:
-    """The nearest known name as a question, or what there is."""
+    """End of a sentence about an unknown name: the nearest known one as a question, or what there is."""
     near = difflib.get_close_matches(name, list(known), n=1, cutoff=0.5)
-    return f"; did you mean {near[0]!r}?" if near else f"; known here: {', '.join(known)}"
+    return f"; did you mean {near[0]!r}?" if near else f"; known here: {', '.join(known)}."
 
 
 def load_description(path: Path, overrides: Sequence[str] = ()) -> Description:
@@ -436,14 +436,15 @@ def _explained(error: ValidationError, file: str) -> str:
     where = [str(part) for part in first["loc"]]
     place = f"{file}, {'.'.join(where)}" if where else file
     if first["type"] == "extra_forbidden":
-        return f"{file}: unknown key {'.'.join(where)!r}{nearest(where[-1], _siblings(where[:-1]))}."
+        return f"{file}: unknown key {'.'.join(where)!r}{nearest(where[-1], _siblings(where[:-1]))}"
     if first["type"] == "missing":
         return f"{file}: the key {'.'.join(where)!r} is missing; `bowdenfit init` writes a template that has it."
     message = first["msg"].removeprefix("Value error, ")
     if where == ["schema"]:
         message = f"schema {first['input']} is newer than this program, which reads up to {SCHEMA}; update bowdenfit"
     shown = f" (found {first['input']!r})" if not isinstance(first["input"], dict | list) and where else ""
-    return f"{place}: {message[:1].lower() + message[1:]}{shown}."
+    sentence = f"{place}: {message[:1].lower() + message[1:]}{shown}"
+    return sentence if sentence.endswith((".", "?")) else f"{sentence}."
 
 
 def _siblings(path: Sequence[str]) -> list[str]:

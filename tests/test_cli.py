@@ -219,7 +219,7 @@ def test_a_table_alone_needs_its_wrap_angle(run, tmp_path):
 
 
 def test_an_internal_error_is_a_sentence_with_a_request(run, monkeypatch, on_body):
-    monkeypatch.setattr("bowdenfit.workflow.read", lambda *_, **__: 1 / 0)
+    monkeypatch.setattr("bowdenfit.workflow.check", lambda *_, **__: 1 / 0)
     code, _, err = run("check", on_body)
     assert code == 1
     assert "our fault" in err

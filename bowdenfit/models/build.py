@@ -129,8 +129,8 @@ def _space(description: Description, measurements: Measurements, cable: Cable) -
     known = [p.name for p in parameters]
     for name in description.prior:
         if name not in known or name in description.coefficients:
-            hint = f"; friction coefficients belong under [friction.{name}]" if name in known else nearest(name, known)
-            raise DescriptionError(f"cable.toml, prior.{name}: no such parameter{hint}.")
+            hint = f"; friction coefficients belong under [friction.{name}]." if name in known else nearest(name, known)
+            raise DescriptionError(f"cable.toml, prior.{name}: no such parameter{hint}")
     settings = {**description.friction, **description.prior}
     return ParameterSpace(tuple(_set(p, settings[p.name]) if p.name in settings else p for p in parameters))
 

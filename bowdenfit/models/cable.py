@@ -204,6 +204,6 @@ def make_cable(description: Description, measurements: Measurements) -> Cable:
 def _lookup(registry: Mapping[str, Entry], name: str | None, what: str, contact: Contact) -> Entry:
     if name is None or name not in registry:
         raise DescriptionError(
-            f"cable.toml, contact {contact.name!r}: the {what} {name!r} is unknown{nearest(str(name), list(registry))}."
+            f"cable.toml, contact {contact.name!r}: the {what} {name!r} is unknown{nearest(str(name), list(registry))}"
         )
     return registry[name]

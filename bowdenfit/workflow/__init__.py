@@ -51,6 +51,32 @@ def read(
     return load_dataset(Path(dataset), changes)
 
 
+def check(dataset: str | Path | Dataset, **reading: Any) -> Dataset:
+    """Read a data set, and build the model where only that can tell whether the description makes sense.
+
+    Loading JAX takes longer than everything else here, so the model is built only for names and priors that the
+    description alone cannot judge.
+
+    Args:
+        dataset: See `read`; its keywords are taken too.
+        reading: Keywords of `read`.
+
+    Raises:
+        DescriptionError, DatasetError: What is wrong, in a sentence.
+    """
+    data = read(dataset, **reading)
+    description = data.description
+    usual = all(c.law == "capstan" and c.wrap_angle.curve in {None, "gaussian"} for c in description.contact)
+    if not usual or description.prior or any(setting.prior for setting in description.friction.values()):
+        import jax
+
+        from bowdenfit.models.build import build_model
+
+        with jax.enable_x64(True):
+            build_model(data)
+    return data
+
+
 def fit(
     dataset: str | Path | Dataset,
     *,

@@ -35,7 +35,7 @@ def test_layers_import_only_downward():
         ("import bowdenfit", {"jax", "emcee", "matplotlib", "pint", "pydantic", "arviz_base", "scipy"}),
         ("import bowdenfit.cli", {"jax", "emcee", "matplotlib", "pint", "pydantic", "numpy"}),
         ("import bowdenfit as bf; bf.read('datasets/on-body-exoskeleton')", {"jax", "emcee", "matplotlib"}),
-        ("import bowdenfit.plots.gallery", {"jax", "emcee"}),
+        ("import bowdenfit.plots.gallery, bowdenfit.results.figure_data", {"jax", "emcee", "scipy", "pint"}),
         ("import bowdenfit.inference.diagnostics, bowdenfit.results.netcdf", {"jax", "emcee", "matplotlib"}),
     ],
 )

@@ -5,7 +5,8 @@ from html import escape
 from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
-    from bowdenfit.results.fit import Fit, OptimalLength
+    from bowdenfit.results.answers import OptimalLength
+    from bowdenfit.results.fit import Fit
 
 
 def design_answer(answer: "OptimalLength") -> str:

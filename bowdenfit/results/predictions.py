@@ -7,7 +7,8 @@ import numpy as np
 from bowdenfit.errors import DatasetError, UsageError
 from bowdenfit.measurements.units import conversion_factor
 from bowdenfit.models.scatter import RUN_SCATTER
-from bowdenfit.results.fit import Fit, Interval
+from bowdenfit.results.answers import Interval
+from bowdenfit.results.fit import Fit
 
 _STROKES = {"pull": 1, "return": -1}
 

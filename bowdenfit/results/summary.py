@@ -5,7 +5,8 @@ from typing import Any
 
 import numpy as np
 
-from bowdenfit.results.fit import Fit, Interval
+from bowdenfit.results.answers import Interval
+from bowdenfit.results.fit import Fit
 
 SCHEMA = 1
 

@@ -132,8 +132,8 @@ def fit(
 def _write(found: "Fit", folder: Path, figures: bool, drawing: Executor) -> None:
     """All files of the results folder; figures are drawn while the others are written."""
     from bowdenfit.report.text import summary_text
-    from bowdenfit.results.figure_data import figure_data
     from bowdenfit.results.folder import FIGURES, SUMMARY_TEXT, write_text
+    from bowdenfit.results.shown import figure_data
     from bowdenfit.results.store import save
 
     if found.posterior is None:
@@ -192,7 +192,7 @@ def plot(found: "Fit", folder: str | Path) -> list[Path]:
     Returns:
         The files written.
     """
-    from bowdenfit.results.figure_data import figure_data
+    from bowdenfit.results.shown import figure_data
 
     return draw(figure_data(found), Path(folder))
 

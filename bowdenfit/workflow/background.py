@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING, Any
 if TYPE_CHECKING:
     from bowdenfit.results.figure_data import FigureData
 
-_DRAWING = "bowdenfit.plots.gallery"
+_DRAWING = ("bowdenfit.plots.gallery", "bowdenfit.results.figure_data")
 
 
 class Inline(Executor):
@@ -51,7 +51,8 @@ def draw(data: "FigureData", folder: Path) -> list[Path]:
 def _ready() -> None:
     """Load what drawing needs; an interrupt is the parent's to handle."""
     signal.signal(signal.SIGINT, signal.SIG_IGN)
-    import_module(_DRAWING)
+    for module in _DRAWING:
+        import_module(module)
 
 
 def load_ahead(*modules: str) -> None:

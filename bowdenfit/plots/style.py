@@ -1,0 +1,86 @@
+"""How every figure looks: colors, sizes and words; the one place where matplotlib's settings are chosen."""
+
+import functools
+import math
+from collections.abc import Callable, Iterable
+from typing import Any, ParamSpec, TypeVar
+
+import matplotlib as mpl
+
+Arguments, Result = ParamSpec("Arguments"), TypeVar("Result")
+
+# Okabe and Ito's palette, which readers with any kind of color vision can tell apart.
+BLACK, ORANGE, SKY, GREEN = "#000000", "#E69F00", "#56B4E9", "#009E73"
+BLUE, VERMILLION, PURPLE, GRAY = "#0072B2", "#D55E00", "#CC79A7", "#666666"
+LIGHT = "#E9E9E9"
+# Each series differs in color, marker and line, so that it survives a gray print.
+SERIES_COLORS = (BLUE, VERMILLION, GREEN, PURPLE, BLACK, ORANGE, SKY, GRAY)
+SERIES_MARKERS = ("o", "s", "^", "D", "v", "P", "X", "h")
+SERIES_LINES = ("-", (0, (5, 1.5)), (0, (1, 1)), (0, (5, 1, 1, 1)))
+
+WIDE = 7.0  # in, both columns of a paper
+MEDIUM = 4.6  # in, figures of one panel
+SMALL = 7  # pt, ticks and legends
+DOTS_PER_INCH = 160
+
+EFFICIENCY, WRAP_ANGLE = "Efficiency (%)", "Wrap angle (deg)"
+WIDE_INTERVAL, NARROW_INTERVAL, MEDIAN, LEAST_SQUARES = "90 % interval", "50 % interval", "Median", "Least squares"
+
+SETTINGS: dict[Any, Any] = {
+    "font.family": ["sans-serif"],
+    "font.sans-serif": ["DejaVu Sans", "Bitstream Vera Sans", "Verdana", "Arial"],  # in SVG; here always the first
+    "mathtext.fontset": "dejavusans",
+    "font.size": 8,
+    "axes.titlesize": 8,
+    "axes.titley": 1.0,  # given, not searched for: the search takes longer than drawing the title
+    "axes.labelsize": 8,
+    "xtick.labelsize": SMALL,
+    "ytick.labelsize": SMALL,
+    "legend.fontsize": SMALL,
+    "legend.frameon": False,
+    "legend.handlelength": 1.8,
+    "axes.spines.top": False,
+    "axes.spines.right": False,
+    "axes.linewidth": 0.7,
+    "axes.grid": True,
+    "axes.axisbelow": True,
+    "axes.formatter.limits": [-3, 4],
+    "grid.color": "#DDDDDD",
+    "grid.linewidth": 0.5,
+    "lines.linewidth": 1.3,
+    "lines.markersize": 4.5,
+    "hatch.linewidth": 0.5,
+    "figure.dpi": DOTS_PER_INCH,
+    "figure.facecolor": "white",
+    "svg.fonttype": "none",
+    "svg.hashsalt": "bowdenfit",
+}
+
+
+def in_paper_style(function: Callable[Arguments, Result]) -> Callable[Arguments, Result]:
+    """Run a function under the settings of this file; matplotlib's own are back afterwards."""
+
+    @functools.wraps(function)
+    def styled(*args: Arguments.args, **kwargs: Arguments.kwargs) -> Result:
+        if all(mpl.rcParams[name] == value for name, value in SETTINGS.items()):
+            return function(*args, **kwargs)  # called by another such function; a context takes 3 ms
+        with mpl.rc_context(SETTINGS):
+            return function(*args, **kwargs)
+
+    return styled
+
+
+def percent(fraction: float) -> str:
+    """'1 %'"""
+    return f"{100 * fraction:.3g} %"
+
+
+def labeled(symbol: str, unit: str) -> str:
+    """Symbol and unit for an axis; no unit is written where there is none."""
+    return symbol if unit in {"", "1"} else f"{symbol} ({unit})"
+
+
+def rounded(values: Iterable[float], spread: float) -> list[str]:
+    """Numbers as text, to two significant digits of their spread."""
+    decimals = 3 if not 0 < spread < math.inf else max(0, 1 - math.floor(math.log10(spread)))
+    return [f"{value:.{decimals}f}".replace("-", "\N{MINUS SIGN}") for value in values]

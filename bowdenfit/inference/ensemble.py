@@ -17,9 +17,9 @@ from bowdenfit.inference.diagnostics import Diagnostics, diagnose_all, shortfall
 from bowdenfit.inference.least_squares import MaximumPosterior
 from bowdenfit.inference.posterior import Posterior
 
-THIN = 10  # steps from one stored state to the next
-_BLOCK = 20  # stored states between two reports
-_FIRST_LOOK = 100  # stored states before the first look
+THIN = 20  # steps from one stored state to the next
+_BLOCK = 10  # stored states between two reports
+_FIRST_LOOK = 50  # stored states before the first look
 _KEPT_PER_WALKER = 20  # draws that are kept of each walker, spread over the second half of its path
 
 Moves = Sequence[tuple[emcee.moves.RedBlueMove, float]]
@@ -84,7 +84,7 @@ class SideBySide(emcee.moves.RedBlueMove):
             pairs = zip(moving, resting, strict=True)
             proposed = [self.move.get_proposal(state.coords[m], [state.coords[r]], model.random) for m, r in pairs]
             coords, factors = (np.concatenate(part) for part in zip(*proposed, strict=True))
-            log_density, _ = model.compute_log_prob_fn(coords)
+            log_density = model.log_prob_fn(coords)  # ours gives an array; emcee would go through it number by number
             which = moving.ravel()
             better = factors + log_density - state.log_prob[which] > np.log(model.random.uniform(size=len(which)))
             state.coords[which[better]] = coords[better]

@@ -5,7 +5,7 @@ on any residual, is reported as not identified. With priors (z itself as further
 posterior at the noise scales' prior medians.
 """
 
-from collections.abc import Callable
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -18,6 +18,7 @@ from jax import Array
 from bowdenfit.errors import ConvergenceError
 from bowdenfit.inference.compilation import compiled
 from bowdenfit.inference.posterior import Posterior
+from bowdenfit.models.build import Term
 from bowdenfit.parameters.priors import HalfNormal, LogNormal, TruncatedNormal, Uniform
 from bowdenfit.parameters.space import Parameter
 
@@ -58,7 +59,8 @@ class LeastSquares:
         residual_sd: Standard deviation of the residuals by table, in the shown unit of the table's noise scale; NaN
             without degrees of freedom.
         readings: Expected readings of each table at the solution, in the table's unit.
-        condition_number: Of the Jacobian with columns in units of the prior's sd, identified parameters only.
+        condition_number: Of the Jacobian with columns in units of the prior's sd; infinite where the measurements leave
+            a direction undetermined. Parameters that ran to an end of their range do not count.
         sum_of_squares: Of the standardized residuals.
         z: Solution in z (noise scales at their prior median).
         converged: Whether the solver met its tolerance.
@@ -136,7 +138,7 @@ def least_squares(posterior: Posterior, objective: Objective, start: np.ndarray)
     """Least squares without priors, from the maximum of the posterior.
 
     The weights of the tables against each other are the prior medians of the noise scales; the standard errors use the
-    scatter that is left (sandwich form), table by table.
+    scatter that is left (sandwich form), table by table; a force table scatters between its runs and within them.
 
     Args:
         posterior: The posterior.
@@ -189,8 +191,7 @@ def _summarized(posterior: Posterior, found: Solution, noise: np.ndarray, at_end
     informed = np.zeros(len(active), dtype=bool)
     informed[: len(s)] = s > _SINGULAR * max(s.max(initial=0.0), 1e-30)
     s, u = s[informed[: len(s)]], u[:, : len(active)][:, informed[: u.shape[1]]]
-    in_order = {term.name: found["residuals"][term.name] for term in posterior.model.terms}  # JAX sorts by key
-    scale, residual_sd = _scatter(in_order, np.sum(u**2, axis=1))
+    scale, residual_sd = _scatter(posterior.model.terms, found["residuals"], np.sum(u**2, axis=1))
     root = vt[informed].T / s
     error = np.sqrt(np.sum((root @ (u.T * scale)) ** 2, axis=1))
     undetermined = np.sum(vt[~informed] ** 2, axis=0) > 1e-6
@@ -222,16 +223,22 @@ def _summarized(posterior: Posterior, found: Solution, noise: np.ndarray, at_end
     )
 
 
-def _scatter(residuals: dict[str, np.ndarray], leverage: np.ndarray) -> tuple[np.ndarray, dict[str, float]]:
-    """Scatter of the standardized residuals of each table about the fit: for each residual, and by table.
+def _scatter(
+    terms: Sequence[Term], residuals: Mapping[str, np.ndarray], leverage: np.ndarray
+) -> tuple[np.ndarray, dict[str, float]]:
+    """Scatter of the standardized residuals about the fit: for each residual, and by table (of its first block).
 
-    A table whose residuals are all used up by parameters has no scatter of its own; its weight stands.
+    A block whose residuals are all used up by parameters has no scatter of its own; its weight stands.
     """
     scale, by_table, start = np.ones(len(leverage)), {}, 0
-    for name, values in residuals.items():
-        rows = slice(start, start + len(values))
-        freedom = np.count_nonzero(values) - leverage[rows].sum()
-        spread = float(np.sqrt(np.sum(values**2) / freedom)) if freedom > _FREEDOM else float("nan")
-        scale[rows] = spread if np.isfinite(spread) else 1.0
-        by_table[name], start = spread, rows.stop
+    for term in terms:
+        spreads, first = [], start
+        for count, independent in term.residual_blocks:
+            rows, values = slice(start, start + count), residuals[term.name][start - first : start - first + count]
+            freedom = min(np.count_nonzero(values), independent) - leverage[rows].sum()
+            spread = float(np.sqrt(np.sum(values**2) / freedom)) if freedom > _FREEDOM else float("nan")
+            scale[rows] = spread if np.isfinite(spread) else 1.0
+            spreads.append(spread)
+            start = rows.stop
+        by_table[term.name] = spreads[0]
     return scale, by_table

@@ -37,6 +37,11 @@ class AnglesTerm:
     unit: str = "deg"
     noise: str = ANGLE_NOISE
 
+    @property
+    def residual_blocks(self) -> tuple[tuple[int, int], ...]:
+        """All readings scatter alike."""
+        return ((len(self.labels), len(self.labels)),)
+
     def _expected(self, values: Mapping[str, Array], data: Mapping[str, Any]) -> Float[Array, " readings"]:
         curves = self.cable.curves
         parts = [curve.wrap_angle(values, data["route"][column]) for column, curve in curves.items()]

@@ -64,6 +64,11 @@ class Term(Protocol):
         """The noise scale that its residuals are standardized by."""
         ...
 
+    @property
+    def residual_blocks(self) -> tuple[tuple[int, int], ...]:
+        """Its residuals by what makes them scatter, in order: how many there are, how many of them vary independently."""
+        ...
+
     def log_likelihood(self, values: Mapping[str, Array], data: Mapping[str, Any]) -> Array:
         """Log likelihood of each reading."""
         ...

@@ -40,6 +40,11 @@ class EfficienciesTerm:
     unit: str = "1"
     noise: str = RUN_SCATTER
 
+    @property
+    def residual_blocks(self) -> tuple[tuple[int, int], ...]:
+        """All rows scatter alike."""
+        return ((len(self.labels), len(self.labels)),)
+
     def _mean_and_sd(
         self, values: Mapping[str, Array], data: Mapping[str, Any], weights: Mapping[str, Array]
     ) -> tuple[Float[Array, " rows"], Float[Array, " rows"]]:

@@ -46,6 +46,12 @@ class SlidingForcesTerm:
     unit: str = "1"
     noise: str = RUN_SCATTER
 
+    @property
+    def residual_blocks(self) -> tuple[tuple[int, int], ...]:
+        """Runs scatter by their mounting; the cells of a run about its mean by the load cells."""
+        runs, cells = len(self.labels), len(self.data["mean"])
+        return ((runs, runs), (cells, cells - runs))
+
     def _deviations(
         self, values: Mapping[str, Array], data: Mapping[str, Any], weights: Mapping[str, Array]
     ) -> tuple[Float[Array, " cells"], Float[Array, " runs"], Float[Array, " runs"]]:
@@ -111,6 +117,11 @@ class HeldForcesTerm:
     name: str = "held_ratio"
     unit: str = "1"
     noise: str = RUN_SCATTER
+
+    @property
+    def residual_blocks(self) -> tuple[tuple[int, int], ...]:
+        """An interval has no scatter."""
+        return ((len(self.labels), 0),)
 
     def log_likelihood(self, values: Mapping[str, Array], data: Mapping[str, Any]) -> Float[Array, " rows"]:
         """Log likelihood of each row."""

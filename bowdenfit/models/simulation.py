@@ -137,7 +137,7 @@ def _simulated_angles(
     theta = jnp.stack([curve.wrap_angle(values, route) for curve in cable.curves.values()], axis=-1)
     reading = np.asarray(theta + scale * values[ANGLE_NOISE] * jax.random.normal(key, theta.shape))
     settings = cable.description.tables.angles
-    limit = settings.detection_limit.to("angle") if settings and settings.detection_limit else 0.0
+    limit = settings.detection_limit.to("angle") if settings and settings.detection_limit else -np.inf
     undetected = reading < limit
     return replace(
         table, angle=np.where(undetected, np.nan, np.maximum(reading, 0.0)), limit=np.where(undetected, limit, np.nan)

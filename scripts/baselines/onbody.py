@@ -1,10 +1,11 @@
-"""What both baselines share: the on-body tables read plainly, the effective sample size, and the report.
+"""What the compared programs share: the on-body tables read plainly, the effective sample size, and the report.
 
-Nothing here uses bowdenfit: the baselines are what a user would write who has the model and no package for it.
+Nothing here uses bowdenfit: the plain programs are what a user would write who has the model and no package for it.
 """
 
 import csv
 import json
+import sys
 import time
 from collections.abc import Callable
 from pathlib import Path
@@ -67,20 +68,33 @@ def smallest_ess(draws: np.ndarray) -> float:
 def report(run: Callable[[int], np.ndarray]) -> None:
     """Run a sampler twice, first cold and then with everything imported and compiled, and print what came out.
 
+    The seed is the first argument of the command line.
+
     Args:
         run: From a seed to draws (chain, draw, parameter) with at least `TARGET` effective ones.
     """
-    draws = run(1)
+    seed = int(sys.argv[1])
+    draws = run(seed)
     ready_at = time.monotonic()
     start = time.perf_counter()
-    again = run(2)
-    seconds = time.perf_counter() - start
+    again = run(seed + 1000)
+    show(ready_at, draws, time.perf_counter() - start, again)
+
+
+def show(ready_at: float, draws: np.ndarray, sampling_seconds: float, again: np.ndarray) -> None:
+    """Print one line of JSON for scripts/benchmark_fit.py.
+
+    Args:
+        ready_at: When the draws were there, on the clock that all processes of the machine share.
+        draws: Draws (chain, draw, parameter).
+        sampling_seconds: Seconds that sampling took with everything compiled.
+        again: The draws of those seconds.
+    """
     mu = np.concatenate([draws[..., :3].reshape(-1, 3), again[..., :3].reshape(-1, 3)])
     page = {
-        "ready_at": ready_at,  # on the clock that all processes of the machine share
+        "ready_at": ready_at,
         "ess": smallest_ess(draws),
-        "sampling_seconds": seconds,
-        "sampling_ess": smallest_ess(again),
+        "draws_per_second": smallest_ess(again) / sampling_seconds,
         "mean": mu.mean(axis=0).tolist(),
         "sd": mu.std(axis=0).tolist(),
     }

@@ -5,8 +5,8 @@ import numpy as np
 import onbody
 from scipy.special import log_ndtr
 
-N_WALKERS = 128
-FIRST_LOOK = 2000  # steps before the effective sample size is looked at
+N_WALKERS = 256  # quicker here than 64 or 128
+FIRST_LOOK = 1000  # steps before the effective sample size is looked at
 THIN = 10
 DATA = onbody.tables()
 

@@ -1,4 +1,8 @@
-"""The on-body posterior with NumPyro: sample statements, a factor for what was too small to detect, and NUTS."""
+"""The on-body posterior with NumPyro: sample statements, a factor for what was too small to detect, and NUTS.
+
+The settings are the quickest of those tried: chains in parallel beat sequential and vectorized ones, and a dense mass
+matrix mixes worse in the funnel that tau makes.
+"""
 
 import jax
 import jax.numpy as jnp
@@ -10,8 +14,11 @@ from jax.scipy.special import log_ndtr
 from numpyro.infer import MCMC, NUTS
 
 N_CHAINS, N_WARMUP, N_DRAWS = 4, 1000, 500  # draws a chain between two looks at the effective sample size
-TARGET_ACCEPTANCE = 0.9
+TARGET_ACCEPTANCE = 0.9  # the default 0.8 diverges more and is no quicker
 DATA = onbody.tables()
+
+numpyro.set_host_device_count(N_CHAINS)
+numpyro.enable_x64()
 
 
 def model() -> None:
@@ -47,7 +54,7 @@ SAMPLER = MCMC(
     num_warmup=N_WARMUP,
     num_samples=N_DRAWS,
     num_chains=N_CHAINS,
-    chain_method="vectorized",
+    chain_method="parallel",
     progress_bar=False,
 )
 
@@ -65,5 +72,4 @@ def run(seed: int) -> np.ndarray:
 
 
 if __name__ == "__main__":
-    numpyro.enable_x64()
     onbody.report(run)

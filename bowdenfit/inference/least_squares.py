@@ -150,7 +150,14 @@ def least_squares(posterior: Posterior, objective: Objective, start: np.ndarray)
     found = _solve(posterior, objective, start, noise, nothing, nothing)
     at_end = np.zeros_like(noise)
     for i in np.flatnonzero(_may_end(parameters) & ~noise & (found["z"] < _SUSPECT)):
-        trial_end = at_end | (np.arange(len(noise)) == i)
+        this, pin = np.arange(len(noise)) == i, np.where(at_end, LOWER_END, 0.0)
+        # A step can leap over the minimum into the flat tail of the map from z; only what ends there from the middle too
+        # has its minimum there.
+        again = _solve(posterior, objective, np.where(this, 0.0, found["z"]), noise | at_end, pin, nothing)
+        found = min(found, again, key=_sum_of_squares)
+        if found["z"][i] >= _SUSPECT:
+            continue
+        trial_end = at_end | this
         pin = np.where(trial_end, LOWER_END, 0.0)
         trial = _solve(posterior, objective, found["z"], noise | trial_end, pin, nothing)
         if _sum_of_squares(trial) <= _sum_of_squares(found) * (1 + 1e-7) + 1e-14:

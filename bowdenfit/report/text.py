@@ -3,8 +3,7 @@
 import textwrap
 from typing import Any
 
-import numpy as np
-
+from bowdenfit.results.answers import decimals
 from bowdenfit.results.fit import Fit
 
 WIDTH = 110
@@ -69,7 +68,7 @@ def _coefficients(page: dict[str, Any]) -> str:
         drawn = "median" in p
         median, interval, moments = "", "", ""
         if drawn:
-            digits = _digits(p["sd"])
+            digits = decimals(p["sd"])
             median, interval = f"{p['median']:.{digits}f}", f"{p['q05']:.{digits}f} to {p['q95']:.{digits}f}"
             moments = f"{p['mean']:.{digits}f} +- {p['sd']:.{digits}f}"
         unit = "" if p["unit"] == "1" else p["unit"]
@@ -86,7 +85,7 @@ def _least_squares(p: dict[str, Any]) -> str:
         return ""
     if not estimate["identified"]:
         return "not identified"
-    digits = _digits(estimate["standard_error"] or abs(estimate["value"]) / 1000)
+    digits = decimals(estimate["standard_error"] or abs(estimate["value"]) / 1000)
     return f"{estimate['value']:.{digits}f} +- {estimate['standard_error']:.{digits}f}"
 
 
@@ -172,13 +171,6 @@ def _answer(fit: Fit) -> str:
 def _origin(page: dict[str, Any]) -> str:
     versions = ", ".join(f"{name} {version}" for name, version in page["versions"].items())
     return _filled(f"Seed {page['seed']}; {versions}.")
-
-
-def _digits(scale: float) -> int:
-    """Decimals that show a quantity of this uncertainty to two significant digits of it."""
-    if not np.isfinite(scale) or scale <= 0:
-        return 4
-    return int(np.clip(1 - np.floor(np.log10(scale)), 0, 8))
 
 
 def _listed(parts: list[str]) -> str:

@@ -92,3 +92,10 @@ class OptimalLength:
         from bowdenfit.results.html import design_answer
 
         return design_answer(self)
+
+
+def decimals(scale: float) -> int:
+    """Decimals that show a quantity of this uncertainty to two significant digits of it."""
+    if not np.isfinite(scale) or scale <= 0:
+        return 4
+    return int(np.clip(1 - np.floor(np.log10(scale)), 0, 8))

@@ -2,7 +2,9 @@
 
 from collections.abc import Sequence
 from html import escape
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
+
+from bowdenfit.results.answers import decimals
 
 if TYPE_CHECKING:
     from bowdenfit.results.answers import OptimalLength
@@ -32,19 +34,29 @@ def fit_page(fit: "Fit") -> str:
         verdict = "Least squares only: no intervals."
     else:
         verdict = "Converged." if fit.converged else "NOT converged: " + "; ".join(fit.reasons) + "."
-    rows = []
-    for name, p in page["parameters"].items():
-        drawn = f"{p['median']:.4g} ({p['q05']:.4g} to {p['q95']:.4g})" if "median" in p else ""
-        squares = p.get("least_squares", {}).get("value")
-        rows.append((name, p["unit"], drawn, f"{squares:.4g}" if squares is not None else "", p["prior"], p["meaning"]))
+    rows = [_parameter_row(name, p) for name, p in page["parameters"].items()]
     heads = ("Parameter", "Unit", "Median (90 % interval)", "Least squares", "Prior", "Meaning")
     optimum = fit.posterior is not None and fit.dataset.description.route is not None
     answer = design_answer(fit.optimal_length()) if optimum else ""
     return f"<h4>{escape(fit.name)}</h4><p>{escape(verdict)}</p>{table(heads, rows)}{answer}"
 
 
+def _parameter_row(name: str, p: dict[str, Any]) -> tuple[str, ...]:
+    drawn, squares = "", ""
+    if "median" in p:
+        digits = decimals(p["sd"])
+        drawn = f"{p['median']:.{digits}f} ({p['q05']:.{digits}f} to {p['q95']:.{digits}f})"
+    estimate = p.get("least_squares")
+    if estimate is not None:
+        squares = f"{estimate['value']:.4g}" if estimate["identified"] else "not identified"
+    return name, "" if p["unit"] == "1" else p["unit"], drawn, squares, p["prior"], p["meaning"]
+
+
 def table(heads: Sequence[str], rows: Sequence[Sequence[str]]) -> str:
     """An HTML table."""
     head = "".join(f"<th>{escape(cell)}</th>" for cell in heads)
-    body = "".join("<tr>" + "".join(f"<td>{escape(cell)}</td>" for cell in row) + "</tr>" for row in rows)
+    body = "".join(
+        "<tr>" + "".join(f'<td style="white-space:nowrap">{escape(cell)}</td>' for cell in row) + "</tr>"
+        for row in rows
+    )
     return f"<table><thead><tr>{head}</tr></thead><tbody>{body}</tbody></table>"

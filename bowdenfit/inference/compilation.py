@@ -1,9 +1,11 @@
 """Compiling ahead of time, with what makes it quick for functions this small."""
 
 from collections.abc import Callable
+from functools import cache
 from typing import Any
 
 import jax
+import jax.numpy as jnp
 
 # XLA's newer fusion emitters take twice as long to compile the small elementwise functions here, which then run no
 # faster; measured on two cores by scripts/benchmark_fit.py.
@@ -22,4 +24,15 @@ def compiled(function: Callable[..., Any], *shapes: Any, run_once: bool = False)
     lowered = jax.jit(function).lower(*shapes)
     if jax.default_backend() != "cpu":
         return lowered.compile()
-    return lowered.compile(compiler_options=_RUN_ONCE if run_once else _OPTIONS)
+    options = _RUN_ONCE if run_once else _OPTIONS
+    return lowered.compile(compiler_options={name: value for name, value in options.items() if _known(name, value)})
+
+
+@cache
+def _known(name: str, value: Any) -> bool:
+    """Whether the installed XLA has an option; they come and go from one version to the next."""
+    try:
+        jax.jit(lambda x: x).lower(jnp.zeros(())).compile(compiler_options={name: value})
+    except jax.errors.JaxRuntimeError:
+        return False
+    return True

@@ -22,6 +22,7 @@ _BLOCK = 10  # stored states between two reports
 _FIRST_LOOK = 50  # stored states before the first look
 _KEPT_PER_WALKER = 20  # draws that are kept of each walker, spread over the second half of its path
 
+Diagnose = Callable[[Mapping[str, np.ndarray], int], dict[str, Diagnostics]]
 Moves = Sequence[tuple[emcee.moves.RedBlueMove, float]]
 
 
@@ -117,6 +118,7 @@ def sample(
     resume: bool = False,
     report: Callable[[Progress], None] | None = None,
     moves: Moves | None = None,
+    diagnose: Diagnose = diagnose_all,
 ) -> Chain:
     """Sample until converged, or until the stated maximum of steps.
 
@@ -131,6 +133,7 @@ def sample(
         resume: Go on from the states in `checkpoint`.
         report: Called after every block.
         moves: Proposals and their weights; `default_moves()` if omitted.
+        diagnose: What diagnoses all quantities; `diagnose_all`, or something that has another process do it.
     """
     points = starting_points(start, settings, np.random.default_rng([seed, 0])).reshape(-1, len(start.z))
     backend = _backend(checkpoint, resume, points.shape)
@@ -154,7 +157,7 @@ def sample(
             state = None
             if report is not None:
                 report(Progress(int(backend.iteration) * THIN, settings.max_steps, *seen))
-        chain = _summarized(posterior, backend, settings, quantities)
+        chain = _summarized(posterior, backend, settings, quantities, diagnose)
         seen = _worst(chain)
         if report is not None:
             report(Progress(chain.steps, settings.max_steps, *seen))
@@ -184,6 +187,7 @@ def _summarized(
     backend: emcee.backends.Backend,
     settings: SamplerSettings,
     quantities: Callable[[np.ndarray], Mapping[str, np.ndarray]],
+    diagnose: Diagnose,
 ) -> Chain:
     """Draws from the second half of every walker's path, with their diagnostics."""
     stored = int(backend.iteration)
@@ -191,7 +195,7 @@ def _summarized(
     z = np.asarray(backend.get_chain()[kept]).transpose(1, 0, 2)
     derived = {k: np.asarray(q).reshape(z.shape[:2]) for k, q in quantities(z.reshape(-1, z.shape[-1])).items()}
     draws = {p.name: z[..., i] for i, p in enumerate(posterior.model.space.free)} | derived
-    diagnostics = diagnose_all(draws, settings.n_ensembles)
+    diagnostics = diagnose(draws, settings.n_ensembles)
     reasons = shortfalls(diagnostics, settings.target_r_hat, settings.target_ess)
     acceptance = float(np.mean(backend.accepted)) / stored
     return Chain(z, derived, diagnostics, settings.n_ensembles, stored * THIN, acceptance, reasons)

@@ -37,13 +37,14 @@ Migration = Callable[[dict[str, Any]], dict[str, Any]]
 MIGRATIONS: Mapping[int, Migration] = {}  # from schema N to N + 1
 
 
-def save(fit: Fit, folder: Path, force: bool = False) -> None:
+def save(fit: Fit, folder: Path, force: bool = False, write_posterior: Callable[..., Any] | None = None) -> None:
     """Write posterior.nc, summary.json and, last, fit.json.
 
     Args:
         fit: The fit.
         folder: Where to; made if missing.
         force: Whether a finished fit there may be replaced.
+        write_posterior: What writes posterior.nc, if another process does; it is written here if omitted.
 
     Raises:
         StoreError: The folder holds a finished fit already, or cannot be written.
@@ -52,9 +53,12 @@ def save(fit: Fit, folder: Path, force: bool = False) -> None:
         raise StoreError(f"{folder} holds a finished fit already; add --force (force=True) to replace it.")
     try:
         folder.mkdir(parents=True, exist_ok=True)
-        (folder / POSTERIOR).unlink(missing_ok=True)
-        if fit.posterior is not None:
-            write_groups(folder / POSTERIOR, *posterior_groups(fit), variable_attributes(fit))
+        if fit.posterior is None:
+            (folder / POSTERIOR).unlink(missing_ok=True)
+        elif write_posterior is None:
+            write_groups(folder / POSTERIOR, *posterior_page(fit))
+        else:
+            write_posterior()
         write_text(folder / SUMMARY, json.dumps(summarize(fit), indent=1) + "\n")
         write_text(folder / FIT, json.dumps(_fit_page(fit), indent=1) + "\n")
     except OSError as error:
@@ -186,8 +190,8 @@ def _least_squares(page: Mapping[str, Any]) -> LeastSquares:
     )
 
 
-def posterior_groups(fit: Fit) -> tuple[Groups, Coordinates, dict[str, str]]:
-    """Contents of posterior.nc as plain data: groups of variables, the readings' labels, and attributes."""
+def posterior_page(fit: Fit) -> tuple[Groups, Coordinates, dict[str, str], dict[str, dict[str, str]]]:
+    """Contents of posterior.nc as plain data: groups of variables, the readings' labels, attributes of file and variables."""
     posterior, space = fit.posterior, fit.model.space
     assert posterior is not None  # the caller asked
     log_prior = -0.5 * np.sum(posterior.z**2 + np.log(2 * np.pi), axis=-1)
@@ -203,10 +207,11 @@ def posterior_groups(fit: Fit) -> tuple[Groups, Coordinates, dict[str, str]]:
         "observed_data": {term.name: term.observed() for term in fit.model.terms},
     }
     labels = {term.name: term.labels for term in fit.model.terms}
-    return groups, labels, {"provenance": json.dumps(asdict(fit.provenance)), "name": fit.name}
+    attributes = {"provenance": json.dumps(asdict(fit.provenance)), "name": fit.name}
+    return groups, labels, attributes, _variable_attributes(fit)
 
 
-def variable_attributes(fit: Fit) -> dict[str, dict[str, str]]:
+def _variable_attributes(fit: Fit) -> dict[str, dict[str, str]]:
     """Unit, symbol and meaning of every variable in the posterior."""
     route = fit.dataset.description.route
     labels = {p.name: {"units": p.unit, "symbol": p.symbol, "long_name": p.meaning} for p in fit.model.space.free}

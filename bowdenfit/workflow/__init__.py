@@ -2,7 +2,7 @@
 
 import secrets
 from collections.abc import Callable, Sequence
-from concurrent.futures import Executor
+from concurrent.futures import Future
 from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any
 from bowdenfit.dataset import Dataset, load_dataset, single_table_dataset
 from bowdenfit.errors import StoreError, UsageError
 from bowdenfit.results.folder import CHAIN, clear, read_checkpoint, refuse_to_overwrite, start_checkpoint
-from bowdenfit.workflow.background import draftsman, draw
+from bowdenfit.workflow.background import Assistants, assistants, draw
 
 if TYPE_CHECKING:
     from bowdenfit.inference.ensemble import Progress
@@ -101,8 +101,8 @@ def fit(
         resume: Go on with an interrupted or unconverged fit in `output`.
         force: Replace a fit in `output`.
         figures: Whether to draw figures into `output`.
-        in_background: Whether another process may be started for the figures, which is quicker; the calling program
-            must then guard its start with `if __name__ == "__main__"`.
+        in_background: Whether other processes may be started for statistics and figures, which is quicker; the calling
+            program must then guard its start with `if __name__ == "__main__"`.
         remember_compilations: Whether JAX may keep compiled programs in the user's cache folder, so that a second fit of
             the same shape compiles nothing; this is a setting of the whole process.
         progress: Called while sampling.
@@ -114,7 +114,7 @@ def fit(
     folder = Path(output) if output is not None else None
     data = read(dataset, **reading)
     seed = _checked(folder, data, mcmc, seed, resume, force)
-    with draftsman(in_background and figures and folder is not None) as drawing:
+    with assistants(in_background and mcmc, in_background and figures and folder is not None) as helpers:
         import jax
 
         from bowdenfit.workflow.fitting import Stopwatch, run
@@ -123,23 +123,27 @@ def fit(
             _remember_compilations()
         with jax.enable_x64(True):
             begin = partial(_begun, folder, data, seed, resume)
-            found = run(data, begin, mcmc, seed, resume, progress, Stopwatch())
+            found = run(data, begin, mcmc, seed, resume, progress, Stopwatch(), helpers)
             if folder is not None:
-                _write(found, folder, figures, drawing)
+                _write(found, folder, figures, helpers)
     return found
 
 
-def _write(found: "Fit", folder: Path, figures: bool, drawing: Executor) -> None:
-    """All files of the results folder; figures are drawn while the others are written."""
+def _write(found: "Fit", folder: Path, figures: bool, helpers: Assistants) -> None:
+    """All files of the results folder, as far as possible at the same time; fit.json comes last of the fit's own."""
     from bowdenfit.report.text import summary_text
-    from bowdenfit.results.folder import FIGURES, SUMMARY_TEXT, write_text
+    from bowdenfit.results.folder import FIGURES, POSTERIOR, SUMMARY_TEXT, write_text
+    from bowdenfit.results.netcdf import write_groups
     from bowdenfit.results.shown import figure_data
-    from bowdenfit.results.store import save
+    from bowdenfit.results.store import posterior_page, save
 
     if found.posterior is None:
         clear(folder)
-    drawn = drawing.submit(draw, figure_data(found), folder / FIGURES) if figures else None
-    save(found, folder, force=True)
+        written: Future[None] | None = None
+    else:
+        written = helpers.statistics.submit(write_groups, folder / POSTERIOR, *posterior_page(found))
+    drawn = helpers.drawing.submit(draw, figure_data(found), folder / FIGURES) if figures else None
+    save(found, folder, force=True, write_posterior=written.result if written else None)
     write_text(folder / SUMMARY_TEXT, summary_text(found))
     if drawn is not None:
         drawn.result()

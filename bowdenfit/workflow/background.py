@@ -3,7 +3,8 @@
 import signal
 from collections.abc import Callable, Iterator
 from concurrent.futures import Executor, Future, ProcessPoolExecutor
-from contextlib import contextmanager
+from contextlib import ExitStack, contextmanager
+from dataclasses import dataclass
 from importlib import import_module
 from multiprocessing import get_context
 from pathlib import Path
@@ -13,7 +14,14 @@ from typing import TYPE_CHECKING, Any
 if TYPE_CHECKING:
     from bowdenfit.results.figure_data import FigureData
 
-_DRAWING = ("bowdenfit.plots.gallery", "bowdenfit.results.figure_data")
+STATISTICS = (
+    "arviz_stats.base",
+    "arviz_base",
+    "h5netcdf",
+    "bowdenfit.inference.diagnostics",
+    "bowdenfit.results.netcdf",
+)
+DRAWING = ("bowdenfit.plots.gallery", "bowdenfit.results.figure_data")
 
 
 class Inline(Executor):
@@ -26,19 +34,43 @@ class Inline(Executor):
         return job
 
 
-@contextmanager
-def draftsman(in_background: bool) -> Iterator[Executor]:
-    """Who draws the figures: a process that loads matplotlib while this one computes, or this one, here and now.
+@dataclass(frozen=True)
+class Assistants:
+    """Who does what beside the fit itself.
 
-    A started process imports the main module again, so only a program that guards its start may ask for the background:
-    the command line does, the library does not unless told to.
+    Args:
+        statistics: Diagnostics and posterior.nc, which need ArviZ.
+        drawing: Figures, which need matplotlib.
     """
-    if not in_background:
-        yield Inline()
-        return
-    with ProcessPoolExecutor(1, get_context("spawn"), initializer=_ready) as pool:
-        pool.submit(len, ())  # the process starts with its first job
-        yield pool
+
+    statistics: Executor
+    drawing: Executor
+
+
+@contextmanager
+def assistants(statistics: bool, drawing: bool) -> Iterator[Assistants]:
+    """Assistants that load their libraries in processes of their own while this one computes, or work here and now.
+
+    A started process imports the main module again, so only a program that guards its start may ask for one: the command
+    line does, the library does not unless told to.
+
+    Args:
+        statistics: Whether to start a process for statistics.
+        drawing: Whether to start a process for drawing.
+    """
+    with ExitStack() as open_pools:
+        pools = [
+            open_pools.enter_context(_process(modules)) if wanted else Inline()
+            for wanted, modules in ((statistics, STATISTICS), (drawing, DRAWING))
+        ]
+        yield Assistants(*pools)
+
+
+def _process(modules: tuple[str, ...]) -> Executor:
+    """A process that loads what its jobs need."""
+    pool = ProcessPoolExecutor(1, get_context("spawn"), initializer=_ready, initargs=(modules,))
+    pool.submit(len, ())  # it starts with its first job
+    return pool
 
 
 def draw(data: "FigureData", folder: Path) -> list[Path]:
@@ -48,10 +80,10 @@ def draw(data: "FigureData", folder: Path) -> list[Path]:
     return draw_all(data, folder)
 
 
-def _ready() -> None:
-    """Load what drawing needs; an interrupt is the parent's to handle."""
+def _ready(modules: tuple[str, ...]) -> None:
+    """Load what the jobs need; an interrupt is the parent's to handle."""
     signal.signal(signal.SIGINT, signal.SIG_IGN)
-    for module in _DRAWING:
+    for module in modules:
         import_module(module)
 
 

@@ -14,13 +14,14 @@ import jax
 import numpy as np
 
 from bowdenfit.dataset import Dataset
+from bowdenfit.inference.diagnostics import diagnose_all
 from bowdenfit.inference.least_squares import MaximumPosterior, least_squares, make_objective, maximum_posterior
 from bowdenfit.inference.posterior import Posterior as Density
 from bowdenfit.models.build import Model, build_model
 from bowdenfit.predictions.draws import for_each_draw, replicator
 from bowdenfit.predictions.optimal_length import optimum_of
 from bowdenfit.results.fit import OPTIMAL_EFFICIENCY, OPTIMAL_LENGTH, Fit, Posterior, Provenance
-from bowdenfit.workflow.background import load_ahead
+from bowdenfit.workflow.background import Assistants, load_ahead
 
 VERSIONED = ("bowdenfit", "jax", "optimistix", "emcee", "arviz-stats", "numpy", "scipy")
 PRIOR_DRAWS = 4096
@@ -65,6 +66,7 @@ def run(
     resume: bool,
     progress: Callable[..., None] | None,
     watch: Stopwatch,
+    helpers: Assistants,
 ) -> Fit:
     """Least squares, and the posterior if `mcmc`; see `bowdenfit.workflow.fit`.
 
@@ -76,11 +78,12 @@ def run(
         resume: Whether the checkpoint has states to go on from.
         progress: Called while sampling.
         watch: Records the stages' times.
+        helpers: Who does the statistics.
     """
     density = Density(build_model(data))
     with ThreadPoolExecutor(1) as thread:
         if mcmc:
-            load_ahead("scipy.stats", "emcee", "arviz_stats.base", "arviz_base")
+            load_ahead("scipy.stats", "emcee")
             programs = thread.submit(_compiled, density, seed)
         with watch.stage("compile least squares"):
             objective = make_objective(density)
@@ -92,7 +95,7 @@ def run(
             return Fit(data, squares, None, not reasons, reasons, provenance(seed, watch))
         with watch.stage("compile the posterior"):
             compiled = programs.result()
-    posterior, reasons = _sampled(density, compiled, start, seed, begin, resume, progress, watch)
+    posterior, reasons = _sampled(density, compiled, start, seed, begin, resume, progress, watch, helpers)
     return Fit(data, squares, posterior, not reasons, reasons, provenance(seed, watch))
 
 
@@ -113,6 +116,7 @@ def _sampled(
     resume: bool,
     progress: Callable[..., None] | None,
     watch: Stopwatch,
+    helpers: Assistants,
 ) -> tuple[Posterior, tuple[str, ...]]:
     with watch.stage("import emcee"):
         from bowdenfit.inference.ensemble import sample
@@ -133,6 +137,7 @@ def _sampled(
             begin(),
             resume,
             progress,
+            diagnose=lambda *args: helpers.statistics.submit(diagnose_all, *args).result(),
         )
     with watch.stage("replicate"):
         values, groups, prior = _implied(density.model, compiled, chain.z, seed)

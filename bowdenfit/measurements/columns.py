@@ -149,7 +149,7 @@ def _readings(heading: str, wanted: tuple[Quantity, ...]) -> list[tuple[Quantity
         return []
     match = _BRACKETED.match(heading)
     name, unit = (match["name"], match["unit"].strip() or None) if match else (heading, None)
-    exact = [(q, unit) for q in wanted if _plain(name) == _plain(q.name)]
+    exact = [(q, unit or _suffix(name, q.name)) for q in wanted if _plain(name) == _plain(q.name)]
     whole = [(q, None) for q in wanted if _plain(heading) == _plain(q.name)]
     named = exact or whole or [(q, unit) for q in wanted if (unit := _suffix(heading, q.name)) is not None]
     return [(q, unit) for q, unit in named if not (q.dimension == "text" and unit and is_unit(unit))]

@@ -7,18 +7,12 @@ from pathlib import Path
 
 import numpy as np
 
-from bowdenfit.description import Contact, Description, Table, load_description, parse_description
+from bowdenfit.description import Contact, Description, Table
+from bowdenfit.description_file import load_description, parse_description
 from bowdenfit.errors import DatasetError, DescriptionError
 from bowdenfit.measurements.columns import ColumnSource
-from bowdenfit.measurements.tables import (
-    EfficiencyTable,
-    ForceTable,
-    Measurements,
-    Route,
-    read_angles,
-    read_efficiencies,
-    read_forces,
-)
+from bowdenfit.measurements.reading import Route, read_angles, read_efficiencies, read_forces
+from bowdenfit.measurements.tables import EfficiencyTable, ForceTable, Measurements
 
 DESCRIPTION_FILE = "cable.toml"
 

@@ -1,5 +1,8 @@
 """Every way bowdenfit can refuse: sentences with a remedy, never a bare traceback."""
 
+import difflib
+from collections.abc import Sequence
+
 
 class BowdenfitError(Exception):
     """Base of all errors a user can cause or meet; its text is complete sentences with a remedy."""
@@ -35,3 +38,9 @@ class ConvergenceError(BowdenfitError):
     """A solver or sampler stopped without an answer that can be used at all."""
 
     exit_code = 3
+
+
+def nearest(name: str, known: Sequence[str]) -> str:
+    """End of a sentence about an unknown name: the nearest known one as a question, or what there is."""
+    near = difflib.get_close_matches(name, list(known), n=1, cutoff=0.5)
+    return f"; did you mean {near[0]!r}?" if near else f"; known here: {', '.join(known)}."

@@ -6,7 +6,8 @@ import jax
 import numpy as np
 
 from bowdenfit.dataset import Dataset
-from bowdenfit.description import Description, parse_description
+from bowdenfit.description import Description
+from bowdenfit.description_file import parse_description
 from bowdenfit.models.build import build_model
 from bowdenfit.models.simulation import Design, empty_tables, simulate, true_values
 
@@ -41,13 +42,13 @@ DESIGN = Design(
 )
 
 
-def cable(n_contacts: int, tables: tuple[str, ...] = ("angles", "forces"), **more: Any) -> Description:
+def cable(n_contacts: int, tables: tuple[str, ...] | dict[str, Any] = ("angles", "forces"), **more: Any) -> Description:
     """A cable of 1 to 5 contacts; from the fourth on two of them share a coefficient."""
     raw = {
         "name": f"cable of {n_contacts} contacts",
         "route": ROUTE,
         "contact": list(CONTACTS[:n_contacts]),
-        "tables": {name: {"file": f"{name}.csv"} for name in tables},
+        "tables": tables if isinstance(tables, dict) else {name: {"file": f"{name}.csv"} for name in tables},
     }
     return parse_description(raw | more)
 

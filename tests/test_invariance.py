@@ -9,10 +9,27 @@ from hypothesis import strategies as st
 
 import bowdenfit as bf
 
-ANGLES = [(430, 58, None), (440, 45, None), (450, 30, 11), (460, 26, 13), (470, 19, 19), (480, 17, 28), (490, 11, 40),
-          (500, 10, 56), (510, None, 68), (520, None, 91), (530, None, 118)]  # fmt: skip
-FORCES = [(440, "a", "pull", 50.0, 38.5), (440, "a", "return", 40.0, 52.0), (470, "b", "pull", 60.0, 47.1),
-          (470, "b", "pull", 80.0, 62.9), (510, "c", "pull", 70.0, 52.6), (525, "d", "return", 30.0, 42.0)]  # fmt: skip
+ANGLES = [
+    (430, 58, None),
+    (440, 45, None),
+    (450, 30, 11),
+    (460, 26, 13),
+    (470, 19, 19),
+    (480, 17, 28),
+    (490, 11, 40),
+    (500, 10, 56),
+    (510, None, 68),
+    (520, None, 91),
+    (530, None, 118),
+]
+FORCES = [
+    (440, "a", "pull", 50.0, 38.5),
+    (440, "a", "return", 40.0, 52.0),
+    (470, "b", "pull", 60.0, 47.1),
+    (470, "b", "pull", 80.0, 62.9),
+    (510, "c", "pull", 70.0, 52.6),
+    (525, "d", "return", 30.0, 42.0),
+]
 LENGTH_UNITS = {"mm": 1.0, "cm": 0.1, "m": 0.001, "inch": 1 / 25.4}
 ANGLE_UNITS = {"deg": 1.0, "rad": np.pi / 180, "turn": 1 / 360, "°": 1.0}
 FORCE_UNITS = {"N": 1.0, "kN": 0.001, "lbf": 1 / 4.4482216152605}
@@ -103,8 +120,20 @@ def dataset(folder, spelling, on_body):
     return bf.read(folder)
 
 
-PLAIN = {"length": "mm", "angle": "deg", "force": "N", "style": "{}_{}", "title": False, "delimiter": ",", "comma": False,
-         "seed": 0, "encoding": "utf-8", "newline": "\n", "remark": False, "strokes": {"pull": "pull", "return": "return"}}  # fmt: skip
+PLAIN = {
+    "length": "mm",
+    "angle": "deg",
+    "force": "N",
+    "style": "{}_{}",
+    "title": False,
+    "delimiter": ",",
+    "comma": False,
+    "seed": 0,
+    "encoding": "utf-8",
+    "newline": "\n",
+    "remark": False,
+    "strokes": {"pull": "pull", "return": "return"},
+}
 
 
 def sorted_tables(data):
@@ -124,8 +153,19 @@ def test_tables_are_the_same_however_they_are_written(tmp_path_factory, on_body,
         np.testing.assert_allclose(found, expected, rtol=1e-12, atol=1e-12)
 
 
-ODD = PLAIN | {"length": "inch", "angle": "turn", "force": "lbf", "style": "{} ({})", "title": True, "delimiter": ";", "comma": True,
-               "seed": 77, "encoding": "utf-16", "newline": "\r\n", "strokes": {"pull": "+1", "return": "-1"}}  # fmt: skip
+ODD = PLAIN | {
+    "length": "inch",
+    "angle": "turn",
+    "force": "lbf",
+    "style": "{} ({})",
+    "title": True,
+    "delimiter": ";",
+    "comma": True,
+    "seed": 77,
+    "encoding": "utf-16",
+    "newline": "\r\n",
+    "strokes": {"pull": "+1", "return": "-1"},
+}
 
 
 def test_coefficients_are_the_same_however_the_tables_are_written(tmp_path, on_body):

@@ -11,7 +11,7 @@ from scipy import integrate, stats
 
 from bowdenfit import workflow
 from bowdenfit.dataset import Dataset, load_dataset, read_dataset
-from bowdenfit.description import load_description
+from bowdenfit.description_file import load_description
 from bowdenfit.inference.compilation import compiled
 from bowdenfit.inference.posterior import Posterior
 from bowdenfit.measurements.tables import EfficiencyTable, ForceTable, Measurements, OwnAngles, Provenance

@@ -13,7 +13,7 @@ import numpy as np
 import pytest
 
 from bowdenfit.dataset import Dataset, read_dataset
-from bowdenfit.description import parse_description
+from bowdenfit.description_file import parse_description
 from bowdenfit.inference.least_squares import LeastSquares, least_squares, make_objective, maximum_posterior
 from bowdenfit.inference.posterior import Posterior
 from bowdenfit.measurements.units import conversion_factor

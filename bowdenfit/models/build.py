@@ -17,9 +17,8 @@ from bowdenfit.description import (
     PriorChoice,
     PriorDefaults,
     QuantityValue,
-    nearest,
 )
-from bowdenfit.errors import DescriptionError
+from bowdenfit.errors import DescriptionError, nearest
 from bowdenfit.measurements.tables import Measurements
 from bowdenfit.models.angles import angles_term
 from bowdenfit.models.cable import ANGLE_NOISE, Cable, constant_angle_name, make_cable

@@ -10,8 +10,8 @@ import numpy as np
 from jax import Array
 from jaxtyping import Float
 
-from bowdenfit.description import Contact, Description, nearest
-from bowdenfit.errors import DescriptionError
+from bowdenfit.description import Contact, Description
+from bowdenfit.errors import DescriptionError, nearest
 from bowdenfit.measurements.tables import AngleTable, EfficiencyTable, ForceTable, Measurements
 from bowdenfit.models.curves import CURVES, Curve
 from bowdenfit.models.laws import CONTACT_LAWS, ContactLaw

@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 
 from bowdenfit.dataset import Dataset
-from bowdenfit.description import parse_description
+from bowdenfit.description_file import parse_description
 from bowdenfit.errors import StoreError
 from bowdenfit.inference.diagnostics import Diagnostics
 from bowdenfit.inference.least_squares import Estimate, LeastSquares

@@ -12,7 +12,8 @@ import numpy as np
 from pydantic import BaseModel, ConfigDict, ValidationError
 
 from bowdenfit.dataset import DESCRIPTION_FILE, Dataset
-from bowdenfit.description import Description, parse_description
+from bowdenfit.description import Description
+from bowdenfit.description_file import parse_description
 from bowdenfit.errors import DescriptionError
 from bowdenfit.models.simulation import Design, empty_tables, simulate, true_values
 from bowdenfit.results.store import write_text

@@ -1,0 +1,140 @@
+"""Reading `cable.toml`: settings from the command line on top, and errors that name the key and the nearest known one."""
+
+import tomllib
+from collections.abc import Mapping, Sequence
+from pathlib import Path
+from typing import Any
+
+from pydantic import BaseModel, ValidationError
+
+from bowdenfit.description import SCHEMA, Description, ParameterSetting
+from bowdenfit.errors import DatasetError, DescriptionError, nearest
+from bowdenfit.measurements.units import route_conversion_factor
+
+
+def load_description(path: Path, overrides: Sequence[str] = ()) -> Description:
+    """Read `cable.toml`.
+
+    Args:
+        path: The file.
+        overrides: Settings from the command line, such as `friction.mu1.fixed=0.1`.
+
+    Raises:
+        DescriptionError: The file is missing or no TOML, a key is unknown, or a value is impossible.
+    """
+    try:
+        raw = tomllib.loads(path.read_text(encoding="utf-8-sig"))
+    except FileNotFoundError:
+        raise DescriptionError(
+            f"{path} does not exist; name a folder that holds a cable.toml, or write one with `bowdenfit init FOLDER`."
+        ) from None
+    except (tomllib.TOMLDecodeError, UnicodeDecodeError) as error:
+        raise DescriptionError(f"{path.name} is not valid TOML: {error}.") from None
+    except OSError as error:
+        raise DescriptionError(f"{path} cannot be read ({error.strerror}).") from None
+    for override in overrides:
+        _set(raw, override)
+    return parse_description(raw, path.name)
+
+
+def parse_description(raw: Mapping[str, Any], file: str = "cable.toml") -> Description:
+    """A description from plain data, with errors that name the key.
+
+    Raises:
+        DescriptionError: A key is unknown, or a value is missing or impossible.
+    """
+    try:
+        description = Description.model_validate(dict(raw))
+    except ValidationError as error:
+        raise DescriptionError(_explained(error, file)) from None
+    _check_units(description, file)
+    return description
+
+
+def _check_units(description: Description, file: str) -> None:
+    """Every unit in the description has the right dimension."""
+    quantities = [(f"contact {c.name!r}, wrap_angle", c.wrap_angle.constant, "angle") for c in description.contact]
+    quantities += [(f"contact {c.name!r}, nominal", c.wrap_angle.nominal, "angle") for c in description.contact]
+    quantities.append(("sensors, force_noise", description.sensors.force_noise, "force"))
+    if description.tables.angles:
+        quantities.append(("tables, angles, detection_limit", description.tables.angles.detection_limit, "angle"))
+    for where, quantity, dimension in quantities:
+        if quantity is None:
+            continue
+        try:
+            quantity.to(dimension)
+        except DatasetError as error:
+            raise DescriptionError(f"{file}, {where}: {error}.") from None
+        if dimension == "angle" and not 0 <= quantity.to("angle") <= 34.91:
+            raise DescriptionError(
+                f"{file}, {where}: {quantity.value:g} {quantity.unit} is not between 0 and 2000 deg."
+            )
+    if description.route is not None:
+        try:
+            route_conversion_factor(description.route.unit, description.route.unit)
+        except DatasetError as error:
+            raise DescriptionError(f"{file}, route, unit: {error}.") from None
+
+
+def _set(raw: dict[str, Any], override: str) -> None:
+    key, separator, text = override.partition("=")
+    if not separator or not key.strip():
+        raise DescriptionError(f"--set {override!r} is not of the form key=value, such as friction.mu1.fixed=0.1.")
+    try:
+        value = tomllib.loads(f"value = {text.strip()}")["value"]
+    except tomllib.TOMLDecodeError:
+        value = text.strip()
+    node: Any = raw
+    *parents, last = key.strip().split(".")
+    for depth, part in enumerate(parents):
+        node = (
+            node[int(part)]
+            if isinstance(node, list) and part.isdigit() and int(part) < len(node)
+            else (node.setdefault(part, {}) if isinstance(node, dict) else None)
+        )
+        if not isinstance(node, dict | list):
+            raise DescriptionError(f"--set {override!r}: {'.'.join(parents[: depth + 1])} has no keys below it.")
+    if parents[:1] in (["friction"], ["prior"]) and len(parents) == 2 and last in ParameterSetting.model_fields:
+        node.clear()  # measured, prior and fixed exclude one another: the command line wins
+    if isinstance(node, list):
+        raise DescriptionError(f"--set {override!r}: {key} is a list; name an entry by its number, from 0.")
+    node[last] = value
+
+
+def _explained(error: ValidationError, file: str) -> str:
+    """The first thing that is wrong, as a sentence."""
+    first = next((e for e in error.errors() if e["type"] == "extra_forbidden"), error.errors()[0])
+    where = [str(part) for part in first["loc"]]
+    place = f"{file}, {'.'.join(where)}" if where else file
+    if first["type"] == "extra_forbidden":
+        return f"{file}: unknown key {'.'.join(where)!r}{nearest(where[-1], _siblings(where[:-1]))}"
+    if first["type"] == "missing":
+        return f"{file}: the key {'.'.join(where)!r} is missing; `bowdenfit init` writes a template that has it."
+    message = first["msg"].removeprefix("Value error, ")
+    if where == ["schema"]:
+        message = f"schema {first['input']} is newer than this program, which reads up to {SCHEMA}; update bowdenfit"
+    shown = f" (found {first['input']!r})" if not isinstance(first["input"], dict | list) and where else ""
+    sentence = f"{place}: {message[:1].lower() + message[1:]}{shown}"
+    return sentence if sentence.endswith((".", "?")) else f"{sentence}."
+
+
+def _siblings(path: Sequence[str]) -> list[str]:
+    """Keys that are known at a place in the description."""
+    model: Any = Description
+    for part in path:
+        if isinstance(model, type) and issubclass(model, BaseModel) and part in model.model_fields:
+            model = _models_in(model.model_fields[part].annotation)
+    if not (isinstance(model, type) and issubclass(model, BaseModel)):
+        return []
+    return [field.alias or name for name, field in model.model_fields.items()]
+
+
+def _models_in(annotation: Any) -> Any:
+    """The first model inside an annotation such as `tuple[Contact, ...]` or `Route | None`."""
+    if isinstance(annotation, type) and issubclass(annotation, BaseModel):
+        return annotation
+    for argument in getattr(annotation, "__args__", ()):
+        found = _models_in(argument)
+        if found is not None:
+            return found
+    return None

@@ -1,0 +1,309 @@
+"""From files to tables: one function a kind of table, with every check that needs no description."""
+
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+
+from bowdenfit.measurements.columns import Column, ColumnSource, Quantity, find_columns, require
+from bowdenfit.measurements.readers import Cell, RawTable, read_csv
+from bowdenfit.measurements.tables import AngleTable, EfficiencyTable, ForceTable, OwnAngles, Provenance
+from bowdenfit.types import Labels, Vector
+
+LARGEST_ANGLE = float(np.deg2rad(2000.0)) * (1 + 1e-12)
+_STROKES = {
+    **dict.fromkeys(("pull", "pulling", "+1", "1", "+1.0", "1.0"), 1),
+    **dict.fromkeys(("return", "returning", "release", "-1", "-1.0"), -1),
+    **dict.fromkeys(("hold", "0", "0.0"), 0),
+}
+_UNUSED = ("time", "velocity", "position")  # columns that a force table may have and that nothing reads
+
+
+@dataclass(frozen=True)
+class Route:
+    """The route variable as tables call it: column name and the unit to convert to."""
+
+    variable: str
+    unit: str
+
+    def quantity(self) -> Quantity:
+        """Its column."""
+        return Quantity(self.variable, "route", self.unit)
+
+
+def read_angles(
+    path: Path,
+    route: Route,
+    contacts: Sequence[str],
+    detection_limit: float | None = None,
+    sources: Mapping[str, ColumnSource] | None = None,
+) -> AngleTable:
+    """Read a table of wrap angles; a blank cell or `<10` is an angle too small to detect.
+
+    Args:
+        path: CSV file.
+        route: The route variable.
+        contacts: Columns of the curved contacts.
+        detection_limit: Limit for blank cells [rad].
+        sources: Columns named by the user.
+
+    Raises:
+        DatasetError: See `read_csv` and `find_columns`; or a cell is not an angle between 0 and 2000 degrees.
+    """
+    table = read_csv(path)
+    found = find_columns(table, (route.quantity(), *(Quantity(c, "angle") for c in contacts)), sources)
+    route_column = require(table, found, route.variable, f"{route.variable}_{route.unit}")
+    columns = [require(table, found, name, f"{name}_deg") for name in contacts]
+    cells = [[_angle_or_limit(cell, c, detection_limit) for cell in c.cells] for c in columns]
+    pairs = np.array(cells, dtype=float).reshape(len(columns), len(table.rows), 2)
+    return AngleTable(
+        _rounded(route_column.numbers()), tuple(contacts), pairs[..., 0].T, pairs[..., 1].T, _provenance(table)
+    )
+
+
+def _angle_or_limit(cell: Cell, column: Column, detection_limit: float | None) -> tuple[float, float]:
+    written = cell.limit()
+    if written is None and not cell.blank:
+        return _angle(cell, column), np.nan
+    limit = written * column.factor if written is not None else detection_limit
+    if limit is None:
+        raise cell.refuse(
+            "the cell is blank, which means too small to detect, but no detection limit is known; write <10 (the "
+            'limit) in the cell, or set detection_limit = { value = 10, unit = "deg" } for the table in cable.toml.'
+        )
+    if not 0 < limit <= LARGEST_ANGLE:
+        raise cell.refuse(f"{cell.shown} is not a possible detection limit; write one between 0 and 2000 deg.")
+    return np.nan, limit
+
+
+def _angle(cell: Cell, column: Column) -> float:
+    angle = column.value(cell)
+    if angle < 0:
+        raise cell.refuse(f"{cell.shown} is negative; wrap angles add up without sign, so write the absolute value.")
+    if angle > LARGEST_ANGLE:
+        raise cell.refuse(
+            f"{cell.shown} is more than 2000 deg ({np.rad2deg(angle):.5g} deg); check the unit of the column."
+        )
+    return angle
+
+
+def read_efficiencies(
+    path: Path, route: Route | None, contacts: Sequence[str], sources: Mapping[str, ColumnSource] | None = None
+) -> EfficiencyTable:
+    """Read a table of transmission efficiencies, 0 to 1 or in percent where the heading or the cell says so.
+
+    Args:
+        path: CSV file.
+        route: The route variable, if the cable has one.
+        contacts: Columns in which rows may carry their own wrap angle.
+        sources: Columns named by the user.
+
+    Raises:
+        DatasetError: See `read_csv` and `find_columns`; or an efficiency is not between 0 and 1.
+    """
+    table = read_csv(path)
+    names = (Quantity("efficiency", "ratio"), Quantity("efficiency_sd", "ratio"))
+    found = find_columns(table, (*names, *_optional(route, contacts)), sources)
+    column = require(table, found, "efficiency", "efficiency (0 to 1) or efficiency_percent")
+    spread = found.get("efficiency_sd")
+    efficiency = [_efficiency(cell, column) for cell in column.cells]
+    pairs = zip(spread.cells, column.cells, strict=True) if spread else ()
+    sd = [0.0 if cell.blank else _efficiency_sd(cell, spread, beside, column) for cell, beside in pairs if spread]
+    return EfficiencyTable(
+        _route_values(table, found, route),
+        np.array(efficiency),
+        np.array(sd) if spread else np.zeros(len(table.rows)),
+        _own_angles(table, found, contacts),
+        _provenance(table),
+    )
+
+
+def _ratio(cell: Cell, column: Column) -> float:
+    """A number, or a percentage where the heading or the cell says so."""
+    percentage = cell.percentage()
+    return column.value(cell) if percentage is None else percentage
+
+
+def _in_percent(cell: Cell, column: Column) -> bool:
+    return column.factor != 1 or cell.percentage() is not None
+
+
+def _efficiency(cell: Cell, column: Column) -> float:
+    value = _ratio(cell, column)
+    if value <= 0:
+        raise cell.refuse(f"an efficiency of {cell.shown} is not possible; it is output force over input force.")
+    if value > 1:
+        usual = (
+            "the usual cause is that input and output force were swapped"
+            if _in_percent(cell, column)
+            else "if it is in percent, name the column efficiency_percent"
+        )
+        raise cell.refuse(f"an efficiency of {cell.shown} is above 1; {usual}.")
+    return value
+
+
+def _efficiency_sd(cell: Cell, column: Column, efficiency: Cell, efficiency_column: Column) -> float:
+    value = _ratio(cell, column)
+    if not 0 < value <= 1:
+        raise cell.refuse(
+            f"a standard deviation of {cell.shown} is not possible for an efficiency; write one up to 1 (100 %)."
+        )
+    if _in_percent(efficiency, efficiency_column) and not _in_percent(cell, column):
+        raise cell.refuse(
+            f"{cell.shown} does not say whether it is in percent as the efficiency beside it is; name the column "
+            "efficiency_sd_percent, or write 1 % for 0.01."
+        )
+    return value
+
+
+def read_forces(
+    paths: Sequence[Path],
+    route: Route | None,
+    contacts: Sequence[str],
+    sources: Mapping[str, ColumnSource] | None = None,
+) -> tuple[ForceTable, tuple[str, ...]]:
+    """Read force tables, one or several files, into one table.
+
+    A run is one mounting of the cable. It is what the `run` column says, file by file; without one, all rows of a file
+    at one route value and one set of own angles are taken for one run, which is remarked on. Without a `stroke` column
+    all rows are taken as pulling, likewise.
+
+    Args:
+        paths: CSV files.
+        route: The route variable, if the cable has one.
+        contacts: Columns in which rows may carry their own wrap angle.
+        sources: Columns named by the user.
+
+    Returns:
+        The table, and remarks on what had to be assumed.
+
+    Raises:
+        DatasetError: See `read_csv` and `find_columns`; or a force is not positive, or a stroke is unknown.
+    """
+    parts = [_read_force_file(path, route, contacts, sources) for path in paths]
+    names: list[str] = []
+    runs = []
+    for path, (part, _) in zip(paths, parts, strict=True):
+        runs.append(part.run + len(names))
+        names += [f"{path.stem}:{name}" if len(paths) > 1 else name for name in part.run_names]
+    tables = [part for part, _ in parts]
+    own = OwnAngles(
+        tuple(contacts),
+        np.concatenate([t.own.angle for t in tables]),
+        np.concatenate([t.own.sd for t in tables]),
+    )
+    merged = ForceTable(
+        np.concatenate([t.route for t in tables]),
+        np.concatenate([t.input_force for t in tables]),
+        np.concatenate([t.output_force for t in tables]),
+        np.concatenate(runs),
+        tuple(names),
+        np.concatenate([t.stroke for t in tables]),
+        own,
+        Provenance(
+            tuple(path.name for path in paths),
+            np.concatenate([np.full(len(t.run), i) for i, t in enumerate(tables)]),
+            np.concatenate([t.origin.row for t in tables]),
+        ),
+    )
+    return merged, tuple(dict.fromkeys(remark for _, remarks in parts for remark in remarks))
+
+
+def _read_force_file(
+    path: Path, route: Route | None, contacts: Sequence[str], sources: Mapping[str, ColumnSource] | None
+) -> tuple[ForceTable, list[str]]:
+    table = read_csv(path)
+    forces = (Quantity("input_force", "force"), Quantity("output_force", "force"))
+    labels = (Quantity("run", "text"), Quantity("stroke", "text"))
+    found = find_columns(table, (*forces, *labels, *_optional(route, contacts)), sources, _UNUSED)
+    columns = [require(table, found, q.name, f"{q.name}_N") for q in forces]
+    input_force, output_force = (np.array([_force(cell, c) for cell in c.cells]) for c in columns)
+    own = _own_angles(table, found, contacts)
+    route_values = _route_values(table, found, route)
+    remarks = []
+    if "stroke" not in found:
+        remarks.append(f"{table.file} has no stroke column: every row is taken as pulling (rope sliding to the motor).")
+    if "run" not in found:
+        remarks.append(
+            f"{table.file} has no run column: all rows at one {route.variable if route else 'wrap angle'} are taken "
+            "as one run (one mounting of the cable)."
+        )
+    run, run_names = _runs(found.get("run"), route_values, own)
+    strokes, origin = _strokes(found, len(table.rows)), _provenance(table)
+    return ForceTable(route_values, input_force, output_force, run, run_names, strokes, own, origin), remarks
+
+
+def _runs(column: Column | None, route: Vector, own: OwnAngles) -> tuple[Labels, tuple[str, ...]]:
+    if column is not None:
+        keys = [cell.text.strip() or "(no run)" for cell in column.cells]
+    else:
+        rows = np.column_stack([route, own.angle])
+        keys = [", ".join(f"{value:g}" for value in row if np.isfinite(value)) or "all" for row in rows]
+    names = tuple(dict.fromkeys(keys))
+    return np.array([names.index(key) for key in keys]), names
+
+
+def _strokes(found: Mapping[str, Column], n_rows: int) -> Labels:
+    if "stroke" not in found:
+        return np.ones(n_rows, dtype=int)
+    strokes = []
+    for cell in found["stroke"].cells:
+        text = cell.text.strip().lower().replace("\u2212", "-").replace(",", ".")
+        if text not in _STROKES:
+            raise cell.refuse(
+                f"{cell.shown} is no stroke; write pull (+1), return (-1) or hold (0, read while nothing slides)."
+            )
+        strokes.append(_STROKES[text])
+    return np.array(strokes)
+
+
+def _force(cell: Cell, column: Column) -> float:
+    value = column.value(cell)
+    if value <= 0:
+        raise cell.refuse(
+            f"{cell.shown} is not positive; the usual cause is the sign convention of the load cell or a "
+            "reading before tension was on: write tension as positive and leave slack readings out."
+        )
+    return value
+
+
+def _optional(route: Route | None, contacts: Sequence[str]) -> tuple[Quantity, ...]:
+    """Columns that efficiency and force tables share: the route variable, own wrap angles and their sd."""
+    angles = [Quantity(name + suffix, "angle") for name in contacts for suffix in ("", "_sd")]
+    return (*([route.quantity()] if route else []), *angles)
+
+
+def _route_values(table: RawTable, found: Mapping[str, Column], route: Route | None) -> Vector:
+    if route is None:
+        return np.full(len(table.rows), np.nan)
+    return _rounded(require(table, found, route.variable, f"{route.variable}_{route.unit}").numbers())
+
+
+def _rounded(values: Iterable[float]) -> Vector:
+    """Values to 12 digits, so that one length is one number whatever unit each table gives it in."""
+    return np.array([float(f"{value:.12g}") for value in values])
+
+
+def _own_angles(table: RawTable, found: Mapping[str, Column], contacts: Sequence[str]) -> OwnAngles:
+    n = len(table.rows)
+    angle, sd = np.full((n, len(contacts)), np.nan), np.full((n, len(contacts)), np.nan)
+    for k, name in enumerate(contacts):
+        for target, column in ((angle, found.get(name)), (sd, found.get(f"{name}_sd"))):
+            if column is not None:
+                target[:, k] = [np.nan if cell.blank else _own_angle(cell, column) for cell in column.cells]
+    return OwnAngles(tuple(contacts), angle, sd)
+
+
+def _own_angle(cell: Cell, column: Column) -> float:
+    if cell.limit() is not None:
+        raise cell.refuse(
+            f"{cell.shown} is no measured angle; leave the cell blank where the contact has a curve, or write the angle."
+        )
+    return _angle(cell, column)
+
+
+def _provenance(table: RawTable) -> Provenance:
+    """Where the rows of one file stand."""
+    rows = np.array([row[0].row for row in table.rows])
+    return Provenance((table.file,), np.zeros(len(rows), dtype=int), rows)

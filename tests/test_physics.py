@@ -127,3 +127,16 @@ DIFFERENTIABLE = {
 def test_gradients_agree_with_finite_differences(name):
     function, arguments = DIFFERENTIABLE[name]
     check_grads(jax.jit(function), arguments, order=1, modes=("fwd", "rev"), rtol=1e-5, atol=1e-5)
+
+
+def test_the_normal_tail_has_the_right_value_and_slope_at_any_distance():
+    import scipy.stats
+
+    from bowdenfit.physics.normal_tail import log_normal_cdf
+
+    x = jnp.array([-1e12, -1e8, -1e4 - 1e-6, -1e4 + 1e-6, -40.0, -3.0, 0.0, 3.0, 30.0])
+    slope = jax.vmap(jax.grad(log_normal_cdf))(x)
+    np.testing.assert_allclose(log_normal_cdf(x), scipy.stats.norm.logcdf(x), rtol=1e-12)
+    close = np.maximum(x, -100)
+    mills = np.where(x < -100, -x - 1 / x, np.exp(scipy.stats.norm.logpdf(close) - scipy.stats.norm.logcdf(close)))
+    np.testing.assert_allclose(slope, mills, rtol=1e-7)

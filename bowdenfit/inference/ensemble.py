@@ -197,6 +197,9 @@ def _summarized(
     draws = {p.name: z[..., i] for i, p in enumerate(posterior.model.space.free)} | derived
     diagnostics = diagnose(draws, settings.n_ensembles)
     reasons = shortfalls(diagnostics, settings.target_r_hat, settings.target_ess)
+    if stored < _FIRST_LOOK:
+        too_short = f"each walker took {stored * THIN} steps, and {_FIRST_LOOK * THIN} are the least that can be judged"
+        reasons = (too_short, *reasons)
     acceptance = float(np.mean(backend.accepted)) / stored
     return Chain(z, derived, diagnostics, settings.n_ensembles, stored * THIN, acceptance, reasons)
 

@@ -8,12 +8,13 @@ import jax
 import jax.numpy as jnp
 import numpy as np
 from jax import Array
-from jax.scipy.special import log_ndtr
 from jax.scipy.stats import norm
 from jaxtyping import Float
 
 from bowdenfit.measurements.tables import AngleTable
 from bowdenfit.models.cable import ANGLE_NOISE, Cable
+from bowdenfit.models.tails import log_normal_cdf
+from bowdenfit.physics.normal_tail import log_normal_cdf
 
 
 @dataclass(frozen=True)
@@ -57,13 +58,13 @@ class AnglesTerm:
     def log_likelihood(self, values: Mapping[str, Array], data: Mapping[str, Any]) -> Float[Array, " readings"]:
         """Log likelihood of each reading."""
         deviation, u = self._split(values, data)
-        return jnp.concatenate([norm.logpdf(deviation) - jnp.log(values[ANGLE_NOISE]), log_ndtr(u)])
+        return jnp.concatenate([norm.logpdf(deviation) - jnp.log(values[ANGLE_NOISE]), log_normal_cdf(u)])
 
     def residuals(self, values: Mapping[str, Array], data: Mapping[str, Any]) -> Float[Array, " readings"]:
         """Standardized residuals; sqrt(-2 log Phi(u)) for undetected angles."""
         deviation, u = self._split(values, data)
         # Beyond 30 sd the root is 0 to the last digit, and its derivative would be 0 times infinity.
-        censored = jnp.where(u < 30.0, jnp.sqrt(-2 * log_ndtr(jnp.minimum(u, 29.0))), 0.0)
+        censored = jnp.where(u < 30.0, jnp.sqrt(-2 * log_normal_cdf(jnp.minimum(u, 29.0))), 0.0)
         return jnp.concatenate([deviation, censored])
 
     def expected(self, values: Mapping[str, Array], data: Mapping[str, Any]) -> Float[Array, " readings"]:

@@ -8,14 +8,15 @@ import jax
 import jax.numpy as jnp
 import numpy as np
 from jax import Array
-from jax.scipy.special import log_ndtr
 from jax.scipy.stats import norm
 from jaxtyping import Float
 
 from bowdenfit.measurements.tables import AngleTable, ForceTable
 from bowdenfit.models.cable import Cable, resolve_angles, row_angles
 from bowdenfit.models.scatter import FORCE_NOISE, GAIN_ERROR, RUN_SCATTER
+from bowdenfit.models.tails import log_normal_cdf
 from bowdenfit.physics.friction import transmission_efficiency
+from bowdenfit.physics.normal_tail import log_normal_cdf
 
 _ROW_ARRAYS = ("route", "own", "is_own", "known_variance", "noisy")
 
@@ -130,7 +131,7 @@ class HeldForcesTerm:
         from_angles = self.cable.exponent_variance(values, angles, variance)
         sd = jnp.sqrt(values[RUN_SCATTER] ** 2 + from_angles + values[FORCE_NOISE] ** 2 / data["weight"])
         ratio = jnp.abs(data["mean"] - values.get(GAIN_ERROR, 0.0))  # the band is symmetric
-        upper, lower = log_ndtr((exponent - ratio) / sd), log_ndtr((-exponent - ratio) / sd)
+        upper, lower = log_normal_cdf((exponent - ratio) / sd), log_normal_cdf((-exponent - ratio) / sd)
         # A band of no width at all holds no reading; the floor keeps its logarithm finite.
         return upper + jnp.log1p(-jnp.exp(jnp.minimum(lower - upper, -1e-12)))
 

@@ -53,11 +53,11 @@ FRICTION = {"prior": {"lognormal": {"median": 0.12, "log_sd": 0.4}}}
 
 
 def recoverable(n_contacts: int) -> Description:
-    """A cable whose priors do not look at its data; of three contacts, one whose angles below 15 deg go undetected."""
+    """A cable whose priors do not look at its data; of three contacts, one whose angles below 10 deg go undetected."""
     plain = cable(n_contacts)
     names = [c.wrap_angle.column for c in plain.curved]
     prior = {name: setting for name, setting in PRIORS.items() if name.startswith("sigma") or name[:-2] in names}
-    angles = {"file": "a.csv"} | ({"detection_limit": {"value": 15, "unit": "deg"}} if n_contacts == 3 else {})
+    angles = {"file": "a.csv"} | ({"detection_limit": {"value": 10, "unit": "deg"}} if n_contacts == 3 else {})
     friction = dict.fromkeys(plain.coefficients, FRICTION)
     return cable(n_contacts, {"angles": angles, "forces": {"file": "f.csv"}}, prior=prior, friction=friction)
 

@@ -13,7 +13,6 @@ from jaxtyping import Float
 
 from bowdenfit.measurements.tables import AngleTable
 from bowdenfit.models.cable import ANGLE_NOISE, Cable
-from bowdenfit.models.tails import log_normal_cdf
 from bowdenfit.physics.normal_tail import log_normal_cdf
 
 

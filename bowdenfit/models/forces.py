@@ -14,7 +14,6 @@ from jaxtyping import Float
 from bowdenfit.measurements.tables import AngleTable, ForceTable
 from bowdenfit.models.cable import Cable, resolve_angles, row_angles
 from bowdenfit.models.scatter import FORCE_NOISE, GAIN_ERROR, RUN_SCATTER
-from bowdenfit.models.tails import log_normal_cdf
 from bowdenfit.physics.friction import transmission_efficiency
 from bowdenfit.physics.normal_tail import log_normal_cdf
 

@@ -192,7 +192,8 @@ def _summarized(
     """Draws from the second half of every walker's path, with their diagnostics."""
     stored = int(backend.iteration)
     kept = np.unique(np.linspace(stored // 2, stored - 1, _KEPT_PER_WALKER).round().astype(int))
-    z = np.asarray(backend.get_chain()[kept]).transpose(1, 0, 2)
+    # In this order in memory, as in a loaded fit: sums must agree to the last bit.
+    z = np.ascontiguousarray(np.asarray(backend.get_chain()[kept]).transpose(1, 0, 2))
     derived = {k: np.asarray(q).reshape(z.shape[:2]) for k, q in quantities(z.reshape(-1, z.shape[-1])).items()}
     draws = {p.name: z[..., i] for i, p in enumerate(posterior.model.space.free)} | derived
     diagnostics = diagnose(draws, settings.n_ensembles)

@@ -4,6 +4,7 @@ from typing import Annotated, Any, Literal
 
 from pydantic import BaseModel, ConfigDict, Field, field_validator, model_validator
 
+from bowdenfit.errors import nearest
 from bowdenfit.measurements.units import conversion_factor
 
 SCHEMA = 1
@@ -214,12 +215,87 @@ class AngleTableSettings(Table):
     undetected: Undetected = "censored"
 
 
+class ForceLimits(_Frozen):
+    """The ends of a load cell's range."""
+
+    low: Finite
+    high: Finite
+    unit: str
+
+
+class Preparation(_Frozen):
+    """How recordings are prepared; every step can be switched.
+
+    `tare` is "fitted" where the offsets of the load cells are parameters; `saturation` is "censored" where a reading at
+    the end of the range counts as one beyond it, which only whole recordings can use.
+    """
+
+    tare: Literal["none", "interval", "fitted"] = "none"
+    quiet: tuple[Finite, Finite] | None = None
+    delay: Literal["estimated", "none"] | QuantityValue = "estimated"
+    saturation: Literal["left out", "censored", "kept"] = "left out"
+    limits: ForceLimits | None = None
+    dropouts: bool = True
+    spikes: bool = True
+    block: Literal["auto", "none"] | QuantityValue = "auto"
+
+    @model_validator(mode="after")
+    def _quiet_known(self) -> "Preparation":
+        if self.tare == "interval" and self.quiet is None:
+            raise ValueError('tare = "interval" needs quiet = [start, end], in seconds, when no load was on the cable')
+        if self.quiet is not None and not self.quiet[0] < self.quiet[1]:
+            raise ValueError("quiet must be [start, end], in seconds")
+        return self
+
+
+class Phase(_Frozen):
+    """A stretch of a recording whose stroke the user sets by hand, in seconds."""
+
+    start: Finite
+    end: Finite
+    stroke: Literal["pull", "return", "hold", "ignore"]
+
+    @model_validator(mode="after")
+    def _ordered(self) -> "Phase":
+        if not self.start < self.end:
+            raise ValueError("a phase must start before it ends")
+        return self
+
+
+class RecordingFile(_Frozen):
+    """One recording: its file, what it was made at, and what its channels are called."""
+
+    file: str
+    name: str | None = None
+    run: str | None = None
+    at: Finite | None = None
+    wrap_angles: dict[str, QuantityValue] = {}
+    velocity: QuantityValue | None = None
+    channels: dict[str, ColumnMap] = {}
+    prepare: Preparation | None = None
+    strokes: tuple[Phase, ...] = ()
+
+
+class RecordingsTable(_Frozen):
+    """Recordings that share their channels' names and their preparation.
+
+    `pattern` reads what a file was recorded at from its name, such as "{at}mm_{velocity:r/min}rpm".
+    """
+
+    files: str | tuple[str, ...] | None = None
+    pattern: str | None = None
+    channels: dict[str, ColumnMap] = {}
+    likelihood: Literal["runs", "whole"] = "runs"
+    prepare: Preparation = Preparation()
+
+
 class Tables(_Frozen):
     """The tables of a data set."""
 
     angles: AngleTableSettings | None = None
     efficiencies: Table | None = None
     forces: Table | None = None
+    recordings: RecordingsTable | None = None
 
     @model_validator(mode="after")
     def _some(self) -> "Tables":
@@ -233,6 +309,7 @@ class Sensors(_Frozen):
 
     force_noise: QuantityValue | None = None
     gain_error_sd: Positive | None = None
+    offset_sd: QuantityValue | None = None
 
 
 class SamplerSettings(_Frozen):
@@ -256,6 +333,12 @@ class PriorDefaults(_Frozen):
     angle_noise_degrees: Positive = 5.0
     run_scatter: Positive = 0.02
     force_noise_newtons: Positive = 2.0
+    block_noise_newtons: Positive = 0.5
+    offset_newtons: Positive = 1.0
+    drag_newtons: Positive = 5.0
+    stribeck: Positive = 0.3
+    viscous_at_highest_speed: Positive = 0.5
+    stribeck_speed_log_sd: Positive = 1.0
 
 
 class Description(_Frozen):
@@ -266,11 +349,15 @@ class Description(_Frozen):
     source: str = ""
     license: str = ""
     geometry: Geometry = "continuous"
+    friction_model: str = "capstan"
+    reference_force: QuantityValue | None = None
+    reference_velocity: QuantityValue | None = None
     route: Route | None = None
     contact: Annotated[tuple[Contact, ...], Field(min_length=1)]
     friction: dict[str, FrictionSetting] = {}
     prior: dict[str, ParameterSetting] = {}
     tables: Tables
+    recording: tuple[RecordingFile, ...] = ()
     sensors: Sensors = Sensors()
     sampler: SamplerSettings = SamplerSettings()
 
@@ -308,7 +395,19 @@ class Description(_Frozen):
             raise ValueError("[tables] has angles, but no contact has a curve that they could determine")
         if self.geometry == "published" and not curved:
             raise ValueError('geometry = "published" needs contacts with a curve')
+        if self.recording and self.tables.recordings is None:
+            raise ValueError("[[recording]] needs recordings = {} under [tables], where what they share can be said")
+        if self.tables.recordings is not None and not (self.recording or self.tables.recordings.files):
+            raise ValueError(
+                'the table recordings names no file: write files = "recordings/*.csv", or a [[recording]] with its file'
+            )
         return self
+
+    @property
+    def fits_offsets(self) -> bool:
+        """Whether the load cells' offsets are parameters."""
+        recordings = self.tables.recordings
+        return self.sensors.offset_sd is not None or (recordings is not None and recordings.prepare.tare == "fitted")
 
     @property
     def coefficients(self) -> tuple[str, ...]:

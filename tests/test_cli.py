@@ -241,7 +241,15 @@ def test_a_whole_fit_in_a_process_of_its_own_and_an_interrupt(on_body, tmp_path)
     ]
     settings = [f"--set={key}" for key in (*QUICK, "sampler.target_ess=100000", "sampler.max_steps=200000")]
     environment = os.environ | {"XDG_CACHE_HOME": str(tmp_path / "cache")}
-    process = subprocess.Popen(command + settings, cwd=ROOT, env=environment, stderr=subprocess.PIPE, text=True)
+    # A shell that runs the tests in the background makes its children deaf to interrupts.
+    process = subprocess.Popen(
+        command + settings,
+        cwd=ROOT,
+        env=environment,
+        stderr=subprocess.PIPE,
+        text=True,
+        preexec_fn=lambda: signal.signal(signal.SIGINT, signal.default_int_handler),
+    )
     checkpoint, deadline = tmp_path / "fit" / "chain.h5", time.monotonic() + 120
     while time.monotonic() < deadline and not (checkpoint.exists() and checkpoint.stat().st_size > 500_000):
         time.sleep(0.2)

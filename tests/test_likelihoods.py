@@ -16,7 +16,8 @@ from bowdenfit.inference.compilation import compiled
 from bowdenfit.inference.posterior import Posterior
 from bowdenfit.measurements.tables import EfficiencyTable, ForceTable, Measurements, OwnAngles, Provenance
 from bowdenfit.models.build import Model, build_model
-from bowdenfit.models.forces import HeldForcesTerm, SlidingForcesTerm
+from bowdenfit.models.forces import HeldForcesTerm
+from bowdenfit.models.runs import RunsTerm
 
 VALUES = {"mu": 0.15, "tau": 0.03, "sigma_F": 0.7}
 
@@ -32,7 +33,8 @@ def _force_table(runs, names=(), angle=None, sd=None) -> ForceTable:
     )
     origin = Provenance(("forces.csv",), np.zeros(n, dtype=int), np.arange(2, n + 2))
     labels = tuple(str(i) for i in range(int(run.max()) + 1))
-    return ForceTable(np.full(n, np.nan), force_in * 1.0, force_out * 1.0, run, labels, stroke, own, origin)
+    velocity = np.full(n, np.nan)
+    return ForceTable(np.full(n, np.nan), force_in * 1.0, force_out * 1.0, run, labels, stroke, own, origin, velocity)
 
 
 def _single_contact(wrap_angle, table: ForceTable, **more) -> Model:
@@ -94,7 +96,7 @@ def test_the_same_holds_for_several_runs_each_with_several_angles_of_its_own():
     table = _force_table([rows[i] for i in order], ("angle",), angles[order], np.zeros(len(rows)))
     model = _single_contact({"column": "angle"}, table)
     (term,) = model.terms
-    assert isinstance(term, SlidingForcesTerm)
+    assert isinstance(term, RunsTerm)
     assert len(term.data["mean"]) == 10
     found = _of_term(model, term, "log_likelihood", VALUES)
     for run in range(3):

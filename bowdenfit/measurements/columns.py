@@ -9,7 +9,7 @@ from dataclasses import dataclass
 from bowdenfit.errors import DatasetError
 from bowdenfit.measurements.quoting import listed, shown
 from bowdenfit.measurements.readers import Cell, RawTable
-from bowdenfit.measurements.units import conversion_factor, is_unit, route_conversion_factor
+from bowdenfit.measurements.units import conversion_factor, dimension_of, is_unit, route_conversion_factor
 
 _BRACKETED = re.compile(r"^(?P<name>.*?)[\s_]*[\[(](?P<unit>[^\])]*)[\])]\s*$")
 _LONGEST_HEADING = 200
@@ -21,7 +21,8 @@ class Quantity:
 
     Args:
         name: Canonical name.
-        dimension: Kind of quantity (`units.INTERNAL_UNITS`), "route" for the route variable, "text" for labels.
+        dimension: Kind of quantity (`units.INTERNAL_UNITS`), "route" for the route variable, "speed" for the velocity of
+            the rope or of the motor, "text" for labels.
         to: Unit to convert to; the internal one if omitted.
     """
 
@@ -92,7 +93,7 @@ def find_columns(
     for heading in table.header:
         if heading in taken or not heading:
             continue
-        readings = [reading for reading in _readings(heading, wanted) if reading[0].name not in sources]
+        readings = [reading for reading in meanings(heading, wanted) if reading[0].name not in sources]
         if len(readings) > 1:
             names = " and ".join(quantity.name for quantity, _ in readings)
             raise DatasetError(
@@ -143,7 +144,7 @@ def _one_space(heading: str) -> str:
     return " ".join(heading.split())
 
 
-def _readings(heading: str, wanted: tuple[Quantity, ...]) -> list[tuple[Quantity, str | None]]:
+def meanings(heading: str, wanted: tuple[Quantity, ...]) -> list[tuple[Quantity, str | None]]:
     """Every quantity that the heading can mean, with the unit written in it; exact names win over name and unit."""
     if len(heading) > _LONGEST_HEADING:
         return []
@@ -180,7 +181,10 @@ def _column(table: RawTable, heading: str, quantity: Quantity, unit: str | None)
             f'cable.toml: columns = {{ {quantity.name} = {{ name = "{heading}", unit = ... }} }}.'
         )
     try:
-        if quantity.dimension == "route":
+        if quantity.dimension == "speed":
+            of_motor = dimension_of(unit) == "angular_velocity"
+            factor = conversion_factor(unit, "angular_velocity" if of_motor else "velocity")
+        elif quantity.dimension == "route":
             factor = route_conversion_factor(unit, quantity.to or "mm")
         else:
             factor = 1.0 if quantity.dimension == "text" else conversion_factor(unit, quantity.dimension, quantity.to)
@@ -190,7 +194,7 @@ def _column(table: RawTable, heading: str, quantity: Quantity, unit: str | None)
 
 
 def _usual(dimension: str) -> str:
-    return {"force": "N", "angle": "deg", "length": "mm", "velocity": "mm/s", "time": "s"}.get(dimension, "mm")
+    return {"force": "N", "angle": "deg", "length": "mm", "speed": "mm/s", "time": "s"}.get(dimension, "mm")
 
 
 def _check_sources(table: RawTable, known: list[str], sources: Mapping[str, ColumnSource]) -> None:
@@ -218,5 +222,5 @@ def _check_sources(table: RawTable, known: list[str], sources: Mapping[str, Colu
 
 def _named_column(table: RawTable, quantity: Quantity, source: ColumnSource) -> Column:
     match = _BRACKETED.match(source.name[:_LONGEST_HEADING])
-    written = next((unit for _, unit in _readings(source.name, (quantity,)) if unit), None)
+    written = next((unit for _, unit in meanings(source.name, (quantity,)) if unit), None)
     return _column(table, source.name, quantity, source.unit or written or (match and match["unit"].strip()) or None)

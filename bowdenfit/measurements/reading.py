@@ -9,6 +9,7 @@ import numpy as np
 from bowdenfit.measurements.columns import Column, ColumnSource, Quantity, find_columns, require
 from bowdenfit.measurements.readers import Cell, RawTable, read_csv
 from bowdenfit.measurements.tables import AngleTable, EfficiencyTable, ForceTable, OwnAngles, Provenance
+from bowdenfit.measurements.units import dimension_of
 from bowdenfit.types import Labels, Vector
 
 LARGEST_ANGLE = float(np.deg2rad(2000.0)) * (1 + 1e-12)
@@ -17,7 +18,7 @@ _STROKES = {
     **dict.fromkeys(("return", "returning", "release", "-1", "-1.0"), -1),
     **dict.fromkeys(("hold", "0", "0.0"), 0),
 }
-_UNUSED = ("time", "velocity", "position")  # columns that a force table may have and that nothing reads
+_UNUSED = ("time", "position")  # columns that a force table may have and that nothing reads
 
 
 @dataclass(frozen=True)
@@ -206,8 +207,20 @@ def read_forces(
             np.concatenate([np.full(len(t.run), i) for i, t in enumerate(tables)]),
             np.concatenate([t.origin.row for t in tables]),
         ),
+        np.concatenate([t.velocity for t in tables]),
+        _one_velocity_unit(tables),
     )
     return merged, tuple(dict.fromkeys(remark for _, remarks in parts for remark in remarks))
+
+
+def _one_velocity_unit(tables: Sequence[ForceTable]) -> str:
+    units = {t.velocity_unit: t.origin.files[0] for t in tables if t.velocity_unit}
+    if len(units) > 1:
+        raise DatasetError(
+            f"{' and '.join(units.values())} give velocities of different kinds, of the rope and of the motor; give both in "
+            "mm/s or both in r/min."
+        )
+    return next(iter(units), "")
 
 
 def _read_force_file(
@@ -215,8 +228,8 @@ def _read_force_file(
 ) -> tuple[ForceTable, list[str]]:
     table = read_csv(path)
     forces = (Quantity("input_force", "force"), Quantity("output_force", "force"))
-    labels = (Quantity("run", "text"), Quantity("stroke", "text"))
-    found = find_columns(table, (*forces, *labels, *_optional(route, contacts)), sources, _UNUSED)
+    others = (Quantity("run", "text"), Quantity("stroke", "text"), Quantity("velocity", "speed"))
+    found = find_columns(table, (*forces, *others, *_optional(route, contacts)), sources, _UNUSED)
     columns = [require(table, found, q.name, f"{q.name}_N") for q in forces]
     input_force, output_force = (np.array([_force(cell, c) for cell in c.cells]) for c in columns)
     own = _own_angles(table, found, contacts)
@@ -231,7 +244,17 @@ def _read_force_file(
         )
     run, run_names = _runs(found.get("run"), route_values, own)
     strokes, origin = _strokes(found, len(table.rows)), _provenance(table)
-    return ForceTable(route_values, input_force, output_force, run, run_names, strokes, own, origin), remarks
+    velocity, unit = _velocities(found.get("velocity"), len(table.rows))
+    parts = (route_values, input_force, output_force, run, run_names, strokes, own, origin, velocity, unit)
+    return ForceTable(*parts), remarks
+
+
+def _velocities(column: Column | None, n_rows: int) -> tuple[Vector, str]:
+    """Velocities, NaN where blank or without a column, and their internal unit."""
+    if column is None:
+        return np.full(n_rows, np.nan), ""
+    values = np.array([np.nan if cell.blank else column.value(cell) for cell in column.cells])
+    return values, "rad/s" if dimension_of(column.unit or "") == "angular_velocity" else "mm/s"
 
 
 def _runs(column: Column | None, route: Vector, own: OwnAngles) -> tuple[Labels, tuple[str, ...]]:

@@ -4,6 +4,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from bowdenfit.measurements.recordings import Recordings
 from bowdenfit.types import Labels, Matrix, Vector
 
 
@@ -104,6 +105,8 @@ class ForceTable:
         stroke: +1 pulling, -1 return, 0 held.
         own: Wrap angles measured with the row.
         origin: Where each row was read.
+        velocity: Velocity of the rope [mm/s] or of the motor [rad/s]; NaN where it is not known.
+        velocity_unit: Which of the two; empty without velocities.
     """
 
     route: Vector
@@ -114,6 +117,8 @@ class ForceTable:
     stroke: Labels
     own: OwnAngles
     origin: Provenance
+    velocity: Vector
+    velocity_unit: str = ""
 
 
 @dataclass(frozen=True)
@@ -123,4 +128,5 @@ class Measurements:
     angles: AngleTable | None = None
     efficiencies: EfficiencyTable | None = None
     forces: ForceTable | None = None
+    recordings: Recordings | None = None
     remarks: tuple[str, ...] = ()

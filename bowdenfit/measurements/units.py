@@ -10,15 +10,25 @@ from bowdenfit.measurements.quoting import shown
 if TYPE_CHECKING:
     import pint
 
-INTERNAL_UNITS = {"force": "N", "length": "mm", "angle": "rad", "time": "s", "velocity": "mm/s", "ratio": "1"}
+INTERNAL_UNITS = {
+    "force": "N",
+    "length": "mm",
+    "angle": "rad",
+    "time": "s",
+    "velocity": "mm/s",
+    "angular_velocity": "rad/s",
+    "ratio": "1",
+}
 _EXAMPLES = {
     "force": "N, kN, lbf, kgf",
     "length": "mm, cm, m, inch",
     "angle": "deg, rad, turn",
     "time": "s, ms",
     "velocity": "mm/s, m/s",
+    "angular_velocity": "r/min, rad/s, deg/s",
     "ratio": "%, 1",
 }
+_AS_PINT_SAYS = {"r/min": "rpm", "rev/min": "rpm", "1/min": "rpm", "u/min": "rpm"}  # the last is German
 # Names with products, quotients and small powers. Pint would compute whatever else it is given, such as 9**9**9.
 _WRITTEN = re.compile(r"[\w°%‰/*^().·\s-]{1,40}")
 _NO_UNIT = re.compile(r"\d\d|%%|(?:\*\*|\^)[\s(-]*\d[\s)]*(?:\*\*|\^)")
@@ -89,6 +99,7 @@ def _parsed(unit: str) -> "pint.Unit":
     unknown = f"the unit {shown(unit)} is not known; use one such as N, lbf, mm, inch, deg, rad, %"
     if text in {"1", "-", ""}:
         text = "dimensionless"
+    text = _AS_PINT_SAYS.get(text.lower(), text)
     if not _WRITTEN.fullmatch(text) or _NO_UNIT.search(text):
         raise DatasetError(unknown)
     try:

@@ -24,9 +24,13 @@ from bowdenfit.models.angles import angles_term
 from bowdenfit.models.cable import ANGLE_NOISE, Cable, constant_angle_name, make_cable
 from bowdenfit.models.efficiencies import efficiencies_term
 from bowdenfit.models.forces import force_terms
-from bowdenfit.models.scatter import FORCE_NOISE, GAIN_ERROR, RUN_SCATTER
+from bowdenfit.models.recordings import NAME as RECORDED
+from bowdenfit.models.recordings import recordings_term
+from bowdenfit.models.scatter import BLOCK_NOISE, FORCE_NOISE, GAIN_ERROR, INPUT_OFFSET, OUTPUT_OFFSET, RUN_SCATTER
 from bowdenfit.parameters.priors import HalfNormal, LogNormal, Normal, Prior, TruncatedNormal, Uniform
 from bowdenfit.parameters.space import Parameter, ParameterSpace
+
+EFFICIENCY_TERMS = ("efficiency", "run_efficiency", RECORDED)  # terms whose readings are efficiencies
 
 
 @runtime_checkable
@@ -118,6 +122,8 @@ def build_model(dataset: Dataset) -> Model:
         terms.append(efficiencies_term(cable, measurements.efficiencies, measurements.angles))
     if measurements.forces is not None:
         terms += force_terms(cable, measurements.forces, measurements.angles)
+    if measurements.recordings is not None:
+        terms.append(recordings_term(cable, measurements.recordings, measurements.angles))
     return Model(cable, _space(description, measurements, cable), tuple(terms))
 
 
@@ -129,7 +135,9 @@ def _space(description: Description, measurements: Measurements, cable: Cable) -
             angle = measurements.angles.column(column)[0]
             parameters += curve.parameters(angle[np.isfinite(angle) & _in_range(description, measurements)], defaults)
     parameters += _uncertain_constants(description)
+    parameters += cable.friction.parameters(defaults)
     parameters += _noise(description, measurements, defaults)
+    parameters += _sensors(description, measurements, defaults)
     known = [p.name for p in parameters]
     for name in description.prior:
         if name not in known or name in description.coefficients:
@@ -192,16 +200,34 @@ def _noise(description: Description, measurements: Measurements, defaults: Prior
         meaning, prior = "standard deviation of an angle reading", HalfNormal(sd / degree)
         text = f"HalfNormal({sd:g} deg)"
         parameters.append(Parameter(ANGLE_NOISE, r"$\sigma_\theta$", meaning, "noise", prior, text, "deg", degree))
-    if measurements.efficiencies is not None or measurements.forces is not None:
+    if any(t is not None for t in (measurements.efficiencies, measurements.forces, measurements.recordings)):
         meaning, prior = "scatter of the log ratio from mounting to mounting", HalfNormal(defaults.run_scatter)
         text = f"HalfNormal({defaults.run_scatter:g})"
         parameters.append(Parameter(RUN_SCATTER, r"$\tau$", meaning, "noise", prior, text))
     if measurements.forces is not None:
         parameters.append(_force_noise(description.sensors.force_noise, defaults.force_noise_newtons))
+    if measurements.recordings is not None:
+        sd = defaults.block_noise_newtons
+        meaning, text = "standard deviation of a block's mean force", f"HalfNormal({sd:g} N)"
+        parameters.append(Parameter(BLOCK_NOISE, r"$\sigma_B$", meaning, "noise", HalfNormal(sd), text, "N"))
+    return parameters
+
+
+def _sensors(description: Description, measurements: Measurements, defaults: PriorDefaults) -> list[Parameter]:
+    """What the load cells may add: a relative gain error between the two, and an offset of each."""
+    parameters = []
     gain = description.sensors.gain_error_sd
     if gain is not None:
         meaning = "relative gain error between the two load cells"
         parameters.append(Parameter(GAIN_ERROR, "$g$", meaning, "sensor", Normal(0.0, gain), f"Normal(0, {gain:g})"))
+    if description.fits_offsets and (measurements.forces is not None or measurements.recordings is not None):
+        stated = description.sensors.offset_sd
+        sd = stated.to("force") if stated is not None else defaults.offset_newtons
+        for name, symbol, end in ((INPUT_OFFSET, "in", "input"), (OUTPUT_OFFSET, "out", "output")):
+            meaning, text = f"offset of the {end} load cell", f"Normal(0, {sd:g}) N"
+            parameters.append(
+                Parameter(name, f"$b_\\mathrm{{{symbol}}}$", meaning, "sensor", Normal(0.0, sd), text, "N")
+            )
     return parameters
 
 

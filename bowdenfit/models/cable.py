@@ -3,7 +3,7 @@
 from collections.abc import Mapping
 from dataclasses import dataclass
 from functools import cached_property
-from typing import TypeVar
+from typing import Protocol, TypeVar, runtime_checkable
 
 import jax.numpy as jnp
 import numpy as np
@@ -12,8 +12,9 @@ from jaxtyping import Float
 
 from bowdenfit.description import Contact, Description
 from bowdenfit.errors import DescriptionError, nearest
-from bowdenfit.measurements.tables import AngleTable, EfficiencyTable, ForceTable, Measurements
+from bowdenfit.measurements.tables import AngleTable, Measurements, OwnAngles
 from bowdenfit.models.curves import CURVES, Curve
+from bowdenfit.models.friction_models import FrictionModel, make_friction_model
 from bowdenfit.models.laws import CONTACT_LAWS, ContactLaw
 
 ANGLE_NOISE = "sigma_theta"
@@ -27,10 +28,12 @@ class Cable:
     Args:
         description: What was said about the cable.
         nominal: Wrap angle used in predictions for contacts measured row by row [rad], by contact name.
+        friction: How friction depends on load and speed.
     """
 
     description: Description
     nominal: Mapping[str, float]
+    friction: FrictionModel
 
     @cached_property
     def curves(self) -> dict[str, Curve]:
@@ -89,6 +92,10 @@ class Cable:
         ]
         return jnp.sum(jnp.stack(terms), axis=0)
 
+    def efficiency_at(self, values: Mapping[str, Array], route: Float[Array, " rows"]) -> Float[Array, " rows"]:
+        """Efficiency while pulling with the reference force at the reference speed [1] at values of the route variable."""
+        return self.friction.efficiency(values, self.exponent_at(values, route))
+
     def exponent_at(self, values: Mapping[str, Array], route: Float[Array, " rows"]) -> Float[Array, " rows"]:
         """Friction exponent [1] at values of the route variable."""
         return self.friction_exponent(values, self.wrap_angles(values, route))
@@ -119,7 +126,22 @@ class RowAngles:
         }
 
 
-def row_angles(cable: Cable, table: EfficiencyTable | ForceTable, angles: AngleTable | None) -> RowAngles:
+@runtime_checkable
+class Measured(Protocol):
+    """Anything measured at values of the route variable, some with wrap angles of their own."""
+
+    @property
+    def route(self) -> np.ndarray:
+        """Route variable; NaN where the cable has no route."""
+        ...
+
+    @property
+    def own(self) -> OwnAngles:
+        """Wrap angles measured with the row."""
+        ...
+
+
+def row_angles(cable: Cable, table: Measured, angles: AngleTable | None) -> RowAngles:
     """The wrap angles of a table's rows, before any parameter is known.
 
     A row's own angle comes first; then, outside the range of the curves, the angle table's row at the same length;
@@ -194,11 +216,20 @@ def make_cable(description: Description, measurements: Measurements) -> Cable:
         if source.nominal is not None:
             nominal[contact.name] = source.nominal.to("angle")
         else:
-            tables = [t for t in (measurements.efficiencies, measurements.forces) if t is not None]
-            nominal[contact.name] = float(np.mean(np.concatenate([t.own.column(source.column)[0] for t in tables])))
-    cable = Cable(description, nominal)
+            nominal[contact.name] = _mean_angle(measurements, source.column)
+    cable = Cable(description, nominal, make_friction_model(description, measurements))
     _ = cable.curves, cable.laws
     return cable
+
+
+def _mean_angle(measurements: Measurements, column: str) -> float:
+    """Mean of the angles that rows and recordings carry in a column [rad]."""
+    tables = [t for t in (measurements.efficiencies, measurements.forces) if t is not None]
+    angles = [t.own.column(column)[0] for t in tables]
+    if measurements.recordings is not None:
+        k = measurements.recordings.columns.index(column)
+        angles.append(np.array([r.own_angle[k] for r in measurements.recordings.each]))
+    return float(np.mean(np.concatenate(angles)))
 
 
 def _lookup(registry: Mapping[str, Entry], name: str | None, what: str, contact: Contact) -> Entry:

@@ -21,11 +21,12 @@ from bowdenfit.physics.friction import transmission_efficiency
 class EfficienciesTerm:
     r"""Likelihood of an efficiency table.
 
-    .. math:: -\log\eta_i \sim \text{Normal}\left(\Lambda_i + g,\ \sqrt{\tau^2 + (s_i/\eta_i)^2
+    .. math:: -\log\eta_i \sim \text{Normal}\left(-\log\eta(\Lambda_i) + g,\ \sqrt{\tau^2 + (s_i/\eta_i)^2
               + \textstyle\sum_k \mu_k^2 \sigma_{\theta,ik}^2}\right)
 
     with the stated standard deviation s of a row, the error of its own measured angles, and the gain error g of the
-    load cells where the description has one.
+    load cells where the description has one. A row does not say at what load and speed it was measured: where friction
+    depends on them, it is taken to hold at the reference force and speed.
 
     Args:
         cable: The cable.
@@ -49,7 +50,10 @@ class EfficienciesTerm:
         self, values: Mapping[str, Array], data: Mapping[str, Any], weights: Mapping[str, Array]
     ) -> tuple[Float[Array, " rows"], Float[Array, " rows"]]:
         angles, variance = resolve_angles(self.cable, values, data)
-        mean = self.cable.friction_exponent(values, angles) + values.get(GAIN_ERROR, 0.0)
+        exponent = self.cable.friction_exponent(values, angles)
+        mean = values.get(GAIN_ERROR, 0.0) + (
+            -jnp.log(self.cable.friction.efficiency(values, exponent)) if self.cable.friction.options else exponent
+        )
         from_angles = self.cable.exponent_variance(weights, angles, variance)
         return mean, jnp.sqrt(weights[RUN_SCATTER] ** 2 + data["log_sd"] ** 2 + from_angles)
 

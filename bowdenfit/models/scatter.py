@@ -3,3 +3,5 @@
 RUN_SCATTER = "tau"
 FORCE_NOISE = "sigma_F"
 GAIN_ERROR = "gain_error"
+BLOCK_NOISE = "sigma_block"
+INPUT_OFFSET, OUTPUT_OFFSET = "input_offset", "output_offset"

@@ -21,7 +21,6 @@ from bowdenfit.measurements.tables import (
 from bowdenfit.models.build import build_model
 from bowdenfit.models.cable import ANGLE_NOISE, Cable
 from bowdenfit.models.scatter import FORCE_NOISE, GAIN_ERROR, RUN_SCATTER
-from bowdenfit.physics.friction import capstan_output_force
 
 
 @dataclass(frozen=True)
@@ -77,7 +76,8 @@ def _force_rows(description: Description, design: Design) -> ForceTable:
             own.angle[:, k] = np.asarray(design.own_angles[name])[run]
     route = np.asarray(design.runs, dtype=float)[run]
     labels = tuple(str(i + 1) for i in range(len(design.runs)))
-    return ForceTable(route, force, 0.8 * force, run, labels, stroke.astype(int), own, _origin("forces.csv", len(run)))
+    origin, velocity = _origin("forces.csv", len(run)), np.full(len(run), np.nan)
+    return ForceTable(route, force, 0.8 * force, run, labels, stroke.astype(int), own, origin, velocity)
 
 
 def _no_own_angles(description: Description, n: int) -> OwnAngles:
@@ -147,9 +147,9 @@ def _simulated_angles(
 def _simulated_efficiencies(
     cable: Cable, table: EfficiencyTable, values: Mapping[str, jax.Array], key: jax.Array, scale: float
 ) -> EfficiencyTable:
-    exponent = cable.exponent_at(values, jnp.asarray(table.route)) + values.get(GAIN_ERROR, 0.0)
-    mounting = scale * values[RUN_SCATTER] * jax.random.normal(key, exponent.shape)
-    return replace(table, efficiency=np.asarray(jnp.exp(-(exponent + mounting))))
+    expected = cable.efficiency_at(values, jnp.asarray(table.route)) * jnp.exp(-values.get(GAIN_ERROR, 0.0))
+    mounting = scale * values[RUN_SCATTER] * jax.random.normal(key, expected.shape)
+    return replace(table, efficiency=np.asarray(expected * jnp.exp(-mounting)))
 
 
 def _simulated_forces(
@@ -164,7 +164,7 @@ def _simulated_forces(
     mounting = scale * values[RUN_SCATTER] * jax.random.normal(of_run, (len(table.run_names),))
     exponent = cable.friction_exponent(values, angles) + mounting[table.run]
     stroke, force = jnp.asarray(table.stroke, dtype=float), jnp.asarray(table.input_force)
-    output = capstan_output_force(force, exponent, stroke) * jnp.exp(-values.get(GAIN_ERROR, 0.0))
+    output = cable.friction.output_force(values, force, exponent, stroke) * jnp.exp(-values.get(GAIN_ERROR, 0.0))
     noise = scale * values[FORCE_NOISE]
     return replace(
         table,

@@ -4,6 +4,9 @@ import jax.numpy as jnp
 from jax import Array
 from jaxtyping import Float
 
+_SMALL_EXPONENT = 1e-6  # below, two terms of the series in p are exact to 1e-12
+_NOTHING_LEFT = 1e-9
+
 
 def friction_exponent(
     friction_coefficient: Float[Array, "*batch contacts"], wrap_angle: Float[Array, "*batch contacts"]
@@ -64,3 +67,81 @@ def capstan_output_force(
         Haptic paper, equation 1; on-body paper, equations 5 to 7.
     """
     return input_force * jnp.exp(-stroke * friction_exponent)
+
+
+def force_scale(
+    force: Float[Array, "*batch"],
+    load_exponent: Float[Array, ""],
+    drag: Float[Array, ""],
+    reference_force: float,
+) -> Float[Array, "*batch"]:
+    r"""The scale on which friction is a shift by :math:`\Lambda`, whatever the load.
+
+    .. math:: g(F) = \frac{u^p - 1}{p}, \quad u = \frac{F + D}{F_\text{ref}}, \quad g \to \log u \text{ as } p \to 0
+
+    p = 0 and D = 0 is the capstan equation; p = 1 a constant friction force; D > 0 a part of the tension that the load
+    cells do not show (adhesion, seals, bending stiffness, or a preload tared away).
+
+    Args:
+        force: Force at one end [N].
+        load_exponent: p, how friction falls with the load, mu(F) = mu (F/F_ref)^-p, from 0 to 1 [1].
+        drag: D [N].
+        reference_force: F_ref, the force at which mu has its stated value [N].
+
+    Returns:
+        g(F) [1].
+    """
+    log_u = jnp.log((force + drag) / reference_force)
+    small = load_exponent < _SMALL_EXPONENT
+    p = jnp.where(small, 1.0, load_exponent)
+    return jnp.where(small, log_u + load_exponent * log_u**2 / 2, jnp.expm1(p * log_u) / p)
+
+
+def force_from_scale(
+    scaled: Float[Array, "*batch"],
+    load_exponent: Float[Array, ""],
+    drag: Float[Array, ""],
+    reference_force: float,
+) -> Float[Array, "*batch"]:
+    """Inverse of `force_scale`: the force [N] at a value of g.
+
+    Where friction would hold more than the whole force the result is what remains of it: next to nothing, less the drag.
+    """
+    small = load_exponent < _SMALL_EXPONENT
+    p = jnp.where(small, 1.0, load_exponent)
+    near_zero = scaled - load_exponent * scaled**2 / 2
+    log_u = jnp.where(small, near_zero, jnp.log(jnp.maximum(1 + p * scaled, _NOTHING_LEFT)) / p)
+    return reference_force * jnp.exp(log_u) - drag
+
+
+def force_scale_slope(
+    force: Float[Array, "*batch"],
+    load_exponent: Float[Array, ""],
+    drag: Float[Array, ""],
+    reference_force: float,
+) -> Float[Array, "*batch"]:
+    r"""Derivative of `force_scale` by the force [1/N], :math:`u^{p - 1}/F_\text{ref}`."""
+    u = (force + drag) / reference_force
+    return u ** (load_exponent - 1) / reference_force
+
+
+def rate_factor(
+    speed: Float[Array, "*batch"],
+    stribeck: Float[Array, ""],
+    stribeck_speed: Float[Array, ""],
+    viscous: Float[Array, ""],
+) -> Float[Array, "*batch"]:
+    r"""How friction depends on speed: more at low speed (Stribeck), and a part proportional to speed.
+
+    .. math:: \frac{\mu(v)}{\mu} = 1 + a \exp\left(-\left(\frac{v}{v_s}\right)^2\right) + c |v|
+
+    Args:
+        speed: v, of either sign, in any unit.
+        stribeck: a [1].
+        stribeck_speed: v_s, in the unit of v.
+        viscous: c, in one over the unit of v.
+
+    Returns:
+        Factor on every friction coefficient [1].
+    """
+    return 1 + stribeck * jnp.exp(-((speed / stribeck_speed) ** 2)) + viscous * jnp.abs(speed)

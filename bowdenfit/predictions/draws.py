@@ -88,7 +88,7 @@ def curves_of(model: Model, route: np.ndarray) -> Callable[[Float[Array, " free"
     def implied(z: Float[Array, " free"]) -> dict[str, Array]:
         values = model.space.constrain(z)
         angles = {name: jnp.rad2deg(curve.wrap_angle(values, at)) for name, curve in model.cable.curves.items()}
-        return angles | {"efficiency": jnp.exp(-model.cable.exponent_at(values, at))}
+        return angles | {"efficiency": model.cable.efficiency_at(values, at)}
 
     return implied
 

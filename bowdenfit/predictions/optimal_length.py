@@ -9,7 +9,6 @@ from jax import Array
 from jaxtyping import Float
 
 from bowdenfit.models.build import Model
-from bowdenfit.physics.friction import transmission_efficiency
 
 GRID_POINTS = 201
 _GOLDEN = (np.sqrt(5.0) - 1) / 2
@@ -38,6 +37,9 @@ def optimum_of(model: Model) -> Callable[[Float[Array, " free"]], tuple[Array, A
         def exponent(route: Array) -> Array:
             return model.cable.exponent_at(values, route[None])[0]
 
+        def efficiency(at_exponent: Array) -> Array:
+            return model.cable.friction.efficiency(values, at_exponent)
+
         on_grid = model.cable.exponent_at(values, jnp.asarray(grid))
         best = jnp.argmin(on_grid)
         at = jnp.asarray(grid)[best]
@@ -52,6 +54,6 @@ def optimum_of(model: Model) -> Callable[[Float[Array, " free"]], tuple[Array, A
         low, high = jax.lax.fori_loop(0, _REFINEMENTS, shrink, ends)
         refined = (low + high) / 2
         better = exponent(refined) < on_grid[best]
-        return jnp.where(better, refined, at), transmission_efficiency(jnp.minimum(exponent(refined), on_grid[best]))
+        return jnp.where(better, refined, at), efficiency(jnp.minimum(exponent(refined), on_grid[best]))
 
     return optimum

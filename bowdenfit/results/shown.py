@@ -4,7 +4,7 @@ import jax
 import jax.numpy as jnp
 import numpy as np
 
-from bowdenfit.models.build import Model
+from bowdenfit.models.build import EFFICIENCY_TERMS, Model
 from bowdenfit.predictions.draws import curves_of
 from bowdenfit.predictions.optimal_length import route_grid
 from bowdenfit.results.figure_data import (
@@ -73,10 +73,10 @@ def _angle_curve(fit: Fit, column: str, band: Band) -> AngleCurve:
 def _points(fit: Fit) -> tuple[EfficiencyPoints, ...]:
     route, points = fit.dataset.description.route, []
     for term in fit.model.terms:
-        if term.name not in {"efficiency", "run_efficiency"}:
+        if term.name not in EFFICIENCY_TERMS:
             continue
         at = np.asarray(term.data["route"], dtype=float)
-        if term.name == "run_efficiency":
+        if term.name != "efficiency":
             at = np.array([at[term.data["run"] == run].mean() for run in range(len(term.labels))])
         if route is None:
             at = np.full(len(at), np.nan)

@@ -2,9 +2,10 @@
 
 import json
 from collections.abc import Callable, Mapping
-from dataclasses import asdict, fields
+from dataclasses import asdict, fields, is_dataclass
 from pathlib import Path
-from typing import Any
+from types import NoneType, UnionType
+from typing import Any, get_args, get_origin, get_type_hints
 
 import numpy as np
 
@@ -13,28 +14,28 @@ from bowdenfit.description_file import parse_description
 from bowdenfit.errors import StoreError
 from bowdenfit.inference.diagnostics import Diagnostics
 from bowdenfit.inference.least_squares import Estimate, LeastSquares
-from bowdenfit.measurements.tables import (
-    AngleTable,
-    EfficiencyTable,
-    ForceTable,
-    Measurements,
-    OwnAngles,
-)
-from bowdenfit.measurements.tables import (
-    Provenance as RowProvenance,
-)
+from bowdenfit.measurements.tables import Measurements
 from bowdenfit.predictions.draws import derived_units
 from bowdenfit.results.fit import OPTIMAL_EFFICIENCY, OPTIMAL_LENGTH, Fit, Posterior, Provenance
 from bowdenfit.results.folder import CHAIN, FIT, POSTERIOR, SUMMARY, write_text
 from bowdenfit.results.netcdf import EXPECTED, Coordinates, Groups, read_groups, write_groups
 from bowdenfit.results.summary import summarize
+from bowdenfit.types import Flags, Labels, Matrix, Vector
 
-SCHEMA = 1
-_WHOLE_NUMBERS = {"run", "stroke", "file", "row"}
-_PARTS = {"own": OwnAngles, "origin": RowProvenance}
-_TABLES = {"angles": AngleTable, "efficiencies": EfficiencyTable, "forces": ForceTable}
+SCHEMA = 2
 Migration = Callable[[dict[str, Any]], dict[str, Any]]
-MIGRATIONS: Mapping[int, Migration] = {}  # from schema N to N + 1
+
+
+def _to_schema_2(page: dict[str, Any]) -> dict[str, Any]:
+    """Before velocities and recordings were read."""
+    measured = page["measurements"] | {"recordings": None}
+    if measured["forces"] is not None:
+        rows = len(measured["forces"]["run"])
+        measured["forces"] = measured["forces"] | {"velocity": [None] * rows, "velocity_unit": ""}
+    return page | {"schema": 2, "measurements": measured}
+
+
+MIGRATIONS: Mapping[int, Migration] = {1: _to_schema_2}  # from schema N to N + 1
 
 
 def save(fit: Fit, folder: Path, force: bool = False, write_posterior: Callable[..., Any] | None = None) -> None:
@@ -152,25 +153,29 @@ def _array(value: list) -> np.ndarray:
 
 
 def _measurements(page: Mapping[str, Any]) -> Measurements:
-    tables = {name: _table(kind, page[name]) if page[name] else None for name, kind in _TABLES.items()}
-    return Measurements(**tables, remarks=tuple(page["remarks"]))
+    return _rebuilt(Measurements, page)
 
 
-def _table(kind: type, page: Mapping[str, Any]) -> Any:
-    values: dict[str, Any] = {}
-    for column in fields(kind):
-        value = page[column.name]
-        if column.name in _PARTS:
-            values[column.name] = _table(_PARTS[column.name], value)
-        elif column.name in {"names", "files", "run_names"}:
-            values[column.name] = tuple(value)
-        elif column.name in _WHOLE_NUMBERS:
-            values[column.name] = np.array(value, dtype=int)
-        else:
-            values[column.name] = _array(value)
-    if kind is OwnAngles and not values["names"]:
-        values |= {name: values[name].reshape(len(page[name]), 0) for name in ("angle", "sd")}
-    return kind(**values)
+def _rebuilt(kind: Any, value: Any) -> Any:
+    """A value of an annotated type from its plain form: dataclasses by their fields, arrays by their kind of number."""
+    if value is None and NoneType in get_args(kind):
+        return None
+    options = [part for part in get_args(kind) if part is not NoneType]
+    if isinstance(kind, UnionType):
+        return _rebuilt(options[0], value)
+    if is_dataclass(kind):
+        hints = get_type_hints(kind)
+        return kind(**{f.name: _rebuilt(hints[f.name], value[f.name]) for f in fields(kind)})
+    if kind in (Labels, Flags):
+        return np.array(value, dtype=int if kind is Labels else bool)
+    if kind is Matrix:
+        return _array(value).reshape(len(value), len(value[0]) if value else 0)
+    if kind is Vector:
+        return _array(value)
+    if get_origin(kind) is tuple:
+        parts = [options[0]] * len(value) if Ellipsis in options else options
+        return tuple(_rebuilt(part, item) for part, item in zip(parts, value, strict=True))
+    return _number(value) if kind is float else value
 
 
 def _least_squares(page: Mapping[str, Any]) -> LeastSquares:

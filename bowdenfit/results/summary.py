@@ -5,6 +5,7 @@ from typing import Any
 
 import numpy as np
 
+from bowdenfit.models.build import EFFICIENCY_TERMS
 from bowdenfit.results.answers import Interval
 from bowdenfit.results.fit import Fit
 
@@ -93,7 +94,7 @@ def measured_against_predicted(fit: Fit) -> list[dict[str, Any]]:
     """
     rows = []
     for term in fit.model.terms:
-        if term.name not in {"efficiency", "run_efficiency"}:
+        if term.name not in EFFICIENCY_TERMS:
             continue
         observed = term.observed()
         for i, label in enumerate(term.labels):

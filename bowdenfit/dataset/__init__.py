@@ -1,8 +1,9 @@
 """A data set: the description and the tables of one folder, read together and checked against each other."""
 
 import hashlib
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
+from functools import partial
 from pathlib import Path
 
 import numpy as np
@@ -81,13 +82,19 @@ def single_table_dataset(path: Path, wrap_angle: tuple[float, str], overrides: S
     return read_dataset(description, path.parent, {})
 
 
-def read_dataset(description: Description, folder: Path, sha256: dict[str, str]) -> Dataset:
+def read_dataset(
+    description: Description,
+    folder: Path,
+    sha256: dict[str, str],
+    channels: Mapping[str, ColumnSource] | None = None,
+) -> Dataset:
     """Read the tables that a description names.
 
     Args:
         description: The description.
         folder: Where its files are.
         sha256: Checksums of what has been read so far.
+        channels: Channels of recordings named on the command line.
 
     Raises:
         DatasetError: A table is missing or wrong, or does not fit the description.
@@ -115,7 +122,18 @@ def read_dataset(description: Description, folder: Path, sha256: dict[str, str])
         checksums |= {
             p.relative_to(folder).as_posix() if p.is_relative_to(folder) else p.name: _sha256(p) for p in paths
         }
-    measurements = Measurements(angles, efficiencies, forces, tuple(remarks))
+    recordings = None
+    if tables.recordings is not None:
+        from bowdenfit.dataset.recordings import read_recordings
+
+        patterns = Table(files=tables.recordings.files) if tables.recordings.files else None
+        found = partial(_paths, patterns, folder, "recordings") if patterns else list
+        recordings, files = read_recordings(description, folder, found, channels or {})
+        checksums |= {name: _sha256(path) for name, path in files.items()}
+        remarks += [remark for r in recordings.each for remark in (*r.account.remarks, *r.strokes.remarks)]
+    elif channels:
+        raise DescriptionError("--channel names channels of recordings, but the data set has none.")
+    measurements = Measurements(angles, efficiencies, forces, recordings, tuple(remarks))
     _check(description, measurements)
     return Dataset(description, measurements, checksums)
 

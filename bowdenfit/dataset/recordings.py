@@ -1,0 +1,187 @@
+"""The recordings of a data set: read, prepared, cut into strokes, and placed on the route."""
+
+from collections.abc import Callable, Mapping, Sequence
+from pathlib import Path
+
+import numpy as np
+
+from bowdenfit.description import ColumnMap, Description, Preparation, QuantityValue, RecordingFile
+from bowdenfit.errors import DatasetError, DescriptionError, nearest
+from bowdenfit.measurements.columns import ColumnSource
+from bowdenfit.measurements.lab_files import read_channels
+from bowdenfit.measurements.preparation import prepare
+from bowdenfit.measurements.recording_files import matched_name, to_recording
+from bowdenfit.measurements.recordings import Blocks, PreparationSettings, Recording, Recordings
+from bowdenfit.measurements.strokes import Span, find_strokes
+from bowdenfit.measurements.units import conversion_factor, dimension_of
+
+
+def read_recordings(
+    description: Description, folder: Path, paths: Callable[[], Sequence[Path]], channels: Mapping[str, ColumnSource]
+) -> tuple[Recordings, dict[str, Path]]:
+    """Read all recordings of a description.
+
+    Args:
+        description: The description; it has a table of recordings.
+        folder: Where its files are.
+        paths: The files that the table's pattern matches.
+        channels: Channels named on the command line; they come before those of the description.
+
+    Returns:
+        The recordings, and the files they were read from by name.
+
+    Raises:
+        DatasetError, DescriptionError: What is wrong, in a sentence.
+    """
+    entries = _entries(description, folder, paths())
+    _check_names(entries)
+    read = [_read(description, path, entry, channels) for path, entry in entries]
+    units = {unit: r.file for r, unit in read if unit}
+    if len(units) > 1:
+        raise DatasetError(
+            f"{' and '.join(units.values())} give velocities of different kinds, of the rope and of the motor; give both in "
+            "mm/s or both in r/min."
+        )
+    recordings = Recordings(description.angle_columns, tuple(r for r, _ in read), next(iter(units), ""))
+    _check_placed(description, recordings)
+    return recordings, {entry.file: path for path, entry in entries}
+
+
+def _entries(description: Description, folder: Path, matched: Sequence[Path]) -> list[tuple[Path, RecordingFile]]:
+    """Every file with what is said of it; a file named in a [[recording]] is not read twice."""
+    table = description.tables.recordings
+    assert table is not None  # the caller asked
+    entries = [(folder / entry.file, entry) for entry in description.recording]
+    named = {path.resolve() for path, _ in entries}
+    for path in matched:
+        if path.resolve() not in named:
+            file = path.relative_to(folder).as_posix() if path.is_relative_to(folder) else path.name
+            entries.append((path, _from_name(description, table.pattern, path, file)))
+    return entries
+
+
+def _from_name(description: Description, pattern: str | None, path: Path, file: str) -> RecordingFile:
+    """What the name of a file says, by the table's pattern."""
+    if pattern is None:
+        return RecordingFile(file=file)
+    values = matched_name(pattern, path)
+    angles = {}
+    for name, (text, unit) in values.items():
+        if name in {"at", "run", "velocity"}:
+            continue
+        if name not in description.angle_columns:
+            known = ["at", "run", "velocity", *description.angle_columns]
+            raise DescriptionError(f"cable.toml, tables.recordings.pattern: {name!r} is unknown{nearest(name, known)}")
+        angles[name] = QuantityValue(value=float(text), unit=unit or "deg")
+    velocity = values.get("velocity")
+    return RecordingFile(
+        file=file,
+        run=values["run"][0] if "run" in values else None,
+        at=float(values["at"][0]) if "at" in values else None,
+        velocity=QuantityValue(value=float(velocity[0]), unit=velocity[1] or "mm/s") if velocity else None,
+        wrap_angles=angles,
+    )
+
+
+def _check_names(entries: list[tuple[Path, RecordingFile]]) -> None:
+    names = [_name(path, entry) for path, entry in entries]
+    twice = next((name for name in names if names.count(name) > 1), None)
+    if twice is not None:
+        raise DescriptionError(
+            f"two recordings are both called {twice!r}; give one of them another name in its [[recording]]."
+        )
+
+
+def _name(path: Path, entry: RecordingFile) -> str:
+    return entry.name or entry.run or path.stem
+
+
+def _read(
+    description: Description, path: Path, entry: RecordingFile, channels: Mapping[str, ColumnSource]
+) -> tuple[Recording, str]:
+    table = description.tables.recordings
+    assert table is not None  # the caller asked
+    name, file = _name(path, entry), read_channels(path)
+    raw, unit = to_recording(file, name, {**_sources(table.channels), **_sources(entry.channels), **channels})
+    blocks, account = prepare(raw, preparation_settings(entry.prepare or table.prepare))
+    spans = [Span(phase.start, phase.end, phase.stroke) for phase in entry.strokes]
+    strokes = find_strokes(blocks, path.name, name, spans)
+    if entry.velocity is not None and not unit:
+        blocks, unit = _at_speed(blocks, entry.velocity)
+    angle, sd = _own_angles(description, entry)
+    route = float("nan") if entry.at is None else entry.at
+    return Recording(name, path.name, entry.run or name, route, angle, sd, blocks, strokes, account), unit
+
+
+def _sources(channels: Mapping[str, ColumnMap]) -> dict[str, ColumnSource]:
+    return {name: ColumnSource(channel.name, channel.unit) for name, channel in channels.items()}
+
+
+def preparation_settings(page: Preparation) -> PreparationSettings:
+    """The preparation that a description asks for, in internal units."""
+    limits = page.limits
+    newtons = conversion_factor(limits.unit, "force") if limits is not None else 1.0
+    return PreparationSettings(
+        "interval" if page.tare == "interval" else "none",
+        page.quiet,
+        page.delay.to("time") if isinstance(page.delay, QuantityValue) else _DELAYS[page.delay],
+        "keep" if page.saturation == "kept" else "flag",
+        (limits.low * newtons, limits.high * newtons) if limits is not None else None,
+        page.dropouts,
+        page.spikes,
+        page.block.to("time") if isinstance(page.block, QuantityValue) else "auto" if page.block == "auto" else 0.0,
+    )
+
+
+_DELAYS = {"estimated": "estimate", "none": "none"}
+
+
+def _at_speed(blocks: Blocks, velocity: QuantityValue) -> tuple[Blocks, str]:
+    """Blocks at the speed that the user states for the whole recording."""
+    of_motor = dimension_of(velocity.unit) == "angular_velocity"
+    speed = velocity.to("angular_velocity" if of_motor else "velocity")
+    stated = Blocks(
+        blocks.time,
+        blocks.input_force,
+        blocks.output_force,
+        np.full(len(blocks.time), speed),
+        blocks.samples,
+        blocks.saturated,
+    )
+    return stated, "rad/s" if of_motor else "mm/s"
+
+
+def _own_angles(description: Description, entry: RecordingFile) -> tuple[np.ndarray, np.ndarray]:
+    """Wrap angles measured with a recording, and their standard deviations [rad]."""
+    columns = description.angle_columns
+    for name in entry.wrap_angles:
+        if name not in columns:
+            raise DescriptionError(
+                f"cable.toml, recording {entry.file!r}, wrap_angles: {name!r} is no column of a contact's wrap angle"
+                f"{nearest(name, columns)}"
+            )
+    stated = [entry.wrap_angles.get(name) for name in columns]
+    angles = [float("nan") if q is None else q.to("angle") for q in stated]
+    sds = [float("nan") if q is None or q.sd is None else q.sd_to("angle") for q in stated]
+    return np.array(angles, dtype=float), np.array(sds, dtype=float)
+
+
+def _check_placed(description: Description, recordings: Recordings) -> None:
+    """Every recording can be given a wrap angle in every contact."""
+    route = description.route
+    for recording in recordings.each:
+        for contact in description.contact:
+            column = contact.wrap_angle.column
+            if column is None or np.isfinite(recording.own_angle[recordings.columns.index(column)]):
+                continue
+            if not contact.wrap_angle.curve:
+                raise DatasetError(
+                    f"the recording {recording.name!r} has no wrap angle for the contact {contact.name!r}; add it to its "
+                    f'[[recording]]: wrap_angles = {{ {column} = {{ value = 90, unit = "deg" }} }}.'
+                )
+            if np.isnan(recording.route):
+                at = f"at = 470   # {route.variable}, in {route.unit}" if route else "at = 470"
+                raise DatasetError(
+                    f"the recording {recording.name!r} does not say at which {route.variable if route else 'length'} it was "
+                    f'made; add that to its [[recording]] ({at}), or read it from the file names: pattern = "{{at}}mm*".'
+                )

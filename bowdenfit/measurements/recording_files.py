@@ -1,0 +1,214 @@
+"""From the channels of a file to a recording: which channel is which force, in which unit, and on which clock."""
+
+import re
+from collections.abc import Mapping, Sequence
+from pathlib import Path
+
+import numpy as np
+
+from bowdenfit.errors import DatasetError
+from bowdenfit.measurements.channels import Channel, ChannelFile
+from bowdenfit.measurements.columns import ColumnSource, Quantity, meanings
+from bowdenfit.measurements.quoting import listed, shown
+from bowdenfit.measurements.recordings import RawRecording
+from bowdenfit.measurements.units import conversion_factor, dimension_of
+
+WANTED = (
+    Quantity("input_force", "force"),
+    Quantity("output_force", "force"),
+    Quantity("velocity", "speed"),
+    Quantity("time", "time"),
+)
+_RATE = re.compile(r"(?P<rate>[0-9.]+(?:[eE][+-]?[0-9]+)?)\s*(?P<unit>k?Hz)", re.IGNORECASE)
+_PATH = re.compile(r"[/.]")
+
+
+def to_recording(file: ChannelFile, name: str, sources: Mapping[str, ColumnSource]) -> tuple[RawRecording, str]:
+    """A recording from the channels of a file.
+
+    Args:
+        file: What was read.
+        name: Name of the recording.
+        sources: Channels that the user has named, by quantity; the others are found by their names. The time may also
+            be given as a rate, such as "1000 Hz"; a minus sign before a unit turns the sign.
+
+    Returns:
+        The recording, and the unit of its velocity: "mm/s", "rad/s", or empty without one.
+
+    Raises:
+        DatasetError: A channel is missing or named twice, or has no unit or clock, or a unit of another kind.
+    """
+    found = {q.name: channel for q in WANTED if (channel := _find(file, q, sources)) is not None}
+    for quantity in ("input_force", "output_force"):
+        if quantity not in found:
+            raise _missing(file, quantity)
+    forces = {q: _converted(file, found[q], q, sources.get(q), "force") for q in ("input_force", "output_force")}
+    clocks = {q: _clock(file, found[q], found.get("time"), sources.get("time")) for q in found if q != "time"}
+    for quantity, values in forces.items():
+        _same_length(file, found[quantity], values, clocks[quantity])
+    velocity, unit = _velocity(file, found.get("velocity"), sources.get("velocity"))
+    return (
+        RawRecording(
+            name,
+            file.path.name,
+            clocks["input_force"],
+            forces["input_force"],
+            clocks["output_force"],
+            forces["output_force"],
+            clocks.get("velocity", np.zeros(0)),
+            velocity,
+        ),
+        unit,
+    )
+
+
+def _find(file: ChannelFile, quantity: Quantity, sources: Mapping[str, ColumnSource]) -> Channel | None:
+    """The channel of a quantity: the one the user names, or the only one whose name says so."""
+    source = sources.get(quantity.name)
+    if source is not None:
+        if quantity.name == "time" and _RATE.fullmatch(source.name.strip()):
+            return None
+        return _named(file, quantity.name, source.name)
+    matches = [c for c in file.channels if _says(c, quantity)]
+    if len(matches) > 1 and quantity.name == "time":
+        return None  # each channel has the clock beside it
+    if len(matches) > 1:
+        raise DatasetError(
+            f"{file.path.name}: the channels {listed(tuple(c.name for c in matches))} can all be the {quantity.name}; say "
+            f"which: --channel {quantity.name}={matches[0].name}, or channels = {{ {quantity.name} = {{ name = "
+            f'"{matches[0].name}" }} }} in cable.toml.'
+        )
+    return matches[0] if matches else None
+
+
+def _says(channel: Channel, quantity: Quantity) -> bool:
+    """Whether the name of a channel, or the last part of its path, is that of the quantity."""
+    names = (channel.name, _PATH.split(channel.name)[-1])
+    return any(meanings(name, (quantity,)) for name in names if name)
+
+
+def _named(file: ChannelFile, quantity: str, name: str) -> Channel:
+    wanted = " ".join(name.split())
+    matches = [c for c in file.channels if c.name == wanted] or [
+        c for c in file.channels if wanted == c.name.rsplit("/", 1)[-1]
+    ]
+    if len(matches) == 1:
+        return matches[0]
+    if matches:
+        raise DatasetError(
+            f"{file.path.name} has several channels called {shown(wanted)}: {listed(tuple(c.name for c in matches))}; give "
+            "the whole name."
+        )
+    raise DatasetError(
+        f"{file.path.name} has no channel {shown(wanted)}, which is named for {quantity}; it has "
+        f"{listed(tuple(c.name for c in file.channels))}."
+    )
+
+
+def _missing(file: ChannelFile, quantity: str) -> DatasetError:
+    return DatasetError(
+        f"{file.path.name} has no channel {quantity}; it has {listed(tuple(c.name for c in file.channels))}. Say which "
+        f'it is and its unit: --channel {quantity}=NAME:N, or channels = {{ {quantity} = {{ name = "NAME", unit = '
+        '"N" } } in cable.toml.'
+    )
+
+
+def _converted(
+    file: ChannelFile, channel: Channel, quantity: str, source: ColumnSource | None, dimension: str
+) -> np.ndarray:
+    """Values of a channel in the internal unit."""
+    sign, unit = _unit(file, channel, quantity, source)
+    try:
+        return channel.values * (sign * conversion_factor(unit, dimension))
+    except DatasetError as error:
+        raise DatasetError(f"{file.path.name}, channel {shown(channel.name)}: {error}.") from None
+
+
+def _unit(file: ChannelFile, channel: Channel, quantity: str, source: ColumnSource | None) -> tuple[float, str]:
+    """Sign and unit of a channel, as the user says, else the file, else the channel's name."""
+    stated = (source.unit if source else None) or channel.unit
+    if not stated:
+        named = [unit for q in WANTED if q.name == quantity for _, unit in meanings(channel.name, (q,)) if unit]
+        stated = named[0] if named else ""
+    if not stated:
+        example = {"velocity": "mm/s", "time": "s"}.get(quantity, "N")
+        raise DatasetError(
+            f"{file.path.name}: the channel {shown(channel.name)} does not say its unit; give it, such as --channel "
+            f"{quantity}={channel.name}:{example}."
+        )
+    text = stated.strip()
+    return (-1.0, text[1:]) if text.startswith(("-", "\u2212")) and len(text) > 1 else (1.0, text)
+
+
+def _clock(file: ChannelFile, channel: Channel, time: Channel | None, source: ColumnSource | None) -> np.ndarray:
+    """Time of each sample of a channel [s]."""
+    rate = _RATE.fullmatch(source.name.strip()) if source is not None else None
+    if rate is not None:
+        hertz = float(rate["rate"]) * (1000.0 if rate["unit"].lower() == "khz" else 1.0)
+        return np.arange(len(channel.values)) / hertz
+    if source is None and channel.time is not None:
+        return channel.time
+    if time is not None:
+        return _converted(file, time, "time", source, "time")
+    raise DatasetError(
+        f"{file.path.name}: the channel {shown(channel.name)} has no clock; name the channel of the time, --channel "
+        "time=NAME:s, or state the sampling rate, --channel time=1000Hz."
+    )
+
+
+def _same_length(file: ChannelFile, channel: Channel, values: Sequence[float], time: Sequence[float]) -> None:
+    if len(values) != len(time):
+        raise DatasetError(
+            f"{file.path.name}: the channel {shown(channel.name)} has {len(values)} samples, but its clock has "
+            f"{len(time)}; name the clock that belongs to it, or state the rate: --channel time=1000Hz."
+        )
+
+
+def _velocity(file: ChannelFile, channel: Channel | None, source: ColumnSource | None) -> tuple[np.ndarray, str]:
+    if channel is None:
+        return np.zeros(0), ""
+    _, unit = _unit(file, channel, "velocity", source)
+    kind = "angular_velocity" if dimension_of(unit) == "angular_velocity" else "velocity"
+    return _converted(file, channel, "velocity", source, kind), "rad/s" if kind == "angular_velocity" else "mm/s"
+
+
+def parsed_channels(texts: Sequence[str]) -> dict[str, ColumnSource]:
+    """Channels named on the command line, such as "input_force=ai0:lbf" or "time=1000Hz".
+
+    Raises:
+        DatasetError: A text is not of that form, or names a quantity that recordings do not have.
+    """
+    known = [q.name for q in WANTED]
+    sources = {}
+    for text in texts:
+        quantity, equals, rest = text.partition("=")
+        name, _, unit = rest.rpartition(":") if ":" in rest else (rest, "", "")
+        if not equals or not name.strip():
+            raise DatasetError(
+                f"--channel {shown(text)} is not of the form QUANTITY=CHANNEL:UNIT, such as input_force=ai0:N."
+            )
+        if quantity.strip() not in known:
+            raise DatasetError(f"--channel {shown(text)}: {shown(quantity.strip())} is none of {', '.join(known)}.")
+        sources[quantity.strip()] = ColumnSource(name.strip(), unit.strip() or None)
+    return sources
+
+
+def matched_name(pattern: str, path: Path) -> dict[str, tuple[str, str]]:
+    """What a file's name says by a pattern such as "{at}mm_{velocity:r/min}rpm": text and unit by quantity.
+
+    Raises:
+        DatasetError: The name does not follow the pattern.
+    """
+    fields = re.findall(r"\{([\w]+)(?::([^}]*))?\}", pattern)
+    expression = re.escape(pattern).replace(r"\*", ".*")
+    for name, unit in fields:
+        written = re.escape("{" + name + (f":{unit}" if unit else "") + "}")
+        kind = r".+?" if name == "run" else r"[+-]?[0-9]+(?:[.,][0-9]+)?"
+        expression = expression.replace(written, f"(?P<{name}>{kind})", 1)
+    match = re.fullmatch(expression, path.stem) or re.fullmatch(expression, path.name)
+    if match is None:
+        raise DatasetError(
+            f"{path.name} does not follow the pattern {shown(pattern)} of the recordings in cable.toml; correct one of them, "
+            "or describe the file in a [[recording]] of its own."
+        )
+    return {name: (match[name].replace(",", "."), unit) for name, unit in fields}

@@ -1,0 +1,212 @@
+"""Force recordings: two load cells sampled while a motor pulls, stops, reverses and returns.
+
+Three stages, each a frozen class: what a file holds (`RawRecording`), how it is to be prepared (`PreparationSettings`), and
+what a fit uses (`Recording`: means of short blocks, with the number of samples that went into each, and an account of all
+the others).
+"""
+
+from dataclasses import dataclass, field
+from typing import Literal
+
+import numpy as np
+
+from bowdenfit.types import Flags, Labels, Vector
+
+PULL, RETURN, SWITCH = 1, -1, 0
+
+
+@dataclass(frozen=True)
+class RawRecording:
+    """One recording as read: samples of both load cells, each with its own clock, in internal units.
+
+    Args:
+        name: Name of the recording, unique in a data set.
+        file: File name, for errors.
+        input_time: Time of each sample of the input force [s].
+        input_force: Force at the motor side [N]; NaN where a sample is missing.
+        output_time: Time of each sample of the output force [s].
+        output_force: Force at the load side [N]; NaN where a sample is missing.
+        velocity_time: Time of each sample of the velocity [s]; empty without one.
+        velocity: Velocity of the rope, positive toward the motor [mm/s], or of the motor [rad/s]; empty without one.
+    """
+
+    name: str
+    file: str
+    input_time: Vector
+    input_force: Vector
+    output_time: Vector
+    output_force: Vector
+    velocity_time: Vector = field(default_factory=lambda: np.zeros(0))
+    velocity: Vector = field(default_factory=lambda: np.zeros(0))
+
+
+@dataclass(frozen=True)
+class PreparationSettings:
+    """Which steps of the preparation are done, and with what; defaults are in the description.
+
+    Args:
+        tare: Whether the mean of the quiet interval is subtracted ("interval") or nothing ("none").
+        quiet: Start and end of an interval without load [s]; None without one.
+        delay: "estimate", "none", or how much later the output channel is than the input channel [s].
+        saturation: "flag" readings at the end of a load cell's range, or "keep" them as they are.
+        limits: Lowest and highest force that the load cells can show [N]; None to look for clipping in the data.
+        dropouts: Whether missing and frozen samples are flagged.
+        spikes: Whether single samples far off their neighbors are flagged.
+        block: Length of the blocks that samples are averaged over [s]; "auto" to choose it from the data; 0 for none.
+    """
+
+    tare: Literal["interval", "none"]
+    quiet: tuple[float, float] | None
+    delay: Literal["estimate", "none"] | float
+    saturation: Literal["flag", "keep"]
+    limits: tuple[float, float] | None
+    dropouts: bool
+    spikes: bool
+    block: Literal["auto"] | float
+
+
+@dataclass(frozen=True)
+class Flagged:
+    """Samples that were left out, for figures and for the account; at most a few hundred of each kind are kept.
+
+    Args:
+        kind: "dropout", "spike", "saturated" or "quiet", one a sample.
+        time: When [s].
+        input_force, output_force: What was read [N].
+    """
+
+    kind: tuple[str, ...]
+    time: Vector
+    input_force: Vector
+    output_force: Vector
+
+
+@dataclass(frozen=True)
+class Account:
+    """What the preparation did, and where every sample went.
+
+    Args:
+        counts: Samples of the common clock by where they went: "used", "dropout", "spike", "saturated", "quiet",
+            "no overlap"; their sum is `samples`.
+        samples: Samples in the recording: those of the channel with more of them.
+        rate: Samples a second of the common clock [1/s].
+        bandwidth: Frequency up to which the forces move together, above which there is only noise [Hz].
+        block: Length of a block [s]; 0 without averaging.
+        tare: What was subtracted from the input and the output force [N].
+        tare_sd: Standard errors of these [N].
+        delay: How much later the output channel was [s]; the output was shifted back by it.
+        delay_sd: Standard error of the delay [s]; NaN where the recording says nothing of it or it was given.
+        noise: Standard deviation of a single sample about the smooth motion, input and output [N].
+        limits: Lowest and highest force taken for the ends of the range [N]; infinite where no clipping was seen.
+        flagged: Samples left out.
+        remarks: What a user should know, in sentences.
+    """
+
+    counts: dict[str, int]
+    samples: int
+    rate: float
+    bandwidth: float
+    block: float
+    tare: tuple[float, float]
+    tare_sd: tuple[float, float]
+    delay: float
+    delay_sd: float
+    noise: tuple[float, float]
+    limits: tuple[float, float]
+    flagged: Flagged
+    remarks: tuple[str, ...]
+
+
+@dataclass(frozen=True)
+class Blocks:
+    """A prepared recording: means over short blocks on one clock.
+
+    Args:
+        time: Middle of each block [s].
+        input_force, output_force: Mean forces of the good samples [N].
+        velocity: Mean velocity [mm/s or rad/s]; all NaN without one.
+        samples: Number of good samples of each block, at least 1; blocks without any are left out.
+        saturated: Blocks most of whose samples were at the end of a load cell's range; their forces are the means of
+            the saturated samples, and they must not be used as readings.
+    """
+
+    time: Vector
+    input_force: Vector
+    output_force: Vector
+    velocity: Vector
+    samples: Labels
+    saturated: Flags
+
+
+@dataclass(frozen=True)
+class Strokes:
+    """What the cable did in each block, and what that says about it before any model of the whole cable.
+
+    Args:
+        stroke: +1 sliding toward the motor, -1 sliding back, 0 switching or held.
+        used_sliding: Whether the block is safely inside a sliding phase.
+        exponent: Friction exponent of this recording by itself [1].
+        center: Mean log ratio of input to output force over both strokes [1]; what sensors add.
+        drag: Drag that straightens the hysteresis loop [N].
+        noise: Standard deviation of a block's log ratio about the play operator [1].
+        correlation: Integrated autocorrelation time of these deviations, in blocks, at least 1.
+        by_hand: Whether the user set the phases.
+        remarks: What a user should know, in sentences.
+    """
+
+    stroke: Labels
+    used_sliding: Flags
+    exponent: float
+    center: float
+    drag: float
+    noise: float
+    correlation: float
+    by_hand: bool
+    remarks: tuple[str, ...]
+
+
+@dataclass(frozen=True)
+class Recording:
+    """One recording, ready for a fit.
+
+    Args:
+        name: Its name, unique in the data set.
+        file: File it was read from.
+        run: Mounting of the cable that it belongs to.
+        route: Value of the route variable; NaN without a route.
+        own_angle: Wrap angle measured with this recording [rad], by contact column; NaN where the curve must serve.
+        own_sd: Standard deviations of these [rad]; NaN where not stated.
+        blocks: The forces.
+        strokes: The phases.
+        account: Where all samples went.
+    """
+
+    name: str
+    file: str
+    run: str
+    route: float
+    own_angle: Vector
+    own_sd: Vector
+    blocks: Blocks
+    strokes: Strokes
+    account: Account
+
+
+@dataclass(frozen=True)
+class Recordings:
+    """All recordings of a data set.
+
+    Args:
+        columns: Contact columns that `own_angle` refers to.
+        each: The recordings.
+        velocity_unit: "mm/s" or "rad/s", what the blocks' velocities are in; empty where none was recorded or stated.
+    """
+
+    columns: tuple[str, ...]
+    each: tuple[Recording, ...]
+    velocity_unit: str = ""
+
+    @property
+    def runs(self) -> tuple[str, ...]:
+        """Names of the runs, each once."""
+        return tuple(dict.fromkeys(r.run for r in self.each))

@@ -1,0 +1,332 @@
+"""Recordings: their sliding blocks as runs, or every block through the play operator.
+
+Both ask for the same coefficients. A run's blocks say how large its friction exponent is; that of the cable is known from
+it only up to what the mounting did to this run.
+"""
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import Any
+
+import jax
+import jax.numpy as jnp
+import numpy as np
+from jax import Array
+from jax.scipy.stats import norm
+from jaxtyping import Float
+
+from bowdenfit.errors import DatasetError
+from bowdenfit.measurements.preparation.play import play
+from bowdenfit.measurements.recordings import Recording, Recordings
+from bowdenfit.measurements.tables import AngleTable, OwnAngles
+from bowdenfit.models.cable import Cable, resolve_angles, row_angles
+from bowdenfit.models.runs import LEAST_FORCE, ROW_ARRAYS, RunsTerm, SlidingRows, run_sums
+from bowdenfit.models.scatter import BLOCK_NOISE, GAIN_ERROR, INPUT_OFFSET, OUTPUT_OFFSET, RUN_SCATTER
+from bowdenfit.physics.friction import transmission_efficiency
+from bowdenfit.physics.hysteresis import play_operator_with_slope
+from bowdenfit.physics.normal_tail import log_normal_cdf
+
+NAME = "recorded_efficiency"
+_MOST_BLOCKS = 600  # of one recording in the play operator; more say no more once noise is averaged
+_LEAST_BAND = 1e-9
+
+
+@dataclass(frozen=True)
+class RecordedAngles:
+    """Where and at which wrap angles each recording was made; see `bowdenfit.models.cable.Measured`."""
+
+    route: np.ndarray
+    own: OwnAngles
+
+
+def recorded_angles(recordings: Recordings) -> RecordedAngles:
+    """Route values and own angles, one row a recording."""
+    shape = (len(recordings.each), len(recordings.columns))
+    angle, sd = (np.array([getattr(r, n) for r in recordings.each]).reshape(shape) for n in ("own_angle", "own_sd"))
+    return RecordedAngles(np.array([r.route for r in recordings.each]), OwnAngles(recordings.columns, angle, sd))
+
+
+def recordings_term(
+    cable: Cable, recordings: Recordings, angles: AngleTable | None
+) -> "RunsTerm | WholeRecordingsTerm":
+    """The term of a data set's recordings, as its description wants them used.
+
+    Raises:
+        DatasetError: Whole recordings are wanted, and one has no reversal.
+    """
+    settings = cable.description.tables.recordings
+    rows = row_angles(cable, recorded_angles(recordings), angles).data
+    labels = tuple(_label(cable, recordings, run) for run in recordings.runs)
+    if settings is None or settings.likelihood == "runs":
+        parts = [_sliding_blocks(r) for r in recordings.each]
+        return RunsTerm(cable, run_sums(cable, _rows(recordings, parts, rows)), labels, NAME, BLOCK_NOISE)
+    for recording in recordings.each:
+        _needs_reversal(recording)
+    censored = settings.prepare.saturation == "censored" and any(r.blocks.saturated.any() for r in recordings.each)
+    if not (cable.friction.options or cable.description.fits_offsets or censored):
+        # On a scale that no parameter changes, the operator is linear in the exponent: it need not be run again.
+        parts = [_all_blocks(r) for r in recordings.each]
+        return RunsTerm(cable, run_sums(cable, _rows(recordings, parts, rows)), labels, NAME, BLOCK_NOISE)
+    return WholeRecordingsTerm(cable, _padded(recordings, rows, censored), labels)
+
+
+def _label(cable: Cable, recordings: Recordings, run: str) -> str:
+    """Name of a run, with its route value where it has just one and does not say it itself."""
+    route, at = cable.description.route, {r.route for r in recordings.each if r.run == run}
+    where = f"{min(at):g} {route.unit}" if route is not None and len(at) == 1 else ""
+    return f"{run} ({where})" if where and where not in run else run
+
+
+def _needs_reversal(recording: Recording) -> None:
+    if len(set(recording.strokes.stroke) - {0}) < 2:
+        raise DatasetError(
+            f"{recording.file}: the recording {recording.name!r} has no reversal, and the play operator has nothing to show "
+            'without one; record a pull and a return, or set likelihood = "runs" for the recordings.'
+        )
+
+
+@dataclass(frozen=True)
+class _Part:
+    """Blocks of one recording that enter: indices, stroke, log ratio, worth."""
+
+    used: np.ndarray
+    stroke: np.ndarray
+    log_ratio: np.ndarray
+    worth: np.ndarray
+
+
+def _positive(recording: Recording) -> np.ndarray:
+    blocks = recording.blocks
+    return ~blocks.saturated & (blocks.input_force > 0) & (blocks.output_force > 0)
+
+
+def _worth(recording: Recording, used: np.ndarray) -> np.ndarray:
+    """What each block is worth: in proportion to its samples, and less where deviations stay alike for long."""
+    samples = recording.blocks.samples[used].astype(float)
+    return samples / recording.blocks.samples.mean() / recording.strokes.correlation
+
+
+def _sliding_blocks(recording: Recording) -> _Part:
+    """Blocks in which the rope slides, with their log ratio."""
+    used = np.flatnonzero(recording.strokes.used_sliding & _positive(recording))
+    stroke, blocks = recording.strokes.stroke[used], recording.blocks
+    ratio = stroke * np.log(blocks.input_force[used] / blocks.output_force[used])
+    return _Part(used, stroke, ratio, _worth(recording, used))
+
+
+def _all_blocks(recording: Recording) -> _Part:
+    r"""Every block after the rope first slid, as the log ratio it would show had it gone on sliding.
+
+    Between contacts the output stands still where the last stroke left it, :math:`y = y(\hat\Lambda) - s (\Lambda -
+    \hat\Lambda)`; so every block reads the friction exponent of the stroke before it.
+    """
+    positive, blocks, strokes = _positive(recording), recording.blocks, recording.strokes
+    x, y = np.log(blocks.input_force[positive]), np.log(blocks.output_force[positive])
+    followed, state = play(x, strokes.exponent, float(y[0] + strokes.center))
+    last = _last_contact(np.asarray(state))
+    slid = last != 0
+    used, stroke = np.flatnonzero(positive)[slid], last[slid]
+    ratio = strokes.exponent - stroke * (y - followed)[slid]
+    still = (np.asarray(state) == 0)[slid]
+    force_in, force_out = blocks.input_force[used], blocks.output_force[used]
+    of_output_alone = np.where(still, 1 + (force_out / force_in) ** 2, 1.0)  # a standing output has no input noise
+    return _Part(used, stroke, ratio, _worth(recording, used) * of_output_alone)
+
+
+def _last_contact(state: np.ndarray) -> np.ndarray:
+    """The last contact up to each block; 0 before the first."""
+    at = np.maximum.accumulate(np.where(state != 0, np.arange(len(state)), -1))
+    return np.where(at >= 0, state[np.maximum(at, 0)], 0).astype(int)
+
+
+def _rows(recordings: Recordings, parts: list[_Part], angles: Mapping[str, np.ndarray]) -> SlidingRows:
+    """Blocks of all recordings as rows of runs."""
+    of_recording = np.repeat(np.arange(len(parts)), [len(p.used) for p in parts])
+    runs = recordings.runs
+
+    def gathered(name: str) -> np.ndarray:
+        pairs = zip(recordings.each, parts, strict=True)
+        return np.concatenate([getattr(r.blocks, name)[p.used] for r, p in pairs])
+
+    run = np.array([runs.index(r.run) for r in recordings.each])[of_recording]
+    return SlidingRows(
+        gathered("input_force"),
+        gathered("output_force"),
+        np.concatenate([p.log_ratio for p in parts]),
+        np.concatenate([p.stroke for p in parts]).astype(int),
+        run,
+        gathered("velocity"),
+        np.concatenate([p.worth for p in parts]),
+        {name: angles[name][of_recording] for name in ROW_ARRAYS},
+    )
+
+
+@dataclass(frozen=True)
+class WholeRecordingsTerm:
+    r"""Likelihood of every block of whole recordings, one value a run.
+
+    .. math:: y_t = \text{clip}(y_{t-1},\ x_t - \Lambda_t - m,\ x_t + \Lambda_t + m), \quad
+              x = g(F_\text{in} - b_\text{in}), \quad
+              \log F_\text{out} = \log\left(g^{-1}(y) e^{-\gamma} + b_\text{out}\right) + e
+
+    with the offsets b and gain error gamma of the load cells. The output is linear in the mounting effect m but for
+    changes of contact, so that m integrates out in closed form at the value that suits the recording best (two passes of
+    the operator: one to find it, one to linearize there).
+
+    Args:
+        cable: The cable.
+        data: Arrays over time and recordings (forces, velocity, weight), over recordings and over runs.
+        labels: Each run in words.
+    """
+
+    cable: Cable
+    data: dict[str, Any]
+    labels: tuple[str, ...]
+    name: str = NAME
+    unit: str = "1"
+    noise: str = RUN_SCATTER
+    reading_noise: str = BLOCK_NOISE
+
+    @property
+    def residual_blocks(self) -> tuple[tuple[int, int], ...]:
+        """Runs scatter by their mounting; the blocks of a run about it by the load cells."""
+        runs, blocks = len(self.labels), self.data["weight"].size
+        return ((runs, runs), (blocks, max(int(np.sum(self.data["n"])) - runs, 1)))
+
+    def _followed(
+        self, values: Mapping[str, Array], data: Mapping[str, Any], exponent: Array, mounting: Array
+    ) -> tuple[Float[Array, "time recordings"], Float[Array, "time recordings"]]:
+        """Deviation of log F_out from the operator's output, and the output's derivative by the exponent."""
+        friction, gain = self.cable.friction, values.get(GAIN_ERROR, 0.0)
+        input_force = jnp.maximum(data["input_force"] - values.get(INPUT_OFFSET, 0.0), LEAST_FORCE)
+        start = jnp.maximum(data["output_force"][0] - values.get(OUTPUT_OFFSET, 0.0), LEAST_FORCE) * jnp.exp(gain)
+        band = jnp.maximum(exponent * friction.rate(values, data["velocity"]) + mounting, _LEAST_BAND)
+        y, slope = play_operator_with_slope(friction.scaled(values, input_force), band, friction.scaled(values, start))
+        output_force = jnp.maximum(friction.force(values, y), LEAST_FORCE)
+        shown = jnp.maximum(output_force * jnp.exp(-gain) + values.get(OUTPUT_OFFSET, 0.0), LEAST_FORCE)
+        loading = slope * jnp.exp(-gain) / (friction.slope(values, output_force) * shown)
+        return data["log_output"] - jnp.log(shown), loading
+
+    def _deviations(
+        self, values: Mapping[str, Array], data: Mapping[str, Any], weights: Mapping[str, Array]
+    ) -> tuple[Array, Array, Array, Array, Array]:
+        """Deviations from each run's own mounting effect; that effect, its sd, its information; the cable's exponent."""
+        angles, variance = resolve_angles(self.cable, values, data)
+        exponent = self.cable.friction_exponent(values, angles)
+        typical = exponent * self.cable.friction.rate(values, data["speed"])
+        guess = jnp.zeros_like(typical)
+        if not self.cable.friction.depends_on_load:  # else the loop's width means another exponent at every scale
+            guess = jax.lax.stop_gradient(data["exponent"] - typical)
+        deviation, loading = self._followed(values, data, exponent, guess)
+        by_recording = jnp.sum(data["weight"] * loading**2, axis=0)
+        step = jnp.sum(data["weight"] * loading * deviation, axis=0) / jnp.maximum(by_recording, 1e-30)
+        reach = jax.lax.stop_gradient(0.5 * data["exponent"])
+        guess = jax.lax.stop_gradient(guess + jnp.clip(step, -reach, reach))
+        deviation, loading = self._followed(values, data, exponent, guess)
+        deviation = deviation + loading * guess
+        total = self._per_run(data, data["weight"] * loading**2)
+        mounting = self._per_run(data, data["weight"] * loading * deviation) / total
+        of_angles = self.cable.exponent_variance(weights, angles, variance)
+        from_angles = self._per_run(data, data["weight"] * loading**2 * of_angles) / total
+        sd = jnp.sqrt(weights[RUN_SCATTER] ** 2 + from_angles + weights[self.reading_noise] ** 2 / total)
+        return deviation - loading * mounting[data["run"]], mounting, sd, total, typical
+
+    def _per_run(self, data: Mapping[str, Any], blocks: Float[Array, "time recordings"]) -> Float[Array, " runs"]:
+        """Sum over the blocks of each run."""
+        return jnp.zeros_like(data["n"]).at[data["run"]].add(jnp.sum(blocks, axis=0))
+
+    def log_likelihood(self, values: Mapping[str, Array], data: Mapping[str, Any]) -> Float[Array, " runs"]:
+        """Log likelihood of each run, all blocks together."""
+        within, mounting, sd, total, _ = self._deviations(values, data, values)
+        noise, n = values[self.reading_noise], data["n"]
+        scatter = self._per_run(data, data["weight"] * within**2)
+        constant = (data["log_weights"] - jnp.log(total) - (n - 1) * jnp.log(2 * jnp.pi)) / 2
+        inside = constant - (n - 1) * jnp.log(noise) - scatter / (2 * noise**2)
+        return inside + norm.logpdf(mounting, 0.0, sd) + self._censored(data, within, noise)
+
+    def _censored(self, data: Mapping[str, Any], within: Array, noise: Array) -> Float[Array, " runs"]:
+        """Log probability that a saturated output lies beyond the end of the range, where it was read."""
+        beyond = data["censored"] * -within * data["output_force"] / noise
+        return self._per_run(data, jnp.where(data["censored"] != 0, log_normal_cdf(beyond), 0.0) * data["share"])
+
+    def residuals(self, values: Mapping[str, Array], data: Mapping[str, Any]) -> Float[Array, " runs_and_blocks"]:
+        """Standardized residuals: between runs, and of the blocks of a run."""
+        within, mounting, sd, _, _ = self._deviations(values, data, jax.lax.stop_gradient(dict(values)))
+        inside = jnp.sqrt(data["weight"]) * within / jax.lax.stop_gradient(values[self.reading_noise])
+        return jnp.concatenate([mounting / jax.lax.stop_gradient(sd), inside.ravel()])
+
+    def expected(self, values: Mapping[str, Array], data: Mapping[str, Any]) -> Float[Array, " runs"]:
+        """Expected efficiency of each run, the effect of its mounting left out [1]."""
+        return transmission_efficiency(self._of_run(self._deviations(values, data, values)[4]))
+
+    def simulate(self, values: Mapping[str, Array], data: Mapping[str, Any], key: Array) -> Float[Array, " runs"]:
+        """Efficiency of each run as the bench would give it [1]."""
+        _, _, sd, _, typical = self._deviations(values, data, values)
+        return transmission_efficiency(self._of_run(typical) + sd * jax.random.normal(key, sd.shape))
+
+    def _of_run(self, of_recording: Array) -> Array:
+        """Mean over the recordings of each run."""
+        run, runs = jnp.asarray(self.data["run"]), len(self.labels)
+        counts = jnp.zeros(runs).at[run].add(1.0)
+        return jnp.zeros(runs).at[run].add(of_recording) / counts
+
+    def observed(self) -> np.ndarray:
+        """Efficiency of each run by the width of its own hysteresis loop [1]."""
+        run, exponent = self.data["run"], self.data["exponent"]
+        return np.exp(-np.bincount(run, exponent) / np.bincount(run))
+
+
+def _padded(recordings: Recordings, angles: Mapping[str, np.ndarray], censored: bool) -> dict[str, Any]:
+    """Arrays over time and recordings; the shorter ones stand still at their end, with no weight."""
+    parts = [_thinned(r, censored) for r in recordings.each]
+    longest = max(len(p["weight"]) for p in parts)
+
+    def padded(name: str, mode: str) -> np.ndarray:
+        return np.stack([np.pad(p[name], (0, longest - len(p[name])), mode) for p in parts], axis=1)  # type: ignore[call-overload]
+
+    runs = recordings.runs
+    run = np.array([runs.index(r.run) for r in recordings.each])
+    held = {name: padded(name, "edge") for name in ("input_force", "output_force", "velocity")}
+    free = {name: padded(name, "constant") for name in ("weight", "worth", "censored", "share")}
+    worth = free.pop("worth")
+    log_weights = np.where(free["weight"] > 0, worth * np.log(np.where(free["weight"] > 0, free["weight"], 1.0)), 0.0)
+    return {name: angles[name] for name in ROW_ARRAYS} | held | free | {
+        "log_output": np.log(held["output_force"]),
+        "run": run,
+        "exponent": np.array([r.strokes.exponent for r in recordings.each]),
+        "speed": np.array([p["speed"] for p in parts]),
+        "n": np.bincount(run, worth.sum(axis=0)),
+        "log_weights": np.bincount(run, log_weights.sum(axis=0)),
+    }  # fmt: skip
+
+
+def _thinned(recording: Recording, censored: bool) -> dict[str, Any]:
+    """Blocks of one recording, joined until there are no more than `_MOST_BLOCKS`."""
+    blocks, strokes = recording.blocks, recording.strokes
+    factor = -(-len(blocks.time) // _MOST_BLOCKS)
+    starts = np.arange(0, len(blocks.time), factor)
+    samples = np.add.reduceat(blocks.samples, starts)
+
+    def mean(values: np.ndarray) -> np.ndarray:
+        return np.add.reduceat(values * blocks.samples, starts) / samples
+
+    force_in, force_out = (np.maximum(mean(f), LEAST_FORCE) for f in (blocks.input_force, blocks.output_force))
+    usable = np.minimum.reduceat(_positive(recording), starts)
+    saturated = np.maximum.reduceat(blocks.saturated, starts)
+    still = np.abs(np.add.reduceat(strokes.stroke, starts)) < 1
+    worth = usable * samples / samples.mean() / max(strokes.correlation / factor, 1.0)
+    weight = worth / (np.where(still, 0.0, 1 / force_in**2) + 1 / force_out**2)
+    low, high = recording.account.limits
+    end = np.where(force_out > (low + high) / 2 if np.isfinite(low + high) else np.isfinite(high), 1.0, -1.0)
+    sliding = recording.strokes.used_sliding
+    speed = np.abs(blocks.velocity[sliding])
+    return {
+        "input_force": force_in,
+        "output_force": force_out,
+        "velocity": mean(blocks.velocity),
+        "weight": weight,
+        "worth": worth,
+        "censored": np.where(saturated & censored, end, 0.0),
+        "share": np.where(saturated, samples / samples.mean() / strokes.correlation, 0.0),
+        "speed": float(speed.mean()) if len(speed) else float("nan"),
+    }

@@ -82,6 +82,20 @@ def _reading_options(verb: Verb) -> Verb:
             "the on-body paper has them.  [default: as in cable.toml, else continuous]",
         ),
         click.option(
+            "--friction",
+            metavar="MODEL",
+            help="How friction depends on load and speed: capstan, or drag, load-dependent and rate-dependent joined by +.  "
+            "[default: as in cable.toml, else capstan]",
+        ),
+        click.option(
+            "--channel",
+            "channels",
+            multiple=True,
+            metavar="QUANTITY=CHANNEL:UNIT",
+            help="Which channel of a recording is input_force, output_force, velocity or time, such as input_force=ai0:lbf "
+            "or time=1000Hz; may be repeated.",
+        ),
+        click.option(
             "--set",
             "settings",
             multiple=True,
@@ -93,15 +107,8 @@ def _reading_options(verb: Verb) -> Verb:
     return verb
 
 
-def _reading(
-    settings: tuple[str, ...], geometry: str | None, undetected: str | None, wrap_angle: str | None
-) -> dict[str, Any]:
-    return {
-        "settings": settings,
-        "geometry": geometry,
-        "undetected": undetected,
-        "wrap_angle": _quantity(wrap_angle, "--wrap-angle", "180deg") if wrap_angle else None,
-    }
+def _reading(wrap_angle: str | None, **options: Any) -> dict[str, Any]:
+    return {**options, "wrap_angle": _quantity(wrap_angle, "--wrap-angle", "180deg") if wrap_angle else None}
 
 
 def _quantity(text: str, option: str, example: str) -> tuple[float, str]:
@@ -136,10 +143,17 @@ def init(folder: Path) -> None:
 def check(dataset: Path, **options: Any) -> None:
     """Read everything in DATASET, say what was understood and what is wrong; fit nothing.
 
-    DATASET is a folder with cable.toml and tables, or one table with --wrap-angle.
+    DATASET is a folder with cable.toml and tables, or one table or recording with --wrap-angle. Of a file alone, its
+    channels are listed: name, unit, sampling rate, length and range.
     """
     from bowdenfit import workflow
     from bowdenfit.report.check import check_text
+
+    if dataset.is_file() and dataset.suffix.lower() != ".toml" and not options["wrap_angle"]:
+        from bowdenfit.report.channels import channels_text
+
+        click.echo(channels_text(workflow.channels_of(dataset)), nl=False)
+        return
 
     click.echo(check_text(workflow.check(dataset, **_reading(**options))), nl=False)
 
@@ -171,7 +185,7 @@ def fit(
 ) -> int:
     """Fit DATASET: least squares, posterior, design answer, figures, all written to a results folder.
 
-    DATASET is a folder with cable.toml and tables, or one table with --wrap-angle.
+    DATASET is a folder with cable.toml and tables, or one table or recording with --wrap-angle.
     """
     from bowdenfit import workflow
 

@@ -7,9 +7,9 @@ from typing import Any
 
 from pydantic import BaseModel, ValidationError
 
-from bowdenfit.description import SCHEMA, Description, ParameterSetting
+from bowdenfit.description import SCHEMA, Description, ParameterSetting, QuantityValue
 from bowdenfit.errors import DatasetError, DescriptionError, nearest
-from bowdenfit.measurements.units import route_conversion_factor
+from bowdenfit.measurements.units import route_conversion_factor, speed_dimension
 
 
 def load_description(path: Path, overrides: Sequence[str] = ()) -> Description:
@@ -32,9 +32,18 @@ def load_description(path: Path, overrides: Sequence[str] = ()) -> Description:
         raise DescriptionError(f"{path.name} is not valid TOML: {error}.") from None
     except OSError as error:
         raise DescriptionError(f"{path} cannot be read ({error.strerror}).") from None
+    return parse_description(overridden(raw, overrides), path.name)
+
+
+def overridden(raw: dict[str, Any], overrides: Sequence[str]) -> dict[str, Any]:
+    """Plain data of a description with settings from the command line put in.
+
+    Raises:
+        DescriptionError: A setting is not of the form key=value, or its key leads nowhere.
+    """
     for override in overrides:
         _set(raw, override)
-    return parse_description(raw, path.name)
+    return raw
 
 
 def parse_description(raw: Mapping[str, Any], file: str = "cable.toml") -> Description:
@@ -56,6 +65,9 @@ def _check_units(description: Description, file: str) -> None:
     quantities = [(f"contact {c.name!r}, wrap_angle", c.wrap_angle.constant, "angle") for c in description.contact]
     quantities += [(f"contact {c.name!r}, nominal", c.wrap_angle.nominal, "angle") for c in description.contact]
     quantities.append(("sensors, force_noise", description.sensors.force_noise, "force"))
+    quantities.append(("sensors, offset_sd", description.sensors.offset_sd, "force"))
+    quantities.append(("reference_force", description.reference_force, "force"))
+    quantities += _recording_quantities(description)
     if description.tables.angles:
         quantities.append(("tables, angles, detection_limit", description.tables.angles.detection_limit, "angle"))
     for where, quantity, dimension in quantities:
@@ -74,6 +86,25 @@ def _check_units(description: Description, file: str) -> None:
             route_conversion_factor(description.route.unit, description.route.unit)
         except DatasetError as error:
             raise DescriptionError(f"{file}, route, unit: {error}.") from None
+
+
+def _recording_quantities(description: Description) -> list[tuple[str, QuantityValue | None, str]]:
+    """Quantities in the table of recordings and in the recordings, with where they stand and what they must measure."""
+    table = description.tables.recordings
+    pages = [("tables, recordings, prepare", table.prepare)] if table is not None else []
+    quantities: list[tuple[str, QuantityValue | None, str]] = []
+    for entry in description.recording:
+        where = f"recording {entry.file!r}"
+        quantities += [(f"{where}, wrap_angles, {name}", angle, "angle") for name, angle in entry.wrap_angles.items()]
+        if entry.velocity is not None:
+            quantities.append((f"{where}, velocity", entry.velocity, speed_dimension(entry.velocity.unit)))
+        if entry.prepare is not None:
+            pages.append((f"{where}, prepare", entry.prepare))
+    for where, page in pages:
+        for name, value in (("delay", page.delay), ("block", page.block)):
+            if isinstance(value, QuantityValue):
+                quantities.append((f"{where}, {name}", value, "time"))
+    return quantities
 
 
 def _set(raw: dict[str, Any], override: str) -> None:

@@ -2,14 +2,16 @@
 
 import hashlib
 from collections.abc import Mapping, Sequence
+from contextlib import nullcontext
 from dataclasses import dataclass
 from functools import partial
+from itertools import islice
 from pathlib import Path
 
 import numpy as np
 
 from bowdenfit.description import Contact, Description, Table
-from bowdenfit.description_file import load_description, parse_description
+from bowdenfit.description_file import load_description, overridden, parse_description
 from bowdenfit.errors import DatasetError, DescriptionError
 from bowdenfit.measurements.columns import ColumnSource
 from bowdenfit.measurements.reading import Route, read_angles, read_efficiencies, read_forces
@@ -33,12 +35,15 @@ class Dataset:
     sha256: dict[str, str]
 
 
-def load_dataset(path: Path, overrides: Sequence[str] = ()) -> Dataset:
+def load_dataset(
+    path: Path, overrides: Sequence[str] = (), channels: Mapping[str, ColumnSource] | None = None
+) -> Dataset:
     """Read a folder with `cable.toml` and tables, or the `cable.toml` itself.
 
     Args:
         path: Folder, or description file.
         overrides: Settings that replace those of the description, such as `friction.mu1.fixed=0.1`.
+        channels: Channels of recordings named on the command line.
 
     Raises:
         DescriptionError: The description is missing or wrong.
@@ -50,36 +55,52 @@ def load_dataset(path: Path, overrides: Sequence[str] = ()) -> Dataset:
             f"--wrap-angle 180deg, or write a cable.toml beside it with `bowdenfit init`."
         )
     file = path if path.suffix == ".toml" else path / DESCRIPTION_FILE
-    return read_dataset(load_description(file, overrides), file.parent, {file.name: _sha256(file)})
+    description = load_description(file, overrides)
+    return read_dataset(description, file.parent, {file.name: _sha256(file)}, channels)
 
 
-def single_table_dataset(path: Path, wrap_angle: tuple[float, str], overrides: Sequence[str] = ()) -> Dataset:
-    """A data set from one table of a cable with one contact at one known wrap angle.
+def single_file_dataset(
+    path: Path,
+    wrap_angle: tuple[float, str],
+    overrides: Sequence[str] = (),
+    channels: Mapping[str, ColumnSource] | None = None,
+) -> Dataset:
+    """A data set from one table or recording of a cable with one contact at one known wrap angle.
 
     Args:
-        path: Table of forces or of efficiencies.
+        path: Table of forces or of efficiencies, or a recording.
         wrap_angle: The angle and its unit.
-        overrides: Not available here; a description is needed for them.
+        overrides: Settings, as for a description.
+        channels: Channels of a recording named on the command line.
 
     Raises:
-        UsageError, DatasetError: The angle or the table is wrong.
+        DescriptionError, DatasetError: The angle, a setting or the file is wrong.
     """
-    if overrides:
-        raise DescriptionError("--set changes a cable.toml; a single table has none: write one with `bowdenfit init`.")
+    kind = _kind_of(path, bool(channels))
+    angle = {"value": wrap_angle[0], "unit": wrap_angle[1]}
+    raw = {
+        "name": path.stem,
+        "source": path.name,
+        "contact": [{"name": "cable", "friction": "mu", "wrap_angle": angle}],
+        "tables": {kind: {"files" if kind == "recordings" else "file": path.name}},
+    }
+    return read_dataset(parse_description(overridden(raw, overrides), "--wrap-angle"), path.parent, {}, channels)
+
+
+_LONG = 200  # rows from which a table with a time and without runs or strokes is a recording
+
+
+def _kind_of(path: Path, has_channels: bool) -> str:
+    """Which kind of table a file without a description is."""
+    if has_channels or path.suffix.lower() not in {".csv", ".txt", ".tsv"}:
+        return "recordings"
     from bowdenfit.measurements.readers import read_csv
 
-    kind = "efficiencies" if any("efficiency" in h.lower() for h in read_csv(path).header) else "forces"
-    angle = {"value": wrap_angle[0], "unit": wrap_angle[1]}
-    description = parse_description(
-        {
-            "name": path.stem,
-            "source": path.name,
-            "contact": [{"name": "cable", "friction": "mu", "wrap_angle": angle}],
-            "tables": {kind: {"file": path.name}},
-        },
-        "--wrap-angle",
-    )
-    return read_dataset(description, path.parent, {})
+    with path.open("rb") if path.is_file() else nullcontext() as file:
+        lines = sum(1 for _ in islice(file, _LONG + 1)) if file is not None else 0
+    if lines > _LONG:
+        return "recordings"
+    return "efficiencies" if any("efficiency" in h.lower() for h in read_csv(path).header) else "forces"
 
 
 def read_dataset(

@@ -1,7 +1,10 @@
 """The recordings of a data set: read, prepared, cut into strokes, and placed on the route."""
 
 from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, replace
 from pathlib import Path
+from types import MappingProxyType
+from typing import Literal
 
 import numpy as np
 
@@ -11,9 +14,16 @@ from bowdenfit.measurements.columns import ColumnSource
 from bowdenfit.measurements.lab_files import read_channels
 from bowdenfit.measurements.preparation import prepare
 from bowdenfit.measurements.recording_files import matched_name, to_recording
-from bowdenfit.measurements.recordings import Blocks, PreparationSettings, Recording, Recordings
+from bowdenfit.measurements.recordings import (
+    Account,
+    Blocks,
+    PreparationSettings,
+    RawRecording,
+    Recording,
+    Recordings,
+)
 from bowdenfit.measurements.strokes import Span, find_strokes
-from bowdenfit.measurements.units import conversion_factor, dimension_of
+from bowdenfit.measurements.units import INTERNAL_UNITS, conversion_factor, speed_dimension
 
 
 def read_recordings(
@@ -35,16 +45,56 @@ def read_recordings(
     """
     entries = _entries(description, folder, paths())
     _check_names(entries)
-    read = [_read(description, path, entry, channels) for path, entry in entries]
-    units = {unit: r.file for r, unit in read if unit}
+    files = [_to_read(description, path, entry, channels) for path, entry in entries]
+    units = {f.velocity_unit: f.raw.file for f in files if f.velocity_unit}
     if len(units) > 1:
         raise DatasetError(
             f"{' and '.join(units.values())} give velocities of different kinds, of the rope and of the motor; give both in "
             "mm/s or both in r/min."
         )
-    recordings = Recordings(description.angle_columns, tuple(r for r, _ in read), next(iter(units), ""))
+    prepared, delay_sd = _prepared(files)
+    each = tuple(_recording(description, f, *parts) for f, parts in zip(files, prepared, strict=True))
+    recordings = Recordings(description.angle_columns, each, next(iter(units), ""), delay_sd)
     _check_placed(description, recordings)
     return recordings, {entry.file: path for path, entry in entries}
+
+
+@dataclass(frozen=True)
+class _File:
+    """A recording's file as read, with what is said of it."""
+
+    raw: RawRecording
+    entry: RecordingFile
+    settings: PreparationSettings
+    delay_sd: float
+    velocity_unit: str
+
+
+def _prepared(files: Sequence[_File]) -> tuple[list[tuple[Blocks, Account]], float]:
+    """Every recording prepared with one delay, and the standard error of that delay [s].
+
+    The two channels run through the same electronics in every recording, so that what each of them says of the delay is
+    put together; an error of it shifts the friction of all of them alike, in proportion to how fast the force changes.
+    """
+    prepared = [prepare(f.raw, f.settings) for f in files]
+    told = [a for f, (_, a) in zip(files, prepared, strict=True) if f.settings.delay == "estimate" and a.delay_sd > 0]
+    if not told:
+        return prepared, max((f.delay_sd for f in files), default=0.0)
+    weights = np.array([1 / a.delay_sd**2 for a in told])
+    delays = np.array([a.delay for a in told])
+    delay = float(np.sum(weights * delays) / weights.sum())
+    apart = float(np.sum(weights * (delays - delay) ** 2) / max(len(told) - 1, 1))
+    sd = float(np.sqrt(max(apart, 1.0) / weights.sum()))
+    together = [
+        parts if f.settings.delay != "estimate" else _shifted(f, delay, sd)
+        for f, parts in zip(files, prepared, strict=True)
+    ]
+    return together, sd
+
+
+def _shifted(file: _File, delay: float, sd: float) -> tuple[Blocks, Account]:
+    blocks, account = prepare(file.raw, replace(file.settings, delay=delay))
+    return blocks, replace(account, delay_sd=sd)
 
 
 def _entries(description: Description, folder: Path, matched: Sequence[Path]) -> list[tuple[Path, RecordingFile]]:
@@ -96,21 +146,27 @@ def _name(path: Path, entry: RecordingFile) -> str:
     return entry.name or entry.run or path.stem
 
 
-def _read(
-    description: Description, path: Path, entry: RecordingFile, channels: Mapping[str, ColumnSource]
-) -> tuple[Recording, str]:
+def _to_read(description: Description, path: Path, entry: RecordingFile, channels: Mapping[str, ColumnSource]) -> _File:
     table = description.tables.recordings
     assert table is not None  # the caller asked
-    name, file = _name(path, entry), read_channels(path)
-    raw, unit = to_recording(file, name, {**_sources(table.channels), **_sources(entry.channels), **channels})
-    blocks, account = prepare(raw, preparation_settings(entry.prepare or table.prepare))
-    spans = [Span(phase.start, phase.end, phase.stroke) for phase in entry.strokes]
-    strokes = find_strokes(blocks, path.name, name, spans)
+    page, sources = entry.prepare or table.prepare, {**_sources(table.channels), **_sources(entry.channels), **channels}
+    raw, unit = to_recording(read_channels(path), _name(path, entry), sources)
+    stated = page.delay.sd_to("time") if isinstance(page.delay, QuantityValue) else None
     if entry.velocity is not None and not unit:
-        blocks, unit = _at_speed(blocks, entry.velocity)
+        unit = INTERNAL_UNITS[speed_dimension(entry.velocity.unit)]
+    return _File(raw, entry, preparation_settings(page), stated or 0.0, unit)
+
+
+def _recording(description: Description, file: _File, blocks: Blocks, account: Account) -> Recording:
+    raw, entry = file.raw, file.entry
+    spans = [Span(phase.start, phase.end, phase.stroke) for phase in entry.strokes]
+    strokes = find_strokes(blocks, raw.file, raw.name, spans)
+    if entry.velocity is not None and not len(raw.velocity):
+        speed = entry.velocity.to(speed_dimension(entry.velocity.unit))
+        blocks = replace(blocks, velocity=np.full(len(blocks.time), speed))
     angle, sd = _own_angles(description, entry)
     route = float("nan") if entry.at is None else entry.at
-    return Recording(name, path.name, entry.run or name, route, angle, sd, blocks, strokes, account), unit
+    return Recording(raw.name, raw.file, entry.run or raw.name, route, angle, sd, blocks, strokes, account)
 
 
 def _sources(channels: Mapping[str, ColumnMap]) -> dict[str, ColumnSource]:
@@ -133,22 +189,7 @@ def preparation_settings(page: Preparation) -> PreparationSettings:
     )
 
 
-_DELAYS = {"estimated": "estimate", "none": "none"}
-
-
-def _at_speed(blocks: Blocks, velocity: QuantityValue) -> tuple[Blocks, str]:
-    """Blocks at the speed that the user states for the whole recording."""
-    of_motor = dimension_of(velocity.unit) == "angular_velocity"
-    speed = velocity.to("angular_velocity" if of_motor else "velocity")
-    stated = Blocks(
-        blocks.time,
-        blocks.input_force,
-        blocks.output_force,
-        np.full(len(blocks.time), speed),
-        blocks.samples,
-        blocks.saturated,
-    )
-    return stated, "rad/s" if of_motor else "mm/s"
+_DELAYS: Mapping[str, Literal["estimate", "none"]] = MappingProxyType({"estimated": "estimate", "none": "none"})
 
 
 def _own_angles(description: Description, entry: RecordingFile) -> tuple[np.ndarray, np.ndarray]:

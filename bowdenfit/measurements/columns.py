@@ -9,7 +9,7 @@ from dataclasses import dataclass
 from bowdenfit.errors import DatasetError
 from bowdenfit.measurements.quoting import listed, shown
 from bowdenfit.measurements.readers import Cell, RawTable
-from bowdenfit.measurements.units import conversion_factor, dimension_of, is_unit, route_conversion_factor
+from bowdenfit.measurements.units import conversion_factor, is_unit, route_conversion_factor, speed_dimension
 
 _BRACKETED = re.compile(r"^(?P<name>.*?)[\s_]*[\[(](?P<unit>[^\])]*)[\])]\s*$")
 _LONGEST_HEADING = 200
@@ -182,8 +182,7 @@ def _column(table: RawTable, heading: str, quantity: Quantity, unit: str | None)
         )
     try:
         if quantity.dimension == "speed":
-            of_motor = dimension_of(unit) == "angular_velocity"
-            factor = conversion_factor(unit, "angular_velocity" if of_motor else "velocity")
+            factor = conversion_factor(unit, speed_dimension(unit))
         elif quantity.dimension == "route":
             factor = route_conversion_factor(unit, quantity.to or "mm")
         else:

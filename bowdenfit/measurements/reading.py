@@ -9,7 +9,7 @@ import numpy as np
 from bowdenfit.measurements.columns import Column, ColumnSource, Quantity, find_columns, require
 from bowdenfit.measurements.readers import Cell, RawTable, read_csv
 from bowdenfit.measurements.tables import AngleTable, EfficiencyTable, ForceTable, OwnAngles, Provenance
-from bowdenfit.measurements.units import dimension_of
+from bowdenfit.measurements.units import INTERNAL_UNITS, speed_dimension
 from bowdenfit.types import Labels, Vector
 
 LARGEST_ANGLE = float(np.deg2rad(2000.0)) * (1 + 1e-12)
@@ -254,7 +254,7 @@ def _velocities(column: Column | None, n_rows: int) -> tuple[Vector, str]:
     if column is None:
         return np.full(n_rows, np.nan), ""
     values = np.array([np.nan if cell.blank else column.value(cell) for cell in column.cells])
-    return values, "rad/s" if dimension_of(column.unit or "") == "angular_velocity" else "mm/s"
+    return values, INTERNAL_UNITS[speed_dimension(column.unit or "")]
 
 
 def _runs(column: Column | None, route: Vector, own: OwnAngles) -> tuple[Labels, tuple[str, ...]]:

@@ -11,7 +11,7 @@ from bowdenfit.measurements.channels import Channel, ChannelFile
 from bowdenfit.measurements.columns import ColumnSource, Quantity, meanings
 from bowdenfit.measurements.quoting import listed, shown
 from bowdenfit.measurements.recordings import RawRecording
-from bowdenfit.measurements.units import conversion_factor, dimension_of
+from bowdenfit.measurements.units import INTERNAL_UNITS, conversion_factor, speed_dimension
 
 WANTED = (
     Quantity("input_force", "force"),
@@ -156,7 +156,7 @@ def _clock(file: ChannelFile, channel: Channel, time: Channel | None, source: Co
     )
 
 
-def _same_length(file: ChannelFile, channel: Channel, values: Sequence[float], time: Sequence[float]) -> None:
+def _same_length(file: ChannelFile, channel: Channel, values: np.ndarray, time: np.ndarray) -> None:
     if len(values) != len(time):
         raise DatasetError(
             f"{file.path.name}: the channel {shown(channel.name)} has {len(values)} samples, but its clock has "
@@ -168,8 +168,8 @@ def _velocity(file: ChannelFile, channel: Channel | None, source: ColumnSource |
     if channel is None:
         return np.zeros(0), ""
     _, unit = _unit(file, channel, "velocity", source)
-    kind = "angular_velocity" if dimension_of(unit) == "angular_velocity" else "velocity"
-    return _converted(file, channel, "velocity", source, kind), "rad/s" if kind == "angular_velocity" else "mm/s"
+    kind = speed_dimension(unit)
+    return _converted(file, channel, "velocity", source, kind), INTERNAL_UNITS[kind]
 
 
 def parsed_channels(texts: Sequence[str]) -> dict[str, ColumnSource]:

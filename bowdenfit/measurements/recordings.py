@@ -200,11 +200,13 @@ class Recordings:
         columns: Contact columns that `own_angle` refers to.
         each: The recordings.
         velocity_unit: "mm/s" or "rad/s", what the blocks' velocities are in; empty where none was recorded or stated.
+        delay_sd: Standard error of the delay that all of them were shifted by [s]; 0 where it is known.
     """
 
     columns: tuple[str, ...]
     each: tuple[Recording, ...]
     velocity_unit: str = ""
+    delay_sd: float = 0.0
 
     @property
     def runs(self) -> tuple[str, ...]:

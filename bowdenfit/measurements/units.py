@@ -60,6 +60,14 @@ def dimension_of(unit: str) -> str:
     return "other"
 
 
+def speed_dimension(unit: str) -> str:
+    """Whether a unit of speed is one of the motor ("angular_velocity") or of the rope ("velocity").
+
+    Anything else counts as one of the rope, and is refused when it is converted.
+    """
+    return "angular_velocity" if is_unit(unit) and dimension_of(unit) == "angular_velocity" else "velocity"
+
+
 def conversion_factor(unit: str, dimension: str, to: str | None = None) -> float:
     """Factor from `unit` to the internal unit of `dimension` (or to another unit of the same kind).
 

@@ -26,7 +26,15 @@ from bowdenfit.models.efficiencies import efficiencies_term
 from bowdenfit.models.forces import force_terms
 from bowdenfit.models.recordings import NAME as RECORDED
 from bowdenfit.models.recordings import recordings_term
-from bowdenfit.models.scatter import BLOCK_NOISE, FORCE_NOISE, GAIN_ERROR, INPUT_OFFSET, OUTPUT_OFFSET, RUN_SCATTER
+from bowdenfit.models.scatter import (
+    BLOCK_NOISE,
+    DELAY_ERROR,
+    FORCE_NOISE,
+    GAIN_ERROR,
+    INPUT_OFFSET,
+    OUTPUT_OFFSET,
+    RUN_SCATTER,
+)
 from bowdenfit.parameters.priors import HalfNormal, LogNormal, Normal, Prior, TruncatedNormal, Uniform
 from bowdenfit.parameters.space import Parameter, ParameterSpace
 
@@ -228,6 +236,11 @@ def _sensors(description: Description, measurements: Measurements, defaults: Pri
             parameters.append(
                 Parameter(name, f"$b_\\mathrm{{{symbol}}}$", meaning, "sensor", Normal(0.0, sd), text, "N")
             )
+    if measurements.recordings is not None and measurements.recordings.delay_sd > 0:
+        sd = 1000 * measurements.recordings.delay_sd
+        meaning, text = "error of the estimated delay between the load cells' channels", f"Normal(0, {sd:.3g} ms)"
+        prior = Normal(0.0, measurements.recordings.delay_sd)
+        parameters.append(Parameter(DELAY_ERROR, r"$\delta$", meaning, "sensor", prior, text, "ms", 1000.0))
     return parameters
 
 

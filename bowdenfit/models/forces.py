@@ -127,6 +127,7 @@ def _sliding(cable: Cable, table: ForceTable, rows: Mapping[str, np.ndarray], us
         stroke,
         table.run[used],
         table.velocity[used],
+        np.zeros(len(used)),
         np.ones(len(used)),
         {name: rows[name][used] for name in ROW_ARRAYS},
     )

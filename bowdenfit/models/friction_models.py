@@ -16,8 +16,9 @@ from jaxtyping import Float
 from bowdenfit.description import Description, PriorDefaults
 from bowdenfit.errors import DescriptionError, nearest
 from bowdenfit.measurements.tables import Measurements
+from bowdenfit.measurements.units import speed_dimension
 from bowdenfit.parameters.priors import HalfNormal, LogNormal, Uniform
-from bowdenfit.parameters.space import Parameter
+from bowdenfit.parameters.space import Parameter, Role
 from bowdenfit.physics.friction import force_from_scale, force_scale, force_scale_slope, rate_factor
 
 DRAG, LOAD_EXPONENT = "drag", "load_exponent"
@@ -93,7 +94,7 @@ class RateDependent:
         low, high = conditions.speeds
         speed, bound = float(np.sqrt(max(low, high / 100) * high)), defaults.viscous_at_highest_speed / high
         spread = defaults.stribeck_speed_log_sd
-        role = "friction_model"
+        role: Role = "friction_model"
         return [
             Parameter(
                 STRIBECK, "$a$", "Stribeck rise: relative rise of friction toward standstill", role,
@@ -208,7 +209,7 @@ def make_friction_model(description: Description, measurements: Measurements) ->
     force = stated.to("force") if stated else _rounded(np.exp(np.mean(np.log(forces)))) if len(forces) else 1.0
     speed = _rounded(float(np.median(speeds))) if len(speeds) else 0.0
     if description.reference_velocity is not None:
-        speed = description.reference_velocity.to("angular_velocity" if unit == "rad/s" else "velocity")
+        speed = description.reference_velocity.to(speed_dimension(unit or "mm/s"))
     ends = (float(speeds.min()), float(speeds.max())) if len(speeds) else (float("nan"), float("nan"))
     conditions = Conditions(float(force), float(speed), ends, unit)
     return FrictionModel(friction_options(description.friction_model), conditions)

@@ -21,7 +21,7 @@ from bowdenfit.measurements.recordings import Recording, Recordings
 from bowdenfit.measurements.tables import AngleTable, OwnAngles
 from bowdenfit.models.cable import Cable, resolve_angles, row_angles
 from bowdenfit.models.runs import LEAST_FORCE, ROW_ARRAYS, RunsTerm, SlidingRows, run_sums
-from bowdenfit.models.scatter import BLOCK_NOISE, GAIN_ERROR, INPUT_OFFSET, OUTPUT_OFFSET, RUN_SCATTER
+from bowdenfit.models.scatter import BLOCK_NOISE, DELAY_ERROR, GAIN_ERROR, INPUT_OFFSET, OUTPUT_OFFSET, RUN_SCATTER
 from bowdenfit.physics.friction import transmission_efficiency
 from bowdenfit.physics.hysteresis import play_operator_with_slope
 from bowdenfit.physics.normal_tail import log_normal_cdf
@@ -123,20 +123,41 @@ def _all_blocks(recording: Recording) -> _Part:
     positive, blocks, strokes = _positive(recording), recording.blocks, recording.strokes
     x, y = np.log(blocks.input_force[positive]), np.log(blocks.output_force[positive])
     followed, state = play(x, strokes.exponent, float(y[0] + strokes.center))
-    last = _last_contact(np.asarray(state))
-    slid = last != 0
-    used, stroke = np.flatnonzero(positive)[slid], last[slid]
-    ratio = strokes.exponent - stroke * (y - followed)[slid]
-    still = (np.asarray(state) == 0)[slid]
+    last, inside = _last_contact(state), _inside_phase(state)
+    kept = (last != 0) & inside
+    used, stroke = np.flatnonzero(positive)[kept], last[kept]
+    ratio = strokes.exponent - stroke * (y - followed)[kept]
     force_in, force_out = blocks.input_force[used], blocks.output_force[used]
-    of_output_alone = np.where(still, 1 + (force_out / force_in) ** 2, 1.0)  # a standing output has no input noise
-    return _Part(used, stroke, ratio, _worth(recording, used) * of_output_alone)
+    of_output_alone = np.where(state[kept] == 0, 1 + (force_out / force_in) ** 2, 1.0)
+    return _Part(used, stroke, ratio, _worth(recording, used) * of_output_alone * _standing_share(state)[kept])
+
+
+def _inside_phase(state: np.ndarray) -> np.ndarray:
+    """Blocks whose neighbors are in the same phase: at a corner a block's mean is of two phases."""
+    same = np.diff(state) == 0
+    return np.append(True, same) & np.append(same, True)
+
+
+def _standing_share(state: np.ndarray) -> np.ndarray:
+    """What a block is worth beside others of its phase: all of it while sliding, a share of one while standing still.
+
+    The operator stands where the highest (or lowest) input left it, noise and all: every block of that phase has this one
+    error in common, and together they are worth no more than one reading with twice the noise.
+    """
+    phase = np.append(0, np.cumsum(np.diff(state) != 0))
+    return np.where(state == 0, 0.5 / np.bincount(phase)[phase], 1.0)
 
 
 def _last_contact(state: np.ndarray) -> np.ndarray:
     """The last contact up to each block; 0 before the first."""
     at = np.maximum.accumulate(np.where(state != 0, np.arange(len(state)), -1))
     return np.where(at >= 0, state[np.maximum(at, 0)], 0).astype(int)
+
+
+def _drift(recording: Recording) -> np.ndarray:
+    """Change of log F_out with time [1/s], by which a delay of its channel shifts it."""
+    blocks = recording.blocks
+    return np.gradient(np.log(np.maximum(blocks.output_force, LEAST_FORCE)), blocks.time)
 
 
 def _rows(recordings: Recordings, parts: list[_Part], angles: Mapping[str, np.ndarray]) -> SlidingRows:
@@ -156,6 +177,7 @@ def _rows(recordings: Recordings, parts: list[_Part], angles: Mapping[str, np.nd
         np.concatenate([p.stroke for p in parts]).astype(int),
         run,
         gathered("velocity"),
+        np.concatenate([p.stroke * _drift(r)[p.used] for r, p in zip(recordings.each, parts, strict=True)]),
         np.concatenate([p.worth for p in parts]),
         {name: angles[name][of_recording] for name in ROW_ARRAYS},
     )
@@ -205,7 +227,8 @@ class WholeRecordingsTerm:
         output_force = jnp.maximum(friction.force(values, y), LEAST_FORCE)
         shown = jnp.maximum(output_force * jnp.exp(-gain) + values.get(OUTPUT_OFFSET, 0.0), LEAST_FORCE)
         loading = slope * jnp.exp(-gain) / (friction.slope(values, output_force) * shown)
-        return data["log_output"] - jnp.log(shown), loading
+        late = values.get(DELAY_ERROR, 0.0) * data["drift"]
+        return data["log_output"] + late - jnp.log(shown), loading
 
     def _deviations(
         self, values: Mapping[str, Array], data: Mapping[str, Any], weights: Mapping[str, Array]
@@ -287,7 +310,7 @@ def _padded(recordings: Recordings, angles: Mapping[str, np.ndarray], censored: 
     runs = recordings.runs
     run = np.array([runs.index(r.run) for r in recordings.each])
     held = {name: padded(name, "edge") for name in ("input_force", "output_force", "velocity")}
-    free = {name: padded(name, "constant") for name in ("weight", "worth", "censored", "share")}
+    free = {name: padded(name, "constant") for name in ("weight", "worth", "censored", "share", "drift")}
     worth = free.pop("worth")
     log_weights = np.where(free["weight"] > 0, worth * np.log(np.where(free["weight"] > 0, free["weight"], 1.0)), 0.0)
     return {name: angles[name] for name in ROW_ARRAYS} | held | free | {
@@ -313,8 +336,16 @@ def _thinned(recording: Recording, censored: bool) -> dict[str, Any]:
     force_in, force_out = (np.maximum(mean(f), LEAST_FORCE) for f in (blocks.input_force, blocks.output_force))
     usable = np.minimum.reduceat(_positive(recording), starts)
     saturated = np.maximum.reduceat(blocks.saturated, starts)
-    still = np.abs(np.add.reduceat(strokes.stroke, starts)) < 1
-    worth = usable * samples / samples.mean() / max(strokes.correlation / factor, 1.0)
+    state = np.sign(np.add.reduceat(strokes.stroke, starts)).astype(int)
+    still = state == 0
+    worth = (
+        usable
+        * _inside_phase(state)
+        * _standing_share(state)
+        * samples
+        / samples.mean()
+        / max(strokes.correlation / factor, 1.0)
+    )
     weight = worth / (np.where(still, 0.0, 1 / force_in**2) + 1 / force_out**2)
     low, high = recording.account.limits
     end = np.where(force_out > (low + high) / 2 if np.isfinite(low + high) else np.isfinite(high), 1.0, -1.0)
@@ -326,6 +357,7 @@ def _thinned(recording: Recording, censored: bool) -> dict[str, Any]:
         "velocity": mean(blocks.velocity),
         "weight": weight,
         "worth": worth,
+        "drift": np.gradient(np.log(force_out), mean(blocks.time)),
         "censored": np.where(saturated & censored, end, 0.0),
         "share": np.where(saturated, samples / samples.mean() / strokes.correlation, 0.0),
         "speed": float(speed.mean()) if len(speed) else float("nan"),

@@ -12,7 +12,7 @@ from jax.scipy.stats import norm
 from jaxtyping import Float
 
 from bowdenfit.models.cable import Cable, resolve_angles
-from bowdenfit.models.scatter import FORCE_NOISE, GAIN_ERROR, INPUT_OFFSET, OUTPUT_OFFSET, RUN_SCATTER
+from bowdenfit.models.scatter import DELAY_ERROR, FORCE_NOISE, GAIN_ERROR, INPUT_OFFSET, OUTPUT_OFFSET, RUN_SCATTER
 from bowdenfit.physics.friction import transmission_efficiency
 from bowdenfit.types import Labels, Vector
 
@@ -31,8 +31,9 @@ class RunsTerm:
               e_{ij} \sim \text{Normal}(0, \sigma_F / \sqrt{w_{ij}}), \quad
               w = 1 / (F_\text{in}^{-2} + F_\text{out}^{-2})
 
-    where rho is the log ratio that the load cells show at a friction exponent: the exponent itself and the gain error for
-    the capstan equation and exact zeros; else a function of the load, taken to first order in m. The mounting effect m is
+    where rho is the log ratio that the load cells show at a friction exponent: the exponent itself, the gain error and what
+    a delay between the two adds, for the capstan equation and exact zeros; else a function of the load, taken to first
+    order in m. The mounting effect m is
     integrated out. Readings of one run at the same angles and stroke (and, where it matters, the same load and speed) are
     one cell, so that the cost does not grow with the length of a recording.
 
@@ -63,13 +64,14 @@ class RunsTerm:
     ) -> tuple[Float[Array, " cells"], Float[Array, " cells"]]:
         """Log ratio that the load cells show, and its derivative by the friction exponent."""
         friction, stroke, gain = self.cable.friction, data["stroke"], values.get(GAIN_ERROR, 0.0)
+        from_delay = values.get(DELAY_ERROR, 0.0) * data["drift"]
         if not (friction.depends_on_load or OUTPUT_OFFSET in values):
-            return exponent + stroke * gain, jnp.ones_like(exponent)
+            return exponent + stroke * gain + from_delay, jnp.ones_like(exponent)
         input_force = jnp.maximum(data["input_force"] - values.get(INPUT_OFFSET, 0.0), LEAST_FORCE)
         output_force = friction.output_force(values, input_force, exponent, stroke)
         shown = jnp.maximum(output_force * jnp.exp(-gain) + values.get(OUTPUT_OFFSET, 0.0), LEAST_FORCE)
         slope = jnp.exp(-gain) / (friction.slope(values, output_force) * shown)
-        return stroke * jnp.log(data["input_force"] / shown), slope
+        return stroke * jnp.log(data["input_force"] / shown) + from_delay, slope
 
     def _deviations(
         self, values: Mapping[str, Array], data: Mapping[str, Any], weights: Mapping[str, Array]
@@ -141,6 +143,7 @@ class SlidingRows:
         stroke: +1 pulling, -1 return.
         run: Number of the run.
         velocity: Velocity; NaN where it is not known.
+        drift: s d(log F_out)/dt, by which a delay of the output channel shifts the log ratio [1/s]; 0 without a clock.
         worth: How many independent readings each counts for [1].
         angles: `ROW_ARRAYS` of every row.
     """
@@ -151,6 +154,7 @@ class SlidingRows:
     stroke: Labels
     run: Labels
     velocity: Vector
+    drift: Vector
     worth: Vector
     angles: Mapping[str, np.ndarray]
 
@@ -177,6 +181,7 @@ def run_sums(cable: Cable, rows: SlidingRows) -> dict[str, Any]:
         "input_force": np.exp(mean(np.log(rows.input_force))),
         "output_force": np.exp(mean(np.log(rows.output_force))),
         "velocity": mean(rows.velocity),
+        "drift": mean(rows.drift),
         "n": np.bincount(row_run, rows.worth),
         "run_weight": run_weight,
         "run_mean": np.bincount(run, cell_weight * cell_mean) / run_weight,

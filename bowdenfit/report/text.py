@@ -1,12 +1,11 @@
 """The printed summary (`summary.txt`): verdict, coefficients, measured beside predicted, the design answer."""
 
-import textwrap
 from typing import Any
 
+from bowdenfit.report.layout import filled, listed, table
 from bowdenfit.results.answers import decimals
 from bowdenfit.results.fit import Fit
 
-WIDTH = 110
 _UNLIMITED = 2000.0  # an angle in degrees or a length in mm beyond which a curve coefficient is no longer a finding
 _RESTS_ON_PRIOR = 0.2  # contraction below which a parameter is said to rest on its prior alone
 
@@ -31,8 +30,8 @@ def _title(fit: Fit) -> str:
     if tables.forces is not None:
         counts.append(f"{len(tables.forces.run)} force readings in {len(tables.forces.run_names)} runs")
     line = f"{fit.name}\n{'=' * len(fit.name)}"
-    fitted = _filled(f"Fitted to {_listed(counts)}; {description.geometry} geometry.")
-    remarks = [_filled(remark) for remark in tables.remarks]
+    fitted = filled(f"Fitted to {listed(counts)}; {description.geometry} geometry.")
+    remarks = [filled(remark) for remark in tables.remarks]
     return "\n".join([line, fitted, *remarks])
 
 
@@ -57,7 +56,7 @@ def _verdict(fit: Fit, page: dict[str, Any]) -> str:
         sampler = page["sampler"]
         state += f" ({sampler['ensembles']} ensembles of {sampler['walkers']} walkers, {sampler['steps']} steps)"
     lines = [f"Verdict: {state}."]
-    lines += [_filled(f"- {reason}", indent="  ") for reason in fit.reasons]
+    lines += [filled(f"- {reason}", indent="  ") for reason in fit.reasons]
     return "\n".join(lines)
 
 
@@ -74,7 +73,7 @@ def _coefficients(page: dict[str, Any]) -> str:
         unit = "" if p["unit"] == "1" else p["unit"]
         rows.append((name, median, interval, moments, _least_squares(p), p["prior"], unit))
     keep = [i for i in range(len(heads)) if i in (0, 4, 5) or any(row[i] for row in rows)]
-    return _table([heads[i] for i in keep], [[row[i] for i in keep] for row in rows]) + _not_identified(page)
+    return table([heads[i] for i in keep], [[row[i] for i in keep] for row in rows]) + _not_identified(page)
 
 
 def _least_squares(p: dict[str, Any]) -> str:
@@ -91,7 +90,7 @@ def _least_squares(p: dict[str, Any]) -> str:
 
 def _not_identified(page: dict[str, Any]) -> str:
     notes = [
-        _filled(f"{name} is not identified by least squares: {p['least_squares']['remark']}.")
+        filled(f"{name} is not identified by least squares: {p['least_squares']['remark']}.")
         for name, p in page["parameters"].items()
         if p.get("least_squares") and not p["least_squares"]["identified"]
     ]
@@ -109,7 +108,7 @@ def _rests_on_prior(page: dict[str, Any]) -> str:
     if not names:
         return ""
     verb = "rests" if len(names) == 1 else "rest"
-    return _filled(f"Hardly informed by the measurements: {_listed(names)} {verb} on the prior almost alone.")
+    return filled(f"Hardly informed by the measurements: {listed(names)} {verb} on the prior almost alone.")
 
 
 def _curves(fit: Fit, page: dict[str, Any]) -> str:
@@ -124,7 +123,7 @@ def _curves(fit: Fit, page: dict[str, Any]) -> str:
         lines.append(f"  {name:<30} {interval}")
     if any(line.endswith("not limited") for line in lines):
         note = "Not limited: the data also allow an exponential, at which A, B and C are infinite; a, b and c above say it all."
-        lines.append(_filled(note, indent="  "))
+        lines.append(filled(note, indent="  "))
     return "\n".join(lines)
 
 
@@ -135,7 +134,7 @@ def _scatter(page: dict[str, Any]) -> str:
         if sd is not None and term in units:
             value = f"{sd:.2f} {units[term]}" if term == "wrap_angle" else f"{100 * sd:.2f} {units[term]}"
             parts.append(f"{term.replace('_', ' ')} {value}")
-    return f"Residual standard deviation of least squares: {_listed(parts)}." if parts else ""
+    return f"Residual standard deviation of least squares: {listed(parts)}." if parts else ""
 
 
 def _measured(fit: Fit, page: dict[str, Any]) -> str:
@@ -146,7 +145,7 @@ def _measured(fit: Fit, page: dict[str, Any]) -> str:
     rows = []
     for row in page["measured"]:
         interval = [f"{row['q05']:.2%} to {row['q95']:.2%}"] if drawn else []
-        what = "run " if row["table"] == "run_efficiency" else ""
+        what = "" if row["table"] == "efficiency" else "run "
         rows.append(
             [
                 what + row["label"],
@@ -156,41 +155,18 @@ def _measured(fit: Fit, page: dict[str, Any]) -> str:
                 f"{row['relative_error']:+.2%}",
             ]
         )
-    return "Efficiency, measured and predicted\n" + _table(heads, rows)
+    return "Efficiency, measured and predicted\n" + table(heads, rows)
 
 
 def _answer(fit: Fit) -> str:
     if fit.posterior is None or fit.dataset.description.route is None:
         return ""
     sentences = [
-        part for line in fit.optimal_length().lines() for part in ([_filled(line)] if "  " not in line else [line])
+        part for line in fit.optimal_length().lines() for part in ([filled(line)] if "  " not in line else [line])
     ]
     return "\n".join(sentences)
 
 
 def _origin(page: dict[str, Any]) -> str:
     versions = ", ".join(f"{name} {version}" for name, version in page["versions"].items())
-    return _filled(f"Seed {page['seed']}; {versions}.")
-
-
-def _listed(parts: list[str]) -> str:
-    return ", ".join(parts[:-1]) + " and " + parts[-1] if len(parts) > 1 else "".join(parts)
-
-
-def _filled(text: str, indent: str = "") -> str:
-    return textwrap.fill(
-        text, WIDTH, initial_indent=indent, subsequent_indent=indent + ("  " if text.startswith("- ") else "")
-    )
-
-
-def _table(heads: list[str] | tuple[str, ...], rows: list[list[str]] | list[tuple[str, ...]]) -> str:
-    """Columns, the first left and the others right aligned, except the prior, which reads better left aligned."""
-    widths = [max(len(str(row[i])) for row in [heads, *rows]) for i in range(len(heads))]
-    left = {i for i, head in enumerate(heads) if i == 0 or head in {"prior", "unit"}}
-    lines = [
-        "  ".join(
-            f"{cell:<{w}}" if i in left else f"{cell:>{w}}" for i, (cell, w) in enumerate(zip(row, widths, strict=True))
-        ).rstrip()
-        for row in [heads, *rows]
-    ]
-    return "\n".join([lines[0], "-" * len(lines[0]), *lines[1:]])
+    return filled(f"Seed {page['seed']}; {versions}.")

@@ -52,7 +52,7 @@ class EfficiencyPoints:
     """Measured efficiencies [1], of rows or of runs.
 
     Args:
-        what: "efficiency" or "run_efficiency".
+        what: "efficiency", "run_efficiency" or "recorded_efficiency".
         labels: Each in words.
         route: Route value; NaN without a route.
         measured: Efficiency.
@@ -92,6 +92,82 @@ class ParameterDraws:
 
 
 @dataclass(frozen=True)
+class RecordedTrace:
+    """One recording: what was read in every block, what the rope did, and what the fit says of it.
+
+    Args:
+        name: Name of the recording.
+        run: Mounting that it belongs to.
+        time: Middle of each block [s].
+        input_force, output_force: Mean forces of each block [N].
+        velocity: Mean velocity of each block, in `FigureData.velocity_unit`; NaN where not known.
+        stroke: +1 pulling, -1 returning, 0 switching or held.
+        used: Blocks safely inside a sliding phase.
+        saturated: Blocks at the end of a load cell's range.
+        predicted: Output force [N] of each block that the cable gives at the measured input force, 5 %, 50 % and 95 %
+            quantiles (first axis) over draws and over new mountings; one row, least squares', without draws.
+        fitted: Output force [N] of each block with this run's own mounting effect.
+        exponent: Friction exponent of the cable here, 5 %, 50 % and 95 % quantiles; three times the estimate without draws.
+        own_exponent: Friction exponent of this recording by itself [1].
+        efficiency: Expected efficiency of the run, 5 %, 50 % and 95 % quantiles.
+        own_efficiency: Efficiency of the run as measured [1].
+        own_efficiency_sd: Its standard error from the readings alone [1].
+        lag: Lags of the autocorrelation [s].
+        autocorrelation: Of the deviations of log F_out from the fitted operator, in blocks that are used.
+        flagged_kind, flagged_time, flagged_input, flagged_output: Samples left out: why, when [s], and what was read [N].
+    """
+
+    name: str
+    run: str
+    time: np.ndarray
+    input_force: np.ndarray
+    output_force: np.ndarray
+    velocity: np.ndarray
+    stroke: np.ndarray
+    used: np.ndarray
+    saturated: np.ndarray
+    predicted: np.ndarray
+    fitted: np.ndarray
+    exponent: np.ndarray
+    own_exponent: float
+    efficiency: np.ndarray
+    own_efficiency: float
+    own_efficiency_sd: float
+    lag: np.ndarray
+    autocorrelation: np.ndarray
+    flagged_kind: tuple[str, ...]
+    flagged_time: np.ndarray
+    flagged_input: np.ndarray
+    flagged_output: np.ndarray
+
+
+@dataclass(frozen=True)
+class Dependence:
+    """How efficiency depends on the load or the speed, where the fit allows it to.
+
+    Args:
+        what: "load" or "speed".
+        label: Axis label with unit.
+        x: Loads [N] or speeds (shown unit).
+        quantiles: Efficiency there, 5 %, 50 % and 95 % quantiles (first axis); one row without draws.
+        constant: Efficiency by the capstan equation alone at the reference, for comparison [1].
+        points_x, points_efficiency: Measured, load by load or speed by speed.
+        points_label: Run of each point.
+        place: Where on the route, in words, such as "at 470 mm"; empty without a route.
+    """
+
+    what: str
+    label: str
+    x: np.ndarray
+    quantiles: np.ndarray
+    constant: float
+    points_x: np.ndarray
+    points_efficiency: np.ndarray
+    points_label: tuple[str, ...]
+    place: str
+
+
+@dataclass(frozen=True)
 class FigureData:
     """Everything the figures of one fit show.
 
@@ -106,6 +182,9 @@ class FigureData:
         optimal_length, optimal_efficiency: Draws, walkers by draws; None likewise.
         parameters: Free parameters.
         n_ensembles: Number of ensembles (walkers are ordered by ensemble).
+        recordings: Recordings, in the order of the data set.
+        velocity_unit: Unit of their velocities as shown, "mm/s" or "r/min"; empty without any.
+        dependences: How efficiency depends on load and speed.
     """
 
     name: str
@@ -119,3 +198,6 @@ class FigureData:
     optimal_efficiency: np.ndarray | None
     parameters: tuple[ParameterDraws, ...]
     n_ensembles: int
+    recordings: tuple[RecordedTrace, ...] = ()
+    velocity_unit: str = ""
+    dependences: tuple[Dependence, ...] = ()

@@ -163,7 +163,7 @@ def _rebuilt(kind: Any, value: Any) -> Any:
     options = [part for part in get_args(kind) if part is not NoneType]
     if isinstance(kind, UnionType):
         return _rebuilt(options[0], value)
-    if is_dataclass(kind):
+    if isinstance(kind, type) and is_dataclass(kind):
         hints = get_type_hints(kind)
         return kind(**{f.name: _rebuilt(hints[f.name], value[f.name]) for f in fields(kind)})
     if kind in (Labels, Flags):

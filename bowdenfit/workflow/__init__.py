@@ -7,13 +7,15 @@ from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from bowdenfit.dataset import Dataset, load_dataset, single_table_dataset
+from bowdenfit.dataset import Dataset, load_dataset, single_file_dataset
 from bowdenfit.errors import StoreError, UsageError
+from bowdenfit.measurements.recording_files import parsed_channels
 from bowdenfit.results.folder import CHAIN, clear, read_checkpoint, refuse_to_overwrite, start_checkpoint
 from bowdenfit.workflow.background import Assistants, assistants, draw
 
 if TYPE_CHECKING:
     from bowdenfit.inference.ensemble import Progress
+    from bowdenfit.measurements.channels import ChannelFile
     from bowdenfit.results.fit import Fit
 
 _LARGEST_SEED = 2**31 - 1
@@ -25,7 +27,9 @@ def read(
     settings: Sequence[str] = (),
     geometry: str | None = None,
     undetected: str | None = None,
+    friction: str | None = None,
     wrap_angle: tuple[float, str] | None = None,
+    channels: Sequence[str] = (),
 ) -> Dataset:
     """Read and check a data set, without fitting anything.
 
@@ -34,7 +38,10 @@ def read(
         settings: Changes to the description, such as "friction.mu1.fixed=0.1".
         geometry: "continuous" or "published", in place of the description's.
         undetected: How angles too small to detect enter: "censored", "zero" or "dropped".
-        wrap_angle: Angle and unit of a table without a description.
+        friction: How friction depends on load and speed: "capstan", or "drag", "load-dependent" and "rate-dependent"
+            joined by "+".
+        wrap_angle: Angle and unit of a table or recording without a description.
+        channels: Channels of recordings, such as "input_force=ai0:lbf" or "time=1000Hz".
 
     Raises:
         DescriptionError, DatasetError: What is wrong, in a sentence.
@@ -46,9 +53,12 @@ def read(
         changes.append(f'geometry="{geometry}"')
     if undetected is not None:
         changes.append(f'tables.angles.undetected="{undetected}"')
+    if friction is not None:
+        changes.append(f'friction_model="{friction}"')
+    sources = parsed_channels(channels)
     if wrap_angle is not None:
-        return single_table_dataset(Path(dataset), wrap_angle, changes)
-    return load_dataset(Path(dataset), changes)
+        return single_file_dataset(Path(dataset), wrap_angle, changes, sources)
+    return load_dataset(Path(dataset), changes, sources)
 
 
 def check(dataset: str | Path | Dataset, **reading: Any) -> Dataset:
@@ -67,7 +77,13 @@ def check(dataset: str | Path | Dataset, **reading: Any) -> Dataset:
     data = read(dataset, **reading)
     description = data.description
     usual = all(c.law == "capstan" and c.wrap_angle.curve in {None, "gaussian"} for c in description.contact)
-    if not usual or description.prior or any(setting.prior for setting in description.friction.values()):
+    if (
+        not usual
+        or description.friction_model != "capstan"
+        or data.measurements.recordings
+        or description.prior
+        or any(setting.prior for setting in description.friction.values())
+    ):
         import jax
 
         from bowdenfit.models.build import build_model
@@ -75,6 +91,20 @@ def check(dataset: str | Path | Dataset, **reading: Any) -> Dataset:
         with jax.enable_x64(True):
             build_model(data)
     return data
+
+
+def channels_of(path: str | Path) -> "ChannelFile":
+    """The channels of a recording's file: names, units, clocks and samples, before anybody says what they mean.
+
+    Args:
+        path: A file that `bowdenfit check` lists.
+
+    Raises:
+        DatasetError: It cannot be read.
+    """
+    from bowdenfit.measurements.lab_files import read_channels
+
+    return read_channels(Path(path))
 
 
 def fit(

@@ -335,16 +335,20 @@ def plot(results: Path, output: Path | None) -> None:
 )
 @click.option("--seed", type=click.IntRange(0, 2**31 - 1), help="Seed.  [default: drawn, and recorded]")
 @click.option("--no-noise", is_flag=True, help="Readings exactly as the model expects them.")
-def simulate(bench: Path, output: Path, seed: int | None, no_noise: bool) -> None:
+@click.option(
+    "--recordings", is_flag=True, help="Recordings, sample by sample, as a bench gives them; BENCH has [recordings]."
+)
+def simulate(bench: Path, output: Path, seed: int | None, no_noise: bool, recordings: bool) -> None:
     """Make a data set from known truth.
 
     BENCH is a cable.toml with two more tables: [truth] with the value of each parameter (what is missing is drawn from its
-    prior), and [design] with the lengths and forces to measure at; datasets/synthetic-bench/bench.toml is one. The truth
-    and the seed are written beside the tables.
+    prior), and [design] with the lengths and forces to measure at; datasets/synthetic-bench/bench.toml is one. With
+    --recordings it has [recordings] in place of [design]: what the motor does, what the bench is like, and what its load
+    cells get wrong; datasets/synthetic-recordings/bench.toml is one. The truth and the seed are written beside the tables.
     """
     from bowdenfit.workflow import simulate as simulated
 
-    simulated(bench, output=output, seed=seed, noise=not no_noise)
+    simulated(bench, output=output, seed=seed, noise=not no_noise, recordings=recordings)
     click.echo(f"Wrote {output}. Next: bowdenfit fit {output}")
 
 

@@ -9,6 +9,7 @@ from dataclasses import dataclass, field
 from typing import Literal
 
 import numpy as np
+from jaxtyping import Float
 
 from bowdenfit.types import Flags, Labels, Vector
 
@@ -32,12 +33,12 @@ class RawRecording:
 
     name: str
     file: str
-    input_time: Vector
-    input_force: Vector
-    output_time: Vector
-    output_force: Vector
-    velocity_time: Vector = field(default_factory=lambda: np.zeros(0))
-    velocity: Vector = field(default_factory=lambda: np.zeros(0))
+    input_time: Float[np.ndarray, " of_input_clock"]
+    input_force: Float[np.ndarray, " of_input"]
+    output_time: Float[np.ndarray, " of_output_clock"]
+    output_force: Float[np.ndarray, " of_output"]
+    velocity_time: Float[np.ndarray, " of_velocity_clock"] = field(default_factory=lambda: np.zeros(0))
+    velocity: Float[np.ndarray, " of_velocity"] = field(default_factory=lambda: np.zeros(0))
 
 
 @dataclass(frozen=True)
@@ -185,8 +186,8 @@ class Recording:
     file: str
     run: str
     route: float
-    own_angle: Vector
-    own_sd: Vector
+    own_angle: Float[np.ndarray, " contacts"]
+    own_sd: Float[np.ndarray, " contacts"]
     blocks: Blocks
     strokes: Strokes
     account: Account

@@ -16,6 +16,7 @@ from bowdenfit.results.figure_data import (
     ParameterDraws,
 )
 from bowdenfit.results.fit import OPTIMAL_EFFICIENCY, OPTIMAL_LENGTH, Fit
+from bowdenfit.results.recorded import dependences, traces, velocity_unit
 
 _BAND_DRAWS = 5000  # enough for a line's width of accuracy
 
@@ -38,6 +39,9 @@ def figure_data(fit: Fit) -> FigureData:
         posterior.optimum[OPTIMAL_EFFICIENCY] if posterior is not None and drawn else None,
         tuple(_parameter(fit, p.name) for p in model.space.free),
         posterior.n_ensembles if posterior is not None else 0,
+        traces(fit),
+        velocity_unit(fit),
+        dependences(fit),
     )
 
 

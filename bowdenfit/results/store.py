@@ -8,6 +8,7 @@ from types import NoneType, UnionType
 from typing import Any, get_args, get_origin, get_type_hints
 
 import numpy as np
+from jaxtyping import AbstractArray
 
 from bowdenfit.dataset import Dataset
 from bowdenfit.description_file import parse_description
@@ -20,7 +21,7 @@ from bowdenfit.results.fit import OPTIMAL_EFFICIENCY, OPTIMAL_LENGTH, Fit, Poste
 from bowdenfit.results.folder import CHAIN, FIT, POSTERIOR, SUMMARY, write_text
 from bowdenfit.results.netcdf import EXPECTED, Coordinates, Groups, read_groups, write_groups
 from bowdenfit.results.summary import summarize
-from bowdenfit.types import Flags, Labels, Matrix, Vector
+from bowdenfit.types import Flags, Labels, Matrix
 
 SCHEMA = 2
 Migration = Callable[[dict[str, Any]], dict[str, Any]]
@@ -170,7 +171,7 @@ def _rebuilt(kind: Any, value: Any) -> Any:
         return np.array(value, dtype=int if kind is Labels else bool)
     if kind is Matrix:
         return _array(value).reshape(len(value), len(value[0]) if value else 0)
-    if kind is Vector:
+    if isinstance(kind, type) and issubclass(kind, AbstractArray):
         return _array(value)
     if get_origin(kind) is tuple:
         parts = [options[0]] * len(value) if Ellipsis in options else options

@@ -281,29 +281,52 @@ def predict(
 
 
 def simulate(
-    bench: str | Path, *, output: str | Path | None = None, seed: int | None = None, noise: bool = True
+    bench: str | Path,
+    *,
+    output: str | Path | None = None,
+    seed: int | None = None,
+    noise: bool = True,
+    recordings: bool = False,
 ) -> Dataset:
     """Make a data set from known truth.
 
     Args:
-        bench: A cable.toml with [truth] and [design].
-        output: Folder to write the tables, the truth and the seed to; nothing is written if omitted.
+        bench: A cable.toml with [truth] and [design], or with [truth] and [recordings].
+        output: Folder to write the tables, the truth and the seed to; nothing is written if omitted, which recordings
+            do not allow.
         seed: Seed; drawn and recorded if omitted.
         noise: Whether readings scatter.
+        recordings: Whether to simulate recordings sample by sample, with the faults of a bench, instead of tables.
 
     Raises:
         BowdenfitError: What is wrong, in a sentence.
     """
     import jax
 
-    from bowdenfit.results.synthetic import make, read_bench, write
-
     seed = secrets.randbelow(_LARGEST_SEED) if seed is None else seed
-    plan = read_bench(Path(bench))
     if output is not None and Path(output).exists() and any(p.name != Path(bench).name for p in Path(output).iterdir()):
         raise StoreError(f"{output} exists already; name another folder with --output, nothing was written.")
+    if recordings:
+        return _simulated_recordings(Path(bench), output, seed, noise)
+    from bowdenfit.results.synthetic import make, read_bench, write
+
+    plan = read_bench(Path(bench))
     with jax.enable_x64(True):
         dataset, truth = make(plan, jax.random.key(seed), noise)
     if output is not None:
         write(plan, dataset, truth, Path(output), seed)
     return dataset
+
+
+def _simulated_recordings(bench: Path, output: str | Path | None, seed: int, noise: bool) -> Dataset:
+    import jax
+
+    from bowdenfit.results.synthetic_recordings import make_recordings, read_recordings_plan, write_recordings
+
+    if output is None:
+        raise UsageError("simulated recordings are files; name a folder for them with output.")
+    plan = read_recordings_plan(bench)
+    with jax.enable_x64(True):
+        made = make_recordings(plan, seed, noise)
+    write_recordings(made, Path(output))
+    return load_dataset(Path(output))

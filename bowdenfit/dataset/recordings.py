@@ -13,7 +13,7 @@ from bowdenfit.errors import DatasetError, DescriptionError, nearest
 from bowdenfit.measurements.columns import ColumnSource
 from bowdenfit.measurements.lab_files import read_channels
 from bowdenfit.measurements.preparation import prepare
-from bowdenfit.measurements.recording_files import matched_name, to_recording
+from bowdenfit.measurements.recording_files import WANTED, matched_name, pattern_fields, to_recording
 from bowdenfit.measurements.recordings import (
     Account,
     Blocks,
@@ -23,6 +23,7 @@ from bowdenfit.measurements.recordings import (
     Recordings,
 )
 from bowdenfit.measurements.strokes import Span, find_strokes
+from bowdenfit.measurements.tables import AngleTable
 from bowdenfit.measurements.units import INTERNAL_UNITS, conversion_factor, speed_dimension
 
 
@@ -84,7 +85,8 @@ def _prepared(files: Sequence[_File]) -> tuple[list[tuple[Blocks, Account]], flo
     delays = np.array([a.delay for a in told])
     delay = float(np.sum(weights * delays) / weights.sum())
     apart = float(np.sum(weights * (delays - delay) ** 2) / max(len(told) - 1, 1))
-    sd = float(np.sqrt(max(apart, 1.0) / weights.sum()))
+    # What the estimates have wrong in common does not average out.
+    sd = max(float(np.sqrt(max(apart, 1.0) / weights.sum())), float(np.median([a.delay_sd for a in told])) / 2)
     together = [
         parts if f.settings.delay != "estimate" else _shifted(f, delay, sd)
         for f, parts in zip(files, prepared, strict=True)
@@ -114,15 +116,13 @@ def _from_name(description: Description, pattern: str | None, path: Path, file: 
     """What the name of a file says, by the table's pattern."""
     if pattern is None:
         return RecordingFile(file=file)
+    _check_pattern(description, pattern)
     values = matched_name(pattern, path)
-    angles = {}
-    for name, (text, unit) in values.items():
-        if name in {"at", "run", "velocity"}:
-            continue
-        if name not in description.angle_columns:
-            known = ["at", "run", "velocity", *description.angle_columns]
-            raise DescriptionError(f"cable.toml, tables.recordings.pattern: {name!r} is unknown{nearest(name, known)}")
-        angles[name] = QuantityValue(value=float(text), unit=unit or "deg")
+    angles = {
+        name: QuantityValue(value=float(text), unit=unit or "deg")
+        for name, (text, unit) in values.items()
+        if name in description.angle_columns
+    }
     velocity = values.get("velocity")
     return RecordingFile(
         file=file,
@@ -131,6 +131,26 @@ def _from_name(description: Description, pattern: str | None, path: Path, file: 
         velocity=QuantityValue(value=float(velocity[0]), unit=velocity[1] or "mm/s") if velocity else None,
         wrap_angles=angles,
     )
+
+
+def _check_pattern(description: Description, pattern: str) -> None:
+    """A pattern names only what a recording can be told, in units of the right kind."""
+    known = ["at", "run", "velocity", *description.angle_columns]
+    place = "cable.toml, tables.recordings.pattern"
+    for name, unit in pattern_fields(pattern):
+        if name not in known:
+            raise DescriptionError(f"{place}: {name!r} is unknown{nearest(name, known)}")
+        if unit and name != "at" and name != "run":
+            dimension = speed_dimension(unit) if name == "velocity" else "angle"
+            _factor(unit, dimension, f"{place}, {{{name}:{unit}}}")
+
+
+def _factor(unit: str, dimension: str, place: str) -> float:
+    """Factor to the internal unit; an error says where the unit stands."""
+    try:
+        return conversion_factor(unit, dimension)
+    except DatasetError as error:
+        raise DescriptionError(f"{place}: {error}.") from None
 
 
 def _check_names(entries: list[tuple[Path, RecordingFile]]) -> None:
@@ -170,13 +190,33 @@ def _recording(description: Description, file: _File, blocks: Blocks, account: A
 
 
 def _sources(channels: Mapping[str, ColumnMap]) -> dict[str, ColumnSource]:
+    known = [quantity.name for quantity in WANTED]
+    for name in channels:
+        if name not in known:
+            raise DescriptionError(
+                f"cable.toml, channels of recordings: no quantity is called {name!r}{nearest(name, known)}"
+            )
     return {name: ColumnSource(channel.name, channel.unit) for name, channel in channels.items()}
 
 
 def preparation_settings(page: Preparation) -> PreparationSettings:
-    """The preparation that a description asks for, in internal units."""
+    """The preparation that a description asks for, in internal units.
+
+    Raises:
+        DescriptionError: The limits or the block contradict themselves.
+    """
     limits = page.limits
-    newtons = conversion_factor(limits.unit, "force") if limits is not None else 1.0
+    newtons = _factor(limits.unit, "force", "cable.toml, prepare, limits") if limits is not None else 1.0
+    if limits is not None and not limits.low < limits.high:
+        raise DescriptionError(
+            f"cable.toml, prepare, limits: low = {limits.low:g} must be below high = {limits.high:g}; they are the lowest and "
+            "the highest force that the load cells can show."
+        )
+    if isinstance(page.block, QuantityValue) and page.block.value <= 0:
+        raise DescriptionError(
+            f"cable.toml, prepare, block: {page.block.value:g} {page.block.unit} is no length of a block; write a positive "
+            'one, or block = "none" to average nothing.'
+        )
     return PreparationSettings(
         "interval" if page.tare == "interval" else "none",
         page.quiet,
@@ -226,3 +266,28 @@ def _check_placed(description: Description, recordings: Recordings) -> None:
                     f"the recording {recording.name!r} does not say at which {route.variable if route else 'length'} it was "
                     f'made; add that to its [[recording]] ({at}), or read it from the file names: pattern = "{{at}}mm*".'
                 )
+
+
+def check_angles(description: Description, recordings: Recordings, angles: AngleTable | None) -> None:
+    """Every recording outside the range of the curves has its wrap angles measured, in its own place or in the table.
+
+    Args:
+        description: The description.
+        recordings: The recordings.
+        angles: The table of wrap angles.
+
+    Raises:
+        DatasetError: A recording has none.
+    """
+    route = description.route
+    if route is None or angles is None:
+        return
+    curved = [recordings.columns.index(c.wrap_angle.column) for c in description.curved if c.wrap_angle.column]
+    for recording in recordings.each:
+        outside = not route.range[0] <= recording.route <= route.range[1]
+        if outside and not np.isfinite(recording.own_angle[curved]).all() and recording.route not in angles.route:
+            raise DatasetError(
+                f"the recording {recording.name!r} was made at {recording.route:g} {route.unit}, outside the range "
+                f"{route.range[0]:g} to {route.range[1]:g} {route.unit} where the angle curves hold, and the angle table has no "
+                "row there; measure the wrap angles there, and add them to the table or as wrap_angles to its [[recording]]."
+            )

@@ -6,7 +6,7 @@ from pathlib import Path
 
 import numpy as np
 
-from bowdenfit.errors import DatasetError
+from bowdenfit.errors import DatasetError, nearest
 from bowdenfit.measurements.channels import Channel, ChannelFile
 from bowdenfit.measurements.columns import ColumnSource, Quantity, meanings
 from bowdenfit.measurements.quoting import listed, shown
@@ -19,7 +19,8 @@ WANTED = (
     Quantity("velocity", "speed"),
     Quantity("time", "time"),
 )
-_RATE = re.compile(r"(?P<rate>[0-9.]+(?:[eE][+-]?[0-9]+)?)\s*(?P<unit>k?Hz)", re.IGNORECASE)
+_RATE = re.compile(r"(?P<rate>[+-]?(?:[0-9]+\.?[0-9]*|\.[0-9]+)(?:e[+-]?[0-9]+)?)\s*(?P<unit>k?Hz)", re.IGNORECASE)
+_FIELD = re.compile(r"\{([A-Za-z_]\w*)(?::([^}]*))?\}")
 _PATH = re.compile(r"[/.]")
 
 
@@ -42,6 +43,7 @@ def to_recording(file: ChannelFile, name: str, sources: Mapping[str, ColumnSourc
     for quantity in ("input_force", "output_force"):
         if quantity not in found:
             raise _missing(file, quantity)
+    _check_distinct(file, found["input_force"], found["output_force"])
     forces = {q: _converted(file, found[q], q, sources.get(q), "force") for q in ("input_force", "output_force")}
     clocks = {q: _clock(file, found[q], found.get("time"), sources.get("time")) for q in found if q != "time"}
     for quantity, values in forces.items():
@@ -59,6 +61,17 @@ def to_recording(file: ChannelFile, name: str, sources: Mapping[str, ColumnSourc
             velocity,
         ),
         unit,
+    )
+
+
+def _check_distinct(file: ChannelFile, one: Channel, other: Channel) -> None:
+    """Refuse one channel, or a copy of it, in the place of both forces."""
+    if not np.array_equal(one.values, other.values, equal_nan=True):
+        return
+    what = "the same channel" if one is other else f"copies of each other, {shown(other.name)} having the same numbers"
+    raise DatasetError(
+        f"{file.path.name}: input_force and output_force are {what} ({shown(one.name)}), as if there were no friction at "
+        "all; name the channels of the two load cells: --channel input_force=NAME:N --channel output_force=NAME:N."
     )
 
 
@@ -100,8 +113,8 @@ def _named(file: ChannelFile, quantity: str, name: str) -> Channel:
             "the whole name."
         )
     raise DatasetError(
-        f"{file.path.name} has no channel {shown(wanted)}, which is named for {quantity}; it has "
-        f"{listed(tuple(c.name for c in file.channels))}."
+        f"{file.path.name} has no channel {shown(wanted)}, which you name as {quantity}"
+        f"{nearest(wanted, [c.name for c in file.channels])}"
     )
 
 
@@ -142,9 +155,8 @@ def _unit(file: ChannelFile, channel: Channel, quantity: str, source: ColumnSour
 
 def _clock(file: ChannelFile, channel: Channel, time: Channel | None, source: ColumnSource | None) -> np.ndarray:
     """Time of each sample of a channel [s]."""
-    rate = _RATE.fullmatch(source.name.strip()) if source is not None else None
-    if rate is not None:
-        hertz = float(rate["rate"]) * (1000.0 if rate["unit"].lower() == "khz" else 1.0)
+    hertz = _rate(file, source)
+    if hertz is not None:
         return np.arange(len(channel.values)) / hertz
     if source is None and channel.time is not None:
         return channel.time
@@ -154,6 +166,19 @@ def _clock(file: ChannelFile, channel: Channel, time: Channel | None, source: Co
         f"{file.path.name}: the channel {shown(channel.name)} has no clock; name the channel of the time, --channel "
         "time=NAME:s, or state the sampling rate, --channel time=1000Hz."
     )
+
+
+def _rate(file: ChannelFile, source: ColumnSource | None) -> float | None:
+    """The sampling rate that the user gives in the place of a clock [1/s]."""
+    rate = _RATE.fullmatch(source.name.strip()) if source is not None else None
+    if rate is None:
+        return None
+    hertz = float(rate["rate"]) * (1000.0 if rate["unit"].lower() == "khz" else 1.0)
+    if not 0 < hertz < np.inf:
+        raise DatasetError(
+            f"{file.path.name}: a sampling rate of {rate[0]} is not possible; it must be above 0, such as time=1000Hz."
+        )
+    return hertz
 
 
 def _same_length(file: ChannelFile, channel: Channel, values: np.ndarray, time: np.ndarray) -> None:
@@ -183,14 +208,38 @@ def parsed_channels(texts: Sequence[str]) -> dict[str, ColumnSource]:
     for text in texts:
         quantity, equals, rest = text.partition("=")
         name, _, unit = rest.rpartition(":") if ":" in rest else (rest, "", "")
-        if not equals or not name.strip():
+        if not equals or not quantity.strip() or not name.strip():
             raise DatasetError(
                 f"--channel {shown(text)} is not of the form QUANTITY=CHANNEL:UNIT, such as input_force=ai0:N."
             )
         if quantity.strip() not in known:
-            raise DatasetError(f"--channel {shown(text)}: {shown(quantity.strip())} is none of {', '.join(known)}.")
+            raise DatasetError(
+                f"--channel {shown(text)}: no quantity is called {shown(quantity.strip())}{nearest(quantity.strip(), known)}"
+            )
+        if quantity.strip() in sources:
+            raise DatasetError(
+                f"--channel names {quantity.strip()} twice, as {shown(sources[quantity.strip()].name)} and {shown(rest)}; "
+                "keep one of them."
+            )
         sources[quantity.strip()] = ColumnSource(name.strip(), unit.strip() or None)
     return sources
+
+
+def pattern_fields(pattern: str) -> tuple[tuple[str, str], ...]:
+    """Names and units of the quantities in a pattern such as "{at}mm_{velocity:r/min}rpm".
+
+    Raises:
+        DatasetError: A name stands there twice.
+    """
+    fields = tuple(_FIELD.findall(pattern))
+    names = [name for name, _ in fields]
+    twice = next((name for name in names if names.count(name) > 1), None)
+    if twice is not None:
+        raise DatasetError(
+            f"cable.toml, tables.recordings.pattern: {shown(pattern)} has {{{twice}}} twice; keep one of them, and put * in the "
+            "place of the other."
+        )
+    return fields
 
 
 def matched_name(pattern: str, path: Path) -> dict[str, tuple[str, str]]:
@@ -199,7 +248,7 @@ def matched_name(pattern: str, path: Path) -> dict[str, tuple[str, str]]:
     Raises:
         DatasetError: The name does not follow the pattern.
     """
-    fields = re.findall(r"\{([\w]+)(?::([^}]*))?\}", pattern)
+    fields = pattern_fields(pattern)
     expression = re.escape(pattern).replace(r"\*", ".*")
     for name, unit in fields:
         written = re.escape("{" + name + (f":{unit}" if unit else "") + "}")

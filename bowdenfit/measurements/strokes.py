@@ -14,6 +14,8 @@ from bowdenfit.types import Flags, Labels, Vector
 _FIT_BLOCKS = 1500  # more than these say no more about the loop
 _GAIN_SD = 0.02  # how far two load cells may disagree before the loop is believed to be off center
 _LEAST_EXPONENT = 1e-3
+_FEWEST = 10  # blocks
+_CLEAR_OF_NOISE = 5.0  # a force below this many standard deviations of its noise may be that of a slack rope
 _STILL = 0.05  # fraction of the typical speed below which the rope is taken to stand still
 _CLEARLY = 0.5  # a fit the other way round must leave less than this fraction of the deviations to be believed
 _ONE_PHASE = 4.0  # spread of the log ratio, in units of its noise, below which there is only one phase
@@ -62,13 +64,14 @@ def find_strokes(blocks: Blocks, file: str, name: str, by_hand: Sequence[Span] =
         by_hand: Phases set by the user; they replace what is found where they apply.
 
     Raises:
-        DatasetError: Hardly anything is under tension; input and output are swapped; only the return is there.
+        DatasetError: It is too short, or a phase lies outside it; hardly anything is under tension; input and output are swapped; only the return is there.
     """
-    usable = ~blocks.saturated & (blocks.input_force > 0) & (blocks.output_force > 0)
-    if usable.sum() < 10:
+    _check_length(blocks, file, name, by_hand)
+    usable = ~blocks.saturated & _under_tension(blocks.input_force) & _under_tension(blocks.output_force)
+    if usable.sum() < _FEWEST:
         raise DatasetError(
-            f"{file}: only {int(usable.sum())} blocks of the recording {name!r} have both forces above 0 and inside the "
-            "range of the load cells; the usual cause is a sign, a unit or a tare that is wrong: see bowdenfit check."
+            f"{file}: only {int(usable.sum())} blocks of the recording {name!r} have both forces above their noise and inside "
+            "the range of the load cells; the usual cause is a sign, a unit or a tare that is wrong: see bowdenfit check."
         )
     force_in, force_out = blocks.input_force[usable], blocks.output_force[usable]
     loop = fit_loop(force_in, force_out)
@@ -103,14 +106,16 @@ def fit_loop(force_in: Vector, force_out: Vector) -> Loop:
     ratio = np.log(few_in / few_out)
     low, high = np.quantile(ratio, (0.05, 0.95))
     width, center = max((high - low) / 2, _LEAST_EXPONENT), (high + low) / 2
-    noise = max(_noise(np.log(few_out)), 1e-6)
+    level = float(np.median(few_out))
+    noise_in, noise_out = (max(_noise(force), 1e-6 * level) for force in (few_in, few_out))
+    noise = float(np.median(np.hypot(noise_in / few_in, noise_out / few_out)))
     if high - low < _ONE_PHASE * noise or low > 0 or high < 0:  # one phase: all of the ratio is friction
         width, center = max(abs(float(np.median(ratio))), _LEAST_EXPONENT), 0.0
-    level = float(np.median(few_out))
 
     def deviations(p: Vector) -> Vector:
         exponent, middle, drag = float(np.exp(p[0])), float(p[1]), level * float(p[2]) ** 2
-        return _follow(few_in, few_out, exponent, middle, drag)[0] / noise
+        deviation = _follow(few_in, few_out, exponent, middle, drag)[0]
+        return deviation / np.hypot(noise_in / (few_in + drag), noise_out / (few_out + drag))
 
     def residuals(p: Vector) -> Vector:
         weak = np.sqrt(len(few_in)) * 0.1
@@ -139,6 +144,11 @@ def _follow(force_in: Vector, force_out: Vector, exponent: float, center: float,
     x, y = np.log(force_in + drag), np.log(force_out + drag)
     followed, state = play(x, exponent, float(y[0] + center))
     return y + center - followed, state
+
+
+def _under_tension(force: Vector) -> Flags:
+    """Where a force stands clear of its noise, so that its logarithm says something."""
+    return force > _CLEAR_OF_NOISE * _noise(force)
 
 
 def _noise(series: Vector) -> float:
@@ -185,6 +195,23 @@ def _overridden(
     return state, used
 
 
+def _check_length(blocks: Blocks, file: str, name: str, by_hand: Sequence[Span]) -> None:
+    """Refuse a recording of a few blocks, and phases that lie outside it."""
+    if len(blocks.time) < _FEWEST:
+        raise DatasetError(
+            f"{file}: the recording {name!r} has only {len(blocks.time)} blocks, and phases can be told from {_FEWEST} on; the "
+            "usual cause is a block that is too long or a recording that was cut off: state a shorter block under prepare in "
+            "cable.toml, or leave the recording out."
+        )
+    for span in by_hand:
+        if not _covered(blocks.time, [span]).any():
+            raise DatasetError(
+                f"{file}: the phase {span.stroke!r} of {name!r} from {span.start:g} to {span.end:g} s holds nothing of the "
+                f"recording, which goes from {blocks.time[0]:.4g} to {blocks.time[-1]:.4g} s; correct its start and end in "
+                "cable.toml, in seconds of the recording's clock."
+            )
+
+
 def _check_swapped(force_in: Vector, force_out: Vector, loop: Loop, velocity: Vector, file: str, name: str) -> None:
     """Refuse a recording whose channels are the wrong way round, or that holds nothing but the return."""
     swap = (
@@ -200,8 +227,8 @@ def _check_swapped(force_in: Vector, force_out: Vector, loop: Loop, velocity: Ve
     if set(loop.state) - {SWITCH} and np.mean(force_out > force_in) > 0.95:
         raise DatasetError(
             f"{file}: in {name!r} the output force is above the input force nearly throughout, as in a return stroke alone; "
-            f"{swap}. If it really is a return without its pull, set its phase by hand: strokes = [{{ start = ..., end = "
-            '..., stroke = "return" }] under its [[recording]].'
+            f"{swap}. If it really is a return without its pull, set its phase by hand in cable.toml, under its [[recording]]: "
+            'strokes = [{ start = ..., end = ..., stroke = "return" }].'
         )
     other = fit_loop(force_out, force_in)
     if other.cost < _CLEARLY * loop.cost and {PULL, RETURN} <= set(other.state):

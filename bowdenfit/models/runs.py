@@ -17,7 +17,7 @@ from bowdenfit.physics.friction import transmission_efficiency
 from bowdenfit.types import Labels, Vector
 
 ROW_ARRAYS = ("route", "own", "is_own", "known_variance", "noisy")
-_LOAD_BINS, _SPEED_BINS = 24, 8  # of each stroke of a run, where friction depends on load or speed
+_LOAD_BINS, _SPEED_BINS, _DELAY_BINS = 24, 8, 8  # of each stroke of a run, where load, speed or a delay matters
 LEAST_FORCE = 1e-3  # N; an offset cannot take more of a reading than this leaves
 
 
@@ -35,11 +35,13 @@ class RunsTerm:
     a delay between the two adds, for the capstan equation and exact zeros; else a function of the load, taken to first
     order in m. The mounting effect m is
     integrated out. Readings of one run at the same angles and stroke (and, where it matters, the same load and speed) are
-    one cell, so that the cost does not grow with the length of a recording.
+    one cell, so that the cost does not grow with the length of a recording. Load matters wherever readings have a clock: a
+    delay between the load cells adds more where the force changes fast for its size.
 
     Args:
         cable: The cable.
-        data: Arrays over cells (wrap angles, stroke, weight, mean log ratio and forces) and over runs (n, sums).
+        data: Arrays over cells (wrap angles, stroke, weight, mean log ratio and forces) and over runs (n, sums). Cells are
+            ordered by run, equally many for each: those that a run lacks have no weight.
         labels: Each run in words.
         name: Name of the readings in results.
         reading_noise: Parameter that is the standard deviation of one reading.
@@ -56,8 +58,8 @@ class RunsTerm:
     @property
     def residual_blocks(self) -> tuple[tuple[int, int], ...]:
         """Runs scatter by their mounting; the cells of a run about its mean by the load cells."""
-        runs, cells = len(self.labels), len(self.data["mean"])
-        return ((runs, runs), (cells, cells - runs))
+        runs, cells, filled = len(self.labels), len(self.data["mean"]), int(np.sum(self.data["weight"] > 0))
+        return ((runs, runs), (cells, filled - runs))
 
     def _shown(
         self, values: Mapping[str, Array], data: Mapping[str, Any], exponent: Float[Array, " cells"]
@@ -89,7 +91,7 @@ class RunsTerm:
 
     def _per_run(self, data: Mapping[str, Any], cells: Float[Array, " cells"]) -> Float[Array, " runs"]:
         """Weighted sum over the cells of each run."""
-        return jnp.zeros_like(data["run_weight"]).at[data["run"]].add(data["weight"] * cells)
+        return jnp.sum((data["weight"] * cells).reshape(len(self.labels), -1), axis=1)
 
     def log_likelihood(self, values: Mapping[str, Array], data: Mapping[str, Any]) -> Float[Array, " runs"]:
         """Log likelihood of each run, all samples together."""
@@ -173,7 +175,7 @@ def run_sums(cable: Cable, rows: SlidingRows) -> dict[str, Any]:
     runs, run = np.unique(rows.run[first], return_inverse=True)
     row_run = np.searchsorted(runs, rows.run)
     run_weight = np.bincount(run, cell_weight)
-    return {name: rows.angles[name][first] for name in ROW_ARRAYS} | {
+    cells = {name: rows.angles[name][first] for name in ROW_ARRAYS} | {
         "stroke": rows.stroke[first].astype(float),
         "run": run,
         "weight": cell_weight,
@@ -182,6 +184,8 @@ def run_sums(cable: Cable, rows: SlidingRows) -> dict[str, Any]:
         "output_force": np.exp(mean(np.log(rows.output_force))),
         "velocity": mean(rows.velocity),
         "drift": mean(rows.drift),
+    }
+    return _rectangular(cells, run) | {
         "n": np.bincount(row_run, rows.worth),
         "run_weight": run_weight,
         "run_mean": np.bincount(run, cell_weight * cell_mean) / run_weight,
@@ -190,13 +194,24 @@ def run_sums(cable: Cable, rows: SlidingRows) -> dict[str, Any]:
     }
 
 
+def _rectangular(cells: dict[str, np.ndarray], run: np.ndarray) -> dict[str, np.ndarray]:
+    """Cells, in order of their runs, padded to equally many a run with weightless copies of the run's first."""
+    starts, counts = np.searchsorted(run, np.arange(run[-1] + 1)), np.bincount(run)
+    place = np.arange(counts.max())[None, :]
+    source = np.where(place < counts[:, None], starts[:, None] + place, starts[:, None]).ravel()
+    padded = {name: values[source] for name, values in cells.items()}
+    return padded | {"weight": np.where((place < counts[:, None]).ravel(), padded["weight"], 0.0)}
+
+
 def _cells(cable: Cable, rows: SlidingRows) -> tuple[np.ndarray, np.ndarray]:
     """The cell of each reading, and the first reading of each cell."""
     keys = [rows.run, rows.stroke, *(rows.angles[name] for name in ROW_ARRAYS)]
     if cable.friction.depends_on_rate:
         keys.append(_bins(rows.velocity, rows.run * 2 + (rows.stroke > 0), _SPEED_BINS))
-    if cable.friction.depends_on_load or cable.description.fits_offsets:
-        keys.append(_bins(rows.input_force + rows.output_force, rows.run * 2 + (rows.stroke > 0), _LOAD_BINS))
+    on_load = cable.friction.depends_on_load or cable.description.fits_offsets
+    if on_load or np.any(rows.drift):
+        bins = _LOAD_BINS if on_load else _DELAY_BINS
+        keys.append(_bins(rows.input_force + rows.output_force, rows.run * 2 + (rows.stroke > 0), bins))
     design = np.column_stack([np.nan_to_num(key) for key in keys])
     _, first, cell = np.unique(design, axis=0, return_index=True, return_inverse=True)
     return cell.ravel(), first

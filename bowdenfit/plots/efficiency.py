@@ -27,7 +27,8 @@ if TYPE_CHECKING:
     from bowdenfit.results.figure_data import EfficiencyPoints, FigureData
 
 # marker, its size [pt] and label by table
-KINDS = {"efficiency": ("o", 4.5, "Measured"), "run_efficiency": ("D", 2.8, "Measured, mean of a run")}
+RUN = ("D", 2.8, "Measured, mean of a run")
+KINDS = {"efficiency": ("o", 4.5, "Measured"), "run_efficiency": RUN, "recorded_efficiency": RUN}
 MOST_NUMBERS, LEAST_NUMBER = 16, 0.5  # so many bars have numbers over them, if they are so many percent high
 LEAST_AT_EDGE = 0.005
 

@@ -11,10 +11,15 @@ from typing import TYPE_CHECKING, Any
 
 from matplotlib.figure import Figure
 
+from bowdenfit.plots.autocorrelation import autocorrelation, has_autocorrelation
 from bowdenfit.plots.coefficients import coefficients, has_coefficients
+from bowdenfit.plots.dependence import dependence, has_dependence
 from bowdenfit.plots.efficiency import efficiency, has_route
+from bowdenfit.plots.hysteresis import has_hysteresis, hysteresis
 from bowdenfit.plots.pairs import has_pairs, pairs
+from bowdenfit.plots.recordings import has_recordings, recordings
 from bowdenfit.plots.residuals import has_residuals, residuals
+from bowdenfit.plots.sample_efficiency import has_sample_efficiency, sample_efficiency
 from bowdenfit.plots.style import DOTS_PER_INCH, in_paper_style
 from bowdenfit.plots.traces import has_traces, traces
 from bowdenfit.plots.wrap_angles import has_curves, wrap_angles
@@ -44,6 +49,11 @@ FIGURES = {
     "pairs": Entry(pairs, has_pairs),
     "traces": Entry(traces, has_traces),
     "residuals": Entry(residuals, has_residuals),
+    "recordings": Entry(recordings, has_recordings),
+    "hysteresis": Entry(hysteresis, has_hysteresis),
+    "sample_efficiency": Entry(sample_efficiency, has_sample_efficiency),
+    "autocorrelation": Entry(autocorrelation, has_autocorrelation),
+    "dependence": Entry(dependence, has_dependence),
 }
 
 

@@ -5,6 +5,7 @@ import numpy as np
 from bowdenfit.dataset import Dataset
 from bowdenfit.description import Contact, Description, FrictionSetting
 from bowdenfit.measurements.tables import AngleTable, EfficiencyTable, ForceTable
+from bowdenfit.report.recordings import recordings_text
 
 
 def check_text(dataset: Dataset) -> str:
@@ -28,6 +29,8 @@ def check_text(dataset: Dataset) -> str:
         lines.append(_efficiencies(measurements.efficiencies))
     if measurements.forces is not None:
         lines.append(_forces(measurements.forces))
+    if measurements.recordings is not None:
+        lines += ["", "Recordings:", *(f"  {line}" for line in recordings_text(measurements.recordings))]
     lines += [f"  note: {remark}" for remark in measurements.remarks]
     lines += ["", *(f"Warning: {warning}" for warning in warnings_of(dataset))]
     lines.append("Everything could be read." + (" Nothing is wrong." if not warnings_of(dataset) else ""))
@@ -45,7 +48,7 @@ def warnings_of(dataset: Dataset) -> list[str]:
     ]
     conditions = _conditions(dataset)
     if not conditions:
-        warnings.append("no table has forces or efficiencies, so the friction coefficients rest on their priors alone.")
+        warnings.append("no table has forces, efficiencies or recordings, so the friction coefficients rest on their priors alone.")
     elif conditions < len(free):
         warnings.append(
             f"{len(free)} friction coefficients are to be found from {conditions} different "
@@ -70,6 +73,8 @@ def _conditions(dataset: Dataset) -> int:
     for table in (dataset.measurements.efficiencies, dataset.measurements.forces):
         if table is not None:
             rows += [tuple(np.nan_to_num(row, nan=-1.0)) for row in np.column_stack([table.route, table.own.angle])]
+    if dataset.measurements.recordings is not None:
+        rows += [tuple(np.nan_to_num([r.route, *r.own_angle], nan=-1.0)) for r in dataset.measurements.recordings.each]
     return len(set(rows))
 
 
@@ -116,7 +121,8 @@ def _angles(table: AngleTable, description: Description) -> list[str]:
     if description.route:
         outside = (table.route < description.route.range[0]) | (table.route > description.route.range[1])
         if outside.any():
-            lines.append(f"  {outside.sum()} rows lie outside the range of the curves; they serve rows measured there.")
+            rows = "1 row lies" if outside.sum() == 1 else f"{outside.sum()} rows lie"
+            lines.append(f"  {rows} outside the range of the curves, and serves measurements made there.")
     return lines
 
 

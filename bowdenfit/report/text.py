@@ -2,9 +2,13 @@
 
 from typing import Any
 
+from bowdenfit.models.scatter import RUN_SCATTER
 from bowdenfit.report.layout import filled, listed, table
+from bowdenfit.report.recordings import recordings_text
 from bowdenfit.results.answers import decimals
+from bowdenfit.results.confounding import confounded
 from bowdenfit.results.fit import Fit
+from bowdenfit.results.rate import rate_effect
 
 _UNLIMITED = 2000.0  # an angle in degrees or a length in mm beyond which a curve coefficient is no longer a finding
 _RESTS_ON_PRIOR = 0.2  # contraction below which a parameter is said to rest on its prior alone
@@ -14,7 +18,15 @@ def summary_text(fit: Fit) -> str:
     """The summary of a fit for people."""
     page = fit.summary()
     blocks = [_title(fit), _verdict(fit, page), _coefficients(page), _rests_on_prior(page), _curves(fit, page)]
-    blocks += [_scatter(page), _measured(fit, page), _answer(fit), _origin(page)]
+    blocks += [
+        _scatter(page),
+        _mountings(page),
+        _recordings(fit),
+        _measured(fit, page),
+        _friction_model(fit),
+        _answer(fit),
+    ]
+    blocks.append(_origin(page))
     return "\n\n".join(block for block in blocks if block) + "\n"
 
 
@@ -27,10 +39,18 @@ def _title(fit: Fit) -> str:
             counts += _angle_counts(fit, len(term.data["angle"]), len(term.data["limit"]))
     if tables.efficiencies is not None:
         counts.append(f"{len(tables.efficiencies.efficiency)} efficiencies")
+    if tables.recordings is not None:
+        blocks = sum(int(r.strokes.used_sliding.sum()) for r in tables.recordings.each)
+        samples, runs = sum(r.account.samples for r in tables.recordings.each), len(tables.recordings.runs)
+        counts.append(
+            f"{samples} samples of {len(tables.recordings.each)} recordings in {runs} runs ({blocks} sliding blocks)"
+        )
     if tables.forces is not None:
         counts.append(f"{len(tables.forces.run)} force readings in {len(tables.forces.run_names)} runs")
     line = f"{fit.name}\n{'=' * len(fit.name)}"
-    fitted = filled(f"Fitted to {listed(counts)}; {description.geometry} geometry.")
+    geometry = f"; {description.geometry} geometry" if description.curved else ""
+    model = f"; friction model {description.friction_model}" if description.friction_model != "capstan" else ""
+    fitted = filled(f"Fitted to {listed(counts)}{geometry}{model}.")
     remarks = [filled(remark) for remark in tables.remarks]
     return "\n".join([line, fitted, *remarks])
 
@@ -57,6 +77,7 @@ def _verdict(fit: Fit, page: dict[str, Any]) -> str:
         state += f" ({sampler['ensembles']} ensembles of {sampler['walkers']} walkers, {sampler['steps']} steps)"
     lines = [f"Verdict: {state}."]
     lines += [filled(f"- {reason}", indent="  ") for reason in fit.reasons]
+    lines += [filled(c.sentence()) for c in confounded(fit)]
     return "\n".join(lines)
 
 
@@ -135,6 +156,45 @@ def _scatter(page: dict[str, Any]) -> str:
             value = f"{sd:.2f} {units[term]}" if term == "wrap_angle" else f"{100 * sd:.2f} {units[term]}"
             parts.append(f"{term.replace('_', ' ')} {value}")
     return f"Residual standard deviation of least squares: {listed(parts)}." if parts else ""
+
+
+def _mountings(page: dict[str, Any]) -> str:
+    """The scatter from mounting to mounting, in words."""
+    tau, runs = (
+        page["parameters"].get(RUN_SCATTER, {}),
+        {r["label"] for r in page["measured"] if r["table"] != "efficiency"},
+    )
+    if "median" not in tau or not runs:
+        return ""
+    shown = (f"{100 * tau[q]:.1f}" for q in ("median", "q05", "q95"))
+    median, low, high = shown
+    return filled(
+        f"From one mounting of the cable to the next the efficiency scatters by {median} % of itself (90 % interval {low} to "
+        f"{high} %). All samples of a run share what its mounting did, so longer runs do not make the coefficients surer; "
+        "more runs do."
+    )
+
+
+def _recordings(fit: Fit) -> str:
+    recordings = fit.dataset.measurements.recordings
+    return "Recordings\n" + "\n".join(recordings_text(recordings)) if recordings is not None else ""
+
+
+def _friction_model(fit: Fit) -> str:
+    """What the options of the friction model found."""
+    friction = fit.model.cable.friction
+    if not friction.options:
+        return ""
+    conditions, lines = friction.conditions, []
+    if friction.depends_on_load:
+        lines.append(
+            f"Coefficients and efficiencies are stated for an input force of {conditions.reference_force:g} N, because "
+            "friction depends on the load."
+        )
+    effect = rate_effect(fit)
+    if effect is not None:
+        lines.append(effect.sentence())
+    return "\n".join(filled(line) for line in lines)
 
 
 def _measured(fit: Fit, page: dict[str, Any]) -> str:

@@ -12,13 +12,13 @@ from bowdenfit.models.scatter import BLOCK_NOISE, RUN_SCATTER
 from bowdenfit.predictions.recorded import DRAWS, Follower, blocks_shown
 from bowdenfit.results.figure_data import Dependence, RecordedTrace
 from bowdenfit.results.fit import Fit
+from bowdenfit.results.rate import SHOWN_SPEED, place_of
 
 _QUANTILES = (0.05, 0.5, 0.95)
 _LAGS = 60
 _REACH = 0.1  # mounting effects of a run that are looked at, either way
 _GRID = 60
 _BINS = 12
-_SHOWN_SPEED = {"rad/s": ("r/min", 30 / np.pi), "mm/s": ("mm/s", 1.0), "": ("", 1.0)}
 
 
 def traces(fit: Fit) -> tuple[RecordedTrace, ...]:
@@ -40,7 +40,7 @@ def traces(fit: Fit) -> tuple[RecordedTrace, ...]:
 def velocity_unit(fit: Fit) -> str:
     """Unit in which velocities are shown; empty without any."""
     recordings = fit.dataset.measurements.recordings
-    return _SHOWN_SPEED[recordings.velocity_unit][0] if recordings is not None else ""
+    return SHOWN_SPEED[recordings.velocity_unit][0] if recordings is not None else ""
 
 
 def _some_draws(fit: Fit) -> np.ndarray:
@@ -115,7 +115,7 @@ def _trace(
     blocks, strokes, flagged = recording.blocks, recording.strokes, recording.account.flagged
     shown = blocks_shown(len(blocks.time))
     n, used = len(shown), strokes.used_sliding[shown]
-    scale = _SHOWN_SPEED[fit.dataset.measurements.recordings.velocity_unit][1]  # type: ignore[union-attr]
+    scale = SHOWN_SPEED[fit.dataset.measurements.recordings.velocity_unit][1]  # type: ignore[union-attr]
     deviation = np.log(np.maximum(blocks.output_force[shown], 1e-3) / np.maximum(fitted[:n], 1e-3))[used]
     step = float(np.median(np.diff(blocks.time[shown]))) if n > 1 else 1.0
     correlation = _autocorrelation(deviation)
@@ -170,12 +170,8 @@ def dependences(fit: Fit) -> tuple[Dependence, ...]:
 
 def _place(fit: Fit, recordings: Recordings) -> tuple[float, list[Recording], str]:
     """The route value with most recordings, those recordings, and the place in words."""
-    route = fit.dataset.description.route
-    if route is None:
-        return 0.0, list(recordings.each), ""
-    values = [r.route for r in recordings.each if route.range[0] <= r.route <= route.range[1]]
-    at = max(set(values), key=values.count) if values else route.middle
-    return at, [r for r in recordings.each if r.route == at], f"at {at:g} {route.unit}"
+    at, place = place_of(fit)
+    return at, [r for r in recordings.each if not place or r.route == at], place
 
 
 def _on_load(fit: Fit, recordings: Recordings) -> Dependence:
@@ -191,7 +187,7 @@ def _on_load(fit: Fit, recordings: Recordings) -> Dependence:
 
 def _on_speed(fit: Fit, recordings: Recordings) -> Dependence:
     at, here, place = _place(fit, recordings)
-    unit, scale = _SHOWN_SPEED[recordings.velocity_unit]
+    unit, scale = SHOWN_SPEED[recordings.velocity_unit]
     low, high = fit.model.cable.friction.conditions.speeds
     grid = np.linspace(low * 0.5, high * 1.05, _GRID)
     points = []

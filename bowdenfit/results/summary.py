@@ -6,8 +6,11 @@ from typing import Any
 import numpy as np
 
 from bowdenfit.models.build import EFFICIENCY_TERMS
+from bowdenfit.results.accounts import accounts
 from bowdenfit.results.answers import Interval
+from bowdenfit.results.confounding import confounded
 from bowdenfit.results.fit import Fit
+from bowdenfit.results.rate import rate_effect
 
 SCHEMA = 1
 
@@ -32,9 +35,16 @@ def summarize(fit: Fit) -> dict[str, Any]:
             "converged": fit.least_squares.converged,
         },
         "measured": measured_against_predicted(fit),
+        "friction_model": fit.dataset.description.friction_model,
+        "confounded": [asdict(c) | {"combination": c.combination} for c in confounded(fit)],
         "seed": fit.provenance.seed,
         "versions": dict(fit.provenance.versions),
     }
+    if fit.dataset.measurements.recordings is not None:
+        page["recordings"] = accounts(fit.dataset.measurements.recordings)
+    effect = rate_effect(fit)
+    if effect is not None:
+        page["rate_effect"] = asdict(effect)
     if fit.posterior is not None:
         page["sampler"] = {
             "ensembles": fit.posterior.n_ensembles,

@@ -125,8 +125,9 @@ def _group_name(file: Any, group: int) -> str:
 
 
 def _channel(file: Any, group: int, index: int, name: str, left_out: LeftOut) -> Channel | None:
-    """One channel, or None if it is no column of numbers."""
-    signal = file.get(group=group, index=index, ignore_invalidation_bits=False)
+    """One channel, or None if it is no column of numbers; samples that the logger called invalid are NaN."""
+    # "Ignoring" the bits hands them over; otherwise the library drops these samples, and channels lose their alignment.
+    signal = file.get(group=group, index=index, ignore_invalidation_bits=True)
     samples = signal.samples
     if samples.dtype.names or samples.ndim != 1 or not is_numeric(samples.dtype):
         left_out.add(name, "they are text, structures or arrays")

@@ -1,0 +1,293 @@
+"""Force recordings over time, and what the other figures of recordings share: which are shown, and their panels."""
+
+import dataclasses
+from collections.abc import Callable, Iterable, Sequence
+from typing import TYPE_CHECKING
+
+import numpy as np
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure
+from matplotlib.lines import Line2D
+
+from bowdenfit.plots.layout import TITLE, drop_unused, legend_above, panels
+from bowdenfit.plots.style import (
+    BLACK,
+    BLUE,
+    GRAY,
+    GREEN,
+    LEAST_SQUARES,
+    MEDIUM,
+    ORANGE,
+    PURPLE,
+    SMALL,
+    VERMILLION,
+    WIDE,
+    WIDE_INTERVAL,
+    in_paper_style,
+)
+
+if TYPE_CHECKING:
+    from bowdenfit.results.figure_data import FigureData, RecordedTrace
+
+MOST = 8  # recordings in a figure
+ALIKE = 4.0  # ranges share an axis if all of them together are so many times the shortest at most
+CHARACTER = 0.064  # in, width of one in a title
+POINTS = 3200  # of each line, all panels together, which is what a page can show
+GAP_STEPS = 5
+MOST_CYCLES = 8  # of each recording over time
+PER_BLOCK = (
+    "time", "input_force", "output_force", "velocity", "stroke", "used", "saturated", "predicted", "fitted",
+)  # fmt: skip
+FORCE, TIME = "Force (N)", "Time from the start (s)"
+# stroke, name and fill, which differ in lightness too
+PHASES = ((1, "Pulling", "#F1F6FC"), (-1, "Returning", "#F3E4CE"), (0, "Switching or held", "#D4D4D4"))
+FLAGS = {"dropout": ("x", VERMILLION), "spike": ("^", PURPLE), "saturated": ("s", ORANGE), "quiet": (".", GRAY)}
+OTHER_FLAG = ("+", GREEN)
+LEGEND_MARK = 4.0  # pt
+MARK_GRID = (160, 60)  # across and up a panel, marks of a kind that it can show
+
+
+def finite(values: Iterable[np.ndarray]) -> np.ndarray:
+    """All finite values in one row."""
+    row = np.concatenate([np.ravel(v) for v in values])
+    return row[np.isfinite(row)]
+
+
+def span(values: Iterable[np.ndarray], room: float = 0.05) -> tuple[float, float]:
+    """Limits that show all values with some room; 0 to 1 without any."""
+    row = finite(values)
+    if not len(row):
+        return 0.0, 1.0
+    low, high = float(row.min()), float(row.max())
+    margin = room * (high - low) if high > low else 0.05 * abs(high) or 0.5
+    return low - margin, high + margin
+
+
+def alike(spans: Sequence[tuple[float, float]]) -> bool:
+    """Whether ranges are so much alike that each can be read on an axis that shows them all."""
+    low, high = min(s[0] for s in spans), max(s[1] for s in spans)
+    return high - low <= ALIKE * min(s[1] - s[0] for s in spans)
+
+
+def set_limits(flat: list[Axes], spans: Sequence[tuple[float, float]], which: str, shared: bool) -> None:
+    """Limits of the "x" or "y" axes: each its own, or all the same."""
+    everywhere = (min(s[0] for s in spans), max(s[1] for s in spans))
+    for axes, own in zip(flat, spans, strict=True):
+        axes.set(**{f"{which}lim": everywhere if shared else own})
+
+
+def chosen(
+    data: "FigureData", shows: "Callable[[RecordedTrace], bool]"
+) -> "tuple[list[RecordedTrace], list[RecordedTrace]]":
+    """The recordings to draw, evenly from all that have what a figure shows, and all of these."""
+    every = [r for r in data.recordings if shows(r)]
+    places = np.linspace(0, len(every) - 1, min(len(every), MOST)).round().astype(int)
+    return [every[i] for i in places.tolist()], every
+
+
+def recording_panels(
+    names: Sequence[str], most_columns: int, height: float | None, share_x: bool, share_y: bool, page: float = MEDIUM
+) -> tuple[Figure, list[Axes], int]:
+    """A panel a recording under its name, in a grid without more columns than it needs.
+
+    Args:
+        names: Of the recordings.
+        most_columns: Panels in a row.
+        height: Of a panel [in]; None for square ones.
+        share_x, share_y: Whether all panels have the same axes.
+        page: Width of the page for a single column [in].
+    """
+    rows = -(-len(names) // most_columns)
+    columns = -(-len(names) // rows)
+    page = page if columns == 1 else WIDE
+    across, down = (0.16 if share_y else 0.42), TITLE + (0.08 if share_x else 0.2)
+    width = (page - 0.8 - across * (columns - 1)) / columns
+    heights = [width if height is None else height] * rows
+    figure, flat = panels(heights, columns, TITLE, (across, down), page, sharex=share_x, sharey=share_y)
+    flat = drop_unused(flat, len(names))
+    for axes, name in zip(flat, names, strict=True):
+        axes.set_title(short(name, int(width / CHARACTER)), fontsize=SMALL)
+    return figure, flat, columns
+
+
+def short(name: str, longest: int) -> str:
+    """The end of a name, which tells recordings of one folder apart."""
+    return name if len(name) <= longest else "\N{HORIZONTAL ELLIPSIS}" + name[1 - longest :]
+
+
+def label_outer(flat: list[Axes], columns: int, x_label: str, y_label: str) -> None:
+    """Names and units on the outer panels; a panel with nothing below it is an outer one."""
+    for i, axes in enumerate(flat):
+        if i % columns == 0:
+            axes.set_ylabel(y_label)
+        if i + columns >= len(flat):
+            axes.set_xlabel(x_label)
+            axes.tick_params(labelbottom=True)
+
+
+def say_how_many(axes: Axes, drawn: int, of: int) -> None:
+    """An entry of the legend that says so where not all recordings are drawn."""
+    if drawn < of:
+        axes.plot([], [], " ", label=f"{drawn} of {of} recordings shown")
+
+
+def enlarge_marks(figure: Figure) -> None:
+    """Make the small marks of many blocks large enough to be told apart in the legend."""
+    for handle in figure.legends[0].legend_handles:
+        if isinstance(handle, Line2D) and handle.get_linestyle() == "None":
+            handle.set_markersize(max(handle.get_markersize(), LEGEND_MARK))
+
+
+def extremes(values: np.ndarray, most: int) -> np.ndarray:
+    """Places of the lowest and the highest value in each of so many stretches, in order; all if there are few."""
+    size = -(-len(values) // most)
+    if size <= 2:
+        return np.arange(len(values))
+    padded = np.append(values, np.full(-len(values) % size, values[-1])).reshape(-1, size)
+    start = size * np.arange(len(padded))
+    places = np.concatenate([start + padded.argmin(axis=1), start + padded.argmax(axis=1)])
+    return np.unique(np.minimum(places, len(values) - 1))
+
+
+def has_recordings(data: "FigureData") -> bool:
+    """Whether forces were recorded."""
+    return any(map(_has_blocks, data.recordings))
+
+
+def _has_blocks(recording: "RecordedTrace") -> bool:
+    return len(recording.time) > 1
+
+
+@in_paper_style
+def recordings(data: "FigureData") -> Figure:
+    """Input and output force [N] over time, what the cable would give at this input, and the samples left out."""
+    whole, every = chosen(data, _has_blocks)
+    shown = [beginning(r) for r in whole]
+    times = [span([r.time - _start(r), r.flagged_time - _start(r)], room=0.0) for r in shown]
+    forces = [_force_limits(r) for r in shown]
+    share_x, share_y = alike(times), alike(forces)
+    figure, flat, columns = recording_panels([r.name for r in shown], 2, 1.5, share_x, share_y, WIDE)
+    set_limits(flat, times, "x", share_x)
+    set_limits(flat, forces, "y", share_y)
+    for axes, recording in zip(flat, shown, strict=True):
+        _phases(axes, recording)
+        _forces(axes, recording, POINTS // (2 * len(shown)))
+        _left_out(axes, recording)
+    label_outer(flat, columns, TIME, FORCE)
+    say_how_many(flat[0], len(shown), len(every))
+    if any(len(a.time) < len(b.time) for a, b in zip(shown, whole, strict=True)):
+        flat[0].plot([], [], " ", label=f"First {MOST_CYCLES} cycles shown")
+    legend_above(figure, flat, columns=4)
+    return figure
+
+
+def beginning(recording: "RecordedTrace") -> "RecordedTrace":
+    """A recording up to the last of as many cycles as can be told apart over time."""
+    sliding = np.flatnonzero(recording.stroke)
+    turns = sliding[1:][np.diff(recording.stroke[sliding]) != 0]
+    if len(turns) < 2 * MOST_CYCLES:
+        return recording
+    stop = int(turns[2 * MOST_CYCLES - 1])
+    sample = recording.flagged_time < recording.time[stop]
+    return dataclasses.replace(
+        recording,
+        **{name: getattr(recording, name)[..., :stop] for name in PER_BLOCK},
+        **{name: getattr(recording, name)[sample] for name in ("flagged_time", "flagged_input", "flagged_output")},
+        flagged_kind=tuple(np.array(recording.flagged_kind, dtype=str)[sample].tolist()),
+    )
+
+
+def _start(recording: "RecordedTrace") -> float:
+    """Time of the first block or sample [s]."""
+    return float(min(recording.time[0], recording.flagged_time.min(initial=np.inf)))
+
+
+def _force_limits(recording: "RecordedTrace") -> tuple[float, float]:
+    """Limits that show what was measured and fitted, and the interval unless it is far away."""
+    low, high = span([recording.input_force, recording.output_force, recording.fitted])
+    band_low, band_high = span([recording.predicted])
+    room = 0.3 * (high - low)
+    return max(min(low, band_low), low - room), min(max(high, band_high), high + room)
+
+
+def _phases(axes: Axes, recording: "RecordedTrace") -> None:
+    """Shade what the rope does, from the middle between two blocks to the next such; not where nothing was recorded."""
+    time, stroke = recording.time - _start(recording), recording.stroke
+    gap = _after_gaps(time)
+    change = np.union1d(np.flatnonzero(np.diff(stroke)) + 1, gap)
+    before, after = time[change - 1], time[change]
+    middle, recorded = 0.5 * (before + after), ~np.isin(change, gap)
+    starts = np.append(time[:1], np.where(recorded, middle, after))
+    stops = np.append(np.where(recorded, middle, before), time[-1:])
+    of = stroke[np.append(0, change)]
+    for value, name, fill in PHASES:
+        spans = [(a, b - a) for a, b in zip(starts[of == value], stops[of == value], strict=True)]
+        if spans:
+            axes.broken_barh(
+                spans, (0, 1), transform=axes.get_xaxis_transform(), facecolor=fill, linewidth=0, zorder=0.4, label=name
+            )
+
+
+def _after_gaps(time: np.ndarray) -> np.ndarray:
+    """Places of the first block after each stretch without any."""
+    steps = np.diff(time)
+    return np.flatnonzero(steps > GAP_STEPS * np.median(steps)) + 1
+
+
+def _forces(axes: Axes, recording: "RecordedTrace", most: int) -> None:
+    """What was measured, predicted and fitted, broken where nothing was recorded."""
+    time = recording.time - _start(recording)
+    gaps = _after_gaps(time)
+
+    def broken(values: np.ndarray) -> np.ndarray:
+        return np.insert(values.astype(float), gaps, np.nan)
+
+    time, predicted = broken(time), [broken(q) for q in recording.predicted]
+
+    def line(values: np.ndarray, **style: object) -> None:
+        places = extremes(values, most)
+        axes.plot(time[places], values[places], **style)  # type: ignore[arg-type]
+
+    line(broken(recording.input_force), color=GRAY, linewidth=0.9, linestyle=(0, (4, 1)), label="Input")
+    line(broken(recording.output_force), color=BLACK, linewidth=1.3, label="Output")
+    if len(predicted) == 1:
+        line(
+            predicted[0], color=BLUE, linewidth=0.9, linestyle="--", label=f"Output predicted, {LEAST_SQUARES.lower()}"
+        )
+    else:
+        at = extremes(predicted[-1], most)
+        axes.fill_between(
+            time[at], predicted[0][at], predicted[-1][at], color=BLUE, alpha=0.4, linewidth=0, zorder=1.5,
+            label=f"Output predicted, {WIDE_INTERVAL}",
+        )  # fmt: skip
+    line(broken(recording.fitted), color=VERMILLION, linewidth=0.7, label="Output fitted")
+
+
+def _left_out(axes: Axes, recording: "RecordedTrace") -> None:
+    """Samples left out, by kind, those beyond the axes or without a reading on their edge; and blocks at a range's end."""
+    kinds, start = np.array(recording.flagged_kind, dtype=str), _start(recording)
+    for kind in dict.fromkeys(recording.flagged_kind):
+        here = kinds == kind
+        x = np.tile(recording.flagged_time[here] - start, 2)
+        y = np.concatenate([recording.flagged_input[here], recording.flagged_output[here]])
+        _marks(axes, x, y, FLAGS.get(kind, OTHER_FLAG), f"Left out: {kind}")
+    at = recording.saturated.astype(bool)
+    if at.any():
+        on_edge = np.full(int(at.sum()), np.nan)
+        _marks(axes, recording.time[at] - start, on_edge, FLAGS["saturated"], "Block at the end of a range", "white")
+
+
+def _marks(
+    axes: Axes, x: np.ndarray, y: np.ndarray, mark: tuple[str, str], label: str, fill: str | None = None
+) -> None:
+    """As many marks as can be told apart."""
+    (left, right), (low, high) = axes.get_xlim(), axes.get_ylim()
+    y = np.clip(np.where(np.isfinite(y), y, low), low, high)
+    across, up = MARK_GRID
+    column, row = np.round(across * (x - left) / (right - left)), np.round(up * (y - low) / (high - low))
+    _, first = np.unique(column * (up + 1) + row, return_index=True)
+    marker, color = mark
+    axes.plot(
+        x[first], y[first], marker, color=color, markersize=3, markerfacecolor=fill or color, markeredgewidth=0.8,
+        clip_on=False, zorder=4, label=label, rasterized=len(first) > MARK_GRID[1],
+    )  # fmt: skip

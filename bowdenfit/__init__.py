@@ -20,10 +20,10 @@ if TYPE_CHECKING:
         UsageError,
     )
     from bowdenfit.results.fit import Fit
-    from bowdenfit.workflow import fit, load, plot, read, simulate
+    from bowdenfit.workflow import compare, fit, load, plot, read, simulate
 
 _WHERE = {
-    **dict.fromkeys(("fit", "load", "plot", "read", "simulate"), "bowdenfit.workflow"),
+    **dict.fromkeys(("compare", "fit", "load", "plot", "read", "simulate"), "bowdenfit.workflow"),
     "Fit": "bowdenfit.results.fit",
     **dict.fromkeys(
         ("BowdenfitError", "ConvergenceError", "DatasetError", "DescriptionError", "StoreError", "UsageError"),
@@ -39,6 +39,7 @@ __all__ = [
     "Fit",
     "StoreError",
     "UsageError",
+    "compare",
     "fit",
     "load",
     "plot",

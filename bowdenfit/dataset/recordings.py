@@ -288,6 +288,6 @@ def check_angles(description: Description, recordings: Recordings, angles: Angle
         if outside and not np.isfinite(recording.own_angle[curved]).all() and recording.route not in angles.route:
             raise DatasetError(
                 f"the recording {recording.name!r} was made at {recording.route:g} {route.unit}, outside the range "
-                f"{route.range[0]:g} to {route.range[1]:g} {route.unit} where the angle curves hold, and the angle table has no "
-                "row there; measure the wrap angles there, and add them to the table or as wrap_angles to its [[recording]]."
+                f"{route.range[0]:g} to {route.range[1]:g} {route.unit} where the angle curves hold, and the angle table has "
+                "no row there; measure the wrap angles there, and add them to the table or as wrap_angles to its [[recording]]."
             )

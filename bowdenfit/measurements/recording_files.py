@@ -204,7 +204,7 @@ def parsed_channels(texts: Sequence[str]) -> dict[str, ColumnSource]:
         DatasetError: A text is not of that form, or names a quantity that recordings do not have.
     """
     known = [q.name for q in WANTED]
-    sources = {}
+    sources: dict[str, ColumnSource] = {}
     for text in texts:
         quantity, equals, rest = text.partition("=")
         name, _, unit = rest.rpartition(":") if ":" in rest else (rest, "", "")
@@ -236,8 +236,8 @@ def pattern_fields(pattern: str) -> tuple[tuple[str, str], ...]:
     twice = next((name for name in names if names.count(name) > 1), None)
     if twice is not None:
         raise DatasetError(
-            f"cable.toml, tables.recordings.pattern: {shown(pattern)} has {{{twice}}} twice; keep one of them, and put * in the "
-            "place of the other."
+            f"cable.toml, tables.recordings.pattern: {shown(pattern)} has {{{twice}}} twice; keep one of them, and put * in "
+            "the place of the other."
         )
     return fields
 

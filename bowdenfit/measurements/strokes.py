@@ -64,7 +64,8 @@ def find_strokes(blocks: Blocks, file: str, name: str, by_hand: Sequence[Span] =
         by_hand: Phases set by the user; they replace what is found where they apply.
 
     Raises:
-        DatasetError: It is too short, or a phase lies outside it; hardly anything is under tension; input and output are swapped; only the return is there.
+        DatasetError: It is too short, or a phase lies outside it; hardly anything is under tension; input and
+            output are swapped; only the return is there.
     """
     _check_length(blocks, file, name, by_hand)
     usable = ~blocks.saturated & _under_tension(blocks.input_force) & _under_tension(blocks.output_force)
@@ -199,8 +200,8 @@ def _check_length(blocks: Blocks, file: str, name: str, by_hand: Sequence[Span])
     """Refuse a recording of a few blocks, and phases that lie outside it."""
     if len(blocks.time) < _FEWEST:
         raise DatasetError(
-            f"{file}: the recording {name!r} has only {len(blocks.time)} blocks, and phases can be told from {_FEWEST} on; the "
-            "usual cause is a block that is too long or a recording that was cut off: state a shorter block under prepare in "
+            f"{file}: the recording {name!r} has too few blocks to tell its phases ({len(blocks.time)}, at least {_FEWEST} "
+            "needed); the usual cause is a block that is too long or a recording that was cut off: state a shorter block under prepare in "
             "cable.toml, or leave the recording out."
         )
     for span in by_hand:

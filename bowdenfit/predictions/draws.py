@@ -93,6 +93,30 @@ def curves_of(model: Model, route: np.ndarray) -> Callable[[Float[Array, " free"
     return implied
 
 
+def output_force_at(
+    model: Model, z: np.ndarray, route: np.ndarray, input_force: float, stroke: int, mounting: np.ndarray
+) -> np.ndarray:
+    """Output force [N] of every draw (rows) at route values (columns), at the reference speed.
+
+    Args:
+        model: The model.
+        z: Draws, one a row.
+        route: Route values; any one number where the cable has no route.
+        input_force: Force at the motor side [N].
+        stroke: +1 pulling, -1 return.
+        mounting: Effect of the mounting on the friction exponent of each draw [1].
+    """
+    at, friction = jnp.asarray(np.atleast_1d(route), dtype=float), model.cable.friction
+
+    def force(z_and_mounting: Float[Array, " free_and_one"]) -> Float[Array, " route"]:
+        values = model.space.constrain(z_and_mounting[:-1])
+        rate = friction.rate(values, jnp.asarray(friction.conditions.reference_speed))
+        exponent = model.cable.exponent_at(values, at) * rate + z_and_mounting[-1]
+        return friction.output_force(values, jnp.asarray(input_force), exponent, jnp.asarray(float(stroke)))
+
+    return for_each_draw(force, model.space.size + 1)(np.column_stack([z, mounting]))
+
+
 def efficiency_at(model: Model, z: np.ndarray, route: np.ndarray) -> np.ndarray:
     """Efficiency of every draw (rows) at route values (columns).
 

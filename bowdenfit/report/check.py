@@ -48,7 +48,9 @@ def warnings_of(dataset: Dataset) -> list[str]:
     ]
     conditions = _conditions(dataset)
     if not conditions:
-        warnings.append("no table has forces, efficiencies or recordings, so the friction coefficients rest on their priors alone.")
+        warnings.append(
+            "no table has forces, efficiencies or recordings, so the friction coefficients rest on their priors alone."
+        )
     elif conditions < len(free):
         warnings.append(
             f"{len(free)} friction coefficients are to be found from {conditions} different "

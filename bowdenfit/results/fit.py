@@ -124,7 +124,7 @@ class Fit:
         Raises:
             UsageError: There is no such parameter, or no posterior.
         """
-        values = self._drawn().values
+        values = self.draws().values
         if name not in values:
             raise UsageError(f"there is no parameter {name!r}; there are {', '.join(values)}.")
         return Interval.of(values[name])
@@ -134,7 +134,7 @@ class Fit:
         """Efficiency and wrap angles of every draw on the grid of the route."""
         with jax.enable_x64(True):
             curves = curves_of(self.model, route_grid(self.model))
-            return for_each_draw(curves, self.model.space.size)(self._drawn().flat_z)
+            return for_each_draw(curves, self.model.space.size)(self.draws().flat_z)
 
     def curves(self) -> tuple[np.ndarray, dict[str, np.ndarray]]:
         """Route values, and by name the efficiency [1] and wrap angles [deg] of every draw (rows) there."""
@@ -159,7 +159,7 @@ class Fit:
             lengths = route.choices if route else 0.0
         wanted = np.atleast_1d(np.asarray(lengths, dtype=float))
         with jax.enable_x64(True):
-            return efficiency_at(self.model, self._drawn().flat_z, wanted)
+            return efficiency_at(self.model, self.draws().flat_z, wanted)
 
     def optimal_length(self) -> OptimalLength:
         """The design answer: which length is best, how sure that is, and what the choices cost.
@@ -172,7 +172,7 @@ class Fit:
 
     @cached_property
     def _optimal_length(self) -> OptimalLength:
-        drawn, route = self._drawn(), self.dataset.description.route
+        drawn, route = self.draws(), self.dataset.description.route
         assert route is not None  # checked by the caller
         lengths, best = drawn.optimum[OPTIMAL_LENGTH].ravel(), drawn.optimum[OPTIMAL_EFFICIENCY].ravel()
         grid, curves = self.curves()
@@ -203,7 +203,12 @@ class Fit:
 
         return fit_page(self)
 
-    def _drawn(self) -> Posterior:
+    def draws(self) -> Posterior:
+        """The posterior.
+
+        Raises:
+            UsageError: There is none.
+        """
         if self.posterior is None:
             raise UsageError(
                 "this fit has no posterior, because it was made without MCMC; fit again without --no-mcmc for intervals."
@@ -211,7 +216,7 @@ class Fit:
         return self.posterior
 
     def _needs_route(self) -> None:
-        self._drawn()
+        self.draws()
         if self.dataset.description.route is None:
             raise UsageError(
                 "the description has no [route], so there is no length to choose; add [route] with variable, unit and "

@@ -2,11 +2,13 @@
 
 from typing import Any
 
+import jax
 import numpy as np
 
 from bowdenfit.errors import DatasetError, UsageError
 from bowdenfit.measurements.units import conversion_factor
 from bowdenfit.models.scatter import RUN_SCATTER
+from bowdenfit.predictions.draws import output_force_at
 from bowdenfit.results.answers import Interval
 from bowdenfit.results.fit import Fit
 
@@ -28,11 +30,17 @@ def predicted_rows(
         UsageError: The input force is not a positive force, or there is no posterior.
     """
     route, sign = fit.dataset.description.route, _STROKES[stroke]
-    name, force = "efficiency", 1.0
+    name, force, per = "efficiency", fit.model.cable.friction.conditions.reference_force, 1.0
     if input_force is not None:
         name, force = "output_force_N", _newtons(input_force)
-    exponent = -np.log(fit.efficiency_draws(lengths))
-    mean, mounted = (force * np.exp(-sign * e) for e in (exponent, exponent + _mounting(fit, len(exponent))[:, None]))
+    else:
+        per = force
+    z = fit.draws().flat_z
+    with jax.enable_x64(True):
+        mean, mounted = (
+            output_force_at(fit.model, z, lengths, force, sign, mounting) / per
+            for mounting in (np.zeros(len(z)), _mounting(fit, len(z)))
+        )
     rows = []
     for i, length in enumerate(lengths):
         row: dict[str, Any] = {} if route is None else {f"{route.variable}_{route.unit}": float(length)}

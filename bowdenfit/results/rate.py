@@ -9,6 +9,7 @@ import numpy as np
 from bowdenfit.results.answers import Interval
 from bowdenfit.results.fit import Fit
 
+_SURE = 0.99  # probability from which a dependence on speed is called one
 SHOWN_SPEED = {"rad/s": ("r/min", 30 / np.pi), "mm/s": ("mm/s", 1.0), "": ("", 1.0)}
 
 
@@ -34,12 +35,13 @@ class RateEffect:
     def sentence(self) -> str:
         """The answer in words."""
         low, high = 100 * self.difference.q05, 100 * self.difference.q95
+        way, sure = ("falls", self.probability_lower) if high < 0 else ("rises", 1 - self.probability_lower)
         verdict = (
             "so the data show no dependence on speed"
             if low <= 0 <= high
-            else "so efficiency falls with speed"
-            if high < 0
-            else "so efficiency rises with speed"
+            else f"so efficiency {way} with speed"
+            if sure > _SURE
+            else f"a hint that efficiency {way} with speed, and no more than that"
         )
         where = f" {self.place}" if self.place else ""
         return (

@@ -1,7 +1,7 @@
 """The verbs that the command line and notebooks share: fit, load, check, simulate, plot."""
 
 import secrets
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from concurrent.futures import Future
 from functools import partial
 from pathlib import Path
@@ -16,6 +16,7 @@ from bowdenfit.workflow.background import Assistants, assistants, draw
 if TYPE_CHECKING:
     from bowdenfit.inference.ensemble import Progress
     from bowdenfit.measurements.channels import ChannelFile
+    from bowdenfit.results.comparison import Comparison
     from bowdenfit.results.fit import Fit
 
 _LARGEST_SEED = 2**31 - 1
@@ -214,6 +215,23 @@ def _begun(folder: Path | None, data: Dataset, seed: int, resume: bool) -> Path 
         clear(folder)
         start_checkpoint(folder / CHAIN, _fingerprint(data, seed))
     return folder / CHAIN
+
+
+def compare(fits: "Mapping[str, Fit]") -> "Comparison":
+    """Compare fits of the same measurements.
+
+    Args:
+        fits: By name.
+
+    Raises:
+        UsageError: There are fewer than two, one has no posterior, or they are not of the same readings.
+    """
+    import jax
+
+    from bowdenfit.results.comparison import compare as compared
+
+    with jax.enable_x64(True):
+        return compared(fits)
 
 
 def plot(found: "Fit", folder: str | Path) -> list[Path]:

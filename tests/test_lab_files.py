@@ -367,7 +367,7 @@ def test_a_bag_folder_with_a_cut_file_is_refused(tmp_path: Path) -> None:
         (b"PAR1", ".xlsx", "rename it to .parquet"),
         (b"\xd0\xcf\x11\xe0\xa1\xb1\x1a\xe1", ".xls", "save it as .xlsx"),
         (b"\xd0\xcf\x11\xe0\xa1\xb1\x1a\xe1", ".xlsx", "without a password"),
-        (b"<?xml version='1.0'?><Document>", ".cmbl", "export the recording as CSV"),
+        (b"<?xml version='1.0'?><Document>", ".tdms", "export the recording as CSV"),
         (b"<?xml version='1.0'?><Document>", ".csv", "Logger Pro"),
         (b"<!DOCTYPE html>", ".mat", "a web page"),
         (b"version https://git-lfs.github.com/spec/v1", ".tdms", "git lfs pull"),
@@ -444,3 +444,45 @@ def test_a_packed_structure_is_measured_before_it_is_unpacked(tmp_path: Path, mo
 def test_an_mdf_file_too_large_is_refused(mf4: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(outcome, "LARGEST_BYTES", 2000)
     assert "decimate it" in refusal(mf4)
+
+
+CMBL = """<Document><DataSet><DataSetName>Latest</DataSetName>
+<DataColumn><DataObjectName>Time</DataObjectName><ColumnUnits>s</ColumnUnits><ColumnCells>
+0
+0.02
+0.04
+</ColumnCells></DataColumn>
+<DataColumn><DataObjectName>Force</DataObjectName><ColumnUnits>N</ColumnUnits><ColumnCells>
+1.5
+Z1
+-2.25
+</ColumnCells></DataColumn></DataSet>{more}</Document>"""
+
+
+def test_a_logger_pro_file_gives_its_columns_with_units_and_clock(tmp_path):
+    path = tmp_path / "run.cmbl"
+    path.write_text(CMBL.format(more=""))
+    file = read_channels(path)
+    assert [(c.name, c.unit) for c in file.channels] == [("Time", "s"), ("Force", "N")]
+    np.testing.assert_array_equal(file.channels[1].values, [1.5, np.nan, -2.25])
+    np.testing.assert_array_equal(file.channels[1].time, [0.0, 0.02, 0.04])
+
+
+def test_several_logger_pro_runs_keep_their_names_apart(tmp_path):
+    path = tmp_path / "run.cmbl"
+    second = CMBL.format(more="")[len("<Document>") : -len("</Document>")].replace("Latest", "Run 1")
+    path.write_text('<?xml version="1.0"?>' + CMBL.format(more=second))
+    assert [c.name for c in read_channels(path).channels] == [
+        "Latest/Time",
+        "Latest/Force",
+        "Run 1/Time",
+        "Run 1/Force",
+    ]
+
+
+@pytest.mark.parametrize("text", [CMBL[:200], '<!DOCTYPE a [<!ENTITY b "c">]>' + CMBL, "<Document></Document>"])
+def test_a_damaged_hostile_or_empty_logger_pro_file_is_refused_in_a_sentence(tmp_path, text):
+    path = tmp_path / "run.cmbl"
+    path.write_text('<?xml version="1.0"?>' + text.replace("{more}", ""))
+    with pytest.raises(DatasetError, match=r"run\.cmbl .*\.$"):
+        read_channels(path)

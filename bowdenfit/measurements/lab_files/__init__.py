@@ -21,6 +21,7 @@ _READERS = {  # ending: module that reads it, what the content must be recognize
     ".tdms": ("tdms", ("tdms",)),
     ".mf4": ("mdf", ("mdf",)),
     ".mdf": ("mdf", ("mdf",)),
+    ".cmbl": ("logger_pro", ("xml",)),
     ".bag": ("rosbag", ("rosbag1",)),
     ".db3": ("rosbag", ("sqlite",)),
     ".mcap": ("rosbag", ("mcap",)),

@@ -91,4 +91,4 @@ def _markup(head: bytes) -> Content:
     text = head.removeprefix(b"\xef\xbb\xbf").lstrip().lower()
     if text.startswith((b"<!doctype html", b"<html")):
         return _PAGE
-    return _XML if text.startswith(b"<?xml") else _UNKNOWN
+    return _XML if text.startswith((b"<?xml", b"<document")) else _UNKNOWN

@@ -8,7 +8,8 @@ import pytest
 from matplotlib.text import Text
 
 from bowdenfit.plots.gallery import FIGURES, draw_all
-from bowdenfit.plots.recordings import POINTS, beginning, extremes
+from bowdenfit.plots.recording_panels import extremes
+from bowdenfit.plots.recordings import POINTS, beginning
 from bowdenfit.plots.sample_efficiency import sample_efficiencies
 from bowdenfit.results.figure_data import Dependence, EfficiencyPoints, FigureData, RecordedTrace
 

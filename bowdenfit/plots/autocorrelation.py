@@ -7,7 +7,7 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
 from bowdenfit.plots.layout import legend_above
-from bowdenfit.plots.recordings import alike, chosen, label_outer, recording_panels, say_how_many, set_limits
+from bowdenfit.plots.recording_panels import alike, chosen, label_outer, recording_panels, say_how_many, set_limits
 from bowdenfit.plots.style import BLUE, GRAY, in_paper_style
 
 if TYPE_CHECKING:

@@ -7,7 +7,7 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
 from bowdenfit.plots.layout import TITLE, legend_above, panels
-from bowdenfit.plots.recordings import short, span
+from bowdenfit.plots.recording_panels import short, span
 from bowdenfit.plots.style import (
     BLACK,
     BLUE,

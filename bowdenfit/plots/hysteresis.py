@@ -7,7 +7,7 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
 from bowdenfit.plots.layout import legend_above
-from bowdenfit.plots.recordings import (
+from bowdenfit.plots.recording_panels import (
     alike,
     chosen,
     enlarge_marks,

@@ -11,7 +11,7 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
 from bowdenfit.plots.layout import legend_above
-from bowdenfit.plots.recordings import alike, chosen, enlarge_marks, label_outer, recording_panels, say_how_many
+from bowdenfit.plots.recording_panels import alike, chosen, enlarge_marks, label_outer, recording_panels, say_how_many
 from bowdenfit.plots.style import (
     BLACK,
     BLUE,

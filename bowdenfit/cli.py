@@ -144,7 +144,7 @@ def check(dataset: Path, **options: Any) -> None:
     """Read everything in DATASET, say what was understood and what is wrong; fit nothing.
 
     DATASET is a folder with cable.toml and tables, or one table or recording with --wrap-angle. Of a file alone, its
-    channels are listed: name, unit, sampling rate, length and range.
+    channels are listed: name, unit, sampling rate, length and range, and what it is as a recording.
     """
     from bowdenfit import workflow
     from bowdenfit.report.check import check_text
@@ -152,7 +152,7 @@ def check(dataset: Path, **options: Any) -> None:
     if dataset.is_file() and dataset.suffix.lower() != ".toml" and not options["wrap_angle"]:
         from bowdenfit.report.channels import channels_text
 
-        click.echo(channels_text(workflow.channels_of(dataset)), nl=False)
+        click.echo(channels_text(*workflow.channels_of(dataset, options["channels"])), nl=False)
         return
 
     click.echo(check_text(workflow.check(dataset, **_reading(**options))), nl=False)

@@ -263,7 +263,10 @@ class Phase(_Frozen):
 
 
 class RecordingFile(_Frozen):
-    """One recording: its file, what it was made at, and what its channels are called."""
+    """One recording: its file, what it was made at, and what its channels are called.
+
+    `where` picks the rows of a file that holds several recordings one below the other, such as { run = 3 }.
+    """
 
     file: str
     name: str | None = None
@@ -272,6 +275,7 @@ class RecordingFile(_Frozen):
     wrap_angles: dict[str, QuantityValue] = {}
     velocity: QuantityValue | None = None
     channels: dict[str, ColumnMap] = {}
+    where: dict[str, Finite] = {}
     prepare: Preparation | None = None
     strokes: tuple[Phase, ...] = ()
 

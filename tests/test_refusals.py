@@ -181,3 +181,32 @@ def test_decimal_commas_byte_order_marks_and_excel_are_no_bad_input(dataset, mon
     out = capsys.readouterr().out
     assert stop.value.code == 0, out
     assert "2 efficiencies, 77.0% to 78.5%" in out
+
+
+def test_velocities_of_the_rope_in_one_table_and_of_the_motor_in_another_are_refused(tmp_path):
+    from bowdenfit.errors import DatasetError
+    from bowdenfit.measurements.reading import read_forces
+
+    rope, motor = tmp_path / "rope.csv", tmp_path / "motor.csv"
+    rope.write_text("input_force_N,output_force_N,velocity_mm_per_s\n50,40,10\n")
+    motor.write_text("input_force_N,output_force_N,velocity [r/min]\n50,40,20\n")
+    with pytest.raises(DatasetError, match=r"rope\.csv and motor\.csv give velocities of different kinds"):
+        read_forces([rope, motor], None, ())
+    (table, _) = read_forces([motor], None, ())
+    assert table.velocity_unit == "rad/s"
+    assert table.velocity[0] == pytest.approx(20 * 2 * 3.141592653589793 / 60)
+
+
+def test_a_coefficient_of_no_contact_is_refused_with_the_nearest_name():
+    from bowdenfit.description_file import parse_description
+    from bowdenfit.errors import DescriptionError
+
+    contact = {"name": "cable", "friction": "mu", "wrap_angle": {"value": 45, "unit": "deg"}}
+    raw = {
+        "name": "a",
+        "contact": [contact],
+        "tables": {"forces": {"file": "f.csv"}},
+        "friction": {"mu1": {"fixed": 0.1}},
+    }
+    with pytest.raises(DescriptionError, match="did you mean 'mu'"):
+        parse_description(raw)

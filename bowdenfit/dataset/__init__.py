@@ -54,6 +54,8 @@ def load_dataset(
             f"{path.name} is a table without a description; say the angle it was measured at, such as "
             f"--wrap-angle 180deg, or write a cable.toml beside it with `bowdenfit init`."
         )
+    if path.suffix.lower() not in {".toml", ""} and not path.exists():
+        raise DescriptionError(f"{path} does not exist; check the spelling and the folder.")
     file = path if path.suffix == ".toml" else path / DESCRIPTION_FILE
     description = load_description(file, overrides)
     return read_dataset(description, file.parent, {file.name: _sha256(file)}, channels)
@@ -64,6 +66,7 @@ def single_file_dataset(
     wrap_angle: tuple[float, str],
     overrides: Sequence[str] = (),
     channels: Mapping[str, ColumnSource] | None = None,
+    kind: str = "",
 ) -> Dataset:
     """A data set from one table or recording of a cable with one contact at one known wrap angle.
 
@@ -72,11 +75,12 @@ def single_file_dataset(
         wrap_angle: The angle and its unit.
         overrides: Settings, as for a description.
         channels: Channels of a recording named on the command line.
+        kind: "forces", "efficiencies" or "recordings"; by the file if omitted.
 
     Raises:
         DescriptionError, DatasetError: The angle, a setting or the file is wrong.
     """
-    kind = _kind_of(path, bool(channels))
+    kind = kind or _kind_of(path, bool(channels))
     angle = {"value": wrap_angle[0], "unit": wrap_angle[1]}
     raw = {
         "name": path.stem,
@@ -87,20 +91,29 @@ def single_file_dataset(
     return read_dataset(parse_description(overridden(raw, overrides), "--wrap-angle"), path.parent, {}, channels)
 
 
-_LONG = 200  # rows from which a table with a time and without runs or strokes is a recording
+_LONG = 200  # rows beyond which a table of forces is a recording
 
 
 def _kind_of(path: Path, has_channels: bool) -> str:
-    """Which kind of table a file without a description is."""
+    """Which kind of table a file without a description is.
+
+    A CSV file is a recording if it is long, or if its rows have a time and neither a run nor a stroke.
+    """
     if has_channels or path.suffix.lower() not in {".csv", ".txt", ".tsv"}:
         return "recordings"
+    from bowdenfit.measurements.columns import Quantity, meanings
     from bowdenfit.measurements.readers import read_csv
 
     with path.open("rb") if path.is_file() else nullcontext() as file:
         lines = sum(1 for _ in islice(file, _LONG + 1)) if file is not None else 0
     if lines > _LONG:
         return "recordings"
-    return "efficiencies" if any("efficiency" in h.lower() for h in read_csv(path).header) else "forces"
+    header = read_csv(path).header
+    if any("efficiency" in heading.lower() for heading in header):
+        return "efficiencies"
+    wanted = (Quantity("time", "time"), Quantity("run", "text"), Quantity("stroke", "text"))
+    found = {quantity.name for heading in header for quantity, _ in meanings(heading, wanted)}
+    return "recordings" if found == {"time"} else "forces"
 
 
 def read_dataset(
@@ -145,11 +158,12 @@ def read_dataset(
         }
     recordings = None
     if tables.recordings is not None:
-        from bowdenfit.dataset.recordings import read_recordings
+        from bowdenfit.dataset.recordings import check_angles, read_recordings
 
         patterns = Table(files=tables.recordings.files) if tables.recordings.files else None
         found = partial(_paths, patterns, folder, "recordings") if patterns else list
         recordings, files = read_recordings(description, folder, found, channels or {})
+        check_angles(description, recordings, angles)
         checksums |= {name: _sha256(path) for name, path in files.items()}
         remarks += [remark for r in recordings.each for remark in (*r.account.remarks, *r.strokes.remarks)]
     elif channels:

@@ -13,7 +13,7 @@ from bowdenfit.errors import DatasetError, DescriptionError, nearest
 from bowdenfit.measurements.columns import ColumnSource
 from bowdenfit.measurements.lab_files import read_channels
 from bowdenfit.measurements.preparation import prepare
-from bowdenfit.measurements.recording_files import WANTED, matched_name, pattern_fields, to_recording
+from bowdenfit.measurements.recording_files import WANTED, matched_name, pattern_fields, rows_where, to_recording
 from bowdenfit.measurements.recordings import (
     Account,
     Blocks,
@@ -170,7 +170,7 @@ def _to_read(description: Description, path: Path, entry: RecordingFile, channel
     table = description.tables.recordings
     assert table is not None  # the caller asked
     page, sources = entry.prepare or table.prepare, {**_sources(table.channels), **_sources(entry.channels), **channels}
-    raw, unit = to_recording(read_channels(path), _name(path, entry), sources)
+    raw, unit = to_recording(rows_where(read_channels(path), entry.where), _name(path, entry), sources)
     stated = page.delay.sd_to("time") if isinstance(page.delay, QuantityValue) else None
     if entry.velocity is not None and not unit:
         unit = INTERNAL_UNITS[speed_dimension(entry.velocity.unit)]

@@ -6,6 +6,7 @@ from pathlib import Path
 
 import numpy as np
 
+from bowdenfit.errors import DatasetError
 from bowdenfit.measurements.columns import Column, ColumnSource, Quantity, find_columns, require
 from bowdenfit.measurements.readers import Cell, RawTable, read_csv
 from bowdenfit.measurements.tables import AngleTable, EfficiencyTable, ForceTable, OwnAngles, Provenance

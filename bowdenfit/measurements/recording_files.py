@@ -2,6 +2,7 @@
 
 import re
 from collections.abc import Mapping, Sequence
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -73,6 +74,35 @@ def _check_distinct(file: ChannelFile, one: Channel, other: Channel) -> None:
         f"{file.path.name}: input_force and output_force are {what} ({shown(one.name)}), as if there were no friction at "
         "all; name the channels of the two load cells: --channel input_force=NAME:N --channel output_force=NAME:N."
     )
+
+
+def rows_where(file: ChannelFile, where: Mapping[str, float]) -> ChannelFile:
+    """The part of a file in which channels have the given values, as where recordings stand one below the other.
+
+    Args:
+        file: What was read.
+        where: Value by name of a channel, such as a number of the run.
+
+    Raises:
+        DatasetError: There is no such channel, or no row has these values.
+    """
+    for name, value in where.items():
+        chosen = _named(file, "where", name).values == value
+        if not chosen.any():
+            raise DatasetError(
+                f"{file.path.name}: no row has {value:g} in the channel {shown(name)}; see bowdenfit check."
+            )
+        channels = tuple(_rows(channel, chosen) for channel in file.channels)
+        file = replace(file, channels=channels)
+    return file
+
+
+def _rows(channel: Channel, chosen: np.ndarray) -> Channel:
+    """The chosen rows of a channel; one of another length is left as it is."""
+    if len(channel.values) != len(chosen):
+        return channel
+    time = None if channel.time is None else channel.time[chosen]
+    return replace(channel, values=channel.values[chosen], time=time)
 
 
 def _find(file: ChannelFile, quantity: Quantity, sources: Mapping[str, ColumnSource]) -> Channel | None:

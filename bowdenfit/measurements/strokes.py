@@ -17,6 +17,7 @@ _LEAST_EXPONENT = 1e-3
 _FEWEST = 10  # blocks
 _CLEAR_OF_NOISE = 5.0  # a force below this many standard deviations of its noise may be that of a slack rope
 _STILL = 0.05  # fraction of the typical speed below which the rope is taken to stand still
+_STEADY = 0.2  # relative change of speed from one block to the next up to which a block is of one speed
 _CLEARLY = 0.5  # a fit the other way round must leave less than this fraction of the deviations to be believed
 _ONE_PHASE = 4.0  # spread of the log ratio, in units of its noise, below which there is only one phase
 
@@ -165,13 +166,18 @@ def _toward_motor(velocity: Vector, state: Labels) -> Vector:
 
 
 def _moving(velocity: Vector, state: Labels) -> Flags:
-    """Where the rope moves the way its contact says; everywhere without a velocity."""
+    """Where the rope moves the way its contact says, and steadily; everywhere without a velocity.
+
+    While the motor speeds up or slows down, a block is of several speeds, and at the slow end of a stroke the rope may stand
+    already.
+    """
     known = np.isfinite(velocity)
     if not known.any():
         return np.ones(len(velocity), dtype=bool)
     speeds = np.abs(velocity[known])
     typical = float(np.median(speeds[speeds > speeds.max() * _STILL])) if speeds.max() > 0 else np.inf
-    return ~known | (velocity * state > _STILL * typical)
+    steady = np.abs(np.gradient(velocity)) < _STEADY * np.abs(velocity) if len(velocity) > 1 else known
+    return ~known | ((velocity * state > _STILL * typical) & steady)
 
 
 def _inside(state: Labels) -> Flags:

@@ -361,7 +361,7 @@ class _Mechanics:
         exponent = self._exponent(velocity)
         x = _play(self._boundary(position, exponent), self._boundary(position, -exponent))
         stroke = np.sign(np.diff(x, prepend=0.0)).astype(int)
-        bench, loaded = self.bench, time >= self.profile.unloaded
+        bench, loaded = self.bench, np.maximum(time, 0.0) >= self.profile.unloaded
         input_force = bench.rope_stiffness * (position - x) + bench.preload
         output_force = bench.preload + bench.load_stiffness * x
         return (

@@ -82,9 +82,11 @@ class HeldForcesTerm:
     def _output_force(
         self, values: Mapping[str, Array], data: Mapping[str, Any], shift: Float[Array, " rows"]
     ) -> Float[Array, " rows"]:
-        """Output force at a shift on the scale g; it stays positive."""
-        output = self.cable.friction.output_force(values, data["input_force"], shift, jnp.ones(()))
-        return jnp.maximum(output, LEAST_FORCE)
+        """Output force that the load cell shows at a shift on the scale g; it stays positive."""
+        input_force = jnp.maximum(data["input_force"] - values.get(INPUT_OFFSET, 0.0), LEAST_FORCE)
+        output = self.cable.friction.output_force(values, input_force, shift, jnp.ones(()))
+        shown = output * jnp.exp(-values.get(GAIN_ERROR, 0.0)) + values.get(OUTPUT_OFFSET, 0.0)
+        return jnp.maximum(shown, LEAST_FORCE)
 
     def simulate(self, values: Mapping[str, Array], data: Mapping[str, Any], key: Array) -> Float[Array, " rows"]:
         """A ratio of input to output force anywhere in the band, with noise [1]."""

@@ -29,6 +29,7 @@ from bowdenfit.physics.normal_tail import log_normal_cdf
 NAME = "recorded_efficiency"
 _MOST_BLOCKS = 600  # of one recording in the play operator; more say no more once noise is averaged
 _LEAST_BAND = 1e-9
+_NEAR_LIMIT = 0.005  # of the end of a range, within which a saturated reading is at it
 
 
 @dataclass(frozen=True)
@@ -122,8 +123,8 @@ def _all_blocks(recording: Recording) -> _Part:
     """
     positive, blocks, strokes = _positive(recording), recording.blocks, recording.strokes
     x, y = np.log(blocks.input_force[positive]), np.log(blocks.output_force[positive])
-    followed, state = play(x, strokes.exponent, float(y[0] + strokes.center))
-    last, inside = _last_contact(state), _inside_phase(state)
+    followed, (state, last) = _followed_in_parts(recording, positive, x, y)
+    inside = _inside_phase(state)
     kept = (last != 0) & inside
     used, stroke = np.flatnonzero(positive)[kept], last[kept]
     ratio = strokes.exponent - stroke * (y - followed)[kept]
@@ -146,6 +147,40 @@ def _standing_share(state: np.ndarray) -> np.ndarray:
     """
     phase = np.append(0, np.cumsum(np.diff(state) != 0))
     return np.where(state == 0, 0.5 / np.bincount(phase)[phase], 1.0)
+
+
+def _at_limit(recording: Recording, force: np.ndarray) -> np.ndarray:
+    """Saturated blocks in which this of the two forces stands at the end of the range, as its saturated samples do."""
+    ends = [end for end in recording.account.limits if np.isfinite(end)]
+    near = [np.abs(force - end) <= _NEAR_LIMIT * max(abs(end), 1.0) for end in ends]
+    return recording.blocks.saturated & (np.any(near, axis=0) if near else np.zeros(len(force), dtype=bool))
+
+
+def _output_saturated(recording: Recording) -> np.ndarray:
+    return _at_limit(recording, recording.blocks.output_force)
+
+
+def _input_saturated(recording: Recording) -> np.ndarray:
+    return _at_limit(recording, recording.blocks.input_force)
+
+
+def _restarts(lost: np.ndarray) -> np.ndarray:
+    """Blocks after a stretch whose input is not known: where the operator stands there must be read anew."""
+    return ~lost & np.append(False, lost[:-1])
+
+
+def _followed_in_parts(
+    recording: Recording, kept: np.ndarray, x: np.ndarray, y: np.ndarray
+) -> tuple[np.ndarray, np.ndarray]:
+    """The operator over the kept blocks, and the last contact up to each, started anew where the input was not known."""
+    starts = np.flatnonzero(np.append(True, _restarts(_input_saturated(recording))[kept][1:]))
+    strokes, followed, state = recording.strokes, np.zeros(len(x)), np.zeros(len(x), dtype=int)
+    last = np.zeros(len(x), dtype=int)
+    for start, stop in zip(starts, [*starts[1:], len(x)], strict=True):
+        part = slice(start, stop)
+        followed[part], state[part] = play(x[part], strokes.exponent, float(y[start] + strokes.center))
+        last[part] = _last_contact(state[part])
+    return followed, np.stack([state, last])
 
 
 def _last_contact(state: np.ndarray) -> np.ndarray:
@@ -221,9 +256,10 @@ class WholeRecordingsTerm:
         """Deviation of log F_out from the operator's output, and the output's derivative by the exponent."""
         friction, gain = self.cable.friction, values.get(GAIN_ERROR, 0.0)
         input_force = jnp.maximum(data["input_force"] - values.get(INPUT_OFFSET, 0.0), LEAST_FORCE)
-        start = jnp.maximum(data["output_force"][0] - values.get(OUTPUT_OFFSET, 0.0), LEAST_FORCE) * jnp.exp(gain)
+        seen = jnp.maximum(data["output_force"] - values.get(OUTPUT_OFFSET, 0.0), LEAST_FORCE) * jnp.exp(gain)
         band = jnp.maximum(exponent * friction.rate(values, data["velocity"]) + mounting, _LEAST_BAND)
-        y, slope = play_operator_with_slope(friction.scaled(values, input_force), band, friction.scaled(values, start))
+        x, stands = friction.scaled(values, input_force), friction.scaled(values, seen)
+        y, slope = play_operator_with_slope(x, band, stands[0], jnp.where(data["restart"], stands, jnp.nan))
         output_force = jnp.maximum(friction.force(values, y), LEAST_FORCE)
         shown = jnp.maximum(output_force * jnp.exp(-gain) + values.get(OUTPUT_OFFSET, 0.0), LEAST_FORCE)
         loading = slope * jnp.exp(-gain) / (friction.slope(values, output_force) * shown)
@@ -239,12 +275,12 @@ class WholeRecordingsTerm:
         typical = exponent * self.cable.friction.rate(values, data["speed"])
         guess = jnp.zeros_like(typical)
         if not self.cable.friction.depends_on_load:  # else the loop's width means another exponent at every scale
-            guess = jax.lax.stop_gradient(data["exponent"] - typical)
+            guess = data["exponent"] - typical
         deviation, loading = self._followed(values, data, exponent, guess)
         by_recording = jnp.sum(data["weight"] * loading**2, axis=0)
         step = jnp.sum(data["weight"] * loading * deviation, axis=0) / jnp.maximum(by_recording, 1e-30)
-        reach = jax.lax.stop_gradient(0.5 * data["exponent"])
-        guess = jax.lax.stop_gradient(guess + jnp.clip(step, -reach, reach))
+        reach = 0.5 * data["exponent"]
+        guess = guess + jnp.clip(step, -reach, reach)
         deviation, loading = self._followed(values, data, exponent, guess)
         deviation = deviation + loading * guess
         total = self._per_run(data, data["weight"] * loading**2)
@@ -269,14 +305,22 @@ class WholeRecordingsTerm:
 
     def _censored(self, data: Mapping[str, Any], within: Array, noise: Array) -> Float[Array, " runs"]:
         """Log probability that a saturated output lies beyond the end of the range, where it was read."""
-        beyond = data["censored"] * -within * data["output_force"] / noise
-        return self._per_run(data, jnp.where(data["censored"] != 0, log_normal_cdf(beyond), 0.0) * data["share"])
+        log_probability = log_normal_cdf(self._beyond(data, within, noise)) * data["share"]
+        return self._per_run(data, jnp.where(data["censored"] != 0, log_probability, 0.0))
+
+    def _beyond(self, data: Mapping[str, Any], within: Array, noise: Array) -> Float[Array, "time recordings"]:
+        """How far beyond the end of the range the output is expected, in standard deviations of a block."""
+        return data["censored"] * -within * data["output_force"] / noise
 
     def residuals(self, values: Mapping[str, Array], data: Mapping[str, Any]) -> Float[Array, " runs_and_blocks"]:
         """Standardized residuals: between runs, and of the blocks of a run."""
         within, mounting, sd, _, _ = self._deviations(values, data, jax.lax.stop_gradient(dict(values)))
         inside = jnp.sqrt(data["weight"]) * within / jax.lax.stop_gradient(values[self.reading_noise])
-        return jnp.concatenate([mounting / jax.lax.stop_gradient(sd), inside.ravel()])
+        beyond = self._beyond(data, within, jax.lax.stop_gradient(values[self.reading_noise]))
+        # Beyond 30 sd the root is 0 to the last digit, and its derivative would be 0 times infinity.
+        root = jnp.sqrt(-2 * data["share"] * log_normal_cdf(jnp.minimum(beyond, 29.0)) + 1e-300)
+        censored = jnp.where((data["censored"] != 0) & (beyond < 30.0), root, 0.0)
+        return jnp.concatenate([mounting / jax.lax.stop_gradient(sd), (inside + censored).ravel()])
 
     def expected(self, values: Mapping[str, Array], data: Mapping[str, Any]) -> Float[Array, " runs"]:
         """Expected efficiency of each run, the effect of its mounting left out [1]."""
@@ -310,9 +354,11 @@ def _padded(recordings: Recordings, angles: Mapping[str, np.ndarray], censored: 
     runs = recordings.runs
     run = np.array([runs.index(r.run) for r in recordings.each])
     held = {name: padded(name, "edge") for name in ("input_force", "output_force", "velocity")}
-    free = {name: padded(name, "constant") for name in ("weight", "worth", "censored", "share", "drift")}
+    free = {name: padded(name, "constant") for name in ("weight", "worth", "censored", "share", "drift", "restart")}
     worth = free.pop("worth")
-    log_weights = np.where(free["weight"] > 0, worth * np.log(np.where(free["weight"] > 0, free["weight"], 1.0)), 0.0)
+    counted = free["weight"] > 0
+    ratio = np.where(counted, free["weight"], 1.0) / np.where(counted, worth, 1.0)
+    log_weights = np.where(counted, worth * np.log(ratio), 0.0)
     return {name: angles[name] for name in ROW_ARRAYS} | held | free | {
         "log_output": np.log(held["output_force"]),
         "run": run,
@@ -334,8 +380,9 @@ def _thinned(recording: Recording, censored: bool) -> dict[str, Any]:
         return np.add.reduceat(values * blocks.samples, starts) / samples
 
     force_in, force_out = (np.maximum(mean(f), LEAST_FORCE) for f in (blocks.input_force, blocks.output_force))
-    usable = np.minimum.reduceat(_positive(recording), starts)
-    saturated = np.maximum.reduceat(blocks.saturated, starts)
+    lost = np.maximum.reduceat(_input_saturated(recording), starts)
+    usable = np.minimum.reduceat(_positive(recording), starts) & ~lost
+    saturated = np.maximum.reduceat(_output_saturated(recording), starts) & ~lost
     state = np.sign(np.add.reduceat(strokes.stroke, starts)).astype(int)
     still = state == 0
     worth = (
@@ -357,6 +404,7 @@ def _thinned(recording: Recording, censored: bool) -> dict[str, Any]:
         "velocity": mean(blocks.velocity),
         "weight": weight,
         "worth": worth,
+        "restart": _restarts(lost),
         "drift": np.gradient(np.log(force_out), mean(blocks.time)),
         "censored": np.where(saturated & censored, end, 0.0),
         "share": np.where(saturated, samples / samples.mean() / strokes.correlation, 0.0),

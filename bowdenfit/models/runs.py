@@ -17,7 +17,8 @@ from bowdenfit.physics.friction import transmission_efficiency
 from bowdenfit.types import Labels, Vector
 
 ROW_ARRAYS = ("route", "own", "is_own", "known_variance", "noisy")
-_LOAD_BINS, _SPEED_BINS, _DELAY_BINS = 24, 8, 8  # of each stroke of a run, where load, speed or a delay matters
+_LOAD_BINS, _SPEED_BINS, _DELAY_BINS = 24, 24, 8  # of each stroke of a run, where load, speed or a delay matters
+_ALIKE = 0.05  # speeds that differ by less than this fraction are one
 LEAST_FORCE = 1e-3  # N; an offset cannot take more of a reading than this leaves
 
 
@@ -63,31 +64,40 @@ class RunsTerm:
 
     def _shown(
         self, values: Mapping[str, Array], data: Mapping[str, Any], exponent: Float[Array, " cells"]
-    ) -> tuple[Float[Array, " cells"], Float[Array, " cells"]]:
-        """Log ratio that the load cells show, and its derivative by the friction exponent."""
+    ) -> tuple[Float[Array, " cells"], Float[Array, " cells"], Float[Array, " cells"]]:
+        """Log ratio that the load cells show, and its derivatives by the friction exponent and by the log of the load."""
         friction, stroke, gain = self.cable.friction, data["stroke"], values.get(GAIN_ERROR, 0.0)
         from_delay = values.get(DELAY_ERROR, 0.0) * data["drift"]
         if not (friction.depends_on_load or OUTPUT_OFFSET in values):
-            return exponent + stroke * gain + from_delay, jnp.ones_like(exponent)
-        input_force = jnp.maximum(data["input_force"] - values.get(INPUT_OFFSET, 0.0), LEAST_FORCE)
-        output_force = friction.output_force(values, input_force, exponent, stroke)
-        shown = jnp.maximum(output_force * jnp.exp(-gain) + values.get(OUTPUT_OFFSET, 0.0), LEAST_FORCE)
-        slope = jnp.exp(-gain) / (friction.slope(values, output_force) * shown)
-        return stroke * jnp.log(data["input_force"] / shown) + from_delay, slope
+            return exponent + stroke * gain + from_delay, jnp.ones_like(exponent), jnp.zeros_like(exponent)
+
+        def ratio(more: Array, load: Array) -> Array:
+            read = data["input_force"] * jnp.exp(load)
+            input_force = jnp.maximum(read - values.get(INPUT_OFFSET, 0.0), LEAST_FORCE)
+            output_force = friction.output_force(values, input_force, exponent + more, stroke)
+            shown = output_force * jnp.exp(-gain) + values.get(OUTPUT_OFFSET, 0.0)
+            return stroke * jnp.log(read / jnp.maximum(shown, LEAST_FORCE))
+
+        zero, one = jnp.zeros_like(exponent), jnp.ones_like(exponent)
+        shown, slope = jax.jvp(ratio, (zero, zero), (one, zero))
+        _, by_load = jax.jvp(ratio, (zero, zero), (zero, one))
+        return shown + from_delay, slope, by_load
 
     def _deviations(
         self, values: Mapping[str, Array], data: Mapping[str, Any], weights: Mapping[str, Array]
     ) -> "_Deviations":
         angles, variance = resolve_angles(self.cable, values, data)
         exponent = self.cable.friction_exponent(values, angles) * self.cable.friction.rate(values, data["velocity"])
-        shown, slope = self._shown(values, data, exponent)
+        shown, slope, by_load = self._shown(values, data, exponent)
         deviation = data["mean"] - shown
         total = self._per_run(data, slope**2)
         mounting = self._per_run(data, slope * deviation) / total
         from_angles = self._per_run(data, slope**2 * self.cable.exponent_variance(weights, angles, variance)) / total
         sd = jnp.sqrt(weights[RUN_SCATTER] ** 2 + from_angles + weights[self.reading_noise] ** 2 / total)
         plain = self._per_run(data, deviation) / data["run_weight"]
-        return _Deviations(deviation - slope * mounting[data["run"]], mounting, sd, total, plain)
+        inside = data["load_squares"] * by_load**2 - 2 * data["load_products"] * by_load
+        by_run = jnp.sum(inside.reshape(len(self.labels), -1), axis=1)
+        return _Deviations(deviation - slope * mounting[data["run"]], mounting, sd, total, plain, by_run)
 
     def _per_run(self, data: Mapping[str, Any], cells: Float[Array, " cells"]) -> Float[Array, " runs"]:
         """Weighted sum over the cells of each run."""
@@ -97,7 +107,7 @@ class RunsTerm:
         """Log likelihood of each run, all samples together."""
         found = self._deviations(values, data, values)
         noise, n = values[self.reading_noise], data["n"]
-        scatter = data["scatter"] + self._per_run(data, found.within**2)
+        scatter = data["scatter"] + found.inside + self._per_run(data, found.within**2)
         constant = (data["log_weights"] - jnp.log(found.total) - (n - 1) * jnp.log(2 * jnp.pi)) / 2
         inside = constant - (n - 1) * jnp.log(noise) - scatter / (2 * noise**2)
         return inside + norm.logpdf(found.mounting, 0.0, found.sd)
@@ -126,13 +136,16 @@ class RunsTerm:
 @jax.tree_util.register_dataclass
 @dataclass(frozen=True)
 class _Deviations:
-    """Of cells from their run's mounting effect; of each run: mounting effect, its sd, information, mean deviation."""
+    """Of cells from their run's mounting effect; of each run: mounting effect, its sd, information, mean deviation, and
+    what the change of friction inside its cells takes off (or adds to) their scatter.
+    """
 
     within: Array
     mounting: Array
     sd: Array
     total: Array
     plain: Array
+    inside: Array
 
 
 @dataclass(frozen=True)
@@ -170,7 +183,8 @@ def run_sums(cable: Cable, rows: SlidingRows) -> dict[str, Any]:
     def mean(values: np.ndarray) -> np.ndarray:
         return np.bincount(cell, weight * values) / cell_weight
 
-    cell_mean = mean(rows.log_ratio)
+    cell_mean, load = mean(rows.log_ratio), np.log(rows.input_force)
+    cell_load = mean(load)
     within = np.bincount(cell, weight * (rows.log_ratio - cell_mean[cell]) ** 2)
     runs, run = np.unique(rows.run[first], return_inverse=True)
     row_run = np.searchsorted(runs, rows.run)
@@ -180,7 +194,9 @@ def run_sums(cable: Cable, rows: SlidingRows) -> dict[str, Any]:
         "run": run,
         "weight": cell_weight,
         "mean": cell_mean,
-        "input_force": np.exp(mean(np.log(rows.input_force))),
+        "input_force": np.exp(cell_load),
+        "load_squares": np.bincount(cell, weight * (load - cell_load[cell]) ** 2),
+        "load_products": np.bincount(cell, weight * (load - cell_load[cell]) * (rows.log_ratio - cell_mean[cell])),
         "output_force": np.exp(mean(np.log(rows.output_force))),
         "velocity": mean(rows.velocity),
         "drift": mean(rows.drift),
@@ -190,7 +206,7 @@ def run_sums(cable: Cable, rows: SlidingRows) -> dict[str, Any]:
         "run_weight": run_weight,
         "run_mean": np.bincount(run, cell_weight * cell_mean) / run_weight,
         "scatter": np.bincount(run, within),
-        "log_weights": np.bincount(row_run, rows.worth * np.log(weight)),
+        "log_weights": np.bincount(row_run, rows.worth * np.log(weight / rows.worth)),
     }
 
 
@@ -200,14 +216,15 @@ def _rectangular(cells: dict[str, np.ndarray], run: np.ndarray) -> dict[str, np.
     place = np.arange(counts.max())[None, :]
     source = np.where(place < counts[:, None], starts[:, None] + place, starts[:, None]).ravel()
     padded = {name: values[source] for name, values in cells.items()}
-    return padded | {"weight": np.where((place < counts[:, None]).ravel(), padded["weight"], 0.0)}
+    filled = (place < counts[:, None]).ravel()
+    return padded | {name: np.where(filled, padded[name], 0.0) for name in ("weight", "load_squares", "load_products")}
 
 
 def _cells(cable: Cable, rows: SlidingRows) -> tuple[np.ndarray, np.ndarray]:
     """The cell of each reading, and the first reading of each cell."""
     keys = [rows.run, rows.stroke, *(rows.angles[name] for name in ROW_ARRAYS)]
     if cable.friction.depends_on_rate:
-        keys.append(_bins(rows.velocity, rows.run * 2 + (rows.stroke > 0), _SPEED_BINS))
+        keys.append(_bins(_steps(rows.velocity), rows.run * 2 + (rows.stroke > 0), _SPEED_BINS))
     on_load = cable.friction.depends_on_load or cable.description.fits_offsets
     if on_load or np.any(rows.drift):
         bins = _LOAD_BINS if on_load else _DELAY_BINS
@@ -215,6 +232,12 @@ def _cells(cable: Cable, rows: SlidingRows) -> tuple[np.ndarray, np.ndarray]:
     design = np.column_stack([np.nan_to_num(key) for key in keys])
     _, first, cell = np.unique(design, axis=0, return_index=True, return_inverse=True)
     return cell.ravel(), first
+
+
+def _steps(velocity: Vector) -> Vector:
+    """Speeds in steps of a few percent; NaN where they are not known."""
+    speed = np.abs(velocity)
+    return np.exp(_ALIKE * np.round(np.log(np.where(speed > 0, speed, np.nan)) / _ALIKE))
 
 
 def _bins(values: Vector, group: Labels, most: int) -> Labels:

@@ -4,7 +4,7 @@ import jax.numpy as jnp
 from jax import Array
 from jaxtyping import Float
 
-_SMALL_EXPONENT = 1e-6  # below, two terms of the series in p are exact to 1e-12
+_SMALL_EXPONENT = 1e-6  # below, three terms of the series in p are exact to the last digit
 _NOTHING_LEFT = 1e-9
 
 
@@ -94,7 +94,8 @@ def force_scale(
     log_u = jnp.log((force + drag) / reference_force)
     small = load_exponent < _SMALL_EXPONENT
     p = jnp.where(small, 1.0, load_exponent)
-    return jnp.where(small, log_u + load_exponent * log_u**2 / 2, jnp.expm1(p * log_u) / p)
+    series = log_u * (1 + load_exponent * log_u / 2 * (1 + load_exponent * log_u / 3))
+    return jnp.where(small, series, jnp.expm1(p * log_u) / p)
 
 
 def force_from_scale(
@@ -109,8 +110,8 @@ def force_from_scale(
     """
     small = load_exponent < _SMALL_EXPONENT
     p = jnp.where(small, 1.0, load_exponent)
-    near_zero = scaled - load_exponent * scaled**2 / 2
-    log_u = jnp.where(small, near_zero, jnp.log(jnp.maximum(1 + p * scaled, _NOTHING_LEFT)) / p)
+    series = scaled * (1 - load_exponent * scaled * (1 / 2 - load_exponent * scaled / 3))
+    log_u = jnp.where(small, series, jnp.log1p(jnp.maximum(p * scaled, _NOTHING_LEFT - 1)) / p)
     return reference_force * jnp.exp(log_u) - drag
 
 

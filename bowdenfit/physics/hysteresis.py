@@ -28,11 +28,20 @@ def play_operator(
     References:
         On-body paper, figure 12 (its three phases are this operator's three states).
     """
-    return _run(x, band, start)[0]
+    bands = jnp.broadcast_to(band, x.shape)
+
+    def step(y: Array, now: tuple[Array, Array]) -> tuple[Array, Array]:
+        y = jnp.clip(y, now[0] - now[1], now[0] + now[1])
+        return y, y
+
+    return jax.lax.scan(step, jnp.broadcast_to(start, x.shape[1:]).astype(x.dtype), (x, bands))[1]
 
 
 def play_operator_with_slope(
-    x: Float[Array, "time *batch"], band: Float[Array, "..."], start: Float[Array, "*batch"]
+    x: Float[Array, "time *batch"],
+    band: Float[Array, "..."],
+    start: Float[Array, "*batch"],
+    restart: Float[Array, "time *batch"],
 ) -> tuple[Float[Array, "time *batch"], Float[Array, "time *batch"]]:
     r"""The play operator, and the derivative of its output by the friction exponent.
 
@@ -43,23 +52,24 @@ def play_operator_with_slope(
         x: Input force on the scale g [1], time first.
         band: Friction exponent [1], the same for all times or one for each.
         start: Output on the scale g before the first sample [1].
+        restart: Output on the scale g where it must be set anew, because the input before was not known [1]; NaN elsewhere.
 
     Returns:
         Output on the scale g, and its slope [1].
     """
-    return _run(x, band, start)
-
-
-def _run(x: Array, band: Array, start: Array) -> tuple[Array, Array]:
     bands = jnp.broadcast_to(band, x.shape)
 
-    def step(carry: tuple[Array, Array], now: tuple[Array, Array]) -> tuple[tuple[Array, Array], tuple[Array, Array]]:
+    def step(
+        carry: tuple[Array, Array], now: tuple[Array, Array, Array]
+    ) -> tuple[tuple[Array, Array], tuple[Array, Array]]:
         y, slope = carry
+        anew = ~jnp.isnan(now[2])
+        y, slope = jnp.where(anew, now[2], y), jnp.where(anew, 0.0, slope)
         low, high = now[0] - now[1], now[0] + now[1]
         slope = jnp.where(y < low, -1.0, jnp.where(y > high, 1.0, slope))
         y = jnp.clip(y, low, high)
         return (y, slope), (y, slope)
 
     begin = jnp.broadcast_to(start, x.shape[1:]).astype(x.dtype)
-    _, (y, slope) = jax.lax.scan(step, (begin, jnp.zeros_like(begin)), (x, bands))
+    _, (y, slope) = jax.lax.scan(step, (begin, jnp.zeros_like(begin)), (x, bands, restart))
     return y, slope

@@ -3,13 +3,21 @@
 import numpy as np
 
 from bowdenfit.measurements.channels import Channel, ChannelFile
+from bowdenfit.measurements.recordings import Recordings
 from bowdenfit.report.layout import filled, table
+from bowdenfit.report.recordings import recordings_text
 
 _HEADS = ("channel", "unit", "samples", "rate", "length", "lowest", "highest", "clock")
 
 
-def channels_text(file: ChannelFile) -> str:
-    """The channels of a file, one a line."""
+def channels_text(file: ChannelFile, recordings: Recordings | None = None, why_not: str = "") -> str:
+    """The channels of a file, one a line, and what the file is as a recording.
+
+    Args:
+        file: What was read.
+        recordings: The file as a recording, where its channels say which is which.
+        why_not: What keeps it from being one, in a sentence.
+    """
     title = f"{file.path.name}: {file.kind}, {len(file.channels)} channel{'s' if len(file.channels) != 1 else ''}"
     rows = [_row(channel) for channel in file.channels]
     keep = [i for i, _ in enumerate(_HEADS) if i in (0, 1, 2, 5, 6) or any(row[i] for row in rows)]
@@ -22,7 +30,15 @@ def channels_text(file: ChannelFile) -> str:
         f"{file.path.name} --wrap-angle 180deg --channel input_force=NAME:N --channel output_force=NAME:N. Names that say it "
         "themselves, such as input_force_N, need no --channel; several recordings go into a cable.toml (bowdenfit init)."
     )
-    return "\n".join([title, "", listing, *(["", *notes] if notes else []), "", how]) + "\n"
+    lines = [title, "", listing, *(["", *notes] if notes else [])]
+    if recordings is not None:
+        lines += ["", *recordings_text(recordings)]
+        lines += [
+            filled(f"Note: {remark}") for r in recordings.each for remark in (*r.account.remarks, *r.strokes.remarks)
+        ]
+    elif why_not:
+        lines += ["", filled(f"As a recording it cannot be used yet: {why_not}")]
+    return "\n".join([*lines, "", how]) + "\n"
 
 
 def _row(channel: Channel) -> tuple[str, ...]:

@@ -8,7 +8,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from bowdenfit.dataset import Dataset, load_dataset, single_file_dataset
-from bowdenfit.errors import StoreError, UsageError
+from bowdenfit.errors import DatasetError, StoreError, UsageError
 from bowdenfit.measurements.recording_files import parsed_channels
 from bowdenfit.results.folder import CHAIN, clear, read_checkpoint, refuse_to_overwrite, start_checkpoint
 from bowdenfit.workflow.background import Assistants, assistants, draw
@@ -16,6 +16,7 @@ from bowdenfit.workflow.background import Assistants, assistants, draw
 if TYPE_CHECKING:
     from bowdenfit.inference.ensemble import Progress
     from bowdenfit.measurements.channels import ChannelFile
+    from bowdenfit.measurements.recordings import Recordings
     from bowdenfit.results.comparison import Comparison
     from bowdenfit.results.fit import Fit
 
@@ -94,18 +95,27 @@ def check(dataset: str | Path | Dataset, **reading: Any) -> Dataset:
     return data
 
 
-def channels_of(path: str | Path) -> "ChannelFile":
-    """The channels of a recording's file: names, units, clocks and samples, before anybody says what they mean.
+def channels_of(path: str | Path, channels: Sequence[str] = ()) -> "tuple[ChannelFile, Recordings | None, str]":
+    """The channels of a recording's file, and the recording that they make.
 
     Args:
-        path: A file that `bowdenfit check` lists.
+        path: A file.
+        channels: Which channel is what, such as "input_force=ai0:lbf".
+
+    Returns:
+        The channels; the recording, prepared and cut into strokes, None where it cannot be; and why not, in a sentence.
 
     Raises:
-        DatasetError: It cannot be read.
+        DatasetError: The file cannot be read.
     """
     from bowdenfit.measurements.lab_files import read_channels
 
-    return read_channels(Path(path))
+    file = read_channels(Path(path))
+    try:
+        data = single_file_dataset(Path(path), (0.0, "deg"), (), parsed_channels(channels), kind="recordings")
+    except DatasetError as error:
+        return file, None, str(error)
+    return file, data.measurements.recordings, ""
 
 
 def fit(

@@ -388,7 +388,9 @@ def test_ticks_are_round_and_within_the_axis(limits):
 def test_all_figures_are_written_in_both_formats_and_nothing_else(tmp_path):
     before = dict(mpl.rcParams)
     written = draw_all(paper_data(), tmp_path / "figures")
-    assert [path.name for path in written] == [f"{name}.{ending}" for name in APPLY["on body"] for ending in ("png", "svg")]
+    assert [path.name for path in written] == [
+        f"{name}.{ending}" for name in APPLY["on body"] for ending in ("png", "svg")
+    ]
     assert sorted(written) == sorted((tmp_path / "figures").iterdir())
     assert all(1_000 < path.stat().st_size < 500_000 for path in written)
     assert dict(mpl.rcParams) == before

@@ -239,3 +239,55 @@ def test_a_gain_error_and_a_constant_angle_are_said_to_be_confounded_with_what_i
 
 def test_parameters_that_the_data_tell_apart_are_not_called_confounded(plain):
     assert confounded(plain[0]) == []
+
+
+def _csv(path, columns, rows):
+    path.write_text("\n".join([",".join(columns), *(",".join(f"{x:.6g}" for x in row) for row in rows)]) + "\n")
+
+
+def test_recordings_one_below_the_other_in_one_file_are_told_apart_by_a_column(recorded, tmp_path):
+    parts = []
+    for run, name in enumerate(("440mm_20rpm", "470mm_20rpm"), start=1):
+        rows = np.loadtxt(recorded / "recordings" / f"{name}.csv", delimiter=",", skiprows=1)
+        parts.append(np.column_stack([np.full(len(rows), run), rows[:, :3]]))
+    _csv(tmp_path / "all.csv", ("run", "time_s", "input_force_N", "output_force_N"), np.concatenate(parts))
+    entries = "".join(
+        f'[[recording]]\nfile = "all.csv"\nname = "{name}"\nwhere = {{ run = {run} }}\n'
+        for run, name in ((1, "a"), (2, "b"))
+    )
+    contact = '[[contact]]\nname = "c"\nfriction = "mu"\nwrap_angle = { value = 90, unit = "deg" }\n'
+    (tmp_path / "cable.toml").write_text(f'name = "two"\n{contact}[tables]\nrecordings = {{}}\n{entries}')
+    first, second = bf.read(tmp_path).measurements.recordings.each
+    assert (first.name, second.name) == ("a", "b")
+    assert first.account.samples == second.account.samples == 1200
+    assert first.strokes.exponent == pytest.approx(0.2746, abs=0.004)
+    assert second.strokes.exponent == pytest.approx(0.2341, abs=0.004)
+
+
+def test_a_short_table_with_a_clock_and_no_runs_is_a_recording_and_one_with_strokes_is_not(recorded, tmp_path):
+    rows = np.loadtxt(recorded / "recordings" / "470mm_60rpm.csv", delimiter=",", skiprows=1)[100:290]
+    _csv(tmp_path / "clock.csv", ("time_s", "input_force_N", "output_force_N"), rows[:, :3])
+    found = bf.read(tmp_path / "clock.csv", wrap_angle=(180.0, "deg")).measurements
+    assert found.recordings is not None
+    assert found.forces is None
+    _csv(
+        tmp_path / "strokes.csv",
+        ("stroke", "input_force_N", "output_force_N"),
+        np.abs(rows[:5, [3, 1, 2]]) * [0, 1, 1] + [1, 0, 0],
+    )
+    found = bf.read(tmp_path / "strokes.csv", wrap_angle=(180.0, "deg")).measurements
+    assert found.recordings is None
+    assert len(found.forces.run) == 5
+
+
+def test_check_of_a_file_alone_lists_channels_and_what_it_is_as_a_recording(recorded):
+    from click.testing import CliRunner
+
+    found = CliRunner().invoke(command, ["check", str(recorded / "recordings" / "440mm_20rpm.csv")])
+    words = " ".join(found.output.split())
+    assert found.exit_code == 0
+    assert "input_force_N N 1200 100 Hz 11.99 s 14.18 134.6 time_s" in words
+    assert "440mm_20rpm 1200" in words
+    csv = str(recorded.parent / "yarn-on-cylinder" / "forces.csv")
+    words = " ".join(CliRunner().invoke(command, ["check", csv]).output.split())
+    assert "As a recording it cannot be used yet" in words

@@ -167,7 +167,9 @@ def test_sliding_samples_of_the_simulated_bench_obey_the_model(name):
 
     @jax.jit
     def predicted(values):
-        exponent = LAMBDA * model.rate(values, jnp.asarray(speed))
+        of_rate = [values[name] for name in ("stribeck", "stribeck_speed", "viscous") if name in values]
+        at_reference = LAMBDA * (rate_factor(jnp.asarray(20.0), *of_rate) if of_rate else 1.0)
+        exponent = at_reference * model.rate(values, jnp.asarray(speed))
         return model.output_force(values, jnp.asarray(force_in), exponent, jnp.asarray(stroke))
 
     assert {1, -1} == set(stroke)

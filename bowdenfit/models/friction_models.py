@@ -182,19 +182,24 @@ class FrictionModel:
         return self.force(values, self.scaled(values, input_force) - stroke * exponent)
 
     def rate(self, values: Mapping[str, Array], speed: Float[Array, "*batch"]) -> Float[Array, "*batch"]:
-        """Factor on the friction exponent at a speed [1]; the reference speed stands in where it is not known."""
+        """Factor on the friction exponent at a speed [1], 1 at the reference speed, which stands in where none is known.
+
+        So coefficients are stated for the reference speed, as they are for the reference force, and what the data say of
+        them does not hang on how far friction would rise toward standstill.
+        """
         if not self.depends_on_rate:
             return jnp.ones_like(speed)
-        known = jnp.where(jnp.isnan(speed), self.conditions.reference_speed, speed)
-        return rate_factor(known, values[STRIBECK], values[STRIBECK_SPEED], values[VISCOUS])
+        reference = jnp.asarray(self.conditions.reference_speed)
+        known = jnp.where(jnp.isnan(speed), reference, speed)
+        parameters = (values[STRIBECK], values[STRIBECK_SPEED], values[VISCOUS])
+        return rate_factor(known, *parameters) / rate_factor(reference, *parameters)
 
     def efficiency(self, values: Mapping[str, Array], exponent: Float[Array, "*batch"]) -> Float[Array, "*batch"]:
         """Efficiency while pulling with the reference force at the reference speed [1]."""
         if not self.options:
             return jnp.exp(-exponent)
         at = jnp.asarray(self.conditions.reference_force)
-        rate = self.rate(values, jnp.asarray(self.conditions.reference_speed))
-        return self.output_force(values, at, exponent * rate, jnp.ones(())) / at
+        return self.output_force(values, at, exponent, jnp.ones(())) / at
 
 
 def make_friction_model(description: Description, measurements: Measurements) -> FrictionModel:

@@ -110,8 +110,7 @@ def output_force_at(
 
     def force(z_and_mounting: Float[Array, " free_and_one"]) -> Float[Array, " route"]:
         values = model.space.constrain(z_and_mounting[:-1])
-        rate = friction.rate(values, jnp.asarray(friction.conditions.reference_speed))
-        exponent = model.cable.exponent_at(values, at) * rate + z_and_mounting[-1]
+        exponent = model.cable.exponent_at(values, at) + z_and_mounting[-1]
         return friction.output_force(values, jnp.asarray(input_force), exponent, jnp.asarray(float(stroke)))
 
     return for_each_draw(force, model.space.size + 1)(np.column_stack([z, mounting]))

@@ -8,7 +8,7 @@ from bowdenfit.report.recordings import recordings_text
 from bowdenfit.results.answers import decimals
 from bowdenfit.results.confounding import confounded
 from bowdenfit.results.fit import Fit
-from bowdenfit.results.rate import rate_effect
+from bowdenfit.results.rate import SHOWN_SPEED, rate_effect
 
 _UNLIMITED = 2000.0  # an angle in degrees or a length in mm beyond which a curve coefficient is no longer a finding
 _RESTS_ON_PRIOR = 0.2  # contraction below which a parameter is said to rest on its prior alone
@@ -190,6 +190,12 @@ def _friction_model(fit: Fit) -> str:
         lines.append(
             f"Coefficients and efficiencies are stated for an input force of {conditions.reference_force:g} N, because "
             "friction depends on the load."
+        )
+    if friction.depends_on_rate:
+        unit, scale = SHOWN_SPEED[conditions.velocity_unit]
+        speed = f"{scale * conditions.reference_speed:.3g} {unit}"
+        lines.append(
+            f"Coefficients and efficiencies are stated for a speed of {speed}, because friction may depend on speed."
         )
     effect = rate_effect(fit)
     if effect is not None:

@@ -226,9 +226,8 @@ def _curves(fit: Fit, at: float, forces: np.ndarray | None, speeds: np.ndarray |
         exponent = model.cable.exponent_at(values, where)[0]
         reference = friction.efficiency(values, exponent)
         if forces is not None:
-            rate = friction.rate(values, jnp.asarray(friction.conditions.reference_speed))
             x = jnp.asarray(forces)
-            return friction.output_force(values, x, exponent * rate, jnp.ones(())) / x, reference
+            return friction.output_force(values, x, exponent, jnp.ones(())) / x, reference
         x = jnp.asarray(friction.conditions.reference_force)
         shift = exponent * friction.rate(values, jnp.asarray(speeds))
         return friction.output_force(values, x, shift, jnp.ones(())) / x, reference

@@ -11,7 +11,7 @@ from bowdenfit.measurements.preparation.play import play
 from bowdenfit.measurements.recordings import PULL, RETURN, SWITCH, Blocks, Strokes
 from bowdenfit.types import Flags, Labels, Vector
 
-_FIT_BLOCKS = 1500  # more than these say no more about the loop
+_FIT_BLOCKS = 1000  # more than these say no more about the loop
 _GAIN_SD = 0.02  # how far two load cells may disagree before the loop is believed to be off center
 _LEAST_EXPONENT = 1e-3
 _FEWEST = 10  # blocks
@@ -19,6 +19,7 @@ _CLEAR_OF_NOISE = 5.0  # a force below this many standard deviations of its nois
 _STILL = 0.05  # fraction of the typical speed below which the rope is taken to stand still
 _STEADY = 0.2  # relative change of speed from one block to the next up to which a block is of one speed
 _CLEARLY = 0.5  # a fit the other way round must leave less than this fraction of the deviations to be believed
+_WELL = 1.5  # cost up to which a loop follows its recording as well as noise lets it
 _ONE_PHASE = 4.0  # spread of the log ratio, in units of its noise, below which there is only one phase
 
 Word = Literal["pull", "return", "hold", "ignore"]
@@ -44,7 +45,7 @@ class Loop:
         drag: Drag that makes its width the same at all loads [N].
         deviation: Of log(F_out + drag) from the operator, block by block [1].
         state: Contact of each block.
-        cost: Robust sum of squares of the deviations.
+        cost: Robust sum of squares of the deviations, in units of their noise, over twice their number.
     """
 
     exponent: float
@@ -123,12 +124,15 @@ def fit_loop(force_in: Vector, force_out: Vector) -> Loop:
         weak = np.sqrt(len(few_in)) * 0.1
         return np.append(deviations(p), [weak * p[1] / _GAIN_SD, weak * p[2] ** 2])
 
-    starts = [[np.log(width), center, 0.05], [np.log(width * 0.8), 0.0, 0.3]]
-    fits = [least_squares(residuals, start, loss="soft_l1", x_scale=[0.1, 0.02, 0.1], max_nfev=40) for start in starts]
+    fits = []
+    for start in ([np.log(width), center, 0.05], [np.log(width * 0.8), 0.0, 0.3]):
+        fits.append(least_squares(residuals, start, loss="soft_l1", x_scale=[0.1, 0.02, 0.1], max_nfev=40))
+        if fits[-1].cost < _WELL * len(few_in):
+            break
     best = min(fits, key=lambda fit: float(fit.cost))
     exponent, middle, drag = float(np.exp(best.x[0])), float(best.x[1]), level * float(best.x[2]) ** 2
     deviation, state = _follow(force_in, force_out, exponent, middle, drag)
-    return Loop(exponent, middle, drag, deviation, state, float(best.cost))
+    return Loop(exponent, middle, drag, deviation, state, float(best.cost) / len(few_in))
 
 
 def _plain_loop(ratio: Vector, state: Labels) -> tuple[float, float]:
@@ -237,6 +241,8 @@ def _check_swapped(force_in: Vector, force_out: Vector, loop: Loop, velocity: Ve
             f"{swap}. If it really is a return without its pull, set its phase by hand in cable.toml, under its [[recording]]: "
             'strokes = [{ start = ..., end = ..., stroke = "return" }].'
         )
+    if loop.cost < _WELL:  # it follows to within its noise, which a swapped one could not
+        return
     other = fit_loop(force_out, force_in)
     if other.cost < _CLEARLY * loop.cost and {PULL, RETURN} <= set(other.state):
         raise DatasetError(

@@ -19,6 +19,7 @@ _LAGS = 60
 _REACH = 0.1  # mounting effects of a run that are looked at, either way
 _GRID = 60
 _BINS = 12
+_CURVES = 4000  # draws of a curve
 
 
 def traces(fit: Fit) -> tuple[RecordedTrace, ...]:
@@ -43,12 +44,12 @@ def velocity_unit(fit: Fit) -> str:
     return SHOWN_SPEED[recordings.velocity_unit][0] if recordings is not None else ""
 
 
-def _some_draws(fit: Fit) -> np.ndarray:
-    """`DRAWS` draws of the posterior, or as many times least squares."""
+def _some_draws(fit: Fit, n: int = DRAWS) -> np.ndarray:
+    """So many draws of the posterior, or as many times least squares."""
     if fit.posterior is None:
-        return np.repeat(fit.least_squares.z[None], DRAWS, axis=0)
+        return np.repeat(fit.least_squares.z[None], n, axis=0)
     flat = fit.posterior.flat_z
-    return flat[np.linspace(0, len(flat) - 1, DRAWS).astype(int)]
+    return flat[np.linspace(0, len(flat) - 1, n).astype(int)]
 
 
 def _predicted(fit: Fit, recordings: Recordings, follower: Follower) -> tuple[np.ndarray, np.ndarray]:
@@ -233,7 +234,7 @@ def _curves(fit: Fit, at: float, forces: np.ndarray | None, speeds: np.ndarray |
         return friction.output_force(values, x, shift, jnp.ones(())) / x, reference
 
     with jax.enable_x64(True):
-        curves, reference = jax.jit(jax.vmap(efficiency))(jnp.asarray(_some_draws(fit)))
+        curves, reference = jax.jit(jax.vmap(efficiency))(jnp.asarray(_some_draws(fit, _CURVES)))
     constant = float(np.median(np.asarray(reference)))
     if fit.posterior is None:
         return np.asarray(curves)[:1], constant

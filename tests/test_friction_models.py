@@ -322,3 +322,12 @@ def test_readings_simulated_inside_the_band_are_inside_it_for_the_likelihood():
     place, _ = _held_by_hand(values, [(0, f, f / r) for f, r in zip(force_in, ratio, strict=True)])
     assert np.all(np.abs(place) <= values["mu"] * THETA + 1e-4)
     assert np.abs(place).max() > 0.9 * values["mu"] * THETA
+
+
+@pytest.mark.parametrize("option", ["drag", "load-dependent"])
+def test_a_dependence_on_load_is_refused_where_no_load_was_measured(option, on_body):
+    from bowdenfit import workflow
+    from bowdenfit.models.build import build_model
+
+    with pytest.raises(DescriptionError, match=f"{option}.*efficiencies alone say nothing of it"):
+        build_model(workflow.read(on_body, friction=option))

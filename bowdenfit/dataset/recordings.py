@@ -13,6 +13,7 @@ from bowdenfit.errors import DatasetError, DescriptionError, nearest
 from bowdenfit.measurements.columns import ColumnSource
 from bowdenfit.measurements.lab_files import read_channels
 from bowdenfit.measurements.preparation import prepare
+from bowdenfit.measurements.preparation.delay import COMMON_ERROR
 from bowdenfit.measurements.recording_files import WANTED, matched_name, pattern_fields, rows_where, to_recording
 from bowdenfit.measurements.recordings import (
     Account,
@@ -25,6 +26,7 @@ from bowdenfit.measurements.recordings import (
 from bowdenfit.measurements.strokes import Span, find_strokes
 from bowdenfit.measurements.tables import AngleTable
 from bowdenfit.measurements.units import INTERNAL_UNITS, conversion_factor, speed_dimension
+from bowdenfit.types import Vector
 
 
 def read_recordings(
@@ -81,17 +83,25 @@ def _prepared(files: Sequence[_File]) -> tuple[list[tuple[Blocks, Account]], flo
     told = [a for f, (_, a) in zip(files, prepared, strict=True) if f.settings.delay == "estimate" and a.delay_sd > 0]
     if not told:
         return prepared, max((f.delay_sd for f in files), default=0.0)
-    weights = np.array([1 / a.delay_sd**2 for a in told])
-    delays = np.array([a.delay for a in told])
-    delay = float(np.sum(weights * delays) / weights.sum())
-    apart = float(np.sum(weights * (delays - delay) ** 2) / max(len(told) - 1, 1))
-    # What the estimates have wrong in common does not average out.
-    sd = max(float(np.sqrt(max(apart, 1.0) / weights.sum())), float(np.median([a.delay_sd for a in told])) / 2)
+    delay, sd = _pooled(np.array([a.delay for a in told]), np.array([a.delay_sd for a in told]))
     together = [
         parts if f.settings.delay != "estimate" else _shifted(f, delay, sd)
         for f, parts in zip(files, prepared, strict=True)
     ]
     return together, sd
+
+
+def _pooled(delays: Vector, sds: Vector) -> tuple[float, float]:
+    """Weighted mean of estimated delays and its standard error [s].
+
+    What chance did to each estimate averages out, and is at least as large as the estimates differ. What all of them have
+    in common, COMMON_ERROR, does not average out.
+    """
+    weights = sds**-2 / np.sum(sds**-2)
+    mean = float(weights @ delays)
+    chance = float(weights**2 @ (sds**2 - COMMON_ERROR**2))
+    apart = float(weights @ (delays - mean) ** 2) / max(len(delays) - 1, 1)
+    return mean, float(np.hypot(np.sqrt(max(chance, apart)), COMMON_ERROR))
 
 
 def _shifted(file: _File, delay: float, sd: float) -> tuple[Blocks, Account]:

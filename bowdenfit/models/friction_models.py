@@ -35,12 +35,26 @@ class Conditions:
         reference_speed: Speed that predictions are made for [mm/s or rad/s].
         speeds: Lowest and highest speed measured at; NaN without any.
         velocity_unit: "mm/s" or "rad/s"; empty without velocities.
+        shows_loads: Whether any table shows the forces, and not their ratio alone.
     """
 
     reference_force: float
     reference_speed: float
     speeds: tuple[float, float]
     velocity_unit: str
+    shows_loads: bool = True
+
+    def needs_loads(self, option: str) -> None:
+        """Refuse an option that efficiencies alone say nothing of.
+
+        Raises:
+            DescriptionError: No table shows the forces.
+        """
+        if not self.shows_loads:
+            raise DescriptionError(
+                f'friction_model has "{option}", but no force table or recording shows at which loads it was measured; '
+                "efficiencies alone say nothing of it: leave it out, or add forces."
+            )
 
 
 @runtime_checkable
@@ -62,7 +76,7 @@ class Drag:
 
     def parameters(self, conditions: Conditions, defaults: PriorDefaults) -> list[Parameter]:
         """The drag in newtons."""
-        del conditions
+        conditions.needs_loads("drag")
         sd = defaults.drag_newtons
         meaning = "drag: tension that the load cells do not show"
         return [Parameter(DRAG, "$D$", meaning, "friction_model", HalfNormal(sd), f"HalfNormal({sd:g} N)", "N")]
@@ -75,6 +89,7 @@ class LoadDependent:
     def parameters(self, conditions: Conditions, defaults: PriorDefaults) -> list[Parameter]:
         """The exponent."""
         del defaults
+        conditions.needs_loads("load-dependent")
         meaning = f"load exponent: how friction falls with the load, mu as stated at {conditions.reference_force:g} N"
         return [Parameter(LOAD_EXPONENT, "$p$", meaning, "friction_model", Uniform(0.0, 1.0), "Uniform(0, 1)")]
 
@@ -216,7 +231,7 @@ def make_friction_model(description: Description, measurements: Measurements) ->
     if description.reference_velocity is not None:
         speed = description.reference_velocity.to(speed_dimension(unit or "mm/s"))
     ends = (float(speeds.min()), float(speeds.max())) if len(speeds) else (float("nan"), float("nan"))
-    conditions = Conditions(float(force), float(speed), ends, unit)
+    conditions = Conditions(float(force), float(speed), ends, unit, len(forces) > 0)
     return FrictionModel(friction_options(description.friction_model), conditions)
 
 

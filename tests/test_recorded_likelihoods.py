@@ -393,9 +393,33 @@ def test_least_squares_of_faultless_recordings_returns_what_they_were_made_with(
     model = _model(recordings, likelihood, friction_model=options)
     estimates = _fitted(model).estimates
     stated_at = model.cable.friction.conditions.reference_speed
-    mu = MU * (float(rate_factor(jnp.asarray(stated_at), *map(jnp.asarray, RATE.values()))) if "stribeck" in truth else 1.0)
+    mu = MU * (
+        float(rate_factor(jnp.asarray(stated_at), *map(jnp.asarray, RATE.values()))) if "stribeck" in truth else 1.0
+    )
     by_bins = 2e-3 if "stribeck" in truth else 5e-4  # two dozen bins of the load, and of the speed
     limit = by_bins if likelihood == "runs" else 1e-4 if "stribeck" in truth else 1e-10
     for name, value in ({"mu": mu} | truth).items():
         assert estimates[name].identified
         assert estimates[name].value == pytest.approx(value, rel=limit)
+
+
+def test_joining_the_blocks_of_a_long_recording_keeps_the_ends_of_its_phases():
+    from bowdenfit.models.recordings import _joined
+
+    state = np.repeat([0, 1, 0, -1, 0, 1], [3, 50, 2, 41, 1, 30])
+    starts = _joined(state, 30)
+    groups = np.split(np.arange(len(state)), starts[1:])
+    assert all(len(set(state[group])) == 1 for group in groups)
+    edges = np.flatnonzero(np.diff(state) != 0)
+    for end in (*edges, *(edges + 1)):
+        assert [end] in [list(group) for group in groups]
+    assert len(groups) < 60
+    np.testing.assert_array_equal(_joined(state, len(state)), np.arange(len(state)))
+
+
+def test_a_joined_recording_gives_the_same_coefficient(monkeypatch):
+    recordings = [_recorded(angle, faults=NOISY) for angle in (1.0, 2.0, 3.0)]
+    whole = _fitted(_model(recordings, "whole", friction_model="drag")).estimates["mu"]
+    monkeypatch.setattr("bowdenfit.models.recordings._MOST_BLOCKS", 80)
+    joined = _fitted(_model(recordings, "whole", friction_model="drag")).estimates["mu"]
+    assert joined.value == pytest.approx(whole.value, abs=0.3 * whole.standard_error)

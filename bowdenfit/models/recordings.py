@@ -370,34 +370,27 @@ def _padded(recordings: Recordings, angles: Mapping[str, np.ndarray], censored: 
 
 
 def _thinned(recording: Recording, censored: bool) -> dict[str, Any]:
-    """Blocks of one recording, joined until there are no more than `_MOST_BLOCKS`."""
+    """Blocks of one recording, joined inside their phases where there are many more than `_MOST_BLOCKS`."""
     blocks, strokes = recording.blocks, recording.strokes
-    factor = -(-len(blocks.time) // _MOST_BLOCKS)
-    starts = np.arange(0, len(blocks.time), factor)
+    starts = _joined(strokes.stroke, _MOST_BLOCKS)
     samples = np.add.reduceat(blocks.samples, starts)
 
     def mean(values: np.ndarray) -> np.ndarray:
         return np.add.reduceat(values * blocks.samples, starts) / samples
 
+    def any_of(flags: np.ndarray) -> np.ndarray:
+        return np.maximum.reduceat(flags, starts)
+
     force_in, force_out = (np.maximum(mean(f), LEAST_FORCE) for f in (blocks.input_force, blocks.output_force))
-    lost = np.maximum.reduceat(_input_saturated(recording), starts)
-    usable = np.minimum.reduceat(_positive(recording), starts) & ~lost
-    saturated = np.maximum.reduceat(_output_saturated(recording), starts) & ~lost
-    state = np.sign(np.add.reduceat(strokes.stroke, starts)).astype(int)
-    still = state == 0
-    worth = (
-        usable
-        * _inside_phase(state)
-        * _standing_share(state)
-        * samples
-        / samples.mean()
-        / max(strokes.correlation / factor, 1.0)
-    )
-    weight = worth / (np.where(still, 0.0, 1 / force_in**2) + 1 / force_out**2)
+    off, saturated = _input_saturated(recording), _output_saturated(recording)
+    lost, each = any_of(off), _worth(recording, np.arange(len(blocks.time)))
+    counted = _positive(recording) & ~off & _inside_phase(strokes.stroke)
+    worth = np.add.reduceat(each * counted * _standing_share(strokes.stroke), starts) * ~lost
+    weight = worth / (np.where(strokes.stroke[starts] == 0, 0.0, 1 / force_in**2) + 1 / force_out**2)
     low, high = recording.account.limits
     end = np.where(force_out > (low + high) / 2 if np.isfinite(low + high) else np.isfinite(high), 1.0, -1.0)
-    sliding = recording.strokes.used_sliding
-    speed = np.abs(blocks.velocity[sliding])
+    beyond = any_of(saturated & censored) & ~lost
+    speed = np.abs(blocks.velocity[strokes.used_sliding])
     return {
         "input_force": force_in,
         "output_force": force_out,
@@ -406,7 +399,22 @@ def _thinned(recording: Recording, censored: bool) -> dict[str, Any]:
         "worth": worth,
         "restart": _restarts(lost),
         "drift": np.gradient(np.log(force_out), mean(blocks.time)),
-        "censored": np.where(saturated & censored, end, 0.0),
-        "share": np.where(saturated, samples / samples.mean() / strokes.correlation, 0.0),
+        "censored": np.where(beyond, end, 0.0),
+        "share": np.where(beyond, np.add.reduceat(each * saturated, starts), 0.0),
         "speed": float(speed.mean()) if len(speed) else float("nan"),
     }
+
+
+def _joined(state: np.ndarray, most: int) -> np.ndarray:
+    """First block of each group of blocks that are joined: of one phase only, its first and last block always alone.
+
+    The operator stands where the end of a stroke left it, so the ends must not be averaged away.
+    """
+    factor = -(-len(state) // most)
+    if factor == 1:
+        return np.arange(len(state))
+    phase = np.append(0, np.cumsum(np.diff(state) != 0))
+    first = np.append(True, np.diff(phase) != 0)
+    last = np.append(first[1:], True)
+    place = np.arange(len(state)) - np.maximum.accumulate(np.where(first, np.arange(len(state)), 0))
+    return np.flatnonzero(first | last | (place % factor == 1))

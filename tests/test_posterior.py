@@ -277,3 +277,14 @@ def test_one_ensemble_across_both_modes_does_jump():
     start = np.repeat([-20.0, 20.0], 64)[:, None] + np.random.default_rng(1).standard_normal((128, 3))
     states = run_side_by_side(default_moves(), log_two_modes, start[None], 1000, 1)
     assert np.any(np.sign(states[-1]) != np.sign(states[0]))
+
+
+def test_walkers_that_never_move_are_a_reason_not_to_trust_the_draws():
+    """Three of 256 far out pass R-hat, effective sample size and drift, and spoil standard deviations."""
+    from bowdenfit.inference.ensemble import _stuck
+
+    z = np.random.default_rng(0).normal(size=(256, 20, 3))
+    assert _stuck(z) == ()
+    z[:3] = z[:3, :1] + 30.0
+    (reason,) = _stuck(z)
+    assert reason.startswith("3 of 256 walkers did not move")

@@ -201,8 +201,19 @@ def _summarized(
     if stored < _FIRST_LOOK:
         too_short = f"each walker took {stored * THIN} steps, and {_FIRST_LOOK * THIN} are the least that can be judged"
         reasons = (too_short, *reasons)
+    reasons = (*reasons, *_stuck(z))
     acceptance = float(np.mean(backend.accepted)) / stored
     return Chain(z, derived, diagnostics, settings.n_ensembles, stored * THIN, acceptance, reasons)
+
+
+def _stuck(z: np.ndarray) -> tuple[str, ...]:
+    """Walkers that never moved in half their path; a few of them far out pass every other check."""
+    stuck = int(np.sum(np.ptp(z[..., 0], axis=1) == 0)) if z.shape[1] > 1 and z.shape[2] else 0
+    if not stuck:
+        return ()
+    return (
+        f"{stuck} of {len(z)} walkers did not move in the second half of their path, far from where the others are",
+    )
 
 
 def _worst(chain: Chain) -> tuple[float, float]:

@@ -173,6 +173,12 @@ def test_delay_of_whole_samples_shifts_the_output_alone(samples):
     np.testing.assert_array_equal(late.stroke, clean.stroke)
 
 
+@pytest.mark.parametrize("delay", [0.02, 0.3])
+def test_a_late_channel_shows_the_rest_before_the_start_first(delay):
+    late = recorded(faults=Faults(delay=delay))
+    np.testing.assert_allclose(late.output_force[late.time < delay], recorded().output_force[0])
+
+
 def test_delay_between_samples_is_exact():
     late = recorded(faults=Faults(delay=0.0005))
     fine = recorded(bench=BenchSettings(rate=2000.0))

@@ -12,7 +12,7 @@ from bowdenfit.description import ColumnMap, Description, Preparation, QuantityV
 from bowdenfit.errors import DatasetError, DescriptionError, nearest
 from bowdenfit.measurements.columns import ColumnSource
 from bowdenfit.measurements.lab_files import read_channels
-from bowdenfit.measurements.preparation import prepare
+from bowdenfit.measurements.preparation import averaged, inspected
 from bowdenfit.measurements.preparation.delay import COMMON_ERROR
 from bowdenfit.measurements.recording_files import WANTED, matched_name, pattern_fields, rows_where, to_recording
 from bowdenfit.measurements.recordings import (
@@ -79,16 +79,12 @@ def _prepared(files: Sequence[_File]) -> tuple[list[tuple[Blocks, Account]], flo
     The two channels run through the same electronics in every recording, so that what each of them says of the delay is
     put together; an error of it shifts the friction of all of them alike, in proportion to how fast the force changes.
     """
-    prepared = [prepare(f.raw, f.settings) for f in files]
-    told = [a for f, (_, a) in zip(files, prepared, strict=True) if f.settings.delay == "estimate" and a.delay_sd > 0]
+    found = [inspected(f.raw, f.settings) for f in files]
+    told = [i.delay for i in found if i.settings.delay == "estimate" and i.delay.sd > 0]
     if not told:
-        return prepared, max((f.delay_sd for f in files), default=0.0)
-    delay, sd = _pooled(np.array([a.delay for a in told]), np.array([a.delay_sd for a in told]))
-    together = [
-        parts if f.settings.delay != "estimate" else _shifted(f, delay, sd)
-        for f, parts in zip(files, prepared, strict=True)
-    ]
-    return together, sd
+        return [averaged(i) for i in found], max((f.delay_sd for f in files), default=0.0)
+    delay, sd = _pooled(np.array([d.value for d in told]), np.array([d.sd for d in told]))
+    return [averaged(i, (delay, sd) if i.settings.delay == "estimate" else None) for i in found], sd
 
 
 def _pooled(delays: Vector, sds: Vector) -> tuple[float, float]:
@@ -102,11 +98,6 @@ def _pooled(delays: Vector, sds: Vector) -> tuple[float, float]:
     chance = float(weights**2 @ (sds**2 - COMMON_ERROR**2))
     apart = float(weights @ (delays - mean) ** 2) / max(len(delays) - 1, 1)
     return mean, float(np.hypot(np.sqrt(max(chance, apart)), COMMON_ERROR))
-
-
-def _shifted(file: _File, delay: float, sd: float) -> tuple[Blocks, Account]:
-    blocks, account = prepare(file.raw, replace(file.settings, delay=delay))
-    return blocks, replace(account, delay_sd=sd)
 
 
 def _entries(description: Description, folder: Path, matched: Sequence[Path]) -> list[tuple[Path, RecordingFile]]:

@@ -11,7 +11,7 @@ from bowdenfit.dataset import Dataset, load_dataset, single_file_dataset
 from bowdenfit.errors import DatasetError, StoreError, UsageError
 from bowdenfit.measurements.recording_files import parsed_channels
 from bowdenfit.results.folder import CHAIN, clear, read_checkpoint, refuse_to_overwrite, start_checkpoint
-from bowdenfit.workflow.background import Assistants, assistants, draw
+from bowdenfit.workflow.background import Assistants, assistants, draw, load_ahead
 
 if TYPE_CHECKING:
     from bowdenfit.inference.ensemble import Progress
@@ -153,6 +153,8 @@ def fit(
         BowdenfitError: What is wrong, in a sentence; nothing is written then.
     """
     folder = Path(output) if output is not None else None
+    if in_background and not isinstance(dataset, Dataset):
+        load_ahead("jax", "optimistix")  # while recordings are read, which takes seconds
     data = read(dataset, **reading)
     seed = _checked(folder, data, mcmc, seed, resume, force)
     with assistants(in_background and mcmc, in_background and figures and folder is not None) as helpers:

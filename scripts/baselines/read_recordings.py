@@ -57,7 +57,8 @@ def steps(folder: Path) -> dict[str, float]:
     seconds["import bowdenfit"] = time.perf_counter() - start
     timed = {
         "read the files": (recordings, "read_channels"),
-        "prepare": (recordings, "prepare"),
+        "flag, tare and find delays": (recordings, "inspected"),
+        "average": (recordings, "averaged"),
         "find strokes": (recordings, "find_strokes"),
         "checksums": (dataset, "_sha256"),
     }

@@ -49,11 +49,48 @@ def prepare(raw: RawRecording, settings: PreparationSettings) -> tuple[Blocks, A
     Raises:
         DatasetError: The recording cannot be one; see `checks.check` and `tare.tare_of`.
     """
+    return averaged(inspected(raw, settings))
+
+
+@dataclass(frozen=True)
+class Inspected:
+    """A recording whose samples are flagged and tared, and whose delay is known as far as it tells it.
+
+    Args:
+        raw: As it was read.
+        settings: Which steps are done, and with what.
+        remarks: What was noticed.
+        cleaned: Both channels on their own clocks.
+        together: Both on one clock, before any delay is taken off.
+        delay: How much later the output channel is.
+    """
+
+    raw: RawRecording
+    settings: PreparationSettings
+    remarks: tuple[str, ...]
+    cleaned: _Cleaned
+    together: Common
+    delay: Delay
+
+
+def inspected(raw: RawRecording, settings: PreparationSettings) -> Inspected:
+    """The steps before averaging, so that several recordings can be given one delay; see `prepare`."""
     remarks = check(raw)
     cleaned = _clean(raw, settings)
     together = _together(raw, cleaned, settings, 0.0)
-    delay = _delay(together, settings)
-    common = _together(raw, cleaned, settings, delay.value) if delay.value else together
+    return Inspected(raw, settings, remarks, cleaned, together, _delay(together, settings))
+
+
+def averaged(found: Inspected, one_for_all: tuple[float, float] | None = None) -> tuple[Blocks, Account]:
+    """The steps after the delay is known; see `prepare`.
+
+    Args:
+        found: The recording.
+        one_for_all: Delay and its standard error [s] that replace those of this recording.
+    """
+    raw, settings, remarks, cleaned = found.raw, found.settings, found.remarks, found.cleaned
+    delay = found.delay if one_for_all is None else Delay(*one_for_all, found.delay.exponent)
+    common = _together(raw, cleaned, settings, delay.value) if delay.value else found.together
     _require_some_good(raw, common)
     filled = [_filled(force, common.fault == GOOD) for force in (common.input_force, common.output_force)]
     bandwidth = bandwidth_of(filled[0], filled[1], 1 / common.step)

@@ -21,8 +21,9 @@ from bowdenfit.models import runs as runs_of_model
 from bowdenfit.models.bench import BenchFriction, BenchSettings, Faults, Profile, simulate_recording, to_raw
 from bowdenfit.models.build import Model, build_model
 from bowdenfit.models.cable import Cable, make_cable, row_angles
-from bowdenfit.models.recordings import WholeRecordingsTerm, _padded, recorded_angles
+from bowdenfit.models.recorded_blocks import recorded_angles
 from bowdenfit.models.runs import RunsTerm, SlidingRows, run_sums
+from bowdenfit.models.whole_recordings import WholeRecordingsTerm, joined, padded
 from bowdenfit.physics.friction import rate_factor
 
 MU, REFERENCE = 0.15, 50.0
@@ -245,7 +246,7 @@ def _whole(model: Model, recordings, censored=False) -> WholeRecordingsTerm:
     """The play operator run at every evaluation, also where sums would do."""
     of_all = Recordings(("angle",), tuple(recordings), "mm/s")
     angles = row_angles(model.cable, recorded_angles(of_all), None).data
-    return WholeRecordingsTerm(model.cable, _padded(of_all, angles, censored), of_all.runs)
+    return WholeRecordingsTerm(model.cable, padded(of_all, angles, censored), of_all.runs)
 
 
 NOISY = Faults(input_noise=0.2, output_noise=0.2)
@@ -404,22 +405,20 @@ def test_least_squares_of_faultless_recordings_returns_what_they_were_made_with(
 
 
 def test_joining_the_blocks_of_a_long_recording_keeps_the_ends_of_its_phases():
-    from bowdenfit.models.recordings import _joined
-
     state = np.repeat([0, 1, 0, -1, 0, 1], [3, 50, 2, 41, 1, 30])
-    starts = _joined(state, 30)
+    starts = joined(state, 30)
     groups = np.split(np.arange(len(state)), starts[1:])
     assert all(len(set(state[group])) == 1 for group in groups)
     edges = np.flatnonzero(np.diff(state) != 0)
     for end in (*edges, *(edges + 1)):
         assert [end] in [list(group) for group in groups]
     assert len(groups) < 60
-    np.testing.assert_array_equal(_joined(state, len(state)), np.arange(len(state)))
+    np.testing.assert_array_equal(joined(state, len(state)), np.arange(len(state)))
 
 
 def test_a_joined_recording_gives_the_same_coefficient(monkeypatch):
     recordings = [_recorded(angle, faults=NOISY) for angle in (1.0, 2.0, 3.0)]
     whole = _fitted(_model(recordings, "whole", friction_model="drag")).estimates["mu"]
-    monkeypatch.setattr("bowdenfit.models.recordings._MOST_BLOCKS", 80)
+    monkeypatch.setattr("bowdenfit.models.whole_recordings._MOST_BLOCKS", 80)
     joined = _fitted(_model(recordings, "whole", friction_model="drag")).estimates["mu"]
     assert joined.value == pytest.approx(whole.value, abs=0.3 * whole.standard_error)

@@ -24,7 +24,7 @@ from bowdenfit.models.angles import angles_term
 from bowdenfit.models.cable import ANGLE_NOISE, Cable, constant_angle_name, make_cable
 from bowdenfit.models.efficiencies import efficiencies_term
 from bowdenfit.models.forces import force_terms
-from bowdenfit.models.recordings import NAME as RECORDED
+from bowdenfit.models.recorded_blocks import RECORDED
 from bowdenfit.models.recordings import recordings_term
 from bowdenfit.models.scatter import (
     BLOCK_NOISE,

@@ -14,7 +14,7 @@ from bowdenfit.measurements.recordings import Recordings
 from bowdenfit.measurements.tables import AngleTable
 from bowdenfit.models.build import Model
 from bowdenfit.models.cable import resolve_angles, row_angles
-from bowdenfit.models.recordings import recorded_angles
+from bowdenfit.models.recorded_blocks import recorded_angles
 from bowdenfit.models.runs import LEAST_FORCE
 from bowdenfit.models.scatter import DELAY_ERROR, GAIN_ERROR, INPUT_OFFSET, OUTPUT_OFFSET
 from bowdenfit.physics.hysteresis import play_operator

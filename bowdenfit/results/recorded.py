@@ -7,7 +7,7 @@ import jax.numpy as jnp
 import numpy as np
 
 from bowdenfit.measurements.recordings import PULL, Recording, Recordings
-from bowdenfit.models.recordings import NAME
+from bowdenfit.models.recorded_blocks import RECORDED
 from bowdenfit.models.scatter import BLOCK_NOISE, RUN_SCATTER
 from bowdenfit.predictions.recorded import DRAWS, Follower, blocks_shown
 from bowdenfit.results.figure_data import Dependence, RecordedTrace
@@ -91,16 +91,16 @@ class _RunEfficiency:
 def _run_efficiencies(fit: Fit) -> dict[str, _RunEfficiency]:
     recordings = fit.dataset.measurements.recordings
     assert recordings is not None  # the caller asked
-    term = next(t for t in fit.model.terms if t.name == NAME)
+    term = next(t for t in fit.model.terms if t.name == RECORDED)
     observed = term.observed()
     sigma = float(np.median(fit.posterior.values[BLOCK_NOISE])) if fit.posterior is not None else float("nan")
     weight = np.asarray(term.data.get("run_weight", np.full(len(observed), np.nan)), dtype=float)
     found = {}
     for i, run in enumerate(recordings.runs):
         if fit.posterior is not None:
-            expected = np.quantile(fit.posterior.expected[NAME][..., i], _QUANTILES)
+            expected = np.quantile(fit.posterior.expected[RECORDED][..., i], _QUANTILES)
         else:
-            expected = np.repeat(fit.least_squares.readings[NAME][i], 3)
+            expected = np.repeat(fit.least_squares.readings[RECORDED][i], 3)
         found[run] = _RunEfficiency(expected, float(observed[i]), float(observed[i] * sigma / np.sqrt(weight[i])))
     return found
 

@@ -2,115 +2,73 @@
 
 from typing import Annotated, Any, Literal
 
-from pydantic import BaseModel, ConfigDict, Field, field_validator, model_validator
+from pydantic import ConfigDict, Field, field_validator, model_validator
 
+from bowdenfit.description.recordings import (
+    ColumnMap,
+    ForceLimits,
+    Phase,
+    Preparation,
+    RecordingFile,
+    RecordingsTable,
+)
+from bowdenfit.description.values import (
+    Finite,
+    FrictionSetting,
+    Frozen,
+    HalfNormalPrior,
+    LogNormalPrior,
+    Measured,
+    NonNegative,
+    NormalPrior,
+    ParameterSetting,
+    Positive,
+    PriorChoice,
+    QuantityValue,
+    UniformPrior,
+)
 from bowdenfit.errors import nearest
-from bowdenfit.measurements.units import conversion_factor
+
+__all__ = [
+    "SCHEMA",
+    "AngleTableSettings",
+    "ColumnMap",
+    "Contact",
+    "Description",
+    "Finite",
+    "ForceLimits",
+    "FrictionSetting",
+    "Geometry",
+    "HalfNormalPrior",
+    "LogNormalPrior",
+    "Measured",
+    "NonNegative",
+    "NormalPrior",
+    "ParameterSetting",
+    "Phase",
+    "Positive",
+    "Preparation",
+    "PriorChoice",
+    "PriorDefaults",
+    "QuantityValue",
+    "RecordingFile",
+    "RecordingsTable",
+    "Route",
+    "SamplerSettings",
+    "Sensors",
+    "Table",
+    "Tables",
+    "Undetected",
+    "UniformPrior",
+    "WrapAngle",
+]
 
 SCHEMA = 1
-Positive = Annotated[float, Field(gt=0, allow_inf_nan=False)]
-NonNegative = Annotated[float, Field(ge=0, allow_inf_nan=False)]
-Finite = Annotated[float, Field(allow_inf_nan=False)]
 Geometry = Literal["continuous", "published"]
 Undetected = Literal["censored", "zero", "dropped"]
 
 
-class _Frozen(BaseModel):
-    model_config = ConfigDict(frozen=True, extra="forbid", strict=False)
-
-
-class QuantityValue(_Frozen):
-    """A number with its unit, and its standard deviation where it is known."""
-
-    value: Finite
-    unit: str
-    sd: Positive | None = None
-
-    def to(self, dimension: str) -> float:
-        """Value in the internal unit of a kind of quantity."""
-        return self.value * conversion_factor(self.unit, dimension)
-
-    def sd_to(self, dimension: str) -> float | None:
-        """Standard deviation in the internal unit."""
-        return None if self.sd is None else self.sd * conversion_factor(self.unit, dimension)
-
-
-class LogNormalPrior(_Frozen):
-    """Positive, known to a factor."""
-
-    median: Positive
-    log_sd: Positive
-
-
-class NormalPrior(_Frozen):
-    """Of either sign."""
-
-    mean: Finite
-    sd: Positive
-
-
-class HalfNormalPrior(_Frozen):
-    """A scale."""
-
-    sd: Positive
-
-
-class UniformPrior(_Frozen):
-    """Between limits."""
-
-    low: Finite
-    high: Finite
-
-    @model_validator(mode="after")
-    def _ordered(self) -> "UniformPrior":
-        if not self.low < self.high:
-            raise ValueError("low must be below high")
-        return self
-
-
-class PriorChoice(_Frozen):
-    """Exactly one kind of prior."""
-
-    lognormal: LogNormalPrior | None = None
-    normal: NormalPrior | None = None
-    half_normal: HalfNormalPrior | None = None
-    uniform: UniformPrior | None = None
-
-    @model_validator(mode="after")
-    def _one(self) -> "PriorChoice":
-        if len(self.model_fields_set) != 1:
-            raise ValueError("write exactly one of lognormal, normal, half_normal, uniform")
-        return self
-
-
-class Measured(_Frozen):
-    """A value measured separately, with its standard deviation; a Normal cut off at 0."""
-
-    value: NonNegative
-    sd: Positive
-
-
-class ParameterSetting(_Frozen):
-    """What the user says of one parameter: measured separately, another prior, or fixed. Numbers in the shown unit."""
-
-    measured: Measured | None = None
-    prior: PriorChoice | None = None
-    fixed: Finite | None = None
-
-    @model_validator(mode="after")
-    def _one(self) -> "ParameterSetting":
-        if len(self.model_fields_set) != 1:
-            raise ValueError("write exactly one of measured, prior, fixed")
-        return self
-
-
-class FrictionSetting(ParameterSetting):
-    """The same for a friction coefficient, which cannot be negative."""
-
-    fixed: NonNegative | None = None
-
-
-class Route(_Frozen):
+class Route(Frozen):
     """What the design question varies: a column of the tables, and where the angle curves hold."""
 
     variable: str = "cable_length"
@@ -143,7 +101,7 @@ class Route(_Frozen):
         return f"{self.variable.replace('_', ' ').capitalize()} ({self.unit})"
 
 
-class WrapAngle(_Frozen):
+class WrapAngle(Frozen):
     """Where a contact's wrap angle comes from: a curve through the angle table, each row, or a constant."""
 
     curve: str | None = None
@@ -178,7 +136,7 @@ class WrapAngle(_Frozen):
         return QuantityValue(value=self.value, unit=self.unit, sd=self.sd)
 
 
-class Contact(_Frozen):
+class Contact(Frozen):
     """One place where rope rubs."""
 
     name: str
@@ -187,19 +145,12 @@ class Contact(_Frozen):
     wrap_angle: WrapAngle
 
 
-class ColumnMap(_Frozen):
-    """Where a quantity stands in a file."""
-
-    name: str
-    unit: str | None = None
-
-
-class Table(_Frozen):
+class Table(Frozen):
     """One table: its file or files, and columns that do not carry the usual names."""
 
     file: str | None = None
     files: str | tuple[str, ...] | None = None
-    columns: dict[str, ColumnMap] = {}
+    columns: dict[str, ColumnMap] = Field(default_factory=dict)
 
     @model_validator(mode="after")
     def _one_source(self) -> "Table":
@@ -215,85 +166,7 @@ class AngleTableSettings(Table):
     undetected: Undetected = "censored"
 
 
-class ForceLimits(_Frozen):
-    """The ends of a load cell's range."""
-
-    low: Finite
-    high: Finite
-    unit: str
-
-
-class Preparation(_Frozen):
-    """How recordings are prepared; every step can be switched.
-
-    `tare` is "fitted" where the offsets of the load cells are parameters; `saturation` is "censored" where a reading at
-    the end of the range counts as one beyond it, which only whole recordings can use.
-    """
-
-    tare: Literal["none", "interval", "fitted"] = "none"
-    quiet: tuple[Finite, Finite] | None = None
-    delay: Literal["estimated", "none"] | QuantityValue = "estimated"
-    saturation: Literal["left out", "censored", "kept"] = "left out"
-    limits: ForceLimits | None = None
-    dropouts: bool = True
-    spikes: bool = True
-    block: Literal["auto", "none"] | QuantityValue = "auto"
-
-    @model_validator(mode="after")
-    def _quiet_known(self) -> "Preparation":
-        if self.tare == "interval" and self.quiet is None:
-            raise ValueError('tare = "interval" needs quiet = [start, end], in seconds, when no load was on the cable')
-        if self.quiet is not None and not self.quiet[0] < self.quiet[1]:
-            raise ValueError("quiet must be [start, end], in seconds")
-        return self
-
-
-class Phase(_Frozen):
-    """A stretch of a recording whose stroke the user sets by hand, in seconds."""
-
-    start: Finite
-    end: Finite
-    stroke: Literal["pull", "return", "hold", "ignore"]
-
-    @model_validator(mode="after")
-    def _ordered(self) -> "Phase":
-        if not self.start < self.end:
-            raise ValueError("a phase must start before it ends")
-        return self
-
-
-class RecordingFile(_Frozen):
-    """One recording: its file, what it was made at, and what its channels are called.
-
-    `where` picks the rows of a file that holds several recordings one below the other, such as { run = 3 }.
-    """
-
-    file: str
-    name: str | None = None
-    run: str | None = None
-    at: Finite | None = None
-    wrap_angles: dict[str, QuantityValue] = {}
-    velocity: QuantityValue | None = None
-    channels: dict[str, ColumnMap] = {}
-    where: dict[str, Finite] = {}
-    prepare: Preparation | None = None
-    strokes: tuple[Phase, ...] = ()
-
-
-class RecordingsTable(_Frozen):
-    """Recordings that share their channels' names and their preparation.
-
-    `pattern` reads what a file was recorded at from its name, such as "{at}mm_{velocity:r/min}rpm".
-    """
-
-    files: str | tuple[str, ...] | None = None
-    pattern: str | None = None
-    channels: dict[str, ColumnMap] = {}
-    likelihood: Literal["runs", "whole"] = "runs"
-    prepare: Preparation = Preparation()
-
-
-class Tables(_Frozen):
+class Tables(Frozen):
     """The tables of a data set."""
 
     angles: AngleTableSettings | None = None
@@ -308,7 +181,7 @@ class Tables(_Frozen):
         return self
 
 
-class Sensors(_Frozen):
+class Sensors(Frozen):
     """What the data sheets of the load cells say."""
 
     force_noise: QuantityValue | None = None
@@ -316,7 +189,7 @@ class Sensors(_Frozen):
     offset_sd: QuantityValue | None = None
 
 
-class SamplerSettings(_Frozen):
+class SamplerSettings(Frozen):
     """How long and how carefully the posterior is sampled."""
 
     n_ensembles: Annotated[int, Field(ge=2)] = 4
@@ -326,7 +199,7 @@ class SamplerSettings(_Frozen):
     target_ess: Annotated[int, Field(ge=100)] = 1000
 
 
-class PriorDefaults(_Frozen):
+class PriorDefaults(Frozen):
     """The weak priors of everything the user says nothing of; angles in degrees, forces in N."""
 
     friction: LogNormalPrior = LogNormalPrior(median=0.12, log_sd=0.7)
@@ -345,7 +218,7 @@ class PriorDefaults(_Frozen):
     stribeck_speed_log_sd: Positive = 1.0
 
 
-class Description(_Frozen):
+class Description(Frozen):
     """Everything said about a cable and its measurements, defaults filled in."""
 
     schema_: Annotated[int, Field(alias="schema", ge=1, le=SCHEMA)] = SCHEMA
@@ -358,8 +231,8 @@ class Description(_Frozen):
     reference_velocity: QuantityValue | None = None
     route: Route | None = None
     contact: Annotated[tuple[Contact, ...], Field(min_length=1)]
-    friction: dict[str, FrictionSetting] = {}
-    prior: dict[str, ParameterSetting] = {}
+    friction: dict[str, FrictionSetting] = Field(default_factory=dict)
+    prior: dict[str, ParameterSetting] = Field(default_factory=dict)
     tables: Tables
     recording: tuple[RecordingFile, ...] = ()
     sensors: Sensors = Sensors()

@@ -1,0 +1,108 @@
+"""Values of a description: quantities with units, priors, and what may be said of one parameter."""
+
+from typing import Annotated
+
+from pydantic import BaseModel, ConfigDict, Field, model_validator
+
+from bowdenfit.measurements.units import conversion_factor
+
+Positive = Annotated[float, Field(gt=0, allow_inf_nan=False)]
+NonNegative = Annotated[float, Field(ge=0, allow_inf_nan=False)]
+Finite = Annotated[float, Field(allow_inf_nan=False)]
+
+
+class Frozen(BaseModel):
+    """Base of all parts: immutable, and strict about names."""
+
+    model_config = ConfigDict(frozen=True, extra="forbid", strict=False)
+
+
+class QuantityValue(Frozen):
+    """A number with its unit, and its standard deviation where it is known."""
+
+    value: Finite
+    unit: str
+    sd: Positive | None = None
+
+    def to(self, dimension: str) -> float:
+        """Value in the internal unit of a kind of quantity."""
+        return self.value * conversion_factor(self.unit, dimension)
+
+    def sd_to(self, dimension: str) -> float | None:
+        """Standard deviation in the internal unit."""
+        return None if self.sd is None else self.sd * conversion_factor(self.unit, dimension)
+
+
+class LogNormalPrior(Frozen):
+    """Positive, known to a factor."""
+
+    median: Positive
+    log_sd: Positive
+
+
+class NormalPrior(Frozen):
+    """Of either sign."""
+
+    mean: Finite
+    sd: Positive
+
+
+class HalfNormalPrior(Frozen):
+    """A scale."""
+
+    sd: Positive
+
+
+class UniformPrior(Frozen):
+    """Between limits."""
+
+    low: Finite
+    high: Finite
+
+    @model_validator(mode="after")
+    def _ordered(self) -> "UniformPrior":
+        if not self.low < self.high:
+            raise ValueError("low must be below high")
+        return self
+
+
+class PriorChoice(Frozen):
+    """Exactly one kind of prior."""
+
+    lognormal: LogNormalPrior | None = None
+    normal: NormalPrior | None = None
+    half_normal: HalfNormalPrior | None = None
+    uniform: UniformPrior | None = None
+
+    @model_validator(mode="after")
+    def _one(self) -> "PriorChoice":
+        if len(self.model_fields_set) != 1:
+            raise ValueError("write exactly one of lognormal, normal, half_normal, uniform")
+        return self
+
+
+class Measured(Frozen):
+    """A value measured separately, with its standard deviation; a Normal cut off at 0."""
+
+    value: NonNegative
+    sd: Positive
+
+
+class ParameterSetting(Frozen):
+    """What the user says of one parameter: measured separately, another prior, or fixed. Numbers in the shown unit."""
+
+    measured: Measured | None = None
+    prior: PriorChoice | None = None
+    fixed: Finite | None = None
+
+    @model_validator(mode="after")
+    def _one(self) -> "ParameterSetting":
+        if len(self.model_fields_set) != 1:
+            raise ValueError("write exactly one of measured, prior, fixed")
+        return self
+
+
+class FrictionSetting(ParameterSetting):
+    """The same for a friction coefficient, which cannot be negative."""
+
+    fixed: NonNegative | None = None

@@ -211,7 +211,10 @@ def test_a_table_alone_needs_its_wrap_angle(run, tmp_path):
     table.write_text(
         "input_force_N,output_force_N\n" + "\n".join(f"{f},{f * 0.8:.3f}" for f in range(10, 60, 5)) + "\n"
     )
-    code, _, err = run("check", table)
+    code, out, _ = run("check", table)
+    assert code == 0
+    assert "--wrap-angle" in out
+    code, _, err = run("fit", table)
     assert code == 2
     assert "--wrap-angle" in err
     fit = bf.fit(table, wrap_angle=(180.0, "deg"), settings=(), mcmc=False)
@@ -241,15 +244,10 @@ def test_a_whole_fit_in_a_process_of_its_own_and_an_interrupt(on_body, tmp_path)
     ]
     settings = [f"--set={key}" for key in (*QUICK, "sampler.target_ess=100000", "sampler.max_steps=200000")]
     environment = os.environ | {"XDG_CACHE_HOME": str(tmp_path / "cache")}
-    # A shell that runs the tests in the background makes its children deaf to interrupts.
-    process = subprocess.Popen(
-        command + settings,
-        cwd=ROOT,
-        env=environment,
-        stderr=subprocess.PIPE,
-        text=True,
-        preexec_fn=lambda: signal.signal(signal.SIGINT, signal.default_int_handler),
-    )
+    # A shell that runs the tests in the background makes its children deaf to interrupts; this one hears again.
+    hear = "import os, signal, sys; signal.signal(signal.SIGINT, signal.SIG_DFL); os.execv(sys.argv[1], sys.argv[1:])"
+    listening = [sys.executable, "-c", hear, *command, *settings]
+    process = subprocess.Popen(listening, cwd=ROOT, env=environment, stderr=subprocess.PIPE, text=True)
     checkpoint, deadline = tmp_path / "fit" / "chain.h5", time.monotonic() + 120
     while time.monotonic() < deadline and not (checkpoint.exists() and checkpoint.stat().st_size > 500_000):
         time.sleep(0.2)

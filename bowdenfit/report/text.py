@@ -2,6 +2,7 @@
 
 from typing import Any
 
+from bowdenfit.models.build import EFFICIENCY_TERMS
 from bowdenfit.models.scatter import RUN_SCATTER
 from bowdenfit.report.layout import filled, listed, table
 from bowdenfit.report.recordings import recordings_text
@@ -149,7 +150,7 @@ def _curves(fit: Fit, page: dict[str, Any]) -> str:
 
 
 def _scatter(page: dict[str, Any]) -> str:
-    units = {"wrap_angle": "deg", "efficiency": "% of the force", "run_efficiency": "% of the force"}
+    units = {"wrap_angle": "deg"} | dict.fromkeys(EFFICIENCY_TERMS, "% of the force")
     parts = []
     for term, sd in page["least_squares"]["residual_sd"].items():
         if sd is not None and term in units:

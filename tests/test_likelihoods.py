@@ -376,3 +376,11 @@ def test_ten_thousand_draws_of_the_prior_give_finite_densities_and_plausible_eff
     assert np.mean(drawn.max(axis=1) > 0.05) > 0.98
     assert np.mean(drawn[:, 10] > 0.05) > 0.94  # in the middle of the range
     assert np.mean(drawn[:, [0, -1]] > 0.05) > 0.6  # at its ends
+
+
+def test_held_readings_alone_bound_the_coefficient_from_below_and_leave_the_rest_to_the_prior():
+    """Friction is at least what holds the load; above that, twice as much friction is as likely as ten times."""
+    at = [float(_held(VALUES | {"mu": mu})[1]) for mu in (0.02, 0.05, 0.2, 0.5, 1.0)]
+    assert at[0] < at[1] < at[2] - 1.0
+    assert at[2] == pytest.approx(0.0, abs=1e-6)
+    assert at[3] == pytest.approx(at[4], abs=1e-9)

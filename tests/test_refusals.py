@@ -210,3 +210,12 @@ def test_a_coefficient_of_no_contact_is_refused_with_the_nearest_name():
     }
     with pytest.raises(DescriptionError, match="did you mean 'mu'"):
         parse_description(raw)
+
+
+def test_held_readings_are_said_to_be_bounds(tmp_path):
+    from bowdenfit.measurements.reading import read_forces
+
+    path = tmp_path / "held.csv"
+    path.write_text("input_force_N,output_force_N,stroke,run\n50,40,hold,1\n50,45,hold,1\n50,35,pull,1\n")
+    _, remarks = read_forces([path], None, ())
+    assert any("2 readings are held" in remark and "lower bound" in remark for remark in remarks)

@@ -245,6 +245,11 @@ def _read_force_file(
         )
     run, run_names = _runs(found.get("run"), route_values, own)
     strokes, origin = _strokes(found, len(table.rows)), _provenance(table)
+    if held := int(np.sum(strokes == 0)):
+        remarks.append(
+            f"{table.file}: {held} readings are held. A held reading says only that friction is at least as large as it takes "
+            "to hold it; a coefficient that rests on such readings alone has a lower bound, and above it nothing but its prior."
+        )
     velocity, unit = _velocities(found.get("velocity"), len(table.rows))
     parts = (route_values, input_force, output_force, run, run_names, strokes, own, origin, velocity, unit)
     return ForceTable(*parts), remarks

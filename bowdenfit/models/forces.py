@@ -25,7 +25,9 @@ class HeldForcesTerm:
               \quad r = g(F_\text{in}) - g(F_\text{out}), \quad
               s^2 = \tau^2 + \sigma_F^2 (g'(F_\text{in})^2 + g'(F_\text{out})^2)
 
-    with g the scale on which friction is a shift, log F for the capstan equation.
+    with g the scale on which friction is a shift, log F for the capstan equation. It is a bound, not a measurement: where
+    inside the band a force comes to rest is not modeled, so a coefficient that rests on held readings alone has a posterior
+    that is its prior above the largest of them, and its intervals must not be read as those of a measured value.
 
     Args:
         cable: The cable.

@@ -26,12 +26,12 @@ from bowdenfit.plots.style import (
 if TYPE_CHECKING:
     from bowdenfit.results.figure_data import FigureData, ParameterDraws
 
-ROLES = ("friction", "angle", "sensor")
+ROLES = ("friction", "friction_model", "angle", "sensor")
 MOST_COLUMNS = 3
 
 
 def shown_coefficients(data: "FigureData") -> list["ParameterDraws"]:
-    """The parameters with draws that belong to friction, constant angles or sensors, in this order."""
+    """The parameters with draws that belong to friction, constant angles or sensors."""
     return [p for role in ROLES for p in data.parameters if p.role == role and p.draws is not None]
 
 

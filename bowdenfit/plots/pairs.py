@@ -16,13 +16,13 @@ if TYPE_CHECKING:
 
 MOST = 8
 SHARE = 0.996  # of the draws, within the axes
-ROLES = ("friction", "noise", "angle", "sensor")
+ROLES = ("friction", "friction_model", "sensor", "noise", "angle")
 FILLS = {0.68: "#5E9FCB", 0.95: "#C3DCEE"}
 MARGIN, GAP, LARGEST = 0.62, 0.09, 1.45  # in
 
 
 def shown_quantities(data: "FigureData") -> list[Quantity]:
-    """Coefficients first, then noise, at most eight together with the optimum."""
+    """Coefficients first, what may be confounded with them next, then noise; at most eight together with the optimum."""
     answer = optimum(data)
     return sampled(data, ROLES)[: MOST - len(answer)] + answer
 

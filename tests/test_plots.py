@@ -7,8 +7,8 @@ import sys
 import matplotlib as mpl
 import numpy as np
 import pytest
+from figure_words import words
 from matplotlib.collections import PolyCollection
-from matplotlib.text import Text
 
 from bowdenfit.plots.densities import BINS, bin_numbers, density, enclosed_share
 from bowdenfit.plots.gallery import FIGURES, draw_all, write
@@ -154,23 +154,6 @@ def drawn(name, data=None):
 
 def line(axes, label):
     return next(artist for artist in axes.get_lines() if artist.get_label() == label)
-
-
-def words(figure):
-    """Every visible text of a figure, and its box on the page."""
-    figure.draw_without_rendering()
-    unseen = {label for axes in figure.axes for label in labels_out_of_view(axes)}
-    texts = [t for t in figure.findobj(Text) if t.get_visible() and t.get_text().strip() and t not in unseen]
-    return [(t.get_text(), t.get_window_extent()) for t in texts]
-
-
-def labels_out_of_view(axes):
-    """Tick labels that matplotlib keeps but does not draw."""
-    for axis in (axes.xaxis, axes.yaxis):
-        low, high = sorted(axis.get_view_interval())
-        for tick in (*axis.get_major_ticks(), *axis.get_minor_ticks()):
-            if not axes.axison or not low <= tick.get_loc() <= high:
-                yield tick.label1
 
 
 @pytest.mark.parametrize("case", APPLY)

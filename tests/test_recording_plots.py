@@ -5,7 +5,7 @@ import dataclasses
 import matplotlib as mpl
 import numpy as np
 import pytest
-from matplotlib.text import Text
+from figure_words import words
 
 from bowdenfit.plots.gallery import FIGURES, draw_all
 from bowdenfit.plots.recording_panels import extremes
@@ -131,23 +131,6 @@ def line(axes, label):
 
 def legend_of(figure):
     return [text.get_text() for legend in figure.legends for text in legend.get_texts()]
-
-
-def words(figure):
-    """Every visible text of a figure, and its box on the page."""
-    figure.draw_without_rendering()
-    unseen = {label for axes in figure.axes for label in labels_out_of_view(axes)}
-    texts = [t for t in figure.findobj(Text) if t.get_visible() and t.get_text().strip() and t not in unseen]
-    return [(t.get_text(), t.get_window_extent()) for t in texts]
-
-
-def labels_out_of_view(axes):
-    """Tick labels that matplotlib keeps but does not draw."""
-    for axis in (axes.xaxis, axes.yaxis):
-        low, high = sorted(axis.get_view_interval())
-        for tick in (*axis.get_major_ticks(), *axis.get_minor_ticks()):
-            if not low <= tick.get_loc() <= high:
-                yield tick.label1
 
 
 @pytest.mark.parametrize("case", CASES)

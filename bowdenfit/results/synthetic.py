@@ -43,19 +43,28 @@ class Bench:
     truth: Mapping[str, float]
 
 
+def plan_page(path: Path) -> tuple[str, dict[str, Any]]:
+    """A plan as text and as plain data.
+
+    Raises:
+        DescriptionError: The file is missing or no TOML.
+    """
+    try:
+        text = path.read_text(encoding="utf-8-sig")
+        return text, tomllib.loads(text)
+    except OSError as error:
+        raise DescriptionError(f"{path} cannot be read ({error.strerror}); name a bench.toml.") from None
+    except (tomllib.TOMLDecodeError, UnicodeDecodeError) as error:
+        raise DescriptionError(f"{path.name} is not valid TOML: {error}.") from None
+
+
 def read_bench(path: Path) -> Bench:
     """Read a plan.
 
     Raises:
         DescriptionError: The file is missing or no TOML, or a table or key in it is wrong.
     """
-    try:
-        text = path.read_text(encoding="utf-8-sig")
-        raw = tomllib.loads(text)
-    except OSError as error:
-        raise DescriptionError(f"{path} cannot be read ({error.strerror}); name a bench.toml.") from None
-    except tomllib.TOMLDecodeError as error:
-        raise DescriptionError(f"{path.name} is not valid TOML: {error}.") from None
+    text, raw = plan_page(path)
     if "design" not in raw:
         raise DescriptionError(
             f"{path.name} has no [design]: say where to measure, such as angles = [430, 440, 450], runs = [440, 470], "

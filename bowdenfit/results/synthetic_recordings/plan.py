@@ -1,6 +1,5 @@
 """A plan of recordings (`bench.toml` with [recordings]): reading it, and refusing what does not fit together."""
 
-import tomllib
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -12,6 +11,7 @@ from pydantic import ValidationError
 from bowdenfit.description import Description
 from bowdenfit.description_file import parse_description
 from bowdenfit.errors import DescriptionError, nearest
+from bowdenfit.results.synthetic import plan_page
 from bowdenfit.results.synthetic_recordings.page import Page, explained, with_reference_force
 from bowdenfit.results.synthetic_recordings.planned import PlannedRecording, planned_recordings
 
@@ -47,13 +47,7 @@ def read_recordings_plan(path: Path) -> RecordingsPlan:
     Raises:
         DescriptionError: The file is missing or no TOML, or a table or key in it is wrong.
     """
-    try:
-        text = path.read_text(encoding="utf-8-sig")
-        raw = tomllib.loads(text)
-    except OSError as error:
-        raise DescriptionError(f"{path} cannot be read ({error.strerror}); name a bench.toml.") from None
-    except (tomllib.TOMLDecodeError, UnicodeDecodeError) as error:
-        raise DescriptionError(f"{path.name} is not valid TOML: {error}.") from None
+    text, raw = plan_page(path)
     return parse_recordings_plan(raw, text, path.name)
 
 

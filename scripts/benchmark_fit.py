@@ -151,6 +151,11 @@ def family(pid: int) -> Iterator[int]:
         yield from family(child)
 
 
+def byte_code(folder: Path) -> dict[str, str]:
+    """Settings that let Python keep byte code, which some machines forbid; without it every start compiles the libraries."""
+    return {"PYTHONDONTWRITEBYTECODE": "", "PYTHONPYCACHEPREFIX": str(folder / "byte_code")}
+
+
 class Bench:
     """Runs of bowdenfit in one temporary folder, each by its name in the tables."""
 
@@ -287,6 +292,7 @@ def main() -> None:
     parser.add_argument("--repeats", type=int, default=3, metavar="N", help="fresh processes a number [default: 3]")
     repeats = max(parser.parse_args().repeats, 1)
     with tempfile.TemporaryDirectory() as folder:
+        os.environ.update(byte_code(Path(folder)))
         bench = Bench(Path(folder), repeats)
         bench.fits("fit")
         bench.fits("fit --no-mcmc", "--no-mcmc")

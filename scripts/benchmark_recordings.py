@@ -47,7 +47,7 @@ from typing import Any
 import jax
 import jax.numpy as jnp
 import numpy as np
-from benchmark_fit import BASELINES, ROOT, Run, measured, say, search_path, show, typical
+from benchmark_fit import BASELINES, ROOT, Run, byte_code, measured, say, search_path, show, typical
 
 import bowdenfit
 from bowdenfit.dataset import Dataset
@@ -113,8 +113,7 @@ class Simulated:
     @property
     def environment(self) -> dict[str, str]:
         """What measured processes share: neither byte code nor the list of fonts is a compiled program."""
-        byte_code = {"PYTHONDONTWRITEBYTECODE": "", "PYTHONPYCACHEPREFIX": str(self.folder / "byte_code")}
-        return byte_code | {"MPLCONFIGDIR": str(self.folder / "matplotlib"), "PYTHONPATH": search_path()}
+        return byte_code(self.folder) | {"MPLCONFIGDIR": str(self.folder / "matplotlib"), "PYTHONPATH": search_path()}
 
     @cached_property
     def one_file(self) -> tuple[Path, Path]:

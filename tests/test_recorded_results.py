@@ -291,3 +291,29 @@ def test_check_of_a_file_alone_lists_channels_and_what_it_is_as_a_recording(reco
     csv = str(recorded.parent / "yarn-on-cylinder" / "forces.csv")
     words = " ".join(CliRunner().invoke(command, ["check", csv]).output.split())
     assert "As a recording it cannot be used yet" in words
+
+
+def test_recordings_forces_efficiencies_and_angles_are_fitted_together(recorded, on_body, tmp_path):
+    import shutil
+
+    folder = tmp_path / "together"
+    shutil.copytree(recorded, folder)
+    shutil.copy(on_body / "efficiencies.csv", folder)
+    (folder / "forces.csv").write_text(
+        "cable_length_mm,run,stroke,input_force_N,output_force_N,velocity [r/min]\n"
+        "440,x,pull,50,38.2,20\n440,x,return,40,52.4,-20\n470,y,pull,60,47.3,20\n"
+    )
+    tables = 'efficiencies = { file = "efficiencies.csv" }\nforces = { file = "forces.csv" }\n[[recording]]'
+    text = (folder / "cable.toml").read_text()
+    (folder / "cable.toml").write_text(text.replace("[[recording]]", tables, 1))
+    together, alone = bf.fit(folder, mcmc=False), bf.fit(recorded, mcmc=False)
+    assert [t.name for t in together.model.terms] == [
+        "wrap_angle",
+        "efficiency",
+        "run_efficiency",
+        "recorded_efficiency",
+    ]
+    for name in ("mu1", "mu2", "mu3"):
+        joint, single = together.least_squares.estimates[name], alone.least_squares.estimates[name]
+        assert joint.standard_error < single.standard_error
+        assert abs(joint.value - single.value) < 2 * single.standard_error

@@ -156,7 +156,7 @@ def _scatter(page: dict[str, Any]) -> str:
         if sd is not None and term in units:
             value = f"{sd:.2f} {units[term]}" if term == "wrap_angle" else f"{100 * sd:.2f} {units[term]}"
             parts.append(f"{term.replace('_', ' ')} {value}")
-    return f"Residual standard deviation of least squares: {listed(parts)}." if parts else ""
+    return filled(f"Residual standard deviation of least squares: {listed(parts)}.") if parts else ""
 
 
 def _mountings(page: dict[str, Any]) -> str:

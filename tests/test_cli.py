@@ -1,5 +1,6 @@
 """The command line as people use it: verbs, output, exit codes."""
 
+import contextlib
 import json
 import os
 import re
@@ -9,11 +10,14 @@ import sys
 import time
 from pathlib import Path
 
+import click
 import numpy as np
 import pytest
 
 import bowdenfit as bf
 from bowdenfit import cli
+from bowdenfit.cli.watching import watched
+from bowdenfit.inference.ensemble import Progress
 
 ROOT = Path(__file__).parent.parent
 QUICK = ("sampler.n_walkers=128", "sampler.target_ess=200", "sampler.target_r_hat=1.05", "sampler.max_steps=4000")
@@ -229,6 +233,23 @@ def test_an_internal_error_is_a_sentence_with_a_request(run, monkeypatch, on_bod
     assert "Traceback" not in err
 
 
+def test_an_interrupt_that_the_garbage_collector_swallows_is_not_lost(tmp_path):
+    """Python drops exceptions of weak-reference callbacks, and an interrupt may arrive in one."""
+    (tmp_path / "chain.h5").touch()
+    before = {number: signal.getsignal(number) for number in (signal.SIGINT, signal.SIGTERM)}
+    signal.signal(signal.SIGINT, signal.default_int_handler)
+    try:
+        with pytest.raises(click.exceptions.Exit) as stopped, watched(tmp_path) as report:
+            report(Progress(200, 4000, None, None))
+            with contextlib.suppress(KeyboardInterrupt):
+                signal.raise_signal(signal.SIGINT)
+            report(Progress(400, 4000, None, None))
+    finally:
+        for number, handler in before.items():
+            signal.signal(number, handler)
+    assert stopped.value.exit_code == 130
+
+
 def test_a_whole_fit_in_a_process_of_its_own_and_an_interrupt(on_body, tmp_path):
     """The real thing once: a spawned command line that is interrupted, resumed, and finishes with figures."""
     command = [
@@ -247,12 +268,15 @@ def test_a_whole_fit_in_a_process_of_its_own_and_an_interrupt(on_body, tmp_path)
     # A shell that runs the tests in the background makes its children deaf to interrupts; this one hears again.
     hear = "import os, signal, sys; signal.signal(signal.SIGINT, signal.SIG_DFL); os.execv(sys.argv[1], sys.argv[1:])"
     listening = [sys.executable, "-c", hear, *command, *settings]
-    process = subprocess.Popen(listening, cwd=ROOT, env=environment, stderr=subprocess.PIPE, text=True)
-    checkpoint, deadline = tmp_path / "fit" / "chain.h5", time.monotonic() + 120
-    while time.monotonic() < deadline and not (checkpoint.exists() and checkpoint.stat().st_size > 500_000):
-        time.sleep(0.2)
-    process.send_signal(signal.SIGINT)
-    _, err = process.communicate(timeout=60)
+    with subprocess.Popen(listening, cwd=ROOT, env=environment, stderr=subprocess.PIPE, text=True) as process:
+        try:
+            checkpoint, deadline = tmp_path / "fit" / "chain.h5", time.monotonic() + 120
+            while time.monotonic() < deadline and not (checkpoint.exists() and checkpoint.stat().st_size > 500_000):
+                time.sleep(0.2)
+            process.send_signal(signal.SIGINT)
+            _, err = process.communicate(timeout=60)
+        finally:
+            process.kill()
     assert process.returncode == 130
     assert "--resume" in err
     assert "Traceback" not in err

@@ -1,0 +1,69 @@
+"""The command line: arguments in, exit code out."""
+
+import os
+import sys
+
+import click
+
+from bowdenfit.cli.data_sets import check, init, simulate
+from bowdenfit.cli.fitting import fit
+from bowdenfit.cli.results import compare, length, plot, predict, summary
+from bowdenfit.cli.watching import INTERRUPTED
+from bowdenfit.errors import BowdenfitError
+
+
+def main() -> None:
+    """Run the command line; every error the user can cause is a sentence and an exit code."""
+    try:
+        sys.exit(bowdenfit.main(standalone_mode=False) or 0)
+    except click.exceptions.Exit as stop:
+        sys.exit(stop.exit_code)
+    except click.ClickException as error:
+        error.show()
+        sys.exit(error.exit_code)
+    except BowdenfitError as error:
+        click.echo(f"Error: {error}", err=True)
+        sys.exit(error.exit_code)
+    except (click.Abort, KeyboardInterrupt):
+        click.echo("Interrupted.", err=True)
+        sys.exit(INTERRUPTED)
+    except BrokenPipeError:
+        os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
+        sys.exit(1)
+    except Exception as error:
+        if os.environ.get("BOWDENFIT_DEBUG"):
+            raise
+        click.echo(
+            f"Error: something went wrong inside bowdenfit ({type(error).__name__}: {error}). This is our fault: please "
+            "report it with what BOWDENFIT_DEBUG=1 prints when you run the command again.",
+            err=True,
+        )
+        sys.exit(1)
+
+
+@click.group(context_settings={"help_option_names": ["-h", "--help"], "max_content_width": 110})
+@click.version_option(package_name="bowdenfit", prog_name="bowdenfit")
+def bowdenfit() -> None:
+    """Friction coefficients of a Bowden cable from bench measurements, with honest uncertainty, and the cable length that
+    transmits force best.
+
+    Start with `bowdenfit init FOLDER`, fill in the files, `bowdenfit check FOLDER`, then `bowdenfit fit FOLDER`.
+
+    Exit codes: 0 done (a fit has converged); 1 failure; 2 bad usage or bad input; 3 the fit finished but must not be
+    trusted; 130 interrupted, with the checkpoint kept.
+    """
+
+
+@click.command(short_help="Print the shell completion script.")
+@click.argument("shell", type=click.Choice(["bash", "zsh", "fish"]))
+def completion(shell: str) -> None:
+    """Print the completion script for SHELL; for bash: eval "$(bowdenfit completion bash)"."""
+    from click.shell_completion import get_completion_class
+
+    script = get_completion_class(shell)
+    assert script is not None  # the three shells above have one
+    click.echo(script(bowdenfit, {}, "bowdenfit", "_BOWDENFIT_COMPLETE").source())
+
+
+for verb in (init, check, fit, summary, predict, length, compare, plot, simulate, completion):
+    bowdenfit.add_command(verb)

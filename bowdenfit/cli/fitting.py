@@ -1,0 +1,63 @@
+"""The verb that fits."""
+
+from pathlib import Path
+from typing import Any
+
+import click
+
+from bowdenfit.cli.options import reading, reading_options
+from bowdenfit.cli.results import show
+from bowdenfit.cli.watching import watched
+
+NOT_TRUSTED = 3
+
+
+@click.command(short_help="Fit a data set: coefficients, uncertainty, design answer, figures.")
+@click.argument("dataset", type=click.Path(path_type=Path))
+@reading_options
+@click.option(
+    "--output", "-o", type=click.Path(path_type=Path), help="Results folder.  [default: fits/NAME OF DATASET]"
+)
+@click.option("--mcmc/--no-mcmc", default=True, help="Sample the posterior; without it there are no intervals.")
+@click.option("--figures/--no-figures", default=True, help="Draw the figures.")
+@click.option(
+    "--seed", type=click.IntRange(0, 2**31 - 1), help="Seed of everything random.  [default: drawn, and recorded]"
+)
+@click.option("--resume", is_flag=True, help="Go on with an interrupted or unconverged fit; refuses changed inputs.")
+@click.option("--force", is_flag=True, help="Replace an earlier fit in the results folder.")
+@click.option("--json", "as_json", is_flag=True, help="Print summary.json instead of the summary for people.")
+def fit(
+    dataset: Path,
+    output: Path | None,
+    mcmc: bool,
+    figures: bool,
+    seed: int | None,
+    resume: bool,
+    force: bool,
+    as_json: bool,
+    **options: Any,
+) -> int:
+    """Fit DATASET: least squares, posterior, design answer, figures, all written to a results folder.
+
+    DATASET is a folder with cable.toml and tables, or one table or recording with --wrap-angle.
+    """
+    from bowdenfit import workflow
+
+    folder = output or Path("fits") / (dataset.stem if dataset.suffix else dataset.resolve().name)
+    with watched(folder) as progress:
+        found = workflow.fit(
+            dataset,
+            output=folder,
+            mcmc=mcmc,
+            seed=seed,
+            resume=resume,
+            force=force,
+            figures=figures,
+            in_background=True,
+            progress=progress,
+            remember_compilations=True,
+            **reading(**options),
+        )
+    show(found, as_json)
+    click.echo(f"Wrote {folder}.", err=True)
+    return 0 if found.converged else NOT_TRUSTED

@@ -1,0 +1,126 @@
+"""Verbs after a fit: summary, predictions, the design answer, comparison, figures."""
+
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+import click
+
+from bowdenfit.cli.options import quantity
+
+if TYPE_CHECKING:
+    from bowdenfit.results.fit import Fit
+
+
+@click.command(short_help="Print the summary of a fit.")
+@click.argument("results", type=click.Path(path_type=Path))
+@click.option("--json", "as_json", is_flag=True, help="Print summary.json instead of the summary for people.")
+def summary(results: Path, as_json: bool) -> None:
+    """Print the summary of a finished fit."""
+    name = "summary.json" if as_json else "summary.txt"
+    if (results / "fit.json").exists() and (results / name).exists():
+        click.echo((results / name).read_text(encoding="utf-8"), nl=False)
+    else:
+        show(load(results), as_json)
+
+
+@click.command(short_help="Predict efficiency or output force at lengths.")
+@click.argument("results", type=click.Path(path_type=Path))
+@click.argument("lengths", type=float, nargs=-1)
+@click.option("--input-force", metavar="FORCE", help="Predict the output force for this input force, such as 100N.")
+@click.option(
+    "--stroke", type=click.Choice(["pull", "return"]), default="pull", show_default=True, help="Direction of sliding."
+)
+@click.option("--format", "form", type=click.Choice(["csv", "json"]), default="csv", show_default=True)
+def predict(results: Path, lengths: tuple[float, ...], input_force: str | None, stroke: str, form: str) -> None:
+    """Predict the efficiency, or the output force for an input force, at LENGTHS (default: the lengths that can be bought).
+
+    The interval q05 to q95 is that of the cable's mean; mounting_q05 to mounting_q95 also holds the scatter from one
+    mounting of the cable to the next. Lengths outside the range of the curves are marked.
+    """
+    from bowdenfit.workflow import predict as predicted
+
+    force = quantity(input_force, "--input-force", "100N") if input_force else None
+    rows = predicted(load(results), lengths or None, force, stroke)
+    if form == "json":
+        import json
+
+        click.echo(json.dumps(rows, indent=1))
+    else:
+        click.echo(",".join(rows[0]))
+        for row in rows:
+            click.echo(",".join(f"{v:.6g}" if isinstance(v, float) else str(v).lower() for v in row.values()))
+
+
+@click.command(short_help="The design answer: which length is best.")
+@click.argument("results", type=click.Path(path_type=Path))
+@click.option("--json", "as_json", is_flag=True, help="Print as JSON.")
+def length(results: Path, as_json: bool) -> None:
+    """The design answer: which length is best, how sure that is, and what the lengths that can be bought cost."""
+    found = load(results)
+    answer = found.optimal_length()
+    if as_json:
+        import json
+
+        click.echo(json.dumps(found.summary()["optimal"], indent=1))
+    else:
+        click.echo(str(answer))
+    if not found.converged:
+        click.echo("Warning: this fit has not converged; do not use these numbers.", err=True)
+
+
+@click.command(short_help="Compare fits of the same measurements.")
+@click.argument("results", type=click.Path(path_type=Path), nargs=-1)
+@click.option("--json", "as_json", is_flag=True, help="Print as JSON.")
+def compare(results: tuple[Path, ...], as_json: bool) -> None:
+    """Compare fits of the same measurements: which model predicts readings left out best, and what changes between them.
+
+    RESULTS are results folders, such as of the same data set fitted with and without --friction rate-dependent; then the
+    comparison says whether efficiency depends on speed.
+    """
+    from bowdenfit import workflow
+    from bowdenfit.report.compare import comparison_text
+
+    found = workflow.compare({_short(folder, results): load(folder) for folder in results})
+    if as_json:
+        import json
+
+        click.echo(json.dumps(found.page(), indent=1))
+    else:
+        click.echo(comparison_text(found), nl=False)
+
+
+def _short(folder: Path, others: tuple[Path, ...]) -> str:
+    """A results folder's own name, or its path where two have the same name."""
+    return folder.name if [other.name for other in others].count(folder.name) == 1 else str(folder)
+
+
+@click.command(short_help="Draw the figures of a fit again.")
+@click.argument("results", type=click.Path(path_type=Path))
+@click.option(
+    "--output", "-o", type=click.Path(path_type=Path), help="Folder for the figures.  [default: RESULTS/figures]"
+)
+def plot(results: Path, output: Path | None) -> None:
+    """Draw the figures of a finished fit again, as PNG and SVG."""
+    from bowdenfit.workflow import plot as draw
+
+    for path in draw(load(results), output or results / "figures"):
+        click.echo(path)
+
+
+def load(results: Path) -> "Fit":
+    """A finished fit."""
+    from bowdenfit.workflow import load
+
+    return load(results)
+
+
+def show(found: "Fit", as_json: bool) -> None:
+    """Print the summary, for people or as JSON."""
+    if as_json:
+        import json
+
+        click.echo(json.dumps(found.summary(), indent=1))
+    else:
+        from bowdenfit.report.text import summary_text
+
+        click.echo(summary_text(found), nl=False)

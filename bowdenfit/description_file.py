@@ -67,6 +67,9 @@ def _check_units(description: Description, file: str) -> None:
     quantities.append(("sensors, force_noise", description.sensors.force_noise, "force"))
     quantities.append(("sensors, offset_sd", description.sensors.offset_sd, "force"))
     quantities.append(("reference_force", description.reference_force, "force"))
+    quantities += [(f"cable, {name}", length, "length") for name, length in description.cable.lengths.items()]
+    quantities.append(("preload, wrap_angle", description.preload.wrap_angle, "angle"))
+    quantities.append(("preload, value", description.preload.value, "force"))
     quantities += _recording_quantities(description)
     if description.tables.angles:
         quantities.append(("tables, angles, detection_limit", description.tables.angles.detection_limit, "angle"))
@@ -77,6 +80,13 @@ def _check_units(description: Description, file: str) -> None:
             quantity.to(dimension)
         except DatasetError as error:
             raise DescriptionError(f"{file}, {where}: {error}.") from None
+        if dimension == "length" and not quantity.value > 0:
+            raise DescriptionError(f"{file}, {where}: {quantity.value:g} {quantity.unit} is not positive.")
+        if where == "preload, value" and quantity.value < 0:
+            raise DescriptionError(
+                f"{file}, {where}: {quantity.value:g} {quantity.unit} is negative; a rope cannot be pushed, so write 0 for a "
+                "slack rope."
+            )
         if dimension == "angle" and not 0 <= quantity.to("angle") <= 34.91:
             raise DescriptionError(
                 f"{file}, {where}: {quantity.value:g} {quantity.unit} is not between 0 and 2000 deg."

@@ -8,14 +8,15 @@ from functools import partial
 from itertools import islice
 from pathlib import Path
 
-import numpy as np
-
-from bowdenfit.description import Contact, Description, Table
+from bowdenfit.dataset.checks import check_measurements
+from bowdenfit.description import Description, Table
 from bowdenfit.description_file import load_description, overridden, parse_description
 from bowdenfit.errors import DatasetError, DescriptionError
 from bowdenfit.measurements.columns import ColumnSource
-from bowdenfit.measurements.reading import Route, read_angles, read_efficiencies, read_forces
-from bowdenfit.measurements.tables import EfficiencyTable, ForceTable, Measurements
+from bowdenfit.measurements.elastic_tables import read_loop, read_preload, read_stretch
+from bowdenfit.measurements.reading import read_angles, read_efficiencies, read_forces
+from bowdenfit.measurements.rows import Route
+from bowdenfit.measurements.tables import Measurements
 
 DESCRIPTION_FILE = "cable.toml"
 
@@ -168,9 +169,38 @@ def read_dataset(
         remarks += [remark for r in recordings.each for remark in (*r.account.remarks, *r.strokes.remarks)]
     elif channels:
         raise DescriptionError("--channel names channels of recordings, but the data set has none.")
-    measurements = Measurements(angles, efficiencies, forces, recordings, tuple(remarks))
-    _check(description, measurements)
+    elastic, read, more = _elastic_tables(description, folder, route)
+    checksums |= {path.name: _sha256(path) for path in read}
+    measurements = Measurements(
+        angles, efficiencies, forces, recordings, elastic.stretch, elastic.preload, elastic.loop, (*remarks, *more)
+    )
+    check_measurements(description, measurements)
     return Dataset(description, measurements, checksums)
+
+
+def _elastic_tables(
+    description: Description, folder: Path, route: Route | None
+) -> tuple[Measurements, list[Path], list[str]]:
+    """Tables of stretch, preload and a loop; the files that were read; remarks."""
+    tables = description.tables
+    read: list[Path] = []
+    remarks: list[str] = []
+    stretch = preload = loop = None
+    if tables.stretch is not None:
+        read += _paths(tables.stretch, folder, "stretch", one=True)
+        stretch, more = read_stretch(read[-1], _sources(tables.stretch))
+        remarks += more
+    if tables.preload is not None:
+        read += _paths(tables.preload, folder, "preload", one=True)
+        preload = read_preload(read[-1], _sources(tables.preload))
+    if tables.loop is not None:
+        read += _paths(tables.loop, folder, "loop", one=True)
+        pulleys = description.cable.input_pulley_radius, description.cable.output_pulley_radius
+        input_radius, output_radius = (None if radius is None else radius.to("length") for radius in pulleys)
+        columns = description.angle_columns
+        loop, more = read_loop(read[-1], route, columns, (input_radius, output_radius), _sources(tables.loop))
+        remarks += more
+    return Measurements(stretch=stretch, preload=preload, loop=loop), read, remarks
 
 
 def _paths(table: Table, folder: Path, kind: str, one: bool = False) -> list[Path]:
@@ -196,45 +226,3 @@ def _sources(table: Table) -> dict[str, ColumnSource]:
 def _sha256(path: Path) -> str:
     with path.open("rb") as file:
         return hashlib.file_digest(file, "sha256").hexdigest()
-
-
-def _check(description: Description, measurements: Measurements) -> None:
-    """Every row of every table can be given a wrap angle in every contact."""
-    for table in (measurements.efficiencies, measurements.forces):
-        if table is None:
-            continue
-        for contact in description.contact:
-            if contact.wrap_angle.constant is None:
-                _check_contact(description, measurements, contact, table)
-
-
-def _check_contact(
-    description: Description, measurements: Measurements, contact: Contact, table: EfficiencyTable | ForceTable
-) -> None:
-    column = contact.wrap_angle.column or ""
-    own, _ = table.own.column(column)
-    if not contact.wrap_angle.curve:
-        missing = np.flatnonzero(np.isnan(own))
-        if len(missing) == len(own):
-            raise DatasetError(
-                f"{table.origin.files[0]} has no column {column!r}, the wrap angle of the contact {contact.name!r}; "
-                f"add it (as {column}_deg), or give the contact a constant angle or a curve in cable.toml."
-            )
-        if len(missing):
-            raise DatasetError(
-                f"{table.origin.place(int(missing[0]))}, column {column!r}: the cell is blank, but the contact "
-                f"{contact.name!r} has no curve that could stand in for it; fill in the measured angle."
-            )
-        return
-    route = description.route
-    assert route is not None and measurements.angles is not None  # the description guarantees both
-    outside = np.isnan(own) & ((table.route < route.range[0]) | (table.route > route.range[1]))
-    for i in np.flatnonzero(outside):
-        at = np.flatnonzero(measurements.angles.route == table.route[i])
-        if not len(at):
-            raise DatasetError(
-                f"{table.origin.place(int(i))}, column {route.variable!r}: {table.route[i]:g} {route.unit} lies outside "
-                f"the range {route.range[0]:g} to {route.range[1]:g} {route.unit} where the angle curves hold, and the "
-                f"angle table has no row there; measure the wrap angles at that {route.variable.replace('_', ' ')}, "
-                "or write them into this row."
-            )

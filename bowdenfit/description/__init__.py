@@ -4,6 +4,7 @@ from typing import Annotated, Any, Literal
 
 from pydantic import ConfigDict, Field, field_validator, model_validator
 
+from bowdenfit.description.elastic import CableSettings, PreloadSettings, StretchSettings
 from bowdenfit.description.recordings import (
     ColumnMap,
     ForceLimits,
@@ -32,6 +33,7 @@ from bowdenfit.errors import nearest
 __all__ = [
     "SCHEMA",
     "AngleTableSettings",
+    "CableSettings",
     "ColumnMap",
     "Contact",
     "Description",
@@ -47,6 +49,7 @@ __all__ = [
     "ParameterSetting",
     "Phase",
     "Positive",
+    "PreloadSettings",
     "Preparation",
     "PriorChoice",
     "PriorDefaults",
@@ -56,6 +59,7 @@ __all__ = [
     "Route",
     "SamplerSettings",
     "Sensors",
+    "StretchSettings",
     "Table",
     "Tables",
     "Undetected",
@@ -173,6 +177,9 @@ class Tables(Frozen):
     efficiencies: Table | None = None
     forces: Table | None = None
     recordings: RecordingsTable | None = None
+    stretch: Table | None = None
+    preload: Table | None = None
+    loop: Table | None = None
 
     @model_validator(mode="after")
     def _some(self) -> "Tables":
@@ -216,6 +223,14 @@ class PriorDefaults(Frozen):
     stribeck: Positive = 0.3
     viscous_at_highest_speed: Positive = 0.5
     stribeck_speed_log_sd: Positive = 1.0
+    stiffness: LogNormalPrior = LogNormalPrior(median=50.0, log_sd=1.5)
+    bedding_stretch_mm: Positive = 2.0
+    bedding_load: LogNormalPrior = LogNormalPrior(median=20.0, log_sd=1.0)
+    lengthening_mm_per_radian: Positive = 1.0
+    stretch_zero_mm: Positive = 5.0
+    preload: LogNormalPrior = LogNormalPrior(median=20.0, log_sd=1.0)
+    stretch_noise_mm: Positive = 0.1
+    preload_noise_newtons: Positive = 2.0
 
 
 class Description(Frozen):
@@ -229,10 +244,13 @@ class Description(Frozen):
     friction_model: str = "capstan"
     reference_force: QuantityValue | None = None
     reference_velocity: QuantityValue | None = None
+    cable: CableSettings = CableSettings()
     route: Route | None = None
     contact: Annotated[tuple[Contact, ...], Field(min_length=1)]
     friction: dict[str, FrictionSetting] = Field(default_factory=dict)
     prior: dict[str, ParameterSetting] = Field(default_factory=dict)
+    stretch: StretchSettings = StretchSettings()
+    preload: PreloadSettings = PreloadSettings()
     tables: Tables
     recording: tuple[RecordingFile, ...] = ()
     sensors: Sensors = Sensors()
@@ -278,6 +296,15 @@ class Description(Frozen):
             raise ValueError(
                 'the table recordings names no file: write files = "recordings/*.csv", or a [[recording]] with its file'
             )
+        if self.stretch.friction is not None and self.stretch.friction not in used:
+            hint = nearest(self.stretch.friction, used)
+            raise ValueError(f"stretch.friction {self.stretch.friction!r} belongs to no contact{hint}")
+        if self.cable.kind != "loop" and self.tables.loop is not None:
+            raise ValueError('the table loop needs kind = "loop" under [cable]')
+        if self.cable.kind == "loop" and self.friction_model != "capstan":
+            raise ValueError(
+                'the equations of a loop hold for friction_model = "capstan" only; leave it out, or fit one rope alone'
+            )
         return self
 
     @property
@@ -285,6 +312,11 @@ class Description(Frozen):
         """Whether the load cells' offsets are parameters."""
         recordings = self.tables.recordings
         return self.sensors.offset_sd is not None or (recordings is not None and recordings.prepare.tare == "fitted")
+
+    @property
+    def preload_follows_stretch(self) -> bool:
+        """Whether preload depends on the wrap angle; so it does by default where a table says how."""
+        return (self.preload.model or ("stretch" if self.tables.preload is not None else "constant")) == "stretch"
 
     @property
     def coefficients(self) -> tuple[str, ...]:

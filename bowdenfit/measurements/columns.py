@@ -193,7 +193,9 @@ def _column(table: RawTable, heading: str, quantity: Quantity, unit: str | None)
 
 
 def _usual(dimension: str) -> str:
-    return {"force": "N", "angle": "deg", "length": "mm", "speed": "mm/s", "time": "s"}.get(dimension, "mm")
+    return {"force": "N", "angle": "deg", "length": "mm", "speed": "mm/s", "time": "s", "torque": "N_m"}.get(
+        dimension, "mm"
+    )
 
 
 def _check_sources(table: RawTable, known: list[str], sources: Mapping[str, ColumnSource]) -> None:

@@ -1,37 +1,29 @@
 """From files to tables: one function a kind of table, with every check that needs no description."""
 
-from collections.abc import Iterable, Mapping, Sequence
-from dataclasses import dataclass
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 
 import numpy as np
 
 from bowdenfit.errors import DatasetError
 from bowdenfit.measurements.columns import Column, ColumnSource, Quantity, find_columns, require
-from bowdenfit.measurements.readers import Cell, RawTable, read_csv
+from bowdenfit.measurements.readers import Cell, read_csv
+from bowdenfit.measurements.rows import (
+    LARGEST_ANGLE,
+    Route,
+    provenance_of,
+    read_angle,
+    read_own_angles,
+    read_route,
+    read_strokes,
+    rounded,
+    shared_columns,
+)
 from bowdenfit.measurements.tables import AngleTable, EfficiencyTable, ForceTable, OwnAngles, Provenance
 from bowdenfit.measurements.units import INTERNAL_UNITS, speed_dimension
 from bowdenfit.types import Labels, Vector
 
-LARGEST_ANGLE = float(np.deg2rad(2000.0)) * (1 + 1e-12)
-_STROKES = {
-    **dict.fromkeys(("pull", "pulling", "+1", "1", "+1.0", "1.0"), 1),
-    **dict.fromkeys(("return", "returning", "release", "-1", "-1.0"), -1),
-    **dict.fromkeys(("hold", "0", "0.0"), 0),
-}
 _UNUSED = ("time", "position")  # columns that a force table may have and that nothing reads
-
-
-@dataclass(frozen=True)
-class Route:
-    """The route variable as tables call it: column name and the unit to convert to."""
-
-    variable: str
-    unit: str
-
-    def quantity(self) -> Quantity:
-        """Its column."""
-        return Quantity(self.variable, "route", self.unit)
 
 
 def read_angles(
@@ -60,14 +52,14 @@ def read_angles(
     cells = [[_angle_or_limit(cell, c, detection_limit) for cell in c.cells] for c in columns]
     pairs = np.array(cells, dtype=float).reshape(len(columns), len(table.rows), 2)
     return AngleTable(
-        _rounded(route_column.numbers()), tuple(contacts), pairs[..., 0].T, pairs[..., 1].T, _provenance(table)
+        rounded(route_column.numbers()), tuple(contacts), pairs[..., 0].T, pairs[..., 1].T, provenance_of(table)
     )
 
 
 def _angle_or_limit(cell: Cell, column: Column, detection_limit: float | None) -> tuple[float, float]:
     written = cell.limit()
     if written is None and not cell.blank:
-        return _angle(cell, column), np.nan
+        return read_angle(cell, column), np.nan
     limit = written * column.factor if written is not None else detection_limit
     if limit is None:
         raise cell.refuse(
@@ -77,17 +69,6 @@ def _angle_or_limit(cell: Cell, column: Column, detection_limit: float | None) -
     if not 0 < limit <= LARGEST_ANGLE:
         raise cell.refuse(f"{cell.shown} is not a possible detection limit; write one between 0 and 2000 deg.")
     return np.nan, limit
-
-
-def _angle(cell: Cell, column: Column) -> float:
-    angle = column.value(cell)
-    if angle < 0:
-        raise cell.refuse(f"{cell.shown} is negative; wrap angles add up without sign, so write the absolute value.")
-    if angle > LARGEST_ANGLE:
-        raise cell.refuse(
-            f"{cell.shown} is more than 2000 deg ({np.rad2deg(angle):.5g} deg); check the unit of the column."
-        )
-    return angle
 
 
 def read_efficiencies(
@@ -106,18 +87,18 @@ def read_efficiencies(
     """
     table = read_csv(path)
     names = (Quantity("efficiency", "ratio"), Quantity("efficiency_sd", "ratio"))
-    found = find_columns(table, (*names, *_optional(route, contacts)), sources)
+    found = find_columns(table, (*names, *shared_columns(route, contacts)), sources)
     column = require(table, found, "efficiency", "efficiency (0 to 1) or efficiency_percent")
     spread = found.get("efficiency_sd")
     efficiency = [_efficiency(cell, column) for cell in column.cells]
     pairs = zip(spread.cells, column.cells, strict=True) if spread else ()
     sd = [0.0 if cell.blank else _efficiency_sd(cell, spread, beside, column) for cell, beside in pairs if spread]
     return EfficiencyTable(
-        _route_values(table, found, route),
+        read_route(table, found, route),
         np.array(efficiency),
         np.array(sd) if spread else np.zeros(len(table.rows)),
-        _own_angles(table, found, contacts),
-        _provenance(table),
+        read_own_angles(table, found, contacts),
+        provenance_of(table),
     )
 
 
@@ -230,11 +211,11 @@ def _read_force_file(
     table = read_csv(path)
     forces = (Quantity("input_force", "force"), Quantity("output_force", "force"))
     others = (Quantity("run", "text"), Quantity("stroke", "text"), Quantity("velocity", "speed"))
-    found = find_columns(table, (*forces, *others, *_optional(route, contacts)), sources, _UNUSED)
+    found = find_columns(table, (*forces, *others, *shared_columns(route, contacts)), sources, _UNUSED)
     columns = [require(table, found, q.name, f"{q.name}_N") for q in forces]
     input_force, output_force = (np.array([_force(cell, c) for cell in c.cells]) for c in columns)
-    own = _own_angles(table, found, contacts)
-    route_values = _route_values(table, found, route)
+    own = read_own_angles(table, found, contacts)
+    route_values = read_route(table, found, route)
     remarks = []
     if "stroke" not in found:
         remarks.append(f"{table.file} has no stroke column: every row is taken as pulling (rope sliding to the motor).")
@@ -244,7 +225,7 @@ def _read_force_file(
             "as one run (one mounting of the cable)."
         )
     run, run_names = _runs(found.get("run"), route_values, own)
-    strokes, origin = _strokes(found, len(table.rows)), _provenance(table)
+    strokes, origin = read_strokes(found, len(table.rows)), provenance_of(table)
     if held := int(np.sum(strokes == 0)):
         remarks.append(
             f"{table.file}: {held} readings are held. A held reading says only that friction is at least as large as it takes "
@@ -273,20 +254,6 @@ def _runs(column: Column | None, route: Vector, own: OwnAngles) -> tuple[Labels,
     return np.array([names.index(key) for key in keys]), names
 
 
-def _strokes(found: Mapping[str, Column], n_rows: int) -> Labels:
-    if "stroke" not in found:
-        return np.ones(n_rows, dtype=int)
-    strokes = []
-    for cell in found["stroke"].cells:
-        text = cell.text.strip().lower().replace("\u2212", "-").replace(",", ".")
-        if text not in _STROKES:
-            raise cell.refuse(
-                f"{cell.shown} is no stroke; write pull (+1), return (-1) or hold (0, read while nothing slides)."
-            )
-        strokes.append(_STROKES[text])
-    return np.array(strokes)
-
-
 def _force(cell: Cell, column: Column) -> float:
     value = column.value(cell)
     if value <= 0:
@@ -295,44 +262,3 @@ def _force(cell: Cell, column: Column) -> float:
             "reading before tension was on: write tension as positive and leave slack readings out."
         )
     return value
-
-
-def _optional(route: Route | None, contacts: Sequence[str]) -> tuple[Quantity, ...]:
-    """Columns that efficiency and force tables share: the route variable, own wrap angles and their sd."""
-    angles = [Quantity(name + suffix, "angle") for name in contacts for suffix in ("", "_sd")]
-    return (*([route.quantity()] if route else []), *angles)
-
-
-def _route_values(table: RawTable, found: Mapping[str, Column], route: Route | None) -> Vector:
-    if route is None:
-        return np.full(len(table.rows), np.nan)
-    return _rounded(require(table, found, route.variable, f"{route.variable}_{route.unit}").numbers())
-
-
-def _rounded(values: Iterable[float]) -> Vector:
-    """Values to 12 digits, so that one length is one number whatever unit each table gives it in."""
-    return np.array([float(f"{value:.12g}") for value in values])
-
-
-def _own_angles(table: RawTable, found: Mapping[str, Column], contacts: Sequence[str]) -> OwnAngles:
-    n = len(table.rows)
-    angle, sd = np.full((n, len(contacts)), np.nan), np.full((n, len(contacts)), np.nan)
-    for k, name in enumerate(contacts):
-        for target, column in ((angle, found.get(name)), (sd, found.get(f"{name}_sd"))):
-            if column is not None:
-                target[:, k] = [np.nan if cell.blank else _own_angle(cell, column) for cell in column.cells]
-    return OwnAngles(tuple(contacts), angle, sd)
-
-
-def _own_angle(cell: Cell, column: Column) -> float:
-    if cell.limit() is not None:
-        raise cell.refuse(
-            f"{cell.shown} is no measured angle; leave the cell blank where the contact has a curve, or write the angle."
-        )
-    return _angle(cell, column)
-
-
-def _provenance(table: RawTable) -> Provenance:
-    """Where the rows of one file stand."""
-    rows = np.array([row[0].row for row in table.rows])
-    return Provenance((table.file,), np.zeros(len(rows), dtype=int), rows)

@@ -5,7 +5,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from bowdenfit.measurements.recordings import Recordings
-from bowdenfit.types import Labels, Matrix, Vector
+from bowdenfit.types import Flags, Labels, Matrix, Vector
 
 
 @dataclass(frozen=True)
@@ -122,6 +122,69 @@ class ForceTable:
 
 
 @dataclass(frozen=True)
+class StretchTable:
+    """Stretch of the rope, seen at its loaded end while the far end is held, under loads and at wrap angles.
+
+    Args:
+        load: Tension at the loaded end [N].
+        wrap_angle: Total wrap angle of the cable [rad].
+        stretch: Reading [mm]; what counts as zero is unknown.
+        unloading: Whether the load was larger before, in the same cycle.
+        peak: Largest load of the row's cycle [N].
+        cycle: Number of the cycle of each row.
+        cycle_names: Name of each cycle.
+        origin: Where each row was read.
+    """
+
+    load: Vector
+    wrap_angle: Vector
+    stretch: Vector
+    unloading: Flags
+    peak: Vector
+    cycle: Labels
+    cycle_names: tuple[str, ...]
+    origin: Provenance
+
+
+@dataclass(frozen=True)
+class PreloadTable:
+    """Preload between fixed ends at wrap angles.
+
+    Args:
+        wrap_angle: Total wrap angle of the cable [rad].
+        preload: Tension at rest [N]; 0 where the rope is slack.
+        origin: Where each row was read.
+    """
+
+    wrap_angle: Vector
+    preload: Vector
+    origin: Provenance
+
+
+@dataclass(frozen=True)
+class LoopTable:
+    """Forces at both ends of a pull-pull loop while it moves.
+
+    Args:
+        route: Route variable; NaN where the cable has no route.
+        input_force: Difference of the tensions at the motor side [N].
+        output_force: Difference of the tensions at the load side [N].
+        stroke: +1 moving forward, -1 moving back.
+        preload: Preload measured with the row [N]; NaN where the cable's own counts.
+        own: Wrap angles measured with the row.
+        origin: Where each row was read.
+    """
+
+    route: Vector
+    input_force: Vector
+    output_force: Vector
+    stroke: Labels
+    preload: Vector
+    own: OwnAngles
+    origin: Provenance
+
+
+@dataclass(frozen=True)
 class Measurements:
     """Everything measured on one cable, and remarks on how it was read."""
 
@@ -129,4 +192,7 @@ class Measurements:
     efficiencies: EfficiencyTable | None = None
     forces: ForceTable | None = None
     recordings: Recordings | None = None
+    stretch: StretchTable | None = None
+    preload: PreloadTable | None = None
+    loop: LoopTable | None = None
     remarks: tuple[str, ...] = ()

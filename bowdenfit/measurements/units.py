@@ -17,6 +17,7 @@ INTERNAL_UNITS = {
     "time": "s",
     "velocity": "mm/s",
     "angular_velocity": "rad/s",
+    "torque": "N*mm",
     "ratio": "1",
 }
 _EXAMPLES = {
@@ -26,6 +27,7 @@ _EXAMPLES = {
     "time": "s, ms",
     "velocity": "mm/s, m/s",
     "angular_velocity": "r/min, rad/s, deg/s",
+    "torque": "N*m, N*mm, lbf*inch",
     "ratio": "%, 1",
 }
 _AS_PINT_SAYS = {"r/min": "rpm", "rev/min": "rpm", "1/min": "rpm", "u/min": "rpm"}  # the last is German

@@ -23,7 +23,9 @@ from bowdenfit.measurements.tables import Measurements
 from bowdenfit.models.angles import angles_term
 from bowdenfit.models.cable import ANGLE_NOISE, Cable, constant_angle_name, make_cable
 from bowdenfit.models.efficiencies import efficiencies_term
+from bowdenfit.models.elasticity import PRELOAD_NOISE, STRETCH_NOISE, elastic_parameters
 from bowdenfit.models.forces import force_terms
+from bowdenfit.models.loop import loop_term
 from bowdenfit.models.recorded_blocks import RECORDED
 from bowdenfit.models.recordings import recordings_term
 from bowdenfit.models.scatter import (
@@ -35,6 +37,7 @@ from bowdenfit.models.scatter import (
     OUTPUT_OFFSET,
     RUN_SCATTER,
 )
+from bowdenfit.models.stretch import preload_term, stretch_term
 from bowdenfit.parameters.priors import HalfNormal, LogNormal, Normal, Prior, TruncatedNormal, Uniform
 from bowdenfit.parameters.space import Parameter, ParameterSpace
 
@@ -132,6 +135,12 @@ def build_model(dataset: Dataset) -> Model:
         terms += force_terms(cable, measurements.forces, measurements.angles)
     if measurements.recordings is not None:
         terms.append(recordings_term(cable, measurements.recordings, measurements.angles))
+    if measurements.stretch is not None:
+        terms.append(stretch_term(cable, measurements.stretch))
+    if measurements.preload is not None:
+        terms.append(preload_term(cable, measurements.preload))
+    if measurements.loop is not None:
+        terms.append(loop_term(cable, measurements.loop, measurements.angles))
     return Model(cable, _space(description, measurements, cable), tuple(terms))
 
 
@@ -144,6 +153,7 @@ def _space(description: Description, measurements: Measurements, cable: Cable) -
             parameters += curve.parameters(angle[np.isfinite(angle) & _in_range(description, measurements)], defaults)
     parameters += _uncertain_constants(description)
     parameters += cable.friction.parameters(defaults)
+    parameters += elastic_parameters(description, measurements, defaults)
     parameters += _noise(description, measurements, defaults)
     parameters += _sensors(description, measurements, defaults)
     known = [p.name for p in parameters]
@@ -212,12 +222,19 @@ def _noise(description: Description, measurements: Measurements, defaults: Prior
         meaning, prior = "scatter of the log ratio from mounting to mounting", HalfNormal(defaults.run_scatter)
         text = f"HalfNormal({defaults.run_scatter:g})"
         parameters.append(Parameter(RUN_SCATTER, r"$\tau$", meaning, "noise", prior, text))
-    if measurements.forces is not None:
+    if measurements.forces is not None or measurements.loop is not None:
         parameters.append(_force_noise(description.sensors.force_noise, defaults.force_noise_newtons))
     if measurements.recordings is not None:
         sd = defaults.block_noise_newtons
         meaning, text = "standard deviation of a block's mean force", f"HalfNormal({sd:g} N)"
         parameters.append(Parameter(BLOCK_NOISE, r"$\sigma_B$", meaning, "noise", HalfNormal(sd), text, "N"))
+    for table, name, symbol, what, sd, unit in (
+        (measurements.stretch, STRETCH_NOISE, r"$\sigma_L$", "stretch", defaults.stretch_noise_mm, "mm"),
+        (measurements.preload, PRELOAD_NOISE, r"$\sigma_P$", "preload", defaults.preload_noise_newtons, "N"),
+    ):
+        if table is not None:
+            meaning, text = f"standard deviation of a {what} reading", f"HalfNormal({sd:g} {unit})"
+            parameters.append(Parameter(name, symbol, meaning, "noise", HalfNormal(sd), text, unit))
     return parameters
 
 
@@ -228,7 +245,9 @@ def _sensors(description: Description, measurements: Measurements, defaults: Pri
     if gain is not None:
         meaning = "relative gain error between the two load cells"
         parameters.append(Parameter(GAIN_ERROR, "$g$", meaning, "sensor", Normal(0.0, gain), f"Normal(0, {gain:g})"))
-    if description.fits_offsets and (measurements.forces is not None or measurements.recordings is not None):
+    if description.fits_offsets and any(
+        table is not None for table in (measurements.forces, measurements.recordings, measurements.loop)
+    ):
         stated = description.sensors.offset_sd
         sd = stated.to("force") if stated is not None else defaults.offset_newtons
         for name, symbol, end in ((INPUT_OFFSET, "in", "input"), (OUTPUT_OFFSET, "out", "output")):

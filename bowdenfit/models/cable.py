@@ -14,6 +14,7 @@ from bowdenfit.description import Contact, Description
 from bowdenfit.errors import DescriptionError, nearest
 from bowdenfit.measurements.tables import AngleTable, Measurements, OwnAngles
 from bowdenfit.models.curves import CURVES, Curve
+from bowdenfit.models.elasticity import Elasticity
 from bowdenfit.models.friction_models import FrictionModel, make_friction_model
 from bowdenfit.models.laws import CONTACT_LAWS, ContactLaw
 
@@ -44,6 +45,11 @@ class Cable:
             for c in self.description.curved
             if route is not None and c.wrap_angle.column is not None
         }
+
+    @cached_property
+    def elasticity(self) -> Elasticity:
+        """How its rope stretches, and its preload."""
+        return Elasticity(self.description)
 
     @cached_property
     def laws(self) -> tuple[ContactLaw, ...]:
@@ -224,11 +230,16 @@ def make_cable(description: Description, measurements: Measurements) -> Cable:
 
 def _mean_angle(measurements: Measurements, column: str) -> float:
     """Mean of the angles that rows and recordings carry in a column [rad]."""
-    tables = [t for t in (measurements.efficiencies, measurements.forces) if t is not None]
+    tables = [t for t in (measurements.efficiencies, measurements.forces, measurements.loop) if t is not None]
     angles = [t.own.column(column)[0] for t in tables]
     if measurements.recordings is not None:
         k = measurements.recordings.columns.index(column)
         angles.append(np.array([r.own_angle[k] for r in measurements.recordings.each]))
+    if not angles:
+        raise DescriptionError(
+            f"cable.toml: no table has the column {column!r}, from which predictions would take their wrap angle; state it as "
+            'nominal = { value = 90, unit = "deg" } of the contact.'
+        )
     return float(np.mean(np.concatenate(angles)))
 
 

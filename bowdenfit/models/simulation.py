@@ -1,7 +1,7 @@
 """A bench on the computer: tables of a cable whose coefficients are known, for testing and for planning."""
 
 from collections.abc import Mapping
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 
 import jax
 import jax.numpy as jnp
@@ -20,6 +20,7 @@ from bowdenfit.measurements.tables import (
 )
 from bowdenfit.models.build import build_model
 from bowdenfit.models.cable import ANGLE_NOISE, Cable
+from bowdenfit.models.elastic_simulation import ElasticDesign, empty_elastic_tables, simulated_elastic_tables
 from bowdenfit.models.scatter import FORCE_NOISE, GAIN_ERROR, RUN_SCATTER
 
 
@@ -34,6 +35,7 @@ class Design:
         input_forces: Input forces of every stroke of a run [N].
         strokes: +1 pulling, -1 return, in order.
         own_angles: Wrap angle of each run [rad], by column of a contact without a curve.
+        elastic: What is measured of stretch, preload and a loop.
     """
 
     angles: tuple[float, ...] = ()
@@ -42,6 +44,7 @@ class Design:
     input_forces: tuple[float, ...] = ()
     strokes: tuple[int, ...] = (1, -1)
     own_angles: Mapping[str, tuple[float, ...]] | None = None
+    elastic: ElasticDesign = field(default_factory=ElasticDesign)
 
 
 def empty_tables(description: Description, design: Design) -> Measurements:
@@ -61,7 +64,8 @@ def empty_tables(description: Description, design: Design) -> Measurements:
         efficiencies = EfficiencyTable(np.array(design.efficiencies), np.full(n, 0.8), np.zeros(n), own, origin)
     if tables.forces is not None:
         forces = _force_rows(description, design)
-    return Measurements(angles, efficiencies, forces)
+    elastic = empty_elastic_tables(description, design.elastic)
+    return replace(elastic, angles=angles, efficiencies=efficiencies, forces=forces)
 
 
 def _force_rows(description: Description, design: Design) -> ForceTable:
@@ -124,10 +128,12 @@ def simulate(
     cable = build_model(Dataset(description, tables, {})).cable
     named = {name: jnp.asarray(value, dtype=float) for name, value in values.items()}
     keys, scale = jax.random.split(key, 3), 1.0 if noise else 0.0
+    of_elastic = jax.random.fold_in(key, 3)  # readings of the other tables stay what they were without these
     angles = tables.angles and _simulated_angles(cable, tables.angles, named, keys[0], scale)
     efficiencies = tables.efficiencies and _simulated_efficiencies(cable, tables.efficiencies, named, keys[1], scale)
     forces = tables.forces and _simulated_forces(cable, tables.forces, named, keys[2], scale)
-    return Dataset(description, Measurements(angles, efficiencies, forces), {})
+    elastic = simulated_elastic_tables(cable, tables, named, of_elastic, scale)
+    return Dataset(description, replace(elastic, angles=angles, efficiencies=efficiencies, forces=forces), {})
 
 
 def _simulated_angles(

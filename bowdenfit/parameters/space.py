@@ -13,7 +13,7 @@ from jaxtyping import Float
 from bowdenfit.errors import DescriptionError
 from bowdenfit.parameters.priors import Prior
 
-Role = Literal["friction", "friction_model", "curve", "angle", "noise", "sensor"]
+Role = Literal["friction", "friction_model", "curve", "angle", "noise", "sensor", "elastic"]
 
 
 @dataclass(frozen=True)

@@ -3,11 +3,12 @@
 Loads no JAX, and must not: the process that draws would pay for it.
 """
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
 import numpy as np
 
 from bowdenfit.results.answers import OptimalLength
+from bowdenfit.results.elastic_figure_data import ElasticFigures
 
 BAND_QUANTILES = (0.05, 0.25, 0.5, 0.75, 0.95)
 
@@ -185,6 +186,7 @@ class FigureData:
         recordings: Recordings, in the order of the data set.
         velocity_unit: Unit of their velocities as shown, "mm/s" or "r/min"; empty without any.
         dependences: How efficiency depends on load and speed.
+        elastic: Stretch, preload and loops.
     """
 
     name: str
@@ -201,3 +203,4 @@ class FigureData:
     recordings: tuple[RecordedTrace, ...] = ()
     velocity_unit: str = ""
     dependences: tuple[Dependence, ...] = ()
+    elastic: ElasticFigures = field(default_factory=ElasticFigures)

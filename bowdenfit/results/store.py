@@ -23,7 +23,7 @@ from bowdenfit.results.netcdf import EXPECTED, Coordinates, Groups, read_groups,
 from bowdenfit.results.summary import summarize
 from bowdenfit.types import Flags, Labels, Matrix
 
-SCHEMA = 2
+SCHEMA = 3
 Migration = Callable[[dict[str, Any]], dict[str, Any]]
 
 
@@ -36,7 +36,13 @@ def _to_schema_2(page: dict[str, Any]) -> dict[str, Any]:
     return page | {"schema": 2, "measurements": measured}
 
 
-MIGRATIONS: Mapping[int, Migration] = {1: _to_schema_2}  # from schema N to N + 1
+def _to_schema_3(page: dict[str, Any]) -> dict[str, Any]:
+    """Before stretch, preload and loops were read."""
+    measured = page["measurements"] | dict.fromkeys(("stretch", "preload", "loop"))
+    return page | {"schema": 3, "measurements": measured}
+
+
+MIGRATIONS: Mapping[int, Migration] = {1: _to_schema_2, 2: _to_schema_3}  # from schema N to N + 1
 
 
 def save(fit: Fit, folder: Path, force: bool = False, write_posterior: Callable[..., Any] | None = None) -> None:

@@ -1,0 +1,131 @@
+"""The preloaded pull-pull loop: two ropes between two pulleys, one pulling while the other returns.
+
+Forces are differences of the two sides' tensions, positive where they pull the load side forward; Euler friction in full
+slip, a linear elastic rope, and a loop of fixed length, so that the mean tensions of both sides add up to twice the preload.
+"""
+
+import jax
+import jax.numpy as jnp
+from jax import Array
+from jaxtyping import Float
+
+from bowdenfit.physics.stretch import mean_tension
+
+
+def loop_output_force(
+    input_force: Float[Array, "*batch"],
+    preload: Float[Array, "*#batch"],
+    friction_exponent: Float[Array, "*#batch"],
+    stroke: Float[Array, "*#batch"],
+) -> Float[Array, "*batch"]:
+    r"""Output force of a loop while it moves.
+
+    .. math:: F_\text{out} = \min\left(F_\text{in} - 2 P \Lambda,\ F_\text{in} e^{-\Lambda}\right)
+
+    while the motor drives forward: the first branch while the return side is taut, the second once it is slack. The load
+    driving the motor (F_in < 0) and the way back follow by exchanging the sides and the ends:
+    :math:`F_\text{out} = s \min(s F_\text{in} - 2 P \Lambda,\ s F_\text{in} e^{-\Lambda},\ s F_\text{in} e^{\Lambda})`.
+
+    Not to be trusted while nothing moves (see `loop_play`), nor for a rope much stiffer at high than at low load, where
+    mean tensions do not quite add up to 2P.
+
+    Args:
+        input_force: F_in, of either sign [N].
+        preload: P, tension of both sides at rest [N].
+        friction_exponent: Lambda of one side [1].
+        stroke: s, +1 moving forward, -1 back [1].
+
+    Returns:
+        Output force [N].
+
+    References:
+        The actuator of the haptic paper (section 3.1), with its equation 1 along both sides.
+    """
+    lower, upper = loop_band(input_force, preload, friction_exponent)
+    return jnp.where(stroke > 0, lower, upper)
+
+
+def loop_band(
+    input_force: Float[Array, "*batch"], preload: Float[Array, "*#batch"], friction_exponent: Float[Array, "*#batch"]
+) -> tuple[Float[Array, "*batch"], Float[Array, "*batch"]]:
+    """Output force while moving forward and while moving back [N]; at rest it lies between the two."""
+    taut, less, more = 2 * preload * friction_exponent, jnp.exp(-friction_exponent), jnp.exp(friction_exponent)
+    slack = jnp.stack(jnp.broadcast_arrays(input_force * less, input_force * more))
+    lower = jnp.minimum(input_force - taut, jnp.min(slack, axis=0))
+    upper = jnp.maximum(input_force + taut, jnp.max(slack, axis=0))
+    return lower, upper
+
+
+def loop_slopes(
+    input_force: Float[Array, "*batch"],
+    preload: Float[Array, "*#batch"],
+    friction_exponent: Float[Array, "*#batch"],
+    stroke: Float[Array, "*#batch"],
+) -> tuple[Float[Array, "*batch"], Float[Array, "*batch"]]:
+    """Derivatives of `loop_output_force` by the input force [1] and by the friction exponent [N]."""
+    output = loop_output_force(input_force, preload, friction_exponent, stroke)
+    taut = output == input_force - stroke * 2 * preload * friction_exponent
+    growth = jnp.exp(-stroke * jnp.sign(input_force) * friction_exponent)
+    by_exponent = jnp.where(taut, 2 * preload, jnp.abs(input_force) * growth)
+    return jnp.where(taut, 1.0, growth), -stroke * by_exponent
+
+
+def loop_play(
+    input_force: Float[Array, "time *batch"],
+    preload: Float[Array, "..."],
+    friction_exponent: Float[Array, "..."],
+    start: Float[Array, "*batch"],
+) -> Float[Array, "time *batch"]:
+    """Output force of a loop through any motion [N]: a play operator whose width is the loss.
+
+    Args:
+        input_force: Time first [N].
+        preload: P [N], the same for all times or one for each.
+        friction_exponent: Lambda of one side [1], likewise.
+        start: Output force before the first time [N]; clipped into the band there.
+    """
+    band = loop_band(input_force, jnp.asarray(preload), jnp.asarray(friction_exponent))
+
+    def step(y: Array, now: tuple[Array, Array]) -> tuple[Array, Array]:
+        y = jnp.clip(y, *now)
+        return y, y
+
+    begin = jnp.broadcast_to(start, input_force.shape[1:]).astype(input_force.dtype)
+    return jax.lax.scan(step, begin, band)[1]
+
+
+def free_motion_loss(
+    preload: Float[Array, "*batch"], friction_exponent: Float[Array, "*#batch"]
+) -> Float[Array, "*batch"]:
+    r"""Force that moving the unloaded loop takes [N], :math:`2 P \Lambda`; times the pulley's radius it is what is felt."""
+    return 2 * preload * friction_exponent
+
+
+def slack_load(preload: Float[Array, "*batch"], friction_exponent: Float[Array, "*#batch"]) -> Float[Array, "*batch"]:
+    r"""Input force at which the return side goes slack [N], :math:`2 P \Lambda/(1 - e^{-\Lambda})`."""
+    return 2 * preload / mean_tension(jnp.ones_like(friction_exponent), friction_exponent)
+
+
+def side_tensions(
+    input_force: Float[Array, "*batch"],
+    preload: Float[Array, "*#batch"],
+    friction_exponent: Float[Array, "*#batch"],
+    stroke: Float[Array, "*#batch"],
+) -> tuple[Float[Array, "*batch"], Float[Array, "*batch"]]:
+    r"""Mean tensions of the pulling and of the returning side [N] under an input force of at least 0.
+
+    With :math:`a = (1 - e^{-s\Lambda})/(s\Lambda)` for the pulling side and b, the same of :math:`-s`, for the other:
+    :math:`\bar T_1 = a (2 P + b F_\text{in})/(a + b)` and :math:`\bar T_2 = 2 P - \bar T_1` while that is positive;
+    else :math:`\bar T_1 = a F_\text{in}` and the returning side is slack.
+
+    Args:
+        input_force: F_in, at least 0 [N].
+        preload: P [N].
+        friction_exponent: Lambda of one side [1].
+        stroke: +1 moving forward, -1 back [1].
+    """
+    one = jnp.ones_like(input_force * stroke * friction_exponent)
+    a, b = mean_tension(one, stroke * friction_exponent), mean_tension(one, -stroke * friction_exponent)
+    taut = a * (2 * preload + b * input_force) / (a + b)
+    slack = taut > 2 * preload
+    return jnp.where(slack, a * input_force, taut), jnp.where(slack, 0.0, 2 * preload - taut)

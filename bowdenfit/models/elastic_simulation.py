@@ -100,7 +100,7 @@ def simulated_elastic_tables(
     if preload is not None:
         term = preload_term(cable, preload)
         noise = scale * values[PRELOAD_NOISE] * jax.random.normal(of_preload, preload.wrap_angle.shape)
-        preload = replace(preload, preload=np.asarray(term.expected(values, term.data) + noise))
+        preload = replace(preload, preload=np.maximum(term.expected(values, term.data) + noise, 0.0))
     if loop is not None:
         loop = _simulated_loop(cable, loop, values, of_loop, scale)
     return Measurements(stretch=stretch, preload=preload, loop=loop)

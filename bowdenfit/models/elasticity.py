@@ -17,6 +17,7 @@ from bowdenfit.physics.stretch import (
     compliance,
     extension,
     mean_tension,
+    mean_tension_from_shares,
     mean_tension_unloading,
     preload_at,
     tension_from_extension,
@@ -70,7 +71,7 @@ class Elasticity:
         values: Values,
         load: Float[Array, "*batch"],
         wrap_angle: Float[Array, "*batch"],
-        peak: Float[Array, "*batch"] | None = None,
+        peak: Float[Array, "*batch"],
     ) -> Float[Array, "*batch"]:
         r"""Stretch seen at the loaded end [mm], :math:`e(\bar T(F, \theta)) + g \theta - \Delta L_0`.
 
@@ -78,11 +79,24 @@ class Elasticity:
             values: Values of the parameters.
             load: F [N].
             wrap_angle: theta [rad].
-            peak: Largest load before, if the load comes down from it [N].
+            peak: Largest load before, from which the load comes down; the load itself while it grows [N].
         """
-        exponent = self.friction_exponent(values, wrap_angle)
-        mean = mean_tension(load, exponent) if peak is None else mean_tension_unloading(load, peak, exponent)
+        mean = mean_tension_unloading(load, peak, self.friction_exponent(values, wrap_angle))
         return self.extension(values, mean) + values[LENGTHENING] * wrap_angle - values[STRETCH_ZERO]
+
+    def stretch_of_rows(self, values: Values, rows: Mapping[str, Array]) -> Float[Array, " rows"]:
+        """The same for the rows of a table, friction worked out once for every different wrap angle [mm].
+
+        Args:
+            values: Values of the parameters.
+            rows: Loads, their peaks, and which of the different wrap angles each row has.
+        """
+        exponent, at = self.friction_exponent(values, rows["wrap_angles"]), rows["at"]
+        one = jnp.ones_like(exponent)
+        shares = mean_tension(one, exponent)[at], mean_tension(one, -exponent)[at]
+        mean = mean_tension_from_shares(rows["load"], rows["peak"], exponent[at], *shares)
+        lengthened = values[LENGTHENING] * rows["wrap_angles"] - values[STRETCH_ZERO]
+        return self.extension(values, mean) + lengthened[at]
 
     def preload(
         self, values: Values, bend: Float[Array, "*batch"]

@@ -255,6 +255,8 @@ def _forces(measurements: Measurements) -> np.ndarray:
     parts = [np.zeros(0)]
     if measurements.forces is not None:
         parts += [measurements.forces.input_force, measurements.forces.output_force]
+    if measurements.loop is not None:
+        parts.append(measurements.loop.input_force * measurements.loop.stroke)
     if measurements.recordings is not None:
         parts += [f for r in measurements.recordings.each for f in (r.blocks.input_force, r.blocks.output_force)]
     forces = np.concatenate(parts)

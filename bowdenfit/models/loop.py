@@ -56,7 +56,9 @@ class LoopTerm:
         angles, variance = resolve_angles(self.cable, values, data)
         mounting = values[RUN_SCATTER] * values[LOOP_MOUNTING] if LOOP_MOUNTING in values else 0.0
         exponent = self.cable.friction_exponent(values, angles) + mounting
-        of_cable = self.cable.elasticity.preload(values, jnp.sum(angles, axis=-1))[0]
+        bends = data["bends"] if "bends" in data else jnp.sum(angles, axis=-1)
+        of_cable = self.cable.elasticity.preload(values, bends)[0]
+        of_cable = of_cable[data["bend"]] if "bends" in data else of_cable
         preload = jnp.where(data["has_preload"], data["preload"], of_cable)
         return data["input_force"] - values.get(INPUT_OFFSET, 0.0), preload, exponent, angles, variance
 
@@ -99,11 +101,14 @@ class LoopTerm:
 
 def loop_term(cable: Cable, table: LoopTable, angles: AngleTable | None) -> LoopTerm:
     """The term of a loop table."""
-    data = row_angles(cable, table, angles).data | {
+    rows = row_angles(cable, table, angles)
+    data = rows.data | {
         "input_force": table.input_force,
         "output_force": table.output_force,
         "stroke": table.stroke.astype(float),
         "preload": np.nan_to_num(table.preload),
         "has_preload": np.isfinite(table.preload),
     }
+    if rows.is_own.all():  # the root behind the preload is found once for every different bend
+        data["bends"], data["bend"] = np.unique(np.sum(rows.own, axis=1), return_inverse=True)
     return LoopTerm(cable, data, tuple(table.origin.place(i) for i in range(len(table.stroke))))

@@ -5,6 +5,7 @@ from dataclasses import dataclass
 from typing import Any
 
 import jax
+import jax.numpy as jnp
 import numpy as np
 from jax import Array
 from jax.scipy.stats import norm
@@ -13,7 +14,9 @@ from jaxtyping import Float
 from bowdenfit.measurements.tables import PreloadTable, StretchTable
 from bowdenfit.models.cable import Cable
 from bowdenfit.models.elasticity import PRELOAD_NOISE, STRETCH_NOISE
+from bowdenfit.physics.normal_tail import log_normal_cdf
 
+MEASURED_PRELOAD = "measured_preload"  # not the name of the parameter
 Expected = Callable[[Cable, Mapping[str, Array], Mapping[str, Any]], Array]
 
 
@@ -24,14 +27,18 @@ class ElasticTerm:
     .. math:: \Delta L_i \sim \text{Normal}(e(\bar T_i) + g \theta_i - \Delta L_0,\ \sigma_L), \qquad
               P_i \sim \text{Normal}(P(\theta_i),\ \sigma_P)
 
+    A preload of 0 is what a load cell says of a slack rope whatever its noise: such a row is known to be at most 0, and
+    contributes :math:`\Phi(-P(\theta)/\sigma_P)`.
+
     Args:
         cable: The cable.
         data: Arrays, one entry a row.
         labels: Each row in words.
-        name: "stretch" or "preload".
+        name: Name of its readings in results.
         unit: Unit of its readings.
         noise: Its noise scale.
         law: What is expected of the rows.
+        lowest: Lowest reading that there can be; None without one.
     """
 
     cable: Cable
@@ -41,11 +48,13 @@ class ElasticTerm:
     unit: str
     noise: str
     law: Expected
+    lowest: float | None = None
 
     @property
     def residual_blocks(self) -> tuple[tuple[int, int], ...]:
-        """All rows scatter alike."""
-        return ((len(self.labels), len(self.labels)),)
+        """All readings scatter alike; a bound has no scatter."""
+        read = len(self.data["reading"])
+        return ((read, read), (len(self.labels) - read, 0))
 
     def expected(self, values: Mapping[str, Array], data: Mapping[str, Any]) -> Float[Array, " rows"]:
         """Expected readings [mm] or [N]."""
@@ -53,29 +62,43 @@ class ElasticTerm:
 
     def log_likelihood(self, values: Mapping[str, Array], data: Mapping[str, Any]) -> Float[Array, " rows"]:
         """Log likelihood of each row."""
-        return norm.logpdf(data["reading"], self.expected(values, data), values[self.noise])
+        deviation, u = self._deviations(values, data, values[self.noise])
+        return jnp.concatenate([norm.logpdf(deviation) - jnp.log(values[self.noise]), log_normal_cdf(u)])
+
+    def _deviations(
+        self, values: Mapping[str, Array], data: Mapping[str, Any], noise: Array
+    ) -> tuple[Float[Array, " read"], Float[Array, " at_most"]]:
+        """Standardized deviations: of the readings, and of those that are only known to be at most so."""
+        expected, n = self.expected(values, data), data["reading"].shape[0]
+        return (data["reading"] - expected[:n]) / noise, (data["at_most"] - expected[n:]) / noise
 
     def residuals(self, values: Mapping[str, Array], data: Mapping[str, Any]) -> Float[Array, " rows"]:
-        """Standardized residuals."""
-        return (data["reading"] - self.expected(values, data)) / jax.lax.stop_gradient(values[self.noise])
+        """Standardized residuals; sqrt(-2 log Phi) for rows known to be at most their reading."""
+        deviation, u = self._deviations(values, data, jax.lax.stop_gradient(values[self.noise]))
+        at_most = jnp.where(u < 30.0, jnp.sqrt(-2 * log_normal_cdf(jnp.minimum(u, 29.0))), 0.0)
+        return jnp.concatenate([deviation, at_most])
 
     def simulate(self, values: Mapping[str, Array], data: Mapping[str, Any], key: Array) -> Float[Array, " rows"]:
         """Readings drawn at given parameters [mm] or [N]."""
         expected = self.expected(values, data)
-        return expected + values[self.noise] * jax.random.normal(key, expected.shape)
+        drawn = expected + values[self.noise] * jax.random.normal(key, expected.shape)
+        return drawn if self.lowest is None else jnp.maximum(drawn, self.lowest)
 
     def observed(self) -> np.ndarray:
         """Readings [mm] or [N]."""
-        return self.data["reading"]
+        return np.concatenate([self.data["reading"], self.data["at_most"]])
 
 
 def stretch_term(cable: Cable, table: StretchTable) -> ElasticTerm:
     """The term of a table of stretch."""
+    angles, at = np.unique(table.wrap_angle, return_inverse=True)
     data = {
         "reading": table.stretch,
         "load": table.load,
-        "wrap_angle": table.wrap_angle,
+        "wrap_angles": angles,
+        "at": at,
         # A row read while the load grew comes down from no larger one: the two branches meet there.
+        "at_most": np.zeros(0),
         "peak": np.where(table.unloading, table.peak, table.load),
     }
     branch = np.where(table.unloading, ", unloading", "")
@@ -87,14 +110,16 @@ def stretch_term(cable: Cable, table: StretchTable) -> ElasticTerm:
 
 
 def _stretch(cable: Cable, values: Mapping[str, Array], data: Mapping[str, Any]) -> Float[Array, " rows"]:
-    return cable.elasticity.stretch(values, data["load"], data["wrap_angle"], data["peak"])
+    return cable.elasticity.stretch_of_rows(values, data)
 
 
 def preload_term(cable: Cable, table: PreloadTable) -> ElasticTerm:
-    """The term of a table of preload."""
-    data = {"reading": table.preload, "wrap_angle": table.wrap_angle}
-    labels = tuple(f"{np.rad2deg(angle):.4g} deg" for angle in table.wrap_angle)
-    return ElasticTerm(cable, data, labels, "preload", "N", PRELOAD_NOISE, _preload)
+    """The term of a table of preload; rows that read 0 come last."""
+    slack = table.preload == 0
+    angles = np.concatenate([table.wrap_angle[~slack], table.wrap_angle[slack]])
+    data = {"reading": table.preload[~slack], "at_most": table.preload[slack], "wrap_angle": angles}
+    labels = tuple(f"{np.rad2deg(angle):.4g} deg" for angle in angles)
+    return ElasticTerm(cable, data, labels, MEASURED_PRELOAD, "N", PRELOAD_NOISE, _preload, 0.0)
 
 
 def _preload(cable: Cable, values: Mapping[str, Array], data: Mapping[str, Any]) -> Float[Array, " rows"]:

@@ -78,6 +78,9 @@ def loop_play(
 ) -> Float[Array, "time *batch"]:
     """Output force of a loop through any motion [N]: a play operator whose width is the loss.
 
+    Exact while the loop moves on. At a reversal the slip fronts of the two sides cross the cable at different times: against
+    a stiff load the output begins to change when about nine tenths of the band are crossed, against a soft one at its end.
+
     Args:
         input_force: Time first [N].
         preload: P [N], the same for all times or one for each.
@@ -102,7 +105,10 @@ def free_motion_loss(
 
 
 def slack_load(preload: Float[Array, "*batch"], friction_exponent: Float[Array, "*#batch"]) -> Float[Array, "*batch"]:
-    r"""Input force at which the return side goes slack [N], :math:`2 P \Lambda/(1 - e^{-\Lambda})`."""
+    r"""Input force at which the return side goes slack [N], :math:`2 P \Lambda/(1 - e^{-\Lambda})`.
+
+    That is while moving forward; for the way back give the exponent a minus sign.
+    """
     return 2 * preload / mean_tension(jnp.ones_like(friction_exponent), friction_exponent)
 
 

@@ -9,7 +9,7 @@ from jaxtyping import Float
 
 _SMALL_EXPONENT = 1e-4  # below this the mean tension is better computed from its series
 _NOTHING_LEFT = 1e-30  # a share of the peak load, and a friction exponent, that are as good as none
-_ITERATIONS = 8  # of Newton's method; six give all digits over the whole range
+_ITERATIONS = 2  # of Fritsch's method, each with four times the digits of the one before
 _POLISHES = 2
 
 
@@ -60,7 +60,7 @@ def tension_from_extension(
     r"""Inverse of `extension`: the tension of a rope that is extended so far; 0 where it is not extended, but slack.
 
     With :math:`a = k(e - d)/T_c` and :math:`L = \log(kd/T_c) - a` the root is :math:`T = T_c (a + w)`,
-    :math:`w + \log w = L` (Lambert's function), found by Newton's method on that and polished on e(T) itself.
+    :math:`w + \log w = L` (Lambert's function), found by Fritsch's iteration of fourth order and polished on e(T) itself.
     Derivatives are those of the implicit function, not of the iterations.
 
     Args:
@@ -71,16 +71,22 @@ def tension_from_extension(
 
     Returns:
         Tension [N].
+
+    References:
+        Fritsch, Shafer and Crowley, Algorithm 443, Communications of the ACM 16 (1973), 123.
     """
     e = jnp.maximum(extended, 0.0)
     ratio = stiffness / bedding_load
     a = ratio * (e - bedding_stretch)
     log_w = jnp.log(jnp.maximum(ratio * bedding_stretch, 1e-300)) - a
     large = log_w > 1.0
-    w = jnp.where(large, log_w - jnp.log(jnp.where(large, log_w, 2.0)), jnp.exp(jnp.minimum(log_w, 1.0)))
+    small = jnp.exp(jnp.minimum(log_w, 1.0))
+    w = jnp.where(large, log_w - jnp.log(jnp.where(large, log_w, 2.0)), small / (1 + 0.63 * small))
     w = jnp.maximum(w, 1e-300)
     for _ in range(_ITERATIONS):
-        w = jnp.maximum(w * (1 + log_w - jnp.log(w)) / (1 + w), 1e-300)
+        rest = log_w - jnp.log(w) - w
+        q = 2 * (1 + w) * (1 + w + 2 * rest / 3)
+        w = jnp.maximum(w * (1 + rest / (1 + w) * (q - rest) / (q - 2 * rest)), 1e-300)
     tension = jnp.clip(bedding_load * (a + w), 0.0, stiffness * e)
     for _ in range(_POLISHES):
         missing = e - extension(tension, stiffness, bedding_stretch, bedding_load)
@@ -130,25 +136,45 @@ def mean_tension_unloading(
     tension :math:`F_\text{peak} e^{-\Lambda x}` that friction still holds from the peak, at
     :math:`x^* = \log(F_\text{peak}/F)/(2\Lambda)`:
 
-    .. math:: \bar T = \frac{2\sqrt{F F_\text{peak}} - F - F_\text{peak} e^{-\Lambda}}{\Lambda} \quad (x^* < 1),
+    .. math:: \bar T = F_\text{peak} \frac{1 - e^{-\Lambda}}{\Lambda}
+              - \frac{(\sqrt{F_\text{peak}} - \sqrt F)^2}{\Lambda} \quad (x^* < 1),
               \qquad \bar T = F \frac{e^\Lambda - 1}{\Lambda} \quad (x^* \ge 1)
 
     Args:
         force: F, load now [N].
-        peak_force: F_peak, the largest load before [N].
+        peak_force: F_peak, the largest load before [N]; with the load itself it is `mean_tension`.
         friction_exponent: Lambda of the whole rope [1].
 
     Returns:
         Mean tension [N].
     """
+    one = jnp.ones_like(friction_exponent)
+    shares = mean_tension(one, friction_exponent), mean_tension(one, -friction_exponent)
+    return mean_tension_from_shares(force, peak_force, friction_exponent, *shares)
+
+
+def mean_tension_from_shares(
+    force: Float[Array, "*batch"],
+    peak_force: Float[Array, "*#batch"],
+    friction_exponent: Float[Array, "*#batch"],
+    loading_share: Float[Array, "*#batch"],
+    unloading_share: Float[Array, "*#batch"],
+) -> Float[Array, "*batch"]:
+    """`mean_tension_unloading` where the mean tension per end tension is known for both ways of sliding.
+
+    Args:
+        force: Load now [N].
+        peak_force: The largest load before [N].
+        friction_exponent: Lambda of the whole rope [1].
+        loading_share: Mean tension under 1 N while the load grows [1].
+        unloading_share: Mean tension under 1 N once all of the rope slides back [1].
+    """
     peak = jnp.maximum(peak_force, force)
-    some = force > _NOTHING_LEFT * peak
-    reach = 0.5 * jnp.log(jnp.where(some, peak / jnp.where(some, force, 1.0), 1 / _NOTHING_LEFT))
-    # In terms of the share of the rope that has slid back nothing cancels where friction is small.
-    share = jnp.minimum(reach / jnp.maximum(friction_exponent, _NOTHING_LEFT), 1.0)
-    slid = friction_exponent * share
-    held = mean_tension(peak * jnp.exp(-slid), friction_exponent - slid)
-    return share * mean_tension(force, -slid) + (1 - share) * held
+    ratio = jnp.where(force > 0, peak / jnp.where(force > 0, force, 1.0), jnp.inf)
+    partly = 0.5 * jnp.log(jnp.minimum(ratio, 1e30)) <= friction_exponent
+    held, now = jnp.sqrt(jnp.where(partly, peak, 1.0)), jnp.sqrt(jnp.where(partly, force, 1.0))
+    given_back = (held - now) ** 2 / jnp.where(friction_exponent > 0, friction_exponent, 1.0)
+    return jnp.where(partly, peak * loading_share - given_back, force * unloading_share)
 
 
 def preload_at(

@@ -5,6 +5,7 @@ import numpy as np
 from bowdenfit.dataset import Dataset
 from bowdenfit.description import Contact, Description, FrictionSetting
 from bowdenfit.measurements.tables import AngleTable, EfficiencyTable, ForceTable
+from bowdenfit.report.elastic import elastic_tables, elastic_warnings
 from bowdenfit.report.recordings import recordings_text
 
 
@@ -29,6 +30,7 @@ def check_text(dataset: Dataset) -> str:
         lines.append(_efficiencies(measurements.efficiencies))
     if measurements.forces is not None:
         lines.append(_forces(measurements.forces))
+    lines += elastic_tables(description, measurements)
     if measurements.recordings is not None:
         lines += ["", "Recordings:", *(f"  {line}" for line in recordings_text(measurements.recordings))]
     lines += [f"  note: {remark}" for remark in measurements.remarks]
@@ -47,11 +49,12 @@ def warnings_of(dataset: Dataset) -> list[str]:
         if not (n in description.friction and description.friction[n].fixed is not None)
     ]
     conditions = _conditions(dataset)
-    if not conditions:
+    shared = description.stretch.friction is not None and measurements.stretch is not None
+    if not conditions and not shared:
         warnings.append(
-            "no table has forces, efficiencies or recordings, so the friction coefficients rest on their priors alone."
+            "no table has forces, efficiencies, a loop or recordings, so the friction coefficients rest on their priors alone."
         )
-    elif conditions < len(free):
+    elif 0 < conditions < len(free):
         warnings.append(
             f"{len(free)} friction coefficients are to be found from {conditions} different "
             f"condition{'s' if conditions > 1 else ''}; what these do not determine will rest on the priors."
@@ -66,13 +69,14 @@ def warnings_of(dataset: Dataset) -> list[str]:
                     f"the curve of {contact.name!r} has three coefficients and {n} detected angles in the range; "
                     "its shape will rest on the priors."
                 )
-    return warnings
+    return warnings + elastic_warnings(description, measurements)
 
 
 def _conditions(dataset: Dataset) -> int:
     """Number of different wrap-angle conditions under which force was measured."""
     rows = []
-    for table in (dataset.measurements.efficiencies, dataset.measurements.forces):
+    tables = dataset.measurements
+    for table in (tables.efficiencies, tables.forces, tables.loop):
         if table is not None:
             rows += [tuple(np.nan_to_num(row, nan=-1.0)) for row in np.column_stack([table.route, table.own.angle])]
     if dataset.measurements.recordings is not None:

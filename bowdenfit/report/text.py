@@ -4,6 +4,7 @@ from typing import Any
 
 from bowdenfit.models.build import EFFICIENCY_TERMS
 from bowdenfit.models.scatter import RUN_SCATTER
+from bowdenfit.report.elastic import elastic_counts, elastic_text
 from bowdenfit.report.layout import filled, listed, table
 from bowdenfit.report.recordings import recordings_text
 from bowdenfit.results.answers import decimals
@@ -25,6 +26,7 @@ def summary_text(fit: Fit) -> str:
         _recordings(fit),
         _measured(fit, page),
         _friction_model(fit),
+        elastic_text(fit),
         _answer(fit),
     ]
     blocks.append(_origin(page))
@@ -48,6 +50,7 @@ def _title(fit: Fit) -> str:
         )
     if tables.forces is not None:
         counts.append(f"{len(tables.forces.run)} force readings in {len(tables.forces.run_names)} runs")
+    counts += elastic_counts(tables)
     line = f"{fit.name}\n{'=' * len(fit.name)}"
     geometry = f"; {description.geometry} geometry" if description.curved else ""
     model = f"; friction model {description.friction_model}" if description.friction_model != "capstan" else ""

@@ -7,6 +7,7 @@ import numpy as np
 from bowdenfit.models.build import EFFICIENCY_TERMS, Model
 from bowdenfit.predictions.draws import curves_of
 from bowdenfit.predictions.optimal_length import route_grid
+from bowdenfit.results.elastic_figures import elastic_figures
 from bowdenfit.results.figure_data import (
     BAND_QUANTILES,
     AngleCurve,
@@ -42,6 +43,7 @@ def figure_data(fit: Fit) -> FigureData:
         traces(fit),
         velocity_unit(fit),
         dependences(fit),
+        elastic_figures(fit),
     )
 
 

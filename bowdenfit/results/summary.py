@@ -9,6 +9,7 @@ from bowdenfit.models.build import EFFICIENCY_TERMS
 from bowdenfit.results.accounts import accounts
 from bowdenfit.results.answers import Interval
 from bowdenfit.results.confounding import confounded
+from bowdenfit.results.elastic_summary import elastic_page
 from bowdenfit.results.fit import Fit
 from bowdenfit.results.rate import rate_effect
 
@@ -42,6 +43,8 @@ def summarize(fit: Fit) -> dict[str, Any]:
     }
     if fit.dataset.measurements.recordings is not None:
         page["recordings"] = accounts(fit.dataset.measurements.recordings)
+    if elastic := elastic_page(fit):
+        page["elastic"] = elastic
     effect = rate_effect(fit)
     if effect is not None:
         page["rate_effect"] = asdict(effect)

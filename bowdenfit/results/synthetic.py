@@ -8,8 +8,6 @@ from pathlib import Path
 from typing import Any
 
 import jax
-import numpy as np
-from pydantic import BaseModel, ConfigDict, ValidationError
 
 from bowdenfit.dataset import DESCRIPTION_FILE, Dataset
 from bowdenfit.description import Description
@@ -17,20 +15,9 @@ from bowdenfit.description_file import parse_description
 from bowdenfit.errors import DescriptionError
 from bowdenfit.models.simulation import Design, empty_tables, simulate, true_values
 from bowdenfit.results.store import write_text
+from bowdenfit.results.synthetic_tables import read_design, table_pages
 
 TRUTH_FILE = "truth.json"
-_STROKES = {"pull": 1, "return": -1}
-
-
-class _DesignPage(BaseModel):
-    """[design] as written: route values, input forces in N, strokes by name."""
-
-    model_config = ConfigDict(extra="forbid", frozen=True)
-    angles: tuple[float, ...] = ()
-    efficiencies: tuple[float, ...] = ()
-    runs: tuple[float, ...] = ()
-    input_forces: tuple[float, ...] = ()
-    strokes: tuple[str, ...] = ("pull", "return")
 
 
 @dataclass(frozen=True)
@@ -77,23 +64,9 @@ def read_bench(path: Path) -> Bench:
     return Bench(
         text,
         parse_description({k: v for k, v in raw.items() if k != "design"}, path.name),
-        _design(raw["design"], path.name),
+        read_design(raw["design"], path.name),
         truth,
     )
-
-
-def _design(page: Mapping[str, Any], file: str) -> Design:
-    try:
-        design = _DesignPage.model_validate(dict(page))
-        strokes = tuple(_STROKES[stroke] for stroke in design.strokes)
-    except ValidationError as error:
-        first = error.errors()[0]
-        raise DescriptionError(f"{file}, design.{'.'.join(map(str, first['loc']))}: {first['msg'].lower()}.") from None
-    except KeyError as error:
-        raise DescriptionError(f"{file}, design.strokes: {error.args[0]!r} is not pull or return.") from None
-    if design.runs and not design.input_forces:
-        raise DescriptionError(f"{file}, design: runs need input_forces, such as [20, 40, 60] (in N).")
-    return Design(design.angles, design.efficiencies, design.runs, design.input_forces, strokes)
 
 
 def make(bench: Bench, key: jax.Array, noise: bool) -> tuple[Dataset, dict[str, float]]:
@@ -126,43 +99,9 @@ def write(bench: Bench, dataset: Dataset, truth: Mapping[str, float], folder: Pa
     """
     folder.mkdir(parents=True, exist_ok=True)
     write_text(folder / DESCRIPTION_FILE, _description_only(bench.text))
-    tables, measured, route = bench.description.tables, dataset.measurements, bench.description.route
-    route_heading = f"{route.variable}_{route.unit}" if route else None
-    if tables.angles and measured.angles:
-        names = [f"{name}_deg" for name in measured.angles.names]
-        shown = np.rad2deg(measured.angles.angle)
-        limits = np.rad2deg(measured.angles.limit)
-        cells = [
-            [f"<{limits[i, k]:g}" if np.isnan(angle) else f"{angle:.1f}" for k, angle in enumerate(row)]
-            for i, row in enumerate(shown)
-        ]
-        rows = [[f"{length:g}", *row] for length, row in zip(measured.angles.route, cells, strict=True)]
-        _write_csv(folder / (tables.angles.file or "angles.csv"), [route_heading or "", *names], rows)
-    if tables.efficiencies and measured.efficiencies:
-        values = zip(measured.efficiencies.route, measured.efficiencies.efficiency, strict=True)
-        rows = [[*([f"{length:g}"] if route else []), f"{eta:.5f}"] for length, eta in values]
-        heads = [*([route_heading] if route_heading else []), "efficiency"]
-        _write_csv(folder / (tables.efficiencies.file or "efficiencies.csv"), heads, rows)
-    if tables.forces and measured.forces:
-        table = measured.forces
-        stroke_names = {1: "pull", -1: "return"}
-        rows = [
-            [
-                *([f"{table.route[i]:g}"] if route else []),
-                table.run_names[table.run[i]],
-                stroke_names[int(table.stroke[i])],
-                f"{table.input_force[i]:.3f}",
-                f"{table.output_force[i]:.3f}",
-            ]
-            for i in range(len(table.run))
-        ]
-        heads = [*([route_heading] if route_heading else []), "run", "stroke", "input_force_N", "output_force_N"]
-        _write_csv(folder / str(tables.forces.file or "forces.csv"), heads, rows)
+    for name, (heads, rows) in table_pages(bench.description, dataset.measurements).items():
+        write_text(folder / name, "\n".join(",".join(row) for row in [heads, *rows]) + "\n")
     write_text(folder / TRUTH_FILE, json.dumps({"seed": seed, "truth": dict(truth)}, indent=1) + "\n")
-
-
-def _write_csv(path: Path, heads: list[str], rows: list[list[str]]) -> None:
-    write_text(path, "\n".join(",".join(row) for row in [heads, *rows]) + "\n")
 
 
 def _description_only(text: str) -> str:
@@ -173,7 +112,7 @@ def _description_only(text: str) -> str:
     kept, skipping = ["# Written by `bowdenfit simulate`; the truth is in truth.json."], False
     for line in lines:
         if line.strip().startswith("["):
-            skipping = line.strip().strip("[]") in {"truth", "design"}
+            skipping = line.strip().strip("[]").split(".")[0] in {"truth", "design"}
         if not skipping:
             kept.append(line)
     return "\n".join(kept).rstrip() + "\n"

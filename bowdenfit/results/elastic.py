@@ -1,0 +1,226 @@
+"""Answers about stretch, preload and loops at wrap angles, with intervals: what `bowdenfit predict --quantity` prints."""
+
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass
+from functools import cached_property
+from typing import Any
+
+import jax
+import jax.numpy as jnp
+import numpy as np
+
+from bowdenfit.errors import UsageError
+from bowdenfit.models.elasticity import PRELOAD
+from bowdenfit.predictions.draws import for_each_draw
+from bowdenfit.predictions.elastic import Bent, bending_contact, knows_preload, knows_stretch
+from bowdenfit.results.answers import Interval
+from bowdenfit.results.fit import Fit
+
+TAUT = 0.95  # probability with which the recommended preload keeps both sides taut
+_BENDS = 25  # wrap angles at which a range of bends is looked at
+
+Row = dict[str, Any]
+
+
+@dataclass(frozen=True)
+class PreloadAnswer:
+    """Which preloads will do.
+
+    Args:
+        bends: Lowest and highest wrap angle that the cable is bent to [rad].
+        reference_angle: Wrap angle at which preloads are meant [rad]; NaN where preload is the same at all.
+        input_force: Largest input force against which both sides must stay taut [N].
+        friction: Limit of what may be felt in free motion [N]; infinite without one.
+        lowest: Lowest preload that keeps both sides taut [N].
+        highest: Highest preload that is felt as no more than the limit [N]; None without one.
+        best: Preload that keeps both sides taut with probability `TAUT`, and is felt least of those [N].
+        felt: What it is felt as in free motion, at the bend where that is most [N].
+        possible: Probability that some preload satisfies both; 1 without a limit.
+    """
+
+    bends: tuple[float, float]
+    reference_angle: float
+    input_force: float
+    friction: float
+    lowest: Interval
+    highest: Interval | None
+    best: float
+    felt: Interval
+    possible: float
+
+
+@dataclass(frozen=True)
+class Elastic:
+    """The elastic answers of one fit. Angles are in rad, forces in N, lengths in mm."""
+
+    fit: Fit
+
+    @cached_property
+    def contact(self) -> int:
+        """Number of the contact that a wrap angle means."""
+        return bending_contact(self.fit.model)
+
+    def bent(self, wrap_angles: Sequence[float] | np.ndarray) -> Bent:
+        """The cable at wrap angles [rad].
+
+        Raises:
+            UsageError: A wrap angle does not say which of several contacts is bent.
+        """
+        return Bent(self.fit.model, self.contact, jnp.asarray(np.atleast_1d(wrap_angles), dtype=float))
+
+    def over(self, function: Callable[[Mapping[str, Any]], Any]) -> Any:
+        """A function of named values, for every draw (or the least-squares estimate alone)."""
+        space, posterior = self.fit.model.space, self.fit.posterior
+        z = self.fit.least_squares.z[None] if posterior is None else posterior.flat_z
+        with jax.enable_x64(True):
+            return for_each_draw(lambda one: function(space.constrain(one)), space.size)(z)
+
+    @cached_property
+    def measured_bends(self) -> np.ndarray:
+        """Different wrap angles that anything was measured at [rad]."""
+        tables, column = self.fit.dataset.measurements, None
+        contact = self.fit.dataset.description.contact[self.contact]
+        column = contact.wrap_angle.column
+        found = [t.wrap_angle for t in (tables.stretch, tables.preload) if t is not None]
+        for table in (tables.loop, tables.forces, tables.efficiencies):
+            if table is not None and column is not None:
+                found.append(table.own.column(column)[0])
+        if contact.wrap_angle.constant is not None:
+            found.append(np.array([contact.wrap_angle.constant.to("angle")]))
+        if tables.recordings is not None and column is not None:
+            k = tables.recordings.columns.index(column)
+            found.append(np.array([r.own_angle[k] for r in tables.recordings.each]))
+        angles = np.concatenate(found) if found else np.zeros(0)
+        return np.unique(np.round(angles[np.isfinite(angles)], 9))
+
+    @property
+    def reference_force(self) -> float:
+        """Input force that answers are given for where none is stated [N]."""
+        return self.fit.model.cable.friction.conditions.reference_force
+
+    def efficiency(
+        self, wrap_angles: np.ndarray, input_force: float | None = None, preload: float | None = None
+    ) -> np.ndarray:
+        """Efficiency [1] of every draw (rows) at wrap angles (columns)."""
+        force = self.reference_force if input_force is None else input_force
+        return self.output_force(wrap_angles, force, 1, preload) / force
+
+    def output_force(
+        self, wrap_angles: np.ndarray, input_force: float, stroke: int = 1, preload: float | None = None
+    ) -> np.ndarray:
+        """Output force [N] of every draw (rows) at wrap angles (columns)."""
+        bent, force = self.bent(wrap_angles), jnp.asarray(float(input_force))
+        return self.over(lambda values: bent.output_force(values, force, float(stroke), preload))
+
+    def friction(self, wrap_angles: np.ndarray, preload: float | None = None) -> np.ndarray:
+        """Force felt in free motion [N], draws by wrap angles.
+
+        Raises:
+            UsageError: The cable has no preload, and none is stated.
+        """
+        self._needs_preload(preload)
+        bent = self.bent(wrap_angles)
+        return self.over(lambda values: bent.friction(values, preload))
+
+    def preload(self, wrap_angles: np.ndarray, preload: float | None = None) -> tuple[np.ndarray, np.ndarray]:
+        """Preload [N] and slack [mm], draws by wrap angles.
+
+        Raises:
+            UsageError: The cable has no preload, and none is stated.
+        """
+        self._needs_preload(preload)
+        bent = self.bent(wrap_angles)
+        return self.over(lambda values: bent.preload(values, preload))
+
+    def slack_load(self, wrap_angles: np.ndarray, preload: float | None = None) -> np.ndarray:
+        """Input force at which the return side of a loop goes slack [N], draws by wrap angles.
+
+        Raises:
+            UsageError: The cable has no preload, and none is stated.
+        """
+        self._needs_preload(preload)
+        bent = self.bent(wrap_angles)
+        return self.over(lambda values: bent.slack_load(values, preload))
+
+    def position(
+        self, wrap_angles: np.ndarray, input_force: float, preload: float | None = None
+    ) -> tuple[np.ndarray, np.ndarray]:
+        """Position error and lost motion at the load side [mm], stated backlash included, draws by wrap angles.
+
+        Raises:
+            UsageError: Nothing says how the rope stretches.
+        """
+        self._needs_stretch()
+        bent, stated = self.bent(wrap_angles), self.fit.dataset.description.cable.backlash
+        backlash = stated.to("length") if stated is not None else 0.0
+        error, lost = self.over(lambda values: bent.position(values, float(input_force), preload))
+        return error + backlash, lost + backlash
+
+    def stiffness(self, wrap_angles: np.ndarray, load: float, preload: float | None = None) -> np.ndarray:
+        """Stiffness seen at the load side [N/mm], draws by wrap angles.
+
+        Raises:
+            UsageError: Nothing says how the rope stretches.
+        """
+        self._needs_stretch()
+        bent = self.bent(wrap_angles)
+        return self.over(lambda values: bent.stiffness(values, float(load), preload))
+
+    def preload_window(
+        self, bends: tuple[float, float], input_force: float = 0.0, friction: float | None = None
+    ) -> PreloadAnswer:
+        """Lowest preload without slack over a range of bends, highest for a given friction, and the best.
+
+        Args:
+            bends: Lowest and highest wrap angle [rad].
+            input_force: Force up to which both sides must stay taut [N].
+            friction: What may be felt in free motion [N]; no limit if omitted.
+
+        Raises:
+            UsageError: The cable has no preload.
+        """
+        self._needs_preload(None)
+        bent = self.bent(np.linspace(*bends, _BENDS))
+        limit = np.inf if friction is None else friction
+        lowest, highest = self.over(
+            lambda values: (bent.lowest_preload(values, input_force), bent.highest_preload(values, min(limit, 1e9)))
+        )
+        best = float(np.quantile(lowest, TAUT))
+        felt = self.over(lambda values: jnp.max(bent.friction(values, best)))
+        follows = self.fit.dataset.description.preload_follows_stretch
+        return PreloadAnswer(
+            bends,
+            self.fit.model.cable.elasticity.reference_angle if follows else float("nan"),
+            input_force,
+            limit,
+            Interval.of(lowest),
+            None if friction is None else Interval.of(highest),
+            best,
+            Interval.of(felt),
+            1.0 if friction is None else float(np.mean(lowest <= highest)),
+        )
+
+    def _needs_preload(self, stated: float | None) -> None:
+        if stated is None and not knows_preload(self.fit.model):
+            raise UsageError(
+                "nothing measured on this cable says what its preload is; state one with --preload 20N, or add a table of "
+                "preload, or of the loop, to cable.toml."
+            )
+
+    def _needs_stretch(self) -> None:
+        if not knows_stretch(self.fit.model):
+            raise UsageError(
+                "nothing measured on this cable says how its rope stretches; add a table of stretch under load to cable.toml."
+            )
+
+
+def has_elastic_answers(fit: Fit) -> bool:
+    """Whether a fit says anything of stretch or preload."""
+    return knows_stretch(fit.model) or knows_preload(fit.model)
+
+
+def preload_draws(fit: Fit) -> np.ndarray:
+    """Draws of the preload [N]; one value where it is fixed or there is only least squares."""
+    if fit.posterior is not None and PRELOAD in fit.posterior.values:
+        return fit.posterior.values[PRELOAD].ravel()
+    return np.array([fit.least_squares.estimates[PRELOAD].value])

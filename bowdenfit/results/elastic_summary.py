@@ -1,0 +1,118 @@
+"""The page about stretch, preload and loops in `summary.json`; people's version is made from the same numbers."""
+
+from dataclasses import asdict
+from typing import Any
+
+import numpy as np
+
+from bowdenfit.errors import UsageError
+from bowdenfit.predictions.elastic import knows_preload, knows_stretch
+from bowdenfit.results.answers import Interval
+from bowdenfit.results.elastic import TAUT, Elastic, PreloadAnswer, has_elastic_answers
+from bowdenfit.results.fit import Fit
+
+_MOST_BENDS = 5
+
+
+def elastic_page(fit: Fit) -> dict[str, Any]:
+    """Answers at the wrap angles that were measured at, and sentences; empty where there are none or no draws."""
+    if fit.posterior is None or not has_elastic_answers(fit):
+        return {}
+    elastic = Elastic(fit)
+    page: dict[str, Any] = {"input_force": elastic.reference_force, "friction_unit": friction_unit(fit), "bends": []}
+    try:
+        bends = elastic.measured_bends
+    except UsageError:
+        bends = np.zeros(0)
+    if len(bends):
+        shown = bends[np.unique(np.linspace(0, len(bends) - 1, _MOST_BENDS).round().astype(int))]
+        page["bends"] = _bends(elastic, shown)
+    window = None
+    if knows_preload(fit.model) and len(bends) > 1:
+        follows = fit.dataset.description.preload_follows_stretch
+        force = 0.0 if follows else elastic.reference_force
+        window = elastic.preload_window((float(bends[0]), float(bends[-1])), force)
+        page["preload_window"] = window_page(fit, window)
+    page["sentences"] = _sentences(fit, window)
+    return page
+
+
+def friction_arm(fit: Fit) -> float:
+    """Radius that turns friction into what is felt [mm], or 1 where none is stated."""
+    radius = fit.dataset.description.cable.output_pulley_radius
+    return radius.to("length") if radius is not None else 1.0
+
+
+def friction_unit(fit: Fit) -> str:
+    """Unit in which friction in free motion is shown."""
+    return "N*mm" if fit.dataset.description.cable.output_pulley_radius is not None else "N"
+
+
+def _bends(elastic: Elastic, bends: np.ndarray) -> list[dict[str, Any]]:
+    fit, force = elastic.fit, elastic.reference_force
+    columns: dict[str, np.ndarray] = {}
+    if knows_preload(fit.model):
+        columns["preload"] = elastic.preload(bends)[0]
+        columns["friction"] = friction_arm(fit) * elastic.friction(bends)
+    if fit.dataset.description.cable.kind == "loop":
+        columns["slack_load"] = elastic.slack_load(bends)
+    columns["efficiency"] = 100 * elastic.efficiency(bends)
+    if knows_stretch(fit.model):
+        columns["position_error"], columns["lost_motion"] = elastic.position(bends, force)
+        columns["stiffness"] = elastic.stiffness(bends, force)
+    degrees = np.rad2deg(bends)
+    return [
+        {"wrap_angle": float(f"{angle:.6g}")} | {name: asdict(Interval.of(d[:, i])) for name, d in columns.items()}
+        for i, angle in enumerate(degrees)
+    ]
+
+
+def window_page(fit: Fit, window: PreloadAnswer) -> dict[str, Any]:
+    """A preload window as plain data; angles in deg, friction in the unit that it is felt in."""
+    arm = friction_arm(fit)
+    felt = {name: arm * value for name, value in asdict(window.felt).items()}
+    return {
+        "bends": [float(angle) for angle in np.rad2deg(window.bends)],
+        "reference_angle": float(np.rad2deg(window.reference_angle)),
+        "input_force": window.input_force,
+        "friction_limit": arm * window.friction,
+        "friction_unit": friction_unit(fit),
+        "lowest": asdict(window.lowest),
+        "highest": asdict(window.highest) if window.highest is not None else None,
+        "best": window.best,
+        "felt": felt,
+        "possible": window.possible,
+    }
+
+
+def _sentences(fit: Fit, window: PreloadAnswer | None) -> list[str]:
+    sentences = []
+    if window is not None:
+        sentences.append(window_sentence(fit, window))
+    warning = fit.dataset.description.cable.sharp_bend
+    if warning:
+        sentences.append("Warning: " + warning)
+    return sentences
+
+
+def window_sentence(fit: Fit, window: PreloadAnswer) -> str:
+    """The preload window in words."""
+    low, high = (f"{angle:.4g}" for angle in np.rad2deg(window.bends))
+    page, unit = window_page(fit, window), friction_unit(fit)
+    at = "" if np.isnan(window.reference_angle) else f" at {page['reference_angle']:.4g} deg"
+    under = f" under up to {window.input_force:g} N" if window.input_force > 0 else ""
+    lowest = window.lowest
+    parts = [
+        f"Over bends from {low} to {high} deg{under} the cable stays taut from a preload of {lowest.median:.3g} N{at} on (90 % "
+        f"interval {lowest.q05:.3g} to {lowest.q95:.3g} N). Least friction is felt without slack, with {TAUT:.0%} "
+        f"probability, at {window.best:.3g} N: then free motion takes {page['felt']['median']:.3g} {unit} "
+        f"({page['felt']['q05']:.3g} to {page['felt']['q95']:.3g}) at the bend where it is most."
+    ]
+    if window.highest is not None:
+        parts.append(
+            f"To be felt as no more than {page['friction_limit']:.3g} {unit}, preload must not exceed "
+            f"{window.highest.median:.3g} N{at} ({window.highest.q05:.3g} to {window.highest.q95:.3g} N)."
+        )
+        if window.possible < TAUT:
+            parts.append(f"That leaves a preload that does both with a probability of only {window.possible:.0%}.")
+    return " ".join(parts)

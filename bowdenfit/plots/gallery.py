@@ -12,14 +12,19 @@ from typing import TYPE_CHECKING, Any
 from matplotlib.figure import Figure
 
 from bowdenfit.plots.autocorrelation import autocorrelation, has_autocorrelation
+from bowdenfit.plots.bending_loss import bending_loss, has_bending_loss
 from bowdenfit.plots.coefficients import coefficients, has_coefficients
 from bowdenfit.plots.dependence import dependence, has_dependence
 from bowdenfit.plots.efficiency import efficiency, has_route
 from bowdenfit.plots.hysteresis import has_hysteresis, hysteresis
+from bowdenfit.plots.loops import has_loops, loops
 from bowdenfit.plots.pairs import has_pairs, pairs
+from bowdenfit.plots.preload import has_preload, preload
+from bowdenfit.plots.preload_window import has_preload_window, preload_window
 from bowdenfit.plots.recordings import has_recordings, recordings
 from bowdenfit.plots.residuals import has_residuals, residuals
 from bowdenfit.plots.sample_efficiency import has_sample_efficiency, sample_efficiency
+from bowdenfit.plots.stretch import has_stretch, stretch
 from bowdenfit.plots.style import DOTS_PER_INCH, in_paper_style
 from bowdenfit.plots.traces import has_traces, traces
 from bowdenfit.plots.wrap_angles import has_curves, wrap_angles
@@ -54,6 +59,11 @@ FIGURES = {
     "sample_efficiency": Entry(sample_efficiency, has_sample_efficiency),
     "autocorrelation": Entry(autocorrelation, has_autocorrelation),
     "dependence": Entry(dependence, has_dependence),
+    "stretch": Entry(stretch, has_stretch),
+    "preload": Entry(preload, has_preload),
+    "bending_loss": Entry(bending_loss, has_bending_loss),
+    "loops": Entry(loops, has_loops),
+    "preload_window": Entry(preload_window, has_preload_window),
 }
 
 

@@ -1,5 +1,7 @@
 """Stretch, preload and loops in words: what was read, what it cannot tell, and what the fit answers."""
 
+from typing import Any
+
 import numpy as np
 
 from bowdenfit.description import Description
@@ -103,29 +105,42 @@ def elastic_text(fit: Fit) -> str:
     page = elastic_page(fit)
     if not page:
         return ""
-    blocks = []
-    if page.get("bends"):
-        force, unit = page["input_force"], page["friction_unit"]
-        heads, rows = [f"At wrap angle (deg), {force:g} N"], []
-        columns = [(key, head, digits) for key, head, digits in _COLUMNS if key in page["bends"][0]]
-        heads += [head.format(unit=unit) for _, head, _ in columns]
-        for bend in page["bends"]:
-            rows.append([f"{bend['wrap_angle']:g}", *(_interval(bend[key], digits) for key, _, digits in columns)])
-        blocks.append(f"{_HEADING}\n" + table(heads, rows))
-    blocks += [filled(sentence) for sentence in page["sentences"]]
+    tables = [_answers(page, columns) for columns in _COLUMNS] if page["bends"] else []
+    blocks = [*([_HEADING] if tables else []), *(t for t in tables if t), *(filled(s) for s in page["sentences"])]
     return "\n".join(blocks)
 
 
 _HEADING = "Stretch and preload, median (90 % interval)"
 _COLUMNS = (
-    ("preload", "preload (N)", 3),
-    ("friction", "felt in free motion ({unit})", 3),
-    ("slack_load", "return slack from (N)", 3),
-    ("efficiency", "efficiency (%)", 3),
-    ("position_error", "position error (mm)", 3),
-    ("lost_motion", "lost motion (mm)", 2),
-    ("stiffness", "stiffness (N/mm)", 3),
+    (
+        ("preload", "preload (N)", 3),
+        ("friction", "felt in free motion ({unit})", 3),
+        ("slack_load", "return side slack from (N)", 3),
+    ),
+    (
+        ("efficiency", "efficiency (%)", 3),
+        ("position_error", "position error (mm)", 3),
+        ("lost_motion", "lost motion (mm)", 2),
+        ("stiffness", "stiffness (N/mm)", 3),
+    ),
 )
+
+
+def _answers(page: dict[str, Any], columns: tuple[tuple[str, str, int], ...]) -> str:
+    """Some of the answers, a row for each wrap angle; empty where the cable has none of them."""
+    there = [column for column in columns if column[0] in page["bends"][0]]
+    if not there:
+        return ""
+    under = f", {page['input_force']:g} N" if any(key in _UNDER_LOAD for key, _, _ in there) else ""
+    heads = [f"at (deg){under}", *(head.format(unit=page["friction_unit"]) for _, head, _ in there)]
+    rows = [
+        [f"{bend['wrap_angle']:g}", *(_interval(bend[key], digits) for key, _, digits in there)]
+        for bend in page["bends"]
+    ]
+    return table(heads, rows)
+
+
+_UNDER_LOAD = {"efficiency", "position_error", "stiffness"}
 
 
 def _interval(row: dict[str, float], digits: int) -> str:

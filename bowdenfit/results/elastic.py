@@ -18,8 +18,7 @@ from bowdenfit.results.fit import Fit
 
 TAUT = 0.95  # probability with which the recommended preload keeps both sides taut
 _BENDS = 25  # wrap angles at which a range of bends is looked at
-
-Row = dict[str, Any]
+_SHOWN = 5  # wrap angles of a summary
 
 
 @dataclass(frozen=True)
@@ -51,7 +50,7 @@ class PreloadAnswer:
 
 @dataclass(frozen=True)
 class Elastic:
-    """The elastic answers of one fit. Angles are in rad, forces in N, lengths in mm."""
+    """The elastic answers of one fit (`fit.elastic`). Angles are in rad, forces in N, lengths in mm."""
 
     fit: Fit
 
@@ -151,10 +150,9 @@ class Elastic:
             UsageError: Nothing says how the rope stretches.
         """
         self._needs_stretch()
-        bent, stated = self.bent(wrap_angles), self.fit.dataset.description.cable.backlash
-        backlash = stated.to("length") if stated is not None else 0.0
+        bent = self.bent(wrap_angles)
         error, lost = self.over(lambda values: bent.position(values, float(input_force), preload))
-        return error + backlash, lost + backlash
+        return error + self._backlash, lost + self._backlash
 
     def stiffness(self, wrap_angles: np.ndarray, load: float, preload: float | None = None) -> np.ndarray:
         """Stiffness seen at the load side [N/mm], draws by wrap angles.
@@ -185,20 +183,68 @@ class Elastic:
         lowest, highest = self.over(
             lambda values: (bent.lowest_preload(values, input_force), bent.highest_preload(values, min(limit, 1e9)))
         )
-        best = float(np.quantile(lowest, TAUT))
+        return self._window(bends, input_force, limit, lowest, highest)
+
+    def _window(
+        self, bends: tuple[float, float], input_force: float, limit: float, lowest: np.ndarray, highest: np.ndarray
+    ) -> PreloadAnswer:
+        """The answer that draws of the lowest and highest preload give; with an infinite limit there is no highest."""
+        bent, best = self.bent(np.linspace(*bends, _BENDS)), float(np.quantile(lowest, TAUT))
         felt = self.over(lambda values: jnp.max(bent.friction(values, best)))
-        follows = self.fit.dataset.description.preload_follows_stretch
+        follows, limited = self.fit.dataset.description.preload_follows_stretch, np.isfinite(limit)
         return PreloadAnswer(
             bends,
             self.fit.model.cable.elasticity.reference_angle if follows else float("nan"),
             input_force,
             limit,
             Interval.of(lowest),
-            None if friction is None else Interval.of(highest),
+            Interval.of(highest) if limited else None,
             best,
             Interval.of(felt),
-            1.0 if friction is None else float(np.mean(lowest <= highest)),
+            float(np.mean(lowest <= highest)) if limited else 1.0,
         )
+
+    @cached_property
+    def usual(self) -> tuple[np.ndarray, dict[str, np.ndarray], PreloadAnswer | None]:
+        """What a summary shows, computed by one program: wrap angles [rad], draws by wrap angles, and the preload window.
+
+        The draws are of preload [N], friction [N], slack load [N], efficiency [1], position error and lost motion [mm],
+        stiffness [N/mm], as far as the cable has them.
+        """
+        bends, model, force = self.measured_bends, self.fit.model, self.reference_force
+        if not len(bends):
+            return bends, {}, None
+        shown = bends[np.unique(np.linspace(0, len(bends) - 1, _SHOWN).round().astype(int))]
+        preloaded, stretches, ends = knows_preload(model), knows_stretch(model), (float(bends[0]), float(bends[-1]))
+        bent, every = self.bent(shown), self.bent(np.linspace(*ends, _BENDS))
+        under = 0.0 if self.fit.dataset.description.preload_follows_stretch else force
+
+        def answers(values: Mapping[str, Any]) -> dict[str, Any]:
+            found = {"efficiency": bent.output_force(values, jnp.asarray(force)) / force}
+            if preloaded:
+                found |= {"preload": bent.preload(values)[0], "friction": bent.friction(values)}
+                found["lowest"] = every.lowest_preload(values, under)
+            if preloaded and bent.is_loop:
+                found["slack_load"] = bent.slack_load(values)
+            if stretches:
+                found["position_error"], found["lost_motion"] = bent.position(values, force)
+                found["stiffness"] = bent.stiffness(values, force)
+            return found
+
+        draws = self.over(answers)
+        lowest = draws.pop("lowest", None)
+        if lowest is None or len(bends) == 1:
+            return shown, self._with_backlash(draws), None
+        return shown, self._with_backlash(draws), self._window(ends, under, np.inf, lowest, lowest)
+
+    def _with_backlash(self, draws: dict[str, np.ndarray]) -> dict[str, np.ndarray]:
+        moved = {name: draws[name] + self._backlash for name in ("position_error", "lost_motion") if name in draws}
+        return draws | moved
+
+    @property
+    def _backlash(self) -> float:
+        stated = self.fit.dataset.description.cable.backlash
+        return stated.to("length") if stated is not None else 0.0
 
     def _needs_preload(self, stated: float | None) -> None:
         if stated is None and not knows_preload(self.fit.model):

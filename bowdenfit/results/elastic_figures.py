@@ -75,7 +75,7 @@ def elastic_figures(fit: Fit) -> ElasticFigures:
 
 def _parts(fit: Fit) -> dict[str, _Part]:
     """The figures that apply."""
-    elastic, tables, parts = Elastic(fit), fit.dataset.measurements, dict[str, _Part]()
+    elastic, tables, parts = fit.elastic, fit.dataset.measurements, dict[str, _Part]()
     if tables.stretch is not None:
         parts["stretch"] = _Stretch(fit, tables.stretch)
     if fit.dataset.description.preload_follows_stretch and knows_preload(fit.model):

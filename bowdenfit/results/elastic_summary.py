@@ -6,35 +6,38 @@ from typing import Any
 import numpy as np
 
 from bowdenfit.errors import UsageError
-from bowdenfit.predictions.elastic import knows_preload, knows_stretch
+from bowdenfit.predictions.elastic import bending_contact
 from bowdenfit.results.answers import Interval
-from bowdenfit.results.elastic import TAUT, Elastic, PreloadAnswer, has_elastic_answers
+from bowdenfit.results.elastic import TAUT, PreloadAnswer, has_elastic_answers
 from bowdenfit.results.fit import Fit
-
-_MOST_BENDS = 5
 
 
 def elastic_page(fit: Fit) -> dict[str, Any]:
     """Answers at the wrap angles that were measured at, and sentences; empty where there are none or no draws."""
     if fit.posterior is None or not has_elastic_answers(fit):
         return {}
-    elastic = Elastic(fit)
-    page: dict[str, Any] = {"input_force": elastic.reference_force, "friction_unit": friction_unit(fit), "bends": []}
-    try:
-        bends = elastic.measured_bends
-    except UsageError:
-        bends = np.zeros(0)
-    if len(bends):
-        shown = bends[np.unique(np.linspace(0, len(bends) - 1, _MOST_BENDS).round().astype(int))]
-        page["bends"] = _bends(elastic, shown)
+    page: dict[str, Any] = {
+        "input_force": fit.elastic.reference_force,
+        "friction_unit": friction_unit(fit),
+        "bends": [],
+    }
     window = None
-    if knows_preload(fit.model) and len(bends) > 1:
-        follows = fit.dataset.description.preload_follows_stretch
-        force = 0.0 if follows else elastic.reference_force
-        window = elastic.preload_window((float(bends[0]), float(bends[-1])), force)
+    if not several_bend(fit):
+        bends, draws, window = fit.elastic.usual
+        page["bends"] = _bends(fit, bends, draws)
+    if window is not None:
         page["preload_window"] = window_page(fit, window)
     page["sentences"] = _sentences(fit, window)
     return page
+
+
+def several_bend(fit: Fit) -> bool:
+    """Whether a wrap angle would not say which of several contacts is bent."""
+    try:
+        bending_contact(fit.model)
+    except UsageError:
+        return True
+    return False
 
 
 def friction_arm(fit: Fit) -> float:
@@ -48,22 +51,13 @@ def friction_unit(fit: Fit) -> str:
     return "N*mm" if fit.dataset.description.cable.output_pulley_radius is not None else "N"
 
 
-def _bends(elastic: Elastic, bends: np.ndarray) -> list[dict[str, Any]]:
-    fit, force = elastic.fit, elastic.reference_force
-    columns: dict[str, np.ndarray] = {}
-    if knows_preload(fit.model):
-        columns["preload"] = elastic.preload(bends)[0]
-        columns["friction"] = friction_arm(fit) * elastic.friction(bends)
-    if fit.dataset.description.cable.kind == "loop":
-        columns["slack_load"] = elastic.slack_load(bends)
-    columns["efficiency"] = 100 * elastic.efficiency(bends)
-    if knows_stretch(fit.model):
-        columns["position_error"], columns["lost_motion"] = elastic.position(bends, force)
-        columns["stiffness"] = elastic.stiffness(bends, force)
-    degrees = np.rad2deg(bends)
+def _bends(fit: Fit, bends: np.ndarray, draws: dict[str, np.ndarray]) -> list[dict[str, Any]]:
+    """One row a wrap angle, in the units that are shown."""
+    scale = {"friction": friction_arm(fit), "efficiency": 100.0}
     return [
-        {"wrap_angle": float(f"{angle:.6g}")} | {name: asdict(Interval.of(d[:, i])) for name, d in columns.items()}
-        for i, angle in enumerate(degrees)
+        {"wrap_angle": float(f"{angle:.6g}")}
+        | {name: asdict(Interval.of(scale.get(name, 1.0) * d[:, i])) for name, d in draws.items()}
+        for i, angle in enumerate(np.rad2deg(bends))
     ]
 
 

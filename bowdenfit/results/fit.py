@@ -4,7 +4,7 @@ from collections.abc import Iterable
 from dataclasses import dataclass, field
 from functools import cached_property
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import jax
 import numpy as np
@@ -18,6 +18,9 @@ from bowdenfit.predictions.choices import at_edge, best_window, rank_choices
 from bowdenfit.predictions.draws import curves_of, efficiency_at, for_each_draw
 from bowdenfit.predictions.optimal_length import route_grid
 from bowdenfit.results.answers import Interval, OptimalLength
+
+if TYPE_CHECKING:
+    from bowdenfit.results.elastic import Elastic
 
 OPTIMAL_LENGTH, OPTIMAL_EFFICIENCY = "optimal_length", "optimal_efficiency"
 
@@ -187,6 +190,13 @@ class Fit:
             best_window(grid, curves["efficiency"], best),
             ranked,
         )
+
+    @cached_property
+    def elastic(self) -> "Elastic":
+        """Answers about stretch, preload and loops at wrap angles."""
+        from bowdenfit.results.elastic import Elastic
+
+        return Elastic(self)
 
     def summary(self) -> dict[str, Any]:
         """Everything on one page, for programs (the contents of summary.json)."""

@@ -55,10 +55,10 @@ def reading_options(verb: Verb) -> Verb:
 
 def reading(wrap_angle: str | None, **options: Any) -> dict[str, Any]:
     """The options of `reading_options` as the workflow takes them."""
-    return {**options, "wrap_angle": quantity(wrap_angle, "--wrap-angle", "180deg") if wrap_angle else None}
+    return {**options, "wrap_angle": parsed_quantity(wrap_angle, "--wrap-angle", "180deg") if wrap_angle else None}
 
 
-def quantity(text: str, option: str, example: str) -> tuple[float, str]:
+def parsed_quantity(text: str, option: str, example: str) -> tuple[float, str]:
     """A number with its unit, such as 180deg or "100 N"."""
     digits = len(text) - len(text.lstrip("+-.0123456789"))
     try:

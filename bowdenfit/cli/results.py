@@ -5,7 +5,7 @@ from typing import TYPE_CHECKING
 
 import click
 
-from bowdenfit.cli.options import quantity
+from bowdenfit.cli.options import parsed_quantity
 
 if TYPE_CHECKING:
     from bowdenfit.results.fit import Fit
@@ -23,24 +23,86 @@ def summary(results: Path, as_json: bool) -> None:
         show(load(results), as_json)
 
 
-@click.command(short_help="Predict efficiency or output force at lengths.")
+QUANTITIES = (
+    "efficiency",
+    "output-force",
+    "preload",
+    "friction",
+    "slack-load",
+    "position",
+    "stiffness",
+    "preload-window",
+)
+
+
+@click.command(short_help="Predict efficiency, forces, preload, position or stiffness.")
 @click.argument("results", type=click.Path(path_type=Path))
 @click.argument("lengths", type=float, nargs=-1)
-@click.option("--input-force", metavar="FORCE", help="Predict the output force for this input force, such as 100N.")
+@click.option(
+    "--quantity",
+    type=click.Choice(QUANTITIES),
+    help="What to predict.  [default: efficiency, or output-force with --input-force]",
+)
+@click.option(
+    "--wrap-angle",
+    "wrap_angles",
+    multiple=True,
+    metavar="ANGLE",
+    help="Predict at this wrap angle instead of a length, such as 90deg; may be repeated.",
+)
+@click.option("--input-force", metavar="FORCE", help="Force at the motor side, such as 100N.")
+@click.option("--preload", metavar="FORCE", help="Preload the cable with this instead of its own, such as 20N.")
+@click.option(
+    "--friction-limit",
+    metavar="TORQUE",
+    help="What may be felt in free motion, such as 50N*mm (or 5N without a pulley radius), for the preload window.",
+)
 @click.option(
     "--stroke", type=click.Choice(["pull", "return"]), default="pull", show_default=True, help="Direction of sliding."
 )
 @click.option("--format", "form", type=click.Choice(["csv", "json"]), default="csv", show_default=True)
-def predict(results: Path, lengths: tuple[float, ...], input_force: str | None, stroke: str, form: str) -> None:
-    """Predict the efficiency, or the output force for an input force, at LENGTHS (default: the lengths that can be bought).
+def predict(
+    results: Path,
+    lengths: tuple[float, ...],
+    input_force: str | None,
+    stroke: str,
+    form: str,
+    quantity: str | None,
+    wrap_angles: tuple[str, ...],
+    preload: str | None,
+    friction_limit: str | None,
+) -> None:
+    """Predict the efficiency, or the output force for an input force, at LENGTHS (default: the lengths that can be bought)
+    or at wrap angles; or what stretch and preload do at wrap angles.
+
+    \b
+    efficiency      output over input force
+    output-force    force at the load side
+    preload         tension at rest, and slack where there is none
+    friction        what moving the unloaded cable takes
+    slack-load      input force at which a loop's return side goes slack
+    position        error and lost motion at the load side, by stretch, slack and backlash
+    stiffness       seen at the load side, motor locked
+    preload-window  lowest preload without slack over these bends, highest for --friction-limit, and the best
 
     The interval q05 to q95 is that of the cable's mean; mounting_q05 to mounting_q95 also holds the scatter from one
     mounting of the cable to the next. Lengths outside the range of the curves are marked.
-    """
+    """  # noqa: D301 - the backspace keeps click from filling the list
     from bowdenfit.workflow import predict as predicted
 
-    force = quantity(input_force, "--input-force", "100N") if input_force else None
-    rows = predicted(load(results), lengths or None, force, stroke)
+    def number(text: str | None, option: str, example: str) -> tuple[float, str] | None:
+        return parsed_quantity(text, option, example) if text else None
+
+    rows = predicted(
+        load(results),
+        lengths or None,
+        number(input_force, "--input-force", "100N"),
+        stroke,
+        quantity=quantity,
+        wrap_angles=[parsed_quantity(angle, "--wrap-angle", "90deg") for angle in wrap_angles],
+        preload=number(preload, "--preload", "20N"),
+        friction_limit=number(friction_limit, "--friction-limit", "50N*mm"),
+    )
     if form == "json":
         import json
 
@@ -48,7 +110,14 @@ def predict(results: Path, lengths: tuple[float, ...], input_force: str | None, 
     else:
         click.echo(",".join(rows[0]))
         for row in rows:
-            click.echo(",".join(f"{v:.6g}" if isinstance(v, float) else str(v).lower() for v in row.values()))
+            click.echo(",".join(_cell(value) for value in row.values()))
+
+
+def _cell(value: object) -> str:
+    """A value as CSV."""
+    if isinstance(value, float):
+        return f"{value:.6g}"
+    return f'"{value}"' if isinstance(value, str) else str(value).lower()
 
 
 @click.command(short_help="The design answer: which length is best.")

@@ -5,8 +5,9 @@ on any residual, is reported as not identified. With priors (z itself as further
 posterior at the noise scales' prior medians.
 """
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
+from itertools import product
 from typing import Any
 
 import jax
@@ -17,8 +18,10 @@ from jax import Array
 
 from bowdenfit.errors import ConvergenceError
 from bowdenfit.inference.compilation import compiled
+from bowdenfit.inference.disagreement import Disagreement, disagreements
 from bowdenfit.inference.posterior import Posterior
-from bowdenfit.models.build import Term
+from bowdenfit.inference.rivals import PINS, contested, fitting_as_well
+from bowdenfit.inference.scatter import scatter_about
 from bowdenfit.parameters.priors import HalfNormal, LogNormal, TruncatedNormal, Uniform
 from bowdenfit.parameters.space import Parameter
 
@@ -27,7 +30,7 @@ _SUSPECT = -2.0  # below this z an estimate may be on its way to the lower end
 _SINGULAR = 1e-8  # singular values below this fraction of the largest carry no information
 _FAR = 50.0  # standard error in units of the prior's sd beyond which data say nothing of a parameter
 
-_FREEDOM = 0.5  # degrees of freedom below which the scatter of a table cannot be estimated
+_DEEPER = 0.999  # share of the sum of squares below which another solution is a deeper valley, and no rounding
 
 Solution = dict[str, Any]
 Objective = Callable[..., Solution]
@@ -65,6 +68,7 @@ class LeastSquares:
         z: Solution in z (noise scales at their prior median).
         converged: Whether the solver met its tolerance.
         message: What it said.
+        disagreements: How well each table agrees with everything else; empty of one table alone.
     """
 
     estimates: dict[str, Estimate]
@@ -75,6 +79,7 @@ class LeastSquares:
     z: np.ndarray
     converged: bool
     message: str
+    disagreements: tuple[Disagreement, ...] = ()
 
 
 @dataclass(frozen=True)
@@ -145,6 +150,16 @@ def least_squares(posterior: Posterior, objective: Objective, start: np.ndarray)
         objective: Its compiled solve.
         start: z to start from.
     """
+    found, at_end = _minimum(posterior, objective, start)
+    trials = _pinned_elsewhere(posterior, objective, start)
+    best = min(trials, key=_sum_of_squares, default=found)
+    if _sum_of_squares(best) < _DEEPER * _sum_of_squares(found):
+        found, at_end = _minimum(posterior, objective, best["z"])
+    return _summarized(posterior, found, _noise(posterior), at_end, trials)
+
+
+def _minimum(posterior: Posterior, objective: Objective, start: np.ndarray) -> tuple[Solution, np.ndarray]:
+    """The minimum without priors, and which parameters have run to their lower end there."""
     parameters, noise = posterior.model.space.free, _noise(posterior)
     nothing = np.zeros(len(noise))
     found = _solve(posterior, objective, start, noise, nothing, nothing)
@@ -162,7 +177,18 @@ def least_squares(posterior: Posterior, objective: Objective, start: np.ndarray)
         trial = _solve(posterior, objective, found["z"], noise | trial_end, pin, nothing)
         if _sum_of_squares(trial) <= _sum_of_squares(found) * (1 + 1e-7) + 1e-14:
             at_end, found = trial_end, trial
-    return _summarized(posterior, found, noise, at_end)
+    return found, at_end
+
+
+def _pinned_elsewhere(posterior: Posterior, objective: Objective, start: np.ndarray) -> list[Solution]:
+    """Solutions with one parameter of the elastic side, or of friction beside it, pinned away from the minimum."""
+    parameters, noise = posterior.model.space.free, _noise(posterior)
+    roles = ["friction", "elastic"] if any(p.role == "elastic" for p in parameters) else []
+    nothing, trials = np.zeros(len(noise)), []
+    for i, z in product([i for i, p in enumerate(parameters) if p.role in roles], PINS):
+        this = np.arange(len(noise)) == i
+        trials.append(_solve(posterior, objective, start, noise | this, np.where(this, z, 0.0), nothing))
+    return trials
 
 
 def _solve(
@@ -191,16 +217,19 @@ def _may_end(parameters: tuple[Parameter, ...]) -> np.ndarray:
     return np.array([isinstance(p.prior, ending) for p in parameters], dtype=bool)
 
 
-def _summarized(posterior: Posterior, found: Solution, noise: np.ndarray, at_end: np.ndarray) -> LeastSquares:
+def _summarized(
+    posterior: Posterior, found: Solution, noise: np.ndarray, at_end: np.ndarray, trials: Sequence[Solution]
+) -> LeastSquares:
     space = posterior.model.space
     active = np.flatnonzero(~noise & ~at_end)
     u, s, vt = np.linalg.svd(found["jacobian"][:, active], full_matrices=True)
     informed = np.zeros(len(active), dtype=bool)
     informed[: len(s)] = s > _SINGULAR * max(s.max(initial=0.0), 1e-30)
     s, u = s[informed[: len(s)]], u[:, : len(active)][:, informed[: u.shape[1]]]
-    scale, residual_sd = _scatter(posterior.model.terms, found["residuals"], np.sum(u**2, axis=1))
+    scale, residual_sd = scatter_about(posterior.model.terms, found["residuals"], np.sum(u**2, axis=1))
     root = vt[informed].T / s
     error = np.sqrt(np.sum((root @ (u.T * scale)) ** 2, axis=1))
+    rivals = fitting_as_well(found, trials, scale)
     undetermined = np.sum(vt[~informed] ** 2, axis=0) > 1e-6
     lost = undetermined | (np.abs(found["z"][active]) > _FAR) | (np.sqrt(np.sum(root**2, axis=1)) > _FAR)
     estimates: dict[str, Estimate] = {}
@@ -215,7 +244,7 @@ def _summarized(posterior: Posterior, found: Solution, noise: np.ndarray, at_end
             estimates[p.name] = Estimate(np.nan, np.nan, False, "the measurements do not determine it")
         else:
             sd = abs(found["slope"][i] * error[np.searchsorted(active, i)]) * p.shown_scale
-            estimates[p.name] = Estimate(value, float(sd), True)
+            estimates[p.name] = _estimate(value, float(sd), [float(r["values"][i]) * p.shown_scale for r in rivals])
     for p in space.fixed:
         estimates[p.name] = Estimate((p.fixed or 0.0) * p.shown_scale, np.nan, True, "fixed")
     condition = (float(s[0] / s[-1]) if informed.all() else float("inf")) if len(active) else 1.0
@@ -224,28 +253,32 @@ def _summarized(posterior: Posterior, found: Solution, noise: np.ndarray, at_end
     scales = {p.name: v * p.shown_scale for p, v in zip(space.free, found["values"], strict=True)}
     scales |= {p.name: (p.fixed or 0.0) * p.shown_scale for p in space.fixed}
     residual_sd = {t.name: residual_sd[t.name] * float(scales[t.noise]) for t in posterior.model.terms}
-    readings = found["readings"]
+    agreement = disagreements(
+        posterior.model.terms, found["residuals"], _by_term(posterior, found), space.free, found["z"]
+    )
     return LeastSquares(
-        estimates, residual_sd, readings, condition, total, found["z"], bool(found["succeeded"]), message
+        estimates,
+        residual_sd,
+        found["readings"],
+        condition,
+        total,
+        found["z"],
+        bool(found["succeeded"]),
+        message,
+        agreement,
     )
 
 
-def _scatter(
-    terms: Sequence[Term], residuals: Mapping[str, np.ndarray], leverage: np.ndarray
-) -> tuple[np.ndarray, dict[str, float]]:
-    """Scatter of the standardized residuals about the fit: for each residual, and by table (of its first block).
+def _estimate(value: float, sd: float, rivals: Sequence[float]) -> Estimate:
+    """An estimate, unless solutions that fit about as well lie far outside its standard error."""
+    ends = contested(value, sd, rivals)
+    if ends is None:
+        return Estimate(value, sd, True)
+    return Estimate(np.nan, np.nan, False, f"values from {ends[0]:.3g} to {ends[1]:.3g} fit about as well")
 
-    A block whose residuals are all used up by parameters has no scatter of its own; its weight stands.
-    """
-    scale, by_table, start = np.ones(len(leverage)), {}, 0
-    for term in terms:
-        spreads, first = [], start
-        for count, independent in term.residual_blocks:
-            rows, values = slice(start, start + count), residuals[term.name][start - first : start - first + count]
-            freedom = min(np.count_nonzero(values), independent) - leverage[rows].sum()
-            spread = float(np.sqrt(np.sum(values**2) / freedom)) if freedom > _FREEDOM else float("nan")
-            scale[rows] = spread if np.isfinite(spread) else 1.0
-            spreads.append(spread)
-            start = rows.stop
-        by_table[term.name] = spreads[0]
-    return scale, by_table
+
+def _by_term(posterior: Posterior, found: Solution) -> dict[str, np.ndarray]:
+    """The Jacobian's rows of each table."""
+    names = [term.name for term in posterior.model.terms]
+    ends = np.cumsum([len(found["residuals"][name]) for name in names])
+    return dict(zip(names, np.split(found["jacobian"], ends[:-1]), strict=True))

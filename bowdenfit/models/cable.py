@@ -17,6 +17,7 @@ from bowdenfit.models.curves import CURVES, Curve
 from bowdenfit.models.elasticity import Elasticity
 from bowdenfit.models.friction_models import FrictionModel, make_friction_model
 from bowdenfit.models.laws import CONTACT_LAWS, ContactLaw
+from bowdenfit.physics.loop import loop_output_force
 
 ANGLE_NOISE = "sigma_theta"
 Entry = TypeVar("Entry")
@@ -100,7 +101,43 @@ class Cable:
 
     def efficiency_at(self, values: Mapping[str, Array], route: Float[Array, " rows"]) -> Float[Array, " rows"]:
         """Efficiency while pulling with the reference force at the reference speed [1] at values of the route variable."""
+        if self.is_loop:
+            force = self.friction.conditions.reference_force
+            return self.output_force_at(values, route, jnp.asarray(force), jnp.ones(())) / force
         return self.friction.efficiency(values, self.exponent_at(values, route))
+
+    @property
+    def is_loop(self) -> bool:
+        """Whether it is a pull-pull loop."""
+        return self.description.cable.kind == "loop"
+
+    def output_force_at(
+        self,
+        values: Mapping[str, Array],
+        route: Float[Array, " rows"],
+        input_force: Float[Array, ""],
+        stroke: Float[Array, ""],
+        mounting: Float[Array, ""] | float = 0.0,
+    ) -> Float[Array, " rows"]:
+        """Output force [N] at values of the route variable, at the reference speed.
+
+        Args:
+            values: Values of the parameters.
+            route: Route variable.
+            input_force: Force at the motor side [N].
+            stroke: +1 pulling, -1 return.
+            mounting: Effect of the mounting on the friction exponent [1].
+        """
+        angles = self.wrap_angles(values, route)
+        exponent = self.friction_exponent(values, angles) + mounting
+        if self.is_loop:
+            preload = self.elasticity.preload_or_none(values, jnp.sum(angles, axis=-1))
+            return loop_output_force(input_force, preload, exponent, stroke)
+        return self.friction.output_force(values, input_force, exponent, stroke)
+
+    def loss_at(self, values: Mapping[str, Array], route: Float[Array, " rows"]) -> Float[Array, " rows"]:
+        """What is least where efficiency is highest: the friction exponent, or of a loop the efficiency with a minus."""
+        return -self.efficiency_at(values, route) if self.is_loop else self.exponent_at(values, route)
 
     def exponent_at(self, values: Mapping[str, Array], route: Float[Array, " rows"]) -> Float[Array, " rows"]:
         """Friction exponent [1] at values of the route variable."""

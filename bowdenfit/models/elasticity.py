@@ -104,8 +104,12 @@ class Elasticity:
         """Preload [N] and slack [mm] at a total wrap angle [rad]."""
         return self.preload_from(values, values[PRELOAD], bend)
 
+    def preload_or_none(self, values: Values, bend: Float[Array, "*batch"]) -> Float[Array, "*batch"]:
+        """Preload [N]; 0 of a cable nothing of whose measurements depends on one."""
+        return self.preload(values, bend)[0] if PRELOAD in values else jnp.zeros(bend.shape)
+
     def preload_from(
-        self, values: Values, reference_preload: Float[Array, ""], bend: Float[Array, "*batch"]
+        self, values: Values, reference_preload: Float[Array, "*#batch"], bend: Float[Array, "*batch"]
     ) -> tuple[Float[Array, "*batch"], Float[Array, "*batch"]]:
         """Preload [N] and slack [mm] at a total wrap angle [rad] of a cable preloaded otherwise."""
         if not self.description.preload_follows_stretch:

@@ -106,12 +106,12 @@ def output_force_at(
         stroke: +1 pulling, -1 return.
         mounting: Effect of the mounting on the friction exponent of each draw [1].
     """
-    at, friction = jnp.asarray(np.atleast_1d(route), dtype=float), model.cable.friction
+    at = jnp.asarray(np.atleast_1d(route), dtype=float)
 
     def force(z_and_mounting: Float[Array, " free_and_one"]) -> Float[Array, " route"]:
         values = model.space.constrain(z_and_mounting[:-1])
-        exponent = model.cable.exponent_at(values, at) + z_and_mounting[-1]
-        return friction.output_force(values, jnp.asarray(input_force), exponent, jnp.asarray(float(stroke)))
+        force_in, direction = jnp.asarray(float(input_force)), jnp.asarray(float(stroke))
+        return model.cable.output_force_at(values, at, force_in, direction, z_and_mounting[-1])
 
     return for_each_draw(force, model.space.size + 1)(np.column_stack([z, mounting]))
 

@@ -54,6 +54,11 @@ class Bent:
         """Total wrap angle of the cable [rad]."""
         return jnp.sum(self._angles(values), axis=-1)
 
+    def preloads(self, values: Values, references: Float[Array, " preloads"]) -> Float[Array, "preloads bends"]:
+        """Preload [N] of the cable preloaded in several ways."""
+        bend = jnp.broadcast_to(self.bend(values), (len(references), len(self.wrap_angle)))
+        return self.elastic.preload_from(values, references[:, None], bend)[0]
+
     def preload(self, values: Values, preload: float | None = None) -> tuple[Array, Array]:
         """Preload [N] and slack [mm], of the cable as it is or preloaded otherwise [N]."""
         if preload is None and PRELOAD not in values:

@@ -34,26 +34,26 @@ def optimum_of(model: Model) -> Callable[[Float[Array, " free"]], tuple[Array, A
     def optimum(z: Float[Array, " free"]) -> tuple[Array, Array]:
         values = model.space.constrain(z)
 
-        def exponent(route: Array) -> Array:
-            return model.cable.exponent_at(values, route[None])[0]
+        def loss(route: Array) -> Array:
+            return model.cable.loss_at(values, route[None])[0]
 
-        def efficiency(at_exponent: Array) -> Array:
-            return model.cable.friction.efficiency(values, at_exponent)
+        def efficiency(at_loss: Array) -> Array:
+            return -at_loss if model.cable.is_loop else model.cable.friction.efficiency(values, at_loss)
 
-        on_grid = model.cable.exponent_at(values, jnp.asarray(grid))
+        on_grid = model.cable.loss_at(values, jnp.asarray(grid))
         best = jnp.argmin(on_grid)
         at = jnp.asarray(grid)[best]
 
         def shrink(_: int, bracket: tuple[Array, Array]) -> tuple[Array, Array]:
             low, high = bracket
             left, right = high - _GOLDEN * (high - low), low + _GOLDEN * (high - low)
-            better_left = exponent(left) < exponent(right)
+            better_left = loss(left) < loss(right)
             return jnp.where(better_left, low, left), jnp.where(better_left, right, high)
 
         ends = jnp.maximum(at - step, grid[0]), jnp.minimum(at + step, grid[-1])
         low, high = jax.lax.fori_loop(0, _REFINEMENTS, shrink, ends)
         refined = (low + high) / 2
-        better = exponent(refined) < on_grid[best]
-        return jnp.where(better, refined, at), efficiency(jnp.minimum(exponent(refined), on_grid[best]))
+        better = loss(refined) < on_grid[best]
+        return jnp.where(better, refined, at), efficiency(jnp.minimum(loss(refined), on_grid[best]))
 
     return optimum

@@ -7,6 +7,7 @@ from bowdenfit.models.scatter import RUN_SCATTER
 from bowdenfit.report.elastic import elastic_counts, elastic_text
 from bowdenfit.report.layout import filled, listed, table
 from bowdenfit.report.recordings import recordings_text
+from bowdenfit.results.agreement import contradiction
 from bowdenfit.results.answers import decimals
 from bowdenfit.results.confounding import confounded
 from bowdenfit.results.fit import Fit
@@ -81,6 +82,8 @@ def _verdict(fit: Fit, page: dict[str, Any]) -> str:
         state += f" ({sampler['ensembles']} ensembles of {sampler['walkers']} walkers, {sampler['steps']} steps)"
     lines = [f"Verdict: {state}."]
     lines += [filled(f"- {reason}", indent="  ") for reason in fit.reasons]
+    if sentence := contradiction(fit):
+        lines.append(filled(sentence))
     lines += [filled(c.sentence()) for c in confounded(fit)]
     return "\n".join(lines)
 

@@ -33,6 +33,7 @@ from bowdenfit.results.fit import Fit
 
 _QUANTILES = (0.05, 0.5, 0.95)
 _POINTS = 61
+_COARSE, _FINE = 25, 401  # friction against preload is smooth, the probability of slack is not
 _MOST_LOOPS = 6
 _COEFFICIENTS = (0.5, 1.0, 2.0)  # times the fitted coefficients
 _PRELOADS = (0.0, 0.5, 1.0, 2.0)  # times the fitted preload
@@ -186,14 +187,14 @@ class _BendingLoss:
         bent, force = self.elastic.bent(self.angles), jnp.asarray(self.elastic.reference_force)
         exponent, (own, _) = bent.exponent(values), bent.preload(values)
 
-        def efficiency(preload: Array, factor: float = 1.0) -> Array:
+        def efficiency(preload: Array, factor: Array | float = 1.0) -> Array:
             return loop_output_force(force, preload, factor * exponent, jnp.asarray(1.0)) / force
 
         return {
             "fitted": efficiency(own),
             "exponent": exponent,
-            "coefficients": jnp.stack([efficiency(own, factor) for factor in _COEFFICIENTS]),
-            "preloads": jnp.stack([efficiency(bent.preload(values, p)[0]) for p in self._preloads]),
+            "coefficients": efficiency(own, jnp.asarray(_COEFFICIENTS)[:, None]),
+            "preloads": efficiency(bent.preloads(values, jnp.asarray(self._preloads))),
         }
 
     def figure(self, draws: Curves) -> BendingLoss:
@@ -299,20 +300,16 @@ class _Window:
     @property
     def _preloads(self) -> np.ndarray:
         typical = float(np.median(preload_draws(self.elastic.fit)))
-        return np.linspace(0.0, max(2.5 * typical, 1.0), _POINTS)
+        return np.linspace(0.0, max(2.5 * typical, 1.0), _COARSE)
 
     @property
     def _bent(self) -> Bent:
-        return self.elastic.bent(np.linspace(*self.bends, _POINTS))
+        return self.elastic.bent(np.linspace(*self.bends, _COARSE))
 
     def curves(self, values: Values) -> Curves:
         bent = self._bent
-        exponent = bent.exponent(values)
-        preloads = [bent.preload(values, float(p))[0] for p in self._preloads]
-        return {
-            "friction": jnp.stack([jnp.max(free_motion_loss(p, exponent)) for p in preloads]),
-            "lowest": bent.lowest_preload(values, self.input_force),
-        }
+        friction = free_motion_loss(bent.preloads(values, jnp.asarray(self._preloads)), bent.exponent(values))
+        return {"friction": jnp.max(friction, axis=-1), "lowest": bent.lowest_preload(values, self.input_force)}
 
     @property
     def input_force(self) -> float:
@@ -321,7 +318,9 @@ class _Window:
         return 0.0 if follows else self.elastic.reference_force
 
     def figure(self, draws: Curves) -> PreloadWindow:
-        fit, preloads = self.elastic.fit, self._preloads
+        fit, coarse = self.elastic.fit, self._preloads
+        preloads = np.linspace(coarse[0], coarse[-1], _FINE)
+        friction = np.stack([np.interp(preloads, coarse, line) for line in _quantiles(draws["friction"])])
         radius = fit.dataset.description.cable.output_pulley_radius
         arm, unit = (radius.to("length"), "N*mm") if radius is not None else (1.0, "N")
         taut = np.mean(draws["lowest"][:, None] <= preloads, axis=0)
@@ -329,7 +328,7 @@ class _Window:
         return PreloadWindow(
             preloads,
             _at_reference(fit).strip(),
-            arm * _quantiles(draws["friction"]),
+            arm * friction,
             unit,
             taut,
             np.quantile(draws["lowest"], _QUANTILES),

@@ -14,6 +14,7 @@ from bowdenfit.dataset import Dataset
 from bowdenfit.description_file import parse_description
 from bowdenfit.errors import StoreError
 from bowdenfit.inference.diagnostics import Diagnostics
+from bowdenfit.inference.disagreement import Disagreement
 from bowdenfit.inference.least_squares import Estimate, LeastSquares
 from bowdenfit.measurements.tables import Measurements
 from bowdenfit.predictions.draws import derived_units
@@ -39,7 +40,10 @@ def _to_schema_2(page: dict[str, Any]) -> dict[str, Any]:
 def _to_schema_3(page: dict[str, Any]) -> dict[str, Any]:
     """Before stretch, preload and loops were read."""
     measured = page["measurements"] | dict.fromkeys(("stretch", "preload", "loop"))
-    return page | {"schema": 3, "measurements": measured}
+    if measured["recordings"] is not None:
+        measured["recordings"] = measured["recordings"] | {"loop": False}
+    squares = page["least_squares"] | {"disagreements": []}
+    return page | {"schema": 3, "measurements": measured, "least_squares": squares}
 
 
 MIGRATIONS: Mapping[int, Migration] = {1: _to_schema_2, 2: _to_schema_3}  # from schema N to N + 1
@@ -199,6 +203,7 @@ def _least_squares(page: Mapping[str, Any]) -> LeastSquares:
         _array(page["z"]),
         page["converged"],
         page["message"],
+        tuple(Disagreement(**d) for d in page["disagreements"]),
     )
 
 

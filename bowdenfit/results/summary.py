@@ -7,6 +7,7 @@ import numpy as np
 
 from bowdenfit.models.build import EFFICIENCY_TERMS
 from bowdenfit.results.accounts import accounts
+from bowdenfit.results.agreement import agreement_page
 from bowdenfit.results.answers import Interval
 from bowdenfit.results.confounding import confounded
 from bowdenfit.results.elastic_summary import elastic_page
@@ -35,6 +36,7 @@ def summarize(fit: Fit) -> dict[str, Any]:
             "sum_of_squares": fit.least_squares.sum_of_squares,
             "converged": fit.least_squares.converged,
         },
+        "agreement": agreement_page(fit),
         "measured": measured_against_predicted(fit),
         "friction_model": fit.dataset.description.friction_model,
         "confounded": [asdict(c) | {"combination": c.combination} for c in confounded(fit)],

@@ -287,23 +287,52 @@ def predict(
     lengths: Sequence[float] | None = None,
     input_force: tuple[float, str] | None = None,
     stroke: str = "pull",
+    *,
+    quantity: str | None = None,
+    wrap_angles: Sequence[tuple[float, str]] = (),
+    preload: tuple[float, str] | None = None,
+    friction_limit: tuple[float, str] | None = None,
 ) -> list[dict[str, Any]]:
-    """Efficiency, or output force, at route values, with intervals; one row a value.
+    """Efficiency, output force, or what stretch and preload do, with intervals; one row a route value or wrap angle.
 
     Args:
         found: The fit.
         lengths: Route values; the description's choices if omitted.
         input_force: Force at the motor side and its unit; efficiencies are predicted if omitted.
         stroke: "pull" or "return".
+        quantity: "efficiency", "output-force", "preload", "friction", "slack-load", "position", "stiffness" or
+            "preload-window"; all but the first two are asked at wrap angles.
+        wrap_angles: Angles and units, in place of route values; those measured at if a quantity is asked and none is named.
+        preload: Preload in place of the cable's own, with its unit.
+        friction_limit: What may be felt in free motion, with its unit, for the preload window.
 
     Raises:
-        UsageError: There is nothing to predict at, or no posterior.
+        UsageError: There is nothing to predict at, no posterior, or the cable has not what is asked for.
     """
     import numpy as np
 
     from bowdenfit.results.predictions import predicted_rows
 
     route = found.dataset.description.route
+    if quantity is None:
+        quantity = "efficiency" if input_force is None else "output-force"
+    of_elastic = quantity not in {"efficiency", "output-force"}
+    if wrap_angles or of_elastic or (route is None and found.model.cable.is_loop):
+        from bowdenfit.results.elastic_predictions import predicted_at_bends, question
+
+        if lengths is not None:
+            raise UsageError("predict at lengths or at wrap angles, not at both; leave one of them out.")
+        found.draws()
+        asked = question(found, wrap_angles, input_force, preload, friction_limit, stroke)
+        return predicted_at_bends(found, quantity, asked)
+    if preload is not None or friction_limit is not None:
+        raise UsageError(
+            "--preload and --friction-limit belong to predictions at wrap angles; name some, as --wrap-angle 90deg."
+        )
+    if quantity == "efficiency" and input_force is not None:
+        raise UsageError(
+            "--quantity efficiency at lengths is that at the fit's own reference force; leave --input-force out."
+        )
     if lengths is None and route is not None and not route.choices:
         raise UsageError("the description has no choices; name the lengths to predict at.")
     wanted = np.asarray(lengths if lengths is not None else route.choices if route else [0.0], dtype=float)

@@ -1,0 +1,142 @@
+r"""Do the tables of a cable agree with each other?
+
+For each table: how far it moves the parameters from where all the others (and the priors) put them, against how far it
+may. If all is right, the move :math:`\delta` that a table makes has covariance :math:`V = H_{-t}^{-1} - H^{-1}`, with H the
+Gauss-Newton information of everything and :math:`H_{-t}` that without the table; so :math:`\delta^\top V^+ \delta` is
+chi-squared with as many degrees of freedom as V has directions, or F where few readings tell how much they scatter. A table
+of many readings is weighed by its scatter about the best that it alone allows: the scatter about a fit that it contradicts
+would hide the contradiction. Of few readings that scatter is too uncertain; theirs about the fit of all has to do.
+
+References:
+    Hausman, Specification tests in econometrics, Econometrica 46 (1978), 1251.
+"""
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from bowdenfit.inference.scatter import scatter_about
+from bowdenfit.models.build import Term
+from bowdenfit.parameters.space import Parameter
+
+WORTH_SAYING = 3.0  # sds; a table that is right says more than this three times in a thousand fits
+_MANY = 20  # degrees of freedom from which a table's own scatter is known well enough
+_LEAST_SCATTER = 1e-4  # readings that agree better than that, in units of their noise's prior, were not measured
+_LEAST_MOVE = 1e-6  # share of a parameter's variance below which a table says nothing of it
+
+
+@dataclass(frozen=True)
+class Disagreement:
+    """How well one table agrees with everything else.
+
+    Args:
+        table: Name of its readings.
+        sds: How improbable the disagreement is, as so many standard deviations of a normal.
+        parameter: The parameter that it moves farthest, in standard deviations.
+        rest, rest_sd: What everything else says of that parameter, in its shown unit.
+        together: What it is with the table.
+    """
+
+    table: str
+    sds: float
+    parameter: str
+    rest: float
+    rest_sd: float
+    together: float
+
+
+def disagreements(
+    terms: Sequence[Term],
+    residuals: Mapping[str, np.ndarray],
+    jacobians: Mapping[str, np.ndarray],
+    parameters: Sequence[Parameter],
+    z: np.ndarray,
+) -> tuple[Disagreement, ...]:
+    """How well each of several tables agrees with the others; empty of one table alone.
+
+    Args:
+        terms: The tables.
+        residuals: Standardized residuals of each.
+        jacobians: Their derivatives by z.
+        parameters: The free parameters.
+        z: Where both were computed; near the best fit.
+    """
+    finite = all(np.isfinite(part).all() for part in (*residuals.values(), *jacobians.values()))
+    if len(terms) < 2 or not finite:
+        return ()
+    weighed = _weighed(terms, residuals, jacobians)
+    information = [w.jacobian.T @ w.jacobian for w in weighed]
+    scores = [w.jacobian.T @ w.residuals for w in weighed]
+    whole = sum(information, np.eye(len(z)))
+    best, covariance = z - np.linalg.solve(whole, sum(scores, z)), np.linalg.inv(whole)
+    found = []
+    for term, table, own in zip(terms, weighed, information, strict=True):
+        rest = np.linalg.inv(whole - own)
+        move = -rest @ (table.jacobian.T @ (table.residuals + table.jacobian @ (best - z)))
+        found.append(_disagreement(term.name, move, rest, rest - covariance, table.freedom, parameters, best))
+    return tuple(d for d in found if d is not None)
+
+
+@dataclass(frozen=True)
+class _Weighed:
+    """Residuals and Jacobian of a table in units of its scatter, and the degrees of freedom that this is known to."""
+
+    residuals: np.ndarray
+    jacobian: np.ndarray
+    freedom: float
+
+
+def _weighed(
+    terms: Sequence[Term], residuals: Mapping[str, np.ndarray], jacobians: Mapping[str, np.ndarray]
+) -> list[_Weighed]:
+    whole = sum((j.T @ j for j in jacobians.values()), np.eye(next(iter(jacobians.values())).shape[1]))
+    together = np.linalg.inv(whole)
+    found = []
+    for term in terms:
+        r, j = residuals[term.name], jacobians[term.name]
+        u, s, _ = np.linalg.svd(j, full_matrices=False)
+        u = u[:, s > 1e-8 * max(s.max(initial=0.0), 1e-30)]
+        of_itself, of_all = np.sum(u**2, axis=1), np.sum((j @ together) * j, axis=1)
+        many = len(r) - of_itself.sum() >= _MANY
+        about, leverage = (r - u @ (u.T @ r), of_itself) if many else (r, of_all)
+        scale, spread = scatter_about([term], {term.name: about}, leverage)
+        known = np.isfinite(spread[term.name])
+        scale = np.maximum(scale, _LEAST_SCATTER)
+        freedom = float(term.residual_blocks[0][1] - leverage.sum()) if known else np.inf
+        found.append(_Weighed(r / scale, j / scale[:, None], freedom))
+    return found
+
+
+def _disagreement(
+    table: str,
+    move: np.ndarray,
+    rest: np.ndarray,
+    covariance: np.ndarray,
+    freedom: float,
+    parameters: Sequence[Parameter],
+    best: np.ndarray,
+) -> Disagreement | None:
+    """What a move says; None where the table says nothing that anything else says something of."""
+    from scipy.stats import chi2, f, norm
+
+    # In units of what the rest leaves open, directions that the table says nothing of have no variance.
+    root = np.linalg.cholesky(rest)
+    shares, directions = np.linalg.eigh(np.linalg.solve(root, np.linalg.solve(root, covariance).T))
+    told = shares > _LEAST_MOVE
+    along = directions[:, told].T @ np.linalg.solve(root, move)
+    moved = np.flatnonzero(np.diag(covariance) > _LEAST_MOVE * np.diag(rest))
+    if not told.any() or not len(moved):
+        return None
+    total, n = float(np.sum(along**2 / shares[told])), int(told.sum())
+    chance = f.sf(total / n, n, max(freedom, 1.0)) if np.isfinite(freedom) else chi2.sf(total, n)
+    sds = float(norm.isf(chance / 2))
+    farthest = moved[np.argmax(np.abs(move[moved]) / np.sqrt(np.diag(covariance)[moved]))]
+    p = parameters[farthest]
+
+    def shown(at: float) -> float:
+        return float(np.asarray(p.prior.constrain(np.asarray(at)))) * p.shown_scale
+
+    z_rest, sd = best[farthest] - move[farthest], np.sqrt(rest[farthest, farthest])
+    spread = abs(shown(z_rest + sd) - shown(z_rest - sd)) / 2
+    return Disagreement(table, min(sds, 37.0), p.name, shown(z_rest), spread, shown(best[farthest]))

@@ -1,0 +1,41 @@
+"""Other solutions that fit about as well: what a standard error at the minimum cannot see.
+
+A standard error is the curvature at the minimum. Where the sum of squares has a floor instead (preload of a loop whose return
+side is always slack, stiffness of a rope read at one load), curvature says nothing of how far that floor reaches. So each
+parameter in question is pinned at values that its prior holds possible, and the others are fitted again.
+"""
+
+from collections.abc import Mapping, Sequence
+from typing import Any
+
+import numpy as np
+
+PINS = (-3.0, -1.5, 0.0, 1.5, 3.0)  # z at which a parameter is pinned
+_AS_WELL = 4.0  # growth of the scaled sum of squares up to which a solution fits about as well: two standard errors
+_APART = 4.0  # standard errors beyond which it is another answer; were the errors normal, 2 could not be passed
+
+Solution = Mapping[str, Any]
+
+
+def fitting_as_well(found: Solution, trials: Sequence[Solution], scale: np.ndarray) -> list[Solution]:
+    """Those of the trials that fit about as well as what was found.
+
+    Args:
+        found: The minimum; its residuals by table.
+        trials: Solutions with a parameter pinned elsewhere.
+        scale: Scatter of each standardized residual about the minimum [1].
+    """
+    limit = _scaled(found, scale) + _AS_WELL
+    return [trial for trial in trials if _scaled(trial, scale) <= limit]
+
+
+def contested(value: float, error: float, rivals: Sequence[float]) -> tuple[float, float] | None:
+    """Lowest and highest value that fit about as well, where one lies further off than the error allows; else None."""
+    if all(abs(rival - value) <= _APART * error for rival in rivals):
+        return None
+    return min(value, *rivals), max(value, *rivals)
+
+
+def _scaled(solution: Solution, scale: np.ndarray) -> float:
+    total = float(np.sum((np.concatenate(list(solution["residuals"].values())) / scale) ** 2))
+    return total if np.isfinite(total) else float("inf")

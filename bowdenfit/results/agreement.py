@@ -1,0 +1,45 @@
+"""Which tables of a fit contradict the others, in words."""
+
+from dataclasses import asdict
+from typing import Any
+
+from bowdenfit.inference.disagreement import WORTH_SAYING, Disagreement
+from bowdenfit.results.answers import decimals
+from bowdenfit.results.fit import Fit
+
+_TABLES = {
+    "wrap_angle": "angles",
+    "efficiency": "efficiencies",
+    "run_efficiency": "forces",
+    "held_ratio": "held forces",
+    "recorded_efficiency": "recordings",
+    "measured_preload": "preload",
+    "loop_output_force": "loop",
+}
+
+
+def agreement_page(fit: Fit) -> list[dict[str, Any]]:
+    """How well each table agrees with everything else, the worst first."""
+    found = sorted(fit.least_squares.disagreements, key=lambda d: -d.sds)
+    return [asdict(d) | {"unit": _unit(fit, d)} for d in found]
+
+
+def contradiction(fit: Fit) -> str:
+    """The table that contradicts everything else most, in a sentence; empty where all agree."""
+    worst = max(fit.least_squares.disagreements, key=lambda d: d.sds, default=None)
+    if worst is None or worst.sds < WORTH_SAYING:
+        return ""
+    unit, digits = _unit(fit, worst), decimals(worst.rest_sd)
+    table = _TABLES.get(worst.table, worst.table)
+    return (
+        f"The table of {table} disagrees with everything else by {worst.sds:.1f} standard deviations: without it "
+        f"{worst.parameter} would be {worst.rest:.{digits}f} +- {worst.rest_sd:.{digits}f}{unit}, with it the fit is at "
+        f"{worst.together:.{digits}f}{unit}. Look at the units and wrap angles of that table and at how it was measured; the "
+        "numbers below are a compromise between readings that cannot all be right."
+    )
+
+
+def _unit(fit: Fit, found: Disagreement) -> str:
+    """Unit of the parameter, with a blank before it."""
+    unit = next(p.unit for p in fit.model.space.free if p.name == found.parameter)
+    return "" if unit == "1" else f" {unit}"

@@ -7,9 +7,9 @@ import numpy as np
 import pytest
 from figure_words import words
 
+from bowdenfit.plots.bands import evenly
 from bowdenfit.plots.gallery import FIGURES, draw_all
 from bowdenfit.plots.preload import stretches
-from bowdenfit.plots.stretch import evenly
 from bowdenfit.results.elastic_figure_data import (
     BendingLoss,
     EfficiencyLine,

@@ -1,11 +1,12 @@
-"""What the figures against the route share: the curve with its intervals, and the marking of what lies outside."""
+"""What figures of curves share: median and intervals, the marking of what lies outside the route, and how many are shown."""
 
-from typing import TYPE_CHECKING
+from collections.abc import Sequence
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from matplotlib.axes import Axes
 
-from bowdenfit.plots.style import BLUE, LEAST_SQUARES, LIGHT, MEDIAN, NARROW_INTERVAL, WIDE_INTERVAL
+from bowdenfit.plots.style import BLUE, GRAY, LEAST_SQUARES, LIGHT, MEDIAN, NARROW_INTERVAL, WIDE_INTERVAL
 
 if TYPE_CHECKING:
     from bowdenfit.results.figure_data import Band
@@ -41,3 +42,42 @@ def shade_outside(axes: Axes, route_range: tuple[float, float], shown: tuple[flo
         if stop - start > margin:
             axes.axvspan(start, stop, facecolor=LIGHT, linewidth=0, zorder=0.4, label=OUTSIDE)
     axes.set_xlim(*shown)
+
+
+def draw_quantiles(axes: Axes, x: np.ndarray, quantiles: np.ndarray, color: Any, **line: Any) -> None:
+    """The median with a band from the lowest to the highest quantile, or the one line where there are no draws.
+
+    Args:
+        axes: Panel to draw on.
+        x: Of the line.
+        quantiles: First axis from low to high, such as 5 %, 50 % and 95 %; or one row.
+        color: Of line and band.
+        line: Label and looks of the line.
+    """
+    axes.plot(x, middle(quantiles), color=color, **line)
+    if len(quantiles) > 1:
+        axes.fill_between(x, quantiles[0], quantiles[-1], color=color, alpha=0.18, linewidth=0)
+
+
+def middle(quantiles: np.ndarray) -> np.ndarray:
+    """The median, or the one row without draws."""
+    row: np.ndarray = quantiles[len(quantiles) // 2]
+    return row
+
+
+def name_band(axes: Axes, quantiles: np.ndarray, color: Any = GRAY) -> None:
+    """The entry of the legend for bands of several colors; none without draws."""
+    if len(quantiles) > 1:
+        axes.fill_between([], [], [], color=color, alpha=0.3, linewidth=0, label=WIDE_INTERVAL)
+
+
+def evenly(every: Sequence[Any], most: int) -> list[Any]:
+    """So many of a sequence at most, from its first to its last."""
+    places = np.linspace(0, len(every) - 1, min(len(every), most)).round().astype(int)
+    return [every[i] for i in places.tolist()]
+
+
+def say_of_how_many(axes: Axes, drawn: int, of: int, what: str = "") -> None:
+    """An entry of the legend that says so where not all are drawn."""
+    if drawn < of:
+        axes.plot([], [], " ", label=" ".join(filter(None, (f"{drawn} of {of}", what, "shown"))))

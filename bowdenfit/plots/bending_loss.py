@@ -8,9 +8,9 @@ import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
+from bowdenfit.plots.bands import draw_quantiles, name_band
 from bowdenfit.plots.layout import LEGEND_ROW, TITLE, legend_above, panels
 from bowdenfit.plots.recording_panels import span
-from bowdenfit.plots.stretch import draw_quantiles, name_band
 from bowdenfit.plots.style import BLACK, EFFICIENCY, GRAY, MEDIUM, WIDE, WRAP_ANGLE, in_paper_style
 
 if TYPE_CHECKING:

@@ -6,9 +6,9 @@ import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
+from bowdenfit.plots.bands import draw_quantiles, evenly, middle, name_band, say_of_how_many
 from bowdenfit.plots.layout import legend_above
 from bowdenfit.plots.recording_panels import alike, enlarge_marks, label_outer, recording_panels, set_limits, span
-from bowdenfit.plots.stretch import draw_quantiles, evenly, middle, name_band, say_of_how_many
 from bowdenfit.plots.style import (
     BLACK,
     BLUE,

@@ -6,9 +6,9 @@ import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
+from bowdenfit.plots.bands import draw_quantiles, name_band
 from bowdenfit.plots.layout import legend_above, panels
 from bowdenfit.plots.recording_panels import span
-from bowdenfit.plots.stretch import draw_quantiles, name_band
 from bowdenfit.plots.style import BLACK, BLUE, LEAST_SQUARES, LIGHT, MEDIAN, MEDIUM, WRAP_ANGLE, in_paper_style, percent
 
 if TYPE_CHECKING:

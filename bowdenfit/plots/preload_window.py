@@ -6,10 +6,10 @@ import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
+from bowdenfit.plots.bands import draw_quantiles, middle, name_band
 from bowdenfit.plots.layout import TITLE, legend_above, panels
 from bowdenfit.plots.preload import stretches
 from bowdenfit.plots.recording_panels import span
-from bowdenfit.plots.stretch import draw_quantiles, middle, name_band
 from bowdenfit.plots.style import (
     BLACK,
     BLUE,
@@ -63,7 +63,8 @@ def _title(window: "PreloadWindow") -> str:
     """The bends and the input force that the window is for."""
     low, high = window.bends
     bends = f"{low:.4g} deg" if low == high else f"{low:.4g} deg to {high:.4g} deg"
-    return f"Bends {bends}, input force up to {window.input_force:.4g} N"
+    loaded = f"input force up to {window.input_force:.4g} N" if window.input_force > 0 else "no load"
+    return f"Bends {bends}, {loaded}"
 
 
 def _name(window: "PreloadWindow") -> str:

@@ -8,6 +8,7 @@ import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
+from bowdenfit.plots.bands import draw_quantiles, evenly, name_band, say_of_how_many
 from bowdenfit.plots.layout import legend_above, panels
 from bowdenfit.plots.recording_panels import span
 from bowdenfit.plots.style import (
@@ -16,7 +17,6 @@ from bowdenfit.plots.style import (
     LEAST_SQUARES,
     MEDIAN,
     MEDIUM,
-    WIDE_INTERVAL,
     in_paper_style,
 )
 
@@ -50,45 +50,6 @@ def stretch(data: "FigureData") -> Figure:
     say_of_how_many(axes, len(shown), len(every))
     legend_above(figure, [axes], columns=min(MOST_COLUMNS, 1 - (-len(shown) // rows)))
     return figure
-
-
-def evenly(every: Sequence[Any], most: int) -> list[Any]:
-    """So many of a sequence at most, from its first to its last."""
-    places = np.linspace(0, len(every) - 1, min(len(every), most)).round().astype(int)
-    return [every[i] for i in places.tolist()]
-
-
-def say_of_how_many(axes: Axes, drawn: int, of: int, what: str = "") -> None:
-    """An entry of the legend that says so where not all are drawn."""
-    if drawn < of:
-        axes.plot([], [], " ", label=" ".join(filter(None, (f"{drawn} of {of}", what, "shown"))))
-
-
-def draw_quantiles(axes: Axes, x: np.ndarray, quantiles: np.ndarray, color: Any, **line: Any) -> None:
-    """The median with a band from the lowest to the highest quantile, or the one line where there are no draws.
-
-    Args:
-        axes: Panel to draw on.
-        x: Of the line.
-        quantiles: First axis from low to high, such as 5 %, 50 % and 95 %; or one row.
-        color: Of line and band.
-        line: Label and looks of the line.
-    """
-    axes.plot(x, middle(quantiles), color=color, **line)
-    if len(quantiles) > 1:
-        axes.fill_between(x, quantiles[0], quantiles[-1], color=color, alpha=0.18, linewidth=0)
-
-
-def middle(quantiles: np.ndarray) -> np.ndarray:
-    """The median, or the one row without draws."""
-    row: np.ndarray = quantiles[len(quantiles) // 2]
-    return row
-
-
-def name_band(axes: Axes, quantiles: np.ndarray, color: Any = GRAY) -> None:
-    """The entry of the legend for bands of several colors; none without draws."""
-    if len(quantiles) > 1:
-        axes.fill_between([], [], [], color=color, alpha=0.3, linewidth=0, label=WIDE_INTERVAL)
 
 
 def _color(number: int, of: int) -> Any:

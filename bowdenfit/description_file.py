@@ -8,6 +8,7 @@ from typing import Any
 from pydantic import BaseModel, ValidationError
 
 from bowdenfit.description import SCHEMA, Description, ParameterSetting, QuantityValue
+from bowdenfit.description.elastic import LOWEST, PRELOAD
 from bowdenfit.errors import DatasetError, DescriptionError, nearest
 from bowdenfit.measurements.units import route_conversion_factor, speed_dimension
 
@@ -57,7 +58,24 @@ def parse_description(raw: Mapping[str, Any], file: str = "cable.toml") -> Descr
     except ValidationError as error:
         raise DescriptionError(_explained(error, file)) from None
     _check_units(description, file)
+    _check_elastic(description, file)
     return description
+
+
+def _check_elastic(description: Description, file: str) -> None:
+    """Preload is stated once, and no elastic parameter is fixed where it cannot be."""
+    if description.preload.value is not None and PRELOAD in description.prior:
+        raise DescriptionError(
+            f"{file} states the preload twice, as value under [preload] and under [prior.{PRELOAD}]; leave one of them out."
+        )
+    for name, setting in description.prior.items():
+        if name not in LOWEST or setting.fixed is None:
+            continue
+        if setting.fixed < 0 or (setting.fixed == 0 and not LOWEST[name]):
+            least = "0 or more" if LOWEST[name] else "more than 0"
+            raise DescriptionError(
+                f"{file}, prior.{name}.fixed: {setting.fixed:g} is not possible; it must be {least}."
+            )
 
 
 def _check_units(description: Description, file: str) -> None:
@@ -80,8 +98,10 @@ def _check_units(description: Description, file: str) -> None:
             quantity.to(dimension)
         except DatasetError as error:
             raise DescriptionError(f"{file}, {where}: {error}.") from None
-        if dimension == "length" and not quantity.value > 0:
-            raise DescriptionError(f"{file}, {where}: {quantity.value:g} {quantity.unit} is not positive.")
+        if dimension == "length" and not (quantity.value > 0 or (where == "cable, backlash" and quantity.value == 0)):
+            raise DescriptionError(
+                f"{file}, {where}: {quantity.value:g} {quantity.unit} is not positive; write its size, or leave the key out."
+            )
         if where == "preload, value" and quantity.value < 0:
             raise DescriptionError(
                 f"{file}, {where}: {quantity.value:g} {quantity.unit} is negative; a rope cannot be pushed, so write 0 for a "
@@ -149,14 +169,37 @@ def _explained(error: ValidationError, file: str) -> str:
     place = f"{file}, {'.'.join(where)}" if where else file
     if first["type"] == "extra_forbidden":
         return f"{file}: unknown key {'.'.join(where)!r}{nearest(where[-1], _siblings(where[:-1]))}"
+    if first["type"] == "missing" and where[-1] == "unit" and isinstance(first["input"], dict):
+        return (
+            f"{place}: the unit is missing; write one, such as {_with_unit(first['input'].get('value'), where[:-1])}."
+        )
     if first["type"] == "missing":
         return f"{file}: the key {'.'.join(where)!r} is missing; `bowdenfit init` writes a template that has it."
+    if first["type"] == "model_type":
+        return f"{place}: {_written_as(first, where)}"
     message = first["msg"].removeprefix("Value error, ")
     if where == ["schema"]:
         message = f"schema {first['input']} is newer than this program, which reads up to {SCHEMA}; update bowdenfit"
     shown = f" (found {first['input']!r})" if not isinstance(first["input"], dict | list) and where else ""
     sentence = f"{place}: {message[:1].lower() + message[1:]}{shown}"
     return sentence if sentence.endswith((".", "?")) else f"{sentence}."
+
+
+def _written_as(error: Mapping[str, Any], where: Sequence[str]) -> str:
+    """How to write what must be a table of keys."""
+    found = error["input"]
+    if error.get("ctx", {}).get("class_name") == QuantityValue.__name__:
+        return f"a number needs its unit (found {found!r}); write it as {_with_unit(found, where)}."
+    how = f"under [{where[0]}]" if len(where) == 1 else "between braces, { key = ... }"
+    return f"this holds keys of its own (found {found!r}); write them {how}."
+
+
+def _with_unit(value: Any, where: Sequence[str]) -> str:
+    """A number with a unit that fits its place, as TOML."""
+    number = value if isinstance(value, int | float) and not isinstance(value, bool) else 20
+    key = ".".join(where)
+    unit = "deg" if "angle" in key else "N" if "force" in key or key == "preload.value" else "mm"
+    return f'{{ value = {number}, unit = "{unit}" }}'
 
 
 def _siblings(path: Sequence[str]) -> list[str]:

@@ -12,9 +12,18 @@ from bowdenfit.description import ColumnMap, Description, Preparation, QuantityV
 from bowdenfit.errors import DatasetError, DescriptionError, nearest
 from bowdenfit.measurements.columns import ColumnSource
 from bowdenfit.measurements.lab_files import read_channels
-from bowdenfit.measurements.preparation import averaged, inspected
+from bowdenfit.measurements.loop_strokes import find_loop_strokes
+from bowdenfit.measurements.preparation import NO_DELAY_OF_LOOPS, averaged, inspected
 from bowdenfit.measurements.preparation.delay import COMMON_ERROR
-from bowdenfit.measurements.recording_files import WANTED, matched_name, pattern_fields, rows_where, to_recording
+from bowdenfit.measurements.recording_files import (
+    TORQUES,
+    WANTED,
+    Pulleys,
+    matched_name,
+    pattern_fields,
+    rows_where,
+    to_recording,
+)
 from bowdenfit.measurements.recordings import (
     Account,
     Blocks,
@@ -56,8 +65,9 @@ def read_recordings(
             "mm/s or both in r/min."
         )
     prepared, delay_sd = _prepared(files)
-    each = tuple(_recording(description, f, *parts) for f, parts in zip(files, prepared, strict=True))
-    recordings = Recordings(description.angle_columns, each, next(iter(units), ""), delay_sd)
+    each = tuple(_recording(description, f, *parts) for f, parts in zip(files, _said_once(prepared), strict=True))
+    unit, loop = next(iter(units), ""), description.cable.kind == "loop"
+    recordings = Recordings(description.angle_columns, each, unit, delay_sd, loop)
     _check_placed(description, recordings)
     return recordings, {entry.file: path for path, entry in entries}
 
@@ -85,6 +95,17 @@ def _prepared(files: Sequence[_File]) -> tuple[list[tuple[Blocks, Account]], flo
         return [averaged(i) for i in found], max((f.delay_sd for f in files), default=0.0)
     delay, sd = _pooled(np.array([d.value for d in told]), np.array([d.sd for d in told]))
     return [averaged(i, (delay, sd) if i.settings.delay == "estimate" else None) for i in found], sd
+
+
+def _said_once(prepared: Sequence[tuple[Blocks, Account]]) -> list[tuple[Blocks, Account]]:
+    """What is said of every loop alike, that its delay is not estimated, kept in the first account only."""
+    said = False
+    kept = []
+    for blocks, account in prepared:
+        remarks = tuple(r for r in account.remarks if r != NO_DELAY_OF_LOOPS or not said)
+        said = said or NO_DELAY_OF_LOOPS in account.remarks
+        kept.append((blocks, replace(account, remarks=remarks)))
+    return kept
 
 
 def _pooled(delays: Vector, sds: Vector) -> tuple[float, float]:
@@ -171,17 +192,30 @@ def _to_read(description: Description, path: Path, entry: RecordingFile, channel
     table = description.tables.recordings
     assert table is not None  # the caller asked
     page, sources = entry.prepare or table.prepare, {**_sources(table.channels), **_sources(entry.channels), **channels}
-    raw, unit = to_recording(rows_where(read_channels(path), entry.where), _name(path, entry), sources)
+    pulleys = _pulleys(description)
+    raw, unit = to_recording(rows_where(read_channels(path), entry.where), _name(path, entry), sources, pulleys)
     stated = page.delay.sd_to("time") if isinstance(page.delay, QuantityValue) else None
     if entry.velocity is not None and not unit:
         unit = INTERNAL_UNITS[speed_dimension(entry.velocity.unit)]
-    return _File(raw, entry, preparation_settings(page), stated or 0.0, unit)
+    settings = replace(preparation_settings(page), loop=pulleys is not None)
+    return _File(raw, entry, settings, stated or 0.0, unit)
+
+
+def _pulleys(description: Description) -> Pulleys | None:
+    """The pulleys of a loop; None for a single rope."""
+    if description.cable.kind != "loop":
+        return None
+    stated = description.cable.input_pulley_radius, description.cable.output_pulley_radius
+    return Pulleys(*(None if radius is None else radius.to("length") for radius in stated))
 
 
 def _recording(description: Description, file: _File, blocks: Blocks, account: Account) -> Recording:
     raw, entry = file.raw, file.entry
     spans = [Span(phase.start, phase.end, phase.stroke) for phase in entry.strokes]
-    strokes = find_strokes(blocks, raw.file, raw.name, spans)
+    if description.cable.kind == "loop":
+        strokes = find_loop_strokes(blocks, raw.file, raw.name, spans, _stated_preload(description))
+    else:
+        strokes = find_strokes(blocks, raw.file, raw.name, spans)
     if entry.velocity is not None and not len(raw.velocity):
         speed = entry.velocity.to(speed_dimension(entry.velocity.unit))
         blocks = replace(blocks, velocity=np.full(len(blocks.time), speed))
@@ -190,8 +224,14 @@ def _recording(description: Description, file: _File, blocks: Blocks, account: A
     return Recording(raw.name, raw.file, entry.run or raw.name, route, angle, sd, blocks, strokes, account)
 
 
+def _stated_preload(description: Description) -> float | None:
+    """The preload that is stated for all wrap angles [N]."""
+    stated = description.preload.value
+    return stated.to("force") if stated is not None and not description.preload_follows_stretch else None
+
+
 def _sources(channels: Mapping[str, ColumnMap]) -> dict[str, ColumnSource]:
-    known = [quantity.name for quantity in WANTED]
+    known = [quantity.name for quantity in (*WANTED, *TORQUES)]
     for name in channels:
         if name not in known:
             raise DescriptionError(

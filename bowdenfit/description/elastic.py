@@ -4,6 +4,9 @@ from typing import Literal
 
 from bowdenfit.description.values import Frozen, QuantityValue
 
+PRELOAD = "preload"
+LOWEST = {"stiffness": False, "bedding_load": False, "bedding_stretch": True, "lengthening": True, PRELOAD: True}
+"""Elastic parameters that cannot be negative, and whether they can be 0."""
 LEAST_BEND_RATIO = 20.0  # rope diameters; haptic paper, equation 2
 
 

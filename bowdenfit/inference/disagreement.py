@@ -21,7 +21,7 @@ from bowdenfit.models.build import Term
 from bowdenfit.parameters.space import Parameter
 
 WORTH_SAYING = 3.0  # sds; a table that is right says more than this three times in a thousand fits
-_MANY = 20  # degrees of freedom from which a table's own scatter is known well enough
+_MANY = 8  # degrees of freedom from which a table's own scatter is known well enough
 _LEAST_SCATTER = 1e-4  # readings that agree better than that, in units of their noise's prior, were not measured
 _LEAST_MOVE = 1e-6  # share of a parameter's variance below which a table says nothing of it
 
@@ -33,6 +33,8 @@ class Disagreement:
     Args:
         table: Name of its readings.
         sds: How improbable the disagreement is, as so many standard deviations of a normal.
+        conflict: By how much the sum of squares would fall if this table had parameters of its own; what is left then is
+            the conflict among the others, so the table with the largest is the odd one out.
         parameter: The parameter that it moves farthest, in standard deviations.
         rest, rest_sd: What everything else says of that parameter, in its shown unit.
         together: What it is with the table.
@@ -40,6 +42,7 @@ class Disagreement:
 
     table: str
     sds: float
+    conflict: float
     parameter: str
     rest: float
     rest_sd: float
@@ -72,9 +75,10 @@ def disagreements(
     best, covariance = z - np.linalg.solve(whole, sum(scores, z)), np.linalg.inv(whole)
     found = []
     for term, table, own in zip(terms, weighed, information, strict=True):
-        rest = np.linalg.inv(whole - own)
-        move = -rest @ (table.jacobian.T @ (table.residuals + table.jacobian @ (best - z)))
-        found.append(_disagreement(term.name, move, rest, rest - covariance, table.freedom, parameters, best))
+        # Summed up, not subtracted: digits would cancel where one table says almost everything.
+        of_rest = sum((i for i in information if i is not own), np.eye(len(z)))
+        move = -np.linalg.solve(of_rest, table.jacobian.T @ (table.residuals + table.jacobian @ (best - z)))
+        found.append(_disagreement(term.name, move, of_rest, covariance, table.freedom, parameters, best))
     return tuple(d for d in found if d is not None)
 
 
@@ -111,32 +115,44 @@ def _weighed(
 def _disagreement(
     table: str,
     move: np.ndarray,
-    rest: np.ndarray,
+    of_rest: np.ndarray,
     covariance: np.ndarray,
     freedom: float,
     parameters: Sequence[Parameter],
     best: np.ndarray,
 ) -> Disagreement | None:
-    """What a move says; None where the table says nothing that anything else says something of."""
+    """What a move says; None where the table says nothing that anything else says something of.
+
+    Args:
+        table: Name of the table.
+        move: How far it moves the parameters, in z.
+        of_rest: Information of everything else.
+        covariance: Inverse of the information of everything.
+        freedom: Degrees of freedom of the table's scatter.
+        parameters: The free parameters.
+        best: Where everything together puts them.
+    """
     from scipy.stats import chi2, f, norm
 
+    rest = np.linalg.inv(of_rest)
+    allowed = np.diag(rest) - np.diag(covariance)
     # In units of what the rest leaves open, directions that the table says nothing of have no variance.
-    root = np.linalg.cholesky(rest)
-    shares, directions = np.linalg.eigh(np.linalg.solve(root, np.linalg.solve(root, covariance).T))
+    root = np.linalg.cholesky(of_rest)
+    shares, directions = np.linalg.eigh(np.eye(len(move)) - root.T @ covariance @ root)
     told = shares > _LEAST_MOVE
-    along = directions[:, told].T @ np.linalg.solve(root, move)
-    moved = np.flatnonzero(np.diag(covariance) > _LEAST_MOVE * np.diag(rest))
+    along = directions[:, told].T @ (root.T @ move)
+    moved = np.flatnonzero(allowed > _LEAST_MOVE * np.diag(rest))
     if not told.any() or not len(moved):
         return None
     total, n = float(np.sum(along**2 / shares[told])), int(told.sum())
     chance = f.sf(total / n, n, max(freedom, 1.0)) if np.isfinite(freedom) else chi2.sf(total, n)
     sds = float(norm.isf(chance / 2))
-    farthest = moved[np.argmax(np.abs(move[moved]) / np.sqrt(np.diag(covariance)[moved]))]
+    farthest = moved[np.argmax(np.abs(move[moved]) / np.sqrt(allowed[moved]))]
     p = parameters[farthest]
 
     def shown(at: float) -> float:
-        return float(np.asarray(p.prior.constrain(np.asarray(at)))) * p.shown_scale
+        return float(np.asarray(p.prior.constrain(np.array([at])))[0]) * p.shown_scale
 
     z_rest, sd = best[farthest] - move[farthest], np.sqrt(rest[farthest, farthest])
     spread = abs(shown(z_rest + sd) - shown(z_rest - sd)) / 2
-    return Disagreement(table, min(sds, 37.0), p.name, shown(z_rest), spread, shown(best[farthest]))
+    return Disagreement(table, min(sds, 37.0), total, p.name, shown(z_rest), spread, shown(best[farthest]))

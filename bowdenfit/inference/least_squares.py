@@ -30,8 +30,6 @@ _SUSPECT = -2.0  # below this z an estimate may be on its way to the lower end
 _SINGULAR = 1e-8  # singular values below this fraction of the largest carry no information
 _FAR = 50.0  # standard error in units of the prior's sd beyond which data say nothing of a parameter
 
-_DEEPER = 0.999  # share of the sum of squares below which another solution is a deeper valley, and no rounding
-
 Solution = dict[str, Any]
 Objective = Callable[..., Solution]
 
@@ -152,9 +150,6 @@ def least_squares(posterior: Posterior, objective: Objective, start: np.ndarray)
     """
     found, at_end = _minimum(posterior, objective, start)
     trials = _pinned_elsewhere(posterior, objective, start)
-    best = min(trials, key=_sum_of_squares, default=found)
-    if _sum_of_squares(best) < _DEEPER * _sum_of_squares(found):
-        found, at_end = _minimum(posterior, objective, best["z"])
     return _summarized(posterior, found, _noise(posterior), at_end, trials)
 
 
@@ -229,7 +224,7 @@ def _summarized(
     scale, residual_sd = scatter_about(posterior.model.terms, found["residuals"], np.sum(u**2, axis=1))
     root = vt[informed].T / s
     error = np.sqrt(np.sum((root @ (u.T * scale)) ** 2, axis=1))
-    rivals = fitting_as_well(found, trials, scale)
+    rivals = fitting_as_well(found, trials, scale, len(s))
     undetermined = np.sum(vt[~informed] ** 2, axis=0) > 1e-6
     lost = undetermined | (np.abs(found["z"][active]) > _FAR) | (np.sqrt(np.sum(root**2, axis=1)) > _FAR)
     estimates: dict[str, Estimate] = {}

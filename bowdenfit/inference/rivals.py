@@ -10,22 +10,26 @@ from typing import Any
 
 import numpy as np
 
-PINS = (-3.0, -1.5, 0.0, 1.5, 3.0)  # z at which a parameter is pinned
-_AS_WELL = 4.0  # growth of the scaled sum of squares up to which a solution fits about as well: two standard errors
+PINS = (-2.5, 0.0, 2.5)  # z at which a parameter is pinned
+_AS_WELL = 0.97725  # probability up to which a deviation counts as chance: two standard errors of a normal reading
 _APART = 4.0  # standard errors beyond which it is another answer; were the errors normal, 2 could not be passed
 
 Solution = Mapping[str, Any]
 
 
-def fitting_as_well(found: Solution, trials: Sequence[Solution], scale: np.ndarray) -> list[Solution]:
+def fitting_as_well(found: Solution, trials: Sequence[Solution], scale: np.ndarray, n_informed: int) -> list[Solution]:
     """Those of the trials that fit about as well as what was found.
 
     Args:
         found: The minimum; its residuals by table.
         trials: Solutions with a parameter pinned elsewhere.
         scale: Scatter of each standardized residual about the minimum [1].
+        n_informed: Number of directions that the residuals determine; scatter about few spare readings is known badly.
     """
-    limit = _scaled(found, scale) + _AS_WELL
+    from scipy.special import stdtrit
+
+    spare = max(sum(np.count_nonzero(r) for r in found["residuals"].values()) - n_informed, 1)
+    limit = _scaled(found, scale) + float(stdtrit(spare, _AS_WELL)) ** 2
     return [trial for trial in trials if _scaled(trial, scale) <= limit]
 
 

@@ -1,13 +1,15 @@
 """Tables of stretch, of preload, and of forces at both ends of a pull-pull loop."""
 
 from collections.abc import Mapping, Sequence
+from difflib import get_close_matches
 from itertools import product
 from pathlib import Path
 
 import numpy as np
 
 from bowdenfit.errors import DatasetError
-from bowdenfit.measurements.columns import Column, ColumnSource, Quantity, find_columns, require
+from bowdenfit.measurements.columns import Column, ColumnSource, Quantity, find_columns, meanings, require
+from bowdenfit.measurements.quoting import shown
 from bowdenfit.measurements.readers import Cell, RawTable, read_csv
 from bowdenfit.measurements.rows import (
     Route,
@@ -26,7 +28,8 @@ _BRANCHES = {
     **dict.fromkeys(("unload", "unloading", "down", "-1"), True),
 }
 _UNUSED = ("time", "position", "run")  # columns that these tables may have and that nothing reads
-_FEWEST = 3  # loads below which a falling stretch may be noise
+_FEWEST = 2  # readings beyond one a group below which a falling stretch may be noise
+_ALIKE = 0.75  # likeness from which an unknown heading is taken for a misspelled one
 _SURE = 0.9  # how closely the stretch must follow the falling line for its sign to be refused
 
 
@@ -48,7 +51,9 @@ def read_stretch(path: Path, sources: Mapping[str, ColumnSource] | None = None) 
     """
     table = read_csv(path)
     wanted = (Quantity("load", "force"), Quantity("wrap_angle", "angle"), Quantity("stretch", "length"))
-    found = find_columns(table, (*wanted, Quantity("branch", "text"), Quantity("cycle", "text")), sources, _UNUSED)
+    optional = (Quantity("branch", "text"), Quantity("cycle", "text"))
+    found = find_columns(table, (*wanted, *optional), sources, _UNUSED)
+    _check_spelling(table, found, optional)
     loads, angles, stretches = (
         require(table, found, name, f"{name}_{unit}")
         for name, unit in (("load", "N"), ("wrap_angle", "deg"), ("stretch", "mm"))
@@ -60,14 +65,47 @@ def read_stretch(path: Path, sources: Mapping[str, ColumnSource] | None = None) 
     cycle, names = _cycles(found.get("cycle"), wrap_angle)
     peak = np.array([load[cycle == c].max() for c in cycle])
     made = StretchTable(load, wrap_angle, np.asarray(stretch), unloading, peak, cycle, names, provenance_of(table))
-    _check_rising(table, made)
-    remarks = []
-    if "branch" not in found:
-        remarks.append(f"{table.file} has no branch column: every row is taken as read while the load grew.")
-    return made, tuple(remarks)
+    _check_rising(stretches, made)
+    return made, tuple(_branch_remarks(table, made, "branch" in found))
+
+
+def _branch_remarks(table: RawTable, made: StretchTable, stated: bool) -> list[str]:
+    """What had to be assumed of loading and unloading."""
+    cycles = [np.flatnonzero(made.cycle == c) for c in range(len(made.cycle_names))]
+    if stated:
+        down = [made.cycle_names[c] for c, rows in enumerate(cycles) if made.unloading[rows].all()]
+        return [
+            f"{table.file} has only readings with falling load at {name}; they are taken to come down from the largest of "
+            "them."
+            for name in down
+        ]
+    remark = f"{table.file} has no branch column: every row is taken as read while the load grew"
+    falls = [row for rows in cycles for row in rows[1:][np.diff(made.load[rows]) < 0]]
+    if not falls:
+        return [remark + "."]
+    return [
+        f"{remark}, although the load falls in row {made.origin.row[falls[0]]}; if the rope was unloaded there, say so in a "
+        "column branch (load or unload)."
+    ]
+
+
+def _check_spelling(table: RawTable, found: Mapping[str, Column], optional: Sequence[Quantity]) -> None:
+    """A column that nothing reads must not be a misspelled one that would have been read."""
+    read = {column.heading for column in found.values()}
+    missing = [quantity.name for quantity in optional if quantity.name not in found]
+    for heading in table.header:
+        name = heading.lower().partition(" ")[0].partition("_")[0]
+        near = get_close_matches(name, missing, n=1, cutoff=_ALIKE) if heading and heading not in read else []
+        if near:
+            raise DatasetError(
+                f"{table.file}, row {table.header_row}: the column {shown(heading)} is not known; did you mean {near[0]}? "
+                "Rename it, or delete it."
+            )
 
 
 def _tension(cell: Cell, column: Column, what: str) -> float:
+    if cell.limit() is not None:
+        raise cell.refuse(f"{cell.shown} is a bound, no reading; write the value, and 0 for a slack rope.")
     value = column.value(cell)
     if value < 0:
         raise cell.refuse(
@@ -84,9 +122,8 @@ def _branches(column: Column | None, n_rows: int) -> Flags:
     for cell in column.cells:
         text = cell.text.strip().lower()
         if text not in _BRANCHES:
-            raise cell.refuse(
-                f"{cell.shown} is no branch; write load (while the load grows) or unload (while it falls)."
-            )
+            seen = "the cell is blank" if cell.blank else f"{cell.shown} is no branch"
+            raise cell.refuse(f"{seen}; write load (while the load grows) or unload (while it falls).")
         branches.append(_BRANCHES[text])
     return np.array(branches, dtype=bool)
 
@@ -102,20 +139,30 @@ def _cycles(column: Column | None, wrap_angle: Vector) -> tuple[Labels, tuple[st
     return np.array([different.index(name) for name in shown], dtype=int), different
 
 
-def _check_rising(table: RawTable, made: StretchTable) -> None:
-    """Stretch that falls while load grows has its sign turned round."""
-    for cycle, unloading in product(range(len(made.cycle_names)), (False, True)):
-        rows = np.flatnonzero((made.cycle == cycle) & (made.unloading == unloading))
-        load, stretch = made.load[rows], made.stretch[rows]
-        if len(np.unique(load)) < _FEWEST or np.ptp(stretch) == 0:
+def _check_rising(column: Column, made: StretchTable) -> None:
+    """Stretch that falls while load grows has its sign turned round: in one branch of a cycle, or in all together."""
+    groups = [
+        np.flatnonzero((made.cycle == cycle) & (made.unloading == unloading))
+        for cycle, unloading in product(range(len(made.cycle_names)), (False, True))
+    ]
+    groups = [rows for rows in groups if len(np.unique(made.load[rows])) > 1]
+    for together in [[rows] for rows in groups] + [groups]:
+        load, stretch = (_about_means(values, together) for values in (made.load, made.stretch))
+        if len(load) - len(together) < _FEWEST or np.ptp(stretch) == 0:
             continue
         if np.corrcoef(load, stretch)[0, 1] < -_SURE:
-            raise DatasetError(
-                f"{table.file}, rows {made.origin.row[rows].min()} to {made.origin.row[rows].max()}: the stretch falls from "
-                f"{stretch[load.argmin()]:g} to {stretch[load.argmax()]:g} mm while the load grows from {load.min():g} to "
-                f"{load.max():g} N; the usual cause is a displacement counted toward the cable: write stretch as positive "
-                "where the rope's end moves away."
+            rows = together[0]
+            low, high = rows[made.load[rows].argmin()], rows[made.load[rows].argmax()]
+            raise column.cells[high].refuse(
+                f"the stretch falls from {made.stretch[low]:g} mm in row {made.origin.row[low]} to {made.stretch[high]:g} mm "
+                f"here while the load grows from {made.load[low]:g} to {made.load[high]:g} N; the usual cause is a "
+                "displacement counted toward the cable: write stretch as positive where the rope's end moves away."
             )
+
+
+def _about_means(values: np.ndarray, groups: Sequence[np.ndarray]) -> np.ndarray:
+    """Values of all groups, each less the mean of its group."""
+    return np.concatenate([values[rows] - values[rows].mean() for rows in groups]) if groups else np.zeros(0)
 
 
 def read_preload(path: Path, sources: Mapping[str, ColumnSource] | None = None) -> PreloadTable:
@@ -167,6 +214,7 @@ def read_loop(
     ends = [Quantity(f"{end}_{what}", what) for end in ("input", "output") for what in ("force", "torque")]
     others = (Quantity("stroke", "text"), Quantity("preload", "force"))
     found = find_columns(table, (*ends, *others, *shared_columns(route, contacts)), sources, _UNUSED)
+    _check_spelling(table, found, others)
     input_force, output_force = (
         _end(table, found, end, radius) for end, radius in zip(("input", "output"), radii, strict=True)
     )
@@ -193,6 +241,11 @@ def read_loop(
     remarks = []
     if "stroke" not in found:
         remarks.append(f"{table.file} has no stroke column: every row is taken as moving forward (the motor pulls).")
+    angles = [h for h in table.header if _plain_angle(h) and h not in {column.heading for column in found.values()}]
+    if angles:
+        remarks.append(
+            f"{table.file} has the column {shown(angles[0])}, which no contact in cable.toml reads; it is left out of account."
+        )
     return made, tuple(remarks)
 
 
@@ -209,6 +262,10 @@ def _end(table: RawTable, found: Mapping[str, Column], end: str, radius: float |
             f'{end}_pulley_radius = {{ value = 15, unit = "mm" }}.'
         )
     return np.asarray(found[torque].numbers()) / radius
+
+
+def _plain_angle(heading: str) -> bool:
+    return any(unit for _, unit in meanings(heading, (Quantity("wrap_angle", "angle"),)))
 
 
 def _check_loss(table: RawTable, made: LoopTable) -> None:

@@ -2,7 +2,7 @@
 
 import re
 from collections.abc import Mapping, Sequence
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from pathlib import Path
 
 import numpy as np
@@ -20,12 +20,23 @@ WANTED = (
     Quantity("velocity", "speed"),
     Quantity("time", "time"),
 )
+TORQUES = (Quantity("input_torque", "torque"), Quantity("output_torque", "torque"))  # of a loop's pulleys
 _RATE = re.compile(r"(?P<rate>[+-]?(?:[0-9]+\.?[0-9]*|\.[0-9]+)(?:e[+-]?[0-9]+)?)\s*(?P<unit>k?Hz)", re.IGNORECASE)
 _FIELD = re.compile(r"\{([A-Za-z_]\w*)(?::([^}]*))?\}")
 _PATH = re.compile(r"[/.]")
 
 
-def to_recording(file: ChannelFile, name: str, sources: Mapping[str, ColumnSource]) -> tuple[RawRecording, str]:
+@dataclass(frozen=True)
+class Pulleys:
+    """Radii of a loop's pulleys at the motor and at the load side [mm], which turn torques into forces; None if not stated."""
+
+    input_radius: float | None = None
+    output_radius: float | None = None
+
+
+def to_recording(
+    file: ChannelFile, name: str, sources: Mapping[str, ColumnSource], pulleys: Pulleys | None = None
+) -> tuple[RawRecording, str]:
     """A recording from the channels of a file.
 
     Args:
@@ -33,19 +44,28 @@ def to_recording(file: ChannelFile, name: str, sources: Mapping[str, ColumnSourc
         name: Name of the recording.
         sources: Channels that the user has named, by quantity; the others are found by their names. The time may also
             be given as a rate, such as "1000 Hz"; a minus sign before a unit turns the sign.
+        pulleys: Of a loop, whose channels may be torques; None for a single rope.
 
     Returns:
         The recording, and the unit of its velocity: "mm/s", "rad/s", or empty without one.
 
     Raises:
-        DatasetError: A channel is missing or named twice, or has no unit or clock, or a unit of another kind.
+        DatasetError: A channel is missing or named twice, or has no unit or clock, or a unit of another kind; a torque is
+            named for a single rope, or its pulley's radius is not stated.
     """
     found = {q.name: channel for q in WANTED if (channel := _find(file, q, sources)) is not None}
+    torques = _torques(file, found, sources, pulleys)
+    found |= torques
     for quantity in ("input_force", "output_force"):
         if quantity not in found:
             raise _missing(file, quantity)
     _check_distinct(file, found["input_force"], found["output_force"])
-    forces = {q: _converted(file, found[q], q, sources.get(q), "force") for q in ("input_force", "output_force")}
+    forces = {
+        q: _from_torque(file, found[q], q, sources, pulleys)
+        if q in torques
+        else _converted(file, found[q], q, sources.get(q), "force")
+        for q in ("input_force", "output_force")
+    }
     clocks = {q: _clock(file, found[q], found.get("time"), sources.get("time")) for q in found if q != "time"}
     for quantity, values in forces.items():
         _same_length(file, found[quantity], values, clocks[quantity])
@@ -63,6 +83,45 @@ def to_recording(file: ChannelFile, name: str, sources: Mapping[str, ColumnSourc
         ),
         unit,
     )
+
+
+def _torques(
+    file: ChannelFile, found: Mapping[str, Channel], sources: Mapping[str, ColumnSource], pulleys: Pulleys | None
+) -> dict[str, Channel]:
+    """Channels of torque in the place of forces, by the force that each becomes."""
+    torques = {}
+    for quantity in TORQUES:
+        force = quantity.name.replace("torque", "force")
+        if pulleys is None and quantity.name in sources:
+            raise DatasetError(
+                f"{file.path.name}: {quantity.name} is named for a single rope, whose ends are measured as forces; if the "
+                'cable is a pull-pull loop, write kind = "loop" under [cable] in cable.toml.'
+            )
+        if pulleys is None or (force in sources and quantity.name not in sources):
+            continue
+        channel = _find(file, quantity, sources)
+        if channel is not None and force in found and (force in sources or quantity.name not in sources):
+            raise DatasetError(
+                f"{file.path.name} has both {force} ({shown(found[force].name)}) and {quantity.name} "
+                f"({shown(channel.name)}); say which is meant: --channel {force}=NAME:N or --channel {quantity.name}=NAME:N*m."
+            )
+        if channel is not None:
+            torques[force] = channel
+    return torques
+
+
+def _from_torque(
+    file: ChannelFile, channel: Channel, force: str, sources: Mapping[str, ColumnSource], pulleys: Pulleys | None
+) -> np.ndarray:
+    """Forces [N] from the torques of a pulley and its radius."""
+    end = force.removesuffix("_force")
+    radius = getattr(pulleys, f"{end}_radius")
+    if radius is None:
+        raise DatasetError(
+            f"{file.path.name} gives {end}_torque, but the radius of that pulley is not known; add it to cable.toml: [cable] "
+            f'{end}_pulley_radius = {{ value = 15, unit = "mm" }}.'
+        )
+    return _converted(file, channel, f"{end}_torque", sources.get(f"{end}_torque"), "torque") / radius
 
 
 def _check_distinct(file: ChannelFile, one: Channel, other: Channel) -> None:
@@ -169,12 +228,15 @@ def _converted(
 
 def _unit(file: ChannelFile, channel: Channel, quantity: str, source: ColumnSource | None) -> tuple[float, str]:
     """Sign and unit of a channel, as the user says, else the file, else the channel's name."""
-    stated = (source.unit if source else None) or channel.unit
+    # A heading such as input_torque_N_m was read as one in m, which only the name of the quantity can tell.
+    of_torque = [unit for q in TORQUES if q.name == quantity for _, unit in meanings(channel.name, (q,)) if unit]
+    stated = (source.unit if source else None) or next(iter(of_torque), None) or channel.unit
     if not stated:
         named = [unit for q in WANTED if q.name == quantity for _, unit in meanings(channel.name, (q,)) if unit]
         stated = named[0] if named else ""
     if not stated:
-        example = {"velocity": "mm/s", "time": "s"}.get(quantity, "N")
+        units = {"velocity": "mm/s", "time": "s", "input_torque": "N*m", "output_torque": "N*m"}
+        example = units.get(quantity, "N")
         raise DatasetError(
             f"{file.path.name}: the channel {shown(channel.name)} does not say its unit; give it, such as --channel "
             f"{quantity}={channel.name}:{example}."
@@ -233,7 +295,7 @@ def parsed_channels(texts: Sequence[str]) -> dict[str, ColumnSource]:
     Raises:
         DatasetError: A text is not of that form, or names a quantity that recordings do not have.
     """
-    known = [q.name for q in WANTED]
+    known = [q.name for q in (*WANTED, *TORQUES)]
     sources: dict[str, ColumnSource] = {}
     for text in texts:
         quantity, equals, rest = text.partition("=")

@@ -54,6 +54,7 @@ class PreparationSettings:
         dropouts: Whether missing and frozen samples are flagged.
         spikes: Whether single samples far off their neighbors are flagged.
         block: Length of the blocks that samples are averaged over [s]; "auto" to choose it from the data; 0 for none.
+        loop: Whether the forces are those of a pull-pull loop, differences of two tensions: of either sign.
     """
 
     tare: Literal["interval", "none"]
@@ -64,6 +65,7 @@ class PreparationSettings:
     dropouts: bool
     spikes: bool
     block: Literal["auto"] | float
+    loop: bool = False
 
 
 @dataclass(frozen=True)
@@ -144,12 +146,16 @@ class Strokes:
     """What the cable did in each block, and what that says about it before any model of the whole cable.
 
     Args:
-        stroke: +1 sliding toward the motor, -1 sliding back, 0 switching or held.
+        stroke: +1 sliding toward the motor, -1 sliding back, 0 switching or held; of a pull-pull loop +1 moving forward,
+            -1 moving back, 0 between.
         used_sliding: Whether the block is safely inside a sliding phase.
-        exponent: Friction exponent of this recording by itself [1].
-        center: Mean log ratio of input to output force over both strokes [1]; what sensors add.
-        drag: Drag that straightens the hysteresis loop [N].
-        noise: Standard deviation of a block's log ratio about the play operator [1].
+        exponent: Friction exponent of this recording by itself [1]; of a pull-pull loop NaN where it does not tell it.
+        center: Mean log ratio of input to output force over both strokes [1]; what sensors add. Of a pull-pull loop the
+            difference [N].
+        drag: Drag that straightens the hysteresis loop [N]; of a pull-pull loop the force lost while both sides are taut,
+            NaN where the recording does not tell it.
+        noise: Standard deviation of a block's log ratio about the play operator [1]; of a pull-pull loop of its output
+            force [N].
         correlation: Integrated autocorrelation time of these deviations, in blocks, at least 1.
         by_hand: Whether the user set the phases.
         remarks: What a user should know, in sentences.
@@ -202,12 +208,14 @@ class Recordings:
         each: The recordings.
         velocity_unit: "mm/s" or "rad/s", what the blocks' velocities are in; empty where none was recorded or stated.
         delay_sd: Standard error of the delay that all of them were shifted by [s]; 0 where it is known.
+        loop: Whether they are of a pull-pull loop; forces are then differences of two tensions, of either sign.
     """
 
     columns: tuple[str, ...]
     each: tuple[Recording, ...]
     velocity_unit: str = ""
     delay_sd: float = 0.0
+    loop: bool = False
 
     @property
     def runs(self) -> tuple[str, ...]:

@@ -69,7 +69,7 @@ def find_strokes(blocks: Blocks, file: str, name: str, by_hand: Sequence[Span] =
         DatasetError: It is too short, or a phase lies outside it; hardly anything is under tension; input and
             output are swapped; only the return is there.
     """
-    _check_length(blocks, file, name, by_hand)
+    check_length(blocks, file, name, by_hand)
     usable = ~blocks.saturated & _under_tension(blocks.input_force) & _under_tension(blocks.output_force)
     if usable.sum() < _FEWEST:
         raise DatasetError(
@@ -78,16 +78,16 @@ def find_strokes(blocks: Blocks, file: str, name: str, by_hand: Sequence[Span] =
         )
     force_in, force_out = blocks.input_force[usable], blocks.output_force[usable]
     loop = fit_loop(force_in, force_out)
-    velocity = _toward_motor(blocks.velocity[usable], loop.state)
+    velocity = toward_motor(blocks.velocity[usable], loop.state)
     if not by_hand:
         _check_swapped(force_in, force_out, loop, velocity, file, name)
     state = np.zeros(len(usable), dtype=int)
     state[usable] = loop.state
     moving = np.ones(len(usable), dtype=bool)
-    moving[usable] = _moving(velocity, loop.state)
-    used = _inside(state) & usable & moving
+    moving[usable] = moving_steadily(velocity, loop.state)
+    used = inside_sliding(state) & usable & moving
     if by_hand:
-        state, used = _overridden(blocks.time, state, used & ~_covered(blocks.time, by_hand), usable, by_hand)
+        state, used = overridden(blocks.time, state, used & ~covered(blocks.time, by_hand), usable, by_hand)
     remarks = _remarks(name, state, used, loop)
     exponent, center = _plain_loop(np.log(force_in / force_out), state[usable])
     correlation = correlation_time(loop.deviation[used[usable]]) if used.any() else 1.0
@@ -110,17 +110,17 @@ def fit_loop(force_in: Vector, force_out: Vector) -> Loop:
     low, high = np.quantile(ratio, (0.05, 0.95))
     width, center = max((high - low) / 2, _LEAST_EXPONENT), (high + low) / 2
     level = float(np.median(few_out))
-    noise_in, noise_out = (max(_noise(force), 1e-6 * level) for force in (few_in, few_out))
+    noise_in, noise_out = (max(white_noise(force), 1e-6 * level) for force in (few_in, few_out))
     noise = float(np.median(np.hypot(noise_in / few_in, noise_out / few_out)))
     if high - low < _ONE_PHASE * noise or low > 0 or high < 0:  # one phase: all of the ratio is friction
         width, center = max(abs(float(np.median(ratio))), _LEAST_EXPONENT), 0.0
 
-    def deviations(p: Vector) -> Vector:
+    def deviations(p: np.ndarray) -> Vector:
         exponent, middle, drag = float(np.exp(p[0])), float(p[1]), level * float(p[2]) ** 2
         deviation = _follow(few_in, few_out, exponent, middle, drag)[0]
         return deviation / np.hypot(noise_in / (few_in + drag), noise_out / (few_out + drag))
 
-    def residuals(p: Vector) -> Vector:
+    def residuals(p: np.ndarray) -> np.ndarray:
         weak = np.sqrt(len(few_in)) * 0.1
         return np.append(deviations(p), [weak * p[1] / _GAIN_SD, weak * p[2] ** 2])
 
@@ -154,22 +154,22 @@ def _follow(force_in: Vector, force_out: Vector, exponent: float, center: float,
 
 def _under_tension(force: Vector) -> Flags:
     """Where a force stands clear of its noise, so that its logarithm says something."""
-    return force > _CLEAR_OF_NOISE * _noise(force)
+    return force > _CLEAR_OF_NOISE * white_noise(force)
 
 
-def _noise(series: Vector) -> float:
+def white_noise(series: Vector) -> float:
     """Standard deviation of the white part of a smooth series, from its second differences."""
     second = np.diff(series, 2)
     return float(1.4826 * np.median(np.abs(second)) / np.sqrt(6)) if len(second) else 0.0
 
 
-def _toward_motor(velocity: Vector, state: Labels) -> Vector:
+def toward_motor(velocity: Vector, state: Labels) -> Vector:
     """Velocity with pulling as positive, whatever sign the recording gives it."""
     pulling = velocity[(state == PULL) & np.isfinite(velocity)]
     return -velocity if len(pulling) and np.median(pulling) < 0 else velocity
 
 
-def _moving(velocity: Vector, state: Labels) -> Flags:
+def moving_steadily(velocity: Vector, state: Labels) -> Flags:
     """Where the rope moves the way its contact says, and steadily; everywhere without a velocity.
 
     While the motor speeds up or slows down, a block is of several speeds, and at the slow end of a stroke the rope may stand
@@ -184,17 +184,18 @@ def _moving(velocity: Vector, state: Labels) -> Flags:
     return ~known | ((velocity * state > _STILL * typical) & steady)
 
 
-def _inside(state: Labels) -> Flags:
+def inside_sliding(state: Labels) -> Flags:
     """Blocks whose neighbors on both sides are in the same contact: where one phase meets the next, a block is both."""
     same = np.diff(state) == 0
     return (state != SWITCH) & np.append(True, same) & np.append(same, True)
 
 
-def _covered(time: Vector, by_hand: Sequence[Span]) -> Flags:
+def covered(time: Vector, by_hand: Sequence[Span]) -> Flags:
+    """Blocks whose phase the user has set."""
     return np.any([(time >= span.start) & (time <= span.end) for span in by_hand], axis=0)
 
 
-def _overridden(
+def overridden(
     time: Vector, state: Labels, used: Flags, usable: Flags, by_hand: Sequence[Span]
 ) -> tuple[Labels, Flags]:
     """Phases as the user has set them, where they were set; what was found, elsewhere."""
@@ -206,7 +207,7 @@ def _overridden(
     return state, used
 
 
-def _check_length(blocks: Blocks, file: str, name: str, by_hand: Sequence[Span]) -> None:
+def check_length(blocks: Blocks, file: str, name: str, by_hand: Sequence[Span]) -> None:
     """Refuse a recording of a few blocks, and phases that lie outside it."""
     if len(blocks.time) < _FEWEST:
         raise DatasetError(
@@ -215,7 +216,7 @@ def _check_length(blocks: Blocks, file: str, name: str, by_hand: Sequence[Span])
             "under prepare in cable.toml, or leave the recording out."
         )
     for span in by_hand:
-        if not _covered(blocks.time, [span]).any():
+        if not covered(blocks.time, [span]).any():
             raise DatasetError(
                 f"{file}: the phase {span.stroke!r} of {name!r} from {span.start:g} to {span.end:g} s holds nothing of the "
                 f"recording, which goes from {blocks.time[0]:.4g} to {blocks.time[-1]:.4g} s; correct its start and end in "

@@ -9,11 +9,13 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from bowdenfit.description import RecordingsTable
 from bowdenfit.errors import DatasetError
 from bowdenfit.measurements.preparation.play import play
 from bowdenfit.measurements.recordings import Recording, Recordings
 from bowdenfit.measurements.tables import AngleTable
 from bowdenfit.models.cable import Cable, row_angles
+from bowdenfit.models.loop_recordings import LoopRecordingsTerm, loop_recordings_term
 from bowdenfit.models.recorded_blocks import (
     RECORDED,
     drift_of,
@@ -31,8 +33,10 @@ from bowdenfit.models.scatter import BLOCK_NOISE
 from bowdenfit.models.whole_recordings import WholeRecordingsTerm, padded
 
 
-def recordings_term(cable: Cable, recordings: Recordings, angles: AngleTable | None) -> RunsTerm | WholeRecordingsTerm:
-    """The term of a data set's recordings, as its description wants them used.
+def recordings_term(
+    cable: Cable, recordings: Recordings, angles: AngleTable | None
+) -> RunsTerm | WholeRecordingsTerm | LoopRecordingsTerm:
+    """The term of a data set's recordings, as its description wants them used; those of a loop are always whole.
 
     Raises:
         DatasetError: Whole recordings are wanted, and one has no reversal.
@@ -40,17 +44,25 @@ def recordings_term(cable: Cable, recordings: Recordings, angles: AngleTable | N
     settings = cable.description.tables.recordings
     rows = row_angles(cable, recorded_angles(recordings), angles).data
     labels = tuple(_label(cable, recordings, run) for run in recordings.runs)
+    if recordings.loop:
+        censored = settings is not None and _censored(settings, recordings)
+        return loop_recordings_term(cable, recordings, rows, labels, censored)
     if settings is None or settings.likelihood == "runs":
         parts = [_sliding_blocks(r) for r in recordings.each]
         return RunsTerm(cable, run_sums(cable, _rows(recordings, parts, rows)), labels, RECORDED, BLOCK_NOISE)
     for recording in recordings.each:
         _needs_reversal(recording)
-    censored = settings.prepare.saturation == "censored" and any(r.blocks.saturated.any() for r in recordings.each)
+    censored = _censored(settings, recordings)
     if not (cable.friction.options or cable.description.fits_offsets or censored):
         # On a scale that no parameter changes, the operator is linear in the exponent: it need not be run again.
         parts = [_all_blocks(r) for r in recordings.each]
         return RunsTerm(cable, run_sums(cable, _rows(recordings, parts, rows)), labels, RECORDED, BLOCK_NOISE)
     return WholeRecordingsTerm(cable, padded(recordings, rows, censored), labels)
+
+
+def _censored(settings: RecordingsTable, recordings: Recordings) -> bool:
+    """Whether readings at the end of the range count as ones beyond it, and there are any."""
+    return settings.prepare.saturation == "censored" and any(r.blocks.saturated.any() for r in recordings.each)
 
 
 def _label(cable: Cable, recordings: Recordings, run: str) -> str:

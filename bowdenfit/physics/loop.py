@@ -13,11 +13,11 @@ from bowdenfit.physics.stretch import mean_tension
 
 
 def loop_output_force(
-    input_force: Float[Array, "*batch"],
-    preload: Float[Array, "*#batch"],
-    friction_exponent: Float[Array, "*#batch"],
-    stroke: Float[Array, "*#batch"],
-) -> Float[Array, "*batch"]:
+    input_force: Float[Array, "..."],
+    preload: Float[Array, "..."],
+    friction_exponent: Float[Array, "..."],
+    stroke: Float[Array, "..."],
+) -> Float[Array, "..."]:
     r"""Output force of a loop while it moves.
 
     .. math:: F_\text{out} = \min\left(F_\text{in} - 2 P \Lambda,\ F_\text{in} e^{-\Lambda}\right)
@@ -46,8 +46,8 @@ def loop_output_force(
 
 
 def loop_band(
-    input_force: Float[Array, "*batch"], preload: Float[Array, "*#batch"], friction_exponent: Float[Array, "*#batch"]
-) -> tuple[Float[Array, "*batch"], Float[Array, "*batch"]]:
+    input_force: Float[Array, "..."], preload: Float[Array, "..."], friction_exponent: Float[Array, "..."]
+) -> tuple[Float[Array, "..."], Float[Array, "..."]]:
     """Output force while moving forward and while moving back [N]; at rest it lies between the two."""
     taut, less, more = 2 * preload * friction_exponent, jnp.exp(-friction_exponent), jnp.exp(friction_exponent)
     slack = jnp.stack(jnp.broadcast_arrays(input_force * less, input_force * more))

@@ -9,12 +9,12 @@ from bowdenfit.physics.loop import loop_band
 
 
 def loop_play_with_slope(
-    input_force: Float[Array, "time *batch"],
-    preload: Float[Array, "*#batch"],
-    friction_exponent: Float[Array, "*#batch"],
-    start: Float[Array, "*batch"],
-    restart: Float[Array, "time *batch"],
-) -> tuple[Float[Array, "time *batch"], Float[Array, "time *batch"]]:
+    input_force: Float[Array, "time recordings"],
+    preload: Float[Array, " recordings"],
+    friction_exponent: Float[Array, " recordings"],
+    start: Float[Array, " recordings"],
+    restart: Float[Array, "time recordings"],
+) -> tuple[Float[Array, "time recordings"], Float[Array, "time recordings"]]:
     r"""The play operator of a loop, and the derivative of its output by the friction exponent.
 
     .. math:: y_t = \text{clip}(y_{t-1},\ f_-(x_t),\ f_+(x_t))
@@ -23,9 +23,9 @@ def loop_play_with_slope(
     was touched, kept while nothing moves, and 0 before the loop has moved at all.
 
     Args:
-        input_force: x, time first [N].
-        preload: P [N].
-        friction_exponent: Lambda of one side [1].
+        input_force: x of each recording, time first [N].
+        preload: P of each [N].
+        friction_exponent: Lambda of one side, of each [1].
         start: Output force before the first time [N].
         restart: Output force where it must be set anew, because the input before was not known [N]; NaN elsewhere.
 

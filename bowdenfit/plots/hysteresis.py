@@ -17,6 +17,7 @@ from bowdenfit.plots.recording_panels import (
     set_limits,
     span,
 )
+from bowdenfit.plots.recordings import is_loop
 from bowdenfit.plots.style import (
     BLACK,
     BLUE,
@@ -43,12 +44,14 @@ STROKES = (
 
 
 def has_hysteresis(data: "FigureData") -> bool:
-    """Whether forces were recorded."""
+    """Whether forces were recorded of a single rope; those of a loop are in the figure of loops."""
     return any(map(_has_forces, data.recordings))
 
 
 def _has_forces(recording: "RecordedTrace") -> bool:
-    return bool(np.any(np.isfinite(recording.input_force) & np.isfinite(recording.output_force)))
+    return not is_loop(recording) and bool(
+        np.any(np.isfinite(recording.input_force) & np.isfinite(recording.output_force))
+    )
 
 
 @in_paper_style

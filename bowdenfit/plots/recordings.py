@@ -44,6 +44,7 @@ PER_BLOCK = (
 FORCE, TIME = "Force (N)", "Time from the start (s)"
 # stroke, name and fill, which differ in lightness too
 PHASES = ((1, "Pulling", "#F1F6FC"), (-1, "Returning", "#F3E4CE"), (0, "Switching or held", "#D4D4D4"))
+LOOP_PHASES = ("Moving forward", "Moving back", "Between")
 FLAGS = {"dropout": ("x", VERMILLION), "spike": ("^", PURPLE), "saturated": ("s", ORANGE), "quiet": (".", GRAY)}
 OTHER_FLAG = ("+", GREEN)
 MARK_GRID = (160, 60)  # across and up a panel, marks of a kind that it can show
@@ -52,6 +53,11 @@ MARK_GRID = (160, 60)  # across and up a panel, marks of a kind that it can show
 def has_recordings(data: "FigureData") -> bool:
     """Whether forces were recorded."""
     return any(map(_has_blocks, data.recordings))
+
+
+def is_loop(recording: "RecordedTrace") -> bool:
+    """Whether it is of a pull-pull loop, which has no efficiency that is the same at all loads."""
+    return not len(recording.efficiency)
 
 
 def _has_blocks(recording: "RecordedTrace") -> bool:
@@ -120,7 +126,8 @@ def _phases(axes: Axes, recording: "RecordedTrace") -> None:
     starts = np.append(time[:1], np.where(recorded, middle, after))
     stops = np.append(np.where(recorded, middle, before), time[-1:])
     of = stroke[np.append(0, change)]
-    for value, name, fill in PHASES:
+    names = LOOP_PHASES if is_loop(recording) else tuple(name for _, name, _ in PHASES)
+    for (value, _, fill), name in zip(PHASES, names, strict=True):
         spans = [(a, b - a) for a, b in zip(starts[of == value], stops[of == value], strict=True)]
         if spans:
             axes.broken_barh(

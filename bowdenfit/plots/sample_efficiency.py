@@ -12,6 +12,7 @@ from matplotlib.figure import Figure
 
 from bowdenfit.plots.layout import legend_above
 from bowdenfit.plots.recording_panels import alike, chosen, enlarge_marks, label_outer, recording_panels, say_how_many
+from bowdenfit.plots.recordings import is_loop
 from bowdenfit.plots.style import (
     BLACK,
     BLUE,
@@ -34,12 +35,12 @@ SHARE = 0.998  # of the samples, within the axis
 
 
 def has_sample_efficiency(data: "FigureData") -> bool:
-    """Whether a recording has blocks inside a sliding phase."""
+    """Whether a recording of a single rope has blocks inside a sliding phase."""
     return any(map(_has_samples, data.recordings))
 
 
 def _has_samples(recording: "RecordedTrace") -> bool:
-    return bool(_sliding(recording).any())
+    return not is_loop(recording) and bool(_sliding(recording).any())
 
 
 def _sliding(recording: "RecordedTrace") -> np.ndarray:

@@ -8,28 +8,30 @@ from bowdenfit.measurements.recordings import Recordings
 from bowdenfit.report.layout import filled, listed, table
 from bowdenfit.results.accounts import accounts
 
-_HEADS = (
-    "recording",
-    "samples",
-    "used",
-    "left out",
-    "block",
-    "pulling",
-    "switching",
-    "returning",
-    "sliding",
-    "exponent",
+_SAMPLES = ("recording", "samples", "used", "left out", "block")
+_HEADS = (*_SAMPLES, "pulling", "switching", "returning", "sliding", "exponent")
+_LOOP_HEADS = (*_SAMPLES, "forward", "between", "back", "moving", "loss", "exponent")
+_NOTE = (
+    "Samples are averaged over blocks; pulling, switching and returning count blocks of each phase, sliding those that "
+    "lie safely inside a pulling or returning phase. The exponent is that of the recording by itself: half the width of "
+    "its hysteresis loop, as a log ratio."
+)
+_LOOP_NOTE = (
+    "Samples are averaged over blocks; forward, between and back count blocks in which the loop moves forward, stands while "
+    "the input force crosses the friction band, and moves back, moving those that lie safely inside a motion. The loss is "
+    "the force that is lost while both sides are taut, 2 x preload x exponent, and the exponent is that of one side, both by "
+    "the recording itself; a dash where it does not tell them."
 )
 
 
 def recordings_text(recordings: Recordings) -> list[str]:
     """What was done to the recordings, line by line."""
     pages = accounts(recordings)
-    lines = table(_HEADS, [_row(page) for page in pages], left=("left out",)).splitlines()
+    losses = [(_or_dash(r.strokes.drag, ".3g", " N"),) if recordings.loop else () for r in recordings.each]
+    rows = [_row(page, loss) for page, loss in zip(pages, losses, strict=True)]
+    lines = table(_LOOP_HEADS if recordings.loop else _HEADS, rows, left=("left out",)).splitlines()
     notes = [
-        "Samples are averaged over blocks; pulling, switching and returning count blocks of each phase, sliding those that "
-        "lie safely inside a pulling or returning phase. The exponent is that of the recording by itself: half the width of "
-        "its hysteresis loop, as a log ratio.",
+        _LOOP_NOTE if recordings.loop else _NOTE,
         *_delay(pages),
         *_tare(pages),
         *_by_hand(pages),
@@ -37,7 +39,7 @@ def recordings_text(recordings: Recordings) -> list[str]:
     return [*lines, *(line for note in notes for line in filled(note).splitlines())]
 
 
-def _row(page: dict[str, Any]) -> tuple[str, ...]:
+def _row(page: dict[str, Any], loss: tuple[str, ...]) -> tuple[str, ...]:
     counts, blocks = page["counts"], page["blocks"]
     left_out = [f"{n} {kind}" for kind, n in counts.items() if kind != "used" and n]
     block = f"{1000 * page['block']:.4g} ms" if page["block"] > 0 else "none"
@@ -48,8 +50,14 @@ def _row(page: dict[str, Any]) -> tuple[str, ...]:
         ", ".join(left_out) or "none",
         block,
         *(str(blocks[name]) for name in ("pulling", "switching", "returning", "sliding")),
-        f"{page['exponent']:.3f}",
+        *loss,
+        _or_dash(page["exponent"], ".3f"),
     )
+
+
+def _or_dash(value: float, digits: str, unit: str = "") -> str:
+    """A number, or a dash where it is not known."""
+    return f"{value:{digits}}{unit}" if np.isfinite(value) else "-"
 
 
 def _delay(pages: list[dict[str, Any]]) -> list[str]:

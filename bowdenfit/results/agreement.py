@@ -7,6 +7,7 @@ from bowdenfit.inference.disagreement import WORTH_SAYING, Disagreement
 from bowdenfit.results.answers import decimals
 from bowdenfit.results.fit import Fit
 
+_AS_MUCH = 0.8  # of the largest conflict: beyond that either table may be the odd one out
 _TABLES = {
     "wrap_angle": "angles",
     "efficiency": "efficiencies",
@@ -19,24 +20,32 @@ _TABLES = {
 
 
 def agreement_page(fit: Fit) -> list[dict[str, Any]]:
-    """How well each table agrees with everything else, the worst first."""
-    found = sorted(fit.least_squares.disagreements, key=lambda d: -d.sds)
+    """How well each table agrees with everything else, the odd one out first."""
+    found = sorted(fit.least_squares.disagreements, key=lambda d: -d.conflict)
     return [asdict(d) | {"unit": _unit(fit, d)} for d in found]
 
 
 def contradiction(fit: Fit) -> str:
-    """The table that contradicts everything else most, in a sentence; empty where all agree."""
-    worst = max(fit.least_squares.disagreements, key=lambda d: d.sds, default=None)
+    """The table that is the odd one out, in a sentence; empty where all agree."""
+    worst = max(fit.least_squares.disagreements, key=lambda d: d.conflict, default=None)
     if worst is None or worst.sds < WORTH_SAYING:
         return ""
     unit, digits = _unit(fit, worst), decimals(worst.rest_sd)
-    table = _TABLES.get(worst.table, worst.table)
+    others = [
+        d.table for d in fit.least_squares.disagreements if d is not worst and d.conflict > _AS_MUCH * worst.conflict
+    ]
+    or_else = f" (or {' or '.join(f'that of {_name(table)}' for table in others)})" if others else ""
     return (
-        f"The table of {table} disagrees with everything else by {worst.sds:.1f} standard deviations: without it "
+        f"The table of {_name(worst.table)}{or_else} disagrees with everything else by {worst.sds:.1f} standard deviations: without it "
         f"{worst.parameter} would be {worst.rest:.{digits}f} +- {worst.rest_sd:.{digits}f}{unit}, with it the fit is at "
         f"{worst.together:.{digits}f}{unit}. Look at the units and wrap angles of that table and at how it was measured; the "
         "numbers below are a compromise between readings that cannot all be right."
     )
+
+
+def _name(table: str) -> str:
+    """A table as the description calls it."""
+    return _TABLES.get(table, table)
 
 
 def _unit(fit: Fit, found: Disagreement) -> str:

@@ -154,6 +154,16 @@ class Elastic:
         error, lost = self.over(lambda values: bent.position(values, float(input_force), preload))
         return error + self._backlash, lost + self._backlash
 
+    def tension(self, extensions: np.ndarray) -> np.ndarray:
+        """Tension [N] of the rope from its extension [mm], draws by extensions; 0 where it is slack.
+
+        Raises:
+            UsageError: Nothing says how the rope stretches.
+        """
+        self._needs_stretch()
+        extended, elastic = jnp.asarray(np.atleast_1d(extensions), dtype=float), self.fit.model.cable.elasticity
+        return self.over(lambda values: elastic.tension(values, extended))
+
     def stiffness(self, wrap_angles: np.ndarray, load: float, preload: float | None = None) -> np.ndarray:
         """Stiffness seen at the load side [N/mm], draws by wrap angles.
 

@@ -10,6 +10,7 @@ from bowdenfit.measurements.recordings import PULL, Recording, Recordings
 from bowdenfit.models.recorded_blocks import RECORDED
 from bowdenfit.models.scatter import BLOCK_NOISE, RUN_SCATTER
 from bowdenfit.predictions.recorded import DRAWS, Follower, blocks_shown
+from bowdenfit.predictions.recorded_loops import LoopFollower
 from bowdenfit.results.figure_data import Dependence, RecordedTrace
 from bowdenfit.results.fit import Fit
 from bowdenfit.results.rate import SHOWN_SPEED, place_of
@@ -28,10 +29,11 @@ def traces(fit: Fit) -> tuple[RecordedTrace, ...]:
     if recordings is None:
         return ()
     with jax.enable_x64(True):
-        follower = Follower(fit.model, recordings, fit.dataset.measurements.angles)
+        kind = LoopFollower if recordings.loop else Follower
+        follower = kind(fit.model, recordings, fit.dataset.measurements.angles)
         predicted, exponent = _predicted(fit, recordings, follower)
         fitted = _fitted(fit, recordings, follower)
-    efficiency = _run_efficiencies(fit)
+    efficiency = _no_efficiencies(recordings) if recordings.loop else _run_efficiencies(fit)
     return tuple(
         _trace(fit, r, predicted[:, :, i], fitted[:, i], exponent[:, i], efficiency[r.run])
         for i, r in enumerate(recordings.each)
@@ -52,7 +54,7 @@ def _some_draws(fit: Fit, n: int = DRAWS) -> np.ndarray:
     return flat[np.linspace(0, len(flat) - 1, n).astype(int)]
 
 
-def _predicted(fit: Fit, recordings: Recordings, follower: Follower) -> tuple[np.ndarray, np.ndarray]:
+def _predicted(fit: Fit, recordings: Recordings, follower: Follower | LoopFollower) -> tuple[np.ndarray, np.ndarray]:
     """Quantiles of the output force with a new mounting, and of the friction exponent without."""
     z, n = _some_draws(fit), len(recordings.each)
     if fit.posterior is None:
@@ -65,7 +67,7 @@ def _predicted(fit: Fit, recordings: Recordings, follower: Follower) -> tuple[np
     return np.quantile(force, _QUANTILES, axis=0), np.quantile(exponent, _QUANTILES, axis=0)
 
 
-def _fitted(fit: Fit, recordings: Recordings, follower: Follower) -> np.ndarray:
+def _fitted(fit: Fit, recordings: Recordings, follower: Follower | LoopFollower) -> np.ndarray:
     """Output force with the mounting effect of each run that suits its recordings best, by looking at many."""
     center = np.median(_some_draws(fit), axis=0)
     grid = np.linspace(-_REACH, _REACH, DRAWS)
@@ -74,9 +76,14 @@ def _fitted(fit: Fit, recordings: Recordings, follower: Follower) -> np.ndarray:
     for i, recording in enumerate(recordings.each):
         shown = blocks_shown(len(recording.blocks.time))
         used, measured = recording.strokes.used_sliding[shown], recording.blocks.output_force[shown]
-        apart = np.abs(np.log(np.maximum(force[:, : len(shown), i], 1e-3) / np.maximum(measured, 1e-3)))
+        apart = np.abs(_apart(force[:, : len(shown), i], measured, recordings.loop))
         columns.append(force[int(np.argmin(np.median(apart[:, used], axis=1))) if used.any() else 0, :, i])
     return np.stack(columns, axis=1)
+
+
+def _apart(one: np.ndarray, other: np.ndarray, loop: bool) -> np.ndarray:
+    """How far forces are apart: their log ratio; of a loop, which pass through zero, their difference [N]."""
+    return one - other if loop else np.log(np.maximum(one, 1e-3) / np.maximum(other, 1e-3))
 
 
 @dataclass(frozen=True)
@@ -105,6 +112,11 @@ def _run_efficiencies(fit: Fit) -> dict[str, _RunEfficiency]:
     return found
 
 
+def _no_efficiencies(recordings: Recordings) -> dict[str, _RunEfficiency]:
+    """Of a loop, whose efficiency depends on the load: no quantiles, and nothing measured."""
+    return dict.fromkeys(recordings.runs, _RunEfficiency(np.zeros(0), float("nan"), float("nan")))
+
+
 def _trace(
     fit: Fit,
     recording: Recording,
@@ -116,8 +128,10 @@ def _trace(
     blocks, strokes, flagged = recording.blocks, recording.strokes, recording.account.flagged
     shown = blocks_shown(len(blocks.time))
     n, used = len(shown), strokes.used_sliding[shown]
-    scale = SHOWN_SPEED[fit.dataset.measurements.recordings.velocity_unit][1]  # type: ignore[union-attr]
-    deviation = np.log(np.maximum(blocks.output_force[shown], 1e-3) / np.maximum(fitted[:n], 1e-3))[used]
+    of_all = fit.dataset.measurements.recordings
+    assert of_all is not None  # it has this one
+    scale = SHOWN_SPEED[of_all.velocity_unit][1]
+    deviation = _apart(blocks.output_force[shown], fitted[:n], of_all.loop)[used]
     step = float(np.median(np.diff(blocks.time[shown]))) if n > 1 else 1.0
     correlation = _autocorrelation(deviation)
     return RecordedTrace(

@@ -22,6 +22,10 @@ from bowdenfit.types import Flags, Vector
 
 _SHOWN_FLAGS = 300
 _USUAL_BLOCK = 0.05
+NO_DELAY_OF_LOOPS = (
+    "How much later the output channel is than the input channel is not estimated for a loop, whose forces pass through zero. "
+    'No delay was assumed; state one if it is known: delay = { value = 10, unit = "ms" } under prepare in cable.toml.'
+)
 
 
 @dataclass(frozen=True)
@@ -93,7 +97,7 @@ def averaged(found: Inspected, one_for_all: tuple[float, float] | None = None) -
     common = _together(raw, cleaned, settings, delay.value) if delay.value else found.together
     _require_some_good(raw, common)
     filled = [_filled(force, common.fault == GOOD) for force in (common.input_force, common.output_force)]
-    bandwidth = bandwidth_of(filled[0], filled[1], 1 / common.step)
+    bandwidth = bandwidth_of(filled[0], filled[1], 1 / common.step, settings.loop)
     noise = _noise(cleaned.input, bandwidth), _noise(cleaned.output, bandwidth)
     samples = _samples_of_block(common, cleaned, settings, bandwidth, noise)
     blocks, counts = average(common, samples)
@@ -125,7 +129,8 @@ def _clean(raw: RawRecording, settings: PreparationSettings) -> _Cleaned:
     tares = [_tare(raw.file, name, channel, settings) for name, (channel, _) in zip(names, found, strict=True)]
     channels = [replace(c, force=c.force - tare) for (c, _), (tare, _) in zip(found, tares, strict=True)]
     for name, channel in zip(names, channels, strict=True):
-        check_sign(raw.file, name, channel.force)
+        if not settings.loop:
+            check_sign(raw.file, name, channel.force)
     ends = max(e[0] for _, e in found), min(e[1] for _, e in found)
     return _Cleaned(channels[0], channels[1], ends, (tares[0][0], tares[1][0]), (tares[0][1], tares[1][1]))
 
@@ -169,6 +174,8 @@ def _delay(common: Common, settings: PreparationSettings) -> Delay:
         return Delay(0.0, math.nan, math.nan)
     if settings.delay != "estimate":
         return Delay(float(settings.delay), math.nan, math.nan)
+    if settings.loop:
+        return Delay(0.0, math.nan, math.nan, NO_DELAY_OF_LOOPS)
     shortest = settings.block if settings.block != "auto" else _USUAL_BLOCK
     return estimate_delay(common.time, common.input_force, common.output_force, common.fault == GOOD, float(shortest))
 
@@ -201,7 +208,7 @@ def _samples_of_block(
     if settings.block == "auto":
         thinned = [step_of(channel.time) / common.step for channel in (cleaned.input, cleaned.output)]
         each = noise[0] * math.sqrt(thinned[0]), noise[1] * math.sqrt(thinned[1])
-        return block_samples(common, bandwidth, each)
+        return block_samples(common, bandwidth, each, settings.loop)
     return max(1, round(settings.block / common.step)) if settings.block > 0 else 0
 
 

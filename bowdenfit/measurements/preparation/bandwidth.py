@@ -35,25 +35,27 @@ class Spectra:
     output_floor: float
 
 
-def bandwidth_of(input_force: Vector, output_force: Vector, rate: float) -> float:
+def bandwidth_of(input_force: Vector, output_force: Vector, rate: float, loop: bool = False) -> float:
     """Frequency up to which the forces move together [Hz].
 
     The lower of two estimates, each a signal-to-noise ratio of 1. The first is where the spectra have come down to twice
     the floor of their top octave, for the channel that reaches it later; a hum common to both does not deceive it. The
     second is the highest frequency at which the two channels are coherent; noise that a filter smoothed does not
-    deceive it.
+    deceive it. Of a pull-pull loop only the first: its output stands still at every reversal and has corners, overtones
+    that a smooth input force has not, and they are motion all the same.
 
     Args:
         input_force: Input force at equal steps, gaps filled [N].
         output_force: Output force on the same clock [N].
         rate: Samples a second [1/s].
+        loop: Whether the forces are of a pull-pull loop.
     """
     spectra = spectra_of(input_force, output_force, rate)
     over = max(
         _first_below(spectra.input_power, spectra.input_floor, spectra.lower, rate),
         _first_below(spectra.output_power, spectra.output_floor, spectra.lower, rate),
     )
-    coherent = np.flatnonzero(spectra.coherence > _COHERENT)
+    coherent = np.flatnonzero(spectra.coherence > _COHERENT) if not loop else np.zeros(0, dtype=int)
     return min(over, float(spectra.upper[coherent[-1]])) if len(coherent) else over
 
 

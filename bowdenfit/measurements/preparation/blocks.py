@@ -5,7 +5,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from bowdenfit.measurements.preparation.clock import DROPOUT, GOOD, KINDS, SATURATED
-from bowdenfit.measurements.preparation.shapes import ChosenFlags, ChosenVector, Places
+from bowdenfit.measurements.preparation.shapes import ChosenFlags, ChosenVector, OtherVector, Places
 from bowdenfit.measurements.recordings import Blocks
 from bowdenfit.types import Flags, Labels, Vector
 
@@ -35,7 +35,7 @@ class Common:
     fault: Labels
 
 
-def block_samples(common: Common, bandwidth: float, noise: tuple[float, float]) -> int:
+def block_samples(common: Common, bandwidth: float, noise: tuple[float, float], loop: bool = False) -> int:
     """Samples of a block, chosen from the data.
 
     Half a period of the bandwidth; longer where the noise of a mean would be more than a tenth of the friction band; never so
@@ -45,9 +45,11 @@ def block_samples(common: Common, bandwidth: float, noise: tuple[float, float]) 
         common: Both channels.
         bandwidth: Frequency up to which the forces move [Hz].
         noise: Standard deviation of the input and the output force, for a sample of the common clock [N].
+        loop: Whether the forces are of a pull-pull loop, whose friction band is one of differences.
     """
     samples = len(common.time)
-    wanted = max(round(1 / (2 * bandwidth * common.step)), _quiet_enough(common, noise))
+    quiet = _quiet_enough_for_loop if loop else _quiet_enough
+    wanted = max(round(1 / (2 * bandwidth * common.step)), quiet(common, noise))
     span = float(common.time[-1] - common.time[0]) / common.step + 1
     return max(1, min(wanted, samples // FEWEST_BLOCKS), int(np.ceil(span / MOST_BLOCKS)))
 
@@ -59,7 +61,20 @@ def _quiet_enough(common: Common, noise: tuple[float, float]) -> int:
         return 1
     forces = common.input_force[good], common.output_force[good]
     single = float(np.median(np.hypot(noise[0] / forces[0], noise[1] / forces[1])))
-    low, high = np.quantile(np.log(forces[0] / forces[1]), (0.1, 0.9))
+    return _enough(np.log(forces[0] / forces[1]), single)
+
+
+def _quiet_enough_for_loop(common: Common, noise: tuple[float, float]) -> int:
+    """Samples over which the noise of the mean difference of the forces comes down to a tenth of half the friction band."""
+    good = common.fault == GOOD
+    if not good.any():
+        return 1
+    return _enough(common.input_force[good] - common.output_force[good], float(np.hypot(*noise)))
+
+
+def _enough(apart: OtherVector, single: float) -> int:
+    """Samples that bring the noise of one down to a tenth of half the spread of how far the two forces are apart."""
+    low, high = np.quantile(apart, (0.1, 0.9))
     band = np.sqrt(max(((high - low) / 2) ** 2 - single**2, single**2 / 100))
     return int(np.ceil((single / (_NOISE_IN_BAND * band)) ** 2)) if single > 0 else 1
 

@@ -16,8 +16,8 @@ from bowdenfit.models.build import build_model
 from bowdenfit.models.elastic_simulation import ElasticDesign
 from bowdenfit.models.simulation import Design
 from bowdenfit.report.check import warnings_of
-from bowdenfit.report.elastic import products_with_preload
 from bowdenfit.report.text import summary_text
+from bowdenfit.results.elastic_summary import products_with_preload
 
 NAMES = ("cable.toml", "stretch.csv", "preload.csv", "loop.csv")
 LOOP = """wrap_angle_deg,stroke,input_force_N,output_force_N,preload_N

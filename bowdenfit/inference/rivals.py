@@ -12,6 +12,7 @@ import numpy as np
 
 PINS = (-2.5, 0.0, 2.5)  # z at which a parameter is pinned
 _AS_WELL = 0.97725  # probability up to which a deviation counts as chance: two standard errors of a normal reading
+_EXACT = 1e-6  # scatter of readings that fit without any
 _APART = 4.0  # standard errors beyond which it is another answer; were the errors normal, 2 could not be passed
 
 Solution = Mapping[str, Any]
@@ -28,6 +29,9 @@ def fitting_as_well(found: Solution, trials: Sequence[Solution], scale: np.ndarr
     """
     from scipy.special import stdtrit
 
+    # Readings without any scatter fit nothing else, whatever their weight.
+    exact = np.concatenate([np.full(len(r), not np.any(r)) for r in found["residuals"].values()])
+    scale = np.where(exact, _EXACT, scale)
     spare = max(sum(np.count_nonzero(r) for r in found["residuals"].values()) - n_informed, 1)
     limit = _scaled(found, scale) + float(stdtrit(spare, _AS_WELL)) ** 2
     return [trial for trial in trials if _scaled(trial, scale) <= limit]

@@ -218,7 +218,7 @@ def read_loop(
     input_force, output_force = (
         _end(table, found, end, radius) for end, radius in zip(("input", "output"), radii, strict=True)
     )
-    stroke = read_strokes(found, len(table.rows))
+    stroke = read_strokes(found, len(table.rows), held="")
     if not stroke.all():
         held = found["stroke"].cells[int(np.flatnonzero(stroke == 0)[0])]
         raise held.refuse(

@@ -42,17 +42,23 @@ def read_angle(cell: Cell, column: Column) -> float:
     return angle
 
 
-def read_strokes(found: Mapping[str, Column], n_rows: int) -> Labels:
-    """Strokes of a table; all pulling without a column."""
+def read_strokes(
+    found: Mapping[str, Column], n_rows: int, held: str = ", or hold (0, read while nothing slides)"
+) -> Labels:
+    """Strokes of a table; all pulling without a column.
+
+    Args:
+        found: Columns of the table.
+        n_rows: Number of its rows.
+        held: What a refusal says of held readings; empty where the table may have none.
+    """
     if "stroke" not in found:
         return np.ones(n_rows, dtype=int)
     strokes = []
     for cell in found["stroke"].cells:
         text = cell.text.strip().lower().replace("\u2212", "-").replace(",", ".")
         if text not in _STROKES:
-            raise cell.refuse(
-                f"{cell.shown} is no stroke; write pull (+1), return (-1) or hold (0, read while nothing slides)."
-            )
+            raise cell.refuse(f"{cell.shown} is no stroke; write pull (+1) or return (-1){held}.")
         strokes.append(_STROKES[text])
     return np.array(strokes)
 

@@ -12,7 +12,7 @@ from bowdenfit.measurements.tables import LoopTable, Measurements, OwnAngles, Pr
 from bowdenfit.models.cable import Cable, resolve_angles, row_angles
 from bowdenfit.models.elasticity import PRELOAD_NOISE, STRETCH_NOISE
 from bowdenfit.models.scatter import FORCE_NOISE
-from bowdenfit.models.stretch import preload_term, stretch_term
+from bowdenfit.models.stretch import ElasticTerm, preload_term, stretch_term
 from bowdenfit.physics.loop import free_motion_loss, loop_output_force
 
 
@@ -96,14 +96,18 @@ def simulated_elastic_tables(
     if stretch is not None:
         term = stretch_term(cable, stretch)
         noise = scale * values[STRETCH_NOISE] * jax.random.normal(of_stretch, stretch.load.shape)
-        stretch = replace(stretch, stretch=np.asarray(term.expected(values, term.data) + noise))
+        stretch = replace(stretch, stretch=np.asarray(term.expected(values, _arrays(term)) + noise))
     if preload is not None:
         term = preload_term(cable, preload)
         noise = scale * values[PRELOAD_NOISE] * jax.random.normal(of_preload, preload.wrap_angle.shape)
-        preload = replace(preload, preload=np.maximum(term.expected(values, term.data) + noise, 0.0))
+        preload = replace(preload, preload=np.maximum(term.expected(values, _arrays(term)) + noise, 0.0))
     if loop is not None:
         loop = _simulated_loop(cable, loop, values, of_loop, scale)
     return Measurements(stretch=stretch, preload=preload, loop=loop)
+
+
+def _arrays(term: ElasticTerm) -> dict[str, jax.Array]:
+    return {name: jnp.asarray(array) for name, array in term.data.items()}
 
 
 def _simulated_loop(

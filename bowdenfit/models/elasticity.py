@@ -171,9 +171,9 @@ def uses_preload(description: Description, measurements: Measurements) -> bool:
 
 
 def _mounting_matters(measurements: Measurements) -> bool:
-    """Whether a loop's mounting scatters as those of single ropes do, which tell by how much."""
-    single = measurements.efficiencies is not None or measurements.forces is not None
-    return single and measurements.loop is not None
+    """Whether a loop table's mounting scatters as other mountings do, which tell by how much."""
+    told = (measurements.efficiencies, measurements.forces, measurements.recordings)
+    return measurements.loop is not None and any(table is not None for table in told)
 
 
 def _rope(defaults: PriorDefaults) -> list[Parameter]:

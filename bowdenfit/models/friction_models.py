@@ -258,7 +258,9 @@ def _forces(measurements: Measurements) -> np.ndarray:
     if measurements.loop is not None:
         parts.append(measurements.loop.input_force * measurements.loop.stroke)
     if measurements.recordings is not None:
-        parts += [f for r in measurements.recordings.each for f in (r.blocks.input_force, r.blocks.output_force)]
+        read = [f for r in measurements.recordings.each for f in (r.blocks.input_force, r.blocks.output_force)]
+        # A loop's force passes through zero; what is asked of it is asked under load.
+        parts += [f[f > 0.2 * f.max()] for f in read] if measurements.recordings.loop else read
     forces = np.concatenate(parts)
     return forces[forces > 0]
 

@@ -9,7 +9,7 @@ from jaxtyping import Float
 
 from bowdenfit.errors import UsageError
 from bowdenfit.models.build import Model
-from bowdenfit.models.elasticity import LENGTHENING, PRELOAD, STIFFNESS, Elasticity
+from bowdenfit.models.elasticity import LENGTHENING, PRELOAD, STIFFNESS, STRETCH_FRICTION, Elasticity
 from bowdenfit.physics.loop import free_motion_loss, loop_output_force, side_tensions, slack_load
 from bowdenfit.physics.stretch import mean_tension
 
@@ -59,7 +59,7 @@ class Bent:
         bend = jnp.broadcast_to(self.bend(values), (len(references), len(self.wrap_angle)))
         return self.elastic.preload_from(values, references[:, None], bend)[0]
 
-    def preload(self, values: Values, preload: float | None = None) -> tuple[Array, Array]:
+    def preload(self, values: Values, preload: float | Array | None = None) -> tuple[Array, Array]:
         """Preload [N] and slack [mm], of the cable as it is or preloaded otherwise [N]."""
         if preload is None and PRELOAD not in values:
             return jnp.zeros_like(self.wrap_angle), jnp.zeros_like(self.wrap_angle)
@@ -70,12 +70,12 @@ class Bent:
         self, values: Values, input_force: Float[Array, "*forces"], stroke: float = 1.0, preload: float | None = None
     ) -> Array:
         """Output force [N]; of a single rope by its friction model."""
-        exponent, direction = self.exponent(values), jnp.asarray(stroke)
+        force, exponent = jnp.broadcast_arrays(input_force, self.exponent(values))
         if self.is_loop:
-            return loop_output_force(input_force, self.preload(values, preload)[0], exponent, direction)
-        return self.model.cable.friction.output_force(values, input_force, exponent, direction)
+            return loop_output_force(force, self.preload(values, preload)[0], exponent, jnp.asarray(stroke))
+        return self.model.cable.friction.output_force(values, force, exponent, jnp.asarray(stroke))
 
-    def friction(self, values: Values, preload: float | None = None) -> Float[Array, " bends"]:
+    def friction(self, values: Values, preload: float | Array | None = None) -> Float[Array, " bends"]:
         """Force that moving the unloaded cable takes [N]; a single rope has one side to drag."""
         loss = free_motion_loss(self.preload(values, preload)[0], self.exponent(values))
         return loss if self.is_loop else loss / 2
@@ -107,7 +107,9 @@ class Bent:
         return mean_tension(jnp.maximum(force, preload), stroke * exponent)
 
     def _while_stretched(self, values: Values) -> Array:
-        return self.elastic.friction_exponent(values, self.bend(values))
+        """Friction exponent of the rope that is stretched, or of the cable where nothing says what that is."""
+        name = self.model.description.stretch.friction or STRETCH_FRICTION
+        return self.elastic.friction_exponent(values, self.bend(values)) if name in values else self.exponent(values)
 
     def stiffness(self, values: Values, load: float, preload: float | None = None) -> Float[Array, " bends"]:
         r"""Stiffness seen at the load side with the motor locked, while the load moves against friction [N/mm].
@@ -131,10 +133,10 @@ class Bent:
 
         Args:
             values: Values of the parameters.
-            input_force: Force up to which the return side must stay taut; 0 for the unloaded cable [N].
+            input_force: Force up to which a loop's return side must stay taut moving forward; 0 for the unloaded cable [N].
         """
         exponent = self.exponent(values)
-        needed = input_force / 2 * mean_tension(jnp.ones_like(exponent), exponent)
+        needed = (input_force / 2 if self.is_loop else 0.0) * mean_tension(jnp.ones_like(exponent), exponent)
         return jnp.max(self._at_reference(values, needed))
 
     def highest_preload(self, values: Values, friction: float) -> Float[Array, ""]:

@@ -5,7 +5,7 @@ import numpy as np
 from bowdenfit.dataset import Dataset
 from bowdenfit.description import Contact, Description, FrictionSetting
 from bowdenfit.measurements.tables import AngleTable, EfficiencyTable, ForceTable
-from bowdenfit.report.elastic import elastic_tables, elastic_warnings
+from bowdenfit.report.elastic_check import elastic_tables, elastic_warnings
 from bowdenfit.report.recordings import recordings_text
 
 

@@ -36,9 +36,9 @@ def contradiction(fit: Fit) -> str:
     ]
     or_else = f" (or {' or '.join(f'that of {_name(table)}' for table in others)})" if others else ""
     return (
-        f"The table of {_name(worst.table)}{or_else} disagrees with everything else by {worst.sds:.1f} standard deviations: without it "
-        f"{worst.parameter} would be {worst.rest:.{digits}f} +- {worst.rest_sd:.{digits}f}{unit}, with it the fit is at "
-        f"{worst.together:.{digits}f}{unit}. Look at the units and wrap angles of that table and at how it was measured; the "
+        f"The table of {_name(worst.table)}{or_else} disagrees with everything else by {worst.sds:.1f} standard deviations: "
+        f"without it {worst.parameter} would be {worst.rest:.{digits}f} +- {worst.rest_sd:.{digits}f}{unit}, with it the fit "
+        f"is at {worst.together:.{digits}f}{unit}. Look at the units and wrap angles of that table and at how it was measured; the "
         "numbers below are a compromise between readings that cannot all be right."
     )
 

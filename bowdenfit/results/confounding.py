@@ -7,7 +7,7 @@ import numpy as np
 
 from bowdenfit.results.fit import Fit
 
-_ROLES = {"friction", "friction_model", "sensor", "angle"}
+_ROLES = {"friction", "friction_model", "sensor", "angle", "elastic"}
 _CLOSE = 0.9  # correlation beyond which two parameters are said to be confounded
 _WORTH_SAYING = 0.5  # the combination must be known to less than this share of what it would be without the correlation
 

@@ -65,7 +65,8 @@ class Elastic:
         Raises:
             UsageError: A wrap angle does not say which of several contacts is bent.
         """
-        return Bent(self.fit.model, self.contact, jnp.asarray(np.atleast_1d(wrap_angles), dtype=float))
+        with jax.enable_x64(True):
+            return Bent(self.fit.model, self.contact, jnp.asarray(np.atleast_1d(wrap_angles), dtype=float))
 
     def over(self, function: Callable[[Mapping[str, Any]], Any]) -> Any:
         """A function of named values, for every draw (or the least-squares estimate alone)."""
@@ -108,8 +109,8 @@ class Elastic:
         self, wrap_angles: np.ndarray, input_force: float, stroke: int = 1, preload: float | None = None
     ) -> np.ndarray:
         """Output force [N] of every draw (rows) at wrap angles (columns)."""
-        bent, force = self.bent(wrap_angles), jnp.asarray(float(input_force))
-        return self.over(lambda values: bent.output_force(values, force, float(stroke), preload))
+        bent, force = self.bent(wrap_angles), float(input_force)
+        return self.over(lambda values: bent.output_force(values, jnp.asarray(force), float(stroke), preload))
 
     def friction(self, wrap_angles: np.ndarray, preload: float | None = None) -> np.ndarray:
         """Force felt in free motion [N], draws by wrap angles.
@@ -161,8 +162,8 @@ class Elastic:
             UsageError: Nothing says how the rope stretches.
         """
         self._needs_stretch()
-        extended, elastic = jnp.asarray(np.atleast_1d(extensions), dtype=float), self.fit.model.cable.elasticity
-        return self.over(lambda values: elastic.tension(values, extended))
+        extended, elastic = np.atleast_1d(np.asarray(extensions, dtype=float)), self.fit.model.cable.elasticity
+        return self.over(lambda values: elastic.tension(values, jnp.asarray(extended)))
 
     def stiffness(self, wrap_angles: np.ndarray, load: float, preload: float | None = None) -> np.ndarray:
         """Stiffness seen at the load side [N/mm], draws by wrap angles.
@@ -190,15 +191,27 @@ class Elastic:
         self._needs_preload(None)
         bent = self.bent(np.linspace(*bends, _BENDS))
         limit = np.inf if friction is None else friction
-        lowest, highest = self.over(
-            lambda values: (bent.lowest_preload(values, input_force), bent.highest_preload(values, min(limit, 1e9)))
-        )
-        return self._window(bends, input_force, limit, lowest, highest)
+
+        def answers(values: Mapping[str, Any]) -> tuple[Any, Any, Any]:
+            lowest = bent.lowest_preload(values, input_force)
+            felt = jnp.max(bent.friction(values, lowest))
+            return lowest, bent.highest_preload(values, min(limit, 1e9)), felt <= limit * (1 + 1e-9)
+
+        return self._window(bends, input_force, limit, *self.over(answers))
 
     def _window(
-        self, bends: tuple[float, float], input_force: float, limit: float, lowest: np.ndarray, highest: np.ndarray
+        self,
+        bends: tuple[float, float],
+        input_force: float,
+        limit: float,
+        lowest: np.ndarray,
+        highest: np.ndarray,
+        possible: np.ndarray,
     ) -> PreloadAnswer:
-        """The answer that draws of the lowest and highest preload give; with an infinite limit there is no highest."""
+        """The answer that draws of the lowest and highest preload, and of whether the lowest will do, give.
+
+        With an infinite limit there is no highest.
+        """
         bent, best = self.bent(np.linspace(*bends, _BENDS)), float(np.quantile(lowest, TAUT))
         felt = self.over(lambda values: jnp.max(bent.friction(values, best)))
         follows, limited = self.fit.dataset.description.preload_follows_stretch, np.isfinite(limit)
@@ -211,7 +224,7 @@ class Elastic:
             Interval.of(highest) if limited else None,
             best,
             Interval.of(felt),
-            float(np.mean(lowest <= highest)) if limited else 1.0,
+            float(np.mean(possible)) if limited else 1.0,
         )
 
     @cached_property
@@ -245,7 +258,7 @@ class Elastic:
         lowest = draws.pop("lowest", None)
         if lowest is None or len(bends) == 1:
             return shown, self._with_backlash(draws), None
-        return shown, self._with_backlash(draws), self._window(ends, under, np.inf, lowest, lowest)
+        return shown, self._with_backlash(draws), self._window(ends, under, np.inf, lowest, lowest, lowest)
 
     def _with_backlash(self, draws: dict[str, np.ndarray]) -> dict[str, np.ndarray]:
         moved = {name: draws[name] + self._backlash for name in ("position_error", "lost_motion") if name in draws}

@@ -5,11 +5,14 @@ from typing import Any
 
 import numpy as np
 
+from bowdenfit.description.elastic import PRELOAD
 from bowdenfit.errors import UsageError
 from bowdenfit.predictions.elastic import bending_contact
 from bowdenfit.results.answers import Interval
 from bowdenfit.results.elastic import TAUT, PreloadAnswer, has_elastic_answers
 from bowdenfit.results.fit import Fit
+
+_CLOSE = -0.9  # correlation of logarithms beyond which only a product is said to be known
 
 
 def elastic_page(fit: Fit) -> dict[str, Any]:
@@ -27,7 +30,7 @@ def elastic_page(fit: Fit) -> dict[str, Any]:
         page["bends"] = _bends(fit, bends, draws)
     if window is not None:
         page["preload_window"] = window_page(fit, window)
-    page["sentences"] = _sentences(fit, window)
+    page["sentences"] = [*_sentences(fit, window), *products_with_preload(fit)]
     return page
 
 
@@ -110,3 +113,21 @@ def window_sentence(fit: Fit, window: PreloadAnswer) -> str:
         if window.possible < TAUT:
             parts.append(f"That leaves a preload that does both with a probability of only {window.possible:.0%}.")
     return " ".join(parts)
+
+
+def products_with_preload(fit: Fit) -> list[str]:
+    """What to say of coefficients of friction of which only the product with the preload is known, as in free motion."""
+    names = [p.name for p in fit.model.space.free]
+    if fit.posterior is None or PRELOAD not in names:
+        return []
+    preload, sentences = fit.posterior.values[PRELOAD].ravel(), []
+    for name in (n for n in fit.dataset.description.coefficients if n in names):
+        friction = fit.posterior.values[name].ravel()
+        if np.corrcoef(np.log(preload), np.log(friction))[0, 1] > _CLOSE:
+            continue
+        known = Interval.of(preload * friction)
+        sentences.append(
+            f"The measurements hardly tell {PRELOAD} and {name} apart; what they do determine is {PRELOAD} x {name} = "
+            f"{known.median:.3g} N (90 % interval {known.q05:.3g} to {known.q95:.3g} N)."
+        )
+    return sentences

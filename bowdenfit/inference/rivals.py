@@ -10,7 +10,7 @@ from typing import Any
 
 import numpy as np
 
-PINS = (-2.5, 0.0, 2.5)  # z at which a parameter is pinned
+PINS = (-2.5, 2.5)  # z at which a parameter is pinned
 _AS_WELL = 0.97725  # probability up to which a deviation counts as chance: two standard errors of a normal reading
 _EXACT = 1e-6  # scatter of readings that fit without any
 _APART = 4.0  # standard errors beyond which it is another answer; were the errors normal, 2 could not be passed

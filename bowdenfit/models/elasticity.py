@@ -89,14 +89,15 @@ class Elasticity:
 
         Args:
             values: Values of the parameters.
-            rows: Loads, their peaks, and which of the different wrap angles each row has.
+            rows: Loads, their peaks, the different wrap angles, and the matrix that gives each row its own.
         """
-        exponent, at = self.friction_exponent(values, rows["wrap_angles"]), rows["at"]
+        exponent, spread = self.friction_exponent(values, rows["wrap_angles"]), rows["spread"]
         one = jnp.ones_like(exponent)
-        shares = mean_tension(one, exponent)[at], mean_tension(one, -exponent)[at]
-        mean = mean_tension_from_shares(rows["load"], rows["peak"], exponent[at], *shares)
         lengthened = values[LENGTHENING] * rows["wrap_angles"] - values[STRETCH_ZERO]
-        return self.extension(values, mean) + lengthened[at]
+        of_angle = jnp.stack([exponent, mean_tension(one, exponent), mean_tension(one, -exponent), lengthened])
+        exponents, loading, unloading, lengthened = of_angle @ spread
+        mean = mean_tension_from_shares(rows["load"], rows["peak"], exponents, loading, unloading)
+        return self.extension(values, mean) + lengthened
 
     def preload(
         self, values: Values, bend: Float[Array, "*batch"]
@@ -134,6 +135,15 @@ class Elasticity:
     ) -> Float[Array, "*batch"]:
         """Force that moving the unloaded loop takes [N]."""
         return free_motion_loss(self.preload(values, bend)[0], exponent)
+
+
+def spread_matrix(at: np.ndarray) -> np.ndarray:
+    """Matrix of zeros and ones that gives each row what belongs to its case; a product with it is quicker than indexing.
+
+    Args:
+        at: Number of the case of each row.
+    """
+    return (np.arange(at.max(initial=-1) + 1)[:, None] == at).astype(float)
 
 
 def elastic_parameters(

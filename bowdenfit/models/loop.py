@@ -13,9 +13,9 @@ from jaxtyping import Float
 
 from bowdenfit.measurements.tables import AngleTable, LoopTable
 from bowdenfit.models.cable import Cable, resolve_angles, row_angles
-from bowdenfit.models.elasticity import LOOP_MOUNTING
+from bowdenfit.models.elasticity import LOOP_MOUNTING, spread_matrix
 from bowdenfit.models.scatter import FORCE_NOISE, GAIN_ERROR, INPUT_OFFSET, OUTPUT_OFFSET, RUN_SCATTER
-from bowdenfit.physics.loop import loop_output_force, loop_slopes
+from bowdenfit.physics.loop import loop_response, loop_response_from
 
 LOOP = "loop_output_force"
 
@@ -49,18 +49,24 @@ class LoopTerm:
         """All rows scatter alike."""
         return ((len(self.labels), len(self.labels)),)
 
-    def _state(
+    def _response(
         self, values: Mapping[str, Array], data: Mapping[str, Any]
-    ) -> tuple[Array, Array, Array, Float[Array, "rows contacts"], Float[Array, "rows contacts"]]:
-        """True input force, preload, friction exponent, wrap angles and their variances."""
-        angles, variance = resolve_angles(self.cable, values, data)
+    ) -> tuple[Array, Array, Array, Array | float]:
+        """Output force, its derivatives, and the variance of the friction exponent from errors of the wrap angles."""
         mounting = values[RUN_SCATTER] * values[LOOP_MOUNTING] if LOOP_MOUNTING in values else 0.0
+        force, elastic = data["input_force"] - values.get(INPUT_OFFSET, 0.0), self.cable.elasticity
+        if "cases" in data:
+            exponent = self.cable.friction_exponent(values, data["cases"]) + mounting
+            preload = elastic.preload(values, jnp.sum(data["cases"], axis=-1))[0]
+            per_case = jnp.stack([2 * preload * exponent, 2 * preload, jnp.exp(-exponent), jnp.exp(exponent)])
+            loss, twice, less, more = per_case @ data["spread"]
+            return *loop_response_from(force, loss, twice, less, more, data["stroke"]), 0.0
+        angles, variance = resolve_angles(self.cable, values, data)
         exponent = self.cable.friction_exponent(values, angles) + mounting
-        bends = data["bends"] if "bends" in data else jnp.sum(angles, axis=-1)
-        of_cable = self.cable.elasticity.preload(values, bends)[0]
-        of_cable = of_cable[data["bend"]] if "bends" in data else of_cable
+        of_cable = elastic.preload(values, jnp.sum(angles, axis=-1))[0]
         preload = jnp.where(data["has_preload"], data["preload"], of_cable)
-        return data["input_force"] - values.get(INPUT_OFFSET, 0.0), preload, exponent, angles, variance
+        response = loop_response(force, preload, exponent, data["stroke"])
+        return *response, self.cable.exponent_variance(values, angles, variance)
 
     def _shown(self, values: Mapping[str, Array], output_force: Array) -> Array:
         """What the output's load cell reads."""
@@ -69,12 +75,11 @@ class LoopTerm:
     def _mean_and_sd(
         self, values: Mapping[str, Array], data: Mapping[str, Any], weights: Mapping[str, Array]
     ) -> tuple[Float[Array, " rows"], Float[Array, " rows"]]:
-        force, preload, exponent, _, _ = self._state(values, data)
-        output = loop_output_force(force, preload, exponent, data["stroke"])
-        force, preload, exponent, angles, variance = self._state(weights, data)
-        by_force, by_exponent = loop_slopes(force, preload, exponent, data["stroke"])
-        from_angles = by_exponent**2 * self.cable.exponent_variance(weights, angles, variance)
-        return self._shown(values, output), jnp.sqrt(weights[FORCE_NOISE] ** 2 * (1 + by_force**2) + from_angles)
+        output, by_force, by_exponent, angle_variance = self._response(values, data)
+        if weights is not values:
+            _, by_force, by_exponent, angle_variance = self._response(weights, data)
+        variance = weights[FORCE_NOISE] ** 2 * (1 + by_force**2)
+        return self._shown(values, output), jnp.sqrt(variance + by_exponent**2 * angle_variance)
 
     def expected(self, values: Mapping[str, Array], data: Mapping[str, Any]) -> Float[Array, " rows"]:
         """Expected output forces [N]."""
@@ -109,6 +114,8 @@ def loop_term(cable: Cable, table: LoopTable, angles: AngleTable | None) -> Loop
         "preload": np.nan_to_num(table.preload),
         "has_preload": np.isfinite(table.preload),
     }
-    if rows.is_own.all():  # the root behind the preload is found once for every different bend
-        data["bends"], data["bend"] = np.unique(np.sum(rows.own, axis=1), return_inverse=True)
+    known = rows.is_own.all() and not rows.known_sd.any() and not rows.has_angle_noise.any()
+    if known and not data["has_preload"].any():  # friction and preload are worked out once for every different case
+        data["cases"], at = np.unique(rows.own, axis=0, return_inverse=True)
+        data["spread"] = spread_matrix(at.ravel())
     return LoopTerm(cable, data, tuple(table.origin.place(i) for i in range(len(table.stroke))))

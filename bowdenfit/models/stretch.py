@@ -13,7 +13,7 @@ from jaxtyping import Float
 
 from bowdenfit.measurements.tables import PreloadTable, StretchTable
 from bowdenfit.models.cable import Cable
-from bowdenfit.models.elasticity import PRELOAD_NOISE, STRETCH_NOISE
+from bowdenfit.models.elasticity import PRELOAD_NOISE, STRETCH_NOISE, spread_matrix
 from bowdenfit.physics.normal_tail import log_normal_cdf
 
 MEASURED_PRELOAD = "measured_preload"  # not the name of the parameter
@@ -96,7 +96,7 @@ def stretch_term(cable: Cable, table: StretchTable) -> ElasticTerm:
         "reading": table.stretch,
         "load": table.load,
         "wrap_angles": angles,
-        "at": at,
+        "spread": spread_matrix(at),
         # A row read while the load grew comes down from no larger one: the two branches meet there.
         "at_most": np.zeros(0),
         "peak": np.where(table.unloading, table.peak, table.load),

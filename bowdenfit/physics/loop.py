@@ -41,8 +41,7 @@ def loop_output_force(
     References:
         The actuator of the haptic paper (section 3.1), with its equation 1 along both sides.
     """
-    lower, upper = loop_band(input_force, preload, friction_exponent)
-    return jnp.where(stroke > 0, lower, upper)
+    return loop_response(input_force, preload, friction_exponent, stroke)[0]
 
 
 def loop_band(
@@ -56,18 +55,40 @@ def loop_band(
     return lower, upper
 
 
-def loop_slopes(
-    input_force: Float[Array, "*batch"],
-    preload: Float[Array, "*#batch"],
-    friction_exponent: Float[Array, "*#batch"],
-    stroke: Float[Array, "*#batch"],
-) -> tuple[Float[Array, "*batch"], Float[Array, "*batch"]]:
-    """Derivatives of `loop_output_force` by the input force [1] and by the friction exponent [N]."""
-    output = loop_output_force(input_force, preload, friction_exponent, stroke)
-    taut = output == input_force - stroke * 2 * preload * friction_exponent
-    growth = jnp.exp(-stroke * jnp.sign(input_force) * friction_exponent)
-    by_exponent = jnp.where(taut, 2 * preload, jnp.abs(input_force) * growth)
-    return jnp.where(taut, 1.0, growth), -stroke * by_exponent
+def loop_response(
+    input_force: Float[Array, "..."],
+    preload: Float[Array, "..."],
+    friction_exponent: Float[Array, "..."],
+    stroke: Float[Array, "..."],
+) -> tuple[Float[Array, "..."], Float[Array, "..."], Float[Array, "..."]]:
+    """`loop_output_force` [N] and its derivatives by the input force [1] and by the friction exponent [N]."""
+    shares = jnp.exp(-friction_exponent), jnp.exp(friction_exponent)
+    return loop_response_from(input_force, 2 * preload * friction_exponent, 2 * preload, *shares, stroke)
+
+
+def loop_response_from(
+    input_force: Float[Array, "..."],
+    taut_loss: Float[Array, "..."],
+    twice_preload: Float[Array, "..."],
+    less: Float[Array, "..."],
+    more: Float[Array, "..."],
+    stroke: Float[Array, "..."],
+) -> tuple[Float[Array, "..."], Float[Array, "..."], Float[Array, "..."]]:
+    """`loop_response` where what depends on preload and friction alone is known.
+
+    Args:
+        input_force: F_in [N].
+        taut_loss: 2 P Lambda [N].
+        twice_preload: 2 P [N].
+        less, more: exp(-Lambda) and exp(Lambda) [1].
+        stroke: +1 moving forward, -1 back [1].
+    """
+    along = stroke * input_force
+    growth = jnp.where(along > 0, less, more)
+    taut, slack = along - taut_loss, along * growth
+    is_taut = taut < slack
+    by_exponent = jnp.where(is_taut, twice_preload, jnp.abs(slack))
+    return stroke * jnp.minimum(taut, slack), jnp.where(is_taut, 1.0, growth), -stroke * by_exponent
 
 
 def loop_play(

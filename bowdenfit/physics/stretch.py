@@ -172,7 +172,8 @@ def mean_tension_from_shares(
     peak = jnp.maximum(peak_force, force)
     ratio = jnp.where(force > 0, peak / jnp.where(force > 0, force, 1.0), jnp.inf)
     partly = 0.5 * jnp.log(jnp.minimum(ratio, 1e30)) <= friction_exponent
-    held, now = jnp.sqrt(jnp.where(partly, peak, 1.0)), jnp.sqrt(jnp.where(partly, force, 1.0))
+    # A load of 0 is never in this part; 1 in its place keeps the derivative of its root finite.
+    held, now = jnp.sqrt(jnp.where(peak > 0, peak, 1.0)), jnp.sqrt(jnp.where(force > 0, force, 1.0))
     given_back = (held - now) ** 2 / jnp.where(friction_exponent > 0, friction_exponent, 1.0)
     return jnp.where(partly, peak * loading_share - given_back, force * unloading_share)
 

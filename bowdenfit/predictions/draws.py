@@ -14,13 +14,14 @@ from bowdenfit.inference.posterior import Posterior
 from bowdenfit.models.build import Model
 
 BATCH = 1024
+_SMALL = 10_000  # numbers in the data below which compiling takes longer than running
 Function = Callable[..., Any]
 
 
-def for_each_draw(function: Function, size: int, *data: Any) -> Callable[[np.ndarray], Any]:
+def for_each_draw(function: Function, size: int, *data: Any, run_once: bool = False) -> Callable[[np.ndarray], Any]:
     """`function` of one z (and of data that are the same for all), compiled to be applied to any number of z (rows)."""
     over_rows = jax.vmap(function, in_axes=(0, *(None for _ in data)))
-    program = compiled(over_rows, jax.ShapeDtypeStruct((BATCH, size), jnp.float64), *data)
+    program = compiled(over_rows, jax.ShapeDtypeStruct((BATCH, size), jnp.float64), *data, run_once=run_once)
 
     def apply(z: np.ndarray) -> Any:
         parts = []
@@ -77,7 +78,8 @@ def replicator(posterior: Posterior, seed: int) -> Callable[[np.ndarray], dict[s
             "replicated": {t.name: t.simulate(values, d, key) for t, d, key in terms},
         }
 
-    program = for_each_draw(implied, model.space.size + 1, posterior.data)
+    small = sum(np.size(array) for array in jax.tree.leaves(posterior.data)) < _SMALL
+    program = for_each_draw(implied, model.space.size + 1, posterior.data, run_once=small)
     return lambda z: program(np.column_stack([z, np.arange(len(z), dtype=float)]))
 
 

@@ -35,11 +35,12 @@ def contradiction(fit: Fit) -> str:
         d.table for d in fit.least_squares.disagreements if d is not worst and d.conflict > _AS_MUCH * worst.conflict
     ]
     or_else = f" (or {' or '.join(f'that of {_name(table)}' for table in others)})" if others else ""
+    together = f"{worst.together:.{digits}f}{unit}"
     return (
         f"The table of {_name(worst.table)}{or_else} disagrees with everything else by {worst.sds:.1f} standard deviations: "
         f"without it {worst.parameter} would be {worst.rest:.{digits}f} +- {worst.rest_sd:.{digits}f}{unit}, with it the fit "
-        f"is at {worst.together:.{digits}f}{unit}. Look at the units and wrap angles of that table and at how it was measured; the "
-        "numbers below are a compromise between readings that cannot all be right."
+        f"is at {together}. Look at the units and wrap angles of that table and at how it was measured: the numbers below "
+        "are a compromise between readings that cannot all be right."
     )
 
 

@@ -68,12 +68,14 @@ class Elastic:
         with jax.enable_x64(True):
             return Bent(self.fit.model, self.contact, jnp.asarray(np.atleast_1d(wrap_angles), dtype=float))
 
-    def over(self, function: Callable[[Mapping[str, Any]], Any]) -> Any:
-        """A function of named values, for every draw (or the least-squares estimate alone)."""
+    def over(self, function: Callable[..., Any], *data: Any) -> Any:
+        """A function of named values (and of data that are the same for all), for every draw, or for least squares alone."""
         space, posterior = self.fit.model.space, self.fit.posterior
         z = self.fit.least_squares.z[None] if posterior is None else posterior.flat_z
         with jax.enable_x64(True):
-            return for_each_draw(lambda one: function(space.constrain(one)), space.size)(z)
+            return for_each_draw(
+                lambda one, *same: function(space.constrain(one), *same), space.size, *data, run_once=True
+            )(z)
 
     @cached_property
     def measured_bends(self) -> np.ndarray:
@@ -213,7 +215,7 @@ class Elastic:
         With an infinite limit there is no highest.
         """
         bent, best = self.bent(np.linspace(*bends, _BENDS)), float(np.quantile(lowest, TAUT))
-        felt = self.over(lambda values: jnp.max(bent.friction(values, best)))
+        felt = self.over(lambda values, preload: jnp.max(bent.friction(values, preload)), np.array(best))
         follows, limited = self.fit.dataset.description.preload_follows_stretch, np.isfinite(limit)
         return PreloadAnswer(
             bends,
@@ -288,8 +290,10 @@ def has_elastic_answers(fit: Fit) -> bool:
     return knows_stretch(fit.model) or knows_preload(fit.model)
 
 
-def preload_draws(fit: Fit) -> np.ndarray:
-    """Draws of the preload [N]; one value where it is fixed or there is only least squares."""
-    if fit.posterior is not None and PRELOAD in fit.posterior.values:
-        return fit.posterior.values[PRELOAD].ravel()
-    return np.array([fit.least_squares.estimates[PRELOAD].value])
+def typical_preload(fit: Fit) -> float:
+    """Preload by least squares, or the median of its prior where the measurements do not tell it [N]."""
+    estimate = fit.least_squares.estimates[PRELOAD].value
+    if np.isfinite(estimate):
+        return float(estimate)
+    prior = next(p.prior for p in fit.model.space.free if p.name == PRELOAD)
+    return float(np.asarray(prior.constrain(np.zeros(1)))[0])

@@ -56,7 +56,7 @@ def elastic_figures(fit: Fit) -> ElasticFigures:
         return {name: part.curves(values) for name, part in parts.items()}
 
     with jax.enable_x64(True):
-        draws = for_each_draw(curves, space.size)(z)
+        draws = for_each_draw(curves, space.size, run_once=True)(z)
         return ElasticFigures(**{name: part.figure(draws[name]) for name, part in parts.items()})
 
 

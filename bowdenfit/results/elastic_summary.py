@@ -25,7 +25,7 @@ def elastic_page(fit: Fit) -> dict[str, Any]:
         "bends": [],
     }
     window = None
-    if not several_bend(fit):
+    if has_bends(fit):
         bends, draws, window = fit.elastic.usual
         page["bends"] = _bends(fit, bends, draws)
     if window is not None:
@@ -34,13 +34,13 @@ def elastic_page(fit: Fit) -> dict[str, Any]:
     return page
 
 
-def several_bend(fit: Fit) -> bool:
-    """Whether a wrap angle would not say which of several contacts is bent."""
+def has_bends(fit: Fit) -> bool:
+    """Whether there are answers at wrap angles, and a wrap angle says which contact is bent."""
     try:
         bending_contact(fit.model)
     except UsageError:
-        return True
-    return False
+        return False
+    return has_elastic_answers(fit)
 
 
 def friction_arm(fit: Fit) -> float:

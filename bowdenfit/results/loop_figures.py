@@ -15,7 +15,7 @@ from jax import Array
 from bowdenfit.physics.friction import transmission_efficiency
 from bowdenfit.physics.loop import free_motion_loss, loop_band, loop_output_force, slack_load
 from bowdenfit.predictions.elastic import Bent
-from bowdenfit.results.elastic import Elastic, preload_draws
+from bowdenfit.results.elastic import Elastic, typical_preload
 from bowdenfit.results.elastic_figure_data import BendingLoss, EfficiencyLine, LoopCurve, PreloadWindow
 from bowdenfit.results.fit import Fit
 from bowdenfit.results.recorded_loops import LoopPoints, loop_points
@@ -50,7 +50,7 @@ class BendingLossPart:
 
     @property
     def _preloads(self) -> np.ndarray:
-        typical = float(np.median(preload_draws(self.elastic.fit)))
+        typical = typical_preload(self.elastic.fit)
         return np.unique([float(f"{typical * factor:.2g}") for factor in _PRELOADS])
 
     def curves(self, values: Values) -> Curves:
@@ -72,7 +72,7 @@ class BendingLossPart:
         """What the figure shows, from the curves of many draws."""
         exponent = median(draws["exponent"])
         coefficient = exponent[-1] / self.angles[-1]
-        typical = float(np.median(preload_draws(self.elastic.fit)))
+        typical = typical_preload(self.elastic.fit)
         lines = zip(_COEFFICIENTS, np.swapaxes(draws["coefficients"], 0, 1), strict=True)
         bent = zip(self._preloads, np.swapaxes(draws["preloads"], 0, 1), strict=True)
         capstan = np.asarray(transmission_efficiency(jnp.asarray(exponent)))
@@ -187,7 +187,7 @@ class WindowPart:
 
     @property
     def _preloads(self) -> np.ndarray:
-        typical = float(np.median(preload_draws(self.elastic.fit)))
+        typical = typical_preload(self.elastic.fit)
         return np.linspace(0.0, max(2.5 * typical, 1.0), _COARSE)
 
     @property

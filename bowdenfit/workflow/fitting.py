@@ -3,7 +3,7 @@
 import platform
 import time
 from collections.abc import Callable, Iterator, Mapping
-from concurrent.futures import ThreadPoolExecutor
+from concurrent.futures import Future, ThreadPoolExecutor
 from contextlib import contextmanager
 from dataclasses import dataclass, field
 from datetime import UTC, datetime
@@ -15,7 +15,14 @@ import numpy as np
 
 from bowdenfit.dataset import Dataset
 from bowdenfit.inference.diagnostics import diagnose_all
-from bowdenfit.inference.least_squares import MaximumPosterior, least_squares, make_objective, maximum_posterior
+from bowdenfit.inference.least_squares import (
+    LeastSquares,
+    MaximumPosterior,
+    Objective,
+    least_squares,
+    make_objective,
+    maximum_posterior,
+)
 from bowdenfit.inference.posterior import Posterior as Density
 from bowdenfit.models.build import Model, build_model
 from bowdenfit.predictions.draws import for_each_draw, replicator
@@ -45,17 +52,17 @@ class Stopwatch:
 
 @dataclass(frozen=True)
 class Compiled:
-    """Programs that sampling needs, compiled while least squares is.
+    """Programs of a fit: those that sampling needs compiled while least squares is, what follows it while it runs.
 
     Args:
         log_density: Of half of all walkers.
         optimum: Optimal length and efficiency of many z; None without a route.
-        implied: Everything else that a draw implies.
+        implied: Everything else that a draw implies, once that is compiled.
     """
 
     log_density: Callable[..., Any]
     optimum: Callable[[np.ndarray], Any] | None
-    implied: Callable[[np.ndarray], Any]
+    implied: Future[Callable[[np.ndarray], Any]]
 
 
 def run(
@@ -84,27 +91,39 @@ def run(
     with ThreadPoolExecutor(1) as thread:
         if mcmc:
             load_ahead("scipy.stats", "emcee")
-            programs = thread.submit(_compiled, density, seed)
+            programs = thread.submit(_sampling_programs, density)
         with watch.stage("compile least squares"):
             objective = make_objective(density)
-        with watch.stage("least squares"):
+        with watch.stage("maximum of the posterior"):
             start = maximum_posterior(density, objective)
-            squares = least_squares(density, objective, start.z)
+        # Sampling does not need least squares, so they are done beside it.
+        classical = thread.submit(_least_squares, density, objective, start, watch)
         if not mcmc:
+            squares = classical.result()
             reasons: tuple[str, ...] = () if squares.converged else (squares.message,)
             return Fit(data, squares, None, not reasons, reasons, provenance(seed, watch))
         with watch.stage("compile the posterior"):
-            compiled = programs.result()
-    posterior, reasons = _sampled(density, compiled, start, seed, begin, resume, progress, watch, helpers)
+            compiled = Compiled(*programs.result(), thread.submit(_implied_program, density, seed))
+        posterior, reasons = _sampled(density, compiled, start, seed, begin, resume, progress, watch, helpers)
+        squares = classical.result()
     return Fit(data, squares, posterior, not reasons, reasons, provenance(seed, watch))
 
 
-def _compiled(density: Density, seed: int) -> Compiled:
+def _least_squares(density: Density, objective: Objective, start: MaximumPosterior, watch: Stopwatch) -> LeastSquares:
+    with jax.enable_x64(True), watch.stage("least squares"):  # the setting is each thread's own
+        return least_squares(density, objective, start.z)
+
+
+def _sampling_programs(density: Density) -> tuple[Callable[..., Any], Callable[[np.ndarray], Any] | None]:
     model, settings = density.model, density.model.description.sampler
-    with jax.enable_x64(True):  # the setting is each thread's own
+    with jax.enable_x64(True):
         log_density = density.batched_log_density(settings.n_ensembles * settings.n_walkers // 2)
-        optimum = for_each_draw(optimum_of(model), model.space.size) if model.description.route else None
-        return Compiled(log_density, optimum, replicator(density, seed))
+        return log_density, for_each_draw(optimum_of(model), model.space.size) if model.description.route else None
+
+
+def _implied_program(density: Density, seed: int) -> Callable[[np.ndarray], Any]:
+    with jax.enable_x64(True):
+        return replicator(density, seed)
 
 
 def _sampled(
@@ -163,7 +182,7 @@ def _implied(
     """Named values and what else the draws imply, and named values of draws from the prior."""
     space, shape, n = model.space, z.shape[:2], z.shape[0] * z.shape[1]
     prior_z = np.random.default_rng([seed, 2]).standard_normal((PRIOR_DRAWS, space.size))
-    implied = compiled.implied(np.concatenate([z.reshape(n, space.size), prior_z]))
+    implied = compiled.implied.result()(np.concatenate([z.reshape(n, space.size), prior_z]))
     groups = {
         group: {name: v[:n].reshape(*shape, *v.shape[1:]) for name, v in values.items()}
         for group, values in implied.items()

@@ -295,3 +295,24 @@ def test_the_report_says_which_table_disagrees_and_the_fit_goes_on(tmp_path):
     worst = fit.summary()["agreement"][0]
     assert worst["table"] == "loop_output_force"
     assert worst["sds"] > 3
+
+
+def test_a_cable_of_several_contacts_stretches_by_all_its_bends_together(on_body, tmp_path):
+    """Its contacts need not be told apart for that; for its efficiency they must."""
+    for file in on_body.iterdir():
+        (tmp_path / file.name).write_text(file.read_text())
+    description = (tmp_path / "cable.toml").read_text()
+    (tmp_path / "cable.toml").write_text(
+        description.replace("[tables]", '[tables]\nstretch = { file = "stretch.csv" }')
+    )
+    (tmp_path / "stretch.csv").write_text((FOLDER / "stretch.csv").read_text())
+    fit = bf.fit(tmp_path, mcmc=False)
+    at = {name: e.value for name, e in fit.least_squares.estimates.items()}
+    exponent, load = at["mu_stretch"] * np.pi / 2, 80.0
+    share = (1 - np.exp(-exponent)) / exponent
+    bedded = at["bedding_stretch"] / at["bedding_load"] * np.exp(-share * load / at["bedding_load"])
+    expected = 1 / (share * (1 / at["stiffness"] + bedded))
+    assert fit.elastic.stiffness([np.pi / 2], load)[0, 0] == pytest.approx(expected, rel=1e-9)
+    assert fit.elastic.position([np.pi / 2], load)[1][0, 0] > 0
+    with pytest.raises(bf.UsageError, match="3 contacts"):
+        fit.elastic.efficiency([np.pi / 2])

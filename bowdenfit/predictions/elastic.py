@@ -22,12 +22,13 @@ class Bent:
 
     Args:
         model: The model.
-        contact: Number of the contact whose wrap angle is given; the others keep theirs.
-        wrap_angle: Wrap angles of that contact [rad].
+        contact: Number of the contact whose wrap angle is given, while the others keep theirs; None where it is that of all
+            contacts together, which is enough to know how the rope stretches.
+        wrap_angle: Wrap angles [rad].
     """
 
     model: Model
-    contact: int
+    contact: int | None
     wrap_angle: Float[Array, " bends"]
 
     @property
@@ -52,6 +53,8 @@ class Bent:
 
     def bend(self, values: Values) -> Float[Array, " bends"]:
         """Total wrap angle of the cable [rad]."""
+        if self.contact is None:
+            return self.wrap_angle
         return jnp.sum(self._angles(values), axis=-1)
 
     def preloads(self, values: Values, references: Float[Array, " preloads"]) -> Float[Array, "preloads bends"]:

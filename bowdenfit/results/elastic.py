@@ -68,6 +68,14 @@ class Elastic:
         with jax.enable_x64(True):
             return Bent(self.fit.model, self.contact, jnp.asarray(np.atleast_1d(wrap_angles), dtype=float))
 
+    def stretched(self, wrap_angles: Sequence[float] | np.ndarray) -> Bent:
+        """The same for the stretch of a single rope, to which only all its bends together matter."""
+        model = self.fit.model
+        if model.cable.is_loop or len(model.description.contact) == 1:
+            return self.bent(wrap_angles)
+        with jax.enable_x64(True):
+            return Bent(model, None, jnp.asarray(np.atleast_1d(wrap_angles), dtype=float))
+
     def over(self, function: Callable[..., Any], *data: Any) -> Any:
         """A function of named values (and of data that are the same for all), for every draw, or for least squares alone."""
         space, posterior = self.fit.model.space, self.fit.posterior
@@ -153,7 +161,7 @@ class Elastic:
             UsageError: Nothing says how the rope stretches.
         """
         self._needs_stretch()
-        bent = self.bent(wrap_angles)
+        bent = self.stretched(wrap_angles)
         error, lost = self.over(lambda values: bent.position(values, float(input_force), preload))
         return error + self._backlash, lost + self._backlash
 
@@ -174,7 +182,7 @@ class Elastic:
             UsageError: Nothing says how the rope stretches.
         """
         self._needs_stretch()
-        bent = self.bent(wrap_angles)
+        bent = self.stretched(wrap_angles)
         return self.over(lambda values: bent.stiffness(values, float(load), preload))
 
     def preload_window(

@@ -21,7 +21,7 @@ def watched(folder: Path) -> "Iterator[Callable[[Progress], None]]":
     """Gives what to call while sampling; says where the checkpoint is when the user (or the system) stops a fit.
 
     An interrupt that arrives inside a callback of the garbage collector is lost: Python prints it and goes on. So it is
-    remembered, and raised again by the next call.
+    remembered, not printed, and raised again by the next call.
 
     Args:
         folder: Results folder.
@@ -34,6 +34,13 @@ def watched(folder: Path) -> "Iterator[Callable[[Progress], None]]":
         asked.set()
         raise KeyboardInterrupt
 
+    printed = sys.unraisablehook
+
+    def lost(what: "sys.UnraisableHookArgs") -> None:
+        if not issubclass(what.exc_type, KeyboardInterrupt):
+            printed(what)
+
+    sys.unraisablehook = lost
     if signal.getsignal(signal.SIGINT) is not signal.SIG_IGN:
         signal.signal(signal.SIGINT, stop)
     signal.signal(signal.SIGTERM, stop)
@@ -53,6 +60,8 @@ def watched(folder: Path) -> "Iterator[Callable[[Progress], None]]":
             )
             raise click.exceptions.Exit(INTERRUPTED) from None
         raise
+    finally:
+        sys.unraisablehook = printed
 
 
 @contextmanager

@@ -131,7 +131,8 @@ class LoopRecordingsTerm:
     ) -> Float[Array, " runs"]:
         """Mean force lost in the blocks that move [N]."""
         true_input = data["input_force"] - values.get(INPUT_OFFSET, 0.0)
-        output = loop_output_force(true_input, preload[None, :], exponent[None, :], data["moving"])
+        stroke = jnp.sign(data["moving"])  # which also holds the weight of each block
+        output = loop_output_force(true_input, preload[None, :], exponent[None, :], stroke)
         return per_run(data, data["moving"] * (data["input_force"] - self._shown(values, output)))
 
     def expected(self, values: Mapping[str, Array], data: Mapping[str, Any]) -> Float[Array, " runs"]:

@@ -9,6 +9,7 @@ from bowdenfit.results.fit import Fit
 
 _ROLES = {"friction", "friction_model", "sensor", "angle", "elastic"}
 _CLOSE = 0.9  # correlation beyond which two parameters are said to be confounded
+_WELL = 0.1  # relative standard deviation below which a positive quantity is known well
 _WORTH_SAYING = 0.5  # the combination must be known to less than this share of what it would be without the correlation
 
 
@@ -53,10 +54,19 @@ def confounded(fit: Fit) -> list[Confounded]:
     """Pairs of parameters whose draws lie along a line, the closest first; empty without draws."""
     if fit.posterior is None:
         return []
-    names = [p.name for p in fit.model.space.free if p.role in _ROLES]
+    names = [
+        p.name for p in fit.model.space.free if p.role in _ROLES and not (p.role == "elastic" and _known(fit, p.name))
+    ]
     pairs = [_pair(fit, a, b) for a, b in combinations(names, 2)]
     found = [pair for pair in pairs if abs(pair.correlation) > _CLOSE and pair.sd < _WORTH_SAYING * pair.first_sd]
     return sorted(found, key=lambda pair: -abs(pair.correlation))
+
+
+def _known(fit: Fit, name: str) -> bool:
+    """Whether a parameter is known well by itself, so that what it is correlated with does not matter."""
+    assert fit.posterior is not None  # the caller checked
+    draws = fit.posterior.values[name]
+    return bool(np.std(draws) < _WELL * np.abs(np.median(draws)))
 
 
 def _pair(fit: Fit, first: str, second: str) -> Confounded:

@@ -1,5 +1,6 @@
 """Settings of every test: 64-bit floats, strict promotion of types, and shapes checked at run time."""
 
+import sys
 from pathlib import Path
 
 import pytest
@@ -13,6 +14,8 @@ with install_import_hook("bowdenfit", "beartype.beartype"):
     import bowdenfit.predictions.draws  # noqa: F401
 
 import jax
+
+from bowdenfit import cli
 
 jax.config.update("jax_enable_x64", True)
 jax.config.update("jax_numpy_dtype_promotion", "standard")
@@ -30,3 +33,17 @@ def on_body() -> Path:
 def bench() -> Path:
     """The plan of the synthetic bench."""
     return ROOT / "datasets" / "synthetic-bench" / "bench.toml"
+
+
+@pytest.fixture
+def run(monkeypatch, capsys):
+    """Run the command line in this process: exit code, standard output, standard error."""
+
+    def call(*arguments):
+        monkeypatch.setattr(sys, "argv", ["bowdenfit", *map(str, arguments)])
+        with pytest.raises(SystemExit) as stop:
+            cli.main()
+        printed = capsys.readouterr()
+        return stop.value.code, printed.out, printed.err
+
+    return call

@@ -15,7 +15,6 @@ import numpy as np
 import pytest
 
 import bowdenfit as bf
-from bowdenfit import cli
 from bowdenfit.cli.watching import watched
 from bowdenfit.inference.ensemble import Progress
 
@@ -30,20 +29,6 @@ def results(on_body, tmp_path_factory):
     folder = tmp_path_factory.mktemp("cli") / "fit"
     bf.fit(on_body, output=folder, seed=11, settings=QUICK)
     return folder
-
-
-@pytest.fixture
-def run(monkeypatch, capsys):
-    """Run the command line in this process: exit code, standard output, standard error."""
-
-    def call(*arguments):
-        monkeypatch.setattr(sys, "argv", ["bowdenfit", *map(str, arguments)])
-        with pytest.raises(SystemExit) as stop:
-            cli.main()
-        printed = capsys.readouterr()
-        return stop.value.code, printed.out, printed.err
-
-    return call
 
 
 def test_help_names_every_verb_and_the_exit_codes(run):

@@ -1,13 +1,10 @@
 """Bad tables of stretch, preload and loops, and good ones that cannot tell what is asked of them."""
 
-import sys
-
 import numpy as np
 import pytest
 from cables import measured
 
 import bowdenfit as bf
-from bowdenfit import cli
 from bowdenfit.description_file import parse_description
 from bowdenfit.inference.least_squares import least_squares, make_objective, maximum_posterior
 from bowdenfit.inference.posterior import Posterior
@@ -37,20 +34,6 @@ def haptic(on_body, tmp_path):
     (folder / "torques.csv").write_bytes((folder / "loop.csv").read_bytes())
     (folder / "loop.csv").write_text(LOOP)
     return folder
-
-
-@pytest.fixture
-def run(monkeypatch, capsys):
-    """Run the command line in this process: exit code, standard output, standard error."""
-
-    def call(*arguments):
-        monkeypatch.setattr(sys, "argv", ["bowdenfit", *map(str, arguments)])
-        with pytest.raises(SystemExit) as stop:
-            cli.main()
-        printed = capsys.readouterr()
-        return stop.value.code, printed.out, printed.err
-
-    return call
 
 
 @pytest.fixture

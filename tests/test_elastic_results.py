@@ -3,7 +3,6 @@
 import csv
 import dataclasses
 import json
-import sys
 from pathlib import Path
 
 import jax
@@ -12,7 +11,6 @@ import pytest
 from scipy import stats
 
 import bowdenfit as bf
-from bowdenfit import cli
 from bowdenfit.dataset import Dataset
 from bowdenfit.inference.least_squares import least_squares, make_objective, maximum_posterior
 from bowdenfit.inference.posterior import Posterior
@@ -39,20 +37,6 @@ def folder(tmp_path_factory):
 @pytest.fixture(scope="module")
 def fit(folder):
     return bf.load(folder)
-
-
-@pytest.fixture
-def run(monkeypatch, capsys):
-    """Run the command line in this process: exit code, standard output, standard error."""
-
-    def call(*arguments):
-        monkeypatch.setattr(sys, "argv", ["bowdenfit", *map(str, arguments)])
-        with pytest.raises(SystemExit) as stop:
-            cli.main()
-        printed = capsys.readouterr()
-        return stop.value.code, printed.out, printed.err
-
-    return call
 
 
 def test_the_plan_makes_the_data_set_that_is_there(tmp_path):

@@ -19,6 +19,8 @@ from bowdenfit.models.runs import LEAST_FORCE
 from bowdenfit.models.scatter import DELAY_ERROR, GAIN_ERROR, INPUT_OFFSET, OUTPUT_OFFSET
 from bowdenfit.physics.hysteresis import play_operator
 
+Follow = Callable[[Array, Array, Mapping[str, Any]], tuple[Array, Array]]
+
 DRAWS = 200  # enough for the edges of a band
 MOST_BLOCKS = 1000  # of a recording in a figure
 _LEAST_BAND = 1e-9
@@ -36,14 +38,23 @@ class Follower:
         model: The model.
         recordings: The recordings.
         angles: The angle table, for recordings outside the curves.
+        follow: Function of a model that gives what it makes of one z, of mounting effects and of the blocks; that of a
+            single rope if omitted.
+        scale: What of an output force a delay shifts in proportion to its rate: its logarithm if omitted.
     """
 
-    def __init__(self, model: Model, recordings: Recordings, angles: AngleTable | None) -> None:
-        self._model, n = model, len(recordings.each)
-        self._data = _arrays(model, recordings, angles)
+    def __init__(
+        self,
+        model: Model,
+        recordings: Recordings,
+        angles: AngleTable | None,
+        follow: Callable[[Model], Follow] | None = None,
+        scale: Callable[[np.ndarray], np.ndarray] = lambda force: np.log(np.maximum(force, LEAST_FORCE)),
+    ) -> None:
+        self._data = _arrays(model, recordings, angles, scale)
         z = jax.ShapeDtypeStruct((DRAWS, model.space.size), jnp.float64)
-        mounting = jax.ShapeDtypeStruct((DRAWS, n), jnp.float64)
-        function = jax.vmap(_followed(model), in_axes=(0, 0, None))
+        mounting = jax.ShapeDtypeStruct((DRAWS, len(recordings.each)), jnp.float64)
+        function = jax.vmap((follow or _followed)(model), in_axes=(0, 0, None))
         self._program: Callable[..., Any] = compiled(function, z, mounting, self._data)
 
     def __call__(
@@ -59,7 +70,9 @@ class Follower:
         return np.asarray(force), np.asarray(exponent)
 
 
-def _arrays(model: Model, recordings: Recordings, angles: AngleTable | None) -> dict[str, Any]:
+def _arrays(
+    model: Model, recordings: Recordings, angles: AngleTable | None, scale: Callable[[np.ndarray], np.ndarray]
+) -> dict[str, Any]:
     """Blocks of all recordings side by side, the shorter ones standing still at their end."""
     shown = [blocks_shown(len(r.blocks.time)) for r in recordings.each]
     longest = max(len(s) for s in shown)
@@ -69,8 +82,7 @@ def _arrays(model: Model, recordings: Recordings, angles: AngleTable | None) -> 
         return np.stack([np.pad(part, (0, longest - len(part)), "edge") for part in parts], axis=1)
 
     rates = [
-        np.gradient(np.log(np.maximum(r.blocks.output_force, LEAST_FORCE)), r.blocks.time)[s]
-        for r, s in zip(recordings.each, shown, strict=True)
+        np.gradient(scale(r.blocks.output_force), r.blocks.time)[s] for r, s in zip(recordings.each, shown, strict=True)
     ]
     rows = row_angles(model.cable, recorded_angles(recordings), angles).data
     return rows | {name: side_by_side(name) for name in ("input_force", "output_force", "velocity")} | {
@@ -78,7 +90,7 @@ def _arrays(model: Model, recordings: Recordings, angles: AngleTable | None) -> 
     }  # fmt: skip
 
 
-def _followed(model: Model) -> Callable[[Array, Array, Mapping[str, Any]], tuple[Array, Array]]:
+def _followed(model: Model) -> Follow:
     """Function of one z, of mounting effects and of the blocks."""
     friction = model.cable.friction
 

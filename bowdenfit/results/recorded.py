@@ -10,7 +10,7 @@ from bowdenfit.measurements.recordings import PULL, Recording, Recordings
 from bowdenfit.models.recorded_blocks import RECORDED
 from bowdenfit.models.scatter import BLOCK_NOISE, RUN_SCATTER
 from bowdenfit.predictions.recorded import DRAWS, Follower, blocks_shown
-from bowdenfit.predictions.recorded_loops import LoopFollower
+from bowdenfit.predictions.recorded_loops import loop_follower
 from bowdenfit.results.figure_data import Dependence, RecordedTrace
 from bowdenfit.results.fit import Fit
 from bowdenfit.results.rate import SHOWN_SPEED, place_of
@@ -29,7 +29,7 @@ def traces(fit: Fit) -> tuple[RecordedTrace, ...]:
     if recordings is None:
         return ()
     with jax.enable_x64(True):
-        kind = LoopFollower if recordings.loop else Follower
+        kind = loop_follower if recordings.loop else Follower
         follower = kind(fit.model, recordings, fit.dataset.measurements.angles)
         predicted, exponent = _predicted(fit, recordings, follower)
         fitted = _fitted(fit, recordings, follower)
@@ -54,7 +54,7 @@ def _some_draws(fit: Fit, n: int = DRAWS) -> np.ndarray:
     return flat[np.linspace(0, len(flat) - 1, n).astype(int)]
 
 
-def _predicted(fit: Fit, recordings: Recordings, follower: Follower | LoopFollower) -> tuple[np.ndarray, np.ndarray]:
+def _predicted(fit: Fit, recordings: Recordings, follower: Follower) -> tuple[np.ndarray, np.ndarray]:
     """Quantiles of the output force with a new mounting, and of the friction exponent without."""
     z, n = _some_draws(fit), len(recordings.each)
     if fit.posterior is None:
@@ -67,7 +67,7 @@ def _predicted(fit: Fit, recordings: Recordings, follower: Follower | LoopFollow
     return np.quantile(force, _QUANTILES, axis=0), np.quantile(exponent, _QUANTILES, axis=0)
 
 
-def _fitted(fit: Fit, recordings: Recordings, follower: Follower | LoopFollower) -> np.ndarray:
+def _fitted(fit: Fit, recordings: Recordings, follower: Follower) -> np.ndarray:
     """Output force with the mounting effect of each run that suits its recordings best, by looking at many."""
     center = np.median(_some_draws(fit), axis=0)
     grid = np.linspace(-_REACH, _REACH, DRAWS)

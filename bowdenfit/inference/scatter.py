@@ -21,7 +21,7 @@ def scatter_about(
         spreads, first = [], start
         for count, independent in term.residual_blocks:
             rows, values = slice(start, start + count), residuals[term.name][start - first : start - first + count]
-            freedom = min(np.count_nonzero(values), independent) - leverage[rows].sum()
+            freedom = min(int(np.count_nonzero(values)), independent) - float(leverage[rows].sum())
             spread = float(np.sqrt(np.sum(values**2) / freedom)) if freedom > _FREEDOM else float("nan")
             scale[rows] = spread if np.isfinite(spread) else 1.0
             spreads.append(spread)

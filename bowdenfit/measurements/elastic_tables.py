@@ -152,7 +152,7 @@ def _check_rising(column: Column, made: StretchTable) -> None:
             continue
         if np.corrcoef(load, stretch)[0, 1] < -_SURE:
             rows = together[0]
-            low, high = rows[made.load[rows].argmin()], rows[made.load[rows].argmax()]
+            low, high = rows[np.argmin(made.load[rows])], rows[np.argmax(made.load[rows])]
             raise column.cells[high].refuse(
                 f"the stretch falls from {made.stretch[low]:g} mm in row {made.origin.row[low]} to {made.stretch[high]:g} mm "
                 f"here while the load grows from {made.load[low]:g} to {made.load[high]:g} N; the usual cause is a "

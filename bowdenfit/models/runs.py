@@ -213,7 +213,7 @@ def run_sums(cable: Cable, rows: SlidingRows) -> dict[str, Any]:
 def _rectangular(cells: dict[str, np.ndarray], run: np.ndarray) -> dict[str, np.ndarray]:
     """Cells, in order of their runs, padded to equally many a run with weightless copies of the run's first."""
     starts, counts = np.searchsorted(run, np.arange(run[-1] + 1)), np.bincount(run)
-    place = np.arange(counts.max())[None, :]
+    place = np.arange(np.max(counts))[None, :]
     source = np.where(place < counts[:, None], starts[:, None] + place, starts[:, None]).ravel()
     padded = {name: values[source] for name, values in cells.items()}
     filled = (place < counts[:, None]).ravel()

@@ -119,7 +119,7 @@ def _falling(rows: StretchTable) -> str:
         these = np.flatnonzero((rows.cycle == cycle) & (rows.unloading == unloading))
         if len(np.unique(rows.load[these])) < 2:
             continue
-        low, high = these[rows.load[these].argmin()], these[rows.load[these].argmax()]
+        low, high = these[np.argmin(rows.load[these])], these[np.argmax(rows.load[these])]
         if rows.stretch[high] < rows.stretch[low]:
             return f"from row {rows.origin.row[low]} to row {rows.origin.row[high]}"
     return ""

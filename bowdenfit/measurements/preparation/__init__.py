@@ -182,7 +182,7 @@ def _delay(common: Common, settings: PreparationSettings) -> Delay:
 
 def _require_some_good(raw: RawRecording, common: Common) -> None:
     if not np.any(common.fault == GOOD):
-        most = KINDS[int(np.bincount(common.fault, minlength=len(KINDS)).argmax())]
+        most = KINDS[int(np.argmax(np.bincount(common.fault, minlength=len(KINDS))))]
         raise DatasetError(
             f"{raw.file}: none of the {len(common.time)} samples of {raw.name} is left, most of them for {most}. Look at "
             "the recording, or switch off the step of the preparation that leaves them out."

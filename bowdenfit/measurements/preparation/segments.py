@@ -79,7 +79,7 @@ def _weight(input_force: Vector, output_force: Vector, count: Labels) -> Vector:
     for force in (input_force, output_force):
         noise = max(noise_of(_convolved(force, _LIGHT)), 1e-4 * float(force.max()))
         variance += (noise / force) ** 2
-    return np.where(count > 0, variance.min() / variance, 0.0)
+    return np.where(count > 0, np.min(variance) / variance, 0.0)
 
 
 def _jitter(force: Vector, step: float) -> Vector:

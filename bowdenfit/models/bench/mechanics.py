@@ -111,7 +111,7 @@ class Mechanics:
         exponent = self.exponent * self.friction.rate_factor(shown) + self.run_effect
         if not np.all(exponent > 0):
             raise UsageError(
-                f"the friction exponent comes out at {exponent.min():.4g}, but friction cannot push: raise the friction "
+                f"the friction exponent comes out at {np.min(exponent):.4g}, but friction cannot push: raise the friction "
                 "coefficients or wrap angles, or lower the scatter between runs (tau) or the viscous term."
             )
         return exponent

@@ -16,6 +16,7 @@ from bowdenfit.inference.least_squares import least_squares, make_objective, max
 from bowdenfit.inference.posterior import Posterior
 from bowdenfit.models.build import build_model
 from bowdenfit.models.simulation import empty_tables, simulate, true_values
+from bowdenfit.predictions.optimal_length import optimum_of
 from bowdenfit.report.text import summary_text
 from bowdenfit.results.shown import figure_data
 from bowdenfit.results.synthetic import read_bench
@@ -300,3 +301,21 @@ def test_a_cable_of_several_contacts_stretches_by_all_its_bends_together(on_body
     assert fit.elastic.position([np.pi / 2], load)[1][0, 0] > 0
     with pytest.raises(bf.UsageError, match="3 contacts"):
         fit.elastic.efficiency([np.pi / 2])
+
+
+def test_a_loop_along_a_route_without_preload_has_the_optimum_of_one_rope(on_body):
+    """And one with preload less efficiency there, at a length that is still the one of least friction."""
+    single, loop = (build_model(bf.read(on_body, settings=settings)) for settings in ((), ('cable.kind="loop"',)))
+    z = np.random.default_rng(0).normal(scale=0.2, size=single.space.size)
+    z = jax.numpy.asarray(z)
+    length, efficiency = optimum_of(single)(z)
+    length_of_loop, efficiency_of_loop = optimum_of(loop)(z)
+    assert float(length_of_loop) == pytest.approx(float(length), abs=1e-4)
+    assert float(efficiency_of_loop) == pytest.approx(float(efficiency), rel=1e-12)
+    force = loop.cable.friction.conditions.reference_force
+    values = loop.space.constrain(z) | {"preload": jax.numpy.asarray(0.4 * force)}
+    at = jax.numpy.asarray(np.linspace(430.0, 530.0, 101))
+    preloaded = np.asarray(loop.cable.efficiency_at(values, at))
+    exponent = np.asarray(single.cable.exponent_at(values, at))
+    np.testing.assert_allclose(preloaded, np.minimum(np.exp(-exponent), 1 - 0.8 * exponent), rtol=1e-12)
+    assert at[preloaded.argmax()] == pytest.approx(float(length), abs=1.0)

@@ -12,7 +12,6 @@ from bowdenfit.description import Description, LogNormalPrior, PriorDefaults
 from bowdenfit.measurements.tables import Measurements
 from bowdenfit.parameters.priors import HalfNormal, LogNormal, Normal, TruncatedNormal
 from bowdenfit.parameters.space import Parameter
-from bowdenfit.physics.loop import free_motion_loss, loop_output_force
 from bowdenfit.physics.stretch import (
     compliance,
     extension,
@@ -118,23 +117,6 @@ class Elasticity:
         return preload_at(
             bend, reference_preload, jnp.asarray(self.reference_angle), values[LENGTHENING], *self.rope(values)
         )
-
-    def loop_output(
-        self,
-        values: Values,
-        input_force: Float[Array, "*batch"],
-        exponent: Float[Array, "*batch"],
-        bend: Float[Array, "*batch"],
-        stroke: float = 1.0,
-    ) -> Float[Array, "*batch"]:
-        """Output force of the loop with its own preload [N]."""
-        return loop_output_force(input_force, self.preload(values, bend)[0], exponent, jnp.asarray(stroke))
-
-    def loop_friction(
-        self, values: Values, exponent: Float[Array, "*batch"], bend: Float[Array, "*batch"]
-    ) -> Float[Array, "*batch"]:
-        """Force that moving the unloaded loop takes [N]."""
-        return free_motion_loss(self.preload(values, bend)[0], exponent)
 
 
 def spread_matrix(at: np.ndarray) -> np.ndarray:

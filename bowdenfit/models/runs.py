@@ -97,7 +97,9 @@ class RunsTerm:
         plain = self._per_run(data, deviation) / data["run_weight"]
         inside = data["load_squares"] * by_load**2 - 2 * data["load_products"] * by_load
         by_run = jnp.sum(inside.reshape(len(self.labels), -1), axis=1)
-        return _Deviations(deviation - slope * mounting[data["run"]], mounting, sd, total, plain, by_run)
+        # Cells are equally many for each run: repeating is quicker than indexing.
+        of_cell = jnp.repeat(mounting, deviation.shape[0] // len(self.labels))
+        return _Deviations(deviation - slope * of_cell, mounting, sd, total, plain, by_run)
 
     def _per_run(self, data: Mapping[str, Any], cells: Float[Array, " cells"]) -> Float[Array, " runs"]:
         """Weighted sum over the cells of each run."""

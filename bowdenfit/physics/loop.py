@@ -48,10 +48,9 @@ def loop_band(
     input_force: Float[Array, "..."], preload: Float[Array, "..."], friction_exponent: Float[Array, "..."]
 ) -> tuple[Float[Array, "..."], Float[Array, "..."]]:
     """Output force while moving forward and while moving back [N]; at rest it lies between the two."""
-    taut, less, more = 2 * preload * friction_exponent, jnp.exp(-friction_exponent), jnp.exp(friction_exponent)
-    slack = jnp.stack(jnp.broadcast_arrays(input_force * less, input_force * more))
-    lower = jnp.minimum(input_force - taut, jnp.min(slack, axis=0))
-    upper = jnp.maximum(input_force + taut, jnp.max(slack, axis=0))
+    lower, upper = (
+        loop_output_force(input_force, preload, friction_exponent, jnp.asarray(stroke)) for stroke in (1.0, -1.0)
+    )
     return lower, upper
 
 

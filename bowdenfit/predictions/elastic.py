@@ -36,15 +36,9 @@ class Bent:
         """Stretch and preload of the cable."""
         return self.model.cable.elasticity
 
-    @property
-    def is_loop(self) -> bool:
-        """Whether it is a pull-pull loop."""
-        return self.model.description.cable.kind == "loop"
-
     def _angles(self, values: Values) -> Float[Array, "bends contacts"]:
-        middle = jnp.zeros_like(self.wrap_angle) + (
-            self.model.description.route.middle if self.model.description.route else 0.0
-        )
+        route = self.model.description.route
+        middle = jnp.full_like(self.wrap_angle, route.middle if route else 0.0)
         return self.model.cable.wrap_angles(values, middle).at[:, self.contact].set(self.wrap_angle)
 
     def exponent(self, values: Values) -> Float[Array, " bends"]:
@@ -74,14 +68,14 @@ class Bent:
     ) -> Array:
         """Output force [N]; of a single rope by its friction model."""
         force, exponent = jnp.broadcast_arrays(input_force, self.exponent(values))
-        if self.is_loop:
+        if self.model.cable.is_loop:
             return loop_output_force(force, self.preload(values, preload)[0], exponent, jnp.asarray(stroke))
         return self.model.cable.friction.output_force(values, force, exponent, jnp.asarray(stroke))
 
     def friction(self, values: Values, preload: float | Array | None = None) -> Float[Array, " bends"]:
         """Force that moving the unloaded cable takes [N]; a single rope has one side to drag."""
         loss = free_motion_loss(self.preload(values, preload)[0], self.exponent(values))
-        return loss if self.is_loop else loss / 2
+        return loss if self.model.cable.is_loop else loss / 2
 
     def slack_load(self, values: Values, preload: float | None = None) -> Float[Array, " bends"]:
         """Input force at which the return side of a loop goes slack [N]."""
@@ -104,10 +98,9 @@ class Bent:
 
     def _pulling_side(self, values: Values, force: Array, preload: Array, stroke: float) -> Array:
         """Mean tension of the side that pulls [N]."""
-        exponent = self.exponent(values) if self.is_loop else self._while_stretched(values)
-        if self.is_loop:
-            return side_tensions(force, preload, exponent, jnp.asarray(stroke))[0]
-        return mean_tension(jnp.maximum(force, preload), stroke * exponent)
+        if self.model.cable.is_loop:
+            return side_tensions(force, preload, self.exponent(values), jnp.asarray(stroke))[0]
+        return mean_tension(jnp.maximum(force, preload), stroke * self._while_stretched(values))
 
     def _while_stretched(self, values: Values) -> Array:
         """Friction exponent of the rope that is stretched, or of the cable where nothing says what that is."""
@@ -120,7 +113,7 @@ class Bent:
         A loop's two sides act together, :math:`1/(a e'(\bar T_1)) + 1/(b e'(\bar T_2))`, until the returning one is slack.
         """
         force = jnp.full_like(self.wrap_angle, load)
-        if not self.is_loop:
+        if not self.model.cable.is_loop:
             exponent = self._while_stretched(values)
             share = mean_tension(jnp.ones_like(exponent), exponent)
             return 1 / (share * self.elastic.compliance(values, share * force))
@@ -139,12 +132,14 @@ class Bent:
             input_force: Force up to which a loop's return side must stay taut moving forward; 0 for the unloaded cable [N].
         """
         exponent = self.exponent(values)
-        needed = (input_force / 2 if self.is_loop else 0.0) * mean_tension(jnp.ones_like(exponent), exponent)
+        needed = (input_force / 2 if self.model.cable.is_loop else 0.0) * mean_tension(
+            jnp.ones_like(exponent), exponent
+        )
         return jnp.max(self._at_reference(values, needed))
 
     def highest_preload(self, values: Values, friction: float) -> Float[Array, ""]:
         """Highest preload, at the reference angle, that is felt as no more than this force at any of these bends [N]."""
-        sides = 2 if self.is_loop else 1
+        sides = 2 if self.model.cable.is_loop else 1
         allowed = friction / (sides * jnp.maximum(self.exponent(values), 1e-12))
         return jnp.min(self._at_reference(values, allowed))
 

@@ -88,7 +88,7 @@ class Elastic:
     @cached_property
     def measured_bends(self) -> np.ndarray:
         """Different wrap angles that anything was measured at [rad]."""
-        tables, column = self.fit.dataset.measurements, None
+        tables = self.fit.dataset.measurements
         contact = self.fit.dataset.description.contact[self.contact]
         column = contact.wrap_angle.column
         found = [t.wrap_angle for t in (tables.stretch, tables.preload) if t is not None]
@@ -107,6 +107,11 @@ class Elastic:
     def reference_force(self) -> float:
         """Input force that answers are given for where none is stated [N]."""
         return self.fit.model.cable.friction.conditions.reference_force
+
+    @property
+    def window_force(self) -> float:
+        """Force up to which a preload window asks for a taut return side: none where bending alone can make it slack [N]."""
+        return 0.0 if self.fit.dataset.description.preload_follows_stretch else self.reference_force
 
     def efficiency(
         self, wrap_angles: np.ndarray, input_force: float | None = None, preload: float | None = None
@@ -247,17 +252,17 @@ class Elastic:
         bends, model, force = self.measured_bends, self.fit.model, self.reference_force
         if not len(bends):
             return bends, {}, None
-        shown = bends[np.unique(np.linspace(0, len(bends) - 1, _SHOWN).round().astype(int))]
+        shown = some_of(bends, _SHOWN)
         preloaded, stretches, ends = knows_preload(model), knows_stretch(model), (float(bends[0]), float(bends[-1]))
         bent, every = self.bent(shown), self.bent(np.linspace(*ends, _BENDS))
-        under = 0.0 if self.fit.dataset.description.preload_follows_stretch else force
+        under = self.window_force
 
         def answers(values: Mapping[str, Any]) -> dict[str, Any]:
             found = {"efficiency": bent.output_force(values, jnp.asarray(force)) / force}
             if preloaded:
                 found |= {"preload": bent.preload(values)[0], "friction": bent.friction(values)}
                 found["lowest"] = every.lowest_preload(values, under)
-            if preloaded and bent.is_loop:
+            if preloaded and model.cable.is_loop:
                 found["slack_load"] = bent.slack_load(values)
             if stretches:
                 found["position_error"], found["lost_motion"] = bent.position(values, force)
@@ -296,6 +301,17 @@ class Elastic:
 def has_elastic_answers(fit: Fit) -> bool:
     """Whether a fit says anything of stretch or preload."""
     return knows_stretch(fit.model) or knows_preload(fit.model)
+
+
+def some_of(values: np.ndarray, most: int) -> np.ndarray:
+    """So many of the values at most, from the first to the last."""
+    return values[np.unique(np.linspace(0, len(values) - 1, most).round().astype(int))] if len(values) else values
+
+
+def friction_arm(fit: Fit) -> tuple[float, str]:
+    """Radius that turns friction into what is felt [mm] and the unit of that; 1 and N without a radius."""
+    radius = fit.dataset.description.cable.output_pulley_radius
+    return (radius.to("length"), "N*mm") if radius is not None else (1.0, "N")
 
 
 def typical_preload(fit: Fit) -> float:

@@ -67,7 +67,7 @@ def _parts(fit: Fit) -> dict[str, Part]:
         parts["stretch"] = _Stretch(fit, tables.stretch)
     if fit.dataset.description.preload_follows_stretch and knows_preload(fit.model):
         parts["preload"] = _Preload(fit)
-    if fit.dataset.description.cable.kind == "loop" and knows_preload(fit.model):
+    if fit.model.cable.is_loop and knows_preload(fit.model):
         try:
             bends = elastic.measured_bends
         except UsageError:

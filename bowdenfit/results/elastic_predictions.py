@@ -10,7 +10,8 @@ import numpy as np
 from bowdenfit.errors import DatasetError, UsageError
 from bowdenfit.measurements.units import conversion_factor
 from bowdenfit.results.answers import Interval
-from bowdenfit.results.elastic_summary import friction_arm, friction_unit, window_page, window_sentence
+from bowdenfit.results.elastic import friction_arm
+from bowdenfit.results.elastic_summary import window_page, window_sentence
 from bowdenfit.results.fit import Fit
 
 Row = dict[str, Any]
@@ -56,8 +57,8 @@ def question(
     angles = [_internal(angle, "angle", "--wrap-angle", 0.0) for angle in wrap_angles]
     limit = None
     if friction_limit is not None:
-        felt = "torque" if friction_unit(fit) != "N" else "force"
-        limit = _internal(friction_limit, felt, "--friction-limit", 0.0) / friction_arm(fit)
+        arm, unit = friction_arm(fit)
+        limit = _internal(friction_limit, "force" if unit == "N" else "torque", "--friction-limit", 0.0) / arm
     return Question(
         np.array(angles) if angles else fit.elastic.measured_bends,
         fit.elastic.reference_force if input_force is None else _internal(input_force, "force", "--input-force", 1e-9),
@@ -127,8 +128,8 @@ def _preload(fit: Fit, asked: Question) -> list[Row]:
 
 
 def _friction(fit: Fit, asked: Question) -> list[Row]:
-    felt, unit = fit.elastic.friction(asked.wrap_angles, asked.preload), friction_unit(fit).replace("*", "_")
-    return _rows(asked, {f"friction_{unit}": friction_arm(fit) * felt})
+    felt, (arm, unit) = fit.elastic.friction(asked.wrap_angles, asked.preload), friction_arm(fit)
+    return _rows(asked, {f"friction_{unit.replace('*', '_')}": arm * felt})
 
 
 def _slack_load(fit: Fit, asked: Question) -> list[Row]:
@@ -146,17 +147,18 @@ def _needs_loop(fit: Fit, quantity: str) -> None:
 def _position(fit: Fit, asked: Question) -> list[Row]:
     error, lost = fit.elastic.position(asked.wrap_angles, asked.input_force, asked.preload)
     columns = {"position_error_mm": error, "lost_motion_mm": lost}
-    if friction_unit(fit) != "N":
-        columns["position_error_deg"] = np.rad2deg(error / friction_arm(fit))
-        columns["lost_motion_deg"] = np.rad2deg(lost / friction_arm(fit))
+    arm, unit = friction_arm(fit)
+    if unit != "N":
+        columns |= {"position_error_deg": np.rad2deg(error / arm), "lost_motion_deg": np.rad2deg(lost / arm)}
     return _rows(asked, columns)
 
 
 def _stiffness(fit: Fit, asked: Question) -> list[Row]:
     stiffness = fit.elastic.stiffness(asked.wrap_angles, asked.input_force, asked.preload)
     columns = {"stiffness_N_per_mm": stiffness}
-    if friction_unit(fit) != "N":
-        columns["stiffness_N_m_per_rad"] = stiffness * friction_arm(fit) ** 2 / 1000
+    arm, unit = friction_arm(fit)
+    if unit != "N":
+        columns["stiffness_N_m_per_rad"] = stiffness * arm**2 / 1000
     return _rows(asked, columns)
 
 
@@ -169,7 +171,7 @@ def _window(fit: Fit, asked: Question) -> list[Row]:
     row |= {f"lowest_{name}_N": page["lowest"][name] for name in ("median", "q05", "q95")}
     if page["highest"] is not None:
         row |= {f"highest_{name}_N": page["highest"][name] for name in ("median", "q05", "q95")}
-    unit = friction_unit(fit).replace("*", "_")
+    unit = friction_arm(fit)[1].replace("*", "_")
     row |= {"best_N": page["best"]} | {f"felt_{name}_{unit}": page["felt"][name] for name in ("median", "q05", "q95")}
     return [row | {"possible": page["possible"], "in_words": window_sentence(fit, found)}]
 

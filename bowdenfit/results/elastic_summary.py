@@ -9,7 +9,7 @@ from bowdenfit.description.elastic import PRELOAD
 from bowdenfit.errors import UsageError
 from bowdenfit.predictions.elastic import bending_contact
 from bowdenfit.results.answers import Interval
-from bowdenfit.results.elastic import TAUT, PreloadAnswer, has_elastic_answers
+from bowdenfit.results.elastic import TAUT, PreloadAnswer, friction_arm, has_elastic_answers
 from bowdenfit.results.fit import Fit
 
 _CLOSE = -0.9  # correlation of logarithms beyond which only a product is said to be known
@@ -21,7 +21,7 @@ def elastic_page(fit: Fit) -> dict[str, Any]:
         return {}
     page: dict[str, Any] = {
         "input_force": fit.elastic.reference_force,
-        "friction_unit": friction_unit(fit),
+        "friction_unit": friction_arm(fit)[1],
         "bends": [],
     }
     window = None
@@ -43,20 +43,9 @@ def has_bends(fit: Fit) -> bool:
     return has_elastic_answers(fit)
 
 
-def friction_arm(fit: Fit) -> float:
-    """Radius that turns friction into what is felt [mm], or 1 where none is stated."""
-    radius = fit.dataset.description.cable.output_pulley_radius
-    return radius.to("length") if radius is not None else 1.0
-
-
-def friction_unit(fit: Fit) -> str:
-    """Unit in which friction in free motion is shown."""
-    return "N*mm" if fit.dataset.description.cable.output_pulley_radius is not None else "N"
-
-
 def _bends(fit: Fit, bends: np.ndarray, draws: dict[str, np.ndarray]) -> list[dict[str, Any]]:
     """One row a wrap angle, in the units that are shown."""
-    scale = {"friction": friction_arm(fit), "efficiency": 100.0}
+    scale = {"friction": friction_arm(fit)[0], "efficiency": 100.0}
     return [
         {"wrap_angle": float(f"{angle:.6g}")}
         | {name: asdict(Interval.of(scale.get(name, 1.0) * d[:, i])) for name, d in draws.items()}
@@ -66,14 +55,14 @@ def _bends(fit: Fit, bends: np.ndarray, draws: dict[str, np.ndarray]) -> list[di
 
 def window_page(fit: Fit, window: PreloadAnswer) -> dict[str, Any]:
     """A preload window as plain data; angles in deg, friction in the unit that it is felt in."""
-    arm = friction_arm(fit)
+    arm, unit = friction_arm(fit)
     felt = {name: arm * value for name, value in asdict(window.felt).items()}
     return {
         "bends": [float(angle) for angle in np.rad2deg(window.bends)],
         "reference_angle": float(np.rad2deg(window.reference_angle)),
         "input_force": window.input_force,
         "friction_limit": arm * window.friction,
-        "friction_unit": friction_unit(fit),
+        "friction_unit": unit,
         "lowest": asdict(window.lowest),
         "highest": asdict(window.highest) if window.highest is not None else None,
         "best": window.best,
@@ -95,7 +84,7 @@ def _sentences(fit: Fit, window: PreloadAnswer | None) -> list[str]:
 def window_sentence(fit: Fit, window: PreloadAnswer) -> str:
     """The preload window in words."""
     low, high = (f"{angle:.4g}" for angle in np.rad2deg(window.bends))
-    page, unit = window_page(fit, window), friction_unit(fit)
+    page, (_, unit) = window_page(fit, window), friction_arm(fit)
     at = "" if np.isnan(window.reference_angle) else f" at {page['reference_angle']:.4g} deg"
     under = f" under up to {window.input_force:g} N" if window.input_force > 0 else ""
     lowest = window.lowest

@@ -15,7 +15,7 @@ from jax import Array
 from bowdenfit.physics.friction import transmission_efficiency
 from bowdenfit.physics.loop import free_motion_loss, loop_band, loop_output_force, slack_load
 from bowdenfit.predictions.elastic import Bent
-from bowdenfit.results.elastic import Elastic, typical_preload
+from bowdenfit.results.elastic import Elastic, friction_arm, some_of, typical_preload
 from bowdenfit.results.elastic_figure_data import BendingLoss, EfficiencyLine, LoopCurve, PreloadWindow
 from bowdenfit.results.fit import Fit
 from bowdenfit.results.recorded_loops import LoopPoints, loop_points
@@ -109,11 +109,7 @@ class LoopsPart:
         """So many of the wrap angles, spread evenly."""
         moved = np.concatenate([self._points_angle, [p.wrap_angle for p in self._recorded]])
         angles = np.unique(np.round(moved, 9)) if len(moved) else self.bends
-        return (
-            angles[np.unique(np.linspace(0, len(angles) - 1, _MOST_LOOPS).round().astype(int))]
-            if len(angles)
-            else angles
-        )
+        return some_of(angles, _MOST_LOOPS)
 
     @property
     def _points_angle(self) -> np.ndarray:
@@ -138,10 +134,8 @@ class LoopsPart:
 
     def _points(self, angle: float) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
         """Readings and recorded blocks at one wrap angle: input force, output force, stroke (0 of a recording)."""
-        table, blocks = (
-            self.elastic.fit.dataset.measurements.loop,
-            [p for p in self._recorded if np.isclose(p.wrap_angle, angle)],
-        )
+        table = self.elastic.fit.dataset.measurements.loop
+        blocks = [p for p in self._recorded if np.isclose(p.wrap_angle, angle)]
         parts = [(p.input_force, p.output_force, np.zeros(len(p.input_force), dtype=int)) for p in blocks]
         if table is not None:
             here = np.isclose(self._points_angle, angle)
@@ -198,21 +192,15 @@ class WindowPart:
         """The curves of one draw."""
         bent = self._bent
         friction = free_motion_loss(bent.preloads(values, jnp.asarray(self._preloads)), bent.exponent(values))
-        return {"friction": jnp.max(friction, axis=-1), "lowest": bent.lowest_preload(values, self.input_force)}
-
-    @property
-    def input_force(self) -> float:
-        """Force up to which the return side must stay taut: none where bending alone can make it slack."""
-        follows = self.elastic.fit.dataset.description.preload_follows_stretch
-        return 0.0 if follows else self.elastic.reference_force
+        lowest = bent.lowest_preload(values, self.elastic.window_force)
+        return {"friction": jnp.max(friction, axis=-1), "lowest": lowest}
 
     def figure(self, draws: Curves) -> PreloadWindow:
         """What the figure shows, from the curves of many draws."""
         fit, coarse = self.elastic.fit, self._preloads
         preloads = np.linspace(coarse[0], coarse[-1], _FINE)
         friction = np.stack([np.interp(preloads, coarse, line) for line in quantiles(draws["friction"])])
-        radius = fit.dataset.description.cable.output_pulley_radius
-        arm, unit = (radius.to("length"), "N*mm") if radius is not None else (1.0, "N")
+        arm, unit = friction_arm(fit)
         taut = np.mean(draws["lowest"][:, None] <= preloads, axis=0)
         low, high = np.rad2deg(self.bends)
         return PreloadWindow(
@@ -223,5 +211,5 @@ class WindowPart:
             taut,
             np.quantile(draws["lowest"], _QUANTILES),
             (float(low), float(high)),
-            self.input_force,
+            self.elastic.window_force,
         )

@@ -5,7 +5,7 @@ import dataclasses
 import matplotlib as mpl
 import numpy as np
 import pytest
-from figure_words import words
+from figure_words import check_words, words
 
 from bowdenfit.plots.bands import evenly
 from bowdenfit.plots.gallery import FIGURES, draw_all
@@ -229,13 +229,7 @@ def spans(axes, label):
 def test_no_words_overlap_or_leave_the_page(case):
     data = CASES[case]()
     for name in NAMES:
-        figure = FIGURES[name].draw(data)
-        boxes, page = words(figure), figure.bbox.padded(1.0)
-        for i, (text, box) in enumerate(boxes):
-            inside = page.x0 <= box.x0 and box.x1 <= page.x1 and page.y0 <= box.y0 and box.y1 <= page.y1
-            assert inside, f"{name}: {text!r} leaves the page"
-            for other, other_box in boxes[i + 1 :]:
-                assert not box.padded(-1.0).overlaps(other_box.padded(-1.0)), f"{name}: {text!r} overlaps {other!r}"
+        check_words(FIGURES[name].draw(data), name)
 
 
 @pytest.mark.parametrize("name", NAMES)

@@ -11,7 +11,6 @@ import pandas
 import pytest
 import scipy.io
 
-from bowdenfit import cli
 from bowdenfit.dataset import load_dataset
 from bowdenfit.dataset.recordings import check_angles
 from bowdenfit.errors import DatasetError
@@ -67,40 +66,34 @@ def columns(simulated):
 
 
 @pytest.fixture
-def refuse(monkeypatch, capsys, tmp_path):
+def refuse(run, tmp_path):
     """Run the command line on bad input, and return its one sentence."""
 
-    def run(*arguments):
+    def call(*arguments):
         before = sorted(tmp_path.rglob("*"))
-        monkeypatch.setattr(sys, "argv", ["bowdenfit", *map(str, arguments)])
-        with pytest.raises(SystemExit) as stop:
-            cli.main()
-        printed = capsys.readouterr()
-        assert stop.value.code == 2, printed
-        assert printed.out == ""
-        assert printed.err.startswith("Error: ")
-        assert printed.err.count("\n") == 1
-        assert len(printed.err) < 520
-        assert "inside bowdenfit" not in printed.err
+        code, out, err = run(*arguments)
+        assert code == 2, (out, err)
+        assert out == ""
+        assert err.startswith("Error: ")
+        assert err.count("\n") == 1
+        assert len(err) < 520
+        assert "inside bowdenfit" not in err
         assert sorted(tmp_path.rglob("*")) == before
-        return printed.err
+        return err
 
-    return run
+    return call
 
 
 @pytest.fixture
-def accept(monkeypatch, capsys):
+def accept(run):
     """Run the command line on input that is good enough, and return what it prints."""
 
-    def run(*arguments):
-        monkeypatch.setattr(sys, "argv", ["bowdenfit", *map(str, arguments)])
-        with pytest.raises(SystemExit) as stop:
-            cli.main()
-        printed = capsys.readouterr()
-        assert stop.value.code == 0, printed
-        return printed.out
+    def call(*arguments):
+        code, out, err = run(*arguments)
+        assert code == 0, (out, err)
+        return out
 
-    return run
+    return call
 
 
 def write(path, columns):

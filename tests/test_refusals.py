@@ -21,22 +21,19 @@ def dataset(on_body, tmp_path):
 
 
 @pytest.fixture
-def refuse(monkeypatch, capsys):
+def refuse(run):
     """Run the command line on spoiled input and return its one sentence."""
 
-    def run(*arguments):
-        monkeypatch.setattr(sys, "argv", ["bowdenfit", *map(str, arguments)])
-        with pytest.raises(SystemExit) as stop:
-            cli.main()
-        printed = capsys.readouterr()
-        assert stop.value.code == 2, printed
-        assert printed.out == ""
-        assert printed.err.startswith("Error: ")
-        assert printed.err.count("\n") == 1
-        assert printed.err.rstrip()[-1] in ".?"
-        return printed.err
+    def call(*arguments):
+        code, out, err = run(*arguments)
+        assert code == 2, (out, err)
+        assert out == ""
+        assert err.startswith("Error: ")
+        assert err.count("\n") == 1
+        assert err.rstrip()[-1] in ".?"
+        return err
 
-    return run
+    return call
 
 
 def spoil(path, old, new, encoding="utf-8"):

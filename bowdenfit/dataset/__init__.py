@@ -195,10 +195,8 @@ def _elastic_tables(
         preload = read_preload(read[-1], _sources(tables.preload))
     if tables.loop is not None:
         read += _paths(tables.loop, folder, "loop", one=True)
-        pulleys = description.cable.input_pulley_radius, description.cable.output_pulley_radius
-        input_radius, output_radius = (None if radius is None else radius.to("length") for radius in pulleys)
-        columns = description.angle_columns
-        loop, more = read_loop(read[-1], route, columns, (input_radius, output_radius), _sources(tables.loop))
+        columns, pulleys = description.angle_columns, description.cable.pulleys
+        loop, more = read_loop(read[-1], route, columns, pulleys, _sources(tables.loop))
         remarks += more
     return Measurements(stretch=stretch, preload=preload, loop=loop), read, remarks
 

@@ -18,7 +18,6 @@ from bowdenfit.measurements.preparation.delay import COMMON_ERROR
 from bowdenfit.measurements.recording_files import (
     TORQUES,
     WANTED,
-    Pulleys,
     matched_name,
     pattern_fields,
     rows_where,
@@ -192,21 +191,13 @@ def _to_read(description: Description, path: Path, entry: RecordingFile, channel
     table = description.tables.recordings
     assert table is not None  # the caller asked
     page, sources = entry.prepare or table.prepare, {**_sources(table.channels), **_sources(entry.channels), **channels}
-    pulleys = _pulleys(description)
+    pulleys = description.cable.pulleys if description.cable.kind == "loop" else None
     raw, unit = to_recording(rows_where(read_channels(path), entry.where), _name(path, entry), sources, pulleys)
     stated = page.delay.sd_to("time") if isinstance(page.delay, QuantityValue) else None
     if entry.velocity is not None and not unit:
         unit = INTERNAL_UNITS[speed_dimension(entry.velocity.unit)]
     settings = replace(preparation_settings(page), loop=pulleys is not None)
     return _File(raw, entry, settings, stated or 0.0, unit)
-
-
-def _pulleys(description: Description) -> Pulleys | None:
-    """The pulleys of a loop; None for a single rope."""
-    if description.cable.kind != "loop":
-        return None
-    stated = description.cable.input_pulley_radius, description.cable.output_pulley_radius
-    return Pulleys(*(None if radius is None else radius.to("length") for radius in stated))
 
 
 def _recording(description: Description, file: _File, blocks: Blocks, account: Account) -> Recording:

@@ -3,6 +3,7 @@
 from typing import Literal
 
 from bowdenfit.description.values import Frozen, QuantityValue
+from bowdenfit.measurements.pulleys import Pulleys
 
 PRELOAD = "preload"
 LOWEST = {"stiffness": False, "bedding_load": False, "bedding_stretch": True, "lengthening": True, PRELOAD: True}
@@ -19,6 +20,12 @@ class CableSettings(Frozen):
     rope_diameter: QuantityValue | None = None
     bend_radius: QuantityValue | None = None
     backlash: QuantityValue | None = None
+
+    @property
+    def pulleys(self) -> Pulleys:
+        """Radii of the pulleys in mm."""
+        stated = self.input_pulley_radius, self.output_pulley_radius
+        return Pulleys(*(None if radius is None else radius.to("length") for radius in stated))
 
     @property
     def lengths(self) -> dict[str, QuantityValue | None]:

@@ -9,6 +9,7 @@ import numpy as np
 
 from bowdenfit.errors import DatasetError
 from bowdenfit.measurements.columns import Column, ColumnSource, Quantity, find_columns, meanings, require
+from bowdenfit.measurements.pulleys import Pulleys
 from bowdenfit.measurements.quoting import shown
 from bowdenfit.measurements.readers import Cell, RawTable, read_csv
 from bowdenfit.measurements.rows import (
@@ -191,7 +192,7 @@ def read_loop(
     path: Path,
     route: Route | None,
     contacts: Sequence[str],
-    radii: tuple[float | None, float | None] = (None, None),
+    pulleys: Pulleys = Pulleys(),  # noqa: B008 - it is immutable
     sources: Mapping[str, ColumnSource] | None = None,
 ) -> tuple[LoopTable, tuple[str, ...]]:
     """Read a table of forces, or torques, at both ends of a pull-pull loop while it moves.
@@ -200,7 +201,7 @@ def read_loop(
         path: CSV file.
         route: The route variable, if the cable has one.
         contacts: Columns in which rows may carry their own wrap angle.
-        radii: Of the pulleys at the motor and at the load side [mm], which turn torques into forces.
+        pulleys: At the motor and at the load side.
         sources: Columns named by the user.
 
     Returns:
@@ -215,9 +216,7 @@ def read_loop(
     others = (Quantity("stroke", "text"), Quantity("preload", "force"))
     found = find_columns(table, (*ends, *others, *shared_columns(route, contacts)), sources, _UNUSED)
     _check_spelling(table, found, others)
-    input_force, output_force = (
-        _end(table, found, end, radius) for end, radius in zip(("input", "output"), radii, strict=True)
-    )
+    input_force, output_force = (_end(table, found, end, pulleys) for end in ("input", "output"))
     stroke = read_strokes(found, len(table.rows), held="")
     if not stroke.all():
         held = found["stroke"].cells[int(np.flatnonzero(stroke == 0)[0])]
@@ -249,19 +248,14 @@ def read_loop(
     return made, tuple(remarks)
 
 
-def _end(table: RawTable, found: Mapping[str, Column], end: str, radius: float | None) -> Vector:
+def _end(table: RawTable, found: Mapping[str, Column], end: str, pulleys: Pulleys) -> Vector:
     """Forces at one end [N], from its force column or from its torques and the radius of its pulley."""
     force, torque = f"{end}_force", f"{end}_torque"
     if force in found and torque in found:
         raise DatasetError(f"{table.file} has both {force} and {torque}; leave one of the two columns out.")
     if torque not in found:
         return np.asarray(require(table, found, force, f"{force}_N or {torque}_N_m").numbers())
-    if radius is None:
-        raise DatasetError(
-            f"{table.file} gives {torque}, but the radius of that pulley is not known; add it to cable.toml: [cable] "
-            f'{end}_pulley_radius = {{ value = 15, unit = "mm" }}.'
-        )
-    return np.asarray(found[torque].numbers()) / radius
+    return pulleys.forces(np.asarray(found[torque].numbers()), end, table.file)
 
 
 def _plain_angle(heading: str) -> bool:

@@ -2,7 +2,7 @@
 
 import re
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -10,6 +10,7 @@ import numpy as np
 from bowdenfit.errors import DatasetError, nearest
 from bowdenfit.measurements.channels import Channel, ChannelFile
 from bowdenfit.measurements.columns import ColumnSource, Quantity, meanings
+from bowdenfit.measurements.pulleys import Pulleys
 from bowdenfit.measurements.quoting import listed, shown
 from bowdenfit.measurements.recordings import RawRecording
 from bowdenfit.measurements.units import INTERNAL_UNITS, conversion_factor, speed_dimension
@@ -24,14 +25,6 @@ TORQUES = (Quantity("input_torque", "torque"), Quantity("output_torque", "torque
 _RATE = re.compile(r"(?P<rate>[+-]?(?:[0-9]+\.?[0-9]*|\.[0-9]+)(?:e[+-]?[0-9]+)?)\s*(?P<unit>k?Hz)", re.IGNORECASE)
 _FIELD = re.compile(r"\{([A-Za-z_]\w*)(?::([^}]*))?\}")
 _PATH = re.compile(r"[/.]")
-
-
-@dataclass(frozen=True)
-class Pulleys:
-    """Radii of a loop's pulleys at the motor and at the load side [mm], which turn torques into forces; None if not stated."""
-
-    input_radius: float | None = None
-    output_radius: float | None = None
 
 
 def to_recording(
@@ -115,13 +108,8 @@ def _from_torque(
 ) -> np.ndarray:
     """Forces [N] from the torques of a pulley and its radius."""
     end = force.removesuffix("_force")
-    radius = getattr(pulleys, f"{end}_radius")
-    if radius is None:
-        raise DatasetError(
-            f"{file.path.name} gives {end}_torque, but the radius of that pulley is not known; add it to cable.toml: [cable] "
-            f'{end}_pulley_radius = {{ value = 15, unit = "mm" }}.'
-        )
-    return _converted(file, channel, f"{end}_torque", sources.get(f"{end}_torque"), "torque") / radius
+    torques = _converted(file, channel, f"{end}_torque", sources.get(f"{end}_torque"), "torque")
+    return (pulleys or Pulleys()).forces(torques, end, file.path.name)
 
 
 def _check_distinct(file: ChannelFile, one: Channel, other: Channel) -> None:

@@ -2,7 +2,6 @@
 
 import secrets
 from collections.abc import Callable, Mapping, Sequence
-from concurrent.futures import Future
 from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -10,8 +9,8 @@ from typing import TYPE_CHECKING, Any
 from bowdenfit.dataset import Dataset, load_dataset, single_file_dataset
 from bowdenfit.errors import DatasetError, StoreError, UsageError
 from bowdenfit.measurements.recording_files import parsed_channels
-from bowdenfit.results.folder import CHAIN, clear, read_checkpoint, refuse_to_overwrite, start_checkpoint
-from bowdenfit.workflow.background import Assistants, assistants, draw, load_ahead
+from bowdenfit.workflow.background import assistants, draw, load_ahead
+from bowdenfit.workflow.storing import LARGEST_SEED, begun, checked_seed, write_results
 
 if TYPE_CHECKING:
     from bowdenfit.inference.ensemble import Progress
@@ -19,8 +18,6 @@ if TYPE_CHECKING:
     from bowdenfit.measurements.recordings import Recordings
     from bowdenfit.results.comparison import Comparison
     from bowdenfit.results.fit import Fit
-
-_LARGEST_SEED = 2**31 - 1
 
 
 def read(
@@ -156,7 +153,7 @@ def fit(
     if in_background and not isinstance(dataset, Dataset):
         load_ahead("jax", "optimistix")  # while recordings are read, which takes seconds
     data = read(dataset, **reading)
-    seed = _checked(folder, data, mcmc, seed, resume, force)
+    seed = checked_seed(folder, data, mcmc, seed, resume, force)
     with assistants(in_background and mcmc, in_background and figures and folder is not None) as helpers:
         import jax
 
@@ -165,68 +162,11 @@ def fit(
         if remember_compilations:
             _remember_compilations()
         with jax.enable_x64(True):
-            begin = partial(_begun, folder, data, seed, resume)
+            begin = partial(begun, folder, data, seed, resume)
             found = run(data, begin, mcmc, seed, resume, progress, Stopwatch(), helpers)
             if folder is not None:
-                _write(found, folder, figures, helpers)
+                write_results(found, folder, figures, helpers)
     return found
-
-
-def _write(found: "Fit", folder: Path, figures: bool, helpers: Assistants) -> None:
-    """All files of the results folder, as far as possible at the same time; fit.json comes last of the fit's own."""
-    from bowdenfit.report.text import summary_text
-    from bowdenfit.results.folder import FIGURES, POSTERIOR, SUMMARY_TEXT, write_text
-    from bowdenfit.results.netcdf import write_groups
-    from bowdenfit.results.shown import figure_data
-    from bowdenfit.results.store import posterior_page, save
-
-    if found.posterior is None:
-        clear(folder)
-        written: Future[None] | None = None
-    else:
-        written = helpers.statistics.submit(write_groups, folder / POSTERIOR, *posterior_page(found))
-    drawn = helpers.drawing.submit(draw, figure_data(found), folder / FIGURES) if figures else None
-    save(found, folder, force=True, write_posterior=written.result if written else None)
-    write_text(folder / SUMMARY_TEXT, summary_text(found))
-    if drawn is not None:
-        drawn.result()
-
-
-def _fingerprint(data: Dataset, seed: int) -> dict[str, Any]:
-    """What must not change between an interrupted fit and its continuation; how long to sample may."""
-    description = data.description.to_json()
-    free = {"max_steps", "target_r_hat", "target_ess"}
-    description["sampler"] = {k: v for k, v in description["sampler"].items() if k not in free}
-    return {"description": description, "sha256": data.sha256, "seed": seed}
-
-
-def _checked(folder: Path | None, data: Dataset, mcmc: bool, seed: int | None, resume: bool, force: bool) -> int:
-    """The seed, once it is clear that the results have a place, or that the checkpoint there belongs to this fit."""
-    if resume and (folder is None or not mcmc):
-        raise UsageError("--resume needs the results folder of a fit with MCMC; name it with --output.")
-    if folder is None or not resume:
-        if folder is not None:
-            refuse_to_overwrite(folder, force)
-        return secrets.randbelow(_LARGEST_SEED) if seed is None else seed
-    before = read_checkpoint(folder)
-    now = _fingerprint(data, before["seed"] if seed is None else seed)
-    changed = [key for key in now if now[key] != before[key]]
-    if changed:
-        what = {"description": "the description", "sha256": "an input file", "seed": "the seed"}[changed[-1]]
-        raise StoreError(
-            f"{folder} cannot be resumed because {what} changed since; undo the change, or start over with --force."
-        )
-    return int(before["seed"])
-
-
-def _begun(folder: Path | None, data: Dataset, seed: int, resume: bool) -> Path | None:
-    """The checkpoint to sample into, in a folder cleared of what was there; nothing is touched before this."""
-    if folder is None:
-        return None
-    if not resume:
-        clear(folder)
-        start_checkpoint(folder / CHAIN, _fingerprint(data, seed))
-    return folder / CHAIN
 
 
 def compare(fits: "Mapping[str, Fit]") -> "Comparison":
@@ -362,7 +302,7 @@ def simulate(
     """
     import jax
 
-    seed = secrets.randbelow(_LARGEST_SEED) if seed is None else seed
+    seed = secrets.randbelow(LARGEST_SEED) if seed is None else seed
     if output is not None and Path(output).exists() and any(p.name != Path(bench).name for p in Path(output).iterdir()):
         raise StoreError(f"{output} exists already; name another folder with --output, nothing was written.")
     if recordings:

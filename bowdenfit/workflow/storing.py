@@ -1,0 +1,73 @@
+"""The results folder of a fit: whether it may be written, the checkpoint, and all files once the fit is done."""
+
+import secrets
+from concurrent.futures import Future
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from bowdenfit.dataset import Dataset
+from bowdenfit.errors import StoreError, UsageError
+from bowdenfit.results.folder import CHAIN, clear, read_checkpoint, refuse_to_overwrite, start_checkpoint
+from bowdenfit.workflow.background import Assistants, draw
+
+if TYPE_CHECKING:
+    from bowdenfit.results.fit import Fit
+
+LARGEST_SEED = 2**31 - 1
+
+
+def write_results(found: "Fit", folder: Path, figures: bool, helpers: Assistants) -> None:
+    """All files of the results folder, as far as possible at the same time; fit.json comes last of the fit's own."""
+    from bowdenfit.report.text import summary_text
+    from bowdenfit.results.folder import FIGURES, POSTERIOR, SUMMARY_TEXT, write_text
+    from bowdenfit.results.netcdf import write_groups
+    from bowdenfit.results.shown import figure_data
+    from bowdenfit.results.store import posterior_page, save
+
+    if found.posterior is None:
+        clear(folder)
+        written: Future[None] | None = None
+    else:
+        written = helpers.statistics.submit(write_groups, folder / POSTERIOR, *posterior_page(found))
+    drawn = helpers.drawing.submit(draw, figure_data(found), folder / FIGURES) if figures else None
+    save(found, folder, force=True, write_posterior=written.result if written else None)
+    write_text(folder / SUMMARY_TEXT, summary_text(found))
+    if drawn is not None:
+        drawn.result()
+
+
+def _fingerprint(data: Dataset, seed: int) -> dict[str, Any]:
+    """What must not change between an interrupted fit and its continuation; how long to sample may."""
+    description = data.description.to_json()
+    free = {"max_steps", "target_r_hat", "target_ess"}
+    description["sampler"] = {k: v for k, v in description["sampler"].items() if k not in free}
+    return {"description": description, "sha256": data.sha256, "seed": seed}
+
+
+def checked_seed(folder: Path | None, data: Dataset, mcmc: bool, seed: int | None, resume: bool, force: bool) -> int:
+    """The seed, once it is clear that the results have a place, or that the checkpoint there belongs to this fit."""
+    if resume and (folder is None or not mcmc):
+        raise UsageError("--resume needs the results folder of a fit with MCMC; name it with --output.")
+    if folder is None or not resume:
+        if folder is not None:
+            refuse_to_overwrite(folder, force)
+        return secrets.randbelow(LARGEST_SEED) if seed is None else seed
+    before = read_checkpoint(folder)
+    now = _fingerprint(data, before["seed"] if seed is None else seed)
+    changed = [key for key in now if now[key] != before[key]]
+    if changed:
+        what = {"description": "the description", "sha256": "an input file", "seed": "the seed"}[changed[-1]]
+        raise StoreError(
+            f"{folder} cannot be resumed because {what} changed since; undo the change, or start over with --force."
+        )
+    return int(before["seed"])
+
+
+def begun(folder: Path | None, data: Dataset, seed: int, resume: bool) -> Path | None:
+    """The checkpoint to sample into, in a folder cleared of what was there; nothing is touched before this."""
+    if folder is None:
+        return None
+    if not resume:
+        clear(folder)
+        start_checkpoint(folder / CHAIN, _fingerprint(data, seed))
+    return folder / CHAIN

@@ -7,6 +7,7 @@ import click
 
 from bowdenfit.cli.data_sets import check, init, simulate
 from bowdenfit.cli.fitting import fit
+from bowdenfit.cli.identifying import identify
 from bowdenfit.cli.results import compare, length, plot, predict, summary
 from bowdenfit.cli.watching import INTERRUPTED
 from bowdenfit.errors import BowdenfitError
@@ -65,5 +66,5 @@ def completion(shell: str) -> None:
     click.echo(script(bowdenfit, {}, "bowdenfit", "_BOWDENFIT_COMPLETE").source())
 
 
-for verb in (init, check, fit, summary, predict, length, compare, plot, simulate, completion):
+for verb in (init, check, fit, summary, predict, length, identify, compare, plot, simulate, completion):
     bowdenfit.add_command(verb)

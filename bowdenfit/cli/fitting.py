@@ -60,4 +60,4 @@ def fit(
         )
     show(found, as_json)
     click.echo(f"Wrote {folder}.", err=True)
-    return 0 if found.converged else NOT_TRUSTED
+    return 0 if found.verdict().trusted else NOT_TRUSTED

@@ -133,8 +133,9 @@ def length(results: Path, as_json: bool) -> None:
         click.echo(json.dumps(found.summary()["optimal"], indent=1))
     else:
         click.echo(str(answer))
-    if not found.converged:
-        click.echo("Warning: this fit has not converged; do not use these numbers.", err=True)
+    troubles = found.verdict().troubles
+    if troubles:
+        click.echo(f"Warning: this fit is {' and '.join(troubles)}; see bowdenfit summary {results}.", err=True)
 
 
 @click.command(short_help="Compare fits of the same measurements.")

@@ -26,6 +26,7 @@ from bowdenfit.parameters.priors import HalfNormal, LogNormal, TruncatedNormal, 
 from bowdenfit.parameters.space import Parameter
 
 LOWER_END = -38.0  # z at which a quantile reaches the lower end of its support in double precision
+UNDETERMINED = "the measurements do not determine it"
 _SUSPECT = -2.0  # below this z an estimate may be on its way to the lower end
 _SINGULAR = 1e-8  # singular values below this fraction of the largest carry no information
 _FAR = 50.0  # standard error in units of the prior's sd beyond which data say nothing of a parameter
@@ -236,7 +237,7 @@ def _summarized(
             remark = f"no finite minimum: runs to its lower end, {value:.3g}"
             estimates[p.name] = Estimate(np.nan, np.nan, False, remark)
         elif lost[np.searchsorted(active, i)]:
-            estimates[p.name] = Estimate(np.nan, np.nan, False, "the measurements do not determine it")
+            estimates[p.name] = Estimate(np.nan, np.nan, False, UNDETERMINED)
         else:
             sd = abs(found["slope"][i] * error[np.searchsorted(active, i)]) * p.shown_scale
             estimates[p.name] = _estimate(value, float(sd), [float(r["values"][i]) * p.shown_scale for r in rivals])

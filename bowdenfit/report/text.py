@@ -7,11 +7,11 @@ from bowdenfit.models.scatter import RUN_SCATTER
 from bowdenfit.report.elastic import elastic_counts, elastic_text
 from bowdenfit.report.layout import filled, listed, table
 from bowdenfit.report.recordings import recordings_text
-from bowdenfit.results.agreement import contradiction
 from bowdenfit.results.answers import decimals
 from bowdenfit.results.confounding import confounded
 from bowdenfit.results.fit import Fit
 from bowdenfit.results.rate import SHOWN_SPEED, rate_effect
+from bowdenfit.results.verdict import CONTRADICTORY, NOT_CONVERGED, NOT_IDENTIFIABLE, Verdict, verdict
 
 _UNLIMITED = 2000.0  # an angle in degrees or a length in mm beyond which a curve coefficient is no longer a finding
 _RESTS_ON_PRIOR = 0.2  # contraction below which a parameter is said to rest on its prior alone
@@ -74,18 +74,26 @@ def _angle_counts(fit: Fit, entered: int, censored: int) -> list[str]:
 
 
 def _verdict(fit: Fit, page: dict[str, Any]) -> str:
+    found = verdict(fit)
     if fit.posterior is None:
-        state = "least squares only; no intervals, no design answer" if fit.converged else "not to be trusted"
+        state = "least squares only; no intervals, no design answer" if found.trusted else _untrusted(found)
     else:
-        state = "converged" if fit.converged else "NOT CONVERGED; do not use these numbers"
+        state = "converged" if found.trusted else _untrusted(found)
         sampler = page["sampler"]
         state += f" ({sampler['ensembles']} ensembles of {sampler['walkers']} walkers, {sampler['steps']} steps)"
     lines = [f"Verdict: {state}."]
-    lines += [filled(f"- {reason}", indent="  ") for reason in fit.reasons]
-    if sentence := contradiction(fit):
-        lines.append(filled(sentence))
-    lines += [filled(c.sentence()) for c in confounded(fit)]
+    lines += [filled(f"- {reason}", indent="  ") for reason in found.reasons]
+    if NOT_IDENTIFIABLE not in found.troubles:  # which says so of the same parameters
+        lines += [filled(c.sentence()) for c in confounded(fit)]
     return "\n".join(lines)
+
+
+def _untrusted(found: Verdict) -> str:
+    """What is wrong, in capitals that nobody overlooks."""
+    kinds = {NOT_IDENTIFIABLE: "COEFFICIENTS NOT IDENTIFIABLE", CONTRADICTORY: "CONTRADICTORY MEASUREMENTS"}
+    if NOT_CONVERGED in found.troubles:
+        return "NOT CONVERGED; do not use these numbers"
+    return f"{listed([kinds[kind] for kind in found.troubles])}; do not use these numbers before reading why"
 
 
 def _coefficients(page: dict[str, Any]) -> str:

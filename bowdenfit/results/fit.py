@@ -21,6 +21,7 @@ from bowdenfit.results.answers import Interval, OptimalLength
 
 if TYPE_CHECKING:
     from bowdenfit.results.elastic import Elastic
+    from bowdenfit.results.verdict import Verdict
 
 OPTIMAL_LENGTH, OPTIMAL_EFFICIENCY = "optimal_length", "optimal_efficiency"
 
@@ -86,7 +87,7 @@ class Fit:
         dataset: What was fitted.
         least_squares: Classical estimates.
         posterior: Draws, or None where only least squares was asked for.
-        converged: Whether the answers may be trusted.
+        converged: Whether the sampler (or, without it, least squares) converged.
         reasons: Why not.
         provenance: Seed, versions, times.
     """
@@ -203,6 +204,12 @@ class Fit:
         from bowdenfit.results.summary import summarize
 
         return summarize(self)
+
+    def verdict(self) -> "Verdict":
+        """Whether the answers may be trusted, and if not, why."""
+        from bowdenfit.results.verdict import verdict
+
+        return verdict(self)
 
     def __repr__(self) -> str:
         state = "converged" if self.converged else "NOT converged" if self.posterior else "least squares only"

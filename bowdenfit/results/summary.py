@@ -13,6 +13,7 @@ from bowdenfit.results.confounding import confounded
 from bowdenfit.results.elastic_summary import elastic_page
 from bowdenfit.results.fit import Fit
 from bowdenfit.results.rate import rate_effect
+from bowdenfit.results.verdict import verdict
 
 SCHEMA = 1
 
@@ -23,11 +24,12 @@ def summarize(fit: Fit) -> dict[str, Any]:
     Args:
         fit: The fit.
     """
+    found = verdict(fit)
     page: dict[str, Any] = {
         "schema": SCHEMA,
         "name": fit.name,
         "geometry": fit.dataset.description.geometry,
-        "verdict": {"converged": fit.converged, "reasons": list(fit.reasons)},
+        "verdict": {"converged": fit.converged, "trusted": found.trusted, "reasons": list(found.reasons)},
         "parameters": {p.name: _parameter(fit, p.name) for p in fit.model.space.parameters},
         "curves": {name: _curve_coefficient(fit, name) for name in curve_coefficients(fit)},
         "least_squares": {

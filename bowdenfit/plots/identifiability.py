@@ -1,0 +1,82 @@
+"""What measurements determine: each parameter's share of measurements and prior, and the combinations that are known."""
+
+from collections.abc import Mapping
+from typing import TYPE_CHECKING
+
+import numpy as np
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure
+
+from bowdenfit.plots.style import BLUE, LIGHT, SMALL, WIDE, in_paper_style
+
+if TYPE_CHECKING:
+    from bowdenfit.inference.identifiability import Knowledge
+
+_ROW, _TOP, _BOTTOM, _NAMES, _GAP = 0.24, 0.34, 0.5, 1.75, 0.35  # in
+_MOST = 0.05  # weight below which a cell of the map is left empty
+
+
+@in_paper_style
+def identifiability(groups: "Mapping[str, Knowledge]") -> Figure:
+    """One row of panels for each group of parameters: who speaks for each, and what each combination consists of.
+
+    Args:
+        groups: Knowledge by group.
+    """
+    heights = [_ROW * len(group.parameters) + _TOP + _BOTTOM for group in groups.values()]
+    total = sum(heights)
+    figure = Figure(figsize=(WIDE, total))
+    width, top = (WIDE - _NAMES - _GAP - 0.15) / 2, total
+    for (name, group), height in zip(groups.items(), heights, strict=True):
+        bottom, tall = (top - height + _BOTTOM) / total, (height - _TOP - _BOTTOM) / total
+        left = figure.add_axes((_NAMES / WIDE, bottom, width / WIDE, tall))
+        _shares(left, name, group)
+        if len(group.parameters) > 1:
+            _combinations(figure.add_axes(((_NAMES + width + _GAP) / WIDE, bottom, width / WIDE, tall)), group)
+        top -= height
+    return figure
+
+
+def _shares(axes: Axes, name: str, group: "Knowledge") -> None:
+    names = [p.name for p in group.parameters]
+    told = np.array([100 * max(p.contraction, 0.0) for p in group.parameters])
+    places = np.arange(len(names))
+    axes.barh(places, told, color=BLUE, height=0.62)
+    axes.barh(places, 100 - told, left=told, color=LIGHT, height=0.62)
+    axes.set_yticks(places, names)
+    axes.set_ylim(len(names) - 0.5, -0.5)
+    axes.set_xlim(0, 100)
+    axes.grid(visible=False)
+    axes.set_title(name[0].upper() + name[1:], loc="left")
+    axes.set_xlabel("Told by the measurements, not the prior (%)")
+
+
+def _combinations(axes: Axes, group: "Knowledge") -> None:
+    """Map of the weights, in units of the priors' standard deviations; columns are combinations."""
+    names, prior_sd = [p.name for p in group.parameters], {p.name: p.prior_sd for p in group.parameters}
+    weights = np.array([[d.weights.get(n, 0.0) * prior_sd[n] for n in names] for d in group.directions]).T
+    weights = weights / np.maximum(np.sqrt(np.sum(weights**2, axis=0)), 1e-300)
+    axes.imshow(weights, cmap="RdBu_r", vmin=-1, vmax=1, aspect="auto")
+    for (row, column), weight in np.ndenumerate(weights):
+        if abs(weight) > _MOST:
+            dark = abs(weight) > 0.6
+            axes.text(
+                column,
+                row,
+                f"{weight:+.1f}",
+                ha="center",
+                va="center",
+                fontsize=SMALL - 1,
+                color="white" if dark else "black",
+            )
+    axes.set_yticks([])
+    axes.set_xticks(np.arange(len(group.directions)), [_known(d.share) for d in group.directions])
+    axes.tick_params(length=0)
+    axes.grid(visible=False)
+    axes.set_title("Combinations, the best known first", loc="left")
+    axes.set_xlabel("Left of the prior variance (%)")
+
+
+def _known(share: float) -> str:
+    percent = 100 * share
+    return f"{percent:.0f}" if percent >= 9.5 else f"{percent:.1f}" if percent >= 0.095 else "<0.1"

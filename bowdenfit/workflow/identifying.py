@@ -1,0 +1,120 @@
+"""What measurements determine: of a fit, of tables before sampling, or of a plan before anything is measured."""
+
+import tomllib
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from bowdenfit.dataset import DESCRIPTION_FILE, Dataset
+from bowdenfit.errors import UsageError
+from bowdenfit.workflow import load, read
+
+if TYPE_CHECKING:
+    from bowdenfit.results.fit import Fit
+    from bowdenfit.results.identifiability import Identifiability
+
+
+def identify(source: "str | Path | Dataset | Fit", **reading: Any) -> "Identifiability":
+    """What measurements determine of a cable's parameters, and what rests on the priors.
+
+    Args:
+        source: A fit or its results folder; a data set (fitted by least squares only); or a plan, a cable.toml with
+            [design] (and [truth], where not given at the priors' medians), before anything is measured.
+        reading: Keywords of `bowdenfit.read`, for a data set.
+
+    Raises:
+        BowdenfitError: What is wrong, in a sentence.
+    """
+    import jax
+
+    from bowdenfit.results.fit import Fit
+    from bowdenfit.results.identifiability import of_fit
+
+    if isinstance(source, str | Path) and (Path(source) / "fit.json").exists():
+        source = load(source)
+    with jax.enable_x64(True):
+        if isinstance(source, Fit):
+            return of_fit(source)
+        if isinstance(source, Dataset) or not _is_plan(Path(source)):
+            return _of_tables(read(source, **reading))
+        if any(reading.values()):
+            raise UsageError("a plan is judged as it stands; change the file instead of naming options.")
+        return _of_plan(Path(source))
+
+
+def _is_plan(path: Path) -> bool:
+    """Whether a file is a plan: a description with [design]."""
+    if path.suffix != ".toml" or not path.is_file():
+        return False
+    try:
+        return "design" in tomllib.loads(path.read_text(encoding="utf-8-sig"))
+    except (OSError, UnicodeDecodeError, tomllib.TOMLDecodeError):
+        return False  # the reader says what is wrong
+
+
+def _of_tables(data: Dataset) -> "Identifiability":
+    from bowdenfit.inference.least_squares import make_objective, maximum_posterior
+    from bowdenfit.inference.posterior import Posterior
+    from bowdenfit.models.build import build_model
+    from bowdenfit.results.identifiability import of_maximum
+
+    posterior = Posterior(build_model(data))
+    best = maximum_posterior(posterior, make_objective(posterior))
+    basis = f"the best fit to the tables, with readings that scatter as {DESCRIPTION_FILE} expects"
+    return of_maximum(posterior.model, best, basis, True)
+
+
+def _of_plan(path: Path) -> "Identifiability":
+    import jax
+    import numpy as np
+
+    from bowdenfit.inference.identifiability import information_at
+    from bowdenfit.inference.posterior import Posterior
+    from bowdenfit.models.build import build_model
+    from bowdenfit.models.simulation import empty_tables, simulate, true_values
+    from bowdenfit.results.identifiability import of_maximum
+    from bowdenfit.results.synthetic import read_bench
+
+    plan = read_bench(path)
+    tables = empty_tables(plan.description, plan.design)
+    space = build_model(Dataset(plan.description, tables, {})).space
+    medians = {p.name: float(np.asarray(p.prior.constrain(np.zeros(1)))[0]) * p.shown_scale for p in space.free}
+    values = true_values(plan.description, tables, medians | dict(plan.truth), jax.random.key(0))
+    data = simulate(plan.description, plan.design, values, jax.random.key(0), noise=False)
+    posterior = Posterior(build_model(data))
+    assumed = "[truth]" if plan.truth else "the medians of the priors"
+    basis = f"the plan, for a cable with the values of {assumed}; nothing has been measured"
+    at = information_at(posterior, np.asarray(posterior.model.space.unconstrain(values)))
+    return of_maximum(posterior.model, at, basis, False)
+
+
+def write(found: "Identifiability", folder: Path) -> list[Path]:
+    """Write identifiability.json, identifiability.txt and the figure.
+
+    Args:
+        found: What is known.
+        folder: Where to; made if missing. Earlier files of these names are replaced.
+
+    Returns:
+        The files written.
+
+    Raises:
+        StoreError: The folder cannot be written.
+    """
+    import json
+
+    from bowdenfit.errors import StoreError
+    from bowdenfit.plots.gallery import FORMATS
+    from bowdenfit.plots.gallery import write as write_figure
+    from bowdenfit.plots.identifiability import identifiability
+    from bowdenfit.report.identifiability import identifiability_text
+    from bowdenfit.results.folder import write_text
+
+    try:
+        folder.mkdir(parents=True, exist_ok=True)
+        write_text(folder / "identifiability.json", json.dumps(found.page(), indent=1) + "\n")
+        write_text(folder / "identifiability.txt", identifiability_text(found))
+        figure = identifiability(found.groups)
+        drawn = [write_figure(figure, folder / f"identifiability.{ending}") for ending in FORMATS]
+    except OSError as error:
+        raise StoreError(f"{folder} cannot be written ({error.strerror}); name another with --output.") from None
+    return [folder / "identifiability.json", folder / "identifiability.txt", *drawn]

@@ -20,7 +20,19 @@ from bowdenfit.inference.ensemble import Progress
 
 ROOT = Path(__file__).parent.parent
 QUICK = ("sampler.n_walkers=128", "sampler.target_ess=200", "sampler.target_r_hat=1.05", "sampler.max_steps=4000")
-VERBS = ("init", "check", "fit", "summary", "predict", "length", "plot", "simulate", "completion")
+VERBS = (
+    "init",
+    "check",
+    "fit",
+    "summary",
+    "predict",
+    "length",
+    "identify",
+    "compare",
+    "plot",
+    "simulate",
+    "completion",
+)
 
 
 @pytest.fixture(scope="module")
@@ -272,3 +284,18 @@ def test_a_whole_fit_in_a_process_of_its_own_and_an_interrupt(on_body, tmp_path)
     names = {p.name for p in (tmp_path / "fit").iterdir()}
     assert names == {"fit.json", "summary.json", "summary.txt", "posterior.nc", "chain.h5", "figures"}
     assert len(list((tmp_path / "fit" / "figures").iterdir())) == 12
+
+
+def test_notes_in_a_results_folder_are_left_alone_and_other_files_stop_a_fit(on_body, tmp_path, run):
+    notes = tmp_path / "fit" / "README.md"
+    notes.parent.mkdir()
+    notes.write_text("what I think of it")
+    arguments = ("fit", on_body, "--no-mcmc", "--no-figures", "--output", notes.parent)
+    assert run(*arguments)[0] == 0
+    assert run(*arguments, "--force")[0] == 0
+    assert notes.read_text() == "what I think of it"
+    (tmp_path / "other").mkdir()
+    (tmp_path / "other" / "thesis.tex").write_text("")
+    code, _, err = run("fit", on_body, "--no-mcmc", "--output", tmp_path / "other")
+    assert code == 2
+    assert "is no results folder" in err

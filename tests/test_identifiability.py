@@ -148,6 +148,22 @@ def test_a_fit_that_has_not_converged_is_not_trusted(on_body, tmp_path, run):
     assert "not converged" in err
 
 
+def test_tables_that_contradict_each_other_are_not_trusted(tmp_path, run):
+    """Forces of a cable with mu = 0.1 beside efficiencies of one with 0.2; tau and its prior leave no room for both."""
+    plan, folder = tmp_path / "plan.toml", tmp_path / "half turn"
+    one = TWO_CONTACTS[: TWO_CONTACTS.rindex("[[contact]]")]
+    truth = "[tables]\nforces = { file = 'forces.csv' }\n[truth]\nmu_a = 0.1\ntau = 0.01\nsigma_F = 0.3\n"
+    plan.write_text(one + truth + "[design]\nruns = [0, 0, 0, 0, 0, 0, 0, 0]\ninput_forces = [20, 50, 100]\n")
+    workflow.simulate(plan, output=folder, seed=1)
+    (folder / "efficiencies.csv").write_text("efficiency\n0.53\n0.54\n0.53\n0.535\n0.54\n0.53\n0.53\n0.54\n0.53\n0.53\n")
+    text = (folder / "cable.toml").read_text()
+    (folder / "cable.toml").write_text(text.replace("[tables]", "[tables]\nefficiencies = { file = 'efficiencies.csv' }"))
+    code, out, _ = run("fit", folder, "-o", tmp_path / "fit", "--seed", 1, "--no-figures", "--no-mcmc")
+    assert code == 3
+    assert "CONTRADICTORY MEASUREMENTS" in out
+    assert "standard deviations: without it mu_a would be" in " ".join(out.split())
+
+
 def test_readings_of_a_plan_are_judged_with_its_curves():
     """Three coefficients and forces at one length only: one sum is determined, the coefficients are not."""
     design = Design(angles=LENGTHS, runs=(430.0,) * 6, input_forces=(20.0, 60.0))

@@ -35,7 +35,7 @@ def write_text(path: Path, text: str) -> None:
 
 
 def refuse_to_overwrite(folder: Path, force: bool) -> None:
-    """Stop before anything is computed if the results would have no place.
+    """Stop before anything is computed if the results would have no place; notes (*.md) may lie there.
 
     Args:
         folder: The results folder.
@@ -54,7 +54,7 @@ def refuse_to_overwrite(folder: Path, force: bool) -> None:
         if force:
             return
         raise StoreError(f"{folder} holds an interrupted fit; go on with --resume, or start over with --force.")
-    if folder.exists() and (not folder.is_dir() or any(folder.iterdir())):
+    if folder.exists() and (not folder.is_dir() or any(path.suffix != ".md" for path in folder.iterdir())):
         raise StoreError(f"{folder} exists and is no results folder; name another with --output.")
 
 

@@ -240,10 +240,13 @@ def _models() -> dict[str, Model]:
     with_efficiencies, _ = measured(cable(3, ("angles", "efficiencies")), 1)
     with_forces, _ = measured(cable(5, tables=censored), 2)
     with_gain, _ = measured(cable(3, ("angles", "efficiencies", "forces"), sensors={"gain_error_sd": 0.01}), 3)
+    without_forces = {"angles": censored["angles"], "efficiencies": {"file": "e.csv"}}
+    robust, _ = measured(cable(2, without_forces, noise="student"), 2)
     return {
         "efficiencies": build_model(with_efficiencies),
         "forces and undetected angles": build_model(with_forces),
         "everything with gain error": build_model(with_gain),
+        "Student noise": build_model(robust),
     }
 
 
@@ -252,7 +255,9 @@ def models() -> dict[str, Model]:
     return _models()
 
 
-MODELS = pytest.mark.parametrize("name", ["efficiencies", "forces and undetected angles", "everything with gain error"])
+MODELS = pytest.mark.parametrize(
+    "name", ["efficiencies", "forces and undetected angles", "everything with gain error", "Student noise"]
+)
 
 
 @MODELS

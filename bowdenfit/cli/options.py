@@ -34,6 +34,12 @@ def reading_options(verb: Verb) -> Verb:
             "[default: as in cable.toml, else capstan]",
         ),
         click.option(
+            "--noise",
+            type=click.Choice(["normal", "student"]),
+            help="How readings scatter: normally, or as a Student-t, with which a few bad readings or mountings hardly pull "
+            "the fit.  [default: as in cable.toml, else normal]",
+        ),
+        click.option(
             "--channel",
             "channels",
             multiple=True,

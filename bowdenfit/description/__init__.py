@@ -44,6 +44,7 @@ __all__ = [
     "HalfNormalPrior",
     "LogNormalPrior",
     "Measured",
+    "Noise",
     "NonNegative",
     "NormalPrior",
     "ParameterSetting",
@@ -57,6 +58,7 @@ __all__ = [
     "RecordingFile",
     "RecordingsTable",
     "Route",
+    "Sampler",
     "SamplerSettings",
     "Sensors",
     "StretchSettings",
@@ -69,6 +71,8 @@ __all__ = [
 
 SCHEMA = 1
 Geometry = Literal["continuous", "published"]
+Noise = Literal["normal", "student"]
+Sampler = Literal["emcee", "nuts", "both"]
 Undetected = Literal["censored", "zero", "dropped"]
 
 
@@ -197,10 +201,16 @@ class Sensors(Frozen):
 
 
 class SamplerSettings(Frozen):
-    """How long and how carefully the posterior is sampled."""
+    """How long and how carefully the posterior is sampled, by emcee's ensembles of walkers, by NUTS, or by both.
 
+    `max_steps` is that of each walker or chain, and does not count the warm-up of NUTS.
+    """
+
+    method: Sampler = "emcee"
     n_ensembles: Annotated[int, Field(ge=2)] = 4
     n_walkers: Annotated[int, Field(ge=16, multiple_of=2)] = 256
+    n_chains: Annotated[int, Field(ge=4)] = 16
+    target_acceptance: Annotated[float, Field(ge=0.6, lt=1)] = 0.98
     max_steps: Annotated[int, Field(ge=200)] = 12000
     target_r_hat: Annotated[float, Field(gt=1)] = 1.01
     target_ess: Annotated[int, Field(ge=100)] = 1000
@@ -242,6 +252,8 @@ class Description(Frozen):
     license: str = ""
     geometry: Geometry = "continuous"
     friction_model: str = "capstan"
+    noise: Noise = "normal"
+    student_degrees_of_freedom: Annotated[int, Field(ge=2, le=100, multiple_of=2)] = 4
     reference_force: QuantityValue | None = None
     reference_velocity: QuantityValue | None = None
     cable: CableSettings = CableSettings()
@@ -301,6 +313,11 @@ class Description(Frozen):
             raise ValueError(f"stretch.friction {self.stretch.friction!r} belongs to no contact{hint}")
         if self.cable.kind != "loop" and self.tables.loop is not None:
             raise ValueError('the table loop needs kind = "loop" under [cable]')
+        freedom = type(self).model_fields["student_degrees_of_freedom"].default
+        if self.noise != "student" and self.student_degrees_of_freedom != freedom:
+            raise ValueError(
+                'student_degrees_of_freedom belongs to noise = "student"; write that beside it, or leave it out'
+            )
         if self.cable.kind == "loop" and self.friction_model != "capstan":
             raise ValueError(
                 'the equations of a loop hold for friction_model = "capstan" only; leave it out, or fit one rope alone'
@@ -312,6 +329,12 @@ class Description(Frozen):
         """Whether the load cells' offsets are parameters."""
         recordings = self.tables.recordings
         return self.sensors.offset_sd is not None or (recordings is not None and recordings.prepare.tare == "fitted")
+
+    @property
+    def noise_in_words(self) -> str:
+        """How readings scatter, for people."""
+        freedom = self.student_degrees_of_freedom
+        return f"Student-t noise with {freedom} degrees of freedom" if self.noise == "student" else "normal noise"
 
     @property
     def preload_follows_stretch(self) -> bool:

@@ -66,6 +66,11 @@ class UniformPrior(Frozen):
         return self
 
 
+def _stated(model: BaseModel) -> int:
+    """How many of a model's fields say something; a stored description writes the others as null."""
+    return sum(getattr(model, name) is not None for name in type(model).model_fields)
+
+
 class PriorChoice(Frozen):
     """Exactly one kind of prior."""
 
@@ -76,7 +81,7 @@ class PriorChoice(Frozen):
 
     @model_validator(mode="after")
     def _one(self) -> "PriorChoice":
-        if len(self.model_fields_set) != 1:
+        if _stated(self) != 1:
             raise ValueError("write exactly one of lognormal, normal, half_normal, uniform")
         return self
 
@@ -97,7 +102,7 @@ class ParameterSetting(Frozen):
 
     @model_validator(mode="after")
     def _one(self) -> "ParameterSetting":
-        if len(self.model_fields_set) != 1:
+        if _stated(self) != 1:
             raise ValueError("write exactly one of measured, prior, fixed")
         return self
 

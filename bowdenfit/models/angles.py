@@ -4,16 +4,14 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Any
 
-import jax
 import jax.numpy as jnp
 import numpy as np
 from jax import Array
-from jax.scipy.stats import norm
 from jaxtyping import Float
 
 from bowdenfit.measurements.tables import AngleTable
 from bowdenfit.models.cable import ANGLE_NOISE, Cable
-from bowdenfit.physics.normal_tail import log_normal_cdf
+from bowdenfit.models.noise import noise_law, scatter
 
 
 @dataclass(frozen=True)
@@ -21,7 +19,8 @@ class AnglesTerm:
     r"""Likelihood of an angle table.
 
     Detected angles are :math:`\text{Normal}(\theta(l), \sigma_\theta)`; one below the detection limit L contributes
-    :math:`\Phi((L - \theta(l)) / \sigma_\theta)`. Readings outside the range of the curves do not enter.
+    :math:`\Phi((L - \theta(l)) / \sigma_\theta)`. With Student noise both are a Student-t's of the same scale. Readings
+    outside the range of the curves do not enter.
 
     Args:
         cable: The cable.
@@ -56,15 +55,13 @@ class AnglesTerm:
 
     def log_likelihood(self, values: Mapping[str, Array], data: Mapping[str, Any]) -> Float[Array, " readings"]:
         """Log likelihood of each reading."""
-        deviation, u = self._split(values, data)
-        return jnp.concatenate([norm.logpdf(deviation) - jnp.log(values[ANGLE_NOISE]), log_normal_cdf(u)])
+        (deviation, u), law = self._split(values, data), noise_law(self.cable.description)
+        return jnp.concatenate([law.log_density(deviation) - jnp.log(values[ANGLE_NOISE]), law.log_cdf(u)])
 
     def residuals(self, values: Mapping[str, Array], data: Mapping[str, Any]) -> Float[Array, " readings"]:
-        """Standardized residuals; sqrt(-2 log Phi(u)) for undetected angles."""
-        deviation, u = self._split(values, data)
-        # Beyond 30 sd the root is 0 to the last digit, and its derivative would be 0 times infinity.
-        censored = jnp.where(u < 30.0, jnp.sqrt(-2 * log_normal_cdf(jnp.minimum(u, 29.0))), 0.0)
-        return jnp.concatenate([deviation, censored])
+        """Standardized residuals; sqrt(-2 log likelihood) for undetected angles."""
+        (deviation, u), law = self._split(values, data), noise_law(self.cable.description)
+        return jnp.concatenate([law.residual(deviation), law.bound_residual(u)])
 
     def expected(self, values: Mapping[str, Array], data: Mapping[str, Any]) -> Float[Array, " readings"]:
         """Expected readings [deg]."""
@@ -73,7 +70,7 @@ class AnglesTerm:
     def simulate(self, values: Mapping[str, Array], data: Mapping[str, Any], key: Array) -> Float[Array, " readings"]:
         """Readings as the bench would give them, undetected ones included [deg]."""
         theta = self._expected(values, data)
-        return jnp.rad2deg(theta + values[ANGLE_NOISE] * jax.random.normal(key, theta.shape))
+        return jnp.rad2deg(theta + values[ANGLE_NOISE] * scatter(key, theta.shape, self.cable.description))
 
     def observed(self) -> np.ndarray:
         """Readings [deg]; NaN where undetected."""

@@ -26,6 +26,7 @@ from bowdenfit.models.efficiencies import efficiencies_term
 from bowdenfit.models.elasticity import PRELOAD_NOISE, STRETCH_NOISE, elastic_parameters
 from bowdenfit.models.forces import force_terms
 from bowdenfit.models.loop import loop_term
+from bowdenfit.models.noise import noise_law
 from bowdenfit.models.recorded_blocks import RECORDED
 from bowdenfit.models.recordings import recordings_term
 from bowdenfit.models.scatter import (
@@ -162,7 +163,27 @@ def _space(description: Description, measurements: Measurements, cable: Cable) -
             hint = f"; friction coefficients belong under [friction.{name}]." if name in known else nearest(name, known)
             raise DescriptionError(f"cable.toml, prior.{name}: no such parameter{hint}")
     settings = {**description.friction, **description.prior}
-    return ParameterSpace(tuple(_set(p, settings[p.name]) if p.name in settings else p for p in parameters))
+    space = ParameterSpace(tuple(_set(p, settings[p.name]) if p.name in settings else p for p in parameters))
+    _check_run_scatter(space, measurements)
+    return space
+
+
+def _check_run_scatter(space: ParameterSpace, measurements: Measurements) -> None:
+    """Mountings may be said to be all alike only where something else makes readings scatter."""
+    for fixed in (p.fixed for p in space.fixed if p.name == RUN_SCATTER):
+        if fixed is not None and fixed < 0:
+            raise DescriptionError(
+                f"cable.toml: {RUN_SCATTER} is fixed at {fixed:g}, and a standard deviation cannot be negative; "
+                "write 0 for mountings that are all alike."
+            )
+        table = measurements.efficiencies
+        if fixed == 0 and table is not None and not np.all(table.sd > 0):
+            place = table.origin.place(int(np.argmin(table.sd > 0)))
+            raise DescriptionError(
+                f"cable.toml: {RUN_SCATTER} is fixed at 0, but {place} has no standard deviation of its own, so that "
+                "nothing would make it scatter and no model could be right; state the sd of every efficiency, or leave "
+                f"{RUN_SCATTER} free."
+            )
 
 
 def _in_range(description: Description, measurements: Measurements) -> np.ndarray:
@@ -212,18 +233,21 @@ def _uncertain_constants(description: Description) -> list[Parameter]:
 
 
 def _noise(description: Description, measurements: Measurements, defaults: PriorDefaults) -> list[Parameter]:
-    parameters, degree = [], float(np.rad2deg(1.0))
+    parameters, degree, law = [], float(np.rad2deg(1.0)), noise_law(description)
     if measurements.angles is not None:
         sd = defaults.angle_noise_degrees
-        meaning, prior = "standard deviation of an angle reading", HalfNormal(sd / degree)
+        meaning, prior = law.meaning("standard deviation of an angle reading"), HalfNormal(sd / degree)
         text = f"HalfNormal({sd:g} deg)"
         parameters.append(Parameter(ANGLE_NOISE, r"$\sigma_\theta$", meaning, "noise", prior, text, "deg", degree))
     if any(t is not None for t in (measurements.efficiencies, measurements.forces, measurements.recordings)):
-        meaning, prior = "scatter of the log ratio from mounting to mounting", HalfNormal(defaults.run_scatter)
+        meaning = law.meaning("scatter of the log ratio from mounting to mounting")
+        prior = HalfNormal(defaults.run_scatter)
         text = f"HalfNormal({defaults.run_scatter:g})"
         parameters.append(Parameter(RUN_SCATTER, r"$\tau$", meaning, "noise", prior, text))
     if measurements.forces is not None or measurements.loop is not None:
-        parameters.append(_force_noise(description.sensors.force_noise, defaults.force_noise_newtons))
+        meaning = "standard deviation of a force reading"
+        meaning = law.meaning(meaning) if measurements.loop is not None else meaning  # inside a run readings are normal
+        parameters.append(_force_noise(description.sensors.force_noise, defaults.force_noise_newtons, meaning))
     if measurements.recordings is not None:
         sd = defaults.block_noise_newtons
         meaning, text = "standard deviation of a block's mean force", f"HalfNormal({sd:g} N)"
@@ -233,7 +257,7 @@ def _noise(description: Description, measurements: Measurements, defaults: Prior
         (measurements.preload, PRELOAD_NOISE, r"$\sigma_P$", "preload", defaults.preload_noise_newtons, "N"),
     ):
         if table is not None:
-            meaning, text = f"standard deviation of a {what} reading", f"HalfNormal({sd:g} {unit})"
+            meaning, text = law.meaning(f"standard deviation of a {what} reading"), f"HalfNormal({sd:g} {unit})"
             parameters.append(Parameter(name, symbol, meaning, "noise", HalfNormal(sd), text, unit))
     return parameters
 
@@ -263,7 +287,7 @@ def _sensors(description: Description, measurements: Measurements, defaults: Pri
     return parameters
 
 
-def _force_noise(stated: QuantityValue | None, scale: float) -> Parameter:
+def _force_noise(stated: QuantityValue | None, scale: float, meaning: str) -> Parameter:
     """Noise of a force reading: free, or as the data sheet says, with its standard deviation or without."""
     prior: Prior = HalfNormal(scale)
     text, fixed = f"HalfNormal({scale:g} N)", None
@@ -272,7 +296,6 @@ def _force_noise(stated: QuantityValue | None, scale: float) -> Parameter:
         text = f"Normal({stated.to('force'):g}, {stated.sd_to('force'):g}) N, cut off at 0"
     elif stated is not None:
         fixed, text = stated.to("force"), "fixed (data sheet)"
-    meaning = "standard deviation of a force reading"
     return Parameter(FORCE_NOISE, r"$\sigma_F$", meaning, "noise", prior, text, "N", fixed=fixed)
 
 

@@ -8,11 +8,11 @@ import jax
 import jax.numpy as jnp
 import numpy as np
 from jax import Array
-from jax.scipy.stats import norm
 from jaxtyping import Float
 
 from bowdenfit.measurements.tables import AngleTable, EfficiencyTable
 from bowdenfit.models.cable import Cable, resolve_angles, row_angles
+from bowdenfit.models.noise import noise_law, scatter
 from bowdenfit.models.scatter import GAIN_ERROR, RUN_SCATTER
 from bowdenfit.physics.friction import transmission_efficiency
 
@@ -26,7 +26,8 @@ class EfficienciesTerm:
 
     with the stated standard deviation s of a row, the error of its own measured angles, and the gain error g of the
     load cells where the description has one. A row does not say at what load and speed it was measured: where friction
-    depends on them, it is taken to hold at the reference force and speed.
+    depends on them, it is taken to hold at the reference force and speed. With Student noise the same mean and scale are a
+    Student-t's.
 
     Args:
         cable: The cable.
@@ -59,12 +60,12 @@ class EfficienciesTerm:
 
     def log_likelihood(self, values: Mapping[str, Array], data: Mapping[str, Any]) -> Float[Array, " rows"]:
         """Log likelihood of each row."""
-        return norm.logpdf(data["loss"], *self._mean_and_sd(values, data, values))
+        return noise_law(self.cable.description).log_density(data["loss"], *self._mean_and_sd(values, data, values))
 
     def residuals(self, values: Mapping[str, Array], data: Mapping[str, Any]) -> Float[Array, " rows"]:
         """Standardized residuals; the weights follow the parameters but are not differentiated."""
         mean, sd = self._mean_and_sd(values, data, jax.lax.stop_gradient(dict(values)))
-        return (data["loss"] - mean) / jax.lax.stop_gradient(sd)
+        return noise_law(self.cable.description).residual((data["loss"] - mean) / jax.lax.stop_gradient(sd))
 
     def expected(self, values: Mapping[str, Array], data: Mapping[str, Any]) -> Float[Array, " rows"]:
         """Expected efficiencies [1]."""
@@ -73,7 +74,7 @@ class EfficienciesTerm:
     def simulate(self, values: Mapping[str, Array], data: Mapping[str, Any], key: Array) -> Float[Array, " rows"]:
         """Efficiencies as the bench would give them [1]."""
         mean, sd = self._mean_and_sd(values, data, values)
-        return transmission_efficiency(mean + sd * jax.random.normal(key, mean.shape))
+        return transmission_efficiency(mean + sd * scatter(key, mean.shape, self.cable.description))
 
     def observed(self) -> np.ndarray:
         """Measured efficiencies [1]."""

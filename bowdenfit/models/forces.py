@@ -12,9 +12,9 @@ from jaxtyping import Float
 
 from bowdenfit.measurements.tables import AngleTable, ForceTable
 from bowdenfit.models.cable import Cable, resolve_angles, row_angles
+from bowdenfit.models.noise import noise_law, scatter
 from bowdenfit.models.runs import LEAST_FORCE, ROW_ARRAYS, RunsTerm, SlidingRows, run_sums
 from bowdenfit.models.scatter import FORCE_NOISE, GAIN_ERROR, INPUT_OFFSET, OUTPUT_OFFSET, RUN_SCATTER
-from bowdenfit.physics.normal_tail import log_normal_cdf
 
 
 @dataclass(frozen=True)
@@ -28,6 +28,9 @@ class HeldForcesTerm:
     with g the scale on which friction is a shift, log F for the capstan equation. It is a bound, not a measurement: where
     inside the band a force comes to rest is not modeled, so a coefficient that rests on held readings alone has a posterior
     that is its prior above the largest of them, and its intervals must not be read as those of a measured value.
+
+    With Student noise Phi is the distribution function of a Student-t: one wrong reading far outside the band then hardly
+    moves the bound.
 
     Args:
         cable: The cable.
@@ -67,7 +70,8 @@ class HeldForcesTerm:
         from_angles = self.cable.exponent_variance(values, angles, variance)
         sd = jnp.sqrt(values[RUN_SCATTER] ** 2 + from_angles + from_cells)
         beyond = jnp.abs(difference)  # the band is symmetric
-        upper, lower = log_normal_cdf((exponent - beyond) / sd), log_normal_cdf((-exponent - beyond) / sd)
+        law = noise_law(self.cable.description)
+        upper, lower = law.log_cdf((exponent - beyond) / sd), law.log_cdf((-exponent - beyond) / sd)
         # A band of no width at all holds no reading; the floor keeps its logarithm finite.
         return upper + jnp.log1p(-jnp.exp(jnp.minimum(lower - upper, -1e-12)))
 
@@ -98,7 +102,7 @@ class HeldForcesTerm:
         _, from_cells = self._difference(values, data)
         inside = limit * jax.random.uniform(band, limit.shape, minval=-1.0, maxval=1.0)
         sd = jnp.sqrt(values[RUN_SCATTER] ** 2 + from_cells)
-        shift = inside + sd * jax.random.normal(noise, limit.shape)
+        shift = inside + sd * scatter(noise, limit.shape, self.cable.description)
         return data["input_force"] / self._output_force(values, data, shift)
 
     def observed(self) -> np.ndarray:

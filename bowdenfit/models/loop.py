@@ -8,12 +8,12 @@ import jax
 import jax.numpy as jnp
 import numpy as np
 from jax import Array
-from jax.scipy.stats import norm
 from jaxtyping import Float
 
 from bowdenfit.measurements.tables import AngleTable, LoopTable
 from bowdenfit.models.cable import Cable, resolve_angles, row_angles
 from bowdenfit.models.elasticity import LOOP_MOUNTING, spread_matrix
+from bowdenfit.models.noise import noise_law, scatter
 from bowdenfit.models.scatter import FORCE_NOISE, GAIN_ERROR, INPUT_OFFSET, OUTPUT_OFFSET, RUN_SCATTER
 from bowdenfit.physics.loop import loop_response, loop_response_from
 
@@ -30,6 +30,8 @@ class LoopTerm:
     with f the loop's output force at the preload of the row, or the cable's at the row's wrap angle; both load cells read
     with noise, and the row's own measured angles have errors. All rows are of one mounting: its effect on the friction
     exponent is a parameter where single ropes tell how mountings scatter, and else belongs to the coefficient found.
+
+    With Student noise the same mean and scale are a Student-t's, row by row; that parameter of the one mounting stays normal.
 
     Args:
         cable: The cable.
@@ -87,17 +89,18 @@ class LoopTerm:
 
     def log_likelihood(self, values: Mapping[str, Array], data: Mapping[str, Any]) -> Float[Array, " rows"]:
         """Log likelihood of each row."""
-        return norm.logpdf(data["output_force"], *self._mean_and_sd(values, data, values))
+        law = noise_law(self.cable.description)
+        return law.log_density(data["output_force"], *self._mean_and_sd(values, data, values))
 
     def residuals(self, values: Mapping[str, Array], data: Mapping[str, Any]) -> Float[Array, " rows"]:
         """Standardized residuals; the weights follow the parameters but are not differentiated."""
         mean, sd = self._mean_and_sd(values, data, jax.lax.stop_gradient(dict(values)))
-        return (data["output_force"] - mean) / jax.lax.stop_gradient(sd)
+        return noise_law(self.cable.description).residual((data["output_force"] - mean) / jax.lax.stop_gradient(sd))
 
     def simulate(self, values: Mapping[str, Array], data: Mapping[str, Any], key: Array) -> Float[Array, " rows"]:
         """Output forces as the bench would give them [N]."""
         mean, sd = self._mean_and_sd(values, data, values)
-        return mean + sd * jax.random.normal(key, mean.shape)
+        return mean + sd * scatter(key, mean.shape, self.cable.description)
 
     def observed(self) -> np.ndarray:
         """Measured output forces [N]."""

@@ -24,6 +24,7 @@ from bowdenfit.models.mounting import (
     side_by_side,
     thinned,
 )
+from bowdenfit.models.noise import noise_law, scatter
 from bowdenfit.models.recorded_blocks import input_saturated, output_saturated, restarts
 from bowdenfit.models.scatter import BLOCK_NOISE, DELAY_ERROR, GAIN_ERROR, INPUT_OFFSET, OUTPUT_OFFSET, RUN_SCATTER
 from bowdenfit.physics.loop import loop_output_force
@@ -46,7 +47,7 @@ class LoopRecordingsTerm:
     where f are the output forces of `bowdenfit.physics.loop.loop_band` moving forward and back, at the cable's preload and
     at the friction exponent Lambda + m of the run. While the return side is taut the output is linear in the mounting
     effect m ~ Normal(0, tau) but for changes of contact; m integrates out in closed form at the value that suits the
-    recording best, as `bowdenfit.models.whole_recordings.WholeRecordingsTerm` does.
+    recording best, as `bowdenfit.models.whole_recordings.WholeRecordingsTerm` does; with Student noise it is a Student-t there.
 
     The reading of a run in results is the mean force lost while it moves, over the blocks inside its phases of motion.
 
@@ -118,13 +119,15 @@ class LoopRecordingsTerm:
     def log_likelihood(self, values: Mapping[str, Array], data: Mapping[str, Any]) -> Float[Array, " runs"]:
         """Log likelihood of each run, all blocks together."""
         found, noise = self._deviations(values, data, values), values[self.reading_noise]
-        return log_likelihood_of(data, found, noise, data["censored"] * -found.within / noise)
+        beyond = data["censored"] * -found.within / noise
+        return log_likelihood_of(data, found, noise, beyond, noise_law(self.cable.description))
 
     def residuals(self, values: Mapping[str, Array], data: Mapping[str, Any]) -> Float[Array, " runs_and_blocks"]:
         """Standardized residuals: between runs, and of the blocks of a run."""
         found = self._deviations(values, data, jax.lax.stop_gradient(dict(values)))
         noise = jax.lax.stop_gradient(values[self.reading_noise])
-        return residuals_of(data, found, noise, data["censored"] * -found.within / noise)
+        beyond = data["censored"] * -found.within / noise
+        return residuals_of(data, found, noise, beyond, noise_law(self.cable.description))
 
     def _lost(
         self, values: Mapping[str, Array], data: Mapping[str, Any], preload: Array, exponent: Array
@@ -148,7 +151,7 @@ class LoopRecordingsTerm:
 
         mean, by_exponent = jax.jvp(lost, (jnp.zeros_like(exponent),), (jnp.ones_like(exponent),))
         sd = self._deviations(values, data, values).sd
-        return mean + by_exponent * sd * jax.random.normal(key, mean.shape)
+        return mean + by_exponent * sd * scatter(key, mean.shape, self.cable.description)
 
     def observed(self) -> np.ndarray:
         """Mean force lost while each run moved [N]."""

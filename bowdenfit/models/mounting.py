@@ -12,10 +12,10 @@ import jax
 import jax.numpy as jnp
 import numpy as np
 from jax import Array
-from jax.scipy.stats import norm
 from jaxtyping import Float
 
 from bowdenfit.measurements.recordings import Recording, Recordings
+from bowdenfit.models.noise import NoiseLaw
 from bowdenfit.models.recorded_blocks import inside_phase, standing_share, worth_of
 from bowdenfit.models.runs import ROW_ARRAYS
 from bowdenfit.models.scatter import RUN_SCATTER
@@ -83,15 +83,16 @@ def mounted(
 
 
 def log_likelihood_of(
-    data: Mapping[str, Any], found: Mounted, noise: Array, beyond: Float[Array, "time recordings"]
+    data: Mapping[str, Any], found: Mounted, noise: Array, beyond: Float[Array, "time recordings"], law: NoiseLaw
 ) -> Float[Array, " runs"]:
-    """Log likelihood of each run, all blocks together.
+    """Log likelihood of each run, all blocks together; these scatter normally about the run.
 
     Args:
         data: Arrays of `side_by_side`.
         found: What the blocks say.
         noise: Standard deviation of a block of weight 1.
         beyond: How far beyond the end of the range a saturated output is expected, in standard deviations of a block.
+        law: How the runs scatter.
     """
     n = data["n"]
     scatter = per_run(data, data["weight"] * found.within**2)
@@ -99,18 +100,19 @@ def log_likelihood_of(
     inside = constant - (n - 1) * jnp.log(noise) - scatter / (2 * noise**2)
     log_probability = log_normal_cdf(beyond) * data["share"]
     censored = per_run(data, jnp.where(data["censored"] != 0, log_probability, 0.0))
-    return inside + norm.logpdf(found.effect, 0.0, found.sd) + censored
+    return inside + law.log_density(found.effect, 0.0, found.sd) + censored
 
 
 def residuals_of(
-    data: Mapping[str, Any], found: Mounted, noise: Array, beyond: Float[Array, "time recordings"]
+    data: Mapping[str, Any], found: Mounted, noise: Array, beyond: Float[Array, "time recordings"], law: NoiseLaw
 ) -> Float[Array, " runs_and_blocks"]:
     """Standardized residuals of the same likelihood: between runs, and of the blocks of a run."""
     inside = jnp.sqrt(data["weight"]) * found.within / noise
     # Beyond 30 sd the root is 0 to the last digit, and its derivative would be 0 times infinity.
     root = jnp.sqrt(-2 * data["share"] * log_normal_cdf(jnp.minimum(beyond, 29.0)) + 1e-300)
     censored = jnp.where((data["censored"] != 0) & (beyond < 30.0), root, 0.0)
-    return jnp.concatenate([found.effect / jax.lax.stop_gradient(found.sd), (inside + censored).ravel()])
+    between = law.residual(found.effect / jax.lax.stop_gradient(found.sd))
+    return jnp.concatenate([between, (inside + censored).ravel()])
 
 
 def residual_blocks_of(data: Mapping[str, Any], n_runs: int) -> tuple[tuple[int, int], ...]:

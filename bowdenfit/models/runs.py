@@ -8,10 +8,10 @@ import jax
 import jax.numpy as jnp
 import numpy as np
 from jax import Array
-from jax.scipy.stats import norm
 from jaxtyping import Float
 
 from bowdenfit.models.cable import Cable, resolve_angles
+from bowdenfit.models.noise import noise_law, scatter
 from bowdenfit.models.scatter import DELAY_ERROR, FORCE_NOISE, GAIN_ERROR, INPUT_OFFSET, OUTPUT_OFFSET, RUN_SCATTER
 from bowdenfit.physics.friction import transmission_efficiency
 from bowdenfit.types import Labels, Vector
@@ -38,6 +38,10 @@ class RunsTerm:
     integrated out. Readings of one run at the same angles and stroke (and, where it matters, the same load and speed) are
     one cell, so that the cost does not grow with the length of a recording. Load matters wherever readings have a clock: a
     delay between the load cells adds more where the force changes fast for its size.
+
+    With Student noise it is the run that may be an outlier, as one that was mounted badly is: its mean deviation, m and the
+    noise of its mean together, is a Student-t of scale :math:`\sqrt{\tau^2 + \sigma_F^2 / \sum w}`, the standard deviation that
+    it has else. Within a run readings scatter normally in either case.
 
     Args:
         cable: The cable.
@@ -109,16 +113,17 @@ class RunsTerm:
         """Log likelihood of each run, all samples together."""
         found = self._deviations(values, data, values)
         noise, n = values[self.reading_noise], data["n"]
-        scatter = data["scatter"] + found.inside + self._per_run(data, found.within**2)
+        squares = data["scatter"] + found.inside + self._per_run(data, found.within**2)
         constant = (data["log_weights"] - jnp.log(found.total) - (n - 1) * jnp.log(2 * jnp.pi)) / 2
-        inside = constant - (n - 1) * jnp.log(noise) - scatter / (2 * noise**2)
-        return inside + norm.logpdf(found.mounting, 0.0, found.sd)
+        inside = constant - (n - 1) * jnp.log(noise) - squares / (2 * noise**2)
+        return inside + noise_law(self.cable.description).log_density(found.mounting, 0.0, found.sd)
 
     def residuals(self, values: Mapping[str, Array], data: Mapping[str, Any]) -> Float[Array, " cells_and_runs"]:
         """Standardized residuals: between runs, and between the cells of a run."""
         found = self._deviations(values, data, jax.lax.stop_gradient(dict(values)))
         inside = jnp.sqrt(data["weight"]) * found.within / jax.lax.stop_gradient(values[self.reading_noise])
-        return jnp.concatenate([found.mounting / jax.lax.stop_gradient(found.sd), inside])
+        between = noise_law(self.cable.description).residual(found.mounting / jax.lax.stop_gradient(found.sd))
+        return jnp.concatenate([between, inside])
 
     def expected(self, values: Mapping[str, Array], data: Mapping[str, Any]) -> Float[Array, " runs"]:
         """Expected efficiency of each run, the effect of its mounting left out [1]."""
@@ -127,8 +132,8 @@ class RunsTerm:
     def simulate(self, values: Mapping[str, Array], data: Mapping[str, Any], key: Array) -> Float[Array, " runs"]:
         """Efficiency of each run as the bench would give it [1]."""
         found = self._deviations(values, data, values)
-        scatter = found.sd * jax.random.normal(key, found.sd.shape)
-        return transmission_efficiency(data["run_mean"] - found.plain + scatter)
+        mounting = found.sd * scatter(key, found.sd.shape, self.cable.description)
+        return transmission_efficiency(data["run_mean"] - found.plain + mounting)
 
     def observed(self) -> np.ndarray:
         """Mean efficiency of each run [1]."""

@@ -1,4 +1,4 @@
-"""Stretch and preload tables: normal readings around what the elastic side of a cable says."""
+"""Stretch and preload tables: readings around what the elastic side of a cable says."""
 
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
@@ -8,13 +8,12 @@ import jax
 import jax.numpy as jnp
 import numpy as np
 from jax import Array
-from jax.scipy.stats import norm
 from jaxtyping import Float
 
 from bowdenfit.measurements.tables import PreloadTable, StretchTable
 from bowdenfit.models.cable import Cable
 from bowdenfit.models.elasticity import PRELOAD_NOISE, STRETCH_NOISE, spread_matrix
-from bowdenfit.physics.normal_tail import log_normal_cdf
+from bowdenfit.models.noise import noise_law, scatter
 
 MEASURED_PRELOAD = "measured_preload"  # not the name of the parameter
 Expected = Callable[[Cable, Mapping[str, Array], Mapping[str, Any]], Array]
@@ -28,7 +27,7 @@ class ElasticTerm:
               P_i \sim \text{Normal}(P(\theta_i),\ \sigma_P)
 
     A preload of 0 is what a load cell says of a slack rope whatever its noise: such a row is known to be at most 0, and
-    contributes :math:`\Phi(-P(\theta)/\sigma_P)`.
+    contributes :math:`\Phi(-P(\theta)/\sigma_P)`. With Student noise the same scales are a Student-t's.
 
     Args:
         cable: The cable.
@@ -63,7 +62,8 @@ class ElasticTerm:
     def log_likelihood(self, values: Mapping[str, Array], data: Mapping[str, Any]) -> Float[Array, " rows"]:
         """Log likelihood of each row."""
         deviation, u = self._deviations(values, data, values[self.noise])
-        return jnp.concatenate([norm.logpdf(deviation) - jnp.log(values[self.noise]), log_normal_cdf(u)])
+        law = noise_law(self.cable.description)
+        return jnp.concatenate([law.log_density(deviation) - jnp.log(values[self.noise]), law.log_cdf(u)])
 
     def _deviations(
         self, values: Mapping[str, Array], data: Mapping[str, Any], noise: Array
@@ -73,15 +73,15 @@ class ElasticTerm:
         return (data["reading"] - expected[:n]) / noise, (data["at_most"] - expected[n:]) / noise
 
     def residuals(self, values: Mapping[str, Array], data: Mapping[str, Any]) -> Float[Array, " rows"]:
-        """Standardized residuals; sqrt(-2 log Phi) for rows known to be at most their reading."""
+        """Standardized residuals; sqrt(-2 log likelihood) for rows known to be at most their reading."""
         deviation, u = self._deviations(values, data, jax.lax.stop_gradient(values[self.noise]))
-        at_most = jnp.where(u < 30.0, jnp.sqrt(-2 * log_normal_cdf(jnp.minimum(u, 29.0))), 0.0)
-        return jnp.concatenate([deviation, at_most])
+        law = noise_law(self.cable.description)
+        return jnp.concatenate([law.residual(deviation), law.bound_residual(u)])
 
     def simulate(self, values: Mapping[str, Array], data: Mapping[str, Any], key: Array) -> Float[Array, " rows"]:
         """Readings drawn at given parameters [mm] or [N]."""
         expected = self.expected(values, data)
-        drawn = expected + values[self.noise] * jax.random.normal(key, expected.shape)
+        drawn = expected + values[self.noise] * scatter(key, expected.shape, self.cable.description)
         return drawn if self.lowest is None else jnp.maximum(drawn, self.lowest)
 
     def observed(self) -> np.ndarray:

@@ -24,6 +24,7 @@ from bowdenfit.models.mounting import (
     side_by_side,
     thinned,
 )
+from bowdenfit.models.noise import noise_law, scatter
 from bowdenfit.models.recorded_blocks import RECORDED, input_saturated, output_saturated, positive, restarts
 from bowdenfit.models.runs import LEAST_FORCE
 from bowdenfit.models.scatter import BLOCK_NOISE, DELAY_ERROR, GAIN_ERROR, INPUT_OFFSET, OUTPUT_OFFSET, RUN_SCATTER
@@ -46,7 +47,8 @@ class WholeRecordingsTerm:
 
     with the offsets b and gain error gamma of the load cells. The output is linear in the mounting effect m but for
     changes of contact, so that m integrates out in closed form at the value that suits the recording best (two passes of
-    the operator: one to find it, one to linearize there).
+    the operator: one to find it, one to linearize there). With Student noise each run's mounting effect, with what noise adds
+    to it, is a Student-t; the blocks scatter normally about their run.
 
     Args:
         cable: The cable.
@@ -103,7 +105,8 @@ class WholeRecordingsTerm:
     def log_likelihood(self, values: Mapping[str, Array], data: Mapping[str, Any]) -> Float[Array, " runs"]:
         """Log likelihood of each run, all blocks together."""
         found, noise = self._deviations(values, data, values)[0], values[self.reading_noise]
-        return log_likelihood_of(data, found, noise, self._beyond(data, found.within, noise))
+        beyond = self._beyond(data, found.within, noise)
+        return log_likelihood_of(data, found, noise, beyond, noise_law(self.cable.description))
 
     def _beyond(self, data: Mapping[str, Any], within: Array, noise: Array) -> Float[Array, "time recordings"]:
         """How far beyond the end of the range the output is expected, in standard deviations of a block."""
@@ -113,7 +116,8 @@ class WholeRecordingsTerm:
         """Standardized residuals: between runs, and of the blocks of a run."""
         found = self._deviations(values, data, jax.lax.stop_gradient(dict(values)))[0]
         noise = jax.lax.stop_gradient(values[self.reading_noise])
-        return residuals_of(data, found, noise, self._beyond(data, found.within, noise))
+        beyond = self._beyond(data, found.within, noise)
+        return residuals_of(data, found, noise, beyond, noise_law(self.cable.description))
 
     def expected(self, values: Mapping[str, Array], data: Mapping[str, Any]) -> Float[Array, " runs"]:
         """Expected efficiency of each run, the effect of its mounting left out [1]."""
@@ -122,7 +126,8 @@ class WholeRecordingsTerm:
     def simulate(self, values: Mapping[str, Array], data: Mapping[str, Any], key: Array) -> Float[Array, " runs"]:
         """Efficiency of each run as the bench would give it [1]."""
         found, typical = self._deviations(values, data, values)
-        return transmission_efficiency(self._of_run(typical) + found.sd * jax.random.normal(key, found.sd.shape))
+        mounting = found.sd * scatter(key, found.sd.shape, self.cable.description)
+        return transmission_efficiency(self._of_run(typical) + mounting)
 
     def _of_run(self, of_recording: Array) -> Array:
         """Mean over the recordings of each run."""

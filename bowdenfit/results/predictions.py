@@ -7,6 +7,7 @@ import numpy as np
 
 from bowdenfit.errors import DatasetError, UsageError
 from bowdenfit.measurements.units import conversion_factor
+from bowdenfit.models.noise import noise_law
 from bowdenfit.models.scatter import RUN_SCATTER
 from bowdenfit.predictions.draws import output_force_at
 from bowdenfit.results.answers import Interval
@@ -76,4 +77,4 @@ def _mounting(fit: Fit, n: int) -> np.ndarray:
     """Effect of one new mounting on the friction exponent, for every draw."""
     posterior = fit.posterior
     scatter = 0.0 if posterior is None else posterior.values.get(RUN_SCATTER, np.zeros(1)).ravel()
-    return scatter * np.random.default_rng([fit.provenance.seed, 3]).standard_normal(n)
+    return scatter * noise_law(fit.dataset.description).draw_with(np.random.default_rng([fit.provenance.seed, 3]), n)

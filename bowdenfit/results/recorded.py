@@ -7,6 +7,7 @@ import jax.numpy as jnp
 import numpy as np
 
 from bowdenfit.measurements.recordings import PULL, Recording, Recordings
+from bowdenfit.models.noise import noise_law
 from bowdenfit.models.recorded_blocks import RECORDED
 from bowdenfit.models.scatter import BLOCK_NOISE, RUN_SCATTER
 from bowdenfit.predictions.recorded import DRAWS, Follower, blocks_shown
@@ -62,7 +63,8 @@ def _predicted(fit: Fit, recordings: Recordings, follower: Follower) -> tuple[np
         return force[:1], exponent[:3]
     tau = fit.posterior.values[RUN_SCATTER].ravel() if RUN_SCATTER in fit.posterior.values else np.zeros(1)
     scatter = tau[np.linspace(0, len(tau) - 1, DRAWS).astype(int)]
-    mounting = scatter[:, None] * np.random.default_rng([fit.provenance.seed, 4]).standard_normal((DRAWS, n))
+    law, generator = noise_law(fit.dataset.description), np.random.default_rng([fit.provenance.seed, 4])
+    mounting = scatter[:, None] * law.draw_with(generator, (DRAWS, n))
     force, exponent = follower(z, mounting)
     return np.quantile(force, _QUANTILES, axis=0), np.quantile(exponent, _QUANTILES, axis=0)
 

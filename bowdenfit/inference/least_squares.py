@@ -5,34 +5,45 @@ on any residual, is reported as not identified. With priors (z itself as further
 posterior at the noise scales' prior medians.
 """
 
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
 from itertools import product
-from typing import Any
 
-import jax
-import jax.numpy as jnp
 import numpy as np
-import optimistix as optx
-from jax import Array
 
 from bowdenfit.errors import ConvergenceError
-from bowdenfit.inference.compilation import compiled
 from bowdenfit.inference.disagreement import Disagreement, disagreements
+from bowdenfit.inference.linearized import linearized
+from bowdenfit.inference.objective import (
+    LOWER_END,
+    Objective,
+    Solution,
+    make_objective,
+    may_end,
+    noise_scales,
+    prior_weights,
+    solve,
+    sum_of_squares,
+)
 from bowdenfit.inference.posterior import Posterior
+from bowdenfit.inference.profiles import Basin, limits
 from bowdenfit.inference.rivals import PINS, contested, fitting_as_well
 from bowdenfit.inference.scatter import scatter_about
-from bowdenfit.parameters.priors import HalfNormal, LogNormal, TruncatedNormal, Uniform
-from bowdenfit.parameters.space import Parameter
 
-LOWER_END = -38.0  # z at which a quantile reaches the lower end of its support in double precision
 UNDETERMINED = "the measurements do not determine it"
 _SUSPECT = -2.0  # below this z an estimate may be on its way to the lower end
-_SINGULAR = 1e-8  # singular values below this fraction of the largest carry no information
+_UNKNOWN = (float("nan"), float("nan"))
 _FAR = 50.0  # standard error in units of the prior's sd beyond which data say nothing of a parameter
 
-Solution = dict[str, Any]
-Objective = Callable[..., Solution]
+__all__ = [
+    "Estimate",
+    "LeastSquares",
+    "MaximumPosterior",
+    "Objective",
+    "least_squares",
+    "make_objective",
+    "maximum_posterior",
+]
 
 
 @dataclass(frozen=True)
@@ -44,12 +55,18 @@ class Estimate:
         standard_error: From the Jacobian; NaN where not identified.
         identified: Whether the data determine it.
         remark: Why not, or that it is fixed; empty otherwise.
+        lower, upper: 90 % interval by the profile of the sum of squares, cut off at the ends of the parameter's range;
+            infinite where nothing limits it, NaN where it was not computed.
+        at_bound: Whether the sum of squares falls all the way to the lower end of its range.
     """
 
     value: float
     standard_error: float
     identified: bool
     remark: str = ""
+    lower: float = float("nan")
+    upper: float = float("nan")
+    at_bound: bool = False
 
 
 @dataclass(frozen=True)
@@ -89,45 +106,15 @@ class MaximumPosterior:
     covariance: np.ndarray
 
 
-def make_objective(posterior: Posterior) -> Objective:
-    """One compiled solve for every use: which parameters are pinned and whether priors count are arguments."""
-    space = posterior.model.space
-
-    def residuals(free: Array, args: Any) -> tuple[Any, Any]:
-        pinned, pin, weight, data = args
-        z = jnp.where(pinned, pin, free)
-        by_term = posterior.residuals(z, data)
-        return jnp.concatenate([*by_term.values(), weight * z]), by_term
-
-    def solve(start: Array, pinned: Array, pin: Array, weight: Array, data: Any) -> dict[str, Any]:
-        args = (pinned, pin, weight, data)
-        solver: optx.LevenbergMarquardt = optx.LevenbergMarquardt(rtol=1e-10, atol=1e-12)
-        solution: optx.Solution = optx.least_squares(
-            residuals, solver, start, args, has_aux=True, max_steps=500, throw=False
-        )
-        z = jnp.where(pinned, pin, solution.value)
-        values, slope = jax.jvp(space.vector, (z,), (jnp.ones_like(z),))
-        jacobian, by_term = jax.jacfwd(residuals, has_aux=True)(solution.value, args)
-        succeeded = solution.result == optx.RESULTS.successful
-        named = space.constrain(z)
-        terms = zip(posterior.model.terms, data, strict=True)
-        found = {"z": z, "values": values, "slope": slope, "residuals": by_term}
-        found["readings"] = {term.name: term.expected(named, d) for term, d in terms}
-        return found | {"jacobian": jacobian[: -z.shape[0]], "succeeded": succeeded}
-
-    vector, flags = jax.ShapeDtypeStruct((space.size,), jnp.float64), jax.ShapeDtypeStruct((space.size,), jnp.bool_)
-    return compiled(solve, vector, flags, vector, vector, posterior.data, run_once=True)
-
-
 def maximum_posterior(posterior: Posterior, objective: Objective) -> MaximumPosterior:
     """Maximum of the posterior with the noise scales at their prior medians.
 
     Raises:
         ConvergenceError: The residuals are not finite at the start.
     """
-    noise = _noise(posterior)
+    noise = noise_scales(posterior)
     n = len(noise)
-    found = _solve(posterior, objective, np.zeros(n), noise, np.zeros(n), np.where(noise, 0.0, 1.0))
+    found = solve(posterior, objective, np.zeros(n), noise, np.zeros(n), prior_weights(noise, True))
     if not all(np.all(np.isfinite(r)) for r in found["residuals"].values()):
         raise ConvergenceError(
             "the model cannot be computed at the prior medians; the usual cause is a prior or a fixed value that is "
@@ -138,7 +125,9 @@ def maximum_posterior(posterior: Posterior, objective: Objective) -> MaximumPost
     return MaximumPosterior(found["z"], np.linalg.inv(information))
 
 
-def least_squares(posterior: Posterior, objective: Objective, start: np.ndarray) -> LeastSquares:
+def least_squares(
+    posterior: Posterior, objective: Objective, start: np.ndarray, intervals: bool = True
+) -> LeastSquares:
     """Least squares without priors, from the maximum of the posterior.
 
     The weights of the tables against each other are the prior medians of the noise scales; the standard errors use the
@@ -148,104 +137,76 @@ def least_squares(posterior: Posterior, objective: Objective, start: np.ndarray)
         posterior: The posterior.
         objective: Its compiled solve.
         start: z to start from.
+        intervals: Whether to compute the profile intervals, which take some twenty solves a parameter.
     """
     found, at_end = _minimum(posterior, objective, start)
     trials = _pinned_elsewhere(posterior, objective, start)
-    return _summarized(posterior, found, _noise(posterior), at_end, trials)
+    noise = noise_scales(posterior)
+    basin = Basin(posterior, objective, found, noise, at_end, prior_weights(noise, False))
+    return _summarized(basin, trials, intervals)
 
 
 def _minimum(posterior: Posterior, objective: Objective, start: np.ndarray) -> tuple[Solution, np.ndarray]:
     """The minimum without priors, and which parameters have run to their lower end there."""
-    parameters, noise = posterior.model.space.free, _noise(posterior)
-    nothing = np.zeros(len(noise))
-    found = _solve(posterior, objective, start, noise, nothing, nothing)
+    parameters, noise = posterior.model.space.free, noise_scales(posterior)
+    nothing, weight = np.zeros(len(noise)), prior_weights(noise, False)
+    found = solve(posterior, objective, start, noise, nothing, weight)
     at_end = np.zeros_like(noise)
-    for i in np.flatnonzero(_may_end(parameters) & ~noise & (found["z"] < _SUSPECT)):
+    for i in np.flatnonzero(may_end(parameters) & ~noise & (found["z"] < _SUSPECT)):
         this, pin = np.arange(len(noise)) == i, np.where(at_end, LOWER_END, 0.0)
         # A step can leap over the minimum into the flat tail of the map from z; only what ends there from the middle too
         # has its minimum there.
-        again = _solve(posterior, objective, np.where(this, 0.0, found["z"]), noise | at_end, pin, nothing)
-        found = min(found, again, key=_sum_of_squares)
+        again = solve(posterior, objective, np.where(this, 0.0, found["z"]), noise | at_end, pin, weight)
+        found = min(found, again, key=sum_of_squares)
         if found["z"][i] >= _SUSPECT:
             continue
         trial_end = at_end | this
         pin = np.where(trial_end, LOWER_END, 0.0)
-        trial = _solve(posterior, objective, found["z"], noise | trial_end, pin, nothing)
-        if _sum_of_squares(trial) <= _sum_of_squares(found) * (1 + 1e-7) + 1e-14:
+        trial = solve(posterior, objective, found["z"], noise | trial_end, pin, weight)
+        if sum_of_squares(trial) <= sum_of_squares(found) * (1 + 1e-7) + 1e-14:
             at_end, found = trial_end, trial
     return found, at_end
 
 
 def _pinned_elsewhere(posterior: Posterior, objective: Objective, start: np.ndarray) -> list[Solution]:
     """Solutions with one parameter of the elastic side, or of friction beside it, pinned away from the minimum."""
-    parameters, noise = posterior.model.space.free, _noise(posterior)
+    parameters, noise = posterior.model.space.free, noise_scales(posterior)
     roles = ["friction", "elastic"] if any(p.role == "elastic" for p in parameters) else []
-    nothing, trials = np.zeros(len(noise)), []
+    weight, trials = prior_weights(noise, False), []
     for i, z in product([i for i, p in enumerate(parameters) if p.role in roles], PINS):
         this = np.arange(len(noise)) == i
-        trials.append(_solve(posterior, objective, start, noise | this, np.where(this, z, 0.0), nothing))
+        trials.append(solve(posterior, objective, start, noise | this, np.where(this, z, 0.0), weight))
     return trials
 
 
-def _solve(
-    posterior: Posterior,
-    objective: Objective,
-    start: np.ndarray,
-    pinned: np.ndarray,
-    pin: np.ndarray,
-    weight: np.ndarray,
-) -> Solution:
-    return jax.tree.map(np.asarray, objective(start, pinned, pin, weight, posterior.data))
-
-
-def _sum_of_squares(found: Solution) -> float:
-    return float(sum(np.sum(r**2) for r in found["residuals"].values()))
-
-
-def _noise(posterior: Posterior) -> np.ndarray:
-    """Which free parameters are noise scales, held at their prior median in least squares."""
-    return np.array([p.role == "noise" for p in posterior.model.space.free], dtype=bool)
-
-
-def _may_end(parameters: tuple[Parameter, ...]) -> np.ndarray:
-    """Which parameters have a lower end that an estimate can run to."""
-    ending = (LogNormal, HalfNormal, TruncatedNormal, Uniform)
-    return np.array([isinstance(p.prior, ending) for p in parameters], dtype=bool)
-
-
-def _summarized(
-    posterior: Posterior, found: Solution, noise: np.ndarray, at_end: np.ndarray, trials: Sequence[Solution]
-) -> LeastSquares:
-    space = posterior.model.space
-    active = np.flatnonzero(~noise & ~at_end)
-    u, s, vt = np.linalg.svd(found["jacobian"][:, active], full_matrices=True)
-    informed = np.zeros(len(active), dtype=bool)
-    informed[: len(s)] = s > _SINGULAR * max(s.max(initial=0.0), 1e-30)
-    s, u = s[informed[: len(s)]], u[:, : len(active)][:, informed[: u.shape[1]]]
-    scale, residual_sd = scatter_about(posterior.model.terms, found["residuals"], np.sum(u**2, axis=1))
-    root = vt[informed].T / s
-    error = np.sqrt(np.sum((root @ (u.T * scale)) ** 2, axis=1))
-    rivals = fitting_as_well(found, trials, scale, len(s))
-    undetermined = np.sum(vt[~informed] ** 2, axis=0) > 1e-6
-    lost = undetermined | (np.abs(found["z"][active]) > _FAR) | (np.sqrt(np.sum(root**2, axis=1)) > _FAR)
+def _summarized(basin: Basin, trials: Sequence[Solution], intervals: bool) -> LeastSquares:
+    posterior, found, at_end = basin.posterior, basin.found, basin.at_end
+    space, terms = posterior.model.space, posterior.model.terms
+    active = np.flatnonzero(~basin.pinned & ~at_end)
+    about = linearized(found["jacobian"][:, active])
+    scale, residual_sd = scatter_about(terms, found["residuals"], about.leverage)
+    rivals = fitting_as_well(found, trials, scale, about.readings.shape[1])
+    error, determined = np.full(space.size, np.nan), at_end.copy()
+    error[active] = np.linalg.norm(about.moves(scale), axis=1)
+    determined[active] = about.determined & (np.abs(found["z"][active]) <= _FAR) & (about.unit_error <= _FAR)
+    profiled = limits(basin, scale, determined) if intervals else {}
     estimates: dict[str, Estimate] = {}
     for i, p in enumerate(space.free):
-        value = float(found["values"][i] * p.shown_scale)
-        if noise[i]:
+        value, limit = float(found["values"][i] * p.shown_scale), profiled.get(p.name, _UNKNOWN)
+        if basin.pinned[i]:
             continue
         if at_end[i]:
-            remark = f"no finite minimum: runs to its lower end, {value:.3g}"
-            estimates[p.name] = Estimate(np.nan, np.nan, False, remark)
-        elif lost[np.searchsorted(active, i)]:
+            estimates[p.name] = Estimate(np.nan, np.nan, False, _at_bound(value, limit[1]), *limit, at_bound=True)
+        elif not determined[i]:
             estimates[p.name] = Estimate(np.nan, np.nan, False, UNDETERMINED)
         else:
-            sd = abs(found["slope"][i] * error[np.searchsorted(active, i)]) * p.shown_scale
-            estimates[p.name] = _estimate(value, float(sd), [float(r["values"][i]) * p.shown_scale for r in rivals])
+            sd = float(abs(found["slope"][i] * error[i]) * p.shown_scale)
+            others = [float(r["values"][i]) * p.shown_scale for r in rivals]
+            estimates[p.name] = _estimate(value, sd, others, limit)
     for p in space.fixed:
         estimates[p.name] = Estimate((p.fixed or 0.0) * p.shown_scale, np.nan, True, "fixed")
-    condition = (float(s[0] / s[-1]) if informed.all() else float("inf")) if len(active) else 1.0
     message = "" if found["succeeded"] else "the solver stopped before it met its tolerance"
-    total = _sum_of_squares(found)
+    total = sum_of_squares(found)
     scales = {p.name: v * p.shown_scale for p, v in zip(space.free, found["values"], strict=True)}
     scales |= {p.name: (p.fixed or 0.0) * p.shown_scale for p in space.fixed}
     residual_sd = {t.name: residual_sd[t.name] * float(scales[t.noise]) for t in posterior.model.terms}
@@ -256,7 +217,7 @@ def _summarized(
         estimates,
         residual_sd,
         found["readings"],
-        condition,
+        about.condition_number,
         total,
         found["z"],
         bool(found["succeeded"]),
@@ -265,12 +226,18 @@ def _summarized(
     )
 
 
-def _estimate(value: float, sd: float, rivals: Sequence[float]) -> Estimate:
+def _estimate(value: float, sd: float, rivals: Sequence[float], limit: tuple[float, float]) -> Estimate:
     """An estimate, unless solutions that fit about as well lie far outside its standard error."""
     ends = contested(value, sd, rivals)
     if ends is None:
-        return Estimate(value, sd, True)
-    return Estimate(np.nan, np.nan, False, f"values from {ends[0]:.3g} to {ends[1]:.3g} fit about as well")
+        return Estimate(value, sd, True, "", *limit)
+    return Estimate(np.nan, np.nan, False, f"values from {ends[0]:.3g} to {ends[1]:.3g} fit about as well", *limit)
+
+
+def _at_bound(value: float, upper: float) -> str:
+    """What is known of a parameter whose sum of squares falls all the way to the lower end of its range."""
+    most = "" if np.isnan(upper) else "; nothing limits it above" if np.isinf(upper) else f"; at most {upper:.3g}"
+    return f"no finite minimum: runs to its lower end, {value:.3g}{most}"
 
 
 def _by_term(posterior: Posterior, found: Solution) -> dict[str, np.ndarray]:

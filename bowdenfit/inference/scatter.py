@@ -1,6 +1,6 @@
 """How the readings of each table scatter about a fit, by what makes them scatter."""
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 
 import numpy as np
 
@@ -16,15 +16,31 @@ def scatter_about(
 
     A block whose residuals are all used up by parameters has no scatter of its own; its weight stands.
     """
-    scale, by_table, start = np.ones(len(leverage)), {}, 0
+    scale = np.ones(len(leverage))
+    by_table: dict[str, float] = {}
+    for name, rows, values, freedom in _blocks(terms, residuals, leverage):
+        spread = float(np.sqrt(np.sum(values**2) / freedom)) if freedom > _FREEDOM else float("nan")
+        scale[rows] = spread if np.isfinite(spread) else 1.0
+        by_table.setdefault(name, spread)
+    return scale, by_table
+
+
+def freedom_by_block(
+    terms: Sequence[Term], residuals: Mapping[str, np.ndarray], leverage: np.ndarray
+) -> tuple[list[slice], np.ndarray]:
+    """Rows of each block, and the degrees of freedom of its scatter; infinite where its weight stands."""
+    blocks = [(rows, freedom) for _, rows, _, freedom in _blocks(terms, residuals, leverage)]
+    return [rows for rows, _ in blocks], np.array([f if f > _FREEDOM else np.inf for _, f in blocks])
+
+
+def _blocks(
+    terms: Sequence[Term], residuals: Mapping[str, np.ndarray], leverage: np.ndarray
+) -> Iterator[tuple[str, slice, np.ndarray, float]]:
+    """Table, rows, residuals and degrees of freedom of every block of residuals that scatter alike."""
+    start = 0
     for term in terms:
-        spreads, first = [], start
+        first = start
         for count, independent in term.residual_blocks:
             rows, values = slice(start, start + count), residuals[term.name][start - first : start - first + count]
-            freedom = min(int(np.count_nonzero(values)), independent) - float(leverage[rows].sum())
-            spread = float(np.sqrt(np.sum(values**2) / freedom)) if freedom > _FREEDOM else float("nan")
-            scale[rows] = spread if np.isfinite(spread) else 1.0
-            spreads.append(spread)
+            yield term.name, rows, values, min(int(np.count_nonzero(values)), independent) - float(leverage[rows].sum())
             start = rows.stop
-        by_table[term.name] = spreads[0]
-    return scale, by_table

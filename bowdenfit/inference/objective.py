@@ -1,0 +1,112 @@
+"""The residuals of a posterior as the solver sees them: which parameters are pinned, and whether priors count."""
+
+from collections.abc import Callable
+from typing import Any
+
+import jax
+import jax.numpy as jnp
+import numpy as np
+from jax import Array
+
+from bowdenfit.inference.compilation import compiled
+from bowdenfit.inference.posterior import Posterior
+from bowdenfit.inference.solver import minimize
+from bowdenfit.parameters.priors import HalfNormal, LogNormal, TruncatedNormal, Uniform
+from bowdenfit.parameters.space import Parameter
+
+Solution = dict[str, Any]
+Objective = Callable[..., Solution]
+
+_TIE = 1e-6  # weight of z that keeps what no reading tells from wandering off, and moves nothing else
+LOWER_END = -38.0  # z at which a quantile reaches the lower end of its support in double precision
+
+
+def make_objective(posterior: Posterior) -> Objective:
+    """One compiled program for every solve: which parameters are pinned and whether priors count are arguments.
+
+    The objective takes the z to start from, which parameters are pinned and where, the weight of each z as a residual of
+    its own (1 with the priors, 0 without), the data, and whether to be quick. It gives z, values and their slope by z,
+    residuals and expected readings by term, all residuals with those of the priors stacked, the Jacobian of the residuals
+    (zero for pinned parameters; `sensitivity` has theirs too), and whether the solver succeeded.
+    """
+    space = posterior.model.space
+    vector = jax.ShapeDtypeStruct((space.size,), jnp.float64)
+    program = compiled(_program(posterior), vector, vector, posterior.data, run_once=True)
+
+    def objective(
+        start: np.ndarray, pinned: np.ndarray, pin: np.ndarray, weight: np.ndarray, data: Any, quick: bool = False
+    ) -> Solution:
+        free, at_start, on_device = np.flatnonzero(~pinned), np.where(pinned, pin, start), jax.device_put(data)
+
+        def everywhere(part: np.ndarray) -> np.ndarray:
+            z = at_start.copy()
+            z[free] = part
+            return z
+
+        def evaluate(part: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+            found = program(everywhere(part), weight, on_device)
+            return np.asarray(found["stacked"]), np.asarray(found["jacobian"])[:, free]
+
+        minimum = minimize(evaluate, at_start[free], quick)
+        found = jax.tree.map(np.asarray, program(everywhere(minimum.x), weight, on_device))
+        sensitivity = found["jacobian"][: -space.size]
+        jacobian = np.where(pinned, 0.0, sensitivity)
+        return found | {"jacobian": jacobian, "sensitivity": sensitivity, "succeeded": minimum.succeeded}
+
+    return objective
+
+
+def _program(posterior: Posterior) -> Callable[..., Solution]:
+    """Everything that one z gives."""
+    space = posterior.model.space
+
+    def residuals(z: Array, weight: Array, data: Any) -> tuple[Array, dict[str, Array]]:
+        by_term = posterior.residuals(z, data)
+        stacked = jnp.concatenate([*by_term.values(), weight * z])
+        return stacked, by_term | {"": stacked}
+
+    def evaluated(z: Array, weight: Array, data: Any) -> Solution:
+        jacobian, by_term = jax.jacfwd(residuals, has_aux=True)(z, weight, data)
+        values, slope = jax.jvp(space.vector, (z,), (jnp.ones_like(z),))
+        named = space.constrain(z)
+        terms = zip(posterior.model.terms, data, strict=True)
+        readings = {term.name: term.expected(named, d) for term, d in terms}
+        found = {"z": z, "values": values, "slope": slope, "readings": readings, "jacobian": jacobian}
+        return found | {"stacked": by_term.pop(""), "residuals": by_term}
+
+    return evaluated
+
+
+def solve(
+    posterior: Posterior,
+    objective: Objective,
+    start: np.ndarray,
+    pinned: np.ndarray,
+    pin: np.ndarray,
+    weight: np.ndarray,
+    quick: bool = False,
+) -> Solution:
+    """The minimum of the posterior's own data; see `make_objective`."""
+    return objective(start, pinned, pin, weight, posterior.data, quick)
+
+
+def sum_of_squares(found: Solution) -> float:
+    """Sum of squares of the standardized residuals, without those of the priors."""
+    return float(sum(np.sum(r**2) for r in found["residuals"].values()))
+
+
+def noise_scales(posterior: Posterior) -> np.ndarray:
+    """Which free parameters are noise scales, held at their prior median in least squares."""
+    return np.array([p.role == "noise" for p in posterior.model.space.free], dtype=bool)
+
+
+def prior_weights(noise: np.ndarray, with_priors: bool) -> np.ndarray:
+    """Weight of each z as a residual: 1 with priors; without them so little that it decides only where nothing else does."""
+    return np.where(noise, 0.0, 1.0 if with_priors else _TIE)
+
+
+def may_end(parameters: tuple[Parameter, ...]) -> np.ndarray:
+    """Which parameters have a lower end that an estimate can run to."""
+    return np.array(
+        [isinstance(p.prior, LogNormal | HalfNormal | TruncatedNormal | Uniform) for p in parameters], dtype=bool
+    )

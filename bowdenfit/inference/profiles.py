@@ -1,0 +1,249 @@
+r"""Profiles of the sum of squares: one parameter pinned, the others fitted again, and how far the sum of squares rises.
+
+The 90 % interval of a parameter holds the values :math:`\theta` at which
+
+.. math:: \frac{C}{V}\,[S(\theta) - S(\hat\theta)] \le t^2_{\nu,\,0.95}
+
+with C the variance that readings of unit scatter would give the parameter and V the one that their scatter about the fit
+gives it, table by table. Where all readings scatter alike, V/C is their variance and this is the F interval of the
+textbooks; of a model that is linear in all its parameters it is the estimate plus and minus t standard errors. The degrees
+of freedom are Satterthwaite's: those of the tables in proportion to what they contribute to V. Limits at the end of a
+parameter's range belong to the interval: it is cut off there, not moved. Where the errors of a row's own angles enter by the
+effective variance, the sum of squares has each value's own weights, so that the interval leans toward the solution with the
+true angles as unknowns; it holds nine in ten truths there, when the standard error's no longer does.
+
+References:
+    Bates and Watts, Nonlinear Regression Analysis and Its Applications (1988), section 6.1.
+    Chandler and Bate, Inference for clustered data using the independence loglikelihood, Biometrika 94 (2007), 167.
+    Satterthwaite, An approximate distribution of estimates of variance components, Biometrics Bulletin 2 (1946), 110.
+"""
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from functools import cache
+
+import numpy as np
+
+from bowdenfit.inference.linearized import linearized
+from bowdenfit.inference.objective import LOWER_END, Objective, Solution, may_end, noise_scales, prior_weights, solve
+from bowdenfit.inference.posterior import Posterior
+from bowdenfit.inference.scatter import freedom_by_block
+from bowdenfit.parameters.priors import Uniform
+
+PROBABILITY = 0.9
+FARTHEST = -LOWER_END
+_ALWAYS = ("friction", "friction_model")  # roles whose intervals are worth their time in large problems
+_SMALL = 20_000  # entries of the Jacobian up to which every parameter's interval is
+_INSIDE = -2.0  # z a little inside the range of a parameter that is at its lower end
+_PRECISION = 3e-4  # of a limit, in the steps that lead to it
+_MOST_STEPS = 50
+_LEAST_STEP, _MOST_STEP, _LONGEST_STEP = 1e-6, 1.0, 8.0  # first step from the minimum, and all others [z]
+
+
+@dataclass(frozen=True)
+class Profile:
+    """How the sum of squares rises on both sides of the minimum.
+
+    Args:
+        name: Name of the parameter.
+        values: Its values, in its shown unit, rising.
+        rise: By how much the sum of squares of the standardized residuals is larger there than at the minimum, the other
+            parameters fitted again; noise scales at their prior median.
+    """
+
+    name: str
+    values: np.ndarray
+    rise: np.ndarray
+
+
+@dataclass(frozen=True)
+class Basin:
+    """A minimum, and what stays pinned while one of its parameters is moved.
+
+    Args:
+        posterior: The posterior.
+        objective: Its compiled solve.
+        found: The minimum.
+        pinned: Noise scales.
+        at_end: Parameters at the lower end of their range, which may leave it when another is moved.
+        weight: Weight of each z as a residual of its own.
+    """
+
+    posterior: Posterior
+    objective: Objective
+    found: Solution
+    pinned: np.ndarray
+    at_end: np.ndarray
+    weight: np.ndarray
+
+    def moved(self, index: int, z: float, start: np.ndarray) -> Solution:
+        """The minimum with one parameter pinned at z; others leave the end of their range where that is better."""
+        this = np.arange(len(self.pinned)) == index
+        ended = self.at_end & ~this
+        pin = np.where(this, z, np.where(ended, LOWER_END, self.found["z"]))
+        found = self._solved(start, self.pinned | this | ended, pin)
+        inside = np.where(ended, _INSIDE, found["z"])
+        if not ended.any() or not np.any(ended & (self._gradient(inside) < 0)):
+            return found
+        return min(found, self._solved(inside, self.pinned | this, pin), key=_total)
+
+    def _solved(self, start: np.ndarray, pinned: np.ndarray, pin: np.ndarray) -> Solution:
+        return solve(self.posterior, self.objective, start, pinned, pin, self.weight, quick=True)
+
+    def _gradient(self, z: np.ndarray) -> np.ndarray:
+        """Of half the sum of squares."""
+        there = self._solved(z, np.ones_like(self.pinned), z)
+        return there["stacked"][: -len(z)] @ there["sensitivity"]
+
+    def rise(self, index: int) -> Callable[[float], float]:
+        """By how much the sum of squares is larger where z of a parameter is pinned; not a number where it has none."""
+        known, lowest = [self.found["z"]], _total(self.found)
+
+        @cache
+        def at(z: float) -> float:
+            found = self.moved(index, z, min(known, key=lambda other: abs(other[index] - z)))
+            if not np.isfinite(_total(found)):
+                return float("nan")
+            known.append(found["z"])
+            return _total(found) - lowest
+
+        return at
+
+    def value(self, index: int, z: float) -> float:
+        """Value of a parameter at z, in its shown unit; infinite where its range has no end."""
+        parameter = self.posterior.model.space.free[index]
+        if z > 0 and not (isinstance(parameter.prior, Uniform) or np.isfinite(z)):
+            return float("inf")
+        if z < 0 and not (may_end((parameter,))[0] or np.isfinite(z)):
+            return float("-inf")
+        every, at = np.ones_like(self.pinned), np.clip(np.full(len(self.pinned), z), -FARTHEST, FARTHEST)
+        values = self._solved(at, every, at)["values"]
+        return float(values[index]) * parameter.shown_scale
+
+
+def profile(
+    posterior: Posterior,
+    objective: Objective,
+    name: str,
+    start: np.ndarray,
+    z: Sequence[float] | np.ndarray | None = None,
+    with_priors: bool = False,
+) -> Profile:
+    """The profile of one free parameter, for figures and for questions of identifiability.
+
+    Args:
+        posterior: The posterior.
+        objective: Its compiled solve.
+        name: Name of the parameter.
+        start: z to start from, such as that of the maximum of the posterior.
+        z: Where the parameter is pinned, as z; 25 values over the central 99.9 % of its prior if omitted.
+        with_priors: Whether the priors count as measurements of the parameters.
+    """
+    space, noise = posterior.model.space, noise_scales(posterior)
+    index, nothing = space.index[name], np.zeros(space.size)
+    weight = prior_weights(noise, with_priors)
+    found = solve(posterior, objective, start, noise, nothing, weight)
+    basin = Basin(posterior, objective, found, noise, np.zeros_like(noise), weight)
+    rise = basin.rise(index)
+    pins = [float(pin) for pin in np.sort(np.linspace(-3.3, 3.3, 25) if z is None else np.asarray(z, dtype=float))]
+    rises = {pin: rise(pin) for pin in sorted(pins, key=lambda pin: abs(pin - found["z"][index]))}  # outward
+    return Profile(name, np.array([basin.value(index, pin) for pin in pins]), np.array([rises[pin] for pin in pins]))
+
+
+def limits(basin: Basin, scale: np.ndarray, determined: np.ndarray) -> dict[str, tuple[float, float]]:
+    """90 % intervals by parameter, in their shown units; without those of parameters that are not determined.
+
+    Args:
+        basin: The minimum.
+        scale: Scatter of each standardized residual about it.
+        determined: Which parameters are.
+    """
+    space, found = basin.posterior.model.space, {}
+    cheap = basin.found["jacobian"].size <= _SMALL
+    for i, p in enumerate(space.free):
+        if determined[i] and not basin.pinned[i] and (cheap or p.role in _ALWAYS):
+            error, ratio, freedom = _spread(basin, scale, i)
+            center = float(basin.found["z"][i])
+            if ratio > 0:
+                ends = interval(basin.rise(i), center, error, ratio, freedom)
+                found[p.name] = basin.value(i, ends[0]), basin.value(i, ends[1])
+    return found
+
+
+def _spread(basin: Basin, scale: np.ndarray, index: int) -> tuple[float, float, float]:
+    """Standard error of z of a parameter, its variance over that by readings of unit scatter, and degrees of freedom.
+
+    Not numbers where the readings say nothing of it, not even a little inside its range.
+    """
+    found, terms = basin.found, basin.posterior.model.terms
+    if basin.at_end[index]:  # where z has no influence; a little inside its range
+        found = basin.moved(index, _INSIDE, basin.found["z"])
+    columns = np.flatnonzero(~basin.pinned & ~basin.at_end | (np.arange(len(basin.pinned)) == index))
+    about = linearized(found["sensitivity"][:, columns])
+    place = int(np.searchsorted(columns, index))
+    if not about.determined[place] or not about.unit_error[place] > 0:
+        return float("nan"), float("nan"), 1.0
+    moves = about.moves(scale)[place] ** 2
+    rows, freedom = freedom_by_block(terms, basin.found["residuals"], about.leverage)
+    variance = float(np.sum(moves))
+    unit = float(about.unit_error[place]) ** 2
+    return float(np.sqrt(variance)), variance / unit, freedom_of(np.array([np.sum(moves[r]) for r in rows]), freedom)
+
+
+def interval(
+    rise: Callable[[float], float], center: float, error: float, ratio: float, freedom: float
+) -> tuple[float, float]:
+    """Limits of the 90 % interval, as z; infinite where the sum of squares never rises enough.
+
+    Args:
+        rise: By how much the sum of squares is larger at a z.
+        center: z of the minimum.
+        error: Standard error of z there; the first step is taken from it.
+        ratio: V/C, variance of the parameter over what readings of unit scatter would give it.
+        freedom: Degrees of freedom.
+    """
+    from scipy.special import stdtrit
+
+    quantile = float(stdtrit(freedom, (1 + PROBABILITY) / 2))
+
+    def above(z: float) -> float:
+        risen = rise(z)
+        return np.sqrt(max(risen, 0.0) / ratio) - quantile if np.isfinite(risen) else float("nan")
+
+    step = float(np.clip(quantile * error, _LEAST_STEP, _MOST_STEP))
+    return _limit(above, center, -step), _limit(above, center, step)
+
+
+def _limit(above: Callable[[float], float], center: float, step: float) -> float:
+    """Where a function that is negative at the center first becomes positive, going by growing steps."""
+    from scipy.optimize import brentq
+
+    inside, end = center, np.copysign(FARTHEST, step)
+    for _ in range(_MOST_STEPS):
+        outside = float(np.clip(inside + step, -FARTHEST, FARTHEST))
+        reached = above(outside)
+        if reached >= 0:
+            return float(brentq(above, inside, outside, xtol=_PRECISION * abs(step))) if reached > 0 else outside
+        if np.isnan(reached):
+            step /= 4
+        else:
+            inside, step = outside, float(np.clip(2 * step, -_LONGEST_STEP, _LONGEST_STEP))
+        if inside == end or abs(step) < _LEAST_STEP:
+            break
+    return float(np.copysign(np.inf, step))
+
+
+def freedom_of(parts: np.ndarray, freedom: np.ndarray) -> float:
+    """Satterthwaite's degrees of freedom of a variance; at least 1.
+
+    Args:
+        parts: What each block of residuals contributes to the variance.
+        freedom: Degrees of freedom of each block's scatter; infinite where it is known.
+    """
+    share = parts / max(float(np.sum(parts)), 1e-300)
+    return float(np.clip(1 / max(float(np.sum(share**2 / freedom)), 1e-9), 1.0, 1e9))
+
+
+def _total(found: Solution) -> float:
+    """Sum of squares of everything that counts, priors too where they do."""
+    return float(found["stacked"] @ found["stacked"])

@@ -75,7 +75,7 @@ def test_a_saved_fit_gives_the_same_answers_again(fit, folder, tmp_path):
 def test_results_of_older_schemas_are_read(on_body, tmp_path, schema):
     bf.fit(on_body, output=tmp_path / "fit", mcmc=False, figures=False)
     page = json.loads((tmp_path / "fit" / "fit.json").read_text())
-    assert page["schema"] == 3
+    assert page["schema"] == 4
     page["schema"] = schema
     gone = ["stretch", "preload", "loop"] + (["recordings"] if schema == 1 else [])
     page["measurements"] = {k: v for k, v in page["measurements"].items() if k not in gone}

@@ -62,6 +62,26 @@ def test_a_fit_is_read_back_bit_for_bit(saved):
     assert (fit.provenance.seed, fit.provenance.versions) == (again.provenance.seed, again.provenance.versions)
 
 
+def test_a_fit_from_before_there_was_a_second_sampler_is_read(saved, tmp_path):
+    fit, folder = saved
+    copy = shutil.copytree(folder, tmp_path / "copy")
+    page = json.loads((copy / "fit.json").read_text())
+    assert page["schema"] == 4
+    page["schema"] = 3
+    for key in ("sampler", "trajectories", "agreement"):
+        del page["posterior"][key]
+    for estimate in page["least_squares"]["estimates"].values():
+        for key in ("lower", "upper", "at_bound"):
+            estimate.pop(key, None)
+    for key in ("method", "n_chains", "target_acceptance"):
+        del page["description"]["sampler"][key]
+    (copy / "fit.json").write_text(json.dumps(page))
+    again = bf.load(copy)
+    assert_same(fit.posterior, again.posterior, "posterior")
+    assert again.posterior.sampler == "emcee"
+    assert fit.dataset.description == again.dataset.description
+
+
 def test_a_loaded_fit_gives_the_same_answers(saved):
     fit, folder = saved
     again = bf.load(folder)
@@ -161,6 +181,19 @@ def test_a_resumed_fit_equals_one_that_was_never_interrupted(saved, on_body, tmp
     resumed = bf.fit(on_body, output=folder, settings=QUICK, figures=False, resume=True)
     np.testing.assert_array_equal(resumed.posterior.z, fit.posterior.z)
     assert resumed.provenance.seed == 3
+
+
+def test_a_checkpoint_from_before_a_setting_existed_is_resumed(saved, on_body, tmp_path):
+    """Settings that have come since stand at their defaults."""
+    fit, folder = saved
+    copy = shutil.copytree(folder, tmp_path / "copy")
+    with h5py.File(copy / "chain.h5", "a") as file:
+        page = json.loads(file.attrs["fingerprint"])
+        for key in ("method", "n_chains", "target_acceptance"):
+            del page["description"]["sampler"][key]
+        file.attrs["fingerprint"] = json.dumps(page)
+    again = bf.fit(on_body, output=copy, settings=QUICK, figures=False, resume=True)
+    np.testing.assert_array_equal(again.posterior.z, fit.posterior.z)
 
 
 def test_resume_tops_up_a_finished_fit(saved, on_body, tmp_path):

@@ -19,6 +19,12 @@ NOT_TRUSTED = 3
     "--output", "-o", type=click.Path(path_type=Path), help="Results folder.  [default: fits/NAME OF DATASET]"
 )
 @click.option("--mcmc/--no-mcmc", default=True, help="Sample the posterior; without it there are no intervals.")
+@click.option(
+    "--sampler",
+    type=click.Choice(["emcee", "nuts", "both"]),
+    help="What samples: ensembles of walkers, NUTS for many parameters or narrow posteriors, or both, to have one check the "
+    "other.  [default: as in cable.toml, else emcee]",
+)
 @click.option("--figures/--no-figures", default=True, help="Draw the figures.")
 @click.option(
     "--seed", type=click.IntRange(0, 2**31 - 1), help="Seed of everything random.  [default: drawn, and recorded]"
@@ -30,6 +36,7 @@ def fit(
     dataset: Path,
     output: Path | None,
     mcmc: bool,
+    sampler: str | None,
     figures: bool,
     seed: int | None,
     resume: bool,
@@ -49,6 +56,7 @@ def fit(
             dataset,
             output=folder,
             mcmc=mcmc,
+            sampler=sampler,
             seed=seed,
             resume=resume,
             force=force,

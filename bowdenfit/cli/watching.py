@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING
 import click
 
 if TYPE_CHECKING:
-    from bowdenfit.inference.ensemble import Progress
+    from bowdenfit.inference.chain import Progress
 
 INTERRUPTED = 130
 
@@ -76,6 +76,7 @@ def _progress_bar() -> "Iterator[Callable[[Progress], None]]":
 
         def report(progress: "Progress") -> None:
             bar.n = progress.steps
+            bar.set_description_str(f"sampling with {progress.sampler}", refresh=False)
             if progress.r_hat is not None and progress.ess is not None:
                 bar.set_postfix_str(f"R-hat {progress.r_hat:.3f}, effective draws {progress.ess:.0f}", refresh=False)
             bar.refresh()

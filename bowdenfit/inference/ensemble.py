@@ -4,8 +4,7 @@ Moves: differential evolution, and now and then its mode-jumping variant. Not `D
 does not sample the density it is given, and every ensemble agrees on the wrong answer.
 """
 
-from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass
+from collections.abc import Callable, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -13,7 +12,8 @@ import emcee
 import numpy as np
 
 from bowdenfit.description import SamplerSettings
-from bowdenfit.inference.diagnostics import Diagnostics, diagnose_all, shortfalls
+from bowdenfit.inference.chain import Chain, Diagnose, Progress, Quantities, judged, stuck, worst
+from bowdenfit.inference.diagnostics import diagnose_all
 from bowdenfit.inference.least_squares import MaximumPosterior
 from bowdenfit.inference.posterior import Posterior
 
@@ -22,41 +22,7 @@ _BLOCK = 10  # stored states between two reports
 _FIRST_LOOK = 50  # stored states before the first look
 _KEPT_PER_WALKER = 20  # draws that are kept of each walker, spread over the second half of its path
 
-Diagnose = Callable[[Mapping[str, np.ndarray], int], dict[str, Diagnostics]]
 Moves = Sequence[tuple[emcee.moves.RedBlueMove, float]]
-
-
-@dataclass(frozen=True)
-class Progress:
-    """Where sampling stands, for a progress bar; R-hat and effective sample size once they have been looked at."""
-
-    steps: int
-    max_steps: int
-    r_hat: float | None
-    ess: float | None
-
-
-@dataclass(frozen=True)
-class Chain:
-    """Draws of the posterior after burn-in.
-
-    Args:
-        z: Draws in z, (ensemble x walker, draw, parameter).
-        quantities: Named derived quantities of every draw, (ensemble x walker, draw).
-        diagnostics: Of parameters and derived quantities.
-        n_ensembles: Number of independent ensembles.
-        steps: Steps taken by each walker.
-        acceptance: Mean fraction of accepted proposals.
-        reasons: Why the draws should not be trusted; empty if they may.
-    """
-
-    z: np.ndarray
-    quantities: dict[str, np.ndarray]
-    diagnostics: dict[str, Diagnostics]
-    n_ensembles: int
-    steps: int
-    acceptance: float
-    reasons: tuple[str, ...]
 
 
 class SideBySide(emcee.moves.RedBlueMove):
@@ -113,7 +79,7 @@ def sample(
     start: MaximumPosterior,
     settings: SamplerSettings,
     seed: int,
-    quantities: Callable[[np.ndarray], Mapping[str, np.ndarray]],
+    quantities: Quantities,
     checkpoint: Path | None = None,
     resume: bool = False,
     report: Callable[[Progress], None] | None = None,
@@ -158,7 +124,7 @@ def sample(
             if report is not None:
                 report(Progress(int(backend.iteration) * THIN, settings.max_steps, *seen))
         chain = _summarized(posterior, backend, settings, quantities, diagnose)
-        seen = _worst(chain)
+        seen = worst(chain)
         if report is not None:
             report(Progress(chain.steps, settings.max_steps, *seen))
         if not chain.reasons or target >= limit:
@@ -186,7 +152,7 @@ def _summarized(
     posterior: Posterior,
     backend: emcee.backends.Backend,
     settings: SamplerSettings,
-    quantities: Callable[[np.ndarray], Mapping[str, np.ndarray]],
+    quantities: Quantities,
     diagnose: Diagnose,
 ) -> Chain:
     """Draws from the second half of every walker's path, with their diagnostics."""
@@ -194,29 +160,10 @@ def _summarized(
     kept = np.unique(np.linspace(stored // 2, stored - 1, _KEPT_PER_WALKER).round().astype(int))
     # In this order in memory, as in a loaded fit: sums must agree to the last bit.
     z = np.ascontiguousarray(np.asarray(backend.get_chain()[kept]).transpose(1, 0, 2))
-    derived = {k: np.asarray(q).reshape(z.shape[:2]) for k, q in quantities(z.reshape(-1, z.shape[-1])).items()}
-    draws = {p.name: z[..., i] for i, p in enumerate(posterior.model.space.free)} | derived
-    diagnostics = diagnose(draws, settings.n_ensembles)
-    reasons = shortfalls(diagnostics, settings.target_r_hat, settings.target_ess)
+    derived, diagnostics, reasons = judged(posterior, z, settings.n_ensembles, settings, quantities, diagnose)
     if stored < _FIRST_LOOK:
         too_short = f"each walker took {stored * THIN} steps, and {_FIRST_LOOK * THIN} are the least that can be judged"
         reasons = (too_short, *reasons)
-    reasons = (*reasons, *_stuck(z))
+    reasons = (*reasons, *stuck(z))
     acceptance = float(np.mean(backend.accepted)) / stored
     return Chain(z, derived, diagnostics, settings.n_ensembles, stored * THIN, acceptance, reasons)
-
-
-def _stuck(z: np.ndarray) -> tuple[str, ...]:
-    """Walkers that never moved in half their path; a few of them far out pass every other check."""
-    stuck = int(np.sum(np.ptp(z[..., 0], axis=1) == 0)) if z.shape[1] > 1 and z.shape[2] else 0
-    if not stuck:
-        return ()
-    return (
-        f"{stuck} of {len(z)} walkers did not move in the second half of their path, far from where the others are",
-    )
-
-
-def _worst(chain: Chain) -> tuple[float, float]:
-    """Highest R-hat and lowest effective sample size of all quantities."""
-    diagnostics = chain.diagnostics.values()
-    return max(d.r_hat for d in diagnostics), min(min(d.ess_bulk, d.ess_tail) for d in diagnostics)

@@ -2,7 +2,7 @@
 
 import json
 from collections.abc import Callable, Mapping
-from dataclasses import asdict, fields, is_dataclass
+from dataclasses import asdict, fields, is_dataclass, replace
 from pathlib import Path
 from types import NoneType, UnionType
 from typing import Any, get_args, get_origin, get_type_hints
@@ -13,6 +13,7 @@ from jaxtyping import AbstractArray
 from bowdenfit.dataset import Dataset
 from bowdenfit.description_file import parse_description
 from bowdenfit.errors import StoreError
+from bowdenfit.inference.chain import Trajectories
 from bowdenfit.inference.diagnostics import Diagnostics
 from bowdenfit.inference.disagreement import Disagreement
 from bowdenfit.inference.least_squares import Estimate, LeastSquares
@@ -21,10 +22,12 @@ from bowdenfit.predictions.draws import derived_units
 from bowdenfit.results.fit import OPTIMAL_EFFICIENCY, OPTIMAL_LENGTH, Fit, Posterior, Provenance
 from bowdenfit.results.folder import CHAIN, FIT, POSTERIOR, SUMMARY, write_text
 from bowdenfit.results.netcdf import EXPECTED, Coordinates, Groups, read_groups, write_groups
+from bowdenfit.results.samplers import SamplerAgreement
 from bowdenfit.results.summary import summarize
 from bowdenfit.types import Flags, Labels, Matrix
 
-SCHEMA = 3
+SCHEMA = 4
+LOG_POSTERIOR = "lp"
 Migration = Callable[[dict[str, Any]], dict[str, Any]]
 
 
@@ -46,7 +49,19 @@ def _to_schema_3(page: dict[str, Any]) -> dict[str, Any]:
     return page | {"schema": 3, "measurements": measured, "least_squares": squares}
 
 
-MIGRATIONS: Mapping[int, Migration] = {1: _to_schema_2, 2: _to_schema_3}  # from schema N to N + 1
+def _to_schema_4(page: dict[str, Any]) -> dict[str, Any]:
+    """Before there was a second sampler, and least squares had intervals."""
+    posterior, squares = page["posterior"], page["least_squares"]
+    estimates = {
+        name: estimate | {"lower": None, "upper": None, "at_bound": estimate["remark"].startswith("no finite minimum")}
+        for name, estimate in squares["estimates"].items()
+    }
+    if posterior is not None:
+        posterior = posterior | {"sampler": "emcee", "trajectories": None, "agreement": None}
+    return page | {"schema": 4, "posterior": posterior, "least_squares": squares | {"estimates": estimates}}
+
+
+MIGRATIONS: Mapping[int, Migration] = {1: _to_schema_2, 2: _to_schema_3, 3: _to_schema_4}  # from schema N to N + 1
 
 
 def save(fit: Fit, folder: Path, force: bool = False, write_posterior: Callable[..., Any] | None = None) -> None:
@@ -127,16 +142,25 @@ def _fit_page(fit: Fit) -> dict[str, Any]:
         "sha256": fit.dataset.sha256,
         "verdict": {"converged": fit.converged, "reasons": list(fit.reasons)},
         "least_squares": _to_plain(asdict(fit.least_squares)),
-        "posterior": {
-            "n_ensembles": posterior.n_ensembles,
-            "steps": posterior.steps,
-            "acceptance": posterior.acceptance,
-            "diagnostics": _to_plain({name: asdict(d) for name, d in posterior.diagnostics.items()}),
-        }
-        if posterior
-        else None,
+        "posterior": _posterior_counts(posterior) if posterior else None,
         "provenance": asdict(fit.provenance),
         "measurements": _to_plain(asdict(fit.dataset.measurements)),
+    }
+
+
+def _posterior_counts(posterior: Posterior) -> dict[str, Any]:
+    """What is known of the draws as a whole; the draws themselves are in posterior.nc."""
+    trajectories = posterior.trajectories
+    if trajectories is not None:
+        trajectories = replace(trajectories, statistics={})
+    return {
+        "n_ensembles": posterior.n_ensembles,
+        "steps": posterior.steps,
+        "acceptance": posterior.acceptance,
+        "sampler": posterior.sampler,
+        "trajectories": _to_plain(asdict(trajectories)) if trajectories else None,
+        "agreement": _to_plain(asdict(posterior.agreement)) if posterior.agreement else None,
+        "diagnostics": _to_plain({name: asdict(d) for name, d in posterior.diagnostics.items()}),
     }
 
 
@@ -190,10 +214,7 @@ def _rebuilt(kind: Any, value: Any) -> Any:
 
 
 def _least_squares(page: Mapping[str, Any]) -> LeastSquares:
-    estimates = {
-        name: Estimate(_number(e["value"]), _number(e["standard_error"]), e["identified"], e["remark"])
-        for name, e in page["estimates"].items()
-    }
+    estimates = {name: _rebuilt(Estimate, e) for name, e in page["estimates"].items()}
     return LeastSquares(
         estimates,
         {name: _number(value) for name, value in page["residual_sd"].items()},
@@ -216,7 +237,7 @@ def posterior_page(fit: Fit) -> tuple[Groups, Coordinates, dict[str, str], dict[
     groups = {
         "posterior": posterior.values | posterior.optimum,
         "unconstrained_posterior": {p.name: posterior.z[..., i] for i, p in enumerate(space.free)},
-        "sample_stats": {"lp": sum(log_likelihood, log_prior)},
+        "sample_stats": {LOG_POSTERIOR: sum(log_likelihood, log_prior)} | _trajectory_statistics(posterior),
         "log_likelihood": posterior.log_likelihood,
         "posterior_predictive": posterior.replicated,
         "predictions": {f"{EXPECTED}{name}": value for name, value in posterior.expected.items()},
@@ -226,6 +247,11 @@ def posterior_page(fit: Fit) -> tuple[Groups, Coordinates, dict[str, str], dict[
     labels = {term.name: term.labels for term in fit.model.terms}
     attributes = {"provenance": json.dumps(asdict(fit.provenance)), "name": fit.name}
     return groups, labels, attributes, _variable_attributes(fit)
+
+
+def _trajectory_statistics(posterior: Posterior) -> dict[str, np.ndarray]:
+    """Statistics of the trajectory that led to each draw, under ArviZ's names; empty of emcee."""
+    return dict(posterior.trajectories.statistics) if posterior.trajectories else {}
 
 
 def _variable_attributes(fit: Fit) -> dict[str, dict[str, str]]:
@@ -245,6 +271,7 @@ def _posterior(path: Path, page: Mapping[str, Any]) -> Posterior:
     groups = read_groups(path)
     values, z = groups["posterior"], groups["unconstrained_posterior"]
     optimum = {name: values.pop(name) for name in (OPTIMAL_LENGTH, OPTIMAL_EFFICIENCY) if name in values}
+    statistics = {name: value for name, value in groups["sample_stats"].items() if name != LOG_POSTERIOR}
     return Posterior(
         np.stack(list(z.values()), axis=-1),
         values,
@@ -257,4 +284,12 @@ def _posterior(path: Path, page: Mapping[str, Any]) -> Posterior:
         page["n_ensembles"],
         page["steps"],
         page["acceptance"],
+        page["sampler"],
+        _trajectories(page["trajectories"], statistics) if page["trajectories"] else None,
+        _rebuilt(SamplerAgreement | None, page["agreement"]),
     )
+
+
+def _trajectories(page: Mapping[str, Any], statistics: dict[str, np.ndarray]) -> Trajectories:
+    numbers = {"energy_mixing": _number(page["energy_mixing"]), "step_size": _number(page["step_size"])}
+    return Trajectories(**{**page, **numbers, "statistics": statistics})

@@ -2,11 +2,14 @@
 
 import secrets
 from concurrent.futures import Future
+from dataclasses import replace
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, get_args
 
 from bowdenfit.dataset import Dataset
-from bowdenfit.errors import StoreError, UsageError
+from bowdenfit.description import Sampler
+from bowdenfit.description_file import parse_description
+from bowdenfit.errors import DescriptionError, StoreError, UsageError
 from bowdenfit.results.folder import CHAIN, clear, read_checkpoint, refuse_to_overwrite, start_checkpoint
 from bowdenfit.workflow.background import Assistants, draw
 
@@ -36,12 +39,35 @@ def write_results(found: "Fit", folder: Path, figures: bool, helpers: Assistants
         drawn.result()
 
 
+def sampled_by(data: Dataset, method: str) -> Dataset:
+    """The same data set, to be sampled by another method than its description says.
+
+    Raises:
+        UsageError: There is no such sampler.
+    """
+    if method not in get_args(Sampler):
+        raise UsageError(f"there is no sampler {method!r}; choose one of {', '.join(get_args(Sampler))}.")
+    sampler = data.description.sampler.model_copy(update={"method": method})
+    return replace(data, description=data.description.model_copy(update={"sampler": sampler}))
+
+
 def _fingerprint(data: Dataset, seed: int) -> dict[str, Any]:
     """What must not change between an interrupted fit and its continuation; how long to sample may."""
-    description = data.description.to_json()
+    return {"description": _for_good(data.description.to_json()), "sha256": data.sha256, "seed": seed}
+
+
+def _for_good(description: dict[str, Any]) -> dict[str, Any]:
+    """A description without what may change."""
     free = {"max_steps", "target_r_hat", "target_ess"}
-    description["sampler"] = {k: v for k, v in description["sampler"].items() if k not in free}
-    return {"description": description, "sha256": data.sha256, "seed": seed}
+    return description | {"sampler": {k: v for k, v in description["sampler"].items() if k not in free}}
+
+
+def _with_defaults(description: dict[str, Any]) -> dict[str, Any]:
+    """A checkpoint's description as it reads today: settings that have come since stand at their defaults."""
+    try:
+        return _for_good(parse_description(description).to_json())
+    except DescriptionError:
+        return description
 
 
 def checked_seed(folder: Path | None, data: Dataset, mcmc: bool, seed: int | None, resume: bool, force: bool) -> int:
@@ -54,6 +80,7 @@ def checked_seed(folder: Path | None, data: Dataset, mcmc: bool, seed: int | Non
         return secrets.randbelow(LARGEST_SEED) if seed is None else seed
     before = read_checkpoint(folder)
     now = _fingerprint(data, before["seed"] if seed is None else seed)
+    before["description"] = _with_defaults(before["description"])
     changed = [key for key in now if now[key] != before[key]]
     if changed:
         what = {"description": "the description", "sha256": "an input file", "seed": "the seed"}[changed[-1]]

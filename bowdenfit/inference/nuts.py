@@ -1,0 +1,251 @@
+"""Sampling with the No-U-Turn sampler (blackjax): several chains side by side, tuned together, run until they agree.
+
+One compiled program takes every chain some steps further. While tuning, each chain adapts its step size, and between
+windows the mass matrix becomes the covariance of all chains' draws; the first is that of the maximum of the posterior.
+
+Posteriors of few readings are funnels: where the scatter is small, so are the coefficients' ranges, and a step size that
+suits the rest is too long to get in there, and once in to get out. So every tenth trajectory takes steps sixteen times
+finer; only if such trajectories diverge is a corner out of reach.
+
+References:
+    Hoffman and Gelman 2014, "The No-U-Turn sampler" (Journal of Machine Learning Research 15); Betancourt 2017, "A
+    conceptual introduction to Hamiltonian Monte Carlo" (arXiv:1701.02434).
+"""
+
+from collections.abc import Callable, Sequence
+from itertools import accumulate
+from pathlib import Path
+from typing import Any, TypeAlias
+
+import jax
+import jax.numpy as jnp
+import numpy as np
+from blackjax.adaptation.step_size import DualAveragingAdaptationState, dual_averaging_adaptation
+from blackjax.mcmc import nuts
+from jax import Array
+
+from bowdenfit.description import SamplerSettings
+from bowdenfit.inference.chain import Chain, Diagnose, Progress, Quantities, Trajectories, judged, stuck, worst
+from bowdenfit.inference.compilation import compiled
+from bowdenfit.inference.diagnostics import diagnose_all, energy_mixing, trajectory_shortfalls
+from bowdenfit.inference.least_squares import MaximumPosterior
+from bowdenfit.inference.posterior import Posterior
+
+BLOCK = 50  # steps between two reports
+WINDOWS = (
+    1,
+    1,
+    2,
+    4,
+    2,
+)  # blocks of warm-up with one mass matrix each; after the last only the step size is taken over
+WARM_UP = sum(WINDOWS)
+MOST_DOUBLINGS = 10  # of a trajectory
+FINE_EVERY, FINER = 10, 16  # every so many trajectories one with so much shorter steps; a block has a whole number
+_FIRST_LOOK = 5  # blocks of draws before the first look
+_KEPT = 20_480  # draws of all chains that are kept, spread evenly; as many as of emcee's walkers by default
+_FIRST_STEP, _STREAM = 0.1, 3
+_STATISTICS = ("diverging", "energy", "acceptance_rate", "tree_depth", "n_steps")
+
+Block: TypeAlias = dict[str, np.ndarray]  # positions and statistics of its steps, and the tuning at its end
+Program: TypeAlias = Callable[..., Any]
+
+
+def make_program(posterior: Posterior, settings: SamplerSettings) -> Program:
+    """Compiled: `BLOCK` steps of every chain; what it makes depends on the seed and the number of the block alone.
+
+    Args:
+        posterior: The posterior.
+        settings: Number of chains and the acceptance that their step sizes aim at.
+    """
+    size, chains = posterior.model.space.size, settings.n_chains
+    kernel, (_, adapted, _) = nuts.build_kernel(), dual_averaging_adaptation(settings.target_acceptance)
+
+    def block(
+        seed: Array, number: Array, z: Array, tuning: Array, adapting: Array, inverse_mass: Array, data: Any
+    ) -> dict[str, Array]:
+        def log_density(z: Array) -> Array:
+            return posterior.log_density(z, data)
+
+        def move(key: Array, state: Any, step_size: Array) -> Any:
+            return kernel(key, state, log_density, step_size, inverse_mass, MOST_DOUBLINGS)
+
+        def step(carried: Any, turn: Any) -> Any:
+            (states, tuning), (key, fine) = carried, turn
+            step_sizes = jnp.exp(jnp.where(adapting, tuning.log_step_size, tuning.log_step_size_avg))
+            step_sizes = jnp.where(fine, step_sizes / FINER, step_sizes)
+            states, info = jax.vmap(move)(jax.random.split(key, chains), states, step_sizes)
+            acceptance = jnp.nan_to_num(info.acceptance_rate)
+            changed = jax.vmap(adapted)(tuning, acceptance)
+            tuning = jax.tree.map(lambda new, old: jnp.where(adapting & ~fine, new, old), changed, tuning)
+            lengths = info.num_trajectory_expansions, info.num_integration_steps
+            return (states, tuning), (states.position, info.is_divergent, info.energy, acceptance, *lengths)
+
+        keys = jax.random.split(jax.random.fold_in(jax.random.key(seed), number), BLOCK)
+        states = jax.vmap(lambda one: nuts.init(one, log_density))(z)
+        carried = states, DualAveragingAdaptationState(*tuning)
+        (_, tuned), steps = jax.lax.scan(step, carried, (keys, _fine(BLOCK)))
+        found = dict(zip(("z", *_STATISTICS), steps, strict=True))
+        return found | {"tuning": jnp.stack(tuned), "inverse_mass": inverse_mass}
+
+    whole, flag = jax.ShapeDtypeStruct((), jnp.uint32), jax.ShapeDtypeStruct((), jnp.bool_)
+    shapes = [jax.ShapeDtypeStruct(shape, jnp.float64) for shape in ((chains, size), (5, chains), (size, size))]
+    return compiled(block, whole, whole, shapes[0], shapes[1], flag, shapes[2], posterior.data)
+
+
+def _fine(steps: int) -> np.ndarray:
+    """Which of the steps are fine."""
+    return np.arange(steps) % FINE_EVERY == FINE_EVERY - 1
+
+
+def starting_points(
+    posterior: Posterior, start: MaximumPosterior, settings: SamplerSettings, generator: np.random.Generator
+) -> np.ndarray:
+    """Over-dispersed starts, (chain, parameter).
+
+    Noise scales start above their prior median: where hardly any noise is left the density is so narrow that the first
+    trajectories would have to be very short.
+    """
+    spread = np.sqrt(2) * generator.standard_normal((settings.n_chains, len(start.z)))
+    z = start.z + spread @ np.linalg.cholesky(start.covariance).T
+    noise = np.array([p.role == "noise" for p in posterior.model.space.free], dtype=bool)
+    return np.where(noise, np.abs(z), z)
+
+
+def sample(
+    posterior: Posterior,
+    program: Program,
+    start: MaximumPosterior,
+    settings: SamplerSettings,
+    seed: int,
+    quantities: Quantities,
+    checkpoint: Path | None = None,
+    resume: bool = False,
+    report: Callable[[Progress], None] | None = None,
+    diagnose: Diagnose = diagnose_all,
+) -> Chain:
+    """Sample until converged, or until the stated maximum of steps.
+
+    Args:
+        posterior: The posterior.
+        program: What `make_program` made for it.
+        start: Center and covariance of the start.
+        settings: Chains, maximum of steps and targets.
+        seed: Seed of everything random here.
+        quantities: Derived quantities of many z; they must converge too.
+        checkpoint: HDF5 file that every block is written to.
+        resume: Go on from the blocks in `checkpoint`.
+        report: Called after every block.
+        diagnose: What diagnoses all quantities; `diagnose_all`, or something that has another process do it.
+    """
+    points = starting_points(posterior, start, settings, np.random.default_rng([seed, _STREAM]))
+    blocks = _stored(checkpoint) if checkpoint is not None and resume else []
+    limit = WARM_UP + max(settings.max_steps // BLOCK, 1)
+    target = min(max(WARM_UP + _FIRST_LOOK, len(blocks)), limit)
+    seen: tuple[float | None, float | None] = (None, None)
+    while True:
+        while len(blocks) < target:
+            z, tuning, mass = _before(blocks, points, start.covariance)
+            numbers = np.uint32(seed), np.uint32(len(blocks))
+            done = program(*numbers, z, tuning, np.bool_(len(blocks) < WARM_UP), mass, posterior.data)
+            blocks.append(jax.tree.map(np.asarray, done))
+            if checkpoint is not None:
+                _store(checkpoint, blocks)
+            if report is not None:
+                report(Progress(len(blocks) * BLOCK, limit * BLOCK, *seen, "nuts"))
+        chain, could_improve = _summarized(posterior, blocks, settings, quantities, diagnose)
+        seen = worst(chain)
+        if report is not None:
+            report(Progress(len(blocks) * BLOCK, limit * BLOCK, *seen, "nuts"))
+        if not could_improve or target >= limit:
+            return chain
+        target = min(target + (target - WARM_UP + 2) // 3, limit)
+
+
+def _before(
+    blocks: Sequence[Block], points: np.ndarray, covariance: np.ndarray
+) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Positions, tuning and inverse mass matrix that the next block starts with."""
+    if not blocks:
+        return points, _untuned(_FIRST_STEP, len(points)), covariance
+    z, tuning, mass = blocks[-1]["z"][-1], blocks[-1]["tuning"], blocks[-1]["inverse_mass"]
+    ends = list(accumulate(WINDOWS))
+    if len(blocks) not in ends:
+        return z, tuning, mass
+    average = float(np.median(tuning[1]))
+    if len(blocks) == WARM_UP:
+        return z, np.concatenate([tuning[:1], np.full((1, len(z)), average), tuning[2:]]), mass
+    window = np.concatenate([block["z"] for block in blocks[-WINDOWS[ends.index(len(blocks))] :]])
+    return z, _untuned(float(np.exp(average)), len(z)), _shrunk(window.reshape(-1, z.shape[1]))
+
+
+def _untuned(step_size: float, chains: int) -> np.ndarray:
+    """Tuning of every chain (columns) at the start of a window: the fields of blackjax's state, in their order."""
+    init, _, _ = dual_averaging_adaptation(0.8)
+    return np.repeat(np.asarray([float(x) for x in init(step_size)])[:, None], chains, axis=1)
+
+
+def _shrunk(draws: np.ndarray) -> np.ndarray:
+    """Covariance of draws (rows), shrunk toward a small multiple of the identity as Stan does."""
+    n, size = draws.shape
+    return n / (n + 5) * np.cov(draws.T).reshape(size, size) + 1e-3 * 5 / (n + 5) * np.eye(size)
+
+
+def _summarized(
+    posterior: Posterior,
+    blocks: Sequence[Block],
+    settings: SamplerSettings,
+    quantities: Quantities,
+    diagnose: Diagnose,
+) -> tuple[Chain, bool]:
+    """The draws after warm-up, with their diagnostics, and whether more of them could change what those say."""
+    drawn = {name: np.concatenate([b[name] for b in blocks[WARM_UP:]]) for name in ("z", *_STATISTICS)}
+    steps, chains = drawn["energy"].shape
+    fine = _fine(steps)
+    kept = np.unique(np.linspace(0, steps - 1, min(steps, max(_KEPT // chains, 1))).round().astype(int))
+    z = np.ascontiguousarray(drawn["z"][kept].transpose(1, 0, 2))
+    statistics = {name: np.ascontiguousarray(drawn[name][kept].T) for name in _STATISTICS}
+    derived, diagnostics, reasons = judged(posterior, z, chains, settings, quantities, diagnose)
+    trajectories = Trajectories(
+        WARM_UP * BLOCK,
+        steps * chains,
+        int(drawn["diverging"].sum()),
+        int(fine.sum()) * chains,
+        int(drawn["diverging"][fine].sum()),
+        int((drawn["tree_depth"][~fine] >= MOST_DOUBLINGS).sum()),
+        energy_mixing(drawn["energy"].T),
+        float(np.exp(blocks[-1]["tuning"][1, 0])),
+        int(sum(b["n_steps"].sum() for b in blocks)),
+        statistics,
+    )
+    reasons = (*reasons, *stuck(z[:, z.shape[1] // 2 :], "chains"))
+    acceptance, could_improve = float(drawn["acceptance_rate"].mean()), bool(reasons)
+    reasons = (*reasons, *trajectory_shortfalls(trajectories))
+    return Chain(z, derived, diagnostics, chains, steps, acceptance, reasons, "nuts", trajectories), could_improve
+
+
+def _store(path: Path, blocks: Sequence[Block]) -> None:
+    """Add the last block to the checkpoint; the count that makes it valid is written last."""
+    import h5py
+
+    with h5py.File(path, "a") as file:
+        group, number = file.require_group("nuts"), len(blocks) - 1
+        for name, values in blocks[-1].items():
+            if name not in group:
+                group.create_dataset(name, (0, *values.shape), values.dtype, maxshape=(None, *values.shape))
+            group[name].resize(number + 1, axis=0)
+            group[name][number] = values
+        file.flush()
+        group.attrs["blocks"] = number + 1
+
+
+def _stored(path: Path) -> list[Block]:
+    """The blocks of a checkpoint."""
+    import h5py
+
+    with h5py.File(path, "r") as file:
+        if "nuts" not in file:
+            return []
+        group = file["nuts"]
+        whole = {name: np.asarray(values) for name, values in group.items()}
+        return [{name: values[i] for name, values in whole.items()} for i in range(int(group.attrs.get("blocks", 0)))]

@@ -1,0 +1,208 @@
+"""Do two samplers of one density agree? Every summary of the draws, against what Monte Carlo error allows."""
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from statistics import NormalDist
+from typing import Any
+
+import numpy as np
+
+FALSE_ALARM = 0.001  # probability that two samplers that are right are said to disagree
+SUMMARIES = ("mean", "sd", "5 % quantile", "95 % quantile")
+NOTICEABLE = 0.1  # sd; smaller differences change no answer
+NAMES = {"emcee": "emcee", "nuts": "NUTS"}
+MANY_PARAMETERS = 25  # above which ensembles of walkers mix slowly
+
+
+@dataclass(frozen=True)
+class SamplerDifference:
+    """Between the draws of two samplers, of one summary of one quantity.
+
+    Args:
+        quantity: A parameter (in z), or the optimal length or efficiency.
+        summary: One of `SUMMARIES`.
+        sds: The second sampler's less the first's, in standard deviations of the quantity.
+        error: Monte Carlo standard error of that, in the same unit.
+    """
+
+    quantity: str
+    summary: str
+    sds: float
+    error: float
+
+    @property
+    def errors(self) -> float:
+        """The difference in Monte Carlo standard errors."""
+        if self.sds == 0:
+            return 0.0
+        return abs(self.sds) / self.error if self.error > 0 else float("inf")
+
+
+@dataclass(frozen=True)
+class SamplerAgreement:
+    """Of two samplers on one density.
+
+    Args:
+        first: The sampler whose draws are the result.
+        second: The other.
+        differences: Of every summary of every quantity.
+        limit: Monte Carlo standard errors that chance exceeds anywhere among them with probability `FALSE_ALARM`.
+    """
+
+    first: str
+    second: str
+    differences: tuple[SamplerDifference, ...]
+    limit: float
+
+    @property
+    def beyond_chance(self) -> tuple[SamplerDifference, ...]:
+        """Differences that chance does not explain and that are large enough to matter, the largest first."""
+        seen = [d for d in self.differences if d.errors > self.limit and abs(d.sds) > NOTICEABLE]
+        return tuple(sorted(seen, key=lambda d: -abs(d.sds)))
+
+    @property
+    def largest(self) -> SamplerDifference:
+        """The largest difference in standard deviations, whether by chance or not."""
+        return max(self.differences, key=lambda d: abs(d.sds))
+
+    @property
+    def agree(self) -> bool:
+        """Whether no difference is beyond chance and noticeable."""
+        return not self.beyond_chance
+
+    def sentence(self) -> str:
+        """What was found, for people."""
+        one, two, most = NAMES[self.first], NAMES[self.second], self.largest
+        if self.agree:
+            sharper = " A larger sampler.target_ess compares more sharply." if abs(most.sds) > NOTICEABLE else ""
+            return (
+                f"{one} and {two} agree within Monte Carlo error: the mean, standard deviation, 5 % and 95 % quantile of every "
+                f"parameter and answer differ by at most {abs(most.sds):.2f} standard deviations ({most.summary} of "
+                f"{most.quantity}, whose Monte Carlo error is {most.error:.2f}).{sharper}"
+            )
+        return f"{one} and {two} disagree {self._where()}; one of them has missed part of the posterior."
+
+    def reasons(self) -> tuple[str, ...]:
+        """Why the draws should not be trusted; empty if the samplers agree."""
+        return () if self.agree else (self.sentence().removesuffix("."),)
+
+    def _where(self) -> str:
+        seen = self.beyond_chance
+        first = seen[0]
+        more = f" and on {len(seen) - 1} more" if len(seen) > 1 else ""
+        return (
+            f"on the {first.summary} of {first.quantity}, by {abs(first.sds):.2f} standard deviations, {first.errors:.0f} "
+            f"times the Monte Carlo error{more}"
+        )
+
+    def page(self) -> dict[str, Any]:
+        """As plain data, for summary.json."""
+        return {
+            "samplers": [self.first, self.second],
+            "agree": self.agree,
+            "sentence": self.sentence(),
+            "false_alarm": FALSE_ALARM,
+            "limit_errors": self.limit,
+            "noticeable_sds": NOTICEABLE,
+            "differences": [d.__dict__ | {"errors": d.errors} for d in self.differences],
+        }
+
+
+@dataclass(frozen=True)
+class Drawn:
+    """What one sampler drew.
+
+    Args:
+        sampler: Its name.
+        draws: By quantity, (walker, draw), ordered by ensemble.
+        n_ensembles: Number of independent ensembles; chains are an ensemble each.
+    """
+
+    sampler: str
+    draws: Mapping[str, np.ndarray]
+    n_ensembles: int
+
+    def error_scale(self) -> float:
+        """By how much Monte Carlo errors are to be multiplied, 1 at the least.
+
+        Walkers of one ensemble move by each other's positions, so errors that take them for independent are too small; how
+        far ensembles lie apart says by how much. All quantities and summaries together tell, four ensembles of one do not.
+        """
+        ratios = []
+        for draws in self.draws.values():
+            parts = [_values(part) for part in np.split(draws, self.n_ensembles)]
+            between = np.var(parts, axis=0, ddof=1) / self.n_ensembles
+            errors = np.array(_errors(draws))
+            known = np.isfinite(errors) & (errors > 0)
+            ratios += list(between[known] / errors[known] ** 2)
+        return float(np.sqrt(max(np.mean(ratios), 1.0))) if ratios else 1.0
+
+
+def compare_samplers(first: Drawn, second: Drawn) -> SamplerAgreement:
+    """Whether two samplers agree on every quantity.
+
+    The limit is Bonferroni's over all comparisons, so that two samplers that are right are said to disagree once in a
+    thousand comparisons of fits at the most.
+
+    Args:
+        first: The sampler whose draws are the result.
+        second: The other, with draws of the same quantities.
+    """
+    scales = first.error_scale(), second.error_scale()
+    found = tuple(d for name in first.draws for d in _differences(name, first, second, scales))
+    limit = NormalDist().inv_cdf(1 - FALSE_ALARM / 2 / max(len(found), 1))
+    return SamplerAgreement(first.sampler, second.sampler, found, limit)
+
+
+def _differences(name: str, first: Drawn, second: Drawn, scales: tuple[float, float]) -> list[SamplerDifference]:
+    draws, others = first.draws[name], second.draws[name]
+    sd = float(np.sqrt((np.var(draws) + np.var(others)) / 2)) or 1.0
+    found = []
+    for summary, value, other, error, other_error in zip(
+        SUMMARIES, _values(draws), _values(others), _errors(draws), _errors(others), strict=True
+    ):
+        both = float(np.hypot(scales[0] * error, scales[1] * other_error))
+        found.append(SamplerDifference(name, summary, float(other - value) / sd, both / sd))
+    return found
+
+
+def _values(draws: np.ndarray) -> list[float]:
+    """Of `SUMMARIES`."""
+    return [float(np.mean(draws)), float(np.std(draws)), *map(float, np.quantile(draws, (0.05, 0.95)))]
+
+
+def _errors(draws: np.ndarray) -> list[float]:
+    """Monte Carlo standard errors of `SUMMARIES`, if every walker is independent of the others."""
+    from arviz_stats.base import array_stats
+
+    if np.ptp(draws) == 0:
+        return [0.0] * len(SUMMARIES)
+    asked: tuple[dict[str, Any], ...] = (
+        {"method": "mean"},
+        {"method": "sd"},
+        *({"method": "quantile", "prob": p} for p in (0.05, 0.95)),
+    )
+    return [float(array_stats.mcse(draws, chain_axis=0, draw_axis=1, **options)) for options in asked]
+
+
+def recommendation(sampler: str, n_parameters: int, short: bool) -> str:
+    """A sentence that recommends the other sampler where emcee does badly, or is likely to; empty otherwise.
+
+    Args:
+        sampler: What sampled.
+        n_parameters: Number of free parameters.
+        short: Whether its draws fall short of what was asked for.
+    """
+    if sampler != "emcee":
+        return ""
+    if short:
+        return (
+            "The ensembles of walkers did not get there. NUTS copes better with posteriors that are narrow, curved or of many "
+            "parameters: fit again with --sampler nuts."
+        )
+    if n_parameters > MANY_PARAMETERS:
+        return (
+            f"With {n_parameters} free parameters NUTS needs fewer draws than ensembles of walkers, which mix more slowly the "
+            "more there are: consider --sampler nuts, or --sampler both to have one check the other."
+        )
+    return ""

@@ -28,8 +28,16 @@ def init(folder: Path) -> None:
 
 @click.command(short_help="Say what was understood of a data set and what is wrong.")
 @click.argument("dataset", type=click.Path(path_type=Path))
+@click.option(
+    "--prior-predictive",
+    "priors",
+    type=click.Path(path_type=Path, file_okay=False),
+    metavar="FOLDER",
+    help="Also draw into FOLDER what the priors alone hold possible beside what was measured, and say which readings lie "
+    "outside; a wrong unit shows here before anything is fitted.",
+)
 @reading_options
-def check(dataset: Path, **options: Any) -> None:
+def check(dataset: Path, priors: Path | None, **options: Any) -> None:
     """Read everything in DATASET, say what was understood and what is wrong; fit nothing.
 
     DATASET is a folder with cable.toml and tables, or one table or recording with --wrap-angle. Of a file alone, its
@@ -44,7 +52,13 @@ def check(dataset: Path, **options: Any) -> None:
         click.echo(channels_text(*workflow.channels_of(dataset, options["channels"])), nl=False)
         return
 
-    click.echo(check_text(workflow.check(dataset, **reading(**options))), nl=False)
+    found = workflow.check(dataset, **reading(**options))
+    click.echo(check_text(found), nl=False)
+    if priors is not None:
+        from bowdenfit.report.prior_predictive import prior_predictive_text
+        from bowdenfit.workflow.checking import show_priors
+
+        click.echo(prior_predictive_text(show_priors(found, priors)) + f"Wrote the figure to {priors}.")
 
 
 @click.command(short_help="Make a data set from known truth.")

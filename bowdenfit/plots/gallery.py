@@ -13,6 +13,7 @@ from matplotlib.figure import Figure
 
 from bowdenfit.plots.autocorrelation import autocorrelation, has_autocorrelation
 from bowdenfit.plots.bending_loss import bending_loss, has_bending_loss
+from bowdenfit.plots.checks import checks, has_checks
 from bowdenfit.plots.coefficients import coefficients, has_coefficients
 from bowdenfit.plots.dependence import dependence, has_dependence
 from bowdenfit.plots.efficiency import efficiency, has_route
@@ -54,6 +55,7 @@ FIGURES = {
     "pairs": Entry(pairs, has_pairs),
     "traces": Entry(traces, has_traces),
     "residuals": Entry(residuals, has_residuals),
+    "checks": Entry(checks, has_checks),
     "recordings": Entry(recordings, has_recordings),
     "hysteresis": Entry(hysteresis, has_hysteresis),
     "sample_efficiency": Entry(sample_efficiency, has_sample_efficiency),

@@ -4,9 +4,11 @@ from typing import Any
 
 from bowdenfit.models.build import EFFICIENCY_TERMS
 from bowdenfit.models.scatter import RUN_SCATTER
+from bowdenfit.report.checks import checks_text
 from bowdenfit.report.elastic import elastic_counts, elastic_text
 from bowdenfit.report.layout import filled, listed, table
 from bowdenfit.report.recordings import recordings_text
+from bowdenfit.report.sampler import sampler_sentences, sampler_text
 from bowdenfit.results.answers import decimals
 from bowdenfit.results.confounding import confounded
 from bowdenfit.results.fit import Fit
@@ -14,6 +16,8 @@ from bowdenfit.results.rate import SHOWN_SPEED, rate_effect
 from bowdenfit.results.verdict import CONTRADICTORY, NOT_CONVERGED, NOT_IDENTIFIABLE, Verdict, verdict
 
 _UNLIMITED = 2000.0  # an angle in degrees or a length in mm beyond which a curve coefficient is no longer a finding
+PROFILED = "90 % profile interval"
+_WIDE = 2.5  # standard errors to each side beyond which an interval needs a word; of many readings it is 1.6
 _RESTS_ON_PRIOR = 0.2  # contraction below which a parameter is said to rest on its prior alone
 
 
@@ -23,9 +27,10 @@ def summary_text(fit: Fit) -> str:
     blocks = [_title(fit), _verdict(fit, page), _coefficients(page), _rests_on_prior(page), _curves(fit, page)]
     blocks += [
         _scatter(page),
-        _mountings(page),
+        _mountings(fit, page),
         _recordings(fit),
         _measured(fit, page),
+        checks_text(page.get("checks", {})),
         _friction_model(fit),
         elastic_text(fit),
         _answer(fit),
@@ -55,7 +60,8 @@ def _title(fit: Fit) -> str:
     line = f"{fit.name}\n{'=' * len(fit.name)}"
     geometry = f"; {description.geometry} geometry" if description.curved else ""
     model = f"; friction model {description.friction_model}" if description.friction_model != "capstan" else ""
-    fitted = filled(f"Fitted to {listed(counts)}{geometry}{model}.")
+    noise = f"; {description.noise_in_words}" if description.noise != "normal" else ""
+    fitted = filled(f"Fitted to {listed(counts)}{geometry}{model}{noise}.")
     remarks = [filled(remark) for remark in tables.remarks]
     return "\n".join([line, fitted, *remarks])
 
@@ -76,13 +82,14 @@ def _angle_counts(fit: Fit, entered: int, censored: int) -> list[str]:
 def _verdict(fit: Fit, page: dict[str, Any]) -> str:
     found = verdict(fit)
     if fit.posterior is None:
-        state = "least squares only; no intervals, no design answer" if found.trusted else _untrusted(found)
+        state = "least squares only; no posterior, no design answer" if found.trusted else _untrusted(found)
     else:
         state = "converged" if found.trusted else _untrusted(found)
         sampler = page["sampler"]
-        state += f" ({sampler['ensembles']} ensembles of {sampler['walkers']} walkers, {sampler['steps']} steps)"
+        state += f" ({sampler_text(sampler)})"
     lines = [f"Verdict: {state}."]
     lines += [filled(f"- {reason}", indent="  ") for reason in found.reasons]
+    lines += [filled(sentence) for sentence in sampler_sentences(page)]
     if NOT_IDENTIFIABLE not in found.troubles:  # which says so of the same parameters
         lines += [filled(c.sentence()) for c in confounded(fit)]
     return "\n".join(lines)
@@ -97,7 +104,8 @@ def _untrusted(found: Verdict) -> str:
 
 
 def _coefficients(page: dict[str, Any]) -> str:
-    heads = ("parameter", "median", "90 % interval", "mean +- sd", "least squares +- s.e.", "prior", "unit")
+    heads = ("parameter", "median", "90 % interval", "mean +- sd", "least squares +- s.e.", PROFILED, "prior", "unit")
+    sampled = any("median" in p for p in page["parameters"].values())
     rows = []
     for name, p in page["parameters"].items():
         drawn = "median" in p
@@ -107,8 +115,10 @@ def _coefficients(page: dict[str, Any]) -> str:
             median, interval = f"{p['median']:.{digits}f}", f"{p['q05']:.{digits}f} to {p['q95']:.{digits}f}"
             moments = f"{p['mean']:.{digits}f} +- {p['sd']:.{digits}f}"
         unit = "" if p["unit"] == "1" else p["unit"]
-        rows.append((name, median, interval, moments, _least_squares(p), p["prior"], unit))
-    keep = [i for i in range(len(heads)) if i in (0, 4, 5) or any(row[i] for row in rows)]
+        # Beside a posterior's intervals there is no room for others; those are in summary.json.
+        profiled = "" if sampled else _profiled(p)
+        rows.append((name, median, interval, moments, _least_squares(p), profiled, p["prior"], unit))
+    keep = [i for i in range(len(heads)) if i in (0, 4, 6) or any(row[i] for row in rows)]
     return table([heads[i] for i in keep], [[row[i] for i in keep] for row in rows]) + _not_identified(page)
 
 
@@ -119,20 +129,59 @@ def _least_squares(p: dict[str, Any]) -> str:
     if estimate is None:
         return ""
     if not estimate["identified"]:
-        return "not identified"
+        return "at bound" if estimate["at_bound"] else "not identified"
     digits = decimals(estimate["standard_error"] or abs(estimate["value"]) / 1000)
     return f"{estimate['value']:.{digits}f} +- {estimate['standard_error']:.{digits}f}"
 
 
+def _profiled(p: dict[str, Any]) -> str:
+    """Profile interval of least squares."""
+    estimate = p.get("least_squares")
+    if estimate is None or all(estimate[side] is None and side not in estimate["open"] for side in ("lower", "upper")):
+        return ""
+    finite = [estimate[side] for side in ("lower", "upper") if estimate[side] is not None]
+    digits = decimals(estimate["standard_error"] or (finite[-1] - finite[0] if len(finite) > 1 else 0.0) / 3 or 1.0)
+    shown = [f"{limit:.{digits}f}" for limit in finite]
+    if not shown:
+        return "not limited"
+    if estimate["open"]:
+        return f"{shown[0]} or more" if "upper" in estimate["open"] else f"{shown[0]} or less"
+    return " to ".join(shown)
+
+
 def _not_identified(page: dict[str, Any]) -> str:
     notes = [
-        filled(f"{name} is not identified by least squares: {p['least_squares']['remark']}.")
+        filled(f"{name} is {_trouble(p['least_squares'])}: {p['least_squares']['remark']}.")
         for name, p in page["parameters"].items()
         if p.get("least_squares") and not p["least_squares"]["identified"]
     ]
     condition = page["least_squares"]["condition_number"]
     shown = "infinite" if condition is None else f"{condition:.3g}"
-    return "\n" + "\n".join([*notes, f"Condition number of the least-squares problem: {shown}."])
+    return "\n" + "\n".join(
+        [*notes, f"Condition number of the least-squares problem: {shown}.", *_about_intervals(page)]
+    )
+
+
+def _about_intervals(page: dict[str, Any]) -> list[str]:
+    """What the profile intervals are, where they are shown and much wider than the standard errors."""
+    wide = [name for name, p in page["parameters"].items() if p.get("least_squares") and _is_wide(p["least_squares"])]
+    if not wide or any("median" in p for p in page["parameters"].values()):
+        return []
+    return [
+        filled(
+            f"The intervals of {listed(wide)} are wider than their standard errors suggest: hardly more readings than unknowns "
+            "leave little to tell the scatter from, or the sum of squares is lopsided."
+        )
+    ]
+
+
+def _is_wide(estimate: dict[str, Any]) -> bool:
+    ends = estimate["lower"], estimate["upper"], estimate["standard_error"]
+    return estimate["identified"] and None not in ends and ends[1] - ends[0] > 2 * _WIDE * ends[2]
+
+
+def _trouble(estimate: dict[str, Any]) -> str:
+    return "at its bound in least squares" if estimate["at_bound"] else "not identified by least squares"
 
 
 def _rests_on_prior(page: dict[str, Any]) -> str:
@@ -173,7 +222,7 @@ def _scatter(page: dict[str, Any]) -> str:
     return filled(f"Residual standard deviation of least squares: {listed(parts)}.") if parts else ""
 
 
-def _mountings(page: dict[str, Any]) -> str:
+def _mountings(fit: Fit, page: dict[str, Any]) -> str:
     """The scatter from mounting to mounting, in words."""
     tau, runs = (
         page["parameters"].get(RUN_SCATTER, {}),
@@ -183,10 +232,16 @@ def _mountings(page: dict[str, Any]) -> str:
         return ""
     shown = (f"{100 * tau[q]:.1f}" for q in ("median", "q05", "q95"))
     median, low, high = shown
+    heavy = (
+        " That is the scale of a Student-t, not a standard deviation: about six mountings in ten lie within it, and now and "
+        "then one lies far outside."
+        if fit.dataset.description.noise == "student"
+        else ""
+    )
     return filled(
         f"From one mounting of the cable to the next the efficiency scatters by {median} % of itself (90 % interval {low} to "
         f"{high} %). All samples of a run share what its mounting did, so longer runs do not make the coefficients surer; "
-        "more runs do."
+        f"more runs do.{heavy}"
     )
 
 

@@ -8,6 +8,7 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from bowdenfit.results.answers import OptimalLength
+from bowdenfit.results.check_figure_data import CheckedTable
 from bowdenfit.results.elastic_figure_data import ElasticFigures
 
 BAND_QUANTILES = (0.05, 0.25, 0.5, 0.75, 0.95)
@@ -187,6 +188,7 @@ class FigureData:
         velocity_unit: Unit of their velocities as shown, "mm/s" or "r/min"; empty without any.
         dependences: How efficiency depends on load and speed.
         elastic: Stretch, preload and loops.
+        checks: Readings against their predictions from all the others.
     """
 
     name: str
@@ -204,3 +206,4 @@ class FigureData:
     velocity_unit: str = ""
     dependences: tuple[Dependence, ...] = ()
     elastic: ElasticFigures = field(default_factory=ElasticFigures)
+    checks: tuple[CheckedTable, ...] = ()

@@ -11,6 +11,7 @@ import numpy as np
 
 from bowdenfit.dataset import Dataset
 from bowdenfit.errors import UsageError
+from bowdenfit.inference.chain import Trajectories
 from bowdenfit.inference.diagnostics import Diagnostics
 from bowdenfit.inference.least_squares import LeastSquares
 from bowdenfit.models.build import Model, build_model
@@ -18,8 +19,10 @@ from bowdenfit.predictions.choices import at_edge, best_window, rank_choices
 from bowdenfit.predictions.draws import curves_of, efficiency_at, for_each_draw
 from bowdenfit.predictions.optimal_length import route_grid
 from bowdenfit.results.answers import Interval, OptimalLength
+from bowdenfit.results.samplers import SamplerAgreement
 
 if TYPE_CHECKING:
+    from bowdenfit.results.checks import Checks
     from bowdenfit.results.elastic import Elastic
     from bowdenfit.results.verdict import Verdict
 
@@ -40,8 +43,11 @@ class Posterior:
         prior: Draws of the parameters from the prior, one row.
         diagnostics: Of parameters and optimum.
         n_ensembles: Number of independent ensembles.
-        steps: Steps of every walker.
-        acceptance: Mean fraction of accepted proposals.
+        steps: Steps of every walker; of NUTS, without warm-up.
+        acceptance: Mean fraction of accepted proposals; of NUTS, mean acceptance along trajectories.
+        sampler: "emcee" or "nuts", whose chains are ensembles of one walker each.
+        trajectories: How the trajectories of NUTS went.
+        agreement: Whether a second sampler agrees, where one was asked.
     """
 
     z: np.ndarray
@@ -55,6 +61,9 @@ class Posterior:
     n_ensembles: int
     steps: int
     acceptance: float
+    sampler: str = "emcee"
+    trajectories: Trajectories | None = None
+    agreement: SamplerAgreement | None = None
 
     @property
     def flat_z(self) -> np.ndarray:
@@ -198,6 +207,13 @@ class Fit:
         from bowdenfit.results.elastic import Elastic
 
         return Elastic(self)
+
+    @cached_property
+    def checks(self) -> "Checks | None":
+        """Every reading against its prediction from all the others, and what the priors do; None without draws."""
+        from bowdenfit.results.checks import checks_of
+
+        return checks_of(self)
 
     def summary(self) -> dict[str, Any]:
         """Everything on one page, for programs (the contents of summary.json)."""

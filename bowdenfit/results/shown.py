@@ -7,6 +7,7 @@ import numpy as np
 from bowdenfit.models.build import EFFICIENCY_TERMS, Model
 from bowdenfit.predictions.draws import curves_of
 from bowdenfit.predictions.optimal_length import route_grid
+from bowdenfit.results.check_figures import checked_tables
 from bowdenfit.results.elastic_figures import elastic_figures
 from bowdenfit.results.figure_data import (
     BAND_QUANTILES,
@@ -44,6 +45,7 @@ def figure_data(fit: Fit) -> FigureData:
         velocity_unit(fit),
         dependences(fit),
         elastic_figures(fit),
+        checked_tables(fit.checks),
     )
 
 

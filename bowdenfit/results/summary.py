@@ -5,14 +5,18 @@ from typing import Any
 
 import numpy as np
 
+from bowdenfit.inference.diagnostics import shortfalls
+from bowdenfit.inference.least_squares import Estimate
 from bowdenfit.models.build import EFFICIENCY_TERMS
 from bowdenfit.results.accounts import accounts
 from bowdenfit.results.agreement import agreement_page
 from bowdenfit.results.answers import Interval
+from bowdenfit.results.checks_page import checks_page
 from bowdenfit.results.confounding import confounded
 from bowdenfit.results.elastic_summary import elastic_page
-from bowdenfit.results.fit import Fit
+from bowdenfit.results.fit import Fit, Posterior
 from bowdenfit.results.rate import rate_effect
+from bowdenfit.results.samplers import recommendation
 from bowdenfit.results.verdict import verdict
 
 SCHEMA = 1
@@ -49,19 +53,35 @@ def summarize(fit: Fit) -> dict[str, Any]:
         page["recordings"] = accounts(fit.dataset.measurements.recordings)
     if elastic := elastic_page(fit):
         page["elastic"] = elastic
+    if checks := checks_page(fit.checks):
+        page["checks"] = checks
     effect = rate_effect(fit)
     if effect is not None:
         page["rate_effect"] = asdict(effect)
     if fit.posterior is not None:
-        page["sampler"] = {
-            "ensembles": fit.posterior.n_ensembles,
-            "walkers": len(fit.posterior.z) // fit.posterior.n_ensembles,
-            "steps": fit.posterior.steps,
-            "acceptance": fit.posterior.acceptance,
-        }
+        page["sampler"] = _sampler(fit, fit.posterior)
+        if fit.posterior.agreement is not None:
+            page["samplers"] = fit.posterior.agreement.page()
         if fit.dataset.description.route is not None:
             page["optimal"] = _optimal(fit)
     return _plain(page)
+
+
+def _sampler(fit: Fit, posterior: Posterior) -> dict[str, Any]:
+    """How the draws came about, and what is recommended instead ("" if nothing is)."""
+    settings = fit.dataset.description.sampler
+    short = shortfalls(posterior.diagnostics, settings.target_r_hat, settings.target_ess)
+    page = {
+        "method": posterior.sampler,
+        "ensembles": posterior.n_ensembles,
+        "walkers": len(posterior.z) // posterior.n_ensembles,
+        "steps": posterior.steps,
+        "acceptance": posterior.acceptance,
+        "recommendation": recommendation(posterior.sampler, fit.model.space.size, bool(short)),
+    }
+    if posterior.trajectories is not None:
+        page |= {k: v for k, v in posterior.trajectories.__dict__.items() if k != "statistics"}
+    return page
 
 
 def _parameter(fit: Fit, name: str) -> dict[str, Any]:
@@ -70,7 +90,7 @@ def _parameter(fit: Fit, name: str) -> dict[str, Any]:
     if parameter.fixed is not None:
         row["fixed"] = parameter.fixed * parameter.shown_scale
     if name in fit.least_squares.estimates:
-        row["least_squares"] = asdict(fit.least_squares.estimates[name])
+        row["least_squares"] = _estimate_page(fit.least_squares.estimates[name])
     if fit.posterior is not None and name in fit.posterior.values:
         draws, diagnostics = fit.posterior.values[name], fit.posterior.diagnostics[name]
         row |= asdict(Interval.of(draws)) | {
@@ -81,6 +101,11 @@ def _parameter(fit: Fit, name: str) -> dict[str, Any]:
             "contraction": contraction(fit, name),
         }
     return row
+
+
+def _estimate_page(estimate: Estimate) -> dict[str, Any]:
+    """An estimate with its interval; `open` names the sides on which nothing limits it."""
+    return asdict(estimate) | {"open": [side for side in ("lower", "upper") if np.isinf(getattr(estimate, side))]}
 
 
 def contraction(fit: Fit, name: str) -> float:

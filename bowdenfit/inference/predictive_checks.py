@@ -1,0 +1,200 @@
+"""What a fit would have said of each reading, had that reading been left out; and whether such predictions are right.
+
+The draws are weighted by the inverse of the reading's own likelihood (Pareto-smoothed), so nothing is fitted again. Where
+the Pareto k of a reading is large, the weights cannot take out all that the reading did: its deviation is then rather
+understated.
+
+References:
+    Vehtari, Gelman and Gabry, Practical Bayesian model evaluation using leave-one-out cross-validation and WAIC,
+    Statistics and Computing 27 (2017), 1413.
+    Säilynoja, Bürkner and Vehtari, Graphical test for discrete uniformity and its applications in goodness-of-fit
+    evaluation and multiple sample comparison, Statistics and Computing 32 (2022), 32.
+"""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+RELIABLE_K = 0.7  # Pareto k up to which the weights of a reading can be trusted
+_TAIL = 0.02  # share of the weight on either side that a Pareto distribution is fitted to
+_LEAST_TAIL = 20  # draws that such a fit takes
+_FLAT = 1e-9  # range of a log likelihood below which it says nothing, as that of a bound far off
+_LEAST = 1e-12  # probability below which no difference is made
+_DRAWS = 10_000  # of a prediction that are enough to place a reading in
+_SIMULATIONS = 1000  # of the band that a distribution of uniform numbers stays in
+
+
+@dataclass(frozen=True)
+class LeftOut:
+    """Predictions of readings from everything but the reading itself, and where the reading lies in each.
+
+    Args:
+        mean, sd: Of the reading drawn anew.
+        q05, median, q95: Its quantiles.
+        below, up_to: Probability of a lower reading, and of one no higher; they differ where a reading is but a bound.
+        tail: Probability of a reading as far out as this one or farther, on either side.
+        pareto_k: How far the fit leans on the reading; beyond 0.7 the weights are not to be trusted.
+    """
+
+    mean: np.ndarray
+    sd: np.ndarray
+    q05: np.ndarray
+    median: np.ndarray
+    q95: np.ndarray
+    below: np.ndarray
+    up_to: np.ndarray
+    tail: np.ndarray
+    pareto_k: np.ndarray
+
+
+def left_out_readings(
+    log_likelihood: np.ndarray, replicated: np.ndarray, observed: np.ndarray, at_most: np.ndarray, n_effective: float
+) -> LeftOut:
+    """Predictions of the readings of one table, each from everything else.
+
+    Args:
+        log_likelihood: Of every reading at every draw, (draw, reading).
+        replicated: Readings drawn anew, (draw, reading).
+        observed: The readings, or the bound of those that are only known to be at most so.
+        at_most: Whether a reading is such a bound.
+        n_effective: Effective number of the draws.
+    """
+    log_weights, pareto_k = _smoothed(log_likelihood, min(n_effective / len(log_likelihood), 1.0))
+    every = max(1, len(log_likelihood) // _DRAWS)
+    weights = np.exp(log_weights - log_weights.max(axis=-1, keepdims=True))[:, ::every]
+    weights /= weights.sum(axis=-1, keepdims=True)
+    rows = [
+        _placed(drawn, w, float(y), bool(bound))
+        for drawn, w, y, bound in zip(replicated[::every].T, weights, observed, at_most, strict=True)
+    ]
+    mean, sd, q05, median, q95, below, up_to, tail = np.array(rows).reshape(-1, 8).T
+    return LeftOut(mean, sd, q05, median, q95, below, up_to, tail, pareto_k)
+
+
+def _smoothed(log_likelihood: np.ndarray, share: float) -> tuple[np.ndarray, np.ndarray]:
+    """Log weights, (reading, draw), and Pareto k.
+
+    A reading that every draw finds equally likely has equal weights and k = 0. So much weight on a handful of draws that
+    no Pareto distribution fits leaves equal weights and an infinite k: that prediction has seen the reading.
+    """
+    from arviz_stats.base import array_stats
+
+    log_weights, pareto_k = np.zeros(log_likelihood.shape[::-1]), np.zeros(log_likelihood.shape[1])
+    tells = np.ptp(log_likelihood, axis=0) > _FLAT
+    if tells.any():
+        told = np.ascontiguousarray(log_likelihood[:, tells].T)
+        with np.errstate(divide="ignore", invalid="ignore"):
+            smooth, k = array_stats.psislw(told, r_eff=share, axis=-1)
+        failed = ~(np.isfinite(k) & np.isfinite(smooth).all(axis=-1))
+        log_weights[tells] = np.where(failed[:, None], 0.0, smooth)
+        pareto_k[tells] = np.where(failed, np.inf, k)
+    return log_weights, pareto_k
+
+
+def _placed(drawn: np.ndarray, weights: np.ndarray, reading: float, at_most: bool) -> tuple[float, ...]:
+    """The fields of `LeftOut` of one reading, but for its Pareto k."""
+    order = np.argsort(drawn)
+    x, w = drawn[order], weights[order]
+    mean = float(w @ x)
+    sd = float(np.sqrt(w @ (x - mean) ** 2))
+    rank = np.cumsum(w) - w / 2
+    q05, median, q95 = (float(q) for q in np.interp((0.05, 0.5, 0.95), rank, x))
+    up_to = float(w[: np.searchsorted(x, reading, "right")].sum())
+    below = 0.0 if at_most else float(w[: np.searchsorted(x, reading, "left")].sum())
+    low, high = _beyond(-x[::-1], w[::-1], -reading), _beyond(x, w, reading)
+    tail = low if at_most else 2 * min(low, high, 0.5)
+    return mean, sd, q05, median, q95, below, up_to, tail
+
+
+def _beyond(x: np.ndarray, weights: np.ndarray, reading: float) -> float:
+    r"""Probability of a value as large as the reading, beyond the draws by a Pareto distribution fitted to their tail.
+
+    .. math:: P(X > y) = P(X > u) \left(1 + \xi \frac{y - u}{s}\right)^{-1/\xi}
+
+    Args:
+        x: Draws, ascending.
+        weights: Their weights.
+        reading: The reading y.
+
+    References:
+        Hosking and Wallis, Parameter and quantile estimation for the generalized Pareto distribution, Technometrics 29
+        (1987), 339: probability-weighted moments.
+    """
+    above = np.cumsum(weights[::-1])[::-1]  # of each draw and all beyond it
+    start = min(int(np.searchsorted(-above, -_TAIL)), len(x) - _LEAST_TAIL)
+    if start <= 0 or reading <= x[start]:
+        return float(weights[np.searchsorted(x, reading, "left") :].sum())
+    excess, w, mass = x[start + 1 :] - x[start], weights[start + 1 :], above[start + 1]
+    if not mass > 0:
+        return float(above[start])
+    mean = float(w @ excess) / mass
+    lower = float(w @ (excess * (above[start + 1 :] - w / 2))) / mass**2
+    if not mean > 2 * lower > 0:
+        return float(above[start])
+    shape = 2 - mean / (mean - 2 * lower)
+    scale = 2 * mean * lower / (mean - 2 * lower)
+    return float(np.maximum(mass * _pareto_survival((reading - x[start]) / scale, shape), _LEAST))
+
+
+def _pareto_survival(excess: float, shape: float) -> float:
+    """Probability beyond an excess, in units of the scale; never bounded, because the tail of a reading's noise is not."""
+    shape = max(shape, 0.0)
+    return float(np.exp(-excess) if shape < 1e-6 else (1 + shape * excess) ** (-1 / shape))
+
+
+def placed_at_random(found: LeftOut, generator: np.random.Generator) -> np.ndarray:
+    """Where each reading lies in its prediction, as a number that is uniform between 0 and 1 if all is right.
+
+    Of a bound only an interval is known; it takes a place at random inside.
+
+    Args:
+        found: The predictions.
+        generator: Source of random numbers.
+    """
+    return np.clip(generator.uniform(found.below, np.maximum(found.up_to, found.below)), 0.0, 1.0)
+
+
+@dataclass(frozen=True)
+class Uniformity:
+    """Whether numbers are uniform between 0 and 1, by their distribution function.
+
+    Args:
+        at: Where it was looked at.
+        share: Share of the numbers up to there.
+        low, high: Band that all of it stays in with the stated probability.
+        probability: That probability.
+    """
+
+    at: np.ndarray
+    share: np.ndarray
+    low: np.ndarray
+    high: np.ndarray
+    probability: float
+
+    @property
+    def holds(self) -> bool:
+        """Whether it stays in the band."""
+        return bool(np.all((self.low <= self.share) & (self.share <= self.high)))
+
+    @property
+    def fault(self) -> str:
+        """What is wrong, in words; empty if nothing is."""
+        if self.holds:
+            return ""
+        low, high = (np.interp(quarter, self.at, self.share - self.at) for quarter in (0.25, 0.75))
+        if abs(low - high) > abs(low + high):
+            return "scatter more than the fit says" if low > high else "scatter less than the fit says"
+        return "lie lower than the fit says" if low + high > 0 else "lie higher than the fit says"
+
+
+def uniformity(places: np.ndarray, probability: float) -> Uniformity:
+    """The distribution function of numbers between 0 and 1 beside the band that uniform ones would stay in.
+
+    Args:
+        places: The numbers; at least two.
+        probability: Probability that uniform numbers stay in the whole band.
+    """
+    from arviz_stats.ecdf_utils import ecdf_pit
+
+    at, share, low, high = ecdf_pit(places, probability, _SIMULATIONS)
+    return Uniformity(at, share, low, high, probability)

@@ -1,0 +1,37 @@
+"""Looking at the priors of a data set before it is fitted."""
+
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from bowdenfit.dataset import Dataset
+
+if TYPE_CHECKING:
+    from bowdenfit.results.check_figure_data import PriorPredictive
+
+FIGURE = "prior_predictive"
+
+
+def show_priors(dataset: Dataset, folder: str | Path, seed: int = 0) -> "PriorPredictive":
+    """Draw what the priors alone hold possible beside what was measured, PNG and SVG; fit nothing.
+
+    Args:
+        dataset: The data set.
+        folder: Where the figure goes; made if missing.
+        seed: Seed of the draws from the priors.
+
+    Returns:
+        What the figure shows.
+    """
+    import jax
+
+    from bowdenfit.plots.gallery import FORMATS, write
+    from bowdenfit.plots.prior_predictive import prior_predictive as drawn
+    from bowdenfit.results.prior_predictive import prior_predictive
+
+    with jax.enable_x64(True):
+        found = prior_predictive(dataset, seed)
+    figure = drawn(found)
+    Path(folder).mkdir(parents=True, exist_ok=True)
+    for ending in FORMATS:
+        write(figure, Path(folder) / f"{FIGURE}.{ending}")
+    return found

@@ -164,7 +164,7 @@ def test_compare_answers_whether_speed_matters_on_the_command_line(plain, with_r
     assert "The data cannot tell" in words
     assert "Letting friction depend on speed (rate) predicts no better than not (plain)." in words
     assert "viscous" in words
-    page = json.loads(CliRunner().invoke(command, ["compare", "--json", str(plain[1]), str(with_rate[1])]).output)
+    page = json.loads(CliRunner().invoke(command, ["compare", "--json", str(plain[1]), str(with_rate[1])]).stdout)
     assert {row["name"] for row in page["fits"]} == {"plain", "rate"}
     assert page["fits"][0]["elpd_difference"] == 0.0
 

@@ -1,4 +1,4 @@
-"""Verbs after a fit: summary, predictions, the design answer, comparison, figures."""
+"""Verbs after a fit: summary, predictions, the design answer, figures."""
 
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -136,32 +136,6 @@ def length(results: Path, as_json: bool) -> None:
     troubles = found.verdict().troubles
     if troubles:
         click.echo(f"Warning: this fit is {' and '.join(troubles)}; see bowdenfit summary {results}.", err=True)
-
-
-@click.command(short_help="Compare fits of the same measurements.")
-@click.argument("results", type=click.Path(path_type=Path), nargs=-1)
-@click.option("--json", "as_json", is_flag=True, help="Print as JSON.")
-def compare(results: tuple[Path, ...], as_json: bool) -> None:
-    """Compare fits of the same measurements: which model predicts readings left out best, and what changes between them.
-
-    RESULTS are results folders, such as of the same data set fitted with and without --friction rate-dependent; then the
-    comparison says whether efficiency depends on speed.
-    """
-    from bowdenfit import workflow
-    from bowdenfit.report.compare import comparison_text
-
-    found = workflow.compare({_short(folder, results): load(folder) for folder in results})
-    if as_json:
-        import json
-
-        click.echo(json.dumps(found.page(), indent=1))
-    else:
-        click.echo(comparison_text(found), nl=False)
-
-
-def _short(folder: Path, others: tuple[Path, ...]) -> str:
-    """A results folder's own name, or its path where two have the same name."""
-    return folder.name if [other.name for other in others].count(folder.name) == 1 else str(folder)
 
 
 @click.command(short_help="Draw the figures of a fit again.")

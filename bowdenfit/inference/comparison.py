@@ -1,13 +1,19 @@
 """How well each of several models predicts readings it was not fitted to: leave-one-out, from the draws of one fit each."""
 
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, field
+from typing import Literal
 
 import numpy as np
 
 RELIABLE_K = 0.7  # Pareto k up to which the importance weights of a reading can be trusted
+SMALL = 100  # readings below which the standard error of a difference is too small more often than not
 _DECISIVE = 2.0  # differences of so many standard errors, and of more than _NOTICEABLE, are said to be seen
 _NOTICEABLE = 4.0
+_NO_WEIGHT = 1e4  # so far below the largest a log weight is none at all
+
+How = Literal["importance sampling", "moment matching", "refit", "rough"]
+Verdict = Literal["clear", "leaning", "open"]
 
 
 @dataclass(frozen=True)
@@ -16,15 +22,23 @@ class Prediction:
 
     Args:
         elpd: Expected log predictive density of each reading, had it been left out.
-        pareto_k: Reliability of each.
+        pareto_k: Reliability of each, as the draws of the fit give it.
+        error: Monte Carlo standard error of each; empty where it was not asked for.
+        readings: Table and label of each; empty where they were not given.
+        how: How each was found; empty where all are by importance sampling, reliable or not.
     """
 
     elpd: np.ndarray
     pareto_k: np.ndarray
+    error: np.ndarray = field(default_factory=lambda: np.zeros(0))
+    readings: tuple[tuple[str, str], ...] = ()
+    how: tuple[How, ...] = ()
 
     @property
     def unreliable(self) -> int:
         """Number of readings whose value leans on few draws."""
+        if self.how:
+            return self.how.count("rough")
         return int(np.sum(~(self.pareto_k <= RELIABLE_K)))
 
 
@@ -47,6 +61,29 @@ class Difference:
         """Whether the data can tell the two apart."""
         return self.elpd > max(_DECISIVE * self.standard_error, _NOTICEABLE)
 
+    def verdict(self, n_readings: int) -> Verdict:
+        """Whether the data can tell the two apart, with so few or so many readings.
+
+        Below a hundred readings the standard error is itself known badly, and rather too small: between two and four of
+        them the data lean, and no more.
+
+        References:
+            Sivula, Magnusson, Matamoros and Vehtari 2020, "Uncertainty in Bayesian leave-one-out cross-validation based
+            model comparison" (arXiv:2008.10296).
+        """
+        if not self.is_seen:
+            return "open"
+        return "leaning" if n_readings < SMALL and self.elpd < 2 * _DECISIVE * self.standard_error else "clear"
+
+
+def reliable_k(n_draws: int) -> float:
+    """Pareto k up to which importance weights of so many draws can be trusted.
+
+    References:
+        Vehtari, Simpson, Gelman, Yao and Gabry 2024, "Pareto smoothed importance sampling" (JMLR 25), section 3.2.4.
+    """
+    return min(1 - 1 / np.log10(n_draws), RELIABLE_K) if n_draws > 10 else 0.0
+
 
 def left_out(log_likelihood: Mapping[str, np.ndarray], n_effective: float) -> Prediction:
     """Leave-one-out by Pareto-smoothed importance sampling.
@@ -59,14 +96,42 @@ def left_out(log_likelihood: Mapping[str, np.ndarray], n_effective: float) -> Pr
         Vehtari, Gelman and Gabry 2017, "Practical Bayesian model evaluation using leave-one-out cross-validation and
         WAIC" (Statistics and Computing 27).
     """
+    readings = np.concatenate([values for values in log_likelihood.values() if values.shape[-1]], axis=-1)
+    draws = readings.reshape(-1, readings.shape[-1])
+    share = min(n_effective / len(draws), 1.0)
+    parts = [weighted_elpd(-draws[:, i], draws[:, i], share) for i in range(draws.shape[1])]
+    elpd, pareto_k, error = (np.array(part) for part in zip(*parts, strict=True))
+    return Prediction(elpd, pareto_k, error)
+
+
+def weighted_elpd(log_ratio: np.ndarray, log_likelihood: np.ndarray, share: float) -> tuple[float, float, float]:
+    """Expected log density of one reading from weighted draws, its Pareto k, and its Monte Carlo standard error.
+
+    Args:
+        log_ratio: Log importance ratio of every draw, up to a constant.
+        log_likelihood: Of the reading, at every draw.
+        share: Effective draws a draw.
+
+    References:
+        Vehtari et al. 2024, "Pareto smoothed importance sampling" (JMLR 25), section 3.2.3 for the error.
+    """
+    log_weights, k = smoothed(log_ratio, share)
+    parts = log_weights + log_likelihood
+    top = float(np.max(parts))
+    elpd = top + float(np.log(np.sum(np.exp(parts - top))))
+    relative = np.exp(parts - elpd) - np.exp(log_weights)  # weight times the relative deviation of the density
+    return elpd, k, float(np.sqrt(np.sum(relative**2) / share))
+
+
+def smoothed(log_ratio: np.ndarray, share: float) -> tuple[np.ndarray, float]:
+    """Pareto-smoothed normalized log weights, and Pareto k; ratios that cannot be computed have no weight."""
     from arviz_stats.base import array_stats
 
-    readings = np.concatenate([values for values in log_likelihood.values() if values.shape[-1]], axis=-1)
-    share = min(n_effective / (readings.shape[0] * readings.shape[1]), 1.0)
-    parts = [
-        array_stats.loo(readings[..., i], chain_axis=0, draw_axis=1, r_eff=share) for i in range(readings.shape[-1])
-    ]
-    return Prediction(np.array([float(p[0]) for p in parts]), np.array([float(p[1]) for p in parts]))
+    usable = np.isfinite(log_ratio)
+    lowest = np.max(log_ratio[usable], initial=0.0) - _NO_WEIGHT
+    # ArviZ's function takes what is left out, the log likelihood, and turns its sign itself.
+    log_weights, k = array_stats.psislw(-np.where(usable, log_ratio, lowest), r_eff=share, axis=0)
+    return np.asarray(log_weights), float(k)
 
 
 def differences(predictions: Mapping[str, Prediction]) -> dict[str, Difference]:
@@ -83,3 +148,36 @@ def differences(predictions: Mapping[str, Prediction]) -> dict[str, Difference]:
         error = float(np.sqrt(len(each) * np.var(each, ddof=1))) if len(each) > 1 else float("nan")
         found[name] = Difference(float(each.sum()), error, max(best.unreliable, predictions[name].unreliable))
     return found
+
+
+def stacking_weights(predictions: Mapping[str, Prediction]) -> dict[str, float]:
+    r"""Weights of the mixture of the models that predicts left-out readings best.
+
+    .. math:: \max_w \sum_i \log \sum_k w_k \exp(\text{elpd}_{ik}), \quad w_k \ge 0, \quad \sum_k w_k = 1
+
+    A run of forces has a log density of hundreds, whose exponential overflows; so each reading's are taken relative to the
+    best model's for it, which leaves the weights as they are.
+
+    Args:
+        predictions: By name of the model, of the same readings in the same order.
+
+    References:
+        Yao, Vehtari, Simpson and Gelman 2018, "Using stacking to average Bayesian predictive distributions" (Bayesian
+        Analysis 13), equation 5.
+    """
+    from scipy.optimize import minimize
+
+    elpd = np.column_stack([p.elpd for p in predictions.values()])
+    density = np.exp(elpd - elpd.max(axis=1, keepdims=True))
+    n = len(predictions)
+
+    def loss(weights: np.ndarray) -> tuple[float, np.ndarray]:
+        mixed = np.maximum(density @ weights, 1e-300)
+        return -float(np.mean(np.log(mixed))), -np.mean(density / mixed[:, None], axis=0)
+
+    whole = {"type": "eq", "fun": lambda w: np.sum(w) - 1, "jac": np.ones_like}
+    found = minimize(
+        loss, np.full(n, 1 / n), jac=True, method="SLSQP", bounds=[(0, 1)] * n, constraints=[whole], tol=1e-10
+    )
+    weights = np.clip(found.x, 0.0, 1.0)
+    return {name: float(w) for name, w in zip(predictions, weights / weights.sum(), strict=True)}

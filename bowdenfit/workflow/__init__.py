@@ -10,10 +10,11 @@ from bowdenfit.dataset import Dataset, load_dataset, single_file_dataset
 from bowdenfit.errors import DatasetError, StoreError, UsageError
 from bowdenfit.measurements.recording_files import parsed_channels
 from bowdenfit.workflow.background import assistants, draw, load_ahead
-from bowdenfit.workflow.storing import LARGEST_SEED, begun, checked_seed, write_results
+from bowdenfit.workflow.calibration import calibrate as calibrate
+from bowdenfit.workflow.storing import LARGEST_SEED, begun, checked_seed, sampled_by, write_results
 
 if TYPE_CHECKING:
-    from bowdenfit.inference.ensemble import Progress
+    from bowdenfit.inference.chain import Progress
     from bowdenfit.measurements.channels import ChannelFile
     from bowdenfit.measurements.recordings import Recordings
     from bowdenfit.results.comparison import Comparison
@@ -27,6 +28,7 @@ def read(
     geometry: str | None = None,
     undetected: str | None = None,
     friction: str | None = None,
+    noise: str | None = None,
     wrap_angle: tuple[float, str] | None = None,
     channels: Sequence[str] = (),
 ) -> Dataset:
@@ -39,6 +41,7 @@ def read(
         undetected: How angles too small to detect enter: "censored", "zero" or "dropped".
         friction: How friction depends on load and speed: "capstan", or "drag", "load-dependent" and "rate-dependent"
             joined by "+".
+        noise: How readings scatter: "normal", or "student" where a few may be grossly wrong.
         wrap_angle: Angle and unit of a table or recording without a description.
         channels: Channels of recordings, such as "input_force=ai0:lbf" or "time=1000Hz".
 
@@ -54,6 +57,8 @@ def read(
         changes.append(f'tables.angles.undetected="{undetected}"')
     if friction is not None:
         changes.append(f'friction_model="{friction}"')
+    if noise is not None:
+        changes.append(f'noise="{noise}"')
     sources = parsed_channels(channels)
     if wrap_angle is not None:
         return single_file_dataset(Path(dataset), wrap_angle, changes, sources)
@@ -120,6 +125,7 @@ def fit(
     *,
     output: str | Path | None = None,
     mcmc: bool = True,
+    sampler: str | None = None,
     seed: int | None = None,
     resume: bool = False,
     force: bool = False,
@@ -135,6 +141,7 @@ def fit(
         dataset: See `read`; its keywords are taken too.
         output: Results folder to write; nothing is written if omitted.
         mcmc: Whether to sample the posterior; without it there are no intervals.
+        sampler: "emcee", "nuts", or "both" to have one check the other; the description's if omitted.
         seed: Seed of everything random; drawn and recorded if omitted.
         resume: Go on with an interrupted or unconverged fit in `output`.
         force: Replace a fit in `output`.
@@ -153,6 +160,8 @@ def fit(
     if in_background and not isinstance(dataset, Dataset):
         load_ahead("jax", "optimistix")  # while recordings are read, which takes seconds
     data = read(dataset, **reading)
+    if sampler is not None:
+        data = sampled_by(data, sampler)
     seed = checked_seed(folder, data, mcmc, seed, resume, force)
     with assistants(in_background and mcmc, in_background and figures and folder is not None) as helpers:
         import jax
@@ -169,21 +178,37 @@ def fit(
     return found
 
 
-def compare(fits: "Mapping[str, Fit]") -> "Comparison":
+def compare(
+    fits: "Mapping[str, Fit]",
+    *,
+    output: str | Path | None = None,
+    force: bool = False,
+    report: Callable[[str], None] | None = None,
+) -> "Comparison":
     """Compare fits of the same measurements.
 
     Args:
         fits: By name.
+        output: Folder for comparison.json, comparison.txt and the figure; nothing is written if omitted.
+        force: Replace a comparison in `output`.
+        report: Called with a sentence before each reading that takes longer, because it would move the posterior.
 
     Raises:
         UsageError: There are fewer than two, one has no posterior, or they are not of the same readings.
+        StoreError: `output` holds something already.
     """
     import jax
 
     from bowdenfit.results.comparison import compare as compared
+    from bowdenfit.workflow.comparing import refuse_to_replace, write_comparison
 
+    if output is not None:
+        refuse_to_replace(Path(output), force)
     with jax.enable_x64(True):
-        return compared(fits)
+        found = compared(fits, report)
+    if output is not None:
+        write_comparison(found, Path(output))
+    return found
 
 
 def plot(found: "Fit", folder: str | Path) -> list[Path]:

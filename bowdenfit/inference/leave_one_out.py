@@ -1,0 +1,185 @@
+"""Leave-one-out with what importance sampling cannot do done otherwise: moment matching, then a fit without the reading."""
+
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, replace
+from functools import cached_property
+from typing import Any
+
+import jax
+import jax.numpy as jnp
+import numpy as np
+from jax import Array
+from jaxtyping import Float
+
+from bowdenfit.description import SamplerSettings
+from bowdenfit.inference.comparison import How, Prediction, left_out, reliable_k, smoothed
+from bowdenfit.inference.compilation import compiled
+from bowdenfit.inference.diagnostics import Diagnostics, diagnose_all
+from bowdenfit.inference.least_squares import MaximumPosterior
+from bowdenfit.inference.moment_matching import matched
+from bowdenfit.inference.posterior import Posterior
+
+# A refit is asked for one number, to a few hundredths: fewer walkers than for the answers of a fit.
+REFIT = SamplerSettings(n_ensembles=4, n_walkers=64, max_steps=4000, target_r_hat=1.02, target_ess=400)
+_RATIO = "likelihood"
+_LARGEST_ERROR = 0.3  # Monte Carlo error of a log density beyond which it is called rough
+
+
+@dataclass(frozen=True)
+class Readings:
+    """The readings of a posterior, any of which may be left out of its density; compiled once for all of them.
+
+    Args:
+        posterior: The posterior.
+        settings: Of the fits without a reading.
+    """
+
+    posterior: Posterior
+    settings: SamplerSettings = REFIT
+
+    @cached_property
+    def names(self) -> tuple[tuple[str, str], ...]:
+        """Table and label of every reading."""
+        return tuple((term.name, label) for term in self.posterior.model.terms for label in term.labels)
+
+    @property
+    def walkers(self) -> int:
+        """Walkers of each ensemble of a refit: more than twice as many as there are parameters."""
+        return max(self.settings.n_walkers, 4 * self.posterior.model.space.size)
+
+    @property
+    def batch(self) -> int:
+        """Rows that the compiled program takes at once: what the sampler asks for at every step."""
+        return self.settings.n_ensembles * self.walkers // 2
+
+    @cached_property
+    def _program(self) -> Callable[..., Any]:
+        def density(
+            z: Float[Array, " free"], data: Any, counts: Float[Array, " readings"]
+        ) -> tuple[Float[Array, ""], Float[Array, " readings"]]:
+            each = jnp.concatenate(list(self.posterior.log_likelihoods(z, data).values()))
+            total = jnp.sum(jnp.where(counts > 0, each, 0.0)) - 0.5 * jnp.sum(z**2)
+            return jnp.where(jnp.isnan(total), -jnp.inf, total), each
+
+        shape = jax.ShapeDtypeStruct((self.batch, self.posterior.model.space.size), jnp.float64)
+        counts = jax.ShapeDtypeStruct((len(self.names),), jnp.float64)
+        return compiled(jax.vmap(density, in_axes=(0, None, None)), shape, self.posterior.data, counts)
+
+    def _counts(self, without: int | None) -> np.ndarray:
+        return np.array([float(i != without) for i in range(len(self.names))])
+
+    def evaluate(self, z: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """Log posterior density, up to a constant, and log likelihood of every reading, at any number of z (rows)."""
+        counts, batch, parts = self._counts(None), self.batch, []
+        for start in range(0, len(z), batch):
+            part = z[start : start + batch]
+            padded = np.concatenate([part, np.repeat(part[-1:], batch - len(part), axis=0)])
+            parts.append(
+                [np.asarray(found)[: len(part)] for found in self._program(padded, self.posterior.data, counts)]
+            )
+        density, each = (np.concatenate(part) for part in zip(*parts, strict=True))
+        return density, each
+
+    def without(self, reading: int) -> Callable[[np.ndarray, Any], Any]:
+        """Log posterior density without a reading, for batches, as the sampler calls it."""
+        counts = self._counts(reading)
+        return lambda z, data: self._program(z, data, counts)[0]
+
+
+def leave_one_out(
+    readings: Readings,
+    z: np.ndarray,
+    log_likelihood: Mapping[str, np.ndarray],
+    n_effective: float,
+    seed: int,
+    wanted: Sequence[int] | None = None,
+    report: Callable[[str], None] | None = None,
+) -> Prediction:
+    """Leave-one-out, with readings whose importance weights cannot be trusted treated one by one.
+
+    Pareto k above the limit calls for moment matching; where that does not bring it down, the model is fitted again
+    without the reading. What even that cannot settle is called rough.
+
+    Args:
+        readings: The readings of the posterior.
+        z: Its draws, (chain, draw, parameter).
+        log_likelihood: Of every reading by table, (chain, draw, reading).
+        n_effective: Effective number of the draws.
+        seed: Seed of the refits.
+        wanted: Positions of the readings in question among `readings.names`; all if omitted.
+        report: Called with a sentence before each reading that takes longer.
+    """
+    tables = [log_likelihood[term.name] for term in readings.posterior.model.terms]
+    each = np.concatenate(tables, axis=-1)
+    chosen = list(range(each.shape[-1])) if wanted is None else list(wanted)
+    draws, limit = z.reshape(-1, z.shape[-1]), reliable_k(z.shape[0] * z.shape[1])
+    share = min(n_effective / len(draws), 1.0)
+    quick = left_out({"": each[..., chosen]}, n_effective)
+    elpd, error = quick.elpd.copy(), quick.error.copy()
+    how: list[How] = ["importance sampling"] * len(chosen)
+    for place in np.flatnonzero(~(quick.pareto_k <= limit)):
+        reading = chosen[place]
+        if report is not None:
+            report(f"leaving out {' '.join(readings.names[reading])}")
+        elpd[place], error[place], how[place] = treated(readings, draws, reading, share, limit, seed)
+    return Prediction(elpd, quick.pareto_k, error, tuple(readings.names[i] for i in chosen), tuple(how))
+
+
+def treated(
+    readings: Readings, draws: np.ndarray, reading: int, share: float, limit: float, seed: int
+) -> tuple[float, float, How]:
+    """Expected log density of a reading whose importance weights fail, its Monte Carlo error, and how it was found.
+
+    Args:
+        readings: The readings.
+        draws: Draws of the posterior with all of them, one a row.
+        reading: Position of the one left out.
+        share: Effective draws a draw.
+        limit: Pareto k that is good enough.
+        seed: Seed of a refit.
+    """
+
+    def evaluate(at: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        density, each = readings.evaluate(at)
+        return density, each[:, reading]
+
+    elpd, k, error = matched(draws, evaluate, share)
+    if k <= limit:
+        return elpd, error, "moment matching"
+    elpd, error, settled = refitted(readings, draws, reading, share, seed)
+    return elpd, error, "refit" if settled else "rough"
+
+
+def refitted(readings: Readings, draws: np.ndarray, reading: int, share: float, seed: int) -> tuple[float, float, bool]:
+    """Expected log density of a reading by a fit without it, its Monte Carlo error, and whether that fit converged.
+
+    Args:
+        readings: The readings.
+        draws: Draws of the posterior with all of them, one a row: where the fit starts, weighted as if it were left out.
+        reading: Position of the one left out.
+        share: Effective draws a draw.
+        seed: Seed of the fit.
+    """
+    from bowdenfit.inference.ensemble import sample
+
+    each = readings.evaluate(draws)[1][:, reading]
+    weights = np.exp(smoothed(-each, share)[0])
+    start = MaximumPosterior(weights @ draws, np.atleast_2d(np.cov(draws.T)))
+    top = float(np.max(each))
+
+    def likelihood(z: np.ndarray) -> dict[str, np.ndarray]:
+        return {_RATIO: np.exp(readings.evaluate(z)[1][:, reading] - top)}
+
+    settings = readings.settings.model_copy(update={"n_walkers": readings.walkers})
+    own_seed = int(np.random.SeedSequence([seed, reading]).generate_state(1)[0])
+    chain = sample(
+        readings.posterior, readings.without(reading), start, settings, own_seed, likelihood, diagnose=_without_drift
+    )
+    mean = float(chain.quantities[_RATIO].mean())
+    error = chain.diagnostics[_RATIO].mcse_mean / mean if mean > 0 else float("nan")
+    return top + float(np.log(mean)) if mean > 0 else -np.inf, error, not chain.reasons and error < _LARGEST_ERROR
+
+
+def _without_drift(draws: Mapping[str, np.ndarray], n_ensembles: int) -> dict[str, Diagnostics]:
+    """Diagnostics without drift, which cannot be told from chance with as few effective draws as a refit needs."""
+    return {name: replace(found, drift=0.0) for name, found in diagnose_all(draws, n_ensembles).items()}

@@ -1,0 +1,120 @@
+"""How much a reading that has not been taken yet would tell of an answer, from draws of the posterior alone.
+
+Every draw gives the answer and, with noise, the reading that a cable of these parameters would give. How far the answer can
+be told from the reading is then a regression over the draws: by the law of total variance the variance of the answer that
+is left once the reading is known is, on average over all that the reading may turn out to be,
+
+    E[Var(answer | reading)] = Var(answer) - Var(E[answer | reading]) = (1 - share) Var(answer).
+"""
+
+from dataclasses import dataclass
+from itertools import combinations_with_replacement
+
+import numpy as np
+from jaxtyping import Float
+
+GROUPS = 64  # of draws: what is learned on all but one is judged on that one
+_DEGREES = {1: 5, 2: 4, 3: 3}  # of the polynomials, by the number of columns of a reading
+_DEGREE_OF_MANY = 2
+_FEWEST = 3  # readings whose scatter says something
+_ALIKE = 1e-9  # relative spread below which readings are all the same
+
+
+@dataclass(frozen=True)
+class Explained:
+    """How much of an answer's variance a reading would take away, on average.
+
+    Args:
+        share: Share of the variance, at least 0 [1].
+        error: Its Monte Carlo standard error, because the draws are so many and no more [1].
+        without: The share with each group of draws left out, before it is cut off at 0 [1].
+    """
+
+    share: float
+    error: float
+    without: Float[np.ndarray, " groups"]
+
+
+def explained(
+    reading: Float[np.ndarray, "draws columns"], answer: Float[np.ndarray, " draws"], groups: int = GROUPS
+) -> Explained:
+    """Share of the variance of an answer that a reading explains.
+
+    The answer is regressed on polynomials of the reading, so that dependence may be curved. The polynomials are fitted
+    without one group of draws and judged on that group, in turn, so that noise does not look like information. Draws that
+    are not independent must follow each other (walker after walker): then groups are nearly so, and the error is right.
+    A regression that cannot follow the true dependence finds too small a share, never too large a one.
+
+    Args:
+        reading: The reading as each draw would give it; several columns are read together.
+        answer: The answer of each draw.
+        groups: Number of groups.
+    """
+    polynomials = _polynomials(reading)
+    left, total = _squares_left(polynomials, answer, groups)
+    without = 1 - (left.sum() - left) / (total.sum() - total) if total.sum() > 0 else np.zeros(len(left))
+    share = 1 - left.sum() / total.sum() if total.sum() > 0 else 0.0
+    return Explained(float(np.clip(share, 0.0, 1.0)), _jackknife_error(without), without)
+
+
+def error_of_difference(one: Explained, other: Explained) -> float:
+    """Standard error of the difference of two shares from the same draws, which err together."""
+    return _jackknife_error(one.without - other.without)
+
+
+def _jackknife_error(without: np.ndarray) -> float:
+    """Standard error from values with one group left out in turn."""
+    n = len(without)
+    return float(np.sqrt((n - 1) / n * np.sum((without - without.mean()) ** 2)))
+
+
+def _squares_left(x: np.ndarray, answer: np.ndarray, groups: int) -> tuple[np.ndarray, np.ndarray]:
+    """Of each group: squared deviations from the regression, and from the mean, that the other groups give."""
+    scale = answer.std()
+    y = (answer - answer.mean()) / (scale if scale > 0 else 1.0)
+    parts = [(x[part], y[part]) for part in np.array_split(np.arange(len(y)), min(groups, len(y)))]
+    products = np.array([a.T @ a for a, _ in parts])
+    with_answer = np.array([a.T @ b for a, b in parts])
+    squares = np.array([b @ b for _, b in parts])
+    return _judged(products, with_answer, squares), _judged(products[:, :1, :1], with_answer[:, :1], squares)
+
+
+def _judged(products: np.ndarray, with_answer: np.ndarray, squares: np.ndarray) -> np.ndarray:
+    """Squared deviations of each group from what least squares of the others predicts."""
+    left = np.empty(len(squares))
+    for g in range(len(squares)):
+        others = products.sum(axis=0) - products[g], with_answer.sum(axis=0) - with_answer[g]
+        coefficients = np.linalg.lstsq(*others, rcond=1e-12)[0]
+        left[g] = squares[g] - 2 * coefficients @ with_answer[g] + coefficients @ products[g] @ coefficients
+    return left
+
+
+def _polynomials(reading: np.ndarray) -> np.ndarray:
+    """Products of powers of the columns, the constant first; columns that say nothing are left out."""
+    columns = [_normal_scores(column) for column in reading.T if np.ptp(column) > _ALIKE * np.abs(column).max()]
+    degree = _DEGREES.get(len(columns), _DEGREE_OF_MANY)
+    terms = [np.ones(len(reading))]
+    for power in range(1, degree + 1):
+        for factors in combinations_with_replacement(columns, power):
+            terms.append(np.prod(factors, axis=0))
+    return np.column_stack(terms)
+
+
+def _normal_scores(column: np.ndarray) -> np.ndarray:
+    """The column brought to a normal distribution by its ranks, so that no far value rules a polynomial."""
+    from scipy.special import ndtri
+    from scipy.stats import rankdata
+
+    return np.asarray(ndtri((rankdata(column) - 0.5) / len(column)))
+
+
+def mean_and_spread(readings: Float[np.ndarray, "draws repeats columns"]) -> Float[np.ndarray, "draws statistics"]:
+    """What several readings of one kind say together: mean and, from three on, the logarithm of their scatter.
+
+    Args:
+        readings: Readings of each draw.
+    """
+    mean = readings.mean(axis=1)
+    if readings.shape[1] < _FEWEST:
+        return mean
+    return np.column_stack([mean, np.log(readings.std(axis=1) + 1e-12)])

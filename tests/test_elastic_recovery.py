@@ -153,7 +153,7 @@ def all_on_the_way_up(dataset: Dataset) -> Dataset:
 def test_the_same_test_rejects_a_model_without_the_unloading_branch(laboratory):
     """The negative control: friction that holds the stretch back while the load comes down, taken for noise."""
     wrong = Laboratory(all_on_the_way_up, QUICK)
-    wrong.programs = laboratory.programs
+    wrong.fits = laboratory.fits
     p = p_values([wrong.ranks(plausible(), Design(elastic=SHORT), seed) for seed in range(6)])
     assert p["sigma_L"] < 0.001
     assert p["lengthening"] < 0.001

@@ -9,11 +9,9 @@ Intervals of one cable share its recordings. Every binomial test here therefore 
 """
 
 import tomllib
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
-from functools import cached_property
 from pathlib import Path
-from typing import Any
 
 import jax
 import numpy as np
@@ -21,12 +19,11 @@ import pytest
 from scipy import stats
 
 import bowdenfit
+from bowdenfit.calibration.laboratory import Laboratory as Fits
 from bowdenfit.dataset import Dataset
 from bowdenfit.dataset.recordings import _File, _prepared, _recording, preparation_settings
 from bowdenfit.description import Description, SamplerSettings
 from bowdenfit.description_file import parse_description
-from bowdenfit.inference.ensemble import sample
-from bowdenfit.inference.least_squares import make_objective, maximum_posterior
 from bowdenfit.inference.posterior import Posterior
 from bowdenfit.measurements.recordings import RawRecording, Recordings
 from bowdenfit.measurements.tables import Measurements
@@ -144,35 +141,17 @@ def prepared(description: Description, cable: Cable) -> Dataset:
     return Dataset(description, Measurements(recordings=Recordings(description.angle_columns, each, "", delay_sd)), {})
 
 
-@dataclass(frozen=True)
-class Programs:
-    """What is compiled once for all cables, whose data are all of one shape."""
-
-    posterior: Posterior
-
-    @cached_property
-    def objective(self) -> Callable[..., Any]:
-        return make_objective(self.posterior)
-
-    @cached_property
-    def log_density(self) -> Callable[..., Any]:
-        return self.posterior.batched_log_density(SAMPLER.n_ensembles * SAMPLER.n_walkers // 2)
-
-
 class Laboratory:
     """Fits recorded cables, and keeps what was compiled for them."""
 
     def __init__(self) -> None:
-        self.programs: dict[str, Programs] = {}
+        self.fits = Fits(SAMPLER)
 
     def draws(self, dataset: Dataset, seed: int) -> dict[str, np.ndarray]:
         """Draws of every parameter [internal units] and of the total exponent at the nominal angle."""
         posterior = Posterior(build_model(dataset))
         space = posterior.model.space
-        shapes = str(jax.tree.map(np.shape, posterior.data)) + str(space.index)
-        programs = self.programs.setdefault(shapes, Programs(posterior))
-        start = maximum_posterior(posterior, programs.objective)
-        z = sample(posterior, programs.log_density, start, SAMPLER, seed, lambda z: {}).z.reshape(-1, space.size)
+        z = self.fits.chain(posterior, seed).z.reshape(-1, space.size)
         found = dict(zip((p.name for p in space.free), np.asarray(jax.vmap(space.vector)(z)).T, strict=True))
         return found | {TOTAL: found["mu_edge"] * EDGE + found["mu_bend"] * NOMINAL}
 

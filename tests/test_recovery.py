@@ -56,7 +56,7 @@ def recovered(per_kind: int, first_seed: int = 0) -> list[dict[str, float]]:
 
 
 def test_over_twenty_cables_of_two_to_five_contacts_nine_in_ten_intervals_hold_the_truth():
-    """Every coefficient, every other parameter, and l*; no binomial test of the 17 rejects at 0.001.
+    """Every coefficient, every other parameter, l* and eta*; no binomial test of the 18 rejects at 0.001.
 
     By chance one of them does once in a hundred seeds or less (binomial tails are far below their level at 20 trials).
     """
@@ -71,7 +71,7 @@ def test_over_twenty_cables_of_two_to_five_contacts_nine_in_ten_intervals_hold_t
 def test_over_two_hundred_cables_ranks_are_uniform():
     """The whole distribution, not only the 90 % interval: Kolmogorov-Smirnov tests of the ranks, over independent cables.
 
-    17 of each kind; the smallest p times their number is below 0.001 once in a thousand seeds.
+    18 of each kind; the smallest p times their number is below 0.001 once in a thousand seeds.
     """
     ranks = recovered(per_kind=50, first_seed=1000)
     p = p_values(ranks)

@@ -5,10 +5,13 @@ import sys
 
 import click
 
+from bowdenfit.cli.calibration import calibrate
+from bowdenfit.cli.comparing import compare
 from bowdenfit.cli.data_sets import check, init, simulate
 from bowdenfit.cli.fitting import fit
 from bowdenfit.cli.identifying import identify
-from bowdenfit.cli.results import compare, length, plot, predict, summary
+from bowdenfit.cli.planning import next_measurement
+from bowdenfit.cli.results import length, plot, predict, summary
 from bowdenfit.cli.watching import INTERRUPTED
 from bowdenfit.errors import BowdenfitError
 
@@ -66,5 +69,7 @@ def completion(shell: str) -> None:
     click.echo(script(bowdenfit, {}, "bowdenfit", "_BOWDENFIT_COMPLETE").source())
 
 
-for verb in (init, check, fit, summary, predict, length, identify, compare, plot, simulate, completion):
+for verb in (
+    init, check, fit, summary, predict, length, identify, next_measurement, compare, calibrate, plot, simulate, completion,
+):  # fmt: skip
     bowdenfit.add_command(verb)

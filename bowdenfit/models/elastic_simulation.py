@@ -2,6 +2,7 @@
 
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
+from typing import Any
 
 import jax
 import jax.numpy as jnp
@@ -10,9 +11,10 @@ import numpy as np
 from bowdenfit.description import Description
 from bowdenfit.measurements.tables import LoopTable, Measurements, OwnAngles, PreloadTable, Provenance, StretchTable
 from bowdenfit.models.cable import Cable, resolve_angles, row_angles
-from bowdenfit.models.elasticity import PRELOAD_NOISE, STRETCH_NOISE
-from bowdenfit.models.scatter import FORCE_NOISE
-from bowdenfit.models.stretch import ElasticTerm, preload_term, stretch_term
+from bowdenfit.models.elasticity import LOOP_MOUNTING, PRELOAD_NOISE, STRETCH_NOISE
+from bowdenfit.models.noise import scatter
+from bowdenfit.models.scatter import FORCE_NOISE, GAIN_ERROR, INPUT_OFFSET, OUTPUT_OFFSET, RUN_SCATTER
+from bowdenfit.models.stretch import ElasticTerm, stretch_term
 from bowdenfit.physics.loop import free_motion_loss, loop_output_force
 
 
@@ -87,43 +89,61 @@ def _origin(file: str, n: int) -> Provenance:
     return Provenance((file,), np.zeros(n, dtype=int), np.arange(2, n + 2))
 
 
-def simulated_elastic_tables(
+def drawn_elastic_readings(
     cable: Cable, tables: Measurements, values: Mapping[str, jax.Array], key: jax.Array, scale: float
-) -> Measurements:
-    """The tables with readings; their noise is multiplied by `scale`."""
+) -> dict[str, dict[str, jax.Array]]:
+    """New readings of the tables of stretch, preload and a loop, by table; their noise is multiplied by `scale`."""
     of_stretch, of_preload, of_loop = jax.random.split(key, 3)
-    stretch, preload, loop = tables.stretch, tables.preload, tables.loop
+    stretch, preload = tables.stretch, tables.preload
+    readings: dict[str, dict[str, jax.Array]] = {}
     if stretch is not None:
         term = stretch_term(cable, stretch)
-        noise = scale * values[STRETCH_NOISE] * jax.random.normal(of_stretch, stretch.load.shape)
-        stretch = replace(stretch, stretch=np.asarray(term.expected(values, _arrays(term)) + noise))
+        noise = scale * values[STRETCH_NOISE] * scatter(of_stretch, stretch.load.shape, cable.description)
+        readings["stretch"] = {"stretch": term.expected(values, _arrays(term)) + noise}
     if preload is not None:
-        term = preload_term(cable, preload)
-        noise = scale * values[PRELOAD_NOISE] * jax.random.normal(of_preload, preload.wrap_angle.shape)
-        preload = replace(preload, preload=np.maximum(term.expected(values, _arrays(term)) + noise, 0.0))
-    if loop is not None:
-        loop = _simulated_loop(cable, loop, values, of_loop, scale)
-    return Measurements(stretch=stretch, preload=preload, loop=loop)
+        noise = scale * values[PRELOAD_NOISE] * scatter(of_preload, preload.wrap_angle.shape, cable.description)
+        expected = cable.elasticity.preload(values, jnp.asarray(preload.wrap_angle))[0]
+        readings["preload"] = {"preload": jnp.maximum(expected + noise, 0.0)}
+    if tables.loop is not None:
+        readings["loop"] = _drawn_loop(cable, tables, values, of_loop, scale)
+    return readings
+
+
+def with_elastic_readings(tables: Measurements, drawn: Mapping[str, Any]) -> Measurements:
+    """The tables with what `drawn_elastic_readings` gave."""
+    return replace(
+        tables,
+        stretch=tables.stretch and replace(tables.stretch, **drawn["stretch"]),
+        preload=tables.preload and replace(tables.preload, **drawn["preload"]),
+        loop=tables.loop and replace(tables.loop, **drawn["loop"]),
+    )
 
 
 def _arrays(term: ElasticTerm) -> dict[str, jax.Array]:
     return {name: jnp.asarray(array) for name, array in term.data.items()}
 
 
-def _simulated_loop(
-    cable: Cable, table: LoopTable, values: Mapping[str, jax.Array], key: jax.Array, scale: float
-) -> LoopTable:
+def _drawn_loop(
+    cable: Cable, tables: Measurements, values: Mapping[str, jax.Array], key: jax.Array, scale: float
+) -> dict[str, jax.Array]:
+    """Forces of a loop with noise in both cells; rows without an input force are of free motion."""
+    table = tables.loop
+    assert table is not None  # the caller asked
     of_input, of_output = jax.random.split(key)
-    rows = {name: jnp.asarray(array) for name, array in row_angles(cable, table, None).data.items()}
-    angles, _ = resolve_angles(cable, values, rows)
-    exponent, stroke = cable.friction_exponent(values, angles), jnp.asarray(table.stroke, dtype=float)
-    preload = cable.elasticity.preload(values, jnp.sum(angles, axis=-1))[0]
+    rows = {name: jnp.asarray(array) for name, array in row_angles(cable, table, tables.angles).data.items()}
+    angles, variance = resolve_angles(cable, values, rows)
+    own = cable.elasticity.preload(values, jnp.sum(angles, axis=-1))[0]
+    preload = jnp.where(jnp.isnan(table.preload), own, jnp.nan_to_num(table.preload))
+    angles = angles + scale * jnp.sqrt(variance) * jax.random.normal(jax.random.fold_in(key, 2), angles.shape)
+    mounting = values[RUN_SCATTER] * values[LOOP_MOUNTING] if LOOP_MOUNTING in values else 0.0
+    exponent, stroke = cable.friction_exponent(values, angles) + mounting, jnp.asarray(table.stroke, dtype=float)
     free = stroke * free_motion_loss(preload, exponent)
     force = jnp.where(jnp.isnan(table.input_force), free, jnp.nan_to_num(table.input_force))
-    output = loop_output_force(force, preload, exponent, stroke)
+    output = loop_output_force(force, preload, exponent, stroke) * jnp.exp(-values.get(GAIN_ERROR, 0.0))
     noise = scale * values[FORCE_NOISE]
-    return replace(
-        table,
-        input_force=np.asarray(force + noise * jax.random.normal(of_input, force.shape)),
-        output_force=np.asarray(output + noise * jax.random.normal(of_output, force.shape)),
-    )
+    return {
+        "input_force": force + values.get(INPUT_OFFSET, 0.0) + noise * jax.random.normal(of_input, force.shape),
+        "output_force": output
+        + values.get(OUTPUT_OFFSET, 0.0)
+        + noise * scatter(of_output, force.shape, cable.description),
+    }

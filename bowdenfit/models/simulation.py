@@ -1,4 +1,8 @@
-"""A bench on the computer: tables of a cable whose coefficients are known, for testing and for planning."""
+"""A bench on the computer: tables of a cable whose coefficients are known, for testing, planning and calibration.
+
+`simulate` measures a design; `simulated_again` measures once more what a data set holds, at coefficients that are known.
+Both draw readings as the likelihood takes them to scatter, so that a posterior can be asked to hold the truth.
+"""
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
@@ -19,9 +23,8 @@ from bowdenfit.measurements.tables import (
     Provenance,
 )
 from bowdenfit.models.build import build_model
-from bowdenfit.models.cable import ANGLE_NOISE, Cable
-from bowdenfit.models.elastic_simulation import ElasticDesign, empty_elastic_tables, simulated_elastic_tables
-from bowdenfit.models.scatter import FORCE_NOISE, GAIN_ERROR, RUN_SCATTER
+from bowdenfit.models.drawn_readings import drawn_angles, drawn_readings, with_angles, with_readings
+from bowdenfit.models.elastic_simulation import ElasticDesign, empty_elastic_tables
 
 
 @dataclass(frozen=True)
@@ -124,56 +127,37 @@ def simulate(
         key: Random key.
         noise: Whether readings scatter; without noise every reading is what the model expects.
     """
-    tables = empty_tables(description, design)
-    cable = build_model(Dataset(description, tables, {})).cable
+    dataset = Dataset(description, empty_tables(description, design), {})
+    return simulated_again(dataset, values, key, noise=noise, beyond_curves=True)
+
+
+def simulated_again(
+    dataset: Dataset, values: Mapping[str, float], key: jax.Array, *, noise: bool = True, beyond_curves: bool = False
+) -> Dataset:
+    """The same tables, with readings drawn anew at known coefficients.
+
+    Kept are lengths, runs, strokes, loads, the rows' own wrap angles and what is stated of their errors, and input forces,
+    which stand for the true ones. Held readings are kept as they are.
+
+    Args:
+        dataset: What was measured.
+        values: True value of every parameter [internal units].
+        key: Random key.
+        noise: Whether readings scatter.
+        beyond_curves: Whether angles outside the range of the curves are drawn too, from the curves; else they are kept, as
+            the rows' own wrap angles are.
+
+    Raises:
+        DatasetError: A table cannot be drawn anew, or the recordings drawn have no strokes that could be found.
+    """
     named = {name: jnp.asarray(value, dtype=float) for name, value in values.items()}
-    keys, scale = jax.random.split(key, 3), 1.0 if noise else 0.0
-    of_elastic = jax.random.fold_in(key, 3)  # readings of the other tables stay what they were without these
-    angles = tables.angles and _simulated_angles(cable, tables.angles, named, keys[0], scale)
-    efficiencies = tables.efficiencies and _simulated_efficiencies(cable, tables.efficiencies, named, keys[1], scale)
-    forces = tables.forces and _simulated_forces(cable, tables.forces, named, keys[2], scale)
-    elastic = simulated_elastic_tables(cable, tables, named, of_elastic, scale)
-    return Dataset(description, replace(elastic, angles=angles, efficiencies=efficiencies, forces=forces), {})
-
-
-def _simulated_angles(
-    cable: Cable, table: AngleTable, values: Mapping[str, jax.Array], key: jax.Array, scale: float
-) -> AngleTable:
-    route = jnp.asarray(table.route)
-    theta = jnp.stack([curve.wrap_angle(values, route) for curve in cable.curves.values()], axis=-1)
-    reading = np.asarray(theta + scale * values[ANGLE_NOISE] * jax.random.normal(key, theta.shape))
-    settings = cable.description.tables.angles
-    limit = settings.detection_limit.to("angle") if settings and settings.detection_limit else -np.inf
-    undetected = reading < limit
-    return replace(
-        table, angle=np.where(undetected, np.nan, np.maximum(reading, 0.0)), limit=np.where(undetected, limit, np.nan)
-    )
-
-
-def _simulated_efficiencies(
-    cable: Cable, table: EfficiencyTable, values: Mapping[str, jax.Array], key: jax.Array, scale: float
-) -> EfficiencyTable:
-    expected = cable.efficiency_at(values, jnp.asarray(table.route)) * jnp.exp(-values.get(GAIN_ERROR, 0.0))
-    mounting = scale * values[RUN_SCATTER] * jax.random.normal(key, expected.shape)
-    return replace(table, efficiency=np.asarray(expected * jnp.exp(-mounting)))
-
-
-def _simulated_forces(
-    cable: Cable, table: ForceTable, values: Mapping[str, jax.Array], key: jax.Array, scale: float
-) -> ForceTable:
-    of_run, of_input, of_output = jax.random.split(key, 3)
-    route = jnp.asarray(np.nan_to_num(table.route))
-    angles = cable.wrap_angles(values, route)
-    for k, contact in enumerate(cable.description.contact):
-        own, _ = table.own.column(contact.wrap_angle.column or "")
-        angles = angles.at[:, k].set(jnp.where(np.isnan(own), angles[:, k], np.nan_to_num(own)))
-    mounting = scale * values[RUN_SCATTER] * jax.random.normal(of_run, (len(table.run_names),))
-    exponent = cable.friction_exponent(values, angles) + mounting[table.run]
-    stroke, force = jnp.asarray(table.stroke, dtype=float), jnp.asarray(table.input_force)
-    output = cable.friction.output_force(values, force, exponent, stroke) * jnp.exp(-values.get(GAIN_ERROR, 0.0))
-    noise = scale * values[FORCE_NOISE]
-    return replace(
-        table,
-        input_force=np.asarray(force + noise * jax.random.normal(of_input, force.shape)),
-        output_force=np.asarray(output + noise * jax.random.normal(of_output, force.shape)),
-    )
+    cable, scale = build_model(dataset).cable, 1.0 if noise else 0.0
+    if beyond_curves and dataset.measurements.angles is not None:
+        drawn = drawn_angles(
+            cable, dataset.measurements.angles, named, jax.random.split(key, 3)[0], scale, everywhere=True
+        )
+        angles = with_angles(dataset.measurements.angles, drawn)
+        others = replace(dataset.measurements, angles=angles)
+        readings = drawn_readings(cable, others, named, key, scale) | {"angles": drawn}
+        return with_readings(Dataset(dataset.description, others, {}), readings)
+    return with_readings(dataset, drawn_readings(cable, dataset.measurements, named, key, scale))

@@ -1,0 +1,82 @@
+"""Are ranks uniform? Simultaneous bands of their distribution function, and p values that go with them."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+
+PLACES = 50  # where the distribution function is looked at
+_SIMULATED = 20_000
+_SEED = 20_220_728
+
+
+@dataclass(frozen=True)
+class Uniformity:
+    """What the distribution function of n uniform ranks looks like.
+
+    The statistic of a sample is the smallest two-sided binomial probability of its distribution function over all places;
+    how small that gets by chance is simulated, and gives bands and p values that agree with each other.
+
+    Args:
+        n: Number of ranks.
+
+    References:
+        Saeilynoja, Buerkner & Vehtari 2022, "Graphical test for discrete uniformity and its applications in goodness-of-fit
+        evaluation and multiple sample comparison" (Statistics and Computing 32).
+    """
+
+    n: int
+
+    @property
+    def places(self) -> np.ndarray:
+        """Ranks at which the distribution function is looked at."""
+        return np.arange(1, PLACES) / PLACES
+
+    @cached_property
+    def _two_sided(self) -> np.ndarray:
+        """Two-sided binomial probability by number of ranks below a place, and place."""
+        from scipy import stats
+
+        counts = np.arange(self.n + 1)[:, None]
+        below, above = (f(counts, self.n, self.places) for f in (stats.binom.cdf, stats.binom.sf))
+        return np.minimum(1.0, 2 * np.minimum(below, above + stats.binom.pmf(counts, self.n, self.places)))
+
+    @cached_property
+    def _by_chance(self) -> np.ndarray:
+        """The statistic of uniform samples, in growing order."""
+        generator = np.random.default_rng(_SEED)
+        counts = generator.multinomial(self.n, np.full(PLACES, 1 / PLACES), size=_SIMULATED)[:, :-1].cumsum(axis=1)
+        return np.sort(self._two_sided[counts, np.arange(PLACES - 1)].min(axis=1))
+
+    def p_value(self, ranks: np.ndarray) -> float:
+        """Probability that uniform ranks are as far from uniform as these."""
+        counts = self.below(ranks)
+        statistic = self._two_sided[counts, np.arange(PLACES - 1)].min()
+        return float((1 + np.searchsorted(self._by_chance, statistic, side="right")) / (1 + _SIMULATED))
+
+    def below(self, ranks: np.ndarray) -> np.ndarray:
+        """How many ranks are at or below each place."""
+        return np.searchsorted(np.sort(ranks), self.places, side="right")
+
+    def band(self, probability: float) -> tuple[np.ndarray, np.ndarray]:
+        """Lowest and highest distribution function at each place, which hold that of uniform ranks with a probability."""
+        from scipy import stats
+
+        gamma = float(np.quantile(self._by_chance, 1 - probability))
+        ends = (stats.binom.ppf(tail, self.n, self.places) / self.n for tail in (gamma / 2, 1 - gamma / 2))
+        low, high = ends
+        return low, high
+
+
+def holm(p_values: Sequence[float]) -> list[float]:
+    """P values corrected for their number, so that the smallest is below alpha by chance with probability alpha at most.
+
+    References:
+        Holm 1979, "A simple sequentially rejective multiple test procedure" (Scandinavian Journal of Statistics 6).
+    """
+    order = np.argsort(p_values)
+    steps = np.arange(len(p_values), 0, -1) * np.asarray(p_values)[order]
+    corrected = np.empty(len(p_values))
+    corrected[order] = np.minimum(np.maximum.accumulate(steps), 1.0)
+    return corrected.tolist()

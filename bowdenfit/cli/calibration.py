@@ -1,0 +1,123 @@
+"""The verb that calibrates."""
+
+import signal
+import sys
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from pathlib import Path
+from typing import Any
+
+import click
+
+from bowdenfit.cli.options import reading, reading_options
+
+NOT_CALIBRATED = 3
+
+
+@click.command(short_help="Show that a description's intervals hold the truth as often as they say.")
+@click.argument("dataset", type=click.Path(path_type=Path))
+@reading_options
+@click.option("--replications", "-n", type=click.IntRange(2), default=200, show_default=True, help="How many.")
+@click.option("--workers", "-j", type=click.IntRange(1), help="Processes.  [default: one a core]")
+@click.option(
+    "--output",
+    "-o",
+    type=click.Path(path_type=Path),
+    help="Results folder.  [default: fits/calibration/NAME OF DATASET]",
+)
+@click.option(
+    "--assume",
+    "assumptions",
+    multiple=True,
+    metavar="KEY=VALUE",
+    help="Fit with this setting changed, while simulating without: what a wrong assumption costs; may be repeated.",
+)
+@click.option(
+    "--seed", type=click.IntRange(0, 2**31 - 1), help="Seed of everything random.  [default: drawn, and recorded]"
+)
+@click.option("--resume", is_flag=True, help="Go on with an interrupted calibration, or add replications.")
+@click.option("--force", is_flag=True, help="Replace an earlier calibration in the results folder.")
+@click.option("--json", "as_json", is_flag=True, help="Print calibration.json instead of the summary for people.")
+def calibrate(
+    dataset: Path,
+    replications: int,
+    workers: int | None,
+    output: Path | None,
+    assumptions: tuple[str, ...],
+    seed: int | None,
+    resume: bool,
+    force: bool,
+    as_json: bool,
+    **options: Any,
+) -> int:
+    """Simulation-based calibration of DATASET: of this very description, for tables like these.
+
+    Again and again, true values are drawn from the priors, tables like the measured ones (the same lengths, runs, loads and
+    wrap angles) are simulated with them and fitted. Then intervals must hold the truth as often as they claim, for every
+    parameter, the optimal length and the efficiency there. What was measured enters only by the design.
+
+    Takes some seconds a replication and core. Exit code 3: not calibrated.
+    """
+    from bowdenfit import workflow
+    from bowdenfit.report.calibration import calibration_text
+
+    folder = output or Path("fits/calibration") / (dataset.stem if dataset.suffix else dataset.resolve().name)
+    with _watched(folder) as progress:
+        found = workflow.calibrate(
+            dataset,
+            replications=replications,
+            workers=workers,
+            output=folder,
+            assume=assumptions,
+            seed=seed,
+            resume=resume,
+            force=force,
+            progress=progress,
+            **reading(**options),
+        )
+    if as_json:
+        import json
+
+        click.echo(json.dumps(found.page(), indent=1))
+    else:
+        click.echo(calibration_text(found), nl=False)
+    click.echo(f"Wrote {folder}.", err=True)
+    return 0 if found.is_calibrated else NOT_CALIBRATED
+
+
+@contextmanager
+def _watched(folder: Path) -> Iterator[Callable[[int, int], None] | None]:
+    """A bar on a terminal; when the user (or the system) stops a calibration, says how to go on."""
+    from bowdenfit.calibration.store import REPLICATIONS
+    from bowdenfit.cli.watching import INTERRUPTED
+
+    def stop(*_: object) -> None:
+        raise KeyboardInterrupt
+
+    signal.signal(signal.SIGTERM, stop)
+    try:
+        with _bar() as progress:
+            yield progress
+    except KeyboardInterrupt:
+        if (folder / REPLICATIONS).exists():
+            click.echo(
+                f"\nInterrupted; what is done is kept in {folder}: run the same command with --resume.", err=True
+            )
+            raise click.exceptions.Exit(INTERRUPTED) from None
+        raise
+
+
+@contextmanager
+def _bar() -> Iterator[Callable[[int, int], None] | None]:
+    if not sys.stderr.isatty():
+        yield None
+        return
+    from tqdm import tqdm
+
+    with tqdm(unit="replication", desc="calibrating", leave=False) as bar:
+
+        def report(done: int, total: int) -> None:
+            bar.total, bar.n = total, done
+            bar.refresh()
+
+        yield report

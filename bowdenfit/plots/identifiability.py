@@ -1,30 +1,35 @@
 """What measurements determine: each parameter's share of measurements and prior, and the combinations that are known."""
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from typing import TYPE_CHECKING
 
 import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
-from bowdenfit.plots.style import BLUE, LIGHT, SMALL, WIDE, in_paper_style
+from bowdenfit.plots.style import BLUE, GRAY, LIGHT, SMALL, WIDE, in_paper_style
 
 if TYPE_CHECKING:
     from bowdenfit.inference.identifiability import Knowledge
+    from bowdenfit.inference.profiles import Profile
 
 _ROW, _TOP, _BOTTOM, _NAMES, _GAP = 0.24, 0.34, 0.5, 1.75, 0.35  # in
+_PROFILE, _ACROSS = 1.75, 4  # height of a row of profiles [in], and how many are in it
+_NINETY, _HIGHEST = 2.71, 12.0  # rise at the ends of a 90 % interval, and the highest shown
 _MOST = 0.05  # weight below which a cell of the map is left empty
 
 
 @in_paper_style
-def identifiability(groups: "Mapping[str, Knowledge]") -> Figure:
+def identifiability(groups: "Mapping[str, Knowledge]", profiles: "Sequence[Profile]" = ()) -> Figure:
     """One row of panels for each group of parameters: who speaks for each, and what each combination consists of.
 
     Args:
         groups: Knowledge by group.
+        profiles: Of the friction coefficients; a last row of panels.
     """
     heights = [_ROW * len(group.parameters) + _TOP + _BOTTOM for group in groups.values()]
-    total = sum(heights)
+    rows = -(-len(profiles) // _ACROSS)
+    total = sum(heights) + rows * _PROFILE
     figure = Figure(figsize=(WIDE, total))
     width, top = (WIDE - _NAMES - _GAP - 0.15) / 2, total
     for (name, group), height in zip(groups.items(), heights, strict=True):
@@ -34,7 +39,23 @@ def identifiability(groups: "Mapping[str, Knowledge]") -> Figure:
         if len(group.parameters) > 1:
             _combinations(figure.add_axes(((_NAMES + width + _GAP) / WIDE, bottom, width / WIDE, tall)), group)
         top -= height
+    for i, one in enumerate(profiles):
+        bottom = top - _PROFILE * (i // _ACROSS + 1) + _BOTTOM
+        across = (WIDE - 0.5) / _ACROSS
+        box = (0.6 + across * (i % _ACROSS), bottom, across - 0.45, _PROFILE - _BOTTOM - _TOP)
+        _profile(figure.add_axes((box[0] / WIDE, box[1] / total, box[2] / WIDE, box[3] / total)), one, i == 0)
     return figure
+
+
+def _profile(axes: Axes, one: "Profile", first: bool) -> None:
+    """Rise of the sum of squares; where it stays flat the readings say nothing."""
+    axes.plot(one.values, one.rise, color=BLUE)
+    axes.axhline(_NINETY, color=GRAY, linestyle="--", linewidth=0.8)
+    axes.set_ylim(-0.5, _HIGHEST)
+    axes.set_xlabel(one.name)
+    if first:
+        axes.set_title("Sum of squares of the readings above its minimum (dashed: 90 % limit)", loc="left")
+        axes.set_ylabel("Rise")
 
 
 def _shares(axes: Axes, name: str, group: "Knowledge") -> None:

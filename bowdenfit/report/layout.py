@@ -3,12 +3,11 @@
 import textwrap
 from collections.abc import Collection, Sequence
 
+from bowdenfit.results.answers import listed
+
+__all__ = ["WIDTH", "filled", "listed", "table"]
+
 WIDTH = 110
-
-
-def listed(parts: Sequence[str]) -> str:
-    """Parts with commas and a last "and"."""
-    return ", ".join(parts[:-1]) + " and " + parts[-1] if len(parts) > 1 else "".join(parts)
 
 
 def filled(text: str, indent: str = "") -> str:

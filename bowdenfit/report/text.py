@@ -12,6 +12,7 @@ from bowdenfit.report.sampler import sampler_sentences, sampler_text
 from bowdenfit.results.answers import decimals
 from bowdenfit.results.confounding import confounded
 from bowdenfit.results.fit import Fit
+from bowdenfit.results.identifiability import determined, of_fit
 from bowdenfit.results.rate import SHOWN_SPEED, rate_effect
 from bowdenfit.results.verdict import CONTRADICTORY, NOT_CONVERGED, NOT_IDENTIFIABLE, Verdict, verdict
 
@@ -24,7 +25,14 @@ _RESTS_ON_PRIOR = 0.2  # contraction below which a parameter is said to rest on 
 def summary_text(fit: Fit) -> str:
     """The summary of a fit for people."""
     page = fit.summary()
-    blocks = [_title(fit), _verdict(fit, page), _coefficients(page), _rests_on_prior(page), _curves(fit, page)]
+    blocks = [
+        _title(fit),
+        _verdict(fit, page),
+        _coefficients(page),
+        _known(fit),
+        _rests_on_prior(page),
+        _curves(fit, page),
+    ]
     blocks += [
         _scatter(page),
         _mountings(fit, page),
@@ -182,6 +190,12 @@ def _is_wide(estimate: dict[str, Any]) -> bool:
 
 def _trouble(estimate: dict[str, Any]) -> str:
     return "at its bound in least squares" if estimate["at_bound"] else "not identified by least squares"
+
+
+def _known(fit: Fit) -> str:
+    """Which coefficients the measurements determine, in a sentence."""
+    friction = of_fit(fit).groups.get("friction") if fit.posterior is not None else None
+    return filled(determined(friction, measured=True)) if friction is not None else ""
 
 
 def _rests_on_prior(page: dict[str, Any]) -> str:

@@ -1,5 +1,6 @@
 """Answers with their uncertainty, as plain data that show themselves; loads no model."""
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -92,6 +93,11 @@ class OptimalLength:
         from bowdenfit.results.html import design_answer
 
         return design_answer(self)
+
+
+def listed(parts: Sequence[str]) -> str:
+    """Parts with commas and a last "and"."""
+    return ", ".join(parts[:-1]) + " and " + parts[-1] if len(parts) > 1 else "".join(parts)
 
 
 def decimals(scale: float) -> int:

@@ -10,8 +10,9 @@ import numpy as np
 
 from bowdenfit.inference.identifiability import NOTHING, Combination, Knowledge, Known, knowledge
 from bowdenfit.inference.least_squares import UNDETERMINED, MaximumPosterior
+from bowdenfit.inference.profiles import Profile
 from bowdenfit.models.build import Model
-from bowdenfit.results.answers import decimals
+from bowdenfit.results.answers import decimals, listed
 from bowdenfit.results.fit import Fit
 
 # Parameters that friction is made of, and those of the rope's elasticity: each group is judged by itself.
@@ -32,12 +33,14 @@ class Identifiability:
         basis: Where it was judged, in words.
         measured: Whether readings entered, or only the plan of what to measure.
         groups: Knowledge by group of `GROUPS`, as far as there are such parameters.
+        profiles: How the sum of squares of the readings rises with each friction coefficient, the others fitted again.
     """
 
     name: str
     basis: str
     measured: bool
     groups: dict[str, Knowledge]
+    profiles: tuple[Profile, ...] = ()
 
     def page(self) -> dict[str, Any]:
         """The same as plain data."""
@@ -46,14 +49,16 @@ class Identifiability:
             "basis": self.basis,
             "sentences": sentences(self),
             "groups": {name: _page(found) for name, found in self.groups.items()},
+            "profiles": {p.name: {"value": p.values.tolist(), "rise": p.rise.tolist()} for p in self.profiles},
         }
 
 
-def of_fit(fit: Fit) -> Identifiability:
+def of_fit(fit: Fit, profiles: tuple[Profile, ...] = ()) -> Identifiability:
     """What a fit knows, from its draws.
 
     Args:
         fit: A fit with a posterior.
+        profiles: Of its friction coefficients.
 
     Raises:
         UsageError: There is no posterior.
@@ -64,10 +69,12 @@ def of_fit(fit: Fit) -> Identifiability:
     with jax.enable_x64(True):
         _, prior_sd = _linear(fit.model, np.median(drawn.flat_z, axis=0))
     groups = _groups(fit.model, np.mean(values, axis=0), spread, prior_sd)
-    return Identifiability(fit.name, "the draws of the posterior", True, groups)
+    return Identifiability(fit.name, "the draws of the posterior", True, groups, profiles)
 
 
-def of_maximum(model: Model, start: MaximumPosterior, basis: str, measured: bool) -> Identifiability:
+def of_maximum(
+    model: Model, start: MaximumPosterior, basis: str, measured: bool, profiles: tuple[Profile, ...] = ()
+) -> Identifiability:
     """What measurements will tell, or tell before sampling: from the Fisher information at one point.
 
     Args:
@@ -75,11 +82,22 @@ def of_maximum(model: Model, start: MaximumPosterior, basis: str, measured: bool
         start: Maximum of the posterior, with the inverse of the information there.
         basis: Where that is, in words.
         measured: Whether readings entered.
+        profiles: Of the friction coefficients.
     """
+    covariance = _with_tails(model, np.asarray(start.covariance))
     with jax.enable_x64(True):
         value, slope = _linear(model, start.z)
-    groups = _groups(model, value, np.asarray(start.covariance) * np.outer(slope, slope), slope)
-    return Identifiability(model.description.name, basis, measured, groups)
+    groups = _groups(model, value, covariance * np.outer(slope, slope), slope)
+    return Identifiability(model.description.name, basis, measured, groups, profiles)
+
+
+def _with_tails(model: Model, covariance: np.ndarray) -> np.ndarray:
+    """The covariance, with the information of Student-t readings: nu / (nu + 3) of what residuals near zero suggest."""
+    description = model.description
+    if description.noise != "student":
+        return covariance
+    freedom, unit = description.student_degrees_of_freedom, np.eye(len(covariance))
+    return np.linalg.inv(freedom / (freedom + 3) * (np.linalg.inv(covariance) - unit) + unit)
 
 
 def _linear(model: Model, z: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
@@ -128,14 +146,14 @@ def determined(found: Knowledge, measured: bool, opening: str = "") -> str:
     opening = opening or ("These measurements determine" if measured else "Measurements by this plan would determine")
     parts = [f"{p.name} {_to(p)}" for p in found.by_themselves]
     parts += [f"{c.words} {_to(c)}" for c in found.determined]
-    said = f"{opening} {_listed(parts)}" if parts else f"{opening} no coefficient by itself"
+    said = f"{opening} {listed(parts)}" if parts else f"{opening} no coefficient by itself"
     resting, half = found.on_prior, found.partly
     if half:
         verb = "owes" if len(half) == 1 else "owe"
-        said += f"; {_listed([p.name for p in half])} {verb} about as much to the prior as to them"
+        said += f"; {listed([p.name for p in half])} {verb} about as much to the prior as to them"
     if resting:
         verb = "rests on its prior" if len(resting) == 1 else "rest on their priors"
-        said += f"; {_listed([p.name for p in resting])} {verb}"
+        said += f"; {listed([p.name for p in resting])} {verb}"
     if found.sharpest is not None and not found.determined:
         said += f"; sharpest of all is {found.sharpest.words}, {_to(found.sharpest)}"
     return said + "."
@@ -146,10 +164,6 @@ def _to(known: Known | Combination) -> str:
     if abs(known.value) > 2 * known.sd:
         return f"to {100 * known.sd / abs(known.value):.2g} %"
     return f"to +- {known.sd:.{decimals(known.sd)}f}"
-
-
-def _listed(parts: list[str]) -> str:
-    return ", ".join(parts[:-1]) + " and " + parts[-1] if len(parts) > 1 else "".join(parts)
 
 
 def unidentified(fit: Fit) -> str:
@@ -179,7 +193,7 @@ def _undetermined(fit: Fit, name: str) -> bool:
 def _in_words(lost: list[str], known: Combination | None) -> str:
     if not lost:
         return ""
-    them = _listed(lost)
+    them = listed(lost)
     if known is not None:
         said = f"The measurements do not tell {them} apart: what they determine is {known.words}, {_to(known)}"
     else:

@@ -158,7 +158,7 @@ def fit(
     """
     folder = Path(output) if output is not None else None
     if in_background and not isinstance(dataset, Dataset):
-        load_ahead("jax", "optimistix")  # while recordings are read, which takes seconds
+        load_ahead("jax", "scipy.optimize")  # while recordings are read, which takes seconds
     data = read(dataset, **reading)
     if sampler is not None:
         data = sampled_by(data, sampler)

@@ -26,7 +26,7 @@ from bowdenfit.results.fit import Fit, Provenance
 from bowdenfit.workflow.background import Assistants, load_ahead
 from bowdenfit.workflow.sampling import implied_program, libraries, sampled, sampling_programs
 
-VERSIONED = ("bowdenfit", "jax", "optimistix", "emcee", "blackjax", "arviz-stats", "numpy", "scipy")
+VERSIONED = ("bowdenfit", "jax", "emcee", "blackjax", "arviz-stats", "numpy", "scipy")
 
 
 @dataclass

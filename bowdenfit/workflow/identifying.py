@@ -12,6 +12,8 @@ if TYPE_CHECKING:
     from bowdenfit.results.fit import Fit
     from bowdenfit.results.identifiability import Identifiability
 
+_REACH, _PINS = 4.0, 21  # standard deviations on both sides that profiles cover, and values in them
+
 
 def identify(source: "str | Path | Dataset | Fit", **reading: Any) -> "Identifiability":
     """What measurements determine of a cable's parameters, and what rests on the priors.
@@ -27,13 +29,12 @@ def identify(source: "str | Path | Dataset | Fit", **reading: Any) -> "Identifia
     import jax
 
     from bowdenfit.results.fit import Fit
-    from bowdenfit.results.identifiability import of_fit
 
     if isinstance(source, str | Path) and (Path(source) / "fit.json").exists():
         source = load(source)
     with jax.enable_x64(True):
         if isinstance(source, Fit):
-            return of_fit(source)
+            return _of_fit(source)
         if isinstance(source, Dataset) or not _is_plan(Path(source)):
             return _of_tables(read(source, **reading))
         if any(reading.values()):
@@ -51,6 +52,29 @@ def _is_plan(path: Path) -> bool:
         return False  # the reader says what is wrong
 
 
+def _of_fit(found: "Fit") -> "Identifiability":
+    from bowdenfit.inference.least_squares import make_objective, maximum_posterior
+    from bowdenfit.inference.posterior import Posterior
+    from bowdenfit.results.identifiability import of_fit
+
+    found.draws()
+    posterior = Posterior(found.model)
+    objective = make_objective(posterior)
+    return of_fit(found, _profiles(posterior, objective, maximum_posterior(posterior, objective)))
+
+
+def _profiles(posterior: Any, objective: Any, best: Any) -> tuple[Any, ...]:
+    """Profiles of the friction coefficients, over four standard deviations on both sides."""
+    import numpy as np
+
+    from bowdenfit.inference.profiles import profile
+
+    space, sd = posterior.model.space, np.sqrt(np.diag(best.covariance))
+    which = [i for i, p in enumerate(space.free) if p.role == "friction"]
+    steps = np.linspace(-_REACH, _REACH, _PINS)
+    return tuple(profile(posterior, objective, space.free[i].name, best.z, z=best.z[i] + sd[i] * steps) for i in which)
+
+
 def _of_tables(data: Dataset) -> "Identifiability":
     from bowdenfit.inference.least_squares import make_objective, maximum_posterior
     from bowdenfit.inference.posterior import Posterior
@@ -58,9 +82,10 @@ def _of_tables(data: Dataset) -> "Identifiability":
     from bowdenfit.results.identifiability import of_maximum
 
     posterior = Posterior(build_model(data))
-    best = maximum_posterior(posterior, make_objective(posterior))
+    objective = make_objective(posterior)
+    best = maximum_posterior(posterior, objective)
     basis = f"the best fit to the tables, with readings that scatter as {DESCRIPTION_FILE} expects"
-    return of_maximum(posterior.model, best, basis, True)
+    return of_maximum(posterior.model, best, basis, True, _profiles(posterior, objective, best))
 
 
 def _of_plan(path: Path) -> "Identifiability":
@@ -113,7 +138,7 @@ def write(found: "Identifiability", folder: Path) -> list[Path]:
         folder.mkdir(parents=True, exist_ok=True)
         write_text(folder / "identifiability.json", json.dumps(found.page(), indent=1) + "\n")
         write_text(folder / "identifiability.txt", identifiability_text(found))
-        figure = identifiability(found.groups)
+        figure = identifiability(found.groups, found.profiles)
         drawn = [write_figure(figure, folder / f"identifiability.{ending}") for ending in FORMATS]
     except OSError as error:
         raise StoreError(f"{folder} cannot be written ({error.strerror}); name another with --output.") from None

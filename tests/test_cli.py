@@ -29,6 +29,8 @@ VERBS = (
     "length",
     "identify",
     "compare",
+    "next",
+    "calibrate",
     "plot",
     "simulate",
     "completion",

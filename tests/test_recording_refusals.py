@@ -520,3 +520,21 @@ def test_a_refusal_from_a_real_process_is_one_sentence(columns, tmp_path):
     assert done.stdout == ""
     assert done.stderr.startswith("Error: run.csv: ")
     assert done.stderr.count("\n") == 1
+
+
+@pytest.mark.parametrize("likelihood", ["runs", "whole"])
+def test_a_run_of_which_nothing_can_be_used_is_refused(on_body, likelihood):
+    """The blocks of one recording are all taken for flagged, as a wrong tare makes them."""
+    import jax
+
+    from bowdenfit.models.build import build_model
+
+    folder = on_body.parent / "synthetic-recordings"
+    data = load_dataset(folder, [f'tables.recordings.likelihood="{likelihood}"'])
+    first, *others = data.measurements.recordings.each
+    blocks = replace(first.blocks, output_force=-np.abs(first.blocks.output_force))
+    recordings = replace(data.measurements.recordings, each=(replace(first, blocks=blocks), *others))
+    bad = replace(data, measurements=replace(data.measurements, recordings=recordings))
+    with jax.enable_x64(True), pytest.raises(DatasetError, match="nothing of the run .* can be used") as error:
+        build_model(bad)
+    assert first.file in str(error.value)

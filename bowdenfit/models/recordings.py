@@ -39,7 +39,7 @@ def recordings_term(
     """The term of a data set's recordings, as its description wants them used; those of a loop are always whole.
 
     Raises:
-        DatasetError: Whole recordings are wanted, and one has no reversal.
+        DatasetError: Whole recordings are wanted, and one has no reversal; or in a run no block can be used.
     """
     settings = cable.description.tables.recordings
     rows = row_angles(cable, recorded_angles(recordings), angles).data
@@ -49,6 +49,7 @@ def recordings_term(
         return loop_recordings_term(cable, recordings, rows, labels, censored)
     if settings is None or settings.likelihood == "runs":
         parts = [_sliding_blocks(r) for r in recordings.each]
+        _needs_blocks(recordings, parts)
         return RunsTerm(cable, run_sums(cable, _rows(recordings, parts, rows)), labels, RECORDED, BLOCK_NOISE)
     for recording in recordings.each:
         _needs_reversal(recording)
@@ -56,6 +57,7 @@ def recordings_term(
     if not (cable.friction.options or cable.description.fits_offsets or censored):
         # On a scale that no parameter changes, the operator is linear in the exponent: it need not be run again.
         parts = [_all_blocks(r) for r in recordings.each]
+        _needs_blocks(recordings, parts)
         return RunsTerm(cable, run_sums(cable, _rows(recordings, parts, rows)), labels, RECORDED, BLOCK_NOISE)
     return WholeRecordingsTerm(cable, padded(recordings, rows, censored), labels)
 
@@ -70,6 +72,18 @@ def _label(cable: Cable, recordings: Recordings, run: str) -> str:
     route, at = cable.description.route, {r.route for r in recordings.each if r.run == run}
     where = f"{min(at):g} {route.unit}" if route is not None and len(at) == 1 else ""
     return f"{run} ({where})" if where and where not in run else run
+
+
+def _needs_blocks(recordings: Recordings, parts: "list[_Part]") -> None:
+    """Every run must have something that the likelihood can use."""
+    for run in recordings.runs:
+        mine = [r for r in recordings.each if r.run == run]
+        if not any(len(p.used) for r, p in zip(recordings.each, parts, strict=True) if r.run == run):
+            raise DatasetError(
+                f"{mine[0].file}: nothing of the run {run!r} can be used, because while the rope slides no block has both "
+                "forces above 0 inside the cells' ranges; the usual causes are a wrong tare, swapped or inverted channels, "
+                "or a pull that hardly moved: look at it with `bowdenfit check FILE`, or leave the recording out."
+            )
 
 
 def _needs_reversal(recording: Recording) -> None:
@@ -120,7 +134,7 @@ def _followed_in_parts(
     recording: Recording, kept: np.ndarray, x: np.ndarray, y: np.ndarray
 ) -> tuple[np.ndarray, np.ndarray]:
     """The operator over the kept blocks, and the last contact up to each, started anew where the input was not known."""
-    starts = np.flatnonzero(np.append(True, restarts(input_saturated(recording))[kept][1:]))
+    starts = np.flatnonzero(np.append(True, restarts(input_saturated(recording))[kept][1:])[: len(x)])
     strokes, followed, state = recording.strokes, np.zeros(len(x)), np.zeros(len(x), dtype=int)
     last = np.zeros(len(x), dtype=int)
     for start, stop in zip(starts, [*starts[1:], len(x)], strict=True):

@@ -137,7 +137,7 @@ def _followed_in_parts(
     starts = np.flatnonzero(np.append(True, restarts(input_saturated(recording))[kept][1:])[: len(x)])
     strokes, followed, state = recording.strokes, np.zeros(len(x)), np.zeros(len(x), dtype=int)
     last = np.zeros(len(x), dtype=int)
-    for start, stop in zip(starts, [*starts[1:], len(x)], strict=True):
+    for start, stop in zip(starts, np.append(starts[1:], len(x))[: len(starts)], strict=True):
         part = slice(start, stop)
         followed[part], state[part] = play(x[part], strokes.exponent, float(y[start] + strokes.center))
         last[part] = last_contact(state[part])

@@ -236,3 +236,14 @@ def test_nine_in_ten_intervals_hold_the_truth():
         ends = [(found.estimates[name].lower, found.estimates[name].upper) for name in ("mu1", "mu2")]
         hits += [low <= value <= high for (low, high), value in zip(ends, truth, strict=True)]
     assert np.all(np.abs(hits - 180) < 3.8 * np.sqrt(200 * 0.9 * 0.1))
+
+
+def test_a_coefficient_at_the_upper_limit_of_its_prior_has_a_lower_limit_and_says_so():
+    """The truth, 0.15, lies beyond the uniform prior's 0.12: the limit is where the sum has risen from that at 0.12."""
+    loss, angle = _rows(6, truth=(0.15,))
+    _, _, found = fitted(of_rows(loss, angle, friction={"mu1": {"prior": {"uniform": {"low": 0.01, "high": 0.12}}}}))
+    estimate = found.estimates["mu1"]
+    assert estimate.at_bound and not estimate.identified
+    assert "runs to its upper end, 0.12" in estimate.remark
+    assert estimate.upper == pytest.approx(0.12, rel=1e-6)
+    assert 0.01 < estimate.lower < 0.12

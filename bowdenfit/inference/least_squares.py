@@ -29,9 +29,11 @@ from bowdenfit.inference.posterior import Posterior
 from bowdenfit.inference.profiles import Basin, limits
 from bowdenfit.inference.rivals import PINS, contested, fitting_as_well
 from bowdenfit.inference.scatter import scatter_about
+from bowdenfit.parameters.priors import Uniform
+from bowdenfit.parameters.space import Parameter
 
 UNDETERMINED = "the measurements do not determine it"
-_SUSPECT = -2.0  # below this z an estimate may be on its way to the lower end
+_SUSPECT = -2.0  # below this z an estimate may be on its way to the lower end, above its negative to the upper
 _UNKNOWN = (float("nan"), float("nan"))
 _FAR = 50.0  # standard error in units of the prior's sd beyond which data say nothing of a parameter
 
@@ -147,25 +149,30 @@ def least_squares(
 
 
 def _minimum(posterior: Posterior, objective: Objective, start: np.ndarray) -> tuple[Solution, np.ndarray]:
-    """The minimum without priors, and which parameters have run to their lower end there."""
+    """The minimum without priors, and which parameters have run to an end of their range there."""
     parameters, noise = posterior.model.space.free, noise_scales(posterior)
-    nothing, weight = np.zeros(len(noise)), prior_weights(noise, False)
-    found = solve(posterior, objective, start, noise, nothing, weight)
+    pin, weight = np.zeros(len(noise)), prior_weights(noise, False)
+    found = solve(posterior, objective, start, noise, pin, weight)
     at_end = np.zeros_like(noise)
-    for i in np.flatnonzero(may_end(parameters) & ~noise & (found["z"] < _SUSPECT)):
-        this, pin = np.arange(len(noise)) == i, np.where(at_end, LOWER_END, 0.0)
+    for i in np.flatnonzero(_suspect(parameters, found["z"]) & ~noise):
+        this, end = np.arange(len(noise)) == i, np.copysign(LOWER_END, found["z"][i])
         # A step can leap over the minimum into the flat tail of the map from z; only what ends there from the middle too
         # has its minimum there.
         again = solve(posterior, objective, np.where(this, 0.0, found["z"]), noise | at_end, pin, weight)
         found = min(found, again, key=sum_of_squares)
-        if found["z"][i] >= _SUSPECT:
+        if not _suspect(parameters, found["z"])[i]:
             continue
-        trial_end = at_end | this
-        pin = np.where(trial_end, LOWER_END, 0.0)
-        trial = solve(posterior, objective, found["z"], noise | trial_end, pin, weight)
+        trial_pin = np.where(this, end, pin)
+        trial = solve(posterior, objective, found["z"], noise | at_end | this, trial_pin, weight)
         if sum_of_squares(trial) <= sum_of_squares(found) * (1 + 1e-7) + 1e-14:
-            at_end, found = trial_end, trial
+            at_end, pin, found = at_end | this, trial_pin, trial
     return found, at_end
+
+
+def _suspect(parameters: tuple[Parameter, ...], z: np.ndarray) -> np.ndarray:
+    """Which parameters may be on their way to an end of their range."""
+    limited = np.array([isinstance(p.prior, Uniform) for p in parameters], dtype=bool)
+    return (may_end(parameters) & (z < _SUSPECT)) | (limited & (z > -_SUSPECT))
 
 
 def _pinned_elsewhere(posterior: Posterior, objective: Objective, start: np.ndarray) -> list[Solution]:
@@ -196,7 +203,7 @@ def _summarized(basin: Basin, trials: Sequence[Solution], intervals: bool) -> Le
         if basin.pinned[i]:
             continue
         if at_end[i]:
-            estimates[p.name] = Estimate(np.nan, np.nan, False, _at_bound(value, limit[1]), *limit, at_bound=True)
+            estimates[p.name] = Estimate(np.nan, np.nan, False, _at_bound(value, limit, found["z"][i] > 0), *limit, at_bound=True)
         elif not determined[i]:
             estimates[p.name] = Estimate(np.nan, np.nan, False, UNDETERMINED)
         else:
@@ -234,8 +241,12 @@ def _estimate(value: float, sd: float, rivals: Sequence[float], limit: tuple[flo
     return Estimate(np.nan, np.nan, False, f"values from {ends[0]:.3g} to {ends[1]:.3g} fit about as well", *limit)
 
 
-def _at_bound(value: float, upper: float) -> str:
-    """What is known of a parameter whose sum of squares falls all the way to the lower end of its range."""
+def _at_bound(value: float, limit: tuple[float, float], at_upper_end: bool) -> str:
+    """What is known of a parameter whose sum of squares falls all the way to an end of its range."""
+    lower, upper = limit
+    if at_upper_end:
+        least = "" if np.isnan(lower) else f"; at least {lower:.3g}"
+        return f"no minimum inside its range: runs to its upper end, {value:.3g}{least}"
     most = "" if np.isnan(upper) else "; nothing limits it above" if np.isinf(upper) else f"; at most {upper:.3g}"
     return f"no finite minimum: runs to its lower end, {value:.3g}{most}"
 

@@ -34,7 +34,7 @@ PROBABILITY = 0.9
 FARTHEST = -LOWER_END
 _ALWAYS = ("friction", "friction_model")  # roles whose intervals are worth their time in large problems
 _SMALL = 20_000  # entries of the Jacobian up to which every parameter's interval is
-_INSIDE = -2.0  # z a little inside the range of a parameter that is at its lower end
+_INSIDE = 2.0  # size of z a little inside the range of a parameter that is at an end of it
 _PRECISION = 3e-4  # of a limit, in the steps that lead to it
 _MOST_STEPS = 50
 _LEAST_STEP, _MOST_STEP, _LONGEST_STEP = 1e-6, 1.0, 8.0  # first step from the minimum, and all others [z]
@@ -65,7 +65,7 @@ class Basin:
         objective: Its compiled solve.
         found: The minimum.
         pinned: Noise scales.
-        at_end: Parameters at the lower end of their range, which may leave it when another is moved.
+        at_end: Parameters at an end of their range, which may leave it when another is moved.
         weight: Weight of each z as a residual of its own.
     """
 
@@ -80,10 +80,11 @@ class Basin:
         """The minimum with one parameter pinned at z; others leave the end of their range where that is better."""
         this = np.arange(len(self.pinned)) == index
         ended = self.at_end & ~this
-        pin = np.where(this, z, np.where(ended, LOWER_END, self.found["z"]))
+        pin = np.where(this, z, self.found["z"])
         found = self._solved(start, self.pinned | this | ended, pin)
-        inside = np.where(ended, _INSIDE, found["z"])
-        if not ended.any() or not np.any(ended & (self._gradient(inside) < 0)):
+        side = np.sign(self.found["z"])
+        inside = np.where(ended, side * _INSIDE, found["z"])
+        if not ended.any() or not np.any(ended & (side * self._gradient(inside) > 0)):
             return found
         return min(found, self._solved(inside, self.pinned | this, pin), key=_total)
 
@@ -177,7 +178,7 @@ def _spread(basin: Basin, scale: np.ndarray, index: int) -> tuple[float, float, 
     """
     found, terms = basin.found, basin.posterior.model.terms
     if basin.at_end[index]:  # where z has no influence; a little inside its range
-        found = basin.moved(index, _INSIDE, basin.found["z"])
+        found = basin.moved(index, float(np.copysign(_INSIDE, basin.found["z"][index])), basin.found["z"])
     columns = np.flatnonzero(~basin.pinned & ~basin.at_end | (np.arange(len(basin.pinned)) == index))
     about = linearized(found["sensitivity"][:, columns])
     place = int(np.searchsorted(columns, index))

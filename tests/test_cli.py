@@ -285,7 +285,7 @@ def test_a_whole_fit_in_a_process_of_its_own_and_an_interrupt(on_body, tmp_path)
     assert found.returncode == 0, found.stderr
     names = {p.name for p in (tmp_path / "fit").iterdir()}
     assert names == {"fit.json", "summary.json", "summary.txt", "posterior.nc", "chain.h5", "figures"}
-    assert len(list((tmp_path / "fit" / "figures").iterdir())) == 12
+    assert len(list((tmp_path / "fit" / "figures").iterdir())) == 14
 
 
 def test_notes_in_a_results_folder_are_left_alone_and_other_files_stop_a_fit(on_body, tmp_path, run):

@@ -155,9 +155,13 @@ def test_tables_that_contradict_each_other_are_not_trusted(tmp_path, run):
     truth = "[tables]\nforces = { file = 'forces.csv' }\n[truth]\nmu_a = 0.1\ntau = 0.01\nsigma_F = 0.3\n"
     plan.write_text(one + truth + "[design]\nruns = [0, 0, 0, 0, 0, 0, 0, 0]\ninput_forces = [20, 50, 100]\n")
     workflow.simulate(plan, output=folder, seed=1)
-    (folder / "efficiencies.csv").write_text("efficiency\n0.53\n0.54\n0.53\n0.535\n0.54\n0.53\n0.53\n0.54\n0.53\n0.53\n")
+    (folder / "efficiencies.csv").write_text(
+        "efficiency\n0.53\n0.54\n0.53\n0.535\n0.54\n0.53\n0.53\n0.54\n0.53\n0.53\n"
+    )
     text = (folder / "cable.toml").read_text()
-    (folder / "cable.toml").write_text(text.replace("[tables]", "[tables]\nefficiencies = { file = 'efficiencies.csv' }"))
+    (folder / "cable.toml").write_text(
+        text.replace("[tables]", "[tables]\nefficiencies = { file = 'efficiencies.csv' }")
+    )
     code, out, _ = run("fit", folder, "-o", tmp_path / "fit", "--seed", 1, "--no-figures", "--no-mcmc")
     assert code == 3
     assert "CONTRADICTORY MEASUREMENTS" in out

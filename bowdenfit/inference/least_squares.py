@@ -203,7 +203,9 @@ def _summarized(basin: Basin, trials: Sequence[Solution], intervals: bool) -> Le
         if basin.pinned[i]:
             continue
         if at_end[i]:
-            estimates[p.name] = Estimate(np.nan, np.nan, False, _at_bound(value, limit, found["z"][i] > 0), *limit, at_bound=True)
+            estimates[p.name] = Estimate(
+                np.nan, np.nan, False, _at_bound(value, limit, found["z"][i] > 0), *limit, at_bound=True
+            )
         elif not determined[i]:
             estimates[p.name] = Estimate(np.nan, np.nan, False, UNDETERMINED)
         else:

@@ -170,7 +170,7 @@ def unidentified(fit: Fit) -> str:
     """Which friction coefficients the measurements do not tell, in a sentence; empty where they tell all.
 
     Only coefficients with the weak default prior count: who states a coefficient as measured, or gives it a prior, knows
-    that it rests on that.
+    that it rests on that. The same holds for what the data sheet of a load cell says.
     """
     names = [p.name for p in fit.model.space.free if p.role == "friction" and not _stated(fit, p.name)]
     if fit.posterior is None:
@@ -186,8 +186,10 @@ def unidentified(fit: Fit) -> str:
 
 def _undetermined(fit: Fit, name: str) -> bool:
     """Whether least squares without priors leaves a coefficient open altogether."""
-    estimate = fit.least_squares.estimates[name]
-    return not estimate.identified and estimate.remark == UNDETERMINED
+    estimates = fit.least_squares.estimates
+    if any(estimates[p.name].remark == UNDETERMINED for p in fit.model.space.free if p.role == "sensor"):
+        return False
+    return estimates[name].remark == UNDETERMINED
 
 
 def _in_words(lost: list[str], known: Combination | None) -> str:

@@ -21,9 +21,15 @@ if TYPE_CHECKING:
     )
     from bowdenfit.results.fit import Fit
     from bowdenfit.workflow import compare, fit, load, plot, read, simulate
+    from bowdenfit.workflow.calibration import calibrate
+    from bowdenfit.workflow.identifying import identify
+    from bowdenfit.workflow.planning import next_measurement
 
 _WHERE = {
     **dict.fromkeys(("compare", "fit", "load", "plot", "read", "simulate"), "bowdenfit.workflow"),
+    "calibrate": "bowdenfit.workflow.calibration",
+    "identify": "bowdenfit.workflow.identifying",
+    "next_measurement": "bowdenfit.workflow.planning",
     "Fit": "bowdenfit.results.fit",
     **dict.fromkeys(
         ("BowdenfitError", "ConvergenceError", "DatasetError", "DescriptionError", "StoreError", "UsageError"),
@@ -39,9 +45,12 @@ __all__ = [
     "Fit",
     "StoreError",
     "UsageError",
+    "calibrate",
     "compare",
     "fit",
+    "identify",
     "load",
+    "next_measurement",
     "plot",
     "read",
     "simulate",

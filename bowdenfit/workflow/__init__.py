@@ -166,7 +166,8 @@ def fit(
     with assistants(in_background and mcmc, in_background and figures and folder is not None) as helpers:
         import jax
 
-        from bowdenfit.workflow.fitting import Stopwatch, run
+        from bowdenfit.workflow.fitting import run
+        from bowdenfit.workflow.stopwatch import Stopwatch
 
         if remember_compilations:
             _remember_compilations()

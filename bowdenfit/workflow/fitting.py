@@ -1,11 +1,8 @@
 """From a data set to a finished fit: the stages in their order, and what runs beside them."""
 
 import platform
-import time
-from collections.abc import Callable, Iterator
+from collections.abc import Callable
 from concurrent.futures import ThreadPoolExecutor
-from contextlib import contextmanager
-from dataclasses import dataclass, field
 from datetime import UTC, datetime
 from pathlib import Path
 
@@ -25,24 +22,9 @@ from bowdenfit.models.build import build_model
 from bowdenfit.results.fit import Fit, Provenance
 from bowdenfit.workflow.background import Assistants, load_ahead
 from bowdenfit.workflow.sampling import implied_program, libraries, sampled, sampling_programs
+from bowdenfit.workflow.stopwatch import Stopwatch
 
 VERSIONED = ("bowdenfit", "jax", "emcee", "blackjax", "arviz-stats", "numpy", "scipy")
-
-
-@dataclass
-class Stopwatch:
-    """Seconds spent in each stage of a fit."""
-
-    seconds: dict[str, float] = field(default_factory=dict)
-
-    @contextmanager
-    def stage(self, name: str) -> Iterator[None]:
-        """Time what runs inside."""
-        start = time.perf_counter()
-        try:
-            yield
-        finally:
-            self.seconds[name] = self.seconds.get(name, 0.0) + time.perf_counter() - start
 
 
 def run(

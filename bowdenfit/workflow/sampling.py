@@ -4,7 +4,7 @@ from collections.abc import Callable, Mapping
 from concurrent.futures import Future
 from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import jax
 import numpy as np
@@ -19,9 +19,7 @@ from bowdenfit.predictions.optimal_length import optimum_of
 from bowdenfit.results.fit import OPTIMAL_EFFICIENCY, OPTIMAL_LENGTH, Posterior
 from bowdenfit.results.samplers import NAMES, Drawn, compare_samplers
 from bowdenfit.workflow.background import Assistants
-
-if TYPE_CHECKING:
-    from bowdenfit.workflow.fitting import Stopwatch
+from bowdenfit.workflow.stopwatch import Stopwatch
 
 PRIOR_DRAWS = 4096
 
@@ -87,7 +85,7 @@ def sampled(
     checkpoint: Path | None,
     resume: bool,
     progress: Callable[..., None] | None,
-    watch: "Stopwatch",
+    watch: Stopwatch,
     helpers: Assistants,
 ) -> tuple[Posterior, tuple[str, ...]]:
     """The posterior, and why it should not be trusted.

@@ -52,8 +52,9 @@ def explained(
     """
     polynomials = _polynomials(reading)
     left, total = _squares_left(polynomials, answer, groups)
-    without = 1 - (left.sum() - left) / (total.sum() - total) if total.sum() > 0 else np.zeros(len(left))
-    share = 1 - left.sum() / total.sum() if total.sum() > 0 else 0.0
+    all_left, all_of_it = float(np.sum(left)), float(np.sum(total))
+    without = 1 - (all_left - left) / (all_of_it - total) if all_of_it > 0 else np.zeros(len(left))
+    share = 1 - all_left / all_of_it if all_of_it > 0 else 0.0
     return Explained(float(np.clip(share, 0.0, 1.0)), _jackknife_error(without), without)
 
 

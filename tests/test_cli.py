@@ -288,6 +288,16 @@ def test_a_whole_fit_in_a_process_of_its_own_and_an_interrupt(on_body, tmp_path)
     assert len(list((tmp_path / "fit" / "figures").iterdir())) == 14
 
 
+@pytest.mark.parametrize(
+    "command", [("check", "DATA", "--prior-predictive"), ("identify", "DATA", "--output")], ids=["check", "identify"]
+)
+def test_figures_for_a_place_that_cannot_be_written_are_refused_in_a_sentence(on_body, tmp_path, run, command):
+    (tmp_path / "file").write_text("")
+    code, _, err = run(*(on_body if part == "DATA" else part for part in command), tmp_path / "file" / "folder")
+    assert code == 2
+    assert "cannot be written" in err
+
+
 def test_notes_in_a_results_folder_are_left_alone_and_other_files_stop_a_fit(on_body, tmp_path, run):
     notes = tmp_path / "fit" / "README.md"
     notes.parent.mkdir()

@@ -28,6 +28,24 @@ def written_whole(path: Path) -> Iterator[Path]:
         temporary.unlink(missing_ok=True)
 
 
+@contextmanager
+def made(folder: Path) -> Iterator[Path]:
+    """A folder to write into, made if missing.
+
+    Args:
+        folder: The folder.
+
+    Raises:
+        StoreError: It cannot be made, or something inside cannot be written.
+    """
+    try:
+        folder.mkdir(parents=True, exist_ok=True)
+        yield folder
+    except OSError as error:
+        why = error.strerror or type(error).__name__
+        raise StoreError(f"{folder} cannot be written ({why}); name another with --output.") from None
+
+
 def write_text(path: Path, text: str) -> None:
     """Write a text file whole."""
     with written_whole(path) as temporary:

@@ -20,7 +20,7 @@ from bowdenfit.inference.least_squares import Estimate, LeastSquares
 from bowdenfit.measurements.tables import Measurements
 from bowdenfit.predictions.draws import derived_units
 from bowdenfit.results.fit import OPTIMAL_EFFICIENCY, OPTIMAL_LENGTH, Fit, Posterior, Provenance
-from bowdenfit.results.folder import CHAIN, FIT, POSTERIOR, SUMMARY, write_text
+from bowdenfit.results.folder import CHAIN, FIT, POSTERIOR, SUMMARY, made, write_text
 from bowdenfit.results.netcdf import EXPECTED, Coordinates, Groups, read_groups, write_groups
 from bowdenfit.results.samplers import SamplerAgreement
 from bowdenfit.results.summary import summarize
@@ -78,8 +78,7 @@ def save(fit: Fit, folder: Path, force: bool = False, write_posterior: Callable[
     """
     if not force and (folder / FIT).exists():
         raise StoreError(f"{folder} holds a finished fit already; add --force (force=True) to replace it.")
-    try:
-        folder.mkdir(parents=True, exist_ok=True)
+    with made(folder):
         if fit.posterior is None:
             (folder / POSTERIOR).unlink(missing_ok=True)
         elif write_posterior is None:
@@ -88,8 +87,6 @@ def save(fit: Fit, folder: Path, force: bool = False, write_posterior: Callable[
             write_posterior()
         write_text(folder / SUMMARY, json.dumps(summarize(fit), indent=1) + "\n")
         write_text(folder / FIT, json.dumps(_fit_page(fit), indent=1) + "\n")
-    except OSError as error:
-        raise StoreError(f"{folder} cannot be written ({error.strerror}); name another with --output.") from None
 
 
 def load(folder: Path) -> Fit:

@@ -221,10 +221,15 @@ def plot(found: "Fit", folder: str | Path) -> list[Path]:
 
     Returns:
         The files written.
+
+    Raises:
+        StoreError: The folder cannot be written.
     """
+    from bowdenfit.results.folder import made
     from bowdenfit.results.shown import figure_data
 
-    return draw(figure_data(found), Path(folder))
+    with made(Path(folder)) as place:
+        return draw(figure_data(found), place)
 
 
 def load(path: str | Path) -> "Fit":

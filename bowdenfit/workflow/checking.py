@@ -21,17 +21,21 @@ def show_priors(dataset: Dataset, folder: str | Path, seed: int = 0) -> "PriorPr
 
     Returns:
         What the figure shows.
+
+    Raises:
+        StoreError: The folder cannot be written.
     """
     import jax
 
     from bowdenfit.plots.gallery import FORMATS, write
     from bowdenfit.plots.prior_predictive import prior_predictive as drawn
+    from bowdenfit.results.folder import made
     from bowdenfit.results.prior_predictive import prior_predictive
 
     with jax.enable_x64(True):
         found = prior_predictive(dataset, seed)
     figure = drawn(found)
-    Path(folder).mkdir(parents=True, exist_ok=True)
-    for ending in FORMATS:
-        write(figure, Path(folder) / f"{FIGURE}.{ending}")
+    with made(Path(folder)) as place:
+        for ending in FORMATS:
+            write(figure, place / f"{FIGURE}.{ending}")
     return found

@@ -48,14 +48,11 @@ def write_comparison(found: "Comparison", folder: Path) -> list[Path]:
     from bowdenfit.plots.comparison import comparison
     from bowdenfit.plots.gallery import FORMATS, write
     from bowdenfit.report.compare import comparison_text
-    from bowdenfit.results.folder import write_text
+    from bowdenfit.results.folder import made, write_text
 
-    try:
-        folder.mkdir(parents=True, exist_ok=True)
+    with made(folder):
         write_text(folder / TEXT, comparison_text(found))
         figure = comparison(found)
         figures = [write(figure, folder / f"{FIGURE}.{ending}") for ending in FORMATS]
         write_text(folder / PAGE, json.dumps(found.page(), indent=1) + "\n")
-    except OSError as error:
-        raise StoreError(f"{folder} cannot be written ({error.strerror}); name another with --output.") from None
     return [folder / TEXT, *figures, folder / PAGE]

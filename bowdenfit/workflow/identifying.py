@@ -127,19 +127,15 @@ def write(found: "Identifiability", folder: Path) -> list[Path]:
     """
     import json
 
-    from bowdenfit.errors import StoreError
     from bowdenfit.plots.gallery import FORMATS
     from bowdenfit.plots.gallery import write as write_figure
     from bowdenfit.plots.identifiability import identifiability
     from bowdenfit.report.identifiability import identifiability_text
-    from bowdenfit.results.folder import write_text
+    from bowdenfit.results.folder import made, write_text
 
-    try:
-        folder.mkdir(parents=True, exist_ok=True)
+    with made(folder):
         write_text(folder / "identifiability.json", json.dumps(found.page(), indent=1) + "\n")
         write_text(folder / "identifiability.txt", identifiability_text(found))
         figure = identifiability(found.groups, found.profiles)
         drawn = [write_figure(figure, folder / f"identifiability.{ending}") for ending in FORMATS]
-    except OSError as error:
-        raise StoreError(f"{folder} cannot be written ({error.strerror}); name another with --output.") from None
     return [folder / "identifiability.json", folder / "identifiability.txt", *drawn]

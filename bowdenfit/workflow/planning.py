@@ -47,6 +47,9 @@ def write(found: "NextMeasurement", folder: str | Path, top: int) -> list[Path]:
 
     Returns:
         The files written.
+
+    Raises:
+        StoreError: The folder cannot be written.
     """
     import json
 
@@ -54,11 +57,11 @@ def write(found: "NextMeasurement", folder: str | Path, top: int) -> list[Path]:
     from bowdenfit.plots.gallery import write as write_figure
     from bowdenfit.plots.next_measurement import next_measurement as drawn
     from bowdenfit.report.next_measurement import next_measurement_text
-    from bowdenfit.results.folder import write_text
+    from bowdenfit.results.folder import made, write_text
 
-    folder = Path(folder)
-    folder.mkdir(parents=True, exist_ok=True)
-    write_text(folder / JSON, json.dumps(found.page(), indent=1) + "\n")
-    write_text(folder / TEXT, next_measurement_text(found, top))
-    figure = drawn(found)
-    return [folder / JSON, folder / TEXT, *(write_figure(figure, folder / f"{FIGURE}.{ending}") for ending in FORMATS)]
+    with made(Path(folder)) as place:
+        write_text(place / JSON, json.dumps(found.page(), indent=1) + "\n")
+        write_text(place / TEXT, next_measurement_text(found, top))
+        figure = drawn(found)
+        figures = [write_figure(figure, place / f"{FIGURE}.{ending}") for ending in FORMATS]
+    return [place / JSON, place / TEXT, *figures]

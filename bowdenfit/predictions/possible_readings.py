@@ -31,7 +31,7 @@ from bowdenfit.predictions.possible_runs import RunDesign, run_readings
 KINDS = ("angle", "force", "efficiency", "stretch", "preload", "loop")
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class Candidate:
     """One reading, or one run, that could be taken next.
 
@@ -46,6 +46,18 @@ class Candidate:
     route: float = float("nan")
     angles: tuple[float, ...] = ()
     load: float = float("nan")
+
+    def __eq__(self, other: object) -> bool:
+        return isinstance(other, Candidate) and self._key == other._key
+
+    def __hash__(self) -> int:
+        return hash(self._key)
+
+    @property
+    def _key(self) -> tuple[object, ...]:
+        """What makes two the same; NaN equals nothing, None does."""
+        route, load = (None if np.isnan(value) else value for value in (self.route, self.load))
+        return self.kind, route, self.angles, load
 
 
 Columns = Mapping[int, tuple[int, ...]]  # places of each candidate's columns among its kind's readings

@@ -1,15 +1,12 @@
 """The verb that calibrates."""
 
-import signal
-import sys
-from collections.abc import Callable, Iterator
-from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
 
 import click
 
-from bowdenfit.cli.options import reading, reading_options
+from bowdenfit.cli.options import name_of, reading, reading_options
+from bowdenfit.cli.watching import watched_calibration
 
 NOT_CALIBRATED = 3
 
@@ -61,8 +58,8 @@ def calibrate(
     from bowdenfit import workflow
     from bowdenfit.report.calibration import calibration_text
 
-    folder = output or Path("fits/calibration") / (dataset.stem if dataset.suffix else dataset.resolve().name)
-    with _watched(folder) as progress:
+    folder = output or Path("fits/calibration") / name_of(dataset)
+    with watched_calibration(folder) as progress:
         found = workflow.calibrate(
             dataset,
             replications=replications,
@@ -83,41 +80,3 @@ def calibrate(
         click.echo(calibration_text(found), nl=False)
     click.echo(f"Wrote {folder}.", err=True)
     return 0 if found.is_calibrated else NOT_CALIBRATED
-
-
-@contextmanager
-def _watched(folder: Path) -> Iterator[Callable[[int, int], None] | None]:
-    """A bar on a terminal; when the user (or the system) stops a calibration, says how to go on."""
-    from bowdenfit.calibration.store import REPLICATIONS
-    from bowdenfit.cli.watching import INTERRUPTED
-
-    def stop(*_: object) -> None:
-        raise KeyboardInterrupt
-
-    signal.signal(signal.SIGTERM, stop)
-    try:
-        with _bar() as progress:
-            yield progress
-    except KeyboardInterrupt:
-        if (folder / REPLICATIONS).exists():
-            click.echo(
-                f"\nInterrupted; what is done is kept in {folder}: run the same command with --resume.", err=True
-            )
-            raise click.exceptions.Exit(INTERRUPTED) from None
-        raise
-
-
-@contextmanager
-def _bar() -> Iterator[Callable[[int, int], None] | None]:
-    if not sys.stderr.isatty():
-        yield None
-        return
-    from tqdm import tqdm
-
-    with tqdm(unit="replication", desc="calibrating", leave=False) as bar:
-
-        def report(done: int, total: int) -> None:
-            bar.total, bar.n = total, done
-            bar.refresh()
-
-        yield report

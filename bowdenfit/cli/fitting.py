@@ -5,9 +5,9 @@ from typing import Any
 
 import click
 
-from bowdenfit.cli.options import reading, reading_options
+from bowdenfit.cli.options import name_of, reading, reading_options
 from bowdenfit.cli.results import show
-from bowdenfit.cli.watching import watched
+from bowdenfit.cli.watching import watched_fit
 
 NOT_TRUSTED = 3
 
@@ -50,8 +50,8 @@ def fit(
     """
     from bowdenfit import workflow
 
-    folder = output or Path("fits") / (dataset.stem if dataset.suffix else dataset.resolve().name)
-    with watched(folder) as progress:
+    folder = output or Path("fits") / name_of(dataset)
+    with watched_fit(folder) as progress:
         found = workflow.fit(
             dataset,
             output=folder,

@@ -1,6 +1,7 @@
 """Options and arguments that several verbs share."""
 
 from collections.abc import Callable
+from pathlib import Path
 from typing import Any
 
 import click
@@ -62,6 +63,11 @@ def reading_options(verb: Verb) -> Verb:
 def reading(wrap_angle: str | None, **options: Any) -> dict[str, Any]:
     """The options of `reading_options` as the workflow takes them."""
     return {**options, "wrap_angle": parsed_quantity(wrap_angle, "--wrap-angle", "180deg") if wrap_angle else None}
+
+
+def name_of(dataset: Path) -> str:
+    """What the results of a data set are called if nothing else is said."""
+    return dataset.stem if dataset.suffix else dataset.resolve().name
 
 
 def parsed_quantity(text: str, option: str, example: str) -> tuple[float, str]:

@@ -1,12 +1,12 @@
-"""While a fit runs: a bar that says where it stands, and an interrupt that keeps the checkpoint."""
+"""While something long runs: a bar that says where it stands, and an interrupt that keeps what is done."""
 
 import signal
 import sys
 import threading
 from collections.abc import Callable, Iterator
-from contextlib import contextmanager
+from contextlib import AbstractContextManager, contextmanager
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any, TypeAlias
 
 import click
 
@@ -14,20 +14,21 @@ if TYPE_CHECKING:
     from bowdenfit.inference.chain import Progress
 
 INTERRUPTED = 130
+Report: TypeAlias = Callable[..., None]
 
 
 @contextmanager
-def watched(folder: Path) -> "Iterator[Callable[[Progress], None]]":
-    """Gives what to call while sampling; says where the checkpoint is when the user (or the system) stops a fit.
+def watched(kept: Path, bar: "AbstractContextManager[Report]", remark: str) -> "Iterator[Report]":
+    """Gives what to call while something long runs; says how to go on when the user (or the system) stops it.
 
     An interrupt that arrives inside a callback of the garbage collector is lost: Python prints it and goes on. So it is
     remembered, not printed, and raised again by the next call.
 
     Args:
-        folder: Results folder.
+        kept: File that lets it go on later, if it is there by then.
+        bar: Gives what shows the progress.
+        remark: What to say then.
     """
-    from bowdenfit.results.folder import CHAIN
-
     asked = threading.Event()
 
     def stop(*_: object) -> None:
@@ -45,27 +46,47 @@ def watched(folder: Path) -> "Iterator[Callable[[Progress], None]]":
         signal.signal(signal.SIGINT, stop)
     signal.signal(signal.SIGTERM, stop)
     try:
-        with _progress_bar() as show:
+        with bar as show:
 
-            def report(progress: "Progress") -> None:
+            def report(*progress: Any) -> None:
                 if asked.is_set():
                     raise KeyboardInterrupt
-                show(progress)
+                show(*progress)
 
             yield report
     except KeyboardInterrupt:
-        if (folder / CHAIN).exists():
-            click.echo(
-                f"\nInterrupted; the checkpoint is kept in {folder}: run the same command with --resume.", err=True
-            )
+        if kept.exists():
+            click.echo(f"\nInterrupted; {remark}: run the same command with --resume.", err=True)
             raise click.exceptions.Exit(INTERRUPTED) from None
         raise
     finally:
         sys.unraisablehook = printed
 
 
+def watched_fit(folder: Path) -> "AbstractContextManager[Report]":
+    """What to call while sampling.
+
+    Args:
+        folder: Results folder.
+    """
+    from bowdenfit.results.folder import CHAIN
+
+    return watched(folder / CHAIN, _sampling_bar(), f"the checkpoint is kept in {folder}")
+
+
+def watched_calibration(folder: Path) -> "AbstractContextManager[Report]":
+    """What to call after each replication.
+
+    Args:
+        folder: Folder of the calibration.
+    """
+    from bowdenfit.calibration.store import REPLICATIONS
+
+    return watched(folder / REPLICATIONS, _replication_bar(), f"what is done is kept in {folder}")
+
+
 @contextmanager
-def _progress_bar() -> "Iterator[Callable[[Progress], None]]":
+def _sampling_bar() -> "Iterator[Callable[[Progress], None]]":
     """A bar with R-hat and effective sample size, on a terminal only."""
     if not sys.stderr.isatty():
         yield lambda _: None
@@ -79,6 +100,23 @@ def _progress_bar() -> "Iterator[Callable[[Progress], None]]":
             bar.set_description_str(f"sampling with {progress.sampler}", refresh=False)
             if progress.r_hat is not None and progress.ess is not None:
                 bar.set_postfix_str(f"R-hat {progress.r_hat:.3f}, effective draws {progress.ess:.0f}", refresh=False)
+            bar.refresh()
+
+        yield report
+
+
+@contextmanager
+def _replication_bar() -> "Iterator[Callable[[int, int], None]]":
+    """A bar of replications, on a terminal only."""
+    if not sys.stderr.isatty():
+        yield lambda *_: None
+        return
+    from tqdm import tqdm
+
+    with tqdm(unit="replication", desc="calibrating", leave=False) as bar:
+
+        def report(done: int, total: int) -> None:
+            bar.total, bar.n = total, done
             bar.refresh()
 
         yield report

@@ -12,7 +12,7 @@ from bowdenfit.report.sampler import sampler_sentences, sampler_text
 from bowdenfit.results.answers import decimals
 from bowdenfit.results.confounding import confounded
 from bowdenfit.results.fit import Fit
-from bowdenfit.results.identifiability import determined, of_fit
+from bowdenfit.results.identifiability import determined
 from bowdenfit.results.rate import SHOWN_SPEED, rate_effect
 from bowdenfit.results.verdict import CONTRADICTORY, NOT_CONVERGED, NOT_IDENTIFIABLE, Verdict, verdict
 
@@ -194,7 +194,7 @@ def _trouble(estimate: dict[str, Any]) -> str:
 
 def _known(fit: Fit) -> str:
     """Which coefficients the measurements determine, in a sentence."""
-    friction = of_fit(fit).groups.get("friction") if fit.posterior is not None else None
+    friction = fit.known.groups.get("friction") if fit.posterior is not None else None
     return filled(determined(friction, measured=True)) if friction is not None else ""
 
 

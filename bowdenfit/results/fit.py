@@ -24,6 +24,7 @@ from bowdenfit.results.samplers import SamplerAgreement
 if TYPE_CHECKING:
     from bowdenfit.results.checks import Checks
     from bowdenfit.results.elastic import Elastic
+    from bowdenfit.results.identifiability import Identifiability
     from bowdenfit.results.verdict import Verdict
 
 OPTIMAL_LENGTH, OPTIMAL_EFFICIENCY = "optimal_length", "optimal_efficiency"
@@ -223,9 +224,20 @@ class Fit:
 
     def verdict(self) -> "Verdict":
         """Whether the answers may be trusted, and if not, why."""
+        return self._verdict
+
+    @cached_property
+    def _verdict(self) -> "Verdict":
         from bowdenfit.results.verdict import verdict
 
         return verdict(self)
+
+    @cached_property
+    def known(self) -> "Identifiability":
+        """What the draws determine, and what rests on the priors."""
+        from bowdenfit.results.identifiability import of_fit
+
+        return of_fit(self)
 
     def __repr__(self) -> str:
         state = "converged" if self.converged else "NOT converged" if self.posterior else "least squares only"

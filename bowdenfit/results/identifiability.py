@@ -53,12 +53,11 @@ class Identifiability:
         }
 
 
-def of_fit(fit: Fit, profiles: tuple[Profile, ...] = ()) -> Identifiability:
+def of_fit(fit: Fit) -> Identifiability:
     """What a fit knows, from its draws.
 
     Args:
         fit: A fit with a posterior.
-        profiles: Of its friction coefficients.
 
     Raises:
         UsageError: There is no posterior.
@@ -69,7 +68,7 @@ def of_fit(fit: Fit, profiles: tuple[Profile, ...] = ()) -> Identifiability:
     with jax.enable_x64(True):
         _, prior_sd = _linear(fit.model, np.median(drawn.flat_z, axis=0))
     groups = _groups(fit.model, np.mean(values, axis=0), spread, prior_sd)
-    return Identifiability(fit.name, "the draws of the posterior", True, groups, profiles)
+    return Identifiability(fit.name, "the draws of the posterior", True, groups)
 
 
 def of_maximum(
@@ -175,7 +174,7 @@ def unidentified(fit: Fit) -> str:
     names = [p.name for p in fit.model.space.free if p.role == "friction" and not _stated(fit, p.name)]
     if fit.posterior is None:
         return _in_words([name for name in names if _undetermined(fit, name)], None)
-    friction = of_fit(fit).groups.get("friction")
+    friction = fit.known.groups.get("friction")
     if friction is None:
         return ""
     share = {p.name: p.share for p in friction.parameters}

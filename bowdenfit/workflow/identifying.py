@@ -1,6 +1,7 @@
 """What measurements determine: of a fit, of tables before sampling, or of a plan before anything is measured."""
 
 import tomllib
+from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -55,12 +56,11 @@ def _is_plan(path: Path) -> bool:
 def _of_fit(found: "Fit") -> "Identifiability":
     from bowdenfit.inference.least_squares import make_objective, maximum_posterior
     from bowdenfit.inference.posterior import Posterior
-    from bowdenfit.results.identifiability import of_fit
 
-    found.draws()
+    known = found.known
     posterior = Posterior(found.model)
     objective = make_objective(posterior)
-    return of_fit(found, _profiles(posterior, objective, maximum_posterior(posterior, objective)))
+    return replace(known, profiles=_profiles(posterior, objective, maximum_posterior(posterior, objective)))
 
 
 def _profiles(posterior: Any, objective: Any, best: Any) -> tuple[Any, ...]:

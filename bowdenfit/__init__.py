@@ -19,18 +19,18 @@ if TYPE_CHECKING:
         StoreError,
         UsageError,
     )
-    from bowdenfit.results.fit import Fit
-    from bowdenfit.workflow import compare, fit, load, plot, read, simulate
-    from bowdenfit.workflow.calibration import calibrate
-    from bowdenfit.workflow.identifying import identify
-    from bowdenfit.workflow.planning import next_measurement
+    from bowdenfit.questions.calibrate.verb import calibrate
+    from bowdenfit.questions.identify.verb import identify
+    from bowdenfit.questions.next.verb import next_measurement
+    from bowdenfit.results.record import Fit
+    from bowdenfit.verbs import compare, fit, load, plot, read, simulate
 
 _WHERE = {
-    **dict.fromkeys(("compare", "fit", "load", "plot", "read", "simulate"), "bowdenfit.workflow"),
-    "calibrate": "bowdenfit.workflow.calibration",
-    "identify": "bowdenfit.workflow.identifying",
-    "next_measurement": "bowdenfit.workflow.planning",
-    "Fit": "bowdenfit.results.fit",
+    **dict.fromkeys(("compare", "fit", "load", "plot", "read", "simulate"), "bowdenfit.verbs"),
+    "calibrate": "bowdenfit.questions.calibrate.verb",
+    "identify": "bowdenfit.questions.identify.verb",
+    "next_measurement": "bowdenfit.questions.next.verb",
+    "Fit": "bowdenfit.results.record",
     **dict.fromkeys(
         ("BowdenfitError", "ConvergenceError", "DatasetError", "DescriptionError", "StoreError", "UsageError"),
         "bowdenfit.errors",

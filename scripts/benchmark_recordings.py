@@ -51,12 +51,12 @@ from benchmark_fit import BASELINES, ROOT, Run, byte_code, measured, say, search
 
 import bowdenfit
 from bowdenfit.dataset import Dataset
-from bowdenfit.description_file import load_description
-from bowdenfit.inference.posterior import Posterior
-from bowdenfit.measurements.preparation.play import play
-from bowdenfit.models.build import build_model
+from bowdenfit.description.file import load_description
+from bowdenfit.inference.log_density import LogDensity
+from bowdenfit.model import build_model
 from bowdenfit.physics.hysteresis import play_operator, play_operator_with_slope
-from bowdenfit.results.synthetic_recordings import make_recordings, parse_recordings_plan, write_recordings
+from bowdenfit.questions.simulate.recordings import make_recordings, parse_recordings_plan, write_recordings
+from bowdenfit.recordings.preparation.play import play
 
 PLAN = ROOT / "datasets" / "synthetic-recordings" / "bench.toml"
 LENGTHS = list(range(430, 530, 10))  # mm
@@ -363,7 +363,7 @@ def density_costs(data: Dataset) -> Costs:
     """Measure one posterior."""
     with jax.enable_x64(True):
         start = time.perf_counter()
-        density = Posterior(build_model(data))
+        density = LogDensity(build_model(data))
         settings, size = data.description.sampler, density.model.space.size
         batch = settings.n_ensembles * settings.n_walkers // 2
         many = jnp.asarray(0.1 * np.random.default_rng(SEED).standard_normal((batch, size)))

@@ -30,18 +30,18 @@ from scipy import stats
 
 from bowdenfit.dataset import Dataset
 from bowdenfit.description import Description, SamplerSettings
-from bowdenfit.description_file import parse_description
+from bowdenfit.description.file import parse_description
 from bowdenfit.inference.compilation import compiled
+from bowdenfit.inference.draws import curves_of, for_each_draw, named_values
 from bowdenfit.inference.ensemble import sample
 from bowdenfit.inference.least_squares import make_objective, maximum_posterior
-from bowdenfit.inference.posterior import Posterior
-from bowdenfit.measurements.tables import AngleTable, EfficiencyTable, Measurements, OwnAngles, Provenance
-from bowdenfit.models.build import Model, build_model
-from bowdenfit.models.simulation import Design, empty_tables, simulate, true_values
-from bowdenfit.predictions.draws import curves_of, for_each_draw, named_values
-from bowdenfit.predictions.next_measurement import explained
-from bowdenfit.predictions.optimal_length import optimum_of
-from bowdenfit.predictions.possible_readings import Candidate, simulated_readings
+from bowdenfit.inference.log_density import LogDensity
+from bowdenfit.kinds.tables import AngleTable, EfficiencyTable, Measurements, OwnAngles, Provenance
+from bowdenfit.model import Model, build_model
+from bowdenfit.questions.next.possible_readings import Candidate, simulated_readings
+from bowdenfit.questions.next.variance_reduction import explained
+from bowdenfit.questions.simulate.simulation import Design, empty_tables, simulate, true_values
+from bowdenfit.results.optimum import optimum_of
 
 LENGTHS = (430.0, 455.0, 480.0, 505.0, 530.0)
 CANDIDATES = tuple(Candidate(kind, at) for kind in ("angle", "efficiency") for at in LENGTHS)
@@ -126,7 +126,7 @@ class Bench:
         of_truth, of_readings, of_refits = jax.random.split(jax.random.key(seed), 3)
         truth = true_values(self.description, empty_tables(self.description, DESIGN), {}, of_truth)
         dataset = simulate(self.description, DESIGN, truth, of_readings)
-        posterior = Posterior(build_model(dataset))
+        posterior = LogDensity(build_model(dataset))
         z = self._draws(posterior, seed)
         length = self._program(posterior, "optimum", self._optimum)(z)[0]
         readings = simulated_readings(posterior.model, dataset.measurements, CANDIDATES, None, z, seed)
@@ -147,7 +147,7 @@ class Bench:
         return Outcome(expected, 1 - left / np.var(length), errors / np.var(length), float(np.std(length)))
 
     def _weighted(
-        self, posterior: Posterior, z: np.ndarray, length: np.ndarray, readings: list[np.ndarray]
+        self, posterior: LogDensity, z: np.ndarray, length: np.ndarray, readings: list[np.ndarray]
     ) -> np.ndarray:
         """Variance of the best length after each outcome (columns) of each candidate, from weighted draws."""
         model = posterior.model
@@ -168,22 +168,22 @@ class Bench:
             left.append(weight @ length**2 - (weight @ length) ** 2)
         return np.array(left)
 
-    def _curves(self, posterior: Posterior) -> Any:
+    def _curves(self, posterior: LogDensity) -> Any:
         return for_each_draw(curves_of(posterior.model, np.array(LENGTHS)), posterior.model.space.size)
 
-    def _values(self, posterior: Posterior) -> Any:
+    def _values(self, posterior: LogDensity) -> Any:
         return for_each_draw(named_values(posterior.model), posterior.model.space.size)
 
-    def _program(self, posterior: Posterior, what: str, make: Callable[[Posterior], Any]) -> Any:
+    def _program(self, posterior: LogDensity, what: str, make: Callable[[LogDensity], Any]) -> Any:
         shapes = what + str(jax.tree.map(np.shape, posterior.data))
         if shapes not in self.programs:
             self.programs[shapes] = make(posterior)
         return self.programs[shapes]
 
-    def _optimum(self, posterior: Posterior) -> Any:
+    def _optimum(self, posterior: LogDensity) -> Any:
         return for_each_draw(optimum_of(posterior.model), posterior.model.space.size)
 
-    def _draws(self, posterior: Posterior, seed: int) -> np.ndarray:
+    def _draws(self, posterior: LogDensity, seed: int) -> np.ndarray:
         """Draws of the posterior by bowdenfit's own sampler."""
         objective = self._program(posterior, "objective", make_objective)
         batch = SAMPLER.n_ensembles * SAMPLER.n_walkers // 2
@@ -193,11 +193,11 @@ class Bench:
         return z.reshape(-1, posterior.model.space.size)
 
     def _refit(
-        self, posterior: Posterior, dataset: Dataset, more: Measurements, base: np.ndarray, root: np.ndarray, key: Any
+        self, posterior: LogDensity, dataset: Dataset, more: Measurements, base: np.ndarray, root: np.ndarray, key: Any
     ) -> np.ndarray:
         """Best lengths of draws of the posterior of the extended data."""
         terms = build_model(replace(dataset, measurements=more)).terms
-        extended = Posterior(Model(posterior.model.cable, posterior.model.space, terms))
+        extended = LogDensity(Model(posterior.model.cable, posterior.model.space, terms))
         arguments = (base, root, jax.random.key_data(key), posterior.data, extended.data)
         shapes = "refit" + str(jax.tree.map(np.shape, (posterior.data, extended.data)))
         if shapes not in self.programs:
@@ -227,7 +227,7 @@ def _origin(n: int) -> Provenance:
     return Provenance(("simulated",), np.zeros(n, dtype=int), np.arange(2, n + 2))
 
 
-def _refitted(posterior: Posterior, extended: Posterior) -> Callable[..., Any]:
+def _refitted(posterior: LogDensity, extended: LogDensity) -> Callable[..., Any]:
     """Function: draws of the old posterior, weighted by the new reading, then moved by Metropolis steps."""
     optimum = jax.vmap(optimum_of(posterior.model))
     old, new = (jax.vmap(p.log_density, in_axes=(0, None)) for p in (posterior, extended))

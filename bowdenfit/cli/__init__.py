@@ -10,9 +10,9 @@ from bowdenfit.cli.comparing import compare
 from bowdenfit.cli.data_sets import check, init, simulate
 from bowdenfit.cli.fitting import fit
 from bowdenfit.cli.identifying import identify
-from bowdenfit.cli.planning import next_measurement
+from bowdenfit.cli.next_measurement import next_measurement
+from bowdenfit.cli.progress import INTERRUPTED
 from bowdenfit.cli.results import length, plot, predict, summary
-from bowdenfit.cli.watching import INTERRUPTED
 from bowdenfit.errors import BowdenfitError
 
 

@@ -6,7 +6,7 @@ from typing import Any
 import click
 
 from bowdenfit.cli.options import name_of, reading, reading_options
-from bowdenfit.cli.watching import watched_calibration
+from bowdenfit.cli.progress import watched_calibration
 
 NOT_CALIBRATED = 3
 
@@ -55,12 +55,12 @@ def calibrate(
 
     Takes some seconds a replication and core. Exit code 3: not calibrated.
     """
-    from bowdenfit import workflow
-    from bowdenfit.report.calibration import calibration_text
+    from bowdenfit import verbs
+    from bowdenfit.questions.calibrate.words import calibration_text
 
     folder = output or Path("fits/calibration") / name_of(dataset)
     with watched_calibration(folder) as progress:
-        found = workflow.calibrate(
+        found = verbs.calibrate(
             dataset,
             replications=replications,
             workers=workers,

@@ -26,11 +26,11 @@ def compare(results: tuple[Path, ...], as_json: bool, output: Path | None, force
 
     Readings that would move the posterior take longer: it is fitted again without them.
     """
-    from bowdenfit import workflow
-    from bowdenfit.report.compare import comparison_text
+    from bowdenfit import verbs
+    from bowdenfit.questions.compare.words import comparison_text
 
     fits = {_short(folder, results): load(folder) for folder in results}
-    found = workflow.compare(fits, output=output, force=force, report=lambda line: click.echo(line, err=True))
+    found = verbs.compare(fits, output=output, force=force, report=lambda line: click.echo(line, err=True))
     if as_json:
         import json
 

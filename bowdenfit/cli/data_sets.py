@@ -43,20 +43,20 @@ def check(dataset: Path, priors: Path | None, **options: Any) -> None:
     DATASET is a folder with cable.toml and tables, or one table or recording with --wrap-angle. Of a file alone, its
     channels are listed: name, unit, sampling rate, length and range, and what it is as a recording.
     """
-    from bowdenfit import workflow
-    from bowdenfit.report.check import check_text
+    from bowdenfit import verbs
+    from bowdenfit.questions.check.data_set_words import check_text
 
     if dataset.is_file() and dataset.suffix.lower() != ".toml" and not options["wrap_angle"]:
-        from bowdenfit.report.channels import channels_text
+        from bowdenfit.questions.check.channels_words import channels_text
 
-        click.echo(channels_text(*workflow.channels_of(dataset, options["channels"])), nl=False)
+        click.echo(channels_text(*verbs.channels_of(dataset, options["channels"])), nl=False)
         return
 
-    found = workflow.check(dataset, **reading(**options))
+    found = verbs.check(dataset, **reading(**options))
     click.echo(check_text(found), nl=False)
     if priors is not None:
-        from bowdenfit.report.prior_predictive import prior_predictive_text
-        from bowdenfit.workflow.checking import show_priors
+        from bowdenfit.questions.check.prior_words import prior_predictive_text
+        from bowdenfit.questions.check.verb import show_priors
 
         click.echo(prior_predictive_text(show_priors(found, priors)) + f"Wrote the figure to {priors}.")
 
@@ -79,7 +79,7 @@ def simulate(bench: Path, output: Path, seed: int | None, no_noise: bool, record
     --recordings it has [recordings] in place of [design]: what the motor does, what the bench is like, and what its load
     cells get wrong; datasets/synthetic-recordings/bench.toml is one. The truth and the seed are written beside the tables.
     """
-    from bowdenfit.workflow import simulate as simulated
+    from bowdenfit.verbs import simulate as simulated
 
     simulated(bench, output=output, seed=seed, noise=not no_noise, recordings=recordings)
     click.echo(f"Wrote {output}. Next: bowdenfit fit {output}")

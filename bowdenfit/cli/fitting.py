@@ -6,8 +6,8 @@ from typing import Any
 import click
 
 from bowdenfit.cli.options import name_of, reading, reading_options
+from bowdenfit.cli.progress import watched_fit
 from bowdenfit.cli.results import show
-from bowdenfit.cli.watching import watched_fit
 
 NOT_TRUSTED = 3
 
@@ -48,11 +48,11 @@ def fit(
 
     DATASET is a folder with cable.toml and tables, or one table or recording with --wrap-angle.
     """
-    from bowdenfit import workflow
+    from bowdenfit import verbs
 
     folder = output or Path("fits") / name_of(dataset)
     with watched_fit(folder) as progress:
-        found = workflow.fit(
+        found = verbs.fit(
             dataset,
             output=folder,
             mcmc=mcmc,

@@ -21,9 +21,9 @@ def identify(source: Path, output: Path | None, as_json: bool, **options: Any) -
     SOURCE is a plan, before anything is measured (a cable.toml with [design], the lengths and forces that you intend to
     measure at, such as datasets/synthetic-bench/bench.toml); a data set; or the results folder of a fit.
     """
-    from bowdenfit.report.identifiability import identifiability_text
-    from bowdenfit.workflow.identifying import identify as identified
-    from bowdenfit.workflow.identifying import write
+    from bowdenfit.questions.identify.verb import identify as identified
+    from bowdenfit.questions.identify.verb import write
+    from bowdenfit.questions.identify.words import identifiability_text
 
     found = identified(source, **reading(**options))
     if output is not None:

@@ -61,7 +61,7 @@ def reading_options(verb: Verb) -> Verb:
 
 
 def reading(wrap_angle: str | None, **options: Any) -> dict[str, Any]:
-    """The options of `reading_options` as the workflow takes them."""
+    """The options of `reading_options` as the verbs take them."""
     return {**options, "wrap_angle": parsed_quantity(wrap_angle, "--wrap-angle", "180deg") if wrap_angle else None}
 
 

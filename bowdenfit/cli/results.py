@@ -8,7 +8,7 @@ import click
 from bowdenfit.cli.options import parsed_quantity
 
 if TYPE_CHECKING:
-    from bowdenfit.results.fit import Fit
+    from bowdenfit.results.record import Fit
 
 
 @click.command(short_help="Print the summary of a fit.")
@@ -88,7 +88,7 @@ def predict(
     The interval q05 to q95 is that of the cable's mean; mounting_q05 to mounting_q95 also holds the scatter from one
     mounting of the cable to the next. Lengths outside the range of the curves are marked.
     """  # noqa: D301 - the backspace keeps click from filling the list
-    from bowdenfit.workflow import predict as predicted
+    from bowdenfit.verbs import predict as predicted
 
     def number(text: str | None, option: str, example: str) -> tuple[float, str] | None:
         return parsed_quantity(text, option, example) if text else None
@@ -145,7 +145,7 @@ def length(results: Path, as_json: bool) -> None:
 )
 def plot(results: Path, output: Path | None) -> None:
     """Draw the figures of a finished fit again, as PNG and SVG."""
-    from bowdenfit.workflow import plot as draw
+    from bowdenfit.verbs import plot as draw
 
     for path in draw(load(results), output or results / "figures"):
         click.echo(path)
@@ -153,7 +153,7 @@ def plot(results: Path, output: Path | None) -> None:
 
 def load(results: Path) -> "Fit":
     """A finished fit."""
-    from bowdenfit.workflow import load
+    from bowdenfit.verbs import load
 
     return load(results)
 
@@ -165,6 +165,6 @@ def show(found: "Fit", as_json: bool) -> None:
 
         click.echo(json.dumps(found.summary(), indent=1))
     else:
-        from bowdenfit.report.text import summary_text
+        from bowdenfit.questions.summary.words import summary_text
 
         click.echo(summary_text(found), nl=False)

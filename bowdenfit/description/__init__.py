@@ -5,14 +5,7 @@ from typing import Annotated, Any, Literal
 from pydantic import ConfigDict, Field, field_validator, model_validator
 
 from bowdenfit.description.elastic import CableSettings, PreloadSettings, StretchSettings
-from bowdenfit.description.recordings import (
-    ColumnMap,
-    ForceLimits,
-    Phase,
-    Preparation,
-    RecordingFile,
-    RecordingsTable,
-)
+from bowdenfit.description.recordings import ColumnMap, ForceLimits, Phase, Preparation, RecordingFile, RecordingsTable
 from bowdenfit.description.values import (
     Finite,
     FrictionSetting,

@@ -2,8 +2,8 @@
 
 from typing import Literal
 
+from bowdenfit.description.pulleys import Pulleys
 from bowdenfit.description.values import Frozen, QuantityValue
-from bowdenfit.measurements.pulleys import Pulleys
 
 PRELOAD = "preload"
 LOWEST = {"stiffness": False, "bedding_load": False, "bedding_stretch": True, "lengthening": True, PRELOAD: True}

@@ -8,7 +8,7 @@ import numpy as np
 
 from bowdenfit.description import SamplerSettings
 from bowdenfit.inference.diagnostics import Diagnostics, shortfalls
-from bowdenfit.inference.posterior import Posterior
+from bowdenfit.inference.log_density import LogDensity
 
 Diagnose: TypeAlias = Callable[[Mapping[str, np.ndarray], int], dict[str, Diagnostics]]
 Quantities: TypeAlias = Callable[[np.ndarray], Mapping[str, np.ndarray]]
@@ -82,7 +82,7 @@ class Chain:
 
 
 def judged(
-    posterior: Posterior,
+    posterior: LogDensity,
     z: np.ndarray,
     n_ensembles: int,
     settings: SamplerSettings,

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from bowdenfit.types import Draws
+from bowdenfit.types import ChainDraws
 
 if TYPE_CHECKING:
     from bowdenfit.inference.chain import Trajectories
@@ -38,12 +38,12 @@ class Diagnostics:
     drift: float
 
 
-def diagnose_all(draws: Mapping[str, Draws], n_ensembles: int) -> dict[str, Diagnostics]:
+def diagnose_all(draws: Mapping[str, ChainDraws], n_ensembles: int) -> dict[str, Diagnostics]:
     """Diagnostics of several quantities by name; see `diagnose`."""
     return {name: diagnose(values, n_ensembles) for name, values in draws.items()}
 
 
-def diagnose(draws: Draws, n_ensembles: int) -> Diagnostics:
+def diagnose(draws: ChainDraws, n_ensembles: int) -> Diagnostics:
     """Diagnostics of one quantity.
 
     Walkers are the chains of the effective sample size; R-hat compares whole ensembles, because the walkers of one
@@ -76,7 +76,7 @@ def diagnose(draws: Draws, n_ensembles: int) -> Diagnostics:
         )
 
 
-def _drift(draws: Draws) -> float:
+def _drift(draws: ChainDraws) -> float:
     """Change from the first to the second half of the draws.
 
     Many walkers that still creep in from an over-dispersed start agree with each other, so that no comparison between

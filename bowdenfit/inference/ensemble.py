@@ -15,7 +15,7 @@ from bowdenfit.description import SamplerSettings
 from bowdenfit.inference.chain import Chain, Diagnose, Progress, Quantities, judged, stuck, worst
 from bowdenfit.inference.diagnostics import diagnose_all
 from bowdenfit.inference.least_squares import MaximumPosterior
-from bowdenfit.inference.posterior import Posterior
+from bowdenfit.inference.log_density import LogDensity
 
 THIN = 20  # steps from one stored state to the next
 _BLOCK = 10  # stored states between two reports
@@ -74,7 +74,7 @@ def starting_points(start: MaximumPosterior, settings: SamplerSettings, generato
 
 
 def sample(
-    posterior: Posterior,
+    posterior: LogDensity,
     log_density: Callable[[np.ndarray, Any], Any],
     start: MaximumPosterior,
     settings: SamplerSettings,
@@ -149,7 +149,7 @@ def _in_halves(log_density: Callable[..., Any], data: Any, half: int) -> Callabl
 
 
 def _summarized(
-    posterior: Posterior,
+    posterior: LogDensity,
     backend: emcee.backends.Backend,
     settings: SamplerSettings,
     quantities: Quantities,

@@ -21,7 +21,7 @@ from jax import Array
 
 from bowdenfit.inference.compilation import compiled
 from bowdenfit.inference.least_squares import MaximumPosterior
-from bowdenfit.inference.posterior import Posterior
+from bowdenfit.inference.log_density import LogDensity
 
 OWN = 0.25  # share of the prior variance below which a parameter may be known by itself: half the prior's sd
 RESTS_ON_PRIOR = 0.8  # share above which the prior alone speaks
@@ -144,7 +144,7 @@ class Knowledge:
         return worst if worst is not None and worst.share > NOTHING else None
 
 
-def information_at(posterior: Posterior, z: np.ndarray) -> MaximumPosterior:
+def information_at(posterior: LogDensity, z: np.ndarray) -> MaximumPosterior:
     """A point and the covariance that measurements would leave there, at the noise scales of that point.
 
     Args:

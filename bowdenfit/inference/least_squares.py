@@ -14,6 +14,7 @@ import numpy as np
 from bowdenfit.errors import ConvergenceError
 from bowdenfit.inference.disagreement import Disagreement, disagreements
 from bowdenfit.inference.linearized import linearized
+from bowdenfit.inference.log_density import LogDensity
 from bowdenfit.inference.objective import (
     LOWER_END,
     Objective,
@@ -25,9 +26,8 @@ from bowdenfit.inference.objective import (
     solve,
     sum_of_squares,
 )
-from bowdenfit.inference.posterior import Posterior
+from bowdenfit.inference.other_minima import PINS, contested, fitting_as_well
 from bowdenfit.inference.profiles import Basin, limits
-from bowdenfit.inference.rivals import PINS, contested, fitting_as_well
 from bowdenfit.inference.scatter import scatter_about
 from bowdenfit.parameters.priors import Uniform
 from bowdenfit.parameters.space import Parameter
@@ -108,7 +108,7 @@ class MaximumPosterior:
     covariance: np.ndarray
 
 
-def maximum_posterior(posterior: Posterior, objective: Objective) -> MaximumPosterior:
+def maximum_posterior(posterior: LogDensity, objective: Objective) -> MaximumPosterior:
     """Maximum of the posterior with the noise scales at their prior medians.
 
     Raises:
@@ -128,7 +128,7 @@ def maximum_posterior(posterior: Posterior, objective: Objective) -> MaximumPost
 
 
 def least_squares(
-    posterior: Posterior, objective: Objective, start: np.ndarray, intervals: bool = True
+    posterior: LogDensity, objective: Objective, start: np.ndarray, intervals: bool = True
 ) -> LeastSquares:
     """Least squares without priors, from the maximum of the posterior.
 
@@ -148,7 +148,7 @@ def least_squares(
     return _summarized(basin, trials, intervals)
 
 
-def _minimum(posterior: Posterior, objective: Objective, start: np.ndarray) -> tuple[Solution, np.ndarray]:
+def _minimum(posterior: LogDensity, objective: Objective, start: np.ndarray) -> tuple[Solution, np.ndarray]:
     """The minimum without priors, and which parameters have run to an end of their range there."""
     parameters, noise = posterior.model.space.free, noise_scales(posterior)
     pin, weight = np.zeros(len(noise)), prior_weights(noise, False)
@@ -175,7 +175,7 @@ def _suspect(parameters: tuple[Parameter, ...], z: np.ndarray) -> np.ndarray:
     return (may_end(parameters) & (z < _SUSPECT)) | (limited & (z > -_SUSPECT))
 
 
-def _pinned_elsewhere(posterior: Posterior, objective: Objective, start: np.ndarray) -> list[Solution]:
+def _pinned_elsewhere(posterior: LogDensity, objective: Objective, start: np.ndarray) -> list[Solution]:
     """Solutions with one parameter of the elastic side, or of friction beside it, pinned away from the minimum."""
     parameters, noise = posterior.model.space.free, noise_scales(posterior)
     roles = ["friction", "elastic"] if any(p.role == "elastic" for p in parameters) else []
@@ -253,7 +253,7 @@ def _at_bound(value: float, limit: tuple[float, float], at_upper_end: bool) -> s
     return f"no finite minimum: runs to its lower end, {value:.3g}{most}"
 
 
-def _by_term(posterior: Posterior, found: Solution) -> dict[str, np.ndarray]:
+def _by_term(posterior: LogDensity, found: Solution) -> dict[str, np.ndarray]:
     """The Jacobian's rows of each table."""
     names = [term.name for term in posterior.model.terms]
     ends = np.cumsum([len(found["residuals"][name]) for name in names])

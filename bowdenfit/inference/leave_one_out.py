@@ -16,8 +16,8 @@ from bowdenfit.inference.comparison import How, Prediction, left_out, reliable_k
 from bowdenfit.inference.compilation import compiled
 from bowdenfit.inference.diagnostics import Diagnostics, diagnose_all
 from bowdenfit.inference.least_squares import MaximumPosterior
+from bowdenfit.inference.log_density import LogDensity
 from bowdenfit.inference.moment_matching import matched
-from bowdenfit.inference.posterior import Posterior
 
 # A refit is asked for one number, to a few hundredths: fewer walkers than for the answers of a fit.
 REFIT = SamplerSettings(n_ensembles=4, n_walkers=64, max_steps=4000, target_r_hat=1.02, target_ess=400)
@@ -34,7 +34,7 @@ class Readings:
         settings: Of the fits without a reading.
     """
 
-    posterior: Posterior
+    posterior: LogDensity
     settings: SamplerSettings = REFIT
 
     @cached_property

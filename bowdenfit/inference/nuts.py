@@ -29,7 +29,7 @@ from bowdenfit.inference.chain import Chain, Diagnose, Progress, Quantities, Tra
 from bowdenfit.inference.compilation import compiled
 from bowdenfit.inference.diagnostics import diagnose_all, energy_mixing, trajectory_shortfalls
 from bowdenfit.inference.least_squares import MaximumPosterior
-from bowdenfit.inference.posterior import Posterior
+from bowdenfit.inference.log_density import LogDensity
 
 BLOCK = 50  # steps between two reports
 WINDOWS = (
@@ -51,7 +51,7 @@ Block: TypeAlias = dict[str, np.ndarray]  # positions and statistics of its step
 Program: TypeAlias = Callable[..., Any]
 
 
-def make_program(posterior: Posterior, settings: SamplerSettings) -> Program:
+def make_program(posterior: LogDensity, settings: SamplerSettings) -> Program:
     """Compiled: `BLOCK` steps of every chain; what it makes depends on the seed and the number of the block alone.
 
     Args:
@@ -99,7 +99,7 @@ def _fine(steps: int) -> np.ndarray:
 
 
 def starting_points(
-    posterior: Posterior, start: MaximumPosterior, settings: SamplerSettings, generator: np.random.Generator
+    posterior: LogDensity, start: MaximumPosterior, settings: SamplerSettings, generator: np.random.Generator
 ) -> np.ndarray:
     """Over-dispersed starts, (chain, parameter).
 
@@ -113,7 +113,7 @@ def starting_points(
 
 
 def sample(
-    posterior: Posterior,
+    posterior: LogDensity,
     program: Program,
     start: MaximumPosterior,
     settings: SamplerSettings,
@@ -192,7 +192,7 @@ def _shrunk(draws: np.ndarray) -> np.ndarray:
 
 
 def _summarized(
-    posterior: Posterior,
+    posterior: LogDensity,
     blocks: Sequence[Block],
     settings: SamplerSettings,
     quantities: Quantities,

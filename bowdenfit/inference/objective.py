@@ -9,7 +9,7 @@ import numpy as np
 from jax import Array
 
 from bowdenfit.inference.compilation import compiled
-from bowdenfit.inference.posterior import Posterior
+from bowdenfit.inference.log_density import LogDensity
 from bowdenfit.inference.solver import minimize
 from bowdenfit.parameters.priors import HalfNormal, LogNormal, TruncatedNormal, Uniform
 from bowdenfit.parameters.space import Parameter
@@ -21,7 +21,7 @@ _TIE = 1e-6  # weight of z that keeps what no reading tells from wandering off, 
 LOWER_END = -38.0  # z at which a quantile reaches the lower end of its support in double precision
 
 
-def make_objective(posterior: Posterior) -> Objective:
+def make_objective(posterior: LogDensity) -> Objective:
     """One compiled program for every solve: which parameters are pinned and whether priors count are arguments.
 
     The objective takes the z to start from, which parameters are pinned and where, the weight of each z as a residual of
@@ -56,7 +56,7 @@ def make_objective(posterior: Posterior) -> Objective:
     return objective
 
 
-def _program(posterior: Posterior) -> Callable[..., Solution]:
+def _program(posterior: LogDensity) -> Callable[..., Solution]:
     """Everything that one z gives."""
     space = posterior.model.space
 
@@ -78,7 +78,7 @@ def _program(posterior: Posterior) -> Callable[..., Solution]:
 
 
 def solve(
-    posterior: Posterior,
+    posterior: LogDensity,
     objective: Objective,
     start: np.ndarray,
     pinned: np.ndarray,
@@ -95,7 +95,7 @@ def sum_of_squares(found: Solution) -> float:
     return float(sum(np.sum(r**2) for r in found["residuals"].values()))
 
 
-def noise_scales(posterior: Posterior) -> np.ndarray:
+def noise_scales(posterior: LogDensity) -> np.ndarray:
     """Which free parameters are noise scales, held at their prior median in least squares."""
     return np.array([p.role == "noise" for p in posterior.model.space.free], dtype=bool)
 

@@ -25,8 +25,8 @@ from functools import cache
 import numpy as np
 
 from bowdenfit.inference.linearized import linearized
+from bowdenfit.inference.log_density import LogDensity
 from bowdenfit.inference.objective import LOWER_END, Objective, Solution, may_end, noise_scales, prior_weights, solve
-from bowdenfit.inference.posterior import Posterior
 from bowdenfit.inference.scatter import freedom_by_block
 from bowdenfit.parameters.priors import Uniform
 
@@ -69,7 +69,7 @@ class Basin:
         weight: Weight of each z as a residual of its own.
     """
 
-    posterior: Posterior
+    posterior: LogDensity
     objective: Objective
     found: Solution
     pinned: np.ndarray
@@ -123,7 +123,7 @@ class Basin:
 
 
 def profile(
-    posterior: Posterior,
+    posterior: LogDensity,
     objective: Objective,
     name: str,
     start: np.ndarray,

@@ -9,7 +9,7 @@ from matplotlib.axes import Axes
 from bowdenfit.plots.style import BLUE, GRAY, LEAST_SQUARES, LIGHT, MEDIAN, NARROW_INTERVAL, WIDE_INTERVAL
 
 if TYPE_CHECKING:
-    from bowdenfit.results.figure_data import Band
+    from bowdenfit.questions.summary.figure_data import Band
 
 OUTSIDE = "Outside the range of the curves"
 

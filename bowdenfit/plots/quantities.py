@@ -9,7 +9,7 @@ from bowdenfit.plots.densities import density, limits, support
 from bowdenfit.plots.style import labeled
 
 if TYPE_CHECKING:
-    from bowdenfit.results.figure_data import FigureData
+    from bowdenfit.questions.summary.figure_data import FigureData
 
 
 @dataclass(frozen=True)

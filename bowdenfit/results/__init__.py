@@ -1,1 +1,1 @@
-"""What a fit found: an immutable object, its summary, and the folder it is kept in."""
+"""The record of a fit, the folder it is kept in, and the best length that follows from its draws."""

@@ -11,19 +11,19 @@ import numpy as np
 from jaxtyping import AbstractArray
 
 from bowdenfit.dataset import Dataset
-from bowdenfit.description_file import parse_description
+from bowdenfit.description.file import parse_description
 from bowdenfit.errors import StoreError
 from bowdenfit.inference.chain import Trajectories
 from bowdenfit.inference.diagnostics import Diagnostics
 from bowdenfit.inference.disagreement import Disagreement
+from bowdenfit.inference.draws import derived_units
 from bowdenfit.inference.least_squares import Estimate, LeastSquares
-from bowdenfit.measurements.tables import Measurements
-from bowdenfit.predictions.draws import derived_units
-from bowdenfit.results.fit import OPTIMAL_EFFICIENCY, OPTIMAL_LENGTH, Fit, Posterior, Provenance
+from bowdenfit.inference.samplers import SamplerAgreement
+from bowdenfit.kinds.tables import Measurements
+from bowdenfit.questions.summary.page import summarize
 from bowdenfit.results.folder import CHAIN, FIT, POSTERIOR, SUMMARY, made, write_text
 from bowdenfit.results.netcdf import EXPECTED, Coordinates, Groups, read_groups, write_groups
-from bowdenfit.results.samplers import SamplerAgreement
-from bowdenfit.results.summary import summarize
+from bowdenfit.results.record import OPTIMAL_EFFICIENCY, OPTIMAL_LENGTH, Draws, Fit, Provenance
 from bowdenfit.types import Flags, Labels, Matrix
 
 SCHEMA = 4
@@ -145,7 +145,7 @@ def _fit_page(fit: Fit) -> dict[str, Any]:
     }
 
 
-def _posterior_counts(posterior: Posterior) -> dict[str, Any]:
+def _posterior_counts(posterior: Draws) -> dict[str, Any]:
     """What is known of the draws as a whole; the draws themselves are in posterior.nc."""
     trajectories = posterior.trajectories
     if trajectories is not None:
@@ -246,7 +246,7 @@ def posterior_page(fit: Fit) -> tuple[Groups, Coordinates, dict[str, str], dict[
     return groups, labels, attributes, _variable_attributes(fit)
 
 
-def _trajectory_statistics(posterior: Posterior) -> dict[str, np.ndarray]:
+def _trajectory_statistics(posterior: Draws) -> dict[str, np.ndarray]:
     """Statistics of the trajectory that led to each draw, under ArviZ's names; empty of emcee."""
     return dict(posterior.trajectories.statistics) if posterior.trajectories else {}
 
@@ -262,14 +262,14 @@ def _variable_attributes(fit: Fit) -> dict[str, dict[str, str]]:
     return labels
 
 
-def _posterior(path: Path, page: Mapping[str, Any]) -> Posterior:
+def _posterior(path: Path, page: Mapping[str, Any]) -> Draws:
     if not path.exists():
         raise StoreError(f"{path} is missing; fit again, or restore the folder from a copy.")
     groups = read_groups(path)
     values, z = groups["posterior"], groups["unconstrained_posterior"]
     optimum = {name: values.pop(name) for name in (OPTIMAL_LENGTH, OPTIMAL_EFFICIENCY) if name in values}
     statistics = {name: value for name, value in groups["sample_stats"].items() if name != LOG_POSTERIOR}
-    return Posterior(
+    return Draws(
         np.stack(list(z.values()), axis=-1),
         values,
         optimum,

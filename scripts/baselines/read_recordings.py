@@ -19,7 +19,7 @@ from unittest.mock import patch
 def with_bowdenfit(file: Path) -> dict[str, float]:
     """All channels, with their names, units and clocks."""
     start = time.perf_counter()
-    from bowdenfit.measurements.lab_files import read_channels
+    from bowdenfit.files import read_channels
 
     channels = read_channels(file).channels
     return {"seconds": time.perf_counter() - start, "rows": len(channels[0].values), "memory": peak()}
@@ -52,14 +52,14 @@ def steps(folder: Path) -> dict[str, float]:
     start = time.perf_counter()
     import bowdenfit
     from bowdenfit import dataset
-    from bowdenfit.dataset import recordings
+    from bowdenfit.kinds.recordings import table
 
     seconds["import bowdenfit"] = time.perf_counter() - start
     timed = {
-        "read the files": (recordings, "read_channels"),
-        "flag, tare and find delays": (recordings, "inspected"),
-        "average": (recordings, "averaged"),
-        "find strokes": (recordings, "find_strokes"),
+        "read the files": (table, "read_channels"),
+        "flag, tare and find delays": (table, "inspected"),
+        "average": (table, "averaged"),
+        "find strokes": (table, "find_strokes"),
         "checksums": (dataset, "_sha256"),
     }
     start = time.perf_counter()
@@ -71,7 +71,7 @@ def steps(folder: Path) -> dict[str, float]:
     start = time.perf_counter()
     import jax
 
-    from bowdenfit.models.build import build_model
+    from bowdenfit.model import build_model
 
     seconds["import JAX"] = time.perf_counter() - start
     start = time.perf_counter()

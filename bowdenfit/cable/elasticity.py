@@ -1,0 +1,219 @@
+"""The elastic side of a cable: how its rope stretches, and what preload it has at a wrap angle."""
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+
+import jax.numpy as jnp
+import numpy as np
+from jax import Array
+from jaxtyping import Float
+
+from bowdenfit.description import Description, LogNormalPrior, PriorDefaults
+from bowdenfit.kinds.tables import Measurements
+from bowdenfit.parameters.priors import HalfNormal, LogNormal, Normal, TruncatedNormal
+from bowdenfit.parameters.space import Parameter
+from bowdenfit.physics.stretch import (
+    compliance,
+    extension,
+    mean_tension,
+    mean_tension_from_shares,
+    mean_tension_unloading,
+    preload_at,
+    tension_from_extension,
+)
+
+STIFFNESS, BEDDING_STRETCH, BEDDING_LOAD = "stiffness", "bedding_stretch", "bedding_load"
+LENGTHENING, PRELOAD, STRETCH_ZERO, STRETCH_FRICTION = "lengthening", "preload", "stretch_zero", "mu_stretch"
+STRETCH_NOISE, PRELOAD_NOISE = "sigma_L", "sigma_P"
+LOOP_MOUNTING = "loop_mounting"
+
+Values = Mapping[str, Array]
+
+
+@dataclass(frozen=True)
+class Elasticity:
+    """Stretch and preload of one cable; every function takes the values of its parameters [internal units].
+
+    Args:
+        description: What was said about the cable.
+    """
+
+    description: Description
+
+    @property
+    def reference_angle(self) -> float:
+        """Wrap angle at which the parameter `preload` holds [rad]."""
+        return self.description.preload.wrap_angle.to("angle")
+
+    def rope(self, values: Values) -> tuple[Array, Array, Array]:
+        """Stiffness [N/mm], bedding-in stretch [mm] and the load over which it is taken up [N]."""
+        return values[STIFFNESS], values[BEDDING_STRETCH], values[BEDDING_LOAD]
+
+    def extension(self, values: Values, tension: Float[Array, "*batch"]) -> Float[Array, "*batch"]:
+        """Extension of the rope under a tension that is the same all along it [mm]."""
+        return extension(tension, *self.rope(values))
+
+    def compliance(self, values: Values, tension: Float[Array, "*batch"]) -> Float[Array, "*batch"]:
+        """Change of the extension with that tension [mm/N]."""
+        return compliance(tension, *self.rope(values))
+
+    def tension(self, values: Values, extended: Float[Array, "*batch"]) -> Float[Array, "*batch"]:
+        """Tension from the extension [N]; 0 where the rope is slack."""
+        return tension_from_extension(extended, *self.rope(values))
+
+    def friction_exponent(self, values: Values, wrap_angle: Float[Array, "*batch"]) -> Float[Array, "*batch"]:
+        """Friction exponent while the rope is stretched [1]."""
+        return values[self.description.stretch.friction or STRETCH_FRICTION] * wrap_angle
+
+    def stretch(
+        self,
+        values: Values,
+        load: Float[Array, "*batch"],
+        wrap_angle: Float[Array, "*batch"],
+        peak: Float[Array, "*batch"],
+    ) -> Float[Array, "*batch"]:
+        r"""Stretch seen at the loaded end [mm], :math:`e(\bar T(F, \theta)) + g \theta - \Delta L_0`.
+
+        Args:
+            values: Values of the parameters.
+            load: F [N].
+            wrap_angle: theta [rad].
+            peak: Largest load before, from which the load comes down; the load itself while it grows [N].
+        """
+        mean = mean_tension_unloading(load, peak, self.friction_exponent(values, wrap_angle))
+        return self.extension(values, mean) + values[LENGTHENING] * wrap_angle - values[STRETCH_ZERO]
+
+    def stretch_of_rows(self, values: Values, rows: Mapping[str, Array]) -> Float[Array, " rows"]:
+        """The same for the rows of a table, friction worked out once for every different wrap angle [mm].
+
+        Args:
+            values: Values of the parameters.
+            rows: Loads, their peaks, the different wrap angles, and the matrix that gives each row its own.
+        """
+        exponent, spread = self.friction_exponent(values, rows["wrap_angles"]), rows["spread"]
+        one = jnp.ones_like(exponent)
+        lengthened = values[LENGTHENING] * rows["wrap_angles"] - values[STRETCH_ZERO]
+        of_angle = jnp.stack([exponent, mean_tension(one, exponent), mean_tension(one, -exponent), lengthened])
+        exponents, loading, unloading, lengthened = of_angle @ spread
+        mean = mean_tension_from_shares(rows["load"], rows["peak"], exponents, loading, unloading)
+        return self.extension(values, mean) + lengthened
+
+    def preload(
+        self, values: Values, bend: Float[Array, "*batch"]
+    ) -> tuple[Float[Array, "*batch"], Float[Array, "*batch"]]:
+        """Preload [N] and slack [mm] at a total wrap angle [rad]."""
+        return self.preload_from(values, values[PRELOAD], bend)
+
+    def preload_or_none(self, values: Values, bend: Float[Array, "*batch"]) -> Float[Array, "*batch"]:
+        """Preload [N]; 0 of a cable nothing of whose measurements depends on one."""
+        return self.preload(values, bend)[0] if PRELOAD in values else jnp.zeros(bend.shape)
+
+    def preload_from(
+        self, values: Values, reference_preload: Float[Array, "*#batch"], bend: Float[Array, "*batch"]
+    ) -> tuple[Float[Array, "*batch"], Float[Array, "*batch"]]:
+        """Preload [N] and slack [mm] at a total wrap angle [rad] of a cable preloaded otherwise."""
+        if not self.description.preload_follows_stretch:
+            return jnp.broadcast_to(reference_preload, bend.shape), jnp.zeros(bend.shape)
+        return preload_at(
+            bend, reference_preload, jnp.asarray(self.reference_angle), values[LENGTHENING], *self.rope(values)
+        )
+
+
+def spread_matrix(at: np.ndarray) -> np.ndarray:
+    """Matrix of zeros and ones that gives each row what belongs to its case; a product with it is quicker than indexing.
+
+    Args:
+        at: Number of the case of each row.
+    """
+    return (np.arange(at.max(initial=-1) + 1)[:, None] == at).astype(float)
+
+
+def elastic_parameters(
+    description: Description, measurements: Measurements, defaults: PriorDefaults
+) -> list[Parameter]:
+    """The parameters of stretch, preload and loop that a data set needs."""
+    parameters = []
+    if uses_rope(description, measurements):
+        parameters += _rope(defaults)
+    if measurements.stretch is not None:
+        sd = defaults.stretch_zero_mm
+        meaning, text = "stretch that the reading calls zero", f"Normal(0, {sd:g}) mm"
+        parameters.append(Parameter(STRETCH_ZERO, r"$\Delta L_0$", meaning, "elastic", Normal(0.0, sd), text, "mm"))
+        if description.stretch.friction is None:
+            parameters.append(_own_friction(defaults.friction))
+    if uses_preload(description, measurements):
+        parameters.append(_preload(description, defaults.preload))
+    if _mounting_matters(measurements):
+        meaning, text = "effect of the loop's mounting on the friction exponent, in units of tau", "Normal(0, 1)"
+        parameters.append(Parameter(LOOP_MOUNTING, "$m$", meaning, "sensor", Normal(0.0, 1.0), text))
+    return parameters
+
+
+def uses_rope(description: Description, measurements: Measurements) -> bool:
+    """Whether anything measured depends on how the rope stretches."""
+    return measurements.stretch is not None or (
+        description.preload_follows_stretch and uses_preload(description, measurements)
+    )
+
+
+def uses_preload(description: Description, measurements: Measurements) -> bool:
+    """Whether anything measured depends on the preload."""
+    recorded = description.cable.kind == "loop" and measurements.recordings is not None
+    return measurements.preload is not None or measurements.loop is not None or recorded
+
+
+def _mounting_matters(measurements: Measurements) -> bool:
+    """Whether a loop table's mounting scatters as other mountings do, which tell by how much."""
+    told = (measurements.efficiencies, measurements.forces, measurements.recordings)
+    return measurements.loop is not None and any(table is not None for table in told)
+
+
+def _rope(defaults: PriorDefaults) -> list[Parameter]:
+    k, load, d, g = (
+        defaults.stiffness,
+        defaults.bedding_load,
+        defaults.bedding_stretch_mm,
+        defaults.lengthening_mm_per_radian,
+    )
+    degree = float(np.deg2rad(1.0))
+    return [
+        Parameter(
+            STIFFNESS, "$k$", "stiffness of the rope once bedded in", "elastic",
+            LogNormal(k.median, k.log_sd), f"LogNormal({k.median:g} N/mm, {k.log_sd:g})", "N/mm",
+        ),
+        Parameter(
+            BEDDING_STRETCH, "$d$", "stretch that bedding in takes up", "elastic",
+            HalfNormal(d), f"HalfNormal({d:g} mm)", "mm",
+        ),
+        Parameter(
+            BEDDING_LOAD, "$T_c$", "load over which the rope beds in", "elastic",
+            LogNormal(load.median, load.log_sd), f"LogNormal({load.median:g} N, {load.log_sd:g})", "N",
+        ),
+        Parameter(
+            LENGTHENING, "$g$", "lengthening of the sheath's center line by bending", "elastic",
+            HalfNormal(g), f"HalfNormal({g * degree:.3g} mm/deg)", "mm/deg", degree,
+        ),
+    ]  # fmt: skip
+
+
+def _own_friction(prior: LogNormalPrior) -> Parameter:
+    return Parameter(
+        STRETCH_FRICTION, r"$\mu_\mathrm{stretch}$", "friction coefficient while the rope is stretched", "friction",
+        LogNormal(prior.median, prior.log_sd), f"LogNormal({prior.median:g}, {prior.log_sd:g})",
+    )  # fmt: skip
+
+
+def _preload(description: Description, default: LogNormalPrior) -> Parameter:
+    """Preload: stated with or without its standard deviation, or free."""
+    settings = description.preload
+    at = f" at {settings.wrap_angle.value:g} {settings.wrap_angle.unit}" if description.preload_follows_stretch else ""
+    name, meaning = (PRELOAD, "$P_0$" if at else "$P$"), f"preload{at}"
+    if settings.value is None:
+        prior, text = LogNormal(default.median, default.log_sd), f"LogNormal({default.median:g} N, {default.log_sd:g})"
+        return Parameter(*name, meaning, "elastic", prior, text, "N")
+    value, sd = settings.value.to("force"), settings.value.sd_to("force")
+    if sd is None:
+        prior = LogNormal(default.median, default.log_sd)
+        return Parameter(*name, meaning, "elastic", prior, "fixed (stated)", "N", fixed=value)
+    text = f"Normal({value:g}, {sd:g}) N, cut off at 0"
+    return Parameter(*name, meaning, "elastic", TruncatedNormal(value, sd), text, "N")

@@ -1,0 +1,224 @@
+"""Reading `cable.toml`: settings from the command line on top, and errors that name the key and the nearest known one."""
+
+import tomllib
+from collections.abc import Mapping, Sequence
+from pathlib import Path
+from typing import Any
+
+from pydantic import BaseModel, ValidationError
+
+from bowdenfit.description import SCHEMA, Description, ParameterSetting, QuantityValue
+from bowdenfit.description.elastic import LOWEST, PRELOAD
+from bowdenfit.errors import DatasetError, DescriptionError, nearest
+from bowdenfit.units import route_conversion_factor, speed_dimension
+
+
+def load_description(path: Path, overrides: Sequence[str] = ()) -> Description:
+    """Read `cable.toml`.
+
+    Args:
+        path: The file.
+        overrides: Settings from the command line, such as `friction.mu1.fixed=0.1`.
+
+    Raises:
+        DescriptionError: The file is missing or no TOML, a key is unknown, or a value is impossible.
+    """
+    try:
+        raw = tomllib.loads(path.read_text(encoding="utf-8-sig"))
+    except FileNotFoundError:
+        raise DescriptionError(
+            f"{path} does not exist; name a folder that holds a cable.toml, or write one with `bowdenfit init FOLDER`."
+        ) from None
+    except (tomllib.TOMLDecodeError, UnicodeDecodeError) as error:
+        raise DescriptionError(f"{path.name} is not valid TOML: {error}.") from None
+    except OSError as error:
+        raise DescriptionError(f"{path} cannot be read ({error.strerror}).") from None
+    return parse_description(overridden(raw, overrides), path.name)
+
+
+def overridden(raw: dict[str, Any], overrides: Sequence[str]) -> dict[str, Any]:
+    """Plain data of a description with settings from the command line put in.
+
+    Raises:
+        DescriptionError: A setting is not of the form key=value, or its key leads nowhere.
+    """
+    for override in overrides:
+        _set(raw, override)
+    return raw
+
+
+def parse_description(raw: Mapping[str, Any], file: str = "cable.toml") -> Description:
+    """A description from plain data, with errors that name the key.
+
+    Raises:
+        DescriptionError: A key is unknown, or a value is missing or impossible.
+    """
+    try:
+        description = Description.model_validate(dict(raw))
+    except ValidationError as error:
+        raise DescriptionError(_explained(error, file)) from None
+    _check_units(description, file)
+    _check_elastic(description, file)
+    return description
+
+
+def _check_elastic(description: Description, file: str) -> None:
+    """Preload is stated once, and no elastic parameter is fixed where it cannot be."""
+    if description.preload.value is not None and PRELOAD in description.prior:
+        raise DescriptionError(
+            f"{file} states the preload twice, as value under [preload] and under [prior.{PRELOAD}]; leave one of them out."
+        )
+    for name, setting in description.prior.items():
+        if name not in LOWEST or setting.fixed is None:
+            continue
+        if setting.fixed < 0 or (setting.fixed == 0 and not LOWEST[name]):
+            least = "0 or more" if LOWEST[name] else "more than 0"
+            raise DescriptionError(
+                f"{file}, prior.{name}.fixed: {setting.fixed:g} is not possible; it must be {least}."
+            )
+
+
+def _check_units(description: Description, file: str) -> None:
+    """Every unit in the description has the right dimension."""
+    quantities = [(f"contact {c.name!r}, wrap_angle", c.wrap_angle.constant, "angle") for c in description.contact]
+    quantities += [(f"contact {c.name!r}, nominal", c.wrap_angle.nominal, "angle") for c in description.contact]
+    quantities.append(("sensors, force_noise", description.sensors.force_noise, "force"))
+    quantities.append(("sensors, offset_sd", description.sensors.offset_sd, "force"))
+    quantities.append(("reference_force", description.reference_force, "force"))
+    quantities += [(f"cable, {name}", length, "length") for name, length in description.cable.lengths.items()]
+    quantities.append(("preload, wrap_angle", description.preload.wrap_angle, "angle"))
+    quantities.append(("preload, value", description.preload.value, "force"))
+    quantities += _recording_quantities(description)
+    if description.tables.angles:
+        quantities.append(("tables, angles, detection_limit", description.tables.angles.detection_limit, "angle"))
+    for where, quantity, dimension in quantities:
+        if quantity is None:
+            continue
+        try:
+            quantity.to(dimension)
+        except DatasetError as error:
+            raise DescriptionError(f"{file}, {where}: {error}.") from None
+        if dimension == "length" and not (quantity.value > 0 or (where == "cable, backlash" and quantity.value == 0)):
+            raise DescriptionError(
+                f"{file}, {where}: {quantity.value:g} {quantity.unit} is not positive; write its size, or leave the key out."
+            )
+        if where == "preload, value" and quantity.value < 0:
+            raise DescriptionError(
+                f"{file}, {where}: {quantity.value:g} {quantity.unit} is negative; a rope cannot be pushed, so write 0 for a "
+                "slack rope."
+            )
+        if dimension == "angle" and not 0 <= quantity.to("angle") <= 34.91:
+            raise DescriptionError(
+                f"{file}, {where}: {quantity.value:g} {quantity.unit} is not between 0 and 2000 deg."
+            )
+    if description.route is not None:
+        try:
+            route_conversion_factor(description.route.unit, description.route.unit)
+        except DatasetError as error:
+            raise DescriptionError(f"{file}, route, unit: {error}.") from None
+
+
+def _recording_quantities(description: Description) -> list[tuple[str, QuantityValue | None, str]]:
+    """Quantities in the table of recordings and in the recordings, with where they stand and what they must measure."""
+    table = description.tables.recordings
+    pages = [("tables, recordings, prepare", table.prepare)] if table is not None else []
+    quantities: list[tuple[str, QuantityValue | None, str]] = []
+    for entry in description.recording:
+        where = f"recording {entry.file!r}"
+        quantities += [(f"{where}, wrap_angles, {name}", angle, "angle") for name, angle in entry.wrap_angles.items()]
+        if entry.velocity is not None:
+            quantities.append((f"{where}, velocity", entry.velocity, speed_dimension(entry.velocity.unit)))
+        if entry.prepare is not None:
+            pages.append((f"{where}, prepare", entry.prepare))
+    for where, page in pages:
+        for name, value in (("delay", page.delay), ("block", page.block)):
+            if isinstance(value, QuantityValue):
+                quantities.append((f"{where}, {name}", value, "time"))
+    return quantities
+
+
+def _set(raw: dict[str, Any], override: str) -> None:
+    key, separator, text = override.partition("=")
+    if not separator or not key.strip():
+        raise DescriptionError(f"--set {override!r} is not of the form key=value, such as friction.mu1.fixed=0.1.")
+    try:
+        value = tomllib.loads(f"value = {text.strip()}")["value"]
+    except tomllib.TOMLDecodeError:
+        value = text.strip()
+    node: Any = raw
+    *parents, last = key.strip().split(".")
+    for depth, part in enumerate(parents):
+        node = (
+            node[int(part)]
+            if isinstance(node, list) and part.isdigit() and int(part) < len(node)
+            else (node.setdefault(part, {}) if isinstance(node, dict) else None)
+        )
+        if not isinstance(node, dict | list):
+            raise DescriptionError(f"--set {override!r}: {'.'.join(parents[: depth + 1])} has no keys below it.")
+    if parents[:1] in (["friction"], ["prior"]) and len(parents) == 2 and last in ParameterSetting.model_fields:
+        node.clear()  # measured, prior and fixed exclude one another: the command line wins
+    if isinstance(node, list):
+        raise DescriptionError(f"--set {override!r}: {key} is a list; name an entry by its number, from 0.")
+    node[last] = value
+
+
+def _explained(error: ValidationError, file: str) -> str:
+    """The first thing that is wrong, as a sentence."""
+    first = next((e for e in error.errors() if e["type"] == "extra_forbidden"), error.errors()[0])
+    where = [str(part) for part in first["loc"]]
+    place = f"{file}, {'.'.join(where)}" if where else file
+    if first["type"] == "extra_forbidden":
+        return f"{file}: unknown key {'.'.join(where)!r}{nearest(where[-1], _siblings(where[:-1]))}"
+    if first["type"] == "missing" and where[-1] == "unit" and isinstance(first["input"], dict):
+        return (
+            f"{place}: the unit is missing; write one, such as {_with_unit(first['input'].get('value'), where[:-1])}."
+        )
+    if first["type"] == "missing":
+        return f"{file}: the key {'.'.join(where)!r} is missing; `bowdenfit init` writes a template that has it."
+    if first["type"] == "model_type":
+        return f"{place}: {_written_as(first, where)}"
+    message = first["msg"].removeprefix("Value error, ")
+    if where == ["schema"]:
+        message = f"schema {first['input']} is newer than this program, which reads up to {SCHEMA}; update bowdenfit"
+    shown = f" (found {first['input']!r})" if not isinstance(first["input"], dict | list) and where else ""
+    sentence = f"{place}: {message[:1].lower() + message[1:]}{shown}"
+    return sentence if sentence.endswith((".", "?")) else f"{sentence}."
+
+
+def _written_as(error: Mapping[str, Any], where: Sequence[str]) -> str:
+    """How to write what must be a table of keys."""
+    found = error["input"]
+    if error.get("ctx", {}).get("class_name") == QuantityValue.__name__:
+        return f"a number needs its unit (found {found!r}); write it as {_with_unit(found, where)}."
+    how = f"under [{where[0]}]" if len(where) == 1 else "between braces, { key = ... }"
+    return f"this holds keys of its own (found {found!r}); write them {how}."
+
+
+def _with_unit(value: Any, where: Sequence[str]) -> str:
+    """A number with a unit that fits its place, as TOML."""
+    number = value if isinstance(value, int | float) and not isinstance(value, bool) else 20
+    key = ".".join(where)
+    unit = "deg" if "angle" in key else "N" if "force" in key or key == "preload.value" else "mm"
+    return f'{{ value = {number}, unit = "{unit}" }}'
+
+
+def _siblings(path: Sequence[str]) -> list[str]:
+    """Keys that are known at a place in the description."""
+    model: Any = Description
+    for part in path:
+        if isinstance(model, type) and issubclass(model, BaseModel) and part in model.model_fields:
+            model = _models_in(model.model_fields[part].annotation)
+    if not (isinstance(model, type) and issubclass(model, BaseModel)):
+        return []
+    return [field.alias or name for name, field in model.model_fields.items()]
+
+
+def _models_in(annotation: Any) -> Any:
+    """The first model inside an annotation such as `tuple[Contact, ...]` or `Route | None`."""
+    if isinstance(annotation, type) and issubclass(annotation, BaseModel):
+        return annotation
+    for argument in getattr(annotation, "__args__", ()):
+        found = _models_in(argument)
+        if found is not None:
+            return found
+    return None

@@ -1,0 +1,129 @@
+"""Recordings in Excel workbooks: every sheet that holds columns of numbers."""
+
+import warnings
+from collections.abc import Iterable, Iterator, Sequence
+from dataclasses import replace
+from datetime import date, datetime, time, timedelta
+from itertools import chain, islice
+from pathlib import Path
+from typing import Any
+
+from bowdenfit.errors import DatasetError
+from bowdenfit.files.channels import Channel, ChannelFile
+from bowdenfit.files.layout import Layout, layout_of
+from bowdenfit.files.libraries import load
+from bowdenfit.files.sheet_columns import columns_of
+from bowdenfit.files.sheets import channels_of
+from bowdenfit.files.text_file import beginning
+from bowdenfit.words import shown
+
+LARGEST_BYTES = 1 << 28
+_FIRST_ROWS = 300
+_Cells = Sequence[Any]
+
+
+def read(path: Path) -> ChannelFile:
+    """Read the columns of numbers of all sheets; with several such sheets names are "Sheet/heading".
+
+    A sheet that cannot be read as columns of numbers, such as one of remarks or a small evaluation, is left out with a
+    remark as long as another one can. Formulas count as what Excel last calculated.
+
+    Limits: workbooks of up to 256 MiB (`LARGEST_BYTES`), about four full sheets; a million rows of two columns take a
+    quarter of a minute.
+
+    Args:
+        path: The workbook (.xlsx or .xlsm).
+
+    Raises:
+        DatasetError: openpyxl is not installed; the file is missing, too large or damaged; no sheet holds columns of
+            numbers, or text stands among the numbers of the only one that does.
+    """
+    openpyxl = load("openpyxl", ".xlsx")
+    _, size = beginning(path, 1)
+    if size > LARGEST_BYTES:
+        raise DatasetError(
+            f"{path.name} has {size >> 20} MiB, more than the {LARGEST_BYTES >> 20} MiB of a workbook that can be read; save "
+            "the needed sheet as CSV."
+        )
+    channels: dict[str, tuple[Channel, ...]] = {}
+    remarks: list[str] = []
+    errors: list[DatasetError] = []
+    for title, rows in _sheets(openpyxl, path):
+        try:
+            channels[title], said = _read_sheet(f"{path.name}, sheet {shown(title)}", rows)
+            remarks += [f"Sheet {shown(title)}: {remark[0].lower()}{remark[1:]}" for remark in said]
+        except DatasetError as error:
+            errors.append(error)
+    found = {title: of_sheet for title, of_sheet in channels.items() if of_sheet}
+    if not found:
+        raise errors[0] if errors else _without_numbers(path)
+    remarks += [f"A sheet was left out: {error}" for error in errors]
+    return ChannelFile(path, "Excel workbook", tuple(_named(found)), tuple(remarks))
+
+
+def _named(sheets: dict[str, tuple[Channel, ...]]) -> Iterator[Channel]:
+    """All channels, with the sheet before their names where there are several sheets."""
+    for title, channels in sheets.items():
+        before = f"{title}/" if len(sheets) > 1 else ""
+        for channel in channels:
+            clock = channel.clock and before + channel.clock
+            yield replace(channel, name=before + channel.name, clock=clock)
+
+
+def _without_numbers(path: Path) -> DatasetError:
+    return DatasetError(
+        f"{path.name} has no sheet with columns of numbers; if they are formulas, open the workbook in Excel and save it, so "
+        "that their values stand in the file."
+    )
+
+
+def _sheets(openpyxl: Any, path: Path) -> Iterator[tuple[str, Iterator[_Cells]]]:
+    """Title and rows of each sheet; what the library cannot read becomes one sentence."""
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore", UserWarning)  # on styles and validations, which do not matter here
+        workbook = _guarded(path, lambda: openpyxl.load_workbook(path, read_only=True, data_only=True))
+        try:
+            for sheet in workbook.worksheets:
+                sheet.reset_dimensions()
+                yield sheet.title, _rows(path, sheet)
+        finally:
+            workbook.close()
+
+
+def _rows(path: Path, sheet: Any) -> Iterator[_Cells]:
+    rows = iter(sheet.iter_rows(values_only=True))
+    while (row := _guarded(path, lambda: next(rows, None))) is not None:
+        yield row
+
+
+def _guarded(path: Path, call: Any) -> Any:
+    try:
+        return call()
+    except Exception as error:  # damaged archives and sheets raise many kinds: zip, XML, key, value and type errors
+        raise DatasetError(
+            f"{path.name} is cut off or damaged ({' '.join(str(error).split())[:120]}); copy it again, or open it in Excel and "
+            "save it anew."
+        ) from None
+
+
+def _read_sheet(place: str, rows: Iterable[_Cells]) -> tuple[tuple[Channel, ...], list[str]]:
+    iterator = iter(rows)
+    first = list(islice(iterator, _FIRST_ROWS))
+    layout = layout_of([[text_of(cell) for cell in row] for row in first], ".")
+    if layout is None:
+        return (), []
+    whole: Layout = layout
+    columns, remarks = columns_of(place, whole, chain(first[whole.start :], iterator))
+    channels, left_out = channels_of(whole, columns)
+    return channels, [*left_out, *remarks]
+
+
+def text_of(cell: object) -> str:
+    """A cell as text: dates as ISO dates, true and false as words."""
+    if cell is None:
+        return ""
+    if isinstance(cell, datetime | date | time):
+        return str(cell)
+    if isinstance(cell, timedelta):
+        return repr(cell.total_seconds())
+    return cell if isinstance(cell, str) else repr(cell)

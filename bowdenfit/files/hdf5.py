@@ -1,0 +1,115 @@
+"""Plain HDF5 files, as scripts in Python, Julia or C write them."""
+
+from collections.abc import Iterator
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from bowdenfit.files.channels import Channel, ChannelFile
+from bowdenfit.files.column_clocks import with_column_clocks, with_lone_clock
+from bowdenfit.files.outcome import LeftOut, channel_file, damage_refused, is_numeric, numbers, refuse_too_large
+from bowdenfit.files.sampling import interval_from, with_interval
+
+MOST_COLUMNS = 64
+_UNITS = ("unit", "units", "Unit", "Units")
+
+
+def read(path: Path) -> ChannelFile:
+    """Read every numeric vector of an HDF5 file, and every column of its numeric tables, by path.
+
+    The unit comes from the attribute `unit` or `units`; the time from a time channel beside it, else from a sampling
+    rate (`rate`, `fs`, `sampling_rate` ...) among the attributes of the data set or of the groups around it.
+
+    Raises:
+        DatasetError: The file is damaged, too large or without numeric channels.
+    """
+    import h5py
+
+    left_out = LeftOut()
+    with damage_refused(path), h5py.File(path, "r") as file:
+        chosen = [each for each in _datasets(file, left_out) if _is_recording(each, left_out)]
+        refuse_too_large(path, sum(2 * each.size * max(1, len(each.dtype.names or ())) for each in chosen))
+        channels = [channel for each in chosen for channel in _channels(each, left_out)]
+        intervals = {each.name.lstrip("/"): _interval(each) for each in chosen}
+    clocked, remarks = with_interval(with_column_clocks(channels), lambda name: _nearest(name, intervals))
+    return channel_file(path, "HDF5", with_lone_clock(clocked), left_out, remarks)
+
+
+def _datasets(group: Any, left_out: LeftOut) -> Iterator[Any]:
+    """All data sets, in the order of the file; links that lead nowhere or out of the file are left alone."""
+    import h5py
+
+    for key in group:
+        if not isinstance(group.get(key, getlink=True), h5py.HardLink):
+            left_out.add(f"{group.name.rstrip('/')}/{key}".lstrip("/"), "they are links")
+            continue
+        member = group[key]
+        if isinstance(member, h5py.Group):
+            yield from _datasets(member, left_out)
+        elif isinstance(member, h5py.Dataset):
+            yield member
+
+
+def _is_recording(dataset: Any, left_out: LeftOut) -> bool:
+    """Whether a data set is a vector or a narrow table of numbers."""
+    name = dataset.name.lstrip("/")
+    shape = dataset.shape or ()
+    numeric = is_numeric(dataset.dtype) or (dataset.dtype.names is not None and len(shape) == 1)
+    if not numeric:
+        left_out.add(name, "they are text, complex numbers or objects")
+    elif dataset.size < 2:
+        left_out.add(name, "they are single numbers or empty")
+    elif len(shape) > 2 or (len(shape) == 2 and min(shape) > MOST_COLUMNS):
+        left_out.add(name, f"they have more than two dimensions or {MOST_COLUMNS} columns")
+    else:
+        return True
+    return False
+
+
+def _channels(dataset: Any, left_out: LeftOut) -> Iterator[Channel]:
+    """The columns of a data set; the longer side of a table is the time."""
+    name, unit = dataset.name.lstrip("/"), _unit(dataset)
+    values = dataset[()]
+    if values.dtype.names:
+        yield from _fields(name, unit, values, left_out)
+    elif values.ndim == 1 or min(values.shape) == 1:
+        yield Channel(name, unit, numbers(values))
+    else:
+        tall = values.shape[0] >= values.shape[1]
+        for number, column in enumerate(values.T if tall else values):
+            yield Channel(f"{name}[:,{number}]" if tall else f"{name}[{number},:]", unit, numbers(column))
+
+
+def _fields(name: str, unit: str, values: np.ndarray, left_out: LeftOut) -> Iterator[Channel]:
+    """The numeric columns of a table whose rows are records."""
+    for field in values.dtype.names or ():
+        if values[field].ndim == 1 and is_numeric(values[field].dtype):
+            yield Channel(f"{name}.{field}", unit, numbers(values[field]))
+        else:
+            left_out.add(f"{name}.{field}", "they are text, complex numbers or objects")
+
+
+def _unit(dataset: Any) -> str:
+    """The unit that the attributes name, else nothing."""
+    found = next((dataset.attrs[name] for name in _UNITS if name in dataset.attrs), "")
+    found = found.flat[0] if isinstance(found, np.ndarray) and found.size == 1 else found
+    text = found.decode("utf-8", "replace") if isinstance(found, bytes) else found
+    return text.strip() if isinstance(text, str) else ""
+
+
+def _interval(dataset: Any) -> tuple[float, str] | None:
+    """Seconds between samples, by the nearest attribute that says so, and the name of that attribute."""
+    holder = dataset
+    while True:
+        if found := interval_from({str(name): holder.attrs[name] for name in holder.attrs}):
+            return found
+        if holder.name == "/":
+            return None
+        holder = holder.parent
+
+
+def _nearest(name: str, intervals: dict[str, tuple[float, str] | None]) -> tuple[float, str] | None:
+    """What belongs to the data set that a channel is from: its own name, or that before the column."""
+    owner = name if name in intervals else max((each for each in intervals if name.startswith(each)), key=len)
+    return intervals[owner]

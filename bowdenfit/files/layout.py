@@ -1,0 +1,206 @@
+"""Where the numbers of a sheet begin and what stands over them, seen from its first rows."""
+
+import re
+from collections.abc import Sequence
+from dataclasses import dataclass
+from itertools import pairwise
+from typing import Literal
+
+import numpy as np
+
+from bowdenfit.files.clocks import is_date
+from bowdenfit.files.headings import Heading, heading_of, is_number, is_units_row, paired, without_label
+from bowdenfit.types import Vector
+
+Kind = Literal["number", "date", "blank", "text"]
+Rows = Sequence[Sequence[str]]
+_EXCEL_MARKS = "#n/a #na #div/0! #value! #num! #ref!"
+_MARKS = "- -- --- n/a na n.d. nd none null <na> nan -nan +nan 1.#qnan -1.#ind"
+_INFINITE = (
+    "inf +inf -inf infinity -infinity ∞ -∞ +∞ 1.#inf -1.#inf overflow +overflow -overflow overrange overload ovld"
+)
+MISSING = frozenset({"", *_EXCEL_MARKS.split(), *_MARKS.split(), *_INFINITE.split(), "ovrflw"})
+_NUMBERS = {
+    ".": re.compile(r"[+-]?(?:\d+\.?\d*|\.\d+)(?:[eE][+-]?\d+)?"),
+    ",": re.compile(r"[+-]?(?:\d+,?\d*|,\d+)(?:[eE][+-]?\d+)?"),
+}
+_SUMMARY = re.compile(
+    r"(?:(?:min|max|avg|average|mean|std|stdev|stddev|sd|sem|median|rms|sum|total|count|range|half range|peak|variance|"
+    r"minimum|maximum|mittelwert|summe|anzahl|moyenne|media|standard deviation|standardabweichung)[\s:.=]*)",
+    re.IGNORECASE,
+)
+_STEPS = 60  # rows that are enough to see a clock rise in even steps
+_UNEVEN = 3.0  # largest step of a clock over its smallest
+
+
+@dataclass(frozen=True)
+class Layout:
+    """What a sheet holds and where.
+
+    Args:
+        start: Position of the first row of data.
+        headings: One for each column; `named` says whether the file gave them.
+        kinds: What the cells of each column are.
+        named: Whether there is a row of headings.
+        score: How much speaks for this reading of the sheet: the number of cells that are numbers.
+        given: Number of cells in the row of headings.
+    """
+
+    start: int
+    headings: tuple[Heading, ...]
+    kinds: tuple[Kind, ...]
+    named: bool
+    score: int
+    given: int = 0
+
+    @property
+    def fits(self) -> bool:
+        """Whether no column stands outside the headings, as happens where decimal commas are taken for separators."""
+        bare = self.given + any(not heading.name for heading in self.headings[: self.given])
+        return not self.named or all(kind == "blank" for kind in self.kinds[bare:])
+
+
+def kind_of(cell: str, decimal: str) -> Kind:
+    """What stands in a cell."""
+    text = cell.strip()
+    if text.lower() in MISSING:
+        return "blank"
+    if _NUMBERS[decimal].fullmatch(text):
+        return "number"
+    return "date" if is_date(text) else "text"
+
+
+def number_of(cell: str, decimal: str) -> float | None:
+    """The number in a cell, NaN where it is missing, None where there is text."""
+    text = cell.strip().replace("\u2212", "-")
+    if text.lower() in MISSING:
+        return float("nan")
+    return float(text.replace(decimal, ".")) if _NUMBERS[decimal].fullmatch(text) else None
+
+
+def is_summary(cells: Sequence[str]) -> bool:
+    """Whether a row below the data is one of minima, averages and the like."""
+    return any(_SUMMARY.fullmatch(cell.strip()) for cell in cells)
+
+
+def layout_of(rows: Rows, decimal: str) -> Layout | None:
+    """How the first rows of a sheet are laid out; None if they hold no data.
+
+    The data are the longest run of rows that agree on which columns are numbers. A row of whole numbers at its top
+    counts as headings where no other headings stand and the clocks below it say so.
+    """
+    kinds = [[kind_of(cell, decimal) for cell in row] for row in rows]
+    start, stop, score = _longest_run(kinds, [is_summary(row) for row in rows])
+    if score <= 0:
+        return None
+    width = max(len(row) for row in rows[start:stop])
+    header, units = _header_rows(rows, start)
+    if not header and _is_numeric_heading(rows[start:stop], kinds[start:stop], decimal):
+        header, start = [rows[start]], start + 1
+    columns = tuple(_kind_of_column(kinds[start:stop], i) for i in range(width))
+    rising = [_rises(rows[start:stop], i, decimal) for i in range(width)]
+    if not header:
+        return Layout(start, tuple(Heading(f"column{i + 1}") for i in range(width)), columns, False, score)
+    names = _names([without_label(row) for row in header], width)
+    written = [heading_of(name, unit) for name, unit in zip(names, [*units, *[""] * width], strict=False)][:width]
+    return Layout(
+        start,
+        paired(written, rising, [kind == "number" for kind in columns]),
+        columns,
+        True,
+        score,
+        max(map(len, header)),
+    )
+
+
+def is_index(values: Vector) -> bool:
+    """Whether a column without heading only counts its rows, as pandas writes its index."""
+    return len(values) > 1 and values[0] in (0, 1) and bool(np.all(np.diff(values) == 1))
+
+
+def _longest_run(kinds: Sequence[Sequence[Kind]], summaries: Sequence[bool]) -> tuple[int, int, int]:
+    """Start, stop and score of the rows that agree on their columns and hold most numbers."""
+    best, start, score = (0, 0, 0), 0, 0
+    for i, row in enumerate(kinds):
+        worth = sum(1 if kind in ("number", "date") else -1 for kind in row if kind != "blank")
+        blank = all(kind == "blank" for kind in row)
+        worth = 0 if summaries[i] else worth
+        if (worth <= 0 and not blank) or (i > start and not _agree(_last_filled(kinds, start, i), row)):
+            start, score = (i, worth) if worth > 0 else (i + 1, 0)
+        else:
+            score += worth
+            start = i if score == 0 else start
+        best = max(best, (start, i + 1, score), key=lambda run: run[2])
+    return best
+
+
+def _last_filled(kinds: Sequence[Sequence[Kind]], start: int, stop: int) -> Sequence[Kind]:
+    return next((kinds[i] for i in range(stop - 1, start - 1, -1) if set(kinds[i]) - {"blank"}), [])
+
+
+def _agree(above: Sequence[Kind], below: Sequence[Kind]) -> bool:
+    return all(a == b or "blank" in (a, b) for a, b in zip(above, below, strict=False))
+
+
+def _header_rows(rows: Rows, start: int) -> tuple[list[Sequence[str]], list[str]]:
+    """The rows of headings right over the data, from above, and the units below them."""
+    above = [i for i in range(start) if any(cell.strip() for cell in rows[i])]
+    width = _filled_width(rows[start])
+    units: list[str] = []
+    if len(above) > 1 and is_units_row(rows[above[-1]]) and _is_over_units(rows[above[-2]], width):
+        units = [cell.strip() for cell in rows[above[-1]]]
+        above = above[:-1]
+    header: list[Sequence[str]] = []
+    below: list[int] = []
+    for i in reversed(above):
+        over = [cell for cell in without_label(rows[i]) if cell.strip()]
+        second = bool(header) and not (len(over) > 1 and all(map(is_number, over)) and [i + 1] == below)
+        if second or not _is_heading(rows[i], width):
+            break
+        below = [i]
+        header = [rows[i], *header]
+    return header, units
+
+
+def _is_heading(row: Sequence[str], width: int) -> bool:
+    """Whether a row can stand over that many columns: metadata have two cells, headings about as many as the data."""
+    return len(row) * 2 >= width and (width == 1 or len(row) > 1)
+
+
+def _is_over_units(row: Sequence[str], width: int) -> bool:
+    """Whether headings stand over a line of units: all words or all numbers, unlike a line such as "Rate", 1000."""
+    return _is_heading(row, width) and len({is_number(cell) for cell in row if cell.strip()}) == 1
+
+
+def _filled_width(row: Sequence[str]) -> int:
+    return max((i + 1 for i, cell in enumerate(row) if cell.strip()), default=0)
+
+
+def _is_numeric_heading(rows: Rows, kinds: Sequence[Sequence[Kind]], decimal: str) -> bool:
+    first = rows[0]
+    if len(rows) < 4 or not all(is_number(cell) for cell in first if cell.strip()):
+        return False
+    bare = any(a == "blank" and b == "number" and not first[i].strip() for i, (a, b) in enumerate(zip(*kinds[:2])))  # noqa: B905
+    whole = all(float(cell.replace(",", ".")).is_integer() for cell in first if cell.strip())
+    jumps = [_rises(rows[1:], i, decimal) and not _rises(rows, i, decimal) for i in range(len(first))]
+    return whole and (bare or any(jumps))
+
+
+def _rises(rows: Rows, column: int, decimal: str) -> bool:
+    """Whether the column rises in even steps."""
+    cells = (number_of(row[column], decimal) for row in rows[:_STEPS] if column < len(row))
+    values = [value for value in cells if value is not None and value == value]
+    steps = [after - before for before, after in pairwise(values)]
+    return len(steps) > 1 and min(steps) > 0 and max(steps) < _UNEVEN * min(steps)
+
+
+def _kind_of_column(kinds: Sequence[Sequence[Kind]], column: int) -> Kind:
+    found = [row[column] for row in kinds if column < len(row) and row[column] != "blank"]
+    return max(set(found), key=found.count) if found else "blank"
+
+
+def _names(header: Sequence[Sequence[str]], width: int) -> list[str]:
+    """One name a column out of one or more rows of headings."""
+    width = max(width, *map(len, header))
+    padded = [[*row, *[""] * (width - len(row))] for row in header]
+    return [" ".join(" ".join(cells).split()) for cells in zip(*padded, strict=True)]

@@ -1,0 +1,228 @@
+"""MATLAB .mat files of all versions: vectors, narrow matrices and structures of them."""
+
+import math
+import warnings
+import zlib
+from collections.abc import Iterator
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from bowdenfit.files.channels import Channel, ChannelFile
+from bowdenfit.files.column_clocks import with_column_clocks, with_lone_clock
+from bowdenfit.files.outcome import (
+    BYTES_PER_SAMPLE,
+    LeftOut,
+    channel_file,
+    damage_refused,
+    is_numeric,
+    numbers,
+    refuse_too_large,
+)
+from bowdenfit.files.sampling import interval_from, with_interval
+
+MOST_COLUMNS = 64
+_TEXT = "they are text"
+_CELLS = "they are cells or arrays of structures (save them as vectors of numbers)"
+_OBJECTS = (
+    "they are objects such as tables, timetables or function handles, which only MATLAB can decode "
+    "(save their columns as plain vectors, for example with table2struct(T, 'ToScalar', true))"
+)
+_NUMERIC = ("double", "single", "logical", *(f"{sign}int{bits}" for sign in ("", "u") for bits in (8, 16, 32, 64)))
+_COMPRESSED = 15  # type number of a compressed element
+
+
+@dataclass(frozen=True)
+class _Variables:
+    """What was found in a file.
+
+    Args:
+        channels: Vectors, and the columns of narrow matrices.
+        settings: Single numbers by name, such as "fs" or "rec.fs".
+        left_out: What is neither.
+    """
+
+    channels: list[Channel] = field(default_factory=list)
+    settings: dict[str, float] = field(default_factory=dict)
+    left_out: LeftOut = field(default_factory=LeftOut)
+
+    def add(self, name: str, values: np.ndarray) -> None:
+        """Sort in one array of numbers, in the orientation that MATLAB shows."""
+        if values.size == 1:
+            self.settings[name] = float(values.reshape(-1)[0])
+        elif values.size == 0:
+            self.left_out.add(name, "they are empty")
+        elif values.ndim > 2 or (values.ndim == 2 and min(values.shape) > MOST_COLUMNS):
+            self.left_out.add(name, f"they have more than two dimensions or {MOST_COLUMNS} columns")
+        else:
+            self.channels.extend(Channel(each, "", numbers(column)) for each, column in _columns(name, values))
+
+
+def read(path: Path) -> ChannelFile:
+    """Read the numeric vectors of a .mat file, and those in its structures as "rec.F_in".
+
+    The columns of a matrix get the names by which MATLAB takes them, "data(:,1)"; the longer side is the time. A
+    vector without a time vector of its length gets its times from a sampling rate (`fs`, `rate`, `dt` ...).
+
+    Raises:
+        DatasetError: The file is damaged, too large or without numeric vectors.
+    """
+    with path.open("rb") as file:
+        modern = file.read(520).endswith(b"\x89HDF\r\n\x1a\n")
+    with damage_refused(path):
+        variables = _read_hdf5(path) if modern else _read_classic(path)
+    clocked, remarks = with_interval(
+        with_column_clocks(variables.channels), lambda name: _interval(name, variables.settings)
+    )
+    return channel_file(path, "MATLAB", with_lone_clock(clocked), variables.left_out, remarks)
+
+
+def _columns(name: str, values: np.ndarray) -> Iterator[tuple[str, np.ndarray]]:
+    """A vector, or the columns (or rows, if these are longer) of a matrix, with their names."""
+    if values.ndim == 1 or min(values.shape) == 1:
+        yield name, values
+        return
+    tall = values.shape[0] >= values.shape[1]
+    for number, column in enumerate(values.T if tall else values, start=1):
+        yield f"{name}(:,{number})" if tall else f"{name}({number},:)", column
+
+
+def _interval(name: str, settings: dict[str, float]) -> tuple[float, str] | None:
+    """The time between samples, by a setting of the same structure or of those around it."""
+    owner = name.rpartition(".")[0]
+    while True:
+        prefix = f"{owner}." if owner else ""
+        near = {each: settings[each] for each in settings if each.rpartition(".")[0] == owner}
+        if found := interval_from({each.removeprefix(prefix): value for each, value in near.items()}):
+            return found[0], f"{prefix}{found[1]}"
+        if not owner:
+            return None
+        owner = owner.rpartition(".")[0]
+
+
+def _read_classic(path: Path) -> _Variables:
+    """Files of MATLAB 4 to 7.2, which SciPy reads."""
+    import scipy.io
+
+    variables = _Variables()
+    with warnings.catch_warnings():
+        # Names that occur twice, and objects without a name: the numbers are read all the same.
+        warnings.filterwarnings("ignore", category=scipy.io.matlab.MatReadWarning)
+        listing = scipy.io.whosmat(path)
+        wanted = [name for name, _, kind in listing if _is_wanted(name, kind, variables.left_out)]
+        refuse_too_large(path, 2 * _n_numbers(path, listing))
+        found = scipy.io.loadmat(path, variable_names=wanted, struct_as_record=False) if wanted else {}
+    for name in wanted:
+        _sort_in(name, found.pop(name), variables)
+    return variables
+
+
+def _is_wanted(name: str, kind: str, left_out: LeftOut) -> bool:
+    """Whether a variable may hold recordings, by its class."""
+    if name == "__function_workspace__":
+        return False
+    if kind in (*_NUMERIC, "struct"):
+        return True
+    left_out.add(name, {"char": _TEXT, "cell": _CELLS, "sparse": "they are sparse"}.get(kind, _OBJECTS))
+    return False
+
+
+def _sort_in(name: str, value: Any, variables: _Variables) -> None:
+    """One variable or field as SciPy decodes it; structures field by field."""
+    if not isinstance(value, np.ndarray) or type(value).__name__ in ("MatlabOpaque", "MatlabFunction", "MatlabObject"):
+        variables.left_out.add(name, _OBJECTS)
+    elif is_numeric(value.dtype):
+        variables.add(name, value)
+    elif value.dtype.kind in "US":
+        variables.left_out.add(name, _TEXT)
+    elif value.dtype.kind == "c":
+        variables.left_out.add(name, "they are complex numbers")
+    elif value.dtype.kind == "O" and value.size and all(hasattr(each, "_fieldnames") for each in value.flat):
+        _sort_in_structures(name, value, variables)
+    else:
+        variables.left_out.add(name, _CELLS if value.dtype.kind == "O" else _OBJECTS)
+
+
+def _sort_in_structures(name: str, value: np.ndarray, variables: _Variables) -> None:
+    """Fields of a structure, or of each in an array of them."""
+    for number, structure in enumerate(value.flat, start=1):
+        owner = name if value.size == 1 else f"{name}({number})"
+        for each in structure._fieldnames:
+            _sort_in(f"{owner}.{each}", getattr(structure, each), variables)
+
+
+def _n_numbers(path: Path, listing: list[tuple[str, tuple[int, ...], str]]) -> int:
+    """How many numbers the variables hold: by their shapes, and structures by their size when unpacked."""
+    plain = sum(math.prod(shape) for _, shape, kind in listing if kind in _NUMERIC)
+    structures = sum(
+        size // BYTES_PER_SAMPLE
+        for (_, _, kind), size in zip(listing, _element_bytes(path), strict=False)
+        if kind == "struct"
+    )
+    return plain + structures
+
+
+def _element_bytes(path: Path) -> list[int]:
+    """Size of each variable of a MATLAB 5 file when unpacked, by the headers alone; nothing for MATLAB 4."""
+    with path.open("rb") as file:
+        head = file.read(128)
+        if not head.startswith(b"MATLAB 5"):
+            return []
+        order = "<" if head[126:128] == b"IM" else ">"
+        sizes = []
+        while len(tag := file.read(8)) == 8:
+            kind, size = (int(each) for each in np.frombuffer(tag, dtype=f"{order}u4"))
+            start = file.tell()
+            sizes.append(_unpacked(file.read(64), order) if kind == _COMPRESSED else size)
+            file.seek(start + size)
+    return sizes
+
+
+def _unpacked(start: bytes, order: str) -> int:
+    """Size of a compressed element, which stands at its start."""
+    tag = zlib.decompressobj().decompress(start, 8)
+    return int(np.frombuffer(tag, dtype=f"{order}u4")[1]) if len(tag) == 8 else 0
+
+
+def _read_hdf5(path: Path) -> _Variables:
+    """Files of MATLAB 7.3, which are HDF5 with all arrays transposed."""
+    import h5py
+
+    variables = _Variables()
+    with h5py.File(path, "r") as file:
+        stored = list(_stored(file, variables.left_out))
+        refuse_too_large(path, 2 * sum(dataset.size for _, dataset in stored))
+        for name, dataset in stored:
+            variables.add(name, np.zeros(0) if "MATLAB_empty" in dataset.attrs else dataset[()].T)
+    return variables
+
+
+def _stored(group: Any, left_out: LeftOut, prefix: str = "") -> Iterator[tuple[str, Any]]:
+    """The numeric variables of a group and of the structures in it, with their names."""
+    import h5py
+
+    for key in group:
+        name, member = f"{prefix}{key}", group[key]
+        kind = _class(member)
+        if key.startswith("#"):
+            continue
+        if "MATLAB_object_decode" in member.attrs or kind == "function_handle":
+            left_out.add(name, _OBJECTS)
+        elif "MATLAB_sparse" in member.attrs:
+            left_out.add(name, "they are sparse")
+        elif isinstance(member, h5py.Group):
+            yield from _stored(member, left_out, f"{name}.")
+        elif kind == "char":
+            left_out.add(name, _TEXT)
+        elif is_numeric(member.dtype) and kind in ("", *_NUMERIC):
+            yield name, member
+        else:
+            left_out.add(name, _CELLS if member.dtype.kind == "O" else "they are complex numbers or objects")
+
+
+def _class(member: Any) -> str:
+    """The class that MATLAB noted on a variable; empty for fields without a note."""
+    noted = member.attrs.get("MATLAB_class", b"")
+    return noted.decode("ascii", "replace") if isinstance(noted, bytes) else str(noted)

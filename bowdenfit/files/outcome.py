@@ -1,0 +1,125 @@
+"""What all readers of binary files share: refusals of damaged and of huge files, and the remarks on what was left out."""
+
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager
+from dataclasses import dataclass, field, replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from bowdenfit.errors import DatasetError
+from bowdenfit.files.channels import Channel, ChannelFile
+from bowdenfit.types import Vector
+from bowdenfit.words import quoted
+
+LARGEST_BYTES = 2 * 1024**3
+"""The most that the samples of one file may need in memory, as 64-bit numbers [bytes]."""
+
+BYTES_PER_SAMPLE = 8
+
+
+@dataclass(frozen=True)
+class LeftOut:
+    """Names of what was not read, by reason.
+
+    Args:
+        names: The names under each reason; filled while reading.
+    """
+
+    names: dict[str, list[str]] = field(default_factory=dict)
+
+    def add(self, name: str, why: str) -> None:
+        """Note that `name` was left out; `why` completes the words "left out because"."""
+        self.names.setdefault(why, []).append(name)
+
+    def remarks(self) -> tuple[str, ...]:
+        """One sentence for each reason."""
+        return tuple(f"Left out because {why}: {quoted(tuple(names))}." for why, names in self.names.items())
+
+
+@contextmanager
+def damage_refused(path: Path) -> Iterator[None]:
+    """Turn whatever a library raises about a file into one sentence about that file.
+
+    Raises:
+        DatasetError: The library could not read the file.
+    """
+    try:
+        yield
+    except DatasetError:
+        raise
+    except MemoryError as error:
+        raise DatasetError(
+            f"{path.name} does not fit into the memory of this computer; save only the channels of the load cells, or "
+            "cut the recording."
+        ) from error
+    # The libraries raise anything on damaged files: OSError, ValueError, KeyError, struct.error, zlib.error, their own.
+    except Exception as error:
+        raise cut_off(path, f"{type(error).__name__}: {error}") from error
+
+
+def cut_off(path: Path, seen: str) -> DatasetError:
+    """Refusal of a file that ends early or is damaged."""
+    words = " ".join(seen.replace(f"{path.parent}/", "").split()).rstrip(".:")
+    words = words if len(words) <= 160 else f"{words[:157]}..."
+    return DatasetError(f"{path.name} is cut off or damaged ({words}); copy it again from the acquisition computer.")
+
+
+def refuse_too_large(path: Path, n_samples: int) -> None:
+    """Refuse a file before it fills the memory.
+
+    Args:
+        path: The file.
+        n_samples: How many numbers it holds, times included.
+
+    Raises:
+        DatasetError: They would need more than `LARGEST_BYTES`.
+    """
+    needed = n_samples * BYTES_PER_SAMPLE
+    if needed > LARGEST_BYTES:
+        raise DatasetError(
+            f"{path.name} holds {needed / 1024**3:.3g} GiB of numbers, more than the {LARGEST_BYTES / 1024**3:.3g} GiB "
+            "that are read at once; save only the channels of the load cells, cut the recording, or decimate it."
+        )
+
+
+def is_numeric(dtype: np.dtype[Any]) -> bool:
+    """Whether values of this type are real numbers, or true and false."""
+    return dtype.kind in "fiub"
+
+
+def numbers(values: np.ndarray) -> Vector:
+    """Samples as 64-bit floats, one after the other in memory."""
+    return np.ascontiguousarray(values, dtype=np.float64).reshape(-1)
+
+
+def channel_file(
+    path: Path, kind: str, channels: Sequence[Channel], left_out: LeftOut, remarks: Sequence[str] = ()
+) -> ChannelFile:
+    """The channels of a file with unique names, and the remarks on it.
+
+    Raises:
+        DatasetError: There is no numeric channel at all.
+    """
+    said = (*remarks, *left_out.remarks())
+    if not channels:
+        raise DatasetError(
+            f"{path.name} holds no recording that can be read: no channel with several numbers. "
+            f"{' '.join((*said, ''))}Save the forces as plain vectors of numbers, or export the recording as CSV."
+        )
+    return ChannelFile(path, kind, _unique(channels), said)
+
+
+def _unique(channels: Sequence[Channel]) -> tuple[Channel, ...]:
+    """Channels with a number behind every name that was there before: "F", "F (2)"."""
+    taken: set[str] = set()
+    result = []
+    for channel in channels:
+        name, count = channel.name, 1
+        while name in taken:
+            count += 1
+            name = f"{channel.name} ({count})"
+        taken.add(name)
+        result.append(replace(channel, name=name))
+    return tuple(result)

@@ -1,0 +1,136 @@
+"""TDMS files of National Instruments (LabVIEW, FlexLogger, DAQExpress)."""
+
+import logging
+from collections.abc import Iterator, Mapping
+from contextlib import contextmanager
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from bowdenfit.files.channels import Channel, ChannelFile
+from bowdenfit.files.column_clocks import with_column_clocks, with_lone_clock
+from bowdenfit.files.libraries import load
+from bowdenfit.files.outcome import (
+    LeftOut,
+    channel_file,
+    cut_off,
+    damage_refused,
+    is_numeric,
+    numbers,
+    refuse_too_large,
+)
+
+_UNITS = ("unit_string", "NI_UnitDescription", "Unit", "unit")
+_WAVEFORM = "wf_increment"
+
+
+def read(path: Path) -> ChannelFile:
+    """Read the numeric channels of a TDMS file, one at a time.
+
+    The time of a channel is that of its waveform (`wf_start_offset` and `wf_increment`), else the time channel of its
+    group. Of a file that was cut off the whole samples are kept.
+
+    Raises:
+        DatasetError: The file is damaged, too large or without numeric channels, or npTDMS is not installed.
+    """
+    nptdms = load("nptdms", "TDMS")
+    with damage_refused(path), _quiet(), nptdms.TdmsFile.open(path) as file:
+        stored = [channel for group in file.groups() for channel in group.channels()]
+        left_out = LeftOut()
+        chosen = [channel for channel in stored if _is_recording(channel, left_out)]
+        refuse_too_large(path, sum(2 * len(channel) for channel in chosen))
+        lengths = _whole_lengths(chosen, file.file_status)
+        channels = [_channel(channel, lengths[channel.path]) for channel in chosen if lengths[channel.path]]
+        incomplete = file.file_status.incomplete_final_segment
+    for channel in chosen:
+        if not lengths[channel.path]:
+            left_out.add(_name(channel), "they are empty")
+    if incomplete and not channels:
+        raise cut_off(path, "it ends before the first whole sample")
+    remarks = _remarks(path, max(map(_n_samples, channels), default=0)) if incomplete else ()
+    return channel_file(path, "TDMS", with_lone_clock(with_column_clocks(channels)), left_out, remarks)
+
+
+@contextmanager
+def _quiet() -> Iterator[None]:
+    """Keep the library's own warnings off the terminal; what they say becomes a remark."""
+    logger = logging.getLogger("nptdms")
+    chatty = [logger, *(logging.getLogger(name) for name in ("nptdms.reader", "nptdms.tdms_segment", "nptdms.tdms"))]
+    levels = [each.level for each in chatty]
+    for each in chatty:
+        each.setLevel(logging.CRITICAL)
+    try:
+        yield
+    finally:
+        for each, level in zip(chatty, levels, strict=True):
+            each.setLevel(level)
+
+
+def _name(channel: Any) -> str:
+    """Group and channel, as "bench/F_in"."""
+    return f"{channel.group_name}/{channel.name}"
+
+
+def _is_recording(channel: Any, left_out: LeftOut) -> bool:
+    """Whether this channel holds numbers; times of the day count as such."""
+    if not (is_numeric(channel.dtype) or channel.dtype.kind == "M"):
+        left_out.add(_name(channel), "they are text or complex numbers")
+        return False
+    return True
+
+
+def _whole_lengths(channels: list[Any], status: Any) -> dict[str, int]:
+    """How many samples to take of each channel.
+
+    A file that ends in the middle of a chunk has more samples of its first channels than of its last; channels of one
+    group that were meant to be equally long are cut to the shortest, so that they stay side by side.
+    """
+    missing = {channel.path: 0 for channel in channels}
+    if status.incomplete_final_segment and status.channel_statuses:
+        for path, segment in status.channel_statuses.items():
+            missing[path] = segment.expected_length - segment.read_length
+    meant = {channel.path: (channel.group_name, len(channel) + missing[channel.path]) for channel in channels}
+    shortest: dict[tuple[str, int], int] = {}
+    for channel in channels:
+        key = meant[channel.path]
+        shortest[key] = min(len(channel), shortest.get(key, len(channel)))
+    return {path: shortest[key] for path, key in meant.items()}
+
+
+def _channel(channel: Any, length: int) -> Channel:
+    """One channel with the time of its waveform, if it has one."""
+    raw = channel[:length]
+    unit = _unit(channel.properties)
+    if raw.dtype.kind == "M":
+        return Channel(_name(channel), "s", _seconds(raw))
+    time = numbers(channel.time_track()[:length]) if _has_waveform(channel.properties) else None
+    return Channel(_name(channel), unit, numbers(raw), time, "" if time is None else _WAVEFORM)
+
+
+def _has_waveform(properties: Mapping[str, Any]) -> bool:
+    """Whether the channel says how its samples follow each other in time."""
+    return properties.get(_WAVEFORM, 0) > 0 and "wf_start_offset" in properties
+
+
+def _unit(properties: Mapping[str, Any]) -> str:
+    """The unit of a channel, by the first property that has one."""
+    return next((str(properties[name]).strip() for name in _UNITS if properties.get(name)), "")
+
+
+def _seconds(dates: np.ndarray) -> np.ndarray:
+    """Dates as seconds from the first."""
+    return (dates - dates[0]) / np.timedelta64(1, "s")
+
+
+def _n_samples(channel: Channel) -> int:
+    """Length of a channel."""
+    return len(channel.values)
+
+
+def _remarks(path: Path, kept: int) -> tuple[str, ...]:
+    """What is said of a file that was cut off."""
+    return (
+        f"{path.name} is cut off in its last segment; the {kept} whole samples before the end were kept. Copy the file "
+        "again from the acquisition computer if there should be more.",
+    )

@@ -1,0 +1,130 @@
+"""Everything that each draw of the posterior implies: named values, curves, replicated readings."""
+
+from collections.abc import Callable, Mapping
+from typing import Any
+
+import jax
+import jax.numpy as jnp
+import numpy as np
+from jax import Array
+from jaxtyping import Float
+
+from bowdenfit.inference.compilation import compiled
+from bowdenfit.inference.log_density import LogDensity
+from bowdenfit.model import Model
+
+BATCH = 1024
+_SMALL = 10_000  # numbers in the data below which compiling takes longer than running
+Function = Callable[..., Any]
+
+
+def for_each_draw(function: Function, size: int, *data: Any, run_once: bool = False) -> Callable[[np.ndarray], Any]:
+    """`function` of one z (and of data that are the same for all), compiled to be applied to any number of z (rows)."""
+    over_rows = jax.vmap(function, in_axes=(0, *(None for _ in data)))
+    program = compiled(over_rows, jax.ShapeDtypeStruct((BATCH, size), jnp.float64), *data, run_once=run_once)
+
+    def apply(z: np.ndarray) -> Any:
+        parts = []
+        for start in range(0, len(z), BATCH):
+            part = z[start : start + BATCH]
+            padded = np.concatenate([part, np.repeat(part[-1:], BATCH - len(part), axis=0)])
+            parts.append(jax.tree.map(np.asarray, program(padded, *data)))
+        whole = jax.tree.map(lambda *x: np.concatenate(x), *parts)
+        return jax.tree.map(lambda x: x[: len(z)], whole)
+
+    return apply
+
+
+def named_values(model: Model) -> Callable[[Float[Array, " free"]], dict[str, Array]]:
+    """Function of z: free parameters and derived curve coefficients by name, in the units they are shown in."""
+
+    def values_of(z: Float[Array, " free"]) -> dict[str, Array]:
+        values = model.space.constrain(z)
+        shown = {p.name: values[p.name] * p.shown_scale for p in model.space.free}
+        for curve in model.cable.curves.values():
+            shown |= curve.derived(values)
+        return shown
+
+    return values_of
+
+
+def derived_units(model: Model) -> dict[str, tuple[str, str]]:
+    """Unit and symbol of every derived curve coefficient, by name."""
+    return {name: unit for curve in model.cable.curves.values() for name, unit in curve.derived_units().items()}
+
+
+def replicator(posterior: LogDensity, seed: int) -> Callable[[np.ndarray], dict[str, dict[str, np.ndarray]]]:
+    """Compiled function of draws (rows): what each draw implies for every reading.
+
+    Its answer has, by group ("values", "log_likelihood", "expected", "replicated") and name, arrays over draws and
+    readings: named values, log likelihood of every reading, expected readings, and readings drawn anew.
+
+    Args:
+        posterior: The posterior.
+        seed: Seed of the readings drawn anew.
+    """
+    model = posterior.model
+    names, key = named_values(model), jax.random.key(seed)
+
+    def implied(z_and_number: Float[Array, " free_and_one"], data: Any) -> dict[str, Mapping[str, Array]]:
+        z, number = z_and_number[:-1], z_and_number[-1].astype(jnp.uint32)
+        keys = jax.random.split(jax.random.fold_in(key, number), max(len(model.terms), 1))
+        values = model.space.constrain(z)
+        terms = list(zip(model.terms, data, keys, strict=False))
+        return {
+            "values": names(z),
+            "log_likelihood": {t.name: t.log_likelihood(values, d) for t, d, _ in terms},
+            "expected": {t.name: t.expected(values, d) for t, d, _ in terms},
+            "replicated": {t.name: t.simulate(values, d, key) for t, d, key in terms},
+        }
+
+    small = sum(np.size(array) for array in jax.tree.leaves(posterior.data)) < _SMALL
+    program = for_each_draw(implied, model.space.size + 1, posterior.data, run_once=small)
+    return lambda z: program(np.column_stack([z, np.arange(len(z), dtype=float)]))
+
+
+def curves_of(model: Model, route: np.ndarray) -> Callable[[Float[Array, " free"]], dict[str, Array]]:
+    """Function of z: wrap angle of every curved contact [deg] and the efficiency [1] at route values."""
+    at = jnp.asarray(route, dtype=float)
+
+    def implied(z: Float[Array, " free"]) -> dict[str, Array]:
+        values = model.space.constrain(z)
+        angles = {name: jnp.rad2deg(curve.wrap_angle(values, at)) for name, curve in model.cable.curves.items()}
+        return angles | {"efficiency": model.cable.efficiency_at(values, at)}
+
+    return implied
+
+
+def output_force_at(
+    model: Model, z: np.ndarray, route: np.ndarray, input_force: float, stroke: int, mounting: np.ndarray
+) -> np.ndarray:
+    """Output force [N] of every draw (rows) at route values (columns), at the reference speed.
+
+    Args:
+        model: The model.
+        z: Draws, one a row.
+        route: Route values; any one number where the cable has no route.
+        input_force: Force at the motor side [N].
+        stroke: +1 pulling, -1 return.
+        mounting: Effect of the mounting on the friction exponent of each draw [1].
+    """
+    at = jnp.asarray(np.atleast_1d(route), dtype=float)
+
+    def force(z_and_mounting: Float[Array, " free_and_one"]) -> Float[Array, " route"]:
+        values = model.space.constrain(z_and_mounting[:-1])
+        force_in, direction = jnp.asarray(float(input_force)), jnp.asarray(float(stroke))
+        return model.cable.output_force_at(values, at, force_in, direction, z_and_mounting[-1])
+
+    return for_each_draw(force, model.space.size + 1)(np.column_stack([z, mounting]))
+
+
+def efficiency_at(model: Model, z: np.ndarray, route: np.ndarray) -> np.ndarray:
+    """Efficiency of every draw (rows) at route values (columns).
+
+    Args:
+        model: The model.
+        z: Draws, one a row.
+        route: Route values; any one number where the cable has no route.
+    """
+    curves = curves_of(model, np.atleast_1d(np.asarray(route, dtype=float)))
+    return for_each_draw(lambda one: curves(one)["efficiency"], model.space.size)(z)

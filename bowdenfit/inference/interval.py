@@ -1,0 +1,22 @@
+"""A quantity with its uncertainty, as plain data."""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+
+@dataclass(frozen=True)
+class Interval:
+    """A quantity with its uncertainty: moments and the 5 % and 95 % quantiles of its draws."""
+
+    mean: float
+    sd: float
+    median: float
+    q05: float
+    q95: float
+
+    @classmethod
+    def of(cls, draws: np.ndarray) -> "Interval":
+        """Of draws of any shape."""
+        q05, median, q95 = (float(q) for q in np.quantile(draws, (0.05, 0.5, 0.95)))
+        return cls(float(np.mean(draws)), float(np.std(draws)), median, q05, q95)

@@ -1,0 +1,58 @@
+"""The posterior density of a model in the coordinates z, where every prior is a standard normal."""
+
+from dataclasses import dataclass
+from functools import cached_property
+from typing import Any
+
+import jax
+import jax.numpy as jnp
+from jax import Array
+from jaxtyping import Float
+
+from bowdenfit.inference.compilation import compiled
+from bowdenfit.model import Model
+
+
+@dataclass(frozen=True)
+class LogDensity:
+    """Log density and residuals of one model; least squares and every sampler use this same object.
+
+    Data are arguments of its functions, not constants inside them, so that other data of the same shape need no new
+    compilation. Needs 64-bit floats: `jax.enable_x64(True)`.
+    """
+
+    model: Model
+
+    def __post_init__(self) -> None:
+        if jnp.zeros(()).dtype != jnp.float64:
+            raise RuntimeError(
+                "bowdenfit computes with 64-bit floats, but JAX is set to 32; the usual cause is calling its inner "
+                "functions directly: wrap the call in `with jax.enable_x64(True):`, or use bowdenfit.fit, which does."
+            )
+
+    @cached_property
+    def data(self) -> tuple[dict[str, Any], ...]:
+        """Data of all terms, in their order."""
+        return tuple(term.data for term in self.model.terms)
+
+    def log_likelihoods(self, z: Float[Array, " free"], data: Any) -> dict[str, Array]:
+        """Log likelihood of every reading, by term."""
+        values = self.model.space.constrain(z)
+        return {t.name: t.log_likelihood(values, d) for t, d in zip(self.model.terms, data, strict=True)}
+
+    def log_density(self, z: Float[Array, " free"], data: Any) -> Float[Array, ""]:
+        """Log posterior density in z, up to the evidence; minus infinity where it cannot be computed."""
+        log_prior = -0.5 * jnp.sum(z**2 + jnp.log(2 * jnp.pi))
+        total = log_prior + sum(jnp.sum(term) for term in self.log_likelihoods(z, data).values())
+        return jnp.where(jnp.isnan(total), -jnp.inf, total)
+
+    def residuals(self, z: Float[Array, " free"], data: Any) -> dict[str, Array]:
+        """Standardized residuals by term; half their sum of squares is minus log likelihood, up to a constant."""
+        values = self.model.space.constrain(z)
+        return {t.name: t.residuals(values, d) for t, d in zip(self.model.terms, data, strict=True)}
+
+    def batched_log_density(self, batch: int) -> Any:
+        """Compiled log density of a batch of z; of one shape only, so that it is compiled once."""
+        function = jax.vmap(self.log_density, in_axes=(0, None))
+        shape = jax.ShapeDtypeStruct((batch, self.model.space.size), jnp.float64)
+        return compiled(function, shape, self.data)

@@ -1,0 +1,1 @@
+"""Wrap angles read along the route."""

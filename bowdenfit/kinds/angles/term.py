@@ -1,0 +1,105 @@
+"""Angle tables: each reading against its curve; what was too small to detect enters as exactly that."""
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import Any
+
+import jax.numpy as jnp
+import numpy as np
+from jax import Array
+from jaxtyping import Float
+
+from bowdenfit.cable.cable import ANGLE_NOISE, Cable
+from bowdenfit.cable.noise import noise_law, scatter
+from bowdenfit.kinds.tables import AngleTable
+
+
+@dataclass(frozen=True)
+class AnglesTerm:
+    r"""Likelihood of an angle table.
+
+    Detected angles are :math:`\text{Normal}(\theta(l), \sigma_\theta)`; one below the detection limit L contributes
+    :math:`\Phi((L - \theta(l)) / \sigma_\theta)`. With Student noise both are a Student-t's of the same scale. Readings
+    outside the range of the curves do not enter.
+
+    Args:
+        cable: The cable.
+        data: Route values of each curve's readings; the order that puts detected readings first; detected angles and
+            the limits of undetected ones [rad].
+        labels: Each reading in words, detected ones first.
+    """
+
+    cable: Cable
+    data: dict[str, Any]
+    labels: tuple[str, ...]
+    name: str = "wrap_angle"
+    unit: str = "deg"
+    noise: str = ANGLE_NOISE
+
+    @property
+    def residual_blocks(self) -> tuple[tuple[int, int], ...]:
+        """All readings scatter alike."""
+        return ((len(self.labels), len(self.labels)),)
+
+    def _expected(self, values: Mapping[str, Array], data: Mapping[str, Any]) -> Float[Array, " readings"]:
+        curves = self.cable.curves
+        parts = [curve.wrap_angle(values, data["route"][column]) for column, curve in curves.items()]
+        return jnp.concatenate(parts)[data["order"]]
+
+    def _split(
+        self, values: Mapping[str, Array], data: Mapping[str, Any]
+    ) -> tuple[Float[Array, " detected"], Float[Array, " undetected"]]:
+        """Standardized deviations: of the detected readings, and of the limits of the undetected ones."""
+        theta, sigma, n = self._expected(values, data), values[ANGLE_NOISE], data["angle"].shape[0]
+        return (data["angle"] - theta[:n]) / sigma, (data["limit"] - theta[n:]) / sigma
+
+    def log_likelihood(self, values: Mapping[str, Array], data: Mapping[str, Any]) -> Float[Array, " readings"]:
+        """Log likelihood of each reading."""
+        (deviation, u), law = self._split(values, data), noise_law(self.cable.description)
+        return jnp.concatenate([law.log_density(deviation) - jnp.log(values[ANGLE_NOISE]), law.log_cdf(u)])
+
+    def residuals(self, values: Mapping[str, Array], data: Mapping[str, Any]) -> Float[Array, " readings"]:
+        """Standardized residuals; sqrt(-2 log likelihood) for undetected angles."""
+        (deviation, u), law = self._split(values, data), noise_law(self.cable.description)
+        return jnp.concatenate([law.residual(deviation), law.bound_residual(u)])
+
+    def expected(self, values: Mapping[str, Array], data: Mapping[str, Any]) -> Float[Array, " readings"]:
+        """Expected readings [deg]."""
+        return jnp.rad2deg(self._expected(values, data))
+
+    def simulate(self, values: Mapping[str, Array], data: Mapping[str, Any], key: Array) -> Float[Array, " readings"]:
+        """Readings as the bench would give them, undetected ones included [deg]."""
+        theta = self._expected(values, data)
+        return jnp.rad2deg(theta + values[ANGLE_NOISE] * scatter(key, theta.shape, self.cable.description))
+
+    def observed(self) -> np.ndarray:
+        """Readings [deg]; NaN where undetected."""
+        return np.rad2deg(np.concatenate([self.data["angle"], np.full(len(self.data["limit"]), np.nan)]))
+
+
+def angles_term(cable: Cable, table: AngleTable) -> AnglesTerm:
+    """The term of an angle table, with undetected angles entering as the description says."""
+    description = cable.description
+    settings, route, published = description.tables.angles, description.route, description.geometry == "published"
+    assert settings is not None and route is not None  # an angle table is read only with both
+    readings: list[tuple[float, float, str]] = []
+    routes: dict[str, np.ndarray] = {}
+    for contact in description.curved:
+        column = contact.wrap_angle.column or ""
+        low, high = (contact.wrap_angle.published_range if published else None) or route.range
+        how = "zero" if published else settings.undetected
+        angle, limit = table.column(column)
+        used = (table.route >= low) & (table.route <= high) & ((how != "dropped") | np.isfinite(angle))
+        routes[column] = table.route[used]
+        for length, reading, at_most in zip(table.route[used], angle[used], limit[used], strict=True):
+            shown = 0.0 if how == "zero" and np.isnan(reading) else reading
+            readings.append((shown, at_most, f"{column} at {length:g} {route.unit}"))
+    detected = np.array([np.isfinite(reading) for reading, _, _ in readings], dtype=bool)
+    order = np.concatenate([np.flatnonzero(detected), np.flatnonzero(~detected)])
+    data = {
+        "route": routes,
+        "order": order,
+        "angle": np.array([readings[i][0] for i in order[: detected.sum()]]),
+        "limit": np.array([readings[i][1] for i in order[detected.sum() :]]),
+    }
+    return AnglesTerm(cable, data, tuple(readings[i][2] for i in order))

@@ -1,0 +1,1 @@
+"""Measured transmission efficiencies."""

@@ -1,0 +1,92 @@
+"""Efficiency tables: the logarithm of each measured efficiency against the friction exponent at its length."""
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import Any
+
+import jax
+import jax.numpy as jnp
+import numpy as np
+from jax import Array
+from jaxtyping import Float
+
+from bowdenfit.cable.cable import Cable, resolve_angles, row_angles
+from bowdenfit.cable.load_cells import GAIN_ERROR, RUN_SCATTER
+from bowdenfit.cable.noise import noise_law, scatter
+from bowdenfit.kinds.tables import AngleTable, EfficiencyTable
+from bowdenfit.physics.friction import transmission_efficiency
+
+
+@dataclass(frozen=True)
+class EfficienciesTerm:
+    r"""Likelihood of an efficiency table.
+
+    .. math:: -\log\eta_i \sim \text{Normal}\left(-\log\eta(\Lambda_i) + g,\ \sqrt{\tau^2 + (s_i/\eta_i)^2
+              + \textstyle\sum_k \mu_k^2 \sigma_{\theta,ik}^2}\right)
+
+    with the stated standard deviation s of a row, the error of its own measured angles, and the gain error g of the
+    load cells where the description has one. A row does not say at what load and speed it was measured: where friction
+    depends on them, it is taken to hold at the reference force and speed. With Student noise the same mean and scale are a
+    Student-t's.
+
+    Args:
+        cable: The cable.
+        data: Arrays, one entry a row.
+        labels: Each row in words.
+    """
+
+    cable: Cable
+    data: dict[str, Any]
+    labels: tuple[str, ...]
+    name: str = "efficiency"
+    unit: str = "1"
+    noise: str = RUN_SCATTER
+
+    @property
+    def residual_blocks(self) -> tuple[tuple[int, int], ...]:
+        """All rows scatter alike."""
+        return ((len(self.labels), len(self.labels)),)
+
+    def _mean_and_sd(
+        self, values: Mapping[str, Array], data: Mapping[str, Any], weights: Mapping[str, Array]
+    ) -> tuple[Float[Array, " rows"], Float[Array, " rows"]]:
+        angles, variance = resolve_angles(self.cable, values, data)
+        exponent = self.cable.friction_exponent(values, angles)
+        mean = values.get(GAIN_ERROR, 0.0) + (
+            -jnp.log(self.cable.friction.efficiency(values, exponent)) if self.cable.friction.options else exponent
+        )
+        from_angles = self.cable.exponent_variance(weights, angles, variance)
+        return mean, jnp.sqrt(weights[RUN_SCATTER] ** 2 + data["log_sd"] ** 2 + from_angles)
+
+    def log_likelihood(self, values: Mapping[str, Array], data: Mapping[str, Any]) -> Float[Array, " rows"]:
+        """Log likelihood of each row."""
+        return noise_law(self.cable.description).log_density(data["loss"], *self._mean_and_sd(values, data, values))
+
+    def residuals(self, values: Mapping[str, Array], data: Mapping[str, Any]) -> Float[Array, " rows"]:
+        """Standardized residuals; the weights follow the parameters but are not differentiated."""
+        mean, sd = self._mean_and_sd(values, data, jax.lax.stop_gradient(dict(values)))
+        return noise_law(self.cable.description).residual((data["loss"] - mean) / jax.lax.stop_gradient(sd))
+
+    def expected(self, values: Mapping[str, Array], data: Mapping[str, Any]) -> Float[Array, " rows"]:
+        """Expected efficiencies [1]."""
+        return transmission_efficiency(self._mean_and_sd(values, data, values)[0])
+
+    def simulate(self, values: Mapping[str, Array], data: Mapping[str, Any], key: Array) -> Float[Array, " rows"]:
+        """Efficiencies as the bench would give them [1]."""
+        mean, sd = self._mean_and_sd(values, data, values)
+        return transmission_efficiency(mean + sd * scatter(key, mean.shape, self.cable.description))
+
+    def observed(self) -> np.ndarray:
+        """Measured efficiencies [1]."""
+        return np.exp(-self.data["loss"])
+
+
+def efficiencies_term(cable: Cable, table: EfficiencyTable, angles: AngleTable | None) -> EfficienciesTerm:
+    """The term of an efficiency table."""
+    rows = row_angles(cable, table, angles)
+    data = rows.data | {"loss": -np.log(table.efficiency), "log_sd": table.sd / table.efficiency}
+    route = cable.description.route
+    labels = tuple(
+        f"{length:g} {route.unit}" if route else table.origin.place(i) for i, length in enumerate(table.route)
+    )
+    return EfficienciesTerm(cable, data, labels)

@@ -1,0 +1,1 @@
+"""Forces read at both ends, run by run."""

@@ -1,0 +1,1 @@
+"""Forces at both ends of a pull-pull loop."""

@@ -1,0 +1,124 @@
+"""Tables of forces at both ends of a pull-pull loop while it moves."""
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import Any
+
+import jax
+import jax.numpy as jnp
+import numpy as np
+from jax import Array
+from jaxtyping import Float
+
+from bowdenfit.cable.cable import Cable, resolve_angles, row_angles
+from bowdenfit.cable.elasticity import LOOP_MOUNTING, spread_matrix
+from bowdenfit.cable.load_cells import FORCE_NOISE, GAIN_ERROR, INPUT_OFFSET, OUTPUT_OFFSET, RUN_SCATTER
+from bowdenfit.cable.noise import noise_law, scatter
+from bowdenfit.kinds.tables import AngleTable, LoopTable
+from bowdenfit.physics.loop import loop_response, loop_response_from
+
+LOOP = "loop_output_force"
+
+
+@dataclass(frozen=True)
+class LoopTerm:
+    r"""Likelihood of a loop table.
+
+    .. math:: F_{\text{out},i} \sim \text{Normal}\left(f(F_{\text{in},i}),\ \sqrt{\sigma_F^2 (1 + f'^2)
+              + f_\Lambda^2 \textstyle\sum_k \mu_k^2 \sigma_{\theta,ik}^2}\right)
+
+    with f the loop's output force at the preload of the row, or the cable's at the row's wrap angle; both load cells read
+    with noise, and the row's own measured angles have errors. All rows are of one mounting: its effect on the friction
+    exponent is a parameter where single ropes tell how mountings scatter, and else belongs to the coefficient found.
+
+    With Student noise the same mean and scale are a Student-t's, row by row; that parameter of the one mounting stays normal.
+
+    Args:
+        cable: The cable.
+        data: Arrays, one entry a row.
+        labels: Each row in words.
+    """
+
+    cable: Cable
+    data: dict[str, Any]
+    labels: tuple[str, ...]
+    name: str = LOOP
+    unit: str = "N"
+    noise: str = FORCE_NOISE
+
+    @property
+    def residual_blocks(self) -> tuple[tuple[int, int], ...]:
+        """All rows scatter alike."""
+        return ((len(self.labels), len(self.labels)),)
+
+    def _response(
+        self, values: Mapping[str, Array], data: Mapping[str, Any]
+    ) -> tuple[Array, Array, Array, Array | float]:
+        """Output force, its derivatives, and the variance of the friction exponent from errors of the wrap angles."""
+        mounting = values[RUN_SCATTER] * values[LOOP_MOUNTING] if LOOP_MOUNTING in values else 0.0
+        force, elastic = data["input_force"] - values.get(INPUT_OFFSET, 0.0), self.cable.elasticity
+        if "cases" in data:
+            exponent = self.cable.friction_exponent(values, data["cases"]) + mounting
+            preload = elastic.preload(values, jnp.sum(data["cases"], axis=-1))[0]
+            per_case = jnp.stack([2 * preload * exponent, 2 * preload, jnp.exp(-exponent), jnp.exp(exponent)])
+            loss, twice, less, more = per_case @ data["spread"]
+            return *loop_response_from(force, loss, twice, less, more, data["stroke"]), 0.0
+        angles, variance = resolve_angles(self.cable, values, data)
+        exponent = self.cable.friction_exponent(values, angles) + mounting
+        of_cable = elastic.preload(values, jnp.sum(angles, axis=-1))[0]
+        preload = jnp.where(data["has_preload"], data["preload"], of_cable)
+        response = loop_response(force, preload, exponent, data["stroke"])
+        return *response, self.cable.exponent_variance(values, angles, variance)
+
+    def _shown(self, values: Mapping[str, Array], output_force: Array) -> Array:
+        """What the output's load cell reads."""
+        return output_force * jnp.exp(-values.get(GAIN_ERROR, 0.0)) + values.get(OUTPUT_OFFSET, 0.0)
+
+    def _mean_and_sd(
+        self, values: Mapping[str, Array], data: Mapping[str, Any], weights: Mapping[str, Array]
+    ) -> tuple[Float[Array, " rows"], Float[Array, " rows"]]:
+        output, by_force, by_exponent, angle_variance = self._response(values, data)
+        if weights is not values:
+            _, by_force, by_exponent, angle_variance = self._response(weights, data)
+        variance = weights[FORCE_NOISE] ** 2 * (1 + by_force**2)
+        return self._shown(values, output), jnp.sqrt(variance + by_exponent**2 * angle_variance)
+
+    def expected(self, values: Mapping[str, Array], data: Mapping[str, Any]) -> Float[Array, " rows"]:
+        """Expected output forces [N]."""
+        return self._mean_and_sd(values, data, values)[0]
+
+    def log_likelihood(self, values: Mapping[str, Array], data: Mapping[str, Any]) -> Float[Array, " rows"]:
+        """Log likelihood of each row."""
+        law = noise_law(self.cable.description)
+        return law.log_density(data["output_force"], *self._mean_and_sd(values, data, values))
+
+    def residuals(self, values: Mapping[str, Array], data: Mapping[str, Any]) -> Float[Array, " rows"]:
+        """Standardized residuals; the weights follow the parameters but are not differentiated."""
+        mean, sd = self._mean_and_sd(values, data, jax.lax.stop_gradient(dict(values)))
+        return noise_law(self.cable.description).residual((data["output_force"] - mean) / jax.lax.stop_gradient(sd))
+
+    def simulate(self, values: Mapping[str, Array], data: Mapping[str, Any], key: Array) -> Float[Array, " rows"]:
+        """Output forces as the bench would give them [N]."""
+        mean, sd = self._mean_and_sd(values, data, values)
+        return mean + sd * scatter(key, mean.shape, self.cable.description)
+
+    def observed(self) -> np.ndarray:
+        """Measured output forces [N]."""
+        return self.data["output_force"]
+
+
+def loop_term(cable: Cable, table: LoopTable, angles: AngleTable | None) -> LoopTerm:
+    """The term of a loop table."""
+    rows = row_angles(cable, table, angles)
+    data = rows.data | {
+        "input_force": table.input_force,
+        "output_force": table.output_force,
+        "stroke": table.stroke.astype(float),
+        "preload": np.nan_to_num(table.preload),
+        "has_preload": np.isfinite(table.preload),
+    }
+    known = rows.is_own.all() and not rows.known_sd.any() and not rows.has_angle_noise.any()
+    if known and not data["has_preload"].any():  # friction and preload are worked out once for every different case
+        data["cases"], at = np.unique(rows.own, axis=0, return_inverse=True)
+        data["spread"] = spread_matrix(at.ravel())
+    return LoopTerm(cable, data, tuple(table.origin.place(i) for i in range(len(table.stroke))))

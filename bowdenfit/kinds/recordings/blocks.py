@@ -1,0 +1,89 @@
+"""What each block of a recording is worth to a likelihood: whether it can be used, and how much it says."""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from bowdenfit.kinds.runs import LEAST_FORCE
+from bowdenfit.kinds.tables import OwnAngles
+from bowdenfit.recordings.recording import Recording, Recordings
+
+RECORDED = "recorded_efficiency"  # name of the readings of recordings in results
+_NEAR_LIMIT = 0.005  # of the end of a range, within which a saturated reading is at it
+
+
+@dataclass(frozen=True)
+class RecordedAngles:
+    """Where and at which wrap angles each recording was made; see `bowdenfit.cable.cable.Measured`."""
+
+    route: np.ndarray
+    own: OwnAngles
+
+
+def recorded_angles(recordings: Recordings) -> RecordedAngles:
+    """Route values and own angles, one row a recording."""
+    shape = (len(recordings.each), len(recordings.columns))
+    angle, sd = (np.array([getattr(r, n) for r in recordings.each]).reshape(shape) for n in ("own_angle", "own_sd"))
+    return RecordedAngles(np.array([r.route for r in recordings.each]), OwnAngles(recordings.columns, angle, sd))
+
+
+def positive(recording: Recording) -> np.ndarray:
+    """Blocks that are readings of a rope under tension."""
+    blocks = recording.blocks
+    return ~blocks.saturated & (blocks.input_force > 0) & (blocks.output_force > 0)
+
+
+def worth_of(recording: Recording, used: np.ndarray) -> np.ndarray:
+    """What each block is worth: in proportion to its samples, and less where deviations stay alike for long."""
+    samples = recording.blocks.samples[used].astype(float)
+    return samples / recording.blocks.samples.mean() / recording.strokes.correlation
+
+
+def drift_of(recording: Recording) -> np.ndarray:
+    """Change of log F_out with time [1/s], by which a delay of its channel shifts it."""
+    blocks = recording.blocks
+    return np.gradient(np.log(np.maximum(blocks.output_force, LEAST_FORCE)), blocks.time)
+
+
+def inside_phase(state: np.ndarray) -> np.ndarray:
+    """Blocks whose neighbors are in the same phase: at a corner a block's mean is of two phases."""
+    same = np.diff(state) == 0
+    return np.append(True, same) & np.append(same, True)
+
+
+def standing_share(state: np.ndarray) -> np.ndarray:
+    """What a block is worth beside others of its phase: all of it while sliding, a share of one while standing still.
+
+    The operator stands where the highest (or lowest) input left it, noise and all: every block of that phase has this one
+    error in common, and together they are worth no more than one reading with twice the noise.
+    """
+    phase = np.append(0, np.cumsum(np.diff(state) != 0))
+    return np.where(state == 0, 0.5 / np.bincount(phase)[phase], 1.0)
+
+
+def last_contact(state: np.ndarray) -> np.ndarray:
+    """The last contact up to each block; 0 before the first."""
+    at = np.maximum.accumulate(np.where(state != 0, np.arange(len(state)), -1))
+    return np.where(at >= 0, state[np.maximum(at, 0)], 0).astype(int)
+
+
+def _at_limit(recording: Recording, force: np.ndarray) -> np.ndarray:
+    """Saturated blocks in which this of the two forces stands at the end of the range, as its saturated samples do."""
+    ends = [end for end in recording.account.limits if np.isfinite(end)]
+    near = [np.abs(force - end) <= _NEAR_LIMIT * max(abs(end), 1.0) for end in ends]
+    return recording.blocks.saturated & (np.any(near, axis=0) if near else np.zeros(len(force), dtype=bool))
+
+
+def output_saturated(recording: Recording) -> np.ndarray:
+    """Blocks whose output force is at least as large as what was read."""
+    return _at_limit(recording, recording.blocks.output_force)
+
+
+def input_saturated(recording: Recording) -> np.ndarray:
+    """Blocks whose input force is not known."""
+    return _at_limit(recording, recording.blocks.input_force)
+
+
+def restarts(lost: np.ndarray) -> np.ndarray:
+    """Blocks after a stretch whose input is not known: where the operator stands there must be read anew."""
+    return ~lost & np.append(False, lost[:-1])

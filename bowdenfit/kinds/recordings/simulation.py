@@ -1,0 +1,173 @@
+"""Recordings measured again on the computer, at the level of prepared blocks.
+
+The input force of every block is kept and stands for the true one; the play operator of a cable with known coefficients
+makes the output force of it, all sensors' errors and the noise of blocks are added, and the strokes are found anew as a
+reader finds them. What happens before blocks are made (clipping, spikes, sampling) is not simulated.
+"""
+
+from collections.abc import Mapping, Sequence
+from dataclasses import replace
+
+import jax
+import jax.numpy as jnp
+import numpy as np
+
+from bowdenfit.cable.cable import Cable, resolve_angles, row_angles
+from bowdenfit.cable.load_cells import BLOCK_NOISE, DELAY_ERROR, GAIN_ERROR, INPUT_OFFSET, OUTPUT_OFFSET, RUN_SCATTER
+from bowdenfit.cable.noise import scatter
+from bowdenfit.description import Description
+from bowdenfit.errors import DatasetError
+from bowdenfit.kinds.recordings.blocks import recorded_angles, worth_of
+from bowdenfit.kinds.runs import LEAST_FORCE
+from bowdenfit.kinds.tables import Measurements
+from bowdenfit.physics.hysteresis import play_operator
+from bowdenfit.physics.loop_motion import loop_play_with_slope
+from bowdenfit.recordings.loop_strokes import find_loop_strokes
+from bowdenfit.recordings.recording import Blocks, Recording, Recordings, Strokes
+from bowdenfit.recordings.strokes import Span, find_strokes
+
+
+def drawn_recordings(
+    cable: Cable, tables: Measurements, values: Mapping[str, jax.Array], key: jax.Array, scale: float
+) -> dict[str, jax.Array]:
+    """Forces of every block (rows) of every recording (columns), padded to the longest, and the delay's error [s].
+
+    All recordings of a run share the effect of its mounting. Noise is as the likelihood counts it: blocks that together
+    are worth one independent reading share one error.
+
+    Args:
+        cable: The cable.
+        tables: Measurements with recordings.
+        values: True values [internal units].
+        key: Random key.
+        scale: Factor on all noise.
+    """
+    recordings = tables.recordings
+    assert recordings is not None  # the caller asked
+    of_run, of_angles, of_input, of_output = jax.random.split(key, 4)
+    rows = row_angles(cable, recorded_angles(recordings), tables.angles).data
+    angles, variance = resolve_angles(cable, values, {name: jnp.asarray(array) for name, array in rows.items()})
+    error = jnp.sqrt(variance) * jax.random.normal(of_angles, angles.shape)
+    run = np.array([recordings.runs.index(r.run) for r in recordings.each])
+    mounting = values[RUN_SCATTER] * scatter(of_run, (len(recordings.runs),), cable.description)[run]
+    exponent = cable.friction_exponent(values, angles + scale * error)
+    force = _beside([r.blocks.input_force for r in recordings.each])
+    output = _loop_output if recordings.loop else _rope_output
+    shown = output(cable, recordings, values, force, exponent, scale * mounting, jnp.sum(angles, axis=-1))
+    places = _beside([_readings_of(r) for r in recordings.each]).astype(int)
+    shape, noise = (places.max() + 1, len(recordings.each)), scale * values[BLOCK_NOISE]
+    errors = [noise * jax.random.normal(k, shape)[places, np.arange(shape[1])] for k in (of_input, of_output)]
+    return {
+        "input_force": jnp.asarray(force) + values.get(INPUT_OFFSET, 0.0) + errors[0],
+        "output_force": shown * jnp.exp(-values.get(GAIN_ERROR, 0.0)) + values.get(OUTPUT_OFFSET, 0.0),
+        "output_error": errors[1],
+        "delay_error": jnp.asarray(scale * values.get(DELAY_ERROR, 0.0)),
+    }
+
+
+def _rope_output(
+    cable: Cable,
+    recordings: Recordings,
+    values: Mapping[str, jax.Array],
+    force: np.ndarray,
+    exponent: jax.Array,
+    mounting: jax.Array,
+    bend: jax.Array,
+) -> jax.Array:
+    """Output of the play operator, which starts where it was in the band when it was measured."""
+    del bend
+    friction, velocity = cable.friction, _beside([r.blocks.velocity for r in recordings.each])
+    band = jnp.maximum(exponent * friction.rate(values, jnp.asarray(velocity)) + mounting, 0.0)
+    x = friction.scaled(values, jnp.maximum(jnp.asarray(force), LEAST_FORCE))
+    y = play_operator(x, band, x[0] + band[0] * np.array([_start(r) for r in recordings.each]))
+    return jnp.maximum(friction.force(values, y), LEAST_FORCE)
+
+
+def _loop_output(
+    cable: Cable,
+    recordings: Recordings,
+    values: Mapping[str, jax.Array],
+    force: np.ndarray,
+    exponent: jax.Array,
+    mounting: jax.Array,
+    bend: jax.Array,
+) -> jax.Array:
+    """Output of a pull-pull loop, which starts at the force where it was measured, or at the edge of its band."""
+    start = jnp.array([r.blocks.output_force[0] for r in recordings.each])
+    preload = cable.elasticity.preload(values, bend)[0]
+    loss = jnp.maximum(exponent + mounting, 0.0)
+    return loop_play_with_slope(jnp.asarray(force), preload, loss, start, jnp.full(force.shape, jnp.nan))[0]
+
+
+def _start(recording: Recording) -> float:
+    """Where in its friction band a recording starts, from -1 (pulling) to 1 (returning)."""
+    blocks, strokes = recording.blocks, recording.strokes
+    ratio = np.log(max(blocks.output_force[0], LEAST_FORCE) / max(blocks.input_force[0], LEAST_FORCE))
+    return float(np.clip((ratio + strokes.center) / strokes.exponent, -1.0, 1.0))
+
+
+def _readings_of(recording: Recording) -> np.ndarray:
+    """Number of the independent reading that each block belongs to."""
+    worth = worth_of(recording, np.arange(len(recording.blocks.time)))
+    return np.floor(np.cumsum(np.minimum(worth, 1.0)) - 1e-9)
+
+
+def _beside(columns: Sequence[np.ndarray]) -> np.ndarray:
+    """Columns side by side, the shorter ones kept at their last value."""
+    longest = max(len(column) for column in columns)
+    return np.stack([np.pad(column, (0, longest - len(column)), "edge") for column in columns], axis=1)
+
+
+def recorded_again(description: Description, recordings: Recordings, drawn: Mapping[str, np.ndarray]) -> Recordings:
+    """The recordings with forces drawn by `drawn_recordings`, their strokes found anew.
+
+    What the likelihood takes a block to be worth is kept: how long deviations stay alike is not found anew.
+
+    Args:
+        description: The cable.
+        recordings: The recordings as measured.
+        drawn: What was drawn.
+
+    Raises:
+        DatasetError: Strokes cannot be found.
+    """
+    each = []
+    for i, recording in enumerate(recordings.each):
+        n, time = len(recording.blocks.time), recording.blocks.time
+        shown, error = drawn["output_force"][:n, i], drawn["output_error"][:n, i]
+        late = shown - float(drawn["delay_error"]) * np.gradient(shown, time)
+        blocks = replace(recording.blocks, input_force=drawn["input_force"][:n, i], output_force=late + error)
+        strokes = _strokes(description, recordings.loop, recording, blocks)
+        each.append(replace(recording, blocks=blocks, strokes=strokes))
+    return replace(recordings, each=tuple(each))
+
+
+def _strokes(description: Description, loop: bool, recording: Recording, blocks: Blocks) -> Strokes:
+    spans = [
+        Span(phase.start, phase.end, phase.stroke)
+        for entry in description.recording
+        if entry.file == recording.file and recording.strokes.by_hand
+        for phase in entry.strokes
+    ]
+    if loop:
+        stated = description.preload.value
+        preload = stated.to("force") if stated is not None and not description.preload_follows_stretch else None
+        found = find_loop_strokes(blocks, recording.file, recording.name, spans, preload)
+    else:
+        found = find_strokes(blocks, recording.file, recording.name, spans)
+    return replace(found, correlation=recording.strokes.correlation)
+
+
+def refuse_saturated(recordings: Recordings) -> None:
+    """Refuse recordings with readings at the end of a load cell's range.
+
+    Raises:
+        DatasetError: There are such; which ones would be with another friction is not known from blocks.
+    """
+    for recording in recordings.each:
+        if recording.blocks.saturated.any():
+            raise DatasetError(
+                f"{recording.file}: {int(recording.blocks.saturated.sum())} blocks of the recording {recording.name!r} are at "
+                "the end of a load cell's range, and what else would be clipped with another friction cannot be told from "
+                "blocks; leave the recording out to calibrate."
+            )

@@ -1,0 +1,311 @@
+"""The recordings of a data set: read, prepared, cut into strokes, and placed on the route."""
+
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, replace
+from pathlib import Path
+from types import MappingProxyType
+from typing import Literal
+
+import numpy as np
+
+from bowdenfit.description import ColumnMap, Description, Preparation, QuantityValue, RecordingFile
+from bowdenfit.errors import DatasetError, DescriptionError, nearest
+from bowdenfit.files import read_channels
+from bowdenfit.files.columns import ColumnSource
+from bowdenfit.kinds.tables import AngleTable
+from bowdenfit.recordings.forces import TORQUES, WANTED, matched_name, pattern_fields, rows_where, to_recording
+from bowdenfit.recordings.loop_strokes import find_loop_strokes
+from bowdenfit.recordings.preparation import NO_DELAY_OF_LOOPS, averaged, inspected
+from bowdenfit.recordings.preparation.delay import COMMON_ERROR
+from bowdenfit.recordings.recording import Account, Blocks, PreparationSettings, RawRecording, Recording, Recordings
+from bowdenfit.recordings.strokes import Span, find_strokes
+from bowdenfit.types import Vector
+from bowdenfit.units import INTERNAL_UNITS, conversion_factor, speed_dimension
+
+
+def read_recordings(
+    description: Description, folder: Path, paths: Callable[[], Sequence[Path]], channels: Mapping[str, ColumnSource]
+) -> tuple[Recordings, dict[str, Path]]:
+    """Read all recordings of a description.
+
+    Args:
+        description: The description; it has a table of recordings.
+        folder: Where its files are.
+        paths: The files that the table's pattern matches.
+        channels: Channels named on the command line; they come before those of the description.
+
+    Returns:
+        The recordings, and the files they were read from by name.
+
+    Raises:
+        DatasetError, DescriptionError: What is wrong, in a sentence.
+    """
+    entries = _entries(description, folder, paths())
+    _check_names(entries)
+    files = [_to_read(description, path, entry, channels) for path, entry in entries]
+    units = {f.velocity_unit: f.raw.file for f in files if f.velocity_unit}
+    if len(units) > 1:
+        raise DatasetError(
+            f"{' and '.join(units.values())} give velocities of different kinds, of the rope and of the motor; give both in "
+            "mm/s or both in r/min."
+        )
+    prepared, delay_sd = _prepared(files)
+    each = tuple(_recording(description, f, *parts) for f, parts in zip(files, _said_once(prepared), strict=True))
+    unit, loop = next(iter(units), ""), description.cable.kind == "loop"
+    recordings = Recordings(description.angle_columns, each, unit, delay_sd, loop)
+    _check_placed(description, recordings)
+    return recordings, {entry.file: path for path, entry in entries}
+
+
+@dataclass(frozen=True)
+class _File:
+    """A recording's file as read, with what is said of it."""
+
+    raw: RawRecording
+    entry: RecordingFile
+    settings: PreparationSettings
+    delay_sd: float
+    velocity_unit: str
+
+
+def _prepared(files: Sequence[_File]) -> tuple[list[tuple[Blocks, Account]], float]:
+    """Every recording prepared with one delay, and the standard error of that delay [s].
+
+    The two channels run through the same electronics in every recording, so that what each of them says of the delay is
+    put together; an error of it shifts the friction of all of them alike, in proportion to how fast the force changes.
+    """
+    found = [inspected(f.raw, f.settings) for f in files]
+    told = [i.delay for i in found if i.settings.delay == "estimate" and i.delay.sd > 0]
+    if not told:
+        return [averaged(i) for i in found], max((f.delay_sd for f in files), default=0.0)
+    delay, sd = _pooled(np.array([d.value for d in told]), np.array([d.sd for d in told]))
+    return [averaged(i, (delay, sd) if i.settings.delay == "estimate" else None) for i in found], sd
+
+
+def _said_once(prepared: Sequence[tuple[Blocks, Account]]) -> list[tuple[Blocks, Account]]:
+    """What is said of every loop alike, that its delay is not estimated, kept in the first account only."""
+    said = False
+    kept = []
+    for blocks, account in prepared:
+        remarks = tuple(r for r in account.remarks if r != NO_DELAY_OF_LOOPS or not said)
+        said = said or NO_DELAY_OF_LOOPS in account.remarks
+        kept.append((blocks, replace(account, remarks=remarks)))
+    return kept
+
+
+def _pooled(delays: Vector, sds: Vector) -> tuple[float, float]:
+    """Weighted mean of estimated delays and its standard error [s].
+
+    What chance did to each estimate averages out, and is at least as large as the estimates differ. What all of them have
+    in common, COMMON_ERROR, does not average out.
+    """
+    weights = sds**-2 / np.sum(sds**-2)
+    mean = float(weights @ delays)
+    chance = float(weights**2 @ (sds**2 - COMMON_ERROR**2))
+    apart = float(weights @ (delays - mean) ** 2) / max(len(delays) - 1, 1)
+    return mean, float(np.hypot(np.sqrt(max(chance, apart)), COMMON_ERROR))
+
+
+def _entries(description: Description, folder: Path, matched: Sequence[Path]) -> list[tuple[Path, RecordingFile]]:
+    """Every file with what is said of it; a file named in a [[recording]] is not read twice."""
+    table = description.tables.recordings
+    assert table is not None  # the caller asked
+    entries = [(folder / entry.file, entry) for entry in description.recording]
+    named = {path.resolve() for path, _ in entries}
+    for path in matched:
+        if path.resolve() not in named:
+            file = path.relative_to(folder).as_posix() if path.is_relative_to(folder) else path.name
+            entries.append((path, _from_name(description, table.pattern, path, file)))
+    return entries
+
+
+def _from_name(description: Description, pattern: str | None, path: Path, file: str) -> RecordingFile:
+    """What the name of a file says, by the table's pattern."""
+    if pattern is None:
+        return RecordingFile(file=file)
+    _check_pattern(description, pattern)
+    values = matched_name(pattern, path)
+    angles = {
+        name: QuantityValue(value=float(text), unit=unit or "deg")
+        for name, (text, unit) in values.items()
+        if name in description.angle_columns
+    }
+    velocity = values.get("velocity")
+    return RecordingFile(
+        file=file,
+        run=values["run"][0] if "run" in values else None,
+        at=float(values["at"][0]) if "at" in values else None,
+        velocity=QuantityValue(value=float(velocity[0]), unit=velocity[1] or "mm/s") if velocity else None,
+        wrap_angles=angles,
+    )
+
+
+def _check_pattern(description: Description, pattern: str) -> None:
+    """A pattern names only what a recording can be told, in units of the right kind."""
+    known = ["at", "run", "velocity", *description.angle_columns]
+    place = "cable.toml, tables.recordings.pattern"
+    for name, unit in pattern_fields(pattern):
+        if name not in known:
+            raise DescriptionError(f"{place}: {name!r} is unknown{nearest(name, known)}")
+        if unit and name != "at" and name != "run":
+            dimension = speed_dimension(unit) if name == "velocity" else "angle"
+            _factor(unit, dimension, f"{place}, {{{name}:{unit}}}")
+
+
+def _factor(unit: str, dimension: str, place: str) -> float:
+    """Factor to the internal unit; an error says where the unit stands."""
+    try:
+        return conversion_factor(unit, dimension)
+    except DatasetError as error:
+        raise DescriptionError(f"{place}: {error}.") from None
+
+
+def _check_names(entries: list[tuple[Path, RecordingFile]]) -> None:
+    names = [_name(path, entry) for path, entry in entries]
+    twice = next((name for name in names if names.count(name) > 1), None)
+    if twice is not None:
+        raise DescriptionError(
+            f"two recordings are both called {twice!r}; give one of them another name in its [[recording]]."
+        )
+
+
+def _name(path: Path, entry: RecordingFile) -> str:
+    return entry.name or entry.run or path.stem
+
+
+def _to_read(description: Description, path: Path, entry: RecordingFile, channels: Mapping[str, ColumnSource]) -> _File:
+    table = description.tables.recordings
+    assert table is not None  # the caller asked
+    page, sources = entry.prepare or table.prepare, {**_sources(table.channels), **_sources(entry.channels), **channels}
+    pulleys = description.cable.pulleys if description.cable.kind == "loop" else None
+    raw, unit = to_recording(rows_where(read_channels(path), entry.where), _name(path, entry), sources, pulleys)
+    stated = page.delay.sd_to("time") if isinstance(page.delay, QuantityValue) else None
+    if entry.velocity is not None and not unit:
+        unit = INTERNAL_UNITS[speed_dimension(entry.velocity.unit)]
+    settings = replace(preparation_settings(page), loop=pulleys is not None)
+    return _File(raw, entry, settings, stated or 0.0, unit)
+
+
+def _recording(description: Description, file: _File, blocks: Blocks, account: Account) -> Recording:
+    raw, entry = file.raw, file.entry
+    spans = [Span(phase.start, phase.end, phase.stroke) for phase in entry.strokes]
+    if description.cable.kind == "loop":
+        strokes = find_loop_strokes(blocks, raw.file, raw.name, spans, _stated_preload(description))
+    else:
+        strokes = find_strokes(blocks, raw.file, raw.name, spans)
+    if entry.velocity is not None and not len(raw.velocity):
+        speed = entry.velocity.to(speed_dimension(entry.velocity.unit))
+        blocks = replace(blocks, velocity=np.full(len(blocks.time), speed))
+    angle, sd = _own_angles(description, entry)
+    route = float("nan") if entry.at is None else entry.at
+    return Recording(raw.name, raw.file, entry.run or raw.name, route, angle, sd, blocks, strokes, account)
+
+
+def _stated_preload(description: Description) -> float | None:
+    """The preload that is stated for all wrap angles [N]."""
+    stated = description.preload.value
+    return stated.to("force") if stated is not None and not description.preload_follows_stretch else None
+
+
+def _sources(channels: Mapping[str, ColumnMap]) -> dict[str, ColumnSource]:
+    known = [quantity.name for quantity in (*WANTED, *TORQUES)]
+    for name in channels:
+        if name not in known:
+            raise DescriptionError(
+                f"cable.toml, channels of recordings: no quantity is called {name!r}{nearest(name, known)}"
+            )
+    return {name: ColumnSource(channel.name, channel.unit) for name, channel in channels.items()}
+
+
+def preparation_settings(page: Preparation) -> PreparationSettings:
+    """The preparation that a description asks for, in internal units.
+
+    Raises:
+        DescriptionError: The limits or the block contradict themselves.
+    """
+    limits = page.limits
+    newtons = _factor(limits.unit, "force", "cable.toml, prepare, limits") if limits is not None else 1.0
+    if limits is not None and not limits.low < limits.high:
+        raise DescriptionError(
+            f"cable.toml, prepare, limits: low = {limits.low:g} must be below high = {limits.high:g}; they are the lowest and "
+            "the highest force that the load cells can show."
+        )
+    if isinstance(page.block, QuantityValue) and page.block.value <= 0:
+        raise DescriptionError(
+            f"cable.toml, prepare, block: {page.block.value:g} {page.block.unit} is no length of a block; write a positive "
+            'one, or block = "none" to average nothing.'
+        )
+    return PreparationSettings(
+        "interval" if page.tare == "interval" else "none",
+        page.quiet,
+        page.delay.to("time") if isinstance(page.delay, QuantityValue) else _DELAYS[page.delay],
+        "keep" if page.saturation == "kept" else "flag",
+        (limits.low * newtons, limits.high * newtons) if limits is not None else None,
+        page.dropouts,
+        page.spikes,
+        page.block.to("time") if isinstance(page.block, QuantityValue) else "auto" if page.block == "auto" else 0.0,
+    )
+
+
+_DELAYS: Mapping[str, Literal["estimate", "none"]] = MappingProxyType({"estimated": "estimate", "none": "none"})
+
+
+def _own_angles(description: Description, entry: RecordingFile) -> tuple[np.ndarray, np.ndarray]:
+    """Wrap angles measured with a recording, and their standard deviations [rad]."""
+    columns = description.angle_columns
+    for name in entry.wrap_angles:
+        if name not in columns:
+            raise DescriptionError(
+                f"cable.toml, recording {entry.file!r}, wrap_angles: {name!r} is no column of a contact's wrap angle"
+                f"{nearest(name, columns)}"
+            )
+    stated = [entry.wrap_angles.get(name) for name in columns]
+    angles = [float("nan") if q is None else q.to("angle") for q in stated]
+    sds = [float("nan") if q is None or q.sd is None else q.sd_to("angle") for q in stated]
+    return np.array(angles, dtype=float), np.array(sds, dtype=float)
+
+
+def _check_placed(description: Description, recordings: Recordings) -> None:
+    """Every recording can be given a wrap angle in every contact."""
+    route = description.route
+    for recording in recordings.each:
+        for contact in description.contact:
+            column = contact.wrap_angle.column
+            if column is None or np.isfinite(recording.own_angle[recordings.columns.index(column)]):
+                continue
+            if not contact.wrap_angle.curve:
+                raise DatasetError(
+                    f"the recording {recording.name!r} has no wrap angle for the contact {contact.name!r}; add it to its "
+                    f'[[recording]]: wrap_angles = {{ {column} = {{ value = 90, unit = "deg" }} }}.'
+                )
+            if np.isnan(recording.route):
+                at = f"at = 470   # {route.variable}, in {route.unit}" if route else "at = 470"
+                raise DatasetError(
+                    f"the recording {recording.name!r} does not say at which {route.variable if route else 'length'} it was "
+                    f'made; add that to its [[recording]] ({at}), or read it from the file names: pattern = "{{at}}mm*".'
+                )
+
+
+def check_angles(description: Description, recordings: Recordings, angles: AngleTable | None) -> None:
+    """Every recording outside the range of the curves has its wrap angles measured, in its own place or in the table.
+
+    Args:
+        description: The description.
+        recordings: The recordings.
+        angles: The table of wrap angles.
+
+    Raises:
+        DatasetError: A recording has none.
+    """
+    route = description.route
+    if route is None or angles is None:
+        return
+    curved = [recordings.columns.index(c.wrap_angle.column) for c in description.curved if c.wrap_angle.column]
+    for recording in recordings.each:
+        outside = not route.range[0] <= recording.route <= route.range[1]
+        if outside and not np.isfinite(recording.own_angle[curved]).all() and recording.route not in angles.route:
+            raise DatasetError(
+                f"the recording {recording.name!r} was made at {recording.route:g} {route.unit}, outside the range "
+                f"{route.range[0]:g} to {route.range[1]:g} {route.unit} where the angle curves hold, and the angle table has "
+                "no row there; measure the wrap angles there, and add them to the table or as wrap_angles to its [[recording]]."
+            )

@@ -1,0 +1,167 @@
+"""Recordings: their sliding blocks as runs, or every block through the play operator.
+
+Both ask for the same coefficients. A run's blocks say how large its friction exponent is; that of the cable is known from
+it only up to what the mounting did to this run.
+"""
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+
+import numpy as np
+
+from bowdenfit.cable.cable import Cable, row_angles
+from bowdenfit.cable.load_cells import BLOCK_NOISE
+from bowdenfit.description import RecordingsTable
+from bowdenfit.errors import DatasetError
+from bowdenfit.kinds.recordings.blocks import (
+    RECORDED,
+    drift_of,
+    input_saturated,
+    inside_phase,
+    last_contact,
+    positive,
+    recorded_angles,
+    restarts,
+    standing_share,
+    worth_of,
+)
+from bowdenfit.kinds.recordings.loops import LoopRecordingsTerm, loop_recordings_term
+from bowdenfit.kinds.recordings.whole import WholeRecordingsTerm, padded
+from bowdenfit.kinds.runs import ROW_ARRAYS, RunsTerm, SlidingRows, run_sums
+from bowdenfit.kinds.tables import AngleTable
+from bowdenfit.recordings.preparation.play import play
+from bowdenfit.recordings.recording import Recording, Recordings
+
+
+def recordings_term(
+    cable: Cable, recordings: Recordings, angles: AngleTable | None
+) -> RunsTerm | WholeRecordingsTerm | LoopRecordingsTerm:
+    """The term of a data set's recordings, as its description wants them used; those of a loop are always whole.
+
+    Raises:
+        DatasetError: Whole recordings are wanted, and one has no reversal; or in a run no block can be used.
+    """
+    settings = cable.description.tables.recordings
+    rows = row_angles(cable, recorded_angles(recordings), angles).data
+    labels = tuple(_label(cable, recordings, run) for run in recordings.runs)
+    if recordings.loop:
+        censored = settings is not None and _censored(settings, recordings)
+        return loop_recordings_term(cable, recordings, rows, labels, censored)
+    if settings is None or settings.likelihood == "runs":
+        parts = [_sliding_blocks(r) for r in recordings.each]
+        _needs_blocks(recordings, parts)
+        return RunsTerm(cable, run_sums(cable, _rows(recordings, parts, rows)), labels, RECORDED, BLOCK_NOISE)
+    for recording in recordings.each:
+        _needs_reversal(recording)
+    censored = _censored(settings, recordings)
+    if not (cable.friction.options or cable.description.fits_offsets or censored):
+        # On a scale that no parameter changes, the operator is linear in the exponent: it need not be run again.
+        parts = [_all_blocks(r) for r in recordings.each]
+        _needs_blocks(recordings, parts)
+        return RunsTerm(cable, run_sums(cable, _rows(recordings, parts, rows)), labels, RECORDED, BLOCK_NOISE)
+    return WholeRecordingsTerm(cable, padded(recordings, rows, censored), labels)
+
+
+def _censored(settings: RecordingsTable, recordings: Recordings) -> bool:
+    """Whether readings at the end of the range count as ones beyond it, and there are any."""
+    return settings.prepare.saturation == "censored" and any(r.blocks.saturated.any() for r in recordings.each)
+
+
+def _label(cable: Cable, recordings: Recordings, run: str) -> str:
+    """Name of a run, with its route value where it has just one and does not say it itself."""
+    route, at = cable.description.route, {r.route for r in recordings.each if r.run == run}
+    where = f"{min(at):g} {route.unit}" if route is not None and len(at) == 1 else ""
+    return f"{run} ({where})" if where and where not in run else run
+
+
+def _needs_blocks(recordings: Recordings, parts: "list[_Part]") -> None:
+    """Every run must have something that the likelihood can use."""
+    for run in recordings.runs:
+        mine = [r for r in recordings.each if r.run == run]
+        if not any(len(p.used) for r, p in zip(recordings.each, parts, strict=True) if r.run == run):
+            raise DatasetError(
+                f"{mine[0].file}: nothing of the run {run!r} can be used, because while the rope slides no block has both "
+                "forces above 0 inside the cells' ranges; the usual causes are a wrong tare, swapped or inverted channels, "
+                "or a pull that hardly moved: look at it with `bowdenfit check FILE`, or leave the recording out."
+            )
+
+
+def _needs_reversal(recording: Recording) -> None:
+    if len(set(recording.strokes.stroke) - {0}) < 2:
+        raise DatasetError(
+            f"{recording.file}: the recording {recording.name!r} has no reversal, and the play operator has nothing to show "
+            'without one; record a pull and a return, or set likelihood = "runs" for the recordings.'
+        )
+
+
+@dataclass(frozen=True)
+class _Part:
+    """Blocks of one recording that enter: indices, stroke, log ratio, worth."""
+
+    used: np.ndarray
+    stroke: np.ndarray
+    log_ratio: np.ndarray
+    worth: np.ndarray
+
+
+def _sliding_blocks(recording: Recording) -> _Part:
+    """Blocks in which the rope slides, with their log ratio."""
+    used = np.flatnonzero(recording.strokes.used_sliding & positive(recording))
+    stroke, blocks = recording.strokes.stroke[used], recording.blocks
+    ratio = stroke * np.log(blocks.input_force[used] / blocks.output_force[used])
+    return _Part(used, stroke, ratio, worth_of(recording, used))
+
+
+def _all_blocks(recording: Recording) -> _Part:
+    r"""Every block after the rope first slid, as the log ratio it would show had it gone on sliding.
+
+    Between contacts the output stands still where the last stroke left it, :math:`y = y(\hat\Lambda) - s (\Lambda -
+    \hat\Lambda)`; so every block reads the friction exponent of the stroke before it.
+    """
+    kept_at, blocks, strokes = positive(recording), recording.blocks, recording.strokes
+    x, y = np.log(blocks.input_force[kept_at]), np.log(blocks.output_force[kept_at])
+    followed, (state, last) = _followed_in_parts(recording, kept_at, x, y)
+    inside = inside_phase(state)
+    kept = (last != 0) & inside
+    used, stroke = np.flatnonzero(kept_at)[kept], last[kept]
+    ratio = strokes.exponent - stroke * (y - followed)[kept]
+    force_in, force_out = blocks.input_force[used], blocks.output_force[used]
+    of_output_alone = np.where(state[kept] == 0, 1 + (force_out / force_in) ** 2, 1.0)
+    return _Part(used, stroke, ratio, worth_of(recording, used) * of_output_alone * standing_share(state)[kept])
+
+
+def _followed_in_parts(
+    recording: Recording, kept: np.ndarray, x: np.ndarray, y: np.ndarray
+) -> tuple[np.ndarray, np.ndarray]:
+    """The operator over the kept blocks, and the last contact up to each, started anew where the input was not known."""
+    starts = np.flatnonzero(np.append(True, restarts(input_saturated(recording))[kept][1:])[: len(x)])
+    strokes, followed, state = recording.strokes, np.zeros(len(x)), np.zeros(len(x), dtype=int)
+    last = np.zeros(len(x), dtype=int)
+    for start, stop in zip(starts, np.append(starts[1:], len(x))[: len(starts)], strict=True):
+        part = slice(start, stop)
+        followed[part], state[part] = play(x[part], strokes.exponent, float(y[start] + strokes.center))
+        last[part] = last_contact(state[part])
+    return followed, np.stack([state, last])
+
+
+def _rows(recordings: Recordings, parts: list[_Part], angles: Mapping[str, np.ndarray]) -> SlidingRows:
+    """Blocks of all recordings as rows of runs."""
+    of_recording = np.repeat(np.arange(len(parts)), [len(p.used) for p in parts])
+    runs = recordings.runs
+
+    def gathered(name: str) -> np.ndarray:
+        pairs = zip(recordings.each, parts, strict=True)
+        return np.concatenate([getattr(r.blocks, name)[p.used] for r, p in pairs])
+
+    run = np.array([runs.index(r.run) for r in recordings.each])[of_recording]
+    return SlidingRows(
+        gathered("input_force"),
+        gathered("output_force"),
+        np.concatenate([p.log_ratio for p in parts]),
+        np.concatenate([p.stroke for p in parts]).astype(int),
+        run,
+        gathered("velocity"),
+        np.concatenate([p.stroke * drift_of(r)[p.used] for r, p in zip(recordings.each, parts, strict=True)]),
+        np.concatenate([p.worth for p in parts]),
+        {name: angles[name][of_recording] for name in ROW_ARRAYS},
+    )

@@ -1,0 +1,1 @@
+"""Stretch of the rope under load."""

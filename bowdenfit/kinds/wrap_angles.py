@@ -1,0 +1,56 @@
+"""Do the tables of a data set fit its description?"""
+
+import numpy as np
+
+from bowdenfit.description import Contact, Description
+from bowdenfit.errors import DatasetError
+from bowdenfit.kinds.tables import EfficiencyTable, ForceTable, LoopTable, Measurements
+
+
+def check_measurements(description: Description, measurements: Measurements) -> None:
+    """Every row of every table can be given a wrap angle in every contact.
+
+    Raises:
+        DatasetError: One cannot; says which, and what to do.
+    """
+    for table in (measurements.efficiencies, measurements.forces, measurements.loop):
+        if table is None:
+            continue
+        for contact in description.contact:
+            if contact.wrap_angle.constant is None:
+                _check_contact(description, measurements, contact, table)
+
+
+def _check_contact(
+    description: Description,
+    measurements: Measurements,
+    contact: Contact,
+    table: EfficiencyTable | ForceTable | LoopTable,
+) -> None:
+    column = contact.wrap_angle.column or ""
+    own, _ = table.own.column(column)
+    if not contact.wrap_angle.curve:
+        missing = np.flatnonzero(np.isnan(own))
+        if len(missing) == len(own):
+            raise DatasetError(
+                f"{table.origin.files[0]} has no column {column!r}, the wrap angle of the contact {contact.name!r}; "
+                f"add it (as {column}_deg), or give the contact a constant angle or a curve in cable.toml."
+            )
+        if len(missing):
+            raise DatasetError(
+                f"{table.origin.place(int(missing[0]))}, column {column!r}: the cell is blank, but the contact "
+                f"{contact.name!r} has no curve that could stand in for it; fill in the measured angle."
+            )
+        return
+    route = description.route
+    assert route is not None and measurements.angles is not None  # the description guarantees both
+    outside = np.isnan(own) & ((table.route < route.range[0]) | (table.route > route.range[1]))
+    for i in np.flatnonzero(outside):
+        at = np.flatnonzero(measurements.angles.route == table.route[i])
+        if not len(at):
+            raise DatasetError(
+                f"{table.origin.place(int(i))}, column {route.variable!r}: {table.route[i]:g} {route.unit} lies outside "
+                f"the range {route.range[0]:g} to {route.range[1]:g} {route.unit} where the angle curves hold, and the "
+                f"angle table has no row there; measure the wrap angles at that {route.variable.replace('_', ' ')}, "
+                "or write them into this row."
+            )

@@ -1,1 +1,0 @@
-"""From files to validated arrays in N, mm, rad and s."""

@@ -1,0 +1,122 @@
+"""Small multiples of recordings: which are shown, in which panels, on which axes."""
+
+from collections.abc import Callable, Iterable, Sequence
+from typing import TYPE_CHECKING
+
+import numpy as np
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure
+from matplotlib.lines import Line2D
+
+from bowdenfit.plots.layout import TITLE, drop_unused, panels
+from bowdenfit.plots.style import MEDIUM, SMALL, WIDE
+
+if TYPE_CHECKING:
+    from bowdenfit.questions.summary.figure_data import FigureData, RecordedTrace
+
+MOST = 8  # recordings in a figure
+ALIKE = 4.0  # ranges share an axis if all of them together are so many times the shortest at most
+CHARACTER = 0.064  # in, width of one in a title
+LEGEND_MARK = 4.0  # pt
+
+
+def finite(values: Iterable[np.ndarray]) -> np.ndarray:
+    """All finite values in one row."""
+    row = np.concatenate([np.ravel(v) for v in values])
+    return row[np.isfinite(row)]
+
+
+def span(values: Iterable[np.ndarray], room: float = 0.05) -> tuple[float, float]:
+    """Limits that show all values with some room; 0 to 1 without any."""
+    row = finite(values)
+    if not len(row):
+        return 0.0, 1.0
+    low, high = float(row.min()), float(row.max())
+    margin = room * (high - low) if high > low else 0.05 * abs(high) or 0.5
+    return low - margin, high + margin
+
+
+def alike(spans: Sequence[tuple[float, float]]) -> bool:
+    """Whether ranges are so much alike that each can be read on an axis that shows them all."""
+    low, high = min(s[0] for s in spans), max(s[1] for s in spans)
+    return high - low <= ALIKE * min(s[1] - s[0] for s in spans)
+
+
+def set_limits(flat: list[Axes], spans: Sequence[tuple[float, float]], which: str, shared: bool) -> None:
+    """Limits of the "x" or "y" axes: each its own, or all the same."""
+    everywhere = (min(s[0] for s in spans), max(s[1] for s in spans))
+    for axes, own in zip(flat, spans, strict=True):
+        axes.set(**{f"{which}lim": everywhere if shared else own})
+
+
+def chosen(
+    data: "FigureData", shows: "Callable[[RecordedTrace], bool]"
+) -> "tuple[list[RecordedTrace], list[RecordedTrace]]":
+    """The recordings to draw, evenly from all that have what a figure shows, and all of these."""
+    every = [r for r in data.recordings if shows(r)]
+    places = np.linspace(0, len(every) - 1, min(len(every), MOST)).round().astype(int)
+    return [every[i] for i in places.tolist()], every
+
+
+def recording_panels(
+    names: Sequence[str], most_columns: int, height: float | None, share_x: bool, share_y: bool, page: float = MEDIUM
+) -> tuple[Figure, list[Axes], int]:
+    """A panel a recording under its name, in a grid without more columns than it needs.
+
+    Args:
+        names: Of the recordings.
+        most_columns: Panels in a row.
+        height: Of a panel [in]; None for square ones.
+        share_x, share_y: Whether all panels have the same axes.
+        page: Width of the page for a single column [in].
+    """
+    rows = -(-len(names) // most_columns)
+    columns = -(-len(names) // rows)
+    page = page if columns == 1 else WIDE
+    across, down = (0.16 if share_y else 0.42), TITLE + (0.08 if share_x else 0.2)
+    width = (page - 0.8 - across * (columns - 1)) / columns
+    heights = [width if height is None else height] * rows
+    figure, flat = panels(heights, columns, TITLE, (across, down), page, sharex=share_x, sharey=share_y)
+    flat = drop_unused(flat, len(names))
+    for axes, name in zip(flat, names, strict=True):
+        axes.set_title(short(name, int(width / CHARACTER)), fontsize=SMALL)
+    return figure, flat, columns
+
+
+def short(name: str, longest: int) -> str:
+    """The end of a name, which tells recordings of one folder apart."""
+    return name if len(name) <= longest else "\N{HORIZONTAL ELLIPSIS}" + name[1 - longest :]
+
+
+def label_outer(flat: list[Axes], columns: int, x_label: str, y_label: str) -> None:
+    """Names and units on the outer panels; a panel with nothing below it is an outer one."""
+    for i, axes in enumerate(flat):
+        if i % columns == 0:
+            axes.set_ylabel(y_label)
+        if i + columns >= len(flat):
+            axes.set_xlabel(x_label)
+            axes.tick_params(labelbottom=True)
+
+
+def say_how_many(axes: Axes, drawn: int, of: int) -> None:
+    """An entry of the legend that says so where not all recordings are drawn."""
+    if drawn < of:
+        axes.plot([], [], " ", label=f"{drawn} of {of} recordings shown")
+
+
+def enlarge_marks(figure: Figure) -> None:
+    """Make the small marks of many blocks large enough to be told apart in the legend."""
+    for handle in figure.legends[0].legend_handles:
+        if isinstance(handle, Line2D) and handle.get_linestyle() == "None":
+            handle.set_markersize(max(handle.get_markersize(), LEGEND_MARK))
+
+
+def extremes(values: np.ndarray, most: int) -> np.ndarray:
+    """Places of the lowest and the highest value in each of so many stretches, in order; all if there are few."""
+    size = -(-len(values) // most)
+    if size <= 2:
+        return np.arange(len(values))
+    padded = np.append(values, np.full(-len(values) % size, values[-1])).reshape(-1, size)
+    start = size * np.arange(len(padded))
+    places = np.concatenate([start + padded.argmin(axis=1), start + padded.argmax(axis=1)])
+    return np.unique(np.minimum(places, len(values) - 1))

@@ -1,0 +1,31 @@
+"""Writing a figure to a file, whole or not at all."""
+
+import os
+from pathlib import Path
+from typing import Any
+
+from matplotlib.figure import Figure
+
+from bowdenfit.plots.style import DOTS_PER_INCH, in_paper_style
+
+FORMATS = ("png", "svg")
+OPTIONS: dict[str, dict[str, Any]] = {
+    "png": {"pil_kwargs": {"compress_level": 2}},  # half the time of the usual 6, a tenth more bytes
+    "svg": {"metadata": {"Date": None}},
+}
+
+
+@in_paper_style
+def write(figure: Figure, path: Path) -> Path:
+    """Write one file under a temporary name and rename it; the same figure always gives the same bytes.
+
+    Whoever reads the folder meanwhile sees the old file or the new one, never half of one.
+    """
+    ending = path.suffix.removeprefix(".")
+    temporary = path.with_name(f".{path.name}.part")
+    try:
+        figure.savefig(temporary, format=ending, dpi=DOTS_PER_INCH, **OPTIONS.get(ending, {}))
+        os.replace(temporary, path)  # noqa: PTH105
+    finally:
+        temporary.unlink(missing_ok=True)
+    return path

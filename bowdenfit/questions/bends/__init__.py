@@ -1,0 +1,1 @@
+"""What do stretch, preload and loops do at a wrap angle?"""

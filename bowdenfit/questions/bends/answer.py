@@ -1,0 +1,323 @@
+"""Answers about stretch, preload and loops at wrap angles, with intervals: what `bowdenfit predict --quantity` prints."""
+
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass
+from functools import cached_property
+from typing import Any
+
+import jax
+import jax.numpy as jnp
+import numpy as np
+
+from bowdenfit.cable.elasticity import PRELOAD
+from bowdenfit.errors import UsageError
+from bowdenfit.inference.draws import for_each_draw
+from bowdenfit.inference.interval import Interval
+from bowdenfit.questions.bends.equations import Bent, bending_contact, knows_preload, knows_stretch
+from bowdenfit.results.record import Fit
+
+TAUT = 0.95  # probability with which the recommended preload keeps both sides taut
+_BENDS = 25  # wrap angles at which a range of bends is looked at
+_SHOWN = 5  # wrap angles of a summary
+
+
+@dataclass(frozen=True)
+class PreloadAnswer:
+    """Which preloads will do.
+
+    Args:
+        bends: Lowest and highest wrap angle that the cable is bent to [rad].
+        reference_angle: Wrap angle at which preloads are meant [rad]; NaN where preload is the same at all.
+        input_force: Largest input force against which both sides must stay taut [N].
+        friction: Limit of what may be felt in free motion [N]; infinite without one.
+        lowest: Lowest preload that keeps both sides taut [N].
+        highest: Highest preload that is felt as no more than the limit [N]; None without one.
+        best: Preload that keeps both sides taut with probability `TAUT`, and is felt least of those [N].
+        felt: What it is felt as in free motion, at the bend where that is most [N].
+        possible: Probability that some preload satisfies both; 1 without a limit.
+    """
+
+    bends: tuple[float, float]
+    reference_angle: float
+    input_force: float
+    friction: float
+    lowest: Interval
+    highest: Interval | None
+    best: float
+    felt: Interval
+    possible: float
+
+
+@dataclass(frozen=True)
+class Elastic:
+    """The elastic answers of one fit (`fit.elastic`). Angles are in rad, forces in N, lengths in mm."""
+
+    fit: Fit
+
+    @cached_property
+    def contact(self) -> int:
+        """Number of the contact that a wrap angle means."""
+        return bending_contact(self.fit.model)
+
+    def bent(self, wrap_angles: Sequence[float] | np.ndarray) -> Bent:
+        """The cable at wrap angles [rad].
+
+        Raises:
+            UsageError: A wrap angle does not say which of several contacts is bent.
+        """
+        with jax.enable_x64(True):
+            return Bent(self.fit.model, self.contact, jnp.asarray(np.atleast_1d(wrap_angles), dtype=float))
+
+    def stretched(self, wrap_angles: Sequence[float] | np.ndarray) -> Bent:
+        """The same for the stretch of a single rope, to which only all its bends together matter."""
+        model = self.fit.model
+        if model.cable.is_loop or len(model.description.contact) == 1:
+            return self.bent(wrap_angles)
+        with jax.enable_x64(True):
+            return Bent(model, None, jnp.asarray(np.atleast_1d(wrap_angles), dtype=float))
+
+    def over(self, function: Callable[..., Any], *data: Any) -> Any:
+        """A function of named values (and of data that are the same for all), for every draw, or for least squares alone."""
+        space, posterior = self.fit.model.space, self.fit.posterior
+        z = self.fit.least_squares.z[None] if posterior is None else posterior.flat_z
+        with jax.enable_x64(True):
+            return for_each_draw(
+                lambda one, *same: function(space.constrain(one), *same), space.size, *data, run_once=True
+            )(z)
+
+    @cached_property
+    def measured_bends(self) -> np.ndarray:
+        """Different wrap angles that anything was measured at [rad]."""
+        tables = self.fit.dataset.measurements
+        contact = self.fit.dataset.description.contact[self.contact]
+        column = contact.wrap_angle.column
+        found = [t.wrap_angle for t in (tables.stretch, tables.preload) if t is not None]
+        for table in (tables.loop, tables.forces, tables.efficiencies):
+            if table is not None and column is not None:
+                found.append(table.own.column(column)[0])
+        if contact.wrap_angle.constant is not None:
+            found.append(np.array([contact.wrap_angle.constant.to("angle")]))
+        if tables.recordings is not None and column is not None:
+            k = tables.recordings.columns.index(column)
+            found.append(np.array([r.own_angle[k] for r in tables.recordings.each]))
+        angles = np.concatenate(found) if found else np.zeros(0)
+        return np.unique(np.round(angles[np.isfinite(angles)], 9))
+
+    @property
+    def reference_force(self) -> float:
+        """Input force that answers are given for where none is stated [N]."""
+        return self.fit.model.cable.friction.conditions.reference_force
+
+    @property
+    def window_force(self) -> float:
+        """Force up to which a preload window asks for a taut return side: none where bending alone can make it slack [N]."""
+        return 0.0 if self.fit.dataset.description.preload_follows_stretch else self.reference_force
+
+    def efficiency(
+        self, wrap_angles: np.ndarray, input_force: float | None = None, preload: float | None = None
+    ) -> np.ndarray:
+        """Efficiency [1] of every draw (rows) at wrap angles (columns)."""
+        force = self.reference_force if input_force is None else input_force
+        return self.output_force(wrap_angles, force, 1, preload) / force
+
+    def output_force(
+        self, wrap_angles: np.ndarray, input_force: float, stroke: int = 1, preload: float | None = None
+    ) -> np.ndarray:
+        """Output force [N] of every draw (rows) at wrap angles (columns)."""
+        bent, force = self.bent(wrap_angles), float(input_force)
+        return self.over(lambda values: bent.output_force(values, jnp.asarray(force), float(stroke), preload))
+
+    def friction(self, wrap_angles: np.ndarray, preload: float | None = None) -> np.ndarray:
+        """Force felt in free motion [N], draws by wrap angles.
+
+        Raises:
+            UsageError: The cable has no preload, and none is stated.
+        """
+        self._needs_preload(preload)
+        bent = self.bent(wrap_angles)
+        return self.over(lambda values: bent.friction(values, preload))
+
+    def preload(self, wrap_angles: np.ndarray, preload: float | None = None) -> tuple[np.ndarray, np.ndarray]:
+        """Preload [N] and slack [mm], draws by wrap angles.
+
+        Raises:
+            UsageError: The cable has no preload, and none is stated.
+        """
+        self._needs_preload(preload)
+        bent = self.bent(wrap_angles)
+        return self.over(lambda values: bent.preload(values, preload))
+
+    def slack_load(self, wrap_angles: np.ndarray, preload: float | None = None) -> np.ndarray:
+        """Input force at which the return side of a loop goes slack [N], draws by wrap angles.
+
+        Raises:
+            UsageError: The cable has no preload, and none is stated.
+        """
+        self._needs_preload(preload)
+        bent = self.bent(wrap_angles)
+        return self.over(lambda values: bent.slack_load(values, preload))
+
+    def position(
+        self, wrap_angles: np.ndarray, input_force: float, preload: float | None = None
+    ) -> tuple[np.ndarray, np.ndarray]:
+        """Position error and lost motion at the load side [mm], stated backlash included, draws by wrap angles.
+
+        Raises:
+            UsageError: Nothing says how the rope stretches.
+        """
+        self._needs_stretch()
+        bent = self.stretched(wrap_angles)
+        error, lost = self.over(lambda values: bent.position(values, float(input_force), preload))
+        return error + self._backlash, lost + self._backlash
+
+    def tension(self, extensions: np.ndarray) -> np.ndarray:
+        """Tension [N] of the rope from its extension [mm], draws by extensions; 0 where it is slack.
+
+        Raises:
+            UsageError: Nothing says how the rope stretches.
+        """
+        self._needs_stretch()
+        extended, elastic = np.atleast_1d(np.asarray(extensions, dtype=float)), self.fit.model.cable.elasticity
+        return self.over(lambda values: elastic.tension(values, jnp.asarray(extended)))
+
+    def stiffness(self, wrap_angles: np.ndarray, load: float, preload: float | None = None) -> np.ndarray:
+        """Stiffness seen at the load side [N/mm], draws by wrap angles.
+
+        Raises:
+            UsageError: Nothing says how the rope stretches.
+        """
+        self._needs_stretch()
+        bent = self.stretched(wrap_angles)
+        return self.over(lambda values: bent.stiffness(values, float(load), preload))
+
+    def preload_window(
+        self, bends: tuple[float, float], input_force: float = 0.0, friction: float | None = None
+    ) -> PreloadAnswer:
+        """Lowest preload without slack over a range of bends, highest for a given friction, and the best.
+
+        Args:
+            bends: Lowest and highest wrap angle [rad].
+            input_force: Force up to which both sides must stay taut [N].
+            friction: What may be felt in free motion [N]; no limit if omitted.
+
+        Raises:
+            UsageError: The cable has no preload.
+        """
+        self._needs_preload(None)
+        bent = self.bent(np.linspace(*bends, _BENDS))
+        limit = np.inf if friction is None else friction
+
+        def answers(values: Mapping[str, Any]) -> tuple[Any, Any, Any]:
+            lowest = bent.lowest_preload(values, input_force)
+            felt = jnp.max(bent.friction(values, lowest))
+            return lowest, bent.highest_preload(values, min(limit, 1e9)), felt <= limit * (1 + 1e-9)
+
+        return self._window(bends, input_force, limit, *self.over(answers))
+
+    def _window(
+        self,
+        bends: tuple[float, float],
+        input_force: float,
+        limit: float,
+        lowest: np.ndarray,
+        highest: np.ndarray,
+        possible: np.ndarray,
+    ) -> PreloadAnswer:
+        """The answer that draws of the lowest and highest preload, and of whether the lowest will do, give.
+
+        With an infinite limit there is no highest.
+        """
+        bent, best = self.bent(np.linspace(*bends, _BENDS)), float(np.quantile(lowest, TAUT))
+        felt = self.over(lambda values, preload: jnp.max(bent.friction(values, preload)), np.array(best))
+        follows, limited = self.fit.dataset.description.preload_follows_stretch, np.isfinite(limit)
+        return PreloadAnswer(
+            bends,
+            self.fit.model.cable.elasticity.reference_angle if follows else float("nan"),
+            input_force,
+            limit,
+            Interval.of(lowest),
+            Interval.of(highest) if limited else None,
+            best,
+            Interval.of(felt),
+            float(np.mean(possible)) if limited else 1.0,
+        )
+
+    @cached_property
+    def usual(self) -> tuple[np.ndarray, dict[str, np.ndarray], PreloadAnswer | None]:
+        """What a summary shows, computed by one program: wrap angles [rad], draws by wrap angles, and the preload window.
+
+        The draws are of preload [N], friction [N], slack load [N], efficiency [1], position error and lost motion [mm],
+        stiffness [N/mm], as far as the cable has them.
+        """
+        bends, model, force = self.measured_bends, self.fit.model, self.reference_force
+        if not len(bends):
+            return bends, {}, None
+        shown = some_of(bends, _SHOWN)
+        preloaded, stretches, ends = knows_preload(model), knows_stretch(model), (float(bends[0]), float(bends[-1]))
+        bent, every = self.bent(shown), self.bent(np.linspace(*ends, _BENDS))
+        under = self.window_force
+
+        def answers(values: Mapping[str, Any]) -> dict[str, Any]:
+            found = {"efficiency": bent.output_force(values, jnp.asarray(force)) / force}
+            if preloaded:
+                found |= {"preload": bent.preload(values)[0], "friction": bent.friction(values)}
+                found["lowest"] = every.lowest_preload(values, under)
+            if preloaded and model.cable.is_loop:
+                found["slack_load"] = bent.slack_load(values)
+            if stretches:
+                found["position_error"], found["lost_motion"] = bent.position(values, force)
+                found["stiffness"] = bent.stiffness(values, force)
+            return found
+
+        draws = self.over(answers)
+        lowest = draws.pop("lowest", None)
+        if lowest is None or len(bends) == 1:
+            return shown, self._with_backlash(draws), None
+        return shown, self._with_backlash(draws), self._window(ends, under, np.inf, lowest, lowest, lowest)
+
+    def _with_backlash(self, draws: dict[str, np.ndarray]) -> dict[str, np.ndarray]:
+        moved = {name: draws[name] + self._backlash for name in ("position_error", "lost_motion") if name in draws}
+        return draws | moved
+
+    @property
+    def _backlash(self) -> float:
+        stated = self.fit.dataset.description.cable.backlash
+        return stated.to("length") if stated is not None else 0.0
+
+    def _needs_preload(self, stated: float | None) -> None:
+        if stated is None and not knows_preload(self.fit.model):
+            raise UsageError(
+                "nothing measured on this cable says what its preload is; state one with --preload 20N, or add a table of "
+                "preload, or of the loop, to cable.toml."
+            )
+
+    def _needs_stretch(self) -> None:
+        if not knows_stretch(self.fit.model):
+            raise UsageError(
+                "nothing measured on this cable says how its rope stretches; add a table of stretch under load to cable.toml."
+            )
+
+
+def has_elastic_answers(fit: Fit) -> bool:
+    """Whether a fit says anything of stretch or preload."""
+    return knows_stretch(fit.model) or knows_preload(fit.model)
+
+
+def some_of(values: np.ndarray, most: int) -> np.ndarray:
+    """So many of the values at most, from the first to the last."""
+    return values[np.unique(np.linspace(0, len(values) - 1, most).round().astype(int))] if len(values) else values
+
+
+def friction_arm(fit: Fit) -> tuple[float, str]:
+    """Radius that turns friction into what is felt [mm] and the unit of that; 1 and N without a radius."""
+    radius = fit.dataset.description.cable.output_pulley_radius
+    return (radius.to("length"), "N*mm") if radius is not None else (1.0, "N")
+
+
+def typical_preload(fit: Fit) -> float:
+    """Preload by least squares, or the median of its prior where the measurements do not tell it [N]."""
+    estimate = fit.least_squares.estimates[PRELOAD].value
+    if np.isfinite(estimate):
+        return float(estimate)
+    prior = next(p.prior for p in fit.model.space.free if p.name == PRELOAD)
+    return float(np.asarray(prior.constrain(np.zeros(1)))[0])

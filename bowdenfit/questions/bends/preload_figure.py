@@ -1,0 +1,81 @@
+"""Preload between fixed ends against the wrap angle, and where bending lets the rope go slack."""
+
+from typing import TYPE_CHECKING
+
+import numpy as np
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure
+
+from bowdenfit.plots.bands import draw_quantiles, name_band
+from bowdenfit.plots.layout import legend_above, panels
+from bowdenfit.plots.panels import span
+from bowdenfit.plots.style import BLACK, BLUE, LEAST_SQUARES, LIGHT, MEDIAN, MEDIUM, WRAP_ANGLE, in_paper_style, percent
+
+if TYPE_CHECKING:
+    from bowdenfit.questions.bends.figure_data import PreloadCurve
+    from bowdenfit.questions.summary.figure_data import FigureData
+
+DARK = "#C4C4C4"
+PERHAPS, RATHER = 0.05, 0.5  # probabilities of being slack from which on a region is shaded lightly and darkly
+PLACES = 2001  # along the wrap angle, for the ends of the regions
+
+
+def has_preload(data: "FigureData") -> bool:
+    """Whether preload depends on the wrap angle."""
+    return data.elastic.preload is not None
+
+
+@in_paper_style
+def preload(data: "FigureData") -> Figure:
+    """Preload [N] against the wrap angle [deg], and below it the slack [mm] where there is any."""
+    curve = data.elastic.preload
+    assert curve is not None
+    ever_slack = bool(np.max(curve.slack) > 0)
+    figure, flat = panels([2.2, 0.9] if ever_slack else [2.6], 1, 0.02, (0, 0.16), MEDIUM, sharex=True)
+    _preload(flat[0], curve)
+    if ever_slack:
+        draw_quantiles(flat[1], curve.wrap_angle, curve.slack, BLUE)
+        _from_zero(flat[1], "Slack (mm)", curve.slack)
+    for axes in flat:
+        _shade_slack(axes, curve)
+    flat[-1].set_xlabel(WRAP_ANGLE)
+    flat[-1].set_xlim(*span([curve.wrap_angle, curve.points_wrap_angle], room=0.02))
+    legend_above(figure, flat, columns=2)
+    return figure
+
+
+def _preload(axes: Axes, curve: "PreloadCurve") -> None:
+    """The curve and the readings."""
+    name = MEDIAN if len(curve.preload) > 1 else LEAST_SQUARES
+    draw_quantiles(axes, curve.wrap_angle, curve.preload, BLUE, label=name)
+    name_band(axes, curve.preload, BLUE)
+    if len(curve.points_wrap_angle):
+        axes.plot(curve.points_wrap_angle, curve.points_preload, "o", color=BLACK, zorder=3, label="Reading")
+    _from_zero(axes, "Preload (N)", curve.preload, curve.points_preload)
+
+
+def _from_zero(axes: Axes, label: str, *values: np.ndarray) -> None:
+    """An axis from just below zero, so that a line on it is seen, to above everything."""
+    highest = span([np.zeros(1), *values])[1]
+    axes.set_ylim(-0.03 * highest, highest)
+    axes.locator_params(axis="y", nbins=5 if axes.get_position().height < 0.3 else 7)
+    axes.set_ylabel(label)
+
+
+def _shade_slack(axes: Axes, curve: "PreloadCurve") -> None:
+    """Where the rope is slack in most draws, and where in some."""
+    angle = np.linspace(curve.wrap_angle.min(), curve.wrap_angle.max(), PLACES)
+    order = np.argsort(curve.wrap_angle)
+    share = np.interp(angle, curve.wrap_angle[order], curve.slack_probability[order])
+    some = f"Slack in {percent(PERHAPS)} to {percent(RATHER)} of the draws"
+    most = f"Slack in more than {percent(RATHER)} of them" if len(curve.preload) > 1 else "Slack"
+    regions = (((share >= PERHAPS) & (share <= RATHER), LIGHT, some), (share > RATHER, DARK, most))
+    for here, color, label in regions if len(curve.preload) > 1 else regions[1:]:
+        for start, stop in stretches(here):
+            axes.axvspan(angle[start], angle[stop], facecolor=color, linewidth=0, zorder=0.4, label=label)
+
+
+def stretches(here: np.ndarray) -> list[tuple[int, int]]:
+    """First and last place of each stretch of true values, in order."""
+    steps = np.flatnonzero(np.diff(np.concatenate([[False], here, [False]]).astype(int)))
+    return [(int(a), int(b) - 1) for a, b in steps.reshape(-1, 2)]

@@ -1,0 +1,92 @@
+"""The results folder of a calibration: one line a replication, written as it ends, so that nothing is lost."""
+
+import json
+import shutil
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Any
+
+from bowdenfit.errors import StoreError
+from bowdenfit.questions.calibrate.replication import Replication
+from bowdenfit.results.folder import FIGURES, SUMMARY_TEXT
+
+REPLICATIONS, CALIBRATION = "replications.jsonl", "calibration.json"
+_WHAT = {"description": "the description", "sha256": "an input file", "seed": "the seed", "assumed": "what is assumed"}
+
+
+def begun(folder: Path, fingerprint: Mapping[str, Any], resume: bool, force: bool) -> dict[int, Replication]:
+    """The replications that a folder holds already, in a folder that is ready for more.
+
+    Args:
+        folder: The results folder.
+        fingerprint: What is calibrated, with its seed.
+        resume: Whether to go on with what is there.
+        force: Whether to replace it.
+
+    Raises:
+        StoreError: The folder holds something else, or what it holds was made of something else.
+    """
+    path = folder / REPLICATIONS
+    if resume:
+        return _resumed(path, fingerprint)
+    if path.exists() and not force:
+        raise StoreError(f"{folder} holds a calibration already; go on with --resume, or start over with --force.")
+    if folder.exists() and not path.exists() and any(folder.iterdir()):
+        raise StoreError(f"{folder} exists and holds no calibration; name another with --output.")
+    _clear(folder)
+    try:
+        folder.mkdir(parents=True, exist_ok=True)
+        path.write_text(json.dumps(dict(fingerprint)) + "\n", encoding="utf-8")
+    except OSError as error:
+        raise StoreError(f"{folder} cannot be written ({error}); name another folder with --output.") from None
+    return {}
+
+
+def _clear(folder: Path) -> None:
+    """Remove what an earlier calibration wrote, and nothing else."""
+    for name in (CALIBRATION, SUMMARY_TEXT, REPLICATIONS):
+        (folder / name).unlink(missing_ok=True)
+    if (folder / FIGURES).is_dir():
+        shutil.rmtree(folder / FIGURES)
+
+
+def seed_of(folder: Path) -> int:
+    """The seed of the calibration in a folder.
+
+    Raises:
+        StoreError: There is none.
+    """
+    return int(_lines(folder / REPLICATIONS)[0]["seed"])
+
+
+def _resumed(path: Path, fingerprint: Mapping[str, Any]) -> dict[int, Replication]:
+    before, *pages = _lines(path)
+    changed = [name for name in _WHAT if before.get(name) != fingerprint[name]]
+    if changed:
+        raise StoreError(
+            f"{path.parent} cannot be resumed because {_WHAT[changed[0]]} changed since; undo the change, or start over with "
+            "--force."
+        )
+    # A line that was being written when the program was stopped is made again.
+    path.write_text("".join(json.dumps(line) + "\n" for line in (before, *pages)), encoding="utf-8")
+    found = [Replication.of_page(page) for page in pages]
+    return {each.number: each for each in found}
+
+
+def _lines(path: Path) -> list[dict[str, Any]]:
+    """The whole lines of a file of replications, the fingerprint first."""
+    if not path.exists():
+        raise StoreError(f"{path.parent} holds no calibration to resume; leave --resume out.")
+    text = path.read_text(encoding="utf-8")
+    whole = text[: text.rfind("\n") + 1].splitlines()
+    try:
+        lines = [json.loads(line) for line in whole]
+        return [lines[0], *({**page, "redrawn": page["redrawn"]} for page in lines[1:])]
+    except (json.JSONDecodeError, IndexError, KeyError, TypeError):
+        raise StoreError(f"{path} is damaged and cannot be resumed; start over with --force.") from None
+
+
+def keep(folder: Path, replication: Replication) -> None:
+    """Add a finished replication."""
+    with (folder / REPLICATIONS).open("a", encoding="utf-8") as file:
+        file.write(json.dumps(replication.page()) + "\n")

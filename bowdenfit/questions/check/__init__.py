@@ -1,0 +1,1 @@
+"""Do data set and fit make sense, reading by reading?"""

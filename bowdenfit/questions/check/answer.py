@@ -1,0 +1,230 @@
+"""Checks of a fit against its own readings: outliers, readings that decide by themselves, trends, and weight of the priors."""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from bowdenfit.inference.predictive_checks import (
+    RELIABLE_K,
+    LeftOut,
+    Uniformity,
+    left_out_readings,
+    placed_at_random,
+    uniformity,
+)
+from bowdenfit.inference.prior_sensitivity import SENSITIVE, Sensitivity, sensitivities
+from bowdenfit.model import Term
+from bowdenfit.questions.check.residual_places import STROKE, Places, places_of
+from bowdenfit.results.record import Draws, Fit
+
+FALSE_ALARM = 0.01  # chance that a healthy fit is said to have an outlier; the same for the other kinds of alarm
+_LEAST_READINGS = 8  # of a table, below which neither its distribution nor a trend can be judged
+_CONFLICT = 2.0  # prior standard deviations from the prior's median to the posterior, beyond which the two are at odds
+_DRAWS = 5000  # that sensitivity to the priors is worked out from
+_STREAM = 5  # of the fit's random numbers
+
+
+@dataclass(frozen=True)
+class TableChecks:
+    """Readings of one table, each beside what everything else says of it.
+
+    Args:
+        table: Name of the readings in results.
+        unit: Their unit.
+        labels: Each in words.
+        reading: The readings; the bound of those that are only known to be at most so.
+        at_most: Whether a reading is such a bound.
+        predicted: Each reading's prediction without itself.
+        places: Where each was taken.
+        probability: Where each lies in its prediction, uniform between 0 and 1 if all is right.
+        uniformity: Whether these are uniform; None of few readings.
+    """
+
+    table: str
+    unit: str
+    labels: tuple[str, ...]
+    reading: np.ndarray
+    at_most: np.ndarray
+    predicted: LeftOut
+    places: Places
+    probability: np.ndarray
+    uniformity: Uniformity | None
+
+    @property
+    def z_score(self) -> np.ndarray:
+        """Deviations from the predictions in their standard deviations; NaN of a bound."""
+        return np.where(self.at_most, np.nan, (self.reading - self.predicted.mean) / self.predicted.sd)
+
+    @property
+    def chance(self) -> np.ndarray:
+        """Probability of a deviation as large, of each reading; where the weights fail, as if predictions were normal.
+
+        Weights that lean on few draws leave much of the reading's own effect in its prediction, which is then too wide.
+        """
+        from scipy.stats import norm
+
+        as_normal = 2 * norm.sf(np.abs(np.nan_to_num(self.z_score)))
+        failing = ~(self.predicted.pareto_k <= RELIABLE_K)
+        return np.where(failing, np.minimum(as_normal, self.predicted.tail), self.predicted.tail)
+
+
+@dataclass(frozen=True)
+class Trend:
+    """A way in which the deviations of a table depend on where its readings were taken.
+
+    Args:
+        table: Name of the readings.
+        group: Contact or the like that they belong to; empty where all are of one kind.
+        against: Axis label of what they depend on.
+        shape: What they do, such as "grow" or "are higher at both ends".
+        chance: Probability of as much by chance.
+    """
+
+    table: str
+    group: str
+    against: str
+    shape: str
+    chance: float
+
+
+@dataclass(frozen=True)
+class Checks:
+    """All checks of a fit.
+
+    Args:
+        tables: By table; held forces, which only bound the friction, are not among them.
+        trends: Deviations that depend on where readings were taken, beyond what chance does.
+        sensitivities: Of friction coefficients and design answers to priors and readings.
+    """
+
+    tables: tuple[TableChecks, ...]
+    trends: tuple[Trend, ...]
+    sensitivities: tuple[Sensitivity, ...]
+
+    @property
+    def n_readings(self) -> int:
+        """Number of readings that were predicted."""
+        return sum(len(table.labels) for table in self.tables)
+
+    @property
+    def outliers(self) -> list[tuple[TableChecks, int]]:
+        """Readings so far out that chance does as much in one healthy fit of a hundred, the farthest first."""
+        found = [(t, i) for t in self.tables for i in np.flatnonzero(t.chance * self.n_readings < FALSE_ALARM).tolist()]
+        return sorted(found, key=lambda item: float(item[0].chance[item[1]]))
+
+    @property
+    def decisive(self) -> list[tuple[TableChecks, int]]:
+        """Readings without which the fit would be a markedly different one, the most decisive first."""
+        found = [(t, i) for t in self.tables for i in np.flatnonzero(~(t.predicted.pareto_k <= RELIABLE_K)).tolist()]
+        return sorted(found, key=lambda item: -float(item[0].predicted.pareto_k[item[1]]))
+
+    @property
+    def outside(self) -> list[tuple[TableChecks, int]]:
+        """Readings taken outside the range in which the curves hold."""
+        return [(t, i) for t in self.tables for i in np.flatnonzero(~t.places.inside).tolist()]
+
+    @property
+    def conflicts(self) -> list[Sensitivity]:
+        """Quantities that a prior and the readings pull to different values."""
+        return [s for s in self.sensitivities if diagnosis(s) == "conflict"]
+
+
+def diagnosis(found: Sensitivity) -> str:
+    """What a sensitivity means: "readings decide", "prior decides", "conflict", or "both count"."""
+    if not found.prior > SENSITIVE:
+        return "readings decide"
+    if not found.likelihood > SENSITIVE:
+        return "prior decides"
+    return "conflict" if abs(found.prior_sds) > _CONFLICT else "both count"
+
+
+def checks_of(fit: Fit) -> Checks | None:
+    """All checks of a fit; None without draws."""
+    if fit.posterior is None:
+        return None
+    terms = [t for t in fit.model.terms if t.labels and t.residual_blocks[0][1] > 0]
+    generator = np.random.default_rng([fit.provenance.seed, _STREAM])
+    tables = tuple(_table(fit, fit.posterior, term, 1 - FALSE_ALARM / len(terms), generator) for term in terms)
+    return Checks(tables, trends_of(tables), _sensitivities(fit, fit.posterior))
+
+
+def _table(
+    fit: Fit, posterior: Draws, term: Term, probability: float, generator: np.random.Generator
+) -> TableChecks:
+    n = len(term.labels)
+    log_likelihood, replicated = (
+        part[term.name].reshape(-1, n) for part in (posterior.log_likelihood, posterior.replicated)
+    )
+    reading, at_most = readings_of(term)
+    predicted = left_out_readings(log_likelihood, replicated, reading, at_most, effective_draws(posterior))
+    placed = placed_at_random(predicted, generator)
+    uniform = uniformity(placed, probability) if n >= _LEAST_READINGS else None
+    places = places_of(fit.dataset, term)
+    return TableChecks(term.name, term.unit, term.labels, reading, at_most, predicted, places, placed, uniform)
+
+
+def readings_of(term: Term) -> tuple[np.ndarray, np.ndarray]:
+    """Readings of a table, with the limit in place of those that are only known to lie below it, and which those are."""
+    reading, limit = term.observed().copy(), term.data.get("limit", np.zeros(0))
+    at_most = np.isnan(reading)
+    reading[at_most] = np.rad2deg(limit)
+    bounds = len(term.data.get("at_most", ()))
+    if bounds:
+        at_most[len(at_most) - bounds :] = True
+    return reading, at_most
+
+
+def effective_draws(posterior: Draws) -> float:
+    """Effective number of the draws, by the worst quantity."""
+    return min((d.ess_bulk for d in posterior.diagnostics.values()), default=float(posterior.z[..., 0].size))
+
+
+def trends_of(tables: tuple[TableChecks, ...]) -> tuple[Trend, ...]:
+    """Dependences of the deviations on where readings were taken, beyond what chance makes in one healthy fit of a hundred.
+
+    Args:
+        tables: Readings beside their predictions.
+    """
+    looked_at = [
+        trend for table in tables for group in dict.fromkeys(table.places.group) for trend in _looked(table, group)
+    ]
+    return tuple(trend for trend in looked_at if trend.chance * len(looked_at) < FALSE_ALARM)
+
+
+def _looked(table: TableChecks, group: str) -> list[Trend]:
+    """Rank correlation of deviations with each place, with the distance from its middle, and with the stroke."""
+    used = ~table.at_most & np.array([g == group for g in table.places.group])
+    if used.sum() < _LEAST_READINGS:
+        return []
+    z, back, found = table.z_score[used], table.places.back[used].astype(float), []
+    for against, numbers in table.places.numbers.items():
+        x = numbers[used]
+        off_middle = np.abs(x - (x.min() + x.max()) / 2)
+        found.append(_trend(table, group, against, x, z, ("grow", "fall")))
+        found.append(
+            _trend(table, group, against, off_middle, z, ("are higher at both ends", "are lower at both ends"))
+        )
+    if 3 <= back.sum() <= len(back) - 3:
+        found.append(_trend(table, group, STROKE, back, z, ("are higher on the way back", "are lower on the way back")))
+    return [trend for trend in found if np.isfinite(trend.chance)]
+
+
+def _trend(table: TableChecks, group: str, against: str, x: np.ndarray, z: np.ndarray, words: tuple[str, str]) -> Trend:
+    from scipy.stats import spearmanr
+
+    if np.ptp(x) == 0:
+        return Trend(table.table, group, against, "", float("nan"))
+    correlation, chance = spearmanr(x, z)
+    return Trend(table.table, group, against, words[int(correlation < 0)], float(chance))
+
+
+def _sensitivities(fit: Fit, posterior: Draws) -> tuple[Sensitivity, ...]:
+    """Of the free friction coefficients and the design answers."""
+    space = fit.model.space
+    every = max(1, posterior.z[..., 0].size // _DRAWS)
+    names = [p.name for p in space.free if p.role == "friction"]
+    quantities = {name: posterior.values[name] for name in names} | posterior.optimum
+    thinned = {name: draws[:, ::every] for name, draws in quantities.items() if np.ptp(draws) > 0}
+    z = {p.name: posterior.z[:, ::every, i] for i, p in enumerate(space.free)}
+    log_likelihood = sum((np.sum(part, axis=-1) for part in posterior.log_likelihood.values()), np.zeros(()))
+    return sensitivities(thinned, z, log_likelihood[:, ::every]) if thinned else ()

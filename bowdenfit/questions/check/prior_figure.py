@@ -1,0 +1,99 @@
+"""What the priors alone hold possible, beside what was measured."""
+
+from typing import TYPE_CHECKING
+
+import numpy as np
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure
+
+from bowdenfit.plots.layout import TITLE, drop_unused, legend_above, panels
+from bowdenfit.plots.style import BLACK, BLUE, EFFICIENCY, SERIES_MARKERS, VERMILLION, WIDE_INTERVAL, in_paper_style
+
+if TYPE_CHECKING:
+    from bowdenfit.questions.check.figure_data import PriorPredictive, PriorTable
+
+ROW, COLUMNS = 1.9, 2  # in; panels in a row
+WIDEST = "99 % interval by the priors"
+WITHIN, WIDE_RANGE = (
+    0.01,
+    20.0,
+)  # of the axis, that counts as one place; times the readings, beyond which scales are wide
+SHIFT = 0.006  # of the axis, between contacts whose readings would hide each other
+
+
+@in_paper_style
+def prior_predictive(data: "PriorPredictive") -> Figure:
+    """Efficiency along the route by the priors, and a panel for each table with its readings."""
+    n = len(data.tables) + (data.efficiency is not None)
+    rows = -(-n // COLUMNS)
+    figure, flat = panels([ROW] * rows, COLUMNS, TITLE, (0.7, 0.78))
+    flat = drop_unused(flat, n)
+    for axes, table in zip(flat, data.tables, strict=False):
+        _readings(axes, table)
+    if data.efficiency is not None:
+        _efficiency(flat[-1], data)
+    legend_above(figure, flat, columns=4)
+    return figure
+
+
+def _readings(axes: Axes, table: "PriorTable") -> None:
+    """Intervals by the priors wherever readings were taken, and what was read."""
+    span = float(np.ptp(table.numbers)) or 1.0
+    groups = list(dict.fromkeys(table.group))
+    for i, group in enumerate(groups):
+        mine = np.array([g == group for g in table.group])
+        shift = SHIFT * span * (i - (len(groups) - 1) / 2)
+        at, low, lower, upper, high = _intervals(table.numbers[mine], table.quantiles[:, mine], WITHIN * span)
+        axes.vlines(at + shift, low, high, color=BLUE, linewidth=0.8, alpha=0.7, label=WIDEST)
+        axes.vlines(at + shift, lower, upper, color=BLUE, linewidth=3.2, alpha=0.35, label=WIDE_INTERVAL)
+        name, marker = group.replace("_", " ") or "Measured", SERIES_MARKERS[i % 8] if len(groups) > 1 else "o"
+        x, reading, out = table.numbers[mine] + shift, table.reading[mine], table.outside[mine]
+        axes.plot(x[~out], reading[~out], marker, color=BLACK, markersize=3.4, zorder=3, label=name)
+        if (out & np.isfinite(reading)).any():
+            axes.plot(
+                x[out], reading[out], marker, color=VERMILLION, markersize=4.2, zorder=3, label="Measured, outside"
+            )
+    _scale(axes, table)
+    axes.set_title(table.name.capitalize())
+    axes.set(xlabel=table.place, ylabel=table.label)
+
+
+def _intervals(numbers: np.ndarray, quantiles: np.ndarray, within: float) -> tuple[np.ndarray, ...]:
+    """Where readings were taken, each place once, and the intervals there that hold those of all its readings."""
+    order = np.argsort(numbers)
+    starts = np.flatnonzero(np.append(True, np.diff(numbers[order]) > within))
+    low, lower, _, upper, high = quantiles[:, order]
+    least, most = np.minimum.reduceat, np.maximum.reduceat
+    at = np.add.reduceat(numbers[order], starts) / np.diff(np.append(starts, len(order)))
+    return at, least(low, starts), least(lower, starts), most(upper, starts), most(high, starts)
+
+
+def _scale(axes: Axes, table: "PriorTable") -> None:
+    """An axis that shows every reading and all 90 % intervals; logarithmic beyond the readings where these are wide."""
+    read = table.reading[np.isfinite(table.reading)]
+    shown = np.concatenate([read, table.quantiles[1], table.quantiles[3]])
+    low, high = float(shown.min()), float(shown.max())
+    typical = float(np.median(np.abs(read))) if len(read) else 0.0
+    if table.label == EFFICIENCY:
+        axes.set_ylim(min(0.0, low), max(100.0, 1.05 * high))
+    elif typical > 0 and max(abs(low), abs(high)) > WIDE_RANGE * typical:
+        axes.set_yscale("symlog", linthresh=10.0 ** np.ceil(np.log10(typical)), linscale=1.5)
+        axes.set_ylim(2 * low if low < 0 else 0.0, 2 * high)
+    else:
+        room = 0.08 * (high - low) or 0.5
+        axes.set_ylim(low - room, high + room)
+
+
+def _efficiency(axes: Axes, data: "PriorPredictive") -> None:
+    """Efficiency against the route."""
+    assert data.efficiency is not None and data.route is not None  # the caller looked
+    low, lower, median, upper, high = data.efficiency
+    axes.fill_between(data.route, low, high, color=BLUE, alpha=0.12, linewidth=0)
+    axes.fill_between(data.route, lower, upper, color=BLUE, alpha=0.22, linewidth=0)
+    axes.plot(data.route, median, color=BLUE)
+    for table in data.tables:
+        if table.label == EFFICIENCY and table.place == data.route_label:
+            axes.plot(table.numbers, table.reading, "o", color=BLACK, markersize=3.6, zorder=3)
+    axes.set_ylim(0, 100)
+    axes.set_title("Efficiency of the cable")
+    axes.set(xlabel=data.route_label, ylabel=EFFICIENCY)

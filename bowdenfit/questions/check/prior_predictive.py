@@ -1,0 +1,83 @@
+"""What the priors alone hold possible, beside what was measured: the check to make before a fit."""
+
+from typing import Any
+
+import jax
+import jax.numpy as jnp
+import numpy as np
+from jax import Array
+
+from bowdenfit.dataset import Dataset
+from bowdenfit.inference.draws import for_each_draw
+from bowdenfit.inference.log_density import LogDensity
+from bowdenfit.model import EFFICIENCY_TERMS, Model, Term, build_model
+from bowdenfit.questions.check.answer import readings_of
+from bowdenfit.questions.check.figure_data import PriorPredictive, PriorTable
+from bowdenfit.questions.check.figure_tables import TABLE_NAMES
+from bowdenfit.questions.check.residual_places import places_of
+from bowdenfit.results.optimum import route_grid
+
+QUANTILES = (0.005, 0.05, 0.5, 0.95, 0.995)
+_DRAWS = 4096
+_AXES = {
+    "wrap_angle": "Wrap angle (deg)",
+    "held_ratio": "Input over output force",
+    "recorded_loss": "Force lost (N)",
+    "stretch": "Stretch (mm)",
+    "measured_preload": "Preload (N)",
+    "loop_output_force": "Output force (N)",
+} | dict.fromkeys(EFFICIENCY_TERMS, "Efficiency (%)")
+
+
+def prior_predictive(dataset: Dataset, seed: int = 0) -> PriorPredictive:
+    """Readings and efficiencies that the priors of a data set hold possible, without a fit.
+
+    Needs 64-bit floats: `jax.enable_x64(True)`.
+
+    Args:
+        dataset: The data set.
+        seed: Seed of the draws from the priors.
+    """
+    model = build_model(dataset)
+    drawn = _drawn(model, np.random.default_rng(seed).standard_normal((_DRAWS, model.space.size)), seed)
+    tables = tuple(_table(dataset, term, drawn["readings"][term.name]) for term in model.terms if term.labels)
+    name, route = dataset.description.name, dataset.description.route
+    if route is None:
+        return PriorPredictive(name, tables)
+    return PriorPredictive(name, tables, route.label, route_grid(model), 100 * _quantiles(drawn["efficiency"]))
+
+
+def _drawn(model: Model, z: np.ndarray, seed: int) -> dict[str, Any]:
+    """Readings of every table, and efficiencies along the route, of every draw (rows)."""
+    key, data = jax.random.key(seed), LogDensity(model).data
+    route = None if model.description.route is None else jnp.asarray(route_grid(model))
+
+    def implied(z_and_number: Array, data: Any) -> dict[str, Any]:
+        values = model.space.constrain(z_and_number[:-1])
+        keys = jax.random.split(jax.random.fold_in(key, z_and_number[-1].astype(jnp.uint32)), max(len(data), 1))
+        terms = zip(model.terms, data, keys, strict=False)
+        readings = {t.name: t.simulate(values, d, k) for t, d, k in terms}
+        return {"readings": readings} | (
+            {} if route is None else {"efficiency": model.cable.efficiency_at(values, route)}
+        )
+
+    program = for_each_draw(implied, model.space.size + 1, data, run_once=True)
+    return program(np.column_stack([z, np.arange(len(z), dtype=float)]))
+
+
+def _quantiles(draws: np.ndarray) -> np.ndarray:
+    return np.nanquantile(np.where(np.isfinite(draws), draws, np.nan), QUANTILES, axis=0)
+
+
+def _table(dataset: Dataset, term: Term, drawn: np.ndarray) -> PriorTable:
+    """One table's readings beside their quantiles; a reading that is only a bound is outside where it is too low for them."""
+    scale = 100.0 if term.name in EFFICIENCY_TERMS else 1.0
+    reading, at_most = readings_of(term)
+    quantiles, reading = scale * _quantiles(drawn), scale * reading
+    outside = (reading < quantiles[0]) | (~at_most & (reading > quantiles[-1]))
+    places = places_of(dataset, term)
+    place, numbers = next(iter(places.numbers.items()))
+    return PriorTable(
+        TABLE_NAMES.get(term.name, term.name), _AXES.get(term.name, term.name), numbers, place, places.group,
+        term.labels, np.where(at_most, np.nan, reading), quantiles, outside,
+    )  # fmt: skip

@@ -1,0 +1,1 @@
+"""Which of several models predicts the measurements best?"""

@@ -1,0 +1,230 @@
+"""Several fits of the same measurements side by side."""
+
+from collections.abc import Callable, Mapping
+from dataclasses import asdict, dataclass
+from typing import Any
+
+import numpy as np
+
+from bowdenfit.cable.load_cells import RUN_SCATTER
+from bowdenfit.errors import UsageError
+from bowdenfit.inference.comparison import Difference, Prediction, differences, stacking_weights
+from bowdenfit.inference.interval import Interval
+from bowdenfit.inference.leave_one_out import Readings, leave_one_out
+from bowdenfit.inference.log_density import LogDensity as Density
+from bowdenfit.questions.compare.common_readings import ANGLES, Common, Omitted, common_readings
+from bowdenfit.questions.recorded.rate import RateEffect, rate_effect
+from bowdenfit.results.record import Draws, Fit
+
+_SHOWN_ROLES = {"friction", "friction_model", "sensor"}
+_OF_RUNS = {"run_efficiency", "recorded_efficiency"}  # tables whose readings are whole runs
+Report = Callable[[str], None]
+
+
+@dataclass(frozen=True)
+class ComparedParameter:
+    """A parameter of several fits.
+
+    Args:
+        symbol: For figures.
+        unit: "1" where there is none.
+        by_fit: Its value and uncertainty in each fit that has it.
+    """
+
+    symbol: str
+    unit: str
+    by_fit: dict[str, Interval]
+
+
+@dataclass(frozen=True)
+class Comparison:
+    """What sets several fits apart.
+
+    Args:
+        differences: How well each predicts readings left out, the best first.
+        weights: Of each in the mixture of all that predicts best.
+        predictions: Of each, reading by reading.
+        omitted: Readings that the fits do not share.
+        described: What each assumes, in words.
+        parameters: Coefficients and the like, by parameter and fit.
+        optimal_length: Of each fit with a route, with its unit.
+        rate_effects: Of the fits in which friction may depend on speed.
+    """
+
+    differences: dict[str, Difference]
+    weights: dict[str, float]
+    predictions: dict[str, Prediction]
+    omitted: tuple[Omitted, ...]
+    described: dict[str, str]
+    parameters: dict[str, ComparedParameter]
+    optimal_length: dict[str, tuple[Interval, str]]
+    rate_effects: dict[str, RateEffect]
+
+    @property
+    def best(self) -> str:
+        """The fit that predicts best."""
+        return next(iter(self.differences))
+
+    @property
+    def readings(self) -> tuple[tuple[str, str], ...]:
+        """Table and label of every reading that is compared."""
+        return self.predictions[self.best].readings
+
+    @property
+    def counts_runs(self) -> bool:
+        """Whether some of the readings are whole runs."""
+        return any(table in _OF_RUNS for table, _ in self.readings)
+
+    def pointwise(self, name: str) -> np.ndarray:
+        """How much worse a fit predicts each reading than the best one does."""
+        return self.predictions[self.best].elpd - self.predictions[name].elpd
+
+    def verdict(self, name: str) -> str:
+        """Whether the data can tell a fit from the best: "clear", "leaning" or "open"."""
+        return self.differences[name].verdict(len(self.readings))
+
+    def page(self) -> dict[str, Any]:
+        """The same as plain data."""
+        return {
+            "fits": [
+                {
+                    "name": name,
+                    "model": self.described[name],
+                    "elpd": float(self.predictions[name].elpd.sum()),
+                    "elpd_difference": d.elpd,
+                    "standard_error": _finite(d.standard_error),
+                    "monte_carlo_error": _finite(float(np.sqrt(np.sum(self.predictions[name].error ** 2)))),
+                    "stacking_weight": self.weights[name],
+                    "unreliable_readings": d.unreliable,
+                    "verdict": "best" if name == self.best else self.verdict(name),
+                }
+                for name, d in self.differences.items()
+            ],
+            "readings": [
+                {"table": table, "label": label, "fits": {name: self._reading(name, i) for name in self.differences}}
+                for i, (table, label) in enumerate(self.readings)
+            ],
+            "not_compared": [asdict(part) | {"sentence": part.sentence()} for part in self.omitted],
+            "parameters": {
+                p: {name: asdict(i) for name, i in row.by_fit.items()} for p, row in self.parameters.items()
+            },
+            "optimal_length": {name: asdict(i) | {"unit": unit} for name, (i, unit) in self.optimal_length.items()},
+            "rate_effect": {name: asdict(effect) for name, effect in self.rate_effects.items()},
+        }
+
+    def _reading(self, name: str, i: int) -> dict[str, Any]:
+        p = self.predictions[name]
+        numbers = {"elpd": p.elpd[i], "monte_carlo_error": p.error[i], "pareto_k": p.pareto_k[i]}
+        return {what: _finite(float(value)) for what, value in numbers.items()} | {"how": p.how[i]}
+
+
+def _finite(value: float) -> float | None:
+    return value if np.isfinite(value) else None
+
+
+def compare(fits: Mapping[str, Fit], report: Report | None = None) -> Comparison:
+    """Compare fits.
+
+    Args:
+        fits: By name.
+        report: Called with a sentence before each reading that needs a refit or the like.
+
+    Raises:
+        UsageError: There are fewer than two, one has no posterior, or they are not of the same readings.
+    """
+    if len(fits) < 2:
+        raise UsageError("a comparison needs at least two fits; name their results folders.")
+    drawn = {name: _drawn(name, fit) for name, fit in fits.items()}
+    common = _common(fits)
+    predictions = {name: _predicted(name, fit, drawn[name], common, report) for name, fit in fits.items()}
+    order = differences(predictions)
+    ordered = {name: fits[name] for name in order}
+    weights = stacking_weights(predictions)
+    return Comparison(
+        order,
+        {name: weights[name] for name in order},
+        {name: predictions[name] for name in order},
+        common.omitted,
+        {name: _described(fit) for name, fit in ordered.items()},
+        _parameters(ordered),
+        {
+            n: (f.optimal_length().length, f.dataset.description.route.unit)
+            for n, f in ordered.items()
+            if f.dataset.description.route
+        },
+        {name: effect for name, fit in ordered.items() if (effect := rate_effect(fit)) is not None},
+    )
+
+
+def _drawn(name: str, fit: Fit) -> Draws:
+    if fit.posterior is None:
+        raise UsageError(f"{name} has no posterior, because it was made without MCMC; fit it again without --no-mcmc.")
+    return fit.posterior
+
+
+def _common(fits: Mapping[str, Fit]) -> Common:
+    """The readings that all fits share; refuses fits of other measurements."""
+    first, *others = fits
+    for name in others:
+        if _inputs(fits[name]) != _inputs(fits[first]):
+            raise UsageError(
+                f"{first} and {name} were not fitted to the same readings, so how well they predict them cannot be "
+                "compared; fit the same data set twice, such as with and without --friction rate-dependent."
+            )
+    common = common_readings(fits)
+    if not common.readings:
+        raise UsageError(
+            f"{', '.join(fits)} have no reading in common that they take for the same, so they cannot be compared. "
+            + " ".join(part.sentence() for part in common.omitted)
+        )
+    return common
+
+
+def _inputs(fit: Fit) -> tuple[list[tuple[str, str]], list[tuple[str, tuple[str, ...]]]]:
+    """Files that were read, description aside, with their checksums; and the readings of every table but angles."""
+    files = sorted((file, digest) for file, digest in fit.dataset.sha256.items() if not file.endswith(".toml"))
+    return files, [(term.name, term.labels) for term in fit.model.terms if term.name != ANGLES]
+
+
+def _predicted(name: str, fit: Fit, drawn: Draws, common: Common, report: Report | None) -> Prediction:
+    said: Report | None = None if report is None else lambda sentence: report(f"{name}: {sentence}")
+    return leave_one_out(
+        Readings(Density(fit.model)),
+        drawn.z,
+        drawn.log_likelihood,
+        _effective(drawn),
+        fit.provenance.seed,
+        common.positions[name],
+        said,
+    )
+
+
+def _effective(drawn: Draws) -> float:
+    """Effective number of draws: the smallest of any quantity."""
+    return min((d.ess_bulk for d in drawn.diagnostics.values()), default=float(drawn.z[..., 0].size))
+
+
+def _described(fit: Fit) -> str:
+    """What sets a fit apart from others of the same data."""
+    description = fit.dataset.description
+    parts = [description.friction_model]
+    if description.curved:
+        parts.append(f"{description.geometry} geometry")
+    parts += [description.noise_in_words] if description.noise != "normal" else []
+    angles = description.tables.angles
+    if angles is not None and angles.undetected != "censored" and description.geometry != "published":
+        parts.append({"zero": "undetected angles as zeros", "dropped": "undetected angles dropped"}[angles.undetected])
+    without_runs = [p for p in fit.model.space.fixed if p.name == RUN_SCATTER and p.fixed == 0.0]
+    fixed = [p.name for p in fit.model.space.fixed if p not in without_runs]
+    parts += ["no run effect"] if without_runs else []
+    return ", ".join(parts + ([f"{', '.join(fixed)} fixed"] if fixed else []))
+
+
+def _parameters(fits: Mapping[str, Fit]) -> dict[str, ComparedParameter]:
+    rows: dict[str, ComparedParameter] = {}
+    for name, fit in fits.items():
+        for p in fit.model.space.free:
+            if p.role in _SHOWN_ROLES and fit.posterior is not None:
+                row = rows.setdefault(p.name, ComparedParameter(p.symbol, p.unit, {}))
+                row.by_fit[name] = Interval.of(np.asarray(fit.posterior.values[p.name]))
+    return rows

@@ -1,0 +1,171 @@
+"""Several fits side by side: how well each predicts readings left out, which readings tell them apart, what changes."""
+
+from itertools import groupby
+from typing import TYPE_CHECKING
+
+import numpy as np
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure
+
+from bowdenfit.plots.layout import TITLE, legend_above, place_labels
+from bowdenfit.plots.style import (
+    BLACK,
+    GRAY,
+    LIGHT,
+    SERIES_COLORS,
+    SERIES_MARKERS,
+    SMALL,
+    WIDE,
+    WIDE_INTERVAL,
+    in_paper_style,
+    labeled,
+)
+
+if TYPE_CHECKING:
+    from bowdenfit.inference.interval import Interval
+    from bowdenfit.questions.compare.answer import Comparison
+
+MOST_LABELED = 40  # readings that are named below the axis
+MOST_COLUMNS = 4  # panels of parameters side by side
+LONGEST_NAME = 22  # characters of a fit's name that have room
+_CHARACTER, _ROW = 0.062, 0.23  # in, of a name
+_RIGHT, _BELOW = 0.18, 0.45
+_MIDDLE = 1.7  # in, height of the middle panel
+_GAP = 0.62
+
+
+@in_paper_style
+def comparison(found: "Comparison") -> Figure:
+    """Differences of elpd with standard errors, their contributions by reading, and parameters side by side."""
+    cells = _cells(found)
+    names = [_shortened(name) for name in found.differences]
+    left = max(0.66, 0.2 + _CHARACTER * max(map(len, names)))
+    height_of_fits = 0.25 + _ROW * len(names)
+    columns = min(MOST_COLUMNS, len(cells)) if cells else 0
+    rows = -(-len(cells) // columns) if cells else 0
+    below_readings = _label_room(found)
+    parts = [TITLE, height_of_fits, _GAP + TITLE, _MIDDLE, below_readings]
+    parts += [TITLE + 0.1, *([height_of_fits, _BELOW + 0.1] * rows)] if rows else []
+    figure = Figure(figsize=(WIDE, sum(parts)))
+    _differences(_axes(figure, left, sum(parts[2:]), WIDE - left - _RIGHT, height_of_fits), found, names)
+    middle = _axes(figure, left, below_readings + sum(parts[5:]), WIDE - left - _RIGHT, _MIDDLE)
+    _by_reading(middle, found, names)
+    flat = [_cell_axes(figure, left, parts, i, columns, height_of_fits) for i in range(len(cells))]
+    for i, (axes, cell) in enumerate(zip(flat, cells, strict=True)):
+        _parameter(axes, cell, names, list(found.differences), i % columns == 0)
+    if flat:
+        flat[0].set_title("Parameters, median and " + WIDE_INTERVAL, loc="left")
+    if len(names) > 2:
+        legend_above(figure, [middle], columns=4)
+    return figure
+
+
+def _shortened(name: str) -> str:
+    return name if len(name) <= LONGEST_NAME else "\N{HORIZONTAL ELLIPSIS}" + name[-LONGEST_NAME + 1 :]
+
+
+def _label_room(found: "Comparison") -> float:
+    """Room below the panel of readings [in]."""
+    if len(found.readings) > MOST_LABELED:
+        return _BELOW + 0.1
+    return 0.25 + 0.045 * max(len(_plain(label)) for _, label in found.readings)
+
+
+def _plain(label: str) -> str:
+    return label.replace("_", " ")
+
+
+def _axes(figure: Figure, left: float, bottom: float, width: float, height: float) -> Axes:
+    """A panel at a place in inches."""
+    page, total = figure.get_size_inches()
+    return figure.add_axes((left / page, bottom / total, width / page, height / total))
+
+
+def _cell_axes(figure: Figure, left: float, parts: list[float], i: int, columns: int, height: float) -> Axes:
+    """The panel of a parameter."""
+    width = (WIDE - left - _RIGHT - 0.22 * (columns - 1)) / columns
+    row = i // columns
+    bottom = sum(parts[6 + 2 * row + 1 :])
+    return _axes(figure, left + (i % columns) * (width + 0.22), bottom, width, height)
+
+
+def _cells(found: "Comparison") -> list[tuple[str, dict[str, "Interval"]]]:
+    """What is shown of each fit: label of the axis, and intervals by fit."""
+    cells = [(labeled(row.symbol, row.unit), row.by_fit) for row in found.parameters.values()]
+    lengths = {name: interval for name, (interval, _) in found.optimal_length.items()}
+    if lengths:
+        unit = next(iter(found.optimal_length.values()))[1]
+        cells.append((labeled("$l^*$", unit), lengths))
+    return cells
+
+
+def _differences(axes: Axes, found: "Comparison", names: list[str]) -> None:
+    """Difference to the best with one and two standard errors."""
+    for i, (name, difference) in enumerate(found.differences.items()):
+        color, marker = SERIES_COLORS[i % len(SERIES_COLORS)], SERIES_MARKERS[i % len(SERIES_MARKERS)]
+        error = difference.standard_error
+        if name != found.best and np.isfinite(error):
+            axes.plot(-difference.elpd + np.array([-2, 2]) * error, [i, i], color=color, linewidth=0.8)
+            axes.plot(-difference.elpd + np.array([-1, 1]) * error, [i, i], color=color, linewidth=2.6)
+        axes.plot([-difference.elpd], [i], marker, color=color, markeredgecolor="white", markersize=6)
+    axes.axvline(0.0, color=BLACK, linewidth=0.7)
+    axes.set_yticks(range(len(names)), names)
+    axes.set(ylim=(len(names) - 0.5, -0.5), xlabel="elpd less that of the best, with one and two standard errors")
+    axes.set_title(f"Prediction of readings left out ({len(found.readings)} readings)", loc="left")
+    axes.grid(axis="y", visible=False)
+    place_labels(axes.figure, axes)  # type: ignore[arg-type]
+
+
+def _by_reading(axes: Axes, found: "Comparison", names: list[str]) -> None:
+    """What each reading adds to the difference."""
+    x = np.arange(len(found.readings))
+    others = list(found.differences)[1:]
+    width = 0.8 / len(others)
+    for i, name in enumerate(others, start=1):
+        place = x + (i - 1 - (len(others) - 1) / 2) * width
+        axes.bar(place, -found.pointwise(name), width, color=SERIES_COLORS[i % len(SERIES_COLORS)], label=names[i])
+    axes.axhline(0.0, color=BLACK, linewidth=0.7)
+    axes.set(xlim=(-0.6, len(x) - 0.4), ylabel="Difference of elpd")
+    axes.set_title("The same by reading: up where the fit predicts it better than the best one does", loc="left")
+    low, high = axes.get_ylim()
+    axes.set_ylim(low, high + 0.16 * (high - low))  # room for the names of the tables
+    _tables(axes, found)
+    axes.grid(axis="x", visible=False)
+    if len(x) <= MOST_LABELED:
+        axes.set_xticks(x, [_plain(label) for _, label in found.readings], rotation=90, fontsize=SMALL - 1)
+    else:
+        axes.set_xlabel("Reading, in the order of the tables")
+    page, box = axes.figure.get_size_inches(), axes.get_position()  # type: ignore[union-attr]
+    axes.yaxis.set_label_coords(-0.45 / (box.width * page[0]), 0.5)
+
+
+def _tables(axes: Axes, found: "Comparison") -> None:
+    """Every other table on gray, its name above."""
+    start = 0
+    for number, (table, group) in enumerate(groupby(name for name, _ in found.readings)):
+        n = len(list(group))
+        if number % 2:
+            axes.axvspan(start - 0.5, start + n - 0.5, color=LIGHT, linewidth=0, zorder=0)
+        axes.annotate(
+            _plain(table), (start - 0.4, 1.0), xycoords=("data", "axes fraction"), xytext=(0, -8),
+            textcoords="offset points", fontsize=SMALL, color=GRAY,
+        )  # fmt: skip
+        start += n
+
+
+def _parameter(
+    axes: Axes, cell: tuple[str, dict[str, "Interval"]], names: list[str], fits: list[str], named: bool
+) -> None:
+    """Median and interval of one parameter in each fit that has it."""
+    label, by_fit = cell
+    for i, name in enumerate(fits):
+        if name in by_fit:
+            color, marker = SERIES_COLORS[i % len(SERIES_COLORS)], SERIES_MARKERS[i % len(SERIES_MARKERS)]
+            axes.plot([by_fit[name].q05, by_fit[name].q95], [i, i], color=color, linewidth=1.6)
+            axes.plot([by_fit[name].median], [i], marker, color=color, markeredgecolor="white", markersize=6)
+    axes.set(ylim=(len(fits) - 0.5, -0.5), xlabel=label)
+    axes.set_yticks(range(len(fits)), names if named else [])
+    axes.locator_params(axis="x", nbins=4)
+    axes.grid(axis="y", visible=False)
+    page, box = axes.figure.get_size_inches(), axes.get_position()  # type: ignore[union-attr]
+    axes.xaxis.set_label_coords(0.5, -0.25 / (box.height * page[1]))

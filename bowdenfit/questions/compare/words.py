@@ -1,0 +1,170 @@
+"""What `bowdenfit compare` prints."""
+
+from collections import Counter
+
+import numpy as np
+
+from bowdenfit.inference.comparison import SMALL
+from bowdenfit.inference.interval import Interval
+from bowdenfit.questions.compare.answer import Comparison
+from bowdenfit.words import decimals, filled, listed, table
+
+_DOMINATES = 0.5  # share of a difference from which one reading is named
+_FEW = 20  # readings treated one by one that are named
+_SHORT = {"importance sampling": "-", "moment matching": "draws moved", "refit": "fitted again", "rough": "rough"}
+
+
+def comparison_text(found: Comparison) -> str:
+    """A comparison for people: which fit predicts best, what changes between them, and what speed does."""
+    heads = ("fit", "model", "elpd less than the best", "standard error", "weight")
+    rows = [
+        (
+            name,
+            found.described[name],
+            f"{d.elpd:.1f}",
+            "" if name == found.best or np.isnan(d.standard_error) else f"{d.standard_error:.1f}",
+            f"{found.weights[name]:.2f}",
+        )
+        for name, d in found.differences.items()
+    ]
+    blocks = [
+        "How well each predicts a reading left out\n" + table(heads, rows, left=("model",)),
+        "\n".join(filled(line) for line in _verdict(found)),
+        "\n".join(filled(line) for line in _basis(found)),
+        _treated(found),
+        _parameters(found),
+        "\n".join(filled(line) for line in _speed(found)),
+    ]
+    return "\n\n".join(block for block in blocks if block) + "\n"
+
+
+def _verdict(found: Comparison) -> list[str]:
+    """What the data prefer, and whether they can tell."""
+    best, *others = found.differences
+    lines = [_preferred(found, name) for name in others if found.verdict(name) == "clear"]
+    lines += [_leaning(found, name) for name in others if found.verdict(name) == "leaning"]
+    alike = [name for name in others if found.verdict(name) == "open"]
+    if alike:
+        size = _difference(found, alike[0]) if len(alike) == 1 else "smaller than 4 or than twice their standard errors"
+        noun = "the difference is" if len(alike) == 1 else "the differences are"
+        lines.append(
+            f"The data cannot tell {best} from {listed(alike)}: {noun} within what chance gives ({size}). Prefer the "
+            "simpler one."
+        )
+    return lines
+
+
+def _preferred(found: Comparison, name: str) -> str:
+    return f"The data prefer {found.best} over {name} ({_difference(found, name)}).{_dominated(found, name)}"
+
+
+def _leaning(found: Comparison, name: str) -> str:
+    n = len(found.readings)
+    return (
+        f"The data lean towards {found.best} over {name} ({_difference(found, name)}), but with {n} readings the "
+        f"standard error is itself uncertain and tends to be too small: not proof.{_dominated(found, name)}"
+    )
+
+
+def _difference(found: Comparison, name: str) -> str:
+    d = found.differences[name]
+    error = "standard error unknown, with one reading" if np.isnan(d.standard_error) else f"+- {d.standard_error:.1f}"
+    return f"elpd difference {d.elpd:.1f} {error}"
+
+
+def _dominated(found: Comparison, name: str) -> str:
+    """The reading that alone makes most of a difference, if one does."""
+    each = found.pointwise(name)
+    most = int(np.argmax(each))
+    if len(each) < 2 or each[most] < _DOMINATES * each.sum():
+        return ""
+    return f" Most of it comes from one reading, {_named(found.readings[most])} ({each[most]:+.1f})."
+
+
+def _named(reading: tuple[str, str]) -> str:
+    return f"{reading[0].replace('_', ' ')} {reading[1]}"
+
+
+def _basis(found: Comparison) -> list[str]:
+    """What is compared, and what is not."""
+    counts = Counter(name for name, _ in found.readings)
+    what = listed([f"{n} of {name.replace('_', ' ')}" for name, n in counts.items()])
+    n = len(found.readings)
+    lines = [
+        f"Compared by leave-one-out on {n} reading{'s' if n > 1 else ''}: {what}. The elpd is the sum of the log densities "
+        "with which the others predict each; the weights make the mixture of the models that predicts best (stacking)."
+    ]
+    if found.counts_runs:
+        lines.append(
+            "A run of forces counts as one reading, because its samples share one mounting: it is left out as a whole."
+        )
+    lines += [part.sentence() for part in found.omitted]
+    if n < SMALL and any(found.verdict(name) != "open" for name in list(found.differences)[1:]) and not _says_so(found):
+        lines.append(f"With {n} readings the standard errors tend to be too small.")
+    return lines
+
+
+def _says_so(found: Comparison) -> bool:
+    return any(found.verdict(name) == "leaning" for name in list(found.differences)[1:])
+
+
+def _treated(found: Comparison) -> str:
+    """Which readings importance sampling could not leave out, and what was done instead."""
+    names = list(found.differences)
+    ways = {name: found.predictions[name].how for name in names}
+    which = [i for i in range(len(found.readings)) if any(ways[name][i] != "importance sampling" for name in names)]
+    if not which:
+        return ""
+    rough = sum(how.count("rough") for how in ways.values())
+    lines = [
+        "Readings that would move the posterior (Pareto k above 0.7) were left out by moving the draws to where they would "
+        "be without the reading (moment matching) or, where that was not enough, by fitting again without it."
+    ]
+    if rough:
+        lines.append(
+            f"For {rough} reading{'s' if rough > 1 else ''} the fit without it did not converge: take the differences as "
+            "rough."
+        )
+    if len(which) > _FEW:
+        lines.append(f"That concerns {len(which)} of {len(found.readings)} readings.")
+        return "\n".join(filled(line) for line in lines)
+    rows = [(_named(found.readings[i]), *(_SHORT[ways[name][i]] for name in names)) for i in which]
+    return "\n".join([*(filled(line) for line in lines), table(("reading", *names), rows)])
+
+
+def _parameters(found: Comparison) -> str:
+    names = list(found.differences)
+    rows = [
+        (_head(p, row.unit), *(_shown(row.by_fit.get(name)) for name in names)) for p, row in found.parameters.items()
+    ]
+    rows += (
+        [("optimal length", *(_shown(found.optimal_length[n][0], found.optimal_length[n][1]) for n in names))]
+        if len(found.optimal_length) == len(names)
+        else []
+    )
+    return "What changes, mean +- sd\n" + table(("parameter", *names), rows)
+
+
+def _head(name: str, unit: str) -> str:
+    return name if unit == "1" else f"{name} ({unit})"
+
+
+def _shown(interval: Interval | None, unit: str = "") -> str:
+    if interval is None:
+        return "-"
+    digits = decimals(interval.sd)
+    return f"{interval.mean:.{digits}f} +- {interval.sd:.{digits}f}" + (f" {unit}" if unit else "")
+
+
+def _speed(found: Comparison) -> list[str]:
+    """The answer on speed, from every fit that allows it."""
+    lines = [f"{name}: {effect.sentence()}" for name, effect in found.rate_effects.items()]
+    without = [name for name in found.differences if name not in found.rate_effects]
+    for name in found.rate_effects:
+        for plain in without:
+            better = found.differences[plain].elpd - found.differences[name].elpd
+            if better <= 0 or not found.differences[plain].is_seen:
+                lines.append(f"Letting friction depend on speed ({name}) predicts no better than not ({plain}).")
+            else:
+                lines.append(f"Letting friction depend on speed ({name}) predicts better than not ({plain}).")
+    return lines

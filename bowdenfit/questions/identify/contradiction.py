@@ -1,0 +1,55 @@
+"""Which tables of a fit contradict the others, in words."""
+
+from dataclasses import asdict
+from typing import Any
+
+from bowdenfit.inference.disagreement import WORTH_SAYING, Disagreement
+from bowdenfit.results.record import Fit
+from bowdenfit.words import decimals
+
+_AS_MUCH = 0.8  # of the largest conflict: beyond that either table may be the odd one out
+_TABLES = {
+    "wrap_angle": "angles",
+    "efficiency": "efficiencies",
+    "run_efficiency": "forces",
+    "held_ratio": "held forces",
+    "recorded_efficiency": "recordings",
+    "measured_preload": "preload",
+    "loop_output_force": "loop",
+}
+
+
+def agreement_page(fit: Fit) -> list[dict[str, Any]]:
+    """How well each table agrees with everything else, the odd one out first."""
+    found = sorted(fit.least_squares.disagreements, key=lambda d: -d.conflict)
+    return [asdict(d) | {"unit": _unit(fit, d)} for d in found]
+
+
+def contradiction(fit: Fit) -> str:
+    """The table that is the odd one out, in a sentence; empty where all agree."""
+    worst = max(fit.least_squares.disagreements, key=lambda d: d.conflict, default=None)
+    if worst is None or worst.sds < WORTH_SAYING:
+        return ""
+    unit, digits = _unit(fit, worst), decimals(worst.rest_sd)
+    others = [
+        d.table for d in fit.least_squares.disagreements if d is not worst and d.conflict > _AS_MUCH * worst.conflict
+    ]
+    or_else = f" (or {' or '.join(f'that of {_name(table)}' for table in others)})" if others else ""
+    together = f"{worst.together:.{digits}f}{unit}"
+    return (
+        f"The table of {_name(worst.table)}{or_else} disagrees with everything else by {worst.sds:.1f} standard deviations: "
+        f"without it {worst.parameter} would be {worst.rest:.{digits}f} +- {worst.rest_sd:.{digits}f}{unit}, with it the fit "
+        f"is at {together}. Look at the units and wrap angles of that table and at how it was measured: the numbers below "
+        "are a compromise between readings that cannot all be right."
+    )
+
+
+def _name(table: str) -> str:
+    """A table as the description calls it."""
+    return _TABLES.get(table, table)
+
+
+def _unit(fit: Fit, found: Disagreement) -> str:
+    """Unit of the parameter, with a blank before it."""
+    unit = next(p.unit for p in fit.model.space.free if p.name == found.parameter)
+    return "" if unit == "1" else f" {unit}"

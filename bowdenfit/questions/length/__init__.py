@@ -1,0 +1,1 @@
+"""Which length is best?"""

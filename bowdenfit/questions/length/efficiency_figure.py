@@ -1,0 +1,144 @@
+"""Efficiency against the route, and below it where the optimum lies and which length to buy."""
+
+from typing import TYPE_CHECKING
+
+import numpy as np
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure
+
+from bowdenfit.plots.bands import draw_band, route_limits, shade_outside
+from bowdenfit.plots.densities import GRID_POINTS, density
+from bowdenfit.plots.layout import TITLE, legend_above, panels
+from bowdenfit.plots.style import (
+    BLACK,
+    BLUE,
+    EFFICIENCY,
+    GREEN,
+    ORANGE,
+    SMALL,
+    VERMILLION,
+    in_paper_style,
+    percent,
+    rounded,
+)
+
+if TYPE_CHECKING:
+    from bowdenfit.questions.summary.figure_data import EfficiencyPoints, FigureData
+    from bowdenfit.results.length import OptimalLength
+
+# marker, its size [pt] and label by table
+RUN = ("D", 2.8, "Measured, mean of a run")
+KINDS = {"efficiency": ("o", 4.5, "Measured"), "run_efficiency": RUN, "recorded_efficiency": RUN}
+MOST_NUMBERS, LEAST_NUMBER = 16, 0.5  # so many bars have numbers over them, if they are so many percent high
+LEAST_AT_EDGE = 0.005
+
+
+def has_route(data: "FigureData") -> bool:
+    """Whether there is a route to draw against."""
+    return data.efficiency is not None
+
+
+@in_paper_style
+def efficiency(data: "FigureData") -> Figure:
+    """Efficiency [%] against the route, the density of the optimal length, and each choice's chance to be the best."""
+    below = 0 if data.optimum is None else 2 if data.optimum.choices else 1
+    figure, flat = panels([2.3] + [0.75] * below, 1, 0.08, (0.0, TITLE + 0.12), sharex=True)
+    shown = route_limits(data.route_range, *(points.route for points in data.points))
+    _curve_and_points(flat[0], data)
+    if data.optimum is not None:
+        _optimum(flat[1], data, data.optimum)
+        for axes in flat[:2]:
+            _mark_optimum(axes, data.optimum)
+        if data.optimum.choices:
+            _choices(flat[2], data.optimum, float(np.ptp(data.route_range)))
+    for axes in flat:
+        shade_outside(axes, data.route_range, shown)
+    flat[-1].set_xlabel(data.route_label)
+    legend_above(figure, flat[:1], columns=3)
+    return figure
+
+
+def _curve_and_points(axes: Axes, data: "FigureData") -> None:
+    assert data.efficiency is not None  # has_route
+    draw_band(axes, data.efficiency, scale=100.0)
+    for points in data.points:
+        _measured(axes, points, points.inside, BLACK, "")
+        outside = ~points.inside & np.isfinite(points.route)
+        if outside.any():
+            _predicted(axes, points, outside)
+            _measured(axes, points, outside, "white", ", outside the range")
+    axes.set_ylabel(EFFICIENCY)
+    axes.locator_params(axis="y", nbins=6)
+
+
+def _measured(axes: Axes, points: "EfficiencyPoints", where: np.ndarray, fill: str, note: str) -> None:
+    """Some of the measured points; the note is added to their label."""
+    marker, size, label = KINDS[points.what]
+    if where.any():
+        axes.plot(
+            points.route[where], 100 * points.measured[where], marker, color=BLACK, markerfacecolor=fill,
+            markersize=size, zorder=3, label=label + note,
+        )  # fmt: skip
+
+
+def _predicted(axes: Axes, points: "EfficiencyPoints", where: np.ndarray) -> None:
+    """What is predicted where there is no curve: median with 90 % interval, or the least-squares value."""
+    predicted, route = 100 * points.predicted[:, where], points.route[where]
+    if len(predicted) == 1:
+        axes.plot(route, predicted[0], "_", color=BLUE, markersize=8, label="Predicted there")
+        return
+    low, _, median, _, high = predicted
+    axes.errorbar(
+        route, median, (median - low, high - median), fmt="_", color=BLUE, markersize=8, capsize=3, linewidth=1.1,
+        label="Predicted there, 90 % interval",
+    )  # fmt: skip
+
+
+def _optimum(axes: Axes, data: "FigureData", optimum: "OptimalLength") -> None:
+    assert data.optimal_length is not None  # comes with the optimum
+    grid = np.linspace(*data.route_range, 2 * GRID_POINTS)
+    height = density(data.optimal_length, grid, *data.route_range)
+    axes.fill_between(grid, height, color=BLUE, alpha=0.38, linewidth=0)
+    axes.plot(grid, height, color=BLUE, linewidth=1.0)
+    axes.set_ylim(0, 1.12 * height.max())
+    axes.set_title("Where the optimum lies", loc="left", fontsize=SMALL)
+    axes.set_ylabel(f"Density (1/{optimum.unit})", fontsize=SMALL)
+    axes.locator_params(axis="y", nbins=3)
+    if optimum.at_edge > LEAST_AT_EDGE:
+        left = bool(optimum.length.median > np.mean(data.route_range))
+        axes.text(
+            0.03 if left else 0.97, 0.9, f"{percent(optimum.at_edge)} of the draws at an end of the range",
+            transform=axes.transAxes, ha="left" if left else "right", va="top", fontsize=SMALL,
+        )  # fmt: skip
+
+
+def _mark_optimum(axes: Axes, optimum: "OptimalLength") -> None:
+    """The median optimum, and the window of lengths that are good enough."""
+    length, window, unit = optimum.length, optimum.window, optimum.unit
+    median, low, high = rounded((length.median, length.q05, length.q95), length.q95 - length.q05)
+    label = f"Optimum {median} {unit} (90 % interval {low} to {high} {unit})"
+    axes.axvline(length.median, color=VERMILLION, linestyle="--", linewidth=1.1, label=label)
+    if np.isfinite(window.start):
+        good = f"Within {percent(window.within)} of the best with {percent(window.probability)} probability"
+        axes.axvspan(
+            window.start, window.stop, facecolor="#D9EFE6", edgecolor=GREEN, linestyle=":", zorder=0.5, label=good
+        )
+
+
+def _choices(axes: Axes, optimum: "OptimalLength", span: float) -> None:
+    """A bar for each choice; lengths that are far apart get bars of a tenth of the span at most."""
+    lengths = np.array([choice.length for choice in optimum.choices])
+    chance = 100 * np.array([choice.probability_best for choice in optimum.choices])
+    width = 0.5 * float(np.min(np.diff(np.unique(lengths)), initial=0.1 * span))
+    axes.bar(lengths, chance, width, color=ORANGE, edgecolor=BLACK, linewidth=0.6)
+    axes.plot(lengths, np.zeros(len(lengths)), "|", color=BLACK, clip_on=False, markersize=5)
+    if len(lengths) <= MOST_NUMBERS:
+        for length, height in zip(lengths, chance, strict=True):
+            axes.annotate(
+                f"{height:.0f}" if height >= LEAST_NUMBER else "", (length, height), (0, 1.5), textcoords="offset points",
+                ha="center", va="bottom", fontsize=6,
+            )  # fmt: skip
+    axes.set_ylim(0, 1.25 * chance.max())
+    axes.set_title("Which choice is the best", loc="left", fontsize=SMALL)
+    axes.set_ylabel("Probability (%)", fontsize=SMALL)
+    axes.locator_params(axis="y", nbins=3)

@@ -1,0 +1,90 @@
+"""Wrap angles against the route: what was read, what was too small to read, and the curve through it."""
+
+from typing import TYPE_CHECKING
+
+import numpy as np
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure
+
+from bowdenfit.plots.bands import draw_band, route_limits, shade_outside
+from bowdenfit.plots.layout import TITLE, drop_unused, legend_above, panels
+from bowdenfit.plots.style import BLACK, MEDIUM, WIDE, WRAP_ANGLE, in_paper_style
+
+if TYPE_CHECKING:
+    from bowdenfit.questions.summary.figure_data import AngleCurve, FigureData
+
+MOST_COLUMNS = 3
+
+
+def has_curves(data: "FigureData") -> bool:
+    """Whether a contact's wrap angle is a curve."""
+    return bool(data.angles)
+
+
+@in_paper_style
+def wrap_angles(data: "FigureData") -> Figure:
+    """Wrap angle [deg] of each curved contact against the route, a panel each."""
+    columns = min(MOST_COLUMNS, len(data.angles))
+    rows = -(-len(data.angles) // columns)
+    page = WIDE if columns > 1 else MEDIUM
+    figure, flat = panels([1.8] * rows, columns, TITLE, (0.2, TITLE + 0.26), page, sharex=True, sharey=True)
+    flat = drop_unused(flat, len(data.angles))
+    everywhere = [route for c in data.angles for route in (c.route, c.undetected_route, c.outside_route)]
+    shown = route_limits(data.route_range, *everywhere)
+    for axes, curve in zip(flat, data.angles, strict=True):
+        draw_band(axes, curve.band)
+        _readings(axes, curve)
+        _undetected(axes, curve, data.route_range, _spacing(everywhere, shown))
+        shade_outside(axes, data.route_range, shown)
+        axes.set_title(curve.contact)
+    flat[0].set_ylim(0, _highest(data.angles))
+    flat[0].locator_params(axis="y", nbins=7)
+    _label(flat, columns, data.route_label)
+    legend_above(figure, flat, columns=4 if columns > 1 else 2)
+    return figure
+
+
+def _readings(axes: Axes, curve: "AngleCurve") -> None:
+    """The readings that the curve follows, and those that it does not."""
+    axes.plot(curve.route, curve.angle, "o", color=BLACK, label="Reading")
+    if len(curve.outside_route):
+        axes.plot(
+            curve.outside_route, curve.outside_angle, "s", color=BLACK, markerfacecolor="white",
+            label="Not used by the curve",
+        )  # fmt: skip
+
+
+def _undetected(axes: Axes, curve: "AngleCurve", route_range: tuple[float, float], spacing: float) -> None:
+    """Readings that may be anything between zero and their limit."""
+    route, limit = curve.undetected_route, curve.limit
+    if not len(route):
+        return
+    start, stop = (np.clip(route + side * spacing / 2, *route_range) for side in (-1, 1))
+    axes.bar(
+        start, limit, stop - start, align="edge", color="none", edgecolor="#999999", linewidth=0, hatch="//////",
+        zorder=0.6, label="Too small to detect",
+    )  # fmt: skip
+    axes.plot(route, limit, "v", color=BLACK, markerfacecolor="white", label="Not detected, at its limit")
+
+
+def _spacing(routes: list[np.ndarray], shown: tuple[float, float]) -> float:
+    """Distance from one reading to the next."""
+    steps = np.diff(np.unique(np.concatenate(routes)))
+    return float(np.min(steps)) if len(steps) else 0.02 * (shown[1] - shown[0])
+
+
+def _highest(curves: tuple["AngleCurve", ...]) -> float:
+    """Top of the axis: above every reading, and above every interval unless that is far above the readings."""
+    readings = np.concatenate([values for c in curves for values in (c.angle, c.limit, c.outside_angle)])
+    band, reading = max(c.band.quantiles.max() for c in curves), readings.max(initial=0.0)
+    return 1.06 * float(max(reading, min(band, 2 * reading) if reading else band))
+
+
+def _label(flat: list[Axes], columns: int, route_label: str) -> None:
+    """Names and units on the outer panels; a panel with nothing below it is an outer one."""
+    for i, axes in enumerate(flat):
+        if i % columns == 0:
+            axes.set_ylabel(WRAP_ANGLE)
+        if i + columns >= len(flat):
+            axes.set_xlabel(route_label)
+            axes.tick_params(labelbottom=True)

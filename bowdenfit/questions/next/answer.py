@@ -1,0 +1,144 @@
+"""What to measure next, as plain data: candidates in order, repeats of the best, and what is best after it."""
+
+from dataclasses import asdict, dataclass
+from typing import Any
+
+from bowdenfit.questions.next.possible_readings import Candidate
+from bowdenfit.questions.next.target import Answer
+
+WITHIN = 2.0  # standard errors within which two candidates are as good as each other
+LEAST_SHARE = 0.01  # of the variance; a measurement that takes away less is not worth making
+
+
+@dataclass(frozen=True)
+class Ranked:
+    """One candidate and what it would do.
+
+    Args:
+        candidate: The candidate.
+        name: As `--candidate` takes it.
+        words: In a sentence.
+        share: Share of the answer's variance that it takes away, on average [1].
+        error: Monte Carlo standard error of the share [1].
+        sd: Standard deviation of the answer afterwards: the root of its average variance.
+        sd_error: Monte Carlo standard error of that.
+        as_good: Whether the best candidate is better by no more than the Monte Carlo error of the difference.
+        cost: What it costs; None where nothing was said of costs.
+    """
+
+    candidate: Candidate
+    name: str
+    words: str
+    share: float
+    error: float
+    sd: float
+    sd_error: float
+    as_good: bool
+    cost: float | None = None
+
+    @property
+    def is_noticeable(self) -> bool:
+        """Whether it would do anything worth the trouble."""
+        return is_noticeable(self.share, self.error)
+
+    @property
+    def worth(self) -> float:
+        """What the ranking goes by: the share of the variance, for each unit of cost where there are costs."""
+        return self.share / (self.cost or 1.0)
+
+
+@dataclass(frozen=True)
+class Repeats:
+    """What the best candidate would do if it were measured several times, each time with a new mounting.
+
+    Args:
+        times: How often.
+        sd: Standard deviation of the answer afterwards.
+    """
+
+    times: tuple[int, ...]
+    sd: tuple[float, ...]
+
+    def to_halve(self, sd: float) -> int | None:
+        """The least number of times that halves a standard deviation; None where none of them does."""
+        return next((n for n, after in zip(self.times, self.sd, strict=True) if after <= sd / 2), None)
+
+
+@dataclass(frozen=True)
+class Step:
+    """One measurement of several made one after the other.
+
+    Args:
+        words: The candidate in a sentence.
+        name: As `--candidate` takes it.
+        sd: Standard deviation of the answer once it and those before it are made.
+    """
+
+    words: str
+    name: str
+    sd: float
+
+
+@dataclass(frozen=True)
+class NextMeasurement:
+    """Candidates from the most to the least worth measuring.
+
+    Args:
+        answer: What is to be known better.
+        ranked: The candidates.
+        repeats: What several readings of the best would do; None where no candidate does anything.
+        plan: The best, then what is best beside it, and so on.
+        route_label: Axis label of the route; empty without one.
+        route_range: Where the curves hold.
+        converged: Whether the fit may be trusted.
+    """
+
+    answer: Answer
+    ranked: tuple[Ranked, ...]
+    repeats: Repeats | None
+    plan: tuple[Step, ...]
+    route_label: str
+    route_range: tuple[float, float]
+    converged: bool
+
+    @property
+    def best(self) -> Ranked | None:
+        """The candidate most worth measuring; None where none would narrow the answer noticeably."""
+        first = self.ranked[0]
+        return first if first.is_noticeable else None
+
+    def page(self) -> dict[str, Any]:
+        """Everything, for programs."""
+        answer = {"name": self.answer.name, "words": self.answer.words, "unit": self.answer.unit, "sd": self.answer.sd}
+        return {
+            "answer": answer,
+            "best": self.best.name if self.best else None,
+            "candidates": [_row(r) for r in self.ranked],
+            "repeats": asdict(self.repeats) if self.repeats else None,
+            "plan": [asdict(step) for step in self.plan],
+            "converged": self.converged,
+        }
+
+    def __str__(self) -> str:
+        best = self.best
+        return f"<next measurement for {self.answer.words}: {best.words if best else 'none helps'}>"
+
+
+def is_noticeable(share: float, error: float) -> bool:
+    """Whether a share of the variance is worth the trouble, and more than the error of its estimate."""
+    return share > max(LEAST_SHARE, WITHIN * error)
+
+
+def _row(ranked: Ranked) -> dict[str, Any]:
+    """A candidate as plain data."""
+    return {
+        "candidate": ranked.name,
+        "words": ranked.words,
+        "variance_reduction": ranked.share,
+        "standard_error": ranked.error,
+        "sd_after": ranked.sd,
+        "sd_after_standard_error": ranked.sd_error,
+        "as_good_as_best": ranked.as_good,
+        "cost": ranked.cost,
+        "variance_reduction_per_cost": None if ranked.cost is None else ranked.worth,
+    }

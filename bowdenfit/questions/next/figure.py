@@ -1,0 +1,113 @@
+"""What to measure next: how well the answer would be known after each candidate."""
+
+import math
+from typing import TYPE_CHECKING
+
+import numpy as np
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure
+
+from bowdenfit.plots.bands import route_limits, shade_outside
+from bowdenfit.plots.layout import LEFT, TITLE, legend_above, panels
+from bowdenfit.plots.style import BLACK, GRAY, SERIES_COLORS, SERIES_LINES, SERIES_MARKERS, in_paper_style
+
+if TYPE_CHECKING:
+    from bowdenfit.questions.next.answer import NextMeasurement, Ranked
+
+PAGE = 5.6  # in
+MOST = 14  # candidates in the figure without a route
+ROW = 0.19  # in, of each of them
+KINDS = {
+    "angle": "Wrap angles",
+    "force": "Force run",
+    "efficiency": "Efficiency",
+    "stretch": "Stretch",
+    "preload": "Preload",
+    "loop": "Loop under load",
+}
+_PER_LETTER = 0.058  # in, of a label's width
+
+
+@in_paper_style
+def next_measurement(found: "NextMeasurement") -> Figure:
+    """Expected standard deviation of the answer, against the route with a line for each kind; else a row a candidate."""
+    along = [r for r in found.ranked if math.isfinite(r.candidate.route) and math.isnan(r.candidate.load)]
+    places = {r.candidate.route for r in along}
+    return _along_route(found, along) if len(along) == len(found.ranked) and len(places) > 1 else _in_rows(found)
+
+
+def _name(found: "NextMeasurement") -> str:
+    """What the axis shows."""
+    return f"Standard deviation ({found.answer.unit})" if found.answer.unit else "Standard deviation"
+
+
+def _title(axes: Axes, found: "NextMeasurement", start: float = 0.0) -> None:
+    """What the figure is about, from a place left of the axes on."""
+    words = found.answer.words
+    first = words[0].upper() if len(words.split()) > 1 else words[0]
+    axes.set_title(f"{first}{words[1:]}: how well it would be known", loc="left", x=start)
+
+
+def _limits(found: "NextMeasurement") -> tuple[float, float]:
+    """An axis that shows what the candidates change, and does not make it look like more than it is."""
+    now, least = found.answer.sd, min(r.sd for r in found.ranked)
+    change = max(now - least, 0.05 * now)
+    return max(0.0, least - 1.5 * change), now + 0.3 * change
+
+
+def _along_route(found: "NextMeasurement", along: "list[Ranked]") -> Figure:
+    figure, (axes,) = panels([2.4], 1, TITLE, (0, 0), PAGE)
+    kinds = [kind for kind in KINDS if any(r.candidate.kind == kind for r in along)]
+    for i, kind in enumerate(kinds):
+        here = sorted((r for r in along if r.candidate.kind == kind), key=lambda r: r.candidate.route)
+        at, sd, error = (
+            np.array(v) for v in zip(*((r.candidate.route, r.sd, 2 * r.sd_error) for r in here), strict=True)
+        )
+        axes.errorbar(
+            at, sd, error, marker=SERIES_MARKERS[i], linestyle=SERIES_LINES[i % len(SERIES_LINES)],
+            color=SERIES_COLORS[i], capsize=2, linewidth=1.1, elinewidth=0.7, label=f"{KINDS[kind]} measured here next",
+        )  # fmt: skip
+    shade_outside(
+        axes, found.route_range, route_limits(found.route_range, np.array([r.candidate.route for r in along]))
+    )
+    _now(axes, found, horizontal=True)
+    axes.set(xlabel=found.route_label, ylabel=_name(found))
+    axes.set_ylim(*_limits(found))
+    _title(axes, found)
+    legend_above(figure, [axes], columns=2)
+    return figure
+
+
+def _now(axes: Axes, found: "NextMeasurement", horizontal: bool) -> None:
+    """The standard deviation as things are, and the best candidate."""
+    line = axes.axhline if horizontal else axes.axvline
+    line(found.answer.sd, color=GRAY, linestyle="--", linewidth=1.0, label="As things are")
+    best = found.best
+    if best is not None:
+        place = (best.candidate.route, best.sd) if horizontal else (best.sd, 0)
+        axes.plot(
+            *place, "o", markersize=10, markerfacecolor="none", color=BLACK, zorder=4, label="Most worth measuring"
+        )
+
+
+def _in_rows(found: "NextMeasurement") -> Figure:
+    """A row for each of the best candidates."""
+    shown = found.ranked[:MOST]
+    room = max(LEFT, 0.15 + _PER_LETTER * max(len(r.words) for r in shown))
+    figure, (axes,) = panels([max(1.0, ROW * (len(shown) + 1))], 1, TITLE, (0, 0), PAGE)
+    box = axes.get_position()
+    axes.set_position((room / PAGE, box.y0, box.x1 - room / PAGE, box.height))
+    rows = np.arange(len(shown))
+    axes.errorbar(
+        [r.sd for r in shown], rows, xerr=[2 * r.sd_error for r in shown], fmt="o", color=SERIES_COLORS[0], capsize=2,
+        markersize=4, label="Expected after this measurement",
+    )  # fmt: skip
+    _now(axes, found, horizontal=False)
+    axes.set_yticks(rows, [r.words for r in shown])
+    axes.set_ylim(len(shown) - 0.4, -0.6)
+    axes.set_xlim(*_limits(found))
+    axes.set_xlabel(_name(found))
+    _title(axes, found, -0.9 * room / (PAGE * axes.get_position().width))
+    axes.grid(visible=False, axis="y")
+    legend_above(figure, [axes], columns=2)
+    return figure

@@ -1,0 +1,132 @@
+"""A force run that could be made next: what its readings say once the effect of its mounting is in them."""
+
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
+from typing import Any
+
+import jax
+import jax.numpy as jnp
+import numpy as np
+from jax import Array
+
+from bowdenfit.cable.cable import Cable, resolve_angles
+from bowdenfit.cable.load_cells import BLOCK_NOISE, FORCE_NOISE, GAIN_ERROR, INPUT_OFFSET, OUTPUT_OFFSET, RUN_SCATTER
+from bowdenfit.cable.noise import scatter
+from bowdenfit.kinds.recordings.blocks import positive, worth_of
+from bowdenfit.kinds.runs import LEAST_FORCE
+from bowdenfit.kinds.tables import ForceTable, Measurements
+from bowdenfit.recordings.recording import Recordings
+from bowdenfit.types import Vector
+
+_MOST = 12  # forces of each stroke; more readings of a run are joined, and count for more
+_SPREAD = 1.05  # ratio of the largest to the smallest force or speed from which on their effect is looked for
+
+
+@dataclass(frozen=True)
+class RunDesign:
+    """Forces and strokes of a run.
+
+    Args:
+        input_force: Input forces [N].
+        stroke: +1 pulling, -1 return.
+        velocity: Velocity as in the tables; NaN where it is not known.
+        worth: How many independent readings each stands for [1].
+        noise: Parameter that is the standard deviation of one reading.
+    """
+
+    input_force: Vector
+    stroke: Vector
+    velocity: Vector
+    worth: Vector
+    noise: str = FORCE_NOISE
+
+
+def typical_run(measurements: Measurements) -> RunDesign | None:
+    """The design of the runs made so far: that of the run of median length; None where none slides."""
+    if measurements.forces is not None and np.any(measurements.forces.stroke != 0):
+        return _of_table(measurements.forces)
+    recordings = measurements.recordings
+    if recordings is not None and not recordings.loop:
+        return _of_recordings(recordings)
+    return None
+
+
+def _of_table(table: ForceTable) -> RunDesign:
+    sliding = table.stroke != 0
+    runs, counts = np.unique(table.run[sliding], return_counts=True)
+    mine = sliding & (table.run == runs[np.argsort(counts, kind="stable")[len(runs) // 2]])
+    worth = np.ones(int(mine.sum()))
+    return _joined(table.input_force[mine], table.stroke[mine], table.velocity[mine], worth, FORCE_NOISE)
+
+
+def _of_recordings(recordings: Recordings) -> RunDesign | None:
+    used = [r.strokes.used_sliding & positive(r) for r in recordings.each]
+    order = [i for i in np.argsort([u.sum() for u in used], kind="stable") if used[i].any()]
+    if not order:
+        return None
+    middle = order[len(order) // 2]
+    recording, where = recordings.each[middle], used[middle]
+    blocks, stroke = recording.blocks, recording.strokes.stroke
+    worth = worth_of(recording, np.flatnonzero(where))
+    return _joined(blocks.input_force[where], stroke[where], blocks.velocity[where], worth, BLOCK_NOISE)
+
+
+def _joined(force: Vector, stroke: Any, velocity: Vector, worth: Vector, noise: str) -> RunDesign:
+    """Readings of like force joined, stroke by stroke."""
+    groups = []
+    for way in (1, -1):
+        mine = np.flatnonzero(stroke == way)
+        order = mine[np.argsort(force[mine], kind="stable")]
+        groups += [part for part in np.array_split(order, _MOST) if len(part)]
+    means = [[np.average(v[g], weights=worth[g]) for g in groups] for v in (force, velocity)]
+    ways, total = [float(stroke[g[0]]) for g in groups], [worth[g].sum() for g in groups]
+    return RunDesign(np.array(means[0]), np.array(ways), np.array(means[1]), np.array(total), noise)
+
+
+def run_readings(
+    cable: Cable, design: RunDesign
+) -> tuple[Callable[[Mapping[str, Array], Mapping[str, Any], Array], Array], int]:
+    """Function that simulates runs at rows of wrap angles, and how many numbers it gives for each.
+
+    A run is told by the coefficients of a weighted straight-line fit to its log ratios: their mean, what differs between
+    the strokes (the gain error of the load cells), and how they change with load and speed where the model lets them.
+
+    Args:
+        cable: The cable.
+        design: Forces and strokes of every run.
+    """
+    fit = _straight_line(cable, design)
+    force, stroke, velocity = (jnp.asarray(a) for a in (design.input_force, design.stroke, design.velocity))
+
+    def simulate(values: Mapping[str, Array], rows: Mapping[str, Any], key: Array) -> Array:
+        of_mounting, of_input, of_output = jax.random.split(key, 3)
+        angles, variance = resolve_angles(cable, values, rows)
+        exponent = cable.friction_exponent(values, angles)
+        sd = jnp.sqrt(values[RUN_SCATTER] ** 2 + cable.exponent_variance(values, angles, variance))
+        mounted = exponent + sd * scatter(of_mounting, exponent.shape, cable.description)
+        shift = mounted[:, None] * cable.friction.rate(values, velocity)
+        output = cable.friction.output_force(values, force, shift, stroke) * jnp.exp(-values.get(GAIN_ERROR, 0.0))
+        noise = values[design.noise] / jnp.sqrt(jnp.asarray(design.worth))
+        read_in = force + values.get(INPUT_OFFSET, 0.0) + noise * jax.random.normal(of_input, output.shape)
+        read_out = output + values.get(OUTPUT_OFFSET, 0.0) + noise * jax.random.normal(of_output, output.shape)
+        ratio = jnp.log(jnp.maximum(read_in, LEAST_FORCE) / jnp.maximum(read_out, LEAST_FORCE))
+        return ((stroke * ratio) @ fit).ravel()
+
+    return simulate, fit.shape[1]
+
+
+def _straight_line(cable: Cable, design: RunDesign) -> np.ndarray:
+    """Matrix from log ratios to the coefficients of their weighted least-squares fit."""
+    columns = [np.ones(len(design.stroke))]
+    if len(np.unique(design.stroke)) > 1:
+        columns.append(design.stroke)
+    offsets = cable.description.fits_offsets
+    if (cable.friction.depends_on_load or offsets) and np.ptp(np.log(design.input_force)) > np.log(_SPREAD):
+        columns.append(np.log(design.input_force))
+    speed = np.log(np.maximum(np.abs(np.nan_to_num(design.velocity)), 1e-9))
+    if cable.friction.depends_on_rate and np.ptp(speed) > np.log(_SPREAD):
+        columns.append(speed)
+    weight = np.sqrt(design.worth) * design.input_force  # the noise of a log ratio falls with the force
+    lines = np.column_stack(columns)
+    lines[:, 1:] -= np.average(lines[:, 1:], axis=0, weights=weight**2)
+    return np.asarray(np.linalg.pinv(lines * weight[:, None]) * weight).T

@@ -1,0 +1,105 @@
+"""The answer that the next measurement is to narrow: the best length, an efficiency or a parameter."""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from bowdenfit.errors import UsageError, nearest
+from bowdenfit.results.record import OPTIMAL_EFFICIENCY, OPTIMAL_LENGTH, Fit
+
+
+@dataclass(frozen=True)
+class Answer:
+    """What is to be known better.
+
+    Args:
+        name: As the user writes it.
+        words: In a sentence.
+        unit: Unit of its standard deviation, empty where there is none.
+        draws: Its value for each draw of the posterior.
+    """
+
+    name: str
+    words: str
+    unit: str
+    draws: np.ndarray
+
+    @property
+    def sd(self) -> float:
+        """Standard deviation as things are."""
+        return float(np.std(self.draws))
+
+    def sd_after(self, share: float) -> float:
+        """Standard deviation once a measurement has taken away this share of the variance."""
+        return self.sd * float(np.sqrt(max(1.0 - share, 0.0)))
+
+
+def answer_of(fit: Fit, wanted: str | None) -> Answer:
+    """The answer that is to be known better.
+
+    Args:
+        fit: The fit.
+        wanted: "optimal-length", "optimal-efficiency", "efficiency@470", or a parameter. If omitted the optimal length where
+            there is a route, else the friction coefficient, or with several the efficiency at the nominal wrap angles.
+
+    Raises:
+        UsageError: There is no such answer, or no posterior.
+    """
+    drawn, route = fit.draws(), fit.dataset.description.route
+    if wanted is None:
+        coefficients = [p.name for p in fit.model.space.free if p.role == "friction"]
+        wanted = "optimal-length" if route else coefficients[0] if len(coefficients) == 1 else "efficiency"
+    what, _, where = wanted.partition("@")
+    if wanted in drawn.values:
+        return _parameter(fit, wanted)
+    if what == "efficiency":
+        return _efficiency(fit, wanted, where)
+    if wanted in ("optimal-length", "optimal-efficiency"):
+        best = fit.optimal_length()  # refuses cables without a route
+        variable = best.variable.replace("_", " ")
+        if wanted == "optimal-length":
+            return Answer(wanted, f"the best {variable}", best.unit, drawn.optimum[OPTIMAL_LENGTH].ravel())
+        return Answer(
+            wanted, f"the efficiency at the best {variable}", "points", 100 * drawn.optimum[OPTIMAL_EFFICIENCY].ravel()
+        )
+    known = ["optimal-length", "optimal-efficiency", "efficiency@..."] if route else ["efficiency"]
+    raise UsageError(f"--for {wanted!r} is no answer of this fit{nearest(wanted, [*known, *drawn.values])}")
+
+
+def _parameter(fit: Fit, name: str) -> Answer:
+    """A parameter, or a coefficient of a curve."""
+    units = {p.name: p.unit for p in fit.model.space.free}
+    draws = fit.draws().values[name].ravel()
+    if not np.all(np.isfinite(draws)):
+        raise UsageError(
+            f"--for {name}: some draws have no finite {name}, so its variance is none that could be reduced; ask for another "
+            "parameter of the same curve."
+        )
+    unit = units.get(name, "1")
+    return Answer(name, name, "" if unit == "1" else unit, draws)
+
+
+def _efficiency(fit: Fit, wanted: str, where: str) -> Answer:
+    """Efficiency at a length, or without a route at the nominal wrap angles, in points of percent."""
+    route = fit.dataset.description.route
+    if route is None:
+        if where:
+            raise UsageError(
+                f"--for {wanted!r}: this cable has no route, and its efficiency is that at its nominal wrap angles; write "
+                "--for efficiency."
+            )
+        return Answer(
+            wanted, "the efficiency at the nominal wrap angles", "points", 100 * fit.efficiency_draws(0.0)[:, 0]
+        )
+    try:
+        at = float(where.removesuffix(route.unit))
+    except ValueError:
+        raise UsageError(
+            f"--for {wanted!r} does not say where; write it as efficiency@{route.middle:g}, in {route.unit}."
+        ) from None
+    if not route.range[0] <= at <= route.range[1]:
+        low, high = route.range
+        raise UsageError(
+            f"--for {wanted!r}: {at:g} {route.unit} lies outside the range {low:g} to {high:g} {route.unit}."
+        )
+    return Answer(wanted, f"the efficiency at {at:g} {route.unit}", "points", 100 * fit.efficiency_draws(at)[:, 0])

@@ -1,0 +1,104 @@
+"""What `bowdenfit next` prints."""
+
+from bowdenfit.questions.next.answer import NextMeasurement, Ranked
+from bowdenfit.words import decimals, filled, listed, table
+
+_MOUNTED = ("force", "efficiency")  # kinds that mean mounting the cable anew
+_MOST_NAMED = 3  # candidates as good as the best that are named in the sentence
+
+
+def next_measurement_text(found: NextMeasurement, top: int) -> str:
+    """What to measure next, in sentences and a table of the best candidates.
+
+    Args:
+        found: The ranking.
+        top: How many candidates the table shows.
+    """
+    sentences = [*_advice(found), *_planned(found), *_repeated(found)]
+    shown = found.ranked[:top]
+    more = len(found.ranked) - len(shown)
+    lines = [
+        "\n".join(filled(line) for line in sentences),
+        _table(found, shown)
+        + (f"\n... and {more} more, ranked lower; --top {len(found.ranked)} shows all." if more > 0 else ""),
+        filled(
+            "Each number is an average over what the reading may turn out to be, given what is known now. The error is that "
+            "of the simulation, not of the measurement."
+        ),
+    ]
+    return "\n\n".join(lines) + "\n"
+
+
+def _sd(found: NextMeasurement, sd: float) -> str:
+    """A standard deviation with the answer's unit."""
+    unit = f" {found.answer.unit}" if found.answer.unit else ""
+    return f"{sd:.{_digits(found)}f}{unit}"
+
+
+def _digits(found: NextMeasurement) -> int:
+    """Decimals of standard deviations: two significant digits, or three where the best candidate changes little."""
+    usual, change = decimals(found.answer.sd), found.answer.sd - found.ranked[0].sd
+    return min(max(usual, decimals(change) - 1), usual + 1) if change > 0 else usual
+
+
+def _advice(found: NextMeasurement) -> list[str]:
+    """What to measure, and what would do as well."""
+    best, answer = found.best, found.answer
+    if best is None:
+        first = found.ranked[0]
+        return [
+            f"None of these measurements would narrow {answer.words} noticeably: its standard deviation is "
+            f"{_sd(found, answer.sd)}, and {_sd(found, first.sd)} after the best of them, {first.words}.",
+            "One more reading of a kind that there are many of already adds little; name another kind with --candidate, or "
+            "ask for another answer with --for.",
+        ]
+    per_cost = " for its cost" if best.cost is not None else ""
+    lines = [
+        f"Measure {best.words} next{per_cost}: on average this would cut the standard deviation of {answer.words} from "
+        f"{_sd(found, answer.sd)} to {_sd(found, best.sd)}."
+    ]
+    alike = [r for r in found.ranked if r.as_good and r is not best]
+    if alike:
+        named = [r.words[0].upper() + r.words[1:] if i == 0 else r.words for i, r in enumerate(alike[:_MOST_NAMED])]
+        named += [f"{len(alike) - _MOST_NAMED} more"] if len(alike) > _MOST_NAMED else []
+        lines.append(f"{listed(named)} would do as well, within the error of this estimate.")
+    return lines
+
+
+def _planned(found: NextMeasurement) -> list[str]:
+    """What would be best after it."""
+    after = [
+        f"{step.words}{' again' if step.name in [s.name for s in found.plan[:i]] else ''} ({_sd(found, step.sd)})"
+        for i, step in enumerate(found.plan)
+    ][1:]
+    if not after:
+        return []
+    return [f"What would be worth most after it, with the standard deviation then: {', then '.join(after)}."]
+
+
+def _repeated(found: NextMeasurement) -> list[str]:
+    """How often the best candidate would have to be measured to halve the standard deviation."""
+    best, repeats = found.best, found.repeats
+    if best is None or repeats is None:
+        return []
+    half, most = repeats.to_halve(found.answer.sd), repeats.times[-1]
+    anew = ", mounted anew each time," if best.candidate.kind in _MOUNTED else ""
+    if half == 1:
+        return []
+    if half is not None:
+        return [f"Measuring nothing but this{anew} would take about {half} times to halve the standard deviation."]
+    return [
+        f"Measuring nothing but this would not halve it: after {most} times{anew} it would still be "
+        f"{_sd(found, repeats.sd[-1])}."
+    ]
+
+
+def _table(found: NextMeasurement, shown: tuple[Ranked, ...]) -> str:
+    unit = f" ({found.answer.unit})" if found.answer.unit else ""
+    digits = _digits(found)
+    heads = ["candidate", f"sd afterwards{unit}", "variance taken away", "error"]
+    rows = [[r.name, f"{r.sd:.{digits}f}", f"{r.share:.1%}", f"{r.error:.1%}"] for r in shown]
+    if any(r.cost is not None for r in shown):
+        heads += ["cost", "taken away per cost"]
+        rows = [[*row, f"{r.cost:g}", f"{r.worth:.2%}"] for row, r in zip(rows, shown, strict=True)]
+    return table(heads, rows)

@@ -1,0 +1,1 @@
+"""What will the cable do at lengths or wrap angles?"""

@@ -1,0 +1,190 @@
+"""Predictions at wrap angles as rows of a table: what `bowdenfit predict --wrap-angle` and `--quantity` print."""
+
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass
+from types import MappingProxyType
+from typing import Any
+
+import numpy as np
+
+from bowdenfit.errors import DatasetError, UsageError
+from bowdenfit.inference.interval import Interval
+from bowdenfit.questions.bends.answer import friction_arm
+from bowdenfit.questions.bends.page import window_page, window_sentence
+from bowdenfit.results.record import Fit
+from bowdenfit.units import conversion_factor
+
+Row = dict[str, Any]
+Stated = tuple[float, str] | None  # a number and its unit
+
+_STROKES = {"pull": 1, "return": -1}
+
+
+@dataclass(frozen=True)
+class Question:
+    """What is asked at wrap angles, in internal units.
+
+    Args:
+        wrap_angles: Wrap angles [rad].
+        input_force: Force at the motor side [N]; the reference force of the fit where none is stated.
+        stated_force: Whether a force was stated.
+        preload: Preload [N] that the cable is given instead of its own; None for its own.
+        friction: What may be felt in free motion [N]; None without a limit.
+        stroke: +1 pulling, -1 returning.
+    """
+
+    wrap_angles: np.ndarray
+    input_force: float
+    stated_force: bool
+    preload: float | None
+    friction: float | None
+    stroke: int
+
+
+def question(
+    fit: Fit,
+    wrap_angles: Sequence[tuple[float, str]] = (),
+    input_force: Stated = None,
+    preload: Stated = None,
+    friction_limit: Stated = None,
+    stroke: str = "pull",
+) -> Question:
+    """A question from numbers with units; wrap angles are those measured at if none is named.
+
+    Raises:
+        UsageError: A number is negative, or has a unit of another kind.
+    """
+    angles = [_internal(angle, "angle", "--wrap-angle", 0.0) for angle in wrap_angles]
+    limit = None
+    if friction_limit is not None:
+        arm, unit = friction_arm(fit)
+        limit = _internal(friction_limit, "force" if unit == "N" else "torque", "--friction-limit", 0.0) / arm
+    return Question(
+        np.array(angles) if angles else fit.elastic.measured_bends,
+        fit.elastic.reference_force if input_force is None else _internal(input_force, "force", "--input-force", 1e-9),
+        input_force is not None,
+        None if preload is None else _internal(preload, "force", "--preload", 0.0),
+        limit,
+        _STROKES[stroke],
+    )
+
+
+def _internal(stated: tuple[float, str], dimension: str, option: str, least: float) -> float:
+    try:
+        value = stated[0] * conversion_factor(stated[1], dimension)
+    except DatasetError as error:
+        raise UsageError(f"{option}: {error}.") from None
+    if value < least:
+        raise UsageError(f"{option} {stated[0]:g}{stated[1]} is not positive; write it without a sign.")
+    return value
+
+
+def predicted_at_bends(fit: Fit, quantity: str, asked: Question) -> list[Row]:
+    """One row a wrap angle, or one row in all for the preload window.
+
+    Args:
+        fit: The fit.
+        quantity: One of `QUANTITIES`.
+        asked: The question.
+
+    Raises:
+        UsageError: There is no posterior, no wrap angle, or the cable has not what is asked for.
+    """
+    fit.draws()
+    if not len(asked.wrap_angles):
+        raise UsageError(
+            "nothing was measured at a wrap angle of its own; name those to predict at, as --wrap-angle 90deg."
+        )
+    return QUANTITIES[quantity](fit, asked)
+
+
+def _rows(asked: Question, columns: Mapping[str, np.ndarray]) -> list[Row]:
+    """Median, moments and interval of the first quantity, the others with their names before."""
+    rows = []
+    for i, angle in enumerate(np.rad2deg(asked.wrap_angles)):
+        row: Row = {"wrap_angle_deg": float(f"{angle:.9g}")}
+        for k, (name, draws) in enumerate(columns.items()):
+            found, before = Interval.of(draws[:, i]), "" if k == 0 else f"{name}_"
+            row |= {name: found.median, f"{before}mean": found.mean, f"{before}sd": found.sd}
+            row |= {f"{before}q05": found.q05, f"{before}q95": found.q95}
+        rows.append(row)
+    return rows
+
+
+def _efficiency(fit: Fit, asked: Question) -> list[Row]:
+    force = fit.elastic.output_force(asked.wrap_angles, asked.input_force, asked.stroke, asked.preload)
+    return _rows(asked, {"efficiency": force / asked.input_force})
+
+
+def _output_force(fit: Fit, asked: Question) -> list[Row]:
+    force = fit.elastic.output_force(asked.wrap_angles, asked.input_force, asked.stroke, asked.preload)
+    return _rows(asked, {"output_force_N": force})
+
+
+def _preload(fit: Fit, asked: Question) -> list[Row]:
+    preload, slack = fit.elastic.preload(asked.wrap_angles, asked.preload)
+    rows = _rows(asked, {"preload_N": preload, "slack_mm": slack})
+    return [row | {"slack_probability": float(np.mean(slack[:, i] > 0))} for i, row in enumerate(rows)]
+
+
+def _friction(fit: Fit, asked: Question) -> list[Row]:
+    felt, (arm, unit) = fit.elastic.friction(asked.wrap_angles, asked.preload), friction_arm(fit)
+    return _rows(asked, {f"friction_{unit.replace('*', '_')}": arm * felt})
+
+
+def _slack_load(fit: Fit, asked: Question) -> list[Row]:
+    _needs_loop(fit, "slack-load")
+    return _rows(asked, {"slack_load_N": fit.elastic.slack_load(asked.wrap_angles, asked.preload)})
+
+
+def _needs_loop(fit: Fit, quantity: str) -> None:
+    if not fit.model.cable.is_loop:
+        raise UsageError(
+            f'--quantity {quantity} is asked of pull-pull loops; this cable has no kind = "loop" under [cable].'
+        )
+
+
+def _position(fit: Fit, asked: Question) -> list[Row]:
+    error, lost = fit.elastic.position(asked.wrap_angles, asked.input_force, asked.preload)
+    columns = {"position_error_mm": error, "lost_motion_mm": lost}
+    arm, unit = friction_arm(fit)
+    if unit != "N":
+        columns |= {"position_error_deg": np.rad2deg(error / arm), "lost_motion_deg": np.rad2deg(lost / arm)}
+    return _rows(asked, columns)
+
+
+def _stiffness(fit: Fit, asked: Question) -> list[Row]:
+    stiffness = fit.elastic.stiffness(asked.wrap_angles, asked.input_force, asked.preload)
+    columns = {"stiffness_N_per_mm": stiffness}
+    arm, unit = friction_arm(fit)
+    if unit != "N":
+        columns["stiffness_N_m_per_rad"] = stiffness * arm**2 / 1000
+    return _rows(asked, columns)
+
+
+def _window(fit: Fit, asked: Question) -> list[Row]:
+    ends = float(asked.wrap_angles.min()), float(asked.wrap_angles.max())
+    force = asked.input_force if asked.stated_force else 0.0
+    found = fit.elastic.preload_window(ends, force, asked.friction)
+    page = window_page(fit, found)
+    row: Row = {"from_deg": page["bends"][0], "to_deg": page["bends"][1], "input_force_N": force}
+    row |= {f"lowest_{name}_N": page["lowest"][name] for name in ("median", "q05", "q95")}
+    if page["highest"] is not None:
+        row |= {f"highest_{name}_N": page["highest"][name] for name in ("median", "q05", "q95")}
+    unit = friction_arm(fit)[1].replace("*", "_")
+    row |= {"best_N": page["best"]} | {f"felt_{name}_{unit}": page["felt"][name] for name in ("median", "q05", "q95")}
+    return [row | {"possible": page["possible"], "in_words": window_sentence(fit, found)}]
+
+
+QUANTITIES: Mapping[str, Callable[[Fit, Question], list[Row]]] = MappingProxyType(
+    {
+        "efficiency": _efficiency,
+        "output-force": _output_force,
+        "preload": _preload,
+        "friction": _friction,
+        "slack-load": _slack_load,
+        "position": _position,
+        "stiffness": _stiffness,
+        "preload-window": _window,
+    }
+)

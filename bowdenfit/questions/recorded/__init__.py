@@ -1,0 +1,1 @@
+"""What do recordings say, sample by sample?"""

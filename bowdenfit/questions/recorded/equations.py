@@ -1,0 +1,108 @@
+"""What each draw says of a recording: the output force that the cable gives at the measured input force."""
+
+from collections.abc import Callable, Mapping
+from typing import Any
+
+import jax
+import jax.numpy as jnp
+import numpy as np
+from jax import Array
+from jaxtyping import Float
+
+from bowdenfit.cable.cable import resolve_angles, row_angles
+from bowdenfit.cable.load_cells import DELAY_ERROR, GAIN_ERROR, INPUT_OFFSET, OUTPUT_OFFSET
+from bowdenfit.inference.compilation import compiled
+from bowdenfit.kinds.recordings.blocks import recorded_angles
+from bowdenfit.kinds.runs import LEAST_FORCE
+from bowdenfit.kinds.tables import AngleTable
+from bowdenfit.model import Model
+from bowdenfit.physics.hysteresis import play_operator
+from bowdenfit.recordings.recording import Recordings
+
+Follow = Callable[[Array, Array, Mapping[str, Any]], tuple[Array, Array]]
+
+DRAWS = 200  # enough for the edges of a band
+MOST_BLOCKS = 1000  # of a recording in a figure
+_LEAST_BAND = 1e-9
+
+
+def blocks_shown(n_blocks: int) -> np.ndarray:
+    """Which blocks of a recording are followed: all, or evenly spaced ones of a long recording."""
+    return np.arange(0, n_blocks, -(-n_blocks // MOST_BLOCKS))
+
+
+class Follower:
+    """Follows all recordings of a data set with the play operator, for `DRAWS` draws at a time; compiled once.
+
+    Args:
+        model: The model.
+        recordings: The recordings.
+        angles: The angle table, for recordings outside the curves.
+        follow: Function of a model that gives what it makes of one z, of mounting effects and of the blocks; that of a
+            single rope if omitted.
+        scale: What of an output force a delay shifts in proportion to its rate: its logarithm if omitted.
+    """
+
+    def __init__(
+        self,
+        model: Model,
+        recordings: Recordings,
+        angles: AngleTable | None,
+        follow: Callable[[Model], Follow] | None = None,
+        scale: Callable[[np.ndarray], np.ndarray] = lambda force: np.log(np.maximum(force, LEAST_FORCE)),
+    ) -> None:
+        self._data = _arrays(model, recordings, angles, scale)
+        z = jax.ShapeDtypeStruct((DRAWS, model.space.size), jnp.float64)
+        mounting = jax.ShapeDtypeStruct((DRAWS, len(recordings.each)), jnp.float64)
+        function = jax.vmap((follow or _followed)(model), in_axes=(0, 0, None))
+        self._program: Callable[..., Any] = compiled(function, z, mounting, self._data)
+
+    def __call__(
+        self, z: Float[np.ndarray, "draws free"], mounting: Float[np.ndarray, "draws recordings"]
+    ) -> tuple[np.ndarray, np.ndarray]:
+        """Output force [N] of each draw, block and recording, and friction exponent [1] of each draw and recording.
+
+        Args:
+            z: `DRAWS` draws.
+            mounting: Effect of the mounting on the friction exponent of each recording [1].
+        """
+        force, exponent = self._program(z, mounting, self._data)
+        return np.asarray(force), np.asarray(exponent)
+
+
+def _arrays(
+    model: Model, recordings: Recordings, angles: AngleTable | None, scale: Callable[[np.ndarray], np.ndarray]
+) -> dict[str, Any]:
+    """Blocks of all recordings side by side, the shorter ones standing still at their end."""
+    shown = [blocks_shown(len(r.blocks.time)) for r in recordings.each]
+    longest = max(len(s) for s in shown)
+
+    def side_by_side(name: str) -> np.ndarray:
+        parts = [getattr(r.blocks, name)[s] for r, s in zip(recordings.each, shown, strict=True)]
+        return np.stack([np.pad(part, (0, longest - len(part)), "edge") for part in parts], axis=1)
+
+    rates = [
+        np.gradient(scale(r.blocks.output_force), r.blocks.time)[s] for r, s in zip(recordings.each, shown, strict=True)
+    ]
+    rows = row_angles(model.cable, recorded_angles(recordings), angles).data
+    return rows | {name: side_by_side(name) for name in ("input_force", "output_force", "velocity")} | {
+        "drift": np.stack([np.pad(rate, (0, longest - len(rate))) for rate in rates], axis=1)
+    }  # fmt: skip
+
+
+def _followed(model: Model) -> Follow:
+    """Function of one z, of mounting effects and of the blocks."""
+    friction = model.cable.friction
+
+    def follow(z: Array, mounting: Array, data: Mapping[str, Any]) -> tuple[Array, Array]:
+        values = model.space.constrain(z)
+        angles, _ = resolve_angles(model.cable, values, data)
+        exponent, gain = model.cable.friction_exponent(values, angles), values.get(GAIN_ERROR, 0.0)
+        input_force = jnp.maximum(data["input_force"] - values.get(INPUT_OFFSET, 0.0), LEAST_FORCE)
+        first = jnp.maximum(data["output_force"][0] - values.get(OUTPUT_OFFSET, 0.0), LEAST_FORCE) * jnp.exp(gain)
+        band = jnp.maximum(exponent * friction.rate(values, data["velocity"]) + mounting, _LEAST_BAND)
+        y = play_operator(friction.scaled(values, input_force), band, friction.scaled(values, first))
+        shown = friction.force(values, y) * jnp.exp(-gain) + values.get(OUTPUT_OFFSET, 0.0)
+        return shown * jnp.exp(-values.get(DELAY_ERROR, 0.0) * data["drift"]), exponent
+
+    return follow

@@ -1,0 +1,121 @@
+"""Output against input force: the loop that friction opens, between the two lines of the capstan equation."""
+
+from typing import TYPE_CHECKING
+
+import numpy as np
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure
+
+from bowdenfit.plots.layout import legend_above
+from bowdenfit.plots.panels import (
+    alike,
+    chosen,
+    enlarge_marks,
+    label_outer,
+    recording_panels,
+    say_how_many,
+    set_limits,
+    span,
+)
+from bowdenfit.plots.style import (
+    BLACK,
+    BLUE,
+    GRAY,
+    LEAST_SQUARES,
+    MEDIAN,
+    VERMILLION,
+    WIDE_INTERVAL,
+    in_paper_style,
+    rounded,
+)
+from bowdenfit.questions.recorded.recordings_figure import is_loop
+
+if TYPE_CHECKING:
+    from bowdenfit.questions.summary.figure_data import FigureData, RecordedTrace
+
+MOST_COLUMNS = 4
+WITHOUT_INTERVAL = 0.05  # uncertainty of an exponent whose digits are to be shown
+# stroke, name, marker, size [pt] and color
+STROKES = (
+    (1, "Pulling", "o", 2.6, BLUE),
+    (-1, "Returning", "s", 2.4, VERMILLION),
+    (0, "Switching or held", "D", 1.4, GRAY),
+)
+
+
+def has_hysteresis(data: "FigureData") -> bool:
+    """Whether forces were recorded of a single rope; those of a loop are in the figure of loops."""
+    return any(map(_has_forces, data.recordings))
+
+
+def _has_forces(recording: "RecordedTrace") -> bool:
+    return not is_loop(recording) and bool(
+        np.any(np.isfinite(recording.input_force) & np.isfinite(recording.output_force))
+    )
+
+
+@in_paper_style
+def hysteresis(data: "FigureData") -> Figure:
+    """Output against input force [N] on equal axes, a panel a recording."""
+    shown, every = chosen(data, _has_forces)
+    limits = [span([r.input_force, r.output_force]) for r in shown]
+    shared = alike(limits)
+    figure, flat, columns = recording_panels([r.name for r in shown], MOST_COLUMNS, None, shared, shared)
+    set_limits(flat, limits, "x", shared)
+    set_limits(flat, limits, "y", shared)
+    for axes, recording in zip(flat, shown, strict=True):
+        axes.locator_params(nbins=5, steps=[1, 2, 5, 10])
+        _loop(axes, recording)
+        _capstan_lines(axes, recording)
+        axes.text(
+            0.98, 0.02, _words(recording), transform=axes.transAxes, ha="right", va="bottom", fontsize=6,
+            linespacing=1.1, zorder=5,
+        )  # fmt: skip
+    label_outer(flat, columns, "Input force (N)", "Output force (N)")
+    say_how_many(flat[0], len(shown), len(every))
+    legend_above(figure, flat, columns=4 if columns > 1 else 2)
+    enlarge_marks(figure)
+    return figure
+
+
+def _loop(axes: Axes, recording: "RecordedTrace") -> None:
+    """The blocks by stroke."""
+    for stroke, name, marker, size, color in STROKES:
+        here = recording.stroke == stroke
+        if here.any():
+            axes.plot(
+                recording.input_force[here], recording.output_force[here], marker, color=color, markersize=size,
+                markeredgewidth=0, label=name, rasterized=True,
+            )  # fmt: skip
+
+
+def _capstan_lines(axes: Axes, recording: "RecordedTrace") -> None:
+    """F_out = F_in exp(-Lambda) when pulling, F_in exp(Lambda) when returning, and the diagonal between."""
+    force = np.array(axes.get_xlim())
+    low, middle, high = _exponent(recording)
+    drawn = len(recording.predicted) > 1
+    for sign in (-1.0, 1.0):
+        if drawn:
+            axes.fill_between(
+                force, force * np.exp(sign * low), force * np.exp(sign * high), color=BLACK, alpha=0.18, linewidth=0,
+                label=f"Capstan equation, {WIDE_INTERVAL}",
+            )  # fmt: skip
+        label = f"Capstan equation, {(MEDIAN if drawn else LEAST_SQUARES).lower()}"
+        axes.plot(force, force * np.exp(sign * middle), color=BLACK, linewidth=0.6, label=label)
+    axes.plot(force, force, color=GRAY, linewidth=0.6, linestyle=(0, (4, 2)), label="No friction")
+
+
+def _words(recording: "RecordedTrace") -> str:
+    """The exponent of this recording by itself, and that of the cable; in short lines, which fit below the loop."""
+    low, middle, high = _exponent(recording)
+    own, width = recording.own_exponent, high - low
+    low_text, middle_text, high_text, own_text = rounded((low, middle, high, own), width or WITHOUT_INTERVAL)
+    lines = [rf"$\Lambda$ here {own_text}"] if np.isfinite(own) else []
+    lines += [rf"$\Lambda$ expected {middle_text}"] + ([f"({low_text} to {high_text})"] if width else [])
+    return "\n".join(lines)
+
+
+def _exponent(recording: "RecordedTrace") -> tuple[float, float, float]:
+    """Ends and middle of the interval of the cable's exponent, all the same without draws."""
+    exponent = recording.exponent.tolist()
+    return exponent[0], exponent[len(exponent) // 2], exponent[-1]

@@ -1,0 +1,104 @@
+"""Whether efficiency depends on speed, where the fit lets it: the difference between two speeds, draw by draw."""
+
+from dataclasses import dataclass
+
+import jax
+import jax.numpy as jnp
+import numpy as np
+
+from bowdenfit.inference.interval import Interval
+from bowdenfit.results.record import Fit
+
+_SURE = 0.99  # probability from which a dependence on speed is called one
+SHOWN_SPEED = {"rad/s": ("r/min", 30 / np.pi), "mm/s": ("mm/s", 1.0), "": ("", 1.0)}
+
+
+@dataclass(frozen=True)
+class RateEffect:
+    """Efficiency at the highest speed less that at the lowest.
+
+    Args:
+        slow, fast: The speeds, in `unit`.
+        unit: "r/min" or "mm/s".
+        place: Route value in words; empty without a route.
+        difference: Efficiency at `fast` less that at `slow` [1].
+        probability_lower: Probability that efficiency is lower at `fast`.
+    """
+
+    slow: float
+    fast: float
+    unit: str
+    place: str
+    difference: Interval
+    probability_lower: float
+
+    def sentence(self) -> str:
+        """The answer in words."""
+        low, high = 100 * self.difference.q05, 100 * self.difference.q95
+        way, sure = ("falls", self.probability_lower) if high < 0 else ("rises", 1 - self.probability_lower)
+        verdict = (
+            "so the data show no dependence on speed"
+            if low <= 0 <= high
+            else f"so efficiency {way} with speed"
+            if sure > _SURE
+            else f"a hint that efficiency {way} with speed, and no more than that"
+        )
+        where = f" {self.place}" if self.place else ""
+        return (
+            f"Efficiency{where} at {self.fast:.3g} {self.unit} less that at {self.slow:.3g} {self.unit}: "
+            f"{100 * self.difference.median:+.2f} points (90 % interval {low:+.2f} to {high:+.2f}), {verdict}."
+        )
+
+
+def rate_effect(fit: Fit) -> RateEffect | None:
+    """The effect of speed; None where the fit has none or no draws."""
+    friction = fit.model.cable.friction
+    if fit.posterior is None or not friction.depends_on_rate:
+        return None
+    unit, scale = SHOWN_SPEED[friction.conditions.velocity_unit]
+    slow, fast = _typical_speeds(fit)
+    at, place = place_of(fit)
+    with jax.enable_x64(True):
+        difference = _differences(fit, at, slow, fast)
+    interval = Interval.of(difference)
+    return RateEffect(slow * scale, fast * scale, unit, place, interval, float(np.mean(difference < 0)))
+
+
+def _typical_speeds(fit: Fit) -> tuple[float, float]:
+    """The lowest and the highest typical speed of a recording or run, internal unit."""
+    measured, speeds = fit.dataset.measurements, []
+    if measured.recordings is not None:
+        for r in measured.recordings.each:
+            used = np.abs(r.blocks.velocity[r.strokes.used_sliding])
+            if np.isfinite(used).any():
+                speeds.append(float(np.nanmedian(used)))
+    if measured.forces is not None and np.isfinite(measured.forces.velocity).any():
+        known = np.abs(measured.forces.velocity[np.isfinite(measured.forces.velocity)])
+        speeds += [float(known.min()), float(known.max())]
+    return min(speeds), max(speeds)
+
+
+def place_of(fit: Fit) -> tuple[float, str]:
+    """Where to answer: at the length with most recordings inside the range, else in its middle."""
+    route, recordings = fit.dataset.description.route, fit.dataset.measurements.recordings
+    if route is None:
+        return 0.0, ""
+    each = recordings.each if recordings is not None else ()
+    values = [r.route for r in each if route.range[0] <= r.route <= route.range[1]]
+    at = max(set(values), key=values.count) if values else route.middle
+    return at, f"at {at:g} {route.unit}"
+
+
+def _differences(fit: Fit, at: float, slow: float, fast: float) -> np.ndarray:
+    model, friction = fit.model, fit.model.cable.friction
+    force = jnp.asarray(friction.conditions.reference_force)
+
+    def difference(z: jax.Array) -> jax.Array:
+        values = model.space.constrain(z)
+        exponent = model.cable.exponent_at(values, jnp.asarray([at]))[0]
+        shifts = exponent * friction.rate(values, jnp.asarray([slow, fast]))
+        output = friction.output_force(values, force, shifts, jnp.ones(())) / force
+        return output[1] - output[0]
+
+    assert fit.posterior is not None  # the caller checked
+    return np.asarray(jax.jit(jax.vmap(difference))(jnp.asarray(fit.posterior.flat_z)))

@@ -1,0 +1,200 @@
+"""Force recordings over time: both forces, phases, what the fit says, and what was left out."""
+
+import dataclasses
+from typing import TYPE_CHECKING
+
+import numpy as np
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure
+
+from bowdenfit.plots.layout import legend_above
+from bowdenfit.plots.panels import (
+    alike,
+    chosen,
+    extremes,
+    label_outer,
+    recording_panels,
+    say_how_many,
+    set_limits,
+    span,
+)
+from bowdenfit.plots.style import (
+    BLACK,
+    BLUE,
+    GRAY,
+    GREEN,
+    LEAST_SQUARES,
+    ORANGE,
+    PURPLE,
+    VERMILLION,
+    WIDE,
+    WIDE_INTERVAL,
+    in_paper_style,
+)
+
+if TYPE_CHECKING:
+    from bowdenfit.questions.summary.figure_data import FigureData, RecordedTrace
+
+POINTS = 3200  # of each line, all panels together, which is what a page can show
+GAP_STEPS = 5
+MOST_CYCLES = 8  # of each recording over time
+PER_BLOCK = (
+    "time", "input_force", "output_force", "velocity", "stroke", "used", "saturated", "predicted", "fitted",
+)  # fmt: skip
+FORCE, TIME = "Force (N)", "Time from the start (s)"
+# stroke, name and fill, which differ in lightness too
+PHASES = ((1, "Pulling", "#F1F6FC"), (-1, "Returning", "#F3E4CE"), (0, "Switching or held", "#D4D4D4"))
+LOOP_PHASES = ("Moving forward", "Moving back", "Between")
+FLAGS = {"dropout": ("x", VERMILLION), "spike": ("^", PURPLE), "saturated": ("s", ORANGE), "quiet": (".", GRAY)}
+OTHER_FLAG = ("+", GREEN)
+MARK_GRID = (160, 60)  # across and up a panel, marks of a kind that it can show
+
+
+def has_recordings(data: "FigureData") -> bool:
+    """Whether forces were recorded."""
+    return any(map(_has_blocks, data.recordings))
+
+
+def is_loop(recording: "RecordedTrace") -> bool:
+    """Whether it is of a pull-pull loop, which has no efficiency that is the same at all loads."""
+    return not len(recording.efficiency)
+
+
+def _has_blocks(recording: "RecordedTrace") -> bool:
+    return len(recording.time) > 1
+
+
+@in_paper_style
+def recordings(data: "FigureData") -> Figure:
+    """Input and output force [N] over time, what the cable would give at this input, and the samples left out."""
+    whole, every = chosen(data, _has_blocks)
+    shown = [beginning(r) for r in whole]
+    times = [span([r.time - _start(r), r.flagged_time - _start(r)], room=0.0) for r in shown]
+    forces = [_force_limits(r) for r in shown]
+    share_x, share_y = alike(times), alike(forces)
+    figure, flat, columns = recording_panels([r.name for r in shown], 2, 1.5, share_x, share_y, WIDE)
+    set_limits(flat, times, "x", share_x)
+    set_limits(flat, forces, "y", share_y)
+    for axes, recording in zip(flat, shown, strict=True):
+        _phases(axes, recording)
+        _forces(axes, recording, POINTS // (2 * len(shown)))
+        _left_out(axes, recording)
+    label_outer(flat, columns, TIME, FORCE)
+    say_how_many(flat[0], len(shown), len(every))
+    if any(len(a.time) < len(b.time) for a, b in zip(shown, whole, strict=True)):
+        flat[0].plot([], [], " ", label=f"First {MOST_CYCLES} cycles shown")
+    legend_above(figure, flat, columns=4)
+    return figure
+
+
+def beginning(recording: "RecordedTrace") -> "RecordedTrace":
+    """A recording up to the last of as many cycles as can be told apart over time."""
+    sliding = np.flatnonzero(recording.stroke)
+    turns = sliding[1:][np.diff(recording.stroke[sliding]) != 0]
+    if len(turns) < 2 * MOST_CYCLES:
+        return recording
+    stop = int(turns[2 * MOST_CYCLES - 1])
+    sample = recording.flagged_time < recording.time[stop]
+    return dataclasses.replace(
+        recording,
+        **{name: getattr(recording, name)[..., :stop] for name in PER_BLOCK},
+        **{name: getattr(recording, name)[sample] for name in ("flagged_time", "flagged_input", "flagged_output")},
+        flagged_kind=tuple(np.array(recording.flagged_kind, dtype=str)[sample].tolist()),
+    )
+
+
+def _start(recording: "RecordedTrace") -> float:
+    """Time of the first block or sample [s]."""
+    return float(min(recording.time[0], recording.flagged_time.min(initial=np.inf)))
+
+
+def _force_limits(recording: "RecordedTrace") -> tuple[float, float]:
+    """Limits that show what was measured and fitted, and the interval unless it is far away."""
+    low, high = span([recording.input_force, recording.output_force, recording.fitted])
+    band_low, band_high = span([recording.predicted])
+    room = 0.3 * (high - low)
+    return max(min(low, band_low), low - room), min(max(high, band_high), high + room)
+
+
+def _phases(axes: Axes, recording: "RecordedTrace") -> None:
+    """Shade what the rope does, from the middle between two blocks to the next such; not where nothing was recorded."""
+    time, stroke = recording.time - _start(recording), recording.stroke
+    gap = _after_gaps(time)
+    change = np.union1d(np.flatnonzero(np.diff(stroke)) + 1, gap)
+    before, after = time[change - 1], time[change]
+    middle, recorded = 0.5 * (before + after), ~np.isin(change, gap)
+    starts = np.append(time[:1], np.where(recorded, middle, after))
+    stops = np.append(np.where(recorded, middle, before), time[-1:])
+    of = stroke[np.append(0, change)]
+    names = LOOP_PHASES if is_loop(recording) else tuple(name for _, name, _ in PHASES)
+    for (value, _, fill), name in zip(PHASES, names, strict=True):
+        spans = [(a, b - a) for a, b in zip(starts[of == value], stops[of == value], strict=True)]
+        if spans:
+            axes.broken_barh(
+                spans, (0, 1), transform=axes.get_xaxis_transform(), facecolor=fill, linewidth=0, zorder=0.4, label=name
+            )
+
+
+def _after_gaps(time: np.ndarray) -> np.ndarray:
+    """Places of the first block after each stretch without any."""
+    steps = np.diff(time)
+    return np.flatnonzero(steps > GAP_STEPS * np.median(steps)) + 1
+
+
+def _forces(axes: Axes, recording: "RecordedTrace", most: int) -> None:
+    """What was measured, predicted and fitted, broken where nothing was recorded."""
+    time = recording.time - _start(recording)
+    gaps = _after_gaps(time)
+
+    def broken(values: np.ndarray) -> np.ndarray:
+        return np.insert(values.astype(float), gaps, np.nan)
+
+    time, predicted = broken(time), [broken(q) for q in recording.predicted]
+
+    def line(values: np.ndarray, **style: object) -> None:
+        places = extremes(values, most)
+        axes.plot(time[places], values[places], **style)  # type: ignore[arg-type]
+
+    line(broken(recording.input_force), color=GRAY, linewidth=0.9, linestyle=(0, (4, 1)), label="Input")
+    line(broken(recording.output_force), color=BLACK, linewidth=1.3, label="Output")
+    if len(predicted) == 1:
+        line(
+            predicted[0], color=BLUE, linewidth=0.9, linestyle="--", label=f"Output predicted, {LEAST_SQUARES.lower()}"
+        )
+    else:
+        at = extremes(predicted[-1], most)
+        axes.fill_between(
+            time[at], predicted[0][at], predicted[-1][at], color=BLUE, alpha=0.4, linewidth=0, zorder=1.5,
+            label=f"Output predicted, {WIDE_INTERVAL}",
+        )  # fmt: skip
+    line(broken(recording.fitted), color=VERMILLION, linewidth=0.7, label="Output fitted")
+
+
+def _left_out(axes: Axes, recording: "RecordedTrace") -> None:
+    """Samples left out, by kind, those beyond the axes or without a reading on their edge; and blocks at a range's end."""
+    kinds, start = np.array(recording.flagged_kind, dtype=str), _start(recording)
+    for kind in dict.fromkeys(recording.flagged_kind):
+        here = kinds == kind
+        x = np.tile(recording.flagged_time[here] - start, 2)
+        y = np.concatenate([recording.flagged_input[here], recording.flagged_output[here]])
+        _marks(axes, x, y, FLAGS.get(kind, OTHER_FLAG), f"Left out: {kind}")
+    at = recording.saturated.astype(bool)
+    if at.any():
+        on_edge = np.full(int(at.sum()), np.nan)
+        _marks(axes, recording.time[at] - start, on_edge, FLAGS["saturated"], "Block at the end of a range", "white")
+
+
+def _marks(
+    axes: Axes, x: np.ndarray, y: np.ndarray, mark: tuple[str, str], label: str, fill: str | None = None
+) -> None:
+    """As many marks as can be told apart."""
+    (left, right), (low, high) = axes.get_xlim(), axes.get_ylim()
+    y = np.clip(np.where(np.isfinite(y), y, low), low, high)
+    across, up = MARK_GRID
+    column, row = np.round(across * (x - left) / (right - left)), np.round(up * (y - low) / (high - low))
+    _, first = np.unique(column * (up + 1) + row, return_index=True)
+    marker, color = mark
+    axes.plot(
+        x[first], y[first], marker, color=color, markersize=3, markerfacecolor=fill or color, markeredgewidth=0.8,
+        clip_on=False, zorder=4, label=label, rasterized=len(first) > MARK_GRID[1],
+    )  # fmt: skip

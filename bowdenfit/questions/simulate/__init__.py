@@ -1,0 +1,1 @@
+"""What would a bench read, were the truth known?"""

@@ -1,0 +1,21 @@
+"""A bench on the computer, sample by sample: a motor pulls a rope against a spring, and two load cells are read.
+
+What the motor does is in `profile`, rope, friction and spring are in `mechanics`, and what the load cells get wrong is in
+`faults`; `recording` puts them together.
+"""
+
+from bowdenfit.questions.simulate.bench.faults import Faults
+from bowdenfit.questions.simulate.bench.mechanics import BenchFriction, BenchSettings
+from bowdenfit.questions.simulate.bench.profile import Profile
+from bowdenfit.questions.simulate.bench.recording import SimulatedRecording, check_settings, simulate_recording, to_raw
+
+__all__ = [
+    "BenchFriction",
+    "BenchSettings",
+    "Faults",
+    "Profile",
+    "SimulatedRecording",
+    "check_settings",
+    "simulate_recording",
+    "to_raw",
+]

@@ -1,0 +1,146 @@
+"""One recording of the bench: the true forces under a motion of the motor, and what the load cells make of them."""
+
+from dataclasses import dataclass
+from typing import Literal
+
+import numpy as np
+
+from bowdenfit.errors import UsageError
+from bowdenfit.questions.simulate.bench.faults import Faults, readings
+from bowdenfit.questions.simulate.bench.mechanics import BenchFriction, BenchSettings, Mechanics
+from bowdenfit.questions.simulate.bench.profile import Profile, motion_of
+from bowdenfit.recordings.recording import RawRecording
+from bowdenfit.types import Labels, Vector
+
+
+@dataclass(frozen=True)
+class SimulatedRecording:
+    """One recording and what truly happened.
+
+    Args:
+        time: Time of each sample [s].
+        input_force, output_force: Readings [N]; NaN where missing.
+        velocity: Velocity of the rope at the drum, positive toward the motor [mm/s].
+        position: Rope pulled in by the motor [mm].
+        stroke: +1 sliding toward the motor, -1 sliding back, 0 stuck.
+        true_input_force, true_output_force: Forces at the time of the sample, before any fault [N].
+        reversals: Times at which the motor sets out in the other direction [s].
+        drum_radius: Radius of the drum [mm].
+    """
+
+    time: Vector
+    input_force: Vector
+    output_force: Vector
+    velocity: Vector
+    position: Vector
+    stroke: Labels
+    true_input_force: Vector
+    true_output_force: Vector
+    reversals: tuple[float, ...]
+    drum_radius: float
+
+    @property
+    def motor_speed(self) -> Vector:
+        """Speed of the motor, positive pulling [rad/s]."""
+        return self.velocity / self.drum_radius
+
+    @property
+    def contact_changes(self) -> tuple[tuple[float, int], ...]:
+        """Time of the first sample of each contact state, and the state."""
+        first = np.flatnonzero(np.diff(self.stroke, prepend=2))
+        return tuple((float(self.time[i]), int(self.stroke[i])) for i in first)
+
+
+def simulate_recording(
+    exponent: float,
+    friction: BenchFriction,
+    profile: Profile,
+    bench: BenchSettings,
+    faults: Faults,
+    generator: np.random.Generator,
+    run_effect: float = 0.0,
+) -> SimulatedRecording:
+    r"""One recording as a bench would give it, quasi-static.
+
+    The motor pulls the rope by q, the load's spring gives way by x >= 0: `F_in = K (q - x) + P`, `F_out = P + k x`.
+    While the rope slides toward the motor `g(F_in) - g(F_out) = Lambda(v) + m`, while it slides back minus that, and in
+    between x stays, so that x follows q by the play operator `x_t = clip(x_{t-1}, x_low(q_t), x_high(q_t))`.
+
+    Args:
+        exponent: Friction exponent of the cable [1].
+        friction: How friction depends on load and speed.
+        profile: What the motor does.
+        bench: Mechanics and sampling.
+        faults: What readings suffer.
+        generator: Random numbers; each kind of fault draws from its own stream, so that one does not change another.
+        run_effect: m, added to the exponent by how the cable was mounted [1].
+
+    Raises:
+        UsageError: The friction exponent is not positive, or a profile or fault contradicts itself.
+    """
+    check_settings(profile, faults)
+    motion = motion_of(profile)
+    n = int(np.floor((motion.start[-1] + profile.pause) * bench.rate + 1e-9)) + 1
+    time = np.arange(n) / bench.rate
+    of_input, of_output = generator.spawn(2)
+    states = Mechanics(exponent, run_effect, friction, profile, bench, motion)
+    stroke, true_input, true_output = states.at(time)
+    late_output = states.at(time - faults.delay)[2] if faults.delay else true_output
+    position, velocity = motion.at(time)
+    shown_output = late_output * np.exp(-faults.gain_error) + faults.output_offset
+    return SimulatedRecording(
+        time,
+        readings(
+            true_input + faults.input_offset, faults.input_noise, faults.input_range, faults, bench.rate, of_input
+        ),
+        readings(shown_output, faults.output_noise, faults.output_range, faults, bench.rate, of_output),
+        velocity,
+        position,
+        stroke,
+        true_input,
+        true_output,
+        motion.reversals,
+        profile.drum_radius,
+    )
+
+
+def to_raw(
+    simulated: SimulatedRecording, name: str, file: str, velocity: Literal["rope", "motor"] = "rope"
+) -> RawRecording:
+    """The recording as a reader of files would hand it on.
+
+    Args:
+        simulated: The recording.
+        name: Its name.
+        file: File name for errors.
+        velocity: Whether the velocity is the rope's [mm/s] or the motor's [rad/s].
+    """
+    time = simulated.time
+    shown = simulated.velocity if velocity == "rope" else simulated.motor_speed
+    return RawRecording(name, file, time, simulated.input_force, time, simulated.output_force, time, shown)
+
+
+def check_settings(profile: Profile, faults: Faults) -> None:
+    """Refuse settings that contradict one another.
+
+    Raises:
+        UsageError: Which ones, and what to change.
+    """
+    if profile.unloaded > profile.lead_in:
+        raise UsageError(
+            f"unloaded = {profile.unloaded:g} s is longer than lead_in = {profile.lead_in:g} s; the time without load "
+            "is the beginning of the lead-in."
+        )
+    for where, back in profile.partial_reversals:
+        if not where < profile.stroke or back > where:
+            raise UsageError(
+                f"the partial reversal [{where:g}, {back:g}] mm does not fit into a stroke of {profile.stroke:g} mm; "
+                "it must start inside the stroke and go back no further than to its start."
+            )
+    if faults.bits is not None and (faults.input_range is None or faults.output_range is None):
+        raise UsageError(
+            f"bits = {faults.bits} needs input_range and output_range, the forces that they are spread over."
+        )
+    for limits in (faults.input_range, faults.output_range):
+        if limits is not None and not limits[0] < limits[1]:
+            raise UsageError(f"the range [{limits[0]:g}, {limits[1]:g}] N is empty; write [lowest, highest].")

@@ -1,0 +1,152 @@
+"""From a plan to recordings: the truth is drawn or taken from the plan, and each recording is simulated from it."""
+
+import dataclasses
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+
+import jax
+import jax.numpy as jnp
+import numpy as np
+
+from bowdenfit.cable.cable import ANGLE_NOISE, Cable
+from bowdenfit.cable.load_cells import FORCE_NOISE, GAIN_ERROR, INPUT_OFFSET, OUTPUT_OFFSET, RUN_SCATTER
+from bowdenfit.dataset import Dataset
+from bowdenfit.description import PriorDefaults
+from bowdenfit.kinds.tables import AngleTable
+from bowdenfit.model import build_model
+from bowdenfit.questions.simulate.bench import Faults, SimulatedRecording, simulate_recording
+from bowdenfit.questions.simulate.recordings.plan import RecordingsPlan
+from bowdenfit.questions.simulate.recordings.planned import RPM, PlannedRecording
+from bowdenfit.questions.simulate.simulation import Design, empty_tables, simulate, true_values
+
+
+@dataclass(frozen=True)
+class MadeRecording:
+    """One recording and its truth: friction exponent without and with the effect of its run, wrap angles [rad]."""
+
+    planned: PlannedRecording
+    faults: Faults
+    simulated: SimulatedRecording
+    exponent: float
+    run_effect: float
+    wrap_angles: Mapping[str, float]
+
+
+@dataclass(frozen=True)
+class MadeRecordings:
+    """Everything that the folder will hold; `truth` in shown units."""
+
+    plan: RecordingsPlan
+    seed: int
+    truth: Mapping[str, float]
+    angles: AngleTable | None
+    each: tuple[MadeRecording, ...]
+
+
+def make_recordings(plan: RecordingsPlan, seed: int, noise: bool = True) -> MadeRecordings:
+    """Make the recordings of a plan.
+
+    Args:
+        plan: The plan.
+        seed: Seed of everything random.
+        noise: Whether readings, angles and mountings scatter, and spikes and gaps occur; the other faults stay.
+
+    Raises:
+        UsageError: A name in the truth is no parameter, or a friction exponent comes out negative.
+    """
+    of_truth, of_readings = jax.random.split(jax.random.key(seed))
+    of_noise, of_runs, of_angles, *of_each = np.random.default_rng(seed).spawn(3 + len(plan.recordings))
+    lengths = np.array([r.length for r in plan.recordings])
+    design = _design(plan)
+    tables, given = empty_tables(plan.description, design), dict(plan.truth)
+    force_noise = given.pop(FORCE_NOISE, abs(of_noise.standard_normal()) * PriorDefaults().force_noise_newtons)
+    values = true_values(plan.description, tables, given, of_truth)
+    model = build_model(Dataset(plan.description, tables, {}))
+    truth = {p.name: values[p.name] * p.shown_scale for p in model.space.parameters} | {FORCE_NOISE: float(force_noise)}
+    named = {name: jnp.asarray(value, dtype=float) for name, value in values.items()}
+    angles = _true_angles(plan, model.cable, named, lengths)
+    exponents = np.asarray(model.cable.friction_exponent(named, jnp.asarray(angles)), dtype=float)
+    scatter = values[RUN_SCATTER] * noise
+    effects = {run: scatter * float(of_runs.standard_normal()) for run in dict.fromkeys(r.run for r in plan.recordings)}
+    contacts = [c.name for c in plan.description.contact]
+    each = []
+    for i, (planned, generator) in enumerate(zip(plan.recordings, of_each, strict=True)):
+        faults = _faults(planned, float(force_noise), values.get(GAIN_ERROR, 0.0), noise)
+        exponent, effect = float(exponents[i]), effects[planned.run]
+        simulated = simulate_recording(
+            exponent, planned.friction, planned.profile, planned.bench, faults, generator, effect
+        )
+        wrap = dict(zip(contacts, map(float, angles[i]), strict=True))
+        each.append(MadeRecording(planned, faults, simulated, exponent, effect, wrap))
+    dataset = simulate(plan.description, design, values, of_readings, noise) if plan.angles else None
+    table = (
+        dataset
+        and dataset.measurements.angles
+        and _with_measured(dataset.measurements.angles, plan, values[ANGLE_NOISE] * noise, of_angles)
+    )
+    return MadeRecordings(plan, seed, {**truth, **_common_truth(each)}, table or None, tuple(each))
+
+
+def _common_truth(each: Sequence[MadeRecording]) -> dict[str, float]:
+    """What all recordings share of friction's dependences and of the sensors, by the names of a fit's parameters."""
+    motor = each[0].planned.friction.speed == "motor"
+    shown = {"stribeck_speed": 1 / RPM, "viscous": RPM} if motor else {}
+    found: dict[str, float] = {}
+    for name in ("load_exponent", "drag", "stribeck", "stribeck_speed", "viscous"):
+        values = {getattr(recording.planned.friction, name) for recording in each}
+        switched_on = name != "stribeck_speed" or "stribeck" in found
+        if len(values) == 1 and switched_on and 0.0 not in values:
+            found[name] = values.pop() * shown.get(name, 1.0)
+    for name in (GAIN_ERROR, INPUT_OFFSET, OUTPUT_OFFSET):
+        values = {getattr(recording.faults, name) for recording in each}
+        if len(values) == 1 and 0.0 not in values:
+            found[name] = values.pop()
+    return found
+
+
+def _design(plan: RecordingsPlan) -> Design:
+    """Tables from which the parameters are declared; one efficiency at a place where all curves hold."""
+    route = plan.description.route
+    return Design(angles=plan.angles, efficiencies=(route.middle if route else 0.0,))
+
+
+def _true_angles(
+    plan: RecordingsPlan, cable: Cable, values: Mapping[str, jax.Array], lengths: np.ndarray
+) -> np.ndarray:
+    """Wrap angle of each recording and contact [rad]: the curve's, or the stated one outside the range."""
+    angles = np.array(cable.wrap_angles(values, jnp.asarray(np.nan_to_num(lengths))), dtype=float)
+    for k, contact in enumerate(plan.description.contact):
+        for i, length in enumerate(lengths.tolist()):
+            if contact.wrap_angle.curve and length in plan.measured_angles:
+                angles[i, k] = np.deg2rad(plan.measured_angles[length][contact.wrap_angle.column or ""])
+    return angles
+
+
+def _faults(planned: PlannedRecording, force_noise: float, gain_error: float, noise: bool) -> Faults:
+    """The faults of a recording, with what the truth says of noise and gain where the plan says nothing."""
+    faults = planned.faults
+    if not planned.states_noise[0]:
+        faults = dataclasses.replace(faults, input_noise=force_noise)
+    if not planned.states_noise[1]:
+        faults = dataclasses.replace(faults, output_noise=force_noise)
+    if not planned.states_gain:
+        faults = dataclasses.replace(faults, gain_error=gain_error)
+    return faults if noise else dataclasses.replace(faults, input_noise=0.0, output_noise=0.0, spikes=0.0, dropouts=0.0)
+
+
+def _with_measured(table: AngleTable, plan: RecordingsPlan, noise: float, generator: np.random.Generator) -> AngleTable:
+    """The angle table with the rows outside the curves' range at its end."""
+    if not plan.measured_angles:
+        return table
+    route = np.array(list(plan.measured_angles), dtype=float)
+    true = np.deg2rad([[row[name] for name in table.names] for row in plan.measured_angles.values()])
+    reading = np.maximum(true + noise * generator.standard_normal(true.shape), 0.0)
+    settings = plan.description.tables.angles
+    limit = settings.detection_limit.to("angle") if settings and settings.detection_limit else -np.inf
+    hidden = reading < limit
+    return dataclasses.replace(
+        table,
+        route=np.append(table.route, route),
+        angle=np.vstack([table.angle, np.where(hidden, np.nan, reading)]),
+        limit=np.vstack([table.limit, np.where(hidden, limit, np.nan)]),
+    )

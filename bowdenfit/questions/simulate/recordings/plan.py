@@ -1,0 +1,156 @@
+"""A plan of recordings (`bench.toml` with [recordings]): reading it, and refusing what does not fit together."""
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from pydantic import ValidationError
+
+from bowdenfit.description import Description
+from bowdenfit.description.file import parse_description
+from bowdenfit.errors import DescriptionError, nearest
+from bowdenfit.questions.simulate.recordings.page import Page, explained, with_reference_force
+from bowdenfit.questions.simulate.recordings.planned import PlannedRecording, planned_recordings
+from bowdenfit.questions.simulate.tables import plan_page
+
+_FITTED_FRICTION = ("friction_model", "reference_force", "reference_velocity")
+
+
+@dataclass(frozen=True)
+class RecordingsPlan:
+    """What to simulate.
+
+    Args:
+        text: The plan as written.
+        description: The cable, with no table but that of the angles.
+        truth: True values as far as they are given [shown units].
+        angles: Route values at which wrap angles are read off the curves.
+        measured_angles: True wrap angles outside the curves [deg], by route value and column.
+        recordings: The recordings.
+        decimals: Digits of a force in the files.
+    """
+
+    text: str
+    description: Description
+    truth: Mapping[str, float]
+    angles: tuple[float, ...]
+    measured_angles: Mapping[float, Mapping[str, float]]
+    recordings: tuple[PlannedRecording, ...]
+    decimals: int
+
+
+def read_recordings_plan(path: Path) -> RecordingsPlan:
+    """Read a plan with [recordings].
+
+    Raises:
+        DescriptionError: The file is missing or no TOML, or a table or key in it is wrong.
+    """
+    text, raw = plan_page(path)
+    return parse_recordings_plan(raw, text, path.name)
+
+
+def parse_recordings_plan(raw: Mapping[str, Any], text: str, file: str = "bench.toml") -> RecordingsPlan:
+    """A plan from plain data.
+
+    Args:
+        raw: The plan.
+        text: The same as written; the description in the data set is cut out of it.
+        file: File name, for errors.
+
+    Raises:
+        DescriptionError: A table or key is wrong.
+    """
+    if "recordings" not in raw:
+        raise DescriptionError(
+            f'{file} has no [recordings]: say what to record, such as lengths = [440, 470], speeds = ["20 r/min"].'
+        )
+    truth = raw.get("truth", {})
+    for name, value in truth.items():
+        if isinstance(value, bool) or not isinstance(value, int | float):
+            raise DescriptionError(f"{file}, truth.{name}: {value!r} is not a number.")
+    description = _description(raw, file)
+    try:
+        page = Page.model_validate(raw["recordings"])
+    except ValidationError as error:
+        raise DescriptionError(explained(error, file)) from None
+    measured = _measured_angles(page, description, file)
+    recordings = planned_recordings(with_reference_force(page, raw, file), description, file)
+    _check_lengths(recordings, measured, description, file)
+    if description.curved and not page.angles:
+        raise DescriptionError(
+            f"{file}, recordings: the angle curves need angles, the values of {_route_name(description)} at which wrap "
+            "angles are read, such as angles = [430, 450, 470]."
+        )
+    angles = page.angles if description.curved else ()
+    return RecordingsPlan(text, description, truth, angles, measured, recordings, page.decimals)
+
+
+def _description(raw: Mapping[str, Any], file: str) -> Description:
+    """The cable without what needs its recordings, whose files do not exist yet: a table of efficiencies stands in for
+    them, and [recordings.friction] for a model of friction.
+    """
+    tables = raw.get("tables", {})
+    if "recording" in raw:
+        raise DescriptionError(f"{file}: a plan has no [[recording]]; these are made from [recordings].")
+    for name in tables:
+        if name not in {"angles", "recordings"}:
+            raise DescriptionError(
+                f"{file}, tables.{name}: a plan of recordings makes angles and recordings only; leave it out, or plan it "
+                "with [design] in a file of its own."
+            )
+    kept = {k: v for k, v in raw.items() if k not in {"truth", "recordings", "tables", *_FITTED_FRICTION}}
+    angles = {"angles": tables["angles"]} if "angles" in tables else {}
+    description = parse_description({**kept, "tables": {**angles, "efficiencies": {"file": "none.csv"}}}, file)
+    for contact in description.contact:
+        if contact.wrap_angle.constant is None and contact.wrap_angle.curve is None:
+            raise DescriptionError(
+                f"{file}, contact {contact.name!r}: recordings are simulated from a constant wrap angle or a curve; "
+                "this contact has only a column."
+            )
+    return description
+
+
+def _measured_angles(page: Page, description: Description, file: str) -> dict[float, dict[str, float]]:
+    columns = [c.wrap_angle.column or "" for c in description.curved]
+    found: dict[float, dict[str, float]] = {}
+    for i, row in enumerate(page.measured_angles):
+        place = f"{file}, recordings.measured_angles.{i}"
+        for name in row:
+            if name not in ["at", *columns]:
+                raise DescriptionError(f"{place}: unknown key {name!r}{nearest(name, ['at', *columns])}")
+        for name in ["at", *columns]:
+            if name not in row:
+                raise DescriptionError(f"{place}: the key {name!r} is missing; angles are in deg.")
+        if _inside(description, row["at"]):
+            raise DescriptionError(f"{place}: {row['at']:g} lies inside the range of the route, where the curves hold.")
+        found[row["at"]] = {name: row[name] for name in columns}
+    return found
+
+
+def _inside(description: Description, length: float) -> bool:
+    return description.route is None or description.route.range[0] <= length <= description.route.range[1]
+
+
+def _route_name(description: Description) -> str:
+    return description.route.variable if description.route else "the route variable"
+
+
+def _check_lengths(
+    recordings: Sequence[PlannedRecording], measured: Mapping[float, Any], description: Description, file: str
+) -> None:
+    """Every recording has wrap angles, and recordings of one mounting have one length."""
+    of_run: dict[str, float] = {}
+    for recording in recordings:
+        length = recording.length
+        if description.curved and not _inside(description, length) and length not in measured:
+            raise DescriptionError(
+                f"{file}, recordings: {length:g} lies outside the range of the route, where the curves do not hold; "
+                f"give its wrap angles in [[recordings.measured_angles]] with at = {length:g}."
+            )
+        if not np.isnan(length) and of_run.setdefault(recording.run, length) != length:
+            raise DescriptionError(
+                f"{file}, recordings: the run {recording.run!r} has the lengths {of_run[recording.run]:g} and "
+                f"{length:g}, but a run is one mounting of the cable."
+            )

@@ -1,0 +1,181 @@
+"""The one page that programs read: `summary.json`; people's versions are made from the same numbers."""
+
+from dataclasses import asdict
+from typing import Any
+
+import numpy as np
+
+from bowdenfit.inference.diagnostics import shortfalls
+from bowdenfit.inference.interval import Interval
+from bowdenfit.inference.least_squares import Estimate
+from bowdenfit.inference.samplers import recommendation
+from bowdenfit.model import EFFICIENCY_TERMS
+from bowdenfit.questions.bends.page import elastic_page
+from bowdenfit.questions.check.page import checks_page
+from bowdenfit.questions.identify.confounding import confounded
+from bowdenfit.questions.identify.contradiction import agreement_page
+from bowdenfit.questions.recorded.preparation_page import accounts
+from bowdenfit.questions.recorded.rate import rate_effect
+from bowdenfit.questions.summary.verdict import verdict
+from bowdenfit.results.record import Draws, Fit
+
+SCHEMA = 1
+
+
+def summarize(fit: Fit) -> dict[str, Any]:
+    """Summary of a fit as plain data; NaN where a number does not exist is None.
+
+    Args:
+        fit: The fit.
+    """
+    found = verdict(fit)
+    page: dict[str, Any] = {
+        "schema": SCHEMA,
+        "name": fit.name,
+        "geometry": fit.dataset.description.geometry,
+        "verdict": {"converged": fit.converged, "trusted": found.trusted, "reasons": list(found.reasons)},
+        "parameters": {p.name: _parameter(fit, p.name) for p in fit.model.space.parameters},
+        "curves": {name: _curve_coefficient(fit, name) for name in curve_coefficients(fit)},
+        "least_squares": {
+            "residual_sd": fit.least_squares.residual_sd,
+            "condition_number": fit.least_squares.condition_number,
+            "sum_of_squares": fit.least_squares.sum_of_squares,
+            "converged": fit.least_squares.converged,
+        },
+        "agreement": agreement_page(fit),
+        "measured": measured_against_predicted(fit),
+        "friction_model": fit.dataset.description.friction_model,
+        "confounded": [asdict(c) | {"combination": c.combination} for c in confounded(fit)],
+        "seed": fit.provenance.seed,
+        "versions": dict(fit.provenance.versions),
+    }
+    if fit.dataset.measurements.recordings is not None:
+        page["recordings"] = accounts(fit.dataset.measurements.recordings)
+    if elastic := elastic_page(fit):
+        page["elastic"] = elastic
+    if checks := checks_page(fit.checks):
+        page["checks"] = checks
+    effect = rate_effect(fit)
+    if effect is not None:
+        page["rate_effect"] = asdict(effect)
+    if fit.posterior is not None:
+        page["sampler"] = _sampler(fit, fit.posterior)
+        if fit.posterior.agreement is not None:
+            page["samplers"] = fit.posterior.agreement.page()
+        if fit.dataset.description.route is not None:
+            page["optimal"] = _optimal(fit)
+    return _plain(page)
+
+
+def _sampler(fit: Fit, posterior: Draws) -> dict[str, Any]:
+    """How the draws came about, and what is recommended instead ("" if nothing is)."""
+    settings = fit.dataset.description.sampler
+    short = shortfalls(posterior.diagnostics, settings.target_r_hat, settings.target_ess)
+    page = {
+        "method": posterior.sampler,
+        "ensembles": posterior.n_ensembles,
+        "walkers": len(posterior.z) // posterior.n_ensembles,
+        "steps": posterior.steps,
+        "acceptance": posterior.acceptance,
+        "recommendation": recommendation(posterior.sampler, fit.model.space.size, bool(short)),
+    }
+    if posterior.trajectories is not None:
+        page |= {k: v for k, v in posterior.trajectories.__dict__.items() if k != "statistics"}
+    return page
+
+
+def _parameter(fit: Fit, name: str) -> dict[str, Any]:
+    parameter = next(p for p in fit.model.space.parameters if p.name == name)
+    row: dict[str, Any] = {"unit": parameter.unit, "meaning": parameter.meaning, "prior": parameter.prior_text}
+    if parameter.fixed is not None:
+        row["fixed"] = parameter.fixed * parameter.shown_scale
+    if name in fit.least_squares.estimates:
+        row["least_squares"] = _estimate_page(fit.least_squares.estimates[name])
+    if fit.posterior is not None and name in fit.posterior.values:
+        draws, diagnostics = fit.posterior.values[name], fit.posterior.diagnostics[name]
+        row |= asdict(Interval.of(draws)) | {
+            "ess_bulk": diagnostics.ess_bulk,
+            "ess_tail": diagnostics.ess_tail,
+            "r_hat": diagnostics.r_hat,
+            "mcse_mean": float(np.std(draws) / np.sqrt(max(diagnostics.ess_bulk, 1.0))),
+            "contraction": contraction(fit, name),
+        }
+    return row
+
+
+def _estimate_page(estimate: Estimate) -> dict[str, Any]:
+    """An estimate with its interval; `open` names the sides on which nothing limits it."""
+    return asdict(estimate) | {"open": [side for side in ("lower", "upper") if np.isinf(getattr(estimate, side))]}
+
+
+def contraction(fit: Fit, name: str) -> float:
+    """How much narrower the posterior is than the prior, in z: 1 where data decide, 0 where the prior alone speaks."""
+    assert fit.posterior is not None  # callers ask only where there are draws
+    return float(1 - np.var(fit.posterior.z[..., fit.model.space.index[name]]))
+
+
+def curve_coefficients(fit: Fit) -> dict[str, tuple[str, str]]:
+    """Unit and symbol of each derived curve coefficient."""
+    from bowdenfit.inference.draws import derived_units
+
+    return derived_units(fit.model)
+
+
+def _curve_coefficient(fit: Fit, name: str) -> dict[str, Any]:
+    row: dict[str, Any] = {"unit": curve_coefficients(fit)[name][0]}
+    if fit.posterior is not None:
+        q05, median, q95 = np.quantile(fit.posterior.values[name], (0.05, 0.5, 0.95))
+        row |= {"median": float(median), "q05": float(q05), "q95": float(q95)}
+    return row
+
+
+def measured_against_predicted(fit: Fit) -> list[dict[str, Any]]:
+    """Every measured efficiency beside what the fit says of it (as section 3.2 of the on-body paper does).
+
+    The relative error is measured over predicted, less 1. Without draws the prediction is least squares'.
+    """
+    rows = []
+    for term in fit.model.terms:
+        if term.name not in EFFICIENCY_TERMS:
+            continue
+        observed = term.observed()
+        for i, label in enumerate(term.labels):
+            row: dict[str, Any] = {"table": term.name, "label": label, "measured": float(observed[i])}
+            if fit.posterior is not None:
+                expected = Interval.of(fit.posterior.expected[term.name][..., i])
+                replicated = fit.posterior.replicated[term.name][..., i]
+                row |= {"predicted": expected.median, "q05": expected.q05, "q95": expected.q95}
+                row["predictive_q05"], row["predictive_q95"] = (float(q) for q in np.quantile(replicated, (0.05, 0.95)))
+            else:
+                row["predicted"] = float(fit.least_squares.readings[term.name][i])
+            row["relative_error"] = row["measured"] / row["predicted"] - 1
+            rows.append(row)
+    return rows
+
+
+def _optimal(fit: Fit) -> dict[str, Any]:
+    answer = fit.optimal_length()
+    return {
+        "route": answer.variable,
+        "unit": answer.unit,
+        "length": asdict(answer.length) | {"at_edge": answer.at_edge},
+        "efficiency": asdict(answer.efficiency),
+        "window": {
+            "within": answer.window.within,
+            "probability": answer.window.probability,
+            "from": answer.window.start,
+            "to": answer.window.stop,
+        },
+        "choices": [asdict(choice) for choice in answer.choices],
+    }
+
+
+def _plain(data: Any) -> Any:
+    """Plain data for JSON: NumPy numbers as Python's, and None for what is not a finite number."""
+    if isinstance(data, dict):
+        return {key: _plain(value) for key, value in data.items()}
+    if isinstance(data, list | tuple):
+        return [_plain(value) for value in data]
+    if isinstance(data, np.generic):
+        data = data.item()
+    return None if isinstance(data, float) and not np.isfinite(data) else data

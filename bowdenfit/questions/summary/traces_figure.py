@@ -1,0 +1,127 @@
+"""Whether independent ensembles agree and stand still: the path of each through the draws."""
+
+from typing import TYPE_CHECKING
+
+import numpy as np
+from matplotlib.figure import Figure
+
+from bowdenfit.plots.quantities import Quantity, optimal_length, sampled
+from bowdenfit.plots.sheet import Panel, Sheet
+from bowdenfit.plots.style import SERIES_COLORS, SERIES_LINES, SMALL, WIDE, WIDE_INTERVAL, in_paper_style
+
+if TYPE_CHECKING:
+    from bowdenfit.questions.summary.figure_data import FigureData
+
+MOST_DRAWS = 40  # shown of each walker
+STRETCHES = 20  # that the path of a chain without other walkers is cut into
+SHARE = 0.98  # of the draws, within the axes
+GRID, MOST_NAMES = 48, 6
+LEFT, RIGHT, BOTTOM, TOP = 0.66, 0.08, 0.42, 0.5  # in, margins; LEFT of each of the two columns
+PANEL, ROW, MARGINAL = 0.68, 0.84, 0.5  # in, height of a panel, of a row, width of a marginal
+
+
+def shown_quantities(data: "FigureData") -> list[Quantity]:
+    """Every sampled parameter, and the optimal length."""
+    return sampled(data) + optimal_length(data)
+
+
+def has_traces(data: "FigureData") -> bool:
+    """Whether there are paths to draw."""
+    return data.n_ensembles > 0 and any(q.draws.shape[1] > 1 for q in shown_quantities(data))
+
+
+@in_paper_style
+def traces(data: "FigureData") -> Figure:
+    """Median and 90 % of the walkers of each ensemble against the draw, and the marginal of each ensemble.
+
+    A chain that has no other walkers is summarized over stretches of its path.
+    """
+    quantities = shown_quantities(data)
+    rows = -(-len(quantities) // 2)
+    sheet = Sheet(WIDE, TOP + BOTTOM + rows * ROW - (ROW - PANEL))
+    panels = [_panel(q, i // rows, rows - 1 - i % rows) for i, q in enumerate(quantities)]
+    for number in range(data.n_ensembles):
+        _ensemble(sheet, number, panels, quantities, data.n_ensembles)
+    chains = len(quantities[0].draws) == data.n_ensembles
+    _axes(sheet, quantities, panels, rows, "Draw of each chain" if chains else "Draw of each walker")
+    _legend(sheet, data.n_ensembles, chains)
+    return sheet.finished()
+
+
+def _panel(quantity: Quantity, column: int, row: int) -> Panel:
+    width = WIDE / 2 - LEFT - RIGHT - MARGINAL
+    draws = quantity.draws.shape[1]
+    return Panel(
+        LEFT + column * WIDE / 2, BOTTOM + row * ROW, width, PANEL, (1.0, float(draws)), quantity.limits(SHARE)
+    )
+
+
+def _ensemble(sheet: Sheet, number: int, panels: list[Panel], quantities: list[Quantity], n_ensembles: int) -> None:
+    """One ensemble in all panels."""
+    color, line = SERIES_COLORS[number % len(SERIES_COLORS)], SERIES_LINES[number % len(SERIES_LINES)]
+    medians, bands, edges = [], [], []
+    for panel, quantity in zip(panels, quantities, strict=True):
+        draws = np.split(quantity.draws, n_ensembles)[number]
+        at, together = _together(draws)
+        low, median, high = (panel.path(at, q) for q in np.quantile(together, (0.05, 0.5, 0.95), axis=0))
+        medians += [median, _marginal(panel, quantity, draws)]
+        if len(draws) > 1:
+            edges += [low, high]
+        bands.append(np.concatenate([low, high[::-1]]))
+    sheet.areas(bands, facecolor=color, alpha=0.07 if edges else 0.03)
+    if edges:
+        sheet.lines(edges, color=color, linestyle=line, linewidth=0.5)
+    sheet.lines(medians, color=color, linestyle=line, linewidth=1.0)
+
+
+def _together(draws: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Where along the path, and which draws are summarized there (columns): all walkers', or a stretch of one chain."""
+    n_walkers, n = draws.shape
+    if n_walkers > 1 or n < 2 * STRETCHES:
+        shown = np.arange(0, n, -(-n // MOST_DRAWS))
+        return 1.0 + shown, draws[:, shown]
+    length = n // STRETCHES
+    stretches = draws[0, : STRETCHES * length].reshape(STRETCHES, length)
+    return 1.0 + length * (np.arange(STRETCHES) + 0.5), stretches.T
+
+
+def _marginal(panel: Panel, quantity: Quantity, draws: np.ndarray) -> np.ndarray:
+    """Density of one ensemble's draws, lying on its side right of the panel."""
+    grid = np.linspace(*panel.y_limits, GRID)
+    start = panel.left + panel.width + 0.04
+    return np.column_stack([start + (MARGINAL - 0.06) * quantity.density(grid, draws), panel.y(grid)])
+
+
+def _axes(sheet: Sheet, quantities: list[Quantity], panels: list[Panel], rows: int, across: str) -> None:
+    sheet.frames(panels)
+    for i, (quantity, panel) in enumerate(zip(quantities, panels, strict=True)):
+        last = i % rows == rows - 1 or i == len(quantities) - 1
+        sheet.ticks_left(panel)
+        sheet.ticks_below(panel, numbers=last, whole=True)
+        middle = panel.bottom + PANEL / 2
+        sheet.text(panel.left - 0.5, middle, quantity.label, ha="center", va="center", rotation=90, fontsize=SMALL)
+        if last:
+            middle = panel.left + panel.width / 2
+            sheet.text(middle, panel.bottom - 0.27, across, ha="center", va="center", fontsize=SMALL)
+
+
+def _legend(sheet: Sheet, n_ensembles: int, chains: bool) -> None:
+    """One entry an ensemble (or chain), and what line and band are."""
+    width, height = sheet.figure.get_size_inches()
+    shown = MOST_NAMES - 1 if chains and n_ensembles > MOST_NAMES else min(n_ensembles, MOST_NAMES)
+    more = n_ensembles - shown if chains else 0
+    for number in range(shown):
+        x, y = width / 2 + 1.0 * (number - (shown + bool(more)) / 2), height - 0.14
+        color, line = SERIES_COLORS[number], SERIES_LINES[number % len(SERIES_LINES)]
+        sheet.lines([np.array([(x, y), (x + 0.25, y)])], color=color, linestyle=line, linewidth=1.2)
+        name = "Chain" if chains else "Ensemble"
+        sheet.text(x + 0.3, y, f"{name} {number + 1}", va="center_baseline", fontsize=SMALL)
+    if more:
+        x = width / 2 + shown - (shown + 1) / 2
+        sheet.text(x, height - 0.14, f"and {more} more", va="center_baseline", fontsize=SMALL)
+    words = f"Thick: median of an ensemble's walkers; thin: their {WIDE_INTERVAL}; right of each panel: density"
+    if chains:
+        words = (
+            f"Line: median of each {STRETCHES}th of a chain; shaded: its {WIDE_INTERVAL}; right of each panel: density"
+        )
+    sheet.text(width / 2, height - 0.32, words, ha="center", va="center_baseline", fontsize=SMALL)

@@ -1,0 +1,44 @@
+"""Whether a fit may be trusted, and if not, why: not converged, not identifiable, or contradictory measurements."""
+
+from dataclasses import dataclass
+
+from bowdenfit.questions.identify.answer import unidentified
+from bowdenfit.questions.identify.contradiction import contradiction
+from bowdenfit.results.record import Fit
+
+NOT_CONVERGED, NOT_IDENTIFIABLE, CONTRADICTORY = "not converged", "not identifiable", "contradictory"
+
+
+@dataclass(frozen=True)
+class Verdict:
+    """Of one fit.
+
+    Args:
+        troubles: What is wrong, by kind: `NOT_CONVERGED`, `NOT_IDENTIFIABLE`, `CONTRADICTORY`; each with sentences.
+    """
+
+    troubles: dict[str, tuple[str, ...]]
+
+    @property
+    def trusted(self) -> bool:
+        """Whether the answers may be used."""
+        return not self.troubles
+
+    @property
+    def reasons(self) -> tuple[str, ...]:
+        """Every sentence."""
+        return tuple(sentence for sentences in self.troubles.values() for sentence in sentences)
+
+
+def verdict(fit: Fit) -> Verdict:
+    """The verdict on a fit."""
+    troubles = {
+        NOT_CONVERGED: () if fit.converged else fit.reasons or ("the fit did not converge",),
+        NOT_IDENTIFIABLE: _sentences(unidentified(fit)),
+        CONTRADICTORY: _sentences(contradiction(fit)),
+    }
+    return Verdict({kind: sentences for kind, sentences in troubles.items() if sentences})
+
+
+def _sentences(sentence: str) -> tuple[str, ...]:
+    return (sentence,) if sentence else ()

@@ -1,0 +1,321 @@
+"""The printed summary (`summary.txt`): verdict, coefficients, measured beside predicted, the design answer."""
+
+from typing import Any
+
+from bowdenfit.cable.load_cells import RUN_SCATTER
+from bowdenfit.model import EFFICIENCY_TERMS
+from bowdenfit.questions.bends.words import elastic_counts, elastic_text
+from bowdenfit.questions.check.words import checks_text
+from bowdenfit.questions.identify.answer import determined
+from bowdenfit.questions.identify.confounding import confounded
+from bowdenfit.questions.recorded.rate import SHOWN_SPEED, rate_effect
+from bowdenfit.questions.recorded.words import recordings_text
+from bowdenfit.questions.summary.sampler_words import sampler_sentences, sampler_text
+from bowdenfit.questions.summary.verdict import CONTRADICTORY, NOT_CONVERGED, NOT_IDENTIFIABLE, Verdict, verdict
+from bowdenfit.results.record import Fit
+from bowdenfit.words import decimals, filled, listed, table
+
+_UNLIMITED = 2000.0  # an angle in degrees or a length in mm beyond which a curve coefficient is no longer a finding
+PROFILED = "90 % profile interval"
+_WIDE = 2.5  # standard errors to each side beyond which an interval needs a word; of many readings it is 1.6
+_RESTS_ON_PRIOR = 0.2  # contraction below which a parameter is said to rest on its prior alone
+
+
+def summary_text(fit: Fit) -> str:
+    """The summary of a fit for people."""
+    page = fit.summary()
+    blocks = [
+        _title(fit),
+        _verdict(fit, page),
+        _coefficients(page),
+        _known(fit),
+        _rests_on_prior(page),
+        _curves(fit, page),
+    ]
+    blocks += [
+        _scatter(page),
+        _mountings(fit, page),
+        _recordings(fit),
+        _measured(fit, page),
+        checks_text(page.get("checks", {})),
+        _friction_model(fit),
+        elastic_text(fit),
+        _answer(fit),
+    ]
+    blocks.append(_origin(page))
+    return "\n\n".join(block for block in blocks if block) + "\n"
+
+
+def _title(fit: Fit) -> str:
+    description = fit.dataset.description
+    tables = fit.dataset.measurements
+    counts = []
+    for term in fit.model.terms:
+        if term.name == "wrap_angle":
+            counts += _angle_counts(fit, len(term.data["angle"]), len(term.data["limit"]))
+    if tables.efficiencies is not None:
+        counts.append(f"{len(tables.efficiencies.efficiency)} efficiencies")
+    if tables.recordings is not None:
+        blocks = sum(int(r.strokes.used_sliding.sum()) for r in tables.recordings.each)
+        samples, runs = sum(r.account.samples for r in tables.recordings.each), len(tables.recordings.runs)
+        counts.append(
+            f"{samples} samples of {len(tables.recordings.each)} recordings in {runs} runs ({blocks} sliding blocks)"
+        )
+    if tables.forces is not None:
+        counts.append(f"{len(tables.forces.run)} force readings in {len(tables.forces.run_names)} runs")
+    counts += elastic_counts(tables)
+    line = f"{fit.name}\n{'=' * len(fit.name)}"
+    geometry = f"; {description.geometry} geometry" if description.curved else ""
+    model = f"; friction model {description.friction_model}" if description.friction_model != "capstan" else ""
+    noise = f"; {description.noise_in_words}" if description.noise != "normal" else ""
+    fitted = filled(f"Fitted to {listed(counts)}{geometry}{model}{noise}.")
+    remarks = [filled(remark) for remark in tables.remarks]
+    return "\n".join([line, fitted, *remarks])
+
+
+def _angle_counts(fit: Fit, entered: int, censored: int) -> list[str]:
+    """How many readings the curves were fitted to, and how those too small to detect entered."""
+    settings, published = fit.dataset.description.tables.angles, fit.dataset.description.geometry == "published"
+    way = "zero" if published or settings is None else settings.undetected
+    how = {
+        "censored": "",
+        "zero": ", those too small to detect taken as 0",
+        "dropped": ", those too small to detect left out",
+    }
+    below = f" and {censored} too small to detect (known to be below the limit)" if censored else how[way]
+    return [f"{entered} wrap angles{below}"]
+
+
+def _verdict(fit: Fit, page: dict[str, Any]) -> str:
+    found = verdict(fit)
+    if fit.posterior is None:
+        state = "least squares only; no posterior, no design answer" if found.trusted else _untrusted(found)
+    else:
+        state = "converged" if found.trusted else _untrusted(found)
+        sampler = page["sampler"]
+        state += f" ({sampler_text(sampler)})"
+    lines = [f"Verdict: {state}."]
+    lines += [filled(f"- {reason}", indent="  ") for reason in found.reasons]
+    lines += [filled(sentence) for sentence in sampler_sentences(page)]
+    if NOT_IDENTIFIABLE not in found.troubles:  # which says so of the same parameters
+        lines += [filled(c.sentence()) for c in confounded(fit)]
+    return "\n".join(lines)
+
+
+def _untrusted(found: Verdict) -> str:
+    """What is wrong, in capitals that nobody overlooks."""
+    kinds = {NOT_IDENTIFIABLE: "COEFFICIENTS NOT IDENTIFIABLE", CONTRADICTORY: "CONTRADICTORY MEASUREMENTS"}
+    if NOT_CONVERGED in found.troubles:
+        return "NOT CONVERGED; do not use these numbers"
+    return f"{listed([kinds[kind] for kind in found.troubles])}; do not use these numbers before reading why"
+
+
+def _coefficients(page: dict[str, Any]) -> str:
+    heads = ("parameter", "median", "90 % interval", "mean +- sd", "least squares +- s.e.", PROFILED, "prior", "unit")
+    sampled = any("median" in p for p in page["parameters"].values())
+    rows = []
+    for name, p in page["parameters"].items():
+        drawn = "median" in p
+        median, interval, moments = "", "", ""
+        if drawn:
+            digits = decimals(p["sd"])
+            median, interval = f"{p['median']:.{digits}f}", f"{p['q05']:.{digits}f} to {p['q95']:.{digits}f}"
+            moments = f"{p['mean']:.{digits}f} +- {p['sd']:.{digits}f}"
+        unit = "" if p["unit"] == "1" else p["unit"]
+        # Beside a posterior's intervals there is no room for others; those are in summary.json.
+        profiled = "" if sampled else _profiled(p)
+        rows.append((name, median, interval, moments, _least_squares(p), profiled, p["prior"], unit))
+    keep = [i for i in range(len(heads)) if i in (0, 4, 6) or any(row[i] for row in rows)]
+    return table([heads[i] for i in keep], [[row[i] for i in keep] for row in rows]) + _not_identified(page)
+
+
+def _least_squares(p: dict[str, Any]) -> str:
+    estimate = p.get("least_squares")
+    if "fixed" in p:
+        return f"{p['fixed']:.4g} (fixed)"
+    if estimate is None:
+        return ""
+    if not estimate["identified"]:
+        return "at bound" if estimate["at_bound"] else "not identified"
+    digits = decimals(estimate["standard_error"] or abs(estimate["value"]) / 1000)
+    return f"{estimate['value']:.{digits}f} +- {estimate['standard_error']:.{digits}f}"
+
+
+def _profiled(p: dict[str, Any]) -> str:
+    """Profile interval of least squares."""
+    estimate = p.get("least_squares")
+    if estimate is None or all(estimate[side] is None and side not in estimate["open"] for side in ("lower", "upper")):
+        return ""
+    finite = [estimate[side] for side in ("lower", "upper") if estimate[side] is not None]
+    digits = decimals(estimate["standard_error"] or (finite[-1] - finite[0] if len(finite) > 1 else 0.0) / 3 or 1.0)
+    shown = [f"{limit:.{digits}f}" for limit in finite]
+    if not shown:
+        return "not limited"
+    if estimate["open"]:
+        return f"{shown[0]} or more" if "upper" in estimate["open"] else f"{shown[0]} or less"
+    return " to ".join(shown)
+
+
+def _not_identified(page: dict[str, Any]) -> str:
+    notes = [
+        filled(f"{name} is {_trouble(p['least_squares'])}: {p['least_squares']['remark']}.")
+        for name, p in page["parameters"].items()
+        if p.get("least_squares") and not p["least_squares"]["identified"]
+    ]
+    condition = page["least_squares"]["condition_number"]
+    shown = "infinite" if condition is None else f"{condition:.3g}"
+    return "\n" + "\n".join(
+        [*notes, f"Condition number of the least-squares problem: {shown}.", *_about_intervals(page)]
+    )
+
+
+def _about_intervals(page: dict[str, Any]) -> list[str]:
+    """What the profile intervals are, where they are shown and much wider than the standard errors."""
+    wide = [name for name, p in page["parameters"].items() if p.get("least_squares") and _is_wide(p["least_squares"])]
+    if not wide or any("median" in p for p in page["parameters"].values()):
+        return []
+    return [
+        filled(
+            f"The intervals of {listed(wide)} are wider than their standard errors suggest: hardly more readings than unknowns "
+            "leave little to tell the scatter from, or the sum of squares is lopsided."
+        )
+    ]
+
+
+def _is_wide(estimate: dict[str, Any]) -> bool:
+    ends = estimate["lower"], estimate["upper"], estimate["standard_error"]
+    return estimate["identified"] and None not in ends and ends[1] - ends[0] > 2 * _WIDE * ends[2]
+
+
+def _trouble(estimate: dict[str, Any]) -> str:
+    return "at its bound in least squares" if estimate["at_bound"] else "not identified by least squares"
+
+
+def _known(fit: Fit) -> str:
+    """Which coefficients the measurements determine, in a sentence."""
+    friction = fit.known.groups.get("friction") if fit.posterior is not None else None
+    return filled(determined(friction, measured=True)) if friction is not None else ""
+
+
+def _rests_on_prior(page: dict[str, Any]) -> str:
+    names = [
+        n
+        for n, p in page["parameters"].items()
+        if p.get("contraction") is not None and p["contraction"] < _RESTS_ON_PRIOR
+    ]
+    if not names:
+        return ""
+    verb = "rests" if len(names) == 1 else "rest"
+    return filled(f"Hardly informed by the measurements: {listed(names)} {verb} on the prior almost alone.")
+
+
+def _curves(fit: Fit, page: dict[str, Any]) -> str:
+    if not page["curves"] or fit.posterior is None:
+        return ""
+    lines = ["Gaussian curves A exp(-((l - B)/C)^2), median (90 % interval):"]
+    for name, c in page["curves"].items():
+        unlimited = any(c[q] is None or abs(c[q]) > _UNLIMITED for q in ("q05", "median", "q95"))
+        interval = (
+            f"{c['median']:.4g} ({c['q05']:.4g} to {c['q95']:.4g}) {c['unit']}" if not unlimited else "not limited"
+        )
+        lines.append(f"  {name:<30} {interval}")
+    if any(line.endswith("not limited") for line in lines):
+        note = "Not limited: the data also allow an exponential, at which A, B and C are infinite; a, b and c above say it all."
+        lines.append(filled(note, indent="  "))
+    return "\n".join(lines)
+
+
+def _scatter(page: dict[str, Any]) -> str:
+    units = {"wrap_angle": "deg"} | dict.fromkeys(EFFICIENCY_TERMS, "% of the force")
+    parts = []
+    for term, sd in page["least_squares"]["residual_sd"].items():
+        if sd is not None and term in units:
+            value = f"{sd:.2f} {units[term]}" if term == "wrap_angle" else f"{100 * sd:.2f} {units[term]}"
+            parts.append(f"{term.replace('_', ' ')} {value}")
+    return filled(f"Residual standard deviation of least squares: {listed(parts)}.") if parts else ""
+
+
+def _mountings(fit: Fit, page: dict[str, Any]) -> str:
+    """The scatter from mounting to mounting, in words."""
+    tau, runs = (
+        page["parameters"].get(RUN_SCATTER, {}),
+        {r["label"] for r in page["measured"] if r["table"] != "efficiency"},
+    )
+    if "median" not in tau or not runs:
+        return ""
+    shown = (f"{100 * tau[q]:.1f}" for q in ("median", "q05", "q95"))
+    median, low, high = shown
+    heavy = (
+        " That is the scale of a Student-t, not a standard deviation: about six mountings in ten lie within it, and now and "
+        "then one lies far outside."
+        if fit.dataset.description.noise == "student"
+        else ""
+    )
+    return filled(
+        f"From one mounting of the cable to the next the efficiency scatters by {median} % of itself (90 % interval {low} to "
+        f"{high} %). All samples of a run share what its mounting did, so longer runs do not make the coefficients surer; "
+        f"more runs do.{heavy}"
+    )
+
+
+def _recordings(fit: Fit) -> str:
+    recordings = fit.dataset.measurements.recordings
+    return "Recordings\n" + "\n".join(recordings_text(recordings)) if recordings is not None else ""
+
+
+def _friction_model(fit: Fit) -> str:
+    """What the options of the friction model found."""
+    friction = fit.model.cable.friction
+    if not friction.options:
+        return ""
+    conditions, lines = friction.conditions, []
+    if friction.depends_on_load:
+        lines.append(
+            f"Coefficients and efficiencies are stated for an input force of {conditions.reference_force:g} N, because "
+            "friction depends on the load."
+        )
+    if friction.depends_on_rate:
+        unit, scale = SHOWN_SPEED[conditions.velocity_unit]
+        speed = f"{scale * conditions.reference_speed:.3g} {unit}"
+        lines.append(
+            f"Coefficients and efficiencies are stated for a speed of {speed}, because friction may depend on speed."
+        )
+    effect = rate_effect(fit)
+    if effect is not None:
+        lines.append(effect.sentence())
+    return "\n".join(filled(line) for line in lines)
+
+
+def _measured(fit: Fit, page: dict[str, Any]) -> str:
+    if not page["measured"]:
+        return ""
+    drawn = fit.posterior is not None
+    heads = ["measured at", "measured", "predicted", *(["90 % interval"] if drawn else []), "measured/predicted - 1"]
+    rows = []
+    for row in page["measured"]:
+        interval = [f"{row['q05']:.2%} to {row['q95']:.2%}"] if drawn else []
+        what = "" if row["table"] == "efficiency" else "run "
+        rows.append(
+            [
+                what + row["label"],
+                f"{row['measured']:.2%}",
+                f"{row['predicted']:.2%}",
+                *interval,
+                f"{row['relative_error']:+.2%}",
+            ]
+        )
+    return "Efficiency, measured and predicted\n" + table(heads, rows)
+
+
+def _answer(fit: Fit) -> str:
+    if fit.posterior is None or fit.dataset.description.route is None:
+        return ""
+    sentences = [
+        part for line in fit.optimal_length().lines() for part in ([filled(line)] if "  " not in line else [line])
+    ]
+    return "\n".join(sentences)
+
+
+def _origin(page: dict[str, Any]) -> str:
+    versions = ", ".join(f"{name} {version}" for name, version in page["versions"].items())
+    return filled(f"Seed {page['seed']}; {versions}.")

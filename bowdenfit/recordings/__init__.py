@@ -1,0 +1,1 @@
+"""From the channels of a recording to forces, prepared and cut into strokes."""

@@ -1,0 +1,267 @@
+"""Phases of a pull-pull loop's recording, by its own play operator: moving forward, moving back, between."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from bowdenfit.errors import DatasetError, DescriptionError
+from bowdenfit.recordings.recording import PULL, RETURN, SWITCH, Blocks, Strokes
+from bowdenfit.recordings.strokes import (
+    Span,
+    check_length,
+    correlation_time,
+    covered,
+    inside_sliding,
+    moving_steadily,
+    overridden,
+    toward_motor,
+    white_noise,
+)
+from bowdenfit.types import Labels, Vector
+
+_FIT_BLOCKS = 2000  # more than these say no more about the loop
+_FEWEST = 10  # blocks
+_LOSSES = (0.03, 0.1, 0.25, 0.45, 0.7, 0.9, 1.0)  # of the largest difference of the forces, where the fit is begun
+_EXPONENTS = (0.2, 0.5, 0.8, 1.0, 1.2)  # of the one that explains that difference without preload
+_LARGEST_SHARE = 0.95  # of the input force, that friction may take
+_CENTER_SD = 0.25  # of the largest difference: how far load cells may disagree before the loop is believed off center
+_WELL = 1.5  # cost a block up to which a loop follows its recording as well as noise lets it
+_CLEARLY = 0.5  # a fit the other way round must leave less than this fraction of the deviations to be believed
+_SURE = 4.5  # what a cost must grow by, in independent blocks, where something that is told is left out: 3 sd
+_CLEAR_OF_NOISE = 5.0  # standard deviations by which an output that moves must change
+_OPPOSITE = -0.5  # correlation of the two forces below which one of them has its sign turned round
+_LEAST = 1e-9
+
+
+@dataclass(frozen=True)
+class ForceLoop:
+    """The play operator of a pull-pull loop that follows a recording best.
+
+    Args:
+        loss: Force lost while both sides are taut, 2 P Lambda [N].
+        exponent: Friction exponent of one side, Lambda [1].
+        center: Input less output force in the middle of the loop, what sensors add [N].
+        deviation: Of the output force from the operator, block by block [N].
+        followed: Output of the operator [N].
+        state: +1 at the lower limit (moving forward), -1 at the upper (moving back), 0 between.
+        cost: Robust sum of squares of the deviations, in units of their noise, over two.
+    """
+
+    loss: float
+    exponent: float
+    center: float
+    deviation: Vector
+    followed: Vector
+    state: Labels
+    cost: float
+
+
+def find_loop_strokes(
+    blocks: Blocks, file: str, name: str, by_hand: Sequence[Span] = (), preload: float | None = None
+) -> Strokes:
+    """The phases of a loop's recording, from the contact state of its play operator and, where recorded, the velocity.
+
+    `Strokes.drag` is the force lost while both sides are taut and `Strokes.exponent` the friction exponent, each NaN where
+    the recording by itself does not tell it: without load beyond the taut branch only the loss is told, and the exponent
+    is that of the stated preload.
+
+    Args:
+        blocks: The prepared recording.
+        file: File name, for errors.
+        name: Name of the recording, for errors and remarks.
+        by_hand: Phases set by the user, "pull" for moving forward and "return" for back; they replace what is found.
+        preload: Preload that the user states, the same at all wrap angles [N].
+
+    Raises:
+        DatasetError: It is too short; a phase lies outside it; the loop never moves; input and output are swapped, or one
+            has its sign turned round.
+        DescriptionError: A phase is to be ignored.
+    """
+    check_length(blocks, file, name, by_hand)
+    _check_none_ignored(by_hand, file)
+    usable = ~blocks.saturated
+    if usable.sum() < _FEWEST:
+        raise DatasetError(
+            f"{file}: only {int(usable.sum())} blocks of the recording {name!r} are inside the range of the load cells; "
+            "correct the limits under prepare in cable.toml, or leave the recording out."
+        )
+    force_in, force_out = blocks.input_force[usable], blocks.output_force[usable]
+    fit = fit_force_loop(force_in, force_out)
+    if not by_hand:
+        _check_ends(force_in, force_out, fit, file, name)
+    _check_moves(force_in, force_out, fit, file, name)
+    velocity = toward_motor(blocks.velocity[usable], fit.state)
+    state, moving = np.zeros(len(usable), dtype=int), np.ones(len(usable), dtype=bool)
+    state[usable], moving[usable] = fit.state, moving_steadily(velocity, fit.state)
+    used = inside_sliding(state) & usable & moving
+    if by_hand:
+        state, used = overridden(blocks.time, state, used & ~covered(blocks.time, by_hand), usable, by_hand)
+    correlation = correlation_time(fit.deviation[used[usable]]) if used.any() else 1.0
+    loss, exponent = _told(force_in, force_out, fit, correlation)
+    remarks = _remarks(name, state[used], fit, loss, exponent, preload)
+    if preload and np.isnan(exponent):
+        exponent = loss / (2 * preload)
+    noise = float(1.4826 * np.median(np.abs(fit.deviation))) or 1e-12
+    return Strokes(state, used, exponent, fit.center, loss, noise, correlation, bool(by_hand), remarks)
+
+
+def loop_limits(force: Vector, loss: float, exponent: float) -> tuple[Vector, Vector]:
+    """Output force while moving forward and while moving back [N]; see `bowdenfit.physics.loop.loop_band`.
+
+    Args:
+        force: Input force, of either sign [N].
+        loss: 2 P Lambda [N].
+        exponent: Lambda [1].
+    """
+    less, more = force * np.exp(-exponent), force * np.exp(exponent)
+    return np.minimum(force - loss, np.minimum(less, more)), np.maximum(force + loss, np.maximum(less, more))
+
+
+def follow(lower: Vector, upper: Vector, start: float) -> tuple[Vector, Labels]:
+    """The play operator between two limits, and its contact: +1 at the lower, -1 at the upper, 0 between."""
+    y, output, state = start, [], []
+    for low, high in zip(lower.tolist(), upper.tolist(), strict=True):
+        contact = SWITCH
+        if y <= low:
+            y, contact = low, PULL
+        elif y >= high:
+            y, contact = high, RETURN
+        output.append(y)
+        state.append(contact)
+    return np.array(output), np.array(state, dtype=int)
+
+
+def fit_force_loop(force_in: Vector, force_out: Vector, taut: bool = True, slack: bool = True) -> ForceLoop:
+    """The loop's play operator that follows the output force best, with loss, friction exponent and center free.
+
+    Args:
+        force_in, force_out: Forces, of either sign [N].
+        taut: Whether force is lost while both sides are taut; else the loop has no preload.
+        slack: Whether the return side may go slack; else all is lost as while both sides are taut.
+    """
+    from scipy.optimize import least_squares
+
+    thin = slice(None, None, -(-len(force_in) // _FIT_BLOCKS))
+    x, y = force_in[thin], force_out[thin]
+    apart, noise = float(np.quantile(np.abs(x - y), 0.98)), _noise(x, y)
+    scale = max(apart, noise)
+
+    def parameters(p: np.ndarray) -> tuple[float, float, float]:
+        loss, exponent = scale * float(np.exp(p[0])), float(np.exp(p[1]))
+        return (loss if taut else 0.0), (exponent if slack else 0.0), scale * float(p[2])
+
+    def residuals(p: np.ndarray) -> np.ndarray:
+        deviation = _deviation(x, y, *parameters(p))[0]
+        return np.append(deviation / noise, np.sqrt(len(x)) * 0.1 * p[2] / _CENTER_SD)
+
+    def cost(p: np.ndarray) -> float:
+        return float(np.sum(np.sqrt(1 + residuals(p) ** 2) - 1))
+
+    starts = sorted(_starts(x, y, scale), key=cost)[:2]
+    fits = [least_squares(residuals, start, loss="soft_l1", x_scale=[0.1, 0.1, 0.1], max_nfev=40) for start in starts]
+    best = min(fits, key=lambda fit: float(fit.cost))
+    loss, exponent, center = parameters(best.x)
+    deviation, followed, state = _deviation(force_in, force_out, loss, exponent, center)
+    return ForceLoop(loss, exponent, center, deviation, followed, state, float(best.cost) * len(force_in) / len(x))
+
+
+def _starts(x: Vector, y: Vector, scale: float) -> list[np.ndarray]:
+    """Where the fit may begin: log of loss over scale, log of exponent, center over scale."""
+    share = min(scale / max(float(np.abs(x).max()), scale), _LARGEST_SHARE)
+    largest = -np.log1p(-share)
+    low, high = np.quantile(x - y, (0.05, 0.95))
+    middle = float(low + high) / 2 / scale if low < 0 < high else 0.0
+    return [
+        np.array([np.log(loss), np.log(exponent * largest), center])
+        for loss in _LOSSES
+        for exponent in _EXPONENTS
+        for center in dict.fromkeys((0.0, middle))
+    ]
+
+
+def _deviation(x: Vector, y: Vector, loss: float, exponent: float, center: float) -> tuple[Vector, Vector, Labels]:
+    """Deviation of the output from the operator, the operator's output, and its contact."""
+    followed, state = follow(*loop_limits(x, loss, exponent), float(y[0]) + center)
+    return y + center - followed, followed, state
+
+
+def _noise(force_in: Vector, force_out: Vector) -> float:
+    """Standard deviation of a block's deviation while the loop moves [N]."""
+    level = float(np.quantile(np.abs(force_in), 0.9))
+    return float(np.hypot(max(white_noise(force_in), 1e-6 * level), max(white_noise(force_out), 1e-6 * level))) or 1e-12
+
+
+def _told(force_in: Vector, force_out: Vector, fit: ForceLoop, correlation: float) -> tuple[float, float]:
+    """Loss and exponent, each NaN where the recording is followed as well without it."""
+    enough = _SURE * correlation
+    loss_told = fit_force_loop(force_in, force_out, taut=False).cost - fit.cost > enough
+    exponent_told = fit_force_loop(force_in, force_out, slack=False).cost - fit.cost > enough
+    return (fit.loss if loss_told else float("nan")), (fit.exponent if exponent_told else float("nan"))
+
+
+def _check_none_ignored(by_hand: Sequence[Span], file: str) -> None:
+    ignored = next((span for span in by_hand if span.stroke == "ignore"), None)
+    if ignored is not None:
+        raise DescriptionError(
+            f"cable.toml, recording {file!r}, strokes: the phase from {ignored.start:g} to {ignored.end:g} s is to be ignored, "
+            "but where a loop stands depends on all that came before; write pull (moving forward), return or hold, or cut the "
+            "file there."
+        )
+
+
+def _check_ends(force_in: Vector, force_out: Vector, fit: ForceLoop, file: str, name: str) -> None:
+    """Refuse channels that are the wrong way round, or of which one counts the other direction as positive."""
+    if fit.cost < _WELL * len(force_in):  # it follows to within its noise, which neither could
+        return
+    if np.ptp(force_in) > 0 and np.ptp(force_out) > 0 and np.corrcoef(force_in, force_out)[0, 1] < _OPPOSITE:
+        raise DatasetError(
+            f"{file}: in {name!r} the output force falls where the input force rises; both must be positive in the same "
+            "direction of motion. Turn the sign of one by a minus before its unit, such as --channel output_force=NAME:-N."
+        )
+    other = fit_force_loop(force_out, force_in)
+    if other.cost < _CLEARLY * fit.cost:
+        raise DatasetError(
+            f"{file}: in {name!r} the output force is ahead of the input force in the direction of motion, as if the loop "
+            "gained force: it is the input that stands still at reversals. If input and output are swapped, map them the other "
+            "way round, such as --channel input_force=OUTPUT_CHANNEL --channel output_force=INPUT_CHANNEL."
+        )
+
+
+def _check_moves(force_in: Vector, force_out: Vector, fit: ForceLoop, file: str, name: str) -> None:
+    """Refuse a recording in which the output force just stands, somewhere inside the friction band."""
+    noise = max(white_noise(force_out), 1e-12)
+    still = np.sum(np.sqrt(1 + ((force_out - np.median(force_out)) / _noise(force_in, force_out)) ** 2) - 1)
+    moved = np.ptp(fit.followed) > _CLEAR_OF_NOISE * noise and fit.state.any()
+    if not moved or float(still) - fit.cost < _SURE:
+        raise DatasetError(
+            f"{file}: the output force of {name!r} stands still, at {np.median(force_out):.4g} N, while the input force goes "
+            f"from {force_in.min():.4g} to {force_in.max():.4g} N: all inside the friction band, so that it tells no more of "
+            "friction than a bound. Record the loop moving against a load, or write what moving it without load takes as a "
+            "row of a loop table."
+        )
+
+
+def _remarks(
+    name: str, used: np.ndarray, fit: ForceLoop, loss: float, exponent: float, preload: float | None
+) -> tuple[str, ...]:
+    remarks = []
+    found = set(used.tolist())
+    if not found:
+        remarks.append(f"{name}: no block lies safely inside a phase of motion.")
+    elif len(found) == 1:
+        which = "forward" if PULL in found else "back"
+        remarks.append(
+            f"{name} moves {which} throughout: offsets of the load cells cannot be told from friction by it."
+        )
+    if len(found) == 2 and abs(fit.center) > _CENTER_SD * max(fit.loss, _LEAST):
+        remarks.append(
+            f"{name}: the input force is off the output force by {fit.center:+.3g} N in the middle of the loop; the usual "
+            "cause is a load cell with a wrong tare: give [sensors] an offset_sd, or tare the recording."
+        )
+    if np.isnan(exponent) and preload is None and np.isfinite(loss):
+        remarks.append(
+            f"{name}: the return side does not go slack, so that this recording by itself tells what is lost, {loss:.3g} N = "
+            "2 x preload x friction exponent, and not the two apart; state or measure the preload, or record under more load."
+        )
+    return tuple(remarks)

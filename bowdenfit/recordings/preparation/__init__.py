@@ -1,0 +1,237 @@
+"""From a recording as read to block means that a fit can use.
+
+The steps, one file each: `checks`, `flags`, `tare`, `delay`, `blocks`; each is a function of arrays that can be used by itself.
+"""
+
+import math
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from bowdenfit.errors import DatasetError
+from bowdenfit.recordings.preparation.bandwidth import bandwidth_of
+from bowdenfit.recordings.preparation.blocks import Common, average, block_samples
+from bowdenfit.recordings.preparation.checks import check, check_sign
+from bowdenfit.recordings.preparation.clock import GOOD, KINDS, NO_OVERLAP, QUIET, Sampled, read_at, spread, step_of
+from bowdenfit.recordings.preparation.delay import Delay, estimate_delay
+from bowdenfit.recordings.preparation.flags import flag
+from bowdenfit.recordings.preparation.noise import noise_about_trend
+from bowdenfit.recordings.preparation.tare import tare_of
+from bowdenfit.recordings.recording import Account, Blocks, Flagged, PreparationSettings, RawRecording
+from bowdenfit.types import Flags, Vector
+
+_SHOWN_FLAGS = 300
+_USUAL_BLOCK = 0.05
+NO_DELAY_OF_LOOPS = (
+    "How much later the output channel is than the input channel is not estimated for a loop, whose forces pass through zero. "
+    'No delay was assumed; state one if it is known: delay = { value = 10, unit = "ms" } under prepare in cable.toml.'
+)
+
+
+@dataclass(frozen=True)
+class _Cleaned:
+    """Both channels on their own clocks, without tare and with faults; the ends of the range, and the tares."""
+
+    input: Sampled
+    output: Sampled
+    limits: tuple[float, float]
+    tare: tuple[float, float]
+    tare_sd: tuple[float, float]
+
+
+def prepare(raw: RawRecording, settings: PreparationSettings) -> tuple[Blocks, Account]:
+    """Check a recording, leave out what is no reading, shift the output back by its delay, and average in blocks.
+
+    Args:
+        raw: The recording as read.
+        settings: Which steps are done, and with what.
+
+    Returns:
+        The block means, and an account of every sample; `Account.limits` holds the limits that were taken, of both load
+        cells together.
+
+    Raises:
+        DatasetError: The recording cannot be one; see `checks.check` and `tare.tare_of`.
+    """
+    return averaged(inspected(raw, settings))
+
+
+@dataclass(frozen=True)
+class Inspected:
+    """A recording whose samples are flagged and tared, and whose delay is known as far as it tells it.
+
+    Args:
+        raw: As it was read.
+        settings: Which steps are done, and with what.
+        remarks: What was noticed.
+        cleaned: Both channels on their own clocks.
+        together: Both on one clock, before any delay is taken off.
+        delay: How much later the output channel is.
+    """
+
+    raw: RawRecording
+    settings: PreparationSettings
+    remarks: tuple[str, ...]
+    cleaned: _Cleaned
+    together: Common
+    delay: Delay
+
+
+def inspected(raw: RawRecording, settings: PreparationSettings) -> Inspected:
+    """The steps before averaging, so that several recordings can be given one delay; see `prepare`."""
+    remarks = check(raw)
+    cleaned = _clean(raw, settings)
+    together = _together(raw, cleaned, settings, 0.0)
+    return Inspected(raw, settings, remarks, cleaned, together, _delay(together, settings))
+
+
+def averaged(found: Inspected, one_for_all: tuple[float, float] | None = None) -> tuple[Blocks, Account]:
+    """The steps after the delay is known; see `prepare`.
+
+    Args:
+        found: The recording.
+        one_for_all: Delay and its standard error [s] that replace those of this recording.
+    """
+    raw, settings, remarks, cleaned = found.raw, found.settings, found.remarks, found.cleaned
+    delay = found.delay if one_for_all is None else Delay(*one_for_all, found.delay.exponent)
+    common = _together(raw, cleaned, settings, delay.value) if delay.value else found.together
+    _require_some_good(raw, common)
+    filled = [_filled(force, common.fault == GOOD) for force in (common.input_force, common.output_force)]
+    bandwidth = bandwidth_of(filled[0], filled[1], 1 / common.step, settings.loop)
+    noise = _noise(cleaned.input, bandwidth), _noise(cleaned.output, bandwidth)
+    samples = _samples_of_block(common, cleaned, settings, bandwidth, noise)
+    blocks, counts = average(common, samples)
+    account = Account(
+        counts=counts,
+        samples=len(common.time),
+        rate=1 / common.step,
+        bandwidth=bandwidth,
+        block=samples * common.step,
+        tare=cleaned.tare,
+        tare_sd=cleaned.tare_sd,
+        delay=delay.value,
+        delay_sd=delay.sd,
+        noise=noise,
+        limits=cleaned.limits,
+        flagged=_flagged(common),
+        remarks=(*remarks, *_remarks(cleaned, delay, counts)),
+    )
+    return blocks, account
+
+
+def _clean(raw: RawRecording, settings: PreparationSettings) -> _Cleaned:
+    """Flag and tare each channel on its own clock, and check its sign."""
+    times = spread(raw.input_time), spread(raw.output_time)
+    forces = raw.input_force, raw.output_force
+    pairs = ((0, 1), (1, 0))
+    found = [flag(times[one], forces[one], times[two], forces[two], settings) for one, two in pairs]
+    names = "input_force", "output_force"
+    tares = [_tare(raw.file, name, channel, settings) for name, (channel, _) in zip(names, found, strict=True)]
+    channels = [replace(c, force=c.force - tare) for (c, _), (tare, _) in zip(found, tares, strict=True)]
+    for name, channel in zip(names, channels, strict=True):
+        if not settings.loop:
+            check_sign(raw.file, name, channel.force)
+    ends = max(e[0] for _, e in found), min(e[1] for _, e in found)
+    return _Cleaned(channels[0], channels[1], ends, (tares[0][0], tares[1][0]), (tares[0][1], tares[1][1]))
+
+
+def _tare(file: str, name: str, channel: Sampled, settings: PreparationSettings) -> tuple[float, float]:
+    if settings.tare == "none":
+        return 0.0, 0.0
+    if settings.quiet is None:
+        raise DatasetError(
+            f"{file}: {name} is to be tared, but no quiet interval is stated. State the start and end of an interval "
+            "without load in seconds, or no tare."
+        )
+    return tare_of(file, name, channel.time, channel.force, settings.quiet, channel.fault == GOOD)
+
+
+def _together(raw: RawRecording, cleaned: _Cleaned, settings: PreparationSettings, delay: float) -> Common:
+    """Both channels on the clock of the one with more samples, the output shifted back by the delay."""
+    output = replace(cleaned.output, time=cleaned.output.time - delay)
+    time = cleaned.input.time if len(cleaned.input.time) >= len(output.time) else output.time
+    input_force, input_fault = read_at(cleaned.input, time)
+    output_force, output_fault = read_at(output, time)
+    fault = np.maximum(input_fault, output_fault)
+    if settings.tare == "interval" and settings.quiet is not None:
+        quiet = (time >= settings.quiet[0]) & (time <= settings.quiet[1])
+        fault = np.where(quiet & (fault != NO_OVERLAP), QUIET, fault)
+    return Common(time, step_of(time), input_force, output_force, _velocity(raw, time), fault)
+
+
+def _velocity(raw: RawRecording, time: Vector) -> Vector:
+    there = np.isfinite(raw.velocity)
+    if there.sum() < 2:
+        return np.full(len(time), np.nan)
+    clock = spread(raw.velocity_time)
+    if len(clock) == len(time) and there.all() and np.array_equal(clock, time):
+        return raw.velocity
+    return np.interp(time, clock[there], raw.velocity[there], left=np.nan, right=np.nan)
+
+
+def _delay(common: Common, settings: PreparationSettings) -> Delay:
+    if settings.delay == "none":
+        return Delay(0.0, math.nan, math.nan)
+    if settings.delay != "estimate":
+        return Delay(float(settings.delay), math.nan, math.nan)
+    if settings.loop:
+        return Delay(0.0, math.nan, math.nan, NO_DELAY_OF_LOOPS)
+    shortest = settings.block if settings.block != "auto" else _USUAL_BLOCK
+    return estimate_delay(common.time, common.input_force, common.output_force, common.fault == GOOD, float(shortest))
+
+
+def _require_some_good(raw: RawRecording, common: Common) -> None:
+    if not np.any(common.fault == GOOD):
+        most = KINDS[int(np.argmax(np.bincount(common.fault, minlength=len(KINDS))))]
+        raise DatasetError(
+            f"{raw.file}: none of the {len(common.time)} samples of {raw.name} is left, most of them for {most}. Look at "
+            "the recording, or switch off the step of the preparation that leaves them out."
+        )
+
+
+def _filled(force: Vector, good: Flags) -> Vector:
+    """A force with straight lines over the samples that are not good, for spectra."""
+    where = np.flatnonzero(good)
+    return force if len(where) == len(force) else np.interp(np.arange(len(force)), where, force[where])
+
+
+def _noise(channel: Sampled, bandwidth: float) -> float:
+    """Standard deviation of a single sample, from the channel on its own clock [N]."""
+    stretch = max(4, round(1 / (2 * bandwidth * step_of(channel.time))))
+    return noise_about_trend(_filled(channel.force, channel.fault == GOOD), stretch)
+
+
+def _samples_of_block(
+    common: Common, cleaned: _Cleaned, settings: PreparationSettings, bandwidth: float, noise: tuple[float, float]
+) -> int:
+    """Samples of a block of the common clock, 0 for no blocks; a slower channel counts with fewer samples."""
+    if settings.block == "auto":
+        thinned = [step_of(channel.time) / common.step for channel in (cleaned.input, cleaned.output)]
+        each = noise[0] * math.sqrt(thinned[0]), noise[1] * math.sqrt(thinned[1])
+        return block_samples(common, bandwidth, each, settings.loop)
+    return max(1, round(settings.block / common.step)) if settings.block > 0 else 0
+
+
+def _flagged(common: Common) -> Flagged:
+    """The samples left out, evenly thinned to a few hundred of each kind, in order of time."""
+    chosen = []
+    for kind in range(GOOD + 1, NO_OVERLAP):
+        where = np.flatnonzero(common.fault == kind)
+        chosen.append(where[np.unique(np.linspace(0, len(where) - 1, min(len(where), _SHOWN_FLAGS)).astype(int))])
+    at = np.sort(np.concatenate(chosen))
+    kinds = tuple(KINDS[k] for k in common.fault[at].tolist())
+    return Flagged(kinds, common.time[at], common.input_force[at], common.output_force[at])
+
+
+def _remarks(cleaned: _Cleaned, delay: Delay, counts: dict[str, int]) -> list[str]:
+    remarks = [delay.remark] if delay.remark else []
+    for name, channel in (("input_force", cleaned.input), ("output_force", cleaned.output)):
+        if channel.gap.any():
+            length = float(np.diff(channel.time)[channel.gap[:-1]].sum())
+            remarks.append(f"The clock of {name} has {int(channel.gap.sum())} gaps, {length:.3g} s together.")
+    if counts["saturated"]:
+        remarks.append(
+            f"{counts['saturated']} samples lie at the end of a load cell's range and say only that the force was at least "
+            "as large."
+        )
+    return remarks

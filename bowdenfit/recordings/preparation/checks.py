@@ -1,0 +1,140 @@
+"""What a recording must be before anything is computed from it; each refusal is a sentence with a remedy."""
+
+import numpy as np
+
+from bowdenfit.errors import DatasetError
+from bowdenfit.recordings.preparation.shapes import OtherVector
+from bowdenfit.recordings.recording import RawRecording
+from bowdenfit.types import Vector
+
+FEWEST_SAMPLES = 20
+LARGEST_FORCE = 1e6
+_MOST_REPEATED = 0.5
+
+
+def check(raw: RawRecording) -> tuple[str, ...]:
+    """Refuse a recording that cannot be one, and remark on what is odd.
+
+    Args:
+        raw: The recording as read.
+
+    Returns:
+        Remarks, in sentences.
+
+    Raises:
+        DatasetError: A channel and its clock differ in length, a channel is too short, never moves or is far too large,
+            a clock runs backwards or stands still, or the two clocks do not overlap.
+    """
+    channels = {
+        "input_force": (raw.input_time, raw.input_force),
+        "output_force": (raw.output_time, raw.output_force),
+    }
+    if len(raw.velocity):
+        channels["velocity"] = (raw.velocity_time, raw.velocity)
+    for name, (time, values) in channels.items():
+        _check_lengths(raw.file, name, time, values)
+        _check_clock(raw.file, name, time)
+    _check_forces(raw.file, "input_force", raw.input_force)
+    _check_forces(raw.file, "output_force", raw.output_force)
+    _check_overlap(raw)
+    remarks = [_repeated(name, time) for name, (time, _) in channels.items()]
+    return tuple(dict.fromkeys(r for r in remarks if r))
+
+
+def check_sign(file: str, name: str, force: Vector) -> None:
+    """Refuse a channel most of whose readings under load are negative; call it once the tare is subtracted.
+
+    Args:
+        file: File name, for the error.
+        name: Channel, "input_force" or "output_force".
+        force: Its readings [N].
+
+    Raises:
+        DatasetError: More than half of the readings above a fifth of the largest are negative.
+    """
+    finite = force[np.isfinite(force)]
+    loaded = finite[np.abs(finite) > 0.2 * np.max(np.abs(finite))]
+    negative = float(np.mean(loaded < 0))
+    if negative > 0.5:
+        raise DatasetError(
+            f"{file}: {100 * negative:.0f} % of the readings of {name} under load are negative, down to "
+            f"{finite.min():.4g} N, but a rope can only pull; the usual cause is the sign convention of the load cell. "
+            f"Turn the sign by mapping the channel with a minus before its unit: --channel {name}=NAME:-N"
+        )
+
+
+def _check_lengths(file: str, name: str, time: OtherVector, values: Vector) -> None:
+    if len(time) != len(values):
+        raise DatasetError(
+            f"{file}: {name} has {len(values)} samples but its clock has {len(time)}; the usual cause is a channel that "
+            "was recorded at another rate than the clock it shares. Export it with its own time, or all at one rate."
+        )
+    finite = int(np.isfinite(values).sum())
+    if finite < FEWEST_SAMPLES:
+        raise DatasetError(
+            f"{file}: {name} has {finite} readings, and a recording needs at least {FEWEST_SAMPLES}; the usual cause is "
+            "a recording that was cut off or another channel than meant. Leave the file out or map the right channel."
+        )
+
+
+def _check_clock(file: str, name: str, time: Vector) -> None:
+    missing = np.flatnonzero(~np.isfinite(time))
+    if len(missing):
+        raise DatasetError(
+            f"{file}: the time of {name} is missing at sample {missing[0] + 1}; every sample needs a time. "
+            "Delete that row, or export the recording again."
+        )
+    backwards = np.flatnonzero(np.diff(time) < 0)
+    if len(backwards):
+        at = int(backwards[0])
+        raise DatasetError(
+            f"{file}: the time of {name} runs backwards at sample {at + 2}, from {time[at]:.10g} s to "
+            f"{time[at + 1]:.10g} s; the usual cause is two recordings in one file. Split the file there."
+        )
+    repeated = _share_repeated(time)
+    if repeated > _MOST_REPEATED:
+        raise DatasetError(
+            f"{file}: {100 * repeated:.0f} % of the times of {name} repeat the one before (the first is {time[0]:.10g} s)"
+            "; the usual cause is a clock written with too few digits. Export the time with more digits."
+        )
+
+
+def _check_forces(file: str, name: str, force: Vector) -> None:
+    finite = force[np.isfinite(force)]
+    low, high = float(finite.min()), float(finite.max())
+    if low == high:
+        raise DatasetError(
+            f"{file}: {name} reads {low:.6g} N in every sample; the usual cause is a load cell that was dead or "
+            "unplugged, or another channel than meant. Map the right channel, or leave the recording out."
+        )
+    typical = float(np.median(np.abs(finite)))
+    if typical > LARGEST_FORCE:
+        raise DatasetError(
+            f"{file}: {name} reads {typical:.4g} N in its middle, far more than a Bowden cable bears; the usual cause is "
+            f"a wrong unit, or counts of the converter. State the unit: --channel {name}=NAME:UNIT"
+        )
+
+
+def _check_overlap(raw: RawRecording) -> None:
+    start = max(raw.input_time[0], raw.output_time[0])
+    end = min(raw.input_time[-1], raw.output_time[-1])
+    if start >= end:
+        raise DatasetError(
+            f"{raw.file}: input_force was sampled from {raw.input_time[0]:.10g} s to {raw.input_time[-1]:.10g} s and "
+            f"output_force from {raw.output_time[0]:.10g} s to {raw.output_time[-1]:.10g} s, which do not overlap; the "
+            "usual cause is two clocks with different zeros. Put both channels on one clock."
+        )
+
+
+def _repeated(name: str, time: Vector) -> str:
+    share = _share_repeated(time)
+    if not share:
+        return ""
+    return (
+        f"{100 * share:.2g} % of the times of {name} repeat the one before, as a clock with few digits does; the samples "
+        "were spread evenly between the different times."
+    )
+
+
+def _share_repeated(time: Vector) -> float:
+    return float(np.mean(np.diff(time) == 0)) if len(time) > 1 else 0.0

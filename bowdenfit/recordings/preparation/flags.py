@@ -1,0 +1,211 @@
+"""Samples that are no readings: missing or frozen ones, spikes, and those at the end of a load cell's range."""
+
+import math
+from dataclasses import dataclass
+
+import numpy as np
+
+from bowdenfit.recordings.preparation.clock import DROPOUT, GOOD, SATURATED, SPIKE, Sampled, gaps_of, step_of
+from bowdenfit.recordings.preparation.delay import RANGE
+from bowdenfit.recordings.preparation.noise import noise_of, quantum_of
+from bowdenfit.recordings.preparation.shapes import ChosenFlags, ChosenVector, OtherVector, Places
+from bowdenfit.recordings.recording import PreparationSettings
+from bowdenfit.types import Flags, Labels, Vector
+
+_SPIKE_SDS = 8.0
+_HALF_WINDOW = 5
+_LONGEST_SPIKE = 3
+_SHORTEST_RUN = 10
+_CHANCE = 1e-6
+_CLOSED = 1
+
+
+@dataclass(frozen=True)
+class Runs:
+    """Stretches of equal successive values.
+
+    Args:
+        start: Index of the first sample of each.
+        length: Samples of each.
+        value: Its value.
+    """
+
+    start: Labels
+    length: Labels
+    value: Vector
+
+    def covered(self, chosen: ChosenFlags, samples: int) -> Flags:
+        """Samples that lie in the chosen stretches."""
+        edges = np.zeros(samples + 1, dtype=int)
+        edges[self.start[chosen]] += 1
+        edges[self.start[chosen] + self.length[chosen]] -= 1
+        return np.cumsum(edges[:-1]) > 0
+
+
+def runs_of(values: Vector) -> Runs:
+    """Split into stretches of equal successive values; each missing value is a stretch of its own."""
+    starts = np.flatnonzero(np.append(True, values[1:] != values[:-1]))
+    return Runs(starts, np.diff(np.append(starts, len(values))), values[starts])
+
+
+def flag(
+    time: Vector, force: Vector, other_time: OtherVector, other_force: OtherVector, settings: PreparationSettings
+) -> tuple[Sampled, tuple[float, float]]:
+    """Find what is wrong with the samples of one channel; the readings stay as they are.
+
+    Samples that are not finite are dropouts whatever the settings say, since nothing can be computed from them.
+
+    Args:
+        time: Clock of the channel, strictly increasing [s].
+        force: Its readings, before any tare [N].
+        other_time: Clock of the other channel [s].
+        other_force: Readings of the other channel [N].
+        settings: Which faults are looked for.
+
+    Returns:
+        The channel with its faults, and the ends of the range that were taken [N].
+    """
+    finite = np.isfinite(force)
+    there = np.isfinite(other_force)
+    other = np.interp(time, other_time[there], other_force[there])
+    other_noise = resolution(other_force[there])
+    off = spikes(force)
+    lag = round(RANGE / step_of(time))
+    ends, at_end = saturation(np.where(off, np.nan, force), other, other_noise, settings.limits, lag)
+    fault = np.full(len(force), GOOD)
+    if settings.saturation == "flag":
+        fault[at_end] = SATURATED
+    if settings.spikes:
+        fault[off] = SPIKE
+    if settings.dropouts:
+        fault[frozen(force, other, other_noise) & ~at_end] = DROPOUT
+    fault[~finite] = DROPOUT
+    gap = gaps_of(time) if settings.dropouts else np.zeros(len(time), dtype=bool)
+    return Sampled(time, np.where(finite, force, np.nan), fault, gap), ends
+
+
+def resolution(force: Vector) -> float:
+    """Smallest change of a channel that means motion [N]: six standard deviations of its noise and two of its steps."""
+    return 6 * noise_of(force) + 2 * quantum_of(force)
+
+
+def frozen(force: Vector, other: Vector, other_resolution: float) -> Flags:
+    """Samples that repeat one value for so long that quantisation cannot explain it, while the other channel moves.
+
+    How long is too long follows from the noise: where it covers at least a third of a quantisation step, the chance of
+    so many repeats is below one in a million. A channel with less noise is never called frozen, because a force that
+    stands still at a reversal looks the same. Repeats that the whole channel has, as after a slower converter, are no fault.
+    """
+    runs = runs_of(force)
+    moved = _range_over(other, runs) > other_resolution
+    too_long = runs.length >= _longest_by_chance(force, runs)
+    return runs.covered(moved & too_long, len(force))
+
+
+def saturation(
+    force: Vector, other: Vector, other_resolution: float, limits: tuple[float, float] | None, lag: int
+) -> tuple[tuple[float, float], Flags]:
+    """Samples at the end of the load cell's range, and the ends [N]; infinite where none was stated or seen.
+
+    With limits stated, everything within a quantisation step of them. Without, the largest or smallest value of the
+    channel where it is held for longer than noise allows, or where the largest is held while the other force goes on
+    rising by more than its resolution, which no cable does; not within the first `lag` samples, in which it may only be later.
+    """
+    finite = force[np.isfinite(force)]
+    if limits is not None:
+        step = min(quantum_of(finite), 1e-3 * (limits[1] - limits[0]))
+        ends = limits
+    else:
+        step, ends = 0.0, _clipped_at(force, finite, other, other_resolution, lag)
+    at_end = (force <= ends[0] + step) | (force >= ends[1] - step)
+    return ends, _closed(at_end) if limits is None else at_end
+
+
+def _clipped_at(
+    force: Vector, finite: OtherVector, other: Vector, other_resolution: float, lag: int
+) -> tuple[float, float]:
+    runs = runs_of(force)
+    by_chance = _longest_by_chance(force, runs)
+    long = (runs.length >= by_chance) & (_range_over(other, runs) > other_resolution)
+    low, high = float(finite.min()), float(finite.max())
+    clipped_low = np.any(long & (runs.value == low))
+    clipped_high = np.any(long & (runs.value == high)) or _rises_at(high, other, runs, lag) > other_resolution
+    return (low if clipped_low else -math.inf, high if clipped_high else math.inf)
+
+
+def _longest_by_chance(force: Vector, runs: Runs) -> float:
+    """Repeats that noise makes less than once in a million recordings; infinite for a channel without enough noise."""
+    finite = force[np.isfinite(force)]
+    noise, step = noise_of(finite), quantum_of(finite)
+    if noise < 0.3 * step or noise == 0:
+        return math.inf
+    same = math.erf(step / (2 * math.sqrt(2) * noise))
+    chance = math.log(_CHANCE / len(force)) / math.log(same) if 0 < same < 1 else 0.0
+    order = np.argsort(runs.length)
+    half = int(np.searchsorted(np.cumsum(runs.length[order]), len(force) / 2))
+    typical = int(runs.length[order[half]])
+    return max(float(_SHORTEST_RUN), chance, 5.0 * typical)
+
+
+def _range_over(other: Vector, runs: Runs) -> ChosenVector:
+    return np.maximum.reduceat(other, runs.start) - np.minimum.reduceat(other, runs.start)
+
+
+def _rises_at(value: float, other: Vector, runs: Runs, lag: int) -> float:
+    """How far the other force rises at most while a channel rests at a value, after the first `lag` samples."""
+    chosen = (runs.value == value) & (runs.length > max(lag, _SHORTEST_RUN))
+    parts = [other[s + lag : s + n] for s, n in zip(runs.start[chosen], runs.length[chosen], strict=True)]
+    return max((float(part.max() - part[0]) for part in parts), default=0.0)
+
+
+def _closed(flags: Flags) -> Flags:
+    """Flag the few samples between flagged ones too: what is left of a clipped stretch is the lower half of its noise."""
+    where = np.flatnonzero(flags)
+    if not len(where):
+        return flags
+    near = np.flatnonzero(np.diff(where) <= _CLOSED + 1)
+    edges = np.zeros(len(flags) + 1, dtype=int)
+    np.add.at(edges, where[near], 1)
+    np.add.at(edges, where[near + 1], -1)
+    return flags | (np.cumsum(edges[:-1]) > 0)
+
+
+def spikes(force: Vector) -> Flags:
+    """One to three successive samples more than eight standard deviations off the running median of eleven.
+
+    Quick motion is no spike: the distance allowed grows with the typical step between the neighbors, and more than three
+    successive samples are left alone.
+    """
+    where = np.flatnonzero(np.isfinite(force))
+    values = force[where]
+    flags = np.zeros(len(force), dtype=bool)
+    if len(values) > 2 * _HALF_WINDOW:
+        flags[where[_spikes_in(values)]] = True
+    return flags
+
+
+def _spikes_in(values: Vector) -> Places:
+    within = values[(values > values.min()) & (values < values.max())]  # clipped stretches would hide the noise
+    noise = math.hypot(noise_of(within), quantum_of(values) / math.sqrt(12))
+    padded = np.pad(values, _HALF_WINDOW, mode="reflect")
+    beside = (padded[: -2 * _HALF_WINDOW] + padded[2 * _HALF_WINDOW :]) / 2
+    suspects = np.flatnonzero(np.abs(values - beside) > _SPIKE_SDS / 2 * noise)
+    windows = padded[suspects[:, None] + np.arange(2 * _HALF_WINDOW + 1)]
+    steps = np.median(np.abs(np.diff(windows, axis=1)), axis=1)
+    allowed = _SPIKE_SDS * noise + 3 * np.maximum(steps - 1.5 * noise, 0)
+    distance = np.abs(values[suspects] - np.median(windows, axis=1))
+    off, distance = suspects[distance > allowed], distance[distance > allowed]
+    return off[_sudden(padded, off, distance)] if len(off) else off
+
+
+def _sudden(padded: OtherVector, off: Places, distance: ChosenVector) -> ChosenFlags:
+    """Whether each suspect is in a short group that the force jumps to, and back from, by half its distance or more."""
+    first = np.append(True, np.diff(off) > 1)
+    group = np.cumsum(first) - 1
+    starts = np.flatnonzero(first)
+    length = np.bincount(group)
+    steps = np.abs(np.diff(padded))
+    before = steps[off[starts] + _HALF_WINDOW - 1]
+    after = steps[off[starts] + length - 1 + _HALF_WINDOW]
+    short = length <= _LONGEST_SPIKE
+    return (short & (np.minimum(before, after) > np.maximum.reduceat(distance, starts) / 2))[group]

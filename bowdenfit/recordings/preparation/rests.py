@@ -1,0 +1,119 @@
+"""Where the output of a recording stands still, and the play operator that knows of it.
+
+By itself the play operator keeps the highest peak of the noise at the end of a pull. From there it touches the other side
+of the band too early, by milliseconds, as if the output channel were that much ahead. So the level of each rest is read
+from the output, over the whole rest.
+"""
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+
+import numpy as np
+
+from bowdenfit.recordings.preparation.segments import Segments
+from bowdenfit.recordings.preparation.shapes import OtherVector
+from bowdenfit.types import Matrix, Vector
+
+_MARGIN = 0.050
+_AWAY = 6.0
+_NEAR = 1.5
+
+
+@dataclass(frozen=True)
+class Rests:
+    """What the output itself says of where it stands still between contact on one side of the band and on the other.
+
+    From the end of a pull to that of the next return the output is `min(level, x + exponent)`, and after a return
+    `max(level, x - exponent)`, with the level that the output is seen to have.
+
+    Args:
+        level: Level of the last rest [1].
+        heading: -1 after a pull, +1 after a return, 0 where the play operator is left alone.
+    """
+
+    level: Matrix
+    heading: Matrix
+
+
+def play_rows(x: Matrix, start: Vector, exponent: OtherVector, rests: Rests | None = None) -> np.ndarray:
+    """Play operator along each row for each exponent at once: an array of exponents, rows and points."""
+    output = np.empty((x.shape[1], len(exponent), x.shape[0]))
+    band = exponent[:, None]
+    lower, upper = x.T[:, None, :] - band, x.T[:, None, :] + band
+    if rests is not None:
+        level, heading = rests.level.T[:, None, :], rests.heading.T[:, None, :]
+        falls, rises = np.minimum(level, upper), np.maximum(level, lower)
+        seen = np.where(heading < 0, falls, rises)
+        lower, upper = np.where(heading == 0, lower, seen), np.where(heading == 0, upper, seen)
+    y = np.broadcast_to(start, output.shape[1:])
+    for here, low, high in zip(output, lower, upper, strict=True):
+        np.maximum(y, low, out=here)
+        y = np.minimum(here, high, out=here)
+    return np.moveaxis(output, 0, -1)
+
+
+def band_of(segments: Segments) -> tuple[float, float]:
+    """Middle and half width of the band of x - y [1]."""
+    low, high = np.quantile((segments.x - segments.y)[segments.weight > 0.05], (0.05, 0.95))
+    return float(low + high) / 2, float(high - low) / 2
+
+
+def starts(segments: Segments, ratio: float) -> Vector:
+    """Log output force with which each segment starts, without the log ratio of the sensors [1]."""
+    return np.mean(segments.y[:, :3], axis=1) - ratio
+
+
+def shifted(y: Matrix, points: float) -> Matrix:
+    """Each row later by a number of points, with straight lines between them; the ends are held."""
+    whole = int(np.floor(points))
+    share = points - whole
+    place = np.arange(y.shape[1]) - whole
+    last = y.shape[1] - 1
+    return (1 - share) * y[:, np.clip(place, 0, last)] + share * y[:, np.clip(place - 1, 0, last)]
+
+
+def sides(segments: Segments, output: Matrix, exponent: float) -> tuple[np.ndarray, np.ndarray]:
+    """Whether the model stands still at each point, and the side of the band that it last touched, 0 for none yet."""
+    gap = segments.x - output
+    touch = np.where(np.abs(gap) >= exponent * (1 - 1e-9), np.sign(gap), 0.0)
+    last = np.maximum.accumulate(np.where(touch != 0, np.arange(touch.shape[1]), -1), axis=1)
+    side = np.where(last >= 0, np.take_along_axis(touch, np.maximum(last, 0), axis=1), 0.0)
+    return touch == 0, side
+
+
+def rests_of(segments: Segments, point: OtherVector) -> Rests:
+    """Read the level of each rest from the output.
+
+    A rest starts where the input comes close to the end of its pull or return, and ends where the play operator touches
+    the other side of the band. A level is the mean of the output over the rest, but for its ends that smoothing rounds.
+
+    Args:
+        segments: The recording.
+        point: Friction exponent [1], log ratio of the sensors [1], and delay [s], all of them roughly right.
+    """
+    exponent, ratio, delay = (float(value) for value in point)
+    output = play_rows(segments.x, starts(segments, ratio), np.array([exponent]))[0]
+    stands, side = sides(segments, output, exponent)
+    seen = shifted(segments.y, -delay / segments.step) - ratio
+    attached = exponent - side * (segments.x - output) <= _AWAY * segments.jitter
+    level, heading = np.where(side > 0, -np.inf, np.inf), np.where(attached, side, 0.0)
+    margin = round(_MARGIN / segments.step)
+    for row, begin, end, after in _half_cycles(side):
+        touched = np.flatnonzero(~stands[row, begin:end])
+        if not len(touched) or begin + touched[-1] + 2 * margin + 3 > end:
+            continue
+        turn = begin + int(touched[-1])
+        value = float(np.mean(seen[row, turn + margin : end - margin]))
+        away = side[row, begin] * (value - segments.x[row, begin:turn]) + exponent
+        far = np.flatnonzero(away > _NEAR * segments.jitter[row, begin:turn])
+        since = begin + int(far[-1]) + 1 if len(far) else begin
+        level[row, since:after], heading[row, since:end] = value, -side[row, begin]
+    return Rests(level, heading)
+
+
+def _half_cycles(side: Matrix) -> Iterator[tuple[int, int, int, int]]:
+    """Row, first point, end, and end of the next one, of all stretches in which the band is touched on one side."""
+    for row, values in enumerate(side):
+        ends = [0, *(np.flatnonzero(np.diff(values)) + 1).tolist(), len(values), len(values)]
+        for begin, end, after in zip(ends[:-2], ends[1:-1], ends[2:], strict=True):
+            yield row, begin, end, after

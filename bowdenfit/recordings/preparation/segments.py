@@ -1,0 +1,103 @@
+"""The liveliest stretches of a recording on a coarse clock, on which the delay of a channel is looked for."""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from bowdenfit.recordings.preparation.noise import noise_of
+from bowdenfit.recordings.preparation.shapes import Places
+from bowdenfit.types import Flags, Labels, Matrix, Vector
+
+_STEP = 0.005
+_SEGMENT = 8.0
+_MOST_POINTS = 5_000
+_WIDTH = 0.012
+_LIGHT = np.array([1.0, 6.0, 15.0, 20.0, 15.0, 6.0, 1.0]) / 64
+
+
+@dataclass(frozen=True)
+class Segments:
+    """Stretches of a recording on a coarse clock, one a row.
+
+    Args:
+        step: Time between points [s].
+        x: log input force, smoothed [1].
+        y: log output force, smoothed alike [1].
+        weight: Inverse relative variance of each point, 0 where it must not be used.
+        jitter: Standard deviation of x by noise [1].
+    """
+
+    step: float
+    x: Matrix
+    y: Matrix
+    weight: Matrix
+    jitter: Matrix
+
+
+def segments_of(time: Vector, input_force: Vector, output_force: Vector, good: Flags) -> Segments | None:
+    """Average onto a coarse clock and cut into stretches of equal length, the liveliest of which are kept."""
+    span = float(time[-1] - time[0])
+    rate = (len(time) - 1) / span
+    step = max(round(_STEP * rate), 1) / rate
+    points = int(span / step)
+    usable = good & (input_force > 0) & (output_force > 0)
+    if points < 20 or usable.sum() < 20:
+        return None
+    place = np.minimum(((time - time[0]) / step).astype(int), points - 1)
+    count = np.bincount(place[usable], minlength=points)
+    sums = [np.bincount(place[usable], f[usable], minlength=points) for f in (input_force, output_force)]
+    forces = [_filled(total, count) for total in sums]
+    x, y = (np.log(force) for force in forces)
+    weights, jitters = _weight(forces[0], forces[1], count), _jitter(forces[0], step)
+    columns = _smooth(x, step), _smooth(y, step), weights, jitters
+    length = min(max(round(_SEGMENT / step), 20), points)
+    rows = points // length
+    x, y, weight, jitter = (v[: rows * length].reshape(rows, length) for v in columns)
+    chosen = _liveliest(x, max(1, _MOST_POINTS // length))
+    return Segments(step, x[chosen], y[chosen], weight[chosen], jitter[chosen])
+
+
+def _filled(total: Vector, count: Labels) -> Vector:
+    where = np.flatnonzero(count)
+    return np.interp(np.arange(len(count)), where, total[where] / count[where])
+
+
+def _smooth(values: Vector, step: float) -> Vector:
+    """Convolved with a Gaussian of a few coarse steps, so that the play operator does not follow every peak of the noise."""
+    width = _WIDTH / step
+    reach = int(np.ceil(3 * width))
+    kernel = np.exp(-0.5 * (np.arange(-reach, reach + 1) / width) ** 2)
+    return _convolved(values, kernel / kernel.sum())
+
+
+def _convolved(values: Vector, kernel: np.ndarray) -> Vector:
+    return np.convolve(np.pad(values, len(kernel) // 2, mode="edge"), kernel, mode="valid")
+
+
+def _weight(input_force: Vector, output_force: Vector, count: Labels) -> Vector:
+    variance = 1e-3**2 + np.zeros(len(count))
+    for force in (input_force, output_force):
+        noise = max(noise_of(_convolved(force, _LIGHT)), 1e-4 * float(force.max()))
+        variance += (noise / force) ** 2
+    return np.where(count > 0, np.min(variance) / variance, 0.0)
+
+
+def _jitter(force: Vector, step: float) -> Vector:
+    """Relative standard deviation of the force after smoothing, for noise that was white before."""
+    points = max(2 * np.sqrt(np.pi) * _WIDTH / step, 1.0)
+    return max(noise_of(force) / np.sqrt(points), 1e-4 * float(force.max())) / force
+
+
+def _liveliest(x: Matrix, most: int) -> Places:
+    """Rows in which the rate changes most, in order."""
+    lag = max(1, x.shape[1] // 50)
+    bends = np.abs(x[:, 2 * lag :] - 2 * x[:, lag:-lag] + x[:, : -2 * lag]).sum(axis=1)
+    return np.sort(np.argsort(-bends, kind="stable")[:most])
+
+
+def reverses(segments: Segments) -> bool:
+    """Whether the input turns around by more than a fifth of its range within a segment."""
+    fifth = 0.2 * float(np.ptp(segments.x))
+    fall = np.max(np.maximum.accumulate(segments.x, axis=1) - segments.x)
+    rise = np.max(segments.x - np.minimum.accumulate(segments.x, axis=1))
+    return bool(fall > fifth and rise > fifth)

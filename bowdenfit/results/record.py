@@ -1,0 +1,270 @@
+"""A finished fit: what was fitted to what, the draws, and the answers that follow from them."""
+
+from collections.abc import Iterable
+from dataclasses import dataclass, field
+from functools import cached_property
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import jax
+import numpy as np
+
+from bowdenfit.dataset import Dataset
+from bowdenfit.errors import UsageError
+from bowdenfit.inference.chain import Trajectories
+from bowdenfit.inference.diagnostics import Diagnostics
+from bowdenfit.inference.draws import curves_of, efficiency_at, for_each_draw
+from bowdenfit.inference.interval import Interval
+from bowdenfit.inference.least_squares import LeastSquares
+from bowdenfit.inference.samplers import SamplerAgreement
+from bowdenfit.model import Model, build_model
+from bowdenfit.results.choices import at_edge, best_window, rank_choices
+from bowdenfit.results.length import OptimalLength
+from bowdenfit.results.optimum import route_grid
+
+if TYPE_CHECKING:
+    from bowdenfit.questions.bends.answer import Elastic
+    from bowdenfit.questions.check.answer import Checks
+    from bowdenfit.questions.identify.answer import Identifiability
+    from bowdenfit.questions.summary.verdict import Verdict
+
+OPTIMAL_LENGTH, OPTIMAL_EFFICIENCY = "optimal_length", "optimal_efficiency"
+
+
+@dataclass(frozen=True)
+class Draws:
+    """Draws of a fit; every array has the walkers (ordered by ensemble) first, then the draws of each.
+
+    Args:
+        z: In the coordinates of the sampler, with parameters last.
+        values: Parameters and derived curve coefficients, in shown units.
+        optimum: Optimal length and efficiency; empty without a route.
+        log_likelihood: Of every reading, by table, readings last.
+        expected: Expected readings.
+        replicated: Readings drawn anew.
+        prior: Draws of the parameters from the prior, one row.
+        diagnostics: Of parameters and optimum.
+        n_ensembles: Number of independent ensembles.
+        steps: Steps of every walker; of NUTS, without warm-up.
+        acceptance: Mean fraction of accepted proposals; of NUTS, mean acceptance along trajectories.
+        sampler: "emcee" or "nuts", whose chains are ensembles of one walker each.
+        trajectories: How the trajectories of NUTS went.
+        agreement: Whether a second sampler agrees, where one was asked.
+    """
+
+    z: np.ndarray
+    values: dict[str, np.ndarray]
+    optimum: dict[str, np.ndarray]
+    log_likelihood: dict[str, np.ndarray]
+    expected: dict[str, np.ndarray]
+    replicated: dict[str, np.ndarray]
+    prior: dict[str, np.ndarray]
+    diagnostics: dict[str, Diagnostics]
+    n_ensembles: int
+    steps: int
+    acceptance: float
+    sampler: str = "emcee"
+    trajectories: Trajectories | None = None
+    agreement: SamplerAgreement | None = None
+
+    @property
+    def flat_z(self) -> np.ndarray:
+        """All draws, one a row."""
+        return self.z.reshape(-1, self.z.shape[-1])
+
+
+@dataclass(frozen=True)
+class Provenance:
+    """How a fit came about.
+
+    Args:
+        seed: Seed of everything random.
+        versions: Of bowdenfit, Python and the libraries that computed.
+        stage_times: Seconds by stage.
+        created: Date and time, UTC.
+    """
+
+    seed: int
+    versions: dict[str, str]
+    stage_times: dict[str, float] = field(default_factory=dict)
+    created: str = ""
+
+
+@dataclass(frozen=True)
+class Fit:
+    """What was found for one data set.
+
+    Args:
+        dataset: What was fitted.
+        least_squares: Classical estimates.
+        posterior: Draws, or None where only least squares was asked for.
+        converged: Whether the sampler (or, without it, least squares) converged.
+        reasons: Why not.
+        provenance: Seed, versions, times.
+    """
+
+    dataset: Dataset
+    least_squares: LeastSquares
+    posterior: Draws | None
+    converged: bool
+    reasons: tuple[str, ...]
+    provenance: Provenance
+
+    @classmethod
+    def load(cls, path: str | Path) -> "Fit":
+        """A fit from its results folder, bit for bit as it was saved."""
+        from bowdenfit.results.store import load
+
+        return load(Path(path))
+
+    def save(self, path: str | Path, force: bool = False) -> None:
+        """Write the results folder (without figures and summary text, which `bowdenfit.fit(output=...)` adds)."""
+        from bowdenfit.results.store import save
+
+        save(self, Path(path), force)
+
+    @cached_property
+    def model(self) -> Model:
+        """The model that was fitted."""
+        return build_model(self.dataset)
+
+    @property
+    def name(self) -> str:
+        """Name of the cable."""
+        return self.dataset.description.name
+
+    def parameter(self, name: str) -> Interval:
+        """A parameter's value and uncertainty, in the unit it is shown in.
+
+        Raises:
+            UsageError: There is no such parameter, or no posterior.
+        """
+        values = self.draws().values
+        if name not in values:
+            raise UsageError(f"there is no parameter {name!r}; there are {', '.join(values)}.")
+        return Interval.of(values[name])
+
+    @cached_property
+    def _curves(self) -> dict[str, np.ndarray]:
+        """Efficiency and wrap angles of every draw on the grid of the route."""
+        with jax.enable_x64(True):
+            curves = curves_of(self.model, route_grid(self.model))
+            return for_each_draw(curves, self.model.space.size)(self.draws().flat_z)
+
+    def curves(self) -> tuple[np.ndarray, dict[str, np.ndarray]]:
+        """Route values, and by name the efficiency [1] and wrap angles [deg] of every draw (rows) there."""
+        self._needs_route()
+        return route_grid(self.model), self._curves
+
+    def efficiency(self, lengths: float | Iterable[float] | None = None) -> list[Interval]:
+        """Efficiency at values of the route variable, with intervals.
+
+        Args:
+            lengths: Route values; the description's choices if omitted.
+
+        Raises:
+            UsageError: There is no posterior.
+        """
+        return [Interval.of(column) for column in self.efficiency_draws(lengths).T]
+
+    def efficiency_draws(self, lengths: float | Iterable[float] | None = None) -> np.ndarray:
+        """Efficiency of every draw (rows) at values of the route variable (columns); see `efficiency`."""
+        route = self.dataset.description.route
+        if lengths is None:
+            lengths = route.choices if route else 0.0
+        wanted = np.atleast_1d(np.asarray(lengths, dtype=float))
+        with jax.enable_x64(True):
+            return efficiency_at(self.model, self.draws().flat_z, wanted)
+
+    def optimal_length(self) -> OptimalLength:
+        """The design answer: which length is best, how sure that is, and what the choices cost.
+
+        Raises:
+            UsageError: The description has no route to vary, or there is no posterior.
+        """
+        self._needs_route()
+        return self._optimal_length
+
+    @cached_property
+    def _optimal_length(self) -> OptimalLength:
+        drawn, route = self.draws(), self.dataset.description.route
+        assert route is not None  # checked by the caller
+        lengths, best = drawn.optimum[OPTIMAL_LENGTH].ravel(), drawn.optimum[OPTIMAL_EFFICIENCY].ravel()
+        grid, curves = self.curves()
+        choices = np.asarray(route.choices)
+        ranked = rank_choices(choices, self.efficiency_draws(choices)) if len(choices) else ()
+        return OptimalLength(
+            route.variable,
+            route.unit,
+            Interval.of(lengths),
+            Interval.of(best),
+            float(at_edge(lengths, route.range).mean()),
+            best_window(grid, curves["efficiency"], best),
+            ranked,
+        )
+
+    @cached_property
+    def elastic(self) -> "Elastic":
+        """Answers about stretch, preload and loops at wrap angles."""
+        from bowdenfit.questions.bends.answer import Elastic
+
+        return Elastic(self)
+
+    @cached_property
+    def checks(self) -> "Checks | None":
+        """Every reading against its prediction from all the others, and what the priors do; None without draws."""
+        from bowdenfit.questions.check.answer import checks_of
+
+        return checks_of(self)
+
+    def summary(self) -> dict[str, Any]:
+        """Everything on one page, for programs (the contents of summary.json)."""
+        from bowdenfit.questions.summary.page import summarize
+
+        return summarize(self)
+
+    def verdict(self) -> "Verdict":
+        """Whether the answers may be trusted, and if not, why."""
+        return self._verdict
+
+    @cached_property
+    def _verdict(self) -> "Verdict":
+        from bowdenfit.questions.summary.verdict import verdict
+
+        return verdict(self)
+
+    @cached_property
+    def known(self) -> "Identifiability":
+        """What the draws determine, and what rests on the priors."""
+        from bowdenfit.questions.identify.answer import of_fit
+
+        return of_fit(self)
+
+    def __repr__(self) -> str:
+        state = "converged" if self.converged else "NOT converged" if self.posterior else "least squares only"
+        return f"<bowdenfit.Fit {self.name!r}: {self.model.space.size} parameters, {state}>"
+
+    def _repr_html_(self) -> str:
+        from bowdenfit.questions.summary.html import fit_page
+
+        return fit_page(self)
+
+    def draws(self) -> Draws:
+        """The posterior.
+
+        Raises:
+            UsageError: There is none.
+        """
+        if self.posterior is None:
+            raise UsageError(
+                "this fit has no posterior, because it was made without MCMC; fit again without --no-mcmc for intervals."
+            )
+        return self.posterior
+
+    def _needs_route(self) -> None:
+        self.draws()
+        if self.dataset.description.route is None:
+            raise UsageError(
+                "the description has no [route], so there is no length to choose; add [route] with variable, unit and "
+                "range, and angles measured along it, to cable.toml."
+            )

@@ -1,0 +1,1 @@
+"""From a data set to a finished fit: stages, helpers beside them, and what is written."""

@@ -1,0 +1,92 @@
+"""What runs beside a fit: libraries are loaded while XLA compiles, figures are drawn while files are written."""
+
+import signal
+from collections.abc import Callable, Iterator
+from concurrent.futures import Executor, Future, ProcessPoolExecutor
+from contextlib import ExitStack, contextmanager
+from dataclasses import dataclass
+from importlib import import_module
+from multiprocessing import get_context
+from pathlib import Path
+from threading import Thread
+from typing import TYPE_CHECKING, Any
+
+if TYPE_CHECKING:
+    from bowdenfit.questions.summary.figure_data import FigureData
+
+STATISTICS = (
+    "arviz_stats.base",
+    "arviz_base",
+    "h5netcdf",
+    "bowdenfit.inference.diagnostics",
+    "bowdenfit.results.netcdf",
+)
+DRAWING = ("bowdenfit.questions.summary.gallery", "bowdenfit.questions.summary.figure_data")
+
+
+class Inline(Executor):
+    """Does every job at once, where it is asked for."""
+
+    def submit(self, function: Callable[..., Any], /, *args: Any, **keywords: Any) -> "Future[Any]":
+        """The finished job."""
+        job: Future[Any] = Future()
+        job.set_result(function(*args, **keywords))
+        return job
+
+
+@dataclass(frozen=True)
+class Assistants:
+    """Who does what beside the fit itself.
+
+    Args:
+        statistics: Diagnostics and posterior.nc, which need ArviZ.
+        drawing: Figures, which need matplotlib.
+    """
+
+    statistics: Executor
+    drawing: Executor
+
+
+@contextmanager
+def assistants(statistics: bool, drawing: bool) -> Iterator[Assistants]:
+    """Assistants that load their libraries in processes of their own while this one computes, or work here and now.
+
+    A started process imports the main module again, so only a program that guards its start may ask for one: the command
+    line does, the library does not unless told to.
+
+    Args:
+        statistics: Whether to start a process for statistics.
+        drawing: Whether to start a process for drawing.
+    """
+    with ExitStack() as open_pools:
+        pools = [
+            open_pools.enter_context(_process(modules)) if wanted else Inline()
+            for wanted, modules in ((statistics, STATISTICS), (drawing, DRAWING))
+        ]
+        yield Assistants(*pools)
+
+
+def _process(modules: tuple[str, ...]) -> Executor:
+    """A process that loads what its jobs need."""
+    pool = ProcessPoolExecutor(1, get_context("spawn"), initializer=_ready, initargs=(modules,))
+    pool.submit(len, ())  # it starts with its first job
+    return pool
+
+
+def draw(data: "FigureData", folder: Path) -> list[Path]:
+    """Draw all figures that apply; loads matplotlib, and no model."""
+    from bowdenfit.questions.summary.gallery import draw_all
+
+    return draw_all(data, folder)
+
+
+def _ready(modules: tuple[str, ...]) -> None:
+    """Load what the jobs need; an interrupt is the parent's to handle."""
+    signal.signal(signal.SIGINT, signal.SIG_IGN)
+    for module in modules:
+        import_module(module)
+
+
+def load_ahead(*modules: str) -> None:
+    """Load modules in a thread, which gets its time while XLA compiles."""
+    Thread(target=lambda: [import_module(name) for name in modules], daemon=True).start()

@@ -1,0 +1,100 @@
+"""The results folder of a fit: whether it may be written, the checkpoint, and all files once the fit is done."""
+
+import secrets
+from concurrent.futures import Future
+from dataclasses import replace
+from pathlib import Path
+from typing import TYPE_CHECKING, Any, get_args
+
+from bowdenfit.dataset import Dataset
+from bowdenfit.description import Sampler
+from bowdenfit.description.file import parse_description
+from bowdenfit.errors import DescriptionError, StoreError, UsageError
+from bowdenfit.results.folder import CHAIN, clear, read_checkpoint, refuse_to_overwrite, start_checkpoint
+from bowdenfit.run.helpers import Assistants, draw
+
+if TYPE_CHECKING:
+    from bowdenfit.results.record import Fit
+
+LARGEST_SEED = 2**31 - 1
+
+
+def write_results(found: "Fit", folder: Path, figures: bool, helpers: Assistants) -> None:
+    """All files of the results folder, as far as possible at the same time; fit.json comes last of the fit's own."""
+    from bowdenfit.questions.summary.figures import figure_data
+    from bowdenfit.questions.summary.words import summary_text
+    from bowdenfit.results.folder import FIGURES, POSTERIOR, SUMMARY_TEXT, write_text
+    from bowdenfit.results.netcdf import write_groups
+    from bowdenfit.results.store import posterior_page, save
+
+    if found.posterior is None:
+        clear(folder)
+        written: Future[None] | None = None
+    else:
+        written = helpers.statistics.submit(write_groups, folder / POSTERIOR, *posterior_page(found))
+    drawn = helpers.drawing.submit(draw, figure_data(found), folder / FIGURES) if figures else None
+    save(found, folder, force=True, write_posterior=written.result if written else None)
+    write_text(folder / SUMMARY_TEXT, summary_text(found))
+    if drawn is not None:
+        drawn.result()
+
+
+def sampled_by(data: Dataset, method: str) -> Dataset:
+    """The same data set, to be sampled by another method than its description says.
+
+    Raises:
+        UsageError: There is no such sampler.
+    """
+    if method not in get_args(Sampler):
+        raise UsageError(f"there is no sampler {method!r}; choose one of {', '.join(get_args(Sampler))}.")
+    sampler = data.description.sampler.model_copy(update={"method": method})
+    return replace(data, description=data.description.model_copy(update={"sampler": sampler}))
+
+
+def _fingerprint(data: Dataset, seed: int) -> dict[str, Any]:
+    """What must not change between an interrupted fit and its continuation; how long to sample may."""
+    return {"description": _for_good(data.description.to_json()), "sha256": data.sha256, "seed": seed}
+
+
+def _for_good(description: dict[str, Any]) -> dict[str, Any]:
+    """A description without what may change."""
+    free = {"max_steps", "target_r_hat", "target_ess"}
+    return description | {"sampler": {k: v for k, v in description["sampler"].items() if k not in free}}
+
+
+def _with_defaults(description: dict[str, Any]) -> dict[str, Any]:
+    """A checkpoint's description as it reads today: settings that have come since stand at their defaults."""
+    try:
+        return _for_good(parse_description(description).to_json())
+    except DescriptionError:
+        return description
+
+
+def checked_seed(folder: Path | None, data: Dataset, mcmc: bool, seed: int | None, resume: bool, force: bool) -> int:
+    """The seed, once it is clear that the results have a place, or that the checkpoint there belongs to this fit."""
+    if resume and (folder is None or not mcmc):
+        raise UsageError("--resume needs the results folder of a fit with MCMC; name it with --output.")
+    if folder is None or not resume:
+        if folder is not None:
+            refuse_to_overwrite(folder, force)
+        return secrets.randbelow(LARGEST_SEED) if seed is None else seed
+    before = read_checkpoint(folder)
+    now = _fingerprint(data, before["seed"] if seed is None else seed)
+    before["description"] = _with_defaults(before["description"])
+    changed = [key for key in now if now[key] != before[key]]
+    if changed:
+        what = {"description": "the description", "sha256": "an input file", "seed": "the seed"}[changed[-1]]
+        raise StoreError(
+            f"{folder} cannot be resumed because {what} changed since; undo the change, or start over with --force."
+        )
+    return int(before["seed"])
+
+
+def begun(folder: Path | None, data: Dataset, seed: int, resume: bool) -> Path | None:
+    """The checkpoint to sample into, in a folder cleared of what was there; nothing is touched before this."""
+    if folder is None:
+        return None
+    if not resume:
+        clear(folder)
+        start_checkpoint(folder / CHAIN, _fingerprint(data, seed))
+    return folder / CHAIN

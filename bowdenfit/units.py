@@ -1,0 +1,128 @@
+"""Units, at the border only: whatever a table is written in becomes N, mm, rad and s here and nowhere else."""
+
+import re
+from functools import cache
+from typing import TYPE_CHECKING
+
+from bowdenfit.errors import DatasetError
+from bowdenfit.words import shown
+
+if TYPE_CHECKING:
+    import pint
+
+INTERNAL_UNITS = {
+    "force": "N",
+    "length": "mm",
+    "angle": "rad",
+    "time": "s",
+    "velocity": "mm/s",
+    "angular_velocity": "rad/s",
+    "torque": "N*mm",
+    "ratio": "1",
+}
+_EXAMPLES = {
+    "force": "N, kN, lbf, kgf",
+    "length": "mm, cm, m, inch",
+    "angle": "deg, rad, turn",
+    "time": "s, ms",
+    "velocity": "mm/s, m/s",
+    "angular_velocity": "r/min, rad/s, deg/s",
+    "torque": "N*m, N*mm, lbf*inch",
+    "ratio": "%, 1",
+}
+_AS_PINT_SAYS = {"r/min": "rpm", "rev/min": "rpm", "1/min": "rpm", "u/min": "rpm"}  # the last is German
+# Names with products, quotients and small powers. Pint would compute whatever else it is given, such as 9**9**9.
+_WRITTEN = re.compile(r"[\w°%‰/*^().·\s-]{1,40}")
+_NO_UNIT = re.compile(r"\d\d|%%|(?:\*\*|\^)[\s(-]*\d[\s)]*(?:\*\*|\^)")
+
+
+@cache
+def _registry() -> "pint.UnitRegistry":
+    """Pint's registry, made at the first conversion (it takes a fifth of a second)."""
+    import pint
+
+    return pint.UnitRegistry(cache_folder=None)
+
+
+def is_unit(text: str) -> bool:
+    """Whether `text` is a unit that pint reads."""
+    try:
+        _parsed(text)
+    except DatasetError:
+        return False
+    return True
+
+
+def dimension_of(unit: str) -> str:
+    """Which of the kinds of quantity in `INTERNAL_UNITS` a unit measures, or "other"."""
+    parsed = _parsed(unit)
+    for dimension, internal in INTERNAL_UNITS.items():
+        if _same_kind(parsed, _parsed(internal)):
+            return dimension
+    return "other"
+
+
+def speed_dimension(unit: str) -> str:
+    """Whether a unit of speed is one of the motor ("angular_velocity") or of the rope ("velocity").
+
+    Anything else counts as one of the rope, and is refused when it is converted.
+    """
+    return "angular_velocity" if is_unit(unit) and dimension_of(unit) == "angular_velocity" else "velocity"
+
+
+def conversion_factor(unit: str, dimension: str, to: str | None = None) -> float:
+    """Factor from `unit` to the internal unit of `dimension` (or to another unit of the same kind).
+
+    Args:
+        unit: Unit as written by the user, anything pint reads.
+        dimension: One of `INTERNAL_UNITS`.
+        to: Target unit, the internal one if omitted.
+
+    Raises:
+        DatasetError: The unit is unknown, or measures something else.
+    """
+    parsed, target = _parsed(unit), _parsed(to or INTERNAL_UNITS[dimension])
+    if not _same_kind(parsed, target):
+        hint = " (kg is a mass: for the weight of that mass write kgf)" if unit.strip() in {"kg", "g", "lb"} else ""
+        raise DatasetError(
+            f"the unit {shown(unit)} does not measure {'a ' if dimension != 'angle' else 'an '}{dimension}{hint}; "
+            f"use one such as {_EXAMPLES.get(dimension, to)}"
+        )
+    return float(_registry().Quantity(1.0, parsed).to(target).magnitude)
+
+
+def route_conversion_factor(unit: str, to: str) -> float:
+    """Factor between two units of the route variable, whatever it measures.
+
+    Raises:
+        DatasetError: A unit is unknown, or the two measure different things.
+    """
+    parsed, target = _parsed(unit), _parsed(to)
+    if not _same_kind(parsed, target):
+        raise DatasetError(f"the unit {shown(unit)} cannot be converted to {to!r}, the unit of [route] in cable.toml")
+    return float(_registry().Quantity(1.0, parsed).to(target).magnitude)
+
+
+@cache
+def _parsed(unit: str) -> "pint.Unit":
+    text = unit.strip().replace("º", "°")  # the ordinal sign of Spanish and Italian keyboards
+    unknown = f"the unit {shown(unit)} is not known; use one such as N, lbf, mm, inch, deg, rad, %"
+    if text in {"1", "-", ""}:
+        text = "dimensionless"
+    text = _AS_PINT_SAYS.get(text.lower(), text)
+    if not _WRITTEN.fullmatch(text) or _NO_UNIT.search(text):
+        raise DatasetError(unknown)
+    try:
+        parsed = _registry().parse_units(text)
+        zero = _registry().Quantity(0.0, parsed).to_root_units().magnitude
+    except Exception as error:  # pint raises many kinds: tokenizer, attribute, value and assertion errors
+        raise DatasetError(unknown) from error
+    if zero != 0:
+        raise DatasetError(f"the unit {shown(unit)} does not count from zero (dB and degC do not); use one that does")
+    return parsed
+
+
+def _same_kind(a: "pint.Unit", b: "pint.Unit") -> bool:
+    """Same dimension; and an angle is not a ratio, although both are without dimension."""
+    root_a, root_b = (_registry().Quantity(1.0, unit).to_root_units().units for unit in (a, b))
+    return bool(root_a == root_b)

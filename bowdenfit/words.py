@@ -1,0 +1,55 @@
+"""Plain text as people read it: quoted values, lists in words, digits worth showing, filled paragraphs, aligned columns."""
+
+import math
+import textwrap
+from collections.abc import Collection, Sequence
+
+_LONGEST = 40  # characters of a quoted value
+WIDTH = 110
+
+
+def shown(value: object) -> str:
+    """Text in quotes, anything else as it is written in Python; the middle of what is long is left out."""
+    try:
+        text = repr(" ".join(value.split()) if isinstance(value, str) else value)
+    except ValueError:  # Python refuses to write out integers of more than 4300 digits
+        return "a very large number"
+    return text if len(text) <= _LONGEST else f"{text[: _LONGEST - 15]}...{text[-12:]}"
+
+
+def quoted(names: tuple[str, ...], most: int = 12) -> str:
+    """Names in quotes with commas between them."""
+    more = f" and {len(names) - most} more" if len(names) > most else ""
+    return ", ".join(shown(name) for name in names[:most]) + more
+
+
+def listed(parts: Sequence[str]) -> str:
+    """Parts with commas and a last "and"."""
+    return ", ".join(parts[:-1]) + " and " + parts[-1] if len(parts) > 1 else "".join(parts)
+
+
+def decimals(scale: float) -> int:
+    """Decimals that show a quantity of this uncertainty to two significant digits of it."""
+    if not math.isfinite(scale) or scale <= 0:
+        return 4
+    return min(max(1 - math.floor(math.log10(scale)), 0), 8)
+
+
+def filled(text: str, indent: str = "") -> str:
+    """A paragraph in lines of at most `WIDTH` characters."""
+    hanging = indent + ("  " if text.startswith("- ") else "")
+    return textwrap.fill(text, WIDTH, initial_indent=indent, subsequent_indent=hanging)
+
+
+def table(heads: Sequence[str], rows: Sequence[Sequence[str]], left: Collection[str] = ("prior", "unit")) -> str:
+    """Columns under a ruled heading, the first and those named in `left` aligned left, the others right."""
+    widths = [max(len(str(row[i])) for row in [heads, *rows]) for i in range(len(heads))]
+    at_left = {i for i, head in enumerate(heads) if i == 0 or head in left}
+    lines = [
+        "  ".join(
+            f"{cell:<{w}}" if i in at_left else f"{cell:>{w}}"
+            for i, (cell, w) in enumerate(zip(row, widths, strict=True))
+        ).rstrip()
+        for row in [heads, *rows]
+    ]
+    return "\n".join([lines[0], "-" * len(lines[0]), *lines[1:]])

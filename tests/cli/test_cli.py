@@ -1,0 +1,313 @@
+"""The command line as people use it: verbs, output, exit codes."""
+
+import contextlib
+import json
+import os
+import re
+import signal
+import subprocess
+import sys
+import time
+from pathlib import Path
+
+import click
+import numpy as np
+import pytest
+
+import bowdenfit as bf
+from bowdenfit.cli.progress import watched_fit
+from bowdenfit.inference.ensemble import Progress
+
+ROOT = Path(__file__).parents[2]
+QUICK = ("sampler.n_walkers=128", "sampler.target_ess=200", "sampler.target_r_hat=1.05", "sampler.max_steps=4000")
+VERBS = (
+    "init",
+    "check",
+    "fit",
+    "summary",
+    "predict",
+    "length",
+    "identify",
+    "compare",
+    "next",
+    "calibrate",
+    "plot",
+    "simulate",
+    "completion",
+)
+
+
+@pytest.fixture(scope="module")
+def results(on_body, tmp_path_factory):
+    """A quick, converged fit with everything in its folder."""
+    folder = tmp_path_factory.mktemp("cli") / "fit"
+    bf.fit(on_body, output=folder, seed=11, settings=QUICK)
+    return folder
+
+
+def test_help_names_every_verb_and_the_exit_codes(run):
+    code, out, _ = run("--help")
+    assert code == 0
+    for verb in VERBS:
+        assert re.search(rf"^  {verb} ", out, re.M), verb
+    assert "130" in out
+
+
+@pytest.mark.parametrize("verb", VERBS)
+def test_every_verb_explains_itself(run, verb):
+    code, out, _ = run(verb, "--help")
+    assert code == 0
+    assert len(out.splitlines()) > 5
+
+
+def test_init_writes_a_template_once(run, tmp_path):
+    folder = tmp_path / "my-cable"
+    assert run("init", folder)[0] == 0
+    written = {p.name: p.read_text() for p in folder.iterdir()}
+    assert set(written) == {"cable.toml", "angles.csv", "forces.csv"}
+    code, _, err = run("init", folder)
+    assert code == 2
+    assert "exists already" in err
+    assert {p.name: p.read_text() for p in folder.iterdir()} == written
+
+
+def test_the_template_becomes_a_data_set_by_filling_in(run, tmp_path):
+    run("init", tmp_path / "cable")
+    folder = tmp_path / "cable"
+    rows = [f"{length},{angle}" for length, angle in ((430, 12), (460, 25), (490, 44), (520, 80))]
+    (folder / "angles.csv").write_text((folder / "angles.csv").read_text() + "\n".join(rows) + "\n")
+    forces = [
+        f"{length},{run_},pull,{50 + i},{40 + i}" for length, run_ in ((440, 1), (480, 2), (520, 3)) for i in range(3)
+    ]
+    (folder / "forces.csv").write_text((folder / "forces.csv").read_text() + "\n".join(forces) + "\n")
+    code, out, err = run("check", folder)
+    assert (code, err) == (0, "")
+    assert "Everything could be read" in out
+
+
+def test_summary_prints_what_the_fit_wrote(run, results):
+    code, out, _ = run("summary", results)
+    assert code == 0
+    assert out == (results / "summary.txt").read_text()
+    code, out, _ = run("summary", results, "--json")
+    assert json.loads(out) == bf.load(results).summary()
+
+
+def test_length_gives_the_design_answer(run, results):
+    code, out, _ = run("length", results)
+    assert code == 0
+    assert re.search(r"Best cable length: 4[67]\d\.\d mm \(90 % interval", out)
+    code, out, _ = run("length", results, "--json")
+    page = json.loads(out)
+    assert page["unit"] == "mm"
+    assert sum(c["probability_best"] for c in page["choices"]) == pytest.approx(1.0)
+
+
+def test_predict_marks_lengths_outside_the_range(run, results):
+    code, out, _ = run("predict", results, "470", "600")
+    assert code == 0
+    heads, inside, outside = (line.split(",") for line in out.splitlines())
+    assert heads[0] == "cable_length_mm"
+    assert inside[heads.index("in_range")] == "true"
+    assert outside[heads.index("in_range")] == "false"
+    assert (
+        float(inside[heads.index("q05")]) < float(inside[heads.index("efficiency")]) < float(inside[heads.index("q95")])
+    )
+
+
+def test_predicted_forces_scale_with_the_input_and_turn_with_the_stroke(run, results):
+    def forces(*options):
+        return json.loads(run("predict", results, "470", "--format", "json", "--input-force", *options)[1])[0]
+
+    pull, pull_in_pounds, back = forces("100N"), forces("22.480894lbf"), forces("100 N", "--stroke", "return")
+    assert pull["output_force_N"] < 100 < back["output_force_N"]
+    assert pull_in_pounds["output_force_N"] == pytest.approx(pull["output_force_N"], rel=1e-6)
+    assert pull["output_force_N"] * back["output_force_N"] == pytest.approx(1e4, rel=1e-3)
+    assert pull["mounting_q05"] < pull["q05"] < pull["q95"] < pull["mounting_q95"]
+
+
+@pytest.mark.parametrize(
+    "arguments",
+    [
+        ("--input-force", "100"),
+        ("--input-force", "100deg"),
+        ("--input-force=-5N",),
+        ("--input-force", "lots"),
+        ("--stroke", "push"),
+    ],
+)
+def test_impossible_predictions_are_refused_in_a_sentence(run, results, arguments):
+    code, out, err = run("predict", results, "470", *arguments)
+    assert (code, out) == (2, "")
+    assert "Traceback" not in err
+    assert "Error: " in err
+
+
+def test_plot_draws_the_figures_again(run, results, tmp_path):
+    code, out, _ = run("plot", results, "--output", tmp_path / "figures")
+    assert code == 0
+    names = {Path(line).name for line in out.split()}
+    assert {"efficiency.png", "efficiency.svg", "wrap_angles.png", "coefficients.png"} <= names
+    assert names == {p.name for p in (tmp_path / "figures").iterdir()}
+
+
+def test_simulate_records_its_truth_and_its_seed(run, bench, tmp_path):
+    assert run("simulate", bench, "--output", tmp_path / "a", "--seed", 5)[0] == 0
+    assert run("simulate", bench, "--output", tmp_path / "b", "--seed", 5)[0] == 0
+    for path in (tmp_path / "a").iterdir():
+        assert path.read_bytes() == (tmp_path / "b" / path.name).read_bytes()
+    page = json.loads((tmp_path / "a" / "truth.json").read_text())
+    assert page["seed"] == 5
+    assert page["truth"]["mu_sheath"] == 0.09
+    assert run("check", tmp_path / "a")[0] == 0
+    code, _, err = run("simulate", bench, "--output", tmp_path / "a")
+    assert code == 2
+    assert "exists already" in err
+
+
+@pytest.mark.parametrize("shell", ["bash", "zsh", "fish"])
+def test_completion_is_printed_for(run, shell):
+    code, out, _ = run("completion", shell)
+    assert code == 0
+    assert "_BOWDENFIT_COMPLETE" in out
+
+
+def test_a_fit_that_has_not_converged_exits_with_3_and_says_why(run, on_body, tmp_path):
+    few = [
+        option for key in ("max_steps=200", "n_ensembles=2", "n_walkers=32") for option in ("--set", f"sampler.{key}")
+    ]
+    code, out, err = run("fit", on_body, "--output", tmp_path / "fit", "--seed", 1, "--no-figures", *few)
+    assert code == 3
+    assert "NOT CONVERGED" in out
+    assert "should be at least 1000" in out
+    assert (tmp_path / "fit" / "fit.json").exists()
+    assert run("length", tmp_path / "fit")[2].startswith("Warning")
+
+
+def test_a_missing_results_folder_is_a_sentence(run, tmp_path):
+    for verb in ("summary", "length", "plot", "predict"):
+        code, _, err = run(verb, tmp_path / "nowhere")
+        assert code == 2
+        assert err.count("\n") == 1
+        assert "does not exist" in err
+
+
+def test_least_squares_alone_have_no_design_answer(run, on_body, tmp_path):
+    code, out, _ = run("fit", on_body, "--no-mcmc", "--output", tmp_path / "fit", "--no-figures", "--json")
+    assert code == 0
+    page = json.loads(out)
+    assert "optimal" not in page
+    assert not page["parameters"]["squeezed_sheath_angle_c"]["least_squares"]["identified"]
+    code, _, err = run("length", tmp_path / "fit")
+    assert code == 2
+    assert "--no-mcmc" in err
+
+
+def test_set_and_geometry_change_the_model(on_body):
+    fixed = bf.fit(on_body, mcmc=False, settings=["friction.mu1.fixed=0.1"], geometry="published")
+    assert fixed.summary()["parameters"]["mu1"]["fixed"] == 0.1
+    assert fixed.summary()["geometry"] == "published"
+
+
+def test_a_table_alone_needs_its_wrap_angle(run, tmp_path):
+    table = tmp_path / "forces.csv"
+    table.write_text(
+        "input_force_N,output_force_N\n" + "\n".join(f"{f},{f * 0.8:.3f}" for f in range(10, 60, 5)) + "\n"
+    )
+    code, out, _ = run("check", table)
+    assert code == 0
+    assert "--wrap-angle" in out
+    code, _, err = run("fit", table)
+    assert code == 2
+    assert "--wrap-angle" in err
+    fit = bf.fit(table, wrap_angle=(180.0, "deg"), settings=(), mcmc=False)
+    assert fit.least_squares.estimates["mu"].value == pytest.approx(-np.log(0.8) / np.pi, rel=1e-4)
+
+
+def test_an_internal_error_is_a_sentence_with_a_request(run, monkeypatch, on_body):
+    monkeypatch.setattr("bowdenfit.verbs.check", lambda *_, **__: 1 / 0)
+    code, _, err = run("check", on_body)
+    assert code == 1
+    assert "our fault" in err
+    assert "Traceback" not in err
+
+
+def test_an_interrupt_that_the_garbage_collector_swallows_is_not_lost(tmp_path):
+    """Python drops exceptions of weak-reference callbacks, and an interrupt may arrive in one."""
+    (tmp_path / "chain.h5").touch()
+    before = {number: signal.getsignal(number) for number in (signal.SIGINT, signal.SIGTERM)}
+    signal.signal(signal.SIGINT, signal.default_int_handler)
+    try:
+        with pytest.raises(click.exceptions.Exit) as stopped, watched_fit(tmp_path) as report:
+            report(Progress(200, 4000, None, None))
+            with contextlib.suppress(KeyboardInterrupt):
+                signal.raise_signal(signal.SIGINT)
+            report(Progress(400, 4000, None, None))
+    finally:
+        for number, handler in before.items():
+            signal.signal(number, handler)
+    assert stopped.value.exit_code == 130
+
+
+def test_a_whole_fit_in_a_process_of_its_own_and_an_interrupt(on_body, tmp_path):
+    """The real thing once: a spawned command line that is interrupted, resumed, and finishes with figures."""
+    command = [
+        sys.executable,
+        "-m",
+        "bowdenfit.cli",
+        "fit",
+        str(on_body),
+        "--output",
+        str(tmp_path / "fit"),
+        "--seed",
+        "2",
+    ]
+    settings = [f"--set={key}" for key in (*QUICK, "sampler.target_ess=100000", "sampler.max_steps=200000")]
+    environment = os.environ | {"XDG_CACHE_HOME": str(tmp_path / "cache")}
+    # A shell that runs the tests in the background makes its children deaf to interrupts; this one hears again.
+    hear = "import os, signal, sys; signal.signal(signal.SIGINT, signal.SIG_DFL); os.execv(sys.argv[1], sys.argv[1:])"
+    listening = [sys.executable, "-c", hear, *command, *settings]
+    with subprocess.Popen(listening, cwd=ROOT, env=environment, stderr=subprocess.PIPE, text=True) as process:
+        try:
+            checkpoint, deadline = tmp_path / "fit" / "chain.h5", time.monotonic() + 120
+            while time.monotonic() < deadline and not (checkpoint.exists() and checkpoint.stat().st_size > 500_000):
+                time.sleep(0.2)
+            process.send_signal(signal.SIGINT)
+            _, err = process.communicate(timeout=60)
+        finally:
+            process.kill()
+    assert process.returncode == 130
+    assert "--resume" in err
+    assert "Traceback" not in err
+    assert [p.name for p in (tmp_path / "fit").iterdir()] == ["chain.h5"]
+    resumed = [*command, "--resume", *(f"--set={key}" for key in QUICK)]
+    found = subprocess.run(resumed, cwd=ROOT, env=environment, capture_output=True, text=True, check=False, timeout=300)
+    assert found.returncode == 0, found.stderr
+    names = {p.name for p in (tmp_path / "fit").iterdir()}
+    assert names == {"fit.json", "summary.json", "summary.txt", "posterior.nc", "chain.h5", "figures"}
+    assert len(list((tmp_path / "fit" / "figures").iterdir())) == 14
+
+
+@pytest.mark.parametrize(
+    "command", [("check", "DATA", "--prior-predictive"), ("identify", "DATA", "--output")], ids=["check", "identify"]
+)
+def test_figures_for_a_place_that_cannot_be_written_are_refused_in_a_sentence(on_body, tmp_path, run, command):
+    (tmp_path / "file").write_text("")
+    code, _, err = run(*(on_body if part == "DATA" else part for part in command), tmp_path / "file" / "folder")
+    assert code == 2
+    assert "cannot be written" in err
+
+
+def test_notes_in_a_results_folder_are_left_alone_and_other_files_stop_a_fit(on_body, tmp_path, run):
+    notes = tmp_path / "fit" / "README.md"
+    notes.parent.mkdir()
+    notes.write_text("what I think of it")
+    arguments = ("fit", on_body, "--no-mcmc", "--no-figures", "--output", notes.parent)
+    assert run(*arguments)[0] == 0
+    assert run(*arguments, "--force")[0] == 0
+    assert notes.read_text() == "what I think of it"
+    (tmp_path / "other").mkdir()
+    (tmp_path / "other" / "thesis.tex").write_text("")
+    code, _, err = run("fit", on_body, "--no-mcmc", "--output", tmp_path / "other")
+    assert code == 2
+    assert "is no results folder" in err

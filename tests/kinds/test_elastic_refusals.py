@@ -1,0 +1,427 @@
+"""Bad tables of stretch, preload and loops, and good ones that cannot tell what is asked of them."""
+
+import numpy as np
+import pytest
+from cables import measured
+
+import bowdenfit as bf
+from bowdenfit.description.file import parse_description
+from bowdenfit.inference.least_squares import least_squares, make_objective, maximum_posterior
+from bowdenfit.inference.log_density import LogDensity
+from bowdenfit.inference.other_minima import contested, fitting_as_well
+from bowdenfit.kinds.elastic_simulation import ElasticDesign
+from bowdenfit.model import build_model
+from bowdenfit.questions.bends.page import products_with_preload
+from bowdenfit.questions.check.data_set_words import warnings_of
+from bowdenfit.questions.simulate.simulation import Design
+from bowdenfit.questions.summary.words import summary_text
+
+NAMES = ("cable.toml", "stretch.csv", "preload.csv", "loop.csv")
+LOOP = """wrap_angle_deg,stroke,input_force_N,output_force_N,preload_N
+45,pull,20,18,10
+90,return,20,22,10
+180,pull,40,33,10
+"""
+
+
+@pytest.fixture
+def haptic(on_body, tmp_path):
+    """A copy of the synthetic haptic loop to spoil, with forces in place of torques."""
+    folder = tmp_path / "cable"
+    folder.mkdir()
+    for name in NAMES:
+        (folder / name).write_bytes((on_body.parent / "synthetic-haptic-loop" / name).read_bytes())
+    (folder / "torques.csv").write_bytes((folder / "loop.csv").read_bytes())
+    (folder / "loop.csv").write_text(LOOP)
+    return folder
+
+
+@pytest.fixture
+def refused(run):
+    """Run the command line on spoiled input and return its one sentence."""
+
+    def call(*arguments):
+        code, out, err = run(*arguments)
+        assert code == 2, (out, err)
+        assert out == ""
+        assert err.startswith("Error: ")
+        assert err.count("\n") == 1
+        assert err.rstrip()[-1] in ".?"
+        return err
+
+    return call
+
+
+def spoil(path, old, new):
+    text = path.read_text(encoding="utf-8")
+    assert old in text, f"{path.name} has no {old!r}"
+    path.write_text(text.replace(old, new), encoding="utf-8")
+
+
+FIRST = "0,load,1,-0.2569"
+S, P, L = "stretch.csv", "preload.csv", "loop.csv"
+TABLES = [
+    # file, what is replaced, by what, what the sentence must name
+    (S, "load_N", "load", ["stretch.csv", "'load'", "does not say its unit", "load_N"]),
+    (S, "load_N", "load_kg", ["'load_kg'", "mass", "kgf"]),
+    (S, "stretch_mm", "stretch", ["'stretch'", "does not say its unit", "stretch_mm"]),
+    (S, "stretch_mm", "stretch_N", ["'stretch_N'", "does not measure a length", "mm"]),
+    (S, "stretch_mm", "elongation_mm", ["no column stretch", "'elongation_mm'", "columns ="]),
+    (S, "wrap_angle_deg", "wrap_angle", ["'wrap_angle'", "does not say its unit", "wrap_angle_deg"]),
+    (S, "wrap_angle_deg", "wrap_angle_mm", ["row 1", "'wrap_angle_mm'", "does not measure an angle"]),
+    (S, "branch", "brench", ["row 1", "'brench'", "did you mean branch?"]),
+    (S, "branch", "cycles", ["row 1", "'cycles'", "did you mean cycle?"]),
+    (S, FIRST, "0,load,-1,-0.2569", ["row 2", "'load_N'", "'-1'", "negative", "tare", "write tension as positive"]),
+    (S, FIRST, "0,load,,-0.2569", ["row 2", "'load_N'", "blank", "delete the row"]),
+    (S, FIRST, "0,load,one,-0.2569", ["row 2", "'load_N'", "'one'", "plain number"]),
+    (S, FIRST, "0,load,nan,-0.2569", ["row 2", "'load_N'", "not a finite number"]),
+    (S, FIRST, "0,load,<1,-0.2569", ["row 2", "'load_N'", "'<1'", "bound", "write the value"]),
+    (S, FIRST, "0,load,1,", ["row 2", "'stretch_mm'", "blank"]),
+    (S, FIRST, "0,,1,-0.2569", ["row 2", "'branch'", "blank", "load", "unload"]),
+    (S, FIRST, "0,sideways,1,-0.2569", ["row 2", "'branch'", "'sideways'", "unload"]),
+    (S, FIRST, "-10,load,1,-0.2569", ["row 2", "'wrap_angle_deg'", "'-10'", "absolute value"]),
+    (S, FIRST, "4000,load,1,-0.2569", ["row 2", "'wrap_angle_deg'", "2000 deg", "check the unit"]),
+    (S, FIRST, "0,load,1,-0,2569", ["row 2", "5 cells", "decimal comma"]),
+    (P, "30,2.236", "30,-2.236", ["preload.csv", "row 4", "'preload_N'", "'-2.236'", "negative", "0 for a slack rope"]),
+    (P, "30,2.236", "-30,2.236", ["row 4", "'wrap_angle_deg'", "'-30'", "absolute value"]),
+    (P, "30,2.236", "30,", ["row 4", "'preload_N'", "blank"]),
+    (P, "30,2.236", ",2.236", ["row 4", "'wrap_angle_deg'", "blank"]),
+    (P, "30,2.236", "30,<0.5", ["row 4", "'preload_N'", "'<0.5'", "bound", "0 for a slack rope"]),
+    (P, "preload_N", "preload", ["'preload'", "does not say its unit", "preload_N"]),
+    (P, "preload_N", "preload_mm", ["'preload_mm'", "does not measure a force"]),
+    (P, "preload_N", "tension_N", ["no column preload", "'tension_N'"]),
+    (L, "90,return,20,22", "90,hold,20,21", ["loop.csv", "row 3", "'stroke'", "held still", "leave the row out"]),
+    (L, "90,return,20,22", "90,push,20,22", ["row 3", "'stroke'", "'push'", "pull"]),
+    (L, "stroke", "strok", ["row 1", "'strok'", "did you mean stroke?"]),
+    (L, "preload_N", "prelaod_N", ["row 1", "'prelaod_N'", "did you mean preload?"]),
+    (L, "20,18,10", "20,18,-1", ["row 2", "'preload_N'", "'-1'", "negative"]),
+    (L, "20,18,10", ",18,10", ["row 2", "'input_force_N'", "blank"]),
+    (L, "20,18,10", "20,x,10", ["row 2", "'output_force_N'", "'x'", "plain number"]),
+    (L, "45,pull", ",pull", ["row 2", "'wrap_angle'", "blank", "housing"]),
+    (L, "45,pull", "-45,pull", ["row 2", "'wrap_angle_deg'", "'-45'"]),
+    (L, "wrap_angle_deg", "bend_deg", ["no column 'wrap_angle'", "housing", "wrap_angle_deg"]),
+    (L, "input_force_N", "input_force", ["'input_force'", "does not say its unit", "input_force_N"]),
+    (L, "input_force_N", "input_force_N_m", ["'input_force_N_m'", "does not measure a force"]),
+    (L, "input_force_N", "input_torque_N", ["'input_torque_N'", "does not measure a torque"]),
+    (L, "input_force_N", "motor_N", ["no column input_force", "input_torque_N_m", "columns ="]),
+    (L, "preload_N", "input_torque_N_m", ["both input_force and input_torque", "leave one"]),
+]
+
+
+@pytest.mark.parametrize(("file", "old", "new", "names"), TABLES)
+def test_a_spoiled_elastic_table_is_refused_by_name(haptic, refused, file, old, new, names):
+    spoil(haptic / file, old, new)
+    said = refused("check", haptic)
+    for name in [file, *names]:
+        assert name in said, said
+
+
+HEADS = {
+    S: "wrap_angle_deg,load_N,stretch_mm",
+    P: "wrap_angle_deg,preload_N",
+    L: "wrap_angle_deg,input_force_N,output_force_N",
+}
+
+
+@pytest.mark.parametrize("file", HEADS)
+@pytest.mark.parametrize(("rows", "names"), [("", "no measurements"), (None, "empty"), (False, "does not exist")])
+def test_an_elastic_table_without_rows_is_refused(haptic, refused, file, rows, names):
+    if rows is False:
+        (haptic / file).unlink()
+    else:
+        (haptic / file).write_text("" if rows is None else HEADS[file] + "\n")
+    said = refused("check", haptic)
+    assert file in said
+    assert names in said
+
+
+FALLING = [
+    ("0,10,0.5\n0,20,0.4\n0,30,0.3\n", "row 4"),
+    ("0,10,0.5\n0,20,0.3\n45,10,0.6\n45,20,0.4\n90,10,0.7\n90,20,0.5\n", "row 3"),
+    ("0,10,0.5\n0,20,0.6\n0,30,0.7\n45,10,0.6\n45,20,0.5\n45,30,0.4\n", "row 7"),
+]
+
+
+@pytest.mark.parametrize(("rows", "row"), FALLING)
+def test_stretch_that_falls_with_load_is_refused_at_all_angles_or_at_one(haptic, refused, rows, row):
+    (haptic / S).write_text(f"{HEADS[S]}\n{rows}")
+    said = refused("check", haptic)
+    for name in (S, row, "stretch_mm", "the stretch falls", "write stretch as positive"):
+        assert name in said, said
+
+
+def test_stretch_that_falls_in_a_single_pair_may_be_noise_and_is_warned_of(haptic, run):
+    (haptic / S).write_text(f"{HEADS[S]}\n0,10,0.5\n0,20,0.4\n")
+    code, out, _ = run("check", haptic)
+    assert code == 0
+    assert "Warning: in stretch.csv the stretch falls while the load grows, from row 2 to row 3" in out
+
+
+def test_output_ahead_of_input_is_refused(haptic, refused):
+    (haptic / L).write_text(LOOP.replace("20,18", "18,20").replace("20,22", "22,20").replace("40,33", "33,40"))
+    said = refused("check", haptic)
+    for name in (L, "row 4", "input 33 N", "output 40 N", "swapped"):
+        assert name in said, said
+
+
+@pytest.mark.parametrize("end", ["input", "output"])
+def test_torque_without_radius_is_refused_with_the_line_to_write(haptic, refused, end):
+    spoil(haptic / "cable.toml", f'{end}_pulley_radius = {{ value = 20, unit = "mm" }}\n', "")
+    (haptic / L).write_bytes((haptic / "torques.csv").read_bytes())
+    said = refused("check", haptic)
+    assert f"{end}_torque" in said
+    assert f'{end}_pulley_radius = {{ value = 15, unit = "mm" }}' in said
+
+
+@pytest.mark.parametrize("verb", ["check", "fit"])
+@pytest.mark.parametrize(
+    ("file", "old", "new"),
+    [
+        (S, FIRST, "0,load,-1,-0.2569"),
+        (P, "30,2.236", "30,-2.236"),
+        (L, "90,return,20,22", "90,hold,20,21"),
+        ("cable.toml", 'kind = "loop"', 'kind = "single"'),
+    ],
+)
+def test_nothing_is_written_after_a_refused_elastic_table(haptic, refused, tmp_path, verb, file, old, new):
+    spoil(haptic / file, old, new)
+    output = ["--output", tmp_path / "results"] if verb == "fit" else []
+    before = sorted(tmp_path.rglob("*"))
+    refused(verb, haptic, *output)
+    assert sorted(tmp_path.rglob("*")) == before
+
+
+RADIUS, ANGLE = 'input_pulley_radius = { value = 20, unit = "mm" }', 'wrap_angle = { value = 90, unit = "deg" }  '
+STRETCH = 'friction = "mu"      '
+DESCRIPTIONS = [
+    ('kind = "loop"', 'kind = "single"', ["table loop", 'kind = "loop"', "[cable]"]),
+    ('kind = "loop"', 'kind = "double"', ["cable.kind", "'single' or 'loop'", "'double'"]),
+    ("[cable]", 'friction_model = "capstan+drag"\n[cable]', ["loop", 'friction_model = "capstan"', "leave it out"]),
+    (STRETCH, 'friction = "mu1"', ["stretch.friction 'mu1'", "belongs to no contact", "did you mean 'mu'?"]),
+    (STRETCH, 'friction = "other"', ["stretch.friction 'other'", "known here: mu"]),
+    (RADIUS, RADIUS.replace("20", "-20"), ["input_pulley_radius", "-20 mm", "not positive", "leave the key out"]),
+    (RADIUS, RADIUS.replace("mm", "N"), ["input_pulley_radius", "'N'", "length"]),
+    (RADIUS, "input_pulley_radius = 20", ["input_pulley_radius", "needs its unit", '{ value = 20, unit = "mm" }']),
+    (RADIUS, "input_pulley_radius = { value = 20 }", ["input_pulley_radius", "unit is missing", 'unit = "mm"']),
+    ('0.05, unit = "mm"', '0.05, unit = "deg"', ["backlash", "'deg'", "length"]),
+    ('0.05, unit = "mm"', '-0.05, unit = "mm"', ["backlash", "-0.05 mm", "not positive"]),
+    (ANGLE, ANGLE.replace("deg", "mm"), ["preload, wrap_angle", "'mm'", "angle"]),
+    (ANGLE, ANGLE.replace("90", "-90"), ["preload, wrap_angle", "-90 deg", "2000 deg"]),
+    (ANGLE, "wrap_angle = 90", ["preload.wrap_angle", "needs its unit", 'unit = "deg"']),
+    ('model = "stretch"', 'value = { value = 10, unit = "mm" }', ["preload, value", "'mm'", "force"]),
+    ('model = "stretch"', 'value = { value = -1, unit = "N" }', ["preload, value", "-1 N", "slack rope"]),
+    ('model = "stretch"', "value = { value = 1 }", ["preload.value", "unit is missing", 'unit = "N"']),
+    ('model = "stretch"', 'model = "springs"', ["preload.model", "'constant' or 'stretch'", "'springs'"]),
+    ("bend_radius", "bend_radus", ["'cable.bend_radus'", "did you mean 'bend_radius'?"]),
+    (STRETCH, 'frction = "mu"', ["'stretch.frction'", "did you mean 'friction'?"]),
+    (ANGLE, ANGLE.replace("wrap_angle", "wrap_angel"), ["'preload.wrap_angel'", "did you mean 'wrap_angle'?"]),
+    ("[stretch]", "[strech]", ["'strech'", "did you mean 'stretch'?"]),
+    ('stretch = { file = "stretch.csv" }', 'stretch = { files = "*.csv" }', ["table stretch", "one file", "4"]),
+    ("[tables]", "[prior.stifness]\nfixed = 3\n[tables]", ["prior.stifness", "did you mean 'stiffness'?"]),
+    ("[tables]", "[prior.stiffness]\nfixed = 0\n[tables]", ["prior.stiffness", "0 is not possible", "more than 0"]),
+    ("[tables]", "[prior.lengthening]\nfixed = -1\n[tables]", ["prior.lengthening", "-1 is not possible", "0 or more"]),
+    ("[tables]", "[prior.preload]\nprior.normal = { mean = 3, sd = 1 }\n[tables]", ["preload cannot be negative"]),
+    (
+        'model = "stretch"',
+        'value = { value = 10, unit = "N" }\n[prior.preload]\nfixed = 3\n[preload.x]',
+        ["unknown key 'preload.x'"],
+    ),
+]
+
+
+@pytest.mark.parametrize(("old", "new", "names"), DESCRIPTIONS)
+def test_a_spoiled_elastic_description_is_refused_by_key(haptic, refused, old, new, names):
+    spoil(haptic / "cable.toml", old, new)
+    said = refused("check", haptic)
+    for name in ["cable.toml", *names]:
+        assert name in said, said
+
+
+def test_a_preload_that_is_stated_twice_is_refused(haptic, refused):
+    spoil(haptic / "cable.toml", 'model = "stretch"', 'value = { value = 10, unit = "N" }')
+    spoil(haptic / "cable.toml", "[tables]", "[prior.preload]\nfixed = 3\n[tables]")
+    assert "states the preload twice" in refused("check", haptic)
+
+
+def test_a_table_of_keys_given_as_a_word_is_refused_with_how_to_write_it(haptic, refused):
+    spoil(haptic / "cable.toml", "[stretch]\n", "")
+    spoil(haptic / "cable.toml", STRETCH, "")
+    spoil(haptic / "cable.toml", "[cable]", 'stretch = "mu"\n[cable]')
+    assert "write them under [stretch]" in refused("check", haptic)
+
+
+@pytest.mark.parametrize(
+    ("file", "old", "new", "note"),
+    [
+        (S, "wrap_angle_deg,branch,load_N", "wrap_angle_deg,note,load_N", "although the load falls in row 13"),
+        (L, "stroke", "remark", "has no stroke column"),
+        (
+            "cable.toml",
+            'wrap_angle = { column = "wrap_angle", nominal = { value = 90, unit = "deg" } }',
+            'wrap_angle = { value = 90, unit = "deg" }',
+            "the column 'wrap_angle_deg', which no contact in cable.toml reads",
+        ),
+    ],
+)
+def test_what_had_to_be_assumed_is_said(haptic, run, file, old, new, note):
+    spoil(haptic / file, old, new)
+    code, out, err = run("check", haptic)
+    assert code == 0, err
+    assert note in out
+
+
+def test_a_cycle_with_falling_load_only_is_remarked_on(haptic, run):
+    (haptic / S).write_text(f"{HEADS[S]},branch\n0,10,0.5,unload\n0,20,0.6,unload\n90,10,0.5,load\n90,20,0.6,load\n")
+    _, out, _ = run("check", haptic)
+    assert "only readings with falling load at 0 deg" in out
+
+
+def test_no_backlash_and_a_slack_rope_are_no_bad_input(haptic, run):
+    spoil(haptic / "cable.toml", "value = 0.05", "value = 0")
+    spoil(haptic / P, "0,0.303", "0,0")
+    spoil(haptic / S, FIRST, "0,load,0,-0.2569")
+    assert run("check", haptic)[0] == 0
+
+
+ANGLES = tuple(np.deg2rad((0.0, 45.0, 90.0, 135.0, 180.0)))
+LOADS = (1.0, 3.0, 6.0, 10.0, 15.0, 20.0, 30.0, 40.0, 60.0, 80.0, 100.0)
+TRUTH = {
+    "mu": 0.07, "mu_stretch": 0.07, "stiffness": 35.0, "bedding_stretch": 0.4, "bedding_load": 15.0, "lengthening": 0.0061,
+    "stretch_zero": 0.3, "preload": 10.0, "sigma_L": 0.02, "sigma_P": 0.3, "sigma_F": 0.3,
+}  # fmt: skip
+FREE = ElasticDesign(free_angles=ANGLES[1:], strokes=(1, -1) * 3)
+CASES = {
+    # tables, what is measured, truth that differs, what cannot be told, what the check warns of
+    "a single load": (
+        ("stretch",), ElasticDesign(loads=(30.0,), stretch_angles=ANGLES), {},
+        ("stiffness", "bedding_stretch", "bedding_load"), "a single load, 30 N, so the stiffness of the rope is not identif",
+    ),
+    "one wrap angle": (
+        ("stretch",), ElasticDesign(loads=LOADS, stretch_angles=ANGLES[2:3], unloading=True), {},
+        ("lengthening", "stretch_zero"), "at one wrap angle, 90 deg",
+    ),
+    "loads far above the bedding load": (
+        ("stretch",), ElasticDesign(loads=tuple(np.linspace(150, 300, 9)), stretch_angles=ANGLES), {"bedding_load": 5.0},
+        ("bedding_stretch", "bedding_load", "stretch_zero"), "no low loads, only 150 to 300 N",
+    ),
+    "loads far below the bedding load": (
+        ("stretch",), ElasticDesign(loads=tuple(np.linspace(0.1, 1.5, 9)), stretch_angles=ANGLES),
+        {"bedding_load": 60.0, "sigma_L": 0.002}, ("stiffness", "bedding_stretch", "bedding_load"), None,
+    ),
+    "preloads alone": (
+        ("preload",), ElasticDesign(preload_angles=tuple(np.deg2rad(np.linspace(60, 180, 8)))), {},
+        ("mu", "stiffness", "bedding_stretch", "lengthening"), "without a table of stretch, preloads tell only",
+    ),
+    "free motion": (("loop",), FREE, {}, ("mu", "preload"), "tells only the product of friction and preload"),
+    "a loop that is always slack": (
+        ("loop",), ElasticDesign(loop_angles=ANGLES[1:], input_forces=(40.0, 60.0, 80.0, 100.0), strokes=(1, -1)),
+        {"preload": 1.0}, ("preload",), None,
+    ),
+}  # fmt: skip
+SEEDS = range(3)
+
+
+def cable_with(tables, **more):
+    contact = {"name": "housing", "friction": "mu", "wrap_angle": {"column": "wrap_angle"}}
+    contact["wrap_angle"]["nominal"] = {"value": 90, "unit": "deg"}
+    raw = {
+        "name": "hard to tell",
+        "cable": {"kind": "loop" if "loop" in tables else "single"},
+        "contact": [contact],
+        "stretch": {"friction": "mu"},
+        "preload": {"wrap_angle": {"value": 90, "unit": "deg"}} if "preload" in tables else {},
+        "tables": {name: {"file": f"{name}.csv"} for name in tables},
+    }
+    return parse_description(raw | more)
+
+
+def estimates_of(tables, design, truth, seeds=SEEDS):
+    """Least-squares estimates and true values [shown units] of several seeds, and the last data set."""
+    objective, found = None, []
+    for seed in seeds:
+        data, values = measured(cable_with(tables), seed, design=Design(elastic=design), **(TRUTH | truth))
+        posterior = LogDensity(build_model(data))
+        objective = objective or make_objective(posterior)
+        estimates = least_squares(posterior, objective, maximum_posterior(posterior, objective).z).estimates
+        true = {p.name: values[p.name] * p.shown_scale for p in posterior.model.space.free}
+        found.append({name: (estimate, true[name]) for name, estimate in estimates.items()})
+    return found, data
+
+
+@pytest.mark.parametrize("case", CASES)
+def test_what_the_data_cannot_tell_is_not_identified_and_no_error_bar_is_too_small(case):
+    tables, design, truth, untold, warning = CASES[case]
+    found, data = estimates_of(tables, design, truth)
+    for estimates in found:
+        for name, (estimate, true) in estimates.items():
+            if not estimate.identified:
+                assert np.isnan(estimate.value)
+                assert estimate.remark
+                continue
+            assert abs(estimate.value - true) < 5 * estimate.standard_error, (name, estimate, true)
+            if name in untold:
+                assert estimate.standard_error > abs(estimate.value), (name, estimate, true)
+    if case == "a single load":
+        assert not any(estimates["stiffness"][0].identified for estimates in found)
+    if warning is not None:
+        assert any(warning in said for said in warnings_of(data)), warnings_of(data)
+
+
+def test_good_tables_leave_nothing_unidentified():
+    design = ElasticDesign(loads=LOADS, stretch_angles=ANGLES, unloading=True)
+    found, data = estimates_of(("stretch",), design, {}, seeds=(0,))
+    assert all(estimate.identified for estimates in found for estimate, _ in estimates.values())
+    assert warnings_of(data) == []
+
+
+def test_the_summary_says_which_values_fit_as_well():
+    tables, design, truth, *_ = CASES["a loop that is always slack"]
+    data, _ = measured(cable_with(tables), 0, design=Design(elastic=design), **(TRUTH | truth))
+    text = " ".join(summary_text(bf.fit(data, mcmc=False, seed=1)).split())
+    assert "preload is not identified by least squares: values from" in text
+    assert "fit about as well" in text
+
+
+def test_free_motion_tells_the_product_of_friction_and_preload_and_says_so():
+    sampler = {"n_walkers": 32, "target_ess": 100, "target_r_hat": 1.1, "max_steps": 400}
+    data, _ = measured(cable_with(("loop",), sampler=sampler), 0, design=Design(elastic=FREE), **TRUTH)
+    fit = bf.fit(data, seed=1)  # so short that the ratio below is 6 to 12, by the seed
+    (sentence,) = products_with_preload(fit)
+    assert sentence.startswith(
+        "The measurements hardly tell preload and mu apart; what they do determine is preload x mu = 0.6"
+    )
+    product = fit.posterior.values["preload"] * fit.posterior.values["mu"]
+    assert np.std(np.log(fit.posterior.values["preload"])) > 5 * np.std(np.log(product))
+    assert np.quantile(product, 0.01) < 0.7 < np.quantile(product, 0.99)
+
+
+def test_a_preload_whose_wrap_angle_is_given_but_not_used_is_warned_of():
+    description = cable_with(("loop",), preload={"wrap_angle": {"value": 90, "unit": "deg"}})
+    data, _ = measured(description, 0, design=Design(elastic=FREE), **TRUTH)
+    assert any('model = "stretch"' in said for said in warnings_of(data))
+
+
+def test_a_rope_that_is_only_stretched_straight_is_said_to_tell_nothing_of_friction(haptic, run):
+    (haptic / S).write_text(f"{HEADS[S]}\n0,5,0.5\n0,20,0.6\n0,30,0.7\n0,40,0.8\n")
+    code, out, _ = run("check", haptic)
+    assert code == 0
+    assert "every row of stretch.csv is at a wrap angle of 0, so it says nothing of friction" in out
+
+
+@pytest.mark.parametrize(("preloads", "said"), [((20, 10, 5), "falls with the wrap angle"), ((0, 0, 0), "reads 0")])
+def test_preloads_that_bending_does_not_give_are_warned_of(haptic, run, preloads, said):
+    rows = "\n".join(f"{angle},{preload}" for angle, preload in zip((0, 90, 180), preloads, strict=True))
+    (haptic / P).write_text(f"{HEADS[P]}\n{rows}\n")
+    code, out, _ = run("check", haptic)
+    assert code == 0
+    assert said in out
+
+
+def test_a_rival_counts_only_where_it_fits_as_well_and_lies_outside_the_error():
+    residuals = np.array([1.0, -1.0, 1.0, -1.0, 0.5, -0.5])
+    found = {"residuals": {"a": residuals}}
+    near, far = ({"residuals": {"a": residuals * factor}} for factor in (1.1, 5.0))
+    assert fitting_as_well(found, [near, far], np.ones(6), 2) == [near]
+    assert contested(10.0, 1.0, [13.0, 7.0]) is None
+    assert contested(10.0, 1.0, [13.0, 1.0]) == (1.0, 13.0)
+    assert contested(10.0, 0.0, [10.0]) is None

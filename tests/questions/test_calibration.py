@@ -1,0 +1,456 @@
+"""Simulation-based calibration: tables drawn anew, ranks, verdicts, and wrong likelihoods that it must catch."""
+
+import json
+from dataclasses import replace
+
+import jax
+import jax.numpy as jnp
+import numpy as np
+import pytest
+from cables import CONTACTS, DESIGN, cable
+from conftest import ROOT
+from scipy import stats
+
+from bowdenfit.dataset import Dataset, load_dataset
+from bowdenfit.description import Description, SamplerSettings
+from bowdenfit.errors import DatasetError, StoreError
+from bowdenfit.inference.compilation import compiled
+from bowdenfit.kinds.drawn_readings import detection_limit, drawn_readings, with_readings
+from bowdenfit.kinds.forces.term import HeldForcesTerm
+from bowdenfit.kinds.recordings.simulation import refuse_saturated
+from bowdenfit.model import build_model
+from bowdenfit.questions.calibrate.acceptable_tables import refusal
+from bowdenfit.questions.calibrate.answer import Calibration, findings
+from bowdenfit.questions.calibrate.figure import coverage, ranks, sharpness
+from bowdenfit.questions.calibrate.refit import Laboratory
+from bowdenfit.questions.calibrate.replication import Plan, Ranked, Replication, Workbench
+from bowdenfit.questions.calibrate.store import begun, keep
+from bowdenfit.questions.calibrate.uniformity import Uniformity, holm
+from bowdenfit.questions.calibrate.words import calibration_text
+from bowdenfit.questions.simulate.simulation import Design, empty_tables, simulated_again
+
+DATA_SETS = (
+    "on-body-exoskeleton",
+    "synthetic-bench",
+    "synthetic-haptic-loop",
+    "synthetic-recordings",
+    "yarn-on-cylinder",
+)
+QUICK = SamplerSettings(n_ensembles=2, n_walkers=32, max_steps=1000, target_ess=100, target_r_hat=1.1)
+
+
+def data_set(name: str) -> Dataset:
+    return load_dataset(ROOT / "datasets" / name)
+
+
+def plausible_values(dataset: Dataset) -> dict[str, float]:
+    """Prior medians [internal units]."""
+    space = build_model(dataset).space
+    return {name: float(value) for name, value in space.constrain(jnp.zeros(space.size)).items()}
+
+
+def drawn_anew(dataset: Dataset, values: dict[str, float], scale: float = 1.0) -> Dataset:
+    """What `simulated_again` gives, compiled in one piece, which is quicker for one draw of many operations."""
+    cable, tables = build_model(dataset).cable, dataset.measurements
+
+    def readings(values, key):
+        return drawn_readings(cable, tables, values, key, scale)
+
+    arguments = {name: jnp.asarray(value) for name, value in values.items()}, jax.random.key(1)
+    return with_readings(dataset, compiled(readings, *arguments, run_once=True)(*arguments))
+
+
+# Tables drawn anew -------------------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("name", DATA_SETS)
+def test_tables_drawn_anew_keep_the_design_and_change_the_readings(name):
+    dataset = data_set(name)
+    again = drawn_anew(dataset, plausible_values(dataset))
+    for table, kept, read in (
+        ("angles", ("route",), "angle"),
+        ("efficiencies", ("route",), "efficiency"),
+        ("forces", ("route", "run", "stroke"), "output_force"),
+        ("stretch", ("load", "wrap_angle", "unloading"), "stretch"),
+        ("preload", ("wrap_angle",), "preload"),
+        ("loop", ("stroke",), "output_force"),
+    ):
+        before, after = (getattr(d.measurements, table) for d in (dataset, again))
+        assert (before is None) == (after is None)
+        if before is not None:
+            for column in kept:
+                np.testing.assert_array_equal(getattr(before, column), getattr(after, column))
+            assert getattr(before, read).shape == getattr(after, read).shape
+            assert not np.array_equal(getattr(before, read), getattr(after, read), equal_nan=True)
+    recordings = again.measurements.recordings
+    if recordings is not None:
+        for one, other in zip(dataset.measurements.recordings.each, recordings.each, strict=True):
+            np.testing.assert_array_equal(one.blocks.time, other.blocks.time)
+            assert not np.array_equal(one.blocks.output_force, other.blocks.output_force)
+    build_model(again)
+
+
+def test_angles_outside_the_range_of_the_curves_stay_as_measured(on_body):
+    dataset = load_dataset(on_body)
+    again = simulated_again(dataset, plausible_values(dataset), jax.random.key(1))
+    table, drawn = dataset.measurements.angles, again.measurements.angles
+    outside = table.route > 530
+    np.testing.assert_array_equal(table.angle[outside], drawn.angle[outside])
+    assert np.all(np.isfinite(drawn.limit) == np.isnan(drawn.angle))
+    assert np.nanmin(drawn.angle) >= np.deg2rad(10)
+
+
+@pytest.mark.parametrize("name", ["on-body-exoskeleton", "synthetic-haptic-loop"])
+def test_tables_drawn_without_noise_are_what_the_model_expects(name):
+    dataset = data_set(name)
+    values = plausible_values(dataset)
+    again = drawn_anew(dataset, values, scale=0.0)
+    named = {name: jnp.asarray(value) for name, value in values.items()}
+    for term in build_model(again).terms:
+        seen, expected = term.observed(), np.asarray(term.expected(named, jax.tree.map(jnp.asarray, term.data)))
+        known = np.isfinite(seen) & ~((seen == 0) & (expected <= 0))  # undetected angles; a slack rope
+        np.testing.assert_allclose(seen[known], expected[known], rtol=1e-9, atol=1e-9)
+
+
+def test_recordings_drawn_without_noise_show_the_friction_exponent_that_they_were_drawn_with():
+    """To 1 %: strokes are found anew by the reader's own play operator, which has a weak pull toward its middle."""
+    dataset = data_set("synthetic-recordings")
+    values = plausible_values(dataset) | {"mu1": 0.09, "mu2": 0.12, "mu3": 0.2}
+    again = drawn_anew(dataset, values, scale=0.0)
+    named = {name: jnp.asarray(value) for name, value in values.items()}
+    cable = build_model(dataset).cable
+    for recording in again.measurements.recordings.each:
+        if recording.route <= 530:
+            expected = float(cable.exponent_at(named, jnp.array([recording.route]))[0])
+            assert recording.strokes.exponent == pytest.approx(expected, rel=0.01)
+
+
+def held_at(forces: tuple[float, ...]) -> Dataset:
+    """Forces that were read while nothing slid, on a cable of one known angle."""
+    description = cable(1, ("forces",), contact=[CONTACTS[2]])
+    table = empty_tables(description, Design(runs=(450.0,), input_forces=forces, strokes=(1,))).forces
+    held = replace(table, stroke=np.zeros(len(forces), dtype=int), output_force=np.full(len(forces), forces[0]))
+    return Dataset(description, replace(empty_tables(description, Design()), forces=held), {})
+
+
+def test_held_readings_slip_as_often_as_their_likelihood_says():
+    """Over 2000 draws of two readings; each count is outside its 99.99 % range once in ten thousand seeds."""
+    dataset = held_at((50.0, 53.0))
+    model, values = build_model(dataset), plausible_values(dataset)
+    named = {name: jnp.asarray(value) for name, value in values.items()}
+    (term,) = model.terms
+    assert isinstance(term, HeldForcesTerm)
+    probability = np.exp(np.asarray(term.log_likelihood(named, jax.tree.map(jnp.asarray, term.data))))
+    draw = jax.jit(
+        jax.vmap(lambda key: drawn_readings(model.cable, dataset.measurements, named, key)["held"]["slipped"])
+    )
+    held = np.sum(~np.asarray(draw(jax.random.split(jax.random.key(2), 2000))), axis=0)
+    assert 0.05 < probability[1] < 0.95
+    for count, p in zip(held, probability, strict=True):
+        assert stats.binomtest(int(count), 2000, float(p)).pvalue > 1e-4
+    drawn = drawn_readings(model.cable, dataset.measurements, named, jax.random.key(1))
+    forces = with_readings(dataset, drawn).measurements.forces
+    np.testing.assert_array_equal(forces.input_force, dataset.measurements.forces.input_force)
+
+
+def test_a_table_of_several_detection_limits_is_refused_unless_one_is_stated(on_body):
+    dataset = load_dataset(on_body)
+    table = dataset.measurements.angles
+    limits = np.where(np.isnan(table.limit), np.nan, np.linspace(0.1, 0.2, len(table.route))[:, None])
+    assert detection_limit(dataset.description, table) == pytest.approx(np.deg2rad(10))
+    silent = dataset.description.tables.angles.model_copy(update={"detection_limit": None})
+    tables = dataset.description.tables.model_copy(update={"angles": silent})
+    description = dataset.description.model_copy(update={"tables": tables})
+    assert detection_limit(description, table) == pytest.approx(np.deg2rad(10))
+    with pytest.raises(DatasetError, match="different detection limits"):
+        detection_limit(description, replace(table, limit=limits))
+
+
+def test_recordings_with_clipped_readings_are_refused():
+    recordings = data_set("synthetic-recordings").measurements.recordings
+    refuse_saturated(recordings)
+    first = recordings.each[0]
+    clipped = replace(first, blocks=replace(first.blocks, saturated=first.blocks.input_force > 100))
+    with pytest.raises(DatasetError, match="end of a load cell's range"):
+        refuse_saturated(replace(recordings, each=(clipped, *recordings.each[1:])))
+
+
+# What no bench would hand in ---------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("name", DATA_SETS)
+def test_measured_tables_pass_the_rule_that_simulated_ones_must_pass(name):
+    dataset = data_set(name)
+    assert refusal(dataset, dataset) == ""
+
+
+def changed(dataset: Dataset, table: str, **columns: object) -> Dataset:
+    rows = getattr(dataset.measurements, table)
+    new = {name: change(getattr(rows, name)) for name, change in columns.items()}
+    return replace(dataset, measurements=replace(dataset.measurements, **{table: replace(rows, **new)}))
+
+
+@pytest.mark.parametrize(
+    ("name", "table", "column", "change", "why"),
+    [
+        ("on-body-exoskeleton", "efficiencies", "efficiency", lambda e: 0.2 * e, "below 20 %"),
+        ("on-body-exoskeleton", "efficiencies", "efficiency", lambda e: e**0.01, "above 99 %"),
+        ("on-body-exoskeleton", "angles", "angle", lambda a: 40 * a, "above 2000 deg"),
+        ("on-body-exoskeleton", "angles", "angle", lambda a: np.where(a > 1, a, np.nan), "too few angles"),
+        ("synthetic-bench", "forces", "output_force", lambda f: -f, "not positive"),
+        ("synthetic-bench", "forces", "output_force", lambda f: f * (1 + np.arange(len(f)) % 2), "scatter"),
+        ("synthetic-haptic-loop", "stretch", "stretch", lambda s: 20 * s, "far from the measured"),
+        ("synthetic-haptic-loop", "stretch", "stretch", lambda s: -s, "falls with the load"),
+        ("synthetic-haptic-loop", "preload", "preload", lambda p: 0 * p, "slack"),
+        ("synthetic-haptic-loop", "preload", "preload", lambda p: 30 * p, "far from the measured"),
+        ("synthetic-haptic-loop", "loop", "stroke", lambda s: -s, "gains force"),
+        ("synthetic-haptic-loop", "loop", "output_force", lambda f: 0.01 * f, "80 %"),
+    ],
+)  # fmt: skip
+def test_tables_that_no_bench_would_hand_in_are_drawn_again(name, table, column, change, why):
+    dataset = data_set(name)
+    assert why in refusal(dataset, changed(dataset, table, **{column: change}))
+
+
+# Ranks -------------------------------------------------------------------------------------------------------------
+
+
+def test_p_values_of_uniform_ranks_are_uniform_and_agree_with_the_band():
+    """Of 400 samples of 100: the share below 0.05 is rejected by a binomial test at 1e-4, by chance once in 10 000 seeds."""
+    by_chance, generator = Uniformity(100), np.random.default_rng(1)
+    low, high = by_chance.band(0.95)
+    rejected, outside = 0, 0
+    for _ in range(400):
+        sample = generator.uniform(size=100)
+        share = by_chance.below(sample) / 100
+        out = bool(np.any((share < low) | (share > high)))
+        p = by_chance.p_value(sample)
+        rejected, outside = rejected + (p <= 0.05), outside + out
+        assert out == (p < 0.05) or abs(p - 0.05) < 0.02
+    assert stats.binomtest(rejected, 400, 0.05).pvalue > 1e-4
+    assert stats.binomtest(outside, 400, 0.05).pvalue > 1e-4
+
+
+def test_ranks_heaped_in_the_middle_or_at_an_end_are_not_uniform():
+    spread = np.linspace(0.01, 0.99, 100)
+    by_chance = Uniformity(100)
+    assert by_chance.p_value(spread) > 0.9
+    assert by_chance.p_value(0.5 + 0.6 * (spread - 0.5)) < 0.001
+    assert by_chance.p_value(spread**2) < 0.001
+
+
+def test_holm_s_correction_is_the_textbook_s():
+    assert holm([0.01, 0.04, 0.03, 0.005]) == pytest.approx([0.03, 0.06, 0.06, 0.02])
+    assert holm([0.6, 0.9]) == [1.0, 1.0]
+
+
+def replications(n: int, sd: float = 1.0, shift: float = 0.0, seed: int = 0, bad: int = 0) -> list[Replication]:
+    """Replications of a normal posterior whose stated spread is `sd` times the right one, shifted by `shift` of it."""
+    generator = np.random.default_rng(seed)
+    found = []
+    for i in range(n):
+        error = 0.3 * generator.standard_normal() + 0.3 * shift
+        ranked = Ranked(0.0, error, 0.3 * sd, float(stats.norm.cdf(-error / (0.3 * sd))))
+        reasons = ("R-hat of mu is 1.2 and should be below 1.03",) if i < bad else ()
+        found.append(
+            Replication(i, {"an efficiency is below 20 %": 1} if i % 7 == 0 else {}, reasons, {"mu": ranked}, 2.0)
+        )
+    return found
+
+
+def test_right_intervals_are_called_calibrated():
+    """By chance, ranks or coverage of the one quantity are called wrong once in fifty seeds or less."""
+    found = findings(replications(200), {"mu": r"$\mu$"})
+    (mu,) = found.quantities
+    assert found.is_calibrated
+    assert mu.shrinkage == pytest.approx(1 - 0.09)
+    assert "CALIBRATED: for this description" in calibration_text(found)
+    assert "29 simulated data sets were drawn again" in calibration_text(found)
+
+
+@pytest.mark.parametrize(
+    ("sd", "shift", "fault"),
+    [(0.5, 0.0, "intervals too narrow"), (2.0, 0.0, "intervals too wide"), (1.0, 0.7, "estimated too high")],
+)  # fmt: skip
+def test_wrong_intervals_are_said_to_be_wrong_in_their_direction(sd, shift, fault):
+    found = findings(replications(200, sd, shift), {})
+    assert not found.is_calibrated
+    assert fault in found.faults["mu"]
+    text = calibration_text(found)
+    assert "NOT CALIBRATED" in text
+    assert f"- mu: {found.faults['mu']}." in text.replace("\n  ", " ")
+
+
+def test_replications_that_did_not_converge_are_counted_and_named_and_too_many_leave_nothing_judged():
+    found = findings(replications(100, bad=5), {})
+    assert found.ranked == 95
+    assert found.is_judged
+    assert "5 replications did not converge and are not ranked (numbers 0, 1, 2, 3, 4)" in calibration_text(found)
+    worse = findings(replications(100, bad=30), {})
+    assert not worse.is_calibrated
+    assert "NOT JUDGED: 70 of 100" in calibration_text(worse)
+
+
+def test_a_calibration_s_figures_show_every_quantity():
+    found = findings(replications(50, 0.5), {"mu": r"$\mu$"})
+    for figure in (ranks(found), coverage(found), sharpness(found)):
+        figure.canvas.draw()
+        words = {text.get_text() for axes in figure.axes for text in (*axes.get_yticklabels(), axes.title)}
+        assert any(r"$\mu$" in word for word in words)
+
+
+# Kept as they end --------------------------------------------------------------------------------------------------
+
+FINGERPRINT = {"description": {"name": "a"}, "sha256": {}, "seed": 3, "assumed": []}
+
+
+def test_replications_are_kept_one_by_one_and_a_torn_line_is_made_again(tmp_path):
+    folder = tmp_path / "new" / "calibration"
+    made = replications(3)
+    assert begun(folder, FINGERPRINT, resume=False, force=False) == {}
+    for each in made:
+        keep(folder, each)
+    file = folder / "replications.jsonl"
+    file.write_text(file.read_text()[:-20])
+    assert begun(folder, FINGERPRINT, resume=True, force=False) == {0: made[0], 1: made[1]}
+    keep(folder, made[2])
+    assert begun(folder, FINGERPRINT, resume=True, force=False)[2] == made[2]
+
+
+def test_another_seed_or_a_folder_of_something_else_is_refused(tmp_path):
+    begun(tmp_path / "c", FINGERPRINT, resume=False, force=False)
+    with pytest.raises(StoreError, match="the seed changed"):
+        begun(tmp_path / "c", FINGERPRINT | {"seed": 4}, resume=True, force=False)
+    with pytest.raises(StoreError, match="--resume, or start over with --force"):
+        begun(tmp_path / "c", FINGERPRINT, resume=False, force=False)
+    with pytest.raises(StoreError, match="holds no calibration to resume"):
+        begun(tmp_path / "none", FINGERPRINT, resume=True, force=False)
+    (tmp_path / "c" / "replications.jsonl").write_text("nothing\n")
+    with pytest.raises(StoreError, match="damaged"):
+        begun(tmp_path / "c", FINGERPRINT, resume=True, force=False)
+    (tmp_path / "other").mkdir()
+    (tmp_path / "other" / "notes.txt").write_text("mine")
+    with pytest.raises(StoreError, match="holds no calibration"):
+        begun(tmp_path / "other", FINGERPRINT, resume=False, force=True)
+    assert (tmp_path / "other" / "notes.txt").read_text() == "mine"
+
+
+# Whole calibrations ------------------------------------------------------------------------------------------------
+
+FRICTION = {"prior": {"lognormal": {"median": 0.12, "log_sd": 0.4}}}
+SMALL_NOISE = {"sigma_F": {"prior": {"half_normal": {"sd": 0.3}}}}
+
+
+def calibrated(plan: Plan, n: int, **changes: object) -> Calibration:
+    bench = Workbench(plan, Laboratory(plan.sampler), **changes)
+    return findings([bench.replication(i) for i in range(n)], {})
+
+
+def designed(description: Description, design: Design) -> Dataset:
+    return Dataset(description, empty_tables(description, design), {})
+
+
+def two_coefficients(**prior: object) -> Dataset:
+    """Runs of 40 samples over a known angle and one read with every run; nothing but the mounting limits the coefficients."""
+    friction = dict.fromkeys(("mu_edge", "mu_clamp"), FRICTION)
+    contacts = [CONTACTS[2], CONTACTS[4]]
+    description = cable(2, ("forces",), contact=contacts, friction=friction, prior=SMALL_NOISE | prior)
+    return designed(description, replace(DESIGN, input_forces=tuple(np.linspace(40.0, 90.0, 40)), strokes=(1,)))
+
+
+def test_a_small_calibration_of_the_right_likelihood_passes():
+    """Of forces with a run effect, twelve times; it fails by chance for one seed in fifty or less."""
+    dataset = two_coefficients()
+    found = calibrated(Plan(dataset, dataset, 5, QUICK), 12)
+    assert not found.faults, found.faults
+    assert {q.name for q in found.quantities} >= {"mu_edge", "mu_clamp", "tau", "sigma_F"}
+
+
+def test_a_small_calibration_catches_samples_of_a_run_taken_for_independent():
+    """Without the run effect intervals are several times too narrow: eight replications reject a coefficient at 0.01.
+
+    A right likelihood would be rejected once in a hundred seeds.
+    """
+    wrong = two_coefficients(tau={"fixed": 1e-6})
+    found = calibrated(Plan(two_coefficients(), wrong, 5, QUICK), 8)
+    assert found.quantities
+    assert {"mu_edge", "mu_clamp"} & set(found.faults)
+    assert "too narrow" in " ".join(found.faults.values())
+
+
+def angles_alone(undetected: str) -> Dataset:
+    """Angles that mostly fall below what can be detected, on a curve that falls along the route."""
+    angles = {"file": "a.csv", "detection_limit": {"value": 20, "unit": "deg"}, "undetected": undetected}
+    normal = {"free_angle_a": (-1.1, 0.2), "free_angle_b": (-1.2, 0.3)}
+    prior = {name: {"prior": {"normal": {"mean": mean, "sd": sd}}} for name, (mean, sd) in normal.items()}
+    prior |= {"sigma_theta": {"prior": {"lognormal": {"median": 2.0, "log_sd": 0.3}}}}
+    return designed(cable(1, {"angles": angles}, prior=prior), Design(angles=DESIGN.angles))
+
+
+def test_a_small_calibration_catches_zeros_in_the_place_of_angles_too_small_to_detect():
+    """Zeros pull the curve down: eight replications reject a parameter at 0.01; a right likelihood, one seed in a hundred."""
+    found = calibrated(Plan(angles_alone("censored"), angles_alone("zero"), 5, QUICK), 8)
+    assert found.quantities
+    assert found.faults
+
+
+def test_a_replication_depends_on_its_number_alone():
+    dataset = data_set("yarn-on-cylinder")
+    plan = Plan(dataset, dataset, 3, QUICK)
+    bench = Workbench(plan)
+    _, second = bench.replication(0), bench.replication(1)
+    alone = Workbench(plan, bench.laboratory).replication(1)
+    assert replace(alone, seconds=0.0) == replace(second, seconds=0.0)
+
+
+def test_the_command_line_calibrates_resumes_and_says_when_too_few_replications_are_there(run, tmp_path):
+    data, folder = ROOT / "datasets" / "yarn-on-cylinder", tmp_path / "c"
+    begin = ("calibrate", data, "-o", folder, "-j", 1)
+    code, out, err = run(*begin, "-n", 2, "--seed", 1)
+    assert code == 3
+    assert "NOT JUDGED: 2 of 2" in out
+    assert f"Wrote {folder}." in err
+    written = {path.relative_to(folder).as_posix() for path in folder.rglob("*.*")}
+    figures = {f"figures/{name}.{e}" for name in ("ranks", "coverage", "sharpness") for e in ("png", "svg")}
+    assert written == {"calibration.json", "summary.txt", "replications.jsonl"} | figures
+    code, _, err = run(*begin, "-n", 2)
+    assert code == 2
+    assert "--resume" in err
+    code, out, _ = run(*begin, "-n", 3, "--resume", "--json")
+    page = json.loads(out)
+    assert code == 3
+    assert (page["replications"], page["seed"]) == (3, 1)
+    assert page["quantities"][0]["name"] == "mu"
+    assert len((folder / "replications.jsonl").read_text().splitlines()) == 4
+
+
+def test_an_interrupted_calibration_says_how_to_go_on(run, tmp_path, monkeypatch):
+    def interrupted(*_, output, **options):
+        begun(output, FINGERPRINT, resume=False, force=False)
+        raise KeyboardInterrupt
+
+    monkeypatch.setattr("bowdenfit.verbs.calibrate", interrupted)
+    code, _, err = run("calibrate", ROOT / "datasets" / "yarn-on-cylinder", "-o", tmp_path / "c")
+    assert code == 130
+    assert "run the same command with --resume" in err
+
+
+def test_what_cannot_be_assumed_or_replicated_is_refused_in_a_sentence(run, tmp_path):
+    data = ROOT / "datasets" / "on-body-exoskeleton"
+    begin = ("calibrate", data, "-o", tmp_path / "c", "-n", 2, "-j", 1)
+    code, _, err = run(*begin, "--assume", "tables.efficiencies.files=[]", "--seed", 1)
+    assert code == 2
+    code, _, err = run(*begin, "--assume", "friction.mu9.fixed=0.1")
+    assert code == 2
+    assert "mu9" in err
+    assert not (tmp_path / "c").exists()
+
+
+@pytest.mark.slow
+def test_processes_give_the_replications_that_one_gives(tmp_path):
+    """Two processes that start cleanly, each with its own programs: the same ranks to the last digit."""
+    from bowdenfit.verbs import calibrate
+
+    data = ROOT / "datasets" / "yarn-on-cylinder"
+    one, two = (calibrate(data, replications=3, workers=workers, seed=1) for workers in (1, 2))
+    assert [q.ranks for q in one.quantities] == [q.ranks for q in two.quantities]

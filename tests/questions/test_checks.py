@@ -1,0 +1,414 @@
+"""Checks of a fit against its own readings, and of the priors before a fit: what they name, and what they leave in peace."""
+
+import dataclasses
+
+import cables
+import elastic_cables
+import jax
+import numpy as np
+import pytest
+from figure_words import check_words
+from laboratory import Laboratory
+from scipy import stats
+
+import bowdenfit as bf
+from bowdenfit.inference.compilation import compiled
+from bowdenfit.inference.diagnostics import Diagnostics
+from bowdenfit.inference.log_density import LogDensity as Density
+from bowdenfit.inference.predictive_checks import LeftOut, left_out_readings, placed_at_random, uniformity
+from bowdenfit.inference.prior_sensitivity import SENSITIVE, sensitivities
+from bowdenfit.model import build_model
+from bowdenfit.questions.check.answer import TableChecks, checks_of, diagnosis, trends_of
+from bowdenfit.questions.check.figure import checks as checks_figure
+from bowdenfit.questions.check.figure_data import CheckedTable
+from bowdenfit.questions.check.figure_tables import checked_tables
+from bowdenfit.questions.check.page import checks_page
+from bowdenfit.questions.check.prior_figure import prior_predictive as prior_figure
+from bowdenfit.questions.check.prior_predictive import prior_predictive
+from bowdenfit.questions.check.prior_words import prior_predictive_text
+from bowdenfit.questions.check.residual_places import Places
+from bowdenfit.questions.check.words import checks_text
+from bowdenfit.questions.summary.figure_data import FigureData
+from bowdenfit.results.record import Draws, Fit, Provenance
+
+DRAWS = 8000
+
+
+def line_through(x, y, sd, seed=0):
+    """Draws of a straight line with a flat prior and known scatter: log likelihood and readings drawn anew, (draw, reading).
+
+    Without reading i the prediction is normal, with a mean and an sd that a textbook gives: an answer from outside.
+    """
+    rng = np.random.default_rng(seed)
+    design = np.column_stack([np.ones_like(x), x])
+    covariance = sd**2 * np.linalg.inv(design.T @ design)
+    center = np.linalg.solve(design.T @ design, design.T @ y)
+    lines = rng.multivariate_normal(center, covariance, DRAWS) @ design.T
+    return stats.norm.logpdf(y, lines, sd), lines + sd * rng.standard_normal(lines.shape)
+
+
+def textbook(x, y, sd):
+    """Mean and sd of the prediction of each reading from all the others."""
+    found = []
+    for i in range(len(x)):
+        rest = np.arange(len(x)) != i
+        design = np.column_stack([np.ones(len(x)), x])
+        information = design[rest].T @ design[rest]
+        mean = design[i] @ np.linalg.solve(information, design[rest].T @ y[rest])
+        found.append((mean, sd * np.sqrt(1 + design[i] @ np.linalg.solve(information, design[i]))))
+    return np.array(found).T
+
+
+def test_predictions_without_a_reading_are_those_of_the_textbook():
+    """Within 0.06 sd: importance weights of 8000 draws err by about 0.015; the seed is fixed."""
+    x = np.linspace(-1, 1, 15)
+    y = 1 + 2 * x + 0.3 * np.random.default_rng(1).standard_normal(15)
+    log_likelihood, replicated = line_through(x, y, 0.3)
+    found = left_out_readings(log_likelihood, replicated, y, np.zeros(15, dtype=bool), DRAWS)
+    mean, sd = textbook(x, y, 0.3)
+    np.testing.assert_allclose((found.mean - mean) / sd, 0.0, atol=0.06)
+    np.testing.assert_allclose(found.sd / sd, 1.0, atol=0.06)
+    np.testing.assert_allclose((found.q95 - found.q05) / (2 * stats.norm.ppf(0.95) * sd), 1.0, atol=0.08)
+    np.testing.assert_allclose(found.up_to, stats.norm.cdf(y, mean, sd), atol=0.03)
+
+
+@pytest.mark.parametrize("z", [3.0, 4.0, 5.0])
+def test_a_tail_beyond_all_draws_is_small_but_never_smaller_than_a_normal_one(z):
+    """The Pareto tail is exponential at the least, so it errs to the side of no alarm, and by less than two sds."""
+    draws = np.random.default_rng(0).standard_normal((20_000, 1))
+    flat = np.zeros_like(draws)
+    (tail,) = left_out_readings(flat, draws, np.array([z]), np.zeros(1, dtype=bool), 20_000).tail
+    assert 0.7 * 2 * stats.norm.sf(z) < tail < 2 * stats.norm.sf(z - 1.0)
+    (other,) = left_out_readings(flat, draws, np.array([-z]), np.zeros(1, dtype=bool), 20_000).tail
+    assert other == pytest.approx(tail, rel=1.0)
+
+
+def test_a_bound_takes_a_place_below_itself_and_stands_out_only_where_more_was_expected():
+    draws = np.random.default_rng(0).normal(20.0, 2.0, (8000, 2))
+    at_most = np.array([True, True])
+    found = left_out_readings(np.zeros_like(draws), draws, np.array([22.0, 10.0]), at_most, 8000)
+    assert found.below[0] == 0.0
+    assert found.up_to[0] == pytest.approx(stats.norm.cdf(1.0), abs=0.02)
+    assert found.tail[0] == pytest.approx(found.up_to[0], abs=1e-9)
+    assert found.tail[1] < 1e-3
+    places = [placed_at_random(found, np.random.default_rng(i))[0] for i in range(200)]
+    assert min(places) > 0.0
+    assert max(places) < found.up_to[0]
+
+
+def test_a_reading_that_hangs_on_one_draw_is_decisive_and_one_that_says_nothing_is_not():
+    draws = np.random.default_rng(0).standard_normal((4000, 2))
+    log_likelihood = np.zeros((4000, 2))
+    log_likelihood[7, 0] = -800.0
+    found = left_out_readings(log_likelihood, draws, np.zeros(2), np.zeros(2, dtype=bool), 4000)
+    assert np.isinf(found.pareto_k[0])
+    assert found.pareto_k[1] == 0.0
+    np.testing.assert_allclose(found.median, 0.0, atol=0.06)
+    assert (found.tail > 0.9).all()
+
+
+def test_uniform_numbers_stay_in_the_band_and_others_do_not():
+    """Of 100 uniform samples 1 leaves a 99 % band on average; more than 6 do in 1 of 10 000 runs, and the seed is fixed."""
+    rng = np.random.default_rng(3)
+    assert sum(not uniformity(rng.uniform(size=30), 0.99).holds for _ in range(100)) <= 6
+    normal = rng.standard_normal(60)
+    assert uniformity(stats.norm.cdf(2.0 * normal), 0.99).fault == "scatter more than the fit says"
+    assert uniformity(stats.norm.cdf(0.3 * normal), 0.99).fault == "scatter less than the fit says"
+    assert uniformity(stats.norm.cdf(normal + 1.5), 0.99).fault == "lie higher than the fit says"
+    assert uniformity(stats.norm.cdf(normal - 1.5), 0.99).fault == "lie lower than the fit says"
+
+
+def normal_posterior(reading, sd, seed=0):
+    """Draws of a z whose prior is standard normal, read once as `reading` with known sd, and their log likelihood."""
+    width = 1 / np.sqrt(1 + 1 / sd**2)
+    z = width**2 * reading / sd**2 + width * np.random.default_rng(seed).standard_normal((4, 2000))
+    return z, stats.norm.logpdf(reading, z, sd)
+
+
+@pytest.mark.parametrize(
+    ("reading", "sd", "expected"),
+    [
+        (0.5, 0.05, "readings decide"),
+        (0.5, 30.0, "prior decides"),
+        (8.0, 0.5, "conflict"),
+        (1.0, 0.8, "both count"),
+    ],
+)
+def test_power_scaling_tells_what_decides(reading, sd, expected):
+    z, log_likelihood = normal_posterior(reading, sd)
+    (found,) = sensitivities(
+        {"mu": 0.1 + 0.01 * z}, {"mu": z, "other": z[::-1] * 0 + normal_posterior(0, 0.1, 1)[0]}, log_likelihood
+    )
+    assert diagnosis(found) == expected
+    assert found.parameter == "mu"
+    assert (found.prior > SENSITIVE) == (expected != "readings decide")
+
+
+def test_the_median_with_a_wider_prior_is_that_of_another_fit():
+    """Conjugate: a prior sqrt(2) times as wide puts the median at reading / (1 + sd^2 / 2); 8000 draws err by 0.01."""
+    z, log_likelihood = normal_posterior(2.0, 0.8)
+    (found,) = sensitivities({"mu": z}, {"mu": z}, log_likelihood)
+    assert found.median == pytest.approx(2.0 / (1 + 0.8**2), abs=0.03)
+    assert found.wider == pytest.approx(2.0 / (1 + 0.8**2 / 2), abs=0.04)
+
+
+def stretch_table(z, load, back):
+    """Readings of stretch with these deviations."""
+    n = len(z)
+    zero, one = np.zeros(n), np.ones(n)
+    predicted = LeftOut(zero, one, -1.64 * one, zero, 1.64 * one, one / 2, one / 2, one, 0.1 * one)
+    places = Places({"Load (N)": load}, ("",) * n, back, np.ones(n, dtype=bool))
+    labels = tuple(f"row {i}" for i in range(n))
+    return TableChecks("stretch", "mm", labels, z, np.zeros(n, dtype=bool), predicted, places, one / 2, None)
+
+
+@pytest.mark.parametrize(
+    ("planted", "words"),
+    [
+        (lambda load, back: 0.02 * load, ("those of stretch grow with the load",)),
+        (lambda load, back: 0.001 * (load - 50) ** 2, ("those of stretch are higher at both ends of the load",)),
+        (lambda load, back: -1.5 * back, ("those of stretch are lower on the way back",)),
+        (lambda load, back: 0.0 * load, ()),
+    ],
+)
+def test_deviations_that_depend_on_load_or_stroke_are_named(planted, words):
+    """Noise alone gives a trend in 1 of 100 tables; the planted ones are 4 sds and more; the seed is fixed."""
+    load, back = np.tile(np.linspace(0, 100, 40), 2), np.repeat([False, True], 40)
+    z = np.random.default_rng(2).standard_normal(80) + planted(load, back)
+    page = {"trends": [dataclasses.asdict(t) for t in trends_of((stretch_table(z, load, back),))]}
+    text = checks_text({"readings": READINGS, "tables": [], "sensitivities": []} | page)
+    assert all(each in " ".join(text.split()) for each in words)
+    assert len(page["trends"]) == len(words)
+
+
+READINGS = [{"outlier": False, "decisive": False, "inside": True}]
+QUICK = ("sampler.n_walkers=128", "sampler.target_ess=200", "sampler.target_r_hat=1.05", "sampler.max_steps=3000")
+
+
+@pytest.fixture(scope="module")
+def fit(on_body):
+    """A quick fit of the on-body data."""
+    return bf.fit(on_body, seed=5, settings=QUICK)
+
+
+def said(fit):
+    """What the summary says of the checks, in one line."""
+    return " ".join(checks_text(fit.summary()["checks"]).split())
+
+
+def test_the_on_body_fit_has_no_outlier_and_says_so_of_550_mm(fit):
+    page = fit.summary()["checks"]
+    (at_550,) = [r for r in page["readings"] if r["label"] == "550 mm"]
+    assert not at_550["inside"]
+    assert abs(at_550["z"]) < 2
+    assert at_550["measured"] == pytest.approx(0.678)
+    assert at_550["q05"] < at_550["measured"] < at_550["q95"]
+    assert at_550["q95"] - at_550["q05"] > 0.04  # wider than the 3 points of a prediction that has seen it
+    text = said(fit)
+    assert "No reading is an outlier." in text
+    assert "Outside the range of the curves: efficiency at 550 mm: measured 67.8 %, expected 68." in text
+    assert len(checks_text(page).splitlines()) <= 10
+
+
+def test_every_reading_has_a_row_and_undetected_angles_are_bounds(fit):
+    page = fit.summary()["checks"]
+    assert [t["readings"] + t["bounds"] for t in page["tables"]] == [22, 4]
+    bounds = [r for r in page["readings"] if "at_most" in r]
+    assert len(bounds) == 5
+    assert all(r["z"] is None and r["at_most"] == pytest.approx(10.0) for r in bounds)
+    assert {s["quantity"] for s in page["sensitivities"]} == {
+        "mu1",
+        "mu2",
+        "mu3",
+        "optimal_length",
+        "optimal_efficiency",
+    }
+
+
+def test_the_same_fit_gives_the_same_checks_and_so_does_the_saved_one(fit, tmp_path):
+    fit.save(tmp_path / "fit")
+    assert bf.load(tmp_path / "fit").summary()["checks"] == fit.summary()["checks"]
+    assert checks_page(checks_of(fit)) is not checks_page(checks_of(fit))
+
+
+def test_without_draws_there_are_no_checks(on_body):
+    squares = bf.fit(on_body, mcmc=False)
+    assert squares.checks is None
+    assert "checks" not in squares.summary()
+    assert checks_text({}) == ""
+
+
+def changed(dataset, table, column, row, by):
+    """The data set with one reading of a table moved."""
+    old = getattr(dataset.measurements, table)
+    values = getattr(old, column).copy()
+    values[row] += by
+    tables = dataclasses.replace(dataset.measurements, **{table: dataclasses.replace(old, **{column: values})})
+    return dataclasses.replace(dataset, measurements=tables)
+
+
+def test_an_angle_misread_by_ten_sds_is_the_one_that_is_named(on_body):
+    right = bf.read(on_body, settings=QUICK)
+    row = int(np.flatnonzero(right.measurements.angles.route == 490.0)[0])
+    found = bf.fit(changed(right, "angles", "angle", (row, 0), np.deg2rad(21.0)), seed=1).checks
+    assert [table.labels[i] for table, i in found.outliers] == ["free_sheath_angle at 490 mm"]
+    text = " ".join(checks_text(checks_page(found)).split())
+    assert "Outlier: free_sheath_angle at 490 mm: measured 61.0 deg, expected" in text
+    figure = checks_figure_of(found)
+    check_words(figure, "an outlier")
+    assert "free_sheath_angle at 490 mm" in {text.get_text() for axes in figure.axes for text in axes.texts}
+
+
+def checks_figure_of(found):
+    return figure_of(checked_tables(found))
+
+
+def figure_of(tables):
+    return checks_figure(FigureData("cable", "", (0.0, 0.0), (), None, (), None, None, None, (), 0, checks=tables))
+
+
+@pytest.fixture(scope="module")
+def forces(tmp_path_factory):
+    """Six runs at 180 deg with a coefficient of 0.114, their mountings 1 % apart."""
+    rng, lines = np.random.default_rng(1), ["run,input_force_N,output_force_N"]
+    for run in range(6):
+        ratio = 0.7 * np.exp(0.01 * rng.standard_normal())
+        for force in (20.0, 30.0, 40.0, 50.0):
+            lines.append(
+                f"{run},{force + 0.2 * rng.standard_normal():.3f},{ratio * force + 0.2 * rng.standard_normal():.3f}"
+            )
+    path = tmp_path_factory.mktemp("forces") / "forces.csv"
+    path.write_text("\n".join(lines) + "\n")
+    return path
+
+
+@pytest.mark.parametrize(("prior", "conflict"), [("value=0.2, sd=0.01", True), ("value=0.12, sd=0.01", False)])
+def test_a_prior_that_is_wrong_and_narrow_is_reported_as_a_conflict(forces, prior, conflict):
+    fit = bf.fit(forces, wrap_angle=(180.0, "deg"), seed=2, settings=(*QUICK, f"friction.mu.measured={{{prior}}}"))
+    text = said(fit)
+    assert ("Prior and readings contradict each other about mu" in text) == conflict
+    assert ("Check the prior, its unit first." in text) == conflict
+    (found,) = fit.checks.sensitivities
+    assert (diagnosis(found) == "conflict") == conflict
+    assert not conflict or found.wider < found.median
+
+
+def many_tables():
+    """Figure data of a loop with stretch, and of angles with an outlier at the end of the axis."""
+    rng, at = np.random.default_rng(0), np.linspace(0.02, 0.98, 49)
+    band = 1.5 * np.sqrt(at * (1 - at) / 50)
+
+    def table(name, n, places, groups=("",)):
+        numbers = {place: np.linspace(0, 180, n) for place in places}
+        flags, outlier = rng.uniform(size=(2, n)) < 0.3, np.zeros(n, dtype=bool)
+        z = rng.standard_normal(n)
+        outlier[-1], z[-1] = True, 7.0
+        labels = tuple(f"squeezed_sheath_angle at {i} mm" for i in range(n))
+        group = tuple(np.resize(np.array(groups), n).tolist())
+        return CheckedTable(
+            name, z, numbers, group, flags[0], flags[1], outlier, labels, at, 0.3 * band, -band, band, 0.99
+        )
+
+    return (
+        table("stretch", 105, ("Load (N)", "Wrap angle (deg)")), table("preload", 8, ("Wrap angle (deg)",)),
+        table("wrap angles", 22, ("Cable length (mm)",), ("free_sheath_angle", "squeezed_sheath_angle")),
+    )  # fmt: skip
+
+
+def test_a_figure_of_many_tables_has_no_words_that_overlap():
+    figure = figure_of(many_tables())
+    check_words(figure, "many tables")
+    assert len(figure.axes) == 3 + 4
+
+
+def test_the_figure_of_the_checks_has_no_words_that_overlap(fit):
+    figure = checks_figure_of(fit.checks)
+    check_words(figure, "on body")
+    titles = {axes.get_title() for axes in figure.axes} - {""}
+    assert titles == {"Wrap angles: 22 readings", "Efficiencies: 4 readings"}
+    assert {axes.get_xlabel() for axes in figure.axes} == {"Predicted probability p", "Cable length (mm)"}
+
+
+def test_all_priors_of_the_on_body_data_allow_what_was_measured(on_body, run, tmp_path):
+    code, out, _ = run("check", on_body, "--prior-predictive", tmp_path / "priors")
+    assert code == 0
+    assert "All 26 readings lie inside the central 99 %" in out
+    assert sorted(p.name for p in (tmp_path / "priors").iterdir()) == ["prior_predictive.png", "prior_predictive.svg"]
+
+
+def test_stretch_in_the_wrong_unit_is_seen_before_the_fit(on_body):
+    right = bf.read(on_body.parent / "synthetic-haptic-loop")
+    table = right.measurements.stretch
+    found = prior_predictive(changed(right, "stretch", "stretch", slice(None), 999 * table.stretch))
+    text = " ".join(prior_predictive_text(found).split())
+    assert text.startswith("Warning: ")
+    assert f"of {len(table.load)} readings (stretch: " in text
+    assert "The usual cause is a unit" in text
+    assert "preload:" not in text
+    check_words(prior_figure(found), "stretch in micrometers")
+
+
+ROWS = 1024  # draws of a fit that are looked at in one go
+
+
+class Checked:
+    """Checks of cables of one kind, whose programs are compiled once."""
+
+    def __init__(self):
+        self.laboratory, self.programs = Laboratory(), {}
+
+    def __call__(self, dataset, seed):
+        density = Density(build_model(dataset))
+        z = self.laboratory.draws(density, seed)
+        z = z[: len(z) // ROWS * ROWS]
+        # The priors of some cables, and how many of their readings are but bounds, depend on what was read.
+        kind = str(density.model.space) + str(jax.tree.map(np.shape, density.data))
+        if kind not in self.programs:
+            shape = jax.ShapeDtypeStruct((ROWS, z.shape[1] + 1), float)
+            self.programs[kind] = compiled(jax.vmap(self.implied(density.model), (0, None)), shape, density.data)
+        numbered = np.column_stack([z, np.arange(len(z), dtype=float)]).reshape(-1, ROWS, z.shape[1] + 1)
+        parts = [jax.tree.map(np.asarray, self.programs[kind](part, density.data)) for part in numbered]
+        drawn = jax.tree.map(lambda *each: np.stack(each), *parts)
+        names = [p.name for p in density.model.space.free]
+        values = dict(zip(names, np.moveaxis(z.reshape(-1, ROWS, z.shape[1]), -1, 0), strict=True))
+        posterior = Draws(
+            z.reshape(-1, ROWS, z.shape[1]), values, {}, drawn["log_likelihood"], {}, drawn["replicated"], {},
+            {"z": Diagnostics(1.0, 500.0, 500.0, 0.0, 0.0)}, 1, 1, 0.5,
+        )  # fmt: skip
+        return checks_of(Fit(dataset, None, posterior, True, (), Provenance(seed, {})))
+
+    @staticmethod
+    def implied(model):
+        def of_draw(z_and_number, data):
+            values = model.space.constrain(z_and_number[:-1])
+            keys = jax.random.split(jax.random.fold_in(jax.random.key(0), z_and_number[-1].astype("uint32")), len(data))
+            terms = list(zip(model.terms, data, keys, strict=True))
+            return {
+                "log_likelihood": {t.name: t.log_likelihood(values, d) for t, d, _ in terms},
+                "replicated": {t.name: t.simulate(values, d, key) for t, d, key in terms},
+            }
+
+        return of_draw
+
+
+def of_forces(seed):
+    """Runs of two contacts with constant angles."""
+    description = cables.cable(2, ("forces",), contact=[cables.CONTACTS[2], cables.CONTACTS[4]])
+    return cables.measured(description, seed=seed)[0]
+
+
+def of_stretch(seed):
+    """A loop with stretch, preload and forces."""
+    return elastic_cables.bench(elastic_cables.elastic_cable(), elastic_cables.TRUTH, seed=seed)[0]
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("measured", [of_forces, of_stretch])
+def test_healthy_cables_are_left_in_peace(measured):
+    """Each kind of alarm may sound in 1 of 100 healthy fits: of 20 more than 2 in 1 of 1000 runs of this test."""
+    checked, alarms = Checked(), []
+    for seed in range(20):
+        found = checked(measured(100 + seed), seed)
+        fault = any(t.uniformity is not None and not t.uniformity.holds for t in found.tables)
+        alarms.append((bool(found.outliers), fault, bool(found.trends), bool(found.conflicts)))
+    assert (np.sum(alarms, axis=0) <= 2).all(), alarms

@@ -1,0 +1,321 @@
+"""What a fit of stretch, preload and a loop says: predictions, summary, contradictions, files, figures."""
+
+import csv
+import dataclasses
+import json
+from pathlib import Path
+
+import jax
+import numpy as np
+import pytest
+from scipy import stats
+
+import bowdenfit as bf
+from bowdenfit.dataset import Dataset
+from bowdenfit.inference.least_squares import least_squares, make_objective, maximum_posterior
+from bowdenfit.inference.log_density import LogDensity
+from bowdenfit.model import build_model
+from bowdenfit.questions.simulate.simulation import empty_tables, simulate, true_values
+from bowdenfit.questions.simulate.tables import read_bench
+from bowdenfit.questions.summary.figures import figure_data
+from bowdenfit.questions.summary.words import summary_text
+from bowdenfit.results.optimum import optimum_of
+from bowdenfit.verbs import predict
+
+FOLDER = Path(__file__).parents[2] / "datasets" / "synthetic-haptic-loop"
+QUICK = ("sampler.n_walkers=64", "sampler.target_ess=200", "sampler.target_r_hat=1.05", "sampler.max_steps=3000")
+TRUTH = json.loads((FOLDER / "truth.json").read_text())["truth"]
+
+
+@pytest.fixture(scope="module")
+def folder(tmp_path_factory):
+    """The results folder of a quick fit, without figures."""
+    results = tmp_path_factory.mktemp("haptic") / "fit"
+    bf.fit(FOLDER, output=results, seed=3, settings=QUICK, figures=False)
+    return results
+
+
+@pytest.fixture(scope="module")
+def fit(folder):
+    return bf.load(folder)
+
+
+def test_the_plan_makes_the_data_set_that_is_there(tmp_path):
+    bf.simulate(FOLDER / "bench.toml", output=tmp_path / "made", seed=2007)
+    for file in ("cable.toml", "stretch.csv", "preload.csv", "loop.csv"):
+        assert (tmp_path / "made" / file).read_text() == (FOLDER / file).read_text(), file
+    assert json.loads((tmp_path / "made" / "truth.json").read_text())["truth"] == TRUTH
+
+
+def test_the_fit_converges_and_holds_the_truth_of_the_data_set(fit):
+    """Every parameter within 4 posterior sds: by chance one of ten is not once in 1600 data sets; this one is fixed."""
+    assert fit.converged
+    for name, value in TRUTH.items():
+        found = fit.parameter(name)
+        assert abs(found.mean - value) < 4 * found.sd, name
+
+
+def test_a_saved_fit_gives_the_same_answers_again(fit, folder, tmp_path):
+    fit.save(tmp_path / "again")
+    again = bf.load(tmp_path / "again")
+    assert again.summary() == fit.summary()
+    assert json.loads((folder / "summary.json").read_text())["elastic"] == json.loads(
+        json.dumps(fit.summary()["elastic"])
+    )
+    measured, before = again.dataset.measurements, fit.dataset.measurements
+    for table in ("stretch", "preload", "loop"):
+        ours, theirs = (jax.tree.leaves(dataclasses.asdict(getattr(m, table))) for m in (measured, before))
+        assert all(
+            np.array_equal(a, b, equal_nan=a.dtype.kind == "f")
+            for a, b in zip(map(np.asarray, ours), map(np.asarray, theirs), strict=True)
+        )
+
+
+@pytest.mark.parametrize("schema", [1, 2])
+def test_results_of_older_schemas_are_read(on_body, tmp_path, schema):
+    bf.fit(on_body, output=tmp_path / "fit", mcmc=False, figures=False)
+    page = json.loads((tmp_path / "fit" / "fit.json").read_text())
+    assert page["schema"] == 4
+    page["schema"] = schema
+    gone = ["stretch", "preload", "loop"] + (["recordings"] if schema == 1 else [])
+    page["measurements"] = {k: v for k, v in page["measurements"].items() if k not in gone}
+    del page["least_squares"]["disagreements"]
+    (tmp_path / "fit" / "fit.json").write_text(json.dumps(page))
+    assert bf.load(tmp_path / "fit").least_squares.estimates["mu1"].identified
+
+
+def test_the_summary_says_what_each_wrap_angle_does(fit):
+    text = summary_text(fit)
+    assert "Fitted to 105 readings of stretch, 8 preloads and 64 readings of a loop." in text
+    assert "Stretch and preload, median (90 % interval)" in text
+    assert "Over bends from 0 to 180 deg the cable stays taut from a preload of" in text
+    assert "disagrees" not in text
+    assert max(map(len, text.splitlines())) <= 130
+    rows = fit.summary()["elastic"]["bends"]
+    assert [row["wrap_angle"] for row in rows] == [0, 30, 60, 135, 180]
+    for row in rows:
+        for quantity in (
+            "preload",
+            "friction",
+            "slack_load",
+            "efficiency",
+            "position_error",
+            "lost_motion",
+            "stiffness",
+        ):
+            assert row[quantity]["q05"] <= row[quantity]["median"] <= row[quantity]["q95"]
+    preload = [row["preload"]["median"] for row in rows]
+    assert preload == sorted(preload)
+
+
+def test_all_figures_of_the_elastic_side_are_drawn(fit, tmp_path):
+    names = {path.stem for path in bf.plot(fit, tmp_path)}
+    assert {"stretch", "preload", "bending_loss", "loops", "preload_window"} <= names
+    shown = figure_data(fit).elastic
+    assert [curve.wrap_angle for curve in shown.stretch] == pytest.approx([0, 45, 90, 135, 180])
+    for curve in shown.stretch:
+        assert np.all(np.diff(curve.loading[1]) > 0)
+        assert np.all(curve.unloading[1] >= curve.loading[1] - 1e-12)
+        assert curve.unloading[1][-1] == pytest.approx(curve.loading[1][-1])
+    assert shown.preload.slack_probability[0] > 0.5
+    assert shown.preload.slack_probability[-1] == 0
+    assert shown.bending_loss.fitted[1][-1] < shown.bending_loss.fitted_capstan[-1]
+    assert [loop.label for loop in shown.loops] == ["45 deg", "90 deg", "135 deg", "180 deg"]
+    assert shown.window.taut_probability[0] == 0
+    assert shown.window.taut_probability[-1] == 1
+
+
+def table(printed: str) -> list[dict[str, str]]:
+    return list(csv.DictReader(printed.splitlines()))
+
+
+def test_efficiency_is_predicted_at_wrap_angles_with_its_own_and_another_preload(fit, folder, run):
+    code, out, _ = run("predict", folder, "--wrap-angle", "90deg", "--wrap-angle", "3.14159265rad", "--input-force", "20N",
+                       "--quantity", "efficiency")  # fmt: skip
+    assert code == 0
+    rows = table(out)
+    assert [float(row["wrap_angle_deg"]) for row in rows] == pytest.approx([90, 180])
+    values = fit.posterior.values
+    mu, preload = values["mu"].ravel(), values["preload"].ravel()
+    exponent = mu * np.pi / 2
+    expected = np.median(np.minimum(20 - 2 * preload * exponent, 20 * np.exp(-exponent))) / 20
+    assert float(rows[0]["efficiency"]) == pytest.approx(expected, rel=1e-5)
+    code, out, _ = run("predict", folder, "--wrap-angle", "90deg", "--input-force", "20N", "--quantity", "efficiency",
+                       "--preload", "30N")  # fmt: skip
+    stiffer = np.median(20 - 60 * exponent) / 20  # at 90 deg, where preload is meant
+    assert float(table(out)[0]["efficiency"]) == pytest.approx(stiffer, rel=1e-5)
+
+
+def test_what_is_felt_is_twice_preload_times_exponent_times_the_radius(fit, folder, run):
+    code, out, _ = run("predict", folder, "--quantity", "friction", "--wrap-angle", "90deg")
+    assert code == 0
+    felt = 2 * fit.posterior.values["preload"] * fit.posterior.values["mu"] * np.pi / 2 * 20
+    (row,) = table(out)
+    assert float(row["friction_N_mm"]) == pytest.approx(np.median(felt), rel=1e-5)
+    assert float(row["q95"]) == pytest.approx(np.quantile(felt, 0.95), rel=1e-5)
+
+
+def test_the_preload_window_is_given_for_bends_and_a_limit(folder, run):
+    code, out, _ = run(
+        "predict", folder, "--quantity", "preload-window", "--friction-limit", "0.3N*m", "--format", "json"
+    )
+    assert code == 0
+    (row,) = json.loads(out)
+    assert (row["from_deg"], row["to_deg"]) == pytest.approx((0, 180))
+    assert row["lowest_q05_N"] < row["lowest_median_N"] < row["best_N"] < row["highest_median_N"]
+    assert row["possible"] == 1
+    assert "must not exceed" in row["in_words"]
+    code, out, _ = run(
+        "predict", folder, "--quantity", "preload-window", "--friction-limit", "0.1N*m", "--format", "json"
+    )
+    (row,) = json.loads(out)
+    assert row["possible"] == 0
+    assert "with a probability of only 0%" in row["in_words"]
+
+
+@pytest.mark.parametrize("quantity", ["preload", "slack-load", "position", "stiffness", "output-force"])
+def test_every_other_quantity_is_a_table_with_intervals(folder, run, quantity):
+    code, out, _ = run("predict", folder, "--quantity", quantity, "--input-force", "20N")
+    assert code == 0
+    rows = table(out)
+    assert len(rows) == 10  # every wrap angle that anything was measured at
+    for row in rows:
+        value = float(next(iter(list(row.values())[1:])))
+        assert float(row["q05"]) <= value <= float(row["q95"])
+
+
+@pytest.mark.parametrize(
+    ("arguments", "words"),
+    [
+        (("500",), "at lengths or at wrap angles, not at both"),
+        (("--wrap-angle", "90"), "write it as 90deg"),
+        (("--wrap-angle", "90N"), "does not measure an angle"),
+        (("--wrap-angle", "-5deg"), "is not positive"),
+        (("--quantity", "preload", "--preload", "-3N"), "is not positive"),
+        (("--quantity", "preload-window", "--friction-limit", "3N"), "does not measure a torque"),
+        (("--quantity", "efficiency", "--input-force", "0N"), "is not positive"),
+    ],
+)
+def test_a_wrong_question_is_refused_with_a_sentence(folder, run, arguments, words):
+    code, out, err = run("predict", folder, *arguments)
+    assert code == 2
+    assert words in " ".join(err.split())
+    assert not out
+
+
+def test_a_cable_without_stretch_says_what_it_lacks(on_body):
+    fit = bf.fit(on_body, mcmc=False)
+    with pytest.raises(bf.UsageError, match="no posterior"):
+        predict(fit, quantity="stiffness", wrap_angles=[(90, "deg")])
+    assert "elastic" not in fit.summary()
+
+
+# Tables that contradict each other
+
+
+@pytest.fixture(scope="module")
+def plan():
+    return read_bench(FOLDER / "bench.toml")
+
+
+@pytest.fixture(scope="module")
+def solved(plan):
+    """Least squares of simulated data sets of one shape, compiled once."""
+    tables = empty_tables(plan.description, plan.design)
+    objective = make_objective(LogDensity(build_model(Dataset(plan.description, tables, {}))))
+
+    def solve(dataset):
+        posterior = LogDensity(build_model(dataset))
+        return least_squares(posterior, objective, maximum_posterior(posterior, objective).z)
+
+    return solve
+
+
+def simulated(plan, seed, **truth):
+    """A data set whose preload readings are all above 0, so that all have one shape."""
+    tables = empty_tables(plan.description, plan.design)
+    values = true_values(plan.description, tables, plan.truth | {"preload": 15.0} | truth, jax.random.key(0))
+    return simulate(plan.description, plan.design, values, jax.random.key(seed))
+
+
+def test_tables_of_one_cable_seldom_disagree(plan, solved):
+    """Over 30 cables without a contradiction no table is 3 sds off, and p-values of the loop's are uniform.
+
+    By chance a loop is beyond 3 sds in 8 of 100 such sets of 30; the other two tables err on the cautious side, because
+    theirs is the scatter about the joint fit. The test of uniformity fails once in a thousand seeds.
+    """
+    found = [d for seed in range(30) for d in solved(simulated(plan, seed)).disagreements]
+    assert {d.table for d in found} == {"stretch", "measured_preload", "loop_output_force"}
+    assert max(d.sds for d in found) < 3
+    p = [2 * stats.norm.sf(d.sds) for d in found if d.table == "loop_output_force"]
+    assert stats.kstest(p, "uniform").pvalue > 0.001
+
+
+def test_a_loop_measured_at_another_preload_is_named_with_its_distance(plan, solved):
+    right, other = simulated(plan, 1), simulated(plan, 1, preload=19.0)
+    mixed = dataclasses.replace(right.measurements, loop=other.measurements.loop)
+    found = solved(dataclasses.replace(right, measurements=mixed)).disagreements
+    loop = next(d for d in found if d.table == "loop_output_force")
+    assert loop.conflict > 0.8 * max(d.conflict for d in found)
+    assert loop.parameter == "preload"
+    assert loop.sds > 4
+    assert loop.rest == pytest.approx(15, abs=0.5)
+
+
+def test_the_report_says_which_table_disagrees_and_the_fit_goes_on(tmp_path):
+    """The loop's preload against the stretch model's: torques of a loop with twice the preload."""
+    for file in ("cable.toml", "stretch.csv", "preload.csv"):
+        (tmp_path / file).write_text((FOLDER / file).read_text())
+    rows = ["wrap_angle_deg,stroke,input_torque_N_m,output_torque_N_m"]
+    for angle, preload in ((45, 8.0), (90, 20.0), (135, 34.0), (180, 50.0)):
+        for force in (5.0, 10.0, 20.0, 40.0, 60.0):
+            exponent = 0.07 * np.deg2rad(angle)
+            out = min(force - 2 * preload * exponent, force * np.exp(-exponent))
+            rows.append(f"{angle},pull,{0.02 * force:.5f},{0.02 * out + 0.004 * np.sin(17 * len(rows)):.5f}")
+    (tmp_path / "loop.csv").write_text("\n".join(rows) + "\n")
+    fit = bf.fit(tmp_path, mcmc=False)
+    text = " ".join(summary_text(fit).split())
+    assert "The table of loop disagrees with everything else by" in text
+    assert "standard deviations: without it" in text
+    worst = fit.summary()["agreement"][0]
+    assert worst["table"] == "loop_output_force"
+    assert worst["sds"] > 3
+
+
+def test_a_cable_of_several_contacts_stretches_by_all_its_bends_together(on_body, tmp_path):
+    """Its contacts need not be told apart for that; for its efficiency they must."""
+    for file in on_body.iterdir():
+        (tmp_path / file.name).write_text(file.read_text())
+    description = (tmp_path / "cable.toml").read_text()
+    (tmp_path / "cable.toml").write_text(
+        description.replace("[tables]", '[tables]\nstretch = { file = "stretch.csv" }')
+    )
+    (tmp_path / "stretch.csv").write_text((FOLDER / "stretch.csv").read_text())
+    fit = bf.fit(tmp_path, mcmc=False)
+    at = {name: e.value for name, e in fit.least_squares.estimates.items()}
+    exponent, load = at["mu_stretch"] * np.pi / 2, 80.0
+    share = (1 - np.exp(-exponent)) / exponent
+    bedded = at["bedding_stretch"] / at["bedding_load"] * np.exp(-share * load / at["bedding_load"])
+    expected = 1 / (share * (1 / at["stiffness"] + bedded))
+    assert fit.elastic.stiffness([np.pi / 2], load)[0, 0] == pytest.approx(expected, rel=1e-9)
+    assert fit.elastic.position([np.pi / 2], load)[1][0, 0] > 0
+    with pytest.raises(bf.UsageError, match="3 contacts"):
+        fit.elastic.efficiency([np.pi / 2])
+
+
+def test_a_loop_along_a_route_without_preload_has_the_optimum_of_one_rope(on_body):
+    """And one with preload less efficiency there, at a length that is still the one of least friction."""
+    single, loop = (build_model(bf.read(on_body, settings=settings)) for settings in ((), ('cable.kind="loop"',)))
+    z = np.random.default_rng(0).normal(scale=0.2, size=single.space.size)
+    z = jax.numpy.asarray(z)
+    length, efficiency = optimum_of(single)(z)
+    length_of_loop, efficiency_of_loop = optimum_of(loop)(z)
+    assert float(length_of_loop) == pytest.approx(float(length), abs=1e-4)
+    assert float(efficiency_of_loop) == pytest.approx(float(efficiency), rel=1e-12)
+    force = loop.cable.friction.conditions.reference_force
+    values = loop.space.constrain(z) | {"preload": jax.numpy.asarray(0.4 * force)}
+    at = jax.numpy.asarray(np.linspace(430.0, 530.0, 101))
+    preloaded = np.asarray(loop.cable.efficiency_at(values, at))
+    exponent = np.asarray(single.cable.exponent_at(values, at))
+    np.testing.assert_allclose(preloaded, np.minimum(np.exp(-exponent), 1 - 0.8 * exponent), rtol=1e-12)
+    assert at[preloaded.argmax()] == pytest.approx(float(length), abs=1.0)

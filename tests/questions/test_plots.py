@@ -1,0 +1,416 @@
+"""The figures: what they draw, what they leave out, and how they are written."""
+
+import dataclasses
+import subprocess
+import sys
+
+import matplotlib as mpl
+import numpy as np
+import pytest
+from figure_words import words
+from matplotlib.collections import PolyCollection
+
+from bowdenfit.inference.interval import Interval
+from bowdenfit.plots.densities import BINS, bin_numbers, density, enclosed_share
+from bowdenfit.plots.sheet import ticks
+from bowdenfit.plots.write import write
+from bowdenfit.questions.summary.figure_data import (
+    BAND_QUANTILES,
+    AngleCurve,
+    Band,
+    EfficiencyPoints,
+    FigureData,
+    ParameterDraws,
+)
+from bowdenfit.questions.summary.gallery import FIGURES, draw_all
+from bowdenfit.results.choices import Choice, Window
+from bowdenfit.results.length import OptimalLength
+
+RANGE = (430.0, 530.0)
+GRID = np.linspace(*RANGE, 41)
+WALKERS, DRAWS, ENSEMBLES = 32, 10, 4
+SPREAD = np.array([-1.6, -0.7, 0.0, 0.7, 1.6])[:, None]
+EFFICIENCIES = np.array([0.77, 0.785, 0.753, 0.678])
+
+
+def parameter(name, symbol, middle, sd, role="friction", unit="1", estimate=None):
+    rng = np.random.default_rng(len(name))
+    draws = np.abs(middle + sd * rng.standard_normal((WALKERS, DRAWS)))
+    prior = np.abs(middle + 5 * sd * rng.standard_normal((1, 500)))
+    return ParameterDraws(name, symbol, unit, role, draws, prior, middle if estimate is None else estimate, sd)
+
+
+def angle_curve(contact, at_start, at_end, outside):
+    median = np.geomspace(at_start, at_end, len(GRID))
+    route = np.arange(430.0, 531.0, 10.0)
+    angle = np.interp(route, GRID, median) + 0.5
+    seen = angle >= 10.0
+    return AngleCurve(
+        contact, Band(GRID, median * (1 + 0.05 * SPREAD)), route[seen], angle[seen], route[~seen],
+        np.full((~seen).sum(), 10.0), np.array([540.0, 550.0]), np.array(outside),
+    )  # fmt: skip
+
+
+def optimum(draws):
+    choices = tuple(Choice(float(c), 0.5 if c in (470.0, 480.0) else 0.0, 0.0) for c in range(430, 531, 10))
+    best = Interval.of(np.full(draws.shape, 0.79))
+    at_edge = float((draws >= RANGE[1]).mean())
+    return OptimalLength(
+        "cable_length", "mm", Interval.of(draws), best, at_edge, Window(0.01, 0.95, 455.0, 484.0), choices
+    )
+
+
+def paper_data(length_draws=None):
+    """Figure data like those of the on-body data set."""
+    rng = np.random.default_rng(7)
+    route = np.array([440.0, 470.0, 510.0, 550.0])
+    points = EfficiencyPoints(
+        "efficiency", tuple(f"{r:g} mm" for r in route), route, EFFICIENCIES,
+        EFFICIENCIES + 0.002 + 0.01 * SPREAD, route <= RANGE[1],
+    )  # fmt: skip
+    lengths = 470 + 4.5 * rng.standard_normal((WALKERS, DRAWS)) if length_draws is None else length_draws
+    return FigureData(
+        "On-body", "Cable length (mm)", RANGE,
+        (angle_curve("free sheath", 5.0, 118.0, [108.0, 100.0]), angle_curve("squeezed sheath", 58.0, 5.0, [28.0, 37.0])),
+        Band(GRID, 0.79 - 1e-5 * (GRID - 470) ** 2 + 0.01 * SPREAD), (points,), optimum(lengths), lengths,
+        0.79 + 0.008 * rng.standard_normal((WALKERS, DRAWS)),
+        (
+            parameter("mu1", r"$\mu_1$", 0.084, 0.01), parameter("mu22", r"$\mu_2$", 0.123, 0.02),
+            parameter("mu333", r"$\mu_3$", 0.17, 0.05, estimate=float("nan")),
+            parameter("sigma_theta", r"$\sigma_\theta$", 2.3, 0.5, "noise", "deg"),
+            parameter("tau", r"$\tau$", 0.0, 0.012, "noise"),
+            parameter("free_sheath_angle_a", r"$a_\mathrm{fs}$", 3.2, 0.05, "curve", "log rad"),
+        ),
+        ENSEMBLES,
+    )  # fmt: skip
+
+
+def without_route(data):
+    points = tuple(dataclasses.replace(p, route=np.full(4, np.nan), inside=np.ones(4, dtype=bool)) for p in data.points)
+    return dataclasses.replace(
+        data, route_label="", route_range=(0.0, 0.0), angles=(), efficiency=None, points=points, optimum=None,
+        optimal_length=None, optimal_efficiency=None, parameters=data.parameters[:1],
+    )  # fmt: skip
+
+
+def without_draws(data):
+    def line(band):
+        return Band(band.route, band.quantiles[2:3])
+
+    return dataclasses.replace(
+        data, angles=tuple(dataclasses.replace(c, band=line(c.band)) for c in data.angles),
+        efficiency=line(data.efficiency), optimum=None, optimal_length=None, optimal_efficiency=None, n_ensembles=0,
+        points=tuple(dataclasses.replace(p, predicted=p.predicted[2:3]) for p in data.points),
+        parameters=tuple(dataclasses.replace(p, draws=None, prior=None) for p in data.parameters),
+    )  # fmt: skip
+
+
+def with_many_runs(data):
+    route = np.resize(np.arange(430.0, 531.0, 10.0), 40)
+    measured = np.resize(EFFICIENCIES[:3], 40)
+    labels = tuple(f"forces/2024-05-03_bench_a.csv, run {i}" for i in range(40))
+    runs = EfficiencyPoints(
+        "run_efficiency", labels, route, measured, measured + 0.01 * SPREAD, np.ones(40, dtype=bool)
+    )
+    return dataclasses.replace(data, points=(*data.points, runs))
+
+
+def with_five_contacts(data):
+    more = tuple(dataclasses.replace(data.angles[0], contact=f"contact {i}") for i in range(3))
+    friction = tuple(parameter(f"mu{'4' * i}", rf"$\mu_{i}$", 0.1, 0.01) for i in range(4, 9))
+    return dataclasses.replace(data, angles=data.angles + more, parameters=friction + data.parameters)
+
+
+def with_constant_draws(data):
+    constant = tuple(dataclasses.replace(p, draws=np.full((WALKERS, DRAWS), 0.1)) for p in data.parameters)
+    return dataclasses.replace(
+        data, parameters=constant, optimal_length=np.full((WALKERS, DRAWS), 470.0),
+        optimal_efficiency=np.full((WALKERS, DRAWS), 0.79),
+    )  # fmt: skip
+
+
+def at_the_edge():
+    rng = np.random.default_rng(1)
+    return paper_data(np.minimum(525 + 6 * rng.standard_normal((WALKERS, DRAWS)), RANGE[1]))
+
+
+CASES = {
+    "on body": paper_data,
+    "no route": lambda: without_route(paper_data()),
+    "least squares only": lambda: without_draws(paper_data()),
+    "many runs": lambda: with_many_runs(paper_data()),
+    "five contacts": lambda: with_five_contacts(paper_data()),
+    "constant draws": lambda: with_constant_draws(paper_data()),
+    "optimum at the edge": at_the_edge,
+}
+APPLY = {
+    "on body": ["wrap_angles", "efficiency", "coefficients", "pairs", "traces", "residuals"],
+    "no route": ["coefficients", "traces", "residuals"],
+    "least squares only": ["wrap_angles", "efficiency", "residuals"],
+}
+
+
+def drawn(name, data=None):
+    return FIGURES[name].draw(paper_data() if data is None else data)
+
+
+def line(axes, label):
+    return next(artist for artist in axes.get_lines() if artist.get_label() == label)
+
+
+@pytest.mark.parametrize("case", APPLY)
+def test_only_figures_that_apply_are_drawn(case):
+    data = CASES[case]()
+    assert [name for name, entry in FIGURES.items() if entry.applies(data)] == APPLY[case]
+
+
+def test_a_single_draw_of_each_walker_has_no_trace_but_all_else():
+    data = paper_data()
+    single = tuple(dataclasses.replace(p, draws=p.draws[:, :1]) for p in data.parameters)
+    data = dataclasses.replace(data, parameters=single, optimal_length=data.optimal_length[:, :1])
+    assert not FIGURES["traces"].applies(data)
+    assert FIGURES["coefficients"].applies(data)
+
+
+@pytest.mark.parametrize("case", CASES)
+def test_no_words_overlap_or_leave_the_page(case):
+    data = CASES[case]()
+    for name, entry in FIGURES.items():
+        if not entry.applies(data):
+            continue
+        figure = entry.draw(data)
+        boxes, page = words(figure), figure.bbox.padded(1.0)
+        for i, (text, box) in enumerate(boxes):
+            inside = page.x0 <= box.x0 and box.x1 <= page.x1 and page.y0 <= box.y0 and box.y1 <= page.y1
+            assert inside, f"{name}: {text!r} leaves the page"
+            for other, other_box in boxes[i + 1 :]:
+                assert not box.padded(-1.0).overlaps(other_box.padded(-1.0)), f"{name}: {text!r} overlaps {other!r}"
+
+
+@pytest.mark.parametrize("case", CASES)
+def test_every_axis_says_what_it_shows_or_shares_one_that_does(case):
+    data = CASES[case]()
+    for name in ("wrap_angles", "efficiency", "coefficients", "residuals"):
+        for axes in FIGURES[name].draw(data).axes if FIGURES[name].applies(data) else ():
+            assert any(other.get_xlabel() for other in axes.get_shared_x_axes().get_siblings(axes))
+            lists_rows = "Measured efficiency" in axes.get_xlabel()
+            assert lists_rows or any(other.get_ylabel() for other in axes.get_shared_y_axes().get_siblings(axes))
+
+
+@pytest.mark.parametrize(
+    ("name", "labels"),
+    [
+        ("wrap_angles", {"Cable length (mm)", "Wrap angle (deg)"}),
+        ("efficiency", {"Cable length (mm)", "Efficiency (%)", "Density (1/mm)", "Probability (%)"}),
+        ("coefficients", {r"$\mu_1$", r"$\mu_2$", r"$\mu_3$", "Density"}),
+        ("pairs", {r"$\mu_1$", r"$\sigma_\theta$ (deg)", "Optimum (mm)", "Efficiency at\noptimum (%)"}),
+        ("traces", {r"$\mu_1$", r"$\sigma_\theta$ (deg)", "Optimum (mm)", "Draw of each walker"}),
+        ("residuals", {"Cable length (mm)", "Residual (deg)"}),
+    ],
+)
+def test_names_and_units_are_the_same_everywhere(name, labels):
+    assert labels <= {text for text, _ in words(drawn(name))}
+
+
+def test_wrap_angles_show_every_reading_as_what_it_is():
+    data = paper_data()
+    axes = drawn("wrap_angles", data).axes[0]
+    curve = data.angles[0]
+    np.testing.assert_array_equal(line(axes, "Reading").get_xydata().T, [curve.route, curve.angle])
+    np.testing.assert_array_equal(
+        line(axes, "Not detected, at its limit").get_xydata().T, [curve.undetected_route, curve.limit]
+    )
+    unused = line(axes, "Not used by the curve")
+    np.testing.assert_array_equal(unused.get_xydata().T, [curve.outside_route, curve.outside_angle])
+    assert unused.get_markerfacecolor() == "white"
+    assert len(axes.patches) >= len(curve.undetected_route)
+
+
+def test_bands_hold_the_quantiles_of_the_curve():
+    data = paper_data()
+    axes = drawn("wrap_angles", data).axes[0]
+    low, _, median, _, high = data.angles[0].band.quantiles
+    np.testing.assert_array_equal(line(axes, "Median").get_ydata(), median)
+    widest = next(c for c in axes.collections if c.get_label() == "90 % interval")
+    heights = widest.get_paths()[0].vertices[:, 1]
+    assert (heights.min(), heights.max()) == (low.min(), high.max())
+
+
+def test_without_draws_there_is_a_line_and_no_band():
+    data = without_draws(paper_data())
+    for name in ("wrap_angles", "efficiency"):
+        axes = drawn(name, data).axes[0]
+        assert line(axes, "Least squares")
+        assert not [c for c in axes.collections if isinstance(c, PolyCollection)]
+    assert len(drawn("efficiency", data).axes) == 1
+
+
+def test_no_curve_is_drawn_outside_the_range():
+    for name in ("wrap_angles", "efficiency"):
+        axes = drawn(name).axes[0]
+        route = line(axes, "Median").get_xdata()
+        assert (route.min(), route.max()) == RANGE
+        assert axes.get_xlim()[1] > 550.0
+        assert "Outside the range of the curves" in [p.get_label() for p in axes.patches]
+
+
+def test_efficiency_marks_points_outside_with_their_prediction():
+    data = paper_data()
+    axes = drawn("efficiency", data).axes[0]
+    np.testing.assert_allclose(line(axes, "Measured").get_ydata(), 100 * EFFICIENCIES[:3])
+    outside = line(axes, "Measured, outside the range")
+    np.testing.assert_allclose(outside.get_xydata(), [[550.0, 67.8]])
+    (container,) = axes.containers
+    (bar,) = container[2][0].get_segments()
+    np.testing.assert_allclose(bar[:, 1], 100 * data.points[0].predicted[[0, -1], 3])
+
+
+def test_optimum_window_and_choices_stand_below_the_efficiency():
+    data = paper_data()
+    _, where, which = drawn("efficiency", data).axes
+    window = next(p for p in where.patches if "best with 95 %" in p.get_label())
+    assert (window.get_x(), window.get_x() + window.get_width()) == (455.0, 484.0)
+    heights = [bar.get_height() for bar in which.containers[0]]
+    assert heights == [100 * choice.probability_best for choice in data.optimum.choices]
+
+
+def test_a_missing_window_is_not_drawn():
+    data = paper_data()
+    nowhere = dataclasses.replace(data.optimum, window=Window(0.01, 0.95, float("nan"), float("nan")))
+    figure = drawn("efficiency", dataclasses.replace(data, optimum=nowhere))
+    assert not [text for text, _ in words(figure) if "probability" in text]
+
+
+def test_an_optimum_at_the_edge_is_said_to_be_there():
+    share = at_the_edge().optimum.at_edge
+    assert share > 0.1
+    assert f"{100 * share:.3g} % of the draws at an end of the range" in [
+        t for t, _ in words(drawn("efficiency", at_the_edge()))
+    ]
+
+
+def test_coefficients_show_prior_posterior_and_least_squares():
+    data = paper_data()
+    axes = drawn("coefficients", data).axes
+    assert len(axes) == 3
+    for panel, p in zip(axes, data.parameters, strict=False):
+        assert {"Posterior", "Prior"} <= {artist.get_label() for artist in panel.get_lines()}
+        low, median, high = (f"{q:.3f}" for q in np.quantile(p.draws, (0.05, 0.5, 0.95)))
+        if p.name == "mu1":
+            assert panel.get_title() == f"Median {median}\n90 % interval {low} to {high}"
+    (bar,) = axes[0].containers[0][2][0].get_segments()
+    np.testing.assert_allclose(bar[:, 0], [0.074, 0.094])
+    assert "Least squares: not identified" in [t.get_text() for t in axes[2].texts]
+
+
+def test_a_far_least_squares_estimate_is_written_not_drawn():
+    data = paper_data()
+    far = dataclasses.replace(data.parameters[0], least_squares=5.0)
+    (axes,) = drawn("coefficients", dataclasses.replace(data, parameters=(far,))).axes
+    assert not axes.containers
+    assert [t.get_text() for t in axes.texts] == ["Least squares: off the axis, 5"]
+
+
+def test_pair_plot_shows_at_most_eight_and_keeps_the_optimum():
+    texts = [text for text, _ in words(drawn("pairs", with_five_contacts(paper_data())))]
+    assert texts.count("Optimum (mm)") == 2  # below its column and left of its row
+    symbols = {text for text in texts if text.startswith("$")}
+    assert len(symbols) == 6
+
+
+def test_traces_tell_a_stray_ensemble():
+    data = paper_data()
+    stray = data.parameters[0].draws.copy()
+    stray[: WALKERS // ENSEMBLES] += 0.05
+    moved = dataclasses.replace(data.parameters[0], draws=stray)
+    figure = drawn("traces", dataclasses.replace(data, parameters=(moved,), optimum=None))
+    medians = [c.get_segments()[0][:, 1].mean() for c in figure.axes[0].collections if c.get_linewidth()[0] == 1.0]
+    assert len(medians) == ENSEMBLES
+    assert medians[0] > max(medians[1:]) + 0.1  # in
+
+
+def test_residuals_are_measured_minus_predicted_in_points():
+    axes = drawn("residuals").axes[0]
+    np.testing.assert_allclose(line(axes, "Measured").get_xdata(), -0.2, atol=1e-12)
+    np.testing.assert_allclose(line(axes, "Outside the range").get_xydata(), [[-0.2, 3.0]])
+    assert [t.get_text() for t in axes.get_yticklabels()] == ["440 mm", "470 mm", "510 mm", "550 mm"]
+
+
+def test_angle_residuals_are_readings_minus_the_curve():
+    first, second = drawn("residuals").axes[1:]
+    for axes in (first, second):
+        np.testing.assert_allclose(axes.get_lines()[0].get_ydata(), 0.5)
+
+
+def test_a_density_integrates_to_one_up_to_its_bound():
+    draws = np.abs(np.random.default_rng(0).standard_normal(20_000))
+    grid = np.linspace(0.0, 5.0, 301)
+    height = density(draws, grid, lower=0.0)
+    assert np.trapezoid(height, grid) == pytest.approx(1.0, abs=0.01)
+    assert height[0] == pytest.approx(
+        np.sqrt(2 / np.pi), rel=0.05
+    )  # a half normal's, which smoothing alone would halve
+    assert density(draws, np.linspace(-1.0, 5.0, 301), lower=0.0)[0] == 0.0
+
+
+def test_the_95_percent_region_holds_95_percent_of_the_draws():
+    x, y = np.random.default_rng(0).standard_normal((2, 20_000))
+    columns, rows = bin_numbers(x, (-4.0, 4.0)), bin_numbers(y, (-4.0, 4.0))
+    share = enclosed_share(columns, rows)
+    assert share.shape == (BINS, BINS)
+    assert (share[rows, columns] <= 0.95).mean() == pytest.approx(0.95, abs=0.015)
+
+
+@pytest.mark.parametrize(
+    "limits", [(0.0, 0.034), (430.0, 530.0), (-1.31, -1.05), (1e-6, 3e-6), (0.171, 0.189), (1.0, 20.0)]
+)
+def test_ticks_are_round_and_within_the_axis(limits):
+    values, texts = ticks(limits, lambda _: 4.0)
+    assert len(values) == len(set(texts)) > 0
+    assert limits[0] <= values.min() <= values.max() <= limits[1]
+
+
+def test_all_figures_are_written_in_both_formats_and_nothing_else(tmp_path):
+    before = dict(mpl.rcParams)
+    written = draw_all(paper_data(), tmp_path / "figures")
+    assert [path.name for path in written] == [
+        f"{name}.{ending}" for name in APPLY["on body"] for ending in ("png", "svg")
+    ]
+    assert sorted(written) == sorted((tmp_path / "figures").iterdir())
+    assert all(1_000 < path.stat().st_size < 500_000 for path in written)
+    assert dict(mpl.rcParams) == before
+
+
+def test_only_the_figures_asked_for_are_written(tmp_path):
+    written = draw_all(without_route(paper_data()), tmp_path, formats=("svg",), names=("efficiency", "coefficients"))
+    assert [path.name for path in written] == ["coefficients.svg"]
+
+
+def test_the_same_data_give_the_same_bytes_with_words_as_text(tmp_path):
+    for folder in ("first", "second"):
+        draw_all(paper_data(), tmp_path / folder, formats=("svg",))
+    for path in (tmp_path / "first").iterdir():
+        assert path.read_bytes() == (tmp_path / "second" / path.name).read_bytes()
+    assert "Wrap angle (deg)</text>" in (tmp_path / "first" / "wrap_angles.svg").read_text(encoding="utf-8")
+
+
+def test_a_failed_write_leaves_the_old_file_and_no_temporary_one(tmp_path):
+    path = tmp_path / "coefficients.nonsense"
+    path.write_text("old")
+    with pytest.raises(ValueError, match="nonsense"):
+        write(drawn("coefficients"), path)
+    assert [p.name for p in tmp_path.iterdir()] == [path.name]
+    assert path.read_text() == "old"
+
+
+def test_drawing_loads_neither_jax_nor_pyplot():
+    program = (
+        "import sys, bowdenfit.questions.summary.gallery\n"
+        "print(*sorted({'jax', 'scipy', 'arviz_base', 'matplotlib.pyplot'} & set(sys.modules)))"
+    )
+    done = subprocess.run([sys.executable, "-c", program], capture_output=True, text=True, check=True)
+    assert done.stdout.strip() == ""
+
+
+def test_the_quantiles_of_the_bands_are_those_that_the_legends_name():
+    assert BAND_QUANTILES == (0.05, 0.25, 0.5, 0.75, 0.95)

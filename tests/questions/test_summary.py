@@ -1,0 +1,138 @@
+"""What a fit says to people: the printed summary, the notebook page, and the verdicts."""
+
+import re
+from html.parser import HTMLParser
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+import bowdenfit as bf
+from bowdenfit.questions.summary.words import summary_text
+
+GOLDEN = Path(__file__).parent / "golden"
+QUICK = ("sampler.n_walkers=128", "sampler.target_ess=200", "sampler.target_r_hat=1.05", "sampler.max_steps=3000")
+
+
+@pytest.fixture(scope="module")
+def fit(on_body):
+    """A quick fit of the on-body data."""
+    return bf.fit(on_body, seed=5, settings=QUICK)
+
+
+def masked(text: str) -> str:
+    """Every number as one #, runs of blanks as one, versions left out: what a golden file can hold on any machine."""
+    text = re.sub(r"Seed .*", "Seed", text, flags=re.S)
+    text = re.sub(r"The fit leans on .*?if in doubt\.", "The fit leans on ...", text, flags=re.S)  # the last ones vary
+    text = re.sub(r"[-+]?\d+(\.\d+)?(e[-+]?\d+)?", "#", text)
+    return re.sub(r"-{3,}", "---", re.sub(r"[ ]{2,}", "  ", text)).strip() + "\n"
+
+
+def test_the_printed_summary_is_that_of_the_golden_file(fit):
+    assert masked(summary_text(fit)) == (GOLDEN / "on_body_summary.txt").read_text()
+
+
+def test_no_line_of_the_summary_is_too_wide_for_a_terminal_of_130(fit):
+    assert max(map(len, summary_text(fit).splitlines())) <= 130
+
+
+def test_every_measured_efficiency_stands_beside_its_prediction(fit):
+    rows = fit.summary()["measured"]
+    assert [row["label"] for row in rows] == ["440 mm", "470 mm", "510 mm", "550 mm"]
+    for row in rows:
+        assert row["q05"] < row["predicted"] < row["q95"]
+        assert row["predictive_q05"] < row["q05"]
+        assert row["relative_error"] == pytest.approx(row["measured"] / row["predicted"] - 1)
+
+
+def test_the_summary_has_every_key_of_the_format(fit):
+    page = fit.summary()
+    assert {"schema", "name", "verdict", "parameters", "optimal", "seed", "versions"} <= set(page)
+    keys = {
+        "unit",
+        "prior",
+        "least_squares",
+        "mean",
+        "sd",
+        "median",
+        "q05",
+        "q95",
+        "ess_bulk",
+        "ess_tail",
+        "r_hat",
+        "mcse_mean",
+    }
+    assert keys <= set(page["parameters"]["mu1"])
+    assert {"value", "standard_error", "identified"} <= set(page["parameters"]["mu1"]["least_squares"])
+    assert {"mean", "sd", "median", "q05", "q95", "at_edge"} <= set(page["optimal"]["length"])
+    assert {"within", "probability", "from", "to"} <= set(page["optimal"]["window"])
+    assert {"length", "probability_best", "expected_regret"} <= set(page["optimal"]["choices"][0])
+
+
+def test_the_summary_agrees_with_the_draws(fit):
+    row, draws = fit.summary()["parameters"]["mu2"], fit.posterior.values["mu2"]
+    assert row["mean"] == pytest.approx(draws.mean())
+    assert row["q95"] == pytest.approx(np.quantile(draws, 0.95))
+
+
+def test_what_is_not_identified_has_no_number(fit):
+    estimate = fit.summary()["parameters"]["squeezed_sheath_angle_c"]["least_squares"]
+    assert not estimate["identified"]
+    assert estimate["value"] is None
+    assert estimate["standard_error"] is None
+
+
+class Tags(HTMLParser):
+    """Checks that tags are closed in order."""
+
+    def __init__(self):
+        super().__init__()
+        self.open, self.seen = [], []
+
+    def handle_starttag(self, tag, attrs):
+        self.open.append(tag)
+        self.seen.append(tag)
+
+    def handle_endtag(self, tag):
+        assert self.open.pop() == tag
+
+
+def test_a_fit_shows_itself_in_a_notebook(fit):
+    for shown in (fit, fit.optimal_length()):
+        page = Tags()
+        page.feed(shown._repr_html_())
+        assert page.open == []
+        assert "table" in page.seen
+    assert "Converged" in fit._repr_html_()
+    assert "least squares" not in repr(fit)
+
+
+def test_a_coefficient_that_no_measurement_informs_is_said_to_rest_on_its_prior(tmp_path, on_body):
+    for path in on_body.iterdir():
+        (tmp_path / path.name).write_text(path.read_text())
+    text = (tmp_path / "cable.toml").read_text().replace('efficiencies = { file = "efficiencies.csv" }', "")
+    (tmp_path / "cable.toml").write_text(text)
+    page = summary_text(bf.fit(tmp_path, seed=1, settings=QUICK))
+    assert "mu1, mu2 and mu3 rest on the prior almost alone" in " ".join(page.split())
+    assert "the measurements do not determine it" in page
+
+
+def test_interval_of_one_parameter_by_name(fit):
+    interval = fit.parameter("sigma_theta")
+    assert 1.0 < interval.median < 4.0
+    with pytest.raises(bf.UsageError, match="there is no parameter"):
+        fit.parameter("mu9")
+
+
+def test_without_a_route_there_is_no_length_to_choose(tmp_path):
+    table = tmp_path / "forces.csv"
+    force = np.tile(np.arange(20.0, 60.0, 5.0), 3)
+    noise = np.random.default_rng(1).normal(0, 0.2, (2, len(force)))
+    rows = [f"{i // 8},{f + a:.3f},{0.7 * f + b:.3f}" for i, (f, a, b) in enumerate(zip(force, *noise, strict=True))]
+    table.write_text("run,input_force_N,output_force_N\n" + "\n".join(rows) + "\n")
+    fit = bf.fit(table, wrap_angle=(180.0, "deg"), seed=1)
+    assert fit.converged
+    assert fit.parameter("mu").q05 < -np.log(0.7) / np.pi < fit.parameter("mu").q95
+    assert "Best" not in summary_text(fit)
+    with pytest.raises(bf.UsageError, match="no \\[route\\]"):
+        fit.optimal_length()

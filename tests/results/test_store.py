@@ -1,0 +1,274 @@
+"""The results folder: whole, never overwritten by accident, and read back bit for bit."""
+
+import dataclasses
+import json
+import shutil
+
+import h5py
+import numpy as np
+import pytest
+
+import bowdenfit as bf
+from bowdenfit.results.folder import written_whole
+
+QUICK = (
+    "sampler.n_ensembles=2",
+    "sampler.n_walkers=64",
+    "sampler.max_steps=400",
+    "sampler.target_ess=100",
+    "sampler.target_r_hat=1.2",
+)
+
+
+@pytest.fixture(scope="module")
+def saved(on_body, tmp_path_factory):
+    """A quick fit of the on-body data with its folder."""
+    folder = tmp_path_factory.mktemp("results") / "fit"
+    return bf.fit(on_body, output=folder, seed=3, settings=QUICK, figures=False), folder
+
+
+def assert_same(a, b, where=""):
+    """Equal to the last bit, all the way down."""
+    assert type(a) is type(b), where
+    if dataclasses.is_dataclass(a):
+        for part in dataclasses.fields(a):
+            assert_same(getattr(a, part.name), getattr(b, part.name), f"{where}.{part.name}")
+    elif isinstance(a, dict):
+        assert list(a) == list(b), where
+        for key in a:
+            assert_same(a[key], b[key], f"{where}[{key}]")
+    elif isinstance(a, np.ndarray):
+        assert a.dtype == b.dtype, where
+        np.testing.assert_array_equal(a, b, err_msg=where, strict=True)
+    elif isinstance(a, float) and np.isnan(a):
+        assert np.isnan(b), where
+    elif isinstance(a, tuple):
+        assert len(a) == len(b), where
+        for i, (x, y) in enumerate(zip(a, b, strict=True)):
+            assert_same(x, y, f"{where}[{i}]")
+    else:
+        assert a == b, where
+
+
+def test_a_fit_is_read_back_bit_for_bit(saved):
+    fit, folder = saved
+    again = bf.Fit.load(folder)
+    assert_same(fit.posterior, again.posterior, "posterior")
+    assert_same(fit.least_squares, again.least_squares, "least_squares")
+    assert_same(fit.dataset.measurements, again.dataset.measurements, "measurements")
+    assert fit.dataset.description == again.dataset.description
+    assert fit.dataset.sha256 == again.dataset.sha256
+    assert (fit.converged, fit.reasons) == (again.converged, again.reasons)
+    assert (fit.provenance.seed, fit.provenance.versions) == (again.provenance.seed, again.provenance.versions)
+
+
+def test_a_fit_from_before_there_was_a_second_sampler_is_read(saved, tmp_path):
+    fit, folder = saved
+    copy = shutil.copytree(folder, tmp_path / "copy")
+    page = json.loads((copy / "fit.json").read_text())
+    assert page["schema"] == 4
+    page["schema"] = 3
+    for key in ("sampler", "trajectories", "agreement"):
+        del page["posterior"][key]
+    for estimate in page["least_squares"]["estimates"].values():
+        for key in ("lower", "upper", "at_bound"):
+            estimate.pop(key, None)
+    for key in ("method", "n_chains", "target_acceptance"):
+        del page["description"]["sampler"][key]
+    (copy / "fit.json").write_text(json.dumps(page))
+    again = bf.load(copy)
+    assert_same(fit.posterior, again.posterior, "posterior")
+    assert again.posterior.sampler == "emcee"
+    assert fit.dataset.description == again.dataset.description
+
+
+def test_a_loaded_fit_gives_the_same_answers(saved):
+    fit, folder = saved
+    again = bf.load(folder)
+    assert fit.optimal_length() == again.optimal_length()
+    assert fit.efficiency([455.0, 470.0]) == again.efficiency([455.0, 470.0])
+    assert json.loads((folder / "summary.json").read_text()) == again.summary()
+
+
+def test_the_same_seed_gives_the_same_draws(saved, on_body):
+    fit, _ = saved
+    again = bf.fit(on_body, seed=3, settings=QUICK)
+    np.testing.assert_array_equal(fit.posterior.z, again.posterior.z)
+
+
+def test_the_posterior_file_opens_in_arviz(saved):
+    import xarray
+
+    fit, folder = saved
+    with xarray.open_datatree(folder / "posterior.nc", engine="h5netcdf") as tree:
+        assert {"posterior", "log_likelihood", "posterior_predictive", "prior", "observed_data", "sample_stats"} <= set(
+            tree.children
+        )
+        assert tree["posterior"]["optimal_length"].attrs["units"] == "mm"
+        assert tree["posterior"]["mu1"].dims == ("chain", "draw")
+        assert set(tree["log_likelihood"].data_vars) == set(tree["observed_data"].data_vars)
+        assert json.loads(tree.attrs["provenance"])["seed"] == fit.provenance.seed
+
+
+def test_the_log_posterior_in_the_file_is_that_of_the_draws(saved):
+    import jax
+    import xarray
+
+    from bowdenfit.inference.log_density import LogDensity
+
+    fit, folder = saved
+    density = LogDensity(fit.model)
+    expected = jax.jit(jax.vmap(density.log_density, in_axes=(0, None)))(fit.posterior.flat_z, density.data)
+    with xarray.open_datatree(folder / "posterior.nc", engine="h5netcdf") as tree:
+        np.testing.assert_allclose(tree["sample_stats"]["lp"].values.ravel(), expected, rtol=1e-10)
+
+
+def test_a_finished_fit_is_not_overwritten(saved, on_body):
+    _, folder = saved
+    before = (folder / "fit.json").read_bytes()
+    with pytest.raises(bf.StoreError, match="--force"):
+        bf.fit(on_body, output=folder, settings=QUICK)
+    assert (folder / "fit.json").read_bytes() == before
+
+
+def test_force_replaces_a_fit_and_nothing_else(saved, on_body, tmp_path):
+    _, folder = saved
+    copy = shutil.copytree(folder, tmp_path / "copy")
+    (copy / "notes.txt").write_text("mine")
+    fit = bf.fit(on_body, output=copy, mcmc=False, seed=9, figures=False, force=True, settings=QUICK)
+    assert bf.load(copy).provenance.seed == fit.provenance.seed == 9
+    assert not (copy / "posterior.nc").exists()
+    assert not (copy / "chain.h5").exists()
+    assert (copy / "notes.txt").read_text() == "mine"
+
+
+def test_a_folder_of_something_else_is_left_alone(on_body, tmp_path):
+    (tmp_path / "thesis.tex").write_text("...")
+    with pytest.raises(bf.StoreError, match="no results folder"):
+        bf.fit(on_body, output=tmp_path, mcmc=False)
+    assert [p.name for p in tmp_path.iterdir()] == ["thesis.tex"]
+
+
+class Stop(Exception):
+    """Stands for the user's interrupt."""
+
+
+def interrupted(on_body, folder, at, **options):
+    """A fit that is interrupted once it has taken `at` steps."""
+
+    def stop(progress):
+        if progress.steps >= at:
+            raise Stop
+
+    with pytest.raises(Stop):
+        bf.fit(on_body, output=folder, seed=3, settings=QUICK, figures=False, progress=stop, **options)
+
+
+def test_an_interrupted_fit_leaves_its_checkpoint_and_nothing_half_written(on_body, tmp_path):
+    folder = tmp_path / "fit"
+    interrupted(on_body, folder, 200)
+    assert [p.name for p in folder.iterdir()] == ["chain.h5"]
+    with pytest.raises(bf.StoreError, match="--resume"):
+        bf.fit(on_body, output=folder, settings=QUICK)
+    with pytest.raises(bf.StoreError, match="--resume"):
+        bf.load(folder)
+
+
+def test_a_resumed_fit_equals_one_that_was_never_interrupted(saved, on_body, tmp_path):
+    fit, _ = saved
+    folder = tmp_path / "fit"
+    interrupted(on_body, folder, 200)
+    resumed = bf.fit(on_body, output=folder, settings=QUICK, figures=False, resume=True)
+    np.testing.assert_array_equal(resumed.posterior.z, fit.posterior.z)
+    assert resumed.provenance.seed == 3
+
+
+def test_a_checkpoint_from_before_a_setting_existed_is_resumed(saved, on_body, tmp_path):
+    """Settings that have come since stand at their defaults."""
+    fit, folder = saved
+    copy = shutil.copytree(folder, tmp_path / "copy")
+    with h5py.File(copy / "chain.h5", "a") as file:
+        page = json.loads(file.attrs["fingerprint"])
+        for key in ("method", "n_chains", "target_acceptance"):
+            del page["description"]["sampler"][key]
+        file.attrs["fingerprint"] = json.dumps(page)
+    again = bf.fit(on_body, output=copy, settings=QUICK, figures=False, resume=True)
+    np.testing.assert_array_equal(again.posterior.z, fit.posterior.z)
+
+
+def test_resume_tops_up_a_finished_fit(saved, on_body, tmp_path):
+    fit, folder = saved
+    copy = shutil.copytree(folder, tmp_path / "copy")
+    more = bf.fit(
+        on_body,
+        output=copy,
+        figures=False,
+        resume=True,
+        settings=(*QUICK, "sampler.max_steps=600", "sampler.target_ess=100000"),
+    )
+    assert (more.posterior.steps, fit.posterior.steps) == (600, 400)
+    assert not more.converged
+
+
+@pytest.mark.parametrize("change", ["friction.mu1.fixed=0.1", "tables.angles.undetected=dropped"])
+def test_resume_refuses_a_changed_input(saved, on_body, change):
+    _, folder = saved
+    with pytest.raises(bf.StoreError, match="changed"):
+        bf.fit(on_body, output=folder, resume=True, settings=(*QUICK, change))
+
+
+def test_resume_refuses_another_seed(saved, on_body):
+    _, folder = saved
+    with pytest.raises(bf.StoreError, match="seed changed"):
+        bf.fit(on_body, output=folder, resume=True, seed=4, settings=QUICK)
+
+
+def test_resume_needs_a_checkpoint(on_body, tmp_path):
+    with pytest.raises(bf.StoreError, match="no checkpoint"):
+        bf.fit(on_body, output=tmp_path / "nothing", resume=True)
+
+
+def test_a_damaged_checkpoint_is_a_sentence(on_body, tmp_path):
+    (tmp_path / "chain.h5").write_bytes(b"not HDF5")
+    with pytest.raises(bf.StoreError, match="damaged"):
+        bf.fit(on_body, output=tmp_path, resume=True)
+
+
+@pytest.mark.parametrize(
+    ("damage", "says"),
+    [
+        (lambda f: (f / "fit.json").write_text("{"), "damaged"),
+        (lambda f: (f / "fit.json").write_text("{}"), "damaged"),
+        (lambda f: (f / "posterior.nc").unlink(), "missing"),
+        (lambda f: (f / "posterior.nc").write_bytes(b"..."), "damaged"),
+        (lambda f: (f / "fit.json").write_text('{"schema": 99}'), "newer"),
+    ],
+)
+def test_a_damaged_folder_is_a_sentence(saved, tmp_path, damage, says):
+    copy = shutil.copytree(saved[1], tmp_path / "copy")
+    damage(copy)
+    with pytest.raises(bf.StoreError, match=says):
+        bf.load(copy)
+
+
+def test_a_missing_folder_is_a_sentence(tmp_path):
+    with pytest.raises(bf.StoreError, match="does not exist"):
+        bf.load(tmp_path / "nowhere")
+
+
+def test_a_write_that_fails_leaves_the_old_file(tmp_path):
+    path = tmp_path / "a.txt"
+    path.write_text("old")
+    with pytest.raises(Stop), written_whole(path) as temporary:
+        temporary.write_text("new, but")
+        raise Stop
+    assert path.read_text() == "old"
+    assert list(tmp_path.iterdir()) == [path]
+
+
+def test_the_checkpoint_carries_what_it_was_started_for(saved):
+    fit, folder = saved
+    with h5py.File(folder / "chain.h5") as file:
+        page = json.loads(file.attrs["fingerprint"])
+    assert page["seed"] == 3
+    assert page["sha256"] == fit.dataset.sha256

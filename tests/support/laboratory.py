@@ -1,0 +1,73 @@
+"""Simulated cables, fitted: do posterior intervals hold the truth as often as they say?"""
+
+from collections.abc import Callable
+
+import numpy as np
+from scipy import stats
+
+from bowdenfit.dataset import Dataset
+from bowdenfit.description import Description, SamplerSettings
+from bowdenfit.inference.least_squares import LeastSquares, least_squares, maximum_posterior
+from bowdenfit.inference.log_density import LogDensity
+from bowdenfit.model import build_model
+from bowdenfit.questions.calibrate.refit import Laboratory as Fits
+from bowdenfit.questions.calibrate.replication import Plan, Workbench
+from bowdenfit.questions.simulate.simulation import Design, empty_tables
+
+SAMPLER = SamplerSettings(n_ensembles=4, n_walkers=64, max_steps=1500, target_ess=500, target_r_hat=1.03)
+PROBABILITY = 0.9
+SEED = 0
+
+
+def anything(measured: Dataset, drawn: Dataset) -> str:
+    """Every table that is drawn is fitted; for descriptions whose priors keep to plausible cables."""
+    return ""
+
+
+class Laboratory:
+    """Simulates cables, fits them, and says for each whether its intervals hold the truth."""
+
+    def __init__(self, disturb: Callable[[Dataset], Dataset] = lambda dataset: dataset, sampler=SAMPLER):
+        self.disturb, self.fits, self.benches = disturb, Fits(sampler), {}
+
+    def least_squares(self, dataset: Dataset) -> LeastSquares:
+        """Classical estimates, as a fit without MCMC gives them."""
+        posterior = LogDensity(build_model(dataset))
+        objective = self.fits.programs_for(posterior).objective
+        return least_squares(posterior, objective, maximum_posterior(posterior, objective).z)
+
+    def draws(self, posterior: LogDensity, seed: int) -> np.ndarray:
+        """Draws of the posterior in z, one a row."""
+        return self.fits.chain(posterior, seed).z.reshape(-1, posterior.model.space.size)
+
+    def ranks(self, description: Description, design: Design, seed: int) -> dict[str, float]:
+        """Share of the posterior below the truth, by parameter, and for the optimum of a cable with a route.
+
+        Uniform between 0 and 1 if all is right.
+        """
+        key = description.model_dump_json() + repr(design)
+        if key not in self.benches:
+            dataset = Dataset(description, empty_tables(description, design), {})
+            plan = Plan(dataset, dataset, SEED, self.fits.sampler)
+            self.benches[key] = Workbench(plan, self.fits, self.disturb, anything)
+        return {name: each.rank for name, each in self.benches[key].replication(seed).ranked.items()}
+
+
+def held(ranks: list[dict[str, float]]) -> dict[str, tuple[int, int]]:
+    """For each parameter: in how many cables the central 90 % interval holds the truth, and of how many."""
+    by_name: dict[str, list[float]] = {}
+    for cable_ranks in ranks:
+        for name, rank in cable_ranks.items():
+            by_name.setdefault(name, []).append(rank)
+    low, high = (1 - PROBABILITY) / 2, (1 + PROBABILITY) / 2
+    return {name: (sum(low < rank < high for rank in values), len(values)) for name, values in by_name.items()}
+
+
+def p_values(ranks: list[dict[str, float]]) -> dict[str, float]:
+    """Of two-sided binomial tests of the rates of `held`."""
+    return {name: stats.binomtest(hits, n, PROBABILITY).pvalue for name, (hits, n) in held(ranks).items()}
+
+
+def table(ranks: list[dict[str, float]]) -> str:
+    """The rates in words, for a failing test."""
+    return ", ".join(f"{name} {hits}/{n}" for name, (hits, n) in held(ranks).items())

@@ -1,7 +1,7 @@
 """From a data set to a model: the cable, its parameters and one term for each table."""
 
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any, Protocol, runtime_checkable
 
 import numpy as np
@@ -29,6 +29,7 @@ from bowdenfit.description import (
     PriorChoice,
     PriorDefaults,
     QuantityValue,
+    UniformPrior,
 )
 from bowdenfit.errors import DescriptionError, nearest
 from bowdenfit.kinds.angles.term import angles_term
@@ -205,7 +206,7 @@ def _friction(description: Description, name: str, prior: LogNormalPrior) -> Par
     )
     return Parameter(
         name, symbol.replace("_", " ") if " " in name else symbol, f"friction coefficient, {contacts}", "friction",
-        LogNormal(prior.median, prior.log_sd), f"LogNormal({prior.median:g}, {prior.log_sd:g})",
+        LogNormal(prior.median, prior.log_sd),
     )  # fmt: skip
 
 
@@ -216,17 +217,17 @@ def _uncertain_constants(description: Description) -> list[Parameter]:
         constant = contact.wrap_angle.constant
         if constant is None or constant.sd is None:
             continue
-        value, sd = constant.to("angle"), constant.sd_to("angle") or 0.0
+        prior, degrees = TruncatedNormal(constant.to("angle"), constant.sd_to("angle") or 0.0), float(np.rad2deg(1.0))
         parameters.append(
             Parameter(
                 constant_angle_name(contact),
                 rf"$\theta_\mathrm{{{contact.name.replace(' ', chr(92) + ' ')}}}$",
                 f"wrap angle, {contact.name}",
                 "angle",
-                TruncatedNormal(value, sd),
-                f"Normal({np.rad2deg(value):.4g}, {np.rad2deg(sd):.3g}) deg, cut off at 0",
+                prior,
                 "deg",
-                float(np.rad2deg(1.0)),
+                degrees,
+                prior_words=prior.text("deg", degrees, 4),
             )
         )
     return parameters
@@ -235,30 +236,26 @@ def _uncertain_constants(description: Description) -> list[Parameter]:
 def _noise(description: Description, measurements: Measurements, defaults: PriorDefaults) -> list[Parameter]:
     parameters, degree, law = [], float(np.rad2deg(1.0)), noise_law(description)
     if measurements.angles is not None:
-        sd = defaults.angle_noise_degrees
-        meaning, prior = law.meaning("standard deviation of an angle reading"), HalfNormal(sd / degree)
-        text = f"HalfNormal({sd:g} deg)"
-        parameters.append(Parameter(ANGLE_NOISE, r"$\sigma_\theta$", meaning, "noise", prior, text, "deg", degree))
+        meaning = law.meaning("standard deviation of an angle reading")
+        prior = HalfNormal(defaults.angle_noise_degrees / degree)
+        parameters.append(Parameter(ANGLE_NOISE, r"$\sigma_\theta$", meaning, "noise", prior, "deg", degree))
     if any(t is not None for t in (measurements.efficiencies, measurements.forces, measurements.recordings)):
         meaning = law.meaning("scatter of the log ratio from mounting to mounting")
-        prior = HalfNormal(defaults.run_scatter)
-        text = f"HalfNormal({defaults.run_scatter:g})"
-        parameters.append(Parameter(RUN_SCATTER, r"$\tau$", meaning, "noise", prior, text))
+        parameters.append(Parameter(RUN_SCATTER, r"$\tau$", meaning, "noise", HalfNormal(defaults.run_scatter)))
     if measurements.forces is not None or measurements.loop is not None:
         meaning = "standard deviation of a force reading"
         meaning = law.meaning(meaning) if measurements.loop is not None else meaning  # inside a run readings are normal
         parameters.append(_force_noise(description.sensors.force_noise, defaults.force_noise_newtons, meaning))
     if measurements.recordings is not None:
-        sd = defaults.block_noise_newtons
-        meaning, text = "standard deviation of a block's mean force", f"HalfNormal({sd:g} N)"
-        parameters.append(Parameter(BLOCK_NOISE, r"$\sigma_B$", meaning, "noise", HalfNormal(sd), text, "N"))
+        meaning, prior = "standard deviation of a block's mean force", HalfNormal(defaults.block_noise_newtons)
+        parameters.append(Parameter(BLOCK_NOISE, r"$\sigma_B$", meaning, "noise", prior, "N"))
     for table, name, symbol, what, sd, unit in (
         (measurements.stretch, STRETCH_NOISE, r"$\sigma_L$", "stretch", defaults.stretch_noise_mm, "mm"),
         (measurements.preload, PRELOAD_NOISE, r"$\sigma_P$", "preload", defaults.preload_noise_newtons, "N"),
     ):
         if table is not None:
-            meaning, text = law.meaning(f"standard deviation of a {what} reading"), f"HalfNormal({sd:g} {unit})"
-            parameters.append(Parameter(name, symbol, meaning, "noise", HalfNormal(sd), text, unit))
+            meaning = law.meaning(f"standard deviation of a {what} reading")
+            parameters.append(Parameter(name, symbol, meaning, "noise", HalfNormal(sd), unit))
     return parameters
 
 
@@ -268,67 +265,61 @@ def _sensors(description: Description, measurements: Measurements, defaults: Pri
     gain = description.sensors.gain_error_sd
     if gain is not None:
         meaning = "relative gain error between the two load cells"
-        parameters.append(Parameter(GAIN_ERROR, "$g$", meaning, "sensor", Normal(0.0, gain), f"Normal(0, {gain:g})"))
+        parameters.append(Parameter(GAIN_ERROR, "$g$", meaning, "sensor", Normal(0.0, gain)))
     if description.fits_offsets and any(
         table is not None for table in (measurements.forces, measurements.recordings, measurements.loop)
     ):
         stated = description.sensors.offset_sd
         sd = stated.to("force") if stated is not None else defaults.offset_newtons
         for name, symbol, end in ((INPUT_OFFSET, "in", "input"), (OUTPUT_OFFSET, "out", "output")):
-            meaning, text = f"offset of the {end} load cell", f"Normal(0, {sd:g}) N"
-            parameters.append(
-                Parameter(name, f"$b_\\mathrm{{{symbol}}}$", meaning, "sensor", Normal(0.0, sd), text, "N")
-            )
+            meaning = f"offset of the {end} load cell"
+            parameters.append(Parameter(name, f"$b_\\mathrm{{{symbol}}}$", meaning, "sensor", Normal(0.0, sd), "N"))
     if measurements.recordings is not None and measurements.recordings.delay_sd > 0:
-        sd = 1000 * measurements.recordings.delay_sd
-        meaning, text = "error of the estimated delay between the load cells' channels", f"Normal(0, {sd:.3g} ms)"
-        prior = Normal(0.0, measurements.recordings.delay_sd)
-        parameters.append(Parameter(DELAY_ERROR, r"$\delta$", meaning, "sensor", prior, text, "ms", 1000.0))
+        meaning, sd = "error of the estimated delay between the load cells' channels", measurements.recordings.delay_sd
+        parameters.append(
+            Parameter(
+                DELAY_ERROR, r"$\delta$", meaning, "sensor", Normal(0.0, sd), "ms", 1000.0,
+                prior_words=f"Normal(0, {1000 * sd:.3g} ms)",
+            )
+        )  # fmt: skip
     return parameters
 
 
 def _force_noise(stated: QuantityValue | None, scale: float, meaning: str) -> Parameter:
     """Noise of a force reading: free, or as the data sheet says, with its standard deviation or without."""
-    prior: Prior = HalfNormal(scale)
-    text, fixed = f"HalfNormal({scale:g} N)", None
-    if stated is not None and stated.sd is not None:
-        prior = TruncatedNormal(stated.to("force"), stated.sd_to("force") or 0.0)
-        text = f"Normal({stated.to('force'):g}, {stated.sd_to('force'):g}) N, cut off at 0"
-    elif stated is not None:
-        fixed, text = stated.to("force"), "fixed (data sheet)"
-    return Parameter(FORCE_NOISE, r"$\sigma_F$", meaning, "noise", prior, text, "N", fixed=fixed)
+    free = Parameter(FORCE_NOISE, r"$\sigma_F$", meaning, "noise", HalfNormal(scale), "N")
+    if stated is None:
+        return free
+    if stated.sd is None:
+        return replace(free, fixed=stated.to("force"), prior_words="fixed (data sheet)")
+    return replace(free, prior=TruncatedNormal(stated.to("force"), stated.sd_to("force") or 0.0))
 
 
 def _set(parameter: Parameter, setting: ParameterSetting) -> Parameter:
     """The parameter as the user wants it; numbers are in its shown unit."""
-    scale, unit = parameter.shown_scale, "" if parameter.unit == "1" else f" {parameter.unit}"
-    fields = {**parameter.__dict__, "fixed": None}
+    scale = parameter.shown_scale
     if setting.fixed is not None:
-        return Parameter(**{**fields, "fixed": setting.fixed / scale, "prior_text": "fixed"})
+        return replace(parameter, fixed=setting.fixed / scale, prior_words="")
     if setting.measured is not None:
         value, sd = setting.measured.value, setting.measured.sd
-        text = f"measured {value:g} +- {sd:g}{unit}"
-        return Parameter(**{**fields, "prior": TruncatedNormal(value / scale, sd / scale), "prior_text": text})
+        words = f"measured {value:g} +- {sd:g}" + ("" if parameter.unit == "1" else f" {parameter.unit}")
+        return replace(parameter, prior=TruncatedNormal(value / scale, sd / scale), fixed=None, prior_words=words)
     assert setting.prior is not None  # a setting has exactly one of the three
     _check_support(parameter, setting.prior)
-    prior, text = _chosen(setting.prior.lognormal or setting.prior.normal or setting.prior.half_normal, scale, unit)
-    if setting.prior.uniform is not None:
-        low, high = setting.prior.uniform.low, setting.prior.uniform.high
-        prior, text = Uniform(low / scale, high / scale), f"Uniform({low:g}, {high:g}){unit}"
-    return Parameter(**{**fields, "prior": prior, "prior_text": text})
+    return replace(parameter, prior=_prior(setting.prior, scale), fixed=None, prior_words="")
 
 
-def _chosen(
-    spec: LogNormalPrior | NormalPrior | HalfNormalPrior | None, scale: float, unit: str
-) -> tuple[Prior | None, str]:
-    match spec:
+def _prior(choice: PriorChoice, scale: float) -> Prior:
+    match choice.lognormal or choice.normal or choice.half_normal or choice.uniform:
         case LogNormalPrior(median=median, log_sd=log_sd):
-            return LogNormal(median / scale, log_sd), f"LogNormal({median:g}{unit}, {log_sd:g})"
+            return LogNormal(median / scale, log_sd)
         case NormalPrior(mean=mean, sd=sd):
-            return Normal(mean / scale, sd / scale), f"Normal({mean:g}, {sd:g}){unit}"
+            return Normal(mean / scale, sd / scale)
         case HalfNormalPrior(sd=sd):
-            return HalfNormal(sd / scale), f"HalfNormal({sd:g}{unit})"
-    return None, ""
+            return HalfNormal(sd / scale)
+        case UniformPrior(low=low, high=high):
+            return Uniform(low / scale, high / scale)
+    raise AssertionError("a choice of a prior has exactly one of the four")
 
 
 def _check_support(parameter: Parameter, choice: PriorChoice) -> None:

@@ -61,25 +61,11 @@ class GaussianCurve:
                 f"logarithm of the {what} in the middle of the range",
                 "curve",
                 Normal(float(np.log(level)), level_sd),
-                f"Normal(log {np.rad2deg(level):.3g} deg, {level_sd:g})",
                 "log rad",
+                prior_words=f"Normal(log {np.rad2deg(level):.3g} deg, {level_sd:g})",
             ),
-            Parameter(
-                self.names[1],
-                symbols[1],
-                f"slope of log {what}",
-                "curve",
-                Normal(0.0, slope_sd),
-                f"Normal(0, {slope_sd:g})",
-            ),
-            Parameter(
-                self.names[2],
-                symbols[2],
-                f"curvature of log {what}",
-                "curve",
-                HalfNormal(curvature_sd),
-                f"HalfNormal({curvature_sd:g})",
-            ),
+            Parameter(self.names[1], symbols[1], f"slope of log {what}", "curve", Normal(0.0, slope_sd)),
+            Parameter(self.names[2], symbols[2], f"curvature of log {what}", "curve", HalfNormal(curvature_sd)),
         )
 
     def wrap_angle(self, values: Mapping[str, Array], route: Float[Array, " rows"]) -> Float[Array, " rows"]:

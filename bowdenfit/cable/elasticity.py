@@ -1,7 +1,7 @@
 """The elastic side of a cable: how its rope stretches, and what preload it has at a wrap angle."""
 
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import jax.numpy as jnp
 import numpy as np
@@ -136,16 +136,15 @@ def elastic_parameters(
     if uses_rope(description, measurements):
         parameters += _rope(defaults)
     if measurements.stretch is not None:
-        sd = defaults.stretch_zero_mm
-        meaning, text = "stretch that the reading calls zero", f"Normal(0, {sd:g}) mm"
-        parameters.append(Parameter(STRETCH_ZERO, r"$\Delta L_0$", meaning, "elastic", Normal(0.0, sd), text, "mm"))
+        meaning, prior = "stretch that the reading calls zero", Normal(0.0, defaults.stretch_zero_mm)
+        parameters.append(Parameter(STRETCH_ZERO, r"$\Delta L_0$", meaning, "elastic", prior, "mm"))
         if description.stretch.friction is None:
             parameters.append(_own_friction(defaults.friction))
     if uses_preload(description, measurements):
         parameters.append(_preload(description, defaults.preload))
     if _mounting_matters(measurements):
-        meaning, text = "effect of the loop's mounting on the friction exponent, in units of tau", "Normal(0, 1)"
-        parameters.append(Parameter(LOOP_MOUNTING, "$m$", meaning, "sensor", Normal(0.0, 1.0), text))
+        meaning = "effect of the loop's mounting on the friction exponent, in units of tau"
+        parameters.append(Parameter(LOOP_MOUNTING, "$m$", meaning, "sensor", Normal(0.0, 1.0)))
     return parameters
 
 
@@ -169,29 +168,24 @@ def _mounting_matters(measurements: Measurements) -> bool:
 
 
 def _rope(defaults: PriorDefaults) -> list[Parameter]:
-    k, load, d, g = (
-        defaults.stiffness,
-        defaults.bedding_load,
-        defaults.bedding_stretch_mm,
-        defaults.lengthening_mm_per_radian,
-    )
-    degree = float(np.deg2rad(1.0))
+    k, load, degree = defaults.stiffness, defaults.bedding_load, float(np.deg2rad(1.0))
+    lengthening = HalfNormal(defaults.lengthening_mm_per_radian)
     return [
         Parameter(
             STIFFNESS, "$k$", "stiffness of the rope once bedded in", "elastic",
-            LogNormal(k.median, k.log_sd), f"LogNormal({k.median:g} N/mm, {k.log_sd:g})", "N/mm",
+            LogNormal(k.median, k.log_sd), "N/mm",
         ),
         Parameter(
             BEDDING_STRETCH, "$d$", "stretch that bedding in takes up", "elastic",
-            HalfNormal(d), f"HalfNormal({d:g} mm)", "mm",
+            HalfNormal(defaults.bedding_stretch_mm), "mm",
         ),
         Parameter(
             BEDDING_LOAD, "$T_c$", "load over which the rope beds in", "elastic",
-            LogNormal(load.median, load.log_sd), f"LogNormal({load.median:g} N, {load.log_sd:g})", "N",
+            LogNormal(load.median, load.log_sd), "N",
         ),
         Parameter(
             LENGTHENING, "$g$", "lengthening of the sheath's center line by bending", "elastic",
-            HalfNormal(g), f"HalfNormal({g * degree:.3g} mm/deg)", "mm/deg", degree,
+            lengthening, "mm/deg", degree, prior_words=lengthening.text("mm/deg", degree, 3),
         ),
     ]  # fmt: skip
 
@@ -199,7 +193,7 @@ def _rope(defaults: PriorDefaults) -> list[Parameter]:
 def _own_friction(prior: LogNormalPrior) -> Parameter:
     return Parameter(
         STRETCH_FRICTION, r"$\mu_\mathrm{stretch}$", "friction coefficient while the rope is stretched", "friction",
-        LogNormal(prior.median, prior.log_sd), f"LogNormal({prior.median:g}, {prior.log_sd:g})",
+        LogNormal(prior.median, prior.log_sd),
     )  # fmt: skip
 
 
@@ -208,12 +202,10 @@ def _preload(description: Description, default: LogNormalPrior) -> Parameter:
     settings = description.preload
     at = f" at {settings.wrap_angle.value:g} {settings.wrap_angle.unit}" if description.preload_follows_stretch else ""
     name, meaning = (PRELOAD, "$P_0$" if at else "$P$"), f"preload{at}"
+    free = Parameter(*name, meaning, "elastic", LogNormal(default.median, default.log_sd), "N")
     if settings.value is None:
-        prior, text = LogNormal(default.median, default.log_sd), f"LogNormal({default.median:g} N, {default.log_sd:g})"
-        return Parameter(*name, meaning, "elastic", prior, text, "N")
+        return free
     value, sd = settings.value.to("force"), settings.value.sd_to("force")
     if sd is None:
-        prior = LogNormal(default.median, default.log_sd)
-        return Parameter(*name, meaning, "elastic", prior, "fixed (stated)", "N", fixed=value)
-    text = f"Normal({value:g}, {sd:g}) N, cut off at 0"
-    return Parameter(*name, meaning, "elastic", TruncatedNormal(value, sd), text, "N")
+        return replace(free, fixed=value, prior_words="fixed (stated)")
+    return replace(free, prior=TruncatedNormal(value, sd))

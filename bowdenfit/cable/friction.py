@@ -77,9 +77,8 @@ class Drag:
     def parameters(self, conditions: Conditions, defaults: PriorDefaults) -> list[Parameter]:
         """The drag in newtons."""
         conditions.needs_loads("drag")
-        sd = defaults.drag_newtons
         meaning = "drag: tension that the load cells do not show"
-        return [Parameter(DRAG, "$D$", meaning, "friction_model", HalfNormal(sd), f"HalfNormal({sd:g} N)", "N")]
+        return [Parameter(DRAG, "$D$", meaning, "friction_model", HalfNormal(defaults.drag_newtons), "N")]
 
 
 @dataclass(frozen=True)
@@ -91,7 +90,7 @@ class LoadDependent:
         del defaults
         conditions.needs_loads("load-dependent")
         meaning = f"load exponent: how friction falls with the load, mu as stated at {conditions.reference_force:g} N"
-        return [Parameter(LOAD_EXPONENT, "$p$", meaning, "friction_model", Uniform(0.0, 1.0), "Uniform(0, 1)")]
+        return [Parameter(LOAD_EXPONENT, "$p$", meaning, "friction_model", Uniform(0.0, 1.0))]
 
 
 @dataclass(frozen=True)
@@ -108,20 +107,20 @@ class RateDependent:
         unit, shown = _SHOWN_SPEED[conditions.velocity_unit]
         low, high = conditions.speeds
         speed, bound = float(np.sqrt(max(low, high / 100) * high)), defaults.viscous_at_highest_speed / high
-        spread = defaults.stribeck_speed_log_sd
         role: Role = "friction_model"
+        stribeck_speed, viscous = LogNormal(speed, defaults.stribeck_speed_log_sd), Uniform(-bound, bound)
         return [
             Parameter(
                 STRIBECK, "$a$", "Stribeck rise: relative rise of friction toward standstill", role,
-                HalfNormal(defaults.stribeck), f"HalfNormal({defaults.stribeck:g})",
+                HalfNormal(defaults.stribeck),
             ),
             Parameter(
                 STRIBECK_SPEED, "$v_s$", "Stribeck speed: where that rise has ended", role,
-                LogNormal(speed, spread), f"LogNormal({speed * shown:.3g} {unit}, {spread:g})", unit, shown,
+                stribeck_speed, unit, shown, prior_words=stribeck_speed.text(unit, shown, 3),
             ),
             Parameter(
                 VISCOUS, "$c$", "viscous coefficient: relative change of friction with speed", role,
-                Uniform(-bound, bound), f"Uniform({-bound / shown:.3g}, {bound / shown:.3g})", f"1/({unit})", 1 / shown,
+                viscous, f"1/({unit})", 1 / shown, prior_words=viscous.text("", 1 / shown, 3),
             ),
         ]  # fmt: skip
 

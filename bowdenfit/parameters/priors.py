@@ -33,6 +33,16 @@ class Prior(Protocol):
         """Inverse of `constrain`."""
         ...
 
+    def text(self, unit: str = "", scale: float = 1.0, digits: int = 6) -> str:
+        """The prior as people read it.
+
+        Args:
+            unit: Unit in which it is said; empty or "1" where there is none.
+            scale: Number said over internal value.
+            digits: Significant digits of what has a unit.
+        """
+        ...
+
 
 @dataclass(frozen=True)
 class Normal:
@@ -49,6 +59,10 @@ class Normal:
         """(value - mean) / sd"""
         return (value - self.mean) / self.sd
 
+    def text(self, unit: str = "", scale: float = 1.0, digits: int = 6) -> str:
+        """Normal(mean, sd) unit"""
+        return f"Normal({_number(self.mean, scale, digits)}, {_number(self.sd, scale, digits)}){_suffix(unit)}"
+
 
 @dataclass(frozen=True)
 class LogNormal:
@@ -64,6 +78,10 @@ class LogNormal:
     def unconstrain(self, value: Float[Numbers, "*any"]) -> Float[Numbers, "*any"]:
         """log(value / median) / log_sd"""
         return jnp.log(value / self.median) / self.log_sd
+
+    def text(self, unit: str = "", scale: float = 1.0, digits: int = 6) -> str:
+        """LogNormal(median unit, log_sd)"""
+        return f"LogNormal({_number(self.median, scale, digits)}{_suffix(unit)}, {_number(self.log_sd)})"
 
 
 @dataclass(frozen=True)
@@ -85,6 +103,10 @@ class HalfNormal:
         tail = 2 * ndtr(-x)
         return jnp.where(tail < 0.5, -ndtri(jnp.minimum(tail, 0.5)), ndtri(erf(x / jnp.sqrt(2.0))))
 
+    def text(self, unit: str = "", scale: float = 1.0, digits: int = 6) -> str:
+        """HalfNormal(sd unit)"""
+        return f"HalfNormal({_number(self.sd, scale, digits)}{_suffix(unit)})"
+
 
 @dataclass(frozen=True)
 class Uniform:
@@ -102,6 +124,10 @@ class Uniform:
         """Standard normal quantile of the fraction of the range."""
         fraction = (value - self.low) / (self.high - self.low)
         return jnp.where(fraction < 0.5, ndtri(fraction), -ndtri(1 - fraction))
+
+    def text(self, unit: str = "", scale: float = 1.0, digits: int = 6) -> str:
+        """Uniform(low, high) unit"""
+        return f"Uniform({_number(self.low, scale, digits)}, {_number(self.high, scale, digits)}){_suffix(unit)}"
 
 
 @dataclass(frozen=True)
@@ -133,6 +159,10 @@ class TruncatedNormal:
         lower = jnp.where(x * (1 + ratio) < _NEAR_ZERO, series, ndtr(x - ratio) - ndtr(-ratio)) / above
         return jnp.where(upper < 0.5, -ndtri(jnp.minimum(upper, 0.5)), ndtri(jnp.minimum(lower, 0.5)))
 
+    def text(self, unit: str = "", scale: float = 1.0, digits: int = 6) -> str:
+        """Normal(mean, sd) unit, cut off at 0"""
+        return f"{Normal(self.mean, self.sd).text(unit, scale, digits)}, cut off at 0"
+
 
 def _split(z: Float[Numbers, "*any"]) -> tuple[Float[Numbers, "*any"], Float[Numbers, "*any"]]:
     """Z for the lower and for the upper branch of a quantile, each harmless where the other branch is taken.
@@ -140,3 +170,12 @@ def _split(z: Float[Numbers, "*any"]) -> tuple[Float[Numbers, "*any"], Float[Num
     (A plain minimum or maximum would halve the derivative at z = 0, where least squares starts.)
     """
     return jnp.where(z < 0, z, -1.0), jnp.where(z < 0, 1.0, z)
+
+
+def _number(value: Real, scale: float = 1.0, digits: int = 6) -> str:
+    """A hyperparameter in the unit in which it is said."""
+    return f"{float(value) * scale:.{digits}g}"
+
+
+def _suffix(unit: str) -> str:
+    return "" if unit in {"", "1"} else f" {unit}"

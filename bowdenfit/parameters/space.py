@@ -26,10 +26,10 @@ class Parameter:
         meaning: One phrase for tables and reports.
         role: What it belongs to; decides how it is treated in least squares and where it is shown.
         prior: Prior in internal units.
-        prior_text: The prior as people read it, in the shown unit.
         unit: Unit in which it is shown ("1" where there is none).
         shown_scale: Shown value over internal value.
         fixed: Value [internal unit] where it is held fixed, else None.
+        prior_words: What is said of the prior instead of what it says itself in the shown unit.
     """
 
     name: str
@@ -37,15 +37,21 @@ class Parameter:
     meaning: str
     role: Role
     prior: Prior
-    prior_text: str
     unit: str = "1"
     shown_scale: float = 1.0
     fixed: float | None = None
+    prior_words: str = ""
 
     @property
     def label(self) -> str:
         """Symbol and unit for an axis."""
         return self.symbol if self.unit == "1" else f"{self.symbol} ({self.unit})"
+
+    @property
+    def prior_text(self) -> str:
+        """The prior as people read it."""
+        stated = self.prior_words or ("" if self.fixed is None else "fixed")
+        return stated or self.prior.text(self.unit, self.shown_scale)
 
 
 @dataclass(frozen=True)

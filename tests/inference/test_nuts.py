@@ -40,7 +40,7 @@ class Target:
 
     def __init__(self, size: int, log_density):
         names = [f"x{i}" for i in range(size)]
-        free = tuple(Parameter(n, n, n, "friction", Normal(0.0, 1.0), "") for n in names)
+        free = tuple(Parameter(n, n, n, "friction", Normal(0.0, 1.0)) for n in names)
         self.model = SimpleNamespace(space=SimpleNamespace(free=free, size=size))
         self.data, self._log_density = (np.zeros(1),), log_density
 

@@ -198,7 +198,7 @@ def test_derivatives_are_finite_and_never_negative_however_far_out(name):
 
 
 def _parameter(name: str, prior: Prior, **more) -> Parameter:
-    return Parameter(name, f"${name}$", "a parameter of a test", "friction", prior, "", **more)
+    return Parameter(name, f"${name}$", "a parameter of a test", "friction", prior, **more)
 
 
 def _space(fixed: tuple[str, ...] = ()) -> ParameterSpace:
@@ -253,3 +253,28 @@ def test_two_parameters_of_one_name_are_refused_with_the_name_and_a_remedy():
 def test_a_label_carries_the_unit_where_there_is_one():
     assert _parameter("mu", HalfNormal(1.0)).label == "$mu$"
     assert _parameter("s", HalfNormal(1.0), unit="deg").label == "$s$ (deg)"
+
+
+@pytest.mark.parametrize(
+    ("prior", "unit", "scale", "text"),
+    [
+        (Normal(0.5, 2.0), "mm", 1.0, "Normal(0.5, 2) mm"),
+        (LogNormal(np.deg2rad(30.0), 0.7), "deg", np.rad2deg(1.0), "LogNormal(30 deg, 0.7)"),
+        (HalfNormal(np.deg2rad(5.0)), "deg", np.rad2deg(1.0), "HalfNormal(5 deg)"),
+        (Uniform(-0.25, 0.5), "1", 1.0, "Uniform(-0.25, 0.5)"),
+        (Uniform(0.0, 0.002), "ms", 1000.0, "Uniform(0, 2) ms"),
+        (TruncatedNormal(3.0, 0.1), "N", 1.0, "Normal(3, 0.1) N, cut off at 0"),
+    ],
+)
+def test_a_prior_says_itself_in_the_unit_in_which_its_parameter_is_shown(prior, unit, scale, text):
+    assert prior.text(unit, scale) == text
+    assert _parameter("x", prior, unit=unit, shown_scale=scale).prior_text == text
+
+
+def test_what_is_said_of_a_prior_comes_before_what_it_says_itself():
+    assert _parameter("x", HalfNormal(1.0), fixed=0.1).prior_text == "fixed"
+    assert (
+        _parameter("x", HalfNormal(1.0), fixed=0.1, prior_words="fixed (data sheet)").prior_text == "fixed (data sheet)"
+    )
+    assert _parameter("x", HalfNormal(1.0), prior_words="measured 1 +- 0.1").prior_text == "measured 1 +- 0.1"
+    assert HalfNormal(0.0174533).text("mm/deg", 1.0, digits=3) == "HalfNormal(0.0175 mm/deg)"

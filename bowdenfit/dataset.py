@@ -7,15 +7,16 @@ from dataclasses import dataclass
 from functools import partial
 from itertools import islice
 from pathlib import Path
+from typing import Any
 
 from bowdenfit.description import Description, Table
 from bowdenfit.description.file import load_description, overridden, parse_description
 from bowdenfit.errors import DatasetError, DescriptionError
 from bowdenfit.files.columns import ColumnSource
 from bowdenfit.kinds.elastic_tables import read_loop, read_preload, read_stretch
+from bowdenfit.kinds.measurements import Measurements
 from bowdenfit.kinds.reading import read_angles, read_efficiencies, read_forces
 from bowdenfit.kinds.rows import Route
-from bowdenfit.kinds.tables import Measurements
 from bowdenfit.kinds.wrap_angles import check_measurements
 
 DESCRIPTION_FILE = "cable.toml"
@@ -171,16 +172,15 @@ def read_dataset(
         raise DescriptionError("--channel names channels of recordings, but the data set has none.")
     elastic, read, more = _elastic_tables(description, folder, route)
     checksums |= {path.name: _sha256(path) for path in read}
-    measurements = Measurements(
-        angles, efficiencies, forces, recordings, elastic.stretch, elastic.preload, elastic.loop, (*remarks, *more)
-    )
+    tables_read = (angles, efficiencies, forces, recordings, *elastic)
+    measurements = Measurements(tuple(table for table in tables_read if table is not None), (*remarks, *more))
     check_measurements(description, measurements)
     return Dataset(description, measurements, checksums)
 
 
 def _elastic_tables(
     description: Description, folder: Path, route: Route | None
-) -> tuple[Measurements, list[Path], list[str]]:
+) -> tuple[list[Any], list[Path], list[str]]:
     """Tables of stretch, preload and a loop; the files that were read; remarks."""
     tables = description.tables
     read: list[Path] = []
@@ -198,7 +198,7 @@ def _elastic_tables(
         columns, pulleys = description.angle_columns, description.cable.pulleys
         loop, more = read_loop(read[-1], route, columns, pulleys, _sources(tables.loop))
         remarks += more
-    return Measurements(stretch=stretch, preload=preload, loop=loop), read, remarks
+    return [stretch, preload, loop], read, remarks
 
 
 def _paths(table: Table, folder: Path, kind: str, one: bool = False) -> list[Path]:

@@ -36,10 +36,10 @@ from bowdenfit.kinds.angles.term import angles_term
 from bowdenfit.kinds.efficiencies.term import efficiencies_term
 from bowdenfit.kinds.forces.term import force_terms
 from bowdenfit.kinds.loop.term import loop_term
+from bowdenfit.kinds.measurements import Measurements
 from bowdenfit.kinds.recordings.blocks import RECORDED
 from bowdenfit.kinds.recordings.term import recordings_term
 from bowdenfit.kinds.stretch.term import preload_term, stretch_term
-from bowdenfit.kinds.tables import Measurements
 from bowdenfit.parameters.priors import HalfNormal, LogNormal, Normal, Prior, TruncatedNormal, Uniform
 from bowdenfit.parameters.space import Parameter, ParameterSpace
 

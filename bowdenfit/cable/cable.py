@@ -16,7 +16,8 @@ from bowdenfit.cable.friction import FrictionModel, make_friction_model
 from bowdenfit.cable.laws import CONTACT_LAWS, ContactLaw
 from bowdenfit.description import Contact, Description
 from bowdenfit.errors import DescriptionError, nearest
-from bowdenfit.kinds.tables import AngleTable, Measurements, OwnAngles
+from bowdenfit.kinds.measurements import Measurements
+from bowdenfit.kinds.tables import AngleTable, OwnAngles
 from bowdenfit.physics.loop import loop_output_force
 
 ANGLE_NOISE = "sigma_theta"

@@ -9,7 +9,7 @@ from jax import Array
 from jaxtyping import Float
 
 from bowdenfit.description import Description, LogNormalPrior, PriorDefaults
-from bowdenfit.kinds.tables import Measurements
+from bowdenfit.kinds.measurements import Measurements
 from bowdenfit.parameters.priors import HalfNormal, LogNormal, Normal, TruncatedNormal
 from bowdenfit.parameters.space import Parameter
 from bowdenfit.physics.stretch import (

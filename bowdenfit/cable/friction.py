@@ -15,7 +15,7 @@ from jaxtyping import Float
 
 from bowdenfit.description import Description, PriorDefaults
 from bowdenfit.errors import DescriptionError, nearest
-from bowdenfit.kinds.tables import Measurements
+from bowdenfit.kinds.measurements import Measurements
 from bowdenfit.parameters.priors import HalfNormal, LogNormal, Uniform
 from bowdenfit.parameters.space import Parameter, Role
 from bowdenfit.physics.friction import force_from_scale, force_scale, force_scale_slope, rate_factor

@@ -17,8 +17,9 @@ from bowdenfit.errors import DatasetError
 from bowdenfit.kinds.efficiencies.term import efficiencies_term
 from bowdenfit.kinds.elastic_simulation import drawn_elastic_readings, with_elastic_readings
 from bowdenfit.kinds.forces.term import HeldForcesTerm, force_terms
+from bowdenfit.kinds.measurements import Measurements
 from bowdenfit.kinds.recordings.simulation import drawn_recordings, recorded_again
-from bowdenfit.kinds.tables import AngleTable, Measurements
+from bowdenfit.kinds.tables import AngleTable
 
 Readings = dict[str, dict[str, jax.Array]]
 
@@ -78,7 +79,7 @@ def with_readings(dataset: Dataset, readings: Mapping[str, Mapping[str, jax.Arra
         forces = replace(forces, **drawn["forces"])
     recordings = tables.recordings and recorded_again(dataset.description, tables.recordings, drawn["recordings"])
     again = with_elastic_readings(tables, drawn)
-    made = replace(again, angles=angles, efficiencies=efficiencies, forces=forces, recordings=recordings, remarks=())
+    made = replace(again.with_tables(angles, efficiencies, forces, recordings), remarks=())
     return Dataset(dataset.description, made, {})
 
 

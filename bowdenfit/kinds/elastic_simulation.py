@@ -13,8 +13,9 @@ from bowdenfit.cable.elasticity import LOOP_MOUNTING, PRELOAD_NOISE, STRETCH_NOI
 from bowdenfit.cable.load_cells import FORCE_NOISE, GAIN_ERROR, INPUT_OFFSET, OUTPUT_OFFSET, RUN_SCATTER
 from bowdenfit.cable.noise import scatter
 from bowdenfit.description import Description
+from bowdenfit.kinds.measurements import Measurements
 from bowdenfit.kinds.stretch.term import ElasticTerm, stretch_term
-from bowdenfit.kinds.tables import LoopTable, Measurements, OwnAngles, PreloadTable, Provenance, StretchTable
+from bowdenfit.kinds.tables import LoopTable, OwnAngles, PreloadTable, Provenance, StretchTable
 from bowdenfit.physics.loop import free_motion_loss, loop_output_force
 
 
@@ -46,10 +47,10 @@ class ElasticDesign:
 def empty_elastic_tables(description: Description, design: ElasticDesign) -> Measurements:
     """Tables of the design's shape with unremarkable readings."""
     tables = description.tables
-    return Measurements(
-        stretch=_stretch_rows(design, tables.stretch.file or "stretch.csv") if tables.stretch else None,
-        preload=_preload_rows(design, tables.preload.file or "preload.csv") if tables.preload else None,
-        loop=_loop_rows(description, design, tables.loop.file or "loop.csv") if tables.loop else None,
+    return Measurements().with_tables(
+        _stretch_rows(design, tables.stretch.file or "stretch.csv") if tables.stretch else None,
+        _preload_rows(design, tables.preload.file or "preload.csv") if tables.preload else None,
+        _loop_rows(description, design, tables.loop.file or "loop.csv") if tables.loop else None,
     )
 
 
@@ -111,11 +112,10 @@ def drawn_elastic_readings(
 
 def with_elastic_readings(tables: Measurements, drawn: Mapping[str, Any]) -> Measurements:
     """The tables with what `drawn_elastic_readings` gave."""
-    return replace(
-        tables,
-        stretch=tables.stretch and replace(tables.stretch, **drawn["stretch"]),
-        preload=tables.preload and replace(tables.preload, **drawn["preload"]),
-        loop=tables.loop and replace(tables.loop, **drawn["loop"]),
+    return tables.with_tables(
+        tables.stretch and replace(tables.stretch, **drawn["stretch"]),
+        tables.preload and replace(tables.preload, **drawn["preload"]),
+        tables.loop and replace(tables.loop, **drawn["loop"]),
     )
 
 

@@ -4,7 +4,6 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from bowdenfit.recordings.recording import Recordings
 from bowdenfit.types import Flags, Labels, Matrix, Vector
 
 
@@ -182,17 +181,3 @@ class LoopTable:
     preload: Vector
     own: OwnAngles
     origin: Provenance
-
-
-@dataclass(frozen=True)
-class Measurements:
-    """Everything measured on one cable, and remarks on how it was read."""
-
-    angles: AngleTable | None = None
-    efficiencies: EfficiencyTable | None = None
-    forces: ForceTable | None = None
-    recordings: Recordings | None = None
-    stretch: StretchTable | None = None
-    preload: PreloadTable | None = None
-    loop: LoopTable | None = None
-    remarks: tuple[str, ...] = ()

@@ -4,7 +4,8 @@ import numpy as np
 
 from bowdenfit.description import Contact, Description
 from bowdenfit.errors import DatasetError
-from bowdenfit.kinds.tables import EfficiencyTable, ForceTable, LoopTable, Measurements
+from bowdenfit.kinds.measurements import Measurements
+from bowdenfit.kinds.tables import EfficiencyTable, ForceTable, LoopTable
 
 
 def check_measurements(description: Description, measurements: Measurements) -> None:

@@ -19,7 +19,8 @@ from bowdenfit.inference.disagreement import Disagreement
 from bowdenfit.inference.draws import derived_units
 from bowdenfit.inference.least_squares import Estimate, LeastSquares
 from bowdenfit.inference.samplers import SamplerAgreement
-from bowdenfit.kinds.tables import Measurements
+from bowdenfit.kinds import KINDS, each_table
+from bowdenfit.kinds.measurements import Measurements
 from bowdenfit.questions.summary.page import summarize
 from bowdenfit.results.folder import CHAIN, FIT, POSTERIOR, SUMMARY, made, write_text
 from bowdenfit.results.netcdf import EXPECTED, Coordinates, Groups, read_groups, write_groups
@@ -141,8 +142,13 @@ def _fit_page(fit: Fit) -> dict[str, Any]:
         "least_squares": _to_plain(asdict(fit.least_squares)),
         "posterior": _posterior_counts(posterior) if posterior else None,
         "provenance": asdict(fit.provenance),
-        "measurements": _to_plain(asdict(fit.dataset.measurements)),
+        "measurements": _measurements_page(fit.dataset.measurements),
     }
+
+
+def _measurements_page(measurements: Measurements) -> dict[str, Any]:
+    tables = {kind.name: asdict(table) for kind, table in each_table(measurements)}
+    return _to_plain({**dict.fromkeys(KINDS), **tables, "remarks": measurements.remarks})
 
 
 def _posterior_counts(posterior: Draws) -> dict[str, Any]:
@@ -185,7 +191,8 @@ def _array(value: list) -> np.ndarray:
 
 
 def _measurements(page: Mapping[str, Any]) -> Measurements:
-    return _rebuilt(Measurements, page)
+    tables = (_rebuilt(kind.table | None, page[name]) for name, kind in KINDS.items())
+    return Measurements(tuple(table for table in tables if table is not None), tuple(page["remarks"]))
 
 
 def _rebuilt(kind: Any, value: Any) -> Any:

@@ -11,7 +11,8 @@ from bowdenfit.cable.friction import Conditions, FrictionModel, friction_options
 from bowdenfit.dataset import Dataset
 from bowdenfit.errors import DescriptionError
 from bowdenfit.kinds.forces.term import HeldForcesTerm
-from bowdenfit.kinds.tables import ForceTable, Measurements, OwnAngles, Provenance
+from bowdenfit.kinds.measurements import Measurements
+from bowdenfit.kinds.tables import ForceTable, OwnAngles, Provenance
 from bowdenfit.model import Model, build_model
 from bowdenfit.physics.friction import force_from_scale, force_scale, force_scale_slope, rate_factor
 from bowdenfit.physics.hysteresis import play_operator
@@ -233,7 +234,7 @@ def _table(rows, velocity=float("nan"), unit="") -> ForceTable:
 def _model(rows, velocity=float("nan"), unit="", **more) -> Model:
     contact = {"name": "sheath", "friction": "mu", "wrap_angle": {"value": 150, "unit": "deg"}}
     description = cable(1, ("forces",), contact=[contact], **more).model_copy(update={"route": None})
-    return build_model(Dataset(description, Measurements(None, None, _table(rows, velocity, unit)), {}))
+    return build_model(Dataset(description, Measurements((_table(rows, velocity, unit),)), {}))
 
 
 HELD = [(0, 50.0, 50.0), (0, 50.0, 40.0), (0, 40.0, 50.0), (0, 50.0, 33.0), (0, 8.0, 4.0), (0, 90.0, 20.0)]

@@ -104,7 +104,7 @@ def with_samples(data: Dataset, n_samples: int, independent: bool) -> Dataset:
     origin = replace(forces.origin, file=forces.origin.file[rows], row=forces.origin.row[rows])
     names = tuple(str(i) for i in range(run.max() + 1))
     drawn_out = replace(forces, **columns, run_names=names, own=own, origin=origin)
-    return replace(data, measurements=replace(data.measurements, forces=drawn_out))
+    return replace(data, measurements=data.measurements.with_tables(drawn_out))
 
 
 def test_501_samples_a_trial_taken_as_independent_claim_the_printed_error(trials, readme):
@@ -193,5 +193,5 @@ def test_taken_as_held_the_readings_only_bound_the_coefficient_from_below(fit, t
     assert f"the posterior is {median:.2f} ({low:.3f} to {high:.2f})" in readme
     forces = fit.dataset.measurements.forces
     held = replace(forces, stroke=np.zeros_like(forces.stroke))
-    as_held = replace(fit.dataset, measurements=replace(fit.dataset.measurements, forces=held))
+    as_held = replace(fit.dataset, measurements=fit.dataset.measurements.with_tables(held))
     assert not bowdenfit.fit(as_held, mcmc=False, seed=1).least_squares.estimates["mu"].identified

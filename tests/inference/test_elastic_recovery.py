@@ -24,7 +24,7 @@ from bowdenfit.dataset import Dataset, load_dataset
 from bowdenfit.description import Description, SamplerSettings
 from bowdenfit.description.file import parse_description
 from bowdenfit.inference.log_density import LogDensity
-from bowdenfit.kinds.tables import Measurements
+from bowdenfit.kinds.measurements import Measurements
 from bowdenfit.model import build_model
 from bowdenfit.questions.simulate.simulation import Design, empty_tables, simulate, true_values
 
@@ -68,12 +68,12 @@ def arrays(data: Any) -> Any:
 def written(dataset: Dataset) -> Dataset:
     """The data set as files of ten decimals would hold its readings."""
     tables = dataset.measurements
-    rounded = {
-        name: replace(rows, **{reading: np.round(getattr(rows, reading), 10)})
+    rounded = [
+        replace(rows, **{reading: np.round(getattr(rows, reading), 10)})
         for name, reading in (("stretch", "stretch"), ("preload", "preload"), ("loop", "output_force"))
         if (rows := getattr(tables, name)) is not None
-    }
-    return replace(dataset, measurements=replace(tables, **rounded))
+    ]
+    return replace(dataset, measurements=tables.with_tables(*rounded))
 
 
 # Noise-free tables -------------------------------------------------------------------------------------------------
@@ -147,7 +147,7 @@ def all_on_the_way_up(dataset: Dataset) -> Dataset:
     """Stretch read while the load came down, taken for stretch read while it grew."""
     rows = dataset.measurements.stretch
     loading = replace(rows, unloading=np.zeros_like(rows.unloading))
-    return replace(dataset, measurements=replace(dataset.measurements, stretch=loading))
+    return replace(dataset, measurements=dataset.measurements.with_tables(loading))
 
 
 def test_the_same_test_rejects_a_model_without_the_unloading_branch(laboratory):
@@ -180,7 +180,7 @@ def test_stretch_and_loop_together_tell_friction_better_than_either_alone(labora
     both = bench(told_by("stretch", "loop"), TRUTH, 3, design=few)[0].measurements
     sd = []
     for names in (("stretch", "loop"), ("stretch",), ("loop",)):
-        alone = Measurements(**{name: getattr(both, name) for name in names})
+        alone = Measurements().with_tables(*(getattr(both, name) for name in names))
         estimate = laboratory.least_squares(Dataset(told_by(*names), alone, {})).estimates["mu"]
         assert estimate.value == pytest.approx(TRUTH["mu"], abs=4 * estimate.standard_error)
         sd.append(estimate.standard_error)
@@ -206,7 +206,7 @@ def stretched_on_body(on_body):
         design = Design(angles=(450.0, 500.0), efficiencies=(470.0,), elastic=ELASTIC)
         values = true_values(description, empty_tables(description, design), truth, jax.random.key(1))
         rows = simulate(description, design, values, jax.random.key(2)).measurements.stretch
-        return Dataset(description, replace(alone.measurements, stretch=rows), {})
+        return Dataset(description, alone.measurements.with_tables(rows), {})
 
     return alone, joined
 
@@ -270,7 +270,7 @@ def test_any_mixture_of_tables_makes_one_posterior_that_is_the_sum_of_its_parts(
     values, total = posterior.model.space.constrain(jnp.asarray(z)), float(np.sum(stats.norm.logpdf(z)))
     angles = dataset.measurements.angles
     for name in tables:
-        alone = Measurements(angles=angles, **{name: getattr(dataset.measurements, name)} if name != "angles" else {})
+        alone = Measurements().with_tables(angles, getattr(dataset.measurements, name))
         terms = build_model(Dataset(dataset.description, alone, {})).terms
         part = [t for t in terms if (t.name == "wrap_angle") == (name == "angles")]
         total += sum(float(jnp.sum(t.log_likelihood(values, arrays(t.data)))) for t in part)

@@ -186,7 +186,7 @@ def test_a_coefficient_that_would_be_negative_is_not_given_a_number():
     dataset, _ = measured(cable(2, ("angles", "efficiencies")), seed=1, noise=False)
     table = dataset.measurements.efficiencies  # all loss grows with the free angle, and falls with the squeezed one
     loss = np.linspace(0.1, 0.9, len(table.route))
-    changed = replace(dataset.measurements, efficiencies=replace(table, efficiency=np.exp(-loss)))
+    changed = dataset.measurements.with_tables(replace(table, efficiency=np.exp(-loss)))
     _, found = fitted(replace(dataset, measurements=changed))
     estimate = found.estimates["mu_squeezed"]
     assert not estimate.identified and np.isnan(estimate.value)

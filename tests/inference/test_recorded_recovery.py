@@ -23,8 +23,8 @@ from bowdenfit.dataset import Dataset
 from bowdenfit.description import Description, SamplerSettings
 from bowdenfit.description.file import parse_description
 from bowdenfit.inference.log_density import LogDensity
+from bowdenfit.kinds.measurements import Measurements
 from bowdenfit.kinds.recordings.table import _File, _prepared, _recording, preparation_settings
-from bowdenfit.kinds.tables import Measurements
 from bowdenfit.model import build_model
 from bowdenfit.questions.calibrate.refit import Laboratory as Fits
 from bowdenfit.questions.simulate.bench import (
@@ -138,7 +138,7 @@ def prepared(description: Description, cable: Cable) -> Dataset:
     ]
     parts, delay_sd = _prepared(files)
     each = tuple(_recording(description, f, *p) for f, p in zip(files, parts, strict=True))
-    return Dataset(description, Measurements(recordings=Recordings(description.angle_columns, each, "", delay_sd)), {})
+    return Dataset(description, Measurements((Recordings(description.angle_columns, each, "", delay_sd),)), {})
 
 
 class Laboratory:

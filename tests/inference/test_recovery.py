@@ -86,7 +86,7 @@ def independent_samples(dataset: Dataset) -> Dataset:
     forces = dataset.measurements.forces
     n = len(forces.run)
     alone = replace(forces, run=np.arange(n), run_names=tuple(str(i) for i in range(n)))
-    return replace(dataset, measurements=replace(dataset.measurements, forces=alone))
+    return replace(dataset, measurements=dataset.measurements.with_tables(alone))
 
 
 def test_the_same_test_rejects_a_likelihood_that_takes_the_samples_of_a_run_for_independent():

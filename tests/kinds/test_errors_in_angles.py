@@ -110,7 +110,7 @@ def _with_angle_errors(dataset: Dataset, misread: np.ndarray, sd: np.ndarray) ->
     forces = dataset.measurements.forces
     angle = np.maximum(forces.own.angle[:, 0] + misread[forces.run], 0.01)
     own = replace(forces.own, angle=angle[:, None], sd=sd[forces.run][:, None])
-    return replace(dataset, measurements=replace(dataset.measurements, forces=replace(forces, own=own)))
+    return replace(dataset, measurements=dataset.measurements.with_tables(replace(forces, own=own)))
 
 
 def _runs(dataset: Dataset) -> tuple[np.ndarray, np.ndarray, np.ndarray]:

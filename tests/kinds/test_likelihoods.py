@@ -15,8 +15,9 @@ from bowdenfit.description.file import load_description
 from bowdenfit.inference.compilation import compiled
 from bowdenfit.inference.log_density import LogDensity
 from bowdenfit.kinds.forces.term import HeldForcesTerm
+from bowdenfit.kinds.measurements import Measurements
 from bowdenfit.kinds.runs import RunsTerm
-from bowdenfit.kinds.tables import EfficiencyTable, ForceTable, Measurements, OwnAngles, Provenance
+from bowdenfit.kinds.tables import EfficiencyTable, ForceTable, OwnAngles, Provenance
 from bowdenfit.model import Model, build_model
 
 VALUES = {"mu": 0.15, "tau": 0.03, "sigma_F": 0.7}
@@ -40,7 +41,7 @@ def _force_table(runs, names=(), angle=None, sd=None) -> ForceTable:
 def _single_contact(wrap_angle, table: ForceTable, **more) -> Model:
     contact = {"name": "sheath", "friction": "mu", "wrap_angle": wrap_angle}
     description = cable(1, ("forces",), contact=[contact], **more)
-    return build_model(Dataset(description.model_copy(update={"route": None}), Measurements(None, None, table), {}))
+    return build_model(Dataset(description.model_copy(update={"route": None}), Measurements((table,)), {}))
 
 
 def _of_term(model: Model, term, what: str, values: dict[str, float]) -> np.ndarray:
@@ -346,7 +347,7 @@ def test_a_row_s_own_angle_comes_before_the_curve_with_its_stated_error_or_none(
         np.array([[np.nan, 0.7], [np.nan] * 2, [np.nan] * 2, [1.0, 0.5]]),
         np.array([[np.nan, 0.02], [np.nan] * 2, [np.nan] * 2, [np.nan, 0.03]]),
     )
-    changed = replace(dataset.measurements, efficiencies=replace(table, own=own))
+    changed = dataset.measurements.with_tables(replace(table, own=own))
     data = build_model(replace(dataset, measurements=changed)).terms[1].data
     np.testing.assert_array_equal(data["is_own"][:, :2], [[False, True], [False] * 2, [False] * 2, [True, True]])
     np.testing.assert_allclose(data["known_variance"][:, 1], [0.02**2, 0, 0, 0.03**2])

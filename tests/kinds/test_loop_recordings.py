@@ -2,7 +2,7 @@
 
 import json
 import math
-from dataclasses import asdict, replace
+from dataclasses import replace
 
 import jax
 import jax.numpy as jnp
@@ -27,7 +27,7 @@ from bowdenfit.recordings.loop_strokes import find_loop_strokes
 from bowdenfit.recordings.preparation import prepare
 from bowdenfit.recordings.recording import PreparationSettings, RawRecording
 from bowdenfit.recordings.strokes import Span
-from bowdenfit.results.store import _measurements, _to_plain, _to_schema_3
+from bowdenfit.results.store import _measurements, _measurements_page, _to_schema_3
 
 PRELOAD, MU, RATE = 20.0, 0.12, 200.0
 HALF_TURN = MU * math.pi
@@ -519,7 +519,7 @@ def test_a_short_posterior_holds_the_truth(sampled):
 
 def test_recordings_of_a_loop_come_back_from_a_saved_fit(sampled):
     measurements = sampled.dataset.measurements
-    page = json.loads(json.dumps(_to_plain(asdict(measurements)), allow_nan=False))
+    page = json.loads(json.dumps(_measurements_page(measurements), allow_nan=False))
     again = _measurements(page).recordings
     assert again.loop
     for one, other in zip(again.each, measurements.recordings.each, strict=True):

@@ -14,10 +14,10 @@ from bowdenfit.dataset import Dataset
 from bowdenfit.inference.least_squares import LeastSquares, least_squares, make_objective, maximum_posterior
 from bowdenfit.inference.log_density import LogDensity
 from bowdenfit.kinds import runs as runs_of_model
+from bowdenfit.kinds.measurements import Measurements
 from bowdenfit.kinds.recordings.blocks import recorded_angles
 from bowdenfit.kinds.recordings.whole import WholeRecordingsTerm, joined, padded
 from bowdenfit.kinds.runs import RunsTerm, SlidingRows, run_sums
-from bowdenfit.kinds.tables import Measurements
 from bowdenfit.model import Model, build_model
 from bowdenfit.physics.friction import rate_factor
 from bowdenfit.questions.simulate.bench import BenchFriction, BenchSettings, Faults, Profile, simulate_recording, to_raw
@@ -239,7 +239,7 @@ def _model(recordings, likelihood="whole", saturation="left out", **more) -> Mod
     more = {"reference_force": REFERENCE_FORCE} | more
     description = cable(1, {"recordings": table}, contact=[CONTACT], **more).model_copy(update={"route": None})
     of_all = Recordings(("angle",), tuple(recordings), "mm/s")
-    return build_model(Dataset(description, Measurements(recordings=of_all), {}))
+    return build_model(Dataset(description, Measurements((of_all,)), {}))
 
 
 def _whole(model: Model, recordings, censored=False) -> WholeRecordingsTerm:

@@ -18,7 +18,8 @@ from bowdenfit.dataset import Dataset, load_dataset
 from bowdenfit.inference.compilation import compiled
 from bowdenfit.inference.least_squares import make_objective, maximum_posterior
 from bowdenfit.inference.log_density import LogDensity
-from bowdenfit.kinds.tables import ForceTable, Measurements, OwnAngles, Provenance
+from bowdenfit.kinds.measurements import Measurements
+from bowdenfit.kinds.tables import ForceTable, OwnAngles, Provenance
 from bowdenfit.model import Model, build_model
 from bowdenfit.physics.student import log_student_cdf, log_student_density, student_bound_residual, student_residual
 
@@ -135,14 +136,14 @@ def _forces(noise: str, table: ForceTable) -> Model:
     contact = {"name": "sheath", "friction": "mu", "wrap_angle": {"value": 150, "unit": "deg"}}
     sensors = {"force_noise": {"value": FORCE_NOISE, "unit": "N"}}
     description = cable(1, ("forces",), contact=[contact], sensors=sensors, noise=noise)
-    return build_model(Dataset(description.model_copy(update={"route": None}), Measurements(None, None, table), {}))
+    return build_model(Dataset(description.model_copy(update={"route": None}), Measurements((table,)), {}))
 
 
 def _with_a_slack_row(dataset: Dataset) -> Dataset:
     """The data set, with a preload table whose first row reads 0."""
     table = dataset.measurements.preload
     slack = replace(table, preload=np.where(np.arange(len(table.preload)) == 0, 0.0, table.preload))
-    return replace(dataset, measurements=replace(dataset.measurements, preload=slack))
+    return replace(dataset, measurements=dataset.measurements.with_tables(slack))
 
 
 @cache

@@ -130,7 +130,7 @@ def held_at(forces: tuple[float, ...]) -> Dataset:
     description = cable(1, ("forces",), contact=[CONTACTS[2]])
     table = empty_tables(description, Design(runs=(450.0,), input_forces=forces, strokes=(1,))).forces
     held = replace(table, stroke=np.zeros(len(forces), dtype=int), output_force=np.full(len(forces), forces[0]))
-    return Dataset(description, replace(empty_tables(description, Design()), forces=held), {})
+    return Dataset(description, empty_tables(description, Design()).with_tables(held), {})
 
 
 def test_held_readings_slip_as_often_as_their_likelihood_says():
@@ -187,7 +187,7 @@ def test_measured_tables_pass_the_rule_that_simulated_ones_must_pass(name):
 def changed(dataset: Dataset, table: str, **columns: object) -> Dataset:
     rows = getattr(dataset.measurements, table)
     new = {name: change(getattr(rows, name)) for name, change in columns.items()}
-    return replace(dataset, measurements=replace(dataset.measurements, **{table: replace(rows, **new)}))
+    return replace(dataset, measurements=dataset.measurements.with_tables(replace(rows, **new)))
 
 
 @pytest.mark.parametrize(

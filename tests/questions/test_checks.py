@@ -243,7 +243,7 @@ def changed(dataset, table, column, row, by):
     old = getattr(dataset.measurements, table)
     values = getattr(old, column).copy()
     values[row] += by
-    tables = dataclasses.replace(dataset.measurements, **{table: dataclasses.replace(old, **{column: values})})
+    tables = dataset.measurements.with_tables(dataclasses.replace(old, **{column: values}))
     return dataclasses.replace(dataset, measurements=tables)
 
 

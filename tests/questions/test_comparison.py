@@ -35,7 +35,7 @@ def outlier():
     efficiency = dataset.measurements.efficiencies.efficiency.copy()
     efficiency[-1] *= 0.93
     table = replace(dataset.measurements.efficiencies, efficiency=efficiency)
-    return LogDensity(build_model(replace(dataset, measurements=replace(dataset.measurements, efficiencies=table))))
+    return LogDensity(build_model(replace(dataset, measurements=dataset.measurements.with_tables(table))))
 
 
 @pytest.fixture(scope="module")

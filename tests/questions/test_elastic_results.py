@@ -253,7 +253,7 @@ def test_tables_of_one_cable_seldom_disagree(plan, solved):
 
 def test_a_loop_measured_at_another_preload_is_named_with_its_distance(plan, solved):
     right, other = simulated(plan, 1), simulated(plan, 1, preload=19.0)
-    mixed = dataclasses.replace(right.measurements, loop=other.measurements.loop)
+    mixed = right.measurements.with_tables(other.measurements.loop)
     found = solved(dataclasses.replace(right, measurements=mixed)).disagreements
     loop = next(d for d in found if d.table == "loop_output_force")
     assert loop.conflict > 0.8 * max(d.conflict for d in found)

@@ -508,14 +508,14 @@ def _with_efficiency(dataset: Dataset, at: float, reading: float) -> Dataset:
         np.append(rows.route, at), np.append(rows.efficiency, reading), np.zeros(n),
         OwnAngles(rows.own.names, nothing, nothing), _origin(n),
     )  # fmt: skip
-    return replace(dataset, measurements=replace(dataset.measurements, efficiencies=table))
+    return replace(dataset, measurements=dataset.measurements.with_tables(table))
 
 
 def _with_angles(dataset: Dataset, at: float, reading: np.ndarray) -> Dataset:
     rows = dataset.measurements.angles
     angle = np.vstack([rows.angle, np.deg2rad(reading)])
     table = AngleTable(np.append(rows.route, at), rows.names, angle, np.full(angle.shape, np.nan), _origin(len(angle)))
-    return replace(dataset, measurements=replace(dataset.measurements, angles=table))
+    return replace(dataset, measurements=dataset.measurements.with_tables(table))
 
 
 def _origin(n: int) -> Provenance:

@@ -171,12 +171,8 @@ def test_compare_answers_whether_speed_matters_on_the_command_line(plain, with_r
 
 def test_compare_refuses_fits_of_different_readings_one_fit_and_fits_without_draws(plain, recorded):
     fit, _ = plain
-    fewer = replace(
-        fit.dataset.measurements,
-        recordings=replace(
-            fit.dataset.measurements.recordings, each=fit.dataset.measurements.recordings.each[:5]
-        ),
-    )  # fmt: skip
+    recordings = fit.dataset.measurements.recordings
+    fewer = fit.dataset.measurements.with_tables(replace(recordings, each=recordings.each[:5]))
     other = replace(fit, dataset=replace(fit.dataset, measurements=fewer))
     with pytest.raises(UsageError, match="same readings"):
         bf.compare({"a": fit, "b": other})

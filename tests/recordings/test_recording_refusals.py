@@ -534,7 +534,7 @@ def test_a_run_of_which_nothing_can_be_used_is_refused(on_body, likelihood):
     first, *others = data.measurements.recordings.each
     blocks = replace(first.blocks, output_force=-np.abs(first.blocks.output_force))
     recordings = replace(data.measurements.recordings, each=(replace(first, blocks=blocks), *others))
-    bad = replace(data, measurements=replace(data.measurements, recordings=recordings))
+    bad = replace(data, measurements=data.measurements.with_tables(recordings))
     with jax.enable_x64(True), pytest.raises(DatasetError, match=r"nothing of the run .* can be used") as error:
         build_model(bad)
     assert first.file in str(error.value)

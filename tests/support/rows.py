@@ -6,7 +6,8 @@ import numpy as np
 
 from bowdenfit.dataset import Dataset
 from bowdenfit.description.file import parse_description
-from bowdenfit.kinds.tables import EfficiencyTable, Measurements, OwnAngles, Provenance
+from bowdenfit.kinds.measurements import Measurements
+from bowdenfit.kinds.tables import EfficiencyTable, OwnAngles, Provenance
 
 
 def of_rows(loss: np.ndarray, angle: np.ndarray, angle_sd: float | np.ndarray = 0.0, **more: Any) -> Dataset:
@@ -32,6 +33,4 @@ def of_rows(loss: np.ndarray, angle: np.ndarray, angle_sd: float | np.ndarray = 
     own = OwnAngles(tuple(f"angle_{i + 1}" for i in range(k)), angle, np.broadcast_to(angle_sd, angle.shape).copy())
     origin = Provenance(("efficiencies.csv",), np.zeros(n, dtype=int), np.arange(2, n + 2))
     table = EfficiencyTable(np.full(n, np.nan), np.exp(-loss), np.zeros(n), own, origin)
-    empty = dict.fromkeys(Measurements.__dataclass_fields__)
-    given = {"efficiencies": table, "remarks": ()}
-    return Dataset(description, Measurements(**{name: given.get(name) for name in empty}), {})
+    return Dataset(description, Measurements((table,)), {})

@@ -17,9 +17,9 @@ from bowdenfit.cable.load_cells import BLOCK_NOISE, DELAY_ERROR, GAIN_ERROR, INP
 from bowdenfit.cable.noise import scatter
 from bowdenfit.description import Description
 from bowdenfit.errors import DatasetError
+from bowdenfit.kinds.measurements import Measurements
 from bowdenfit.kinds.recordings.blocks import recorded_angles, worth_of
 from bowdenfit.kinds.runs import LEAST_FORCE
-from bowdenfit.kinds.tables import Measurements
 from bowdenfit.physics.hysteresis import play_operator
 from bowdenfit.physics.loop_motion import loop_play_with_slope
 from bowdenfit.recordings.loop_strokes import find_loop_strokes

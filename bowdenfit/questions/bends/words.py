@@ -2,7 +2,7 @@
 
 from typing import Any
 
-from bowdenfit.kinds.tables import Measurements
+from bowdenfit.kinds.measurements import Measurements
 from bowdenfit.questions.bends.page import elastic_page
 from bowdenfit.results.record import Fit
 from bowdenfit.words import filled, table

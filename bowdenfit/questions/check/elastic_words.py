@@ -6,7 +6,8 @@ import numpy as np
 
 from bowdenfit.description import Description
 from bowdenfit.description.elastic import PRELOAD
-from bowdenfit.kinds.tables import LoopTable, Measurements, PreloadTable, StretchTable
+from bowdenfit.kinds.measurements import Measurements
+from bowdenfit.kinds.tables import LoopTable, PreloadTable, StretchTable
 
 _LOW = 1 / 3  # share of the highest load above which a lowest load is not low
 _FREE = 0.25  # output over input force below which a loop moves all but freely

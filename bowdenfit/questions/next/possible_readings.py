@@ -14,12 +14,12 @@ from bowdenfit.inference.draws import for_each_draw
 from bowdenfit.kinds.angles.term import angles_term
 from bowdenfit.kinds.efficiencies.term import efficiencies_term
 from bowdenfit.kinds.loop.term import loop_term
+from bowdenfit.kinds.measurements import Measurements
 from bowdenfit.kinds.stretch.term import preload_term, stretch_term
 from bowdenfit.kinds.tables import (
     AngleTable,
     EfficiencyTable,
     LoopTable,
-    Measurements,
     OwnAngles,
     PreloadTable,
     Provenance,

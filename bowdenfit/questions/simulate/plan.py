@@ -9,15 +9,8 @@ from pydantic import BaseModel, ConfigDict, Field, ValidationError
 from bowdenfit.description import Description
 from bowdenfit.errors import DescriptionError
 from bowdenfit.kinds.elastic_simulation import ElasticDesign
-from bowdenfit.kinds.tables import (
-    AngleTable,
-    EfficiencyTable,
-    ForceTable,
-    LoopTable,
-    Measurements,
-    PreloadTable,
-    StretchTable,
-)
+from bowdenfit.kinds.measurements import Measurements
+from bowdenfit.kinds.tables import AngleTable, EfficiencyTable, ForceTable, LoopTable, PreloadTable, StretchTable
 from bowdenfit.questions.simulate.simulation import Design
 
 Page = tuple[list[str], list[list[str]]]  # headings and rows

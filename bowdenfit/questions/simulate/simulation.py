@@ -5,7 +5,7 @@ Both draw readings as the likelihood takes them to scatter, so that a posterior 
 """
 
 from collections.abc import Mapping
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field
 
 import jax
 import jax.numpy as jnp
@@ -16,7 +16,8 @@ from bowdenfit.description import Description
 from bowdenfit.errors import UsageError
 from bowdenfit.kinds.drawn_readings import drawn_angles, drawn_readings, with_angles, with_readings
 from bowdenfit.kinds.elastic_simulation import ElasticDesign, empty_elastic_tables
-from bowdenfit.kinds.tables import AngleTable, EfficiencyTable, ForceTable, Measurements, OwnAngles, Provenance
+from bowdenfit.kinds.measurements import Measurements
+from bowdenfit.kinds.tables import AngleTable, EfficiencyTable, ForceTable, OwnAngles, Provenance
 from bowdenfit.model import build_model
 
 
@@ -61,7 +62,7 @@ def empty_tables(description: Description, design: Design) -> Measurements:
     if tables.forces is not None:
         forces = _force_rows(description, design)
     elastic = empty_elastic_tables(description, design.elastic)
-    return replace(elastic, angles=angles, efficiencies=efficiencies, forces=forces)
+    return elastic.with_tables(angles, efficiencies, forces)
 
 
 def _force_rows(description: Description, design: Design) -> ForceTable:
@@ -150,7 +151,7 @@ def simulated_again(
             cable, dataset.measurements.angles, named, jax.random.split(key, 3)[0], scale, everywhere=True
         )
         angles = with_angles(dataset.measurements.angles, drawn)
-        others = replace(dataset.measurements, angles=angles)
+        others = dataset.measurements.with_tables(angles)
         readings = drawn_readings(cable, others, named, key, scale) | {"angles": drawn}
         return with_readings(Dataset(dataset.description, others, {}), readings)
     return with_readings(dataset, drawn_readings(cable, dataset.measurements, named, key, scale))

@@ -1,0 +1,41 @@
+"""Everything measured on one cable: at most one table a kind."""
+
+from dataclasses import dataclass, replace
+from typing import Any, TypeVar
+
+from bowdenfit.kinds.tables import AngleTable, EfficiencyTable, ForceTable, LoopTable, PreloadTable, StretchTable
+from bowdenfit.recordings.recording import Recordings
+
+AnyTable = TypeVar("AnyTable")
+
+
+@dataclass(frozen=True)
+class Measurements:
+    """The tables of one cable, each found by its class, and remarks on how they were read.
+
+    Args:
+        tables: At most one of a class.
+        remarks: What had to be assumed.
+    """
+
+    tables: tuple[Any, ...] = ()
+    remarks: tuple[str, ...] = ()
+
+    def table(self, of: type[AnyTable]) -> AnyTable | None:
+        """The table of a class; None if nothing of that kind was measured."""
+        return next((table for table in self.tables if type(table) is of), None)
+
+    def with_tables(self, *tables: Any) -> "Measurements":
+        """The same with other tables in place of those of their classes; None changes nothing."""
+        new = {type(table): table for table in tables if table is not None}
+        kept = {type(table): table for table in self.tables}
+        return replace(self, tables=tuple((kept | new).values()))
+
+    # Until everything asks by class:
+    angles = property(lambda self: self.table(AngleTable))
+    efficiencies = property(lambda self: self.table(EfficiencyTable))
+    forces = property(lambda self: self.table(ForceTable))
+    recordings = property(lambda self: self.table(Recordings))
+    stretch = property(lambda self: self.table(StretchTable))
+    preload = property(lambda self: self.table(PreloadTable))
+    loop = property(lambda self: self.table(LoopTable))

@@ -19,10 +19,10 @@ if TYPE_CHECKING:
         StoreError,
         UsageError,
     )
+    from bowdenfit.front_desk import Fit
     from bowdenfit.questions.calibrate.verb import calibrate
     from bowdenfit.questions.identify.verb import identify
     from bowdenfit.questions.next.verb import next_measurement
-    from bowdenfit.results.record import Fit
     from bowdenfit.verbs import compare, fit, load, plot, read, simulate
 
 _WHERE = {
@@ -30,7 +30,7 @@ _WHERE = {
     "calibrate": "bowdenfit.questions.calibrate.verb",
     "identify": "bowdenfit.questions.identify.verb",
     "next_measurement": "bowdenfit.questions.next.verb",
-    "Fit": "bowdenfit.results.record",
+    "Fit": "bowdenfit.front_desk",
     **dict.fromkeys(
         ("BowdenfitError", "ConvergenceError", "DatasetError", "DescriptionError", "StoreError", "UsageError"),
         "bowdenfit.errors",

@@ -15,10 +15,10 @@ from bowdenfit.run.storing import LARGEST_SEED, begun, checked_seed, sampled_by,
 
 if TYPE_CHECKING:
     from bowdenfit.files.channels import ChannelFile
+    from bowdenfit.front_desk import Fit
     from bowdenfit.inference.chain import Progress
     from bowdenfit.questions.compare.answer import Comparison
     from bowdenfit.recordings.recording import Recordings
-    from bowdenfit.results.record import Fit
 
 
 def read(
@@ -238,9 +238,9 @@ def load(path: str | Path) -> "Fit":
     Raises:
         StoreError: The folder is missing, unfinished or damaged.
     """
-    from bowdenfit.results.store import load as load_fit
+    from bowdenfit.front_desk import Fit
 
-    return load_fit(Path(path))
+    return Fit.load(path)
 
 
 def _remember_compilations() -> None:

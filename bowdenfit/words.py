@@ -3,6 +3,7 @@
 import math
 import textwrap
 from collections.abc import Collection, Sequence
+from html import escape
 
 _LONGEST = 40  # characters of a quoted value
 WIDTH = 110
@@ -53,3 +54,11 @@ def table(heads: Sequence[str], rows: Sequence[Sequence[str]], left: Collection[
         for row in [heads, *rows]
     ]
     return "\n".join([lines[0], "-" * len(lines[0]), *lines[1:]])
+
+
+def html_table(heads: Sequence[str], rows: Sequence[Sequence[str]]) -> str:
+    """A table for notebooks."""
+    head = "".join(f"<th>{escape(cell)}</th>" for cell in heads)
+    cells = ["".join(f'<td style="white-space:nowrap">{escape(cell)}</td>' for cell in row) for row in rows]
+    body = "".join(f"<tr>{row}</tr>" for row in cells)
+    return f"<table><thead><tr>{head}</tr></thead><tbody>{body}</tbody></table>"

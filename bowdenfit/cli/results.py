@@ -8,7 +8,7 @@ import click
 from bowdenfit.cli.options import parsed_quantity
 
 if TYPE_CHECKING:
-    from bowdenfit.results.record import Fit
+    from bowdenfit.front_desk import Fit
 
 
 @click.command(short_help="Print the summary of a fit.")

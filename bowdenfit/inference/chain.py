@@ -9,6 +9,7 @@ import numpy as np
 from bowdenfit.description import SamplerSettings
 from bowdenfit.inference.diagnostics import Diagnostics, shortfalls
 from bowdenfit.inference.log_density import LogDensity
+from bowdenfit.inference.trajectories import Trajectories
 
 Diagnose: TypeAlias = Callable[[Mapping[str, np.ndarray], int], dict[str, Diagnostics]]
 Quantities: TypeAlias = Callable[[np.ndarray], Mapping[str, np.ndarray]]
@@ -23,35 +24,6 @@ class Progress:
     r_hat: float | None
     ess: float | None
     sampler: str = "emcee"
-
-
-@dataclass(frozen=True)
-class Trajectories:
-    """How the trajectories of Hamiltonian Monte Carlo went.
-
-    Args:
-        warm_up: Steps of each chain that tuned the sampler; they are not among the draws.
-        drawn: Trajectories of all chains after that.
-        diverged: How many of them broke off because their energy was not kept.
-        fine: How many of them took the fine steps that reach where the others break off.
-        fine_diverged: How many of those broke off too.
-        saturated: How many of the others were as long as trajectories may be.
-        energy_mixing: E-BFMI of the chain where it is lowest.
-        step_size: Step size after tuning, the same for all chains.
-        gradients: Gradients computed in all, those of tuning included.
-        statistics: Of every kept draw under ArviZ's names, (chain, draw).
-    """
-
-    warm_up: int
-    drawn: int
-    diverged: int
-    fine: int
-    fine_diverged: int
-    saturated: int
-    energy_mixing: float
-    step_size: float
-    gradients: int
-    statistics: dict[str, np.ndarray]
 
 
 @dataclass(frozen=True)

@@ -3,18 +3,11 @@
 import warnings
 from collections.abc import Mapping
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
 
 import numpy as np
 
 from bowdenfit.types import ChainDraws
 
-if TYPE_CHECKING:
-    from bowdenfit.inference.chain import Trajectories
-
-MOST_FINE_DIVERGED = 0.001  # share of the trajectories of fine steps, without which a corner is out of reach
-MOST_DIVERGED = 0.01  # share of all; those of ordinary steps may fail where the fine ones do not
-LEAST_ENERGY_MIXING = 0.3
 MAXIMUM_DRIFT = 0.08  # a Monte Carlo error of 3 % at 1000 effective draws, two and a half times over
 
 
@@ -102,40 +95,4 @@ def shortfalls(diagnostics: Mapping[str, Diagnostics], target_r_hat: float, targ
         if not low >= target_ess:
             which = "bulk" if d.ess_bulk <= d.ess_tail else "tail"
             reasons.append(f"{which} effective sample size of {name} is {low:.0f} and should be at least {target_ess}")
-    return tuple(reasons)
-
-
-def energy_mixing(energy: np.ndarray) -> float:
-    """E-BFMI of the chain where it is lowest: how far one step may change the energy, against how far it spreads.
-
-    Args:
-        energy: Of every draw, (chain, draw), none left out.
-
-    References:
-        Betancourt 2016, "Diagnosing suboptimal cotangent disintegrations in Hamiltonian Monte Carlo" (arXiv:1604.00695).
-    """
-    from arviz_stats.base import array_stats
-
-    if not np.all(np.isfinite(energy)) or np.any(np.ptp(energy, axis=1) == 0):
-        return float("nan")
-    return float(np.min(array_stats.bfmi(energy, chain_axis=0, draw_axis=1)))
-
-
-def trajectory_shortfalls(trajectories: "Trajectories") -> tuple[str, ...]:
-    """What keeps draws of Hamiltonian Monte Carlo from being trusted, in words; empty if nothing does."""
-    reasons = []
-    for diverged, drawn, most, which in (
-        (trajectories.fine_diverged, trajectories.fine, MOST_FINE_DIVERGED, " of fine steps"),
-        (trajectories.diverged, trajectories.drawn, MOST_DIVERGED, ""),
-    ):
-        if diverged > most * drawn:
-            reasons.append(
-                f"{diverged} of {drawn} trajectories{which} diverged, and 1 in {1 / most:.0f} is the most: a narrow corner of "
-                "the posterior may be missing; raise sampler.target_acceptance, or state what is known as priors"
-            )
-    if not trajectories.energy_mixing >= LEAST_ENERGY_MIXING:
-        reasons.append(
-            f"the energy of a chain mixes slowly (E-BFMI {trajectories.energy_mixing:.2f}, which should be at least "
-            f"{LEAST_ENERGY_MIXING:g}): its tails may be missing; let it run longer, or state what is known as priors"
-        )
     return tuple(reasons)

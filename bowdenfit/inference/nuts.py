@@ -25,11 +25,12 @@ from blackjax.mcmc import nuts
 from jax import Array
 
 from bowdenfit.description import SamplerSettings
-from bowdenfit.inference.chain import Chain, Diagnose, Progress, Quantities, Trajectories, judged, stuck, worst
+from bowdenfit.inference.chain import Chain, Diagnose, Progress, Quantities, judged, stuck, worst
 from bowdenfit.inference.compilation import compiled
-from bowdenfit.inference.diagnostics import diagnose_all, energy_mixing, trajectory_shortfalls
+from bowdenfit.inference.diagnostics import diagnose_all
 from bowdenfit.inference.least_squares import MaximumPosterior
 from bowdenfit.inference.log_density import LogDensity
+from bowdenfit.inference.trajectories import Trajectories, energy_mixing, trajectory_shortfalls
 
 BLOCK = 50  # steps between two reports
 WINDOWS = (

@@ -1,11 +1,13 @@
 """The best length with its uncertainty, as plain data that show themselves; loads no model."""
 
 from dataclasses import dataclass
+from html import escape
 
 import numpy as np
 
 from bowdenfit.inference.interval import Interval
 from bowdenfit.results.choices import Choice, Window
+from bowdenfit.words import html_table
 
 
 @dataclass(frozen=True)
@@ -73,6 +75,16 @@ class OptimalLength:
         return lines
 
     def _repr_html_(self) -> str:
-        from bowdenfit.questions.summary.html import design_answer
-
-        return design_answer(self)
+        shown = [line for line in self.lines() if line and "P(best)" not in line]
+        sentences = shown[: len(shown) - len(self.choices)]
+        text = "".join(f"<p>{escape(line)}</p>" for line in sentences)
+        heads = (
+            f"{self.variable.replace('_', ' ').capitalize()} ({self.unit})",
+            "P(best)",
+            "Expected loss of efficiency",
+        )
+        rows = [
+            (f"{c.length:g}", f"{c.probability_best:.1%}", f"{100 * c.expected_regret:.2f} points")
+            for c in self.choices
+        ]
+        return text + (html_table(heads, rows) if rows else "")

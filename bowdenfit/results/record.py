@@ -1,34 +1,28 @@
-"""A finished fit: what was fitted to what, the draws, and the answers that follow from them."""
+"""The record of a fit: what was fitted to what, the draws, and what follows from them without asking a question."""
 
-from collections.abc import Iterable
+from collections.abc import Callable, Iterable
 from dataclasses import dataclass, field
-from functools import cached_property
-from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from functools import cached_property, wraps
+from typing import Any, TypeVar
 
 import jax
 import numpy as np
 
 from bowdenfit.dataset import Dataset
 from bowdenfit.errors import UsageError
-from bowdenfit.inference.chain import Trajectories
 from bowdenfit.inference.diagnostics import Diagnostics
 from bowdenfit.inference.draws import curves_of, efficiency_at, for_each_draw
 from bowdenfit.inference.interval import Interval
 from bowdenfit.inference.least_squares import LeastSquares
 from bowdenfit.inference.samplers import SamplerAgreement
+from bowdenfit.inference.trajectories import Trajectories
 from bowdenfit.model import Model, build_model
 from bowdenfit.results.choices import at_edge, best_window, rank_choices
 from bowdenfit.results.length import OptimalLength
 from bowdenfit.results.optimum import route_grid
 
-if TYPE_CHECKING:
-    from bowdenfit.questions.bends.answer import Elastic
-    from bowdenfit.questions.check.answer import Checks
-    from bowdenfit.questions.identify.answer import Identifiability
-    from bowdenfit.questions.summary.verdict import Verdict
-
 OPTIMAL_LENGTH, OPTIMAL_EFFICIENCY = "optimal_length", "optimal_efficiency"
+Answer = TypeVar("Answer")
 
 
 @dataclass(frozen=True)
@@ -91,8 +85,8 @@ class Provenance:
 
 
 @dataclass(frozen=True)
-class Fit:
-    """What was found for one data set.
+class Record:
+    """What was found for one data set; every question is asked of this.
 
     Args:
         dataset: What was fitted.
@@ -101,6 +95,7 @@ class Fit:
         converged: Whether the sampler (or, without it, least squares) converged.
         reasons: Why not.
         provenance: Seed, versions, times.
+        answers: What questions asked `once` have answered, by question.
     """
 
     dataset: Dataset
@@ -109,19 +104,7 @@ class Fit:
     converged: bool
     reasons: tuple[str, ...]
     provenance: Provenance
-
-    @classmethod
-    def load(cls, path: str | Path) -> "Fit":
-        """A fit from its results folder, bit for bit as it was saved."""
-        from bowdenfit.results.store import load
-
-        return load(Path(path))
-
-    def save(self, path: str | Path, force: bool = False) -> None:
-        """Write the results folder (without figures and summary text, which `bowdenfit.fit(output=...)` adds)."""
-        from bowdenfit.results.store import save
-
-        save(self, Path(path), force)
+    answers: dict[Callable[..., Any], Any] = field(default_factory=dict, init=False, repr=False, compare=False)
 
     @cached_property
     def model(self) -> Model:
@@ -203,52 +186,6 @@ class Fit:
             ranked,
         )
 
-    @cached_property
-    def elastic(self) -> "Elastic":
-        """Answers about stretch, preload and loops at wrap angles."""
-        from bowdenfit.questions.bends.answer import Elastic
-
-        return Elastic(self)
-
-    @cached_property
-    def checks(self) -> "Checks | None":
-        """Every reading against its prediction from all the others, and what the priors do; None without draws."""
-        from bowdenfit.questions.check.answer import checks_of
-
-        return checks_of(self)
-
-    def summary(self) -> dict[str, Any]:
-        """Everything on one page, for programs (the contents of summary.json)."""
-        from bowdenfit.questions.summary.page import summarize
-
-        return summarize(self)
-
-    def verdict(self) -> "Verdict":
-        """Whether the answers may be trusted, and if not, why."""
-        return self._verdict
-
-    @cached_property
-    def _verdict(self) -> "Verdict":
-        from bowdenfit.questions.summary.verdict import verdict
-
-        return verdict(self)
-
-    @cached_property
-    def known(self) -> "Identifiability":
-        """What the draws determine, and what rests on the priors."""
-        from bowdenfit.questions.identify.answer import of_fit
-
-        return of_fit(self)
-
-    def __repr__(self) -> str:
-        state = "converged" if self.converged else "NOT converged" if self.posterior else "least squares only"
-        return f"<bowdenfit.Fit {self.name!r}: {self.model.space.size} parameters, {state}>"
-
-    def _repr_html_(self) -> str:
-        from bowdenfit.questions.summary.html import fit_page
-
-        return fit_page(self)
-
     def draws(self) -> Draws:
         """The posterior.
 
@@ -268,3 +205,16 @@ class Fit:
                 "the description has no [route], so there is no length to choose; add [route] with variable, unit and "
                 "range, and angles measured along it, to cable.toml."
             )
+
+
+def once(question: Callable[[Record], Answer]) -> Callable[[Record], Answer]:
+    """A question that is worked out once for each record, which keeps the answer."""
+
+    @wraps(question)
+    def answer(fit: Record) -> Answer:
+        if question not in fit.answers:
+            fit.answers[question] = question(fit)
+        found: Answer = fit.answers[question]
+        return found
+
+    return answer

@@ -13,18 +13,17 @@ from jaxtyping import AbstractArray
 from bowdenfit.dataset import Dataset
 from bowdenfit.description.file import parse_description
 from bowdenfit.errors import StoreError
-from bowdenfit.inference.chain import Trajectories
 from bowdenfit.inference.diagnostics import Diagnostics
 from bowdenfit.inference.disagreement import Disagreement
 from bowdenfit.inference.draws import derived_units
 from bowdenfit.inference.least_squares import Estimate, LeastSquares
 from bowdenfit.inference.samplers import SamplerAgreement
+from bowdenfit.inference.trajectories import Trajectories
 from bowdenfit.kinds import KINDS, each_table
 from bowdenfit.kinds.measurements import Measurements
-from bowdenfit.questions.summary.page import summarize
 from bowdenfit.results.folder import CHAIN, FIT, POSTERIOR, SUMMARY, made, write_text
 from bowdenfit.results.netcdf import EXPECTED, Coordinates, Groups, read_groups, write_groups
-from bowdenfit.results.record import OPTIMAL_EFFICIENCY, OPTIMAL_LENGTH, Draws, Fit, Provenance
+from bowdenfit.results.record import OPTIMAL_EFFICIENCY, OPTIMAL_LENGTH, Draws, Provenance, Record
 from bowdenfit.types import Flags, Labels, Matrix
 
 SCHEMA = 4
@@ -65,11 +64,18 @@ def _to_schema_4(page: dict[str, Any]) -> dict[str, Any]:
 MIGRATIONS: Mapping[int, Migration] = {1: _to_schema_2, 2: _to_schema_3, 3: _to_schema_4}  # from schema N to N + 1
 
 
-def save(fit: Fit, folder: Path, force: bool = False, write_posterior: Callable[..., Any] | None = None) -> None:
+def save(
+    fit: Record,
+    summary: Mapping[str, Any],
+    folder: Path,
+    force: bool = False,
+    write_posterior: Callable[..., Any] | None = None,
+) -> None:
     """Write posterior.nc, summary.json and, last, fit.json.
 
     Args:
         fit: The fit.
+        summary: Contents of summary.json.
         folder: Where to; made if missing.
         force: Whether a finished fit there may be replaced.
         write_posterior: What writes posterior.nc, if another process does; it is written here if omitted.
@@ -86,11 +92,11 @@ def save(fit: Fit, folder: Path, force: bool = False, write_posterior: Callable[
             write_groups(folder / POSTERIOR, *posterior_page(fit))
         else:
             write_posterior()
-        write_text(folder / SUMMARY, json.dumps(summarize(fit), indent=1) + "\n")
+        write_text(folder / SUMMARY, json.dumps(summary, indent=1) + "\n")
         write_text(folder / FIT, json.dumps(_fit_page(fit), indent=1) + "\n")
 
 
-def load(folder: Path) -> Fit:
+def load(folder: Path) -> Record:
     """Read a results folder.
 
     Raises:
@@ -107,7 +113,7 @@ def load(folder: Path) -> Fit:
         raise StoreError(
             f"{folder} is damaged ({type(error).__name__}: {error}); fit again, or restore the folder from a copy."
         ) from error
-    return Fit(dataset, squares, posterior, verdict["converged"], tuple(verdict["reasons"]), provenance)
+    return Record(dataset, squares, posterior, verdict["converged"], tuple(verdict["reasons"]), provenance)
 
 
 def _read_page(folder: Path) -> dict[str, Any]:
@@ -132,7 +138,7 @@ def _migrated(page: dict[str, Any], folder: Path) -> dict[str, Any]:
     return page
 
 
-def _fit_page(fit: Fit) -> dict[str, Any]:
+def _fit_page(fit: Record) -> dict[str, Any]:
     posterior = fit.posterior
     return {
         "schema": SCHEMA,
@@ -232,7 +238,7 @@ def _least_squares(page: Mapping[str, Any]) -> LeastSquares:
     )
 
 
-def posterior_page(fit: Fit) -> tuple[Groups, Coordinates, dict[str, str], dict[str, dict[str, str]]]:
+def posterior_page(fit: Record) -> tuple[Groups, Coordinates, dict[str, str], dict[str, dict[str, str]]]:
     """Contents of posterior.nc as plain data: groups of variables, the readings' labels, attributes of file and variables."""
     posterior, space = fit.posterior, fit.model.space
     assert posterior is not None  # the caller asked
@@ -258,7 +264,7 @@ def _trajectory_statistics(posterior: Draws) -> dict[str, np.ndarray]:
     return dict(posterior.trajectories.statistics) if posterior.trajectories else {}
 
 
-def _variable_attributes(fit: Fit) -> dict[str, dict[str, str]]:
+def _variable_attributes(fit: Record) -> dict[str, dict[str, str]]:
     """Unit, symbol and meaning of every variable in the posterior."""
     route = fit.dataset.description.route
     labels = {p.name: {"units": p.unit, "symbol": p.symbol, "long_name": p.meaning} for p in fit.model.space.free}

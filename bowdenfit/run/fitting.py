@@ -9,6 +9,7 @@ from pathlib import Path
 import jax
 
 from bowdenfit.dataset import Dataset
+from bowdenfit.front_desk import Fit
 from bowdenfit.inference.least_squares import (
     LeastSquares,
     MaximumPosterior,
@@ -19,7 +20,7 @@ from bowdenfit.inference.least_squares import (
 )
 from bowdenfit.inference.log_density import LogDensity as Density
 from bowdenfit.model import build_model
-from bowdenfit.results.record import Fit, Provenance
+from bowdenfit.results.record import Provenance
 from bowdenfit.run.helpers import Assistants, load_ahead
 from bowdenfit.run.sampling import implied_program, libraries, sampled, sampling_programs
 from bowdenfit.run.stopwatch import Stopwatch

@@ -14,7 +14,7 @@ from bowdenfit.results.folder import CHAIN, clear, read_checkpoint, refuse_to_ov
 from bowdenfit.run.helpers import Assistants, draw
 
 if TYPE_CHECKING:
-    from bowdenfit.results.record import Fit
+    from bowdenfit.front_desk import Fit
 
 LARGEST_SEED = 2**31 - 1
 
@@ -33,7 +33,7 @@ def write_results(found: "Fit", folder: Path, figures: bool, helpers: Assistants
     else:
         written = helpers.statistics.submit(write_groups, folder / POSTERIOR, *posterior_page(found))
     drawn = helpers.drawing.submit(draw, figure_data(found), folder / FIGURES) if figures else None
-    save(found, folder, force=True, write_posterior=written.result if written else None)
+    save(found, found.summary(), folder, force=True, write_posterior=written.result if written else None)
     write_text(folder / SUMMARY_TEXT, summary_text(found))
     if drawn is not None:
         drawn.result()

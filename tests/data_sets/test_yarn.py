@@ -13,7 +13,7 @@ from scipy import stats
 
 import bowdenfit
 from bowdenfit.dataset import Dataset
-from bowdenfit.results.record import Fit
+from bowdenfit.front_desk import Fit
 
 FOLDER = Path(__file__).parents[2] / "datasets" / "yarn-on-cylinder"
 NOMINAL = np.repeat([45, 90, 135, 180, 225, 270, 315], 3)

@@ -14,10 +14,9 @@ import bowdenfit as bf
 from bowdenfit import verbs
 from bowdenfit.description import SamplerSettings
 from bowdenfit.inference import nuts
-from bowdenfit.inference.chain import Trajectories
-from bowdenfit.inference.diagnostics import energy_mixing, trajectory_shortfalls
 from bowdenfit.inference.least_squares import MaximumPosterior
 from bowdenfit.inference.samplers import FALSE_ALARM, Drawn, SamplerAgreement, compare_samplers, recommendation
+from bowdenfit.inference.trajectories import Trajectories, energy_mixing, trajectory_shortfalls
 from bowdenfit.parameters.priors import Normal
 from bowdenfit.parameters.space import Parameter
 from bowdenfit.questions.summary.words import summary_text

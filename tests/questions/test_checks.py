@@ -29,7 +29,7 @@ from bowdenfit.questions.check.prior_words import prior_predictive_text
 from bowdenfit.questions.check.residual_places import Places
 from bowdenfit.questions.check.words import checks_text
 from bowdenfit.questions.summary.figure_data import FigureData
-from bowdenfit.results.record import Draws, Fit, Provenance
+from bowdenfit.results.record import Draws, Provenance, Record
 
 DRAWS = 8000
 
@@ -375,7 +375,7 @@ class Checked:
             z.reshape(-1, ROWS, z.shape[1]), values, {}, drawn["log_likelihood"], {}, drawn["replicated"], {},
             {"z": Diagnostics(1.0, 500.0, 500.0, 0.0, 0.0)}, 1, 1, 0.5,
         )  # fmt: skip
-        return checks_of(Fit(dataset, None, posterior, True, (), Provenance(seed, {})))
+        return checks_of(Record(dataset, None, posterior, True, (), Provenance(seed, {})))
 
     @staticmethod
     def implied(model):

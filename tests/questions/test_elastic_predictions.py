@@ -13,10 +13,11 @@ from scipy.integrate import quad
 from scipy.optimize import brentq
 
 from bowdenfit.description import Description
+from bowdenfit.front_desk import Fit
 from bowdenfit.inference.least_squares import LeastSquares
 from bowdenfit.questions.bends.words import elastic_text
 from bowdenfit.questions.check.data_set_words import check_text
-from bowdenfit.results.record import Draws, Fit, Provenance
+from bowdenfit.results.record import Draws, Provenance
 
 BENDS = np.deg2rad([0.0, 30.0, 75.0, 120.0, 180.0, 270.0])
 MU, DEGREE = TRUTH["mu"], np.deg2rad(1.0)

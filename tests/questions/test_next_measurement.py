@@ -16,6 +16,7 @@ from scipy import stats
 import bowdenfit as bf
 from bowdenfit.dataset import Dataset, load_dataset
 from bowdenfit.errors import UsageError
+from bowdenfit.front_desk import Fit
 from bowdenfit.inference.draws import curves_of, for_each_draw, named_values
 from bowdenfit.inference.log_density import LogDensity as Density
 from bowdenfit.kinds.tables import AngleTable, EfficiencyTable, OwnAngles, Provenance
@@ -31,7 +32,7 @@ from bowdenfit.questions.next.variance_reduction import error_of_difference, exp
 from bowdenfit.questions.next.words import next_measurement_text
 from bowdenfit.questions.simulate.simulation import Design, empty_tables
 from bowdenfit.results.optimum import optimum_of
-from bowdenfit.results.record import Draws, Fit
+from bowdenfit.results.record import Draws
 from bowdenfit.results.record import Provenance as Origin
 
 QUICK = ("sampler.n_walkers=128", "sampler.target_ess=200", "sampler.target_r_hat=1.05", "sampler.max_steps=3000")

@@ -14,7 +14,7 @@ from bowdenfit.errors import UsageError
 from bowdenfit.inference.draws import for_each_draw
 from bowdenfit.inference.interval import Interval
 from bowdenfit.questions.bends.equations import Bent, bending_contact, knows_preload, knows_stretch
-from bowdenfit.results.record import Fit
+from bowdenfit.results.record import Record, once
 
 TAUT = 0.95  # probability with which the recommended preload keeps both sides taut
 _BENDS = 25  # wrap angles at which a range of bends is looked at
@@ -50,9 +50,9 @@ class PreloadAnswer:
 
 @dataclass(frozen=True)
 class Elastic:
-    """The elastic answers of one fit (`fit.elastic`). Angles are in rad, forces in N, lengths in mm."""
+    """The elastic answers of one fit. Angles are in rad, forces in N, lengths in mm."""
 
-    fit: Fit
+    fit: Record
 
     @cached_property
     def contact(self) -> int:
@@ -298,7 +298,13 @@ class Elastic:
             )
 
 
-def has_elastic_answers(fit: Fit) -> bool:
+@once
+def elastic_answers(fit: Record) -> Elastic:
+    """The elastic answers of a fit."""
+    return Elastic(fit)
+
+
+def has_elastic_answers(fit: Record) -> bool:
     """Whether a fit says anything of stretch or preload."""
     return knows_stretch(fit.model) or knows_preload(fit.model)
 
@@ -308,13 +314,13 @@ def some_of(values: np.ndarray, most: int) -> np.ndarray:
     return values[np.unique(np.linspace(0, len(values) - 1, most).round().astype(int))] if len(values) else values
 
 
-def friction_arm(fit: Fit) -> tuple[float, str]:
+def friction_arm(fit: Record) -> tuple[float, str]:
     """Radius that turns friction into what is felt [mm] and the unit of that; 1 and N without a radius."""
     radius = fit.dataset.description.cable.output_pulley_radius
     return (radius.to("length"), "N*mm") if radius is not None else (1.0, "N")
 
 
-def typical_preload(fit: Fit) -> float:
+def typical_preload(fit: Record) -> float:
     """Preload by least squares, or the median of its prior where the measurements do not tell it [N]."""
     estimate = fit.least_squares.estimates[PRELOAD].value
     if np.isfinite(estimate):

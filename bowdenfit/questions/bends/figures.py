@@ -15,11 +15,11 @@ from jax import Array
 from bowdenfit.errors import UsageError
 from bowdenfit.inference.draws import BATCH, for_each_draw
 from bowdenfit.kinds.tables import StretchTable
-from bowdenfit.questions.bends.answer import has_elastic_answers
+from bowdenfit.questions.bends.answer import elastic_answers, has_elastic_answers
 from bowdenfit.questions.bends.equations import knows_preload
 from bowdenfit.questions.bends.figure_data import ElasticFigures, PreloadCurve, StretchCurve
 from bowdenfit.questions.bends.loop_figures import BendingLossPart, Curves, LoopsPart, Values, WindowPart, quantiles
-from bowdenfit.results.record import Fit
+from bowdenfit.results.record import Record
 
 _POINTS = 61
 _LEAST_BEND = 0.1  # rad; a figure against the wrap angle needs a range
@@ -37,7 +37,7 @@ class Part(Protocol):
         ...
 
 
-def elastic_figures(fit: Fit) -> ElasticFigures:
+def elastic_figures(fit: Record) -> ElasticFigures:
     """What the figures of stretch, preload and loops show; empty where the cable has none of them."""
     if not has_elastic_answers(fit):
         return ElasticFigures()
@@ -56,9 +56,9 @@ def elastic_figures(fit: Fit) -> ElasticFigures:
         return ElasticFigures(**{name: part.figure(draws[name]) for name, part in parts.items()})
 
 
-def _parts(fit: Fit) -> dict[str, Part]:
+def _parts(fit: Record) -> dict[str, Part]:
     """The figures that apply."""
-    elastic, tables, parts = fit.elastic, fit.dataset.measurements, dict[str, Part]()
+    elastic, tables, parts = elastic_answers(fit), fit.dataset.measurements, dict[str, Part]()
     if tables.stretch is not None:
         parts["stretch"] = _Stretch(fit, tables.stretch)
     if fit.dataset.description.preload_follows_stretch and knows_preload(fit.model):
@@ -79,7 +79,7 @@ def _parts(fit: Fit) -> dict[str, Part]:
 class _Stretch:
     """Stretch against load at each wrap angle."""
 
-    fit: Fit
+    fit: Record
     table: StretchTable
 
     @property
@@ -116,7 +116,7 @@ class _Stretch:
 class _Preload:
     """Preload against the wrap angle."""
 
-    fit: Fit
+    fit: Record
 
     @property
     def _angles(self) -> np.ndarray:

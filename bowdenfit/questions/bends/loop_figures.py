@@ -18,7 +18,7 @@ from bowdenfit.questions.bends.answer import Elastic, friction_arm, some_of, typ
 from bowdenfit.questions.bends.equations import Bent
 from bowdenfit.questions.bends.figure_data import BendingLoss, EfficiencyLine, LoopCurve, PreloadWindow
 from bowdenfit.questions.recorded.loop_traces import LoopPoints, loop_points
-from bowdenfit.results.record import Fit
+from bowdenfit.results.record import Record
 
 _QUANTILES = (0.05, 0.5, 0.95)
 _POINTS = 61
@@ -90,7 +90,7 @@ class BendingLossPart:
         )
 
 
-def _at_reference(fit: Fit) -> str:
+def _at_reference(fit: Record) -> str:
     """' at 0 deg' where preload depends on the wrap angle."""
     settings = fit.dataset.description.preload
     follows = fit.dataset.description.preload_follows_stretch

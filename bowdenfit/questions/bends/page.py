@@ -8,25 +8,25 @@ import numpy as np
 from bowdenfit.description.elastic import PRELOAD
 from bowdenfit.errors import UsageError
 from bowdenfit.inference.interval import Interval
-from bowdenfit.questions.bends.answer import TAUT, PreloadAnswer, friction_arm, has_elastic_answers
+from bowdenfit.questions.bends.answer import TAUT, PreloadAnswer, elastic_answers, friction_arm, has_elastic_answers
 from bowdenfit.questions.bends.equations import bending_contact
-from bowdenfit.results.record import Fit
+from bowdenfit.results.record import Record
 
 _CLOSE = -0.9  # correlation of logarithms beyond which only a product is said to be known
 
 
-def elastic_page(fit: Fit) -> dict[str, Any]:
+def elastic_page(fit: Record) -> dict[str, Any]:
     """Answers at the wrap angles that were measured at, and sentences; empty where there are none or no draws."""
     if fit.posterior is None or not has_elastic_answers(fit):
         return {}
     page: dict[str, Any] = {
-        "input_force": fit.elastic.reference_force,
+        "input_force": elastic_answers(fit).reference_force,
         "friction_unit": friction_arm(fit)[1],
         "bends": [],
     }
     window = None
     if has_bends(fit):
-        bends, draws, window = fit.elastic.usual
+        bends, draws, window = elastic_answers(fit).usual
         page["bends"] = _bends(fit, bends, draws)
     if window is not None:
         page["preload_window"] = window_page(fit, window)
@@ -34,7 +34,7 @@ def elastic_page(fit: Fit) -> dict[str, Any]:
     return page
 
 
-def has_bends(fit: Fit) -> bool:
+def has_bends(fit: Record) -> bool:
     """Whether there are answers at wrap angles, and a wrap angle says which contact is bent."""
     try:
         bending_contact(fit.model)
@@ -43,7 +43,7 @@ def has_bends(fit: Fit) -> bool:
     return has_elastic_answers(fit)
 
 
-def _bends(fit: Fit, bends: np.ndarray, draws: dict[str, np.ndarray]) -> list[dict[str, Any]]:
+def _bends(fit: Record, bends: np.ndarray, draws: dict[str, np.ndarray]) -> list[dict[str, Any]]:
     """One row a wrap angle, in the units that are shown."""
     scale = {"friction": friction_arm(fit)[0], "efficiency": 100.0}
     return [
@@ -53,7 +53,7 @@ def _bends(fit: Fit, bends: np.ndarray, draws: dict[str, np.ndarray]) -> list[di
     ]
 
 
-def window_page(fit: Fit, window: PreloadAnswer) -> dict[str, Any]:
+def window_page(fit: Record, window: PreloadAnswer) -> dict[str, Any]:
     """A preload window as plain data; angles in deg, friction in the unit that it is felt in."""
     arm, unit = friction_arm(fit)
     felt = {name: arm * value for name, value in asdict(window.felt).items()}
@@ -71,7 +71,7 @@ def window_page(fit: Fit, window: PreloadAnswer) -> dict[str, Any]:
     }
 
 
-def _sentences(fit: Fit, window: PreloadAnswer | None) -> list[str]:
+def _sentences(fit: Record, window: PreloadAnswer | None) -> list[str]:
     sentences = []
     if window is not None:
         sentences.append(window_sentence(fit, window))
@@ -81,7 +81,7 @@ def _sentences(fit: Fit, window: PreloadAnswer | None) -> list[str]:
     return sentences
 
 
-def window_sentence(fit: Fit, window: PreloadAnswer) -> str:
+def window_sentence(fit: Record, window: PreloadAnswer) -> str:
     """The preload window in words."""
     low, high = (f"{angle:.4g}" for angle in np.rad2deg(window.bends))
     page, (_, unit) = window_page(fit, window), friction_arm(fit)
@@ -104,7 +104,7 @@ def window_sentence(fit: Fit, window: PreloadAnswer) -> str:
     return " ".join(parts)
 
 
-def products_with_preload(fit: Fit) -> list[str]:
+def products_with_preload(fit: Record) -> list[str]:
     """What to say of coefficients of friction of which only the product with the preload is known, as in free motion."""
     names = [p.name for p in fit.model.space.free]
     if fit.posterior is None or PRELOAD not in names:

@@ -4,7 +4,7 @@ from typing import Any
 
 from bowdenfit.kinds.measurements import Measurements
 from bowdenfit.questions.bends.page import elastic_page
-from bowdenfit.results.record import Fit
+from bowdenfit.results.record import Record
 from bowdenfit.words import filled, table
 
 
@@ -18,7 +18,7 @@ def elastic_counts(measured: Measurements) -> list[str]:
     return [f"{count} {what}" for count, what in kinds if count is not None]
 
 
-def elastic_text(fit: Fit) -> str:
+def elastic_text(fit: Record) -> str:
     """The answers about stretch, preload and the loop, with their intervals."""
     page = elastic_page(fit)
     if not page:

@@ -15,7 +15,7 @@ from bowdenfit.inference.predictive_checks import (
 from bowdenfit.inference.prior_sensitivity import SENSITIVE, Sensitivity, sensitivities
 from bowdenfit.model import Term
 from bowdenfit.questions.check.residual_places import STROKE, Places, places_of
-from bowdenfit.results.record import Draws, Fit
+from bowdenfit.results.record import Draws, Record, once
 
 FALSE_ALARM = 0.01  # chance that a healthy fit is said to have an outlier; the same for the other kinds of alarm
 _LEAST_READINGS = 8  # of a table, below which neither its distribution nor a trend can be judged
@@ -138,7 +138,8 @@ def diagnosis(found: Sensitivity) -> str:
     return "conflict" if abs(found.prior_sds) > _CONFLICT else "both count"
 
 
-def checks_of(fit: Fit) -> Checks | None:
+@once
+def checks_of(fit: Record) -> Checks | None:
     """All checks of a fit; None without draws."""
     if fit.posterior is None:
         return None
@@ -149,7 +150,7 @@ def checks_of(fit: Fit) -> Checks | None:
 
 
 def _table(
-    fit: Fit, posterior: Draws, term: Term, probability: float, generator: np.random.Generator
+    fit: Record, posterior: Draws, term: Term, probability: float, generator: np.random.Generator
 ) -> TableChecks:
     n = len(term.labels)
     log_likelihood, replicated = (
@@ -218,7 +219,7 @@ def _trend(table: TableChecks, group: str, against: str, x: np.ndarray, z: np.nd
     return Trend(table.table, group, against, words[int(correlation < 0)], float(chance))
 
 
-def _sensitivities(fit: Fit, posterior: Draws) -> tuple[Sensitivity, ...]:
+def _sensitivities(fit: Record, posterior: Draws) -> tuple[Sensitivity, ...]:
     """Of the free friction coefficients and the design answers."""
     space = fit.model.space
     every = max(1, posterior.z[..., 0].size // _DRAWS)

@@ -14,7 +14,7 @@ from bowdenfit.inference.leave_one_out import Readings, leave_one_out
 from bowdenfit.inference.log_density import LogDensity as Density
 from bowdenfit.questions.compare.common_readings import ANGLES, Common, Omitted, common_readings
 from bowdenfit.questions.recorded.rate import RateEffect, rate_effect
-from bowdenfit.results.record import Draws, Fit
+from bowdenfit.results.record import Draws, Record
 
 _SHOWN_ROLES = {"friction", "friction_model", "sensor"}
 _OF_RUNS = {"run_efficiency", "recorded_efficiency"}  # tables whose readings are whole runs
@@ -122,7 +122,7 @@ def _finite(value: float) -> float | None:
     return value if np.isfinite(value) else None
 
 
-def compare(fits: Mapping[str, Fit], report: Report | None = None) -> Comparison:
+def compare(fits: Mapping[str, Record], report: Report | None = None) -> Comparison:
     """Compare fits.
 
     Args:
@@ -156,13 +156,13 @@ def compare(fits: Mapping[str, Fit], report: Report | None = None) -> Comparison
     )
 
 
-def _drawn(name: str, fit: Fit) -> Draws:
+def _drawn(name: str, fit: Record) -> Draws:
     if fit.posterior is None:
         raise UsageError(f"{name} has no posterior, because it was made without MCMC; fit it again without --no-mcmc.")
     return fit.posterior
 
 
-def _common(fits: Mapping[str, Fit]) -> Common:
+def _common(fits: Mapping[str, Record]) -> Common:
     """The readings that all fits share; refuses fits of other measurements."""
     first, *others = fits
     for name in others:
@@ -180,13 +180,13 @@ def _common(fits: Mapping[str, Fit]) -> Common:
     return common
 
 
-def _inputs(fit: Fit) -> tuple[list[tuple[str, str]], list[tuple[str, tuple[str, ...]]]]:
+def _inputs(fit: Record) -> tuple[list[tuple[str, str]], list[tuple[str, tuple[str, ...]]]]:
     """Files that were read, description aside, with their checksums; and the readings of every table but angles."""
     files = sorted((file, digest) for file, digest in fit.dataset.sha256.items() if not file.endswith(".toml"))
     return files, [(term.name, term.labels) for term in fit.model.terms if term.name != ANGLES]
 
 
-def _predicted(name: str, fit: Fit, drawn: Draws, common: Common, report: Report | None) -> Prediction:
+def _predicted(name: str, fit: Record, drawn: Draws, common: Common, report: Report | None) -> Prediction:
     said: Report | None = None if report is None else lambda sentence: report(f"{name}: {sentence}")
     return leave_one_out(
         Readings(Density(fit.model)),
@@ -204,7 +204,7 @@ def _effective(drawn: Draws) -> float:
     return min((d.ess_bulk for d in drawn.diagnostics.values()), default=float(drawn.z[..., 0].size))
 
 
-def _described(fit: Fit) -> str:
+def _described(fit: Record) -> str:
     """What sets a fit apart from others of the same data."""
     description = fit.dataset.description
     parts = [description.friction_model]
@@ -220,7 +220,7 @@ def _described(fit: Fit) -> str:
     return ", ".join(parts + ([f"{', '.join(fixed)} fixed"] if fixed else []))
 
 
-def _parameters(fits: Mapping[str, Fit]) -> dict[str, ComparedParameter]:
+def _parameters(fits: Mapping[str, Record]) -> dict[str, ComparedParameter]:
     rows: dict[str, ComparedParameter] = {}
     for name, fit in fits.items():
         for p in fit.model.space.free:

@@ -11,7 +11,7 @@ import numpy as np
 
 from bowdenfit.kinds.recordings.blocks import RECORDED
 from bowdenfit.model import Term
-from bowdenfit.results.record import Fit
+from bowdenfit.results.record import Record
 
 ANGLES = "wrap_angle"  # the table whose readings depend on how the fit takes what was not detected
 _SAME = 1e-6  # relative difference of sums over the same samples in another order
@@ -58,7 +58,7 @@ class Common:
     omitted: tuple[Omitted, ...]
 
 
-def common_readings(fits: Mapping[str, Fit]) -> Common:
+def common_readings(fits: Mapping[str, Record]) -> Common:
     """The readings that all fits have, as the same events.
 
     Args:
@@ -85,7 +85,7 @@ def _count(keys: Mapping[Key, np.ndarray] | list[Key], table: str) -> int:
     return sum(key[0] == table for key in keys)
 
 
-def _events(fit: Fit) -> dict[Key, np.ndarray]:
+def _events(fit: Record) -> dict[Key, np.ndarray]:
     """What each reading says, by table, label and how often that label came before; in the order of the model's terms."""
     found: dict[Key, np.ndarray] = {}
     for term in fit.model.terms:
@@ -95,7 +95,7 @@ def _events(fit: Fit) -> dict[Key, np.ndarray]:
     return found
 
 
-def _said(term: Term, fit: Fit) -> np.ndarray:
+def _said(term: Term, fit: Record) -> np.ndarray:
     """Of each reading, numbers that are the same wherever it is the same event; NaN where it is a limit alone."""
     if term.name == RECORDED:  # the likelihood of all its blocks; their number tells how they were chosen
         settings = fit.dataset.description.tables.recordings
@@ -108,7 +108,7 @@ def _same(one: np.ndarray, other: np.ndarray) -> bool:
     return one.shape == other.shape and np.allclose(one, other, rtol=_SAME, atol=0.0, equal_nan=True)
 
 
-def _why(table: str, fits: Mapping[str, Fit]) -> str:
+def _why(table: str, fits: Mapping[str, Record]) -> str:
     """Why the readings of a table are not the same events in all fits."""
     descriptions = [fit.dataset.description for fit in fits.values()]
     if table == RECORDED:
@@ -129,7 +129,7 @@ def _why(table: str, fits: Mapping[str, Fit]) -> str:
     return "the others are not in all fits"
 
 
-def _treatment(fit: Fit) -> str:
+def _treatment(fit: Record) -> str:
     """How a fit takes angles that are too small to detect."""
     description = fit.dataset.description
     if description.geometry == "published":

@@ -12,7 +12,7 @@ from bowdenfit.inference.identifiability import NOTHING, Combination, Knowledge,
 from bowdenfit.inference.least_squares import UNDETERMINED, MaximumPosterior
 from bowdenfit.inference.profiles import Profile
 from bowdenfit.model import Model
-from bowdenfit.results.record import Fit
+from bowdenfit.results.record import Record, once
 from bowdenfit.words import decimals, listed
 
 # Parameters that friction is made of, and those of the rope's elasticity: each group is judged by itself.
@@ -53,7 +53,8 @@ class Identifiability:
         }
 
 
-def of_fit(fit: Fit) -> Identifiability:
+@once
+def identifiability(fit: Record) -> Identifiability:
     """What a fit knows, from its draws.
 
     Args:
@@ -165,7 +166,7 @@ def _to(known: Known | Combination) -> str:
     return f"to +- {known.sd:.{decimals(known.sd)}f}"
 
 
-def unidentified(fit: Fit) -> str:
+def unidentified(fit: Record) -> str:
     """Which friction coefficients the measurements do not tell, in a sentence; empty where they tell all.
 
     Only coefficients with the weak default prior count: who states a coefficient as measured, or gives it a prior, knows
@@ -174,7 +175,7 @@ def unidentified(fit: Fit) -> str:
     names = [p.name for p in fit.model.space.free if p.role == "friction" and not _stated(fit, p.name)]
     if fit.posterior is None:
         return _in_words([name for name in names if _undetermined(fit, name)], None)
-    friction = fit.known.groups.get("friction")
+    friction = identifiability(fit).groups.get("friction")
     if friction is None:
         return ""
     share = {p.name: p.share for p in friction.parameters}
@@ -183,7 +184,7 @@ def unidentified(fit: Fit) -> str:
     return _in_words(lost, known)
 
 
-def _undetermined(fit: Fit, name: str) -> bool:
+def _undetermined(fit: Record, name: str) -> bool:
     """Whether least squares without priors leaves a coefficient open altogether."""
     estimates = fit.least_squares.estimates
     if any(estimates[p.name].remark == UNDETERMINED for p in fit.model.space.free if p.role == "sensor"):
@@ -207,7 +208,7 @@ def _in_words(lost: list[str], known: Combination | None) -> str:
     )
 
 
-def _stated(fit: Fit, name: str) -> bool:
+def _stated(fit: Record, name: str) -> bool:
     """Whether the description says something of a coefficient beyond naming it."""
     return name in fit.dataset.description.friction
 

@@ -5,7 +5,7 @@ from itertools import combinations
 
 import numpy as np
 
-from bowdenfit.results.record import Fit
+from bowdenfit.results.record import Record
 
 _ROLES = {"friction", "friction_model", "sensor", "angle", "elastic"}
 _CLOSE = 0.9  # correlation beyond which two parameters are said to be confounded
@@ -50,7 +50,7 @@ class Confounded:
         )
 
 
-def confounded(fit: Fit) -> list[Confounded]:
+def confounded(fit: Record) -> list[Confounded]:
     """Pairs of parameters whose draws lie along a line, the closest first; empty without draws."""
     if fit.posterior is None:
         return []
@@ -62,14 +62,14 @@ def confounded(fit: Fit) -> list[Confounded]:
     return sorted(found, key=lambda pair: -abs(pair.correlation))
 
 
-def _known(fit: Fit, name: str) -> bool:
+def _known(fit: Record, name: str) -> bool:
     """Whether a parameter is known well by itself, so that what it is correlated with does not matter."""
     assert fit.posterior is not None  # the caller checked
     draws = fit.posterior.values[name]
     return bool(np.std(draws) < _WELL * np.abs(np.median(draws)))
 
 
-def _pair(fit: Fit, first: str, second: str) -> Confounded:
+def _pair(fit: Record, first: str, second: str) -> Confounded:
     assert fit.posterior is not None  # the caller checked
     a, b = fit.posterior.values[first].ravel(), fit.posterior.values[second].ravel()
     covariance = np.cov(a, b)

@@ -4,7 +4,7 @@ from dataclasses import asdict
 from typing import Any
 
 from bowdenfit.inference.disagreement import WORTH_SAYING, Disagreement
-from bowdenfit.results.record import Fit
+from bowdenfit.results.record import Record
 from bowdenfit.words import decimals
 
 _AS_MUCH = 0.8  # of the largest conflict: beyond that either table may be the odd one out
@@ -19,13 +19,13 @@ _TABLES = {
 }
 
 
-def agreement_page(fit: Fit) -> list[dict[str, Any]]:
+def agreement_page(fit: Record) -> list[dict[str, Any]]:
     """How well each table agrees with everything else, the odd one out first."""
     found = sorted(fit.least_squares.disagreements, key=lambda d: -d.conflict)
     return [asdict(d) | {"unit": _unit(fit, d)} for d in found]
 
 
-def contradiction(fit: Fit) -> str:
+def contradiction(fit: Record) -> str:
     """The table that is the odd one out, in a sentence; empty where all agree."""
     worst = max(fit.least_squares.disagreements, key=lambda d: d.conflict, default=None)
     if worst is None or worst.sds < WORTH_SAYING:
@@ -49,7 +49,7 @@ def _name(table: str) -> str:
     return _TABLES.get(table, table)
 
 
-def _unit(fit: Fit, found: Disagreement) -> str:
+def _unit(fit: Record, found: Disagreement) -> str:
     """Unit of the parameter, with a blank before it."""
     unit = next(p.unit for p in fit.model.space.free if p.name == found.parameter)
     return "" if unit == "1" else f" {unit}"

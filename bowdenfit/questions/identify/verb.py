@@ -11,12 +11,12 @@ from bowdenfit.verbs import load, read
 
 if TYPE_CHECKING:
     from bowdenfit.questions.identify.answer import Identifiability
-    from bowdenfit.results.record import Fit
+    from bowdenfit.results.record import Record
 
 _REACH, _PINS = 4.0, 21  # standard deviations on both sides that profiles cover, and values in them
 
 
-def identify(source: "str | Path | Dataset | Fit", **reading: Any) -> "Identifiability":
+def identify(source: "str | Path | Dataset | Record", **reading: Any) -> "Identifiability":
     """What measurements determine of a cable's parameters, and what rests on the priors.
 
     Args:
@@ -29,12 +29,12 @@ def identify(source: "str | Path | Dataset | Fit", **reading: Any) -> "Identifia
     """
     import jax
 
-    from bowdenfit.results.record import Fit
+    from bowdenfit.results.record import Record
 
     if isinstance(source, str | Path) and (Path(source) / "fit.json").exists():
         source = load(source)
     with jax.enable_x64(True):
-        if isinstance(source, Fit):
+        if isinstance(source, Record):
             return _of_fit(source)
         if isinstance(source, Dataset) or not _is_plan(Path(source)):
             return _of_tables(read(source, **reading))
@@ -53,11 +53,12 @@ def _is_plan(path: Path) -> bool:
         return False  # the reader says what is wrong
 
 
-def _of_fit(found: "Fit") -> "Identifiability":
+def _of_fit(found: "Record") -> "Identifiability":
     from bowdenfit.inference.least_squares import make_objective, maximum_posterior
     from bowdenfit.inference.log_density import LogDensity
+    from bowdenfit.questions.identify.answer import identifiability
 
-    known = found.known
+    known = identifiability(found)
     posterior = LogDensity(found.model)
     objective = make_objective(posterior)
     return replace(known, profiles=_profiles(posterior, objective, maximum_posterior(posterior, objective)))

@@ -9,7 +9,7 @@ import numpy as np
 from bowdenfit.errors import DatasetError, UsageError, nearest
 from bowdenfit.questions.next.possible_candidates import ALONG, columns_without_curve, route_words, why_not
 from bowdenfit.questions.next.possible_readings import KINDS, Candidate
-from bowdenfit.results.record import Fit
+from bowdenfit.results.record import Record
 from bowdenfit.units import conversion_factor, dimension_of, route_conversion_factor
 
 _LOADED = ("stretch", "loop")
@@ -32,7 +32,7 @@ _KIND_WORDS = {
 }
 
 
-def parsed_candidates(fit: Fit, texts: Iterable[str]) -> tuple[Candidate, ...]:
+def parsed_candidates(fit: Record, texts: Iterable[str]) -> tuple[Candidate, ...]:
     """Candidates as users write them, such as "angle@450" or "stretch@90deg,50N".
 
     Raises:
@@ -41,7 +41,7 @@ def parsed_candidates(fit: Fit, texts: Iterable[str]) -> tuple[Candidate, ...]:
     return tuple(dict.fromkeys(_parsed(fit, text) for text in texts))
 
 
-def _parsed(fit: Fit, text: str) -> Candidate:
+def _parsed(fit: Record, text: str) -> Candidate:
     kind, _, where = text.partition("@")
     if kind not in KINDS:
         raise UsageError(f"--candidate {text!r} is of no kind that can be measured{nearest(kind, KINDS)}")
@@ -55,7 +55,7 @@ def _parsed(fit: Fit, text: str) -> Candidate:
     return candidate
 
 
-def _with_part(fit: Fit, candidate: Candidate, text: str, part: str) -> Candidate:
+def _with_part(fit: Record, candidate: Candidate, text: str, part: str) -> Candidate:
     """The candidate with one more number of its place."""
     found = _NUMBER.fullmatch(part)
     route = fit.dataset.description.route
@@ -79,7 +79,7 @@ def _with_part(fit: Fit, candidate: Candidate, text: str, part: str) -> Candidat
     )
 
 
-def _check_complete(fit: Fit, candidate: Candidate, text: str) -> None:
+def _check_complete(fit: Record, candidate: Candidate, text: str) -> None:
     """Every number that the kind needs must be there."""
     along = candidate.kind in ALONG and fit.dataset.description.route is not None
     if along:

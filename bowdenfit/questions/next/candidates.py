@@ -9,12 +9,12 @@ from bowdenfit.kinds.tables import OwnAngles
 from bowdenfit.questions.next.possible_candidates import columns_without_curve, why_not
 from bowdenfit.questions.next.possible_readings import KINDS, Candidate
 from bowdenfit.questions.next.possible_runs import typical_run
-from bowdenfit.results.record import Fit
+from bowdenfit.results.record import Record
 
 GRID, MOST_ANGLES, MOST_LOADS = 11, 9, 5  # lengths without choices; wrap angles and loads of default candidates
 
 
-def default_candidates(fit: Fit) -> tuple[Candidate, ...]:
+def default_candidates(fit: Record) -> tuple[Candidate, ...]:
     """Everything the tables of the description can hold, at the lengths and wrap angles that suggest themselves.
 
     Raises:
@@ -29,7 +29,7 @@ def default_candidates(fit: Fit) -> tuple[Candidate, ...]:
     return tuple(found)
 
 
-def _of_kind(fit: Fit, kind: str) -> list[Candidate]:
+def _of_kind(fit: Record, kind: str) -> list[Candidate]:
     """Candidates of one kind that the description has a table for."""
     tables, measured = fit.dataset.description.tables, fit.dataset.measurements
     has = {name: getattr(tables, name) is not None for name in ("efficiencies", "stretch", "preload", "loop")}
@@ -53,7 +53,7 @@ def _of_kind(fit: Fit, kind: str) -> list[Candidate]:
     return []
 
 
-def _own_of_recordings(fit: Fit) -> OwnAngles | None:
+def _own_of_recordings(fit: Record) -> OwnAngles | None:
     recordings = fit.dataset.measurements.recordings
     if recordings is None:
         return None
@@ -62,7 +62,7 @@ def _own_of_recordings(fit: Fit) -> OwnAngles | None:
     return OwnAngles(recordings.columns, angle, np.full(shape, np.nan))
 
 
-def _lengths(fit: Fit) -> list[float]:
+def _lengths(fit: Record) -> list[float]:
     """Lengths that can be bought, or a grid over the range; none without a route."""
     route = fit.dataset.description.route
     if route is None:
@@ -70,7 +70,7 @@ def _lengths(fit: Fit) -> list[float]:
     return [float(at) for at in (route.choices or np.linspace(*route.range, GRID))]
 
 
-def _along_cable(fit: Fit, kind: str, own: OwnAngles | None) -> list[Candidate]:
+def _along_cable(fit: Record, kind: str, own: OwnAngles | None) -> list[Candidate]:
     """At each length, also those outside the range at which angles were read; without a route at angles measured before."""
     route, measured = fit.dataset.description.route, fit.dataset.measurements
     if route is not None:

@@ -9,17 +9,17 @@ from bowdenfit.cable.elasticity import PRELOAD, PRELOAD_NOISE, STRETCH_NOISE
 from bowdenfit.cable.load_cells import FORCE_NOISE, RUN_SCATTER
 from bowdenfit.questions.next.possible_readings import Candidate
 from bowdenfit.questions.next.possible_runs import typical_run
-from bowdenfit.results.record import Fit
+from bowdenfit.results.record import Record
 
 ALONG = ("angle", "force", "efficiency", "loop")  # kinds that are measured at a value of the route, where there is one
 
 
-def columns_without_curve(fit: Fit) -> tuple[str, ...]:
+def columns_without_curve(fit: Record) -> tuple[str, ...]:
     """Columns of contacts whose wrap angle is measured row by row."""
     return tuple(name for name in fit.dataset.description.angle_columns if name not in fit.model.cable.curves)
 
 
-def why_not(fit: Fit, candidate: Candidate) -> str:
+def why_not(fit: Record, candidate: Candidate) -> str:
     """Why a candidate makes no sense for this cable; empty where it does."""
     names, cable = {p.name for p in fit.model.space.parameters}, fit.model.cable
     kind = candidate.kind
@@ -43,7 +43,7 @@ def why_not(fit: Fit, candidate: Candidate) -> str:
     return ""
 
 
-def _outside(fit: Fit, candidate: Candidate, why: str, measured: bool = False) -> str:
+def _outside(fit: Record, candidate: Candidate, why: str, measured: bool = False) -> str:
     """A sentence where the length lies outside the range of the curves (and has no measured angles)."""
     route, angles = fit.dataset.description.route, fit.dataset.measurements.angles
     assert route is not None  # curves have one
@@ -57,13 +57,13 @@ def _outside(fit: Fit, candidate: Candidate, why: str, measured: bool = False) -
     )
 
 
-def route_words(fit: Fit) -> str:
+def route_words(fit: Record) -> str:
     """What the route varies, in words."""
     route = fit.dataset.description.route
     return route.variable.replace("_", " ") if route else "length"
 
 
-def words_of(fit: Fit, candidate: Candidate) -> str:
+def words_of(fit: Record, candidate: Candidate) -> str:
     """A candidate in words, such as "the wrap angles at 450 mm"."""
     route = fit.dataset.description.route
     what = {

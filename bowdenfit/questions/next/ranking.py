@@ -14,7 +14,7 @@ from bowdenfit.questions.next.possible_readings import Candidate, simulated_read
 from bowdenfit.questions.next.possible_runs import typical_run
 from bowdenfit.questions.next.target import Answer, answer_of
 from bowdenfit.questions.next.variance_reduction import Explained, error_of_difference, explained, mean_and_spread
-from bowdenfit.results.record import Fit
+from bowdenfit.results.record import Record
 
 REPEATS = (1, 2, 4, 8, 16, 32)
 STEPS, MOST_IN_PLAN = 3, 24  # measurements in a plan, and candidates that it chooses from
@@ -22,7 +22,7 @@ _SEED = 7  # beside the fit's own
 
 
 def next_measurement(
-    fit: Fit,
+    fit: Record,
     wanted: str | None = None,
     candidates: Sequence[str] = (),
     costs: Mapping[str, float] | None = None,
@@ -53,7 +53,7 @@ def next_measurement(
     return NextMeasurement(answer, ranked, repeats, plan, *shown, fit.converged)
 
 
-def _readings(fit: Fit, chosen: Sequence[Candidate], repeats: int) -> list[np.ndarray]:
+def _readings(fit: Record, chosen: Sequence[Candidate], repeats: int) -> list[np.ndarray]:
     measured, z = fit.dataset.measurements, fit.draws().flat_z
     with jax.enable_x64(True):
         seed = fit.provenance.seed + _SEED
@@ -61,7 +61,7 @@ def _readings(fit: Fit, chosen: Sequence[Candidate], repeats: int) -> list[np.nd
 
 
 def _ranked(
-    fit: Fit,
+    fit: Record,
     answer: Answer,
     chosen: Sequence[Candidate],
     found: Sequence[Explained],
@@ -88,7 +88,7 @@ def _ranked(
     return tuple(ranked)
 
 
-def _repeats(fit: Fit, answer: Answer, candidate: Candidate) -> Repeats:
+def _repeats(fit: Record, answer: Answer, candidate: Candidate) -> Repeats:
     """The candidate measured several times."""
     (readings,) = _readings(fit, [candidate], max(REPEATS))
     shares = [explained(mean_and_spread(readings[:, :n]), answer.draws).share for n in REPEATS]

@@ -5,7 +5,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from bowdenfit.errors import UsageError, nearest
-from bowdenfit.results.record import OPTIMAL_EFFICIENCY, OPTIMAL_LENGTH, Fit
+from bowdenfit.results.record import OPTIMAL_EFFICIENCY, OPTIMAL_LENGTH, Record
 
 
 @dataclass(frozen=True)
@@ -34,7 +34,7 @@ class Answer:
         return self.sd * float(np.sqrt(max(1.0 - share, 0.0)))
 
 
-def answer_of(fit: Fit, wanted: str | None) -> Answer:
+def answer_of(fit: Record, wanted: str | None) -> Answer:
     """The answer that is to be known better.
 
     Args:
@@ -66,7 +66,7 @@ def answer_of(fit: Fit, wanted: str | None) -> Answer:
     raise UsageError(f"--for {wanted!r} is no answer of this fit{nearest(wanted, [*known, *drawn.values])}")
 
 
-def _parameter(fit: Fit, name: str) -> Answer:
+def _parameter(fit: Record, name: str) -> Answer:
     """A parameter, or a coefficient of a curve."""
     units = {p.name: p.unit for p in fit.model.space.free}
     draws = fit.draws().values[name].ravel()
@@ -79,7 +79,7 @@ def _parameter(fit: Fit, name: str) -> Answer:
     return Answer(name, name, "" if unit == "1" else unit, draws)
 
 
-def _efficiency(fit: Fit, wanted: str, where: str) -> Answer:
+def _efficiency(fit: Record, wanted: str, where: str) -> Answer:
     """Efficiency at a length, or without a route at the nominal wrap angles, in points of percent."""
     route = fit.dataset.description.route
     if route is None:

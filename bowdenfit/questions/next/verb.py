@@ -6,13 +6,13 @@ from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
     from bowdenfit.questions.next.answer import NextMeasurement
-    from bowdenfit.results.record import Fit
+    from bowdenfit.results.record import Record
 
 JSON, TEXT, FIGURE = "next_measurement.json", "next_measurement.txt", "next_measurement"
 
 
 def next_measurement(
-    found: "Fit | str | Path",
+    found: "Record | str | Path",
     answer: str | None = None,
     candidates: Sequence[str] = (),
     costs: Mapping[str, float] | None = None,

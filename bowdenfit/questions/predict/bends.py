@@ -9,9 +9,9 @@ import numpy as np
 
 from bowdenfit.errors import DatasetError, UsageError
 from bowdenfit.inference.interval import Interval
-from bowdenfit.questions.bends.answer import friction_arm
+from bowdenfit.questions.bends.answer import elastic_answers, friction_arm
 from bowdenfit.questions.bends.page import window_page, window_sentence
-from bowdenfit.results.record import Fit
+from bowdenfit.results.record import Record
 from bowdenfit.units import conversion_factor
 
 Row = dict[str, Any]
@@ -42,7 +42,7 @@ class Question:
 
 
 def question(
-    fit: Fit,
+    fit: Record,
     wrap_angles: Sequence[tuple[float, str]] = (),
     input_force: Stated = None,
     preload: Stated = None,
@@ -60,8 +60,10 @@ def question(
         arm, unit = friction_arm(fit)
         limit = _internal(friction_limit, "force" if unit == "N" else "torque", "--friction-limit", 0.0) / arm
     return Question(
-        np.array(angles) if angles else fit.elastic.measured_bends,
-        fit.elastic.reference_force if input_force is None else _internal(input_force, "force", "--input-force", 1e-9),
+        np.array(angles) if angles else elastic_answers(fit).measured_bends,
+        elastic_answers(fit).reference_force
+        if input_force is None
+        else _internal(input_force, "force", "--input-force", 1e-9),
         input_force is not None,
         None if preload is None else _internal(preload, "force", "--preload", 0.0),
         limit,
@@ -79,7 +81,7 @@ def _internal(stated: tuple[float, str], dimension: str, option: str, least: flo
     return value
 
 
-def predicted_at_bends(fit: Fit, quantity: str, asked: Question) -> list[Row]:
+def predicted_at_bends(fit: Record, quantity: str, asked: Question) -> list[Row]:
     """One row a wrap angle, or one row in all for the preload window.
 
     Args:
@@ -111,41 +113,41 @@ def _rows(asked: Question, columns: Mapping[str, np.ndarray]) -> list[Row]:
     return rows
 
 
-def _efficiency(fit: Fit, asked: Question) -> list[Row]:
-    force = fit.elastic.output_force(asked.wrap_angles, asked.input_force, asked.stroke, asked.preload)
+def _efficiency(fit: Record, asked: Question) -> list[Row]:
+    force = elastic_answers(fit).output_force(asked.wrap_angles, asked.input_force, asked.stroke, asked.preload)
     return _rows(asked, {"efficiency": force / asked.input_force})
 
 
-def _output_force(fit: Fit, asked: Question) -> list[Row]:
-    force = fit.elastic.output_force(asked.wrap_angles, asked.input_force, asked.stroke, asked.preload)
+def _output_force(fit: Record, asked: Question) -> list[Row]:
+    force = elastic_answers(fit).output_force(asked.wrap_angles, asked.input_force, asked.stroke, asked.preload)
     return _rows(asked, {"output_force_N": force})
 
 
-def _preload(fit: Fit, asked: Question) -> list[Row]:
-    preload, slack = fit.elastic.preload(asked.wrap_angles, asked.preload)
+def _preload(fit: Record, asked: Question) -> list[Row]:
+    preload, slack = elastic_answers(fit).preload(asked.wrap_angles, asked.preload)
     rows = _rows(asked, {"preload_N": preload, "slack_mm": slack})
     return [row | {"slack_probability": float(np.mean(slack[:, i] > 0))} for i, row in enumerate(rows)]
 
 
-def _friction(fit: Fit, asked: Question) -> list[Row]:
-    felt, (arm, unit) = fit.elastic.friction(asked.wrap_angles, asked.preload), friction_arm(fit)
+def _friction(fit: Record, asked: Question) -> list[Row]:
+    felt, (arm, unit) = elastic_answers(fit).friction(asked.wrap_angles, asked.preload), friction_arm(fit)
     return _rows(asked, {f"friction_{unit.replace('*', '_')}": arm * felt})
 
 
-def _slack_load(fit: Fit, asked: Question) -> list[Row]:
+def _slack_load(fit: Record, asked: Question) -> list[Row]:
     _needs_loop(fit, "slack-load")
-    return _rows(asked, {"slack_load_N": fit.elastic.slack_load(asked.wrap_angles, asked.preload)})
+    return _rows(asked, {"slack_load_N": elastic_answers(fit).slack_load(asked.wrap_angles, asked.preload)})
 
 
-def _needs_loop(fit: Fit, quantity: str) -> None:
+def _needs_loop(fit: Record, quantity: str) -> None:
     if not fit.model.cable.is_loop:
         raise UsageError(
             f'--quantity {quantity} is asked of pull-pull loops; this cable has no kind = "loop" under [cable].'
         )
 
 
-def _position(fit: Fit, asked: Question) -> list[Row]:
-    error, lost = fit.elastic.position(asked.wrap_angles, asked.input_force, asked.preload)
+def _position(fit: Record, asked: Question) -> list[Row]:
+    error, lost = elastic_answers(fit).position(asked.wrap_angles, asked.input_force, asked.preload)
     columns = {"position_error_mm": error, "lost_motion_mm": lost}
     arm, unit = friction_arm(fit)
     if unit != "N":
@@ -153,8 +155,8 @@ def _position(fit: Fit, asked: Question) -> list[Row]:
     return _rows(asked, columns)
 
 
-def _stiffness(fit: Fit, asked: Question) -> list[Row]:
-    stiffness = fit.elastic.stiffness(asked.wrap_angles, asked.input_force, asked.preload)
+def _stiffness(fit: Record, asked: Question) -> list[Row]:
+    stiffness = elastic_answers(fit).stiffness(asked.wrap_angles, asked.input_force, asked.preload)
     columns = {"stiffness_N_per_mm": stiffness}
     arm, unit = friction_arm(fit)
     if unit != "N":
@@ -162,10 +164,10 @@ def _stiffness(fit: Fit, asked: Question) -> list[Row]:
     return _rows(asked, columns)
 
 
-def _window(fit: Fit, asked: Question) -> list[Row]:
+def _window(fit: Record, asked: Question) -> list[Row]:
     ends = float(asked.wrap_angles.min()), float(asked.wrap_angles.max())
     force = asked.input_force if asked.stated_force else 0.0
-    found = fit.elastic.preload_window(ends, force, asked.friction)
+    found = elastic_answers(fit).preload_window(ends, force, asked.friction)
     page = window_page(fit, found)
     row: Row = {"from_deg": page["bends"][0], "to_deg": page["bends"][1], "input_force_N": force}
     row |= {f"lowest_{name}_N": page["lowest"][name] for name in ("median", "q05", "q95")}
@@ -176,7 +178,7 @@ def _window(fit: Fit, asked: Question) -> list[Row]:
     return [row | {"possible": page["possible"], "in_words": window_sentence(fit, found)}]
 
 
-QUANTITIES: Mapping[str, Callable[[Fit, Question], list[Row]]] = MappingProxyType(
+QUANTITIES: Mapping[str, Callable[[Record, Question], list[Row]]] = MappingProxyType(
     {
         "efficiency": _efficiency,
         "output-force": _output_force,

@@ -10,14 +10,14 @@ from bowdenfit.cable.noise import noise_law
 from bowdenfit.errors import DatasetError, UsageError
 from bowdenfit.inference.draws import output_force_at
 from bowdenfit.inference.interval import Interval
-from bowdenfit.results.record import Fit
+from bowdenfit.results.record import Record
 from bowdenfit.units import conversion_factor
 
 _STROKES = {"pull": 1, "return": -1}
 
 
 def predicted_rows(
-    fit: Fit, lengths: np.ndarray, input_force: tuple[float, str] | None, stroke: str
+    fit: Record, lengths: np.ndarray, input_force: tuple[float, str] | None, stroke: str
 ) -> list[dict[str, Any]]:
     """Efficiency, or output force, at route values.
 
@@ -73,7 +73,7 @@ def _newtons(force: tuple[float, str]) -> float:
     return newtons
 
 
-def _mounting(fit: Fit, n: int) -> np.ndarray:
+def _mounting(fit: Record, n: int) -> np.ndarray:
     """Effect of one new mounting on the friction exponent, for every draw."""
     posterior = fit.posterior
     scatter = 0.0 if posterior is None else posterior.values.get(RUN_SCATTER, np.zeros(1)).ravel()

@@ -10,7 +10,7 @@ from bowdenfit.cable.cable import resolve_angles, row_angles
 from bowdenfit.kinds.recordings.blocks import recorded_angles
 from bowdenfit.questions.recorded.equations import blocks_shown
 from bowdenfit.recordings.recording import Recording
-from bowdenfit.results.record import Fit
+from bowdenfit.results.record import Record
 
 _ALIKE = np.deg2rad(0.05)  # wrap angles that differ by less are shown as one
 
@@ -31,7 +31,7 @@ class LoopPoints:
     recordings: tuple[str, ...]
 
 
-def loop_points(fit: Fit, contact: int | None = None) -> tuple[LoopPoints, ...]:
+def loop_points(fit: Record, contact: int | None = None) -> tuple[LoopPoints, ...]:
     """Blocks of a loop's recordings by wrap angle, the smallest first; empty without such recordings.
 
     Args:
@@ -48,7 +48,7 @@ def loop_points(fit: Fit, contact: int | None = None) -> tuple[LoopPoints, ...]:
     return tuple(_points(float(angle[g].mean()), [recordings.each[i] for i in g.tolist()]) for g in groups)
 
 
-def _angles(fit: Fit) -> np.ndarray:
+def _angles(fit: Record) -> np.ndarray:
     """Wrap angles of each recording in each contact [rad], by the middle of the draws where curves give them."""
     tables, cable, space = fit.dataset.measurements, fit.model.cable, fit.model.space
     assert tables.recordings is not None  # the caller checked

@@ -7,7 +7,7 @@ import jax.numpy as jnp
 import numpy as np
 
 from bowdenfit.inference.interval import Interval
-from bowdenfit.results.record import Fit
+from bowdenfit.results.record import Record
 
 _SURE = 0.99  # probability from which a dependence on speed is called one
 SHOWN_SPEED = {"rad/s": ("r/min", 30 / np.pi), "mm/s": ("mm/s", 1.0), "": ("", 1.0)}
@@ -50,7 +50,7 @@ class RateEffect:
         )
 
 
-def rate_effect(fit: Fit) -> RateEffect | None:
+def rate_effect(fit: Record) -> RateEffect | None:
     """The effect of speed; None where the fit has none or no draws."""
     friction = fit.model.cable.friction
     if fit.posterior is None or not friction.depends_on_rate:
@@ -64,7 +64,7 @@ def rate_effect(fit: Fit) -> RateEffect | None:
     return RateEffect(slow * scale, fast * scale, unit, place, interval, float(np.mean(difference < 0)))
 
 
-def _typical_speeds(fit: Fit) -> tuple[float, float]:
+def _typical_speeds(fit: Record) -> tuple[float, float]:
     """The lowest and the highest typical speed of a recording or run, internal unit."""
     measured, speeds = fit.dataset.measurements, []
     if measured.recordings is not None:
@@ -78,7 +78,7 @@ def _typical_speeds(fit: Fit) -> tuple[float, float]:
     return min(speeds), max(speeds)
 
 
-def place_of(fit: Fit) -> tuple[float, str]:
+def place_of(fit: Record) -> tuple[float, str]:
     """Where to answer: at the length with most recordings inside the range, else in its middle."""
     route, recordings = fit.dataset.description.route, fit.dataset.measurements.recordings
     if route is None:
@@ -89,7 +89,7 @@ def place_of(fit: Fit) -> tuple[float, str]:
     return at, f"at {at:g} {route.unit}"
 
 
-def _differences(fit: Fit, at: float, slow: float, fast: float) -> np.ndarray:
+def _differences(fit: Record, at: float, slow: float, fast: float) -> np.ndarray:
     model, friction = fit.model, fit.model.cable.friction
     force = jnp.asarray(friction.conditions.reference_force)
 

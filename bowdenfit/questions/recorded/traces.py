@@ -14,7 +14,7 @@ from bowdenfit.questions.recorded.loop_equations import loop_follower
 from bowdenfit.questions.recorded.rate import SHOWN_SPEED, place_of
 from bowdenfit.questions.summary.figure_data import Dependence, RecordedTrace
 from bowdenfit.recordings.recording import PULL, Recording, Recordings
-from bowdenfit.results.record import Fit
+from bowdenfit.results.record import Record
 
 _QUANTILES = (0.05, 0.5, 0.95)
 _LAGS = 60
@@ -24,7 +24,7 @@ _BINS = 12
 _CURVES = 4000  # draws of a curve
 
 
-def traces(fit: Fit) -> tuple[RecordedTrace, ...]:
+def traces(fit: Record) -> tuple[RecordedTrace, ...]:
     """Every recording of a fit, as figures show it."""
     recordings = fit.dataset.measurements.recordings
     if recordings is None:
@@ -41,13 +41,13 @@ def traces(fit: Fit) -> tuple[RecordedTrace, ...]:
     )
 
 
-def velocity_unit(fit: Fit) -> str:
+def velocity_unit(fit: Record) -> str:
     """Unit in which velocities are shown; empty without any."""
     recordings = fit.dataset.measurements.recordings
     return SHOWN_SPEED[recordings.velocity_unit][0] if recordings is not None else ""
 
 
-def _some_draws(fit: Fit, n: int = DRAWS) -> np.ndarray:
+def _some_draws(fit: Record, n: int = DRAWS) -> np.ndarray:
     """So many draws of the posterior, or as many times least squares."""
     if fit.posterior is None:
         return np.repeat(fit.least_squares.z[None], n, axis=0)
@@ -55,7 +55,7 @@ def _some_draws(fit: Fit, n: int = DRAWS) -> np.ndarray:
     return flat[np.linspace(0, len(flat) - 1, n).astype(int)]
 
 
-def _predicted(fit: Fit, recordings: Recordings, follower: Follower) -> tuple[np.ndarray, np.ndarray]:
+def _predicted(fit: Record, recordings: Recordings, follower: Follower) -> tuple[np.ndarray, np.ndarray]:
     """Quantiles of the output force with a new mounting, and of the friction exponent without."""
     z, n = _some_draws(fit), len(recordings.each)
     if fit.posterior is None:
@@ -69,7 +69,7 @@ def _predicted(fit: Fit, recordings: Recordings, follower: Follower) -> tuple[np
     return np.quantile(force, _QUANTILES, axis=0), np.quantile(exponent, _QUANTILES, axis=0)
 
 
-def _fitted(fit: Fit, recordings: Recordings, follower: Follower) -> np.ndarray:
+def _fitted(fit: Record, recordings: Recordings, follower: Follower) -> np.ndarray:
     """Output force with the mounting effect of each run that suits its recordings best, by looking at many."""
     center = np.median(_some_draws(fit), axis=0)
     grid = np.linspace(-_REACH, _REACH, DRAWS)
@@ -97,7 +97,7 @@ class _RunEfficiency:
     sd: float
 
 
-def _run_efficiencies(fit: Fit) -> dict[str, _RunEfficiency]:
+def _run_efficiencies(fit: Record) -> dict[str, _RunEfficiency]:
     recordings = fit.dataset.measurements.recordings
     assert recordings is not None  # the caller asked
     term = next(t for t in fit.model.terms if t.name == RECORDED)
@@ -120,7 +120,7 @@ def _no_efficiencies(recordings: Recordings) -> dict[str, _RunEfficiency]:
 
 
 def _trace(
-    fit: Fit,
+    fit: Record,
     recording: Recording,
     predicted: np.ndarray,
     fitted: np.ndarray,
@@ -172,7 +172,7 @@ def _autocorrelation(deviation: np.ndarray) -> np.ndarray:
     return np.array(products) / products[0]
 
 
-def dependences(fit: Fit) -> tuple[Dependence, ...]:
+def dependences(fit: Record) -> tuple[Dependence, ...]:
     """How efficiency depends on load and speed, where the friction model lets it."""
     friction, recordings = fit.model.cable.friction, fit.dataset.measurements.recordings
     if recordings is None or not friction.options:
@@ -185,13 +185,13 @@ def dependences(fit: Fit) -> tuple[Dependence, ...]:
     return tuple(found)
 
 
-def _place(fit: Fit, recordings: Recordings) -> tuple[float, list[Recording], str]:
+def _place(fit: Record, recordings: Recordings) -> tuple[float, list[Recording], str]:
     """The route value with most recordings, those recordings, and the place in words."""
     at, place = place_of(fit)
     return at, [r for r in recordings.each if not place or r.route == at], place
 
 
-def _on_load(fit: Fit, recordings: Recordings) -> Dependence:
+def _on_load(fit: Record, recordings: Recordings) -> Dependence:
     at, here, place = _place(fit, recordings)
     used = [(r, r.strokes.used_sliding & (r.strokes.stroke == PULL)) for r in here]
     forces = np.concatenate([r.blocks.input_force[u] for r, u in used] or [np.array([10.0, 100.0])])
@@ -202,7 +202,7 @@ def _on_load(fit: Fit, recordings: Recordings) -> Dependence:
     return Dependence("load", "Input force (N)", grid, quantiles, constant, x, y, label, place)
 
 
-def _on_speed(fit: Fit, recordings: Recordings) -> Dependence:
+def _on_speed(fit: Record, recordings: Recordings) -> Dependence:
     at, here, place = _place(fit, recordings)
     unit, scale = SHOWN_SPEED[recordings.velocity_unit]
     low, high = fit.model.cable.friction.conditions.speeds
@@ -233,7 +233,7 @@ def _binned(recording: Recording, used: np.ndarray) -> tuple[np.ndarray, np.ndar
     return np.array([force[part].mean() for part in order]), np.array([efficiency[part].mean() for part in order])
 
 
-def _curves(fit: Fit, at: float, forces: np.ndarray | None, speeds: np.ndarray | None) -> tuple[np.ndarray, float]:
+def _curves(fit: Record, at: float, forces: np.ndarray | None, speeds: np.ndarray | None) -> tuple[np.ndarray, float]:
     """Quantiles of the efficiency while pulling against load or speed, and the efficiency at the reference."""
     model, friction = fit.model, fit.model.cable.friction
     where = jnp.asarray([at])

@@ -7,6 +7,7 @@ import numpy as np
 from bowdenfit.inference.draws import curves_of
 from bowdenfit.model import EFFICIENCY_TERMS, Model
 from bowdenfit.questions.bends.figures import elastic_figures
+from bowdenfit.questions.check.answer import checks_of
 from bowdenfit.questions.check.figure_tables import checked_tables
 from bowdenfit.questions.recorded.traces import dependences, traces, velocity_unit
 from bowdenfit.questions.summary.figure_data import (
@@ -18,12 +19,12 @@ from bowdenfit.questions.summary.figure_data import (
     ParameterDraws,
 )
 from bowdenfit.results.optimum import route_grid
-from bowdenfit.results.record import OPTIMAL_EFFICIENCY, OPTIMAL_LENGTH, Fit
+from bowdenfit.results.record import OPTIMAL_EFFICIENCY, OPTIMAL_LENGTH, Record
 
 _BAND_DRAWS = 5000  # enough for a line's width of accuracy
 
 
-def figure_data(fit: Fit) -> FigureData:
+def figure_data(fit: Record) -> FigureData:
     """What the figures of a fit show."""
     description, posterior, model = fit.dataset.description, fit.posterior, fit.model
     route = description.route
@@ -45,11 +46,11 @@ def figure_data(fit: Fit) -> FigureData:
         velocity_unit(fit),
         dependences(fit),
         elastic_figures(fit),
-        checked_tables(fit.checks),
+        checked_tables(checks_of(fit)),
     )
 
 
-def _bands(fit: Fit, model: Model) -> dict[str, Band]:
+def _bands(fit: Record, model: Model) -> dict[str, Band]:
     if fit.posterior is not None:
         grid, curves = fit.curves()
         every = max(1, len(fit.posterior.flat_z) // _BAND_DRAWS)
@@ -60,7 +61,7 @@ def _bands(fit: Fit, model: Model) -> dict[str, Band]:
     return {name: Band(grid, np.asarray(line)[None]) for name, line in curves.items()}
 
 
-def _angle_curve(fit: Fit, column: str, band: Band) -> AngleCurve:
+def _angle_curve(fit: Record, column: str, band: Band) -> AngleCurve:
     table, route = fit.dataset.measurements.angles, fit.dataset.description.route
     assert table is not None and route is not None  # a curve has both
     angle, limit = table.column(column)
@@ -78,7 +79,7 @@ def _angle_curve(fit: Fit, column: str, band: Band) -> AngleCurve:
     )
 
 
-def _points(fit: Fit) -> tuple[EfficiencyPoints, ...]:
+def _points(fit: Record) -> tuple[EfficiencyPoints, ...]:
     route, points = fit.dataset.description.route, []
     for term in fit.model.terms:
         if term.name not in EFFICIENCY_TERMS:
@@ -96,7 +97,7 @@ def _points(fit: Fit) -> tuple[EfficiencyPoints, ...]:
     return tuple(points)
 
 
-def _parameter(fit: Fit, name: str) -> ParameterDraws:
+def _parameter(fit: Record, name: str) -> ParameterDraws:
     parameter = next(p for p in fit.model.space.free if p.name == name)
     estimate = fit.least_squares.estimates.get(name)
     drawn = fit.posterior

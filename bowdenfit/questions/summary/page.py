@@ -11,18 +11,19 @@ from bowdenfit.inference.least_squares import Estimate
 from bowdenfit.inference.samplers import recommendation
 from bowdenfit.model import EFFICIENCY_TERMS
 from bowdenfit.questions.bends.page import elastic_page
+from bowdenfit.questions.check.answer import checks_of
 from bowdenfit.questions.check.page import checks_page
 from bowdenfit.questions.identify.confounding import confounded
 from bowdenfit.questions.identify.contradiction import agreement_page
 from bowdenfit.questions.recorded.preparation_page import accounts
 from bowdenfit.questions.recorded.rate import rate_effect
 from bowdenfit.questions.summary.verdict import verdict
-from bowdenfit.results.record import Draws, Fit
+from bowdenfit.results.record import Draws, Record
 
 SCHEMA = 1
 
 
-def summarize(fit: Fit) -> dict[str, Any]:
+def summarize(fit: Record) -> dict[str, Any]:
     """Summary of a fit as plain data; NaN where a number does not exist is None.
 
     Args:
@@ -53,7 +54,7 @@ def summarize(fit: Fit) -> dict[str, Any]:
         page["recordings"] = accounts(fit.dataset.measurements.recordings)
     if elastic := elastic_page(fit):
         page["elastic"] = elastic
-    if checks := checks_page(fit.checks):
+    if checks := checks_page(checks_of(fit)):
         page["checks"] = checks
     effect = rate_effect(fit)
     if effect is not None:
@@ -67,7 +68,7 @@ def summarize(fit: Fit) -> dict[str, Any]:
     return _plain(page)
 
 
-def _sampler(fit: Fit, posterior: Draws) -> dict[str, Any]:
+def _sampler(fit: Record, posterior: Draws) -> dict[str, Any]:
     """How the draws came about, and what is recommended instead ("" if nothing is)."""
     settings = fit.dataset.description.sampler
     short = shortfalls(posterior.diagnostics, settings.target_r_hat, settings.target_ess)
@@ -84,7 +85,7 @@ def _sampler(fit: Fit, posterior: Draws) -> dict[str, Any]:
     return page
 
 
-def _parameter(fit: Fit, name: str) -> dict[str, Any]:
+def _parameter(fit: Record, name: str) -> dict[str, Any]:
     parameter = next(p for p in fit.model.space.parameters if p.name == name)
     row: dict[str, Any] = {"unit": parameter.unit, "meaning": parameter.meaning, "prior": parameter.prior_text}
     if parameter.fixed is not None:
@@ -108,20 +109,20 @@ def _estimate_page(estimate: Estimate) -> dict[str, Any]:
     return asdict(estimate) | {"open": [side for side in ("lower", "upper") if np.isinf(getattr(estimate, side))]}
 
 
-def contraction(fit: Fit, name: str) -> float:
+def contraction(fit: Record, name: str) -> float:
     """How much narrower the posterior is than the prior, in z: 1 where data decide, 0 where the prior alone speaks."""
     assert fit.posterior is not None  # callers ask only where there are draws
     return float(1 - np.var(fit.posterior.z[..., fit.model.space.index[name]]))
 
 
-def curve_coefficients(fit: Fit) -> dict[str, tuple[str, str]]:
+def curve_coefficients(fit: Record) -> dict[str, tuple[str, str]]:
     """Unit and symbol of each derived curve coefficient."""
     from bowdenfit.inference.draws import derived_units
 
     return derived_units(fit.model)
 
 
-def _curve_coefficient(fit: Fit, name: str) -> dict[str, Any]:
+def _curve_coefficient(fit: Record, name: str) -> dict[str, Any]:
     row: dict[str, Any] = {"unit": curve_coefficients(fit)[name][0]}
     if fit.posterior is not None:
         q05, median, q95 = np.quantile(fit.posterior.values[name], (0.05, 0.5, 0.95))
@@ -129,7 +130,7 @@ def _curve_coefficient(fit: Fit, name: str) -> dict[str, Any]:
     return row
 
 
-def measured_against_predicted(fit: Fit) -> list[dict[str, Any]]:
+def measured_against_predicted(fit: Record) -> list[dict[str, Any]]:
     """Every measured efficiency beside what the fit says of it (as section 3.2 of the on-body paper does).
 
     The relative error is measured over predicted, less 1. Without draws the prediction is least squares'.
@@ -153,7 +154,7 @@ def measured_against_predicted(fit: Fit) -> list[dict[str, Any]]:
     return rows
 
 
-def _optimal(fit: Fit) -> dict[str, Any]:
+def _optimal(fit: Record) -> dict[str, Any]:
     answer = fit.optimal_length()
     return {
         "route": answer.variable,

@@ -4,7 +4,7 @@ from dataclasses import dataclass
 
 from bowdenfit.questions.identify.answer import unidentified
 from bowdenfit.questions.identify.contradiction import contradiction
-from bowdenfit.results.record import Fit
+from bowdenfit.results.record import Record, once
 
 NOT_CONVERGED, NOT_IDENTIFIABLE, CONTRADICTORY = "not converged", "not identifiable", "contradictory"
 
@@ -30,7 +30,8 @@ class Verdict:
         return tuple(sentence for sentences in self.troubles.values() for sentence in sentences)
 
 
-def verdict(fit: Fit) -> Verdict:
+@once
+def verdict(fit: Record) -> Verdict:
     """The verdict on a fit."""
     troubles = {
         NOT_CONVERGED: () if fit.converged else fit.reasons or ("the fit did not converge",),

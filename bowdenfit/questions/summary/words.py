@@ -6,13 +6,14 @@ from bowdenfit.cable.load_cells import RUN_SCATTER
 from bowdenfit.model import EFFICIENCY_TERMS
 from bowdenfit.questions.bends.words import elastic_counts, elastic_text
 from bowdenfit.questions.check.words import checks_text
-from bowdenfit.questions.identify.answer import determined
+from bowdenfit.questions.identify.answer import determined, identifiability
 from bowdenfit.questions.identify.confounding import confounded
 from bowdenfit.questions.recorded.rate import SHOWN_SPEED, rate_effect
 from bowdenfit.questions.recorded.words import recordings_text
+from bowdenfit.questions.summary.page import summarize
 from bowdenfit.questions.summary.sampler_words import sampler_sentences, sampler_text
 from bowdenfit.questions.summary.verdict import CONTRADICTORY, NOT_CONVERGED, NOT_IDENTIFIABLE, Verdict, verdict
-from bowdenfit.results.record import Fit
+from bowdenfit.results.record import Record
 from bowdenfit.words import decimals, filled, listed, table
 
 _UNLIMITED = 2000.0  # an angle in degrees or a length in mm beyond which a curve coefficient is no longer a finding
@@ -21,9 +22,9 @@ _WIDE = 2.5  # standard errors to each side beyond which an interval needs a wor
 _RESTS_ON_PRIOR = 0.2  # contraction below which a parameter is said to rest on its prior alone
 
 
-def summary_text(fit: Fit) -> str:
+def summary_text(fit: Record) -> str:
     """The summary of a fit for people."""
-    page = fit.summary()
+    page = summarize(fit)
     blocks = [
         _title(fit),
         _verdict(fit, page),
@@ -46,7 +47,7 @@ def summary_text(fit: Fit) -> str:
     return "\n\n".join(block for block in blocks if block) + "\n"
 
 
-def _title(fit: Fit) -> str:
+def _title(fit: Record) -> str:
     description = fit.dataset.description
     tables = fit.dataset.measurements
     counts = []
@@ -73,7 +74,7 @@ def _title(fit: Fit) -> str:
     return "\n".join([line, fitted, *remarks])
 
 
-def _angle_counts(fit: Fit, entered: int, censored: int) -> list[str]:
+def _angle_counts(fit: Record, entered: int, censored: int) -> list[str]:
     """How many readings the curves were fitted to, and how those too small to detect entered."""
     settings, published = fit.dataset.description.tables.angles, fit.dataset.description.geometry == "published"
     way = "zero" if published or settings is None else settings.undetected
@@ -86,7 +87,7 @@ def _angle_counts(fit: Fit, entered: int, censored: int) -> list[str]:
     return [f"{entered} wrap angles{below}"]
 
 
-def _verdict(fit: Fit, page: dict[str, Any]) -> str:
+def _verdict(fit: Record, page: dict[str, Any]) -> str:
     found = verdict(fit)
     if fit.posterior is None:
         state = "least squares only; no posterior, no design answer" if found.trusted else _untrusted(found)
@@ -191,9 +192,9 @@ def _trouble(estimate: dict[str, Any]) -> str:
     return "at its bound in least squares" if estimate["at_bound"] else "not identified by least squares"
 
 
-def _known(fit: Fit) -> str:
+def _known(fit: Record) -> str:
     """Which coefficients the measurements determine, in a sentence."""
-    friction = fit.known.groups.get("friction") if fit.posterior is not None else None
+    friction = identifiability(fit).groups.get("friction") if fit.posterior is not None else None
     return filled(determined(friction, measured=True)) if friction is not None else ""
 
 
@@ -209,7 +210,7 @@ def _rests_on_prior(page: dict[str, Any]) -> str:
     return filled(f"Hardly informed by the measurements: {listed(names)} {verb} on the prior almost alone.")
 
 
-def _curves(fit: Fit, page: dict[str, Any]) -> str:
+def _curves(fit: Record, page: dict[str, Any]) -> str:
     if not page["curves"] or fit.posterior is None:
         return ""
     lines = ["Gaussian curves A exp(-((l - B)/C)^2), median (90 % interval):"]
@@ -235,7 +236,7 @@ def _scatter(page: dict[str, Any]) -> str:
     return filled(f"Residual standard deviation of least squares: {listed(parts)}.") if parts else ""
 
 
-def _mountings(fit: Fit, page: dict[str, Any]) -> str:
+def _mountings(fit: Record, page: dict[str, Any]) -> str:
     """The scatter from mounting to mounting, in words."""
     tau, runs = (
         page["parameters"].get(RUN_SCATTER, {}),
@@ -258,12 +259,12 @@ def _mountings(fit: Fit, page: dict[str, Any]) -> str:
     )
 
 
-def _recordings(fit: Fit) -> str:
+def _recordings(fit: Record) -> str:
     recordings = fit.dataset.measurements.recordings
     return "Recordings\n" + "\n".join(recordings_text(recordings)) if recordings is not None else ""
 
 
-def _friction_model(fit: Fit) -> str:
+def _friction_model(fit: Record) -> str:
     """What the options of the friction model found."""
     friction = fit.model.cable.friction
     if not friction.options:
@@ -286,7 +287,7 @@ def _friction_model(fit: Fit) -> str:
     return "\n".join(filled(line) for line in lines)
 
 
-def _measured(fit: Fit, page: dict[str, Any]) -> str:
+def _measured(fit: Record, page: dict[str, Any]) -> str:
     if not page["measured"]:
         return ""
     drawn = fit.posterior is not None
@@ -307,7 +308,7 @@ def _measured(fit: Fit, page: dict[str, Any]) -> str:
     return "Efficiency, measured and predicted\n" + table(heads, rows)
 
 
-def _answer(fit: Fit) -> str:
+def _answer(fit: Record) -> str:
     if fit.posterior is None or fit.dataset.description.route is None:
         return ""
     sentences = [

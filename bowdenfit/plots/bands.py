@@ -1,20 +1,23 @@
 """What figures of curves share: median and intervals, the marking of what lies outside the route, and how many are shown."""
 
+from __future__ import annotations
+
 from collections.abc import Sequence
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
-from matplotlib.axes import Axes
 
 from bowdenfit.plots.style import BLUE, GRAY, LEAST_SQUARES, LIGHT, MEDIAN, NARROW_INTERVAL, WIDE_INTERVAL
 
 if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+
     from bowdenfit.questions.summary.figure_data import Band
 
 OUTSIDE = "Outside the range of the curves"
 
 
-def draw_band(axes: Axes, band: "Band", scale: float = 1.0) -> None:
+def draw_band(axes: Axes, band: Band, scale: float = 1.0) -> None:
     """Median with 50 % and 90 % intervals, or the least-squares line where there are no draws."""
     quantiles = scale * band.quantiles
     if band.is_line:

@@ -4,19 +4,29 @@ matplotlib's constrained layout would find the same places, but draws every labe
 quarter of the time of a figure. Tests see to it that nothing overlaps or leaves the page.
 """
 
-from collections.abc import Iterable, Sequence
+from __future__ import annotations
 
-from matplotlib.artist import Artist
-from matplotlib.axes import Axes
-from matplotlib.figure import Figure
-from matplotlib.gridspec import GridSpec
+from collections.abc import Iterable, Sequence
+from typing import TYPE_CHECKING
 
 from bowdenfit.plots.style import WIDE
+
+if TYPE_CHECKING:
+    from matplotlib.artist import Artist
+    from matplotlib.axes import Axes
+    from matplotlib.figure import Figure
 
 LEFT, RIGHT, BOTTOM = 0.62, 0.18, 0.45  # margins
 LEGEND_ROW, LEGEND_ROOM = 0.155, 0.12
 TITLE = 0.22  # room for a title of one line
 LABEL_LEFT, LABEL_BELOW = 0.41, 0.25  # from the axes to its labels
+
+
+def empty_page(width: float, height: float) -> Figure:
+    """A figure of this size without anything on it; sizes in inches."""
+    from matplotlib.figure import Figure
+
+    return Figure(figsize=(width, height))
 
 
 def panels(
@@ -35,9 +45,9 @@ def panels(
     across, down = gaps
     height = top + sum(heights) + down * (len(heights) - 1) + BOTTOM
     width = (page - LEFT - RIGHT - across * (columns - 1)) / columns
-    figure = Figure(figsize=(page, height))
-    grid = GridSpec(
-        len(heights), columns, figure, height_ratios=heights, left=LEFT / page, right=1 - RIGHT / page,
+    figure = empty_page(page, height)
+    grid = figure.add_gridspec(
+        len(heights), columns, height_ratios=heights, left=LEFT / page, right=1 - RIGHT / page,
         bottom=BOTTOM / height, top=1 - top / height, wspace=across / width, hspace=down * len(heights) / sum(heights),
     )  # fmt: skip
     flat = list(grid.subplots(**sharing, squeeze=False).flat)  # type: ignore[call-overload]

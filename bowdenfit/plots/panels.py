@@ -1,17 +1,19 @@
 """Small multiples of recordings: which are shown, in which panels, on which axes."""
 
+from __future__ import annotations
+
 from collections.abc import Callable, Iterable, Sequence
 from typing import TYPE_CHECKING
 
 import numpy as np
-from matplotlib.axes import Axes
-from matplotlib.figure import Figure
-from matplotlib.lines import Line2D
 
 from bowdenfit.plots.layout import TITLE, drop_unused, panels
 from bowdenfit.plots.style import MEDIUM, SMALL, WIDE
 
 if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+    from matplotlib.figure import Figure
+
     from bowdenfit.questions.summary.figure_data import FigureData, RecordedTrace
 
 MOST = 8  # recordings in a figure
@@ -49,9 +51,7 @@ def set_limits(flat: list[Axes], spans: Sequence[tuple[float, float]], which: st
         axes.set(**{f"{which}lim": everywhere if shared else own})
 
 
-def chosen(
-    data: "FigureData", shows: "Callable[[RecordedTrace], bool]"
-) -> "tuple[list[RecordedTrace], list[RecordedTrace]]":
+def chosen(data: FigureData, shows: Callable[[RecordedTrace], bool]) -> tuple[list[RecordedTrace], list[RecordedTrace]]:
     """The recordings to draw, evenly from all that have what a figure shows, and all of these."""
     every = [r for r in data.recordings if shows(r)]
     places = np.linspace(0, len(every) - 1, min(len(every), MOST)).round().astype(int)
@@ -106,6 +106,8 @@ def say_how_many(axes: Axes, drawn: int, of: int) -> None:
 
 def enlarge_marks(figure: Figure) -> None:
     """Make the small marks of many blocks large enough to be told apart in the legend."""
+    from matplotlib.lines import Line2D
+
     for handle in figure.legends[0].legend_handles:
         if isinstance(handle, Line2D) and handle.get_linestyle() == "None":
             handle.set_markersize(max(handle.get_markersize(), LEGEND_MARK))

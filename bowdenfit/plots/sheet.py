@@ -4,13 +4,18 @@ A matplotlib Axes costs about 10 ms to make and draw in each format, so a grid o
 sheet is one Axes, a panel is a box on it, and all panels share a few collections.
 """
 
+from __future__ import annotations
+
 from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass
+from typing import TYPE_CHECKING
 
 import numpy as np
-from matplotlib.collections import LineCollection, PolyCollection
-from matplotlib.figure import Figure
-from matplotlib.ticker import MaxNLocator
+
+from bowdenfit.plots.layout import empty_page
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
 
 TICK = 0.035  # in
 TICK_SIZE = 6  # pt
@@ -47,7 +52,7 @@ class Sheet:
     """A figure whose only Axes measures inches from the lower left corner."""
 
     def __init__(self, width: float, height: float) -> None:
-        self.figure = Figure(figsize=(width, height))
+        self.figure = empty_page(width, height)
         self.axes = self.figure.add_axes((0.0, 0.0, 1.0, 1.0))
         self.axes.set(xlim=(0, width), ylim=(0, height))
         self.axes.set_axis_off()
@@ -55,10 +60,14 @@ class Sheet:
 
     def lines(self, paths: Sequence[np.ndarray], **style: object) -> None:
         """Draw lines, all in one style."""
+        from matplotlib.collections import LineCollection
+
         self.axes.add_collection(LineCollection(paths, **style), autolim=False)  # type: ignore[arg-type]
 
     def areas(self, outlines: Sequence[np.ndarray], **style: object) -> None:
         """Fill areas, all in one style."""
+        from matplotlib.collections import PolyCollection
+
         self.axes.add_collection(PolyCollection(outlines, linewidth=0, **style), autolim=False)  # type: ignore[arg-type]
 
     def text(self, x: float, y: float, words: str, **style: object) -> None:
@@ -106,6 +115,8 @@ def ticks(
         room: How many of the given texts fit next to each other along the axis.
         whole: Whether only whole numbers make sense.
     """
+    from matplotlib.ticker import MaxNLocator
+
     low, high = limits
     for most in (4, 3, 2, 1):
         values = np.asarray(

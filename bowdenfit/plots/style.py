@@ -1,11 +1,12 @@
-"""How every figure looks: colors, sizes and words; the one place where matplotlib's settings are chosen."""
+"""How every figure looks: colors, sizes and words; the one place where matplotlib's settings are chosen.
+
+This room and the figure files load matplotlib only once they draw, so that what a figure shows can be worked out without.
+"""
 
 import functools
 import math
 from collections.abc import Callable, Iterable
 from typing import Any, ParamSpec, TypeVar
-
-import matplotlib as mpl
 
 Arguments, Result = ParamSpec("Arguments"), TypeVar("Result")
 
@@ -62,12 +63,21 @@ def in_paper_style(function: Callable[Arguments, Result]) -> Callable[Arguments,
 
     @functools.wraps(function)
     def styled(*args: Arguments.args, **kwargs: Arguments.kwargs) -> Result:
+        import matplotlib as mpl
+
         if all(mpl.rcParams[name] == value for name, value in SETTINGS.items()):
             return function(*args, **kwargs)  # called by another such function; a context takes 3 ms
         with mpl.rc_context(SETTINGS):
             return function(*args, **kwargs)
 
     return styled
+
+
+def mapped_color(colors: str, place: float) -> Any:
+    """The color at a place from 0 to 1 of one of matplotlib's color maps."""
+    import matplotlib as mpl
+
+    return mpl.colormaps[colors](place)
 
 
 def percent(fraction: float) -> str:

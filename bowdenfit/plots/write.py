@@ -1,12 +1,15 @@
 """Writing a figure to a file, whole or not at all."""
 
+from __future__ import annotations
+
 import os
 from pathlib import Path
-from typing import Any
-
-from matplotlib.figure import Figure
+from typing import TYPE_CHECKING, Any
 
 from bowdenfit.plots.style import DOTS_PER_INCH, in_paper_style
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
 
 FORMATS = ("png", "svg")
 OPTIONS: dict[str, dict[str, Any]] = {

@@ -21,7 +21,13 @@ STATISTICS = (
     "bowdenfit.inference.diagnostics",
     "bowdenfit.results.netcdf",
 )
-DRAWING = ("bowdenfit.questions.summary.gallery", "bowdenfit.questions.summary.figure_data")
+DRAWING = (
+    "matplotlib.figure",
+    "matplotlib.backends.backend_agg",
+    "matplotlib.backends.backend_svg",
+    "bowdenfit.questions.summary.gallery",
+    "bowdenfit.questions.summary.figure_data",
+)
 
 
 class Inline(Executor):

@@ -1,19 +1,19 @@
 """Efficiency against the wrap angle for several friction coefficients and preloads, and by the capstan equation."""
 
+from __future__ import annotations
+
 from collections.abc import Sequence
 from typing import TYPE_CHECKING, Any
 
-import matplotlib as mpl
 import numpy as np
-from matplotlib.axes import Axes
-from matplotlib.figure import Figure
 
 from bowdenfit.plots.bands import draw_quantiles, name_band
 from bowdenfit.plots.layout import LEGEND_ROW, TITLE, legend_above, panels
 from bowdenfit.plots.panels import span
-from bowdenfit.plots.style import BLACK, EFFICIENCY, GRAY, MEDIUM, WIDE, WRAP_ANGLE, in_paper_style
+from bowdenfit.plots.style import BLACK, EFFICIENCY, GRAY, MEDIUM, WIDE, WRAP_ANGLE, in_paper_style, mapped_color
 
 if TYPE_CHECKING:
+    from bowdenfit.plots.layout import Axes, Figure
     from bowdenfit.questions.bends.figure_data import BendingLoss, EfficiencyLine
     from bowdenfit.questions.summary.figure_data import FigureData
 
@@ -25,13 +25,13 @@ LINES_IN_A_ROW = 2  # of a panel's legend
 COEFFICIENTS, PRELOADS, FITTED = ("Friction", "YlOrRd"), ("Preload", "GnBu"), ("Efficiency", "Greys")
 
 
-def has_bending_loss(data: "FigureData") -> bool:
+def has_bending_loss(data: FigureData) -> bool:
     """Whether efficiency against the wrap angle is known for a loop or a rope with preload."""
     return data.elastic.bending_loss is not None
 
 
 @in_paper_style
-def bending_loss(data: "FigureData") -> Figure:
+def bending_loss(data: FigureData) -> Figure:
     """Efficiency [%] against the wrap angle [deg]: several friction coefficients, and several preloads."""
     loss = data.elastic.bending_loss
     assert loss is not None
@@ -51,7 +51,7 @@ def bending_loss(data: "FigureData") -> Figure:
     return figure
 
 
-def _lines(axes: Axes, loss: "BendingLoss", lines: "Sequence[EfficiencyLine]", colors: str) -> None:
+def _lines(axes: Axes, loss: BendingLoss, lines: Sequence[EfficiencyLine], colors: str) -> None:
     """The lines of one panel with the capstan equation's dashed, and their legend between title and panel."""
     handles = []
     for i, line in enumerate(lines):
@@ -67,7 +67,7 @@ def _lines(axes: Axes, loss: "BendingLoss", lines: "Sequence[EfficiencyLine]", c
         )  # fmt: skip
 
 
-def _fitted(axes: Axes, loss: "BendingLoss") -> None:
+def _fitted(axes: Axes, loss: BendingLoss) -> None:
     """The cable itself, and the entries of the legend above both panels."""
     label = loss.fitted_label[:1].upper() + loss.fitted_label[1:]
     draw_quantiles(axes, loss.wrap_angle, 100 * loss.fitted, BLACK, linewidth=1.6, label=label)
@@ -78,10 +78,10 @@ def _fitted(axes: Axes, loss: "BendingLoss") -> None:
 
 def _color(colors: str, number: int, of: int) -> Any:
     """From light to dark, as the number in the label grows."""
-    return mpl.colormaps[colors](0.42 + 0.5 * (number + 0.5) / of)
+    return mapped_color(colors, 0.42 + 0.5 * (number + 0.5) / of)
 
 
-def _limits(loss: "BendingLoss") -> tuple[float, float]:
+def _limits(loss: BendingLoss) -> tuple[float, float]:
     """Efficiencies that show every line, from 0 % to 100 % at most."""
     lines = [v for line in (*loss.coefficients, *loss.preloads) for v in (line.efficiency, line.capstan)]
     low, high = span([100 * np.asarray(v) for v in (*lines, loss.fitted, loss.fitted_capstan)], room=0.04)

@@ -1,10 +1,10 @@
 """Output against input force of a preloaded loop, moving forward and back, a panel for each wrap angle."""
 
+from __future__ import annotations
+
 from typing import TYPE_CHECKING
 
 import numpy as np
-from matplotlib.axes import Axes
-from matplotlib.figure import Figure
 
 from bowdenfit.plots.bands import draw_quantiles, evenly, middle, name_band, say_of_how_many
 from bowdenfit.plots.layout import legend_above
@@ -12,6 +12,7 @@ from bowdenfit.plots.panels import alike, enlarge_marks, label_outer, recording_
 from bowdenfit.plots.style import BLACK, BLUE, GRAY, LEAST_SQUARES, MEDIAN, PURPLE, VERMILLION, in_paper_style
 
 if TYPE_CHECKING:
+    from bowdenfit.plots.layout import Axes, Figure
     from bowdenfit.questions.bends.figure_data import LoopCurve
     from bowdenfit.questions.summary.figure_data import FigureData
 
@@ -25,13 +26,13 @@ STROKES = (
 )
 
 
-def has_loops(data: "FigureData") -> bool:
+def has_loops(data: FigureData) -> bool:
     """Whether the cable is a loop with preload."""
     return bool(data.elastic.loops)
 
 
 @in_paper_style
-def loops(data: "FigureData") -> Figure:
+def loops(data: FigureData) -> Figure:
     """Output against input force [N], a panel for each of at most six wrap angles."""
     shown = evenly(data.elastic.loops, MOST)
     across = [span([loop.input_force, loop.points_input], room=0.03) for loop in shown]
@@ -53,7 +54,7 @@ def loops(data: "FigureData") -> Figure:
     return figure
 
 
-def _curves(axes: Axes, loop: "LoopCurve") -> None:
+def _curves(axes: Axes, loop: LoopCurve) -> None:
     """Both ways, and the way forward of a rope without preload."""
     name = (MEDIAN if len(loop.forward) > 1 else LEAST_SQUARES).lower()
     draw_quantiles(axes, loop.input_force, loop.forward, BLUE, label=f"Forward, {name}")
@@ -65,7 +66,7 @@ def _curves(axes: Axes, loop: "LoopCurve") -> None:
     )  # fmt: skip
 
 
-def _readings(axes: Axes, loop: "LoopCurve") -> None:
+def _readings(axes: Axes, loop: LoopCurve) -> None:
     """Forces by stroke; those of recordings are many and small."""
     for stroke, name, marker, size, color in STROKES:
         here = loop.points_stroke == stroke
@@ -77,7 +78,7 @@ def _readings(axes: Axes, loop: "LoopCurve") -> None:
             )  # fmt: skip
 
 
-def _slack(axes: Axes, loop: "LoopCurve") -> None:
+def _slack(axes: Axes, loop: LoopCurve) -> None:
     """The input force at which the return side goes slack, where it is shown, and what the rope is on either side."""
     low, high = axes.get_xlim()
     load = float(middle(loop.slack_load))
@@ -93,7 +94,7 @@ def _slack(axes: Axes, loop: "LoopCurve") -> None:
     _branches(axes, loop, (load - low) / (high - low))
 
 
-def _branches(axes: Axes, loop: "LoopCurve", place: float) -> None:
+def _branches(axes: Axes, loop: LoopCurve, place: float) -> None:
     """Both branches named along the line, at the end of it that is farther from the loop."""
     bottom, top = axes.get_ylim()
     height = float(np.interp(middle(loop.slack_load), loop.input_force, middle(loop.forward + loop.back) / 2))

@@ -1,10 +1,10 @@
 """Preload between fixed ends against the wrap angle, and where bending lets the rope go slack."""
 
+from __future__ import annotations
+
 from typing import TYPE_CHECKING
 
 import numpy as np
-from matplotlib.axes import Axes
-from matplotlib.figure import Figure
 
 from bowdenfit.plots.bands import draw_quantiles, name_band
 from bowdenfit.plots.layout import legend_above, panels
@@ -12,6 +12,7 @@ from bowdenfit.plots.panels import span
 from bowdenfit.plots.style import BLACK, BLUE, LEAST_SQUARES, LIGHT, MEDIAN, MEDIUM, WRAP_ANGLE, in_paper_style, percent
 
 if TYPE_CHECKING:
+    from bowdenfit.plots.layout import Axes, Figure
     from bowdenfit.questions.bends.figure_data import PreloadCurve
     from bowdenfit.questions.summary.figure_data import FigureData
 
@@ -20,13 +21,13 @@ PERHAPS, RATHER = 0.05, 0.5  # probabilities of being slack from which on a regi
 PLACES = 2001  # along the wrap angle, for the ends of the regions
 
 
-def has_preload(data: "FigureData") -> bool:
+def has_preload(data: FigureData) -> bool:
     """Whether preload depends on the wrap angle."""
     return data.elastic.preload is not None
 
 
 @in_paper_style
-def preload(data: "FigureData") -> Figure:
+def preload(data: FigureData) -> Figure:
     """Preload [N] against the wrap angle [deg], and below it the slack [mm] where there is any."""
     curve = data.elastic.preload
     assert curve is not None
@@ -44,7 +45,7 @@ def preload(data: "FigureData") -> Figure:
     return figure
 
 
-def _preload(axes: Axes, curve: "PreloadCurve") -> None:
+def _preload(axes: Axes, curve: PreloadCurve) -> None:
     """The curve and the readings."""
     name = MEDIAN if len(curve.preload) > 1 else LEAST_SQUARES
     draw_quantiles(axes, curve.wrap_angle, curve.preload, BLUE, label=name)
@@ -62,7 +63,7 @@ def _from_zero(axes: Axes, label: str, *values: np.ndarray) -> None:
     axes.set_ylabel(label)
 
 
-def _shade_slack(axes: Axes, curve: "PreloadCurve") -> None:
+def _shade_slack(axes: Axes, curve: PreloadCurve) -> None:
     """Where the rope is slack in most draws, and where in some."""
     angle = np.linspace(curve.wrap_angle.min(), curve.wrap_angle.max(), PLACES)
     order = np.argsort(curve.wrap_angle)

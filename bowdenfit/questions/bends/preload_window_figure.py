@@ -1,10 +1,10 @@
 """What a preload costs in free motion and what it buys: both sides of the loop staying taut."""
 
+from __future__ import annotations
+
 from typing import TYPE_CHECKING
 
 import numpy as np
-from matplotlib.axes import Axes
-from matplotlib.figure import Figure
 
 from bowdenfit.plots.bands import draw_quantiles, middle, name_band
 from bowdenfit.plots.layout import TITLE, legend_above, panels
@@ -24,19 +24,20 @@ from bowdenfit.plots.style import (
 from bowdenfit.questions.bends.preload_figure import stretches
 
 if TYPE_CHECKING:
+    from bowdenfit.plots.layout import Axes, Figure
     from bowdenfit.questions.bends.figure_data import PreloadWindow
     from bowdenfit.questions.summary.figure_data import FigureData
 
 ENOUGH = 0.95  # probability of staying taut from which on a preload is within the window
 
 
-def has_preload_window(data: "FigureData") -> bool:
+def has_preload_window(data: FigureData) -> bool:
     """Whether the cable is a loop whose preload can be chosen."""
     return data.elastic.window is not None
 
 
 @in_paper_style
-def preload_window(data: "FigureData") -> Figure:
+def preload_window(data: FigureData) -> Figure:
     """Friction felt in free motion, and the probability that both sides stay taut [%], against preload [N]."""
     window = data.elastic.window
     assert window is not None
@@ -59,7 +60,7 @@ def preload_window(data: "FigureData") -> Figure:
     return figure
 
 
-def _title(window: "PreloadWindow") -> str:
+def _title(window: PreloadWindow) -> str:
     """The bends and the input force that the window is for."""
     low, high = window.bends
     bends = f"{low:.4g} deg" if low == high else f"{low:.4g} deg to {high:.4g} deg"
@@ -67,11 +68,11 @@ def _title(window: "PreloadWindow") -> str:
     return f"Bends {bends}, {loaded}"
 
 
-def _name(window: "PreloadWindow") -> str:
+def _name(window: PreloadWindow) -> str:
     return f"Friction, {(MEDIAN if len(window.friction) > 1 else LEAST_SQUARES).lower()}"
 
 
-def _shade_window(axes: Axes, window: "PreloadWindow") -> None:
+def _shade_window(axes: Axes, window: PreloadWindow) -> None:
     """The preloads that are enough, or the words that none shown is."""
     fine = np.linspace(window.preload.min(), window.preload.max(), 2001)
     regions = stretches(np.interp(fine, window.preload, window.taut_probability) >= ENOUGH)
@@ -82,7 +83,7 @@ def _shade_window(axes: Axes, window: "PreloadWindow") -> None:
         axes.plot([], [], " ", label=f"No preload shown is taut with {percent(ENOUGH)}")
 
 
-def _mark_lowest(axes: Axes, window: "PreloadWindow") -> None:
+def _mark_lowest(axes: Axes, window: PreloadWindow) -> None:
     """The lowest preload that is enough with its interval, or in words where it is off the axis."""
     low, high = axes.get_xlim()
     lowest, which = float(middle(window.lowest)), MEDIAN if len(window.friction) > 1 else LEAST_SQUARES

@@ -1,19 +1,19 @@
 """Stretch of the rope against its load, a curve for each wrap angle, loading and coming down again."""
 
+from __future__ import annotations
+
 from collections.abc import Sequence
 from typing import TYPE_CHECKING, Any
 
-import matplotlib as mpl
 import numpy as np
-from matplotlib.axes import Axes
-from matplotlib.figure import Figure
 
 from bowdenfit.plots.bands import draw_quantiles, evenly, name_band, say_of_how_many
 from bowdenfit.plots.layout import legend_above, panels
 from bowdenfit.plots.panels import span
-from bowdenfit.plots.style import BLACK, GRAY, LEAST_SQUARES, MEDIAN, MEDIUM, in_paper_style
+from bowdenfit.plots.style import BLACK, GRAY, LEAST_SQUARES, MEDIAN, MEDIUM, in_paper_style, mapped_color
 
 if TYPE_CHECKING:
+    from bowdenfit.plots.layout import Axes, Figure
     from bowdenfit.questions.bends.figure_data import StretchCurve
     from bowdenfit.questions.summary.figure_data import FigureData
 
@@ -23,13 +23,13 @@ DASHES = (0, (4, 1.6))
 MARKERS = ("o", "s", "^", "D", "v", "p", "<", "h")  # whose open forms can be told from the filled ones
 
 
-def has_stretch(data: "FigureData") -> bool:
+def has_stretch(data: FigureData) -> bool:
     """Whether the rope's stretch is known at any wrap angle."""
     return bool(data.elastic.stretch)
 
 
 @in_paper_style
-def stretch(data: "FigureData") -> Figure:
+def stretch(data: FigureData) -> Figure:
     """Stretch [mm] against load [N], a color for each wrap angle."""
     every = sorted(data.elastic.stretch, key=lambda curve: curve.wrap_angle)
     shown = evenly(every, MOST)
@@ -47,10 +47,10 @@ def stretch(data: "FigureData") -> Figure:
 
 def _color(number: int, of: int) -> Any:
     """From dark to light as the wrap angle grows."""
-    return mpl.colormaps["viridis"](DARKEST + (LIGHTEST - DARKEST) * number / max(of - 1, 1))
+    return mapped_color("viridis", DARKEST + (LIGHTEST - DARKEST) * number / max(of - 1, 1))
 
 
-def _curve(axes: Axes, curve: "StretchCurve", color: Any, marker: str) -> None:
+def _curve(axes: Axes, curve: StretchCurve, color: Any, marker: str) -> None:
     """Both branches of one wrap angle, and the readings on each."""
     draw_quantiles(axes, curve.load, curve.loading, color)
     if curve.unloading is not None:
@@ -64,7 +64,7 @@ def _curve(axes: Axes, curve: "StretchCurve", color: Any, marker: str) -> None:
     axes.plot([], [], marker=marker, markersize=3.8, color=color, label=f"{curve.wrap_angle:.4g} deg")
 
 
-def _explain(axes: Axes, shown: "Sequence[StretchCurve]") -> int:
+def _explain(axes: Axes, shown: Sequence[StretchCurve]) -> int:
     """Entries of the legend for what all wrap angles share, which fill its first column; how many they are."""
     name = MEDIAN if len(shown[0].loading) > 1 else LEAST_SQUARES
     down = any(c.unloading is not None or np.any(c.points_unloading) for c in shown)

@@ -1,12 +1,12 @@
 """Figures of a calibration: ranks against uniform ones, how often intervals hold the truth, bias and shrinkage."""
 
+from __future__ import annotations
+
 from collections.abc import Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING
 
 import numpy as np
-from matplotlib.axes import Axes
-from matplotlib.figure import Figure
 
 from bowdenfit.plots.layout import TITLE, legend_above, panels
 from bowdenfit.plots.style import BLUE, GRAY, LIGHT, VERMILLION, in_paper_style
@@ -14,6 +14,7 @@ from bowdenfit.plots.write import FORMATS, write
 from bowdenfit.questions.calibrate.uniformity import Uniformity
 
 if TYPE_CHECKING:
+    from bowdenfit.plots.layout import Axes, Figure
     from bowdenfit.questions.calibrate.answer import Calibration, Checked
 
 _COLUMNS = 4
@@ -22,7 +23,7 @@ _ROW = 0.24  # in, of a quantity
 
 
 @in_paper_style
-def draw_calibration(found: "Calibration", folder: Path, formats: Sequence[str] = FORMATS) -> list[Path]:
+def draw_calibration(found: Calibration, folder: Path, formats: Sequence[str] = FORMATS) -> list[Path]:
     """Draw and write all figures of a calibration.
 
     Args:
@@ -36,7 +37,7 @@ def draw_calibration(found: "Calibration", folder: Path, formats: Sequence[str] 
 
 
 @in_paper_style
-def ranks(found: "Calibration") -> Figure:
+def ranks(found: Calibration) -> Figure:
     """Distribution function of the ranks less that of uniform ones, with the band that holds uniform ones in 99 %.
 
     A hump to the left of the middle and a dip to the right is of intervals too wide, the reverse of intervals too narrow; all
@@ -75,7 +76,7 @@ def _label_edges(flat: Sequence[Axes], columns: int, below: str, left: str) -> N
 
 
 @in_paper_style
-def coverage(found: "Calibration") -> Figure:
+def coverage(found: Calibration) -> Figure:
     """How often the 50 and 90 % intervals of each quantity hold the truth, and what chance allows."""
     figure, flat = _lines(found, 2)
     for k, axes in enumerate(flat):
@@ -96,7 +97,7 @@ def coverage(found: "Calibration") -> Figure:
 
 
 @in_paper_style
-def sharpness(found: "Calibration") -> Figure:
+def sharpness(found: Calibration) -> Figure:
     """Bias of the posterior mean, and how far the data narrow the prior."""
     figure, (left, right) = _lines(found, 2)
     for i, q in enumerate(found.quantities):
@@ -110,7 +111,7 @@ def sharpness(found: "Calibration") -> Figure:
     return figure
 
 
-def _lines(found: "Calibration", columns: int) -> tuple[Figure, list[Axes]]:
+def _lines(found: Calibration, columns: int) -> tuple[Figure, list[Axes]]:
     """Panels with one line for each quantity, the first on top."""
     quantities: tuple[Checked, ...] = found.quantities
     figure, flat = panels([0.3 + _ROW * len(quantities)], columns, 0.1, (0.35, 0.3), sharey=True)

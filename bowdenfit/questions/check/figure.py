@@ -1,15 +1,16 @@
 """Every reading against its prediction from all the others: is their scatter as predicted, and does it depend on anything?"""
 
+from __future__ import annotations
+
 from typing import TYPE_CHECKING
 
 import numpy as np
-from matplotlib.axes import Axes
-from matplotlib.figure import Figure
 
 from bowdenfit.plots.layout import TITLE, drop_unused, legend_above, panels
 from bowdenfit.plots.style import BLACK, BLUE, GRAY, LIGHT, SERIES_COLORS, SERIES_MARKERS, VERMILLION, in_paper_style
 
 if TYPE_CHECKING:
+    from bowdenfit.plots.layout import Axes, Figure
     from bowdenfit.questions.check.figure_data import CheckedTable
     from bowdenfit.questions.summary.figure_data import FigureData
 
@@ -19,13 +20,13 @@ BACK = "Read on the way back"
 LEAST_LIMIT = 3.2  # standard deviations that the axis shows at least
 
 
-def has_checks(data: "FigureData") -> bool:
+def has_checks(data: FigureData) -> bool:
     """Whether readings were predicted without themselves."""
     return bool(data.checks)
 
 
 @in_paper_style
-def checks(data: "FigureData") -> Figure:
+def checks(data: FigureData) -> Figure:
     """One row a table: distribution of the readings in their predictions, and deviations by where they were taken."""
     columns = 1 + max(len(table.numbers) for table in data.checks)
     figure, flat = panels([ROW] * len(data.checks), columns, TITLE, (0.62, 0.74))
@@ -42,7 +43,7 @@ def checks(data: "FigureData") -> Figure:
     return figure
 
 
-def _distribution(axes: Axes, table: "CheckedTable") -> None:
+def _distribution(axes: Axes, table: CheckedTable) -> None:
     """Share of readings up to a place in their predictions, less what it should be."""
     axes.set_title(f"{table.name.capitalize()}: {len(table.labels)} readings")
     axes.axhline(0.0, color=GRAY, linewidth=0.8)
@@ -58,7 +59,7 @@ def _distribution(axes: Axes, table: "CheckedTable") -> None:
     axes.plot(at, off, drawstyle="steps-post", color=BLUE, label="Distribution of the readings")
 
 
-def _deviations(axes: Axes, table: "CheckedTable", label: str, numbers: np.ndarray) -> None:
+def _deviations(axes: Axes, table: CheckedTable, label: str, numbers: np.ndarray) -> None:
     """Deviations in standard deviations against one of the places."""
     z = table.z_score
     axes.axhspan(-2, 2, color=LIGHT, linewidth=0, zorder=0.4, label="Within two standard deviations")

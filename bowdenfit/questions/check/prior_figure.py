@@ -1,15 +1,16 @@
 """What the priors alone hold possible, beside what was measured."""
 
+from __future__ import annotations
+
 from typing import TYPE_CHECKING
 
 import numpy as np
-from matplotlib.axes import Axes
-from matplotlib.figure import Figure
 
 from bowdenfit.plots.layout import TITLE, drop_unused, legend_above, panels
 from bowdenfit.plots.style import BLACK, BLUE, EFFICIENCY, SERIES_MARKERS, VERMILLION, WIDE_INTERVAL, in_paper_style
 
 if TYPE_CHECKING:
+    from bowdenfit.plots.layout import Axes, Figure
     from bowdenfit.questions.check.figure_data import PriorPredictive, PriorTable
 
 ROW, COLUMNS = 1.9, 2  # in; panels in a row
@@ -22,7 +23,7 @@ SHIFT = 0.006  # of the axis, between contacts whose readings would hide each ot
 
 
 @in_paper_style
-def prior_predictive(data: "PriorPredictive") -> Figure:
+def prior_predictive(data: PriorPredictive) -> Figure:
     """Efficiency along the route by the priors, and a panel for each table with its readings."""
     n = len(data.tables) + (data.efficiency is not None)
     rows = -(-n // COLUMNS)
@@ -36,7 +37,7 @@ def prior_predictive(data: "PriorPredictive") -> Figure:
     return figure
 
 
-def _readings(axes: Axes, table: "PriorTable") -> None:
+def _readings(axes: Axes, table: PriorTable) -> None:
     """Intervals by the priors wherever readings were taken, and what was read."""
     span = float(np.ptp(table.numbers)) or 1.0
     groups = list(dict.fromkeys(table.group))
@@ -68,7 +69,7 @@ def _intervals(numbers: np.ndarray, quantiles: np.ndarray, within: float) -> tup
     return at, least(low, starts), least(lower, starts), most(upper, starts), most(high, starts)
 
 
-def _scale(axes: Axes, table: "PriorTable") -> None:
+def _scale(axes: Axes, table: PriorTable) -> None:
     """An axis that shows every reading and all 90 % intervals; logarithmic beyond the readings where these are wide."""
     read = table.reading[np.isfinite(table.reading)]
     shown = np.concatenate([read, table.quantiles[1], table.quantiles[3]])
@@ -84,7 +85,7 @@ def _scale(axes: Axes, table: "PriorTable") -> None:
         axes.set_ylim(low - room, high + room)
 
 
-def _efficiency(axes: Axes, data: "PriorPredictive") -> None:
+def _efficiency(axes: Axes, data: PriorPredictive) -> None:
     """Efficiency against the route."""
     assert data.efficiency is not None and data.route is not None  # the caller looked
     low, lower, median, upper, high = data.efficiency

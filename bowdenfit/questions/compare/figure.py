@@ -1,13 +1,13 @@
 """Several fits side by side: how well each predicts readings left out, which readings tell them apart, what changes."""
 
+from __future__ import annotations
+
 from itertools import groupby
 from typing import TYPE_CHECKING
 
 import numpy as np
-from matplotlib.axes import Axes
-from matplotlib.figure import Figure
 
-from bowdenfit.plots.layout import TITLE, legend_above, place_labels
+from bowdenfit.plots.layout import TITLE, empty_page, legend_above, place_labels
 from bowdenfit.plots.style import (
     BLACK,
     GRAY,
@@ -23,6 +23,7 @@ from bowdenfit.plots.style import (
 
 if TYPE_CHECKING:
     from bowdenfit.inference.interval import Interval
+    from bowdenfit.plots.layout import Axes, Figure
     from bowdenfit.questions.compare.answer import Comparison
 
 MOST_LABELED = 40  # readings that are named below the axis
@@ -35,7 +36,7 @@ _GAP = 0.62
 
 
 @in_paper_style
-def comparison(found: "Comparison") -> Figure:
+def comparison(found: Comparison) -> Figure:
     """Differences of elpd with standard errors, their contributions by reading, and parameters side by side."""
     cells = _cells(found)
     names = [_shortened(name) for name in found.differences]
@@ -46,7 +47,7 @@ def comparison(found: "Comparison") -> Figure:
     below_readings = _label_room(found)
     parts = [TITLE, height_of_fits, _GAP + TITLE, _MIDDLE, below_readings]
     parts += [TITLE + 0.1, *([height_of_fits, _BELOW + 0.1] * rows)] if rows else []
-    figure = Figure(figsize=(WIDE, sum(parts)))
+    figure = empty_page(WIDE, sum(parts))
     _differences(_axes(figure, left, sum(parts[2:]), WIDE - left - _RIGHT, height_of_fits), found, names)
     middle = _axes(figure, left, below_readings + sum(parts[5:]), WIDE - left - _RIGHT, _MIDDLE)
     _by_reading(middle, found, names)
@@ -64,7 +65,7 @@ def _shortened(name: str) -> str:
     return name if len(name) <= LONGEST_NAME else "\N{HORIZONTAL ELLIPSIS}" + name[-LONGEST_NAME + 1 :]
 
 
-def _label_room(found: "Comparison") -> float:
+def _label_room(found: Comparison) -> float:
     """Room below the panel of readings [in]."""
     if len(found.readings) > MOST_LABELED:
         return _BELOW + 0.1
@@ -89,7 +90,7 @@ def _cell_axes(figure: Figure, left: float, parts: list[float], i: int, columns:
     return _axes(figure, left + (i % columns) * (width + 0.22), bottom, width, height)
 
 
-def _cells(found: "Comparison") -> list[tuple[str, dict[str, "Interval"]]]:
+def _cells(found: Comparison) -> list[tuple[str, dict[str, Interval]]]:
     """What is shown of each fit: label of the axis, and intervals by fit."""
     cells = [(labeled(row.symbol, row.unit), row.by_fit) for row in found.parameters.values()]
     lengths = {name: interval for name, (interval, _) in found.optimal_length.items()}
@@ -99,7 +100,7 @@ def _cells(found: "Comparison") -> list[tuple[str, dict[str, "Interval"]]]:
     return cells
 
 
-def _differences(axes: Axes, found: "Comparison", names: list[str]) -> None:
+def _differences(axes: Axes, found: Comparison, names: list[str]) -> None:
     """Difference to the best with one and two standard errors."""
     for i, (name, difference) in enumerate(found.differences.items()):
         color, marker = SERIES_COLORS[i % len(SERIES_COLORS)], SERIES_MARKERS[i % len(SERIES_MARKERS)]
@@ -116,7 +117,7 @@ def _differences(axes: Axes, found: "Comparison", names: list[str]) -> None:
     place_labels(axes.figure, axes)  # type: ignore[arg-type]
 
 
-def _by_reading(axes: Axes, found: "Comparison", names: list[str]) -> None:
+def _by_reading(axes: Axes, found: Comparison, names: list[str]) -> None:
     """What each reading adds to the difference."""
     x = np.arange(len(found.readings))
     others = list(found.differences)[1:]
@@ -139,7 +140,7 @@ def _by_reading(axes: Axes, found: "Comparison", names: list[str]) -> None:
     axes.yaxis.set_label_coords(-0.45 / (box.width * page[0]), 0.5)
 
 
-def _tables(axes: Axes, found: "Comparison") -> None:
+def _tables(axes: Axes, found: Comparison) -> None:
     """Every other table on gray, its name above."""
     start = 0
     for number, (table, group) in enumerate(groupby(name for name, _ in found.readings)):
@@ -154,7 +155,7 @@ def _tables(axes: Axes, found: "Comparison") -> None:
 
 
 def _parameter(
-    axes: Axes, cell: tuple[str, dict[str, "Interval"]], names: list[str], fits: list[str], named: bool
+    axes: Axes, cell: tuple[str, dict[str, Interval]], names: list[str], fits: list[str], named: bool
 ) -> None:
     """Median and interval of one parameter in each fit that has it."""
     label, by_fit = cell

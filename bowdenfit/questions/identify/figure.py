@@ -1,17 +1,19 @@
 """What measurements determine: each parameter's share of measurements and prior, and the combinations that are known."""
 
+from __future__ import annotations
+
 from collections.abc import Mapping, Sequence
 from typing import TYPE_CHECKING
 
 import numpy as np
-from matplotlib.axes import Axes
-from matplotlib.figure import Figure
 
+from bowdenfit.plots.layout import empty_page
 from bowdenfit.plots.style import BLUE, GRAY, LIGHT, SMALL, WIDE, in_paper_style
 
 if TYPE_CHECKING:
     from bowdenfit.inference.identifiability import Knowledge
     from bowdenfit.inference.profiles import Profile
+    from bowdenfit.plots.layout import Axes, Figure
 
 _ROW, _TOP, _BOTTOM, _NAMES, _GAP = 0.24, 0.34, 0.5, 1.75, 0.35  # in
 _PROFILE, _ACROSS = 1.75, 4  # height of a row of profiles [in], and how many are in it
@@ -20,7 +22,7 @@ _MOST = 0.05  # weight below which a cell of the map is left empty
 
 
 @in_paper_style
-def identifiability(groups: "Mapping[str, Knowledge]", profiles: "Sequence[Profile]" = ()) -> Figure:
+def identifiability(groups: Mapping[str, Knowledge], profiles: Sequence[Profile] = ()) -> Figure:
     """One row of panels for each group of parameters: who speaks for each, and what each combination consists of.
 
     Args:
@@ -30,7 +32,7 @@ def identifiability(groups: "Mapping[str, Knowledge]", profiles: "Sequence[Profi
     heights = [_ROW * len(group.parameters) + _TOP + _BOTTOM for group in groups.values()]
     rows = -(-len(profiles) // _ACROSS)
     total = sum(heights) + rows * _PROFILE
-    figure = Figure(figsize=(WIDE, total))
+    figure = empty_page(WIDE, total)
     width, top = (WIDE - _NAMES - _GAP - 0.15) / 2, total
     for (name, group), height in zip(groups.items(), heights, strict=True):
         bottom, tall = (top - height + _BOTTOM) / total, (height - _TOP - _BOTTOM) / total
@@ -47,7 +49,7 @@ def identifiability(groups: "Mapping[str, Knowledge]", profiles: "Sequence[Profi
     return figure
 
 
-def _profile(axes: Axes, one: "Profile", first: bool) -> None:
+def _profile(axes: Axes, one: Profile, first: bool) -> None:
     """Rise of the sum of squares; where it stays flat the readings say nothing."""
     axes.plot(one.values, one.rise, color=BLUE)
     axes.axhline(_NINETY, color=GRAY, linestyle="--", linewidth=0.8)
@@ -58,7 +60,7 @@ def _profile(axes: Axes, one: "Profile", first: bool) -> None:
         axes.set_ylabel("Rise")
 
 
-def _shares(axes: Axes, name: str, group: "Knowledge") -> None:
+def _shares(axes: Axes, name: str, group: Knowledge) -> None:
     names = [p.name for p in group.parameters]
     told = np.array([100 * max(p.contraction, 0.0) for p in group.parameters])
     places = np.arange(len(names))
@@ -72,7 +74,7 @@ def _shares(axes: Axes, name: str, group: "Knowledge") -> None:
     axes.set_xlabel("Told by the measurements, not the prior (%)")
 
 
-def _combinations(axes: Axes, group: "Knowledge") -> None:
+def _combinations(axes: Axes, group: Knowledge) -> None:
     """Map of the weights, in units of the priors' standard deviations; columns are combinations."""
     names, prior_sd = [p.name for p in group.parameters], {p.name: p.prior_sd for p in group.parameters}
     weights = np.array([[d.weights.get(n, 0.0) * prior_sd[n] for n in names] for d in group.directions]).T

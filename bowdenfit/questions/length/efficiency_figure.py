@@ -1,10 +1,10 @@
 """Efficiency against the route, and below it where the optimum lies and which length to buy."""
 
+from __future__ import annotations
+
 from typing import TYPE_CHECKING
 
 import numpy as np
-from matplotlib.axes import Axes
-from matplotlib.figure import Figure
 
 from bowdenfit.plots.bands import draw_band, route_limits, shade_outside
 from bowdenfit.plots.densities import GRID_POINTS, density
@@ -23,6 +23,7 @@ from bowdenfit.plots.style import (
 )
 
 if TYPE_CHECKING:
+    from bowdenfit.plots.layout import Axes, Figure
     from bowdenfit.questions.summary.figure_data import EfficiencyPoints, FigureData
     from bowdenfit.results.length import OptimalLength
 
@@ -33,13 +34,13 @@ MOST_NUMBERS, LEAST_NUMBER = 16, 0.5  # so many bars have numbers over them, if 
 LEAST_AT_EDGE = 0.005
 
 
-def has_route(data: "FigureData") -> bool:
+def has_route(data: FigureData) -> bool:
     """Whether there is a route to draw against."""
     return data.efficiency is not None
 
 
 @in_paper_style
-def efficiency(data: "FigureData") -> Figure:
+def efficiency(data: FigureData) -> Figure:
     """Efficiency [%] against the route, the density of the optimal length, and each choice's chance to be the best."""
     below = 0 if data.optimum is None else 2 if data.optimum.choices else 1
     figure, flat = panels([2.3] + [0.75] * below, 1, 0.08, (0.0, TITLE + 0.12), sharex=True)
@@ -58,7 +59,7 @@ def efficiency(data: "FigureData") -> Figure:
     return figure
 
 
-def _curve_and_points(axes: Axes, data: "FigureData") -> None:
+def _curve_and_points(axes: Axes, data: FigureData) -> None:
     assert data.efficiency is not None  # has_route
     draw_band(axes, data.efficiency, scale=100.0)
     for points in data.points:
@@ -71,7 +72,7 @@ def _curve_and_points(axes: Axes, data: "FigureData") -> None:
     axes.locator_params(axis="y", nbins=6)
 
 
-def _measured(axes: Axes, points: "EfficiencyPoints", where: np.ndarray, fill: str, note: str) -> None:
+def _measured(axes: Axes, points: EfficiencyPoints, where: np.ndarray, fill: str, note: str) -> None:
     """Some of the measured points; the note is added to their label."""
     marker, size, label = KINDS[points.what]
     if where.any():
@@ -81,7 +82,7 @@ def _measured(axes: Axes, points: "EfficiencyPoints", where: np.ndarray, fill: s
         )  # fmt: skip
 
 
-def _predicted(axes: Axes, points: "EfficiencyPoints", where: np.ndarray) -> None:
+def _predicted(axes: Axes, points: EfficiencyPoints, where: np.ndarray) -> None:
     """What is predicted where there is no curve: median with 90 % interval, or the least-squares value."""
     predicted, route = 100 * points.predicted[:, where], points.route[where]
     if len(predicted) == 1:
@@ -94,7 +95,7 @@ def _predicted(axes: Axes, points: "EfficiencyPoints", where: np.ndarray) -> Non
     )  # fmt: skip
 
 
-def _optimum(axes: Axes, data: "FigureData", optimum: "OptimalLength") -> None:
+def _optimum(axes: Axes, data: FigureData, optimum: OptimalLength) -> None:
     assert data.optimal_length is not None  # comes with the optimum
     grid = np.linspace(*data.route_range, 2 * GRID_POINTS)
     height = density(data.optimal_length, grid, *data.route_range)
@@ -112,7 +113,7 @@ def _optimum(axes: Axes, data: "FigureData", optimum: "OptimalLength") -> None:
         )  # fmt: skip
 
 
-def _mark_optimum(axes: Axes, optimum: "OptimalLength") -> None:
+def _mark_optimum(axes: Axes, optimum: OptimalLength) -> None:
     """The median optimum, and the window of lengths that are good enough."""
     length, window, unit = optimum.length, optimum.window, optimum.unit
     median, low, high = rounded((length.median, length.q05, length.q95), length.q95 - length.q05)
@@ -125,7 +126,7 @@ def _mark_optimum(axes: Axes, optimum: "OptimalLength") -> None:
         )
 
 
-def _choices(axes: Axes, optimum: "OptimalLength", span: float) -> None:
+def _choices(axes: Axes, optimum: OptimalLength, span: float) -> None:
     """A bar for each choice; lengths that are far apart get bars of a tenth of the span at most."""
     lengths = np.array([choice.length for choice in optimum.choices])
     chance = 100 * np.array([choice.probability_best for choice in optimum.choices])

@@ -1,28 +1,29 @@
 """Wrap angles against the route: what was read, what was too small to read, and the curve through it."""
 
+from __future__ import annotations
+
 from typing import TYPE_CHECKING
 
 import numpy as np
-from matplotlib.axes import Axes
-from matplotlib.figure import Figure
 
 from bowdenfit.plots.bands import draw_band, route_limits, shade_outside
 from bowdenfit.plots.layout import TITLE, drop_unused, legend_above, panels
 from bowdenfit.plots.style import BLACK, MEDIUM, WIDE, WRAP_ANGLE, in_paper_style
 
 if TYPE_CHECKING:
+    from bowdenfit.plots.layout import Axes, Figure
     from bowdenfit.questions.summary.figure_data import AngleCurve, FigureData
 
 MOST_COLUMNS = 3
 
 
-def has_curves(data: "FigureData") -> bool:
+def has_curves(data: FigureData) -> bool:
     """Whether a contact's wrap angle is a curve."""
     return bool(data.angles)
 
 
 @in_paper_style
-def wrap_angles(data: "FigureData") -> Figure:
+def wrap_angles(data: FigureData) -> Figure:
     """Wrap angle [deg] of each curved contact against the route, a panel each."""
     columns = min(MOST_COLUMNS, len(data.angles))
     rows = -(-len(data.angles) // columns)
@@ -44,7 +45,7 @@ def wrap_angles(data: "FigureData") -> Figure:
     return figure
 
 
-def _readings(axes: Axes, curve: "AngleCurve") -> None:
+def _readings(axes: Axes, curve: AngleCurve) -> None:
     """The readings that the curve follows, and those that it does not."""
     axes.plot(curve.route, curve.angle, "o", color=BLACK, label="Reading")
     if len(curve.outside_route):
@@ -54,7 +55,7 @@ def _readings(axes: Axes, curve: "AngleCurve") -> None:
         )  # fmt: skip
 
 
-def _undetected(axes: Axes, curve: "AngleCurve", route_range: tuple[float, float], spacing: float) -> None:
+def _undetected(axes: Axes, curve: AngleCurve, route_range: tuple[float, float], spacing: float) -> None:
     """Readings that may be anything between zero and their limit."""
     route, limit = curve.undetected_route, curve.limit
     if not len(route):
@@ -73,7 +74,7 @@ def _spacing(routes: list[np.ndarray], shown: tuple[float, float]) -> float:
     return float(np.min(steps)) if len(steps) else 0.02 * (shown[1] - shown[0])
 
 
-def _highest(curves: tuple["AngleCurve", ...]) -> float:
+def _highest(curves: tuple[AngleCurve, ...]) -> float:
     """Top of the axis: above every reading, and above every interval unless that is far above the readings."""
     readings = np.concatenate([values for c in curves for values in (c.angle, c.limit, c.outside_angle)])
     band, reading = max(c.band.quantiles.max() for c in curves), readings.max(initial=0.0)

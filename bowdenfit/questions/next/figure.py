@@ -1,17 +1,18 @@
 """What to measure next: how well the answer would be known after each candidate."""
 
+from __future__ import annotations
+
 import math
 from typing import TYPE_CHECKING
 
 import numpy as np
-from matplotlib.axes import Axes
-from matplotlib.figure import Figure
 
 from bowdenfit.plots.bands import route_limits, shade_outside
 from bowdenfit.plots.layout import LEFT, TITLE, legend_above, panels
 from bowdenfit.plots.style import BLACK, GRAY, SERIES_COLORS, SERIES_LINES, SERIES_MARKERS, in_paper_style
 
 if TYPE_CHECKING:
+    from bowdenfit.plots.layout import Axes, Figure
     from bowdenfit.questions.next.answer import NextMeasurement, Ranked
 
 PAGE = 5.6  # in
@@ -29,33 +30,33 @@ _PER_LETTER = 0.058  # in, of a label's width
 
 
 @in_paper_style
-def next_measurement(found: "NextMeasurement") -> Figure:
+def next_measurement(found: NextMeasurement) -> Figure:
     """Expected standard deviation of the answer, against the route with a line for each kind; else a row a candidate."""
     along = [r for r in found.ranked if math.isfinite(r.candidate.route) and math.isnan(r.candidate.load)]
     places = {r.candidate.route for r in along}
     return _along_route(found, along) if len(along) == len(found.ranked) and len(places) > 1 else _in_rows(found)
 
 
-def _name(found: "NextMeasurement") -> str:
+def _name(found: NextMeasurement) -> str:
     """What the axis shows."""
     return f"Standard deviation ({found.answer.unit})" if found.answer.unit else "Standard deviation"
 
 
-def _title(axes: Axes, found: "NextMeasurement", start: float = 0.0) -> None:
+def _title(axes: Axes, found: NextMeasurement, start: float = 0.0) -> None:
     """What the figure is about, from a place left of the axes on."""
     words = found.answer.words
     first = words[0].upper() if len(words.split()) > 1 else words[0]
     axes.set_title(f"{first}{words[1:]}: how well it would be known", loc="left", x=start)
 
 
-def _limits(found: "NextMeasurement") -> tuple[float, float]:
+def _limits(found: NextMeasurement) -> tuple[float, float]:
     """An axis that shows what the candidates change, and does not make it look like more than it is."""
     now, least = found.answer.sd, min(r.sd for r in found.ranked)
     change = max(now - least, 0.05 * now)
     return max(0.0, least - 1.5 * change), now + 0.3 * change
 
 
-def _along_route(found: "NextMeasurement", along: "list[Ranked]") -> Figure:
+def _along_route(found: NextMeasurement, along: list[Ranked]) -> Figure:
     figure, (axes,) = panels([2.4], 1, TITLE, (0, 0), PAGE)
     kinds = [kind for kind in KINDS if any(r.candidate.kind == kind for r in along)]
     for i, kind in enumerate(kinds):
@@ -78,7 +79,7 @@ def _along_route(found: "NextMeasurement", along: "list[Ranked]") -> Figure:
     return figure
 
 
-def _now(axes: Axes, found: "NextMeasurement", horizontal: bool) -> None:
+def _now(axes: Axes, found: NextMeasurement, horizontal: bool) -> None:
     """The standard deviation as things are, and the best candidate."""
     line = axes.axhline if horizontal else axes.axvline
     line(found.answer.sd, color=GRAY, linestyle="--", linewidth=1.0, label="As things are")
@@ -90,7 +91,7 @@ def _now(axes: Axes, found: "NextMeasurement", horizontal: bool) -> None:
         )
 
 
-def _in_rows(found: "NextMeasurement") -> Figure:
+def _in_rows(found: NextMeasurement) -> Figure:
     """A row for each of the best candidates."""
     shown = found.ranked[:MOST]
     room = max(LEFT, 0.15 + _PER_LETTER * max(len(r.words) for r in shown))

@@ -1,16 +1,17 @@
 """Whether what the model leaves over in a recording is noise: autocorrelation of the deviations against the lag."""
 
+from __future__ import annotations
+
 from typing import TYPE_CHECKING
 
 import numpy as np
-from matplotlib.axes import Axes
-from matplotlib.figure import Figure
 
 from bowdenfit.plots.layout import legend_above
 from bowdenfit.plots.panels import alike, chosen, label_outer, recording_panels, say_how_many, set_limits
 from bowdenfit.plots.style import BLUE, GRAY, in_paper_style
 
 if TYPE_CHECKING:
+    from bowdenfit.plots.layout import Axes, Figure
     from bowdenfit.questions.summary.figure_data import FigureData, RecordedTrace
 
 MOST_COLUMNS = 4
@@ -18,17 +19,17 @@ NORMAL_95 = 1.96
 MOST_STEMS = 60  # lags that have a stem each; with more, a line alone
 
 
-def has_autocorrelation(data: "FigureData") -> bool:
+def has_autocorrelation(data: FigureData) -> bool:
     """Whether the deviations of a recording were correlated with each other."""
     return any(map(_has_lags, data.recordings))
 
 
-def _has_lags(recording: "RecordedTrace") -> bool:
+def _has_lags(recording: RecordedTrace) -> bool:
     return len(recording.lag) > 1 and bool(np.isfinite(recording.autocorrelation).any())
 
 
 @in_paper_style
-def autocorrelation(data: "FigureData") -> Figure:
+def autocorrelation(data: FigureData) -> Figure:
     """Autocorrelation against the lag [s], a panel a recording, and the band that noise without memory would keep to."""
     shown, every = chosen(data, _has_lags)
     lags = [(float(-0.02 * r.lag.max()), float(1.02 * r.lag.max())) for r in shown]
@@ -46,12 +47,12 @@ def autocorrelation(data: "FigureData") -> Figure:
     return figure
 
 
-def _bound(recording: "RecordedTrace") -> float:
+def _bound(recording: RecordedTrace) -> float:
     """What 95 % of the autocorrelations of so many independent blocks are within."""
     return NORMAL_95 / float(np.sqrt(max(int(recording.used.sum()), 1)))
 
 
-def _panel(axes: Axes, recording: "RecordedTrace") -> None:
+def _panel(axes: Axes, recording: RecordedTrace) -> None:
     lag, correlation = recording.lag, recording.autocorrelation
     bound = _bound(recording)
     axes.axhspan(-bound, bound, facecolor="#D5D5D5", linewidth=0, zorder=0.6, label="95 % of noise without memory")

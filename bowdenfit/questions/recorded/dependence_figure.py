@@ -1,10 +1,10 @@
 """How efficiency depends on the load and on the speed, against the capstan equation, for which it does not."""
 
+from __future__ import annotations
+
 from typing import TYPE_CHECKING
 
 import numpy as np
-from matplotlib.axes import Axes
-from matplotlib.figure import Figure
 
 from bowdenfit.plots.layout import TITLE, legend_above, panels
 from bowdenfit.plots.panels import short, span
@@ -24,6 +24,7 @@ from bowdenfit.plots.style import (
 )
 
 if TYPE_CHECKING:
+    from bowdenfit.plots.layout import Axes, Figure
     from bowdenfit.questions.summary.figure_data import Dependence, FigureData
 
 MOST_COLUMNS = 2
@@ -32,13 +33,13 @@ WIDE_RANGE = 30.0  # highest over lowest x, beyond which the axis is logarithmic
 POINT_COLORS = (BLACK, *SERIES_COLORS[2:4], *SERIES_COLORS[5:8], BLACK, BLACK)  # not those of the curves
 
 
-def has_dependence(data: "FigureData") -> bool:
+def has_dependence(data: FigureData) -> bool:
     """Whether the fit lets efficiency depend on load or speed."""
     return bool(data.dependences)
 
 
 @in_paper_style
-def dependence(data: "FigureData") -> Figure:
+def dependence(data: FigureData) -> Figure:
     """Efficiency [%] against load and speed, a panel each on one efficiency axis."""
     columns = min(MOST_COLUMNS, len(data.dependences))
     rows = -(-len(data.dependences) // columns)
@@ -61,7 +62,7 @@ def dependence(data: "FigureData") -> Figure:
     return figure
 
 
-def _curve(axes: Axes, one: "Dependence") -> None:
+def _curve(axes: Axes, one: Dependence) -> None:
     """Median with 90 % interval, or the least-squares line; and the constant efficiency for comparison."""
     quantiles, drawn = 100 * one.quantiles, len(one.quantiles) > 1
     middle = quantiles[len(quantiles) // 2]
@@ -78,7 +79,7 @@ def _curve(axes: Axes, one: "Dependence") -> None:
         axes.xaxis.set_major_formatter("{x:g}")
 
 
-def _points(axes: Axes, one: "Dependence", runs: list[str]) -> None:
+def _points(axes: Axes, one: Dependence, runs: list[str]) -> None:
     """What was measured, with a mark a run unless these are too many."""
     labels = np.array(one.points_label, dtype=str)
     if len(runs) > MOST_NAMES:
@@ -88,7 +89,7 @@ def _points(axes: Axes, one: "Dependence", runs: list[str]) -> None:
         _measured(axes, one, labels == run, i, short(run, LONGEST))
 
 
-def _measured(axes: Axes, one: "Dependence", here: np.ndarray, number: int, label: str) -> None:
+def _measured(axes: Axes, one: Dependence, here: np.ndarray, number: int, label: str) -> None:
     if here.any():
         axes.plot(
             one.points_x[here], 100 * one.points_efficiency[here], SERIES_MARKERS[number], color=POINT_COLORS[number],

@@ -1,10 +1,10 @@
 """Output against input force: the loop that friction opens, between the two lines of the capstan equation."""
 
+from __future__ import annotations
+
 from typing import TYPE_CHECKING
 
 import numpy as np
-from matplotlib.axes import Axes
-from matplotlib.figure import Figure
 
 from bowdenfit.plots.layout import legend_above
 from bowdenfit.plots.panels import (
@@ -31,6 +31,7 @@ from bowdenfit.plots.style import (
 from bowdenfit.questions.recorded.recordings_figure import is_loop
 
 if TYPE_CHECKING:
+    from bowdenfit.plots.layout import Axes, Figure
     from bowdenfit.questions.summary.figure_data import FigureData, RecordedTrace
 
 MOST_COLUMNS = 4
@@ -43,19 +44,19 @@ STROKES = (
 )
 
 
-def has_hysteresis(data: "FigureData") -> bool:
+def has_hysteresis(data: FigureData) -> bool:
     """Whether forces were recorded of a single rope; those of a loop are in the figure of loops."""
     return any(map(_has_forces, data.recordings))
 
 
-def _has_forces(recording: "RecordedTrace") -> bool:
+def _has_forces(recording: RecordedTrace) -> bool:
     return not is_loop(recording) and bool(
         np.any(np.isfinite(recording.input_force) & np.isfinite(recording.output_force))
     )
 
 
 @in_paper_style
-def hysteresis(data: "FigureData") -> Figure:
+def hysteresis(data: FigureData) -> Figure:
     """Output against input force [N] on equal axes, a panel a recording."""
     shown, every = chosen(data, _has_forces)
     limits = [span([r.input_force, r.output_force]) for r in shown]
@@ -78,7 +79,7 @@ def hysteresis(data: "FigureData") -> Figure:
     return figure
 
 
-def _loop(axes: Axes, recording: "RecordedTrace") -> None:
+def _loop(axes: Axes, recording: RecordedTrace) -> None:
     """The blocks by stroke."""
     for stroke, name, marker, size, color in STROKES:
         here = recording.stroke == stroke
@@ -89,7 +90,7 @@ def _loop(axes: Axes, recording: "RecordedTrace") -> None:
             )  # fmt: skip
 
 
-def _capstan_lines(axes: Axes, recording: "RecordedTrace") -> None:
+def _capstan_lines(axes: Axes, recording: RecordedTrace) -> None:
     """F_out = F_in exp(-Lambda) when pulling, F_in exp(Lambda) when returning, and the diagonal between."""
     force = np.array(axes.get_xlim())
     low, middle, high = _exponent(recording)
@@ -105,7 +106,7 @@ def _capstan_lines(axes: Axes, recording: "RecordedTrace") -> None:
     axes.plot(force, force, color=GRAY, linewidth=0.6, linestyle=(0, (4, 2)), label="No friction")
 
 
-def _words(recording: "RecordedTrace") -> str:
+def _words(recording: RecordedTrace) -> str:
     """The exponent of this recording by itself, and that of the cable; in short lines, which fit below the loop."""
     low, middle, high = _exponent(recording)
     own, width = recording.own_exponent, high - low
@@ -115,7 +116,7 @@ def _words(recording: "RecordedTrace") -> str:
     return "\n".join(lines)
 
 
-def _exponent(recording: "RecordedTrace") -> tuple[float, float, float]:
+def _exponent(recording: RecordedTrace) -> tuple[float, float, float]:
     """Ends and middle of the interval of the cable's exponent, all the same without draws."""
     exponent = recording.exponent.tolist()
     return exponent[0], exponent[len(exponent) // 2], exponent[-1]

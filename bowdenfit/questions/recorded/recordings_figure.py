@@ -1,11 +1,11 @@
 """Force recordings over time: both forces, phases, what the fit says, and what was left out."""
 
+from __future__ import annotations
+
 import dataclasses
 from typing import TYPE_CHECKING
 
 import numpy as np
-from matplotlib.axes import Axes
-from matplotlib.figure import Figure
 
 from bowdenfit.plots.layout import legend_above
 from bowdenfit.plots.panels import (
@@ -33,6 +33,7 @@ from bowdenfit.plots.style import (
 )
 
 if TYPE_CHECKING:
+    from bowdenfit.plots.layout import Axes, Figure
     from bowdenfit.questions.summary.figure_data import FigureData, RecordedTrace
 
 POINTS = 3200  # of each line, all panels together, which is what a page can show
@@ -50,22 +51,22 @@ OTHER_FLAG = ("+", GREEN)
 MARK_GRID = (160, 60)  # across and up a panel, marks of a kind that it can show
 
 
-def has_recordings(data: "FigureData") -> bool:
+def has_recordings(data: FigureData) -> bool:
     """Whether forces were recorded."""
     return any(map(_has_blocks, data.recordings))
 
 
-def is_loop(recording: "RecordedTrace") -> bool:
+def is_loop(recording: RecordedTrace) -> bool:
     """Whether it is of a pull-pull loop, which has no efficiency that is the same at all loads."""
     return not len(recording.efficiency)
 
 
-def _has_blocks(recording: "RecordedTrace") -> bool:
+def _has_blocks(recording: RecordedTrace) -> bool:
     return len(recording.time) > 1
 
 
 @in_paper_style
-def recordings(data: "FigureData") -> Figure:
+def recordings(data: FigureData) -> Figure:
     """Input and output force [N] over time, what the cable would give at this input, and the samples left out."""
     whole, every = chosen(data, _has_blocks)
     shown = [beginning(r) for r in whole]
@@ -87,7 +88,7 @@ def recordings(data: "FigureData") -> Figure:
     return figure
 
 
-def beginning(recording: "RecordedTrace") -> "RecordedTrace":
+def beginning(recording: RecordedTrace) -> RecordedTrace:
     """A recording up to the last of as many cycles as can be told apart over time."""
     sliding = np.flatnonzero(recording.stroke)
     turns = sliding[1:][np.diff(recording.stroke[sliding]) != 0]
@@ -103,12 +104,12 @@ def beginning(recording: "RecordedTrace") -> "RecordedTrace":
     )
 
 
-def _start(recording: "RecordedTrace") -> float:
+def _start(recording: RecordedTrace) -> float:
     """Time of the first block or sample [s]."""
     return float(min(recording.time[0], recording.flagged_time.min(initial=np.inf)))
 
 
-def _force_limits(recording: "RecordedTrace") -> tuple[float, float]:
+def _force_limits(recording: RecordedTrace) -> tuple[float, float]:
     """Limits that show what was measured and fitted, and the interval unless it is far away."""
     low, high = span([recording.input_force, recording.output_force, recording.fitted])
     band_low, band_high = span([recording.predicted])
@@ -116,7 +117,7 @@ def _force_limits(recording: "RecordedTrace") -> tuple[float, float]:
     return max(min(low, band_low), low - room), min(max(high, band_high), high + room)
 
 
-def _phases(axes: Axes, recording: "RecordedTrace") -> None:
+def _phases(axes: Axes, recording: RecordedTrace) -> None:
     """Shade what the rope does, from the middle between two blocks to the next such; not where nothing was recorded."""
     time, stroke = recording.time - _start(recording), recording.stroke
     gap = _after_gaps(time)
@@ -141,7 +142,7 @@ def _after_gaps(time: np.ndarray) -> np.ndarray:
     return np.flatnonzero(steps > GAP_STEPS * np.median(steps)) + 1
 
 
-def _forces(axes: Axes, recording: "RecordedTrace", most: int) -> None:
+def _forces(axes: Axes, recording: RecordedTrace, most: int) -> None:
     """What was measured, predicted and fitted, broken where nothing was recorded."""
     time = recording.time - _start(recording)
     gaps = _after_gaps(time)
@@ -170,7 +171,7 @@ def _forces(axes: Axes, recording: "RecordedTrace", most: int) -> None:
     line(broken(recording.fitted), color=VERMILLION, linewidth=0.7, label="Output fitted")
 
 
-def _left_out(axes: Axes, recording: "RecordedTrace") -> None:
+def _left_out(axes: Axes, recording: RecordedTrace) -> None:
     """Samples left out, by kind, those beyond the axes or without a reading on their edge; and blocks at a range's end."""
     kinds, start = np.array(recording.flagged_kind, dtype=str), _start(recording)
     for kind in dict.fromkeys(recording.flagged_kind):

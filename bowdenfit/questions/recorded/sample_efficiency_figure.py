@@ -4,11 +4,11 @@ References:
     On-body paper, figures 13 and 15.
 """
 
+from __future__ import annotations
+
 from typing import TYPE_CHECKING
 
 import numpy as np
-from matplotlib.axes import Axes
-from matplotlib.figure import Figure
 
 from bowdenfit.plots.layout import legend_above
 from bowdenfit.plots.panels import alike, chosen, enlarge_marks, label_outer, recording_panels, say_how_many
@@ -26,6 +26,7 @@ from bowdenfit.plots.style import (
 from bowdenfit.questions.recorded.recordings_figure import is_loop
 
 if TYPE_CHECKING:
+    from bowdenfit.plots.layout import Axes, Figure
     from bowdenfit.questions.summary.figure_data import FigureData, RecordedTrace
 
 MOST_COLUMNS = 4
@@ -34,22 +35,22 @@ EDGE = 0.12  # of the panel's width, right of the samples
 SHARE = 0.998  # of the samples, within the axis
 
 
-def has_sample_efficiency(data: "FigureData") -> bool:
+def has_sample_efficiency(data: FigureData) -> bool:
     """Whether a recording of a single rope has blocks inside a sliding phase."""
     return any(map(_has_samples, data.recordings))
 
 
-def _has_samples(recording: "RecordedTrace") -> bool:
+def _has_samples(recording: RecordedTrace) -> bool:
     return not is_loop(recording) and bool(_sliding(recording).any())
 
 
-def _sliding(recording: "RecordedTrace") -> np.ndarray:
+def _sliding(recording: RecordedTrace) -> np.ndarray:
     """The blocks whose forces tell the efficiency."""
     forces = np.minimum(recording.input_force, recording.output_force)
     return recording.used & (recording.stroke != 0) & (forces > 0)
 
 
-def sample_efficiencies(recording: "RecordedTrace") -> tuple[np.ndarray, np.ndarray]:
+def sample_efficiencies(recording: RecordedTrace) -> tuple[np.ndarray, np.ndarray]:
     """Efficiency [1] of each used block, F_out / F_in when pulling and F_in / F_out when returning; and its stroke."""
     here = _sliding(recording)
     stroke = recording.stroke[here]
@@ -57,7 +58,7 @@ def sample_efficiencies(recording: "RecordedTrace") -> tuple[np.ndarray, np.ndar
 
 
 @in_paper_style
-def sample_efficiency(data: "FigureData") -> Figure:
+def sample_efficiency(data: FigureData) -> Figure:
     """Efficiency [%] of each used block against its number, a panel a recording on one efficiency axis."""
     shown, every = chosen(data, _has_samples)
     counts = [(0.0, float(_sliding(r).sum())) for r in shown]
@@ -80,7 +81,7 @@ def sample_efficiency(data: "FigureData") -> Figure:
     return figure
 
 
-def _samples(axes: Axes, recording: "RecordedTrace") -> None:
+def _samples(axes: Axes, recording: RecordedTrace) -> None:
     """A mark a block, by stroke."""
     values, stroke = sample_efficiencies(recording)
     number = 1 + np.arange(len(values))
@@ -93,7 +94,7 @@ def _samples(axes: Axes, recording: "RecordedTrace") -> None:
             )  # fmt: skip
 
 
-def _mean(axes: Axes, recording: "RecordedTrace", count: float) -> None:
+def _mean(axes: Axes, recording: RecordedTrace, count: float) -> None:
     """The run's efficiency as measured, with the uncertainty from its readings."""
     mean, off = 100 * recording.own_efficiency, 100 * NORMAL_90 * recording.own_efficiency_sd
     if not np.isfinite(mean):
@@ -107,7 +108,7 @@ def _mean(axes: Axes, recording: "RecordedTrace", count: float) -> None:
         )  # fmt: skip
 
 
-def _expected(axes: Axes, recording: "RecordedTrace") -> None:
+def _expected(axes: Axes, recording: RecordedTrace) -> None:
     """What is expected of the cable, at the right edge."""
     efficiency = 100 * recording.efficiency
     low, middle, high = efficiency[0], efficiency[len(efficiency) // 2], efficiency[-1]
@@ -120,7 +121,7 @@ def _expected(axes: Axes, recording: "RecordedTrace") -> None:
     )  # fmt: skip
 
 
-def _limits(shown: "list[RecordedTrace]") -> tuple[float, float]:
+def _limits(shown: list[RecordedTrace]) -> tuple[float, float]:
     """Efficiency axis [%] that shows nearly all samples, every mean and every expectation."""
     ends = [np.quantile(sample_efficiencies(r)[0], (0.5 - SHARE / 2, 0.5 + SHARE / 2)) for r in shown]
     means = np.array([r.own_efficiency for r in shown])

@@ -1,10 +1,10 @@
 """What the data say about each coefficient, against what was assumed before and what least squares finds."""
 
+from __future__ import annotations
+
 from typing import TYPE_CHECKING
 
 import numpy as np
-from matplotlib.axes import Axes
-from matplotlib.figure import Figure
 
 from bowdenfit.plots.densities import GRID_POINTS, density, limits, support
 from bowdenfit.plots.layout import TITLE, drop_unused, legend_above, panels
@@ -24,24 +24,25 @@ from bowdenfit.plots.style import (
 )
 
 if TYPE_CHECKING:
+    from bowdenfit.plots.layout import Axes, Figure
     from bowdenfit.questions.summary.figure_data import FigureData, ParameterDraws
 
 ROLES = ("friction", "friction_model", "angle", "sensor")
 MOST_COLUMNS = 3
 
 
-def shown_coefficients(data: "FigureData") -> list["ParameterDraws"]:
+def shown_coefficients(data: FigureData) -> list[ParameterDraws]:
     """The parameters with draws that belong to friction, constant angles or sensors."""
     return [p for role in ROLES for p in data.parameters if p.role == role and p.draws is not None]
 
 
-def has_coefficients(data: "FigureData") -> bool:
+def has_coefficients(data: FigureData) -> bool:
     """Whether a coefficient was sampled."""
     return bool(shown_coefficients(data))
 
 
 @in_paper_style
-def coefficients(data: "FigureData") -> Figure:
+def coefficients(data: FigureData) -> Figure:
     """Posterior density of each coefficient against its prior, and the least-squares estimate with standard error."""
     parameters = shown_coefficients(data)
     columns = min(MOST_COLUMNS, len(parameters))
@@ -54,7 +55,7 @@ def coefficients(data: "FigureData") -> Figure:
     return figure
 
 
-def _panel(axes: Axes, parameter: "ParameterDraws") -> None:
+def _panel(axes: Axes, parameter: ParameterDraws) -> None:
     draws = parameter.draws
     assert draws is not None  # shown_coefficients
     shown = _axis(parameter, draws)
@@ -71,7 +72,7 @@ def _panel(axes: Axes, parameter: "ParameterDraws") -> None:
     axes.set_title(_title(parameter, draws))
 
 
-def _axis(parameter: "ParameterDraws", draws: np.ndarray) -> tuple[float, float]:
+def _axis(parameter: ParameterDraws, draws: np.ndarray) -> tuple[float, float]:
     """Limits that show the posterior, and the least-squares estimate unless it is far away."""
     low, high = limits(draws)
     value, width = parameter.least_squares, high - low
@@ -80,7 +81,7 @@ def _axis(parameter: "ParameterDraws", draws: np.ndarray) -> tuple[float, float]
     return low, high
 
 
-def _least_squares(axes: Axes, parameter: "ParameterDraws", shown: tuple[float, float], height: float) -> None:
+def _least_squares(axes: Axes, parameter: ParameterDraws, shown: tuple[float, float], height: float) -> None:
     """The estimate with its standard error, or a note where there is none to draw."""
     value, error = parameter.least_squares, parameter.standard_error
     if shown[0] <= value <= shown[1]:
@@ -97,7 +98,7 @@ def _least_squares(axes: Axes, parameter: "ParameterDraws", shown: tuple[float, 
     )  # fmt: skip
 
 
-def _title(parameter: "ParameterDraws", draws: np.ndarray) -> str:
+def _title(parameter: ParameterDraws, draws: np.ndarray) -> str:
     low, middle, high = (float(q) for q in np.quantile(draws, (0.05, 0.5, 0.95)))
     low_text, median, high_text = rounded((low, middle, high), high - low)
     unit = "" if parameter.unit == "1" else f" {parameter.unit}"

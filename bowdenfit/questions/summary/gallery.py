@@ -8,8 +8,6 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from matplotlib.figure import Figure
-
 from bowdenfit.plots.style import in_paper_style
 from bowdenfit.plots.write import FORMATS, write
 from bowdenfit.questions.bends.bending_loss_figure import bending_loss, has_bending_loss
@@ -31,7 +29,9 @@ from bowdenfit.questions.summary.residuals_figure import has_residuals, residual
 from bowdenfit.questions.summary.traces_figure import has_traces, traces
 
 if TYPE_CHECKING:
+    from bowdenfit.plots.layout import Figure
     from bowdenfit.questions.summary.figure_data import FigureData
+
 
 @dataclass(frozen=True)
 class Entry:

@@ -1,10 +1,11 @@
 """How the unknowns hang together: every two of them, and each alone on the diagonal."""
 
+from __future__ import annotations
+
 from itertools import combinations
 from typing import TYPE_CHECKING
 
 import numpy as np
-from matplotlib.figure import Figure
 
 from bowdenfit.plots.densities import BINS, bin_numbers, enclosed_share
 from bowdenfit.plots.quantities import Quantity, optimum, sampled
@@ -12,6 +13,7 @@ from bowdenfit.plots.sheet import Panel, Sheet
 from bowdenfit.plots.style import BLUE, SMALL, WIDE, in_paper_style
 
 if TYPE_CHECKING:
+    from bowdenfit.plots.layout import Figure
     from bowdenfit.questions.summary.figure_data import FigureData
 
 MOST = 8
@@ -21,19 +23,19 @@ FILLS = {0.68: "#5E9FCB", 0.95: "#C3DCEE"}
 MARGIN, GAP, LARGEST = 0.62, 0.09, 1.45  # in
 
 
-def shown_quantities(data: "FigureData") -> list[Quantity]:
+def shown_quantities(data: FigureData) -> list[Quantity]:
     """Coefficients first, what may be confounded with them next, then noise; at most eight together with the optimum."""
     answer = optimum(data)
     return sampled(data, ROLES)[: MOST - len(answer)] + answer
 
 
-def has_pairs(data: "FigureData") -> bool:
+def has_pairs(data: FigureData) -> bool:
     """Whether there are two quantities to draw against each other."""
     return len(shown_quantities(data)) > 1
 
 
 @in_paper_style
-def pairs(data: "FigureData") -> Figure:
+def pairs(data: FigureData) -> Figure:
     """Joint and marginal posterior of coefficients, noise and optimum."""
     quantities = shown_quantities(data)
     size = min(LARGEST, (WIDE - MARGIN - GAP) / len(quantities))
@@ -107,7 +109,7 @@ def _axes(sheet: Sheet, quantities: list[Quantity], panels: dict[tuple[int, int]
             sheet.text(0.16, middle, quantity.label, ha="center", va="center", rotation=90, fontsize=SMALL)
 
 
-def _words(sheet: Sheet, data: "FigureData", panels: dict[tuple[int, int], Panel]) -> None:
+def _words(sheet: Sheet, data: FigureData, panels: dict[tuple[int, int], Panel]) -> None:
     """The key, in the empty corner right of the first panel."""
     first = panels[0, 0]
     x, y = first.left + first.width + 2.5 * GAP, first.bottom + first.height

@@ -1,13 +1,12 @@
 """What the model leaves over: measured minus predicted efficiencies, and angle readings minus their curve."""
 
-from typing import TYPE_CHECKING
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
-from matplotlib.axes import Axes
-from matplotlib.figure import Figure
-from matplotlib.gridspec import GridSpec
 
-from bowdenfit.plots.layout import RIGHT, TITLE, legend_above, place_labels
+from bowdenfit.plots.layout import RIGHT, TITLE, empty_page, legend_above, place_labels
 from bowdenfit.plots.style import (
     BLACK,
     BLUE,
@@ -24,6 +23,7 @@ from bowdenfit.plots.style import (
 )
 
 if TYPE_CHECKING:
+    from bowdenfit.plots.layout import Axes, Figure
     from bowdenfit.questions.summary.figure_data import AngleCurve, EfficiencyPoints, FigureData
 
 ROW, LEAST, MOST = 0.155, 1.8, 8.0  # in, height of a labeled row and of the panels
@@ -31,38 +31,38 @@ CONTACT, GAP, BELOW = 0.8, 0.32, 0.6  # in, least height of a contact's panel, b
 LONGEST, CHARACTER = 26, 0.064  # characters of a label, and width of one [in]
 
 
-def has_residuals(data: "FigureData") -> bool:
+def has_residuals(data: FigureData) -> bool:
     """Whether anything measured is compared with a prediction."""
     return bool(data.points) or any(len(c.route) for c in data.angles)
 
 
 @in_paper_style
-def residuals(data: "FigureData") -> Figure:
+def residuals(data: FigureData) -> Figure:
     """Efficiencies by label with their predictive intervals, and angles against the route."""
     curves = [c for c in data.angles if len(c.route)]
     labels = [_short(label) for points in data.points for label in points.labels]
     inner = float(np.clip(max(ROW * len(labels), (CONTACT + GAP) * len(curves) - GAP), LEAST, MOST))
     width, top = (WIDE if labels and curves else MEDIUM), (TITLE if curves else 0.08)
     height = inner + BELOW + top
-    figure = Figure(figsize=(width, height))
+    figure = empty_page(width, height)
     left = 0.2 + CHARACTER * max(map(len, labels), default=0)
     middle = width / 2 - 0.1 if labels and curves else width - RIGHT
     box = {"bottom": BELOW / height, "top": 1 - top / height}
     if labels:
-        axes = figure.add_subplot(GridSpec(1, 1, figure, left=left / width, right=middle / width, **box)[0])
+        axes = figure.add_subplot(figure.add_gridspec(1, 1, left=left / width, right=middle / width, **box)[0])
         _efficiencies(axes, data.points, labels, int(inner / (0.85 * ROW)))
         place_labels(figure, axes)
     if curves:
         start = middle + 0.75 if labels else 0.75
         hspace = GAP * len(curves) / (inner - GAP * (len(curves) - 1))
-        grid = GridSpec(len(curves), 1, figure, left=start / width, right=1 - RIGHT / width, hspace=hspace, **box)
+        grid = figure.add_gridspec(len(curves), 1, left=start / width, right=1 - RIGHT / width, hspace=hspace, **box)
         _angles(figure, grid, curves, data.route_label)
     if labels:
         legend_above(figure, figure.axes[:1], columns=4 if curves else 2)
     return figure
 
 
-def _efficiencies(axes: Axes, tables: "tuple[EfficiencyPoints, ...]", labels: list[str], most: int) -> None:
+def _efficiencies(axes: Axes, tables: tuple[EfficiencyPoints, ...], labels: list[str], most: int) -> None:
     """One row a measurement, the first on top."""
     measured = 100 * np.concatenate([t.measured for t in tables])
     predicted = 100 * np.concatenate([t.predicted for t in tables], axis=1)
@@ -87,7 +87,7 @@ def _efficiencies(axes: Axes, tables: "tuple[EfficiencyPoints, ...]", labels: li
     axes.set_xlabel(f"Measured efficiency minus\n{what} (percentage points)")
 
 
-def _angles(figure: Figure, grid: GridSpec, curves: "list[AngleCurve]", route_label: str) -> None:
+def _angles(figure: Figure, grid: Any, curves: list[AngleCurve], route_label: str) -> None:
     """A panel a contact, below each other, on one route axis."""
     first: Axes | None = None
     for i, curve in enumerate(curves):

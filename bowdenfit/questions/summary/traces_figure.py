@@ -1,15 +1,17 @@
 """Whether independent ensembles agree and stand still: the path of each through the draws."""
 
+from __future__ import annotations
+
 from typing import TYPE_CHECKING
 
 import numpy as np
-from matplotlib.figure import Figure
 
 from bowdenfit.plots.quantities import Quantity, optimal_length, sampled
 from bowdenfit.plots.sheet import Panel, Sheet
 from bowdenfit.plots.style import SERIES_COLORS, SERIES_LINES, SMALL, WIDE, WIDE_INTERVAL, in_paper_style
 
 if TYPE_CHECKING:
+    from bowdenfit.plots.layout import Figure
     from bowdenfit.questions.summary.figure_data import FigureData
 
 MOST_DRAWS = 40  # shown of each walker
@@ -20,18 +22,18 @@ LEFT, RIGHT, BOTTOM, TOP = 0.66, 0.08, 0.42, 0.5  # in, margins; LEFT of each of
 PANEL, ROW, MARGINAL = 0.68, 0.84, 0.5  # in, height of a panel, of a row, width of a marginal
 
 
-def shown_quantities(data: "FigureData") -> list[Quantity]:
+def shown_quantities(data: FigureData) -> list[Quantity]:
     """Every sampled parameter, and the optimal length."""
     return sampled(data) + optimal_length(data)
 
 
-def has_traces(data: "FigureData") -> bool:
+def has_traces(data: FigureData) -> bool:
     """Whether there are paths to draw."""
     return data.n_ensembles > 0 and any(q.draws.shape[1] > 1 for q in shown_quantities(data))
 
 
 @in_paper_style
-def traces(data: "FigureData") -> Figure:
+def traces(data: FigureData) -> Figure:
     """Median and 90 % of the walkers of each ensemble against the draw, and the marginal of each ensemble.
 
     A chain that has no other walkers is summarized over stretches of its path.

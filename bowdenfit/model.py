@@ -7,8 +7,8 @@ from typing import Any, Protocol, runtime_checkable
 import numpy as np
 from jax import Array
 
-from bowdenfit.cable.cable import ANGLE_NOISE, Cable, constant_angle_name, make_cable
-from bowdenfit.cable.elasticity import PRELOAD_NOISE, STRETCH_NOISE, elastic_parameters
+from bowdenfit.cable.cable import ANGLE_NOISE, Cable, constant_angle_name
+from bowdenfit.cable.elasticity import PRELOAD_NOISE, STRETCH_NOISE
 from bowdenfit.cable.load_cells import (
     BLOCK_NOISE,
     DELAY_ERROR,
@@ -34,8 +34,10 @@ from bowdenfit.description import (
 from bowdenfit.errors import DescriptionError, nearest
 from bowdenfit.kinds.angles.term import angles_term
 from bowdenfit.kinds.efficiencies.term import efficiencies_term
+from bowdenfit.kinds.elastic_parameters import elastic_parameters
 from bowdenfit.kinds.forces.term import force_terms
 from bowdenfit.kinds.loop.term import loop_term
+from bowdenfit.kinds.measured_cable import measured_cable
 from bowdenfit.kinds.measurements import Measurements
 from bowdenfit.kinds.recordings.blocks import RECORDED
 from bowdenfit.kinds.recordings.term import recordings_term
@@ -127,7 +129,7 @@ def build_model(dataset: Dataset) -> Model:
         DescriptionError: A curve family, contact law or parameter that the description names is unknown.
     """
     description, measurements = dataset.description, dataset.measurements
-    cable = make_cable(description, measurements)
+    cable = measured_cable(description, measurements)
     terms: list[Term] = []
     if measurements.angles is not None:
         terms.append(angles_term(cable, measurements.angles))

@@ -3,21 +3,19 @@
 from collections.abc import Mapping
 from dataclasses import dataclass
 from functools import cached_property
-from typing import Protocol, TypeVar, runtime_checkable
+from typing import TypeVar
 
 import jax.numpy as jnp
-import numpy as np
 from jax import Array
 from jaxtyping import Float
 
+from bowdenfit.cable.conditions import Conditions
 from bowdenfit.cable.curves import CURVES, Curve
 from bowdenfit.cable.elasticity import Elasticity
-from bowdenfit.cable.friction import FrictionModel, make_friction_model
+from bowdenfit.cable.friction import FrictionModel, friction_options
 from bowdenfit.cable.laws import CONTACT_LAWS, ContactLaw
 from bowdenfit.description import Contact, Description
 from bowdenfit.errors import DescriptionError, nearest
-from bowdenfit.kinds.measurements import Measurements
-from bowdenfit.kinds.tables import AngleTable, OwnAngles
 from bowdenfit.physics.loop import loop_output_force
 
 ANGLE_NOISE = "sigma_theta"
@@ -145,140 +143,36 @@ class Cable:
         return self.friction_exponent(values, self.wrap_angles(values, route))
 
 
-@dataclass(frozen=True)
-class RowAngles:
-    """Which wrap angle each row of a table has: the curve's, or its own measured one with its error.
-
-    All are arrays over rows and contacts; `data` hands them to jitted functions.
-    """
-
-    route: np.ndarray
-    own: np.ndarray
-    is_own: np.ndarray
-    known_sd: np.ndarray
-    has_angle_noise: np.ndarray
-
-    @property
-    def data(self) -> dict[str, np.ndarray]:
-        """As plain data."""
-        return {
-            "route": self.route,
-            "own": self.own,
-            "is_own": self.is_own,
-            "known_variance": self.known_sd**2,
-            "noisy": self.has_angle_noise,
-        }
-
-
-@runtime_checkable
-class Measured(Protocol):
-    """Anything measured at values of the route variable, some with wrap angles of their own."""
-
-    @property
-    def route(self) -> np.ndarray:
-        """Route variable; NaN where the cable has no route."""
-        ...
-
-    @property
-    def own(self) -> OwnAngles:
-        """Wrap angles measured with the row."""
-        ...
-
-
-def row_angles(cable: Cable, table: Measured, angles: AngleTable | None) -> RowAngles:
-    """The wrap angles of a table's rows, before any parameter is known.
-
-    A row's own angle comes first; then, outside the range of the curves, the angle table's row at the same length;
-    else the curve. An own angle without a stated sd has the angle table's noise where its contact has a curve, and is
-    exact otherwise. An angle too small to detect outside the range counts as half the limit, sd limit/sqrt(12).
-    """
-    contacts, n = cable.description.contact, len(table.route)
-    own, sd, noisy = (
-        np.zeros((n, len(contacts))),
-        np.zeros((n, len(contacts))),
-        np.zeros((n, len(contacts)), dtype=bool),
-    )
-    is_own = np.zeros((n, len(contacts)), dtype=bool)
-    for k, contact in enumerate(contacts):
-        if contact.wrap_angle.column is None:
-            continue
-        angle, angle_sd = table.own.column(contact.wrap_angle.column)
-        if contact.wrap_angle.curve and angles is not None:
-            angle, angle_sd = _outside_curves(cable, contact.wrap_angle.column, table.route, angle, angle_sd, angles)
-        has = ~np.isnan(angle)
-        own[has, k], is_own[has, k] = angle[has], True
-        sd[has, k] = np.nan_to_num(angle_sd[has])
-        noisy[has, k] = np.isnan(angle_sd[has]) & bool(contact.wrap_angle.curve)
-    return RowAngles(np.nan_to_num(table.route), own, is_own, sd, noisy)
-
-
-def _outside_curves(
-    cable: Cable, column: str, route: np.ndarray, angle: np.ndarray, sd: np.ndarray, angles: AngleTable
-) -> tuple[np.ndarray, np.ndarray]:
-    """Own angles completed from the angle table for rows outside the range of the curves."""
-    limits = cable.description.route
-    angle, sd = angle.copy(), sd.copy()
-    measured, detection_limit = angles.column(column)
-    for i in np.flatnonzero(np.isnan(angle)):
-        if limits is None or limits.range[0] <= route[i] <= limits.range[1]:
-            continue
-        at = np.flatnonzero(angles.route == route[i])
-        readings = np.where(np.isnan(measured[at]), detection_limit[at] / 2, measured[at])
-        angle[i] = readings.mean()
-        if np.isnan(measured[at]).any():
-            sd[i] = np.nanmax(detection_limit[at]) / np.sqrt(12)
-    return angle, sd
-
-
-def resolve_angles(
-    cable: Cable, values: Mapping[str, Array], rows: Mapping[str, Array]
-) -> tuple[Float[Array, "rows contacts"], Float[Array, "rows contacts"]]:
-    """Wrap angle [rad] and its variance [rad^2] for each row and contact, at given parameters."""
-    angles = jnp.where(rows["is_own"], rows["own"], cable.wrap_angles(values, rows["route"]))
-    variance = rows["known_variance"]
-    if ANGLE_NOISE in values:
-        variance = variance + jnp.where(rows["noisy"], values[ANGLE_NOISE] ** 2, 0.0)
-    return angles, variance
-
-
 def constant_angle_name(contact: Contact) -> str:
     """Name of the parameter for a constant wrap angle that is itself uncertain."""
     return "wrap_angle_" + "_".join(contact.name.lower().split())
 
 
-def make_cable(description: Description, measurements: Measurements) -> Cable:
-    """The cable of a description, with nominal angles for predictions from the description or the rows' mean.
+def make_cable(description: Description, own_angles: Mapping[str, float], conditions: Conditions) -> Cable:
+    """The cable of a description.
+
+    Args:
+        description: What was said about the cable.
+        own_angles: Mean of the wrap angles that were measured with each reading [rad], by column.
+        conditions: At what loads and speeds it was measured.
 
     Raises:
-        DescriptionError: A curve family or contact law is unknown.
+        DescriptionError: A curve family, contact law or friction model is unknown, or a nominal angle.
     """
     nominal: dict[str, float] = {}
     for contact in description.contact:
         source = contact.wrap_angle
         if source.column is None or source.curve:
             continue
-        if source.nominal is not None:
-            nominal[contact.name] = source.nominal.to("angle")
-        else:
-            nominal[contact.name] = _mean_angle(measurements, source.column)
-    cable = Cable(description, nominal, make_friction_model(description, measurements))
+        if source.nominal is None and source.column not in own_angles:
+            raise DescriptionError(
+                f"cable.toml: no table has the column {source.column!r}, from which predictions would take their wrap "
+                'angle; state it as nominal = { value = 90, unit = "deg" } of the contact.'
+            )
+        nominal[contact.name] = source.nominal.to("angle") if source.nominal else own_angles[source.column]
+    cable = Cable(description, nominal, FrictionModel(friction_options(description.friction_model), conditions))
     _ = cable.curves, cable.laws
     return cable
-
-
-def _mean_angle(measurements: Measurements, column: str) -> float:
-    """Mean of the angles that rows and recordings carry in a column [rad]."""
-    tables = [t for t in (measurements.efficiencies, measurements.forces, measurements.loop) if t is not None]
-    angles = [t.own.column(column)[0] for t in tables]
-    if measurements.recordings is not None:
-        k = measurements.recordings.columns.index(column)
-        angles.append(np.array([r.own_angle[k] for r in measurements.recordings.each]))
-    if not angles:
-        raise DescriptionError(
-            f"cable.toml: no table has the column {column!r}, from which predictions would take their wrap angle; state it as "
-            'nominal = { value = 90, unit = "deg" } of the contact.'
-        )
-    return float(np.mean(np.concatenate(angles)))
 
 
 def _lookup(registry: Mapping[str, Entry], name: str | None, what: str, contact: Contact) -> Entry:

@@ -9,7 +9,6 @@ from jax import Array
 from jaxtyping import Float
 
 from bowdenfit.description import Description, LogNormalPrior, PriorDefaults
-from bowdenfit.kinds.measurements import Measurements
 from bowdenfit.parameters.priors import HalfNormal, LogNormal, Normal, TruncatedNormal
 from bowdenfit.parameters.space import Parameter
 from bowdenfit.physics.stretch import (
@@ -128,46 +127,21 @@ def spread_matrix(at: np.ndarray) -> np.ndarray:
     return (np.arange(at.max(initial=-1) + 1)[:, None] == at).astype(float)
 
 
-def elastic_parameters(
-    description: Description, measurements: Measurements, defaults: PriorDefaults
-) -> list[Parameter]:
-    """The parameters of stretch, preload and loop that a data set needs."""
-    parameters = []
-    if uses_rope(description, measurements):
-        parameters += _rope(defaults)
-    if measurements.stretch is not None:
-        meaning, prior = "stretch that the reading calls zero", Normal(0.0, defaults.stretch_zero_mm)
-        parameters.append(Parameter(STRETCH_ZERO, r"$\Delta L_0$", meaning, "elastic", prior, "mm"))
-        if description.stretch.friction is None:
-            parameters.append(_own_friction(defaults.friction))
-    if uses_preload(description, measurements):
-        parameters.append(_preload(description, defaults.preload))
-    if _mounting_matters(measurements):
-        meaning = "effect of the loop's mounting on the friction exponent, in units of tau"
-        parameters.append(Parameter(LOOP_MOUNTING, "$m$", meaning, "sensor", Normal(0.0, 1.0)))
-    return parameters
+def stretch_parameters(description: Description, defaults: PriorDefaults) -> list[Parameter]:
+    """What a reading of stretch depends on beside the rope: its zero, and friction of its own where no contact's acts."""
+    meaning, prior = "stretch that the reading calls zero", Normal(0.0, defaults.stretch_zero_mm)
+    zero = Parameter(STRETCH_ZERO, r"$\Delta L_0$", meaning, "elastic", prior, "mm")
+    return [zero] if description.stretch.friction else [zero, _own_friction(defaults.friction)]
 
 
-def uses_rope(description: Description, measurements: Measurements) -> bool:
-    """Whether anything measured depends on how the rope stretches."""
-    return measurements.stretch is not None or (
-        description.preload_follows_stretch and uses_preload(description, measurements)
-    )
+def loop_mounting_parameter() -> Parameter:
+    """How the mounting of a loop differs from others."""
+    meaning = "effect of the loop's mounting on the friction exponent, in units of tau"
+    return Parameter(LOOP_MOUNTING, "$m$", meaning, "sensor", Normal(0.0, 1.0))
 
 
-def uses_preload(description: Description, measurements: Measurements) -> bool:
-    """Whether anything measured depends on the preload."""
-    recorded = description.cable.kind == "loop" and measurements.recordings is not None
-    return measurements.preload is not None or measurements.loop is not None or recorded
-
-
-def _mounting_matters(measurements: Measurements) -> bool:
-    """Whether a loop table's mounting scatters as other mountings do, which tell by how much."""
-    told = (measurements.efficiencies, measurements.forces, measurements.recordings)
-    return measurements.loop is not None and any(table is not None for table in told)
-
-
-def _rope(defaults: PriorDefaults) -> list[Parameter]:
+def rope_parameters(defaults: PriorDefaults) -> list[Parameter]:
+    """How the rope stretches, and the sheath by bending."""
     k, load, degree = defaults.stiffness, defaults.bedding_load, float(np.deg2rad(1.0))
     lengthening = HalfNormal(defaults.lengthening_mm_per_radian)
     return [
@@ -197,7 +171,7 @@ def _own_friction(prior: LogNormalPrior) -> Parameter:
     )  # fmt: skip
 
 
-def _preload(description: Description, default: LogNormalPrior) -> Parameter:
+def preload_parameter(description: Description, default: LogNormalPrior) -> Parameter:
     """Preload: stated with or without its standard deviation, or free."""
     settings = description.preload
     at = f" at {settings.wrap_angle.value:g} {settings.wrap_angle.unit}" if description.preload_follows_stretch else ""

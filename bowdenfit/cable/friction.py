@@ -13,48 +13,16 @@ import numpy as np
 from jax import Array
 from jaxtyping import Float
 
-from bowdenfit.description import Description, PriorDefaults
+from bowdenfit.cable.conditions import Conditions
+from bowdenfit.description import PriorDefaults
 from bowdenfit.errors import DescriptionError, nearest
-from bowdenfit.kinds.measurements import Measurements
 from bowdenfit.parameters.priors import HalfNormal, LogNormal, Uniform
 from bowdenfit.parameters.space import Parameter, Role
 from bowdenfit.physics.friction import force_from_scale, force_scale, force_scale_slope, rate_factor
-from bowdenfit.units import speed_dimension
 
 DRAG, LOAD_EXPONENT = "drag", "load_exponent"
 STRIBECK, STRIBECK_SPEED, VISCOUS = "stribeck", "stribeck_speed", "viscous"
 _SHOWN_SPEED = {"mm/s": ("mm/s", 1.0), "rad/s": ("r/min", 30 / np.pi), "": ("mm/s", 1.0)}
-
-
-@dataclass(frozen=True)
-class Conditions:
-    """At what loads and speeds the cable was measured.
-
-    Args:
-        reference_force: Force at which friction coefficients have their stated values [N].
-        reference_speed: Speed that predictions are made for [mm/s or rad/s].
-        speeds: Lowest and highest speed measured at; NaN without any.
-        velocity_unit: "mm/s" or "rad/s"; empty without velocities.
-        shows_loads: Whether any table shows the forces, and not their ratio alone.
-    """
-
-    reference_force: float
-    reference_speed: float
-    speeds: tuple[float, float]
-    velocity_unit: str
-    shows_loads: bool = True
-
-    def needs_loads(self, option: str) -> None:
-        """Refuse an option that efficiencies alone say nothing of.
-
-        Raises:
-            DescriptionError: No table shows the forces.
-        """
-        if not self.shows_loads:
-            raise DescriptionError(
-                f'friction_model has "{option}", but no force table or recording shows at which loads it was measured; '
-                "efficiencies alone say nothing of it: leave it out, or add forces."
-            )
 
 
 @runtime_checkable
@@ -214,62 +182,3 @@ class FrictionModel:
             return jnp.exp(-exponent)
         at = jnp.asarray(self.conditions.reference_force)
         return self.output_force(values, at, exponent, jnp.ones(())) / at
-
-
-def make_friction_model(description: Description, measurements: Measurements) -> FrictionModel:
-    """The friction model of a description, with reference force and speed as stated or from the middle of the data.
-
-    Raises:
-        DescriptionError: An option is unknown.
-    """
-    unit = _velocity_unit(measurements)
-    forces, speeds = _forces(measurements), _speeds(measurements)
-    stated = description.reference_force
-    force = stated.to("force") if stated else _rounded(np.exp(np.mean(np.log(forces)))) if len(forces) else 1.0
-    speed = _rounded(float(np.median(speeds))) if len(speeds) else 0.0
-    if description.reference_velocity is not None:
-        speed = description.reference_velocity.to(speed_dimension(unit or "mm/s"))
-    ends = (float(speeds.min()), float(speeds.max())) if len(speeds) else (float("nan"), float("nan"))
-    conditions = Conditions(float(force), float(speed), ends, unit, len(forces) > 0)
-    return FrictionModel(friction_options(description.friction_model), conditions)
-
-
-def _rounded(value: float) -> float:
-    """To two digits: a reference is a convention, and should look like one."""
-    return float(f"{value:.2g}")
-
-
-def _velocity_unit(measurements: Measurements) -> str:
-    forces, recordings = measurements.forces, measurements.recordings
-    units = {u for u in (forces and forces.velocity_unit, recordings and recordings.velocity_unit) if u}
-    if len(units) > 1:
-        raise DescriptionError(
-            "velocities are of the rope (mm/s) in one table and of the motor (r/min) in another; give both in the same kind."
-        )
-    return units.pop() if units else ""
-
-
-def _forces(measurements: Measurements) -> np.ndarray:
-    """Forces of both ends, wherever they are positive."""
-    parts = [np.zeros(0)]
-    if measurements.forces is not None:
-        parts += [measurements.forces.input_force, measurements.forces.output_force]
-    if measurements.loop is not None:
-        parts.append(measurements.loop.input_force * measurements.loop.stroke)
-    if measurements.recordings is not None:
-        read = [f for r in measurements.recordings.each for f in (r.blocks.input_force, r.blocks.output_force)]
-        # A loop's force passes through zero; what is asked of it is asked under load.
-        parts += [f[f > 0.2 * f.max()] for f in read] if measurements.recordings.loop else read
-    forces = np.concatenate(parts)
-    return forces[forces > 0]
-
-
-def _speeds(measurements: Measurements) -> np.ndarray:
-    """Speeds while the rope slides."""
-    parts = [np.zeros(0)]
-    if measurements.forces is not None:
-        parts.append(np.abs(measurements.forces.velocity))
-    if measurements.recordings is not None:
-        parts += [np.abs(r.blocks.velocity[r.strokes.used_sliding]) for r in measurements.recordings.each]
-    speeds = np.concatenate(parts)
-    return speeds[np.isfinite(speeds) & (speeds > 0)]

@@ -8,7 +8,7 @@ import jax
 import jax.numpy as jnp
 import numpy as np
 
-from bowdenfit.cable.cable import ANGLE_NOISE, Cable, resolve_angles, row_angles
+from bowdenfit.cable.cable import ANGLE_NOISE, Cable
 from bowdenfit.cable.load_cells import FORCE_NOISE, GAIN_ERROR, INPUT_OFFSET, OUTPUT_OFFSET, RUN_SCATTER
 from bowdenfit.cable.noise import scatter
 from bowdenfit.dataset import Dataset
@@ -19,6 +19,8 @@ from bowdenfit.kinds.elastic_simulation import drawn_elastic_readings, with_elas
 from bowdenfit.kinds.forces.term import HeldForcesTerm, force_terms
 from bowdenfit.kinds.measurements import Measurements
 from bowdenfit.kinds.recordings.simulation import drawn_recordings, recorded_again
+from bowdenfit.kinds.resolve_angles import resolve_angles
+from bowdenfit.kinds.row_angles import row_angles
 from bowdenfit.kinds.tables import AngleTable
 
 Readings = dict[str, dict[str, jax.Array]]
@@ -147,7 +149,9 @@ def _drawn_forces(
     assert table is not None  # the caller asked
     of_run, of_input, of_output = jax.random.split(key, 3)
     runs, run = len(table.run_names), jnp.asarray(table.run)
-    rows = {name: jnp.asarray(array) for name, array in row_angles(cable, table, tables.angles).data.items()}
+    rows = {
+        name: jnp.asarray(array) for name, array in row_angles(cable.description, table, tables.angles).data.items()
+    }
     angles, variance = resolve_angles(cable, values, rows)
     of_angles = jax.random.normal(jax.random.fold_in(key, 3), (runs, angles.shape[1]))
     angles = angles + scale * jnp.sqrt(variance) * of_angles[run]

@@ -8,12 +8,14 @@ import jax
 import jax.numpy as jnp
 import numpy as np
 
-from bowdenfit.cable.cable import Cable, resolve_angles, row_angles
+from bowdenfit.cable.cable import Cable
 from bowdenfit.cable.elasticity import LOOP_MOUNTING, PRELOAD_NOISE, STRETCH_NOISE
 from bowdenfit.cable.load_cells import FORCE_NOISE, GAIN_ERROR, INPUT_OFFSET, OUTPUT_OFFSET, RUN_SCATTER
 from bowdenfit.cable.noise import scatter
 from bowdenfit.description import Description
 from bowdenfit.kinds.measurements import Measurements
+from bowdenfit.kinds.resolve_angles import resolve_angles
+from bowdenfit.kinds.row_angles import row_angles
 from bowdenfit.kinds.stretch.term import ElasticTerm, stretch_term
 from bowdenfit.kinds.tables import LoopTable, OwnAngles, PreloadTable, Provenance, StretchTable
 from bowdenfit.physics.loop import free_motion_loss, loop_output_force
@@ -130,7 +132,9 @@ def _drawn_loop(
     table = tables.loop
     assert table is not None  # the caller asked
     of_input, of_output = jax.random.split(key)
-    rows = {name: jnp.asarray(array) for name, array in row_angles(cable, table, tables.angles).data.items()}
+    rows = {
+        name: jnp.asarray(array) for name, array in row_angles(cable.description, table, tables.angles).data.items()
+    }
     angles, variance = resolve_angles(cable, values, rows)
     own = cable.elasticity.preload(values, jnp.sum(angles, axis=-1))[0]
     preload = jnp.where(jnp.isnan(table.preload), own, jnp.nan_to_num(table.preload))

@@ -10,9 +10,10 @@ import numpy as np
 from jax import Array
 from jaxtyping import Float
 
-from bowdenfit.cable.cable import Cable, resolve_angles
+from bowdenfit.cable.cable import Cable
 from bowdenfit.cable.load_cells import DELAY_ERROR, FORCE_NOISE, GAIN_ERROR, INPUT_OFFSET, OUTPUT_OFFSET, RUN_SCATTER
 from bowdenfit.cable.noise import noise_law, scatter
+from bowdenfit.kinds.resolve_angles import resolve_angles
 from bowdenfit.physics.friction import transmission_efficiency
 from bowdenfit.types import Labels, Vector
 

@@ -7,7 +7,8 @@ import pytest
 from cables import cable
 from scipy import stats
 
-from bowdenfit.cable.friction import Conditions, FrictionModel, friction_options
+from bowdenfit.cable.conditions import Conditions
+from bowdenfit.cable.friction import FrictionModel, friction_options
 from bowdenfit.dataset import Dataset
 from bowdenfit.errors import DescriptionError
 from bowdenfit.kinds.forces.term import HeldForcesTerm

@@ -9,14 +9,16 @@ import pytest
 from cables import cable
 from scipy import integrate, stats
 
-from bowdenfit.cable.cable import Cable, make_cable, row_angles
+from bowdenfit.cable.cable import Cable
 from bowdenfit.dataset import Dataset
 from bowdenfit.inference.least_squares import LeastSquares, least_squares, make_objective, maximum_posterior
 from bowdenfit.inference.log_density import LogDensity
 from bowdenfit.kinds import runs as runs_of_model
+from bowdenfit.kinds.measured_cable import measured_cable
 from bowdenfit.kinds.measurements import Measurements
 from bowdenfit.kinds.recordings.blocks import recorded_angles
 from bowdenfit.kinds.recordings.whole import WholeRecordingsTerm, joined, padded
+from bowdenfit.kinds.row_angles import row_angles
 from bowdenfit.kinds.runs import RunsTerm, SlidingRows, run_sums
 from bowdenfit.model import Model, build_model
 from bowdenfit.physics.friction import rate_factor
@@ -57,7 +59,7 @@ def _cable(**more) -> Cable:
     """A cable of one contact, whose wrap angle comes with the readings."""
     tables = {"recordings": {"files": "*.csv"}}
     description = cable(1, tables, contact=[CONTACT], reference_force=REFERENCE_FORCE, **more)
-    return make_cable(description.model_copy(update={"route": None}), Measurements())
+    return measured_cable(description.model_copy(update={"route": None}), Measurements())
 
 
 def _law(rows: SlidingRows, values, m):
@@ -245,7 +247,7 @@ def _model(recordings, likelihood="whole", saturation="left out", **more) -> Mod
 def _whole(model: Model, recordings, censored=False) -> WholeRecordingsTerm:
     """The play operator run at every evaluation, also where sums would do."""
     of_all = Recordings(("angle",), tuple(recordings), "mm/s")
-    angles = row_angles(model.cable, recorded_angles(of_all), None).data
+    angles = row_angles(model.description, recorded_angles(of_all), None).data
     return WholeRecordingsTerm(model.cable, padded(of_all, angles, censored), of_all.runs)
 
 

@@ -10,9 +10,11 @@ import numpy as np
 from jax import Array
 from jaxtyping import Float
 
-from bowdenfit.cable.cable import Cable, resolve_angles, row_angles
+from bowdenfit.cable.cable import Cable
 from bowdenfit.cable.load_cells import GAIN_ERROR, RUN_SCATTER
 from bowdenfit.cable.noise import noise_law, scatter
+from bowdenfit.kinds.resolve_angles import resolve_angles
+from bowdenfit.kinds.row_angles import row_angles
 from bowdenfit.kinds.tables import AngleTable, EfficiencyTable
 from bowdenfit.physics.friction import transmission_efficiency
 
@@ -83,7 +85,7 @@ class EfficienciesTerm:
 
 def efficiencies_term(cable: Cable, table: EfficiencyTable, angles: AngleTable | None) -> EfficienciesTerm:
     """The term of an efficiency table."""
-    rows = row_angles(cable, table, angles)
+    rows = row_angles(cable.description, table, angles)
     data = rows.data | {"loss": -np.log(table.efficiency), "log_sd": table.sd / table.efficiency}
     route = cable.description.route
     labels = tuple(

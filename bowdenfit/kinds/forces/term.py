@@ -10,9 +10,11 @@ import numpy as np
 from jax import Array
 from jaxtyping import Float
 
-from bowdenfit.cable.cable import Cable, resolve_angles, row_angles
+from bowdenfit.cable.cable import Cable
 from bowdenfit.cable.load_cells import FORCE_NOISE, GAIN_ERROR, INPUT_OFFSET, OUTPUT_OFFSET, RUN_SCATTER
 from bowdenfit.cable.noise import noise_law, scatter
+from bowdenfit.kinds.resolve_angles import resolve_angles
+from bowdenfit.kinds.row_angles import row_angles
 from bowdenfit.kinds.runs import LEAST_FORCE, ROW_ARRAYS, RunsTerm, SlidingRows, run_sums
 from bowdenfit.kinds.tables import AngleTable, ForceTable
 
@@ -112,7 +114,7 @@ class HeldForcesTerm:
 
 def force_terms(cable: Cable, table: ForceTable, angles: AngleTable | None) -> tuple[RunsTerm | HeldForcesTerm, ...]:
     """The terms of a force table: sliding rows by run, held rows one by one."""
-    rows = row_angles(cable, table, angles).data
+    rows = row_angles(cable.description, table, angles).data
     terms: list[RunsTerm | HeldForcesTerm] = []
     sliding, held = np.flatnonzero(table.stroke != 0), np.flatnonzero(table.stroke == 0)
     if len(sliding):

@@ -10,10 +10,12 @@ import numpy as np
 from jax import Array
 from jaxtyping import Float
 
-from bowdenfit.cable.cable import Cable, resolve_angles, row_angles
+from bowdenfit.cable.cable import Cable
 from bowdenfit.cable.elasticity import LOOP_MOUNTING, spread_matrix
 from bowdenfit.cable.load_cells import FORCE_NOISE, GAIN_ERROR, INPUT_OFFSET, OUTPUT_OFFSET, RUN_SCATTER
 from bowdenfit.cable.noise import noise_law, scatter
+from bowdenfit.kinds.resolve_angles import resolve_angles
+from bowdenfit.kinds.row_angles import row_angles
 from bowdenfit.kinds.tables import AngleTable, LoopTable
 from bowdenfit.physics.loop import loop_response, loop_response_from
 
@@ -109,7 +111,7 @@ class LoopTerm:
 
 def loop_term(cable: Cable, table: LoopTable, angles: AngleTable | None) -> LoopTerm:
     """The term of a loop table."""
-    rows = row_angles(cable, table, angles)
+    rows = row_angles(cable.description, table, angles)
     data = rows.data | {
         "input_force": table.input_force,
         "output_force": table.output_force,

@@ -14,7 +14,7 @@ _NEAR_LIMIT = 0.005  # of the end of a range, within which a saturated reading i
 
 @dataclass(frozen=True)
 class RecordedAngles:
-    """Where and at which wrap angles each recording was made; see `bowdenfit.cable.cable.Measured`."""
+    """Where and at which wrap angles each recording was made; see `bowdenfit.kinds.row_angles.Measured`."""
 
     route: np.ndarray
     own: OwnAngles

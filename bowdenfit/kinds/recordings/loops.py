@@ -10,7 +10,7 @@ import numpy as np
 from jax import Array
 from jaxtyping import Float
 
-from bowdenfit.cable.cable import Cable, resolve_angles
+from bowdenfit.cable.cable import Cable
 from bowdenfit.cable.load_cells import BLOCK_NOISE, DELAY_ERROR, GAIN_ERROR, INPUT_OFFSET, OUTPUT_OFFSET, RUN_SCATTER
 from bowdenfit.cable.noise import noise_law, scatter
 from bowdenfit.kinds.recordings.blocks import input_saturated, output_saturated, restarts
@@ -25,6 +25,7 @@ from bowdenfit.kinds.recordings.mounting import (
     side_by_side,
     thinned,
 )
+from bowdenfit.kinds.resolve_angles import resolve_angles
 from bowdenfit.physics.loop import loop_output_force
 from bowdenfit.physics.loop_motion import loop_play_with_slope
 from bowdenfit.recordings.loop_strokes import loop_limits

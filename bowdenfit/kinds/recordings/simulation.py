@@ -12,13 +12,15 @@ import jax
 import jax.numpy as jnp
 import numpy as np
 
-from bowdenfit.cable.cable import Cable, resolve_angles, row_angles
+from bowdenfit.cable.cable import Cable
 from bowdenfit.cable.load_cells import BLOCK_NOISE, DELAY_ERROR, GAIN_ERROR, INPUT_OFFSET, OUTPUT_OFFSET, RUN_SCATTER
 from bowdenfit.cable.noise import scatter
 from bowdenfit.description import Description
 from bowdenfit.errors import DatasetError
 from bowdenfit.kinds.measurements import Measurements
 from bowdenfit.kinds.recordings.blocks import recorded_angles, worth_of
+from bowdenfit.kinds.resolve_angles import resolve_angles
+from bowdenfit.kinds.row_angles import row_angles
 from bowdenfit.kinds.runs import LEAST_FORCE
 from bowdenfit.physics.hysteresis import play_operator
 from bowdenfit.physics.loop_motion import loop_play_with_slope
@@ -45,7 +47,7 @@ def drawn_recordings(
     recordings = tables.recordings
     assert recordings is not None  # the caller asked
     of_run, of_angles, of_input, of_output = jax.random.split(key, 4)
-    rows = row_angles(cable, recorded_angles(recordings), tables.angles).data
+    rows = row_angles(cable.description, recorded_angles(recordings), tables.angles).data
     angles, variance = resolve_angles(cable, values, {name: jnp.asarray(array) for name, array in rows.items()})
     error = jnp.sqrt(variance) * jax.random.normal(of_angles, angles.shape)
     run = np.array([recordings.runs.index(r.run) for r in recordings.each])

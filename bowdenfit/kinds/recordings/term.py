@@ -9,7 +9,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from bowdenfit.cable.cable import Cable, row_angles
+from bowdenfit.cable.cable import Cable
 from bowdenfit.cable.load_cells import BLOCK_NOISE
 from bowdenfit.description import RecordingsTable
 from bowdenfit.errors import DatasetError
@@ -27,6 +27,7 @@ from bowdenfit.kinds.recordings.blocks import (
 )
 from bowdenfit.kinds.recordings.loops import LoopRecordingsTerm, loop_recordings_term
 from bowdenfit.kinds.recordings.whole import WholeRecordingsTerm, padded
+from bowdenfit.kinds.row_angles import row_angles
 from bowdenfit.kinds.runs import ROW_ARRAYS, RunsTerm, SlidingRows, run_sums
 from bowdenfit.kinds.tables import AngleTable
 from bowdenfit.recordings.preparation.play import play
@@ -42,7 +43,7 @@ def recordings_term(
         DatasetError: Whole recordings are wanted, and one has no reversal; or in a run no block can be used.
     """
     settings = cable.description.tables.recordings
-    rows = row_angles(cable, recorded_angles(recordings), angles).data
+    rows = row_angles(cable.description, recorded_angles(recordings), angles).data
     labels = tuple(_label(cable, recordings, run) for run in recordings.runs)
     if recordings.loop:
         censored = settings is not None and _censored(settings, recordings)

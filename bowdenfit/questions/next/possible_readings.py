@@ -9,12 +9,12 @@ import jax.numpy as jnp
 import numpy as np
 from jax import Array
 
-from bowdenfit.cable.cable import row_angles
 from bowdenfit.inference.draws import for_each_draw
 from bowdenfit.kinds.angles.term import angles_term
 from bowdenfit.kinds.efficiencies.term import efficiencies_term
 from bowdenfit.kinds.loop.term import loop_term
 from bowdenfit.kinds.measurements import Measurements
+from bowdenfit.kinds.row_angles import row_angles
 from bowdenfit.kinds.stretch.term import preload_term, stretch_term
 from bowdenfit.kinds.tables import (
     AngleTable,
@@ -131,7 +131,7 @@ def _simulation(
         return _angles(model, places, wanted)
     if kind == "force":
         assert design is not None  # the caller has one wherever there are runs
-        rows = row_angles(model.cable, _rows(model, wanted, EfficiencyTable), measurements.angles).data
+        rows = row_angles(model.description, _rows(model, wanted, EfficiencyTable), measurements.angles).data
         simulate, width = run_readings(model.cable, design)
         return Simulation(simulate, rows, {i: tuple(range(n * width, (n + 1) * width)) for n, i in enumerate(places)})
     term = _term(model, measurements, kind, wanted)

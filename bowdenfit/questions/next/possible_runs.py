@@ -9,11 +9,12 @@ import jax.numpy as jnp
 import numpy as np
 from jax import Array
 
-from bowdenfit.cable.cable import Cable, resolve_angles
+from bowdenfit.cable.cable import Cable
 from bowdenfit.cable.load_cells import BLOCK_NOISE, FORCE_NOISE, GAIN_ERROR, INPUT_OFFSET, OUTPUT_OFFSET, RUN_SCATTER
 from bowdenfit.cable.noise import scatter
 from bowdenfit.kinds.measurements import Measurements
 from bowdenfit.kinds.recordings.blocks import positive, worth_of
+from bowdenfit.kinds.resolve_angles import resolve_angles
 from bowdenfit.kinds.runs import LEAST_FORCE
 from bowdenfit.kinds.tables import ForceTable
 from bowdenfit.recordings.recording import Recordings

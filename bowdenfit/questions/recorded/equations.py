@@ -9,10 +9,11 @@ import numpy as np
 from jax import Array
 from jaxtyping import Float
 
-from bowdenfit.cable.cable import resolve_angles, row_angles
 from bowdenfit.cable.load_cells import DELAY_ERROR, GAIN_ERROR, INPUT_OFFSET, OUTPUT_OFFSET
 from bowdenfit.inference.compilation import compiled
 from bowdenfit.kinds.recordings.blocks import recorded_angles
+from bowdenfit.kinds.resolve_angles import resolve_angles
+from bowdenfit.kinds.row_angles import row_angles
 from bowdenfit.kinds.runs import LEAST_FORCE
 from bowdenfit.kinds.tables import AngleTable
 from bowdenfit.model import Model
@@ -84,7 +85,7 @@ def _arrays(
     rates = [
         np.gradient(scale(r.blocks.output_force), r.blocks.time)[s] for r, s in zip(recordings.each, shown, strict=True)
     ]
-    rows = row_angles(model.cable, recorded_angles(recordings), angles).data
+    rows = row_angles(model.description, recorded_angles(recordings), angles).data
     return rows | {name: side_by_side(name) for name in ("input_force", "output_force", "velocity")} | {
         "drift": np.stack([np.pad(rate, (0, longest - len(rate))) for rate in rates], axis=1)
     }  # fmt: skip

@@ -7,8 +7,8 @@ import jax.numpy as jnp
 import numpy as np
 from jax import Array
 
-from bowdenfit.cable.cable import resolve_angles
 from bowdenfit.cable.load_cells import DELAY_ERROR, GAIN_ERROR, INPUT_OFFSET, OUTPUT_OFFSET
+from bowdenfit.kinds.resolve_angles import resolve_angles
 from bowdenfit.kinds.tables import AngleTable
 from bowdenfit.model import Model
 from bowdenfit.physics.loop import loop_play

@@ -6,8 +6,9 @@ import jax
 import jax.numpy as jnp
 import numpy as np
 
-from bowdenfit.cable.cable import resolve_angles, row_angles
 from bowdenfit.kinds.recordings.blocks import recorded_angles
+from bowdenfit.kinds.resolve_angles import resolve_angles
+from bowdenfit.kinds.row_angles import row_angles
 from bowdenfit.questions.recorded.equations import blocks_shown
 from bowdenfit.recordings.recording import Recording
 from bowdenfit.results.record import Record
@@ -52,7 +53,7 @@ def _angles(fit: Record) -> np.ndarray:
     """Wrap angles of each recording in each contact [rad], by the middle of the draws where curves give them."""
     tables, cable, space = fit.dataset.measurements, fit.model.cable, fit.model.space
     assert tables.recordings is not None  # the caller checked
-    measured = row_angles(cable, recorded_angles(tables.recordings), tables.angles).data
+    measured = row_angles(cable.description, recorded_angles(tables.recordings), tables.angles).data
     z = fit.least_squares.z if fit.posterior is None else np.median(fit.posterior.flat_z, axis=0)
     with jax.enable_x64(True):
         rows = {name: jnp.asarray(array) for name, array in measured.items()}

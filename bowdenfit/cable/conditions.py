@@ -1,0 +1,64 @@
+"""At what loads and speeds a cable was measured, and what its coefficients are stated for."""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from bowdenfit.description import Description
+from bowdenfit.errors import DescriptionError
+from bowdenfit.types import Vector
+from bowdenfit.units import speed_dimension
+
+
+@dataclass(frozen=True)
+class Conditions:
+    """At what loads and speeds the cable was measured.
+
+    Args:
+        reference_force: Force at which friction coefficients have their stated values [N].
+        reference_speed: Speed that predictions are made for [mm/s or rad/s].
+        speeds: Lowest and highest speed measured at; NaN without any.
+        velocity_unit: "mm/s" or "rad/s"; empty without velocities.
+        shows_loads: Whether any table shows the forces, and not their ratio alone.
+    """
+
+    reference_force: float
+    reference_speed: float
+    speeds: tuple[float, float]
+    velocity_unit: str
+    shows_loads: bool = True
+
+    def needs_loads(self, option: str) -> None:
+        """Refuse an option that efficiencies alone say nothing of.
+
+        Raises:
+            DescriptionError: No table shows the forces.
+        """
+        if not self.shows_loads:
+            raise DescriptionError(
+                f'friction_model has "{option}", but no force table or recording shows at which loads it was measured; '
+                "efficiencies alone say nothing of it: leave it out, or add forces."
+            )
+
+
+def make_conditions(description: Description, forces: Vector, speeds: Vector, velocity_unit: str) -> Conditions:
+    """Reference force and speed as stated, or from the middle of the measurements.
+
+    Args:
+        description: What was said about the cable.
+        forces: Forces of both ends, wherever they are positive [N].
+        speeds: Speeds while the rope slides [mm/s or rad/s].
+        velocity_unit: Which of the two; empty without velocities.
+    """
+    stated = description.reference_force
+    force = stated.to("force") if stated else _rounded(np.exp(np.mean(np.log(forces)))) if len(forces) else 1.0
+    speed = _rounded(float(np.median(speeds))) if len(speeds) else 0.0
+    if description.reference_velocity is not None:
+        speed = description.reference_velocity.to(speed_dimension(velocity_unit or "mm/s"))
+    ends = (float(speeds.min()), float(speeds.max())) if len(speeds) else (float("nan"), float("nan"))
+    return Conditions(float(force), float(speed), ends, velocity_unit, len(forces) > 0)
+
+
+def _rounded(value: float) -> float:
+    """To two digits: a reference is a convention, and should look like one."""
+    return float(f"{value:.2g}")

@@ -1,0 +1,96 @@
+"""Which wrap angles the rows of a table have, before any parameter is known."""
+
+from dataclasses import dataclass
+from typing import Protocol, runtime_checkable
+
+import numpy as np
+
+from bowdenfit.description import Description
+from bowdenfit.kinds.tables import AngleTable, OwnAngles
+
+
+@dataclass(frozen=True)
+class RowAngles:
+    """Which wrap angle each row of a table has: the curve's, or its own measured one with its error.
+
+    All are arrays over rows and contacts; `data` hands them to jitted functions.
+    """
+
+    route: np.ndarray
+    own: np.ndarray
+    is_own: np.ndarray
+    known_sd: np.ndarray
+    has_angle_noise: np.ndarray
+
+    @property
+    def data(self) -> dict[str, np.ndarray]:
+        """As plain data."""
+        return {
+            "route": self.route,
+            "own": self.own,
+            "is_own": self.is_own,
+            "known_variance": self.known_sd**2,
+            "noisy": self.has_angle_noise,
+        }
+
+
+@runtime_checkable
+class Measured(Protocol):
+    """Anything measured at values of the route variable, some with wrap angles of their own."""
+
+    @property
+    def route(self) -> np.ndarray:
+        """Route variable; NaN where the cable has no route."""
+        ...
+
+    @property
+    def own(self) -> OwnAngles:
+        """Wrap angles measured with the row."""
+        ...
+
+
+def row_angles(description: Description, table: Measured, angles: AngleTable | None) -> RowAngles:
+    """The wrap angles of a table's rows, before any parameter is known.
+
+    A row's own angle comes first; then, outside the range of the curves, the angle table's row at the same length;
+    else the curve. An own angle without a stated sd has the angle table's noise where its contact has a curve, and is
+    exact otherwise. An angle too small to detect outside the range counts as half the limit, sd limit/sqrt(12).
+    """
+    contacts, n = description.contact, len(table.route)
+    own, sd, noisy = (
+        np.zeros((n, len(contacts))),
+        np.zeros((n, len(contacts))),
+        np.zeros((n, len(contacts)), dtype=bool),
+    )
+    is_own = np.zeros((n, len(contacts)), dtype=bool)
+    for k, contact in enumerate(contacts):
+        if contact.wrap_angle.column is None:
+            continue
+        angle, angle_sd = table.own.column(contact.wrap_angle.column)
+        if contact.wrap_angle.curve and angles is not None:
+            angle, angle_sd = _outside_curves(
+                description, contact.wrap_angle.column, table.route, angle, angle_sd, angles
+            )
+        has = ~np.isnan(angle)
+        own[has, k], is_own[has, k] = angle[has], True
+        sd[has, k] = np.nan_to_num(angle_sd[has])
+        noisy[has, k] = np.isnan(angle_sd[has]) & bool(contact.wrap_angle.curve)
+    return RowAngles(np.nan_to_num(table.route), own, is_own, sd, noisy)
+
+
+def _outside_curves(
+    description: Description, column: str, route: np.ndarray, angle: np.ndarray, sd: np.ndarray, angles: AngleTable
+) -> tuple[np.ndarray, np.ndarray]:
+    """Own angles completed from the angle table for rows outside the range of the curves."""
+    limits = description.route
+    angle, sd = angle.copy(), sd.copy()
+    measured, detection_limit = angles.column(column)
+    for i in np.flatnonzero(np.isnan(angle)):
+        if limits is None or limits.range[0] <= route[i] <= limits.range[1]:
+            continue
+        at = np.flatnonzero(angles.route == route[i])
+        readings = np.where(np.isnan(measured[at]), detection_limit[at] / 2, measured[at])
+        angle[i] = readings.mean()
+        if np.isnan(measured[at]).any():
+            sd[i] = np.nanmax(detection_limit[at]) / np.sqrt(12)
+    return angle, sd

@@ -9,7 +9,7 @@ import jax.numpy as jnp
 import numpy as np
 
 from bowdenfit.cable.cable import ANGLE_NOISE, Cable
-from bowdenfit.cable.load_cells import FORCE_NOISE, GAIN_ERROR, INPUT_OFFSET, OUTPUT_OFFSET, RUN_SCATTER
+from bowdenfit.cable.load_cells import FORCE_NOISE, RUN_SCATTER, LoadCells
 from bowdenfit.cable.noise import scatter
 from bowdenfit.dataset import Dataset
 from bowdenfit.description import Description
@@ -159,13 +159,14 @@ def _drawn_forces(
     exponent = cable.friction_exponent(values, angles) * cable.friction.rate(values, jnp.asarray(table.velocity))
     stroke, force = jnp.asarray(table.stroke, dtype=float), jnp.asarray(table.input_force)
     output = cable.friction.output_force(values, force, exponent + mounting[run], stroke)
-    shown = output * jnp.exp(-values.get(GAIN_ERROR, 0.0)) + values.get(OUTPUT_OFFSET, 0.0)
-    noise, slides = scale * values[FORCE_NOISE], table.stroke != 0
-    read = force + values.get(INPUT_OFFSET, 0.0) + noise * jax.random.normal(of_input, force.shape)
+    cells, noise, slides = LoadCells.of(values), scale * values[FORCE_NOISE], table.stroke != 0
+    read = cells.shown_input(force) + noise * jax.random.normal(of_input, force.shape)
     return {
         "input_force": jnp.where(slides, read, force),
         "output_force": jnp.where(
-            slides, shown + noise * jax.random.normal(of_output, force.shape), table.output_force
+            slides,
+            cells.shown_output(output) + noise * jax.random.normal(of_output, force.shape),
+            table.output_force,
         ),
     }
 

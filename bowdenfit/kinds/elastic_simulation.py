@@ -10,7 +10,7 @@ import numpy as np
 
 from bowdenfit.cable.cable import Cable
 from bowdenfit.cable.elasticity import LOOP_MOUNTING, PRELOAD_NOISE, STRETCH_NOISE
-from bowdenfit.cable.load_cells import FORCE_NOISE, GAIN_ERROR, INPUT_OFFSET, OUTPUT_OFFSET, RUN_SCATTER
+from bowdenfit.cable.load_cells import FORCE_NOISE, RUN_SCATTER, LoadCells
 from bowdenfit.cable.noise import scatter
 from bowdenfit.description import Description
 from bowdenfit.kinds.measurements import Measurements
@@ -143,11 +143,9 @@ def _drawn_loop(
     exponent, stroke = cable.friction_exponent(values, angles) + mounting, jnp.asarray(table.stroke, dtype=float)
     free = stroke * free_motion_loss(preload, exponent)
     force = jnp.where(jnp.isnan(table.input_force), free, jnp.nan_to_num(table.input_force))
-    output = loop_output_force(force, preload, exponent, stroke) * jnp.exp(-values.get(GAIN_ERROR, 0.0))
-    noise = scale * values[FORCE_NOISE]
+    output = loop_output_force(force, preload, exponent, stroke)
+    cells, noise = LoadCells.of(values), scale * values[FORCE_NOISE]
     return {
-        "input_force": force + values.get(INPUT_OFFSET, 0.0) + noise * jax.random.normal(of_input, force.shape),
-        "output_force": output
-        + values.get(OUTPUT_OFFSET, 0.0)
-        + noise * scatter(of_output, force.shape, cable.description),
+        "input_force": cells.shown_input(force) + noise * jax.random.normal(of_input, force.shape),
+        "output_force": cells.shown_output(output) + noise * scatter(of_output, force.shape, cable.description),
     }

@@ -11,7 +11,7 @@ from jax import Array
 from jaxtyping import Float
 
 from bowdenfit.cable.cable import Cable
-from bowdenfit.cable.load_cells import DELAY_ERROR, FORCE_NOISE, GAIN_ERROR, INPUT_OFFSET, OUTPUT_OFFSET, RUN_SCATTER
+from bowdenfit.cable.load_cells import FORCE_NOISE, LEAST_FORCE, OUTPUT_OFFSET, RUN_SCATTER, LoadCells
 from bowdenfit.cable.noise import noise_law, scatter
 from bowdenfit.kinds.resolve_angles import resolve_angles
 from bowdenfit.physics.friction import transmission_efficiency
@@ -20,7 +20,6 @@ from bowdenfit.types import Labels, Vector
 ROW_ARRAYS = ("route", "own", "is_own", "known_variance", "noisy")
 _LOAD_BINS, _SPEED_BINS, _DELAY_BINS = 24, 24, 8  # of each stroke of a run, where load, speed or a delay matters
 _ALIKE = 0.05  # speeds that differ by less than this fraction are one
-LEAST_FORCE = 1e-3  # N; an offset cannot take more of a reading than this leaves
 
 
 @dataclass(frozen=True)
@@ -71,17 +70,16 @@ class RunsTerm:
         self, values: Mapping[str, Array], data: Mapping[str, Any], exponent: Float[Array, " cells"]
     ) -> tuple[Float[Array, " cells"], Float[Array, " cells"], Float[Array, " cells"]]:
         """Log ratio that the load cells show, and its derivatives by the friction exponent and by the log of the load."""
-        friction, stroke, gain = self.cable.friction, data["stroke"], values.get(GAIN_ERROR, 0.0)
-        from_delay = values.get(DELAY_ERROR, 0.0) * data["drift"]
+        friction, stroke, cells = self.cable.friction, data["stroke"], LoadCells.of(values)
+        from_delay = cells.late(data["drift"])
         if not (friction.depends_on_load or OUTPUT_OFFSET in values):
-            return exponent + stroke * gain + from_delay, jnp.ones_like(exponent), jnp.zeros_like(exponent)
+            return exponent + stroke * cells.gain_error + from_delay, jnp.ones_like(exponent), jnp.zeros_like(exponent)
 
         def ratio(more: Array, load: Array) -> Array:
             read = data["input_force"] * jnp.exp(load)
-            input_force = jnp.maximum(read - values.get(INPUT_OFFSET, 0.0), LEAST_FORCE)
+            input_force = cells.true_input(read, LEAST_FORCE)
             output_force = friction.output_force(values, input_force, exponent + more, stroke)
-            shown = output_force * jnp.exp(-gain) + values.get(OUTPUT_OFFSET, 0.0)
-            return stroke * jnp.log(read / jnp.maximum(shown, LEAST_FORCE))
+            return stroke * jnp.log(read / cells.shown_output(output_force, LEAST_FORCE))
 
         zero, one = jnp.zeros_like(exponent), jnp.ones_like(exponent)
         shown, slope = jax.jvp(ratio, (zero, zero), (one, zero))

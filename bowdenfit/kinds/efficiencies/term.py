@@ -11,7 +11,7 @@ from jax import Array
 from jaxtyping import Float
 
 from bowdenfit.cable.cable import Cable
-from bowdenfit.cable.load_cells import GAIN_ERROR, RUN_SCATTER
+from bowdenfit.cable.load_cells import RUN_SCATTER, LoadCells
 from bowdenfit.cable.noise import noise_law, scatter
 from bowdenfit.kinds.resolve_angles import resolve_angles
 from bowdenfit.kinds.row_angles import row_angles
@@ -54,7 +54,7 @@ class EfficienciesTerm:
     ) -> tuple[Float[Array, " rows"], Float[Array, " rows"]]:
         angles, variance = resolve_angles(self.cable, values, data)
         exponent = self.cable.friction_exponent(values, angles)
-        mean = values.get(GAIN_ERROR, 0.0) + (
+        mean = LoadCells.of(values).gain_error + (
             -jnp.log(self.cable.friction.efficiency(values, exponent)) if self.cable.friction.options else exponent
         )
         from_angles = self.cable.exponent_variance(weights, angles, variance)

@@ -11,11 +11,11 @@ from jax import Array
 from jaxtyping import Float
 
 from bowdenfit.cable.cable import Cable
-from bowdenfit.cable.load_cells import FORCE_NOISE, GAIN_ERROR, INPUT_OFFSET, OUTPUT_OFFSET, RUN_SCATTER
+from bowdenfit.cable.load_cells import FORCE_NOISE, LEAST_FORCE, RUN_SCATTER, LoadCells
 from bowdenfit.cable.noise import noise_law, scatter
 from bowdenfit.kinds.resolve_angles import resolve_angles
 from bowdenfit.kinds.row_angles import row_angles
-from bowdenfit.kinds.runs import LEAST_FORCE, ROW_ARRAYS, RunsTerm, SlidingRows, run_sums
+from bowdenfit.kinds.runs import ROW_ARRAYS, RunsTerm, SlidingRows, run_sums
 from bowdenfit.kinds.tables import AngleTable, ForceTable
 
 
@@ -56,10 +56,9 @@ class HeldForcesTerm:
         self, values: Mapping[str, Array], data: Mapping[str, Any]
     ) -> tuple[Float[Array, " rows"], Float[Array, " rows"]]:
         """Difference of the forces on the scale on which friction is a shift, and its variance from the load cells."""
-        friction = self.cable.friction
-        input_force = jnp.maximum(data["input_force"] - values.get(INPUT_OFFSET, 0.0), LEAST_FORCE)
-        output_force = jnp.maximum(data["output_force"] - values.get(OUTPUT_OFFSET, 0.0), LEAST_FORCE)
-        output_force = output_force * jnp.exp(values.get(GAIN_ERROR, 0.0))
+        friction, cells = self.cable.friction, LoadCells.of(values)
+        input_force = cells.true_input(data["input_force"], LEAST_FORCE)
+        output_force = cells.true_output(data["output_force"], LEAST_FORCE)
         slopes = friction.slope(values, input_force) ** 2 + friction.slope(values, output_force) ** 2
         difference = friction.scaled(values, input_force) - friction.scaled(values, output_force)
         return difference, slopes * values[FORCE_NOISE] ** 2
@@ -91,10 +90,10 @@ class HeldForcesTerm:
         self, values: Mapping[str, Array], data: Mapping[str, Any], shift: Float[Array, " rows"]
     ) -> Float[Array, " rows"]:
         """Output force that the load cell shows at a shift on the scale g; it stays positive."""
-        input_force = jnp.maximum(data["input_force"] - values.get(INPUT_OFFSET, 0.0), LEAST_FORCE)
+        cells = LoadCells.of(values)
+        input_force = cells.true_input(data["input_force"], LEAST_FORCE)
         output = self.cable.friction.output_force(values, input_force, shift, jnp.ones(()))
-        shown = output * jnp.exp(-values.get(GAIN_ERROR, 0.0)) + values.get(OUTPUT_OFFSET, 0.0)
-        return jnp.maximum(shown, LEAST_FORCE)
+        return cells.shown_output(output, LEAST_FORCE)
 
     def simulate(self, values: Mapping[str, Array], data: Mapping[str, Any], key: Array) -> Float[Array, " rows"]:
         """A ratio of input to output force anywhere in the band, with noise [1]."""

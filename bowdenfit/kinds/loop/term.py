@@ -12,7 +12,7 @@ from jaxtyping import Float
 
 from bowdenfit.cable.cable import Cable
 from bowdenfit.cable.elasticity import LOOP_MOUNTING, spread_matrix
-from bowdenfit.cable.load_cells import FORCE_NOISE, GAIN_ERROR, INPUT_OFFSET, OUTPUT_OFFSET, RUN_SCATTER
+from bowdenfit.cable.load_cells import FORCE_NOISE, RUN_SCATTER, LoadCells
 from bowdenfit.cable.noise import noise_law, scatter
 from bowdenfit.kinds.resolve_angles import resolve_angles
 from bowdenfit.kinds.row_angles import row_angles
@@ -58,7 +58,7 @@ class LoopTerm:
     ) -> tuple[Array, Array, Array, Array | float]:
         """Output force, its derivatives, and the variance of the friction exponent from errors of the wrap angles."""
         mounting = values[RUN_SCATTER] * values[LOOP_MOUNTING] if LOOP_MOUNTING in values else 0.0
-        force, elastic = data["input_force"] - values.get(INPUT_OFFSET, 0.0), self.cable.elasticity
+        force, elastic = LoadCells.of(values).true_input(data["input_force"]), self.cable.elasticity
         if "cases" in data:
             exponent = self.cable.friction_exponent(values, data["cases"]) + mounting
             preload = elastic.preload(values, jnp.sum(data["cases"], axis=-1))[0]
@@ -72,10 +72,6 @@ class LoopTerm:
         response = loop_response(force, preload, exponent, data["stroke"])
         return *response, self.cable.exponent_variance(values, angles, variance)
 
-    def _shown(self, values: Mapping[str, Array], output_force: Array) -> Array:
-        """What the output's load cell reads."""
-        return output_force * jnp.exp(-values.get(GAIN_ERROR, 0.0)) + values.get(OUTPUT_OFFSET, 0.0)
-
     def _mean_and_sd(
         self, values: Mapping[str, Array], data: Mapping[str, Any], weights: Mapping[str, Array]
     ) -> tuple[Float[Array, " rows"], Float[Array, " rows"]]:
@@ -83,7 +79,7 @@ class LoopTerm:
         if weights is not values:
             _, by_force, by_exponent, angle_variance = self._response(weights, data)
         variance = weights[FORCE_NOISE] ** 2 * (1 + by_force**2)
-        return self._shown(values, output), jnp.sqrt(variance + by_exponent**2 * angle_variance)
+        return LoadCells.of(values).shown_output(output), jnp.sqrt(variance + by_exponent**2 * angle_variance)
 
     def expected(self, values: Mapping[str, Array], data: Mapping[str, Any]) -> Float[Array, " rows"]:
         """Expected output forces [N]."""

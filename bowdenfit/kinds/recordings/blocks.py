@@ -4,7 +4,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from bowdenfit.kinds.runs import LEAST_FORCE
+from bowdenfit.cable.load_cells import LEAST_FORCE
 from bowdenfit.kinds.tables import OwnAngles
 from bowdenfit.recordings.recording import Recording, Recordings
 

@@ -11,7 +11,7 @@ from jax import Array
 from jaxtyping import Float
 
 from bowdenfit.cable.cable import Cable
-from bowdenfit.cable.load_cells import BLOCK_NOISE, DELAY_ERROR, GAIN_ERROR, INPUT_OFFSET, OUTPUT_OFFSET, RUN_SCATTER
+from bowdenfit.cable.load_cells import BLOCK_NOISE, RUN_SCATTER, LoadCells
 from bowdenfit.cable.noise import noise_law, scatter
 from bowdenfit.kinds.recordings.blocks import input_saturated, output_saturated, restarts
 from bowdenfit.kinds.recordings.mounting import (
@@ -71,25 +71,21 @@ class LoopRecordingsTerm:
         """Runs scatter by their mounting; the blocks of a run about it by the load cells."""
         return residual_blocks_of(self.data, len(self.labels))
 
-    def _shown(self, values: Mapping[str, Array], output_force: Array) -> Array:
-        """What the output's load cell reads."""
-        return output_force * jnp.exp(-values.get(GAIN_ERROR, 0.0)) + values.get(OUTPUT_OFFSET, 0.0)
-
     def _followed(
         self, values: Mapping[str, Array], data: Mapping[str, Any], preload: Array, exponent: Array
     ) -> tuple[Float[Array, "time recordings"], Float[Array, "time recordings"]]:
         """Deviation of F_out from the operator's output, and the output's derivative by the exponent [N]."""
-        gain = jnp.exp(values.get(GAIN_ERROR, jnp.zeros(())))
-        stands = (data["output_force"] - values.get(OUTPUT_OFFSET, 0.0)) * gain
+        cells = LoadCells.of(values)
+        stands = cells.true_output(data["output_force"])
         y, slope = loop_play_with_slope(
-            data["input_force"] - values.get(INPUT_OFFSET, 0.0),
+            cells.true_input(data["input_force"]),
             preload,
             jnp.maximum(exponent, _LEAST_EXPONENT),
             stands[0],
             jnp.where(data["restart"], stands, jnp.nan),
         )
-        late = values.get(DELAY_ERROR, 0.0) * data["drift"]
-        return data["output_force"] + late - self._shown(values, y), slope / gain
+        late = cells.late(data["drift"])
+        return data["output_force"] + late - cells.shown_output(y), cells.shown_change(slope)
 
     def _state(
         self, values: Mapping[str, Array], data: Mapping[str, Any]
@@ -134,10 +130,10 @@ class LoopRecordingsTerm:
         self, values: Mapping[str, Array], data: Mapping[str, Any], preload: Array, exponent: Array
     ) -> Float[Array, " runs"]:
         """Mean force lost in the blocks that move [N]."""
-        true_input = data["input_force"] - values.get(INPUT_OFFSET, 0.0)
+        cells = LoadCells.of(values)
         stroke = jnp.sign(data["moving"])  # which also holds the weight of each block
-        output = loop_output_force(true_input, preload[None, :], exponent[None, :], stroke)
-        return per_run(data, data["moving"] * (data["input_force"] - self._shown(values, output)))
+        output = loop_output_force(cells.true_input(data["input_force"]), preload[None, :], exponent[None, :], stroke)
+        return per_run(data, data["moving"] * (data["input_force"] - cells.shown_output(output)))
 
     def expected(self, values: Mapping[str, Array], data: Mapping[str, Any]) -> Float[Array, " runs"]:
         """Expected mean force lost while each run moves, the effect of its mounting left out [N]."""

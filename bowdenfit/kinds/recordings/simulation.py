@@ -13,7 +13,7 @@ import jax.numpy as jnp
 import numpy as np
 
 from bowdenfit.cable.cable import Cable
-from bowdenfit.cable.load_cells import BLOCK_NOISE, DELAY_ERROR, GAIN_ERROR, INPUT_OFFSET, OUTPUT_OFFSET, RUN_SCATTER
+from bowdenfit.cable.load_cells import BLOCK_NOISE, LEAST_FORCE, RUN_SCATTER, LoadCells
 from bowdenfit.cable.noise import scatter
 from bowdenfit.description import Description
 from bowdenfit.errors import DatasetError
@@ -21,7 +21,6 @@ from bowdenfit.kinds.measurements import Measurements
 from bowdenfit.kinds.recordings.blocks import recorded_angles, worth_of
 from bowdenfit.kinds.resolve_angles import resolve_angles
 from bowdenfit.kinds.row_angles import row_angles
-from bowdenfit.kinds.runs import LEAST_FORCE
 from bowdenfit.physics.hysteresis import play_operator
 from bowdenfit.physics.loop_motion import loop_play_with_slope
 from bowdenfit.recordings.loop_strokes import find_loop_strokes
@@ -54,16 +53,16 @@ def drawn_recordings(
     mounting = values[RUN_SCATTER] * scatter(of_run, (len(recordings.runs),), cable.description)[run]
     exponent = cable.friction_exponent(values, angles + scale * error)
     force = _beside([r.blocks.input_force for r in recordings.each])
-    output = _loop_output if recordings.loop else _rope_output
+    cells, output = LoadCells.of(values), _loop_output if recordings.loop else _rope_output
     shown = output(cable, recordings, values, force, exponent, scale * mounting, jnp.sum(angles, axis=-1))
     places = _beside([_readings_of(r) for r in recordings.each]).astype(int)
     shape, noise = (places.max() + 1, len(recordings.each)), scale * values[BLOCK_NOISE]
     errors = [noise * jax.random.normal(k, shape)[places, np.arange(shape[1])] for k in (of_input, of_output)]
     return {
-        "input_force": jnp.asarray(force) + values.get(INPUT_OFFSET, 0.0) + errors[0],
-        "output_force": shown * jnp.exp(-values.get(GAIN_ERROR, 0.0)) + values.get(OUTPUT_OFFSET, 0.0),
+        "input_force": cells.shown_input(jnp.asarray(force)) + errors[0],
+        "output_force": cells.shown_output(shown),
         "output_error": errors[1],
-        "delay_error": jnp.asarray(scale * values.get(DELAY_ERROR, 0.0)),
+        "delay_error": jnp.asarray(scale * cells.delay_error),
     }
 
 

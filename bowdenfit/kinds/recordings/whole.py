@@ -11,7 +11,7 @@ from jax import Array
 from jaxtyping import Float
 
 from bowdenfit.cable.cable import Cable
-from bowdenfit.cable.load_cells import BLOCK_NOISE, DELAY_ERROR, GAIN_ERROR, INPUT_OFFSET, OUTPUT_OFFSET, RUN_SCATTER
+from bowdenfit.cable.load_cells import BLOCK_NOISE, LEAST_FORCE, RUN_SCATTER, LoadCells
 from bowdenfit.cable.noise import noise_law, scatter
 from bowdenfit.kinds.recordings.blocks import RECORDED, input_saturated, output_saturated, positive, restarts
 from bowdenfit.kinds.recordings.mounting import (
@@ -27,7 +27,6 @@ from bowdenfit.kinds.recordings.mounting import (
     thinned,
 )
 from bowdenfit.kinds.resolve_angles import resolve_angles
-from bowdenfit.kinds.runs import LEAST_FORCE
 from bowdenfit.physics.friction import transmission_efficiency
 from bowdenfit.physics.hysteresis import play_operator_with_slope
 from bowdenfit.recordings.recording import Recording, Recordings
@@ -74,17 +73,16 @@ class WholeRecordingsTerm:
         self, values: Mapping[str, Array], data: Mapping[str, Any], exponent: Array, mounting: Array
     ) -> tuple[Float[Array, "time recordings"], Float[Array, "time recordings"]]:
         """Deviation of log F_out from the operator's output, and the output's derivative by the exponent."""
-        friction, gain = self.cable.friction, values.get(GAIN_ERROR, 0.0)
-        input_force = jnp.maximum(data["input_force"] - values.get(INPUT_OFFSET, 0.0), LEAST_FORCE)
-        seen = jnp.maximum(data["output_force"] - values.get(OUTPUT_OFFSET, 0.0), LEAST_FORCE) * jnp.exp(gain)
+        friction, cells = self.cable.friction, LoadCells.of(values)
+        input_force = cells.true_input(data["input_force"], LEAST_FORCE)
+        seen = cells.true_output(data["output_force"], LEAST_FORCE)
         band = jnp.maximum(exponent * friction.rate(values, data["velocity"]) + mounting, _LEAST_BAND)
         x, stands = friction.scaled(values, input_force), friction.scaled(values, seen)
         y, slope = play_operator_with_slope(x, band, stands[0], jnp.where(data["restart"], stands, jnp.nan))
         output_force = jnp.maximum(friction.force(values, y), LEAST_FORCE)
-        shown = jnp.maximum(output_force * jnp.exp(-gain) + values.get(OUTPUT_OFFSET, 0.0), LEAST_FORCE)
-        loading = slope * jnp.exp(-gain) / (friction.slope(values, output_force) * shown)
-        late = values.get(DELAY_ERROR, 0.0) * data["drift"]
-        return data["log_output"] + late - jnp.log(shown), loading
+        shown = cells.shown_output(output_force, LEAST_FORCE)
+        loading = cells.shown_change(slope) / (friction.slope(values, output_force) * shown)
+        return data["log_output"] + cells.late(data["drift"]) - jnp.log(shown), loading
 
     def _deviations(
         self, values: Mapping[str, Array], data: Mapping[str, Any], weights: Mapping[str, Array]

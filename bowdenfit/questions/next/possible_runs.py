@@ -10,12 +10,11 @@ import numpy as np
 from jax import Array
 
 from bowdenfit.cable.cable import Cable
-from bowdenfit.cable.load_cells import BLOCK_NOISE, FORCE_NOISE, GAIN_ERROR, INPUT_OFFSET, OUTPUT_OFFSET, RUN_SCATTER
+from bowdenfit.cable.load_cells import BLOCK_NOISE, FORCE_NOISE, LEAST_FORCE, RUN_SCATTER, LoadCells
 from bowdenfit.cable.noise import scatter
 from bowdenfit.kinds.measurements import Measurements
 from bowdenfit.kinds.recordings.blocks import positive, worth_of
 from bowdenfit.kinds.resolve_angles import resolve_angles
-from bowdenfit.kinds.runs import LEAST_FORCE
 from bowdenfit.kinds.tables import ForceTable
 from bowdenfit.recordings.recording import Recordings
 from bowdenfit.types import Vector
@@ -107,10 +106,10 @@ def run_readings(
         sd = jnp.sqrt(values[RUN_SCATTER] ** 2 + cable.exponent_variance(values, angles, variance))
         mounted = exponent + sd * scatter(of_mounting, exponent.shape, cable.description)
         shift = mounted[:, None] * cable.friction.rate(values, velocity)
-        output = cable.friction.output_force(values, force, shift, stroke) * jnp.exp(-values.get(GAIN_ERROR, 0.0))
-        noise = values[design.noise] / jnp.sqrt(jnp.asarray(design.worth))
-        read_in = force + values.get(INPUT_OFFSET, 0.0) + noise * jax.random.normal(of_input, output.shape)
-        read_out = output + values.get(OUTPUT_OFFSET, 0.0) + noise * jax.random.normal(of_output, output.shape)
+        output = cable.friction.output_force(values, force, shift, stroke)
+        cells, noise = LoadCells.of(values), values[design.noise] / jnp.sqrt(jnp.asarray(design.worth))
+        read_in = cells.shown_input(force) + noise * jax.random.normal(of_input, output.shape)
+        read_out = cells.shown_output(output) + noise * jax.random.normal(of_output, output.shape)
         ratio = jnp.log(jnp.maximum(read_in, LEAST_FORCE) / jnp.maximum(read_out, LEAST_FORCE))
         return ((stroke * ratio) @ fit).ravel()
 

@@ -9,12 +9,11 @@ import numpy as np
 from jax import Array
 from jaxtyping import Float
 
-from bowdenfit.cable.load_cells import DELAY_ERROR, GAIN_ERROR, INPUT_OFFSET, OUTPUT_OFFSET
+from bowdenfit.cable.load_cells import LEAST_FORCE, LoadCells
 from bowdenfit.inference.compilation import compiled
 from bowdenfit.kinds.recordings.blocks import recorded_angles
 from bowdenfit.kinds.resolve_angles import resolve_angles
 from bowdenfit.kinds.row_angles import row_angles
-from bowdenfit.kinds.runs import LEAST_FORCE
 from bowdenfit.kinds.tables import AngleTable
 from bowdenfit.model import Model
 from bowdenfit.physics.hysteresis import play_operator
@@ -98,12 +97,12 @@ def _followed(model: Model) -> Follow:
     def follow(z: Array, mounting: Array, data: Mapping[str, Any]) -> tuple[Array, Array]:
         values = model.space.constrain(z)
         angles, _ = resolve_angles(model.cable, values, data)
-        exponent, gain = model.cable.friction_exponent(values, angles), values.get(GAIN_ERROR, 0.0)
-        input_force = jnp.maximum(data["input_force"] - values.get(INPUT_OFFSET, 0.0), LEAST_FORCE)
-        first = jnp.maximum(data["output_force"][0] - values.get(OUTPUT_OFFSET, 0.0), LEAST_FORCE) * jnp.exp(gain)
+        exponent, cells = model.cable.friction_exponent(values, angles), LoadCells.of(values)
+        input_force = cells.true_input(data["input_force"], LEAST_FORCE)
+        first = cells.true_output(data["output_force"][0], LEAST_FORCE)
         band = jnp.maximum(exponent * friction.rate(values, data["velocity"]) + mounting, _LEAST_BAND)
         y = play_operator(friction.scaled(values, input_force), band, friction.scaled(values, first))
-        shown = friction.force(values, y) * jnp.exp(-gain) + values.get(OUTPUT_OFFSET, 0.0)
-        return shown * jnp.exp(-values.get(DELAY_ERROR, 0.0) * data["drift"]), exponent
+        shown = cells.shown_output(friction.force(values, y))
+        return shown * jnp.exp(-cells.late(data["drift"])), exponent
 
     return follow

@@ -7,7 +7,7 @@ import jax.numpy as jnp
 import numpy as np
 from jax import Array
 
-from bowdenfit.cable.load_cells import DELAY_ERROR, GAIN_ERROR, INPUT_OFFSET, OUTPUT_OFFSET
+from bowdenfit.cable.load_cells import LoadCells
 from bowdenfit.kinds.resolve_angles import resolve_angles
 from bowdenfit.kinds.tables import AngleTable
 from bowdenfit.model import Model
@@ -36,12 +36,10 @@ def _followed(model: Model) -> Follow:
     def follow(z: Array, mounting: Array, data: Mapping[str, Any]) -> tuple[Array, Array]:
         values = model.space.constrain(z)
         angles, _ = resolve_angles(cable, values, data)
-        exponent, gain = cable.friction_exponent(values, angles), jnp.exp(values.get(GAIN_ERROR, jnp.zeros(())))
+        exponent, cells = cable.friction_exponent(values, angles), LoadCells.of(values)
         preload = cable.elasticity.preload(values, jnp.sum(angles, axis=-1))[0]
-        start = (data["output_force"][0] - values.get(OUTPUT_OFFSET, 0.0)) * gain
-        force = data["input_force"] - values.get(INPUT_OFFSET, 0.0)
+        start, force = cells.true_output(data["output_force"][0]), cells.true_input(data["input_force"])
         y = loop_play(force, preload, jnp.maximum(exponent + mounting, _LEAST_EXPONENT), start)
-        shown = y / gain + values.get(OUTPUT_OFFSET, 0.0)
-        return shown - values.get(DELAY_ERROR, 0.0) * data["drift"], exponent
+        return cells.shown_output(y) - cells.late(data["drift"]), exponent
 
     return follow

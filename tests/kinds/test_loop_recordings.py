@@ -27,7 +27,7 @@ from bowdenfit.recordings.loop_strokes import find_loop_strokes
 from bowdenfit.recordings.preparation import prepare
 from bowdenfit.recordings.recording import PreparationSettings, RawRecording
 from bowdenfit.recordings.strokes import Span
-from bowdenfit.results.store import _measurements, _measurements_page, _to_schema_3
+from bowdenfit.results.store import _measurements, _measurements_page
 
 PRELOAD, MU, RATE = 20.0, 0.12, 200.0
 HALF_TURN = MU * math.pi
@@ -527,12 +527,6 @@ def test_recordings_of_a_loop_come_back_from_a_saved_fit(sampled):
         np.testing.assert_equal(one.strokes.exponent, other.strokes.exponent)
         assert np.array_equal(one.blocks.output_force, other.blocks.output_force)
     assert np.isnan(again.each[0].strokes.exponent)
-
-
-def test_fits_from_before_loops_are_of_single_ropes():
-    page = {"schema": 2, "measurements": {"recordings": {"columns": [], "each": []}}, "least_squares": {}}
-    assert _to_schema_3(page)["measurements"]["recordings"]["loop"] is False
-    assert _to_schema_3(page | {"measurements": {"recordings": None}})["measurements"]["recordings"] is None
 
 
 @pytest.mark.parametrize("follows", [False, True])

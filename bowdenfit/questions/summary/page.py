@@ -18,6 +18,7 @@ from bowdenfit.questions.identify.contradiction import agreement_page
 from bowdenfit.questions.recorded.preparation_page import accounts
 from bowdenfit.questions.recorded.rate import rate_effect
 from bowdenfit.questions.summary.verdict import verdict
+from bowdenfit.results.plain import plain
 from bowdenfit.results.record import Draws, Record
 
 SCHEMA = 1
@@ -65,7 +66,8 @@ def summarize(fit: Record) -> dict[str, Any]:
             page["samplers"] = fit.posterior.agreement.page()
         if fit.dataset.description.route is not None:
             page["optimal"] = _optimal(fit)
-    return _plain(page)
+    everything: dict[str, Any] = plain(page)
+    return everything
 
 
 def _sampler(fit: Record, posterior: Draws) -> dict[str, Any]:
@@ -169,14 +171,3 @@ def _optimal(fit: Record) -> dict[str, Any]:
         },
         "choices": [asdict(choice) for choice in answer.choices],
     }
-
-
-def _plain(data: Any) -> Any:
-    """Plain data for JSON: NumPy numbers as Python's, and None for what is not a finite number."""
-    if isinstance(data, dict):
-        return {key: _plain(value) for key, value in data.items()}
-    if isinstance(data, list | tuple):
-        return [_plain(value) for value in data]
-    if isinstance(data, np.generic):
-        data = data.item()
-    return None if isinstance(data, float) and not np.isfinite(data) else data

@@ -1,0 +1,77 @@
+"""Any answer as plain data for JSON, and stored data back as what they were: one pair for every dataclass."""
+
+from collections.abc import Mapping
+from dataclasses import fields, is_dataclass
+from types import NoneType, UnionType
+from typing import Any, get_args, get_origin, get_type_hints
+
+import numpy as np
+from jaxtyping import AbstractArray
+
+from bowdenfit.types import Flags, Labels, Matrix
+
+
+def plain(answer: Any) -> Any:
+    """An answer as programs read it: what is no finite number is None.
+
+    Args:
+        answer: Of a dataclass the fields are given, or the attributes that its `JSON` names; arrays become lists.
+    """
+    return _plain(answer, keep=False)
+
+
+def stored(data: Any) -> Any:
+    """The same so that `rebuilt` gives it back: all fields of dataclasses, and infinity as a word."""
+    return _plain(data, keep=True)
+
+
+def _plain(data: Any, keep: bool) -> Any:
+    if is_dataclass(data):
+        names = [f.name for f in fields(data)]
+        data = {name: getattr(data, name) for name in (names if keep else getattr(data, "JSON", names))}
+    if isinstance(data, Mapping):
+        return {key: _plain(value, keep) for key, value in data.items()}
+    if isinstance(data, np.ndarray | np.generic):
+        data = data.tolist()
+    if isinstance(data, list | tuple):
+        return [_plain(value, keep) for value in data]
+    if isinstance(data, float) and not np.isfinite(data):
+        return None if np.isnan(data) or not keep else "Infinity" if data > 0 else "-Infinity"
+    return data
+
+
+def rebuilt(kind: Any, value: Any) -> Any:
+    """A value of an annotated type from what `stored` made of it.
+
+    Args:
+        kind: The type; of an optional one the first that is not None.
+        value: Plain data.
+    """
+    if value is None and NoneType in get_args(kind):
+        return None
+    parts, origin = [part for part in get_args(kind) if part is not NoneType], get_origin(kind)
+    if isinstance(kind, UnionType):
+        return rebuilt(parts[0], value)
+    if origin is dict:
+        return {key: rebuilt(parts[1], item) for key, item in value.items()}
+    if origin is tuple:
+        each = [parts[0]] * len(value) if Ellipsis in parts else parts
+        return tuple(rebuilt(part, item) for part, item in zip(each, value, strict=True))
+    if isinstance(kind, type) and is_dataclass(kind):
+        hints = get_type_hints(kind)
+        return kind(**{f.name: rebuilt(hints[f.name], value[f.name]) for f in fields(kind)})
+    if origin is np.ndarray or (isinstance(kind, type) and issubclass(kind, AbstractArray | np.ndarray)):
+        return _array(kind, value)
+    return _number(value) if kind is float else value
+
+
+def _array(kind: Any, value: list[Any]) -> np.ndarray:
+    if kind in (Labels, Flags):
+        return np.array(value, dtype=int if kind is Labels else bool)
+    numbers = [[_number(x) for x in row] if isinstance(row, list) else _number(row) for row in value]
+    array = np.array(numbers, dtype=float)
+    return array.reshape(len(value), len(value[0]) if value else 0) if kind is Matrix else array
+
+
+def _number(value: Any) -> float:
+    return float("nan") if value is None else float(value)

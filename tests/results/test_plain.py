@@ -1,0 +1,63 @@
+"""Any dataclass as plain data, and stored data back bit for bit."""
+
+import json
+from dataclasses import dataclass
+from typing import ClassVar
+
+import numpy as np
+
+from bowdenfit.results.plain import plain, rebuilt, stored
+from bowdenfit.types import Flags, Labels, Matrix, Vector
+
+
+@dataclass(frozen=True)
+class Inner:
+    value: float
+    words: str
+
+    JSON: ClassVar = ("words", "twice")
+
+    @property
+    def twice(self) -> float:
+        return 2 * self.value
+
+
+@dataclass(frozen=True)
+class Outer:
+    inner: tuple[Inner, ...]
+    by_name: dict[str, Inner]
+    vector: Vector
+    matrix: Matrix
+    flags: Flags
+    labels: Labels
+    pair: tuple[float, float]
+    perhaps: Inner | None
+
+
+OUTER = Outer(
+    (Inner(1 / 3, "a"),),
+    {"b": Inner(float("inf"), "c")},
+    np.array([0.1, np.nan, -np.inf]),
+    np.zeros((0, 0)),
+    np.array([True]),
+    np.array([3]),
+    (float("nan"), -float("inf")),
+    None,
+)
+
+
+def test_an_answer_gives_the_attributes_that_its_json_names_and_no_number_where_there_is_none():
+    assert plain(OUTER)["inner"] == [{"words": "a", "twice": 2 / 3}]
+    assert plain(OUTER)["by_name"] == {"b": {"words": "c", "twice": None}}
+    assert plain(OUTER)["vector"] == [0.1, None, None]
+    assert plain({"sd": np.float64(0.5), "n": np.int64(2)}) == {"sd": 0.5, "n": 2}
+
+
+def test_stored_data_come_back_bit_for_bit():
+    again = rebuilt(Outer, json.loads(json.dumps(stored(OUTER), allow_nan=False)))
+    for name in vars(OUTER):
+        one, other = getattr(OUTER, name), getattr(again, name)
+        assert type(one) is type(other), name
+        np.testing.assert_equal(other, one, err_msg=name)
+        if isinstance(one, np.ndarray):
+            assert (one.dtype, one.shape) == (other.dtype, other.shape), name

@@ -9,7 +9,7 @@ from jax import Array
 from jaxtyping import Float
 
 from bowdenfit.description import Description, LogNormalPrior, PriorDefaults
-from bowdenfit.parameters.priors import HalfNormal, LogNormal, Normal, TruncatedNormal
+from bowdenfit.parameters.priors import HalfNormal, LogNormal, TruncatedNormal
 from bowdenfit.parameters.space import Parameter
 from bowdenfit.physics.stretch import (
     compliance,
@@ -23,8 +23,6 @@ from bowdenfit.physics.stretch import (
 
 STIFFNESS, BEDDING_STRETCH, BEDDING_LOAD = "stiffness", "bedding_stretch", "bedding_load"
 LENGTHENING, PRELOAD, STRETCH_ZERO, STRETCH_FRICTION = "lengthening", "preload", "stretch_zero", "mu_stretch"
-STRETCH_NOISE, PRELOAD_NOISE = "sigma_L", "sigma_P"
-LOOP_MOUNTING = "loop_mounting"
 
 Values = Mapping[str, Array]
 
@@ -127,21 +125,8 @@ def spread_matrix(at: np.ndarray) -> np.ndarray:
     return (np.arange(at.max(initial=-1) + 1)[:, None] == at).astype(float)
 
 
-def stretch_parameters(description: Description, defaults: PriorDefaults) -> list[Parameter]:
-    """What a reading of stretch depends on beside the rope: its zero, and friction of its own where no contact's acts."""
-    meaning, prior = "stretch that the reading calls zero", Normal(0.0, defaults.stretch_zero_mm)
-    zero = Parameter(STRETCH_ZERO, r"$\Delta L_0$", meaning, "elastic", prior, "mm")
-    return [zero] if description.stretch.friction else [zero, _own_friction(defaults.friction)]
-
-
-def loop_mounting_parameter() -> Parameter:
-    """How the mounting of a loop differs from others."""
-    meaning = "effect of the loop's mounting on the friction exponent, in units of tau"
-    return Parameter(LOOP_MOUNTING, "$m$", meaning, "sensor", Normal(0.0, 1.0))
-
-
 def rope_parameters(defaults: PriorDefaults) -> list[Parameter]:
-    """How the rope stretches, and the sheath by bending."""
+    """How the rope stretches and the sheath lengthens."""
     k, load, degree = defaults.stiffness, defaults.bedding_load, float(np.deg2rad(1.0))
     lengthening = HalfNormal(defaults.lengthening_mm_per_radian)
     return [
@@ -162,13 +147,6 @@ def rope_parameters(defaults: PriorDefaults) -> list[Parameter]:
             lengthening, "mm/deg", degree, prior_words=lengthening.text("mm/deg", degree, 3),
         ),
     ]  # fmt: skip
-
-
-def _own_friction(prior: LogNormalPrior) -> Parameter:
-    return Parameter(
-        STRETCH_FRICTION, r"$\mu_\mathrm{stretch}$", "friction coefficient while the rope is stretched", "friction",
-        LogNormal(prior.median, prior.log_sd),
-    )  # fmt: skip
 
 
 def preload_parameter(description: Description, default: LogNormalPrior) -> Parameter:

@@ -17,7 +17,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from bowdenfit.inference.scatter import scatter_about
-from bowdenfit.model import Term
+from bowdenfit.kinds.term import Term
 from bowdenfit.parameters.space import Parameter
 
 WORTH_SAYING = 3.0  # sds; a table that is right says more than this three times in a thousand fits

@@ -4,7 +4,7 @@ from collections.abc import Iterator, Mapping, Sequence
 
 import numpy as np
 
-from bowdenfit.model import Term
+from bowdenfit.kinds.term import Term
 
 _FREEDOM = 0.5  # degrees of freedom below which the scatter of a table cannot be estimated
 

@@ -9,14 +9,16 @@ import jax.numpy as jnp
 import numpy as np
 
 from bowdenfit.cable.cable import Cable
-from bowdenfit.cable.elasticity import LOOP_MOUNTING, PRELOAD_NOISE, STRETCH_NOISE
 from bowdenfit.cable.load_cells import FORCE_NOISE, RUN_SCATTER, LoadCells
 from bowdenfit.cable.noise import scatter
 from bowdenfit.description import Description
+from bowdenfit.kinds.elastic_term import ElasticTerm
+from bowdenfit.kinds.loop.term import LOOP_MOUNTING
 from bowdenfit.kinds.measurements import Measurements
+from bowdenfit.kinds.preload.term import PRELOAD_NOISE
 from bowdenfit.kinds.resolve_angles import resolve_angles
 from bowdenfit.kinds.row_angles import row_angles
-from bowdenfit.kinds.stretch.term import ElasticTerm, stretch_term
+from bowdenfit.kinds.stretch.term import STRETCH_NOISE, stretch_term
 from bowdenfit.kinds.tables import LoopTable, OwnAngles, PreloadTable, Provenance, StretchTable
 from bowdenfit.physics.loop import free_motion_loss, loop_output_force
 

@@ -12,6 +12,9 @@ from jaxtyping import Float
 from bowdenfit.cable.cable import ANGLE_NOISE, Cable
 from bowdenfit.cable.noise import noise_law, scatter
 from bowdenfit.kinds.tables import AngleTable
+from bowdenfit.kinds.term import Circumstances, TermKind
+from bowdenfit.parameters.priors import HalfNormal
+from bowdenfit.parameters.space import Parameter
 
 
 @dataclass(frozen=True)
@@ -103,3 +106,24 @@ def angles_term(cable: Cable, table: AngleTable) -> AnglesTerm:
         "limit": np.array([readings[i][1] for i in order[detected.sum() :]]),
     }
     return AnglesTerm(cable, data, tuple(readings[i][2] for i in order))
+
+
+def _parameters(table: AngleTable, at: Circumstances) -> list[Parameter]:
+    """Those of every curve, with priors by the angles inside its range, and how angles scatter."""
+    route, degree, sd = at.description.route, float(np.rad2deg(1.0)), at.defaults.angle_noise_degrees
+    assert route is not None  # an angle table is read only with one
+    inside = (table.route >= route.range[0]) & (table.route <= route.range[1])
+    read = {column: table.column(column)[0] for column in at.cable.curves}
+    curves = [
+        parameter
+        for column, curve in at.cable.curves.items()
+        for parameter in curve.parameters(read[column][np.isfinite(read[column]) & inside], at.defaults)
+    ]
+    noise = Parameter(
+        ANGLE_NOISE, r"$\sigma_\theta$", at.noise.meaning("standard deviation of an angle reading"), "noise",
+        HalfNormal(sd / degree), "deg", degree,
+    )  # fmt: skip
+    return [*curves, noise]
+
+
+ANGLES = TermKind(lambda cable, table, _: (angles_term(cable, table),), _parameters)

@@ -13,9 +13,13 @@ from jaxtyping import Float
 from bowdenfit.cable.cable import Cable
 from bowdenfit.cable.load_cells import RUN_SCATTER, LoadCells
 from bowdenfit.cable.noise import noise_law, scatter
+from bowdenfit.errors import DescriptionError
 from bowdenfit.kinds.resolve_angles import resolve_angles
 from bowdenfit.kinds.row_angles import row_angles
+from bowdenfit.kinds.shared_parameters import run_scatter
 from bowdenfit.kinds.tables import AngleTable, EfficiencyTable
+from bowdenfit.kinds.term import TermKind
+from bowdenfit.parameters.space import ParameterSpace
 from bowdenfit.physics.friction import transmission_efficiency
 
 
@@ -92,3 +96,22 @@ def efficiencies_term(cable: Cable, table: EfficiencyTable, angles: AngleTable |
         f"{length:g} {route.unit}" if route else table.origin.place(i) for i, length in enumerate(table.route)
     )
     return EfficienciesTerm(cable, data, labels)
+
+
+def _check_run_scatter(table: EfficiencyTable, space: ParameterSpace) -> None:
+    """Mountings may be said to be all alike only where something else makes every row scatter."""
+    if any(p.name == RUN_SCATTER and p.fixed == 0 for p in space.fixed) and not np.all(table.sd > 0):
+        place = table.origin.place(int(np.argmin(table.sd > 0)))
+        raise DescriptionError(
+            f"cable.toml: {RUN_SCATTER} is fixed at 0, but {place} has no standard deviation of its own, so that "
+            "nothing would make it scatter and no model could be right; state the sd of every efficiency, or leave "
+            f"{RUN_SCATTER} free."
+        )
+
+
+EFFICIENCIES = TermKind(
+    lambda cable, table, angles: (efficiencies_term(cable, table, angles),),
+    lambda _, at: [run_scatter(at)],
+    tells_mountings=True,
+    check=_check_run_scatter,
+)

@@ -16,7 +16,10 @@ from bowdenfit.cable.noise import noise_law, scatter
 from bowdenfit.kinds.resolve_angles import resolve_angles
 from bowdenfit.kinds.row_angles import row_angles
 from bowdenfit.kinds.runs import ROW_ARRAYS, RunsTerm, SlidingRows, run_sums
+from bowdenfit.kinds.shared_parameters import force_noise, offsets, run_scatter
 from bowdenfit.kinds.tables import AngleTable, ForceTable
+from bowdenfit.kinds.term import Circumstances, TermKind
+from bowdenfit.parameters.space import Parameter
 
 
 @dataclass(frozen=True)
@@ -152,3 +155,11 @@ def _run_label(cable: Cable, table: ForceTable, run: int) -> str:
     at = np.unique(table.route[table.run == run])
     where = f" ({at[0]:g} {route.unit})" if len(at) == 1 else ""
     return f"{table.run_names[run]}{where}"
+
+
+def _parameters(_: ForceTable, at: Circumstances) -> list[Parameter]:
+    """Inside a run readings are normal, whatever the noise of mountings."""
+    return [run_scatter(at), force_noise(at, "standard deviation of a force reading"), *offsets(at)]
+
+
+FORCES = TermKind(force_terms, _parameters, tells_mountings=True)

@@ -11,15 +11,20 @@ from jax import Array
 from jaxtyping import Float
 
 from bowdenfit.cable.cable import Cable
-from bowdenfit.cable.elasticity import LOOP_MOUNTING, spread_matrix
+from bowdenfit.cable.elasticity import spread_matrix
 from bowdenfit.cable.load_cells import FORCE_NOISE, RUN_SCATTER, LoadCells
 from bowdenfit.cable.noise import noise_law, scatter
 from bowdenfit.kinds.resolve_angles import resolve_angles
 from bowdenfit.kinds.row_angles import row_angles
+from bowdenfit.kinds.shared_parameters import force_noise, offsets, preload
 from bowdenfit.kinds.tables import AngleTable, LoopTable
+from bowdenfit.kinds.term import Circumstances, TermKind
+from bowdenfit.parameters.priors import Normal
+from bowdenfit.parameters.space import Parameter
 from bowdenfit.physics.loop import loop_response, loop_response_from
 
-LOOP = "loop_output_force"
+LOOP_FORCE = "loop_output_force"
+LOOP_MOUNTING = "loop_mounting"
 
 
 @dataclass(frozen=True)
@@ -44,7 +49,7 @@ class LoopTerm:
     cable: Cable
     data: dict[str, Any]
     labels: tuple[str, ...]
-    name: str = LOOP
+    name: str = LOOP_FORCE
     unit: str = "N"
     noise: str = FORCE_NOISE
 
@@ -120,3 +125,14 @@ def loop_term(cable: Cable, table: LoopTable, angles: AngleTable | None) -> Loop
         data["cases"], at = np.unique(rows.own, axis=0, return_inverse=True)
         data["spread"] = spread_matrix(at.ravel())
     return LoopTerm(cable, data, tuple(table.origin.place(i) for i in range(len(table.stroke))))
+
+
+def _parameters(_: LoopTable, at: Circumstances) -> list[Parameter]:
+    """Preload, noise and offsets; and what its one mounting did, where other readings tell how mountings scatter."""
+    meaning = "effect of the loop's mounting on the friction exponent, in units of tau"
+    mounting = Parameter(LOOP_MOUNTING, "$m$", meaning, "sensor", Normal(0.0, 1.0))
+    noise = force_noise(at, at.noise.meaning("standard deviation of a force reading"))
+    return [*preload(at), *([mounting] if at.mountings_scatter else []), noise, *offsets(at)]
+
+
+LOOP = TermKind(lambda cable, table, angles: (loop_term(cable, table, angles),), _parameters)

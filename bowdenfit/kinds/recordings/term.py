@@ -10,7 +10,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from bowdenfit.cable.cable import Cable
-from bowdenfit.cable.load_cells import BLOCK_NOISE
+from bowdenfit.cable.load_cells import BLOCK_NOISE, DELAY_ERROR
 from bowdenfit.description import RecordingsTable
 from bowdenfit.errors import DatasetError
 from bowdenfit.kinds.recordings.blocks import (
@@ -29,7 +29,11 @@ from bowdenfit.kinds.recordings.loops import LoopRecordingsTerm, loop_recordings
 from bowdenfit.kinds.recordings.whole import WholeRecordingsTerm, padded
 from bowdenfit.kinds.row_angles import row_angles
 from bowdenfit.kinds.runs import ROW_ARRAYS, RunsTerm, SlidingRows, run_sums
+from bowdenfit.kinds.shared_parameters import offsets, preload, run_scatter
 from bowdenfit.kinds.tables import AngleTable
+from bowdenfit.kinds.term import Circumstances, TermKind
+from bowdenfit.parameters.priors import HalfNormal, Normal
+from bowdenfit.parameters.space import Parameter
 from bowdenfit.recordings.preparation.play import play
 from bowdenfit.recordings.recording import Recording, Recordings
 
@@ -166,3 +170,23 @@ def _rows(recordings: Recordings, parts: list[_Part], angles: Mapping[str, np.nd
         np.concatenate([p.worth for p in parts]),
         {name: angles[name][of_recording] for name in ROW_ARRAYS},
     )
+
+
+def _parameters(recordings: Recordings, at: Circumstances) -> list[Parameter]:
+    """Scatter of mountings and blocks, what the load cells add, and of a loop its preload."""
+    sd, late = at.defaults.block_noise_newtons, recordings.delay_sd
+    block_noise = Parameter(
+        BLOCK_NOISE, r"$\sigma_B$", "standard deviation of a block's mean force", "noise",
+        HalfNormal(sd), "N",
+    )  # fmt: skip
+    delay = Parameter(
+        DELAY_ERROR, r"$\delta$", "error of the estimated delay between the load cells' channels", "sensor",
+        Normal(0.0, late), "ms", 1000.0, prior_words=f"Normal(0, {1000 * late:.3g} ms)",
+    )  # fmt: skip
+    of_loop = preload(at) if at.cable.is_loop else []
+    return [*of_loop, run_scatter(at), block_noise, *offsets(at), *([delay] if late > 0 else [])]
+
+
+RECORDINGS = TermKind(
+    lambda cable, recordings, angles: (recordings_term(cable, recordings, angles),), _parameters, tells_mountings=True
+)

@@ -13,7 +13,7 @@ from bowdenfit.inference.predictive_checks import (
     uniformity,
 )
 from bowdenfit.inference.prior_sensitivity import SENSITIVE, Sensitivity, sensitivities
-from bowdenfit.model import Term
+from bowdenfit.kinds.term import Term
 from bowdenfit.questions.check.residual_places import STROKE, Places, places_of
 from bowdenfit.results.record import Draws, Record, once
 

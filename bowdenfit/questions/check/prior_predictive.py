@@ -10,7 +10,8 @@ from jax import Array
 from bowdenfit.dataset import Dataset
 from bowdenfit.inference.draws import for_each_draw
 from bowdenfit.inference.log_density import LogDensity
-from bowdenfit.model import EFFICIENCY_TERMS, Model, Term, build_model
+from bowdenfit.kinds.term import Term
+from bowdenfit.model import EFFICIENCY_TERMS, Model, build_model
 from bowdenfit.questions.check.answer import readings_of
 from bowdenfit.questions.check.figure_data import PriorPredictive, PriorTable
 from bowdenfit.questions.check.figure_tables import TABLE_NAMES

@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 
 from bowdenfit.dataset import Dataset
-from bowdenfit.model import Term
+from bowdenfit.kinds.term import Term
 
 LOAD, WRAP_ANGLE, RUN, STROKE = "Load (N)", "Wrap angle (deg)", "Run", "Stroke"
 

@@ -10,7 +10,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from bowdenfit.kinds.recordings.blocks import RECORDED
-from bowdenfit.model import Term
+from bowdenfit.kinds.term import Term
 from bowdenfit.results.record import Record
 
 ANGLES = "wrap_angle"  # the table whose readings depend on how the fit takes what was not detected

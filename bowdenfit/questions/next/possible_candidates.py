@@ -5,8 +5,10 @@ from collections.abc import Sequence
 import numpy as np
 
 from bowdenfit.cable.cable import ANGLE_NOISE
-from bowdenfit.cable.elasticity import PRELOAD, PRELOAD_NOISE, STRETCH_NOISE
+from bowdenfit.cable.elasticity import PRELOAD
 from bowdenfit.cable.load_cells import FORCE_NOISE, RUN_SCATTER
+from bowdenfit.kinds.preload.term import PRELOAD_NOISE
+from bowdenfit.kinds.stretch.term import STRETCH_NOISE
 from bowdenfit.questions.next.possible_readings import Candidate
 from bowdenfit.questions.next.possible_runs import typical_run
 from bowdenfit.results.record import Record

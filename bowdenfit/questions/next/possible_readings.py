@@ -14,8 +14,9 @@ from bowdenfit.kinds.angles.term import angles_term
 from bowdenfit.kinds.efficiencies.term import efficiencies_term
 from bowdenfit.kinds.loop.term import loop_term
 from bowdenfit.kinds.measurements import Measurements
+from bowdenfit.kinds.preload.term import preload_term
 from bowdenfit.kinds.row_angles import row_angles
-from bowdenfit.kinds.stretch.term import preload_term, stretch_term
+from bowdenfit.kinds.stretch.term import stretch_term
 from bowdenfit.kinds.tables import (
     AngleTable,
     EfficiencyTable,
@@ -25,7 +26,8 @@ from bowdenfit.kinds.tables import (
     Provenance,
     StretchTable,
 )
-from bowdenfit.model import Model, Term
+from bowdenfit.kinds.term import Term
+from bowdenfit.model import Model
 from bowdenfit.questions.next.possible_runs import RunDesign, run_readings
 
 KINDS = ("angle", "force", "efficiency", "stretch", "preload", "loop")

@@ -1,0 +1,86 @@
+"""Readings around what the elastic side of a cable says, of stretch or of preload."""
+
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
+from typing import Any
+
+import jax
+import jax.numpy as jnp
+import numpy as np
+from jax import Array
+from jaxtyping import Float
+
+from bowdenfit.cable.cable import Cable
+from bowdenfit.cable.noise import noise_law, scatter
+
+Expected = Callable[[Cable, Mapping[str, Array], Mapping[str, Any]], Array]
+
+
+@dataclass(frozen=True)
+class ElasticTerm:
+    r"""Likelihood of a table of stretch, or of preload.
+
+    .. math:: \Delta L_i \sim \text{Normal}(e(\bar T_i) + g \theta_i - \Delta L_0,\ \sigma_L), \qquad
+              P_i \sim \text{Normal}(P(\theta_i),\ \sigma_P)
+
+    A preload of 0 is what a load cell says of a slack rope whatever its noise: such a row is known to be at most 0, and
+    contributes :math:`\Phi(-P(\theta)/\sigma_P)`. With Student noise the same scales are a Student-t's.
+
+    Args:
+        cable: The cable.
+        data: Arrays, one entry a row.
+        labels: Each row in words.
+        name: Name of its readings in results.
+        unit: Unit of its readings.
+        noise: Its noise scale.
+        law: What is expected of the rows.
+        lowest: Lowest reading that there can be; None without one.
+    """
+
+    cable: Cable
+    data: dict[str, Any]
+    labels: tuple[str, ...]
+    name: str
+    unit: str
+    noise: str
+    law: Expected
+    lowest: float | None = None
+
+    @property
+    def residual_blocks(self) -> tuple[tuple[int, int], ...]:
+        """All readings scatter alike; a bound has no scatter."""
+        read = len(self.data["reading"])
+        return ((read, read), (len(self.labels) - read, 0))
+
+    def expected(self, values: Mapping[str, Array], data: Mapping[str, Any]) -> Float[Array, " rows"]:
+        """Expected readings [mm] or [N]."""
+        return self.law(self.cable, values, data)
+
+    def log_likelihood(self, values: Mapping[str, Array], data: Mapping[str, Any]) -> Float[Array, " rows"]:
+        """Log likelihood of each row."""
+        deviation, u = self._deviations(values, data, values[self.noise])
+        law = noise_law(self.cable.description)
+        return jnp.concatenate([law.log_density(deviation) - jnp.log(values[self.noise]), law.log_cdf(u)])
+
+    def _deviations(
+        self, values: Mapping[str, Array], data: Mapping[str, Any], noise: Array
+    ) -> tuple[Float[Array, " read"], Float[Array, " at_most"]]:
+        """Standardized deviations: of the readings, and of those that are only known to be at most so."""
+        expected, n = self.expected(values, data), data["reading"].shape[0]
+        return (data["reading"] - expected[:n]) / noise, (data["at_most"] - expected[n:]) / noise
+
+    def residuals(self, values: Mapping[str, Array], data: Mapping[str, Any]) -> Float[Array, " rows"]:
+        """Standardized residuals; sqrt(-2 log likelihood) for rows known to be at most their reading."""
+        deviation, u = self._deviations(values, data, jax.lax.stop_gradient(values[self.noise]))
+        law = noise_law(self.cable.description)
+        return jnp.concatenate([law.residual(deviation), law.bound_residual(u)])
+
+    def simulate(self, values: Mapping[str, Array], data: Mapping[str, Any], key: Array) -> Float[Array, " rows"]:
+        """Readings drawn at given parameters [mm] or [N]."""
+        expected = self.expected(values, data)
+        drawn = expected + values[self.noise] * scatter(key, expected.shape, self.cable.description)
+        return drawn if self.lowest is None else jnp.maximum(drawn, self.lowest)
+
+    def observed(self) -> np.ndarray:
+        """Readings [mm] or [N]."""
+        return np.concatenate([self.data["reading"], self.data["at_most"]])

@@ -1,0 +1,1 @@
+"""Preload between fixed ends."""

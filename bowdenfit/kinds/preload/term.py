@@ -1,0 +1,42 @@
+"""Preload tables: the tension between fixed ends, at wrap angles."""
+
+from collections.abc import Mapping
+from typing import Any
+
+import numpy as np
+from jax import Array
+from jaxtyping import Float
+
+from bowdenfit.cable.cable import Cable
+from bowdenfit.kinds.elastic_term import ElasticTerm
+from bowdenfit.kinds.shared_parameters import preload
+from bowdenfit.kinds.tables import PreloadTable
+from bowdenfit.kinds.term import Circumstances, TermKind
+from bowdenfit.parameters.priors import HalfNormal
+from bowdenfit.parameters.space import Parameter
+
+MEASURED_PRELOAD = "measured_preload"  # not the name of the parameter
+PRELOAD_NOISE = "sigma_P"
+
+
+def preload_term(cable: Cable, table: PreloadTable) -> ElasticTerm:
+    """The term of a table of preload; rows that read 0 come last."""
+    slack = table.preload == 0
+    angles = np.concatenate([table.wrap_angle[~slack], table.wrap_angle[slack]])
+    data = {"reading": table.preload[~slack], "at_most": table.preload[slack], "wrap_angle": angles}
+    labels = tuple(f"{np.rad2deg(angle):.4g} deg" for angle in angles)
+    return ElasticTerm(cable, data, labels, MEASURED_PRELOAD, "N", PRELOAD_NOISE, _preload, 0.0)
+
+
+def _preload(cable: Cable, values: Mapping[str, Array], data: Mapping[str, Any]) -> Float[Array, " rows"]:
+    return cable.elasticity.preload(values, data["wrap_angle"])[0]
+
+
+def _parameters(_: PreloadTable, at: Circumstances) -> list[Parameter]:
+    """The preload, and how readings scatter."""
+    sd, meaning = at.defaults.preload_noise_newtons, at.noise.meaning("standard deviation of a preload reading")
+    noise = Parameter(PRELOAD_NOISE, r"$\sigma_P$", meaning, "noise", HalfNormal(sd), "N")
+    return [*preload(at), noise]
+
+
+PRELOAD = TermKind(lambda cable, table, _: (preload_term(cable, table),), _parameters)

@@ -1,0 +1,124 @@
+"""A kind's half in the likelihood: what a term is, and what a kind declares of its terms."""
+
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, field
+from typing import Any, Protocol, runtime_checkable
+
+import numpy as np
+from jax import Array
+
+from bowdenfit.cable.cable import Cable
+from bowdenfit.cable.noise import NoiseLaw, noise_law
+from bowdenfit.description import Description, PriorDefaults
+from bowdenfit.kinds.measurements import Measurements
+from bowdenfit.kinds.tables import AngleTable
+from bowdenfit.parameters.space import Parameter, ParameterSpace
+
+
+@runtime_checkable
+class Term(Protocol):
+    """One table against one cable: what inference, predictions and reports need of it."""
+
+    @property
+    def cable(self) -> Cable:
+        """The cable."""
+        ...
+
+    @property
+    def data(self) -> dict[str, Any]:
+        """Arrays that its functions take."""
+        ...
+
+    @property
+    def labels(self) -> tuple[str, ...]:
+        """Each reading in words."""
+        ...
+
+    @property
+    def name(self) -> str:
+        """Name of its readings in results."""
+        ...
+
+    @property
+    def unit(self) -> str:
+        """Unit of its readings in results."""
+        ...
+
+    @property
+    def noise(self) -> str:
+        """The noise scale that its residuals are standardized by."""
+        ...
+
+    @property
+    def residual_blocks(self) -> tuple[tuple[int, int], ...]:
+        """Its residuals by what makes them scatter, in order: how many there are, how many of them vary independently."""
+        ...
+
+    def log_likelihood(self, values: Mapping[str, Array], data: Mapping[str, Any]) -> Array:
+        """Log likelihood of each reading."""
+        ...
+
+    def residuals(self, values: Mapping[str, Array], data: Mapping[str, Any]) -> Array:
+        """Standardized residuals of the same likelihood."""
+        ...
+
+    def expected(self, values: Mapping[str, Array], data: Mapping[str, Any]) -> Array:
+        """Expected readings in the term's unit."""
+        ...
+
+    def simulate(self, values: Mapping[str, Array], data: Mapping[str, Any], key: Array) -> Array:
+        """Readings drawn at given parameters, in the term's unit."""
+        ...
+
+    def observed(self) -> np.ndarray:
+        """Readings in the term's unit."""
+        ...
+
+
+@dataclass(frozen=True)
+class Circumstances:
+    """What a kind looks at when it says which parameters it needs.
+
+    Args:
+        cable: The cable.
+        measurements: Everything measured on it.
+        mountings_scatter: Whether readings of any kind tell how mountings scatter.
+        defaults: Priors of what the user says nothing of.
+    """
+
+    cable: Cable
+    measurements: Measurements
+    mountings_scatter: bool
+    defaults: PriorDefaults = field(default_factory=PriorDefaults)
+
+    @property
+    def description(self) -> Description:
+        """What was said about the cable."""
+        return self.cable.description
+
+    @property
+    def noise(self) -> NoiseLaw:
+        """How readings scatter."""
+        return noise_law(self.cable.description)
+
+
+def _always_fits(table: Any, space: ParameterSpace) -> None:
+    """Nothing that could be fixed is at odds with the table."""
+    del table, space
+
+
+@dataclass(frozen=True)
+class TermKind:
+    """What a kind of measurement adds to the likelihood.
+
+    Args:
+        terms: Terms of a table against a cable; wrap angles that were measured hold outside the range of the curves.
+        parameters: The parameters that they need, those that other kinds share included.
+        tells_mountings: Whether its readings tell how mountings scatter.
+        check: Whether parameters that the user fixed leave the table a model.
+    """
+
+    terms: Callable[[Cable, Any, AngleTable | None], Sequence[Term]]
+    parameters: Callable[[Any, Circumstances], list[Parameter]]
+    tells_mountings: bool = False
+    check: Callable[[Any, ParameterSpace], None] = _always_fits

@@ -19,18 +19,31 @@ if TYPE_CHECKING:
         StoreError,
         UsageError,
     )
-    from bowdenfit.front_desk import Fit
+    from bowdenfit.front_desk import Fit, load
     from bowdenfit.questions.calibrate.verb import calibrate
+    from bowdenfit.questions.check.verb import check
+    from bowdenfit.questions.compare.verb import compare
     from bowdenfit.questions.identify.verb import identify
     from bowdenfit.questions.next.verb import next_measurement
-    from bowdenfit.verbs import compare, fit, load, plot, read, simulate
+    from bowdenfit.questions.predict.verb import predict
+    from bowdenfit.questions.simulate.verb import simulate
+    from bowdenfit.questions.summary.verb import plot
+    from bowdenfit.reading import read
+    from bowdenfit.run.verb import fit
 
 _WHERE = {
-    **dict.fromkeys(("compare", "fit", "load", "plot", "read", "simulate"), "bowdenfit.verbs"),
-    "calibrate": "bowdenfit.questions.calibrate.verb",
-    "identify": "bowdenfit.questions.identify.verb",
-    "next_measurement": "bowdenfit.questions.next.verb",
     "Fit": "bowdenfit.front_desk",
+    "calibrate": "bowdenfit.questions.calibrate.verb",
+    "check": "bowdenfit.questions.check.verb",
+    "compare": "bowdenfit.questions.compare.verb",
+    "fit": "bowdenfit.run.verb",
+    "identify": "bowdenfit.questions.identify.verb",
+    "load": "bowdenfit.front_desk",
+    "next_measurement": "bowdenfit.questions.next.verb",
+    "plot": "bowdenfit.questions.summary.verb",
+    "predict": "bowdenfit.questions.predict.verb",
+    "read": "bowdenfit.reading",
+    "simulate": "bowdenfit.questions.simulate.verb",
     **dict.fromkeys(
         ("BowdenfitError", "ConvergenceError", "DatasetError", "DescriptionError", "StoreError", "UsageError"),
         "bowdenfit.errors",
@@ -46,12 +59,14 @@ __all__ = [
     "StoreError",
     "UsageError",
     "calibrate",
+    "check",
     "compare",
     "fit",
     "identify",
     "load",
     "next_measurement",
     "plot",
+    "predict",
     "read",
     "simulate",
 ]

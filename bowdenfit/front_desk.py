@@ -11,7 +11,8 @@ from bowdenfit.questions.summary.html import fit_page
 from bowdenfit.questions.summary.page import summarize
 from bowdenfit.questions.summary.verdict import Verdict, verdict
 from bowdenfit.results.record import Record
-from bowdenfit.results.store import load, save
+from bowdenfit.results.store import load as load_record
+from bowdenfit.results.store import save
 
 
 class Fit(Record):
@@ -29,7 +30,7 @@ class Fit(Record):
         Raises:
             StoreError: The folder is missing, unfinished or damaged.
         """
-        return cls.of(load(Path(path)))
+        return cls.of(load_record(Path(path)))
 
     def save(self, path: str | Path, force: bool = False) -> None:
         """Write the results folder (without figures and summary text, which `bowdenfit.fit(output=...)` adds).
@@ -68,3 +69,12 @@ class Fit(Record):
 
     def _repr_html_(self) -> str:
         return fit_page(self)
+
+
+def load(path: str | Path) -> Fit:
+    """A fit from its results folder, bit for bit as it was saved.
+
+    Raises:
+        StoreError: The folder is missing, unfinished or damaged.
+    """
+    return Fit.load(path)

@@ -5,15 +5,11 @@ import sys
 
 import click
 
-from bowdenfit.cli.calibration import calibrate
-from bowdenfit.cli.comparing import compare
-from bowdenfit.cli.data_sets import check, init, simulate
-from bowdenfit.cli.fitting import fit
-from bowdenfit.cli.identifying import identify
-from bowdenfit.cli.next_measurement import next_measurement
+from bowdenfit.cli.commands import command
 from bowdenfit.cli.progress import INTERRUPTED
-from bowdenfit.cli.results import length, plot, predict, summary
+from bowdenfit.cli.starting import completion, init
 from bowdenfit.errors import BowdenfitError
+from bowdenfit.verbs import VERBS
 
 
 def main() -> None:
@@ -58,18 +54,5 @@ def bowdenfit() -> None:
     """
 
 
-@click.command(short_help="Print the shell completion script.")
-@click.argument("shell", type=click.Choice(["bash", "zsh", "fish"]))
-def completion(shell: str) -> None:
-    """Print the completion script for SHELL; for bash: eval "$(bowdenfit completion bash)"."""
-    from click.shell_completion import get_completion_class
-
-    script = get_completion_class(shell)
-    assert script is not None  # the three shells above have one
-    click.echo(script(bowdenfit, {}, "bowdenfit", "_BOWDENFIT_COMPLETE").source())
-
-
-for verb in (
-    init, check, fit, summary, predict, length, identify, next_measurement, compare, calibrate, plot, simulate, completion,
-):  # fmt: skip
-    bowdenfit.add_command(verb)
+for each in (init, *map(command, VERBS), completion):
+    bowdenfit.add_command(each)

@@ -15,6 +15,7 @@ from bowdenfit.errors import StoreError
 
 FIT, SUMMARY, SUMMARY_TEXT = "fit.json", "summary.json", "summary.txt"
 POSTERIOR, CHAIN, FIGURES = "posterior.nc", "chain.h5", "figures"
+REPLICATIONS = "replications.jsonl"  # of a calibration
 
 
 @contextmanager

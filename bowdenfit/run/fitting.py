@@ -38,7 +38,7 @@ def run(
     watch: Stopwatch,
     helpers: Assistants,
 ) -> Fit:
-    """Least squares, and the posterior if `mcmc`; see `bowdenfit.verbs.fit`.
+    """Least squares, and the posterior if `mcmc`; see `bowdenfit.run.verb.fit`.
 
     Args:
         data: What is fitted.

@@ -12,11 +12,10 @@ from bowdenfit.description.file import parse_description
 from bowdenfit.errors import DescriptionError, StoreError, UsageError
 from bowdenfit.results.folder import CHAIN, clear, read_checkpoint, refuse_to_overwrite, start_checkpoint
 from bowdenfit.run.helpers import Assistants, draw
+from bowdenfit.verb import LARGEST_SEED
 
 if TYPE_CHECKING:
     from bowdenfit.front_desk import Fit
-
-LARGEST_SEED = 2**31 - 1
 
 
 def write_results(found: "Fit", folder: Path, figures: bool, helpers: Assistants) -> None:
@@ -90,7 +89,7 @@ def checked_seed(folder: Path | None, data: Dataset, mcmc: bool, seed: int | Non
     return int(before["seed"])
 
 
-def begun(folder: Path | None, data: Dataset, seed: int, resume: bool) -> Path | None:
+def start_checkpointing(folder: Path | None, data: Dataset, seed: int, resume: bool) -> Path | None:
     """The checkpoint to sample into, in a folder cleared of what was there; nothing is touched before this."""
     if folder is None:
         return None

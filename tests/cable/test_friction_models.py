@@ -327,8 +327,8 @@ def test_readings_simulated_inside_the_band_are_inside_it_for_the_likelihood():
 
 @pytest.mark.parametrize("option", ["drag", "load-dependent"])
 def test_a_dependence_on_load_is_refused_where_no_load_was_measured(option, on_body):
-    from bowdenfit import verbs
+    import bowdenfit as bf
     from bowdenfit.model import build_model
 
     with pytest.raises(DescriptionError, match=f"{option}.*efficiencies alone say nothing of it"):
-        build_model(verbs.read(on_body, friction=option))
+        build_model(bf.read(on_body, friction=option))

@@ -15,8 +15,9 @@ import numpy as np
 import pytest
 
 import bowdenfit as bf
-from bowdenfit.cli.progress import watched_fit
+from bowdenfit.cli.progress import watched
 from bowdenfit.inference.ensemble import Progress
+from bowdenfit.verbs import FIT
 
 ROOT = Path(__file__).parents[2]
 QUICK = ("sampler.n_walkers=128", "sampler.target_ess=200", "sampler.target_r_hat=1.05", "sampler.max_steps=4000")
@@ -225,7 +226,7 @@ def test_a_table_alone_needs_its_wrap_angle(run, tmp_path):
 
 
 def test_an_internal_error_is_a_sentence_with_a_request(run, monkeypatch, on_body):
-    monkeypatch.setattr("bowdenfit.verbs.check", lambda *_, **__: 1 / 0)
+    monkeypatch.setattr("bowdenfit.questions.check.verb.check", lambda *_, **__: 1 / 0)
     code, _, err = run("check", on_body)
     assert code == 1
     assert "our fault" in err
@@ -238,7 +239,7 @@ def test_an_interrupt_that_the_garbage_collector_swallows_is_not_lost(tmp_path):
     before = {number: signal.getsignal(number) for number in (signal.SIGINT, signal.SIGTERM)}
     signal.signal(signal.SIGINT, signal.default_int_handler)
     try:
-        with pytest.raises(click.exceptions.Exit) as stopped, watched_fit(tmp_path) as report:
+        with pytest.raises(click.exceptions.Exit) as stopped, watched(tmp_path, FIT.watch) as report:
             report(Progress(200, 4000, None, None))
             with contextlib.suppress(KeyboardInterrupt):
                 signal.raise_signal(signal.SIGINT)

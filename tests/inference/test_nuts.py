@@ -11,7 +11,6 @@ import pytest
 from scipy import stats
 
 import bowdenfit as bf
-from bowdenfit import verbs
 from bowdenfit.description import SamplerSettings
 from bowdenfit.inference import nuts
 from bowdenfit.inference.least_squares import MaximumPosterior
@@ -364,6 +363,6 @@ def test_emcee_and_nuts_agree_on_every_data_set(name):
 
     The small on-body data are also fitted by both above, in every run of the tests.
     """
-    found = verbs.fit(DATA / name, sampler="both", seed=1)
+    found = bf.fit(DATA / name, sampler="both", seed=1)
     assert found.posterior.agreement.agree, found.posterior.agreement.sentence()
     assert found.converged, found.reasons

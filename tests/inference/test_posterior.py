@@ -10,7 +10,7 @@ import pytest
 from numpyro.infer import MCMC, NUTS
 from scipy import stats
 
-from bowdenfit import verbs
+import bowdenfit as bf
 from bowdenfit.dataset import load_dataset
 from bowdenfit.description import SamplerSettings
 from bowdenfit.inference.draws import for_each_draw, named_values
@@ -110,7 +110,7 @@ def by_nuts(bench) -> Draws:
 
 @pytest.fixture(scope="module")
 def by_bowdenfit(bench, on_body) -> Draws:
-    found = verbs.fit(on_body, seed=20220728, settings=["sampler.target_ess=6000"])
+    found = bf.fit(on_body, seed=20220728, settings=["sampler.target_ess=6000"])
     assert found.converged
     drawn = bench.quantities(found.posterior.flat_z)
     for name in ("mu1", "sigma_theta"):

@@ -9,7 +9,7 @@ import pytest
 from cables import cable, measured
 from scipy import integrate, stats
 
-from bowdenfit import verbs
+import bowdenfit as bf
 from bowdenfit.dataset import Dataset, load_dataset, read_dataset
 from bowdenfit.description.file import load_description
 from bowdenfit.inference.compilation import compiled
@@ -364,7 +364,7 @@ def test_ten_thousand_draws_of_the_prior_give_finite_densities_and_plausible_eff
     The slope of a log angle is wide open a priori (sd 3 over half the range), so that at the ends of the range one draw in
     four or three has so much wrap that nothing passes; in the middle, and at the best length, nearly none has.
     """
-    dataset = load_dataset(on_body) if which == "on-body" else verbs.simulate(bench, seed=1)
+    dataset = load_dataset(on_body) if which == "on-body" else bf.simulate(bench, seed=1)
     posterior = LogDensity(build_model(dataset))
     model = posterior.model
     low, high = model.description.route.range

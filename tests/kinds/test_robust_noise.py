@@ -12,7 +12,7 @@ import pytest
 from cables import cable
 from scipy import stats
 
-from bowdenfit import verbs
+import bowdenfit as bf
 from bowdenfit.cable.noise import NormalNoise, StudentNoise, noise_law, scatter
 from bowdenfit.dataset import Dataset, load_dataset
 from bowdenfit.inference.compilation import compiled
@@ -355,7 +355,7 @@ def test_a_sampled_student_fit_answers_as_if_two_digits_had_not_been_swapped(on_
         ("robust", on_body, "student"),
         ("typo", folder, "student"),
     ):
-        found = verbs.fit(data, seed=1, noise=noise)
+        found = bf.fit(data, seed=1, noise=noise)
         assert found.converged
         answers[name] = np.concatenate([np.asarray(found.posterior.values[p]).reshape(-1, 1) for p in MU_NAMES], axis=1)
     center, sd = np.median(answers["right"], axis=0), answers["right"].std(axis=0)
@@ -383,7 +383,7 @@ def test_noise_is_chosen_on_the_command_line_and_named_in_the_summary(run, on_bo
     code, out, err = run("fit", on_body, "--no-mcmc", "--no-figures", "--noise", "student", "-o", tmp_path / "fit")
     assert code in {0, 3}, err
     assert "Student-t noise with 4 degrees of freedom" in out
-    assert verbs.load(tmp_path / "fit").dataset.description.noise == "student"
+    assert bf.load(tmp_path / "fit").dataset.description.noise == "student"
 
 
 @pytest.mark.parametrize(
@@ -408,7 +408,7 @@ def test_noise_that_does_not_exist_is_refused_in_a_sentence(run, on_body, settin
 
 
 def test_degrees_of_freedom_can_be_chosen(on_body):
-    description = verbs.read(on_body, settings=["student_degrees_of_freedom=6"], noise="student").description
+    description = bf.read(on_body, settings=["student_degrees_of_freedom=6"], noise="student").description
     assert noise_law(description) == StudentNoise(6)
-    assert noise_law(verbs.read(on_body).description) == NormalNoise()
+    assert noise_law(bf.read(on_body).description) == NormalNoise()
     assert type(description).model_validate(description.to_json()) == description

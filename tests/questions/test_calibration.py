@@ -425,11 +425,10 @@ def test_the_command_line_calibrates_resumes_and_says_when_too_few_replications_
 
 
 def test_an_interrupted_calibration_says_how_to_go_on(run, tmp_path, monkeypatch):
-    def interrupted(*_, output, **options):
-        begun(output, FINGERPRINT, resume=False, force=False)
+    def interrupted(*_):
         raise KeyboardInterrupt
 
-    monkeypatch.setattr("bowdenfit.verbs.calibrate", interrupted)
+    monkeypatch.setattr("bowdenfit.questions.calibrate.processes.replicated", interrupted)
     code, _, err = run("calibrate", ROOT / "datasets" / "yarn-on-cylinder", "-o", tmp_path / "c")
     assert code == 130
     assert "run the same command with --resume" in err
@@ -449,7 +448,7 @@ def test_what_cannot_be_assumed_or_replicated_is_refused_in_a_sentence(run, tmp_
 @pytest.mark.slow
 def test_processes_give_the_replications_that_one_gives(tmp_path):
     """Two processes that start cleanly, each with its own programs: the same ranks to the last digit."""
-    from bowdenfit.verbs import calibrate
+    from bowdenfit import calibrate
 
     data = ROOT / "datasets" / "yarn-on-cylinder"
     one, two = (calibrate(data, replications=3, workers=workers, seed=1) for workers in (1, 2))

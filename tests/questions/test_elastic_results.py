@@ -11,6 +11,7 @@ import pytest
 from scipy import stats
 
 import bowdenfit as bf
+from bowdenfit import predict
 from bowdenfit.dataset import Dataset
 from bowdenfit.inference.least_squares import least_squares, make_objective, maximum_posterior
 from bowdenfit.inference.log_density import LogDensity
@@ -20,7 +21,6 @@ from bowdenfit.questions.simulate.tables import read_bench
 from bowdenfit.questions.summary.figures import figure_data
 from bowdenfit.questions.summary.words import summary_text
 from bowdenfit.results.optimum import optimum_of
-from bowdenfit.verbs import predict
 
 FOLDER = Path(__file__).parents[2] / "datasets" / "synthetic-haptic-loop"
 QUICK = ("sampler.n_walkers=64", "sampler.target_ess=200", "sampler.target_r_hat=1.05", "sampler.max_steps=3000")

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from cables import LENGTHS, cable, measured
 
-from bowdenfit import verbs
+import bowdenfit as bf
 from bowdenfit.description.file import parse_description
 from bowdenfit.inference.identifiability import knowledge
 from bowdenfit.questions.identify.verb import identify
@@ -93,7 +93,7 @@ def test_a_plan_with_more_runs_knows_more(tmp_path):
 def test_the_judgment_before_sampling_agrees_with_the_fit(on_body):
     """The Fisher information at the maximum against draws: sds within a third (a funnel is not a normal)."""
     before = identify(on_body).groups["friction"]
-    found = verbs.fit(on_body, seed=3, settings=["sampler.n_walkers=64", "sampler.max_steps=1500"])
+    found = bf.fit(on_body, seed=3, settings=["sampler.n_walkers=64", "sampler.max_steps=1500"])
     after = identify(found).groups["friction"]
     for p, q in zip(before.parameters, after.parameters, strict=True):
         assert p.sd == pytest.approx(q.sd, rel=0.33), p.name
@@ -107,7 +107,7 @@ def two_turns(tmp_path_factory):
     plan = folder.parent / "plan.toml"
     truth = "[truth]\nmu_a = 0.1\nmu_b = 0.15\ntau = 0.01\nsigma_F = 0.3\n"
     plan.write_text(TWO_CONTACTS + truth + "[design]\nruns = [0, 0, 0, 0, 0, 0]\ninput_forces = [20, 50, 100]\n")
-    verbs.simulate(plan, output=folder, seed=1)
+    bf.simulate(plan, output=folder, seed=1)
     return folder
 
 
@@ -154,7 +154,7 @@ def test_tables_that_contradict_each_other_are_not_trusted(tmp_path, run):
     one = TWO_CONTACTS[: TWO_CONTACTS.rindex("[[contact]]")]
     truth = "[tables]\nforces = { file = 'forces.csv' }\n[truth]\nmu_a = 0.1\ntau = 0.01\nsigma_F = 0.3\n"
     plan.write_text(one + truth + "[design]\nruns = [0, 0, 0, 0, 0, 0, 0, 0]\ninput_forces = [20, 50, 100]\n")
-    verbs.simulate(plan, output=folder, seed=1)
+    bf.simulate(plan, output=folder, seed=1)
     (folder / "efficiencies.csv").write_text(
         "efficiency\n0.53\n0.54\n0.53\n0.535\n0.54\n0.53\n0.53\n0.54\n0.53\n0.53\n"
     )

@@ -8,7 +8,6 @@ import pytest
 from cables import cable, measured
 
 import bowdenfit as bf
-from bowdenfit import verbs
 from bowdenfit.cli import bowdenfit as command
 from bowdenfit.errors import UsageError
 from bowdenfit.inference.comparison import Difference, Prediction, differences
@@ -107,7 +106,7 @@ def test_the_summary_says_where_the_samples_went_and_how_much_mountings_differ(p
 
 
 def test_check_shows_the_recordings_and_has_no_false_warning(recorded):
-    text = check_text(verbs.check(recorded))
+    text = check_text(bf.check(recorded))
     assert "470 mm, 60 r/min" in text
     assert "Warning" not in text
     assert "Nothing is wrong" in text

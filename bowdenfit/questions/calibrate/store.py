@@ -8,9 +8,9 @@ from typing import Any
 
 from bowdenfit.errors import StoreError
 from bowdenfit.questions.calibrate.replication import Replication
-from bowdenfit.results.folder import FIGURES, SUMMARY_TEXT
+from bowdenfit.results.folder import FIGURES, REPLICATIONS, SUMMARY_TEXT
 
-REPLICATIONS, CALIBRATION = "replications.jsonl", "calibration.json"
+CALIBRATION = "calibration.json"
 _WHAT = {"description": "the description", "sha256": "an input file", "seed": "the seed", "assumed": "what is assumed"}
 
 

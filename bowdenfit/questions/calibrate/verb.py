@@ -5,64 +5,68 @@ import os
 import secrets
 from collections.abc import Callable, Sequence
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Annotated, Any, Unpack
 
-from bowdenfit.dataset import Dataset
-from bowdenfit.errors import DescriptionError, UsageError
-from bowdenfit.questions.calibrate.processes import replicated
+from bowdenfit.reading import Reading, read
+from bowdenfit.results.folder import REPLICATIONS
+from bowdenfit.verb import LARGEST_SEED, Argument, Option, Output, Reply, Verb, Watch
 
 if TYPE_CHECKING:
+    from bowdenfit.dataset import Dataset
     from bowdenfit.questions.calibrate.answer import Calibration
     from bowdenfit.questions.calibrate.replication import Plan
 
+NOT_CALIBRATED = 3
 Report = Callable[[int, int], None]
 
 
 def calibrate(
-    dataset: str | Path | Dataset,
+    dataset: Annotated["str | Path | Dataset", Argument("DATASET")],
     *,
-    replications: int = 200,
-    workers: int | None = None,
-    output: str | Path | None = None,
-    assume: Sequence[str] = (),
-    seed: int | None = None,
-    resume: bool = False,
-    force: bool = False,
+    replications: Annotated[int, Option(("-n",), least=2)] = 200,
+    workers: Annotated[int | None, Option(("-j",), least=1, default="one a core")] = None,
+    output: Annotated[Output, Option(("-o",), default="fits/calibration/NAME OF DATASET")] = None,
+    assume: Annotated[Sequence[str], Option(metavar="KEY=VALUE")] = (),
+    seed: Annotated[int | None, Option(least=0, most=LARGEST_SEED, default="drawn, and recorded")] = None,
+    resume: Annotated[bool, Option()] = False,
+    force: Annotated[bool, Option()] = False,
     progress: Report | None = None,
-    **reading: Any,
+    **reading: Unpack[Reading],
 ) -> "Calibration":
     """Simulation-based calibration: whether intervals of this description hold the truth as often as they claim.
 
     True values are drawn from the priors, tables of the same shape are simulated with them and fitted, and the truth is
     ranked among the draws. Priors that look at the data (the level of a curve) are those of the data set as measured.
+    Every replication is written as it ends, if `output` says where. With more than one worker, the calling program must
+    guard its start with `if __name__ == "__main__"`.
 
     Args:
         dataset: See `bowdenfit.read`; its keywords are taken too.
         replications: How many.
-        workers: How many processes; one a core if omitted. With more than one, the calling program must guard its start
-            with `if __name__ == "__main__"`.
-        output: Results folder; every replication is written as it ends. Nothing is written if omitted.
-        assume: Settings of the description that the fits change, such as "prior.tau.fixed=0.001", while tables are simulated
-            without: what a wrong assumption costs.
-        seed: Seed of everything random; drawn and recorded if omitted.
-        resume: Go on with an interrupted calibration in `output`, or add replications.
-        force: Replace a calibration in `output`.
+        workers: Processes.
+        output: Results folder.
+        assume: Fit with this setting changed, while simulating without: what a wrong assumption costs; may be repeated.
+        seed: Seed of everything random.
+        resume: Go on with an interrupted calibration, or add replications.
+        force: Replace an earlier calibration in the results folder.
         progress: Called after every replication with how many are done, and of how many.
         reading: Keywords of `bowdenfit.read`.
 
     Raises:
         BowdenfitError: What is wrong, in a sentence; a data set that cannot be replicated is refused.
     """
-    from bowdenfit.verbs import read
+    from bowdenfit.dataset import Dataset
+    from bowdenfit.errors import UsageError
+    from bowdenfit.questions.calibrate.processes import replicated
 
     folder = Path(output) if output is not None else None
     if resume and folder is None:
         raise UsageError("--resume needs the results folder of a calibration; name it with --output.")
     stated = read(dataset, **reading)
-    settings = {**reading, "settings": [*reading.get("settings", ()), *assume]}
     if assume and isinstance(dataset, Dataset):
         raise UsageError("settings can be assumed of a data set in a folder only; name the folder.")
-    assumed = read(dataset, **settings) if assume else stated
+    changes: Reading = {**reading, "settings": [*reading.get("settings", ()), *assume]}
+    assumed = read(dataset, **changes) if assume else stated
     seed = _seed(folder, seed, resume)
     import jax
 
@@ -89,8 +93,6 @@ def calibrate(
 
 def _seed(folder: Path | None, seed: int | None, resume: bool) -> int:
     """The seed: as stated, else that of the calibration to go on with, else a new one."""
-    from bowdenfit.run.storing import LARGEST_SEED
-
     if seed is not None:
         return seed
     if folder is None or not resume:
@@ -106,6 +108,7 @@ def checked(plan: "Plan") -> dict[str, str]:
     Raises:
         DescriptionError, DatasetError, UsageError: It cannot; says why.
     """
+    from bowdenfit.errors import DescriptionError, UsageError
     from bowdenfit.kinds.drawn_readings import detection_limit
     from bowdenfit.kinds.recordings.simulation import refuse_saturated
     from bowdenfit.model import build_model
@@ -130,7 +133,7 @@ def checked(plan: "Plan") -> dict[str, str]:
     return symbols | {OPTIMAL_LENGTH: r"$l^*$", OPTIMAL_EFFICIENCY: r"$\eta^*$"}
 
 
-def _kinds(dataset: Dataset) -> list[str]:
+def _kinds(dataset: "Dataset") -> list[str]:
     tables = dataset.measurements
     return [name for name, table in vars(tables).items() if name != "remarks" and table is not None]
 
@@ -157,3 +160,33 @@ def _write(found: "Calibration", folder: Path) -> None:
     if found.quantities:
         draw_calibration(found, folder / FIGURES)
     write_text(folder / CALIBRATION, json.dumps(found.page(), indent=1) + "\n")
+
+
+def _reply(found: "Calibration", asked: dict[str, Any]) -> Reply:
+    from bowdenfit.questions.calibrate.words import calibration_text
+
+    exit_code = 0 if found.is_calibrated else NOT_CALIBRATED
+    return Reply(calibration_text(found), found.page, (f"Wrote {asked['output']}.",), exit_code)
+
+
+def _show(bar: Any, done: int, total: int) -> None:
+    bar.total, bar.n = total, done
+    bar.refresh()
+
+
+VERB = Verb(
+    calibrate,
+    _reply,
+    "Show that a description's intervals hold the truth as often as they say.",
+    """Simulation-based calibration of DATASET: of this very description, for tables like these.
+
+    Again and again, true values are drawn from the priors, tables like the measured ones (the same lengths, runs, loads and
+    wrap angles) are simulated with them and fitted. Then intervals must hold the truth as often as they claim, for every
+    parameter, the optimal length and the efficiency there. What was measured enters only by the design.
+
+    Takes some seconds a replication and core. Exit code 3: not calibrated.
+    """,
+    json="Print calibration.json instead of the summary for people.",
+    results="fits/calibration",
+    watch=Watch(REPLICATIONS, "what is done is kept in", {"unit": "replication", "desc": "calibrating"}, _show),
+)

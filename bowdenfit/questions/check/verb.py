@@ -1,17 +1,80 @@
-"""Looking at the priors of a data set before it is fitted."""
+"""Reading a data set and saying what was understood of it, and looking at its priors, before anything is fitted."""
 
+from collections.abc import Sequence
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Annotated, Unpack
 
-from bowdenfit.dataset import Dataset
+from bowdenfit.reading import Reading, read
+from bowdenfit.verb import Argument, Option, Reply, Verb
 
 if TYPE_CHECKING:
+    from bowdenfit.dataset import Dataset
+    from bowdenfit.files.channels import ChannelFile
     from bowdenfit.questions.check.figure_data import PriorPredictive
+    from bowdenfit.recordings.recording import Recordings
 
 FIGURE = "prior_predictive"
 
 
-def show_priors(dataset: Dataset, folder: str | Path, seed: int = 0) -> "PriorPredictive":
+def check(dataset: "str | Path | Dataset", **reading: Unpack[Reading]) -> "Dataset":
+    """Read a data set, and build the model where only that can tell whether the description makes sense.
+
+    Loading JAX takes longer than everything else here, so the model is built only for names and priors that the
+    description alone cannot judge.
+
+    Args:
+        dataset: See `bowdenfit.read`; its keywords are taken too.
+        reading: Keywords of `bowdenfit.read`.
+
+    Raises:
+        DescriptionError, DatasetError: What is wrong, in a sentence.
+    """
+    data = read(dataset, **reading)
+    description = data.description
+    usual = all(c.law == "capstan" and c.wrap_angle.curve in {None, "gaussian"} for c in description.contact)
+    if (
+        not usual
+        or description.friction_model != "capstan"
+        or data.measurements.recordings
+        or description.prior
+        or any(setting.prior for setting in description.friction.values())
+    ):
+        import jax
+
+        from bowdenfit.model import build_model
+
+        with jax.enable_x64(True):
+            build_model(data)
+    return data
+
+
+def channels_of(path: str | Path, channels: Sequence[str] = ()) -> "tuple[ChannelFile, Recordings | None, str]":
+    """The channels of a recording's file, and the recording that they make.
+
+    Args:
+        path: A file.
+        channels: Which channel is what, such as "input_force=ai0:lbf".
+
+    Returns:
+        The channels; the recording, prepared and cut into strokes, None where it cannot be; and why not, in a sentence.
+
+    Raises:
+        DatasetError: The file cannot be read.
+    """
+    from bowdenfit.dataset import single_file_dataset
+    from bowdenfit.errors import DatasetError
+    from bowdenfit.files import read_channels
+    from bowdenfit.recordings.forces import parsed_channels
+
+    file = read_channels(Path(path))
+    try:
+        data = single_file_dataset(Path(path), (0.0, "deg"), (), parsed_channels(channels), kind="recordings")
+    except DatasetError as error:
+        return file, None, str(error)
+    return file, data.measurements.recordings, ""
+
+
+def show_priors(dataset: "Dataset", folder: str | Path, seed: int = 0) -> "PriorPredictive":
     """Draw what the priors alone hold possible beside what was measured, PNG and SVG; fit nothing.
 
     Args:
@@ -39,3 +102,46 @@ def show_priors(dataset: Dataset, folder: str | Path, seed: int = 0) -> "PriorPr
         for ending in FORMATS:
             write(figure, place / f"{FIGURE}.{ending}")
     return found
+
+
+def describe(
+    dataset: Annotated[Path, Argument("DATASET")],
+    *,
+    prior_predictive: Annotated[Path | None, Option(metavar="FOLDER")] = None,
+    **reading: Unpack[Reading],
+) -> Reply:
+    """What was understood of a data set; of a file alone, its channels.
+
+    Args:
+        dataset: Folder, description or file.
+        prior_predictive: Also draw into FOLDER what the priors alone hold possible beside what was measured, and say which
+            readings lie outside; a wrong unit shows here before anything is fitted.
+        reading: Keywords of `bowdenfit.read`.
+    """
+    from bowdenfit.questions.check.data_set_words import check_text
+
+    if dataset.is_file() and dataset.suffix.lower() != ".toml" and not reading.get("wrap_angle"):
+        from bowdenfit.questions.check.channels_words import channels_text
+
+        return Reply(channels_text(*channels_of(dataset, reading.get("channels", ()))))
+    found = check(dataset, **reading)
+    text = check_text(found)
+    if prior_predictive is not None:
+        from bowdenfit.questions.check.prior_words import prior_predictive_text
+
+        text += prior_predictive_text(show_priors(found, prior_predictive)) + f"Wrote the figure to {prior_predictive}.\n"
+    return Reply(text)
+
+
+VERB = Verb(
+    describe,
+    lambda reply, _: reply,
+    "Say what was understood of a data set and what is wrong.",
+    """Read everything in DATASET, say what was understood and what is wrong; fit nothing.
+
+    DATASET is a folder with cable.toml and tables, or one table or recording with --wrap-angle. Of a file alone, its
+    channels are listed: name, unit, sampling rate, length and range, and what it is as a recording.
+    """,
+    name="check",
+    json="",
+)

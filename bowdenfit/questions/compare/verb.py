@@ -1,15 +1,52 @@
-"""A comparison of fits to its folder: as plain data, for people, and as a figure."""
+"""Comparing fits, and the comparison in its folder: as plain data, for people, and as a figure."""
 
-import json
+from collections.abc import Callable, Mapping
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Annotated, Any
 
 from bowdenfit.errors import StoreError
+from bowdenfit.questions.writing import write_answer
+from bowdenfit.verb import Argument, Option, Output, Reply, Verb
 
 if TYPE_CHECKING:
     from bowdenfit.questions.compare.answer import Comparison
+    from bowdenfit.results.record import Record
 
-PAGE, TEXT, FIGURE = "comparison.json", "comparison.txt", "comparison"
+NAME = "comparison"
+
+
+def compare(
+    fits: Annotated["Mapping[str, Record]", Argument("RESULTS", many=True, results=True)],
+    *,
+    output: Annotated[Output, Option(("-o",))] = None,
+    force: Annotated[bool, Option()] = False,
+    report: Callable[[str], None] | None = None,
+) -> "Comparison":
+    """Compare fits of the same measurements.
+
+    Args:
+        fits: By name.
+        output: Folder for comparison.json, comparison.txt and the figure; nothing is written without one.
+        force: Replace a comparison in --output.
+        report: Called with a sentence before each reading that takes longer, because it would move the posterior.
+
+    Raises:
+        UsageError: There are fewer than two, one has no posterior, or they are not of the same readings.
+        StoreError: `output` holds something already.
+    """
+    import jax
+
+    from bowdenfit.questions.compare.answer import compare as compared
+    from bowdenfit.questions.compare.figure import comparison
+    from bowdenfit.questions.compare.words import comparison_text
+
+    if output is not None:
+        refuse_to_replace(Path(output), force)
+    with jax.enable_x64(True):
+        found = compared(fits, report)
+    if output is not None:
+        write_answer(output, NAME, found.page(), comparison_text(found), lambda: comparison(found))
+    return found
 
 
 def refuse_to_replace(folder: Path, force: bool) -> None:
@@ -24,7 +61,7 @@ def refuse_to_replace(folder: Path, force: bool) -> None:
     """
     if not folder.exists() or (folder.is_dir() and not any(folder.iterdir())):
         return
-    if not (folder / PAGE).exists():
+    if not (folder / f"{NAME}.json").exists():
         raise StoreError(f"{folder} exists and holds no comparison; name another with --output.")
     if not force:
         raise StoreError(
@@ -32,27 +69,22 @@ def refuse_to_replace(folder: Path, force: bool) -> None:
         )
 
 
-def write_comparison(found: "Comparison", folder: Path) -> list[Path]:
-    """Write comparison.txt, the figure as PNG and SVG, and, last, comparison.json.
-
-    Args:
-        found: The comparison.
-        folder: Where to; made if missing.
-
-    Returns:
-        The files.
-
-    Raises:
-        StoreError: The folder cannot be written.
-    """
-    from bowdenfit.plots.write import FORMATS, write
-    from bowdenfit.questions.compare.figure import comparison
+def _reply(found: "Comparison", asked: dict[str, Any]) -> Reply:
     from bowdenfit.questions.compare.words import comparison_text
-    from bowdenfit.results.folder import made, write_text
 
-    with made(folder):
-        write_text(folder / TEXT, comparison_text(found))
-        figure = comparison(found)
-        figures = [write(figure, folder / f"{FIGURE}.{ending}") for ending in FORMATS]
-        write_text(folder / PAGE, json.dumps(found.page(), indent=1) + "\n")
-    return [folder / TEXT, *figures, folder / PAGE]
+    return Reply(comparison_text(found), found.page, (f"Wrote {asked['output']}.",) if asked["output"] else ())
+
+
+VERB = Verb(
+    compare,
+    _reply,
+    "Compare fits of the same measurements.",
+    """Compare fits of the same measurements: which model predicts readings left out best, and what changes between them.
+
+    RESULTS are results folders, such as of the same data set fitted with and without --friction rate-dependent; then the
+    comparison says whether efficiency depends on speed. Likewise --geometry published against the continuous one, --noise
+    student, or --set prior.tau.fixed=0 for a cable whose mountings are all alike.
+
+    Readings that would move the posterior take longer: it is fitted again without them.
+    """,
+)

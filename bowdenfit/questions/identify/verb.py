@@ -3,25 +3,33 @@
 import tomllib
 from dataclasses import replace
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Annotated, Any, Unpack
 
-from bowdenfit.dataset import DESCRIPTION_FILE, Dataset
-from bowdenfit.errors import UsageError
-from bowdenfit.verbs import load, read
+from bowdenfit.questions.writing import files_of, write_answer
+from bowdenfit.reading import Reading, read
+from bowdenfit.verb import Argument, Option, Output, Reply, Verb
 
 if TYPE_CHECKING:
+    from bowdenfit.dataset import Dataset
     from bowdenfit.questions.identify.answer import Identifiability
     from bowdenfit.results.record import Record
 
+NAME = "identifiability"
 _REACH, _PINS = 4.0, 21  # standard deviations on both sides that profiles cover, and values in them
 
 
-def identify(source: "str | Path | Dataset | Record", **reading: Any) -> "Identifiability":
+def identify(
+    source: Annotated["str | Path | Dataset | Record", Argument("SOURCE")],
+    *,
+    output: Annotated[Output, Option(("-o",))] = None,
+    **reading: Unpack[Reading],
+) -> "Identifiability":
     """What measurements determine of a cable's parameters, and what rests on the priors.
 
     Args:
         source: A fit or its results folder; a data set (fitted by least squares only); or a plan, a cable.toml with
             [design] (and [truth], where not given at the priors' medians), before anything is measured.
+        output: Folder for identifiability.json, .txt and figures.
         reading: Keywords of `bowdenfit.read`, for a data set.
 
     Raises:
@@ -29,18 +37,28 @@ def identify(source: "str | Path | Dataset | Record", **reading: Any) -> "Identi
     """
     import jax
 
+    with jax.enable_x64(True):
+        found = _identify(source, reading)
+    if output is not None:
+        _write(found, output)
+    return found
+
+
+def _identify(source: "str | Path | Dataset | Record", reading: Reading) -> "Identifiability":
+    from bowdenfit.dataset import Dataset
+    from bowdenfit.errors import UsageError
     from bowdenfit.results.record import Record
+    from bowdenfit.results.store import load
 
     if isinstance(source, str | Path) and (Path(source) / "fit.json").exists():
-        source = load(source)
-    with jax.enable_x64(True):
-        if isinstance(source, Record):
-            return _of_fit(source)
-        if isinstance(source, Dataset) or not _is_plan(Path(source)):
-            return _of_tables(read(source, **reading))
-        if any(reading.values()):
-            raise UsageError("a plan is judged as it stands; change the file instead of naming options.")
-        return _of_plan(Path(source))
+        source = load(Path(source))
+    if isinstance(source, Record):
+        return _of_fit(source)
+    if isinstance(source, Dataset) or not _is_plan(Path(source)):
+        return _of_tables(read(source, **reading))
+    if any(reading.values()):
+        raise UsageError("a plan is judged as it stands; change the file instead of naming options.")
+    return _of_plan(Path(source))
 
 
 def _is_plan(path: Path) -> bool:
@@ -76,7 +94,8 @@ def _profiles(posterior: Any, objective: Any, best: Any) -> tuple[Any, ...]:
     return tuple(profile(posterior, objective, space.free[i].name, best.z, z=best.z[i] + sd[i] * steps) for i in which)
 
 
-def _of_tables(data: Dataset) -> "Identifiability":
+def _of_tables(data: "Dataset") -> "Identifiability":
+    from bowdenfit.dataset import DESCRIPTION_FILE
     from bowdenfit.inference.least_squares import make_objective, maximum_posterior
     from bowdenfit.inference.log_density import LogDensity
     from bowdenfit.model import build_model
@@ -93,6 +112,7 @@ def _of_plan(path: Path) -> "Identifiability":
     import jax
     import numpy as np
 
+    from bowdenfit.dataset import Dataset
     from bowdenfit.inference.identifiability import information_at
     from bowdenfit.inference.log_density import LogDensity
     from bowdenfit.model import build_model
@@ -113,30 +133,28 @@ def _of_plan(path: Path) -> "Identifiability":
     return of_maximum(posterior.model, at, basis, False)
 
 
-def write(found: "Identifiability", folder: Path) -> list[Path]:
-    """Write identifiability.json, identifiability.txt and the figure.
-
-    Args:
-        found: What is known.
-        folder: Where to; made if missing. Earlier files of these names are replaced.
-
-    Returns:
-        The files written.
-
-    Raises:
-        StoreError: The folder cannot be written.
-    """
-    import json
-
-    from bowdenfit.plots.write import FORMATS
-    from bowdenfit.plots.write import write as write_figure
+def _write(found: "Identifiability", folder: str | Path) -> None:
     from bowdenfit.questions.identify.figure import identifiability
     from bowdenfit.questions.identify.words import identifiability_text
-    from bowdenfit.results.folder import made, write_text
 
-    with made(folder):
-        write_text(folder / "identifiability.json", json.dumps(found.page(), indent=1) + "\n")
-        write_text(folder / "identifiability.txt", identifiability_text(found))
-        figure = identifiability(found.groups, found.profiles)
-        drawn = [write_figure(figure, folder / f"identifiability.{ending}") for ending in FORMATS]
-    return [folder / "identifiability.json", folder / "identifiability.txt", *drawn]
+    text = identifiability_text(found)
+    write_answer(folder, NAME, found.page(), text, lambda: identifiability(found.groups, found.profiles))
+
+
+def _reply(found: "Identifiability", asked: dict[str, Any]) -> Reply:
+    from bowdenfit.questions.identify.words import identifiability_text
+
+    notes = tuple(f"Wrote {path}." for path in files_of(asked["output"], NAME)) if asked["output"] else ()
+    return Reply(identifiability_text(found), found.page, notes)
+
+
+VERB = Verb(
+    identify,
+    _reply,
+    "Which coefficients the measurements determine, and which rest on the prior.",
+    """Say which friction coefficients, or which sums of them, SOURCE determines and how well, and which rest on the prior.
+
+    SOURCE is a plan, before anything is measured (a cable.toml with [design], the lengths and forces that you intend to
+    measure at, such as datasets/synthetic-bench/bench.toml); a data set; or the results folder of a fit.
+    """,
+)

@@ -1,67 +1,88 @@
-"""What to measure next, for the command line and for notebooks."""
+"""Asking what to measure next."""
 
 from collections.abc import Mapping, Sequence
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Annotated, Any
+
+from bowdenfit.questions.writing import files_of, write_answer
+from bowdenfit.verb import Argument, Option, Output, Reply, Verb
 
 if TYPE_CHECKING:
     from bowdenfit.questions.next.answer import NextMeasurement
     from bowdenfit.results.record import Record
 
-JSON, TEXT, FIGURE = "next_measurement.json", "next_measurement.txt", "next_measurement"
+NAME = "next_measurement"
 
 
 def next_measurement(
-    found: "Record | str | Path",
-    answer: str | None = None,
-    candidates: Sequence[str] = (),
-    costs: Mapping[str, float] | None = None,
+    found: Annotated["Record | str | Path", Argument("RESULTS", results=True)],
+    answer: Annotated[
+        str | None,
+        Option(("--for",), metavar="ANSWER", default="optimal-length; without a route the friction coefficient"),
+    ] = None,
+    candidates: Annotated[
+        Sequence[str],
+        Option(("--candidate",), metavar="KIND@WHERE", default="all that the data set's tables can hold"),
+    ] = (),
+    costs: Annotated[Mapping[str, float] | None, Option(("--cost",), "angle=0.5", "KIND=NUMBER")] = None,
+    *,
+    top: Annotated[int, Option(least=1)] = 10,
+    output: Annotated[Output, Option(("-o",))] = None,
 ) -> "NextMeasurement":
     """Rank what could be measured next by how far it would narrow an answer, on average.
 
     Args:
         found: The fit, or its results folder.
-        answer: "optimal-length", "optimal-efficiency", "efficiency@470" or a parameter; the optimal length if omitted, or
-            without a route the friction coefficient.
-        candidates: Such as "angle@450" or "stretch@90deg,50N"; whatever the data set's tables can hold if omitted.
-        costs: Cost of a measurement of each kind; then candidates are ranked by what they do for their cost.
+        answer: What is to be known better: optimal-length, optimal-efficiency, efficiency@470, or a parameter such as mu1.
+        candidates: A measurement that you could make, such as angle@450, force@470, efficiency@470, stretch@90deg,50N,
+            preload@90deg or loop@90deg,30N; may be repeated.
+        costs: What a measurement of a kind costs, in any unit; then candidates are ranked by what they do for their cost;
+            may be repeated.
+        top: How many candidates to show.
+        output: Folder for the ranking and its figure.
 
     Raises:
         UsageError: The fit has no posterior, or the answer, a candidate or a cost makes no sense.
-        StoreError: The results folder is missing or damaged.
+        StoreError: The results folder is missing or damaged, or `output` cannot be written.
     """
-    from bowdenfit.questions.next.ranking import next_measurement as ranked
-    from bowdenfit.verbs import load
-
-    fit = load(found) if isinstance(found, str | Path) else found
-    return ranked(fit, answer, candidates, costs)
-
-
-def write(found: "NextMeasurement", folder: str | Path, top: int) -> list[Path]:
-    """Write the ranking as JSON and text, and its figure.
-
-    Args:
-        found: The ranking.
-        folder: Where to; made if missing.
-        top: How many candidates the text shows.
-
-    Returns:
-        The files written.
-
-    Raises:
-        StoreError: The folder cannot be written.
-    """
-    import json
-
-    from bowdenfit.plots.write import FORMATS
-    from bowdenfit.plots.write import write as write_figure
     from bowdenfit.questions.next.figure import next_measurement as drawn
+    from bowdenfit.questions.next.ranking import next_measurement as ranked
     from bowdenfit.questions.next.words import next_measurement_text
-    from bowdenfit.results.folder import made, write_text
+    from bowdenfit.results.store import load
 
-    with made(Path(folder)) as place:
-        write_text(place / JSON, json.dumps(found.page(), indent=1) + "\n")
-        write_text(place / TEXT, next_measurement_text(found, top))
-        figure = drawn(found)
-        figures = [write_figure(figure, place / f"{FIGURE}.{ending}") for ending in FORMATS]
-    return [place / JSON, place / TEXT, *figures]
+    fit = load(Path(found)) if isinstance(found, str | Path) else found
+    ranking = ranked(fit, answer, candidates, costs)
+    if output is not None:
+        text = next_measurement_text(ranking, top)
+        write_answer(output, NAME, ranking.page(), text, lambda: drawn(ranking))
+    return ranking
+
+
+def _reply(found: "NextMeasurement", asked: dict[str, Any]) -> Reply:
+    from bowdenfit.questions.next.words import next_measurement_text
+
+    notes = tuple(f"Wrote {path}." for path in files_of(asked["output"], NAME)) if asked["output"] else ()
+    return Reply(next_measurement_text(found, asked["top"]), found.page, notes)
+
+
+VERB = Verb(
+    next_measurement,
+    _reply,
+    "What to measure next.",
+    """What to measure next: candidates ranked by how far each would narrow the answer, on average over what it may read.
+
+    \b
+    KIND        a reading of
+    angle       the wrap angles of all curved contacts at a length
+    force       forces at both ends, a run like those made so far, mounted anew
+    efficiency  the efficiency at a length, mounted anew
+    stretch     the rope's stretch at a wrap angle and load
+    preload     the preload at a wrap angle
+    loop        the output force of a pull-pull loop at a wrap angle and input force
+
+    A number without a unit is a value of the route, such as the cable length.
+    """,
+    name="next",
+    json="Print all candidates as JSON.",
+    warns=True,
+)

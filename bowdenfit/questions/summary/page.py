@@ -18,6 +18,7 @@ from bowdenfit.questions.identify.contradiction import agreement_page
 from bowdenfit.questions.recorded.preparation_page import accounts
 from bowdenfit.questions.recorded.rate import rate_effect
 from bowdenfit.questions.summary.verdict import verdict
+from bowdenfit.results.length import OptimalLength
 from bowdenfit.results.plain import plain
 from bowdenfit.results.record import Draws, Record
 
@@ -65,7 +66,7 @@ def summarize(fit: Record) -> dict[str, Any]:
         if fit.posterior.agreement is not None:
             page["samplers"] = fit.posterior.agreement.page()
         if fit.dataset.description.route is not None:
-            page["optimal"] = _optimal(fit)
+            page["optimal"] = optimal_page(fit.optimal_length())
     everything: dict[str, Any] = plain(page)
     return everything
 
@@ -156,8 +157,8 @@ def measured_against_predicted(fit: Record) -> list[dict[str, Any]]:
     return rows
 
 
-def _optimal(fit: Record) -> dict[str, Any]:
-    answer = fit.optimal_length()
+def optimal_page(answer: OptimalLength) -> dict[str, Any]:
+    """The design answer as plain data."""
     return {
         "route": answer.variable,
         "unit": answer.unit,

@@ -1,0 +1,73 @@
+"""A verb as a command: its options from the keywords of its function, its output from the reply."""
+
+import inspect
+import json
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import click
+
+from bowdenfit.cli.keywords import Keyword, keywords_of
+from bowdenfit.cli.progress import watched
+from bowdenfit.verb import Argument, Verb
+
+if TYPE_CHECKING:
+    from bowdenfit.front_desk import Fit
+
+
+def command(verb: Verb) -> click.Command:
+    """The command of a verb.
+
+    Args:
+        verb: What it does; see `bowdenfit.verb`.
+    """
+    keywords = keywords_of(verb.function)
+    parameters = [keyword.parameter() for keyword in keywords]
+    if verb.formats:
+        shape = click.Choice(verb.formats)
+        parameters.append(click.Option(["--format", "form"], type=shape, default=verb.formats[0], show_default=True))
+    elif verb.json:
+        parameters.append(click.Option(["--json", "as_json"], is_flag=True, help=verb.json))
+
+    def run(as_json: bool = False, form: str = "", **given: Any) -> int:
+        return _run(verb, keywords, given, as_json or form == "json")
+
+    name = verb.name or verb.function.__name__
+    return click.Command(name, callback=run, params=parameters, help=inspect.cleandoc(verb.text), short_help=verb.short)
+
+
+def _run(verb: Verb, keywords: tuple[Keyword, ...], given: dict[str, Any], as_json: bool) -> int:
+    """Ask, and print the reply."""
+    asked = {keyword.name: keyword.value(given[keyword.name]) for keyword in keywords}
+    found = next((k.name for k in keywords if isinstance(k.mark, Argument) and k.mark.results), None)
+    if found is not None:
+        asked[found] = _loaded(given[found])
+    if verb.results and asked["output"] is None:
+        asked["output"] = Path(verb.results) / _name_of(Path(asked["dataset"]))
+    if verb.watch is None:
+        answer = verb.function(**asked, **verb.behind)
+    else:
+        with watched(asked["output"], verb.watch) as progress:
+            answer = verb.function(**asked, **verb.behind, progress=progress)
+    reply = verb.reply(answer, asked)
+    click.echo(json.dumps(reply.page(), indent=1) + "\n" if as_json and reply.page else reply.text, nl=False)
+    for note in reply.notes:
+        click.echo(note, err=True)
+    if verb.warns and found is not None and (troubles := asked[found].verdict().troubles):
+        click.echo(f"Warning: this fit is {' and '.join(troubles)}; see bowdenfit summary {given[found]}.", err=True)
+    return reply.exit_code
+
+
+def _loaded(results: Path | tuple[Path, ...]) -> "Fit | dict[str, Fit]":
+    """The fit of a results folder; of several, by their own names, or by their paths where two have the same name."""
+    from bowdenfit.front_desk import load
+
+    if isinstance(results, Path):
+        return load(results)
+    names = [folder.name for folder in results]
+    return {folder.name if names.count(folder.name) == 1 else str(folder): load(folder) for folder in results}
+
+
+def _name_of(dataset: Path) -> str:
+    """What the results of a data set are called if nothing else is said."""
+    return dataset.stem if dataset.suffix else dataset.resolve().name

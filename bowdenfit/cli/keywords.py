@@ -1,0 +1,169 @@
+"""The keywords of a function as options and arguments of the command line."""
+
+import inspect
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from types import UnionType
+from typing import Annotated, Any, Literal, Union, get_args, get_origin, get_type_hints
+
+import click
+
+from bowdenfit.errors import UsageError
+from bowdenfit.verb import Argument, Option, Quantity
+
+
+@dataclass(frozen=True)
+class Keyword:
+    """One keyword of a verb's function.
+
+    Args:
+        name: Its name.
+        kind: Its type.
+        mark: How it is written on the command line.
+        default: What counts if it is not.
+        words: What the docstring says of it.
+    """
+
+    name: str
+    kind: Any
+    mark: Option | Argument
+    default: Any
+    words: str
+
+    def parameter(self) -> click.Parameter:
+        """The argument or option of click."""
+        if isinstance(self.mark, Argument):
+            kind = float if self._is(Sequence[float]) else click.Path(path_type=Path)
+            many, metavar = (-1, f"[{self.mark.name}]...") if self.mark.many else (1, self.mark.name)
+            return click.Argument([self.name], type=kind, nargs=many, metavar=metavar)
+        shown = self.default is not None and self.default != () and not self._is(bool)
+        default = f"  [default: {self.mark.default}]" if self.mark.default else ""
+        extra: dict[str, Any] = {"metavar": self.mark.metavar} if self.mark.metavar else {}
+        if self._is(bool):
+            extra["is_flag"] = True
+        return click.Option(
+            self._flags(self.mark),
+            type=self._type(self.mark),
+            default=None if self._is_many else self.default,
+            multiple=self._is_many,
+            required=self.mark.required,
+            help=self.words + default,
+            show_default=shown and not default,
+            **extra,
+        )
+
+    def value(self, given: Any) -> Any:
+        """What the function gets for what was written.
+
+        Raises:
+            UsageError: It cannot be read.
+        """
+        if isinstance(self.mark, Argument) or given is None:
+            return given
+        one = self._reader(self.mark)
+        if one is None:
+            return given
+        if self._is(Mapping[str, float]):
+            return dict(one(text) for text in given)
+        return [one(text) for text in given] if self._is_many else one(given)
+
+    def _reader(self, mark: Option) -> Callable[[str], Any] | None:
+        """What reads one value; None where click has done so."""
+        flag = self._flags(mark)[0]
+        if self._is(Quantity) or self._is(Sequence[Quantity]):
+            return lambda text: read_quantity(text, flag, mark.example)
+        if self._is(Mapping[str, float]):
+            return lambda text: read_named_number(text, flag, mark.example)
+        return None
+
+    def _is(self, *kinds: Any) -> bool:
+        stated = get_args(self.kind) if get_origin(self.kind) in {Union, UnionType} else (self.kind,)
+        return any(kind in stated for kind in kinds)
+
+    @property
+    def _is_many(self) -> bool:
+        return self._is(Sequence[str], Sequence[Quantity], Mapping[str, float])
+
+    def _flags(self, mark: Option) -> list[str]:
+        """Flags, the long one first, and the name that the value goes by."""
+        long = next((flag for flag in mark.flags if flag.startswith("--")), f"--{self.name.replace('_', '-')}")
+        both = f"{long}/--no-{long[2:]}" if self._is(bool) and self.default else long
+        return [both, *(flag for flag in mark.flags if flag != long), self.name]
+
+    def _type(self, mark: Option) -> Any:
+        for kind in get_args(self.kind) if get_origin(self.kind) in {Union, UnionType} else (self.kind,):
+            if get_origin(kind) is Literal:
+                return click.Choice(get_args(kind))
+            if kind is int:
+                return click.IntRange(mark.least, mark.most)
+        return bool if self._is(bool) else click.Path(path_type=Path) if self._is(Path) else str
+
+
+def keywords_of(function: Callable[..., Any]) -> tuple[Keyword, ...]:
+    """The keywords of a function that the command line has: arguments first, then what changes the reading of a data set.
+
+    Args:
+        function: Of a verb; its docstring says what each is for.
+    """
+    words, own, shared = _words(function), [], list[Keyword]()
+    for name, parameter in inspect.signature(function).parameters.items():
+        if parameter.kind is inspect.Parameter.VAR_KEYWORD:
+            (record,) = get_args(parameter.annotation)
+            hints, about = get_type_hints(record, include_extras=True), _words(record)
+            shared = [_keyword(key, hint, () if "Sequence" in str(hint) else None, about) for key, hint in hints.items()]
+        elif get_origin(parameter.annotation) is Annotated:
+            default = None if parameter.default is inspect.Parameter.empty else parameter.default
+            own.append(_keyword(name, parameter.annotation, default, words))
+    arguments = [keyword for keyword in own if isinstance(keyword.mark, Argument)]
+    return (*arguments, *shared, *(keyword for keyword in own if keyword not in arguments))
+
+
+def _keyword(name: str, annotation: Any, default: Any, words: Mapping[str, str]) -> Keyword:
+    return Keyword(name, annotation.__origin__, annotation.__metadata__[0], default, words.get(name, ""))
+
+
+def _words(documented: Any) -> dict[str, str]:
+    """What a docstring says of each argument."""
+    _, _, text = inspect.cleandoc(documented.__doc__ or "").partition("Args:\n")
+    words: dict[str, str] = {}
+    name = ""
+    for line in text.splitlines():
+        if not line.startswith("    "):
+            break
+        if not line.startswith("     "):
+            name, _, line = line.strip().partition(": ")
+            words[name] = line
+        else:
+            words[name] += f" {line.strip()}"
+    return words
+
+
+def read_quantity(text: str, option: str, example: str) -> Quantity:
+    """A number with its unit, such as 180deg or "100 N".
+
+    Args:
+        text: As written.
+        option: Of which.
+        example: How it is written right.
+
+    Raises:
+        UsageError: It is something else.
+    """
+    digits = len(text) - len(text.lstrip("+-.0123456789"))
+    try:
+        value, unit = float(text[:digits]), text[digits:].strip()
+    except ValueError:
+        value, unit = 0.0, ""
+    if not unit:
+        raise UsageError(f"{option} {text!r} is not a number with its unit; write it as {example}.")
+    return value, unit
+
+
+def read_named_number(text: str, option: str, example: str) -> tuple[str, float]:
+    """Kind and number of an option such as angle=0.5."""
+    kind, _, number = text.partition("=")
+    try:
+        return kind.strip(), float(number)
+    except ValueError:
+        raise UsageError(f"{option} {text!r} is not a kind and a number; write it as {example}.") from None

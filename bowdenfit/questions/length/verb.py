@@ -1,0 +1,36 @@
+"""Asking which length is best."""
+
+from typing import TYPE_CHECKING, Annotated
+
+from bowdenfit.verb import Argument, Reply, Verb
+
+if TYPE_CHECKING:
+    from bowdenfit.results.length import OptimalLength
+    from bowdenfit.results.record import Record
+
+
+def length(found: Annotated["Record", Argument("RESULTS", results=True)]) -> "OptimalLength":
+    """The design answer: which length is best, how sure that is, and what the lengths that can be bought cost.
+
+    Args:
+        found: The fit.
+
+    Raises:
+        UsageError: The description has no route to vary, or there is no posterior.
+    """
+    return found.optimal_length()
+
+
+def _reply(answer: "OptimalLength", _: object) -> Reply:
+    from bowdenfit.questions.summary.page import optimal_page
+
+    return Reply(f"{answer}\n", lambda: optimal_page(answer))
+
+
+VERB = Verb(
+    length,
+    _reply,
+    "The design answer: which length is best.",
+    "The design answer: which length is best, how sure that is, and what the lengths that can be bought cost.",
+    warns=True,
+)

@@ -1,0 +1,106 @@
+"""Predicting what a cable does at lengths or wrap angles."""
+
+from collections.abc import Sequence
+from typing import TYPE_CHECKING, Annotated, Any, Literal
+
+from bowdenfit.verb import Argument, Option, Quantity, Reply, Stroke, Verb
+
+if TYPE_CHECKING:
+    from bowdenfit.results.record import Record
+
+Asked = Literal[
+    "efficiency", "output-force", "preload", "friction", "slack-load", "position", "stiffness", "preload-window"
+]
+AT_LENGTHS = ("efficiency", "output-force")  # all others are asked at wrap angles
+
+
+def predict(
+    found: Annotated["Record", Argument("RESULTS", results=True)],
+    lengths: Annotated[Sequence[float] | None, Argument("LENGTHS", many=True)] = None,
+    input_force: Annotated[Quantity | None, Option(metavar="FORCE", example="100N")] = None,
+    stroke: Annotated[Stroke, Option()] = "pull",
+    *,
+    quantity: Annotated[Asked | None, Option(default="efficiency, or output-force with --input-force")] = None,
+    wrap_angles: Annotated[Sequence[Quantity], Option(("--wrap-angle",), "90deg", "ANGLE")] = (),
+    preload: Annotated[Quantity | None, Option(metavar="FORCE", example="20N")] = None,
+    friction_limit: Annotated[Quantity | None, Option(metavar="TORQUE", example="50N*mm")] = None,
+) -> list[dict[str, Any]]:
+    """Efficiency, output force, or what stretch and preload do, with intervals; one row a route value or wrap angle.
+
+    Args:
+        found: The fit.
+        lengths: Route values; the description's choices if omitted.
+        input_force: Force at the motor side, such as 100N.
+        stroke: Direction of sliding.
+        quantity: What to predict.
+        wrap_angles: Predict at this wrap angle instead of a length, such as 90deg; may be repeated.
+        preload: Preload the cable with this instead of its own, such as 20N.
+        friction_limit: What may be felt in free motion, such as 50N*mm (or 5N without a pulley radius), for the preload
+            window.
+
+    Raises:
+        UsageError: There is nothing to predict at, no posterior, or the cable has not what is asked for.
+    """
+    import numpy as np
+
+    from bowdenfit.errors import UsageError
+    from bowdenfit.questions.predict.lengths import predicted_rows
+
+    route = found.dataset.description.route
+    if quantity is None:
+        quantity = "efficiency" if input_force is None else "output-force"
+    if wrap_angles or quantity not in AT_LENGTHS or (route is None and found.model.cable.is_loop):
+        from bowdenfit.questions.predict.bends import predicted_at_bends, question
+
+        if lengths:
+            raise UsageError("predict at lengths or at wrap angles, not at both; leave one of them out.")
+        found.draws()
+        asked = question(found, wrap_angles, input_force, preload, friction_limit, stroke)
+        return predicted_at_bends(found, quantity, asked)
+    if preload is not None or friction_limit is not None:
+        raise UsageError(
+            "--preload and --friction-limit belong to predictions at wrap angles; name some, as --wrap-angle 90deg."
+        )
+    if quantity == "efficiency" and input_force is not None:
+        raise UsageError(
+            "--quantity efficiency at lengths is that at the fit's own reference force; leave --input-force out."
+        )
+    if not lengths and route is not None and not route.choices:
+        raise UsageError("the description has no choices; name the lengths to predict at.")
+    wanted = np.asarray(lengths or (route.choices if route else [0.0]), dtype=float)
+    return predicted_rows(found, wanted, input_force, stroke)
+
+
+def _table(rows: list[dict[str, Any]]) -> str:
+    """Rows as CSV."""
+    return "\n".join([",".join(rows[0]), *(",".join(_cell(value) for value in row.values()) for row in rows)]) + "\n"
+
+
+def _cell(value: object) -> str:
+    if isinstance(value, float):
+        return f"{value:.6g}"
+    return f'"{value}"' if isinstance(value, str) else str(value).lower()
+
+
+VERB = Verb(
+    predict,
+    lambda rows, _: Reply(_table(rows), lambda: rows),
+    "Predict efficiency, forces, preload, position or stiffness.",
+    """Predict the efficiency, or the output force for an input force, at LENGTHS (default: the lengths that can be bought)
+    or at wrap angles; or what stretch and preload do at wrap angles.
+
+    \b
+    efficiency      output over input force
+    output-force    force at the load side
+    preload         tension at rest, and slack where there is none
+    friction        what moving the unloaded cable takes
+    slack-load      input force at which a loop's return side goes slack
+    position        error and lost motion at the load side, by stretch, slack and backlash
+    stiffness       seen at the load side, motor locked
+    preload-window  lowest preload without slack over these bends, highest for --friction-limit, and the best
+
+    The interval q05 to q95 is that of the cable's mean; mounting_q05 to mounting_q95 also holds the scatter from one
+    mounting of the cable to the next. Lengths outside the range of the curves are marked.
+    """,
+    formats=("csv", "json"),
+)

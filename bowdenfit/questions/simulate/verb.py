@@ -1,0 +1,84 @@
+"""Making a data set from known truth."""
+
+import secrets
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Any
+
+from bowdenfit.verb import LARGEST_SEED, Argument, Option, Output, Reply, Verb
+
+if TYPE_CHECKING:
+    from bowdenfit.dataset import Dataset
+
+
+def simulate(
+    bench: Annotated[str | Path, Argument("BENCH")],
+    *,
+    output: Annotated[Output, Option(("-o",), required=True)] = None,
+    seed: Annotated[int | None, Option(least=0, most=LARGEST_SEED, default="drawn, and recorded")] = None,
+    noise: Annotated[bool, Option()] = True,
+    recordings: Annotated[bool, Option()] = False,
+) -> "Dataset":
+    """Make a data set from known truth. Only recordings need an `output`; tables without one are not written.
+
+    Args:
+        bench: A cable.toml with [truth] and [design], or with [truth] and [recordings].
+        output: Folder for the tables, the truth and the seed; must not exist.
+        seed: Seed of everything random.
+        noise: Readings that scatter, or exactly as the model expects them.
+        recordings: Recordings, sample by sample, as a bench gives them; BENCH has [recordings].
+
+    Raises:
+        BowdenfitError: What is wrong, in a sentence.
+    """
+    import jax
+
+    from bowdenfit.errors import StoreError
+
+    seed = secrets.randbelow(LARGEST_SEED) if seed is None else seed
+    if output is not None and Path(output).exists() and any(p.name != Path(bench).name for p in Path(output).iterdir()):
+        raise StoreError(f"{output} exists already; name another folder with --output, nothing was written.")
+    if recordings:
+        return _simulated_recordings(Path(bench), output, seed, noise)
+    from bowdenfit.questions.simulate.tables import make, read_bench, write
+
+    plan = read_bench(Path(bench))
+    with jax.enable_x64(True):
+        dataset, truth = make(plan, jax.random.key(seed), noise)
+    if output is not None:
+        write(plan, dataset, truth, Path(output), seed)
+    return dataset
+
+
+def _simulated_recordings(bench: Path, output: str | Path | None, seed: int, noise: bool) -> "Dataset":
+    import jax
+
+    from bowdenfit.dataset import load_dataset
+    from bowdenfit.errors import UsageError
+    from bowdenfit.questions.simulate.recordings import make_recordings, read_recordings_plan, write_recordings
+
+    if output is None:
+        raise UsageError("simulated recordings are files; name a folder for them with output.")
+    plan = read_recordings_plan(bench)
+    with jax.enable_x64(True):
+        made = make_recordings(plan, seed, noise)
+    write_recordings(made, Path(output))
+    return load_dataset(Path(output))
+
+
+def _reply(_: "Dataset", asked: dict[str, Any]) -> Reply:
+    return Reply(f"Wrote {asked['output']}. Next: bowdenfit fit {asked['output']}\n")
+
+
+VERB = Verb(
+    simulate,
+    _reply,
+    "Make a data set from known truth.",
+    """Make a data set from known truth.
+
+    BENCH is a cable.toml with two more tables: [truth] with the value of each parameter (what is missing is drawn from its
+    prior), and [design] with the lengths and forces to measure at; datasets/synthetic-bench/bench.toml is one. With
+    --recordings it has [recordings] in place of [design]: what the motor does, what the bench is like, and what its load
+    cells get wrong; datasets/synthetic-recordings/bench.toml is one. The truth and the seed are written beside the tables.
+    """,
+    json="",
+)

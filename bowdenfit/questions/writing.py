@@ -1,0 +1,47 @@
+"""Writing an answer to a folder: for people, as a figure, and for programs; in one way for all questions."""
+
+import json
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+PAGE, TEXT, FIGURES = "json", "txt", ("png", "svg")
+
+
+def files_of(folder: str | Path, name: str) -> list[Path]:
+    """The files of an answer.
+
+    Args:
+        folder: Where they are.
+        name: Of the answer.
+    """
+    return [Path(folder) / f"{name}.{ending}" for ending in (PAGE, TEXT, *FIGURES)]
+
+
+def write_answer(folder: str | Path, name: str, page: Any, text: str, draw: Callable[[], Any]) -> list[Path]:
+    """Write an answer as text, as a figure and, last, as JSON; a folder that has the JSON has everything.
+
+    Args:
+        folder: Where to; made if missing. Earlier files of these names are replaced.
+        name: Of the files.
+        page: Plain data.
+        text: For people.
+        draw: Gives the figure.
+
+    Returns:
+        The files written.
+
+    Raises:
+        StoreError: The folder cannot be written.
+    """
+    from bowdenfit.plots.write import write
+    from bowdenfit.results.folder import made, write_text
+
+    page_file, text_file, *figures = files = files_of(folder, name)
+    with made(Path(folder)):
+        write_text(text_file, text)
+        figure = draw()
+        for path in figures:
+            write(figure, path)
+        write_text(page_file, json.dumps(page, indent=1) + "\n")
+    return files

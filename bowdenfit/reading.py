@@ -1,0 +1,74 @@
+"""Reading a data set with changes to its description: the keywords that every verb on measurements takes."""
+
+from collections.abc import Sequence
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Literal, TypedDict, Unpack
+
+from bowdenfit.verb import Option, Quantity
+
+if TYPE_CHECKING:
+    from bowdenfit.dataset import Dataset
+
+
+class Reading(TypedDict, total=False):
+    """Changes to the description of a data set.
+
+    Args:
+        settings: Change a setting of cable.toml, such as friction.mu1.fixed=0.1; may be repeated.
+        channels: Which channel of a recording is input_force, output_force, velocity or time, such as input_force=ai0:lbf
+            or time=1000Hz; may be repeated.
+        noise: How readings scatter: normally, or as a Student-t, with which a few bad readings or mountings hardly pull
+            the fit.
+        friction: How friction depends on load and speed: capstan, or drag, load-dependent and rate-dependent joined by +.
+        geometry: How wrap angles follow the length: one curve over the whole range, or regions with dropped angles as
+            the on-body paper has them.
+        undetected: How angles too small to detect enter.
+        wrap_angle: Wrap angle of a single table without cable.toml, such as 180deg.
+    """
+
+    settings: Annotated[Sequence[str], Option(("--set",), metavar="KEY=VALUE")]
+    channels: Annotated[Sequence[str], Option(("--channel",), metavar="QUANTITY=CHANNEL:UNIT")]
+    noise: Annotated[Literal["normal", "student"] | None, Option(default="as in cable.toml, else normal")]
+    friction: Annotated[str | None, Option(metavar="MODEL", default="as in cable.toml, else capstan")]
+    geometry: Annotated[Literal["continuous", "published"] | None, Option(default="as in cable.toml, else continuous")]
+    undetected: Annotated[
+        Literal["censored", "zero", "dropped"] | None, Option(default="as in cable.toml, else censored")
+    ]
+    wrap_angle: Annotated[Quantity | None, Option(metavar="ANGLE", example="180deg")]
+
+
+_SETTINGS = {  # keywords that stand for a setting of cable.toml
+    "geometry": "geometry",
+    "undetected": "tables.angles.undetected",
+    "friction": "friction_model",
+    "noise": "noise",
+}
+
+
+def read(dataset: "str | Path | Dataset", **reading: Unpack[Reading]) -> "Dataset":
+    """Read and check a data set, without fitting anything.
+
+    Args:
+        dataset: Folder with a cable.toml, the file itself, or one table if `wrap_angle` is given.
+        reading: See `Reading`; `wrap_angle` is a number and its unit.
+
+    Raises:
+        DescriptionError, DatasetError: What is wrong, in a sentence.
+        UsageError: There is no such keyword.
+    """
+    from bowdenfit.dataset import Dataset, load_dataset, single_file_dataset
+    from bowdenfit.errors import UsageError, nearest
+    from bowdenfit.recordings.forces import parsed_channels
+
+    for name in reading:
+        if name not in Reading.__annotations__:
+            raise UsageError(f"there is no keyword {name!r}{nearest(name, list(Reading.__annotations__))}")
+    if isinstance(dataset, Dataset):
+        return dataset
+    stated = {key: reading.get(name) for name, key in _SETTINGS.items()}
+    changes = [*reading.get("settings", ()), *(f'{key}="{value}"' for key, value in stated.items() if value is not None)]
+    sources = parsed_channels(reading.get("channels", ()))
+    wrap_angle = reading.get("wrap_angle")
+    if wrap_angle is not None:
+        return single_file_dataset(Path(dataset), wrap_angle, changes, sources)
+    return load_dataset(Path(dataset), changes, sources)

@@ -1,0 +1,124 @@
+"""Fitting a data set."""
+
+from collections.abc import Callable
+from functools import partial
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Any, Literal, Unpack
+
+from bowdenfit.questions.summary.verb import reply
+from bowdenfit.reading import Reading, read
+from bowdenfit.results.folder import CHAIN
+from bowdenfit.verb import LARGEST_SEED, Argument, Option, Output, Reply, Verb, Watch
+
+if TYPE_CHECKING:
+    from bowdenfit.dataset import Dataset
+    from bowdenfit.front_desk import Fit
+    from bowdenfit.inference.chain import Progress
+
+NOT_TRUSTED = 3
+
+
+def fit(
+    dataset: Annotated["str | Path | Dataset", Argument("DATASET")],
+    *,
+    output: Annotated[Output, Option(("-o",), default="fits/NAME OF DATASET")] = None,
+    mcmc: Annotated[bool, Option()] = True,
+    sampler: Annotated[
+        Literal["emcee", "nuts", "both"] | None, Option(default="as in cable.toml, else emcee")
+    ] = None,
+    figures: Annotated[bool, Option()] = True,
+    seed: Annotated[int | None, Option(least=0, most=LARGEST_SEED, default="drawn, and recorded")] = None,
+    resume: Annotated[bool, Option()] = False,
+    force: Annotated[bool, Option()] = False,
+    in_background: bool = False,
+    remember_compilations: bool = False,
+    progress: "Callable[[Progress], None] | None" = None,
+    **reading: Unpack[Reading],
+) -> "Fit":
+    """Fit a data set: least squares, then the posterior, then the design answer. Nothing is written unless `output` says where.
+
+    Args:
+        dataset: See `bowdenfit.read`; its keywords are taken too.
+        output: Results folder.
+        mcmc: Sample the posterior; without it there are no intervals.
+        sampler: What samples: ensembles of walkers, NUTS for many parameters or narrow posteriors, or both, to have one
+            check the other.
+        figures: Draw the figures.
+        seed: Seed of everything random.
+        resume: Go on with an interrupted or unconverged fit; refuses changed inputs.
+        force: Replace an earlier fit in the results folder.
+        in_background: Whether other processes may be started for statistics and figures, which is quicker; the calling
+            program must then guard its start with `if __name__ == "__main__"`.
+        remember_compilations: Whether JAX may keep compiled programs in the user's cache folder, so that a second fit of
+            the same shape compiles nothing; this is a setting of the whole process.
+        progress: Called while sampling.
+        reading: Keywords of `bowdenfit.read`.
+
+    Raises:
+        BowdenfitError: What is wrong, in a sentence; nothing is written then.
+    """
+    from bowdenfit.run.helpers import assistants, load_ahead
+    from bowdenfit.run.storing import checked_seed, sampled_by, start_checkpointing, write_results
+
+    folder = Path(output) if output is not None else None
+    if in_background and isinstance(dataset, str | Path):
+        load_ahead("jax", "scipy.optimize")  # while recordings are read, which takes seconds
+    data = read(dataset, **reading)
+    if sampler is not None:
+        data = sampled_by(data, sampler)
+    seed = checked_seed(folder, data, mcmc, seed, resume, force)
+    with assistants(in_background and mcmc, in_background and figures and folder is not None) as helpers:
+        import jax
+
+        from bowdenfit.run.fitting import run
+        from bowdenfit.run.stopwatch import Stopwatch
+
+        if remember_compilations:
+            _remember_compilations()
+        with jax.enable_x64(True):
+            begin = partial(start_checkpointing, folder, data, seed, resume)
+            found = run(data, begin, mcmc, seed, resume, progress, Stopwatch(), helpers)
+            if folder is not None:
+                write_results(found, folder, figures, helpers)
+    return found
+
+
+def _remember_compilations() -> None:
+    """Keep compiled programs in the user's cache folder."""
+    import jax
+    from platformdirs import user_cache_dir
+
+    jax.config.update("jax_compilation_cache_dir", user_cache_dir("bowdenfit"))
+    jax.config.update("jax_persistent_cache_min_compile_time_secs", 0.1)
+    jax.config.update("jax_persistent_cache_min_entry_size_bytes", -1)
+
+
+def _reply(found: "Fit", asked: dict[str, Any]) -> Reply:
+    said = reply(found)
+    exit_code = 0 if found.verdict().trusted else NOT_TRUSTED
+    return Reply(said.text, said.page, (f"Wrote {asked['output']}.",), exit_code)
+
+
+def _show(bar: Any, progress: "Progress") -> None:
+    """Steps, R-hat and effective sample size."""
+    bar.n = progress.steps
+    bar.set_description_str(f"sampling with {progress.sampler}", refresh=False)
+    if progress.r_hat is not None and progress.ess is not None:
+        bar.set_postfix_str(f"R-hat {progress.r_hat:.3f}, effective draws {progress.ess:.0f}", refresh=False)
+    bar.refresh()
+
+
+_BAR = {"unit": "step", "desc": "sampling", "bar_format": "{desc} {n_fmt} steps, {elapsed}{postfix}"}
+VERB = Verb(
+    fit,
+    _reply,
+    "Fit a data set: coefficients, uncertainty, design answer, figures.",
+    """Fit DATASET: least squares, posterior, design answer, figures, all written to a results folder.
+
+    DATASET is a folder with cable.toml and tables, or one table or recording with --wrap-angle.
+    """,
+    json="Print summary.json instead of the summary for people.",
+    results="fits",
+    watch=Watch(CHAIN, "the checkpoint is kept in", _BAR, _show),
+    behind={"in_background": True, "remember_compilations": True},
+)

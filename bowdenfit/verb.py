@@ -1,0 +1,119 @@
+"""What a verb is: one function, whose keywords are its options on the command line too.
+
+A keyword becomes an option by `Annotated[type, Option(...)]`; its name, type and default, and what the function's docstring
+says of it, are the option's. A keyword without belongs to programs alone. Loads nothing, so that `--help` is instant.
+"""
+
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any, Literal, TypeAlias
+
+Quantity: TypeAlias = tuple[float, str]  # a number and its unit
+LARGEST_SEED = 2**31 - 1
+
+
+@dataclass(frozen=True)
+class Option:
+    """How a keyword is written on the command line, as far as its name, type and docstring do not say.
+
+    Args:
+        flags: Other than the keyword's own name, such as "--set", or short ones beside it, such as "-o".
+        example: Of what stands behind it, such as "180deg"; named where it cannot be read.
+        metavar: What stands behind it in the help.
+        default: In words, where the default of the keyword does not say it.
+        least, most: Limits of a whole number.
+        required: Whether it must be named on the command line.
+    """
+
+    flags: tuple[str, ...] = ()
+    example: str = ""
+    metavar: str | None = None
+    default: str = ""
+    least: int | None = None
+    most: int | None = None
+    required: bool = False
+
+
+@dataclass(frozen=True)
+class Argument:
+    """How a positional argument is written on the command line.
+
+    Args:
+        name: In capitals in the help.
+        many: Whether there may be several.
+        results: Whether it is the results folder of a fit, of which the function takes the fit.
+    """
+
+    name: str
+    many: bool = False
+    results: bool = False
+
+
+@dataclass(frozen=True)
+class Reply:
+    """What the command line prints of an answer.
+
+    Args:
+        text: For people.
+        page: For programs, made only where `--json` asks for it.
+        notes: Lines beside the answer, on standard error.
+        exit_code: 0, or 3 for an answer that must not be trusted.
+    """
+
+    text: str
+    page: Callable[[], Any] | None = None
+    notes: tuple[str, ...] = ()
+    exit_code: int = 0
+
+
+@dataclass(frozen=True)
+class Watch:
+    """How a verb that takes long is watched and interrupted.
+
+    Args:
+        kept: File in the results folder that lets it go on later.
+        remark: What is kept; the folder follows.
+        bar: Options of the progress bar.
+        show: Moves the bar by what the function reports.
+    """
+
+    kept: str
+    remark: str
+    bar: Mapping[str, Any]
+    show: Callable[..., None]
+
+
+@dataclass(frozen=True)
+class Verb:
+    """One verb of the command line and of notebooks.
+
+    Args:
+        function: What notebooks call.
+        reply: What the command line prints, from the answer and the keywords it was asked with.
+        short: In the list of verbs.
+        text: In the verb's own help.
+        name: On the command line; the function's if omitted.
+        json: What `--json` prints, in words; empty without that option.
+        formats: What `--format` takes in place of `--json`: that of the text, and "json".
+        results: Folder in which results go unless `output` names another.
+        watch: How it is interrupted; None if it is quick.
+        behind: Keywords that the command line adds.
+        warns: Whether a fit that is not to be trusted is said beside the answer.
+    """
+
+    function: Callable[..., Any]
+    reply: Callable[..., Reply]
+    short: str
+    text: str
+    name: str = ""
+    json: str = "Print as JSON."
+    formats: tuple[str, ...] = ()
+    results: str = ""
+    watch: Watch | None = None
+    behind: Mapping[str, Any] = field(default_factory=dict)
+    warns: bool = False
+
+
+Output: TypeAlias = str | Path | None
+Stroke: TypeAlias = Literal["pull", "return"]

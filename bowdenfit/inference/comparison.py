@@ -6,11 +6,11 @@ from typing import Literal
 
 import numpy as np
 
-RELIABLE_K = 0.7  # Pareto k up to which the importance weights of a reading can be trusted
+from bowdenfit.inference.psis import RELIABLE_K, weighted_elpd
+
 SMALL = 100  # readings below which the standard error of a difference is too small more often than not
 _DECISIVE = 2.0  # differences of so many standard errors, and of more than _NOTICEABLE, are said to be seen
 _NOTICEABLE = 4.0
-_NO_WEIGHT = 1e4  # so far below the largest a log weight is none at all
 
 How = Literal["importance sampling", "moment matching", "refit", "rough"]
 Verdict = Literal["clear", "leaning", "open"]
@@ -76,15 +76,6 @@ class Difference:
         return "leaning" if n_readings < SMALL and self.elpd < 2 * _DECISIVE * self.standard_error else "clear"
 
 
-def reliable_k(n_draws: int) -> float:
-    """Pareto k up to which importance weights of so many draws can be trusted.
-
-    References:
-        Vehtari, Simpson, Gelman, Yao and Gabry 2024, "Pareto smoothed importance sampling" (JMLR 25), section 3.2.4.
-    """
-    return min(1 - 1 / np.log10(n_draws), RELIABLE_K) if n_draws > 10 else 0.0
-
-
 def left_out(log_likelihood: Mapping[str, np.ndarray], n_effective: float) -> Prediction:
     """Leave-one-out by Pareto-smoothed importance sampling.
 
@@ -102,36 +93,6 @@ def left_out(log_likelihood: Mapping[str, np.ndarray], n_effective: float) -> Pr
     parts = [weighted_elpd(-draws[:, i], draws[:, i], share) for i in range(draws.shape[1])]
     elpd, pareto_k, error = (np.array(part) for part in zip(*parts, strict=True))
     return Prediction(elpd, pareto_k, error)
-
-
-def weighted_elpd(log_ratio: np.ndarray, log_likelihood: np.ndarray, share: float) -> tuple[float, float, float]:
-    """Expected log density of one reading from weighted draws, its Pareto k, and its Monte Carlo standard error.
-
-    Args:
-        log_ratio: Log importance ratio of every draw, up to a constant.
-        log_likelihood: Of the reading, at every draw.
-        share: Effective draws a draw.
-
-    References:
-        Vehtari et al. 2024, "Pareto smoothed importance sampling" (JMLR 25), section 3.2.3 for the error.
-    """
-    log_weights, k = smoothed(log_ratio, share)
-    parts = log_weights + log_likelihood
-    top = float(np.max(parts))
-    elpd = top + float(np.log(np.sum(np.exp(parts - top))))
-    relative = np.exp(parts - elpd) - np.exp(log_weights)  # weight times the relative deviation of the density
-    return elpd, k, float(np.sqrt(np.sum(relative**2) / share))
-
-
-def smoothed(log_ratio: np.ndarray, share: float) -> tuple[np.ndarray, float]:
-    """Pareto-smoothed normalized log weights, and Pareto k; ratios that cannot be computed have no weight."""
-    from arviz_stats.base import array_stats
-
-    usable = np.isfinite(log_ratio)
-    lowest = np.max(log_ratio[usable], initial=0.0) - _NO_WEIGHT
-    # ArviZ's function takes what is left out, the log likelihood, and turns its sign itself.
-    log_weights, k = array_stats.psislw(-np.where(usable, log_ratio, lowest), r_eff=share, axis=0)
-    return np.asarray(log_weights), float(k)
 
 
 def differences(predictions: Mapping[str, Prediction]) -> dict[str, Difference]:

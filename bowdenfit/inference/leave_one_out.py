@@ -12,12 +12,13 @@ from jax import Array
 from jaxtyping import Float
 
 from bowdenfit.description import SamplerSettings
-from bowdenfit.inference.comparison import How, Prediction, left_out, reliable_k, smoothed
+from bowdenfit.inference.comparison import How, Prediction, left_out
 from bowdenfit.inference.compilation import compiled
 from bowdenfit.inference.diagnostics import Diagnostics, diagnose_all
 from bowdenfit.inference.least_squares import MaximumPosterior
 from bowdenfit.inference.log_density import LogDensity
 from bowdenfit.inference.moment_matching import matched
+from bowdenfit.inference.psis import reliable_k, smoothed
 
 # A refit is asked for one number, to a few hundredths: fewer walkers than for the answers of a fit.
 REFIT = SamplerSettings(n_ensembles=4, n_walkers=64, max_steps=4000, target_r_hat=1.02, target_ess=400)

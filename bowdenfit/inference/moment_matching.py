@@ -9,7 +9,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from bowdenfit.inference.comparison import smoothed, weighted_elpd
+from bowdenfit.inference.psis import smoothed, weighted_elpd
 
 _MOST_STEPS = 30
 _FLOOR = 1e-12

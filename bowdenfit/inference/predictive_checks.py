@@ -15,10 +15,10 @@ from dataclasses import dataclass
 
 import numpy as np
 
-RELIABLE_K = 0.7  # Pareto k up to which the weights of a reading can be trusted
+from bowdenfit.inference.psis import smoothed
+
 _TAIL = 0.02  # share of the weight on either side that a Pareto distribution is fitted to
 _LEAST_TAIL = 20  # draws that such a fit takes
-_FLAT = 1e-9  # range of a log likelihood below which it says nothing, as that of a bound far off
 _LEAST = 1e-12  # probability below which no difference is made
 _DRAWS = 10_000  # of a prediction that are enough to place a reading in
 _SIMULATIONS = 1000  # of the band that a distribution of uniform numbers stays in
@@ -59,36 +59,13 @@ def left_out_readings(
         at_most: Whether a reading is such a bound.
         n_effective: Effective number of the draws.
     """
-    log_weights, pareto_k = _smoothed(log_likelihood, min(n_effective / len(log_likelihood), 1.0))
-    every = max(1, len(log_likelihood) // _DRAWS)
-    weights = np.exp(log_weights - log_weights.max(axis=-1, keepdims=True))[:, ::every]
-    weights /= weights.sum(axis=-1, keepdims=True)
-    rows = [
-        _placed(drawn, w, float(y), bool(bound))
-        for drawn, w, y, bound in zip(replicated[::every].T, weights, observed, at_most, strict=True)
-    ]
-    mean, sd, q05, median, q95, below, up_to, tail = np.array(rows).reshape(-1, 8).T
-    return LeftOut(mean, sd, q05, median, q95, below, up_to, tail, pareto_k)
-
-
-def _smoothed(log_likelihood: np.ndarray, share: float) -> tuple[np.ndarray, np.ndarray]:
-    """Log weights, (reading, draw), and Pareto k.
-
-    A reading that every draw finds equally likely has equal weights and k = 0. So much weight on a handful of draws that
-    no Pareto distribution fits leaves equal weights and an infinite k: that prediction has seen the reading.
-    """
-    from arviz_stats.base import array_stats
-
-    log_weights, pareto_k = np.zeros(log_likelihood.shape[::-1]), np.zeros(log_likelihood.shape[1])
-    tells = np.ptp(log_likelihood, axis=0) > _FLAT
-    if tells.any():
-        told = np.ascontiguousarray(log_likelihood[:, tells].T)
-        with np.errstate(divide="ignore", invalid="ignore"):
-            smooth, k = array_stats.psislw(told, r_eff=share, axis=-1)
-        failed = ~(np.isfinite(k) & np.isfinite(smooth).all(axis=-1))
-        log_weights[tells] = np.where(failed[:, None], 0.0, smooth)
-        pareto_k[tells] = np.where(failed, np.inf, k)
-    return log_weights, pareto_k
+    share, every = min(n_effective / len(log_likelihood), 1.0), max(1, len(log_likelihood) // _DRAWS)
+    rows = []
+    for likelihood, drawn, reading, bound in zip(log_likelihood.T, replicated.T, observed, at_most, strict=True):
+        log_weights, k = smoothed(-likelihood, share)
+        weights = np.exp(log_weights - log_weights.max())[::every]
+        rows.append((*_placed(drawn[::every], weights / weights.sum(), float(reading), bool(bound)), k))
+    return LeftOut(*np.array(rows).reshape(-1, 9).T)
 
 
 def _placed(drawn: np.ndarray, weights: np.ndarray, reading: float, at_most: bool) -> tuple[float, ...]:

@@ -13,7 +13,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from bowdenfit.inference.predictive_checks import RELIABLE_K
+from bowdenfit.inference.psis import RELIABLE_K, smoothed
 
 SENSITIVE = 0.05  # from which a quantity is said to be sensitive
 _POWERS = (0.99, 1.01)
@@ -91,9 +91,7 @@ def _scaled(part: np.ndarray) -> Callable[[np.ndarray], float]:
 
 def _median_with_wider_prior(values: np.ndarray, log_prior: np.ndarray) -> float:
     """Median under weights that undo half of one prior; NaN where these lean on few draws."""
-    from arviz_stats.base import array_stats
-
-    log_weights, pareto_k = array_stats.psislw((1 - _WIDER) * log_prior)
+    log_weights, pareto_k = smoothed((_WIDER - 1) * log_prior)
     if not pareto_k <= RELIABLE_K:
         return float("nan")
     order = np.argsort(values)

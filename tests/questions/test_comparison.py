@@ -11,10 +11,11 @@ from scipy import stats
 
 import bowdenfit as bf
 from bowdenfit.errors import DescriptionError, UsageError
-from bowdenfit.inference.comparison import Difference, Prediction, differences, left_out, reliable_k, stacking_weights
+from bowdenfit.inference.comparison import Difference, Prediction, differences, left_out, stacking_weights
 from bowdenfit.inference.leave_one_out import REFIT, Readings, leave_one_out, refitted
 from bowdenfit.inference.log_density import LogDensity
 from bowdenfit.inference.moment_matching import Affine, best_map, matched
+from bowdenfit.inference.psis import reliable_k
 from bowdenfit.model import build_model
 from bowdenfit.questions.compare.answer import Comparison
 from bowdenfit.questions.compare.common_readings import Common, Omitted, common_readings

@@ -5,7 +5,6 @@ from dataclasses import dataclass
 import numpy as np
 
 from bowdenfit.inference.predictive_checks import (
-    RELIABLE_K,
     LeftOut,
     Uniformity,
     left_out_readings,
@@ -13,6 +12,7 @@ from bowdenfit.inference.predictive_checks import (
     uniformity,
 )
 from bowdenfit.inference.prior_sensitivity import SENSITIVE, Sensitivity, sensitivities
+from bowdenfit.inference.psis import RELIABLE_K
 from bowdenfit.kinds.term import Term
 from bowdenfit.questions.check.residual_places import STROKE, Places, places_of
 from bowdenfit.results.record import Draws, Record, once

@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from bowdenfit.inference.predictive_checks import RELIABLE_K
+from bowdenfit.inference.psis import RELIABLE_K
 from bowdenfit.questions.check.answer import Checks, TableChecks
 from bowdenfit.questions.check.figure_data import CheckedTable
 

@@ -4,20 +4,16 @@ import hashlib
 from collections.abc import Mapping, Sequence
 from contextlib import nullcontext
 from dataclasses import dataclass
-from functools import partial
 from itertools import islice
 from pathlib import Path
-from typing import Any
 
-from bowdenfit.description import Description, Table
+from bowdenfit.description import Description
 from bowdenfit.description.file import load_description, overridden, parse_description
-from bowdenfit.errors import DatasetError, DescriptionError
+from bowdenfit.errors import DescriptionError
 from bowdenfit.files.columns import ColumnSource
-from bowdenfit.kinds.elastic_tables import read_loop, read_preload, read_stretch
+from bowdenfit.kinds import KINDS, each_table
+from bowdenfit.kinds.kind import Source
 from bowdenfit.kinds.measurements import Measurements
-from bowdenfit.kinds.reading import read_angles, read_efficiencies, read_forces
-from bowdenfit.kinds.rows import Route
-from bowdenfit.kinds.wrap_angles import check_measurements
 
 DESCRIPTION_FILE = "cable.toml"
 
@@ -135,90 +131,19 @@ def read_dataset(
     Raises:
         DatasetError: A table is missing or wrong, or does not fit the description.
     """
-    tables = description.tables
-    route = Route(description.route.variable, description.route.unit) if description.route else None
-    own = description.angle_columns
-    remarks: list[str] = []
-    angles = efficiencies = forces = None
-    checksums = dict(sha256)
-    if tables.angles is not None and route is not None:
-        (path,) = _paths(tables.angles, folder, "angles", one=True)
-        limit = tables.angles.detection_limit
-        columns = [c.wrap_angle.column for c in description.curved if c.wrap_angle.column]
-        angles = read_angles(path, route, columns, limit.to("angle") if limit else None, _sources(tables.angles))
-        checksums[path.name] = _sha256(path)
-    if tables.efficiencies is not None:
-        (path,) = _paths(tables.efficiencies, folder, "efficiencies", one=True)
-        efficiencies = read_efficiencies(path, route, own, _sources(tables.efficiencies))
-        checksums[path.name] = _sha256(path)
-    if tables.forces is not None:
-        paths = _paths(tables.forces, folder, "forces")
-        forces, force_remarks = read_forces(paths, route, own, _sources(tables.forces))
-        remarks += force_remarks
-        checksums |= {
-            p.relative_to(folder).as_posix() if p.is_relative_to(folder) else p.name: _sha256(p) for p in paths
-        }
-    recordings = None
-    if tables.recordings is not None:
-        from bowdenfit.kinds.recordings.table import check_angles, read_recordings
-
-        patterns = Table(files=tables.recordings.files) if tables.recordings.files else None
-        found = partial(_paths, patterns, folder, "recordings") if patterns else list
-        recordings, files = read_recordings(description, folder, found, channels or {})
-        check_angles(description, recordings, angles)
-        checksums |= {name: _sha256(path) for name, path in files.items()}
-        remarks += [remark for r in recordings.each for remark in (*r.account.remarks, *r.strokes.remarks)]
-    elif channels:
-        raise DescriptionError("--channel names channels of recordings, but the data set has none.")
-    elastic, read, more = _elastic_tables(description, folder, route)
-    checksums |= {path.name: _sha256(path) for path in read}
-    tables_read = (angles, efficiencies, forces, recordings, *elastic)
-    measurements = Measurements(tuple(table for table in tables_read if table is not None), (*remarks, *more))
-    check_measurements(description, measurements)
-    return Dataset(description, measurements, checksums)
-
-
-def _elastic_tables(
-    description: Description, folder: Path, route: Route | None
-) -> tuple[list[Any], list[Path], list[str]]:
-    """Tables of stretch, preload and a loop; the files that were read; remarks."""
-    tables = description.tables
-    read: list[Path] = []
-    remarks: list[str] = []
-    stretch = preload = loop = None
-    if tables.stretch is not None:
-        read += _paths(tables.stretch, folder, "stretch", one=True)
-        stretch, more = read_stretch(read[-1], _sources(tables.stretch))
-        remarks += more
-    if tables.preload is not None:
-        read += _paths(tables.preload, folder, "preload", one=True)
-        preload = read_preload(read[-1], _sources(tables.preload))
-    if tables.loop is not None:
-        read += _paths(tables.loop, folder, "loop", one=True)
-        columns, pulleys = description.angle_columns, description.cable.pulleys
-        loop, more = read_loop(read[-1], route, columns, pulleys, _sources(tables.loop))
-        remarks += more
-    return [stretch, preload, loop], read, remarks
-
-
-def _paths(table: Table, folder: Path, kind: str, one: bool = False) -> list[Path]:
-    """The files of a table; patterns are expanded in sorted order."""
-    named = [table.file] if table.file else [table.files] if isinstance(table.files, str) else list(table.files or ())
-    paths: list[Path] = []
-    for name in named:
-        if name is None:
+    measurements, checksums = Measurements(), dict(sha256)
+    for kind in KINDS.values():
+        settings = getattr(description.tables, kind.name, None)
+        if settings is None:
             continue
-        matches = sorted(folder.glob(name)) if any(c in name for c in "*?[") else [folder / name]
-        if not matches:
-            raise DatasetError(f"no file in {folder} matches {name!r}, which cable.toml names for the table {kind}.")
-        paths += matches
-    if one and len(paths) != 1:
-        raise DatasetError(f"the table {kind} must be one file; cable.toml names {len(paths)}.")
-    return paths
-
-
-def _sources(table: Table) -> dict[str, ColumnSource]:
-    return {name: ColumnSource(column.name, column.unit) for name, column in table.columns.items()}
+        found = kind.read(Source(kind.name, settings, description, folder, channels or {}))
+        measurements = Measurements((*measurements.tables, found.table), (*measurements.remarks, *found.remarks))
+        checksums |= {name: _sha256(path) for name, path in found.files.items()}
+    if channels and not any(kind.takes_channels for kind, _ in each_table(measurements)):
+        raise DescriptionError("--channel names channels of recordings, but the data set has none.")
+    for kind, table in each_table(measurements):
+        kind.check(table, description, measurements)
+    return Dataset(description, measurements, checksums)
 
 
 def _sha256(path: Path) -> str:

@@ -3,27 +3,23 @@
 from collections.abc import Iterator
 from typing import Any
 
+from bowdenfit.kinds.angles import ANGLES
+from bowdenfit.kinds.efficiencies import EFFICIENCIES
+from bowdenfit.kinds.forces import FORCES
 from bowdenfit.kinds.kind import Kind
+from bowdenfit.kinds.loop import LOOP
 from bowdenfit.kinds.measurements import Measurements
-from bowdenfit.kinds.tables import AngleTable, EfficiencyTable, ForceTable, LoopTable, PreloadTable, StretchTable
-from bowdenfit.recordings.recording import Recordings
+from bowdenfit.kinds.preload import PRELOAD
+from bowdenfit.kinds.recordings import RECORDINGS
+from bowdenfit.kinds.stretch import STRETCH
 
-KINDS: dict[str, Kind] = {
-    kind.name: kind
-    for kind in (
-        Kind("angles", AngleTable),
-        Kind("efficiencies", EfficiencyTable),
-        Kind("forces", ForceTable),
-        Kind("recordings", Recordings),
-        Kind("stretch", StretchTable),
-        Kind("preload", PreloadTable),
-        Kind("loop", LoopTable),
-    )
+KINDS: dict[str, Kind[Any]] = {
+    kind.name: kind for kind in (ANGLES, EFFICIENCIES, FORCES, RECORDINGS, STRETCH, PRELOAD, LOOP)
 }
 """Every kind by its name, in the order in which tables are read, fitted and spoken of."""
 
 
-def each_table(measurements: Measurements) -> Iterator[tuple[Kind, Any]]:
+def each_table(measurements: Measurements) -> Iterator[tuple[Kind[Any], Any]]:
     """Every table with its kind, in the order of the kinds."""
     for kind in KINDS.values():
         table = measurements.table(kind.table)

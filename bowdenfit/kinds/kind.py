@@ -1,16 +1,137 @@
 """What a kind of measurement declares of itself, as far as NumPy goes; its term in the likelihood is declared beside it."""
 
-from dataclasses import dataclass
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any, Generic, TypeVar
+
+import numpy as np
+
+from bowdenfit.description import Description
+from bowdenfit.errors import DatasetError
+from bowdenfit.files.columns import ColumnSource
+from bowdenfit.kinds.measurements import Measurements
+from bowdenfit.kinds.rows import Conditions
+from bowdenfit.types import Vector
+
+Page = tuple[list[str], list[list[str]]]  # headings and rows
+AnyTable = TypeVar("AnyTable")
 
 
 @dataclass(frozen=True)
-class Kind:
+class Source:
+    """Where a table is to be read from, and what is said of it.
+
+    Args:
+        kind: Name of its kind.
+        settings: What stands under that name in [tables].
+        description: The whole description.
+        folder: Where the files are.
+        channels: Channels named on the command line.
+    """
+
+    kind: str
+    settings: Any
+    description: Description
+    folder: Path
+    channels: Mapping[str, ColumnSource] = field(default_factory=dict)
+
+    @property
+    def files(self) -> list[Path]:
+        """Its files; patterns are expanded in sorted order.
+
+        Raises:
+            DatasetError: A pattern matches none.
+        """
+        stated = (getattr(self.settings, "file", None), self.settings.files)
+        named = [name for part in stated if part for name in ([part] if isinstance(part, str) else part)]
+        paths: list[Path] = []
+        for name in named:
+            matches = sorted(self.folder.glob(name)) if any(c in name for c in "*?[") else [self.folder / name]
+            if not matches:
+                raise DatasetError(
+                    f"no file in {self.folder} matches {name!r}, which cable.toml names for the table {self.kind}."
+                )
+            paths += matches
+        return paths
+
+    @property
+    def file(self) -> Path:
+        """Its only file.
+
+        Raises:
+            DatasetError: It has several.
+        """
+        paths = self.files
+        if len(paths) != 1:
+            raise DatasetError(f"the table {self.kind} must be one file; cable.toml names {len(paths)}.")
+        return paths[0]
+
+    @property
+    def columns(self) -> dict[str, ColumnSource]:
+        """Columns that do not carry the usual names."""
+        return {name: ColumnSource(column.name, column.unit) for name, column in self.settings.columns.items()}
+
+    def name_of(self, path: Path) -> str:
+        """A file as seen from the folder."""
+        return path.relative_to(self.folder).as_posix() if path.is_relative_to(self.folder) else path.name
+
+
+@dataclass(frozen=True)
+class Found(Generic[AnyTable]):
+    """A table that was read.
+
+    Args:
+        table: The table.
+        files: The files it was read from, by name.
+        remarks: What had to be assumed, in sentences.
+    """
+
+    table: AnyTable
+    files: Mapping[str, Path]
+    remarks: tuple[str, ...] = ()
+
+
+@dataclass(frozen=True)
+class Kind(Generic[AnyTable]):
     """A kind of measurement.
 
     Args:
         name: What it is called under [tables] in cable.toml, and in fit.json.
         table: The class of its tables; no two kinds share one.
+        read: Reads its files.
+        describe: What was understood of a table, for `check`, line by line.
+        heading: Over these lines, where they are a section of their own.
+        warnings: What a table will not be able to tell, as far as counting shows.
+        check: Refuses a table that does not fit the description or the other tables.
+        count: How many readings were fitted, in words; empty where its term counts them.
+        implausible: Why no bench would hand in simulated readings in place of the measured ones, in a few words; empty if
+            one might.
+        page: Its table as the headings and rows of a file; None where it is written otherwise.
+        conditions: Where and at which wrap angles friction was measured; None if it was not.
+        forces: Forces that friction acted on [N].
+        speeds: Speeds of sliding [mm/s or rad/s].
+        velocity_unit: Which of the two; empty without velocities.
+        takes_channels: Whether channels can be named on the command line.
     """
 
     name: str
-    table: type
+    table: type[AnyTable]
+    read: Callable[[Source], Found[AnyTable]]
+    describe: Callable[[AnyTable, Description], list[str]]
+    heading: str = ""
+    warnings: Callable[[AnyTable, Description, Measurements], list[str]] = lambda *_: []
+    check: Callable[[AnyTable, Description, Measurements], None] = lambda *_: None
+    count: Callable[[AnyTable], str] = lambda _: ""
+    implausible: Callable[[AnyTable, AnyTable], str] = lambda *_: ""
+    page: Callable[[AnyTable, Description], Page] | None = None
+    conditions: Callable[[AnyTable], Conditions] | None = None
+    forces: Callable[[AnyTable], Vector] = lambda _: np.zeros(0)
+    speeds: Callable[[AnyTable], Vector] = lambda _: np.zeros(0)
+    velocity_unit: Callable[[AnyTable], str] = lambda _: ""
+    takes_channels: bool = False
+
+
+def itself(table: AnyTable) -> AnyTable:
+    """The conditions of a table whose rows carry them."""
+    return table

@@ -3,9 +3,6 @@
 from dataclasses import dataclass, replace
 from typing import Any, TypeVar
 
-from bowdenfit.kinds.tables import AngleTable, EfficiencyTable, ForceTable, LoopTable, PreloadTable, StretchTable
-from bowdenfit.recordings.recording import Recordings
-
 AnyTable = TypeVar("AnyTable")
 
 
@@ -32,10 +29,13 @@ class Measurements:
         return replace(self, tables=tuple((kept | new).values()))
 
     # Until everything asks by class:
-    angles = property(lambda self: self.table(AngleTable))
-    efficiencies = property(lambda self: self.table(EfficiencyTable))
-    forces = property(lambda self: self.table(ForceTable))
-    recordings = property(lambda self: self.table(Recordings))
-    stretch = property(lambda self: self.table(StretchTable))
-    preload = property(lambda self: self.table(PreloadTable))
-    loop = property(lambda self: self.table(LoopTable))
+    angles = property(lambda self: self._named("AngleTable"))
+    efficiencies = property(lambda self: self._named("EfficiencyTable"))
+    forces = property(lambda self: self._named("ForceTable"))
+    recordings = property(lambda self: self._named("Recordings"))
+    stretch = property(lambda self: self._named("StretchTable"))
+    preload = property(lambda self: self._named("PreloadTable"))
+    loop = property(lambda self: self._named("LoopTable"))
+
+    def _named(self, name: str) -> Any:
+        return next((table for table in self.tables if type(table).__name__ == name), None)

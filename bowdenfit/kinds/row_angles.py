@@ -1,12 +1,12 @@
 """Which wrap angles the rows of a table have, before any parameter is known."""
 
 from dataclasses import dataclass
-from typing import Protocol, runtime_checkable
 
 import numpy as np
 
 from bowdenfit.description import Description
-from bowdenfit.kinds.tables import AngleTable, OwnAngles
+from bowdenfit.kinds.angles.table import AngleTable
+from bowdenfit.kinds.rows import Conditions
 
 
 @dataclass(frozen=True)
@@ -34,22 +34,7 @@ class RowAngles:
         }
 
 
-@runtime_checkable
-class Measured(Protocol):
-    """Anything measured at values of the route variable, some with wrap angles of their own."""
-
-    @property
-    def route(self) -> np.ndarray:
-        """Route variable; NaN where the cable has no route."""
-        ...
-
-    @property
-    def own(self) -> OwnAngles:
-        """Wrap angles measured with the row."""
-        ...
-
-
-def row_angles(description: Description, table: Measured, angles: AngleTable | None) -> RowAngles:
+def row_angles(description: Description, table: Conditions, angles: AngleTable | None) -> RowAngles:
     """The wrap angles of a table's rows, before any parameter is known.
 
     A row's own angle comes first; then, outside the range of the curves, the angle table's row at the same length;

@@ -2,15 +2,21 @@
 
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
+from difflib import get_close_matches
+from typing import Protocol
 
 import numpy as np
 
+from bowdenfit.description import Description, Route
+from bowdenfit.errors import DatasetError
 from bowdenfit.files.columns import Column, Quantity, require
 from bowdenfit.files.csv_table import Cell, RawTable
-from bowdenfit.kinds.tables import OwnAngles, Provenance
-from bowdenfit.types import Labels, Vector
+from bowdenfit.types import Labels, Matrix, Vector
+from bowdenfit.words import shown
 
 LARGEST_ANGLE = float(np.deg2rad(2000.0)) * (1 + 1e-12)
+_ALIKE = 0.75  # likeness from which an unknown heading is taken for a misspelled one
+STROKE_NAMES = {1: "pull", -1: "return"}
 _STROKES = {
     **dict.fromkeys(("pull", "pulling", "+1", "1", "+1.0", "1.0"), 1),
     **dict.fromkeys(("return", "returning", "release", "-1", "-1.0"), -1),
@@ -19,15 +25,72 @@ _STROKES = {
 
 
 @dataclass(frozen=True)
-class Route:
+class Provenance:
+    """Where each row of a table was read, so that any row can be named.
+
+    Args:
+        files: File names.
+        file: Number of the file of each row.
+        row: Line of the file.
+    """
+
+    files: tuple[str, ...]
+    file: Labels
+    row: Labels
+
+    def place(self, i: int) -> str:
+        """Row i in words."""
+        return f"{self.files[self.file[i]]}, row {self.row[i]}"
+
+
+@dataclass(frozen=True)
+class OwnAngles:
+    """Wrap angles measured row by row: NaN where a row has none and the curve must serve.
+
+    Args:
+        names: Column of each contact.
+        angle: Wrap angle [rad].
+        sd: Its standard deviation where the table gives one [rad], else NaN.
+    """
+
+    names: tuple[str, ...]
+    angle: Matrix
+    sd: Matrix
+
+    def column(self, name: str) -> tuple[Vector, Vector]:
+        """Angles and standard deviations of one contact; all NaN if the table has no such column."""
+        if name not in self.names:
+            return np.full(len(self.angle), np.nan), np.full(len(self.angle), np.nan)
+        k = self.names.index(name)
+        return self.angle[:, k], self.sd[:, k]
+
+
+class Conditions(Protocol):
+    """Under what forces were measured, row by row."""
+
+    @property
+    def route(self) -> Vector:
+        """Route variable; NaN where the cable has no route."""
+        ...
+
+    @property
+    def own(self) -> OwnAngles:
+        """Wrap angles measured with the row."""
+        ...
+
+
+class Rows(Conditions, Protocol):
+    """The same of a table, whose rows can be named."""
+
+    @property
+    def origin(self) -> Provenance:
+        """Where each row was read."""
+        ...
+
+
+def route_column(route: Route) -> Quantity:
     """The route variable as tables call it: column name and the unit to convert to."""
-
-    variable: str
-    unit: str
-
-    def quantity(self) -> Quantity:
-        """Its column."""
-        return Quantity(self.variable, "route", self.unit)
+    return Quantity(route.variable, "route", route.unit)
 
 
 def read_angle(cell: Cell, column: Column) -> float:
@@ -66,7 +129,7 @@ def read_strokes(
 def shared_columns(route: Route | None, contacts: Sequence[str]) -> tuple[Quantity, ...]:
     """Columns that efficiency and force tables share: the route variable, own wrap angles and their sd."""
     angles = [Quantity(name + suffix, "angle") for name in contacts for suffix in ("", "_sd")]
-    return (*([route.quantity()] if route else []), *angles)
+    return (*([route_column(route)] if route else []), *angles)
 
 
 def read_route(table: RawTable, found: Mapping[str, Column], route: Route | None) -> Vector:
@@ -104,3 +167,46 @@ def provenance_of(table: RawTable) -> Provenance:
     """Where the rows of one file stand."""
     rows = np.array([row[0].row for row in table.rows])
     return Provenance((table.file,), np.zeros(len(rows), dtype=int), rows)
+
+
+def in_words(values: np.ndarray, unit: str) -> str:
+    """The range of values, or their one value."""
+    low, high = float(values.min()), float(values.max())
+    return f"{low:.4g} {unit}" if low == high else f"{low:.4g} to {high:.4g} {unit}"
+
+
+def route_heading(description: Description) -> list[str]:
+    """Heading of the route variable's column in a file that is written; none without a route."""
+    return [f"{description.route.variable}_{description.route.unit}"] if description.route else []
+
+
+def route_cells(route: float, description: Description) -> list[str]:
+    """A row's cell in that column."""
+    return [f"{route:g}"] if description.route else []
+
+
+def read_tension(cell: Cell, column: Column, what: str) -> float:
+    """A tension [N], 0 for a slack rope; `what` it is, for refusals."""
+    if cell.limit() is not None:
+        raise cell.refuse(f"{cell.shown} is a bound, no reading; write the value, and 0 for a slack rope.")
+    value = column.value(cell)
+    if value < 0:
+        raise cell.refuse(
+            f"{what} of {cell.shown} is negative; a rope cannot be pushed: the usual cause is the sign convention of the "
+            "load cell or its tare, so write tension as positive, and 0 for a slack rope."
+        )
+    return value
+
+
+def check_spelling(table: RawTable, found: Mapping[str, Column], optional: Sequence[Quantity]) -> None:
+    """A column that nothing reads must not be a misspelled one that would have been read."""
+    read = {column.heading for column in found.values()}
+    missing = [quantity.name for quantity in optional if quantity.name not in found]
+    for heading in table.header:
+        name = heading.lower().partition(" ")[0].partition("_")[0]
+        near = get_close_matches(name, missing, n=1, cutoff=_ALIKE) if heading and heading not in read else []
+        if near:
+            raise DatasetError(
+                f"{table.file}, row {table.header_row}: the column {shown(heading)} is not known; did you mean {near[0]}? "
+                "Rename it, or delete it."
+            )

@@ -1,33 +1,26 @@
-"""Do the tables of a data set fit its description?"""
+"""Does every row of a table have a wrap angle in every contact?"""
 
 import numpy as np
 
 from bowdenfit.description import Contact, Description
 from bowdenfit.errors import DatasetError
+from bowdenfit.kinds.angles.table import AngleTable
 from bowdenfit.kinds.measurements import Measurements
-from bowdenfit.kinds.tables import EfficiencyTable, ForceTable, LoopTable
+from bowdenfit.kinds.rows import Rows
 
 
-def check_measurements(description: Description, measurements: Measurements) -> None:
-    """Every row of every table can be given a wrap angle in every contact.
+def check_rows(table: Rows, description: Description, measurements: Measurements) -> None:
+    """Every row can be given a wrap angle in every contact.
 
     Raises:
         DatasetError: One cannot; says which, and what to do.
     """
-    for table in (measurements.efficiencies, measurements.forces, measurements.loop):
-        if table is None:
-            continue
-        for contact in description.contact:
-            if contact.wrap_angle.constant is None:
-                _check_contact(description, measurements, contact, table)
+    for contact in description.contact:
+        if contact.wrap_angle.constant is None:
+            _check_contact(description, measurements.table(AngleTable), contact, table)
 
 
-def _check_contact(
-    description: Description,
-    measurements: Measurements,
-    contact: Contact,
-    table: EfficiencyTable | ForceTable | LoopTable,
-) -> None:
+def _check_contact(description: Description, angles: AngleTable | None, contact: Contact, table: Rows) -> None:
     column = contact.wrap_angle.column or ""
     own, _ = table.own.column(column)
     if not contact.wrap_angle.curve:
@@ -44,10 +37,10 @@ def _check_contact(
             )
         return
     route = description.route
-    assert route is not None and measurements.angles is not None  # the description guarantees both
+    assert route is not None and angles is not None  # the description guarantees both
     outside = np.isnan(own) & ((table.route < route.range[0]) | (table.route > route.range[1]))
     for i in np.flatnonzero(outside):
-        at = np.flatnonzero(measurements.angles.route == table.route[i])
+        at = np.flatnonzero(angles.route == table.route[i])
         if not len(at):
             raise DatasetError(
                 f"{table.origin.place(int(i))}, column {route.variable!r}: {table.route[i]:g} {route.unit} lies outside "

@@ -1,10 +1,15 @@
 """Bad input: one sentence that names the place and the remedy, exit code 2, and nothing written."""
 
 import sys
+from pathlib import Path
 
 import pytest
 
 from bowdenfit import cli
+from bowdenfit.dataset import read_dataset
+from bowdenfit.description.file import parse_description
+from bowdenfit.kinds.forces.table import ForceTable
+from bowdenfit.kinds.measurements import Measurements
 
 
 @pytest.fixture
@@ -180,22 +185,27 @@ def test_decimal_commas_byte_order_marks_and_excel_are_no_bad_input(dataset, mon
     assert "2 efficiencies, 77.0% to 78.5%" in out
 
 
+def read_forces(folder: Path, *files: str) -> Measurements:
+    """Tables of forces of a cable of one known wrap angle."""
+    contact = {"name": "cable", "friction": "mu", "wrap_angle": {"value": 45, "unit": "deg"}}
+    raw = {"name": "forces", "contact": [contact], "tables": {"forces": {"files": files}}}
+    return read_dataset(parse_description(raw), folder, {}).measurements
+
+
 def test_velocities_of_the_rope_in_one_table_and_of_the_motor_in_another_are_refused(tmp_path):
     from bowdenfit.errors import DatasetError
-    from bowdenfit.kinds.reading import read_forces
 
     rope, motor = tmp_path / "rope.csv", tmp_path / "motor.csv"
     rope.write_text("input_force_N,output_force_N,velocity_mm_per_s\n50,40,10\n")
     motor.write_text("input_force_N,output_force_N,velocity [r/min]\n50,40,20\n")
     with pytest.raises(DatasetError, match=r"rope\.csv and motor\.csv give velocities of different kinds"):
-        read_forces([rope, motor], None, ())
-    (table, _) = read_forces([motor], None, ())
+        read_forces(tmp_path, "rope.csv", "motor.csv")
+    table = read_forces(tmp_path, "motor.csv").table(ForceTable)
     assert table.velocity_unit == "rad/s"
     assert table.velocity[0] == pytest.approx(20 * 2 * 3.141592653589793 / 60)
 
 
 def test_a_coefficient_of_no_contact_is_refused_with_the_nearest_name():
-    from bowdenfit.description.file import parse_description
     from bowdenfit.errors import DescriptionError
 
     contact = {"name": "cable", "friction": "mu", "wrap_angle": {"value": 45, "unit": "deg"}}
@@ -210,9 +220,7 @@ def test_a_coefficient_of_no_contact_is_refused_with_the_nearest_name():
 
 
 def test_held_readings_are_said_to_be_bounds(tmp_path):
-    from bowdenfit.kinds.reading import read_forces
-
     path = tmp_path / "held.csv"
     path.write_text("input_force_N,output_force_N,stroke,run\n50,40,hold,1\n50,45,hold,1\n50,35,pull,1\n")
-    _, remarks = read_forces([path], None, ())
+    remarks = read_forces(tmp_path, "held.csv").remarks
     assert any("2 readings are held" in remark and "lower bound" in remark for remark in remarks)

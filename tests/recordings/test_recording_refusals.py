@@ -14,7 +14,7 @@ import scipy.io
 from bowdenfit.dataset import load_dataset
 from bowdenfit.errors import DatasetError
 from bowdenfit.files import columns_csv
-from bowdenfit.kinds.recordings.table import check_angles
+from bowdenfit.kinds.recordings.angles import check_angles
 from bowdenfit.questions.simulate.bench import BenchFriction, BenchSettings, Faults, Profile, simulate_recording
 from bowdenfit.recordings.recording import PULL, RETURN
 
@@ -467,14 +467,13 @@ def test_a_recording_outside_the_curves_needs_a_row_of_angles(columns, tmp_path,
     write(tmp_path / "run.csv", columns)
     spoil(tmp_path)
     data = load_dataset(tmp_path)
-    table = data.measurements.angles
     moved = replace(data.measurements.recordings.each[0], route=float(at))
     recordings = replace(data.measurements.recordings, each=(moved,))
     if not refused:
-        check_angles(data.description, recordings, table)
+        check_angles(recordings, data.description, data.measurements)
         return
     with pytest.raises(DatasetError, match=r"'run' was made at 640 mm, outside the range 430 to 530 mm"):
-        check_angles(data.description, recordings, table)
+        check_angles(recordings, data.description, data.measurements)
 
 
 SINGLE = {

@@ -1,1 +1,17 @@
-"""Measured transmission efficiencies."""
+"""Transmission efficiencies."""
+
+from bowdenfit.kinds.efficiencies.table import EfficiencyTable, describe, implausible, page, read_efficiencies
+from bowdenfit.kinds.kind import Kind, itself
+from bowdenfit.kinds.wrap_angles import check_rows
+
+EFFICIENCIES = Kind(
+    name="efficiencies",
+    table=EfficiencyTable,
+    read=read_efficiencies,
+    check=check_rows,
+    describe=describe,
+    implausible=implausible,
+    page=page,
+    count=lambda table: f"{len(table.efficiency)} efficiencies",
+    conditions=itself,
+)

@@ -1,1 +1,20 @@
-"""Forces at both ends of a pull-pull loop."""
+"""Forces at both ends of a pull-pull loop while it moves."""
+
+from bowdenfit.kinds.kind import Kind, itself
+from bowdenfit.kinds.loop.table import LoopTable, read_loop
+from bowdenfit.kinds.loop.words import describe, implausible, page, warnings_of
+from bowdenfit.kinds.wrap_angles import check_rows
+
+LOOP = Kind(
+    name="loop",
+    table=LoopTable,
+    read=read_loop,
+    check=check_rows,
+    describe=describe,
+    warnings=warnings_of,
+    implausible=implausible,
+    page=page,
+    count=lambda table: f"{len(table.stroke)} readings of a loop",
+    conditions=itself,
+    forces=lambda table: table.input_force * table.stroke,
+)

@@ -1,1 +1,35 @@
-"""Force recordings."""
+"""Force recordings: two load cells sampled while a motor pulls, stops, reverses and returns."""
+
+import numpy as np
+
+from bowdenfit.kinds.kind import Kind
+from bowdenfit.kinds.recordings.angles import check_angles, recorded_angles
+from bowdenfit.kinds.recordings.table import read_recordings
+from bowdenfit.kinds.recordings.words import count, implausible, recordings_text
+from bowdenfit.recordings.recording import Recordings
+from bowdenfit.types import Vector
+
+
+def _forces(recordings: Recordings) -> Vector:
+    """Of both ends; a loop's force passes through zero, and what is asked of it is asked under load."""
+    read = [force for r in recordings.each for force in (r.blocks.input_force, r.blocks.output_force)]
+    return np.concatenate([f[f > 0.2 * f.max()] for f in read] if recordings.loop else read)
+
+
+RECORDINGS = Kind(
+    name="recordings",
+    table=Recordings,
+    read=read_recordings,
+    check=check_angles,
+    describe=lambda recordings, _: recordings_text(recordings),
+    heading="Recordings",
+    implausible=implausible,
+    count=count,
+    conditions=recorded_angles,
+    forces=_forces,
+    speeds=lambda recordings: np.concatenate(
+        [np.abs(r.blocks.velocity[r.strokes.used_sliding]) for r in recordings.each]
+    ),
+    velocity_unit=lambda recordings: recordings.velocity_unit,
+    takes_channels=True,
+)

@@ -1,30 +1,13 @@
 """What each block of a recording is worth to a likelihood: whether it can be used, and how much it says."""
 
-from dataclasses import dataclass
 
 import numpy as np
 
 from bowdenfit.cable.load_cells import LEAST_FORCE
-from bowdenfit.kinds.tables import OwnAngles
-from bowdenfit.recordings.recording import Recording, Recordings
+from bowdenfit.recordings.recording import Recording
 
 RECORDED = "recorded_efficiency"  # name of the readings of recordings in results
 _NEAR_LIMIT = 0.005  # of the end of a range, within which a saturated reading is at it
-
-
-@dataclass(frozen=True)
-class RecordedAngles:
-    """Where and at which wrap angles each recording was made; see `bowdenfit.kinds.row_angles.Measured`."""
-
-    route: np.ndarray
-    own: OwnAngles
-
-
-def recorded_angles(recordings: Recordings) -> RecordedAngles:
-    """Route values and own angles, one row a recording."""
-    shape = (len(recordings.each), len(recordings.columns))
-    angle, sd = (np.array([getattr(r, n) for r in recordings.each]).reshape(shape) for n in ("own_angle", "own_sd"))
-    return RecordedAngles(np.array([r.route for r in recordings.each]), OwnAngles(recordings.columns, angle, sd))
 
 
 def positive(recording: Recording) -> np.ndarray:

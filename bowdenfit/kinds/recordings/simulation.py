@@ -18,7 +18,8 @@ from bowdenfit.cable.noise import scatter
 from bowdenfit.description import Description
 from bowdenfit.errors import DatasetError
 from bowdenfit.kinds.measurements import Measurements
-from bowdenfit.kinds.recordings.blocks import recorded_angles, worth_of
+from bowdenfit.kinds.recordings.angles import recorded_angles
+from bowdenfit.kinds.recordings.blocks import worth_of
 from bowdenfit.kinds.resolve_angles import resolve_angles
 from bowdenfit.kinds.row_angles import row_angles
 from bowdenfit.physics.hysteresis import play_operator

@@ -1,6 +1,6 @@
 """The recordings of a data set: read, prepared, cut into strokes, and placed on the route."""
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 from types import MappingProxyType
@@ -12,7 +12,8 @@ from bowdenfit.description import ColumnMap, Description, Preparation, QuantityV
 from bowdenfit.errors import DatasetError, DescriptionError, nearest
 from bowdenfit.files import read_channels
 from bowdenfit.files.columns import ColumnSource
-from bowdenfit.kinds.tables import AngleTable
+from bowdenfit.kinds.kind import Found, Source
+from bowdenfit.kinds.recordings.angles import check_placed
 from bowdenfit.recordings.forces import TORQUES, WANTED, matched_name, pattern_fields, rows_where, to_recording
 from bowdenfit.recordings.loop_strokes import find_loop_strokes
 from bowdenfit.recordings.preparation import NO_DELAY_OF_LOOPS, averaged, inspected
@@ -23,24 +24,17 @@ from bowdenfit.types import Vector
 from bowdenfit.units import INTERNAL_UNITS, conversion_factor, speed_dimension
 
 
-def read_recordings(
-    description: Description, folder: Path, paths: Callable[[], Sequence[Path]], channels: Mapping[str, ColumnSource]
-) -> tuple[Recordings, dict[str, Path]]:
+def read_recordings(source: Source) -> Found[Recordings]:
     """Read all recordings of a description.
 
     Args:
-        description: The description; it has a table of recordings.
-        folder: Where its files are.
-        paths: The files that the table's pattern matches.
-        channels: Channels named on the command line; they come before those of the description.
-
-    Returns:
-        The recordings, and the files they were read from by name.
+        source: Where they are; channels named on the command line come before those of the description.
 
     Raises:
         DatasetError, DescriptionError: What is wrong, in a sentence.
     """
-    entries = _entries(description, folder, paths())
+    description, channels = source.description, source.channels
+    entries = _entries(source)
     _check_names(entries)
     files = [_to_read(description, path, entry, channels) for path, entry in entries]
     units = {f.velocity_unit: f.raw.file for f in files if f.velocity_unit}
@@ -53,8 +47,9 @@ def read_recordings(
     each = tuple(_recording(description, f, *parts) for f, parts in zip(files, _said_once(prepared), strict=True))
     unit, loop = next(iter(units), ""), description.cable.kind == "loop"
     recordings = Recordings(description.angle_columns, each, unit, delay_sd, loop)
-    _check_placed(description, recordings)
-    return recordings, {entry.file: path for path, entry in entries}
+    check_placed(recordings, description)
+    remarks = [remark for r in each for remark in (*r.account.remarks, *r.strokes.remarks)]
+    return Found(recordings, {entry.file: path for path, entry in entries}, tuple(remarks))
 
 
 @dataclass(frozen=True)
@@ -106,16 +101,14 @@ def _pooled(delays: Vector, sds: Vector) -> tuple[float, float]:
     return mean, float(np.hypot(np.sqrt(max(chance, apart)), COMMON_ERROR))
 
 
-def _entries(description: Description, folder: Path, matched: Sequence[Path]) -> list[tuple[Path, RecordingFile]]:
+def _entries(source: Source) -> list[tuple[Path, RecordingFile]]:
     """Every file with what is said of it; a file named in a [[recording]] is not read twice."""
-    table = description.tables.recordings
-    assert table is not None  # the caller asked
-    entries = [(folder / entry.file, entry) for entry in description.recording]
+    description = source.description
+    entries = [(source.folder / entry.file, entry) for entry in description.recording]
     named = {path.resolve() for path, _ in entries}
-    for path in matched:
+    for path in source.files:
         if path.resolve() not in named:
-            file = path.relative_to(folder).as_posix() if path.is_relative_to(folder) else path.name
-            entries.append((path, _from_name(description, table.pattern, path, file)))
+            entries.append((path, _from_name(description, source.settings.pattern, path, source.name_of(path))))
     return entries
 
 
@@ -263,49 +256,3 @@ def _own_angles(description: Description, entry: RecordingFile) -> tuple[np.ndar
     angles = [float("nan") if q is None else q.to("angle") for q in stated]
     sds = [float("nan") if q is None or q.sd is None else q.sd_to("angle") for q in stated]
     return np.array(angles, dtype=float), np.array(sds, dtype=float)
-
-
-def _check_placed(description: Description, recordings: Recordings) -> None:
-    """Every recording can be given a wrap angle in every contact."""
-    route = description.route
-    for recording in recordings.each:
-        for contact in description.contact:
-            column = contact.wrap_angle.column
-            if column is None or np.isfinite(recording.own_angle[recordings.columns.index(column)]):
-                continue
-            if not contact.wrap_angle.curve:
-                raise DatasetError(
-                    f"the recording {recording.name!r} has no wrap angle for the contact {contact.name!r}; add it to its "
-                    f'[[recording]]: wrap_angles = {{ {column} = {{ value = 90, unit = "deg" }} }}.'
-                )
-            if np.isnan(recording.route):
-                at = f"at = 470   # {route.variable}, in {route.unit}" if route else "at = 470"
-                raise DatasetError(
-                    f"the recording {recording.name!r} does not say at which {route.variable if route else 'length'} it was "
-                    f'made; add that to its [[recording]] ({at}), or read it from the file names: pattern = "{{at}}mm*".'
-                )
-
-
-def check_angles(description: Description, recordings: Recordings, angles: AngleTable | None) -> None:
-    """Every recording outside the range of the curves has its wrap angles measured, in its own place or in the table.
-
-    Args:
-        description: The description.
-        recordings: The recordings.
-        angles: The table of wrap angles.
-
-    Raises:
-        DatasetError: A recording has none.
-    """
-    route = description.route
-    if route is None or angles is None:
-        return
-    curved = [recordings.columns.index(c.wrap_angle.column) for c in description.curved if c.wrap_angle.column]
-    for recording in recordings.each:
-        outside = not route.range[0] <= recording.route <= route.range[1]
-        if outside and not np.isfinite(recording.own_angle[curved]).all() and recording.route not in angles.route:
-            raise DatasetError(
-                f"the recording {recording.name!r} was made at {recording.route:g} {route.unit}, outside the range "
-                f"{route.range[0]:g} to {route.range[1]:g} {route.unit} where the angle curves hold, and the angle table has "
-                "no row there; measure the wrap angles there, and add them to the table or as wrap_angles to its [[recording]]."
-            )

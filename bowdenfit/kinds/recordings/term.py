@@ -13,6 +13,7 @@ from bowdenfit.cable.cable import Cable
 from bowdenfit.cable.load_cells import BLOCK_NOISE, DELAY_ERROR
 from bowdenfit.description import RecordingsTable
 from bowdenfit.errors import DatasetError
+from bowdenfit.kinds.recordings.angles import recorded_angles
 from bowdenfit.kinds.recordings.blocks import (
     RECORDED,
     drift_of,
@@ -20,7 +21,6 @@ from bowdenfit.kinds.recordings.blocks import (
     inside_phase,
     last_contact,
     positive,
-    recorded_angles,
     restarts,
     standing_share,
     worth_of,

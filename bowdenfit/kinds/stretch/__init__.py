@@ -1,1 +1,16 @@
 """Stretch of the rope under load."""
+
+from bowdenfit.kinds.kind import Kind
+from bowdenfit.kinds.stretch.table import StretchTable, read_stretch
+from bowdenfit.kinds.stretch.words import describe, implausible, page, warnings_of
+
+STRETCH = Kind(
+    name="stretch",
+    table=StretchTable,
+    read=read_stretch,
+    describe=describe,
+    warnings=warnings_of,
+    implausible=implausible,
+    page=page,
+    count=lambda table: f"{len(table.load)} readings of stretch",
+)

@@ -2,20 +2,9 @@
 
 from typing import Any
 
-from bowdenfit.kinds.measurements import Measurements
 from bowdenfit.questions.bends.page import elastic_page
 from bowdenfit.results.record import Record
 from bowdenfit.words import filled, table
-
-
-def elastic_counts(measured: Measurements) -> list[str]:
-    """How many readings of each kind were fitted."""
-    kinds = (
-        (measured.stretch and len(measured.stretch.load), "readings of stretch"),
-        (measured.preload and len(measured.preload.preload), "preloads"),
-        (measured.loop and len(measured.loop.stroke), "readings of a loop"),
-    )
-    return [f"{count} {what}" for count, what in kinds if count is not None]
 
 
 def elastic_text(fit: Record) -> str:

@@ -3,7 +3,7 @@
 import numpy as np
 
 from bowdenfit.files.channels import Channel, ChannelFile
-from bowdenfit.questions.recorded.words import recordings_text
+from bowdenfit.kinds.recordings.words import recordings_text
 from bowdenfit.recordings.recording import Recordings
 from bowdenfit.words import filled, table
 

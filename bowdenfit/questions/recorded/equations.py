@@ -11,7 +11,7 @@ from jaxtyping import Float
 
 from bowdenfit.cable.load_cells import LEAST_FORCE, LoadCells
 from bowdenfit.inference.compilation import compiled
-from bowdenfit.kinds.recordings.blocks import recorded_angles
+from bowdenfit.kinds.recordings.angles import recorded_angles
 from bowdenfit.kinds.resolve_angles import resolve_angles
 from bowdenfit.kinds.row_angles import row_angles
 from bowdenfit.kinds.tables import AngleTable

@@ -6,7 +6,7 @@ import jax
 import jax.numpy as jnp
 import numpy as np
 
-from bowdenfit.kinds.recordings.blocks import recorded_angles
+from bowdenfit.kinds.recordings.angles import recorded_angles
 from bowdenfit.kinds.resolve_angles import resolve_angles
 from bowdenfit.kinds.row_angles import row_angles
 from bowdenfit.questions.recorded.equations import blocks_shown

@@ -1,6 +1,6 @@
 """What a plan says is measured ([design]), and simulated tables as the rows of their files."""
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from typing import Any, Literal
 
 import numpy as np
@@ -8,15 +8,14 @@ from pydantic import BaseModel, ConfigDict, Field, ValidationError
 
 from bowdenfit.description import Description
 from bowdenfit.errors import DescriptionError
+from bowdenfit.kinds import each_table
 from bowdenfit.kinds.elastic_simulation import ElasticDesign
+from bowdenfit.kinds.kind import Page
 from bowdenfit.kinds.measurements import Measurements
-from bowdenfit.kinds.tables import AngleTable, EfficiencyTable, ForceTable, LoopTable, PreloadTable, StretchTable
 from bowdenfit.questions.simulate.simulation import Design
 
-Page = tuple[list[str], list[list[str]]]  # headings and rows
 Stroke = Literal["pull", "return"]
 _STROKES: Mapping[str, int] = {"pull": 1, "return": -1}
-_STROKE_NAMES = {sign: name for name, sign in _STROKES.items()}
 
 
 class _Page(BaseModel):
@@ -100,83 +99,9 @@ def _radians(degrees: Sequence[float]) -> tuple[float, ...]:
 
 def table_pages(description: Description, measured: Measurements) -> dict[str, Page]:
     """Headings and rows of every table, by file name."""
-    return dict(_pages(description, measured))
-
-
-def _pages(description: Description, measured: Measurements) -> Iterator[tuple[str, Page]]:
-    tables, route = description.tables, description.route
-    heading = [f"{route.variable}_{route.unit}"] if route else []
-    if tables.angles and measured.angles:
-        yield tables.angles.file or "angles.csv", _angles(measured.angles, heading)
-    if tables.efficiencies and measured.efficiencies:
-        yield tables.efficiencies.file or "efficiencies.csv", _efficiencies(measured.efficiencies, heading)
-    if tables.forces and measured.forces:
-        yield str(tables.forces.file or "forces.csv"), _forces(measured.forces, heading)
-    if tables.stretch and measured.stretch:
-        yield tables.stretch.file or "stretch.csv", _stretch(measured.stretch)
-    if tables.preload and measured.preload:
-        yield tables.preload.file or "preload.csv", _preload(measured.preload)
-    if tables.loop and measured.loop:
-        yield tables.loop.file or "loop.csv", _loop(description, measured.loop)
-
-
-def _angles(table: AngleTable, heading: list[str]) -> Page:
-    shown, limits = np.rad2deg(table.angle), np.rad2deg(table.limit)
-    cells = [
-        [f"<{limits[i, k]:g}" if np.isnan(angle) else f"{angle:.1f}" for k, angle in enumerate(row)]
-        for i, row in enumerate(shown)
-    ]
-    rows = [[f"{length:g}", *row] for length, row in zip(table.route, cells, strict=True)]
-    return [*(heading or [""]), *(f"{name}_deg" for name in table.names)], rows
-
-
-def _efficiencies(table: EfficiencyTable, heading: list[str]) -> Page:
-    values = zip(table.route, table.efficiency, strict=True)
-    return [*heading, "efficiency"], [[*_placed(length, heading), f"{eta:.5f}"] for length, eta in values]
-
-
-def _placed(route: float, heading: list[str]) -> list[str]:
-    return [f"{route:g}"] if heading else []
-
-
-def _forces(table: ForceTable, heading: list[str]) -> Page:
-    rows = [
-        [
-            *_placed(table.route[i], heading),
-            table.run_names[table.run[i]],
-            _STROKE_NAMES[int(table.stroke[i])],
-            f"{table.input_force[i]:.3f}",
-            f"{table.output_force[i]:.3f}",
-        ]
-        for i in range(len(table.run))
-    ]
-    return [*heading, "run", "stroke", "input_force_N", "output_force_N"], rows
-
-
-def _stretch(table: StretchTable) -> Page:
-    branch = np.where(table.unloading, "unload", "load")
-    columns = zip(np.rad2deg(table.wrap_angle), branch, table.load, table.stretch, strict=True)
-    rows = [[f"{angle:.6g}", way, f"{load:g}", f"{stretch:.4f}"] for angle, way, load, stretch in columns]
-    return ["wrap_angle_deg", "branch", "load_N", "stretch_mm"], rows
-
-
-def _preload(table: PreloadTable) -> Page:
-    columns = zip(np.rad2deg(table.wrap_angle), table.preload, strict=True)
-    return ["wrap_angle_deg", "preload_N"], [[f"{angle:.6g}", f"{preload:.3f}"] for angle, preload in columns]
-
-
-def _loop(description: Description, table: LoopTable) -> Page:
-    """As torques where both pulleys' radii are stated."""
-    cable, names = description.cable, table.own.names
-    radii = [radius.to("length") / 1000 for radius in (cable.input_pulley_radius, cable.output_pulley_radius) if radius]
-    what, (first, second), digits = ("force_N", (1.0, 1.0), 3) if len(radii) < 2 else ("torque_N_m", radii, 5)
-    rows = [
-        [
-            *(f"{angle:.6g}" for angle in np.rad2deg(table.own.angle[i])),
-            _STROKE_NAMES[int(table.stroke[i])],
-            f"{first * table.input_force[i]:.{digits}f}",
-            f"{second * table.output_force[i]:.{digits}f}",
-        ]
-        for i in range(len(table.stroke))
-    ]
-    return [*(f"{name}_deg" for name in names), "stroke", f"input_{what}", f"output_{what}"], rows
+    pages = {}
+    for kind, table in each_table(measured):
+        settings = getattr(description.tables, kind.name, None)
+        if settings and kind.page:
+            pages[settings.file or f"{kind.name}.csv"] = kind.page(table, description)
+    return pages

@@ -9,13 +9,13 @@ from bowdenfit.inference.diagnostics import shortfalls
 from bowdenfit.inference.interval import Interval
 from bowdenfit.inference.least_squares import Estimate
 from bowdenfit.inference.samplers import recommendation
+from bowdenfit.kinds.recordings.accounts import accounts
 from bowdenfit.model import EFFICIENCY_TERMS
 from bowdenfit.questions.bends.page import elastic_page
 from bowdenfit.questions.check.answer import checks_of
 from bowdenfit.questions.check.page import checks_page
 from bowdenfit.questions.identify.confounding import confounded
 from bowdenfit.questions.identify.contradiction import agreement_page
-from bowdenfit.questions.recorded.preparation_page import accounts
 from bowdenfit.questions.recorded.rate import rate_effect
 from bowdenfit.questions.summary.verdict import verdict
 from bowdenfit.results.length import OptimalLength

@@ -3,13 +3,14 @@
 from typing import Any
 
 from bowdenfit.cable.load_cells import RUN_SCATTER
+from bowdenfit.kinds import each_table
+from bowdenfit.kinds.recordings.words import recordings_text
 from bowdenfit.model import EFFICIENCY_TERMS
-from bowdenfit.questions.bends.words import elastic_counts, elastic_text
+from bowdenfit.questions.bends.words import elastic_text
 from bowdenfit.questions.check.words import checks_text
 from bowdenfit.questions.identify.answer import determined, identifiability
 from bowdenfit.questions.identify.confounding import confounded
 from bowdenfit.questions.recorded.rate import SHOWN_SPEED, rate_effect
-from bowdenfit.questions.recorded.words import recordings_text
 from bowdenfit.questions.summary.page import summarize
 from bowdenfit.questions.summary.sampler_words import sampler_sentences, sampler_text
 from bowdenfit.questions.summary.verdict import CONTRADICTORY, NOT_CONVERGED, NOT_IDENTIFIABLE, Verdict, verdict
@@ -54,17 +55,7 @@ def _title(fit: Record) -> str:
     for term in fit.model.terms:
         if term.name == "wrap_angle":
             counts += _angle_counts(fit, len(term.data["angle"]), len(term.data["limit"]))
-    if tables.efficiencies is not None:
-        counts.append(f"{len(tables.efficiencies.efficiency)} efficiencies")
-    if tables.recordings is not None:
-        blocks = sum(int(r.strokes.used_sliding.sum()) for r in tables.recordings.each)
-        samples, runs = sum(r.account.samples for r in tables.recordings.each), len(tables.recordings.runs)
-        counts.append(
-            f"{samples} samples of {len(tables.recordings.each)} recordings in {runs} runs ({blocks} sliding blocks)"
-        )
-    if tables.forces is not None:
-        counts.append(f"{len(tables.forces.run)} force readings in {len(tables.forces.run_names)} runs")
-    counts += elastic_counts(tables)
+    counts += [count for kind, table in each_table(tables) if (count := kind.count(table))]
     line = f"{fit.name}\n{'=' * len(fit.name)}"
     geometry = f"; {description.geometry} geometry" if description.curved else ""
     model = f"; friction model {description.friction_model}" if description.friction_model != "capstan" else ""

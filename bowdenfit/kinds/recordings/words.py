@@ -4,10 +4,12 @@ from typing import Any
 
 import numpy as np
 
-from bowdenfit.questions.recorded.preparation_page import accounts
-from bowdenfit.recordings.recording import Recordings
+from bowdenfit.kinds.plausibility import FACTOR, SCATTER, beyond
+from bowdenfit.kinds.recordings.accounts import accounts
+from bowdenfit.recordings.recording import PULL, RETURN, Recordings
 from bowdenfit.words import filled, listed, table
 
+_FEWEST_BLOCKS = 10  # of each stroke of a plausible recording
 _SAMPLES = ("recording", "samples", "used", "left out", "block")
 _HEADS = (*_SAMPLES, "pulling", "switching", "returning", "sliding", "exponent")
 _LOOP_HEADS = (*_SAMPLES, "forward", "between", "back", "moving", "loss", "exponent")
@@ -83,3 +85,23 @@ def _tare(pages: list[dict[str, Any]]) -> list[str]:
 def _by_hand(pages: list[dict[str, Any]]) -> list[str]:
     names = [p["name"] for p in pages if p["phases_by_hand"]]
     return [f"Phases set by hand in cable.toml: {listed(names)}."] if names else []
+
+
+def count(recordings: Recordings) -> str:
+    """How many samples of how many recordings, in how many runs."""
+    blocks = sum(int(r.strokes.used_sliding.sum()) for r in recordings.each)
+    samples, runs = sum(r.account.samples for r in recordings.each), len(recordings.runs)
+    return f"{samples} samples of {len(recordings.each)} recordings in {runs} runs ({blocks} sliding blocks)"
+
+
+def implausible(real: Recordings, made: Recordings) -> str:
+    """Recordings that hardly slide, are nothing but noise, or of an efficiency that no bench reads."""
+    for one, other in zip(real.each, made.each, strict=True):
+        for stroke in (PULL, RETURN):
+            before, after = (int(np.sum(r.strokes.used_sliding & (r.strokes.stroke == stroke))) for r in (one, other))
+            if after < min(before, _FEWEST_BLOCKS):
+                return "a recording hardly slides"
+        if other.strokes.noise > max(FACTOR * one.strokes.noise, SCATTER if not real.loop else 0.0):
+            return "a recording is nothing but noise"
+    exponents = np.array([r.strokes.exponent for r in made.each])
+    return beyond(exponents[np.isfinite(exponents)], "the efficiency of a recording")

@@ -1,0 +1,146 @@
+"""Wrap angles of the curved contacts against the route variable."""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from bowdenfit.description import Description
+from bowdenfit.files.columns import Column, Quantity, find_columns, require
+from bowdenfit.files.csv_table import Cell, read_csv
+from bowdenfit.kinds.kind import Found, Page, Source
+from bowdenfit.kinds.measurements import Measurements
+from bowdenfit.kinds.rows import (
+    LARGEST_ANGLE,
+    Provenance,
+    provenance_of,
+    read_angle,
+    rounded,
+    route_column,
+    route_heading,
+)
+from bowdenfit.types import Matrix, Vector
+
+_FEWEST = 3  # detected angles below which a curve's shape rests on its priors; as many as it has coefficients
+
+
+@dataclass(frozen=True)
+class AngleTable:
+    """Wrap angle of each curved contact against the route variable.
+
+    Args:
+        route: Route variable, in the unit of the description.
+        names: Column of each contact.
+        angle: Measured wrap angle [rad]; NaN where it was not detected.
+        limit: Detection limit where it was not detected [rad]; NaN elsewhere.
+        origin: Where each row was read.
+    """
+
+    route: Vector
+    names: tuple[str, ...]
+    angle: Matrix
+    limit: Matrix
+    origin: Provenance
+
+    def column(self, name: str) -> tuple[Vector, Vector]:
+        """Angles and detection limits of one contact."""
+        k = self.names.index(name)
+        return self.angle[:, k], self.limit[:, k]
+
+
+def read_angles(source: Source) -> Found[AngleTable]:
+    """Read a table of wrap angles; a blank cell or `<10` is an angle too small to detect.
+
+    Args:
+        source: Where it is.
+
+    Raises:
+        DatasetError: See `read_csv` and `find_columns`; or a cell is not an angle between 0 and 2000 degrees.
+    """
+    path, route, stated = source.file, source.description.route, source.settings.detection_limit
+    assert route is not None  # a description has angles only with a route
+    contacts = [c.wrap_angle.column for c in source.description.curved if c.wrap_angle.column]
+    detection_limit = stated.to("angle") if stated else None
+    table = read_csv(path)
+    wanted = (route_column(route), *(Quantity(c, "angle") for c in contacts))
+    found = find_columns(table, wanted, source.columns)
+    lengths = require(table, found, route.variable, f"{route.variable}_{route.unit}")
+    columns = [require(table, found, name, f"{name}_deg") for name in contacts]
+    cells = [[_angle_or_limit(cell, c, detection_limit) for cell in c.cells] for c in columns]
+    pairs = np.array(cells, dtype=float).reshape(len(columns), len(table.rows), 2)
+    return Found(
+        AngleTable(rounded(lengths.numbers()), tuple(contacts), pairs[..., 0].T, pairs[..., 1].T, provenance_of(table)),
+        {path.name: path},
+    )
+
+
+def _angle_or_limit(cell: Cell, column: Column, detection_limit: float | None) -> tuple[float, float]:
+    written = cell.limit()
+    if written is None and not cell.blank:
+        return read_angle(cell, column), np.nan
+    limit = written * column.factor if written is not None else detection_limit
+    if limit is None:
+        raise cell.refuse(
+            "the cell is blank, which means too small to detect, but no detection limit is known; write <10 (the "
+            'limit) in the cell, or set detection_limit = { value = 10, unit = "deg" } for the table in cable.toml.'
+        )
+    if not 0 < limit <= LARGEST_ANGLE:
+        raise cell.refuse(f"{cell.shown} is not a possible detection limit; write one between 0 and 2000 deg.")
+    return np.nan, limit
+
+
+def describe(table: AngleTable, description: Description) -> list[str]:
+    """What was detected in each column, and what lies outside the range of the curves."""
+    settings = description.tables.angles
+    how = settings.undetected if settings else "censored"
+    lines = []
+    for name in table.names:
+        angle, limit = table.column(name)
+        found = np.rad2deg(angle[np.isfinite(angle)])
+        below = (
+            f", {np.isnan(angle).sum()} below {np.rad2deg(np.nanmax(limit)):g} deg ({how})"
+            if np.isnan(angle).any()
+            else ""
+        )
+        spread = f", {found.min():.4g} to {found.max():.4g} deg" if len(found) else ""
+        lines.append(f"{table.origin.files[0]}: {name}, {len(found)} detected{spread}{below}")
+    if description.route:
+        outside = (table.route < description.route.range[0]) | (table.route > description.route.range[1])
+        if outside.any():
+            rows = "1 row lies" if outside.sum() == 1 else f"{outside.sum()} rows lie"
+            lines.append(f"{rows} outside the range of the curves, and serves measurements made there.")
+    return lines
+
+
+def warnings_of(table: AngleTable, description: Description, measurements: Measurements) -> list[str]:
+    """Curves that too few angles determine."""
+    del measurements
+    assert description.route is not None  # an angle table is read only with one
+    low, high = description.route.range
+    inside, warnings = (table.route >= low) & (table.route <= high), []
+    for contact in description.curved:
+        n = int(np.isfinite(table.column(contact.wrap_angle.column or "")[0][inside]).sum())
+        if n < _FEWEST:
+            warnings.append(
+                f"the curve of {contact.name!r} has three coefficients and {n} detected angles in the range; "
+                "its shape will rest on the priors."
+            )
+    return warnings
+
+
+def implausible(real: AngleTable, made: AngleTable) -> str:
+    """Angles beyond the readable, or fewer than a curve has coefficients."""
+    if np.nanmax(made.angle, initial=0.0) > LARGEST_ANGLE:
+        return "an angle is above 2000 deg"
+    detected, enough = (np.isfinite(table.angle).sum(axis=0) for table in (made, real))
+    return "too few angles are detected" if np.any(detected < np.minimum(enough, _FEWEST)) else ""
+
+
+def page(table: AngleTable, description: Description) -> Page:
+    """Headings and rows of its file."""
+    shown, limits = np.rad2deg(table.angle), np.rad2deg(table.limit)
+    cells = [
+        [f"<{limits[i, k]:g}" if np.isnan(angle) else f"{angle:.1f}" for k, angle in enumerate(row)]
+        for i, row in enumerate(shown)
+    ]
+    rows = [[f"{length:g}", *row] for length, row in zip(table.route, cells, strict=True)]
+    return [*(route_heading(description) or [""]), *(f"{name}_deg" for name in table.names)], rows

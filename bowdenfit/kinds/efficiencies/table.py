@@ -1,0 +1,127 @@
+"""Transmission efficiencies: output force over input force while pulling."""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from bowdenfit.description import Description
+from bowdenfit.files.columns import Column, Quantity, find_columns, require
+from bowdenfit.files.csv_table import Cell, read_csv
+from bowdenfit.kinds.kind import Found, Page, Source
+from bowdenfit.kinds.plausibility import beyond
+from bowdenfit.kinds.rows import (
+    OwnAngles,
+    Provenance,
+    provenance_of,
+    read_own_angles,
+    read_route,
+    route_cells,
+    route_heading,
+    shared_columns,
+)
+from bowdenfit.types import Vector
+
+
+@dataclass(frozen=True)
+class EfficiencyTable:
+    """Measured transmission efficiencies.
+
+    Args:
+        route: Route variable; NaN where the cable has no route.
+        efficiency: Output force over input force while pulling [1].
+        sd: Standard deviation where given [1], else 0.
+        own: Wrap angles measured with the row.
+        origin: Where each row was read.
+    """
+
+    route: Vector
+    efficiency: Vector
+    sd: Vector
+    own: OwnAngles
+    origin: Provenance
+
+
+def read_efficiencies(source: Source) -> Found[EfficiencyTable]:
+    """Read a table of transmission efficiencies, 0 to 1 or in percent where the heading or the cell says so.
+
+    Args:
+        source: Where it is.
+
+    Raises:
+        DatasetError: See `read_csv` and `find_columns`; or an efficiency is not between 0 and 1.
+    """
+    path, route, contacts = source.file, source.description.route, source.description.angle_columns
+    table = read_csv(path)
+    names = (Quantity("efficiency", "ratio"), Quantity("efficiency_sd", "ratio"))
+    found = find_columns(table, (*names, *shared_columns(route, contacts)), source.columns)
+    column = require(table, found, "efficiency", "efficiency (0 to 1) or efficiency_percent")
+    spread = found.get("efficiency_sd")
+    efficiency = [_efficiency(cell, column) for cell in column.cells]
+    pairs = zip(spread.cells, column.cells, strict=True) if spread else ()
+    sd = [0.0 if cell.blank else _efficiency_sd(cell, spread, beside, column) for cell, beside in pairs if spread]
+    rows = EfficiencyTable(
+        read_route(table, found, route),
+        np.array(efficiency),
+        np.array(sd) if spread else np.zeros(len(table.rows)),
+        read_own_angles(table, found, contacts),
+        provenance_of(table),
+    )
+    return Found(rows, {path.name: path})
+
+
+def _ratio(cell: Cell, column: Column) -> float:
+    """A number, or a percentage where the heading or the cell says so."""
+    percentage = cell.percentage()
+    return column.value(cell) if percentage is None else percentage
+
+
+def _in_percent(cell: Cell, column: Column) -> bool:
+    return column.factor != 1 or cell.percentage() is not None
+
+
+def _efficiency(cell: Cell, column: Column) -> float:
+    value = _ratio(cell, column)
+    if value <= 0:
+        raise cell.refuse(f"an efficiency of {cell.shown} is not possible; it is output force over input force.")
+    if value > 1:
+        usual = (
+            "the usual cause is that input and output force were swapped"
+            if _in_percent(cell, column)
+            else "if it is in percent, name the column efficiency_percent"
+        )
+        raise cell.refuse(f"an efficiency of {cell.shown} is above 1; {usual}.")
+    return value
+
+
+def _efficiency_sd(cell: Cell, column: Column, efficiency: Cell, efficiency_column: Column) -> float:
+    value = _ratio(cell, column)
+    if not 0 < value <= 1:
+        raise cell.refuse(
+            f"a standard deviation of {cell.shown} is not possible for an efficiency; write one up to 1 (100 %)."
+        )
+    if _in_percent(efficiency, efficiency_column) and not _in_percent(cell, column):
+        raise cell.refuse(
+            f"{cell.shown} does not say whether it is in percent as the efficiency beside it is; name the column "
+            "efficiency_sd_percent, or write 1 % for 0.01."
+        )
+    return value
+
+
+def describe(table: EfficiencyTable, description: Description) -> list[str]:
+    """How many there are, and how large."""
+    del description
+    low, high = table.efficiency.min(), table.efficiency.max()
+    return [f"{table.origin.files[0]}: {len(table.efficiency)} efficiencies, {low:.1%} to {high:.1%}"]
+
+
+def implausible(real: EfficiencyTable, made: EfficiencyTable) -> str:
+    """Efficiencies that no bench reads."""
+    del real
+    return beyond(-np.log(made.efficiency), "an efficiency")
+
+
+def page(table: EfficiencyTable, description: Description) -> Page:
+    """Headings and rows of its file."""
+    values = zip(table.route, table.efficiency, strict=True)
+    rows = [[*route_cells(length, description), f"{eta:.5f}"] for length, eta in values]
+    return [*route_heading(description), "efficiency"], rows

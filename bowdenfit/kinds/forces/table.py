@@ -1,0 +1,167 @@
+"""Pairs of forces read at both ends of a cable, in runs: one run is one mounting."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+
+from bowdenfit.errors import DatasetError
+from bowdenfit.files.columns import Column, Quantity, find_columns, require
+from bowdenfit.files.csv_table import Cell, read_csv
+from bowdenfit.kinds.kind import Found, Source
+from bowdenfit.kinds.rows import (
+    OwnAngles,
+    Provenance,
+    provenance_of,
+    read_own_angles,
+    read_route,
+    read_strokes,
+    shared_columns,
+)
+from bowdenfit.types import Labels, Vector
+from bowdenfit.units import INTERNAL_UNITS, speed_dimension
+
+_UNUSED = ("time", "position")  # columns that a force table may have and that nothing reads
+
+
+@dataclass(frozen=True)
+class ForceTable:
+    """Pairs of forces read at both ends.
+
+    Args:
+        route: Route variable; NaN where the cable has no route.
+        input_force: Force at the motor side [N].
+        output_force: Force at the load side [N].
+        run: Number of the run (one mounting of the cable) of each row.
+        run_names: Name of each run.
+        stroke: +1 pulling, -1 return, 0 held.
+        own: Wrap angles measured with the row.
+        origin: Where each row was read.
+        velocity: Velocity of the rope [mm/s] or of the motor [rad/s]; NaN where it is not known.
+        velocity_unit: Which of the two; empty without velocities.
+    """
+
+    route: Vector
+    input_force: Vector
+    output_force: Vector
+    run: Labels
+    run_names: tuple[str, ...]
+    stroke: Labels
+    own: OwnAngles
+    origin: Provenance
+    velocity: Vector
+    velocity_unit: str = ""
+
+
+def read_forces(source: Source) -> Found[ForceTable]:
+    """Read force tables, one or several files, into one table.
+
+    A run is one mounting of the cable. It is what the `run` column says, file by file; without one, all rows of a file
+    at one route value and one set of own angles are taken for one run, which is remarked on. Without a `stroke` column
+    all rows are taken as pulling, likewise.
+
+    Args:
+        source: Where they are.
+
+    Raises:
+        DatasetError: See `read_csv` and `find_columns`; or a force is not positive, or a stroke is unknown.
+    """
+    paths, contacts = source.files, source.description.angle_columns
+    parts = [_read_force_file(path, source) for path in paths]
+    names: list[str] = []
+    runs = []
+    for path, (part, _) in zip(paths, parts, strict=True):
+        runs.append(part.run + len(names))
+        names += [f"{path.stem}:{name}" if len(paths) > 1 else name for name in part.run_names]
+    tables = [part for part, _ in parts]
+    own = OwnAngles(
+        tuple(contacts),
+        np.concatenate([t.own.angle for t in tables]),
+        np.concatenate([t.own.sd for t in tables]),
+    )
+    merged = ForceTable(
+        np.concatenate([t.route for t in tables]),
+        np.concatenate([t.input_force for t in tables]),
+        np.concatenate([t.output_force for t in tables]),
+        np.concatenate(runs),
+        tuple(names),
+        np.concatenate([t.stroke for t in tables]),
+        own,
+        Provenance(
+            tuple(path.name for path in paths),
+            np.concatenate([np.full(len(t.run), i) for i, t in enumerate(tables)]),
+            np.concatenate([t.origin.row for t in tables]),
+        ),
+        np.concatenate([t.velocity for t in tables]),
+        _one_velocity_unit(tables),
+    )
+    remarks = dict.fromkeys(remark for _, said in parts for remark in said)
+    return Found(merged, {source.name_of(path): path for path in paths}, tuple(remarks))
+
+
+def _one_velocity_unit(tables: Sequence[ForceTable]) -> str:
+    units = {t.velocity_unit: t.origin.files[0] for t in tables if t.velocity_unit}
+    if len(units) > 1:
+        raise DatasetError(
+            f"{' and '.join(units.values())} give velocities of different kinds, of the rope and of the motor; give both in "
+            "mm/s or both in r/min."
+        )
+    return next(iter(units), "")
+
+
+def _read_force_file(path: Path, source: Source) -> tuple[ForceTable, list[str]]:
+    table, route, contacts = read_csv(path), source.description.route, source.description.angle_columns
+    forces = (Quantity("input_force", "force"), Quantity("output_force", "force"))
+    others = (Quantity("run", "text"), Quantity("stroke", "text"), Quantity("velocity", "speed"))
+    found = find_columns(table, (*forces, *others, *shared_columns(route, contacts)), source.columns, _UNUSED)
+    columns = [require(table, found, q.name, f"{q.name}_N") for q in forces]
+    input_force, output_force = (np.array([_force(cell, c) for cell in c.cells]) for c in columns)
+    own = read_own_angles(table, found, contacts)
+    route_values = read_route(table, found, route)
+    remarks = []
+    if "stroke" not in found:
+        remarks.append(f"{table.file} has no stroke column: every row is taken as pulling (rope sliding to the motor).")
+    if "run" not in found:
+        remarks.append(
+            f"{table.file} has no run column: all rows at one {route.variable if route else 'wrap angle'} are taken "
+            "as one run (one mounting of the cable)."
+        )
+    run, run_names = _runs(found.get("run"), route_values, own)
+    strokes, origin = read_strokes(found, len(table.rows)), provenance_of(table)
+    if held := int(np.sum(strokes == 0)):
+        remarks.append(
+            f"{table.file}: {held} readings are held. A held reading says only that friction is at least as large as it takes "
+            "to hold it; a coefficient that rests on such readings alone has a lower bound, and above it nothing but its prior."
+        )
+    velocity, unit = _velocities(found.get("velocity"), len(table.rows))
+    parts = (route_values, input_force, output_force, run, run_names, strokes, own, origin, velocity, unit)
+    return ForceTable(*parts), remarks
+
+
+def _velocities(column: Column | None, n_rows: int) -> tuple[Vector, str]:
+    """Velocities, NaN where blank or without a column, and their internal unit."""
+    if column is None:
+        return np.full(n_rows, np.nan), ""
+    values = np.array([np.nan if cell.blank else column.value(cell) for cell in column.cells])
+    return values, INTERNAL_UNITS[speed_dimension(column.unit or "")]
+
+
+def _runs(column: Column | None, route: Vector, own: OwnAngles) -> tuple[Labels, tuple[str, ...]]:
+    if column is not None:
+        keys = [cell.text.strip() or "(no run)" for cell in column.cells]
+    else:
+        rows = np.column_stack([route, own.angle])
+        keys = [", ".join(f"{value:g}" for value in row if np.isfinite(value)) or "all" for row in rows]
+    names = tuple(dict.fromkeys(keys))
+    return np.array([names.index(key) for key in keys]), names
+
+
+def _force(cell: Cell, column: Column) -> float:
+    value = column.value(cell)
+    if value <= 0:
+        raise cell.refuse(
+            f"{cell.shown} is not positive; the usual cause is the sign convention of the load cell or a "
+            "reading before tension was on: write tension as positive and leave slack readings out."
+        )
+    return value

@@ -1,0 +1,124 @@
+"""Forces, or torques, at both ends of a pull-pull loop while it moves."""
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+
+import numpy as np
+
+from bowdenfit.description.pulleys import Pulleys
+from bowdenfit.errors import DatasetError
+from bowdenfit.files.columns import Column, Quantity, find_columns, meanings, require
+from bowdenfit.files.csv_table import RawTable, read_csv
+from bowdenfit.kinds.kind import Found, Source
+from bowdenfit.kinds.rows import (
+    OwnAngles,
+    Provenance,
+    check_spelling,
+    provenance_of,
+    read_own_angles,
+    read_route,
+    read_strokes,
+    read_tension,
+    shared_columns,
+)
+from bowdenfit.types import Labels, Vector
+from bowdenfit.words import shown
+
+_UNUSED = ("time", "position", "run")  # columns that such a table may have and that nothing reads
+
+
+@dataclass(frozen=True)
+class LoopTable:
+    """Forces at both ends of a pull-pull loop while it moves.
+
+    Args:
+        route: Route variable; NaN where the cable has no route.
+        input_force: Difference of the tensions at the motor side [N].
+        output_force: Difference of the tensions at the load side [N].
+        stroke: +1 moving forward, -1 moving back.
+        preload: Preload measured with the row [N]; NaN where the cable's own counts.
+        own: Wrap angles measured with the row.
+        origin: Where each row was read.
+    """
+
+    route: Vector
+    input_force: Vector
+    output_force: Vector
+    stroke: Labels
+    preload: Vector
+    own: OwnAngles
+    origin: Provenance
+
+
+def read_loop(source: Source) -> Found[LoopTable]:
+    """Read a table of forces, or torques, at both ends of a pull-pull loop while it moves.
+
+    Args:
+        source: Where it is.
+
+    Raises:
+        DatasetError: See `read_csv` and `find_columns`; or a preload is negative, a torque has no radius, or the output is
+            larger than the input while moving forward.
+    """
+    path, route, contacts = source.file, source.description.route, source.description.angle_columns
+    table, pulleys = read_csv(path), source.description.cable.pulleys
+    ends = [Quantity(f"{end}_{what}", what) for end in ("input", "output") for what in ("force", "torque")]
+    others = (Quantity("stroke", "text"), Quantity("preload", "force"))
+    found = find_columns(table, (*ends, *others, *shared_columns(route, contacts)), source.columns, _UNUSED)
+    check_spelling(table, found, others)
+    input_force, output_force = (_end(table, found, end, pulleys) for end in ("input", "output"))
+    stroke = read_strokes(found, len(table.rows), held="")
+    if not stroke.all():
+        held = found["stroke"].cells[int(np.flatnonzero(stroke == 0)[0])]
+        raise held.refuse(
+            "a loop that is held still tells nothing but bounds; write pull (moving forward) or return, or leave the row out."
+        )
+    column = found.get("preload")
+    preload = np.full(len(table.rows), np.nan)
+    if column is not None:
+        preload = np.array([np.nan if c.blank else read_tension(c, column, "a preload") for c in column.cells])
+    made = LoopTable(
+        read_route(table, found, route),
+        input_force,
+        output_force,
+        stroke,
+        preload,
+        read_own_angles(table, found, contacts),
+        provenance_of(table),
+    )
+    _check_loss(table, made)
+    remarks = []
+    if "stroke" not in found:
+        remarks.append(f"{table.file} has no stroke column: every row is taken as moving forward (the motor pulls).")
+    angles = [h for h in table.header if _plain_angle(h) and h not in {column.heading for column in found.values()}]
+    if angles:
+        remarks.append(
+            f"{table.file} has the column {shown(angles[0])}, which no contact in cable.toml reads; it is left out of account."
+        )
+    return Found(made, {path.name: path}, tuple(remarks))
+
+
+def _end(table: RawTable, found: Mapping[str, Column], end: str, pulleys: Pulleys) -> Vector:
+    """Forces at one end [N], from its force column or from its torques and the radius of its pulley."""
+    force, torque = f"{end}_force", f"{end}_torque"
+    if force in found and torque in found:
+        raise DatasetError(f"{table.file} has both {force} and {torque}; leave one of the two columns out.")
+    if torque not in found:
+        return np.asarray(require(table, found, force, f"{force}_N or {torque}_N_m").numbers())
+    return pulleys.forces(np.asarray(found[torque].numbers()), end, table.file)
+
+
+def _plain_angle(heading: str) -> bool:
+    return any(unit for _, unit in meanings(heading, (Quantity("wrap_angle", "angle"),)))
+
+
+def _check_loss(table: RawTable, made: LoopTable) -> None:
+    """A loop loses force: over all rows the output is behind the input in the direction of motion."""
+    gained = made.stroke * (made.output_force - made.input_force)
+    if np.median(gained) > 0:
+        worst = int(np.argmax(gained))
+        raise DatasetError(
+            f"{table.file}: in most rows the output is larger than the input in the direction of motion, as in row "
+            f"{made.origin.row[worst]} (input {made.input_force[worst]:.4g} N, output {made.output_force[worst]:.4g} N); the "
+            "usual cause is that input and output columns, or pull and return, were swapped."
+        )

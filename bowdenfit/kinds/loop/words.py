@@ -1,0 +1,73 @@
+"""Tables of a loop in words and in rows: what was read, what it cannot tell, what is plausible, how a file says it."""
+
+import numpy as np
+
+from bowdenfit.description import Description
+from bowdenfit.description.elastic import PRELOAD
+from bowdenfit.kinds.kind import Page
+from bowdenfit.kinds.loop.table import LoopTable
+from bowdenfit.kinds.measurements import Measurements
+from bowdenfit.kinds.plausibility import HIGHEST, LOWEST
+from bowdenfit.kinds.preload.table import PreloadTable
+from bowdenfit.kinds.rows import STROKE_NAMES, in_words
+from bowdenfit.kinds.stretch.table import StretchTable
+
+_FREE = 0.25  # output over input force below which a loop moves all but freely
+
+
+def describe(rows: LoopTable, description: Description) -> list[str]:
+    """Readings of each direction, how large, and where their preload comes from."""
+    forward = int(np.sum(rows.stroke > 0))
+    how = "follows the wrap angle as the stretch model says" if description.preload_follows_stretch else "is constant"
+    measured = int(np.isfinite(rows.preload).sum())
+    own = f"; {measured} rows have their own measured preload" if measured else ""
+    return [
+        f"{rows.origin.files[0]}: {len(rows.stroke)} readings of a loop ({forward} moving forward, "
+        f"{len(rows.stroke) - forward} back), input {in_words(rows.input_force, 'N')}; its preload {how}{own}"
+    ]
+
+
+def warnings_of(rows: LoopTable, description: Description, measurements: Measurements) -> list[str]:
+    """What the table will not be able to tell, as far as counting shows."""
+    warnings, has_preload = [], measurements.table(PreloadTable) is not None
+    elastic = has_preload or measurements.table(StretchTable) is not None
+    if description.preload_follows_stretch and not elastic:
+        warnings.append(
+            "the preload is said to follow the stretch of the rope, but no table has stretch or preload; how it changes with "
+            "the wrap angle will rest on the priors."
+        )
+    stated = description.preload.value is not None or PRELOAD in description.prior or has_preload
+    told = stated or np.isfinite(rows.preload).any()
+    if not told and np.median(np.abs(rows.output_force)) < _FREE * np.median(np.abs(rows.input_force)):
+        warnings.append(
+            f"nearly all of {rows.origin.files[0]} was read in free motion, with hardly any output force; that tells only the "
+            "product of friction and preload: load the loop until its return side is slack, or measure the preload."
+        )
+    return warnings
+
+
+def implausible(real: LoopTable, made: LoopTable) -> str:
+    """A loop that gains force, or loses none or nearly all of it."""
+    lost = made.stroke * (made.input_force - made.output_force)
+    if np.median(lost) < 0:
+        return "a loop gains force"
+    loaded = np.abs(real.input_force) >= 0.5 * np.abs(real.input_force).max()
+    share = np.median(lost[loaded] / np.abs(made.input_force[loaded]))
+    return "" if 1 - HIGHEST <= share <= 1 - LOWEST else "a loop loses less than 1 % or more than 80 % of its force"
+
+
+def page(table: LoopTable, description: Description) -> Page:
+    """Headings and rows of its file, as torques where both pulleys' radii are stated."""
+    cable, names = description.cable, table.own.names
+    radii = [radius.to("length") / 1000 for radius in (cable.input_pulley_radius, cable.output_pulley_radius) if radius]
+    what, (first, second), digits = ("force_N", (1.0, 1.0), 3) if len(radii) < 2 else ("torque_N_m", radii, 5)
+    rows = [
+        [
+            *(f"{angle:.6g}" for angle in np.rad2deg(table.own.angle[i])),
+            STROKE_NAMES[int(table.stroke[i])],
+            f"{first * table.input_force[i]:.{digits}f}",
+            f"{second * table.output_force[i]:.{digits}f}",
+        ]
+        for i in range(len(table.stroke))
+    ]
+    return [*(f"{name}_deg" for name in names), "stroke", f"input_{what}", f"output_{what}"], rows

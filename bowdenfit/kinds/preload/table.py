@@ -1,0 +1,51 @@
+"""Preload between fixed ends at wrap angles."""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from bowdenfit.files.columns import Quantity, find_columns, require
+from bowdenfit.files.csv_table import read_csv
+from bowdenfit.kinds.kind import Found, Source
+from bowdenfit.kinds.rows import Provenance, provenance_of, read_angle, read_tension
+from bowdenfit.types import Vector
+
+_UNUSED = ("time", "position", "run")  # columns that such a table may have and that nothing reads
+
+
+@dataclass(frozen=True)
+class PreloadTable:
+    """Preload between fixed ends at wrap angles.
+
+    Args:
+        wrap_angle: Total wrap angle of the cable [rad].
+        preload: Tension at rest [N]; 0 where the rope is slack.
+        origin: Where each row was read.
+    """
+
+    wrap_angle: Vector
+    preload: Vector
+    origin: Provenance
+
+
+def read_preload(source: Source) -> Found[PreloadTable]:
+    """Read a table of preload against wrap angle, measured between fixed ends; 0 where the rope is slack.
+
+    Args:
+        source: Where it is.
+
+    Raises:
+        DatasetError: See `read_csv` and `find_columns`; or a preload is negative.
+    """
+    path = source.file
+    table = read_csv(path)
+    wanted = (Quantity("preload", "force"), Quantity("wrap_angle", "angle"))
+    found = find_columns(table, wanted, source.columns, _UNUSED)
+    angles = require(table, found, "wrap_angle", "wrap_angle_deg")
+    preloads = require(table, found, "preload", "preload_N")
+    rows = PreloadTable(
+        np.array([read_angle(cell, angles) for cell in angles.cells]),
+        np.array([read_tension(cell, preloads, "a preload") for cell in preloads.cells]),
+        provenance_of(table),
+    )
+    return Found(rows, {path.name: path})

@@ -35,7 +35,6 @@ def run(
     seed: int,
     resume: bool,
     progress: Callable[..., None] | None,
-    watch: Stopwatch,
     helpers: Assistants,
 ) -> Fit:
     """Least squares, and the posterior if `mcmc`; see `bowdenfit.run.verb.fit`.
@@ -47,9 +46,9 @@ def run(
         seed: Seed.
         resume: Whether the checkpoint has states to go on from.
         progress: Called while sampling.
-        watch: Records the stages' times.
         helpers: Who does the statistics.
     """
+    watch = Stopwatch()
     density = Density(build_model(data))
     with ThreadPoolExecutor(1) as thread:
         if mcmc:

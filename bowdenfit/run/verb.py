@@ -71,13 +71,12 @@ def fit(
         import jax
 
         from bowdenfit.run.fitting import run
-        from bowdenfit.run.stopwatch import Stopwatch
 
         if remember_compilations:
             _remember_compilations()
         with jax.enable_x64(True):
             begin = partial(start_checkpointing, folder, data, seed, resume)
-            found = run(data, begin, mcmc, seed, resume, progress, Stopwatch(), helpers)
+            found = run(data, begin, mcmc, seed, resume, progress, helpers)
             if folder is not None:
                 write_results(found, folder, figures, helpers)
     return found

@@ -14,7 +14,7 @@ from bowdenfit.verb import LARGEST_SEED, Argument, Option, Output, Reply, Verb, 
 if TYPE_CHECKING:
     from bowdenfit.dataset import Dataset
     from bowdenfit.questions.calibrate.answer import Calibration
-    from bowdenfit.questions.calibrate.replication import Plan
+    from bowdenfit.questions.calibrate.replication import Plan, Replication
 
 NOT_CALIBRATED = 3
 Report = Callable[[int, int], None]
@@ -57,7 +57,6 @@ def calibrate(
     """
     from bowdenfit.dataset import Dataset
     from bowdenfit.errors import UsageError
-    from bowdenfit.questions.calibrate.processes import replicated
 
     folder = Path(output) if output is not None else None
     if resume and folder is None:
@@ -72,12 +71,31 @@ def calibrate(
 
     from bowdenfit.questions.calibrate.answer import findings
     from bowdenfit.questions.calibrate.replication import Plan
-    from bowdenfit.questions.calibrate.store import begun, keep
+    from bowdenfit.questions.calibrate.store import begun
 
     plan = Plan(stated, assumed, seed)
     with jax.enable_x64(True):
         symbols = checked(plan)
     done = {} if folder is None else begun(folder, _fingerprint(plan, assume), resume, force)
+    _replicate(plan, done, replications, workers, folder, progress)
+    found = findings(tuple(done.values()), symbols, name=stated.description.name, assumed=tuple(assume), seed=seed)
+    if folder is not None:
+        _write(found, folder)
+    return found
+
+
+def _replicate(
+    plan: "Plan",
+    done: "dict[int, Replication]",
+    replications: int,
+    workers: int | None,
+    folder: Path | None,
+    progress: Report | None,
+) -> None:
+    """Do what is not done yet, and keep each as it ends."""
+    from bowdenfit.questions.calibrate.processes import replicated
+    from bowdenfit.questions.calibrate.store import keep
+
     missing = [number for number in range(replications) if number not in done]
     for each in replicated(plan, missing, workers or os.cpu_count() or 1):
         done[each.number] = each
@@ -85,10 +103,6 @@ def calibrate(
             keep(folder, each)
         if progress is not None:
             progress(len(done), max(replications, len(done)))
-    found = findings(tuple(done.values()), symbols, name=stated.description.name, assumed=tuple(assume), seed=seed)
-    if folder is not None:
-        _write(found, folder)
-    return found
 
 
 def _seed(folder: Path | None, seed: int | None, resume: bool) -> int:

@@ -16,7 +16,7 @@ from bowdenfit.inference.log_density import LogDensity
 from bowdenfit.kinds import runs as runs_of_model
 from bowdenfit.kinds.measured_cable import measured_cable
 from bowdenfit.kinds.measurements import Measurements
-from bowdenfit.kinds.recordings.blocks import recorded_angles
+from bowdenfit.kinds.recordings.angles import recorded_angles
 from bowdenfit.kinds.recordings.whole import WholeRecordingsTerm, joined, padded
 from bowdenfit.kinds.row_angles import row_angles
 from bowdenfit.kinds.runs import RunsTerm, SlidingRows, run_sums

@@ -14,7 +14,7 @@ from bowdenfit.recordings.recording import Recordings
 
 @dataclass(frozen=True)
 class RecordedAngles:
-    """Where and at which wrap angles each recording was made; see `bowdenfit.cable.cable.Measured`."""
+    """Where and at which wrap angles each recording was made; see `Conditions`."""
 
     route: np.ndarray
     own: OwnAngles

@@ -38,12 +38,14 @@ def write_results(found: "Fit", folder: Path, figures: bool, helpers: Assistants
         drawn.result()
 
 
-def sampled_by(data: Dataset, method: str) -> Dataset:
-    """The same data set, to be sampled by another method than its description says.
+def sampled_by(data: Dataset, method: str | None) -> Dataset:
+    """The same data set, to be sampled by another method than its description says; the description's if None.
 
     Raises:
         UsageError: There is no such sampler.
     """
+    if method is None:
+        return data
     if method not in get_args(Sampler):
         raise UsageError(f"there is no sampler {method!r}; choose one of {', '.join(get_args(Sampler))}.")
     sampler = data.description.sampler.model_copy(update={"method": method})

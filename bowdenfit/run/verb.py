@@ -63,9 +63,7 @@ def fit(
     folder = Path(output) if output is not None else None
     if in_background and isinstance(dataset, str | Path):
         load_ahead("jax", "scipy.optimize")  # while recordings are read, which takes seconds
-    data = read(dataset, **reading)
-    if sampler is not None:
-        data = sampled_by(data, sampler)
+    data = sampled_by(read(dataset, **reading), sampler)
     seed = checked_seed(folder, data, mcmc, seed, resume, force)
     with assistants(in_background and mcmc, in_background and figures and folder is not None) as helpers:
         import jax

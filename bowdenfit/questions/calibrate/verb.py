@@ -55,17 +55,12 @@ def calibrate(
     Raises:
         BowdenfitError: What is wrong, in a sentence; a data set that cannot be replicated is refused.
     """
-    from bowdenfit.dataset import Dataset
     from bowdenfit.errors import UsageError
 
     folder = Path(output) if output is not None else None
     if resume and folder is None:
         raise UsageError("--resume needs the results folder of a calibration; name it with --output.")
-    stated = read(dataset, **reading)
-    if assume and isinstance(dataset, Dataset):
-        raise UsageError("settings can be assumed of a data set in a folder only; name the folder.")
-    changes: Reading = {**reading, "settings": [*reading.get("settings", ()), *assume]}
-    assumed = read(dataset, **changes) if assume else stated
+    stated, assumed = _stated_and_assumed(dataset, reading, assume)
     seed = _seed(folder, seed, resume)
     import jax
 
@@ -82,6 +77,22 @@ def calibrate(
     if folder is not None:
         _write(found, folder)
     return found
+
+
+def _stated_and_assumed(
+    dataset: "str | Path | Dataset", reading: Reading, assume: Sequence[str]
+) -> "tuple[Dataset, Dataset]":
+    """The data set as it is described, which is simulated, and as the fits take it to be."""
+    from bowdenfit.dataset import Dataset
+    from bowdenfit.errors import UsageError
+
+    stated = read(dataset, **reading)
+    if not assume:
+        return stated, stated
+    if isinstance(dataset, Dataset):
+        raise UsageError("settings can be assumed of a data set in a folder only; name the folder.")
+    changes: Reading = {**reading, "settings": [*reading.get("settings", ()), *assume]}
+    return stated, read(dataset, **changes)
 
 
 def _replicate(

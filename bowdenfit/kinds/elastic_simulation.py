@@ -1,26 +1,12 @@
 """Tables of stretch, preload and a loop, measured on the computer."""
 
-from collections.abc import Mapping
-from dataclasses import dataclass, replace
-from typing import Any
+from dataclasses import dataclass
 
-import jax
-import jax.numpy as jnp
 import numpy as np
 
-from bowdenfit.cable.cable import Cable
-from bowdenfit.cable.load_cells import FORCE_NOISE, RUN_SCATTER, LoadCells
-from bowdenfit.cable.noise import scatter
 from bowdenfit.description import Description
-from bowdenfit.kinds.elastic_term import ElasticTerm
-from bowdenfit.kinds.loop.term import LOOP_MOUNTING
 from bowdenfit.kinds.measurements import Measurements
-from bowdenfit.kinds.preload.term import PRELOAD_NOISE
-from bowdenfit.kinds.resolve_angles import resolve_angles
-from bowdenfit.kinds.row_angles import row_angles
-from bowdenfit.kinds.stretch.term import STRETCH_NOISE, stretch_term
 from bowdenfit.kinds.tables import LoopTable, OwnAngles, PreloadTable, Provenance, StretchTable
-from bowdenfit.physics.loop import free_motion_loss, loop_output_force
 
 
 @dataclass(frozen=True)
@@ -92,62 +78,3 @@ def _loop_rows(description: Description, design: ElasticDesign, file: str) -> Lo
 
 def _origin(file: str, n: int) -> Provenance:
     return Provenance((file,), np.zeros(n, dtype=int), np.arange(2, n + 2))
-
-
-def drawn_elastic_readings(
-    cable: Cable, tables: Measurements, values: Mapping[str, jax.Array], key: jax.Array, scale: float
-) -> dict[str, dict[str, jax.Array]]:
-    """New readings of the tables of stretch, preload and a loop, by table; their noise is multiplied by `scale`."""
-    of_stretch, of_preload, of_loop = jax.random.split(key, 3)
-    stretch, preload = tables.stretch, tables.preload
-    readings: dict[str, dict[str, jax.Array]] = {}
-    if stretch is not None:
-        term = stretch_term(cable, stretch)
-        noise = scale * values[STRETCH_NOISE] * scatter(of_stretch, stretch.load.shape, cable.description)
-        readings["stretch"] = {"stretch": term.expected(values, _arrays(term)) + noise}
-    if preload is not None:
-        noise = scale * values[PRELOAD_NOISE] * scatter(of_preload, preload.wrap_angle.shape, cable.description)
-        expected = cable.elasticity.preload(values, jnp.asarray(preload.wrap_angle))[0]
-        readings["preload"] = {"preload": jnp.maximum(expected + noise, 0.0)}
-    if tables.loop is not None:
-        readings["loop"] = _drawn_loop(cable, tables, values, of_loop, scale)
-    return readings
-
-
-def with_elastic_readings(tables: Measurements, drawn: Mapping[str, Any]) -> Measurements:
-    """The tables with what `drawn_elastic_readings` gave."""
-    return tables.with_tables(
-        tables.stretch and replace(tables.stretch, **drawn["stretch"]),
-        tables.preload and replace(tables.preload, **drawn["preload"]),
-        tables.loop and replace(tables.loop, **drawn["loop"]),
-    )
-
-
-def _arrays(term: ElasticTerm) -> dict[str, jax.Array]:
-    return {name: jnp.asarray(array) for name, array in term.data.items()}
-
-
-def _drawn_loop(
-    cable: Cable, tables: Measurements, values: Mapping[str, jax.Array], key: jax.Array, scale: float
-) -> dict[str, jax.Array]:
-    """Forces of a loop with noise in both cells; rows without an input force are of free motion."""
-    table = tables.loop
-    assert table is not None  # the caller asked
-    of_input, of_output = jax.random.split(key)
-    rows = {
-        name: jnp.asarray(array) for name, array in row_angles(cable.description, table, tables.angles).data.items()
-    }
-    angles, variance = resolve_angles(cable, values, rows)
-    own = cable.elasticity.preload(values, jnp.sum(angles, axis=-1))[0]
-    preload = jnp.where(jnp.isnan(table.preload), own, jnp.nan_to_num(table.preload))
-    angles = angles + scale * jnp.sqrt(variance) * jax.random.normal(jax.random.fold_in(key, 2), angles.shape)
-    mounting = values[RUN_SCATTER] * values[LOOP_MOUNTING] if LOOP_MOUNTING in values else 0.0
-    exponent, stroke = cable.friction_exponent(values, angles) + mounting, jnp.asarray(table.stroke, dtype=float)
-    free = stroke * free_motion_loss(preload, exponent)
-    force = jnp.where(jnp.isnan(table.input_force), free, jnp.nan_to_num(table.input_force))
-    output = loop_output_force(force, preload, exponent, stroke)
-    cells, noise = LoadCells.of(values), scale * values[FORCE_NOISE]
-    return {
-        "input_force": cells.shown_input(force) + noise * jax.random.normal(of_input, force.shape),
-        "output_force": cells.shown_output(output) + noise * scatter(of_output, force.shape, cable.description),
-    }

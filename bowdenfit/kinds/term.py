@@ -1,7 +1,7 @@
 """A kind's half in the likelihood: what a term is, and what a kind declares of its terms."""
 
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from typing import Any, Protocol, runtime_checkable
 
 import numpy as np
@@ -102,9 +102,35 @@ class Circumstances:
         return noise_law(self.cable.description)
 
 
-def _always_fits(table: Any, space: ParameterSpace) -> None:
-    """Nothing that could be fixed is at odds with the table."""
-    del table, space
+Draw = Callable[[Cable, Any, AngleTable | None, Mapping[str, Array], Array, float], dict[str, Array]]
+
+
+def _always(*_: Any) -> None:
+    """Nothing to object to."""
+
+
+def _with_fields(description: Description, table: Any, drawn: Mapping[str, np.ndarray]) -> Any:
+    """The table with the arrays that were drawn in place of its own."""
+    del description
+    return replace(table, **drawn)
+
+
+@dataclass(frozen=True)
+class Bench:
+    """How a table is measured again on the computer, as its likelihood takes readings to scatter.
+
+    Args:
+        draw: New readings by name, of a function that JAX can compile. It takes the cable, the table, measured wrap angles,
+            true values [internal units], a random key and a factor on all noise. The key is that of the whole bench: a kind
+            makes one of its own of it that no other uses, so that its readings do not depend on which other tables there
+            are. An array called "slipped" says which readings a bench could not have taken as it says it did.
+        table: The table with what was drawn.
+        check: Refuses a table that cannot be measured again.
+    """
+
+    draw: Draw
+    table: Callable[[Description, Any, Mapping[str, np.ndarray]], Any] = _with_fields
+    check: Callable[[Description, Any], object] = _always
 
 
 @dataclass(frozen=True)
@@ -112,13 +138,17 @@ class TermKind:
     """What a kind of measurement adds to the likelihood.
 
     Args:
+        name: What it is called in KINDS.
         terms: Terms of a table against a cable; wrap angles that were measured hold outside the range of the curves.
         parameters: The parameters that they need, those that other kinds share included.
+        bench: How such a table is measured again on the computer.
         tells_mountings: Whether its readings tell how mountings scatter.
         check: Whether parameters that the user fixed leave the table a model.
     """
 
+    name: str
     terms: Callable[[Cable, Any, AngleTable | None], Sequence[Term]]
     parameters: Callable[[Any, Circumstances], list[Parameter]]
+    bench: Bench
     tells_mountings: bool = False
-    check: Callable[[Any, ParameterSpace], None] = _always_fits
+    check: Callable[[Any, ParameterSpace], None] = _always

@@ -36,13 +36,7 @@ from bowdenfit.kinds.term import Circumstances, TermKind
 from bowdenfit.parameters.space import Parameter
 
 TERMS: dict[str, TermKind] = {
-    "angles": ANGLES,
-    "efficiencies": EFFICIENCIES,
-    "forces": FORCES,
-    "recordings": RECORDINGS,
-    "stretch": STRETCH,
-    "preload": PRELOAD,
-    "loop": LOOP,
+    kind.name: kind for kind in (ANGLES, EFFICIENCIES, FORCES, RECORDINGS, STRETCH, PRELOAD, LOOP)
 }
 """What each kind adds to the likelihood."""
 

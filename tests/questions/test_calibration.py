@@ -15,7 +15,8 @@ from bowdenfit.dataset import Dataset, load_dataset
 from bowdenfit.description import Description, SamplerSettings
 from bowdenfit.errors import DatasetError, StoreError
 from bowdenfit.inference.compilation import compiled
-from bowdenfit.kinds.drawn_readings import detection_limit, drawn_readings, with_readings
+from bowdenfit.kinds.angles.term import detection_limit
+from bowdenfit.kinds.drawn_readings import drawn_readings
 from bowdenfit.kinds.forces.term import HeldForcesTerm
 from bowdenfit.kinds.recordings.simulation import refuse_saturated
 from bowdenfit.model import build_model
@@ -27,7 +28,7 @@ from bowdenfit.questions.calibrate.replication import Plan, Ranked, Replication,
 from bowdenfit.questions.calibrate.store import begun, keep
 from bowdenfit.questions.calibrate.uniformity import Uniformity, holm
 from bowdenfit.questions.calibrate.words import calibration_text
-from bowdenfit.questions.simulate.simulation import Design, empty_tables, simulated_again
+from bowdenfit.questions.simulate.simulation import Design, empty_tables, simulated_again, with_readings
 
 DATA_SETS = (
     "on-body-exoskeleton",
@@ -142,7 +143,7 @@ def test_held_readings_slip_as_often_as_their_likelihood_says():
     assert isinstance(term, HeldForcesTerm)
     probability = np.exp(np.asarray(term.log_likelihood(named, jax.tree.map(jnp.asarray, term.data))))
     draw = jax.jit(
-        jax.vmap(lambda key: drawn_readings(model.cable, dataset.measurements, named, key)["held"]["slipped"])
+        jax.vmap(lambda key: drawn_readings(model.cable, dataset.measurements, named, key)["forces"]["slipped"])
     )
     held = np.sum(~np.asarray(draw(jax.random.split(jax.random.key(2), 2000))), axis=0)
     assert 0.05 < probability[1] < 0.95
@@ -167,12 +168,13 @@ def test_a_table_of_several_detection_limits_is_refused_unless_one_is_stated(on_
 
 
 def test_recordings_with_clipped_readings_are_refused():
-    recordings = data_set("synthetic-recordings").measurements.recordings
-    refuse_saturated(recordings)
+    dataset = data_set("synthetic-recordings")
+    description, recordings = dataset.description, dataset.measurements.recordings
+    refuse_saturated(description, recordings)
     first = recordings.each[0]
     clipped = replace(first, blocks=replace(first.blocks, saturated=first.blocks.input_force > 100))
     with pytest.raises(DatasetError, match="end of a load cell's range"):
-        refuse_saturated(replace(recordings, each=(clipped, *recordings.each[1:])))
+        refuse_saturated(description, replace(recordings, each=(clipped, *recordings.each[1:])))
 
 
 # What no bench would hand in ---------------------------------------------------------------------------------------

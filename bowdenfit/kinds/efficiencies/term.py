@@ -1,7 +1,7 @@
 """Efficiency tables: the logarithm of each measured efficiency against the friction exponent at its length."""
 
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 import jax
@@ -13,12 +13,13 @@ from jaxtyping import Float
 from bowdenfit.cable.cable import Cable
 from bowdenfit.cable.load_cells import RUN_SCATTER, LoadCells
 from bowdenfit.cable.noise import noise_law, scatter
+from bowdenfit.description import Description
 from bowdenfit.errors import DescriptionError
 from bowdenfit.kinds.resolve_angles import resolve_angles
 from bowdenfit.kinds.row_angles import row_angles
 from bowdenfit.kinds.shared_parameters import run_scatter
 from bowdenfit.kinds.tables import AngleTable, EfficiencyTable
-from bowdenfit.kinds.term import TermKind
+from bowdenfit.kinds.term import Bench, TermKind
 from bowdenfit.parameters.space import ParameterSpace
 from bowdenfit.physics.friction import transmission_efficiency
 
@@ -109,9 +110,32 @@ def _check_run_scatter(table: EfficiencyTable, space: ParameterSpace) -> None:
         )
 
 
+def _draw(
+    cable: Cable,
+    table: EfficiencyTable,
+    angles: AngleTable | None,
+    values: Mapping[str, Array],
+    key: Array,
+    scale: float,
+) -> dict[str, Array]:
+    """Efficiencies with all that makes them scatter."""
+    term = efficiencies_term(cable, table, angles)
+    mean, sd = term._mean_and_sd(values, jax.tree.map(jnp.asarray, term.data), values)
+    noise = scale * sd * scatter(jax.random.split(key, 3)[1], mean.shape, cable.description)
+    return {"efficiency": jnp.exp(-(mean + noise))}
+
+
+def _drawn_table(_: Description, table: EfficiencyTable, drawn: Mapping[str, np.ndarray]) -> EfficiencyTable:
+    """A stated standard deviation is taken to be in proportion to the efficiency."""
+    efficiency = drawn["efficiency"]
+    return replace(table, efficiency=efficiency, sd=table.sd / table.efficiency * efficiency)
+
+
 EFFICIENCIES = TermKind(
+    "efficiencies",
     lambda cable, table, angles: (efficiencies_term(cable, table, angles),),
     lambda _, at: [run_scatter(at)],
+    Bench(_draw, _drawn_table),
     tells_mountings=True,
     check=_check_run_scatter,
 )

@@ -1,7 +1,7 @@
 """Force tables: four numbers a run, the effect of its mounting integrated out; held readings as intervals."""
 
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 import jax
@@ -13,12 +13,13 @@ from jaxtyping import Float
 from bowdenfit.cable.cable import Cable
 from bowdenfit.cable.load_cells import FORCE_NOISE, LEAST_FORCE, RUN_SCATTER, LoadCells
 from bowdenfit.cable.noise import noise_law, scatter
+from bowdenfit.description import Description
 from bowdenfit.kinds.resolve_angles import resolve_angles
 from bowdenfit.kinds.row_angles import row_angles
 from bowdenfit.kinds.runs import ROW_ARRAYS, RunsTerm, SlidingRows, run_sums
 from bowdenfit.kinds.shared_parameters import force_noise, offsets, run_scatter
 from bowdenfit.kinds.tables import AngleTable, ForceTable
-from bowdenfit.kinds.term import Circumstances, TermKind
+from bowdenfit.kinds.term import Bench, Circumstances, TermKind
 from bowdenfit.parameters.space import Parameter
 
 
@@ -162,4 +163,51 @@ def _parameters(_: ForceTable, at: Circumstances) -> list[Parameter]:
     return [run_scatter(at), force_noise(at, "standard deviation of a force reading"), *offsets(at)]
 
 
-FORCES = TermKind(force_terms, _parameters, tells_mountings=True)
+def _draw(
+    cable: Cable,
+    table: ForceTable,
+    angles: AngleTable | None,
+    values: Mapping[str, Array],
+    key: Array,
+    scale: float,
+) -> dict[str, Array]:
+    """Forces of sliding rows with noise in both cells around true ones; all rows of a run share its mounting and angles."""
+    held_key, key = jax.random.fold_in(key, 5), jax.random.split(key, 3)[2]
+    of_run, of_input, of_output = jax.random.split(key, 3)
+    runs, run = len(table.run_names), jnp.asarray(table.run)
+    rows = {name: jnp.asarray(array) for name, array in row_angles(cable.description, table, angles).data.items()}
+    bends, variance = resolve_angles(cable, values, rows)
+    of_angles = jax.random.normal(jax.random.fold_in(key, 3), (runs, bends.shape[1]))
+    bends = bends + scale * jnp.sqrt(variance) * of_angles[run]
+    mounting = scale * values[RUN_SCATTER] * scatter(of_run, (runs,), cable.description)
+    exponent = cable.friction_exponent(values, bends) * cable.friction.rate(values, jnp.asarray(table.velocity))
+    stroke, force = jnp.asarray(table.stroke, dtype=float), jnp.asarray(table.input_force)
+    output = cable.friction.output_force(values, force, exponent + mounting[run], stroke)
+    cells, noise, slides = LoadCells.of(values), scale * values[FORCE_NOISE], table.stroke != 0
+    read = cells.shown_input(force) + noise * jax.random.normal(of_input, force.shape)
+    return {
+        "input_force": jnp.where(slides, read, force),
+        "output_force": jnp.where(
+            slides,
+            cells.shown_output(output) + noise * jax.random.normal(of_output, force.shape),
+            table.output_force,
+        ),
+        "slipped": _slipped(cable, table, angles, values, held_key),
+    }
+
+
+def _slipped(
+    cable: Cable, table: ForceTable, angles: AngleTable | None, values: Mapping[str, Array], key: Array
+) -> Array:
+    """Which held readings would have slipped: their likelihood is the probability that friction holds their forces."""
+    held = [t for t in force_terms(cable, table, angles) if isinstance(t, HeldForcesTerm)]
+    log_probability = [term.log_likelihood(values, jax.tree.map(jnp.asarray, term.data)) for term in held]
+    slipped = [jnp.log(jax.random.uniform(key, p.shape)) > p for p in log_probability]
+    return jnp.concatenate([*slipped, jnp.zeros(0, dtype=bool)])
+
+
+def _drawn_table(_: Description, table: ForceTable, drawn: Mapping[str, np.ndarray]) -> ForceTable:
+    return replace(table, input_force=drawn["input_force"], output_force=drawn["output_force"])
+
+
+FORCES = TermKind("forces", force_terms, _parameters, Bench(_draw, _drawn_table), tells_mountings=True)

@@ -18,10 +18,10 @@ from bowdenfit.kinds.resolve_angles import resolve_angles
 from bowdenfit.kinds.row_angles import row_angles
 from bowdenfit.kinds.shared_parameters import force_noise, offsets, preload
 from bowdenfit.kinds.tables import AngleTable, LoopTable
-from bowdenfit.kinds.term import Circumstances, TermKind
+from bowdenfit.kinds.term import Bench, Circumstances, TermKind
 from bowdenfit.parameters.priors import Normal
 from bowdenfit.parameters.space import Parameter
-from bowdenfit.physics.loop import loop_response, loop_response_from
+from bowdenfit.physics.loop import free_motion_loss, loop_output_force, loop_response, loop_response_from
 
 LOOP_FORCE = "loop_output_force"
 LOOP_MOUNTING = "loop_mounting"
@@ -135,4 +135,32 @@ def _parameters(_: LoopTable, at: Circumstances) -> list[Parameter]:
     return [*preload(at), *([mounting] if at.mountings_scatter else []), noise, *offsets(at)]
 
 
-LOOP = TermKind(lambda cable, table, angles: (loop_term(cable, table, angles),), _parameters)
+def _draw(
+    cable: Cable,
+    table: LoopTable,
+    angles: AngleTable | None,
+    values: Mapping[str, Array],
+    key: Array,
+    scale: float,
+) -> dict[str, Array]:
+    """Forces of a loop with noise in both cells; rows without an input force are of free motion."""
+    key = jax.random.split(jax.random.fold_in(key, 3), 3)[2]
+    of_input, of_output = jax.random.split(key)
+    rows = {name: jnp.asarray(array) for name, array in row_angles(cable.description, table, angles).data.items()}
+    bends, variance = resolve_angles(cable, values, rows)
+    own = cable.elasticity.preload(values, jnp.sum(bends, axis=-1))[0]
+    preload = jnp.where(jnp.isnan(table.preload), own, jnp.nan_to_num(table.preload))
+    bends = bends + scale * jnp.sqrt(variance) * jax.random.normal(jax.random.fold_in(key, 2), bends.shape)
+    mounting = values[RUN_SCATTER] * values[LOOP_MOUNTING] if LOOP_MOUNTING in values else 0.0
+    exponent, stroke = cable.friction_exponent(values, bends) + mounting, jnp.asarray(table.stroke, dtype=float)
+    free = stroke * free_motion_loss(preload, exponent)
+    force = jnp.where(jnp.isnan(table.input_force), free, jnp.nan_to_num(table.input_force))
+    output = loop_output_force(force, preload, exponent, stroke)
+    cells, noise = LoadCells.of(values), scale * values[FORCE_NOISE]
+    return {
+        "input_force": cells.shown_input(force) + noise * jax.random.normal(of_input, force.shape),
+        "output_force": cells.shown_output(output) + noise * scatter(of_output, force.shape, cable.description),
+    }
+
+
+LOOP = TermKind("loop", lambda cable, table, angles: (loop_term(cable, table, angles),), _parameters, Bench(_draw))

@@ -3,15 +3,18 @@
 from collections.abc import Mapping
 from typing import Any
 
+import jax
+import jax.numpy as jnp
 import numpy as np
 from jax import Array
 from jaxtyping import Float
 
 from bowdenfit.cable.cable import Cable
+from bowdenfit.cable.noise import scatter
 from bowdenfit.kinds.elastic_term import ElasticTerm
 from bowdenfit.kinds.shared_parameters import preload
-from bowdenfit.kinds.tables import PreloadTable
-from bowdenfit.kinds.term import Circumstances, TermKind
+from bowdenfit.kinds.tables import AngleTable, PreloadTable
+from bowdenfit.kinds.term import Bench, Circumstances, TermKind
 from bowdenfit.parameters.priors import HalfNormal
 from bowdenfit.parameters.space import Parameter
 
@@ -39,4 +42,18 @@ def _parameters(_: PreloadTable, at: Circumstances) -> list[Parameter]:
     return [*preload(at), noise]
 
 
-PRELOAD = TermKind(lambda cable, table, _: (preload_term(cable, table),), _parameters)
+def _draw(
+    cable: Cable,
+    table: PreloadTable,
+    angles: AngleTable | None,
+    values: Mapping[str, Array],
+    key: Array,
+    scale: float,
+) -> dict[str, Array]:
+    del angles
+    bend, key = jnp.asarray(table.wrap_angle), jax.random.split(jax.random.fold_in(key, 3), 3)[1]
+    noise = scale * values[PRELOAD_NOISE] * scatter(key, bend.shape, cable.description)
+    return {"preload": jnp.maximum(cable.elasticity.preload(values, bend)[0] + noise, 0.0)}
+
+
+PRELOAD = TermKind("preload", lambda cable, table, _: (preload_term(cable, table),), _parameters, Bench(_draw))

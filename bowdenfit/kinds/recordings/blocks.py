@@ -1,6 +1,5 @@
 """What each block of a recording is worth to a likelihood: whether it can be used, and how much it says."""
 
-
 import numpy as np
 
 from bowdenfit.cable.load_cells import LEAST_FORCE

@@ -17,11 +17,11 @@ from bowdenfit.cable.load_cells import BLOCK_NOISE, LEAST_FORCE, RUN_SCATTER, Lo
 from bowdenfit.cable.noise import scatter
 from bowdenfit.description import Description
 from bowdenfit.errors import DatasetError
-from bowdenfit.kinds.measurements import Measurements
 from bowdenfit.kinds.recordings.angles import recorded_angles
 from bowdenfit.kinds.recordings.blocks import worth_of
 from bowdenfit.kinds.resolve_angles import resolve_angles
 from bowdenfit.kinds.row_angles import row_angles
+from bowdenfit.kinds.tables import AngleTable
 from bowdenfit.physics.hysteresis import play_operator
 from bowdenfit.physics.loop_motion import loop_play_with_slope
 from bowdenfit.recordings.loop_strokes import find_loop_strokes
@@ -30,7 +30,12 @@ from bowdenfit.recordings.strokes import Span, find_strokes
 
 
 def drawn_recordings(
-    cable: Cable, tables: Measurements, values: Mapping[str, jax.Array], key: jax.Array, scale: float
+    cable: Cable,
+    recordings: Recordings,
+    measured: AngleTable | None,
+    values: Mapping[str, jax.Array],
+    key: jax.Array,
+    scale: float,
 ) -> dict[str, jax.Array]:
     """Forces of every block (rows) of every recording (columns), padded to the longest, and the delay's error [s].
 
@@ -39,15 +44,14 @@ def drawn_recordings(
 
     Args:
         cable: The cable.
-        tables: Measurements with recordings.
+        recordings: The recordings as measured.
+        measured: Wrap angles measured at lengths.
         values: True values [internal units].
-        key: Random key.
+        key: Random key of the bench.
         scale: Factor on all noise.
     """
-    recordings = tables.recordings
-    assert recordings is not None  # the caller asked
-    of_run, of_angles, of_input, of_output = jax.random.split(key, 4)
-    rows = row_angles(cable.description, recorded_angles(recordings), tables.angles).data
+    of_run, of_angles, of_input, of_output = jax.random.split(jax.random.fold_in(key, 4), 4)
+    rows = row_angles(cable.description, recorded_angles(recordings), measured).data
     angles, variance = resolve_angles(cable, values, {name: jnp.asarray(array) for name, array in rows.items()})
     error = jnp.sqrt(variance) * jax.random.normal(of_angles, angles.shape)
     run = np.array([recordings.runs.index(r.run) for r in recordings.each])
@@ -160,7 +164,7 @@ def _strokes(description: Description, loop: bool, recording: Recording, blocks:
     return replace(found, correlation=recording.strokes.correlation)
 
 
-def refuse_saturated(recordings: Recordings) -> None:
+def refuse_saturated(_: Description, recordings: Recordings) -> None:
     """Refuse recordings with readings at the end of a load cell's range.
 
     Raises:

@@ -26,12 +26,13 @@ from bowdenfit.kinds.recordings.blocks import (
     worth_of,
 )
 from bowdenfit.kinds.recordings.loops import LoopRecordingsTerm, loop_recordings_term
+from bowdenfit.kinds.recordings.simulation import drawn_recordings, recorded_again, refuse_saturated
 from bowdenfit.kinds.recordings.whole import WholeRecordingsTerm, padded
 from bowdenfit.kinds.row_angles import row_angles
 from bowdenfit.kinds.runs import ROW_ARRAYS, RunsTerm, SlidingRows, run_sums
 from bowdenfit.kinds.shared_parameters import offsets, preload, run_scatter
 from bowdenfit.kinds.tables import AngleTable
-from bowdenfit.kinds.term import Circumstances, TermKind
+from bowdenfit.kinds.term import Bench, Circumstances, TermKind
 from bowdenfit.parameters.priors import HalfNormal, Normal
 from bowdenfit.parameters.space import Parameter
 from bowdenfit.recordings.preparation.play import play
@@ -188,5 +189,9 @@ def _parameters(recordings: Recordings, at: Circumstances) -> list[Parameter]:
 
 
 RECORDINGS = TermKind(
-    lambda cable, recordings, angles: (recordings_term(cable, recordings, angles),), _parameters, tells_mountings=True
+    "recordings",
+    lambda cable, recordings, angles: (recordings_term(cable, recordings, angles),),
+    _parameters,
+    Bench(drawn_recordings, recorded_again, refuse_saturated),
+    tells_mountings=True,
 )

@@ -3,15 +3,18 @@
 from collections.abc import Mapping
 from typing import Any
 
+import jax
+import jax.numpy as jnp
 import numpy as np
 from jax import Array
 from jaxtyping import Float
 
 from bowdenfit.cable.cable import Cable
 from bowdenfit.cable.elasticity import STRETCH_FRICTION, STRETCH_ZERO, rope_parameters, spread_matrix
+from bowdenfit.cable.noise import scatter
 from bowdenfit.kinds.elastic_term import ElasticTerm
-from bowdenfit.kinds.tables import StretchTable
-from bowdenfit.kinds.term import Circumstances, TermKind
+from bowdenfit.kinds.tables import AngleTable, StretchTable
+from bowdenfit.kinds.term import Bench, Circumstances, TermKind
 from bowdenfit.parameters.priors import HalfNormal, LogNormal, Normal
 from bowdenfit.parameters.space import Parameter
 
@@ -63,4 +66,18 @@ def _parameters(_: StretchTable, at: Circumstances) -> list[Parameter]:
     ]  # fmt: skip
 
 
-STRETCH = TermKind(lambda cable, table, _: (stretch_term(cable, table),), _parameters)
+def _draw(
+    cable: Cable,
+    table: StretchTable,
+    angles: AngleTable | None,
+    values: Mapping[str, Array],
+    key: Array,
+    scale: float,
+) -> dict[str, Array]:
+    del angles
+    term, key = stretch_term(cable, table), jax.random.split(jax.random.fold_in(key, 3), 3)[0]
+    noise = scale * values[STRETCH_NOISE] * scatter(key, table.load.shape, cable.description)
+    return {"stretch": term.expected(values, jax.tree.map(jnp.asarray, term.data)) + noise}
+
+
+STRETCH = TermKind("stretch", lambda cable, table, _: (stretch_term(cable, table),), _parameters, Bench(_draw))

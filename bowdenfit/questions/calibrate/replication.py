@@ -15,10 +15,11 @@ from bowdenfit.description import SamplerSettings
 from bowdenfit.errors import ConvergenceError, DatasetError, UsageError
 from bowdenfit.inference.compilation import compiled
 from bowdenfit.inference.log_density import LogDensity
-from bowdenfit.kinds.drawn_readings import drawn_readings, with_readings
+from bowdenfit.kinds.drawn_readings import drawn_readings, slipped
 from bowdenfit.model import Model, build_model
 from bowdenfit.questions.calibrate.acceptable_tables import refusal
 from bowdenfit.questions.calibrate.refit import SAMPLER, Laboratory, with_parameters_of
+from bowdenfit.questions.simulate.simulation import with_readings
 from bowdenfit.results.record import OPTIMAL_EFFICIENCY, OPTIMAL_LENGTH
 
 MOST_DRAWN = 5000  # tables, before a replication is given up
@@ -172,8 +173,7 @@ class Workbench:
             dataset = with_readings(self.plan.stated, drawn)
         except DatasetError:
             return "a recording has no strokes"
-        slipped = np.asarray(drawn.get("held", {}).get("slipped", False)).any()
-        return "held readings would have slipped" if slipped else self.refusal(self.plan.stated, dataset)
+        return "held readings would have slipped" if slipped(drawn) else self.refusal(self.plan.stated, dataset)
 
     def _ranked_parameters(self, z_true: np.ndarray, z: np.ndarray) -> dict[str, Ranked]:
         """Parameters that both descriptions have and that are fitted."""

@@ -134,16 +134,13 @@ def checked(plan: "Plan") -> dict[str, str]:
         DescriptionError, DatasetError, UsageError: It cannot; says why.
     """
     from bowdenfit.errors import DescriptionError, UsageError
-    from bowdenfit.kinds.drawn_readings import detection_limit
-    from bowdenfit.kinds.recordings.simulation import refuse_saturated
+    from bowdenfit.kinds.terms import measured_kinds
     from bowdenfit.model import build_model
     from bowdenfit.results.record import OPTIMAL_EFFICIENCY, OPTIMAL_LENGTH
 
     stated, assumed = plan.stated.description, plan.assumed.description
-    if plan.stated.measurements.angles is not None:
-        detection_limit(stated, plan.stated.measurements.angles)
-    if plan.stated.measurements.recordings is not None:
-        refuse_saturated(plan.stated.measurements.recordings)
+    for kind, table in measured_kinds(plan.stated.measurements):
+        kind.bench.check(stated, table)
     if stated.angle_columns != assumed.angle_columns or _kinds(plan.stated) != _kinds(plan.assumed):
         raise DescriptionError(
             "--assume changes which tables or columns the data set has; the fits must read what is simulated, so change "
@@ -159,8 +156,9 @@ def checked(plan: "Plan") -> dict[str, str]:
 
 
 def _kinds(dataset: "Dataset") -> list[str]:
-    tables = dataset.measurements
-    return [name for name, table in vars(tables).items() if name != "remarks" and table is not None]
+    from bowdenfit.kinds import each_table
+
+    return [kind.name for kind, _ in each_table(dataset.measurements)]
 
 
 def _fingerprint(plan: "Plan", assumptions: Sequence[str]) -> dict[str, Any]:

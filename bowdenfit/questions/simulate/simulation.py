@@ -5,7 +5,7 @@ Both draw readings as the likelihood takes them to scatter, so that a posterior 
 """
 
 from collections.abc import Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 
 import jax
 import jax.numpy as jnp
@@ -14,7 +14,8 @@ import numpy as np
 from bowdenfit.dataset import Dataset
 from bowdenfit.description import Description
 from bowdenfit.errors import UsageError
-from bowdenfit.kinds.drawn_readings import drawn_angles, drawn_readings, with_angles, with_readings
+from bowdenfit.kinds.angles.term import drawn_angles
+from bowdenfit.kinds.drawn_readings import drawn_readings, with_drawn_readings
 from bowdenfit.kinds.elastic_simulation import ElasticDesign, empty_elastic_tables
 from bowdenfit.kinds.measurements import Measurements
 from bowdenfit.kinds.tables import AngleTable, EfficiencyTable, ForceTable, OwnAngles, Provenance
@@ -146,12 +147,18 @@ def simulated_again(
     """
     named = {name: jnp.asarray(value, dtype=float) for name, value in values.items()}
     cable, scale = build_model(dataset).cable, 1.0 if noise else 0.0
-    if beyond_curves and dataset.measurements.angles is not None:
-        drawn = drawn_angles(
-            cable, dataset.measurements.angles, named, jax.random.split(key, 3)[0], scale, everywhere=True
-        )
-        angles = with_angles(dataset.measurements.angles, drawn)
-        others = dataset.measurements.with_tables(angles)
-        readings = drawn_readings(cable, others, named, key, scale) | {"angles": drawn}
-        return with_readings(Dataset(dataset.description, others, {}), readings)
-    return with_readings(dataset, drawn_readings(cable, dataset.measurements, named, key, scale))
+    angles, beyond = dataset.measurements.angles, {}
+    if beyond_curves and angles is not None:
+        beyond = {"angles": drawn_angles(cable, angles, angles, named, key, scale, everywhere=True)}
+        drawn = {name: np.asarray(array) for name, array in beyond["angles"].items()}
+        dataset = replace(dataset, measurements=dataset.measurements.with_tables(replace(angles, **drawn)))
+    return with_readings(dataset, drawn_readings(cable, dataset.measurements, named, key, scale) | beyond)
+
+
+def with_readings(dataset: Dataset, readings: Mapping[str, Mapping[str, jax.Array]]) -> Dataset:
+    """The data set with what `drawn_readings` gave; checksums do not hold for it.
+
+    Raises:
+        DatasetError: The strokes of a recording cannot be found.
+    """
+    return Dataset(dataset.description, with_drawn_readings(dataset.description, dataset.measurements, readings), {})

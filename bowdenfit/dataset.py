@@ -7,6 +7,7 @@ from dataclasses import dataclass
 from itertools import islice
 from pathlib import Path
 
+from bowdenfit.cable.registry import check_names
 from bowdenfit.description import Description
 from bowdenfit.description.file import load_description, overridden, parse_description
 from bowdenfit.errors import DescriptionError
@@ -141,6 +142,7 @@ def read_dataset(
         checksums |= {name: _sha256(path) for name, path in found.files.items()}
     if channels and not any(kind.takes_channels for kind, _ in each_table(measurements)):
         raise DescriptionError("--channel names channels of recordings, but the data set has none.")
+    check_names(description)
     for kind, table in each_table(measurements):
         kind.check(table, description, measurements)
     return Dataset(description, measurements, checksums)

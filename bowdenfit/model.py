@@ -5,6 +5,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from bowdenfit.cable.cable import Cable, constant_angle_name
+from bowdenfit.cable.laws import symbol_of
 from bowdenfit.cable.load_cells import RUN_SCATTER
 from bowdenfit.dataset import Dataset
 from bowdenfit.description import (
@@ -67,6 +68,7 @@ def _space(cable: Cable, measurements: Measurements) -> ParameterSpace:
         *(_friction(description, name, defaults.friction) for name in description.coefficients),
         *(p for p in asked if p.role == "curve"),
         *_uncertain_constants(description),
+        *cable.law_parameters(defaults),
         *cable.friction.parameters(defaults),
         *(p for p in asked if p.role != "curve"),
     ]
@@ -114,7 +116,7 @@ def _uncertain_constants(description: Description) -> list[Parameter]:
         parameters.append(
             Parameter(
                 constant_angle_name(contact),
-                rf"$\theta_\mathrm{{{contact.name.replace(' ', chr(92) + ' ')}}}$",
+                symbol_of(r"\theta", contact.name),
                 f"wrap angle, {contact.name}",
                 "angle",
                 prior,

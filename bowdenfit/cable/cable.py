@@ -3,23 +3,23 @@
 from collections.abc import Mapping
 from dataclasses import dataclass
 from functools import cached_property
-from typing import TypeVar
 
 import jax.numpy as jnp
 from jax import Array
 from jaxtyping import Float
 
 from bowdenfit.cable.conditions import Conditions
-from bowdenfit.cable.curves import CURVES, Curve
-from bowdenfit.cable.elasticity import Elasticity
+from bowdenfit.cable.curves import Curve
+from bowdenfit.cable.elasticity import STRETCH_FRICTION, Elasticity
 from bowdenfit.cable.friction import FrictionModel, friction_options
-from bowdenfit.cable.laws import CONTACT_LAWS, ContactLaw
-from bowdenfit.description import Contact, Description
-from bowdenfit.errors import DescriptionError, nearest
+from bowdenfit.cable.laws import Capstan, ContactLaw, parameter_of
+from bowdenfit.cable.registry import CONTACT_LAWS, CURVES, check_names, class_at
+from bowdenfit.description import Contact, Description, PriorDefaults
+from bowdenfit.errors import DescriptionError
+from bowdenfit.parameters.space import Parameter
 from bowdenfit.physics.loop import loop_output_force
 
 ANGLE_NOISE = "sigma_theta"
-Entry = TypeVar("Entry")
 
 
 @dataclass(frozen=True)
@@ -41,20 +41,26 @@ class Cable:
         """The curve of each curved contact, by its column."""
         route = self.description.route
         return {
-            c.wrap_angle.column: _lookup(CURVES, c.wrap_angle.curve, "curve", c)(c.wrap_angle.column, route)
-            for c in self.description.curved
-            if route is not None and c.wrap_angle.column is not None
+            source.column: class_at(CURVES[source.curve])(source.column, route)
+            for source in (c.wrap_angle for c in self.description.contact)
+            if route is not None and source.column is not None and source.curve is not None
         }
 
     @cached_property
     def elasticity(self) -> Elasticity:
-        """How its rope stretches, and its preload."""
-        return Elasticity(self.description)
+        """How its rope stretches, under the law of the contact whose friction acts, and its preload."""
+        acting = self.description.stretch.friction
+        laws = [law for law in self.laws if law.friction == acting]
+        return Elasticity(self.description, laws[0] if laws else Capstan("", STRETCH_FRICTION))
 
     @cached_property
     def laws(self) -> tuple[ContactLaw, ...]:
         """The law of each contact."""
-        return tuple(_lookup(CONTACT_LAWS, c.law, "law", c) for c in self.description.contact)
+        return tuple(class_at(CONTACT_LAWS[c.law])(c.name, c.friction) for c in self.description.contact)
+
+    def law_parameters(self, defaults: PriorDefaults) -> list[Parameter]:
+        """Parameters that contact laws have of their own."""
+        return [parameter for law in self.laws for parameter in law.parameters(defaults)]
 
     def wrap_angles(self, values: Mapping[str, Array], route: Float[Array, " rows"]) -> Float[Array, "rows contacts"]:
         """Wrap angle of each contact [rad] at values of the route variable."""
@@ -80,8 +86,7 @@ class Cable:
         self, values: Mapping[str, Array], wrap_angles: Float[Array, "rows contacts"]
     ) -> Float[Array, " rows"]:
         """Friction exponent [1] at given wrap angles [rad]."""
-        contacts = zip(self.description.contact, self.laws, strict=True)
-        terms = [law.exponent(values[c.friction], wrap_angles[..., k]) for k, (c, law) in enumerate(contacts)]
+        terms = [law.exponent(values, wrap_angles[..., k]) for k, law in enumerate(self.laws)]
         return jnp.sum(jnp.stack(terms), axis=0)
 
     def exponent_variance(
@@ -91,10 +96,8 @@ class Cable:
         angle_variance: Float[Array, "rows contacts"],
     ) -> Float[Array, " rows"]:
         """Variance of the friction exponent from independent errors of the wrap angles [rad^2]."""
-        contacts = zip(self.description.contact, self.laws, strict=True)
         terms = [
-            law.sensitivity(values[c.friction], wrap_angles[..., k]) ** 2 * angle_variance[..., k]
-            for k, (c, law) in enumerate(contacts)
+            law.slope(values, wrap_angles[..., k]) ** 2 * angle_variance[..., k] for k, law in enumerate(self.laws)
         ]
         return jnp.sum(jnp.stack(terms), axis=0)
 
@@ -145,7 +148,7 @@ class Cable:
 
 def constant_angle_name(contact: Contact) -> str:
     """Name of the parameter for a constant wrap angle that is itself uncertain."""
-    return "wrap_angle_" + "_".join(contact.name.lower().split())
+    return parameter_of("wrap_angle", contact.name)
 
 
 def make_cable(description: Description, own_angles: Mapping[str, float], conditions: Conditions) -> Cable:
@@ -159,6 +162,7 @@ def make_cable(description: Description, own_angles: Mapping[str, float], condit
     Raises:
         DescriptionError: A curve family, contact law or friction model is unknown, or a nominal angle.
     """
+    check_names(description)
     nominal: dict[str, float] = {}
     for contact in description.contact:
         source = contact.wrap_angle
@@ -170,14 +174,4 @@ def make_cable(description: Description, own_angles: Mapping[str, float], condit
                 'angle; state it as nominal = { value = 90, unit = "deg" } of the contact.'
             )
         nominal[contact.name] = source.nominal.to("angle") if source.nominal else own_angles[source.column]
-    cable = Cable(description, nominal, FrictionModel(friction_options(description.friction_model), conditions))
-    _ = cable.curves, cable.laws
-    return cable
-
-
-def _lookup(registry: Mapping[str, Entry], name: str | None, what: str, contact: Contact) -> Entry:
-    if name is None or name not in registry:
-        raise DescriptionError(
-            f"cable.toml, contact {contact.name!r}: the {what} {name!r} is unknown{nearest(str(name), list(registry))}"
-        )
-    return registry[name]
+    return Cable(description, nominal, FrictionModel(friction_options(description.friction_model), conditions))

@@ -1,10 +1,10 @@
 """Curve families: how the wrap angle of a contact depends on the route variable.
 
-A new family is one class here or in a file beside it, and one line in `CURVES`; the contract tests pick it up.
+A new family is one class here or in a file beside it, and one line in `bowdenfit.cable.registry`; the contract tests pick
+it up.
 """
 
 from collections.abc import Mapping
-from types import MappingProxyType
 from typing import Protocol, runtime_checkable
 
 import jax.numpy as jnp
@@ -88,6 +88,3 @@ class GaussianCurve:
 def _short(column: str) -> str:
     """First word of a column name, as a subscript."""
     return column.split("_")[0]
-
-
-CURVES: Mapping[str, type[Curve]] = MappingProxyType({"gaussian": GaussianCurve})

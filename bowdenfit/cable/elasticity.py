@@ -8,6 +8,7 @@ import numpy as np
 from jax import Array
 from jaxtyping import Float
 
+from bowdenfit.cable.laws import ContactLaw
 from bowdenfit.description import Description, LogNormalPrior, PriorDefaults
 from bowdenfit.parameters.priors import HalfNormal, LogNormal, TruncatedNormal
 from bowdenfit.parameters.space import Parameter
@@ -33,9 +34,11 @@ class Elasticity:
 
     Args:
         description: What was said about the cable.
+        law: Law of the contact that the rope as a whole is while it is stretched.
     """
 
     description: Description
+    law: ContactLaw
 
     @property
     def reference_angle(self) -> float:
@@ -60,7 +63,7 @@ class Elasticity:
 
     def friction_exponent(self, values: Values, wrap_angle: Float[Array, "*batch"]) -> Float[Array, "*batch"]:
         """Friction exponent while the rope is stretched [1]."""
-        return values[self.description.stretch.friction or STRETCH_FRICTION] * wrap_angle
+        return self.law.exponent(values, wrap_angle)
 
     def stretch(
         self,

@@ -1,45 +1,96 @@
 """Contact laws: what one contact adds to the friction exponent of the cable.
 
-A new law is one class here or in a file beside it, and one line in `CONTACT_LAWS`; the contract tests pick it up.
+A new law is one class here or in a file beside it, and one line in `bowdenfit.cable.registry`; the contract tests pick it
+up. What it adds to the exponent is all that it must say: parameters of its own and derivatives follow.
 """
 
+from abc import ABC, abstractmethod
 from collections.abc import Mapping
 from dataclasses import dataclass
-from types import MappingProxyType
-from typing import Protocol, runtime_checkable
 
+import jax
+import jax.numpy as jnp
+import numpy as np
 from jax import Array
 from jaxtyping import Float
 
-
-@runtime_checkable
-class ContactLaw(Protocol):
-    """What a contact law must offer. Contacts are in series, so their contributions add."""
-
-    def exponent(self, friction_coefficient: Array, wrap_angle: Array) -> Array:
-        """Contribution to the friction exponent [1] at a wrap angle [rad]."""
-        ...
-
-    def sensitivity(self, friction_coefficient: Array, wrap_angle: Array) -> Array:
-        """Derivative of `exponent` by the wrap angle [1/rad]; carries an angle's error into the force prediction."""
-        ...
+from bowdenfit.description import PriorDefaults
+from bowdenfit.parameters.priors import HalfNormal
+from bowdenfit.parameters.space import Parameter
 
 
 @dataclass(frozen=True)
-class Capstan:
+class ContactLaw(ABC):
+    """The law of one contact. Contacts are in series, so what they add to the friction exponent is summed up.
+
+    Args:
+        contact: Name of the contact.
+        friction: Name of its friction coefficient.
+    """
+
+    contact: str
+    friction: str
+
+    def parameters(self, defaults: PriorDefaults) -> tuple[Parameter, ...]:
+        """Parameters of its own, beside the friction coefficient; named after the contact by `parameter_of`."""
+        del defaults
+        return ()
+
+    @abstractmethod
+    def exponent(self, values: Mapping[str, Array], wrap_angle: Float[Array, "*rows"]) -> Float[Array, "*rows"]:
+        """Contribution to the friction exponent [1].
+
+        Args:
+            values: Values of the parameters.
+            wrap_angle: Wrap angle of the contact [rad].
+        """
+
+    def slope(self, values: Mapping[str, Array], wrap_angle: Float[Array, "*rows"]) -> Float[Array, "*rows"]:
+        """Derivative of `exponent` by the wrap angle [1/rad]; carries an angle's error into the force prediction."""
+        return jax.jvp(lambda at: self.exponent(values, at), (wrap_angle,), (jnp.ones_like(wrap_angle),))[1]
+
+
+class Capstan(ContactLaw):
     r"""Coulomb friction over a wrap angle, :math:`\mu_k \theta_k` (haptic paper, equation 1; on-body paper, eq. 7)."""
 
-    def exponent(
-        self, friction_coefficient: Float[Array, ""], wrap_angle: Float[Array, " rows"]
-    ) -> Float[Array, " rows"]:
+    def exponent(self, values: Mapping[str, Array], wrap_angle: Float[Array, "*rows"]) -> Float[Array, "*rows"]:
         """Mu theta"""
-        return friction_coefficient * wrap_angle
-
-    def sensitivity(
-        self, friction_coefficient: Float[Array, ""], wrap_angle: Float[Array, " rows"]
-    ) -> Float[Array, " rows"]:
-        """Mu"""
-        return friction_coefficient + 0 * wrap_angle
+        return values[self.friction] * wrap_angle
 
 
-CONTACT_LAWS: Mapping[str, ContactLaw] = MappingProxyType({"capstan": Capstan()})
+class Wobble(ContactLaw):
+    r"""Coulomb friction of a sheath that is never quite straight, :math:`\mu_k (\theta_k + w_k)`.
+
+    A sheath wanders between its supports, so the rope rubs even where the route is straight. The unintended wrap angle w is
+    the one of prestressing tendons in their ducts, w = k x of a tendon of length x, where k is generally 0.005 to 0.01 rad
+    a meter. Here w itself is the parameter, of the sheath as long as it was measured: a sheath lies less straight than a
+    duct that is tied every meter.
+
+    References:
+        EN 1992-1-1:2004 (Eurocode 2), 5.10.5.2, equation 5.45.
+    """
+
+    def parameters(self, defaults: PriorDefaults) -> tuple[Parameter, ...]:
+        """The unintended wrap angle w."""
+        degree = float(np.deg2rad(1.0))
+        return (
+            Parameter(
+                parameter_of("wobble", self.contact), symbol_of("w", self.contact),
+                f"unintended wrap angle, {self.contact}", "friction_model",
+                HalfNormal(defaults.wobble_degrees * degree), "deg", 1 / degree,
+            ),
+        )  # fmt: skip
+
+    def exponent(self, values: Mapping[str, Array], wrap_angle: Float[Array, "*rows"]) -> Float[Array, "*rows"]:
+        """Mu (theta + w)"""
+        return values[self.friction] * (wrap_angle + values[parameter_of("wobble", self.contact)])
+
+
+def parameter_of(what: str, contact: str) -> str:
+    """Name of a parameter that one contact has, such as "wobble_free_sheath"."""
+    return f"{what}_" + "_".join(contact.lower().split())
+
+
+def symbol_of(letter: str, contact: str) -> str:
+    """Its symbol, in matplotlib's math notation."""
+    return rf"${letter}_\mathrm{{{contact.replace(' ', chr(92) + ' ')}}}$"

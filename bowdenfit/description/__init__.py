@@ -22,6 +22,7 @@ from bowdenfit.description.values import (
     UniformPrior,
 )
 from bowdenfit.errors import nearest
+from bowdenfit.words import listed
 
 __all__ = [
     "SCHEMA",
@@ -145,6 +146,11 @@ class Contact(Frozen):
     law: str = "capstan"
     wrap_angle: WrapAngle
 
+    @property
+    def special_law(self) -> str:
+        """Its law where that is not the usual one; empty otherwise."""
+        return "" if self.law == type(self).model_fields["law"].default else self.law
+
 
 class Table(Frozen):
     """One table: its file or files, and columns that do not carry the usual names."""
@@ -223,6 +229,7 @@ class PriorDefaults(Frozen):
     block_noise_newtons: Positive = 0.5
     offset_newtons: Positive = 1.0
     drag_newtons: Positive = 5.0
+    wobble_degrees: Positive = 30.0
     stribeck: Positive = 0.3
     viscous_at_highest_speed: Positive = 0.5
     stribeck_speed_log_sd: Positive = 1.0
@@ -304,6 +311,13 @@ class Description(Frozen):
         if self.stretch.friction is not None and self.stretch.friction not in used:
             hint = nearest(self.stretch.friction, used)
             raise ValueError(f"stretch.friction {self.stretch.friction!r} belongs to no contact{hint}")
+        laws = [c.special_law for c in self.contact if c.friction == self.stretch.friction]
+        if len(laws) > 1 and any(laws):
+            raise ValueError(
+                f"stretch.friction {self.stretch.friction!r} acts in {len(laws)} contacts, and by the "
+                f"{next(filter(None, laws))} law their wrap angles together do not tell the friction of the rope; leave "
+                "stretch.friction out, for a coefficient of its own"
+            )
         if self.cable.kind != "loop" and self.tables.loop is not None:
             raise ValueError('the table loop needs kind = "loop" under [cable]')
         freedom = type(self).model_fields["student_degrees_of_freedom"].default
@@ -328,6 +342,11 @@ class Description(Frozen):
         """How readings scatter, for people."""
         freedom = self.student_degrees_of_freedom
         return f"Student-t noise with {freedom} degrees of freedom" if self.noise == "student" else "normal noise"
+
+    @property
+    def laws_in_words(self) -> str:
+        """Which contacts have another law than the usual one; empty where none has."""
+        return listed([f"the {c.special_law} law in the contact {c.name!r}" for c in self.contact if c.special_law])
 
     @property
     def preload_follows_stretch(self) -> bool:

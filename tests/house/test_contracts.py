@@ -9,13 +9,14 @@ import jax.numpy as jnp
 import numpy as np
 import pytest
 
-from bowdenfit.cable.curves import CURVES
-from bowdenfit.cable.laws import CONTACT_LAWS
+from bowdenfit.cable.laws import Capstan, ContactLaw
+from bowdenfit.cable.registry import CONTACT_LAWS, CURVES, class_at
 from bowdenfit.description import PriorDefaults, Route
 
 ROOT = Path(__file__).parents[2]
 ROUTE = Route(variable="cable_length", unit="mm", range=(400.0, 600.0))
 LENGTHS = jnp.linspace(400.0, 600.0, 21)
+DEFAULTS = PriorDefaults()
 
 
 def test_layers_import_only_downward():
@@ -57,27 +58,47 @@ def test_importing_changes_no_global_setting():
     assert found.stdout.strip() == "True"
 
 
+def _law(name: str) -> tuple[ContactLaw, dict[str, jax.Array]]:
+    """A law of a contact, with values of its coefficient and of its own parameters."""
+    law = class_at(CONTACT_LAWS[name])("free sheath", "mu")
+    own = {p.name: p.prior.constrain(jnp.array(0.4)) for p in law.parameters(DEFAULTS)}
+    return law, {"mu": jnp.array(0.12), **own}
+
+
 @pytest.mark.parametrize("name", CONTACT_LAWS)
-def test_a_contact_law_loses_nothing_without_wrap_and_more_with_more(name):
-    law = CONTACT_LAWS[name]
-    angles = jnp.linspace(0.0, 6.0, 25)
-    exponent = law.exponent(jnp.array(0.12), angles)
-    assert exponent[0] == 0.0
+def test_a_contact_law_never_gains_force_and_loses_more_with_more_wrap(name):
+    law, values = _law(name)
+    exponent = law.exponent(values, jnp.linspace(0.0, 6.0, 25))
+    assert exponent[0] >= 0.0
     assert np.all(np.diff(exponent) > 0)
 
 
+def test_the_capstan_equation_loses_nothing_without_wrap():
+    assert Capstan("free sheath", "mu").exponent({"mu": jnp.array(0.12)}, jnp.zeros(1))[0] == 0.0
+
+
 @pytest.mark.parametrize("name", CONTACT_LAWS)
-def test_the_sensitivity_of_a_contact_law_is_its_derivative(name):
-    law = CONTACT_LAWS[name]
-    for angle in (0.1, 1.0, 4.0):
-        derivative = jax.grad(lambda a: law.exponent(jnp.array(0.12), a[None])[0])(jnp.array(angle))
-        np.testing.assert_allclose(law.sensitivity(jnp.array(0.12), jnp.array([angle]))[0], derivative, rtol=1e-12)
+def test_the_slope_of_a_contact_law_is_its_derivative(name):
+    law, values = _law(name)
+    at, step = jnp.array([0.1, 1.0, 4.0]), 1e-5
+    difference = (law.exponent(values, at + step) - law.exponent(values, at - step)) / (2 * step)
+    np.testing.assert_allclose(law.slope(values, at), difference, rtol=1e-9)
+
+
+@pytest.mark.parametrize("name", CONTACT_LAWS)
+def test_parameters_of_a_contact_law_are_fully_declared_and_named_after_the_contact(name):
+    for p in _law(name)[0].parameters(DEFAULTS):
+        assert p.name.endswith("_free_sheath")
+        assert p.symbol.startswith("$")
+        assert "free sheath" in p.meaning
+        assert p.role == "friction_model"
+        assert np.isfinite(float(p.prior.constrain(jnp.zeros(()))))
 
 
 @pytest.mark.parametrize("name", CURVES)
 def test_a_curve_gives_positive_finite_angles_over_the_prior(name):
-    curve = CURVES[name]("sheath_angle", ROUTE)
-    parameters = curve.parameters(np.array([0.3, 0.5, 0.9]), PriorDefaults())
+    curve = class_at(CURVES[name])("sheath_angle", ROUTE)
+    parameters = curve.parameters(np.array([0.3, 0.5, 0.9]), DEFAULTS)
     for z in np.random.default_rng(0).standard_normal((200, len(parameters))):
         values = {p.name: p.prior.constrain(jnp.array(x)) for p, x in zip(parameters, z, strict=True)}
         angle = np.asarray(curve.wrap_angle(values, LENGTHS))
@@ -87,15 +108,15 @@ def test_a_curve_gives_positive_finite_angles_over_the_prior(name):
 
 @pytest.mark.parametrize("name", CURVES)
 def test_a_curve_names_the_unit_of_every_derived_quantity(name):
-    curve = CURVES[name]("sheath_angle", ROUTE)
-    parameters = curve.parameters(np.array([0.3, 0.5, 0.9]), PriorDefaults())
+    curve = class_at(CURVES[name])("sheath_angle", ROUTE)
+    parameters = curve.parameters(np.array([0.3, 0.5, 0.9]), DEFAULTS)
     values = {p.name: p.prior.constrain(jnp.array(0.3)) for p in parameters}
     assert set(curve.derived(values)) == set(curve.derived_units())
 
 
 @pytest.mark.parametrize("name", CURVES)
 def test_parameters_of_a_curve_are_fully_declared(name):
-    for p in CURVES[name]("sheath_angle", ROUTE).parameters(np.zeros(0), PriorDefaults()):
+    for p in class_at(CURVES[name])("sheath_angle", ROUTE).parameters(np.zeros(0), DEFAULTS):
         assert p.symbol.startswith("$")
         assert p.meaning
         assert p.prior_text

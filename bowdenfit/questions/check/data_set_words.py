@@ -20,7 +20,10 @@ def check_text(dataset: Dataset) -> str:
     else:
         lines.append("Route: none, so there is no length to choose.")
     lines += ["", "Contacts:"]
-    lines += [f"  {c.name}: {c.friction}, {_angle_source(c, description)}" for c in description.contact]
+    lines += [
+        f"  {c.name}: {c.friction}, {f'{c.special_law} law, ' if c.special_law else ''}{_angle_source(c, description)}"
+        for c in description.contact
+    ]
     lines += ["", "Friction coefficients:"]
     lines += [f"  {name}: {_setting(description.friction.get(name))}" for name in description.coefficients]
     lines += ["", "Measurements:"]

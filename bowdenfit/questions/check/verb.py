@@ -31,10 +31,8 @@ def check(dataset: "str | Path | Dataset", **reading: Unpack[Reading]) -> "Datas
     """
     data = read(dataset, **reading)
     description = data.description
-    usual = all(c.law == "capstan" and c.wrap_angle.curve in {None, "gaussian"} for c in description.contact)
     if (
-        not usual
-        or description.friction_model != "capstan"
+        description.friction_model != "capstan"
         or data.measurements.recordings
         or description.prior
         or any(setting.prior for setting in description.friction.values())

@@ -207,7 +207,7 @@ def _effective(drawn: Draws) -> float:
 def _described(fit: Record) -> str:
     """What sets a fit apart from others of the same data."""
     description = fit.dataset.description
-    parts = [description.friction_model]
+    parts = [description.friction_model, *([description.laws_in_words] if description.laws_in_words else [])]
     if description.curved:
         parts.append(f"{description.geometry} geometry")
     parts += [description.noise_in_words] if description.noise != "normal" else []

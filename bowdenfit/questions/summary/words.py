@@ -59,8 +59,9 @@ def _title(fit: Record) -> str:
     line = f"{fit.name}\n{'=' * len(fit.name)}"
     geometry = f"; {description.geometry} geometry" if description.curved else ""
     model = f"; friction model {description.friction_model}" if description.friction_model != "capstan" else ""
+    laws = f"; {description.laws_in_words}" if description.laws_in_words else ""
     noise = f"; {description.noise_in_words}" if description.noise != "normal" else ""
-    fitted = filled(f"Fitted to {listed(counts)}{geometry}{model}{noise}.")
+    fitted = filled(f"Fitted to {listed(counts)}{geometry}{laws}{model}{noise}.")
     remarks = [filled(remark) for remark in tables.remarks]
     return "\n".join([line, fitted, *remarks])
 

@@ -1,31 +1,26 @@
 """Recordings in the files that acquisition programs write: one entry that finds the reader by ending and by content."""
 
-import os
+from collections.abc import Callable
 from importlib import import_module
 from pathlib import Path
 
 from bowdenfit.errors import DatasetError
 from bowdenfit.files.channels import ChannelFile
-from bowdenfit.files.contents import Content, recognized
+from bowdenfit.files.contents import TEXT, UNKNOWN, Content, recognized
+from bowdenfit.files.text_file import first_bytes
 
-_TEXT = ("csv", "txt", "tsv", "dat", "asc", "log", "lvm")
-_READERS = {  # ending: module that reads it, what the content must be recognized as
-    **{f".{ending}": ("columns_csv", ()) for ending in _TEXT},
-    ".xlsx": ("excel", ("zip",)),
-    ".xlsm": ("excel", ("zip",)),
-    ".parquet": ("parquet", ("parquet",)),
-    ".pq": ("parquet", ("parquet",)),
-    ".mat": ("matlab", ("matlab", "")),  # MATLAB 4 files start without any mark
-    ".h5": ("hdf5", ("hdf5",)),
-    ".hdf5": ("hdf5", ("hdf5",)),
-    ".tdms": ("tdms", ("tdms",)),
-    ".mf4": ("mdf", ("mdf",)),
-    ".mdf": ("mdf", ("mdf",)),
-    ".cmbl": ("logger_pro", ("xml",)),
-    ".bag": ("rosbag", ("rosbag1",)),
-    ".db3": ("rosbag", ("sqlite",)),
-    ".mcap": ("rosbag", ("mcap",)),
+FORMATS: dict[str, str | Callable[[Path], ChannelFile]] = {
+    **dict.fromkeys(TEXT, f"{__name__}.columns_csv"),
+    **dict.fromkeys((".xlsx", ".xlsm"), f"{__name__}.excel"),
+    **dict.fromkeys((".parquet", ".pq"), f"{__name__}.parquet"),
+    ".mat": f"{__name__}.matlab",
+    **dict.fromkeys((".h5", ".hdf5"), f"{__name__}.hdf5"),
+    ".tdms": f"{__name__}.tdms",
+    **dict.fromkeys((".mf4", ".mdf"), f"{__name__}.mdf"),
+    ".cmbl": f"{__name__}.logger_pro",
+    **dict.fromkeys((".bag", ".db3", ".mcap"), f"{__name__}.rosbag"),
 }
+"""Who reads files with an ending: a function, or a module whose `read` is imported with the first such file."""
 
 
 def read_channels(path: Path) -> ChannelFile:
@@ -41,9 +36,8 @@ def read_channels(path: Path) -> ChannelFile:
         DatasetError: The file is missing, empty, unreadable, damaged, too large, not what its ending says, or of no
             kind that can be read; or its library is not installed.
     """
-    module = "rosbag" if _is_ros2_folder(path) else _module_for(path)
-    reader = import_module(f"{__name__}.{module}")
-    result: ChannelFile = reader.read(path)
+    reader = FORMATS[".bag" if _is_ros2_folder(path) else _checked_ending(path)]
+    result: ChannelFile = import_module(reader).read(path) if isinstance(reader, str) else reader(path)
     return result
 
 
@@ -52,55 +46,32 @@ def _is_ros2_folder(path: Path) -> bool:
     return path.is_dir() and (path / "metadata.yaml").is_file()
 
 
-def _module_for(path: Path) -> str:
-    """Name of the module that reads this file."""
-    content = recognized(path, _head(path))
+def _checked_ending(path: Path) -> str:
+    """The ending of a file that is what it says."""
+    content = recognized(path, first_bytes(path, 1024))
     ending = path.suffix.lower()
-    if ending not in _READERS:
+    if ending not in FORMATS:
         raise _unknown_ending(path, content)
-    module, contents = _READERS[ending]
-    if content.key not in contents and (contents or content.key):
+    if not content.suits(ending):
         raise _wrong_ending(path, content)
-    return module
-
-
-def _head(path: Path) -> bytes:
-    """The first bytes of the file."""
-    if path.is_dir():
-        raise DatasetError(
-            f"{path.name} is a folder, not a recording; give one of the files in it "
-            "(only a ROS 2 bag is a folder, and it holds a metadata.yaml)."
-        )
-    try:
-        with path.open("rb") as file:
-            head = file.read(1024)
-    except FileNotFoundError as error:
-        raise DatasetError(f"{path} does not exist; check the spelling and the folder.") from error
-    except OSError as error:
-        raise DatasetError(
-            f"{path.name} cannot be read ({error.strerror or os.strerror(error.errno or 0)}); check its permissions, and "
-            "that no other program holds it open."
-        ) from error
-    if not head:
-        raise DatasetError(f"{path.name} is empty (0 bytes); copy it again from the acquisition computer.")
-    return head
+    return ending
 
 
 def _unknown_ending(path: Path, content: Content) -> DatasetError:
     """What to do with an ending that nobody reads."""
-    if content.key:
-        return DatasetError(f"{path.name} is {content.what}; {content.remedy}.")
+    if content is not UNKNOWN:
+        return DatasetError(f"{path.name} is {content.what}; {content.advice}.")
     ending = f"the ending {path.suffix}" if path.suffix else "no ending"
     return DatasetError(
         f"{path.name} has {ending}, which says nothing about its content; export the recording as CSV, or rename it to "
-        f"what it is: {', '.join(_READERS)}."
+        f"what it is: {', '.join(FORMATS)}."
     )
 
 
 def _wrong_ending(path: Path, content: Content) -> DatasetError:
     """What the file really is."""
-    if content.key:
-        return DatasetError(f"{path.name} is not a {path.suffix} file but {content.what}; {content.remedy}.")
+    if content is not UNKNOWN:
+        return DatasetError(f"{path.name} is not a {path.suffix} file but {content.what}; {content.advice}.")
     return DatasetError(
         f"{path.name} does not start as a {path.suffix} file does: it is damaged or of another kind; copy it again from "
         "the acquisition computer, or export the recording as CSV."

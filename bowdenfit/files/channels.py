@@ -1,6 +1,7 @@
 """The channels of one file as the acquisition wrote them: named columns of numbers, before anybody says what they mean."""
 
-from dataclasses import dataclass
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
 from pathlib import Path
 
 import numpy as np
@@ -51,3 +52,18 @@ class ChannelFile:
     kind: str
     channels: tuple[Channel, ...]
     remarks: tuple[str, ...] = ()
+
+
+def with_unique_names(channels: Sequence[Channel]) -> tuple[Channel, ...]:
+    """Channels with numbers behind names that stand there twice: "45", "45 (2)", "45 (3)"."""
+    taken = {channel.name for channel in channels}
+    seen: set[str] = set()
+    named = []
+    for channel in channels:
+        name, count = channel.name, 1
+        while name in seen or (count > 1 and name in taken):
+            count += 1
+            name = f"{channel.name} ({count})"
+        seen.add(name)
+        named.append(replace(channel, name=name))
+    return tuple(named)

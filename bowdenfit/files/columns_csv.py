@@ -3,7 +3,6 @@
 import csv
 import io
 import warnings
-from array import array
 from collections.abc import Iterator, Sequence
 from pathlib import Path
 from typing import Any
@@ -11,22 +10,22 @@ from typing import Any
 import numpy as np
 
 from bowdenfit.errors import DatasetError
+from bowdenfit.files.cells import MISSING
 from bowdenfit.files.channels import ChannelFile
-from bowdenfit.files.clocks import seconds_of_dates
-from bowdenfit.files.csv_ends import data_end
-from bowdenfit.files.csv_start import Sheet, cells_of, start_of
-from bowdenfit.files.layout import MISSING, number_of
+from bowdenfit.files.csv_rows import cells_of
+from bowdenfit.files.csv_start import Sheet, start_of
+from bowdenfit.files.layout import is_summary
 from bowdenfit.files.libraries import load
+from bowdenfit.files.outcome import refuse_larger
+from bowdenfit.files.sheet_columns import SheetRows, columns_of
 from bowdenfit.files.sheets import channels_of, with_rate
-from bowdenfit.files.text_file import Section, beginning, is_comment, rows_before
-from bowdenfit.types import Vector
-from bowdenfit.words import shown
+from bowdenfit.files.text_file import Line, Section, first_bytes, last_lines, lines_between, rows_before
 
 LARGEST_BYTES = 2 << 30
 _FIRST_BYTES = 1 << 18
+_LAST_BYTES = 1 << 16
 _ROWS_AT_ONCE = 200_000
 _MARKS = sorted({form for mark in MISSING for form in (mark, mark.upper(), mark.capitalize(), mark.title())})
-_Columns = list[Vector | None]
 
 
 def read(path: Path) -> ChannelFile:
@@ -47,40 +46,32 @@ def read(path: Path) -> ChannelFile:
         DatasetError: The file is missing, empty, too large, no text, has no rows of numbers, or a cell among numbers is
             text.
     """
-    data, size = beginning(path, _FIRST_BYTES)
-    _check_size(path, size)
+    data = first_bytes(path, _FIRST_BYTES)
+    refuse_larger(path, LARGEST_BYTES, "convert it to Parquet with the needed columns only, or cut it into runs")
     sheet = start_of(path, data)
-    end = data_end(path, sheet, size)
-    if end.stop <= sheet.start:
+    last = last_lines(path, sheet.encoding, sheet.start, _LAST_BYTES)
+    cut = _is_cut(last[-51:], sheet.separator)
+    stop = last[-1].start if cut else path.stat().st_size
+    if stop <= sheet.start:
         raise DatasetError(f"{path.name} breaks off before its first whole row of numbers; copy or export it again.")
-    columns = _fast(path, sheet, end.stop)
-    remarks = list(end.remarks)
-    if columns is None:
-        columns, comments = _careful(path, sheet, end.stop)
-        remarks += comments
+    split = last[0].start if last else stop
+    long = _long(path, sheet, split) if split > sheet.start else {}
+    columns, remarks = columns_of(_rows(path, sheet, sheet.start if long is None else split, stop, long))
     channels, left_out = channels_of(sheet.layout, columns)
     if not channels:
         raise DatasetError(f"{path.name} has no column of numbers; check that it is the file of the recording.")
     timed, clock = with_rate(channels, sheet.metadata)
-    return ChannelFile(path, "CSV", timed, (*sheet.remarks, *left_out, *remarks, *clock))
+    row = rows_before(path, stop) + 1 if cut else 0
+    broken = [f"The file breaks off in row {row}; that row was left out."] if cut else []
+    return ChannelFile(path, "CSV", timed, (*left_out, *broken, *remarks, *clock))
 
 
-def _check_size(path: Path, size: int) -> None:
-    if size == 0:
-        raise DatasetError(f"{path.name} is empty; export the recording again.")
-    if size > LARGEST_BYTES:
-        raise DatasetError(
-            f"{path.name} has {size / (1 << 30):.1f} GiB, more than the {LARGEST_BYTES / (1 << 30):g} GiB that can be read; "
-            "convert it to Parquet with the needed columns only, or cut it into runs."
-        )
-
-
-def _fast(path: Path, sheet: Sheet, stop: int) -> _Columns | None:
-    """Columns as pandas reads them; None where it meets a cell that it cannot."""
+def _long(path: Path, sheet: Sheet, stop: int) -> dict[int, np.ndarray] | None:
+    """The columns up to a byte as pandas reads them, dates as text; None where it meets a cell that it cannot."""
     pandas = load("pandas", "CSV")
     kinds = sheet.layout.kinds
     used = [i for i, kind in enumerate(kinds) if kind != "text"]
-    pieces: dict[int, list] = {i: [] for i in used}
+    pieces: dict[int, list[np.ndarray]] = {i: [] for i in used}
     with io.BufferedReader(Section(path, sheet.start, stop), 1 << 20) as stream, warnings.catch_warnings():
         # A warning means that a row has more cells than the headings, or that a column holds different kinds.
         warnings.simplefilter("error")
@@ -108,11 +99,7 @@ def _fast(path: Path, sheet: Sheet, stop: int) -> _Columns | None:
                     pieces[i].append(values.to_numpy(copy=True))
         except (ValueError, Warning, csv.Error):
             return None
-    columns: _Columns = [None] * len(kinds)
-    for i in used:
-        joined = np.concatenate(pieces.pop(i)) if pieces[i] else np.empty(0)
-        columns[i] = seconds_of_dates(joined, _place(path, sheet, i)) if kinds[i] == "date" else _finite(joined)
-    return columns
+    return {i: np.concatenate(pieces.pop(i)) for i in used if pieces[i]}
 
 
 def _exactly(version: str) -> dict[str, Any]:
@@ -121,75 +108,28 @@ def _exactly(version: str) -> dict[str, Any]:
     return {"float_precision": "round_trip"} if (int(major), int(minor)) < (3, 1) else {}
 
 
-def _careful(path: Path, sheet: Sheet, stop: int) -> tuple[_Columns, list[str]]:
-    """Columns read cell by cell, which finds the cell that is no number, and remarks on comments between them.
+def _rows(path: Path, sheet: Sheet, start: int, stop: int, before: dict[int, np.ndarray] | None) -> SheetRows:
+    """The rows of a section of the file [bytes], to be read cell by cell behind what has been read before."""
+    spaces = "\r\n\t ".replace(sheet.separator, "")
 
-    Raises:
-        DatasetError: Text stands in a column of numbers, or a row has too many cells.
-    """
-    kinds = sheet.layout.kinds
-    numbers = {i: array("d") for i, kind in enumerate(kinds) if kind in ("number", "blank")}
-    dates: dict[int, list[str]] = {i: [] for i, kind in enumerate(kinds) if kind == "date"}
-    comments = 0
-    first = rows_before(path, sheet.start) + 1
-    for row, line in _lines(path, sheet, stop, first):
-        if is_comment(line):
-            comments += 1
-            continue
-        cells = cells_of(line, sheet.separator)
-        if not line.strip():
-            continue
-        _check_width(path, sheet, row, cells)
-        for i, column in numbers.items():
-            column.append(_number(path, sheet, row, i, cells[i] if i < len(cells) else ""))
-        for i, texts in dates.items():
-            texts.append(cells[i] if i < len(cells) else "")
-    columns: _Columns = [None] * len(kinds)
-    for i, column in numbers.items():
-        columns[i] = _finite(np.array(column, dtype=float))
-    for i, texts in dates.items():
-        columns[i] = seconds_of_dates(texts, _place(path, sheet, i))
-    return columns, [f"{comments} comment lines between the rows of data were left out."] if comments else []
+    def cells() -> Iterator[Sequence[str] | None]:
+        for text in lines_between(path, sheet.encoding, start, stop):
+            line = Line(0, 0, text)
+            filled = [""] if line.blank else cells_of(text, sheet.separator)
+            yield None if line.comment else filled if text.strip(spaces) else []
+
+    def number(position: int) -> int:
+        return rows_before(path, start) + position + 1
+
+    return SheetRows(path.name, sheet.layout, cells(), number, sheet.decimal, True, before)
 
 
-def _lines(path: Path, sheet: Sheet, stop: int, first: int) -> Iterator[tuple[int, str]]:
-    with io.BufferedReader(Section(path, sheet.start, stop), 1 << 20) as stream:
-        text = io.TextIOWrapper(stream, encoding=sheet.encoding, errors="replace")
-        yield from enumerate(text, start=first)
-
-
-def _number(path: Path, sheet: Sheet, row: int, column: int, cell: str) -> float:
-    value = number_of(cell, sheet.decimal)
-    if value is not None:
-        return value
-    other = "," if sheet.decimal == "." else "."
-    mixed = number_of(cell, other) is not None
-    raise DatasetError(
-        f"{path.name}, row {row}, column {shown(_name(sheet, column))}: {shown(cell)} is not a number"
-        + (f" like the others, which have a decimal {'comma' if other == '.' else 'point'}" if mixed else "")
-        + "; correct the cell, or leave it blank if the sample is missing."
-    )
-
-
-def _check_width(path: Path, sheet: Sheet, row: int, cells: Sequence[str]) -> None:
-    extra = [cell for cell in cells[len(sheet.layout.kinds) :] if cell.strip()]
-    if extra:
-        raise DatasetError(
-            f"{path.name}, row {row}: {len(cells)} cells where the rows above have {len(sheet.layout.kinds)} (the first too "
-            f"many is {shown(extra[0])}); the usual cause is a decimal comma in a file separated by commas, or a row that "
-            "was written twice: correct or delete the row."
-        )
-
-
-def _finite(values: np.ndarray) -> Vector:
-    """Numbers with NaN for those too large to be any."""
-    values[~np.isfinite(values)] = np.nan
-    return values
-
-
-def _place(path: Path, sheet: Sheet, column: int) -> str:
-    return f"{path.name}, column {shown(_name(sheet, column))}"
-
-
-def _name(sheet: Sheet, column: int) -> str:
-    return sheet.layout.headings[column].name or f"column{column + 1}"
+def _is_cut(lines: Sequence[Line], separator: str) -> bool:
+    """Whether a file breaks off in the last of its lines: it has no end, and fewer cells or digits than those before."""
+    *whole, last = [cells_of(line.text, separator) for line in lines if not line.blank] or [[]]
+    if not whole or lines[-1].ended or lines[-1].blank or lines[-1].comment or is_summary(last):
+        return False
+    if len(last) < min(map(len, whole)):
+        return True
+    ends = [row[-1].strip() for row in whole if len(row) == len(last)]
+    return bool(ends) and (len(last[-1].strip()) < min(map(len, ends)) or last[-1].strip()[-1:] in {*"eE+-"})

@@ -4,59 +4,68 @@ import zipfile
 from dataclasses import dataclass
 from pathlib import Path
 
+TEXT = tuple(f".{ending}" for ending in ("csv", "txt", "tsv", "dat", "asc", "log", "lvm"))
+
 
 @dataclass(frozen=True)
 class Content:
     """A kind of file that its first bytes give away.
 
     Args:
-        key: Short name; empty for a file that is not recognized.
         what: What it is, for people, with an article.
-        remedy: What to do with such a file, as an order.
+        endings: The endings of such files, the usual one first; none for files that nobody reads.
+        remedy: What to do with such a file that has another ending, as an order; to rename it if omitted.
     """
 
-    key: str
     what: str
-    remedy: str
+    endings: tuple[str, ...] = ()
+    remedy: str = ""
+
+    @property
+    def advice(self) -> str:
+        """What to do with such a file that has another ending."""
+        return self.remedy or f"rename it to {self.endings[0]}"
+
+    def suits(self, ending: str) -> bool:
+        """Whether files with an ending may start so; those of which nobody knows how they start may start in any way."""
+        return ending in self.endings or not any(ending in each.endings for each in _CONTENTS)
 
 
-_UNKNOWN = Content("", "a file of unknown kind", "export the recording as CSV")
+UNKNOWN = Content("a file of unknown kind", (*TEXT, ".mat"), "export the recording as CSV")  # MATLAB 4 has no mark
 _EXPORT = "open it in the program that wrote it and export the recording as CSV"
 _UNPACK = "unpack it and give the file inside"
-_STARTS = (  # the longer start before the shorter one
-    (b"MATLAB 5", Content("matlab", "a MATLAB file", "rename it to .mat")),
-    (b"MATLAB 7", Content("matlab", "a MATLAB 7.3 file", "rename it to .mat")),
-    (b"\x89HDF\r\n\x1a\n", Content("hdf5", "an HDF5 file", "rename it to .h5")),
-    (b"TDSm", Content("tdms", "a TDMS file of National Instruments", "rename it to .tdms")),
-    (b"TDSh", Content("tdms_index", "the index of a TDMS file", "give the .tdms file that lies next to it")),
-    (b"MDF     ", Content("mdf", "an MDF measurement file", "rename it to .mf4")),
-    (b"UnFinMF ", Content("mdf", "an MDF measurement file", "rename it to .mf4")),
-    (b"#ROSBAG", Content("rosbag1", "a ROS 1 bag", "rename it to .bag")),
-    (b"\x89MCAP0\r\n", Content("mcap", "an MCAP file", "rename it to .mcap")),
-    (b"SQLite format 3\0", Content("sqlite", "an SQLite database", "rename it to .db3 if it is a ROS 2 bag")),
-    (b"PAR1", Content("parquet", "a Parquet file", "rename it to .parquet")),
-    (
-        b"\xd0\xcf\x11\xe0\xa1\xb1\x1a\xe1",
-        Content(
-            "xls",
-            "an old Excel workbook (.xls) or one with a password",
-            "open it in Excel or LibreOffice and save it as .xlsx without a password",
-        ),
+_STARTS = {  # the longer start before the shorter one
+    b"MATLAB 5": Content("a MATLAB file", (".mat",)),
+    b"MATLAB 7": Content("a MATLAB 7.3 file", (".mat",)),
+    b"\x89HDF\r\n\x1a\n": Content("an HDF5 file", (".h5", ".hdf5")),
+    b"TDSm": Content("a TDMS file of National Instruments", (".tdms",)),
+    b"TDSh": Content("the index of a TDMS file", (), "give the .tdms file that lies next to it"),
+    b"MDF     ": Content("an MDF measurement file", (".mf4", ".mdf")),
+    b"UnFinMF ": Content("an MDF measurement file", (".mf4", ".mdf")),
+    b"#ROSBAG": Content("a ROS 1 bag", (".bag",)),
+    b"\x89MCAP0\r\n": Content("an MCAP file", (".mcap",)),
+    b"SQLite format 3\0": Content("an SQLite database", (".db3",), "rename it to .db3 if it is a ROS 2 bag"),
+    b"PAR1": Content("a Parquet file", (".parquet", ".pq")),
+    b"\xd0\xcf\x11\xe0\xa1\xb1\x1a\xe1": Content(
+        "an old Excel workbook (.xls) or one with a password",
+        (),
+        "open it in Excel or LibreOffice and save it as .xlsx without a password",
     ),
-    (b"\x1f\x8b", Content("gzip", "a gzip archive", _UNPACK)),
-    (b"BZh", Content("bzip2", "a bzip2 archive", _UNPACK)),
-    (b"\xfd7zXZ\0", Content("xz", "an xz archive", _UNPACK)),
-    (b"7z\xbc\xaf\x27\x1c", Content("7z", "a 7-Zip archive", _UNPACK)),
-    (b"Rar!\x1a\x07", Content("rar", "a RAR archive", _UNPACK)),
-    (b"\x28\xb5\x2f\xfd", Content("zstd", "a Zstandard archive", _UNPACK)),
-    (b"%PDF-", Content("pdf", "a PDF document", "give the recording itself")),
-    (b"version https://git-lfs", Content("lfs", "a Git LFS pointer without the data", "run 'git lfs pull' first")),
-)
-_ZIP = Content("zip", "a ZIP archive", _UNPACK)
-_WORKBOOK = Content("zip", "an Excel workbook", "rename it to .xlsx")
-_OPEN_DOCUMENT = Content("ods", "an OpenDocument spreadsheet", "open it in LibreOffice and save it as .xlsx")
-_PAGE = Content("html", "a web page", "download the recording itself, or export it as CSV")
-_XML = Content("xml", "an XML file, such as those of Logger Pro (.cmbl)", _EXPORT)
+    b"\x1f\x8b": Content("a gzip archive", (), _UNPACK),
+    b"BZh": Content("a bzip2 archive", (), _UNPACK),
+    b"\xfd7zXZ\0": Content("an xz archive", (), _UNPACK),
+    b"7z\xbc\xaf\x27\x1c": Content("a 7-Zip archive", (), _UNPACK),
+    b"Rar!\x1a\x07": Content("a RAR archive", (), _UNPACK),
+    b"\x28\xb5\x2f\xfd": Content("a Zstandard archive", (), _UNPACK),
+    b"%PDF-": Content("a PDF document", (), "give the recording itself"),
+    b"version https://git-lfs": Content("a Git LFS pointer without the data", (), "run 'git lfs pull' first"),
+}
+_ZIP = Content("a ZIP archive", (".xlsx", ".xlsm"), _UNPACK)
+_WORKBOOK = Content("an Excel workbook", (".xlsx", ".xlsm"))
+_OPEN_DOCUMENT = Content("an OpenDocument spreadsheet", (), "open it in LibreOffice and save it as .xlsx")
+_PAGE = Content("a web page", (), "download the recording itself, or export it as CSV")
+_XML = Content("an XML file, such as those of Logger Pro (.cmbl)", (".cmbl",), _EXPORT)
+_CONTENTS = (UNKNOWN, *_STARTS.values(), _ZIP, _XML)
 
 
 def recognized(path: Path, head: bytes) -> Content:
@@ -68,10 +77,7 @@ def recognized(path: Path, head: bytes) -> Content:
     """
     if head.startswith(b"PK\x03\x04"):
         return _archive(path)
-    for start, content in _STARTS:
-        if head.startswith(start):
-            return content
-    return _markup(head)
+    return next((content for start, content in _STARTS.items() if head.startswith(start)), None) or _markup(head)
 
 
 def _archive(path: Path) -> Content:
@@ -91,4 +97,4 @@ def _markup(head: bytes) -> Content:
     text = head.removeprefix(b"\xef\xbb\xbf").lstrip().lower()
     if text.startswith((b"<!doctype html", b"<html")):
         return _PAGE
-    return _XML if text.startswith((b"<?xml", b"<document")) else _UNKNOWN
+    return _XML if text.startswith((b"<?xml", b"<document")) else UNKNOWN

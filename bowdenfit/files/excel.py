@@ -3,18 +3,17 @@
 import warnings
 from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import replace
-from datetime import date, datetime, time, timedelta
 from itertools import chain, islice
 from pathlib import Path
 from typing import Any
 
 from bowdenfit.errors import DatasetError
 from bowdenfit.files.channels import Channel, ChannelFile
-from bowdenfit.files.layout import Layout, layout_of
+from bowdenfit.files.layout import layout_of
 from bowdenfit.files.libraries import load
-from bowdenfit.files.sheet_columns import columns_of
+from bowdenfit.files.outcome import damage_refused, refuse_larger
+from bowdenfit.files.sheet_columns import SheetRows, columns_of, text_of
 from bowdenfit.files.sheets import channels_of
-from bowdenfit.files.text_file import beginning
 from bowdenfit.words import shown
 
 LARGEST_BYTES = 1 << 28
@@ -39,12 +38,7 @@ def read(path: Path) -> ChannelFile:
             numbers, or text stands among the numbers of the only one that does.
     """
     openpyxl = load("openpyxl", ".xlsx")
-    _, size = beginning(path, 1)
-    if size > LARGEST_BYTES:
-        raise DatasetError(
-            f"{path.name} has {size >> 20} MiB, more than the {LARGEST_BYTES >> 20} MiB of a workbook that can be read; save "
-            "the needed sheet as CSV."
-        )
+    refuse_larger(path, LARGEST_BYTES, "save the needed sheet as CSV")
     channels: dict[str, tuple[Channel, ...]] = {}
     remarks: list[str] = []
     errors: list[DatasetError] = []
@@ -81,7 +75,8 @@ def _sheets(openpyxl: Any, path: Path) -> Iterator[tuple[str, Iterator[_Cells]]]
     """Title and rows of each sheet; what the library cannot read becomes one sentence."""
     with warnings.catch_warnings():
         warnings.simplefilter("ignore", UserWarning)  # on styles and validations, which do not matter here
-        workbook = _guarded(path, lambda: openpyxl.load_workbook(path, read_only=True, data_only=True))
+        with damage_refused(path):
+            workbook = openpyxl.load_workbook(path, read_only=True, data_only=True)
         try:
             for sheet in workbook.worksheets:
                 sheet.reset_dimensions()
@@ -91,39 +86,18 @@ def _sheets(openpyxl: Any, path: Path) -> Iterator[tuple[str, Iterator[_Cells]]]
 
 
 def _rows(path: Path, sheet: Any) -> Iterator[_Cells]:
-    rows = iter(sheet.iter_rows(values_only=True))
-    while (row := _guarded(path, lambda: next(rows, None))) is not None:
-        yield row
+    with damage_refused(path):
+        yield from sheet.iter_rows(values_only=True)
 
 
-def _guarded(path: Path, call: Any) -> Any:
-    try:
-        return call()
-    except Exception as error:  # damaged archives and sheets raise many kinds: zip, XML, key, value and type errors
-        raise DatasetError(
-            f"{path.name} is cut off or damaged ({' '.join(str(error).split())[:120]}); copy it again, or open it in Excel and "
-            "save it anew."
-        ) from None
-
-
-def _read_sheet(place: str, rows: Iterable[_Cells]) -> tuple[tuple[Channel, ...], list[str]]:
-    iterator = iter(rows)
+def _read_sheet(place: str, cells: Iterable[_Cells]) -> tuple[tuple[Channel, ...], list[str]]:
+    iterator = iter(cells)
     first = list(islice(iterator, _FIRST_ROWS))
     layout = layout_of([[text_of(cell) for cell in row] for row in first], ".")
     if layout is None:
         return (), []
-    whole: Layout = layout
-    columns, remarks = columns_of(place, whole, chain(first[whole.start :], iterator))
-    channels, left_out = channels_of(whole, columns)
+    start = layout.start
+    rows = SheetRows(place, layout, chain(first[start:], iterator), lambda position: start + position + 1)
+    columns, remarks = columns_of(rows)
+    channels, left_out = channels_of(layout, columns)
     return channels, [*left_out, *remarks]
-
-
-def text_of(cell: object) -> str:
-    """A cell as text: dates as ISO dates, true and false as words."""
-    if cell is None:
-        return ""
-    if isinstance(cell, datetime | date | time):
-        return str(cell)
-    if isinstance(cell, timedelta):
-        return repr(cell.total_seconds())
-    return cell if isinstance(cell, str) else repr(cell)

@@ -10,27 +10,10 @@ from bowdenfit.units import is_unit
 _BRACKETED = re.compile(r"^(?P<name>.*?)[\s_]*[\[(](?P<unit>[^\])]*)[\])]\s*$")
 _NUMBER = re.compile(r"[+-]?\d+(?:[.,]\d+)?")
 # `F_in` is no force in inches, nor `cell_A` one in ampere: behind a name only what cannot be a word counts as unit.
-_SUFFIXES = {
-    *("N", "kN", "mN", "lbf", "kgf", "gf", "ozf", "Nm", "Nmm", "mNm", "N*m", "N*mm", "V", "mV", "uV", "mV/V", "V/V"),
-    *("mA", "Pa", "kPa", "MPa", "bar", "psi", "kg", "mm", "cm", "m", "um", "inch", "mm/s", "m/s", "cm/s", "rad", "deg"),
-    *(
-        "rad/s",
-        "deg/s",
-        "rpm",
-        "s",
-        "ms",
-        "us",
-        "ns",
-        "min",
-        "h",
-        "sec",
-        "Hz",
-        "degree",
-        "degrees",
-        "seconds",
-        "newton",
-    ),
-}
+_SUFFIXES = (
+    "N kN mN lbf kgf gf ozf newton Nm Nmm mNm N*m N*mm V mV uV mV/V V/V mA Pa kPa MPa bar psi kg mm cm m um inch mm/s m/s "
+    "cm/s rad deg degree degrees rad/s deg/s rpm s ms us ns min h sec seconds Hz"
+)
 _FORCES = {"N", "kN", "mN", "lbf", "kgf"}
 
 
@@ -104,26 +87,11 @@ def paired(headings: Sequence[Heading], rising: Sequence[bool], numeric: Sequenc
     return tuple(named)
 
 
-def unique(headings: Sequence[Heading]) -> tuple[Heading, ...]:
-    """Headings with numbers behind names that stand there twice: "45", "45 (2)", "45 (3)"."""
-    taken = {heading.name for heading in headings}
-    seen: set[str] = set()
-    named: list[Heading] = []
-    for heading in headings:
-        name, count = heading.name, 1
-        while name in seen or (count > 1 and name in taken):
-            count += 1
-            name = f"{heading.name} ({count})"
-        seen.add(name)
-        named.append(replace(heading, name=name))
-    return tuple(named)
-
-
 def _unit_behind(heading: str) -> str:
     """Unit in `input_force_N`, `velocity_mm_per_s`, "Force N" or `force_N_45deg_trial1`."""
     words = re.split(r"[\s_]+", heading)
     for start in range(1, len(words)):
         candidate = "_".join(words[start:]).replace("_per_", "/")
-        if candidate in _SUFFIXES:
+        if candidate in _SUFFIXES.split():
             return candidate
     return next((word for word in words[1:] if word in _FORCES), "")

@@ -4,26 +4,14 @@ import re
 from collections.abc import Sequence
 from dataclasses import dataclass
 from itertools import pairwise
-from typing import Literal
 
 import numpy as np
 
-from bowdenfit.files.clocks import is_date
+from bowdenfit.files.cells import Kind, kind_of, number_of
 from bowdenfit.files.headings import Heading, heading_of, is_number, is_units_row, paired, without_label
 from bowdenfit.types import Vector
 
-Kind = Literal["number", "date", "blank", "text"]
 Rows = Sequence[Sequence[str]]
-_EXCEL_MARKS = "#n/a #na #div/0! #value! #num! #ref!"
-_MARKS = "- -- --- n/a na n.d. nd none null <na> nan -nan +nan 1.#qnan -1.#ind"
-_INFINITE = (
-    "inf +inf -inf infinity -infinity ∞ -∞ +∞ 1.#inf -1.#inf overflow +overflow -overflow overrange overload ovld"
-)
-MISSING = frozenset({"", *_EXCEL_MARKS.split(), *_MARKS.split(), *_INFINITE.split(), "ovrflw"})
-_NUMBERS = {
-    ".": re.compile(r"[+-]?(?:\d+\.?\d*|\.\d+)(?:[eE][+-]?\d+)?"),
-    ",": re.compile(r"[+-]?(?:\d+,?\d*|,\d+)(?:[eE][+-]?\d+)?"),
-}
 _SUMMARY = re.compile(
     r"(?:(?:min|max|avg|average|mean|std|stdev|stddev|sd|sem|median|rms|sum|total|count|range|half range|peak|variance|"
     r"minimum|maximum|mittelwert|summe|anzahl|moyenne|media|standard deviation|standardabweichung)[\s:.=]*)",
@@ -54,28 +42,18 @@ class Layout:
     given: int = 0
 
     @property
+    def room(self) -> int:
+        """Number of columns that the headings leave room for; a nameless one may be that of an index."""
+        return self.given + any(not heading.name for heading in self.headings[: self.given])
+
+    @property
     def fits(self) -> bool:
         """Whether no column stands outside the headings, as happens where decimal commas are taken for separators."""
-        bare = self.given + any(not heading.name for heading in self.headings[: self.given])
-        return not self.named or all(kind == "blank" for kind in self.kinds[bare:])
+        return not self.named or all(kind == "blank" for kind in self.kinds[self.room :])
 
-
-def kind_of(cell: str, decimal: str) -> Kind:
-    """What stands in a cell."""
-    text = cell.strip()
-    if text.lower() in MISSING:
-        return "blank"
-    if _NUMBERS[decimal].fullmatch(text):
-        return "number"
-    return "date" if is_date(text) else "text"
-
-
-def number_of(cell: str, decimal: str) -> float | None:
-    """The number in a cell, NaN where it is missing, None where there is text."""
-    text = cell.strip().replace("\u2212", "-")
-    if text.lower() in MISSING:
-        return float("nan")
-    return float(text.replace(decimal, ".")) if _NUMBERS[decimal].fullmatch(text) else None
+    def name(self, column: int) -> str:
+        """What a column is called, by its place where it has no heading."""
+        return self.headings[column].name or f"column{column + 1}"
 
 
 def is_summary(cells: Sequence[str]) -> bool:

@@ -8,7 +8,7 @@ import numpy as np
 from bowdenfit.errors import DatasetError
 from bowdenfit.files.channels import Channel, ChannelFile
 from bowdenfit.files.clocks import with_clocks
-from bowdenfit.files.outcome import LeftOut, channel_file, damage_refused
+from bowdenfit.files.outcome import LeftOut, channel_file, damage_refused, refuse_larger
 from bowdenfit.types import Vector
 
 LARGEST_BYTES = 512 * 1024**2
@@ -26,10 +26,7 @@ def read(path: Path) -> ChannelFile:
     Raises:
         DatasetError: It is too large, damaged, or holds no numbers.
     """
-    if path.stat().st_size > LARGEST_BYTES:
-        raise DatasetError(
-            f"{path.name} has more than {LARGEST_BYTES // 1024**2} MiB of XML; export the run as CSV from Logger Pro."
-        )
+    refuse_larger(path, LARGEST_BYTES, "export the run as CSV from Logger Pro")
     with damage_refused(path):
         root = _parsed(path)
     columns = [(name, column) for name, run in _runs(root) for column in run.iter("DataColumn")]

@@ -2,14 +2,14 @@
 
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
 from bowdenfit.errors import DatasetError
-from bowdenfit.files.channels import Channel, ChannelFile
+from bowdenfit.files.channels import Channel, ChannelFile, with_unique_names
 from bowdenfit.types import Vector
 from bowdenfit.words import quoted
 
@@ -66,12 +66,13 @@ def cut_off(path: Path, seen: str) -> DatasetError:
     return DatasetError(f"{path.name} is cut off or damaged ({words}); copy it again from the acquisition computer.")
 
 
-def refuse_too_large(path: Path, n_samples: int) -> None:
+def refuse_too_large(path: Path, n_samples: int, what: str = "") -> None:
     """Refuse a file before it fills the memory.
 
     Args:
         path: The file.
         n_samples: How many numbers it holds, times included.
+        what: What these are, for the error.
 
     Raises:
         DatasetError: They would need more than `LARGEST_BYTES`.
@@ -79,8 +80,21 @@ def refuse_too_large(path: Path, n_samples: int) -> None:
     needed = n_samples * BYTES_PER_SAMPLE
     if needed > LARGEST_BYTES:
         raise DatasetError(
-            f"{path.name} holds {needed / 1024**3:.3g} GiB of numbers, more than the {LARGEST_BYTES / 1024**3:.3g} GiB "
+            f"{path.name} holds {needed / 1024**3:.3g} GiB of numbers{what}, more than the {LARGEST_BYTES / 1024**3:.3g} GiB "
             "that are read at once; save only the channels of the load cells, cut the recording, or decimate it."
+        )
+
+
+def refuse_larger(path: Path, most: int, remedy: str) -> None:
+    """Refuse a file of more than so many bytes, whatever it holds.
+
+    Raises:
+        DatasetError: It has more.
+    """
+    size = path.stat().st_size
+    if size > most:
+        raise DatasetError(
+            f"{path.name} has {size / 1024**3:.3g} GiB, more than the {most / 1024**3:.3g} GiB that can be read; {remedy}."
         )
 
 
@@ -108,18 +122,4 @@ def channel_file(
             f"{path.name} holds no recording that can be read: no channel with several numbers. "
             f"{' '.join((*said, ''))}Save the forces as plain vectors of numbers, or export the recording as CSV."
         )
-    return ChannelFile(path, kind, _unique(channels), said)
-
-
-def _unique(channels: Sequence[Channel]) -> tuple[Channel, ...]:
-    """Channels with a number behind every name that was there before: "F", "F (2)"."""
-    taken: set[str] = set()
-    result = []
-    for channel in channels:
-        name, count = channel.name, 1
-        while name in taken:
-            count += 1
-            name = f"{channel.name} ({count})"
-        taken.add(name)
-        result.append(replace(channel, name=name))
-    return tuple(result)
+    return ChannelFile(path, kind, with_unique_names(channels), said)

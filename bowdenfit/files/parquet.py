@@ -1,21 +1,18 @@
 """Recordings in Parquet files."""
 
-from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
-from bowdenfit.errors import DatasetError
-from bowdenfit.files.channels import Channel, ChannelFile
+from bowdenfit.files.channels import Channel, ChannelFile, with_unique_names
 from bowdenfit.files.clocks import with_clocks
-from bowdenfit.files.headings import Heading, heading_of, unique
+from bowdenfit.files.headings import Heading, heading_of
 from bowdenfit.files.libraries import load
-from bowdenfit.files.text_file import beginning
+from bowdenfit.files.outcome import LeftOut, channel_file, damage_refused, refuse_too_large
 from bowdenfit.types import Vector
 from bowdenfit.words import shown
 
-LARGEST_BYTES = 2 << 30
 _UNIT_KEYS = (b"unit", b"units", b"Unit")
 
 
@@ -25,7 +22,7 @@ def read(path: Path) -> ChannelFile:
     The unit is what the metadata of the column say under "unit", else what its heading says. Columns are read one by
     one, so that the memory needed is about that of the numbers, 8 bytes a cell.
 
-    Limits: 2 GiB of numbers (`LARGEST_BYTES`).
+    Limits: 2 GiB of numbers (`outcome.LARGEST_BYTES`).
 
     Args:
         path: The file.
@@ -35,32 +32,20 @@ def read(path: Path) -> ChannelFile:
     """
     pyarrow = load("pyarrow", "Parquet")
     parquet = load("pyarrow.parquet", "Parquet")
-    beginning(path, 1)
-    try:
-        with parquet.ParquetFile(path) as file:
-            fields = list(file.schema_arrow)
-            used = [(i, field) for i, field in enumerate(fields) if _is_readable(pyarrow, field.type)]
-            _check_size(path, file.metadata.num_rows, len(used))
-            columns = [_values(pyarrow, file.read(columns=[field.name]).column(0)) for _, field in used]
-    except (pyarrow.ArrowException, OSError) as error:
-        said = " ".join(str(error).split())[:120]
-        raise DatasetError(
-            f"{path.name} is cut off or damaged ({said}); copy it again from the acquisition computer."
-        ) from None
-    if not used:
-        raise DatasetError(f"{path.name} has no column of numbers; check that it is the file of the recording.")
-    headings = unique([_heading(pyarrow, field) for _, field in used])
+    with damage_refused(path), parquet.ParquetFile(path) as file:
+        fields = list(file.schema_arrow)
+        used = [field for field in fields if _is_readable(pyarrow, field.type)]
+        rows = file.metadata.num_rows
+        refuse_too_large(path, rows * len(used), f" ({rows} rows of {len(used)} columns)")
+        columns = [_values(pyarrow, file.read(columns=[field.name]).column(0)) for field in used]
+    headings = [_heading(pyarrow, field) for field in used]
     channels = [Channel(h.name, h.unit, values) for h, values in zip(headings, columns, strict=True)]
-    left_out = [field for field in fields if not _is_readable(pyarrow, field.type)]
-    return ChannelFile(path, "Parquet", with_clocks(channels), tuple(_remarks(left_out)))
-
-
-def _check_size(path: Path, rows: int, columns: int) -> None:
-    if rows * columns * 8 > LARGEST_BYTES:
-        raise DatasetError(
-            f"{path.name} holds {rows} rows of {columns} columns, more than the {LARGEST_BYTES / (1 << 30):g} GiB of numbers "
-            "that can be read; write a file with the needed columns only, or cut it into runs."
-        )
+    remarks = [
+        f"The column {shown(field.name)} holds no numbers ({field.type}) and was left out."
+        for field in fields
+        if not _is_readable(pyarrow, field.type)
+    ]
+    return channel_file(path, "Parquet", with_clocks(with_unique_names(channels)), LeftOut(), remarks)
 
 
 def _is_readable(pyarrow: Any, kind: Any) -> bool:
@@ -87,8 +72,3 @@ def _heading(pyarrow: Any, field: Any) -> Heading:
     metadata = field.metadata or {}
     unit = next((metadata[key].decode("utf-8", errors="replace") for key in _UNIT_KEYS if key in metadata), "")
     return Heading(field.name, unit) if unit else heading_of(field.name)
-
-
-def _remarks(fields: list[Any]) -> Iterator[str]:
-    for field in fields:
-        yield f"The column {shown(field.name)} holds no numbers ({field.type}) and was left out."

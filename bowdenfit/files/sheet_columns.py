@@ -1,117 +1,174 @@
 """The columns of a sheet out of its rows of cells: numbers, dates, and what stands below the data."""
 
+import math
+import re
 from array import array
-from collections.abc import Iterable, Sequence
-from dataclasses import dataclass, field
+from collections.abc import Callable, Iterable, Mapping, Sequence
+from dataclasses import dataclass
 from datetime import timedelta
 from typing import Any
 
 import numpy as np
 
-from bowdenfit.errors import DatasetError
-from bowdenfit.files.clocks import seconds_of_dates
-from bowdenfit.files.layout import Layout, is_summary, number_of
+from bowdenfit.files.cells import Cell, kind_of, number_of
+from bowdenfit.files.clocks import is_date, seconds_of_dates
+from bowdenfit.files.csv_rows import too_many_cells
+from bowdenfit.files.layout import Layout, is_summary
 from bowdenfit.types import Vector
 from bowdenfit.words import shown
 
 _MOST_SUMMARY_ROWS = 40
 _MOST_ROWS_AFTER_BLANK = 10
-_NAN = float("nan")
+_DATA, _BLANK, _EMPTY, _COMMENT, _SUMMARY, _WORDS, _MIXED = b"d ,#swm"
+_BLOCK_OF_WORDS = re.compile(rb"(?<=[^ ])(?: +[wm#]+)+$")
+_LAST_FEW = re.compile(rb"([^ ]+) +([^ ]{1,%d})" % _MOST_ROWS_AFTER_BLANK)
 
 
 @dataclass(frozen=True)
-class _Cells:
-    """What has been read of a sheet: the numbers and dates of each column, and words among them."""
-
-    numbers: dict[int, array]
-    dates: dict[int, list[str]]
-    words: list[tuple[int, int, str]] = field(default_factory=list)
-    filled: list[tuple[int, int]] = field(default_factory=list)
-
-
-def columns_of(place: str, layout: Layout, rows: Iterable[Sequence[Any]]) -> tuple[list[Vector | None], list[str]]:
-    """The numbers of each column, None for a column of text, and remarks on rows left out below the data.
+class SheetRows:
+    """The rows of a sheet from the first of data on.
 
     Args:
         place: File and sheet, for errors.
         layout: Headings and kinds of the columns.
-        rows: Cells from the first row of data on.
+        rows: Their cells, text or as the library gives them; None for a comment.
+        number: The number in the file of the row at a position, from 0.
+        decimal: Decimal mark of numbers that are text.
+        of_text: Whether they are lines of text, of which blank ones are only space and none may have too many cells.
+        before: Numbers or dates of the columns that have been read from the rows before.
+    """
+
+    place: str
+    layout: Layout
+    rows: Iterable[Sequence[Any] | None]
+    number: Callable[[int], int]
+    decimal: str = "."
+    of_text: bool = False
+    before: Mapping[int, np.ndarray] | None = None
+
+
+@dataclass(frozen=True)
+class _Cells:
+    """What has been read of a sheet.
+
+    Args:
+        numbers: The numbers of each column.
+        dates: The texts of each column of dates.
+        words: Position, column and text of each cell that is not as it should be; the cells of a row that has too many.
+        letters: What each row holds.
+    """
+
+    numbers: dict[int, array]
+    dates: dict[int, list[str]]
+    words: list[tuple[int, int, Any]]
+    letters: bytearray
+
+
+def columns_of(sheet: SheetRows) -> tuple[list[Vector | None], list[str]]:
+    """The numbers of each column, None for a column of text, and remarks on rows left out below the data.
 
     Raises:
         DatasetError: Text stands among the numbers of a column.
     """
-    cells = _read(layout, rows)
-    last = cells.filled[-1][1] if cells.filled else 0
-    stop = _data_end(cells, last)
-    for row, column, text in cells.words:
-        if row < stop and layout.kinds[column] == "number":
-            name = layout.headings[column].name or f"column{column + 1}"
-            raise DatasetError(
-                f"{place}, row {layout.start + row + 1}, column {shown(name)}: "
-                f"{shown(text)} is not a number; correct the cell, or leave it blank if the sample is missing."
-            )
-    columns: list[Vector | None] = [None] * len(layout.kinds)
-    for i, values in cells.numbers.items():
-        columns[i] = np.array(values[:stop], dtype=float)
-    for i, texts in cells.dates.items():
-        columns[i] = seconds_of_dates(texts[:stop], f"{place}, column {shown(layout.headings[i].name)}")
-    return columns, _remarks(layout.start, cells, stop, last)
+    kinds, cells = sheet.layout.kinds, _read(sheet)
+    stop = _data_end(bytes(cells.letters))
+    for position, column, text in cells.words:
+        if position >= stop:
+            break
+        if column == len(kinds):
+            too_many_cells(sheet.place, sheet.number(position), text, len(kinds))
+        elif kinds[column] == "number" or (sheet.of_text and kinds[column] == "blank"):
+            raise Cell(sheet.place, sheet.number(position), sheet.layout.name(column), text).no_sample(sheet.decimal)
+    space = [_COMMENT, _BLANK] if sheet.of_text else [_COMMENT]
+    kept = ~np.isin(np.array(cells.letters[:stop]), space)
+    columns: list[Vector | None] = [None] * len(kinds)
+    before = sheet.before or {}
+    for i, values in (cells.numbers | cells.dates).items():
+        found = np.array(values[:stop], dtype=object if i in cells.dates else float)[kept]
+        whole = np.concatenate([before[i], found]) if i in before else found
+        if i in cells.dates:
+            columns[i] = seconds_of_dates(whole, f"{sheet.place}, column {shown(sheet.layout.name(i))}")
+        else:
+            columns[i] = np.where(np.isfinite(whole), whole, np.nan)
+    return columns, _remarks(sheet, cells.letters, stop)
 
 
-def _read(layout: Layout, rows: Iterable[Sequence[Any]]) -> _Cells:
-    kinds = layout.kinds
+def text_of(cell: object) -> str:
+    """A cell as text: dates as ISO dates, true and false as words."""
+    if isinstance(cell, timedelta):
+        return repr(cell.total_seconds())
+    if cell is None or isinstance(cell, str):
+        return cell or ""
+    return repr(cell) if isinstance(cell, bool | int | float) else str(cell)
+
+
+def _read(sheet: SheetRows) -> _Cells:
+    kinds = sheet.layout.kinds
     numbers = {i: array("d") for i, kind in enumerate(kinds) if kind in ("number", "blank")}
-    cells = _Cells(numbers, {i: [] for i, kind in enumerate(kinds) if kind == "date"})
-    for position, row in enumerate(rows):
+    cells = _Cells(numbers, {i: [] for i, kind in enumerate(kinds) if kind == "date"}, [], bytearray())
+    for position, row in enumerate(sheet.rows):
+        known, filled = len(cells.words), row or ()
+        if sheet.of_text and any(map(str.strip, filled[len(kinds) :])):
+            cells.words.append((position, len(kinds), filled))
         for i, column in cells.numbers.items():
-            cell = row[i] if i < len(row) else None
-            column.append(cell if type(cell) is float else _number(cells, position, i, cell))
+            cell = filled[i] if i < len(filled) else None
+            column.append(cell if type(cell) is float else _number(cells, position, i, cell, sheet.decimal))
         for i, texts in cells.dates.items():
-            texts.append("" if i >= len(row) or row[i] is None else str(row[i]))
-        if any(cell is not None and cell != "" for cell in row):
-            _extend(cells.filled, position)
+            texts.append(text_of(filled[i]) if i < len(filled) else "")
+            if texts[-1] and not is_date(texts[-1].strip()):
+                cells.words.append((position, i, texts[-1]))
+        cells.letters.append(_letter(row, sheet, len(cells.words) > known))
     return cells
 
 
-def _number(cells: _Cells, row: int, column: int, cell: object) -> float:
+def _number(cells: _Cells, row: int, column: int, cell: object, decimal: str) -> float:
     if cell is None:
-        return _NAN
+        return math.nan
     if isinstance(cell, float | int) and not isinstance(cell, bool):
         return float(cell)
     if isinstance(cell, timedelta):
         return cell.total_seconds()
-    value = None if isinstance(cell, bool) else number_of(str(cell), ".")
+    value = None if isinstance(cell, bool) else number_of(str(cell), decimal)
     if value is None:
         cells.words.append((row, column, str(cell)))
-        return _NAN
+        return math.nan
     return value
 
 
-def _extend(runs: list[tuple[int, int]], row: int) -> None:
-    """Add a filled row to the runs of filled rows (first, behind the last)."""
-    if runs and runs[-1][1] == row:
-        runs[-1] = (runs[-1][0], row + 1)
-    else:
-        runs.append((row, row + 1))
+def _letter(row: Sequence[Any] | None, sheet: SheetRows, worded: bool) -> int:
+    """What a row holds; statistics bear a label in a column that holds no words in the data."""
+    if row is None:
+        return _COMMENT
+    if all(cell is None or cell == "" for cell in row):
+        return _EMPTY if sheet.of_text and row else _BLANK
+    if not worded:
+        return _DATA
+    texts, kinds = [text_of(cell) for cell in row], sheet.layout.kinds
+    if is_summary([text for i, text in enumerate(texts) if i >= len(kinds) or kinds[i] != "text"]):
+        return _SUMMARY
+    found = {kind_of(text, sheet.decimal) for text in texts}
+    return _MIXED if len(kinds) == 1 or found & {"number", "date"} else _WORDS
 
 
-def _data_end(cells: _Cells, last: int) -> int:
-    """Row behind the data: that of the first statistic below them, or of the blank row before a few last ones."""
-    labels = [row for row, _, text in cells.words if is_summary([text]) and last - row <= _MOST_SUMMARY_ROWS]
-    stop = min(labels, default=last)
-    runs = [(start, min(end, stop)) for start, end in cells.filled if start < stop]
-    worded = {row for row, _, _ in cells.words}
-    while len(runs) > 1 and all(row in worded for row in range(*runs[-1])):
-        runs.pop()
-    if len(runs) == 2 and (after := runs[1][1] - runs[1][0]) <= _MOST_ROWS_AFTER_BLANK and runs[0][1] > 2 * after:
-        runs.pop()
-    return runs[-1][1] if runs else stop
+def _data_end(letters: bytes) -> int:
+    """Position of the row behind the data, by a letter for each row.
+
+    Below the data stand statistics, words alone, a block in whose every row are words, or a few last rows after a blank.
+    """
+    filled = letters.rstrip(b" ,#")
+    label = filled.find(_SUMMARY, max(0, len(filled) - _MOST_SUMMARY_ROWS))
+    data = (filled if label < 0 else filled[:label]).rstrip(b" ,#w")
+    data = _BLOCK_OF_WORDS.sub(b"", data)
+    last = _LAST_FEW.fullmatch(data)
+    return last.end(1) if last and last.end(1) > 2 * len(last[2]) + 2 else len(data)
 
 
-def _remarks(start: int, cells: _Cells, stop: int, last: int) -> list[str]:
-    below = [max(first, stop) for first, end in cells.filled if end > stop]
-    if not below:
-        return []
-    top, bottom = start + below[0] + 1, start + last
-    where = f"Row {top} was" if top == bottom else f"Rows {top} to {bottom} were"
-    return [f"{where} left out: they stand below the data, as statistics do."]
+def _remarks(sheet: SheetRows, letters: bytearray, stop: int) -> list[str]:
+    comments = letters[:stop].count(_COMMENT)
+    said = [f"{comments} comment lines between the rows of data were left out."] if comments else []
+    below = [i for i in range(stop, len(letters)) if letters[i] not in b" ,#"]
+    if below:
+        top, bottom = sheet.number(below[0]), sheet.number(below[-1])
+        where = f"Row {top} was" if top == bottom else f"Rows {top} to {bottom} were"
+        said.append(f"{where} left out: they stand below the data, as statistics do.")
+    return said

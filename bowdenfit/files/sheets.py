@@ -7,9 +7,8 @@ from dataclasses import replace
 
 import numpy as np
 
-from bowdenfit.files.channels import Channel
+from bowdenfit.files.channels import Channel, with_unique_names
 from bowdenfit.files.clocks import names_time, with_clocks, without_tails
-from bowdenfit.files.headings import Heading, unique
 from bowdenfit.files.layout import Layout, is_index
 from bowdenfit.types import Vector
 from bowdenfit.words import shown
@@ -21,6 +20,7 @@ _RATE = re.compile(
     re.IGNORECASE,
 )
 _PERIODS = ("interval", "period", "time", "step", "delta_x", "dt", "d_t")
+_SECONDS = ("s", "ms", "us", "µs", "ns")
 _FACTORS = {"khz": 1e3, "mhz": 1e6, "ks/s": 1e3, "ms/s": 1e6, "ms": 1e-3, "us": 1e-6, "µs": 1e-6, "ns": 1e-9}
 
 
@@ -31,7 +31,7 @@ def channels_of(layout: Layout, columns: Sequence[Vector | None]) -> tuple[tuple
         layout: Its headings.
         columns: The numbers of each column; None for one of text.
     """
-    kept: list[tuple[Heading, Vector]] = []
+    kept: list[Channel] = []
     remarks: list[str] = []
     nameless = [not heading.name for heading in layout.headings]
     for i, (heading, values) in enumerate(zip(layout.headings, columns, strict=True)):
@@ -43,11 +43,10 @@ def channels_of(layout: Layout, columns: Sequence[Vector | None]) -> tuple[tuple
         elif nameless[i] and layout.named and is_index(values):
             remarks.append(f"{place} has no heading, only counts the rows and was left out.")
         else:
-            kept.append((heading if heading.name else replace(heading, name=f"column{i + 1}"), values))
+            kept.append(Channel(layout.name(i), heading.unit, values))
     if not layout.named:
         remarks.append("there is no row of headings; the columns are called column1, column2, ... from the left.")
-    headings = unique([heading for heading, _ in kept])
-    found = [Channel(h.name, h.unit, values) for h, (_, values) in zip(headings, kept, strict=True)]
+    found = with_unique_names(kept)
     return with_clocks(without_tails(found)) if found else (), [_sentence(remark) for remark in remarks]
 
 
@@ -59,13 +58,7 @@ def stated_rate(lines: Sequence[str]) -> tuple[float, str] | None:
         if match is None:
             continue
         value = float(match["value"].replace(",", ".")) * _FACTORS.get((match["unit"] or "").lower(), 1.0)
-        period = match["what"].lower().endswith(_PERIODS) or (match["unit"] or "").lower() in (
-            "s",
-            "ms",
-            "us",
-            "µs",
-            "ns",
-        )
+        period = match["what"].lower().endswith(_PERIODS) or (match["unit"] or "").lower() in _SECONDS
         if value > 0 and math.isfinite(value):
             return (1 / value if period else value), plain[:80]
     return None

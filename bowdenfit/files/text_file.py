@@ -1,13 +1,17 @@
 """Text files of any size and encoding: their first and last lines, and sections of them as streams."""
 
+import codecs
 import io
+import os
 import re
+from collections.abc import Iterator
 from dataclasses import dataclass
 from pathlib import Path
 
 from bowdenfit.errors import DatasetError
 
 _BYTE_ORDER_MARKS = ((b"\xff\xfe", "utf-16-le"), (b"\xfe\xff", "utf-16-be"), (b"\xef\xbb\xbf", "utf-8"))
+_COMMENT = re.compile(r"\s*\"?\s*(?P<mark>#(?!n/a|div/0!|value!|num!|ref!|na\b)|%)", re.IGNORECASE)
 _PIECE = 1 << 24
 
 
@@ -34,6 +38,12 @@ class Line:
     def blank(self) -> bool:
         """Whether it holds nothing but separators."""
         return not self.text.strip(" \t\r\n;,|\"'")
+
+    @property
+    def comment(self) -> str:
+        """The mark (# or %) that makes it a comment, else nothing; a row of data may begin with Excel's #N/A."""
+        match = _COMMENT.match(self.text)
+        return match["mark"] if match else ""
 
 
 class Section(io.RawIOBase):
@@ -62,14 +72,18 @@ class Section(io.RawIOBase):
         super().close()
 
 
-def beginning(path: Path, most: int) -> tuple[bytes, int]:
-    """First bytes of a file, and the size of all of it.
+def first_bytes(path: Path, most: int = -1) -> bytes:
+    """The first bytes of a file, or all of them.
 
     Raises:
-        DatasetError: The file is missing or cannot be read.
+        DatasetError: The file is missing, a folder, empty, or cannot be read.
     """
+    if path.is_dir():
+        raise DatasetError(
+            f"{path.name} is a folder, not a recording or a table; give one of the files in it "
+            "(only a ROS 2 bag is a folder, and it holds a metadata.yaml)."
+        )
     try:
-        size = path.stat().st_size
         with path.open("rb") as file:
             data = file.read(most)
     except FileNotFoundError:
@@ -78,65 +92,42 @@ def beginning(path: Path, most: int) -> tuple[bytes, int]:
         ) from None
     except OSError as error:
         raise DatasetError(
-            f"{path.name} cannot be read ({error.strerror}); check that it is a file you may open."
+            f"{path.name} cannot be read ({error.strerror or os.strerror(error.errno or 0)}); check its permissions, and "
+            "that no other program holds it open."
         ) from None
-    return data, size
+    if not data:
+        raise DatasetError(
+            f"{path.name} is empty (0 bytes); copy it again from the acquisition computer, or fill it in."
+        )
+    return data
 
 
-def encoding_of(data: bytes, name: str) -> tuple[str, int]:
-    """Encoding of a text by its first bytes, and how many of them are a byte-order mark.
+def first_lines(data: bytes, name: str, whole: bool) -> tuple[str, list[Line]]:
+    """The encoding of a text and its lines, by its first bytes or, if `whole`, all of them.
 
     Raises:
         DatasetError: It is no text.
     """
-    for mark, encoding in _BYTE_ORDER_MARKS:
-        if data.startswith(mark):
-            return encoding, len(mark)
-    if b"\x00" in data:
-        raise DatasetError(
-            f"{name} is not a text file; name the file by its format (.xlsx, .mat, .tdms, ...) or export it as CSV."
-        )
-    whole = data.rpartition(b"\n")[0] or data
-    try:
-        whole.decode("utf-8")
-    except UnicodeDecodeError:
-        return "cp1252", 0
-    return "utf-8", 0
+    encoding, mark = _encoding(data, name, whole)
+    return encoding, _lines(data[mark:], encoding, mark)
 
 
-def lines_of(data: bytes, encoding: str, row: int, start: int) -> list[Line]:
-    """Lines of a piece of a file.
-
-    Args:
-        data: The piece.
-        encoding: Its encoding.
-        row: Number of its first line.
-        start: Where it starts [bytes].
-    """
-    if encoding.startswith("utf-16"):
-        texts = list(io.StringIO(data.decode(encoding, errors="replace"), newline=""))
-        lengths = [len(text.encode(encoding, errors="replace")) for text in texts]
-    else:
-        pieces = data.splitlines(keepends=True)
-        texts = [piece.decode(encoding, errors="replace") for piece in pieces]
-        lengths = [len(piece) for piece in pieces]
-    lines = []
-    for text, length in zip(texts, lengths, strict=True):
-        lines.append(Line(row, start, text))
-        row, start = row + 1, start + length
-    return lines
-
-
-def last_lines(path: Path, encoding: str, start: int, size: int, most: int) -> list[Line]:
+def last_lines(path: Path, encoding: str, start: int, most: int) -> list[Line]:
     """Lines from `start` to the end of a file, or the last of them if these are more than `most` bytes.
 
-    The rows of the latter are counted from the first line as 0: `rows_before` gives what to add.
+    Their rows count from the first of them; `rows_before` gives what to add.
     """
-    skipped = max(start, (size - most) // 2 * 2 + start % 2)
+    skipped = max(start, (path.stat().st_size - most) // 2 * 2 + start % 2)
     with path.open("rb") as file:
         file.seek(skipped)
-        lines = lines_of(file.read(), encoding, 0, skipped)
+        lines = _lines(file.read(), encoding, skipped)
     return lines if skipped == start else lines[1:]
+
+
+def lines_between(path: Path, encoding: str, start: int, stop: int) -> Iterator[str]:
+    """Lines of a section of a file [bytes], one after the other."""
+    with io.BufferedReader(Section(path, start, stop), 1 << 20) as stream:
+        yield from io.TextIOWrapper(stream, encoding=encoding, errors="replace")
 
 
 def rows_before(path: Path, stop: int) -> int:
@@ -148,6 +139,33 @@ def rows_before(path: Path, stop: int) -> int:
     return feeds or returns
 
 
-def is_comment(text: str) -> bool:
-    """Whether a line is a comment (# or %); a data row may begin with Excel's #N/A, which is none."""
-    return bool(re.match(r"\s*\"?\s*(?:#(?!n/a|div/0!|value!|num!|ref!|na\b)|%)", text, re.IGNORECASE))
+def _encoding(data: bytes, name: str, whole: bool) -> tuple[str, int]:
+    """Encoding of a text, and how many bytes are a byte-order mark."""
+    for mark, encoding in _BYTE_ORDER_MARKS:
+        if data.startswith(mark):
+            return encoding, len(mark)
+    if b"\x00" in data:
+        raise DatasetError(
+            f"{name} is not a text file; name the file by its format (.xlsx, .mat, .tdms, ...) or export it as CSV."
+        )
+    try:
+        codecs.getincrementaldecoder("utf-8")().decode(data, final=whole)
+    except UnicodeDecodeError:
+        return "cp1252", 0
+    return "utf-8", 0
+
+
+def _lines(data: bytes, encoding: str, start: int) -> list[Line]:
+    """Lines of a piece of a file that starts there [bytes]; the first is called row 1."""
+    if encoding.startswith("utf-16"):
+        texts = list(io.StringIO(data.decode(encoding, errors="replace"), newline=""))
+        lengths = [len(text.encode(encoding, errors="replace")) for text in texts]
+    else:
+        pieces = data.splitlines(keepends=True)
+        texts = [piece.decode(encoding, errors="replace") for piece in pieces]
+        lengths = [len(piece) for piece in pieces]
+    lines = []
+    for row, (text, length) in enumerate(zip(texts, lengths, strict=True), start=1):
+        lines.append(Line(row, start, text))
+        start += length
+    return lines

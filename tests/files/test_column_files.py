@@ -16,7 +16,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from bowdenfit.errors import DatasetError
-from bowdenfit.files import columns_csv, excel, parquet
+from bowdenfit.files import columns_csv, excel, outcome, parquet, read_channels
 from bowdenfit.files.channels import Channel
 from bowdenfit.files.clocks import with_clocks
 
@@ -85,19 +85,39 @@ def test_every_habit_of_csv_writers_gives_the_same_channels(habit, tmp_path):
     check(read_text(tmp_path, HABITS[habit]))
 
 
-SLOW_HABITS = {"comment between the rows", "quoted decimal commas"}
+SLOW_HABIT = "comment between the rows"
 
 
-@pytest.mark.parametrize("habit", sorted(HABITS.keys() - SLOW_HABITS))
-def test_usual_habits_do_not_need_the_slow_way(habit, tmp_path, monkeypatch):
-    monkeypatch.setattr(columns_csv, "_careful", None)
+@pytest.fixture
+def as_if_long(monkeypatch):
+    """Read all but the last lines as those of long files are, and return how many columns each such reading gave."""
+    widths, read_long = [], columns_csv._long
+
+    def watched(*arguments):
+        columns = read_long(*arguments)
+        widths.append(columns and len(columns))
+        return columns
+
+    monkeypatch.setattr(columns_csv, "_LAST_BYTES", 30)
+    monkeypatch.setattr(columns_csv, "_long", watched)
+    return widths
+
+
+@pytest.mark.parametrize("habit", sorted(HABITS.keys() - {SLOW_HABIT}))
+def test_usual_habits_do_not_need_the_slow_way(habit, tmp_path, as_if_long):
     check(read_text(tmp_path, HABITS[habit]))
+    assert as_if_long[0] >= 3
 
 
-def test_pieces_of_a_long_file_are_joined(tmp_path, monkeypatch):
-    monkeypatch.setattr(columns_csv, "_careful", None)
+def test_a_comment_between_the_rows_of_a_long_file_is_read_the_slow_way(tmp_path, as_if_long):
+    check(read_text(tmp_path, HABITS[SLOW_HABIT]))
+    assert as_if_long == [None]
+
+
+def test_pieces_of_a_long_file_are_joined(tmp_path, monkeypatch, as_if_long):
     monkeypatch.setattr(columns_csv, "_ROWS_AT_ONCE", 2)
     check(read_text(tmp_path, HABITS["plain"]))
+    assert as_if_long == [3]
 
 
 @pytest.mark.parametrize("encoding", ["utf-8-sig", "utf-16", "cp1252"])
@@ -254,9 +274,9 @@ def test_files_without_numbers_are_refused(data, what, tmp_path):
 
 
 def test_a_missing_file_and_a_huge_one_are_refused(tmp_path, monkeypatch):
-    for module in (columns_csv, excel, parquet):
-        with pytest.raises(DatasetError, match="does not exist"):
-            module.read(tmp_path / "none")
+    for name in ("none.csv", "none.xlsx", "none.parquet"):
+        with pytest.raises(DatasetError, match=f"{name} does not exist"):
+            read_channels(tmp_path / name)
     monkeypatch.setattr(columns_csv, "LARGEST_BYTES", 10)
     with pytest.raises(DatasetError, match="Parquet"):
         read_text(tmp_path, HABITS["plain"])
@@ -392,6 +412,7 @@ def test_damaged_workbooks_and_those_without_numbers_are_refused(tmp_path):
 @pytest.mark.parametrize(("module", "reader"), [("openpyxl", excel), ("pyarrow", parquet), ("pandas", columns_csv)])
 def test_a_missing_library_is_named_with_how_to_install_it(module, reader, tmp_path, monkeypatch):
     monkeypatch.setitem(sys.modules, module, None)
+    monkeypatch.setattr(columns_csv, "_LAST_BYTES", 30)
     (tmp_path / "run").write_text(HABITS["plain"])
     with pytest.raises(DatasetError, match=rf"needs {module}, which is not installed.*bowdenfit\[lab\]"):
         reader.read(tmp_path / "run")
@@ -422,7 +443,7 @@ def test_parquet_timestamps_are_clocks_and_nulls_are_missing(tmp_path):
 
 def test_damaged_and_huge_parquet_files_are_refused(tmp_path, monkeypatch):
     path = write_parquet(tmp_path, {"a": np.arange(1000.0)})
-    monkeypatch.setattr(parquet, "LARGEST_BYTES", 100)
+    monkeypatch.setattr(outcome, "LARGEST_BYTES", 100)
     with pytest.raises(DatasetError, match="1000 rows of 1 columns"):
         parquet.read(path)
     path.write_bytes(path.read_bytes()[:2000])

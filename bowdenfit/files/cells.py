@@ -1,0 +1,176 @@
+"""What stands in one cell of a sheet: a number in any laboratory's spelling, a mark for none, a date, or words."""
+
+import math
+import re
+from collections.abc import Iterable
+from dataclasses import dataclass, field
+from typing import Literal
+
+from bowdenfit.errors import DatasetError
+from bowdenfit.files.clocks import is_date
+from bowdenfit.words import shown
+
+Kind = Literal["number", "date", "blank", "text"]
+_UNDETECTED = re.compile(r"(?:<=|<|≤|&lt;)(?P<limit>.*)", re.DOTALL)
+_NUMBER = re.compile(r"[+-]?(?=[.,]?\d)\d*(?:(?P<mark>[.,])\d*)?(?:[eE][+-]?\d+)?")
+_GROUPED = re.compile(r"[+-]?[1-9]\d{0,2}(?P<separator>[ '.,])\d{3}(?:(?P=separator)\d{3})*(?:(?P<mark>[.,])\d+)?")
+_AMBIGUOUS = re.compile(r"[+-]?[1-9]\d{0,2}[.,]\d{3}")
+_SPACES = "\t\v\f\x85\xa0\u2000\u2001\u2002\u2003\u2004\u2005\u2006\u2007\u2008\u2009\u200a\u202f\u205f\u3000"
+_TYPOGRAPHY = str.maketrans({"\u2212": "-", "’": "'", **dict.fromkeys(_SPACES, " ")})
+_EXCEL_MARKS = "#n/a #na #div/0! #value! #num! #ref!"
+_NAN_MARKS = "--- <na> nan -nan +nan 1.#qnan -1.#ind"
+_INFINITE = "inf +inf -inf infinity -infinity ∞ -∞ +∞ 1.#inf -1.#inf"
+_OVERFLOW = "overflow +overflow -overflow overrange overload ovld ovrflw"
+BLANK = frozenset({"", "-", "--", "n/a", "na", "n.d.", "nd", "none", "null"})
+NOT_FINITE = frozenset(f"{_EXCEL_MARKS} {_NAN_MARKS} {_INFINITE} {_OVERFLOW}".split())
+MISSING = BLANK | NOT_FINITE
+"""What recordings have in the place of a missing sample; a table may leave cells blank, but not be infinite."""
+
+
+@dataclass(frozen=True)
+class Decimals:
+    """How a file writes decimals.
+
+    Args:
+        comma: Whether a lone comma is a decimal one, as in files separated by semicolons or tabs.
+        seen: The first number that can only be read with a decimal point, and with a decimal comma.
+    """
+
+    comma: bool = False
+    seen: dict[str, str] = field(default_factory=dict)
+
+    @classmethod
+    def of(cls, texts: Iterable[str], comma: bool) -> "Decimals":
+        """What the numbers of a file say about its decimal sign."""
+        seen: dict[str, str] = {}
+        for text in texts:
+            if "," in text or "." in text:
+                plain = _plain(text.strip(" <=≤%"))
+                match = _NUMBER.fullmatch(plain) or _GROUPED.fullmatch(plain)
+                if match and match["mark"] and match.start("mark") > 0 and not _AMBIGUOUS.fullmatch(plain):
+                    seen.setdefault(match["mark"], plain)
+        return cls(comma, seen)
+
+    def other(self, mark: str) -> str | None:
+        """A number of the file that speaks against `mark` being decimal."""
+        return self.seen.get("," if mark == "." else ".")
+
+
+@dataclass(frozen=True)
+class Cell:
+    """One cell with its place, for errors that can be found again in the file."""
+
+    file: str
+    row: int
+    column: str
+    text: str
+    decimals: Decimals = Decimals()
+
+    def refuse(self, what: str) -> DatasetError:
+        """An error that names this cell."""
+        return DatasetError(f"{self.file}, row {self.row}, column {shown(self.column)}: {what}")
+
+    @property
+    def shown(self) -> str:
+        """What stands in the cell, for an error message."""
+        return shown(self.text)
+
+    @property
+    def blank(self) -> bool:
+        """Whether nothing was written here (or one of the usual marks for nothing)."""
+        return self.text.strip().lower() in BLANK
+
+    def number(self) -> float:
+        """The number in this cell.
+
+        Raises:
+            DatasetError: The cell is blank, is text, or is not finite.
+        """
+        if self.blank:
+            raise self.refuse("the cell is blank; fill in the value or delete the row.")
+        return self._parse(self.text)
+
+    def percentage(self) -> float | None:
+        """The number where the cell itself carries a percent sign ("78.5 %"), else None."""
+        text = self.text.strip()
+        return self._parse(text[:-1]) / 100 if text.endswith("%") else None
+
+    def limit(self) -> float | None:
+        """The number behind a less-than sign ("<10"), else None."""
+        match = _UNDETECTED.fullmatch(self.text.strip())
+        return self._parse(match["limit"]) if match else None
+
+    def no_sample(self, decimal: str) -> DatasetError:
+        """An error that says why this cell is no sample of a recording with this decimal mark."""
+        other = "," if decimal == "." else "."
+        mixed = number_of(self.text, other) is not None
+        return self.refuse(
+            f"{self.shown} is not a number"
+            + (f" like the others, which have a decimal {'comma' if other == '.' else 'point'}" if mixed else "")
+            + "; correct the cell, or leave it blank if the sample is missing."
+        )
+
+    def _parse(self, text: str) -> float:
+        plain = _plain(text)
+        if plain.lower() in NOT_FINITE:
+            raise self.refuse(f"{self.shown} is not a finite number; correct the value or delete the row.")
+        if _AMBIGUOUS.fullmatch(plain):
+            self._refuse_ambiguous(plain)
+        written = _with_decimal_point(plain)
+        if written is None:
+            raise self.refuse(
+                f"{self.shown} is not a number; write a plain number there "
+                "(remarks go into a comment line that starts with #)."
+            )
+        if not math.isfinite(float(written)):
+            raise self.refuse(f"{self.shown} is too large for a number; correct the value.")
+        return float(written)
+
+    def _refuse_ambiguous(self, text: str) -> None:
+        """Three digits behind a separator are decimals only where the file leaves no doubt."""
+        mark = "," if "," in text else "."
+        meanings = f"{self.shown} may mean {text.replace(mark, '')} or {text.replace(mark, '.')}"
+        if mark == "," and not self.decimals.comma:
+            raise self.refuse(f"{meanings}; write it without a thousands separator and with a decimal point.")
+        if against := self.decimals.other(mark):
+            raise self.refuse(
+                f"{meanings}, because elsewhere the file has {shown(against)}; write all its decimals the same way, and "
+                "no thousands separators."
+            )
+
+
+def number_of(text: str, decimal: str) -> float | None:
+    """The number of a recording with one decimal mark, NaN where it is missing, None where there is text."""
+    plain = _plain(text)
+    if plain.lower() in MISSING:
+        return math.nan
+    match = _NUMBER.fullmatch(plain)
+    return float(plain.replace(",", ".")) if match and match["mark"] in (None, decimal) else None
+
+
+def kind_of(text: str, decimal: str) -> Kind:
+    """What stands in a cell of a recording."""
+    value = number_of(text, decimal)
+    if value is not None:
+        return "blank" if math.isnan(value) else "number"
+    return "date" if is_date(text.strip()) else "text"
+
+
+def is_plain_number(text: str) -> bool:
+    """Whether a text is a number in any spelling, with separators of thousands where they belong."""
+    return _with_decimal_point(_plain(text)) is not None
+
+
+def _plain(text: str) -> str:
+    """A number without the finer points of typography."""
+    return text.strip().translate(_TYPOGRAPHY)
+
+
+def _with_decimal_point(text: str) -> str | None:
+    """The number in Python's spelling, or None if it is none; separators of thousands must stand where they belong."""
+    if _NUMBER.fullmatch(text):
+        return text.replace(",", ".")
+    grouped = _GROUPED.fullmatch(text)
+    if grouped is None or grouped["mark"] == grouped["separator"]:
+        return None
+    return text.replace(grouped["separator"], "").replace(",", ".")

@@ -9,12 +9,13 @@ from pathlib import Path
 
 from bowdenfit.cable.registry import check_names
 from bowdenfit.description import Description
-from bowdenfit.description.file import load_description, overridden, parse_description
+from bowdenfit.description.file import overridden
 from bowdenfit.errors import DescriptionError
 from bowdenfit.files.columns import ColumnSource
 from bowdenfit.kinds import KINDS, each_table
 from bowdenfit.kinds.kind import Source
 from bowdenfit.kinds.measurements import Measurements
+from bowdenfit.kinds.settings import load_description, parse_description
 
 DESCRIPTION_FILE = "cable.toml"
 
@@ -134,7 +135,7 @@ def read_dataset(
     """
     measurements, checksums = Measurements(), dict(sha256)
     for kind in KINDS.values():
-        settings = getattr(description.tables, kind.name, None)
+        settings = description.tables.stated.get(kind.name)
         if settings is None:
             continue
         found = kind.read(Source(kind.name, settings, description, folder, channels or {}))

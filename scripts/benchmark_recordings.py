@@ -51,8 +51,8 @@ from benchmark_fit import BASELINES, ROOT, Run, byte_code, measured, say, search
 
 import bowdenfit
 from bowdenfit.dataset import Dataset
-from bowdenfit.description.file import load_description
 from bowdenfit.inference.log_density import LogDensity
+from bowdenfit.kinds.settings import load_description
 from bowdenfit.model import build_model
 from bowdenfit.physics.hysteresis import play_operator, play_operator_with_slope
 from bowdenfit.questions.simulate.recordings import make_recordings, parse_recordings_plan, write_recordings

@@ -30,17 +30,18 @@ from scipy import stats
 
 from bowdenfit.dataset import Dataset
 from bowdenfit.description import Description, SamplerSettings
-from bowdenfit.description.file import parse_description
 from bowdenfit.inference.compilation import compiled
 from bowdenfit.inference.draws import curves_of, for_each_draw, named_values
 from bowdenfit.inference.ensemble import sample
 from bowdenfit.inference.least_squares import make_objective, maximum_posterior
 from bowdenfit.inference.log_density import LogDensity
+from bowdenfit.kinds.design import Design
+from bowdenfit.kinds.settings import parse_description
 from bowdenfit.kinds.tables import AngleTable, EfficiencyTable, Measurements, OwnAngles, Provenance
 from bowdenfit.model import Model, build_model
 from bowdenfit.questions.next.possible_readings import Candidate, simulated_readings
 from bowdenfit.questions.next.variance_reduction import explained
-from bowdenfit.questions.simulate.simulation import Design, empty_tables, simulate, true_values
+from bowdenfit.questions.simulate.simulation import empty_tables, simulate, true_values
 from bowdenfit.results.optimum import optimum_of
 
 LENGTHS = (430.0, 455.0, 480.0, 505.0, 530.0)

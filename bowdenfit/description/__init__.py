@@ -1,11 +1,11 @@
 """The description of a cable, `cable.toml`, as frozen models; the only place where defaults are written."""
 
-from typing import Annotated, Any, Literal
+from typing import Annotated, Any, Literal, TypeVar
 
 from pydantic import ConfigDict, Field, field_validator, model_validator
 
 from bowdenfit.description.elastic import CableSettings, PreloadSettings, StretchSettings
-from bowdenfit.description.recordings import ColumnMap, ForceLimits, Phase, Preparation, RecordingFile, RecordingsTable
+from bowdenfit.description.recordings import ColumnMap, ForceLimits, Phase, Preparation, RecordingFile
 from bowdenfit.description.values import (
     Finite,
     FrictionSetting,
@@ -26,7 +26,6 @@ from bowdenfit.words import listed
 
 __all__ = [
     "SCHEMA",
-    "AngleTableSettings",
     "CableSettings",
     "ColumnMap",
     "Contact",
@@ -50,15 +49,14 @@ __all__ = [
     "PriorDefaults",
     "QuantityValue",
     "RecordingFile",
-    "RecordingsTable",
     "Route",
     "Sampler",
     "SamplerSettings",
     "Sensors",
     "StretchSettings",
     "Table",
+    "TableSettings",
     "Tables",
-    "Undetected",
     "UniformPrior",
     "WrapAngle",
 ]
@@ -67,7 +65,7 @@ SCHEMA = 1
 Geometry = Literal["continuous", "published"]
 Noise = Literal["normal", "student"]
 Sampler = Literal["emcee", "nuts", "both"]
-Undetected = Literal["censored", "zero", "dropped"]
+AnySettings = TypeVar("AnySettings")
 
 
 class Route(Frozen):
@@ -152,7 +150,21 @@ class Contact(Frozen):
         return "" if self.law == type(self).model_fields["law"].default else self.law
 
 
-class Table(Frozen):
+class TableSettings(Frozen):
+    """What all that stands under [tables] has in common."""
+
+    @property
+    def fits_offsets(self) -> bool:
+        """Whether it asks for the load cells' offsets to be parameters."""
+        return False
+
+    @property
+    def tells_preload(self) -> bool:
+        """Whether its readings tell how preload depends on the wrap angle."""
+        return False
+
+
+class Table(TableSettings):
     """One table: its file or files, and columns that do not carry the usual names."""
 
     file: str | None = None
@@ -166,29 +178,19 @@ class Table(Frozen):
         return self
 
 
-class AngleTableSettings(Table):
-    """The table of wrap angles; how angles too small to detect enter the fit."""
-
-    detection_limit: QuantityValue | None = None
-    undetected: Undetected = "censored"
-
-
 class Tables(Frozen):
-    """The tables of a data set."""
-
-    angles: AngleTableSettings | None = None
-    efficiencies: Table | None = None
-    forces: Table | None = None
-    recordings: RecordingsTable | None = None
-    stretch: Table | None = None
-    preload: Table | None = None
-    loop: Table | None = None
+    """The tables of a data set by their kinds, which `bowdenfit.kinds.settings` adds as fields."""
 
     @model_validator(mode="after")
     def _some(self) -> "Tables":
         if not self.model_fields_set:
             raise ValueError('name at least one table, such as efficiencies = { file = "efficiencies.csv" }')
         return self
+
+    @property
+    def stated(self) -> dict[str, Any]:
+        """What is said of each table that there is, by the name of its kind."""
+        return {name: said for name in type(self).model_fields if (said := getattr(self, name)) is not None}
 
 
 class Sensors(Frozen):
@@ -293,21 +295,8 @@ class Description(Frozen):
             raise ValueError(
                 f"the contact {curved[0].name!r} has a curve, so a [route] is needed: variable, unit, range"
             )
-        if curved and self.tables.angles is None:
-            raise ValueError(
-                f"no table has the column {curved[0].wrap_angle.column!r} of the contact {curved[0].name!r}: "
-                'name one under [tables], angles = { file = "angles.csv" }'
-            )
-        if self.tables.angles is not None and not curved:
-            raise ValueError("[tables] has angles, but no contact has a curve that they could determine")
         if self.geometry == "published" and not curved:
             raise ValueError('geometry = "published" needs contacts with a curve')
-        if self.recording and self.tables.recordings is None:
-            raise ValueError("[[recording]] needs recordings = {} under [tables], where what they share can be said")
-        if self.tables.recordings is not None and not (self.recording or self.tables.recordings.files):
-            raise ValueError(
-                'the table recordings names no file: write files = "recordings/*.csv", or a [[recording]] with its file'
-            )
         if self.stretch.friction is not None and self.stretch.friction not in used:
             hint = nearest(self.stretch.friction, used)
             raise ValueError(f"stretch.friction {self.stretch.friction!r} belongs to no contact{hint}")
@@ -318,8 +307,6 @@ class Description(Frozen):
                 f"{next(filter(None, laws))} law their wrap angles together do not tell the friction of the rope; leave "
                 "stretch.friction out, for a coefficient of its own"
             )
-        if self.cable.kind != "loop" and self.tables.loop is not None:
-            raise ValueError('the table loop needs kind = "loop" under [cable]')
         freedom = type(self).model_fields["student_degrees_of_freedom"].default
         if self.noise != "student" and self.student_degrees_of_freedom != freedom:
             raise ValueError(
@@ -334,8 +321,7 @@ class Description(Frozen):
     @property
     def fits_offsets(self) -> bool:
         """Whether the load cells' offsets are parameters."""
-        recordings = self.tables.recordings
-        return self.sensors.offset_sd is not None or (recordings is not None and recordings.prepare.tare == "fitted")
+        return self.sensors.offset_sd is not None or any(said.fits_offsets for said in self.tables.stated.values())
 
     @property
     def noise_in_words(self) -> str:
@@ -351,7 +337,8 @@ class Description(Frozen):
     @property
     def preload_follows_stretch(self) -> bool:
         """Whether preload depends on the wrap angle; so it does by default where a table says how."""
-        return (self.preload.model or ("stretch" if self.tables.preload is not None else "constant")) == "stretch"
+        told = any(said.tells_preload for said in self.tables.stated.values())
+        return (self.preload.model or ("stretch" if told else "constant")) == "stretch"
 
     @property
     def coefficients(self) -> tuple[str, ...]:
@@ -367,6 +354,10 @@ class Description(Frozen):
     def angle_columns(self) -> tuple[str, ...]:
         """Columns in which rows may carry their own wrap angle."""
         return tuple(dict.fromkeys(c.wrap_angle.column for c in self.contact if c.wrap_angle.column))
+
+    def table(self, of: type[AnySettings]) -> AnySettings | None:
+        """What is said of the table whose kind has settings of a class; None if there is no such table."""
+        return next((said for said in self.tables.stated.values() if type(said) is of), None)
 
     def to_json(self) -> dict[str, Any]:
         """The resolved description as plain data."""

@@ -1,27 +1,30 @@
 """Reading `cable.toml`: settings from the command line on top, and errors that name the key and the nearest known one."""
 
 import tomllib
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
 from pydantic import BaseModel, ValidationError
 
-from bowdenfit.description import SCHEMA, Description, ParameterSetting, QuantityValue
+from bowdenfit.description import SCHEMA, Description, ParameterSetting, QuantityValue, Route
 from bowdenfit.description.elastic import LOWEST, PRELOAD
 from bowdenfit.errors import DatasetError, DescriptionError, nearest
-from bowdenfit.units import route_conversion_factor, speed_dimension
+from bowdenfit.units import route_conversion_factor
+
+Stated = tuple[str, QuantityValue | None, str]
+"""Where a quantity stands, the quantity, and what it must measure."""
 
 
-def load_description(path: Path, overrides: Sequence[str] = ()) -> Description:
-    """Read `cable.toml`.
+def read_toml(path: Path, overrides: Sequence[str] = ()) -> dict[str, Any]:
+    """Plain data of `cable.toml`.
 
     Args:
         path: The file.
         overrides: Settings from the command line, such as `friction.mu1.fixed=0.1`.
 
     Raises:
-        DescriptionError: The file is missing or no TOML, a key is unknown, or a value is impossible.
+        DescriptionError: The file is missing or no TOML, or a setting leads nowhere.
     """
     try:
         raw = tomllib.loads(path.read_text(encoding="utf-8-sig"))
@@ -33,7 +36,7 @@ def load_description(path: Path, overrides: Sequence[str] = ()) -> Description:
         raise DescriptionError(f"{path.name} is not valid TOML: {error}.") from None
     except OSError as error:
         raise DescriptionError(f"{path} cannot be read ({error.strerror}).") from None
-    return parse_description(overridden(raw, overrides), path.name)
+    return overridden(raw, overrides)
 
 
 def overridden(raw: dict[str, Any], overrides: Sequence[str]) -> dict[str, Any]:
@@ -47,19 +50,34 @@ def overridden(raw: dict[str, Any], overrides: Sequence[str]) -> dict[str, Any]:
     return raw
 
 
-def parse_description(raw: Mapping[str, Any], file: str = "cable.toml") -> Description:
-    """A description from plain data, with errors that name the key.
+def validated(raw: Mapping[str, Any], model: type[Description], file: str) -> Description:
+    """A description from plain data, with errors that name the key; `kinds.settings` parses those with tables.
+
+    Args:
+        raw: The data.
+        model: Description with a field for every kind of table.
+        file: Its file, for errors.
 
     Raises:
         DescriptionError: A key is unknown, or a value is missing or impossible.
     """
     try:
-        description = Description.model_validate(dict(raw))
+        description = model.model_validate(dict(raw))
     except ValidationError as error:
-        raise DescriptionError(_explained(error, file)) from None
-    _check_units(description, file)
+        raise DescriptionError(_explained(error, model, file)) from None
+    check_quantities(_quantities(description), file)
+    _check_route(description.route, file)
     _check_elastic(description, file)
     return description
+
+
+def _check_route(route: Route | None, file: str) -> None:
+    if route is None:
+        return
+    try:
+        route_conversion_factor(route.unit, route.unit)
+    except DatasetError as error:
+        raise DescriptionError(f"{file}, route, unit: {error}.") from None
 
 
 def _check_elastic(description: Description, file: str) -> None:
@@ -78,19 +96,27 @@ def _check_elastic(description: Description, file: str) -> None:
             )
 
 
-def _check_units(description: Description, file: str) -> None:
-    """Every unit in the description has the right dimension."""
-    quantities = [(f"contact {c.name!r}, wrap_angle", c.wrap_angle.constant, "angle") for c in description.contact]
-    quantities += [(f"contact {c.name!r}, nominal", c.wrap_angle.nominal, "angle") for c in description.contact]
-    quantities.append(("sensors, force_noise", description.sensors.force_noise, "force"))
-    quantities.append(("sensors, offset_sd", description.sensors.offset_sd, "force"))
-    quantities.append(("reference_force", description.reference_force, "force"))
-    quantities += [(f"cable, {name}", length, "length") for name, length in description.cable.lengths.items()]
-    quantities.append(("preload, wrap_angle", description.preload.wrap_angle, "angle"))
-    quantities.append(("preload, value", description.preload.value, "force"))
-    quantities += _recording_quantities(description)
-    if description.tables.angles:
-        quantities.append(("tables, angles, detection_limit", description.tables.angles.detection_limit, "angle"))
+def _quantities(description: Description) -> list[Stated]:
+    """Quantities of the description but for its tables."""
+    cable, preload, sensors = description.cable, description.preload, description.sensors
+    return [
+        *((f"contact {c.name!r}, wrap_angle", c.wrap_angle.constant, "angle") for c in description.contact),
+        *((f"contact {c.name!r}, nominal", c.wrap_angle.nominal, "angle") for c in description.contact),
+        ("sensors, force_noise", sensors.force_noise, "force"),
+        ("sensors, offset_sd", sensors.offset_sd, "force"),
+        ("reference_force", description.reference_force, "force"),
+        *((f"cable, {name}", length, "length") for name, length in cable.lengths.items()),
+        ("preload, wrap_angle", preload.wrap_angle, "angle"),
+        ("preload, value", preload.value, "force"),
+    ]
+
+
+def check_quantities(quantities: Iterable[Stated], file: str) -> None:
+    """Every quantity is in a unit of the right dimension, and possible.
+
+    Raises:
+        DescriptionError: One is not.
+    """
     for where, quantity, dimension in quantities:
         if quantity is None:
             continue
@@ -111,30 +137,6 @@ def _check_units(description: Description, file: str) -> None:
             raise DescriptionError(
                 f"{file}, {where}: {quantity.value:g} {quantity.unit} is not between 0 and 2000 deg."
             )
-    if description.route is not None:
-        try:
-            route_conversion_factor(description.route.unit, description.route.unit)
-        except DatasetError as error:
-            raise DescriptionError(f"{file}, route, unit: {error}.") from None
-
-
-def _recording_quantities(description: Description) -> list[tuple[str, QuantityValue | None, str]]:
-    """Quantities in the table of recordings and in the recordings, with where they stand and what they must measure."""
-    table = description.tables.recordings
-    pages = [("tables, recordings, prepare", table.prepare)] if table is not None else []
-    quantities: list[tuple[str, QuantityValue | None, str]] = []
-    for entry in description.recording:
-        where = f"recording {entry.file!r}"
-        quantities += [(f"{where}, wrap_angles, {name}", angle, "angle") for name, angle in entry.wrap_angles.items()]
-        if entry.velocity is not None:
-            quantities.append((f"{where}, velocity", entry.velocity, speed_dimension(entry.velocity.unit)))
-        if entry.prepare is not None:
-            pages.append((f"{where}, prepare", entry.prepare))
-    for where, page in pages:
-        for name, value in (("delay", page.delay), ("block", page.block)):
-            if isinstance(value, QuantityValue):
-                quantities.append((f"{where}, {name}", value, "time"))
-    return quantities
 
 
 def _set(raw: dict[str, Any], override: str) -> None:
@@ -162,13 +164,13 @@ def _set(raw: dict[str, Any], override: str) -> None:
     node[last] = value
 
 
-def _explained(error: ValidationError, file: str) -> str:
+def _explained(error: ValidationError, model: type[Description], file: str) -> str:
     """The first thing that is wrong, as a sentence."""
     first = next((e for e in error.errors() if e["type"] == "extra_forbidden"), error.errors()[0])
     where = [str(part) for part in first["loc"]]
     place = f"{file}, {'.'.join(where)}" if where else file
     if first["type"] == "extra_forbidden":
-        return f"{file}: unknown key {'.'.join(where)!r}{nearest(where[-1], _siblings(where[:-1]))}"
+        return f"{file}: unknown key {'.'.join(where)!r}{nearest(where[-1], _siblings(model, where[:-1]))}"
     if first["type"] == "missing" and where[-1] == "unit" and isinstance(first["input"], dict):
         return (
             f"{place}: the unit is missing; write one, such as {_with_unit(first['input'].get('value'), where[:-1])}."
@@ -202,9 +204,8 @@ def _with_unit(value: Any, where: Sequence[str]) -> str:
     return f'{{ value = {number}, unit = "{unit}" }}'
 
 
-def _siblings(path: Sequence[str]) -> list[str]:
+def _siblings(model: Any, path: Sequence[str]) -> list[str]:
     """Keys that are known at a place in the description."""
-    model: Any = Description
     for part in path:
         if isinstance(model, type) and issubclass(model, BaseModel) and part in model.model_fields:
             model = _models_in(model.model_fields[part].annotation)

@@ -77,16 +77,3 @@ class RecordingFile(Frozen):
     where: dict[str, Finite] = Field(default_factory=dict)
     prepare: Preparation | None = None
     strokes: tuple[Phase, ...] = ()
-
-
-class RecordingsTable(Frozen):
-    """Recordings that share their channels' names and their preparation.
-
-    `pattern` reads what a file was recorded at from its name, such as "{at}mm_{velocity:r/min}rpm".
-    """
-
-    files: str | tuple[str, ...] | None = None
-    pattern: str | None = None
-    channels: dict[str, ColumnMap] = Field(default_factory=dict)
-    likelihood: Literal["runs", "whole"] = "runs"
-    prepare: Preparation = Preparation()

@@ -7,9 +7,11 @@ from typing import Any, Generic, TypeVar
 
 import numpy as np
 
-from bowdenfit.description import Description
+from bowdenfit.description import Description, Table, TableSettings
+from bowdenfit.description.file import Stated
 from bowdenfit.errors import DatasetError
 from bowdenfit.files.columns import ColumnSource
+from bowdenfit.kinds.design import Design
 from bowdenfit.kinds.measurements import Measurements
 from bowdenfit.kinds.rows import Conditions
 from bowdenfit.types import Vector
@@ -100,6 +102,10 @@ class Kind(Generic[AnyTable]):
         name: What it is called under [tables] in cable.toml, and in fit.json.
         table: The class of its tables; no two kinds share one.
         read: Reads its files.
+        settings: What may stand under its name in [tables].
+        contradiction: What a description says that cannot be, in a sentence without its full stop; its settings are None
+            where there is no such table.
+        quantities: Quantities in the settings, which must have the right dimensions.
         describe: What was understood of a table, for `check`, line by line.
         heading: Over these lines, where they are a section of their own.
         warnings: What a table will not be able to tell, as far as counting shows.
@@ -108,6 +114,7 @@ class Kind(Generic[AnyTable]):
         implausible: Why no bench would hand in simulated readings in place of the measured ones, in a few words; empty if
             one might.
         page: Its table as the headings and rows of a file; None where it is written otherwise.
+        empty: A table of a design's shape with unremarkable readings, as of a file of some name; None where a design has none.
         conditions: Where and at which wrap angles friction was measured; None if it was not.
         forces: Forces that friction acted on [N].
         speeds: Speeds of sliding [mm/s or rad/s].
@@ -119,17 +126,25 @@ class Kind(Generic[AnyTable]):
     table: type[AnyTable]
     read: Callable[[Source], Found[AnyTable]]
     describe: Callable[[AnyTable, Description], list[str]]
+    settings: type[TableSettings] = Table
+    contradiction: Callable[[Any, Description], str] = lambda *_: ""
+    quantities: Callable[[Any, Description], list[Stated]] = lambda *_: []
     heading: str = ""
     warnings: Callable[[AnyTable, Description, Measurements], list[str]] = lambda *_: []
     check: Callable[[AnyTable, Description, Measurements], None] = lambda *_: None
     count: Callable[[AnyTable], str] = lambda _: ""
     implausible: Callable[[AnyTable, AnyTable], str] = lambda *_: ""
     page: Callable[[AnyTable, Description], Page] | None = None
+    empty: Callable[[Design, Description, str], AnyTable] | None = None
     conditions: Callable[[AnyTable], Conditions] | None = None
     forces: Callable[[AnyTable], Vector] = lambda _: np.zeros(0)
     speeds: Callable[[AnyTable], Vector] = lambda _: np.zeros(0)
     velocity_unit: Callable[[AnyTable], str] = lambda _: ""
     takes_channels: bool = False
+
+    def file_name(self, settings: Any) -> str:
+        """The file that a table is written to: as stated, or by the name of its kind."""
+        return getattr(settings, "file", None) or f"{self.name}.csv"
 
 
 def itself(table: AnyTable) -> AnyTable:

@@ -38,6 +38,11 @@ class Provenance:
     file: Labels
     row: Labels
 
+    @classmethod
+    def below_heading(cls, file: str, n: int) -> "Provenance":
+        """Rows of a file that is written with one line of headings."""
+        return cls((file,), np.zeros(n, dtype=int), np.arange(2, n + 2))
+
     def place(self, i: int) -> str:
         """Row i in words."""
         return f"{self.files[self.file[i]]}, row {self.row[i]}"
@@ -56,6 +61,11 @@ class OwnAngles:
     names: tuple[str, ...]
     angle: Matrix
     sd: Matrix
+
+    @classmethod
+    def none(cls, names: tuple[str, ...], n: int) -> "OwnAngles":
+        """Rows without wrap angles of their own."""
+        return cls(names, np.full((n, len(names)), np.nan), np.full((n, len(names)), np.nan))
 
     def column(self, name: str) -> tuple[Vector, Vector]:
         """Angles and standard deviations of one contact; all NaN if the table has no such column."""

@@ -9,12 +9,12 @@ from typing import Any, get_type_hints
 import numpy as np
 
 from bowdenfit.dataset import Dataset
-from bowdenfit.description.file import parse_description
 from bowdenfit.errors import StoreError
 from bowdenfit.inference.draws import derived_units
 from bowdenfit.inference.least_squares import LeastSquares
 from bowdenfit.kinds import KINDS, each_table
 from bowdenfit.kinds.measurements import Measurements
+from bowdenfit.kinds.settings import parse_description
 from bowdenfit.results.folder import CHAIN, FIT, POSTERIOR, SUMMARY, made, write_text
 from bowdenfit.results.netcdf import EXPECTED, Coordinates, Groups, read_groups, write_groups
 from bowdenfit.results.plain import rebuilt, stored

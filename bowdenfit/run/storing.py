@@ -8,8 +8,8 @@ from typing import TYPE_CHECKING, Any, get_args
 
 from bowdenfit.dataset import Dataset
 from bowdenfit.description import Sampler
-from bowdenfit.description.file import parse_description
 from bowdenfit.errors import DescriptionError, StoreError, UsageError
+from bowdenfit.kinds.settings import parse_description
 from bowdenfit.results.folder import CHAIN, clear, read_checkpoint, refuse_to_overwrite, start_checkpoint
 from bowdenfit.run.helpers import Assistants, draw
 from bowdenfit.verb import LARGEST_SEED

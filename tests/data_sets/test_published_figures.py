@@ -13,9 +13,9 @@ import numpy as np
 import pytest
 
 from bowdenfit.dataset import Dataset, read_dataset
-from bowdenfit.description.file import parse_description
 from bowdenfit.inference.least_squares import LeastSquares, least_squares, make_objective, maximum_posterior
 from bowdenfit.inference.log_density import LogDensity
+from bowdenfit.kinds.settings import parse_description
 from bowdenfit.model import Model, build_model
 from bowdenfit.physics.geometry import log_quadratic_coefficients
 from bowdenfit.results.optimum import optimum_of

@@ -22,11 +22,12 @@ from scipy import stats
 
 from bowdenfit.dataset import Dataset, load_dataset
 from bowdenfit.description import Description, SamplerSettings
-from bowdenfit.description.file import parse_description
 from bowdenfit.inference.log_density import LogDensity
+from bowdenfit.kinds.design import Design
 from bowdenfit.kinds.measurements import Measurements
+from bowdenfit.kinds.settings import parse_description
 from bowdenfit.model import build_model
-from bowdenfit.questions.simulate.simulation import Design, empty_tables, simulate, true_values
+from bowdenfit.questions.simulate.simulation import empty_tables, simulate, true_values
 
 QUICK = SamplerSettings(n_ensembles=4, n_walkers=32, max_steps=1000, target_ess=500, target_r_hat=1.03)
 ROPE = ("stiffness", "bedding_stretch", "bedding_load", "lengthening", "stretch_zero", "sigma_L")

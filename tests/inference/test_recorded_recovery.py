@@ -21,10 +21,10 @@ from scipy import stats
 import bowdenfit
 from bowdenfit.dataset import Dataset
 from bowdenfit.description import Description, SamplerSettings
-from bowdenfit.description.file import parse_description
 from bowdenfit.inference.log_density import LogDensity
 from bowdenfit.kinds.measurements import Measurements
 from bowdenfit.kinds.recordings.table import _File, _prepared, _recording, preparation_settings
+from bowdenfit.kinds.settings import parse_description
 from bowdenfit.model import build_model
 from bowdenfit.questions.calibrate.refit import Laboratory as Fits
 from bowdenfit.questions.simulate.bench import (

@@ -5,15 +5,14 @@ import pytest
 from cables import measured
 
 import bowdenfit as bf
-from bowdenfit.description.file import parse_description
 from bowdenfit.inference.least_squares import least_squares, make_objective, maximum_posterior
 from bowdenfit.inference.log_density import LogDensity
 from bowdenfit.inference.other_minima import contested, fitting_as_well
-from bowdenfit.kinds.elastic_simulation import ElasticDesign
+from bowdenfit.kinds.design import Design, ElasticDesign
+from bowdenfit.kinds.settings import parse_description
 from bowdenfit.model import build_model
 from bowdenfit.questions.bends.page import products_with_preload
 from bowdenfit.questions.check.data_set_words import warnings_of
-from bowdenfit.questions.simulate.simulation import Design
 from bowdenfit.questions.summary.words import summary_text
 
 NAMES = ("cable.toml", "stretch.csv", "preload.csv", "loop.csv")

@@ -11,12 +11,12 @@ from scipy import integrate, stats
 
 import bowdenfit as bf
 from bowdenfit.dataset import Dataset, load_dataset, read_dataset
-from bowdenfit.description.file import load_description
 from bowdenfit.inference.compilation import compiled
 from bowdenfit.inference.log_density import LogDensity
 from bowdenfit.kinds.forces.term import HeldForcesTerm
 from bowdenfit.kinds.measurements import Measurements
 from bowdenfit.kinds.runs import RunsTerm
+from bowdenfit.kinds.settings import load_description
 from bowdenfit.kinds.tables import EfficiencyTable, ForceTable, OwnAngles, Provenance
 from bowdenfit.model import Model, build_model
 

@@ -7,9 +7,9 @@ import pytest
 
 from bowdenfit import cli
 from bowdenfit.dataset import read_dataset
-from bowdenfit.description.file import parse_description
 from bowdenfit.kinds.forces.table import ForceTable
 from bowdenfit.kinds.measurements import Measurements
+from bowdenfit.kinds.settings import parse_description
 
 
 @pytest.fixture

@@ -16,6 +16,7 @@ from bowdenfit.description import Description, SamplerSettings
 from bowdenfit.errors import DatasetError, StoreError
 from bowdenfit.inference.compilation import compiled
 from bowdenfit.kinds.angles.term import detection_limit
+from bowdenfit.kinds.design import Design
 from bowdenfit.kinds.drawn_readings import drawn_readings
 from bowdenfit.kinds.forces.term import HeldForcesTerm
 from bowdenfit.kinds.recordings.simulation import refuse_saturated
@@ -28,7 +29,7 @@ from bowdenfit.questions.calibrate.replication import Plan, Ranked, Replication,
 from bowdenfit.questions.calibrate.store import begun, keep
 from bowdenfit.questions.calibrate.uniformity import Uniformity, holm
 from bowdenfit.questions.calibrate.words import calibration_text
-from bowdenfit.questions.simulate.simulation import Design, empty_tables, simulated_again, with_readings
+from bowdenfit.questions.simulate.simulation import empty_tables, simulated_again, with_readings
 
 DATA_SETS = (
     "on-body-exoskeleton",

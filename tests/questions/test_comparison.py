@@ -16,11 +16,11 @@ from bowdenfit.inference.leave_one_out import REFIT, Readings, leave_one_out, re
 from bowdenfit.inference.log_density import LogDensity
 from bowdenfit.inference.moment_matching import Affine, best_map, matched
 from bowdenfit.inference.psis import reliable_k
+from bowdenfit.kinds.design import Design
 from bowdenfit.model import build_model
 from bowdenfit.questions.compare.answer import Comparison
 from bowdenfit.questions.compare.common_readings import Common, Omitted, common_readings
 from bowdenfit.questions.compare.words import comparison_text
-from bowdenfit.questions.simulate.simulation import Design
 
 QUICK = ("sampler.n_walkers=64", "sampler.target_ess=200", "sampler.target_r_hat=1.05", "sampler.max_steps=3000")
 EDGE = {"name": "edge", "friction": "mu_edge", "wrap_angle": {"value": 45, "unit": "deg"}}

@@ -7,10 +7,10 @@ import pytest
 from cables import LENGTHS, cable, measured
 
 import bowdenfit as bf
-from bowdenfit.description.file import parse_description
 from bowdenfit.inference.identifiability import knowledge
+from bowdenfit.kinds.design import Design
+from bowdenfit.kinds.settings import parse_description
 from bowdenfit.questions.identify.verb import identify
-from bowdenfit.questions.simulate.simulation import Design
 
 PRIOR_SD = 0.7
 TWO_CONTACTS = """

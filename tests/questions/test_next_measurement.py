@@ -19,6 +19,7 @@ from bowdenfit.errors import UsageError
 from bowdenfit.front_desk import Fit
 from bowdenfit.inference.draws import curves_of, for_each_draw, named_values
 from bowdenfit.inference.log_density import LogDensity as Density
+from bowdenfit.kinds.design import Design
 from bowdenfit.kinds.tables import AngleTable, EfficiencyTable, OwnAngles, Provenance
 from bowdenfit.model import Model, build_model
 from bowdenfit.questions.next import verb
@@ -30,7 +31,7 @@ from bowdenfit.questions.next.possible_runs import RunDesign, typical_run
 from bowdenfit.questions.next.ranking import next_measurement
 from bowdenfit.questions.next.variance_reduction import error_of_difference, explained, mean_and_spread
 from bowdenfit.questions.next.words import next_measurement_text
-from bowdenfit.questions.simulate.simulation import Design, empty_tables
+from bowdenfit.questions.simulate.simulation import empty_tables
 from bowdenfit.results.optimum import optimum_of
 from bowdenfit.results.record import Draws
 from bowdenfit.results.record import Provenance as Origin

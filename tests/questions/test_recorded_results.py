@@ -11,10 +11,10 @@ import bowdenfit as bf
 from bowdenfit.cli import bowdenfit as command
 from bowdenfit.errors import UsageError
 from bowdenfit.inference.comparison import Difference, Prediction, differences
+from bowdenfit.kinds.design import Design
 from bowdenfit.questions.check.data_set_words import check_text
 from bowdenfit.questions.identify.confounding import confounded
 from bowdenfit.questions.recorded.rate import RateEffect, rate_effect
-from bowdenfit.questions.simulate.simulation import Design
 from bowdenfit.questions.summary.figure_data import RecordedTrace
 from bowdenfit.questions.summary.figures import figure_data
 from bowdenfit.questions.summary.words import summary_text

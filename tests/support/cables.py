@@ -7,9 +7,10 @@ import numpy as np
 
 from bowdenfit.dataset import Dataset
 from bowdenfit.description import Description
-from bowdenfit.description.file import parse_description
+from bowdenfit.kinds.design import Design
+from bowdenfit.kinds.settings import parse_description
 from bowdenfit.model import build_model
-from bowdenfit.questions.simulate.simulation import Design, empty_tables, simulate, true_values
+from bowdenfit.questions.simulate.simulation import empty_tables, simulate, true_values
 
 ROUTE = {"variable": "cable_length", "unit": "mm", "range": [400, 600]}
 CONTACTS: tuple[dict[str, Any], ...] = (

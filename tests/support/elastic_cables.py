@@ -7,10 +7,10 @@ import numpy as np
 
 from bowdenfit.dataset import Dataset
 from bowdenfit.description import Description
-from bowdenfit.description.file import parse_description
-from bowdenfit.kinds.elastic_simulation import ElasticDesign
+from bowdenfit.kinds.design import Design, ElasticDesign
+from bowdenfit.kinds.settings import parse_description
 from bowdenfit.model import build_model
-from bowdenfit.questions.simulate.simulation import Design, empty_tables, simulate, true_values
+from bowdenfit.questions.simulate.simulation import empty_tables, simulate, true_values
 
 HOUSING: dict[str, Any] = {
     "name": "housing",

@@ -9,10 +9,11 @@ from bowdenfit.dataset import Dataset
 from bowdenfit.description import Description, SamplerSettings
 from bowdenfit.inference.least_squares import LeastSquares, least_squares, maximum_posterior
 from bowdenfit.inference.log_density import LogDensity
+from bowdenfit.kinds.design import Design
 from bowdenfit.model import build_model
 from bowdenfit.questions.calibrate.refit import Laboratory as Fits
 from bowdenfit.questions.calibrate.replication import Plan, Workbench
-from bowdenfit.questions.simulate.simulation import Design, empty_tables
+from bowdenfit.questions.simulate.simulation import empty_tables
 
 SAMPLER = SamplerSettings(n_ensembles=4, n_walkers=64, max_steps=1500, target_ess=500, target_r_hat=1.03)
 PROBABILITY = 0.9

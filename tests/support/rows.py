@@ -5,8 +5,8 @@ from typing import Any
 import numpy as np
 
 from bowdenfit.dataset import Dataset
-from bowdenfit.description.file import parse_description
 from bowdenfit.kinds.measurements import Measurements
+from bowdenfit.kinds.settings import parse_description
 from bowdenfit.kinds.tables import EfficiencyTable, OwnAngles, Provenance
 
 

@@ -1,14 +1,28 @@
 """Wrap angles of curved contacts along the route."""
 
-from bowdenfit.kinds.angles.table import AngleTable, describe, implausible, page, read_angles, warnings_of
+from bowdenfit.kinds.angles.table import (
+    AngleSettings,
+    AngleTable,
+    contradiction,
+    describe,
+    empty,
+    implausible,
+    page,
+    read_angles,
+    warnings_of,
+)
 from bowdenfit.kinds.kind import Kind
 
 ANGLES = Kind(
     name="angles",
     table=AngleTable,
     read=read_angles,
+    settings=AngleSettings,
+    contradiction=contradiction,
+    quantities=lambda said, _: [("tables, angles, detection_limit", said.detection_limit, "angle")],
     describe=describe,
     warnings=warnings_of,
     implausible=implausible,
     page=page,
+    empty=empty,
 )

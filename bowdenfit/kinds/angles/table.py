@@ -1,12 +1,14 @@
 """Wrap angles of the curved contacts against the route variable."""
 
 from dataclasses import dataclass
+from typing import Literal
 
 import numpy as np
 
-from bowdenfit.description import Description
+from bowdenfit.description import Description, QuantityValue, Table
 from bowdenfit.files.columns import Column, Quantity, find_columns, require
 from bowdenfit.files.csv_table import Cell, read_csv
+from bowdenfit.kinds.design import Design
 from bowdenfit.kinds.kind import Found, Page, Source
 from bowdenfit.kinds.measurements import Measurements
 from bowdenfit.kinds.rows import (
@@ -21,6 +23,26 @@ from bowdenfit.kinds.rows import (
 from bowdenfit.types import Matrix, Vector
 
 _FEWEST = 3  # detected angles below which a curve's shape rests on its priors; as many as it has coefficients
+
+
+class AngleSettings(Table):
+    """The table of wrap angles; how angles too small to detect enter the fit."""
+
+    detection_limit: QuantityValue | None = None
+    undetected: Literal["censored", "zero", "dropped"] = "censored"
+
+
+def contradiction(settings: AngleSettings | None, description: Description) -> str:
+    """Curves without angles, or angles without curves."""
+    curved = description.curved
+    if settings is None and curved:
+        return (
+            f"no table has the column {curved[0].wrap_angle.column!r} of the contact {curved[0].name!r}: "
+            'name one under [tables], angles = { file = "angles.csv" }'
+        )
+    if settings is not None and not curved:
+        return "[tables] has angles, but no contact has a curve that they could determine"
+    return ""
 
 
 @dataclass(frozen=True)
@@ -90,7 +112,7 @@ def _angle_or_limit(cell: Cell, column: Column, detection_limit: float | None) -
 
 def describe(table: AngleTable, description: Description) -> list[str]:
     """What was detected in each column, and what lies outside the range of the curves."""
-    settings = description.tables.angles
+    settings = description.table(AngleSettings)
     how = settings.undetected if settings else "censored"
     lines = []
     for name in table.names:
@@ -144,3 +166,11 @@ def page(table: AngleTable, description: Description) -> Page:
     ]
     rows = [[f"{length:g}", *row] for length, row in zip(table.route, cells, strict=True)]
     return [*(route_heading(description) or [""]), *(f"{name}_deg" for name in table.names)], rows
+
+
+def empty(design: Design, description: Description, file: str) -> AngleTable:
+    """A table of a design's shape with unremarkable readings."""
+    columns = tuple(c.wrap_angle.column or "" for c in description.curved)
+    shape = (len(design.angles), len(columns))
+    angle, limit = np.full(shape, np.deg2rad(30)), np.full(shape, np.nan)
+    return AngleTable(np.array(design.angles), columns, angle, limit, Provenance.below_heading(file, shape[0]))

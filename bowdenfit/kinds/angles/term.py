@@ -14,6 +14,7 @@ from bowdenfit.cable.cable import ANGLE_NOISE, Cable
 from bowdenfit.cable.noise import noise_law, scatter
 from bowdenfit.description import Description
 from bowdenfit.errors import DatasetError
+from bowdenfit.kinds.angles.table import AngleSettings
 from bowdenfit.kinds.tables import AngleTable
 from bowdenfit.kinds.term import Bench, Circumstances, TermKind
 from bowdenfit.parameters.priors import HalfNormal
@@ -86,7 +87,7 @@ class AnglesTerm:
 def angles_term(cable: Cable, table: AngleTable) -> AnglesTerm:
     """The term of an angle table, with undetected angles entering as the description says."""
     description = cable.description
-    settings, route, published = description.tables.angles, description.route, description.geometry == "published"
+    settings, route, published = description.table(AngleSettings), description.route, description.geometry == "published"
     assert settings is not None and route is not None  # an angle table is read only with both
     readings: list[tuple[float, float, str]] = []
     routes: dict[str, np.ndarray] = {}
@@ -170,7 +171,7 @@ def detection_limit(description: Description, table: AngleTable) -> float:
     Raises:
         DatasetError: The cells name several, so that it is not known which one holds where an angle was detected.
     """
-    settings = description.tables.angles
+    settings = description.table(AngleSettings)
     if settings is not None and settings.detection_limit is not None:
         return settings.detection_limit.to("angle")
     limits = np.unique(table.limit[np.isfinite(table.limit)])

@@ -1,6 +1,6 @@
 """Transmission efficiencies."""
 
-from bowdenfit.kinds.efficiencies.table import EfficiencyTable, describe, implausible, page, read_efficiencies
+from bowdenfit.kinds.efficiencies.table import EfficiencyTable, describe, empty, implausible, page, read_efficiencies
 from bowdenfit.kinds.kind import Kind, itself
 from bowdenfit.kinds.wrap_angles import check_rows
 
@@ -12,6 +12,7 @@ EFFICIENCIES = Kind(
     describe=describe,
     implausible=implausible,
     page=page,
+    empty=empty,
     count=lambda table: f"{len(table.efficiency)} efficiencies",
     conditions=itself,
 )

@@ -7,6 +7,7 @@ import numpy as np
 from bowdenfit.description import Description
 from bowdenfit.files.columns import Column, Quantity, find_columns, require
 from bowdenfit.files.csv_table import Cell, read_csv
+from bowdenfit.kinds.design import Design
 from bowdenfit.kinds.kind import Found, Page, Source
 from bowdenfit.kinds.plausibility import beyond
 from bowdenfit.kinds.rows import (
@@ -125,3 +126,10 @@ def page(table: EfficiencyTable, description: Description) -> Page:
     values = zip(table.route, table.efficiency, strict=True)
     rows = [[*route_cells(length, description), f"{eta:.5f}"] for length, eta in values]
     return [*route_heading(description), "efficiency"], rows
+
+
+def empty(design: Design, description: Description, file: str) -> EfficiencyTable:
+    """A table of a design's shape with unremarkable readings."""
+    n = len(design.efficiencies)
+    own, origin = OwnAngles.none(description.angle_columns, n), Provenance.below_heading(file, n)
+    return EfficiencyTable(np.array(design.efficiencies), np.full(n, 0.8), np.zeros(n), own, origin)

@@ -3,7 +3,7 @@
 import numpy as np
 
 from bowdenfit.kinds.forces.table import ForceTable, read_forces
-from bowdenfit.kinds.forces.words import count, describe, implausible, page
+from bowdenfit.kinds.forces.words import count, describe, empty, implausible, page
 from bowdenfit.kinds.kind import Kind, itself
 from bowdenfit.kinds.wrap_angles import check_rows
 
@@ -15,6 +15,7 @@ FORCES = Kind(
     describe=describe,
     implausible=implausible,
     page=page,
+    empty=empty,
     count=count,
     conditions=itself,
     forces=lambda table: np.concatenate([table.input_force, table.output_force]),

@@ -3,10 +3,11 @@
 import numpy as np
 
 from bowdenfit.description import Description
+from bowdenfit.kinds.design import Design
 from bowdenfit.kinds.forces.table import ForceTable
 from bowdenfit.kinds.kind import Page
 from bowdenfit.kinds.plausibility import SCATTER, beyond, parts
-from bowdenfit.kinds.rows import STROKE_NAMES, route_cells, route_heading
+from bowdenfit.kinds.rows import STROKE_NAMES, OwnAngles, Provenance, route_cells, route_heading
 
 
 def count(table: ForceTable) -> str:
@@ -55,3 +56,20 @@ def page(table: ForceTable, description: Description) -> Page:
         for i in range(len(table.run))
     ]
     return [*route_heading(description), "run", "stroke", "input_force_N", "output_force_N"], rows
+
+
+def empty(design: Design, description: Description, file: str) -> ForceTable:
+    """A table of a design's shape with unremarkable readings."""
+    per_run = len(design.strokes) * len(design.input_forces)
+    run = np.repeat(np.arange(len(design.runs)), per_run)
+    stroke = np.tile(np.repeat(design.strokes, len(design.input_forces)), len(design.runs))
+    force = np.tile(design.input_forces, len(design.runs) * len(design.strokes))
+    names = description.angle_columns
+    own = OwnAngles.none(names, len(run))
+    for k, name in enumerate(names):
+        if design.own_angles and name in design.own_angles:
+            own.angle[:, k] = np.asarray(design.own_angles[name])[run]
+    route = np.asarray(design.runs, dtype=float)[run]
+    labels = tuple(str(i + 1) for i in range(len(design.runs)))
+    origin, velocity = Provenance.below_heading(file, len(run)), np.full(len(run), np.nan)
+    return ForceTable(route, force, 0.8 * force, run, labels, stroke.astype(int), own, origin, velocity)

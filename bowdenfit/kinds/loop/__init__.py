@@ -2,18 +2,20 @@
 
 from bowdenfit.kinds.kind import Kind, itself
 from bowdenfit.kinds.loop.table import LoopTable, read_loop
-from bowdenfit.kinds.loop.words import describe, implausible, page, warnings_of
+from bowdenfit.kinds.loop.words import contradiction, describe, empty, implausible, page, warnings_of
 from bowdenfit.kinds.wrap_angles import check_rows
 
 LOOP = Kind(
     name="loop",
     table=LoopTable,
     read=read_loop,
+    contradiction=contradiction,
     check=check_rows,
     describe=describe,
     warnings=warnings_of,
     implausible=implausible,
     page=page,
+    empty=empty,
     count=lambda table: f"{len(table.stroke)} readings of a loop",
     conditions=itself,
     forces=lambda table: table.input_force * table.stroke,

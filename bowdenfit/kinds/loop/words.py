@@ -2,17 +2,24 @@
 
 import numpy as np
 
-from bowdenfit.description import Description
+from bowdenfit.description import Description, Table
 from bowdenfit.description.elastic import PRELOAD
+from bowdenfit.kinds.design import Design
 from bowdenfit.kinds.kind import Page
 from bowdenfit.kinds.loop.table import LoopTable
 from bowdenfit.kinds.measurements import Measurements
 from bowdenfit.kinds.plausibility import HIGHEST, LOWEST
 from bowdenfit.kinds.preload.table import PreloadTable
-from bowdenfit.kinds.rows import STROKE_NAMES, in_words
+from bowdenfit.kinds.rows import STROKE_NAMES, OwnAngles, Provenance, in_words
 from bowdenfit.kinds.stretch.table import StretchTable
 
 _FREE = 0.25  # output over input force below which a loop moves all but freely
+
+
+def contradiction(settings: Table | None, description: Description) -> str:
+    """A loop's table of a cable that is none."""
+    wrong = settings is not None and description.cable.kind != "loop"
+    return 'the table loop needs kind = "loop" under [cable]' if wrong else ""
 
 
 def describe(rows: LoopTable, description: Description) -> list[str]:
@@ -71,3 +78,19 @@ def page(table: LoopTable, description: Description) -> Page:
         for i in range(len(table.stroke))
     ]
     return [*(f"{name}_deg" for name in names), "stroke", f"input_{what}", f"output_{what}"], rows
+
+
+def empty(design: Design, description: Description, file: str) -> LoopTable:
+    """A table of a design's shape with unremarkable readings."""
+    elastic = design.elastic
+    loaded = [(a, f, s) for a in elastic.loop_angles for s in elastic.strokes for f in elastic.input_forces]
+    free = [(a, np.nan, s) for a in elastic.free_angles for s in elastic.strokes]
+    rows = np.array([*loaded, *free], dtype=float).reshape(-1, 3)
+    names, n = description.angle_columns, len(rows)
+    own = OwnAngles.none(names, n)
+    column = next((c.wrap_angle.column for c in description.contact if c.wrap_angle.column), None)
+    if column is not None:
+        own.angle[:, names.index(column)] = rows[:, 0]
+    nothing = np.full(n, np.nan)
+    origin = Provenance.below_heading(file, n)
+    return LoopTable(nothing, rows[:, 1], 0.8 * rows[:, 1], rows[:, 2].astype(int), nothing, own, origin)

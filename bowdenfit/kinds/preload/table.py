@@ -4,6 +4,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from bowdenfit.description import Table
 from bowdenfit.files.columns import Quantity, find_columns, require
 from bowdenfit.files.csv_table import read_csv
 from bowdenfit.kinds.kind import Found, Source
@@ -11,6 +12,15 @@ from bowdenfit.kinds.rows import Provenance, provenance_of, read_angle, read_ten
 from bowdenfit.types import Vector
 
 _UNUSED = ("time", "position", "run")  # columns that such a table may have and that nothing reads
+
+
+class PreloadTableSettings(Table):
+    """The table of preload, by which it follows the stretch of the rope unless the description says otherwise."""
+
+    @property
+    def tells_preload(self) -> bool:
+        """It does."""
+        return True
 
 
 @dataclass(frozen=True)

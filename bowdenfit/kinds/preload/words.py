@@ -3,11 +3,12 @@
 import numpy as np
 
 from bowdenfit.description import Description
+from bowdenfit.kinds.design import Design
 from bowdenfit.kinds.kind import Page
 from bowdenfit.kinds.measurements import Measurements
 from bowdenfit.kinds.plausibility import within_factor
 from bowdenfit.kinds.preload.table import PreloadTable
-from bowdenfit.kinds.rows import in_words
+from bowdenfit.kinds.rows import Provenance, in_words
 from bowdenfit.kinds.stretch.table import StretchTable
 from bowdenfit.kinds.stretch.words import one_angle_warning
 
@@ -59,3 +60,10 @@ def page(table: PreloadTable, description: Description) -> Page:
     del description
     columns = zip(np.rad2deg(table.wrap_angle), table.preload, strict=True)
     return ["wrap_angle_deg", "preload_N"], [[f"{angle:.6g}", f"{preload:.3f}"] for angle, preload in columns]
+
+
+def empty(design: Design, description: Description, file: str) -> PreloadTable:
+    """A table of a design's shape with unremarkable readings."""
+    del description
+    angles = np.asarray(design.elastic.preload_angles, dtype=float)
+    return PreloadTable(angles, np.full(len(angles), 20.0), Provenance.below_heading(file, len(angles)))

@@ -4,6 +4,7 @@ import numpy as np
 
 from bowdenfit.kinds.kind import Kind
 from bowdenfit.kinds.recordings.angles import check_angles, recorded_angles
+from bowdenfit.kinds.recordings.settings import RecordingsTable, contradiction, quantities_of
 from bowdenfit.kinds.recordings.table import read_recordings
 from bowdenfit.kinds.recordings.words import count, implausible, recordings_text
 from bowdenfit.recordings.recording import Recordings
@@ -20,6 +21,9 @@ RECORDINGS = Kind(
     name="recordings",
     table=Recordings,
     read=read_recordings,
+    settings=RecordingsTable,
+    contradiction=contradiction,
+    quantities=quantities_of,
     check=check_angles,
     describe=lambda recordings, _: recordings_text(recordings),
     heading="Recordings",

@@ -14,6 +14,7 @@ from bowdenfit.files import read_channels
 from bowdenfit.files.columns import ColumnSource
 from bowdenfit.kinds.kind import Found, Source
 from bowdenfit.kinds.recordings.angles import check_placed
+from bowdenfit.kinds.recordings.settings import RecordingsTable
 from bowdenfit.recordings.forces import TORQUES, WANTED, matched_name, pattern_fields, rows_where, to_recording
 from bowdenfit.recordings.loop_strokes import find_loop_strokes
 from bowdenfit.recordings.preparation import NO_DELAY_OF_LOOPS, averaged, inspected
@@ -167,7 +168,7 @@ def _name(path: Path, entry: RecordingFile) -> str:
 
 
 def _to_read(description: Description, path: Path, entry: RecordingFile, channels: Mapping[str, ColumnSource]) -> _File:
-    table = description.tables.recordings
+    table = description.table(RecordingsTable)
     assert table is not None  # the caller asked
     page, sources = entry.prepare or table.prepare, {**_sources(table.channels), **_sources(entry.channels), **channels}
     pulleys = description.cable.pulleys if description.cable.kind == "loop" else None

@@ -11,7 +11,6 @@ import numpy as np
 
 from bowdenfit.cable.cable import Cable
 from bowdenfit.cable.load_cells import BLOCK_NOISE, DELAY_ERROR
-from bowdenfit.description import RecordingsTable
 from bowdenfit.errors import DatasetError
 from bowdenfit.kinds.recordings.angles import recorded_angles
 from bowdenfit.kinds.recordings.blocks import (
@@ -26,6 +25,7 @@ from bowdenfit.kinds.recordings.blocks import (
     worth_of,
 )
 from bowdenfit.kinds.recordings.loops import LoopRecordingsTerm, loop_recordings_term
+from bowdenfit.kinds.recordings.settings import RecordingsTable
 from bowdenfit.kinds.recordings.simulation import drawn_recordings, recorded_again, refuse_saturated
 from bowdenfit.kinds.recordings.whole import WholeRecordingsTerm, padded
 from bowdenfit.kinds.row_angles import row_angles
@@ -47,7 +47,7 @@ def recordings_term(
     Raises:
         DatasetError: Whole recordings are wanted, and one has no reversal; or in a run no block can be used.
     """
-    settings = cable.description.tables.recordings
+    settings = cable.description.table(RecordingsTable)
     rows = row_angles(cable.description, recorded_angles(recordings), angles).data
     labels = tuple(_label(cable, recordings, run) for run in recordings.runs)
     if recordings.loop:

@@ -2,7 +2,7 @@
 
 from bowdenfit.kinds.kind import Kind
 from bowdenfit.kinds.stretch.table import StretchTable, read_stretch
-from bowdenfit.kinds.stretch.words import describe, implausible, page, warnings_of
+from bowdenfit.kinds.stretch.words import describe, empty, implausible, page, warnings_of
 
 STRETCH = Kind(
     name="stretch",
@@ -12,5 +12,6 @@ STRETCH = Kind(
     warnings=warnings_of,
     implausible=implausible,
     page=page,
+    empty=empty,
     count=lambda table: f"{len(table.load)} readings of stretch",
 )

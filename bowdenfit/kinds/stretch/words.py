@@ -5,11 +5,12 @@ from itertools import product
 import numpy as np
 
 from bowdenfit.description import Description
+from bowdenfit.kinds.design import Design
 from bowdenfit.kinds.kind import Page
 from bowdenfit.kinds.measurements import Measurements
 from bowdenfit.kinds.plausibility import parts, within_factor
 from bowdenfit.kinds.preload.table import PreloadTable
-from bowdenfit.kinds.rows import in_words
+from bowdenfit.kinds.rows import Provenance, in_words
 from bowdenfit.kinds.stretch.table import StretchTable
 
 _LOW = 1 / 3  # share of the highest load above which a lowest load is not low
@@ -101,3 +102,21 @@ def page(table: StretchTable, description: Description) -> Page:
     columns = zip(np.rad2deg(table.wrap_angle), branch, table.load, table.stretch, strict=True)
     rows = [[f"{angle:.6g}", way, f"{load:g}", f"{stretch:.4f}"] for angle, way, load, stretch in columns]
     return ["wrap_angle_deg", "branch", "load_N", "stretch_mm"], rows
+
+
+def empty(design: Design, description: Description, file: str) -> StretchTable:
+    """A table of a design's shape with unremarkable readings."""
+    del description
+    loads, angles = (
+        np.asarray(design.elastic.loads, dtype=float),
+        np.asarray(design.elastic.stretch_angles, dtype=float),
+    )
+    cycle = np.concatenate([loads, loads[-2::-1]]) if design.elastic.unloading else loads
+    down = np.arange(len(cycle)) >= len(loads)
+    n = len(angles)
+    load, wrap_angle = np.tile(cycle, n), np.repeat(angles, len(cycle))
+    peak = np.full(len(load), loads.max(initial=0.0))
+    names = tuple(f"{angle:.4g} deg" for angle in np.rad2deg(angles))
+    of_cycle = np.repeat(np.arange(n), len(cycle))
+    origin = Provenance.below_heading(file, len(load))
+    return StretchTable(load, wrap_angle, 0.01 * load, np.tile(down, n), peak, of_cycle, names, origin)

@@ -12,6 +12,7 @@ from bowdenfit.inference.comparison import Difference, Prediction, differences, 
 from bowdenfit.inference.interval import Interval
 from bowdenfit.inference.leave_one_out import Readings, leave_one_out
 from bowdenfit.inference.log_density import LogDensity as Density
+from bowdenfit.kinds.angles.table import AngleSettings
 from bowdenfit.questions.compare.common_readings import ANGLES, Common, Omitted, common_readings
 from bowdenfit.questions.recorded.rate import RateEffect, rate_effect
 from bowdenfit.results.record import Draws, Record
@@ -211,7 +212,7 @@ def _described(fit: Record) -> str:
     if description.curved:
         parts.append(f"{description.geometry} geometry")
     parts += [description.noise_in_words] if description.noise != "normal" else []
-    angles = description.tables.angles
+    angles = description.table(AngleSettings)
     if angles is not None and angles.undetected != "censored" and description.geometry != "published":
         parts.append({"zero": "undetected angles as zeros", "dropped": "undetected angles dropped"}[angles.undetected])
     without_runs = [p for p in fit.model.space.fixed if p.name == RUN_SCATTER and p.fixed == 0.0]

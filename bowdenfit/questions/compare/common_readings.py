@@ -9,7 +9,9 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from bowdenfit.kinds.angles.table import AngleSettings
 from bowdenfit.kinds.recordings.blocks import RECORDED
+from bowdenfit.kinds.recordings.settings import RecordingsTable
 from bowdenfit.kinds.term import Term
 from bowdenfit.results.record import Record
 
@@ -98,7 +100,7 @@ def _events(fit: Record) -> dict[Key, np.ndarray]:
 def _said(term: Term, fit: Record) -> np.ndarray:
     """Of each reading, numbers that are the same wherever it is the same event; NaN where it is a limit alone."""
     if term.name == RECORDED:  # the likelihood of all its blocks; their number tells how they were chosen
-        settings = fit.dataset.description.tables.recordings
+        settings = fit.dataset.description.table(RecordingsTable)
         whole = float(settings is not None and settings.likelihood == "whole")
         return np.column_stack([term.data["n"], np.full(len(term.labels), whole)])
     return np.column_stack([term.observed(), term.data["n"]] if "n" in term.data else [term.observed()])
@@ -112,7 +114,7 @@ def _why(table: str, fits: Mapping[str, Record]) -> str:
     """Why the readings of a table are not the same events in all fits."""
     descriptions = [fit.dataset.description for fit in fits.values()]
     if table == RECORDED:
-        likelihoods = {d.tables.recordings.likelihood for d in descriptions if d.tables.recordings}
+        likelihoods = {said.likelihood for d in descriptions if (said := d.table(RecordingsTable))}
         if len(likelihoods) > 1:
             return (
                 "some fits take the sliding blocks of runs and others whole recordings, which are not the same readings"
@@ -134,6 +136,6 @@ def _treatment(fit: Record) -> str:
     description = fit.dataset.description
     if description.geometry == "published":
         return "zeros, in the published regions"
-    settings = description.tables.angles
+    settings = description.table(AngleSettings)
     undetected = settings.undetected if settings is not None else "censored"
     return {"censored": "below the limit", "zero": "zeros", "dropped": "dropped"}[undetected]

@@ -31,13 +31,12 @@ def default_candidates(fit: Record) -> tuple[Candidate, ...]:
 
 def _of_kind(fit: Record, kind: str) -> list[Candidate]:
     """Candidates of one kind that the description has a table for."""
-    tables, measured = fit.dataset.description.tables, fit.dataset.measurements
-    has = {name: getattr(tables, name) is not None for name in ("efficiencies", "stretch", "preload", "loop")}
+    stated, measured = fit.dataset.description.tables.stated, fit.dataset.measurements
     if kind == "angle":
-        return [Candidate(kind, at) for at in _lengths(fit)] if tables.angles is not None else []
+        return [Candidate(kind, at) for at in _lengths(fit)] if "angles" in stated else []
     if kind == "efficiency":
         table = measured.efficiencies
-        return _along_cable(fit, kind, table.own if table is not None else None) if has["efficiencies"] else []
+        return _along_cable(fit, kind, table.own if table is not None else None) if "efficiencies" in stated else []
     if kind == "force":
         table_of_forces = measured.forces
         own = table_of_forces.own if table_of_forces is not None else _own_of_recordings(fit)

@@ -10,6 +10,7 @@ import numpy as np
 from jax import Array
 
 from bowdenfit.inference.draws import for_each_draw
+from bowdenfit.kinds.angles.table import AngleSettings
 from bowdenfit.kinds.angles.term import angles_term
 from bowdenfit.kinds.efficiencies.term import efficiencies_term
 from bowdenfit.kinds.loop.term import loop_term
@@ -172,7 +173,7 @@ def _rows(model: Model, wanted: Sequence[Candidate], table: type) -> Any:
 
 def _angles(model: Model, places: Sequence[int], wanted: Sequence[Candidate]) -> Simulation:
     """Angles of all curved contacts; what is read below the detection limit is not detected."""
-    columns, settings = tuple(model.cable.curves), model.description.tables.angles
+    columns, settings = tuple(model.cable.curves), model.description.table(AngleSettings)
     shape = (len(wanted), len(columns))
     route = np.array([c.route for c in wanted])
     table = AngleTable(route, columns, np.full(shape, np.deg2rad(30)), np.full(shape, np.nan), _origin(len(wanted)))

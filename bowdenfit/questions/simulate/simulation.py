@@ -5,7 +5,7 @@ Both draw readings as the likelihood takes them to scatter, so that a posterior 
 """
 
 from collections.abc import Mapping
-from dataclasses import dataclass, field, replace
+from dataclasses import replace
 
 import jax
 import jax.numpy as jnp
@@ -14,81 +14,24 @@ import numpy as np
 from bowdenfit.dataset import Dataset
 from bowdenfit.description import Description
 from bowdenfit.errors import UsageError
+from bowdenfit.kinds import KINDS
 from bowdenfit.kinds.angles.term import drawn_angles
+from bowdenfit.kinds.design import Design
 from bowdenfit.kinds.drawn_readings import drawn_readings, with_drawn_readings
-from bowdenfit.kinds.elastic_simulation import ElasticDesign, empty_elastic_tables
 from bowdenfit.kinds.measurements import Measurements
-from bowdenfit.kinds.tables import AngleTable, EfficiencyTable, ForceTable, OwnAngles, Provenance
 from bowdenfit.model import build_model
-
-
-@dataclass(frozen=True)
-class Design:
-    """What is measured: at which lengths, and for forces at which input forces.
-
-    Args:
-        angles: Route values at which wrap angles are read.
-        efficiencies: Route values at which an efficiency is measured.
-        runs: Route value of each force run.
-        input_forces: Input forces of every stroke of a run [N].
-        strokes: +1 pulling, -1 return, in order.
-        own_angles: Wrap angle of each run [rad], by column of a contact without a curve.
-        elastic: What is measured of stretch, preload and a loop.
-    """
-
-    angles: tuple[float, ...] = ()
-    efficiencies: tuple[float, ...] = ()
-    runs: tuple[float, ...] = ()
-    input_forces: tuple[float, ...] = ()
-    strokes: tuple[int, ...] = (1, -1)
-    own_angles: Mapping[str, tuple[float, ...]] | None = None
-    elastic: ElasticDesign = field(default_factory=ElasticDesign)
 
 
 def empty_tables(description: Description, design: Design) -> Measurements:
     """Tables of the design's shape with unremarkable readings, from which the model's parameters can be declared."""
-    tables = description.tables
-    columns = tuple(c.wrap_angle.column or "" for c in description.curved)
-    angles = efficiencies = forces = None
-    if tables.angles is not None:
-        shape = (len(design.angles), len(columns))
-        origin = _origin(tables.angles.file or "angles.csv", len(design.angles))
-        angles = AngleTable(
-            np.array(design.angles), columns, np.full(shape, np.deg2rad(30)), np.full(shape, np.nan), origin
+    stated = description.tables.stated
+    return Measurements(
+        tuple(
+            kind.empty(design, description, kind.file_name(stated[kind.name]))
+            for kind in KINDS.values()
+            if kind.name in stated and kind.empty is not None
         )
-    if tables.efficiencies is not None:
-        n = len(design.efficiencies)
-        own, origin = _no_own_angles(description, n), _origin(tables.efficiencies.file or "efficiencies.csv", n)
-        efficiencies = EfficiencyTable(np.array(design.efficiencies), np.full(n, 0.8), np.zeros(n), own, origin)
-    if tables.forces is not None:
-        forces = _force_rows(description, design)
-    elastic = empty_elastic_tables(description, design.elastic)
-    return elastic.with_tables(angles, efficiencies, forces)
-
-
-def _force_rows(description: Description, design: Design) -> ForceTable:
-    per_run = len(design.strokes) * len(design.input_forces)
-    run = np.repeat(np.arange(len(design.runs)), per_run)
-    stroke = np.tile(np.repeat(design.strokes, len(design.input_forces)), len(design.runs))
-    force = np.tile(design.input_forces, len(design.runs) * len(design.strokes))
-    names = description.angle_columns
-    own = _no_own_angles(description, len(run))
-    for k, name in enumerate(names):
-        if design.own_angles and name in design.own_angles:
-            own.angle[:, k] = np.asarray(design.own_angles[name])[run]
-    route = np.asarray(design.runs, dtype=float)[run]
-    labels = tuple(str(i + 1) for i in range(len(design.runs)))
-    origin, velocity = _origin("forces.csv", len(run)), np.full(len(run), np.nan)
-    return ForceTable(route, force, 0.8 * force, run, labels, stroke.astype(int), own, origin, velocity)
-
-
-def _no_own_angles(description: Description, n: int) -> OwnAngles:
-    names = description.angle_columns
-    return OwnAngles(names, np.full((n, len(names)), np.nan), np.full((n, len(names)), np.nan))
-
-
-def _origin(file: str, n: int) -> Provenance:
-    return Provenance((file,), np.zeros(n, dtype=int), np.arange(2, n + 2))
+    )
 
 
 def true_values(

@@ -11,10 +11,13 @@ import jax
 
 from bowdenfit.dataset import DESCRIPTION_FILE, Dataset
 from bowdenfit.description import Description
-from bowdenfit.description.file import parse_description
 from bowdenfit.errors import DescriptionError
-from bowdenfit.questions.simulate.plan import read_design, table_pages
-from bowdenfit.questions.simulate.simulation import Design, empty_tables, simulate, true_values
+from bowdenfit.kinds import each_table
+from bowdenfit.kinds.design import Design, read_design
+from bowdenfit.kinds.kind import Page
+from bowdenfit.kinds.measurements import Measurements
+from bowdenfit.kinds.settings import parse_description
+from bowdenfit.questions.simulate.simulation import empty_tables, simulate, true_values
 from bowdenfit.results.store import write_text
 
 TRUTH_FILE = "truth.json"
@@ -102,6 +105,16 @@ def write(bench: Bench, dataset: Dataset, truth: Mapping[str, float], folder: Pa
     for name, (heads, rows) in table_pages(bench.description, dataset.measurements).items():
         write_text(folder / name, "\n".join(",".join(row) for row in [heads, *rows]) + "\n")
     write_text(folder / TRUTH_FILE, json.dumps({"seed": seed, "truth": dict(truth)}, indent=1) + "\n")
+
+
+def table_pages(description: Description, measured: Measurements) -> dict[str, Page]:
+    """Headings and rows of every table, by file name."""
+    pages = {}
+    for kind, table in each_table(measured):
+        settings = description.tables.stated.get(kind.name)
+        if settings and kind.page:
+            pages[kind.file_name(settings)] = kind.page(table, description)
+    return pages
 
 
 def _description_only(text: str) -> str:

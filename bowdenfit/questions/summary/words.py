@@ -4,6 +4,7 @@ from typing import Any
 
 from bowdenfit.cable.load_cells import RUN_SCATTER
 from bowdenfit.kinds import each_table
+from bowdenfit.kinds.angles.table import AngleSettings
 from bowdenfit.kinds.recordings.words import recordings_text
 from bowdenfit.model import EFFICIENCY_TERMS
 from bowdenfit.questions.bends.words import elastic_text
@@ -68,7 +69,7 @@ def _title(fit: Record) -> str:
 
 def _angle_counts(fit: Record, entered: int, censored: int) -> list[str]:
     """How many readings the curves were fitted to, and how those too small to detect entered."""
-    settings, published = fit.dataset.description.tables.angles, fit.dataset.description.geometry == "published"
+    settings, published = fit.dataset.description.table(AngleSettings), fit.dataset.description.geometry == "published"
     way = "zero" if published or settings is None else settings.undetected
     how = {
         "censored": "",

@@ -12,12 +12,14 @@ from bowdenfit.cable.cable import ANGLE_NOISE, Cable
 from bowdenfit.cable.load_cells import FORCE_NOISE, GAIN_ERROR, INPUT_OFFSET, OUTPUT_OFFSET, RUN_SCATTER
 from bowdenfit.dataset import Dataset
 from bowdenfit.description import PriorDefaults
+from bowdenfit.kinds.angles.table import AngleSettings
+from bowdenfit.kinds.design import Design
 from bowdenfit.kinds.tables import AngleTable
 from bowdenfit.model import build_model
 from bowdenfit.questions.simulate.bench import Faults, SimulatedRecording, simulate_recording
 from bowdenfit.questions.simulate.recordings.plan import RecordingsPlan
 from bowdenfit.questions.simulate.recordings.planned import RPM, PlannedRecording
-from bowdenfit.questions.simulate.simulation import Design, empty_tables, simulate, true_values
+from bowdenfit.questions.simulate.simulation import empty_tables, simulate, true_values
 
 
 @dataclass(frozen=True)
@@ -141,7 +143,7 @@ def _with_measured(table: AngleTable, plan: RecordingsPlan, noise: float, genera
     route = np.array(list(plan.measured_angles), dtype=float)
     true = np.deg2rad([[row[name] for name in table.names] for row in plan.measured_angles.values()])
     reading = np.maximum(true + noise * generator.standard_normal(true.shape), 0.0)
-    settings = plan.description.tables.angles
+    settings = plan.description.table(AngleSettings)
     limit = settings.detection_limit.to("angle") if settings and settings.detection_limit else -np.inf
     hidden = reading < limit
     return dataclasses.replace(

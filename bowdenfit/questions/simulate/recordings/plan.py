@@ -9,8 +9,8 @@ import numpy as np
 from pydantic import ValidationError
 
 from bowdenfit.description import Description
-from bowdenfit.description.file import parse_description
 from bowdenfit.errors import DescriptionError, nearest
+from bowdenfit.kinds.settings import parse_description
 from bowdenfit.questions.simulate.recordings.page import Page, explained, with_reference_force
 from bowdenfit.questions.simulate.recordings.planned import PlannedRecording, planned_recordings
 from bowdenfit.questions.simulate.tables import plan_page

@@ -9,6 +9,7 @@ from typing import Any
 import numpy as np
 
 from bowdenfit.dataset import DESCRIPTION_FILE
+from bowdenfit.kinds.angles.table import AngleSettings
 from bowdenfit.questions.simulate.bench import SimulatedRecording
 from bowdenfit.questions.simulate.recordings.making import MadeRecording, MadeRecordings
 from bowdenfit.questions.simulate.recordings.plan import RecordingsPlan
@@ -29,7 +30,7 @@ def write_recordings(made: MadeRecordings, folder: Path) -> None:
     (folder / RECORDINGS_FOLDER).mkdir(parents=True, exist_ok=True)
     write_text(folder / DESCRIPTION_FILE, _description_text(made.plan))
     if made.angles is not None:
-        settings = made.plan.description.tables.angles
+        settings = made.plan.description.table(AngleSettings)
         write_text(folder / ((settings and settings.file) or "angles.csv"), _angles_text(made))
     for recording in made.each:
         write_text(folder / recording.planned.file, _recording_text(recording.simulated, made.plan.decimals))

@@ -1,21 +1,64 @@
-"""What a plan says is measured ([design]), and simulated tables as the rows of their files."""
+"""What a simulated bench measures of each kind ([design] of a plan)."""
 
 from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
 from typing import Any, Literal
 
 import numpy as np
 from pydantic import BaseModel, ConfigDict, Field, ValidationError
 
-from bowdenfit.description import Description
 from bowdenfit.errors import DescriptionError
-from bowdenfit.kinds import each_table
-from bowdenfit.kinds.elastic_simulation import ElasticDesign
-from bowdenfit.kinds.kind import Page
-from bowdenfit.kinds.measurements import Measurements
-from bowdenfit.questions.simulate.simulation import Design
 
 Stroke = Literal["pull", "return"]
 _STROKES: Mapping[str, int] = {"pull": 1, "return": -1}
+
+
+@dataclass(frozen=True)
+class ElasticDesign:
+    """What is measured of stretch, preload and a loop.
+
+    Args:
+        loads: Loads of every loading of the rope, growing [N].
+        stretch_angles: Wrap angles at which the rope is stretched [rad].
+        unloading: Whether it is read on the way down too.
+        preload_angles: Wrap angles at which the preload is read [rad].
+        loop_angles: Wrap angles at which the loop is moved under load [rad].
+        input_forces: Input forces of the loop at each of them [N].
+        strokes: +1 forward, -1 back, in order.
+        free_angles: Wrap angles at which the loop is moved without load [rad].
+    """
+
+    loads: tuple[float, ...] = ()
+    stretch_angles: tuple[float, ...] = ()
+    unloading: bool = False
+    preload_angles: tuple[float, ...] = ()
+    loop_angles: tuple[float, ...] = ()
+    input_forces: tuple[float, ...] = ()
+    strokes: tuple[int, ...] = (1,)
+    free_angles: tuple[float, ...] = ()
+
+
+@dataclass(frozen=True)
+class Design:
+    """What is measured: at which lengths, and for forces at which input forces.
+
+    Args:
+        angles: Route values at which wrap angles are read.
+        efficiencies: Route values at which an efficiency is measured.
+        runs: Route value of each force run.
+        input_forces: Input forces of every stroke of a run [N].
+        strokes: +1 pulling, -1 return, in order.
+        own_angles: Wrap angle of each run [rad], by column of a contact without a curve.
+        elastic: What is measured of stretch, preload and a loop.
+    """
+
+    angles: tuple[float, ...] = ()
+    efficiencies: tuple[float, ...] = ()
+    runs: tuple[float, ...] = ()
+    input_forces: tuple[float, ...] = ()
+    strokes: tuple[int, ...] = (1, -1)
+    own_angles: Mapping[str, tuple[float, ...]] | None = None
+    elastic: ElasticDesign = field(default_factory=ElasticDesign)
 
 
 class _Page(BaseModel):
@@ -95,13 +138,3 @@ def read_design(page: Mapping[str, Any], file: str) -> Design:
 
 def _radians(degrees: Sequence[float]) -> tuple[float, ...]:
     return tuple(float(angle) for angle in np.deg2rad(degrees))
-
-
-def table_pages(description: Description, measured: Measurements) -> dict[str, Page]:
-    """Headings and rows of every table, by file name."""
-    pages = {}
-    for kind, table in each_table(measured):
-        settings = getattr(description.tables, kind.name, None)
-        if settings and kind.page:
-            pages[settings.file or f"{kind.name}.csv"] = kind.page(table, description)
-    return pages

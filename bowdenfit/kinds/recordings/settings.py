@@ -1,0 +1,54 @@
+"""What a description says of recordings under [tables]."""
+
+from typing import Literal
+
+from pydantic import Field
+
+from bowdenfit.description import ColumnMap, Description, Preparation, QuantityValue, TableSettings
+from bowdenfit.description.file import Stated
+from bowdenfit.units import speed_dimension
+
+
+class RecordingsTable(TableSettings):
+    """Recordings that share their channels' names and their preparation.
+
+    `pattern` reads what a file was recorded at from its name, such as "{at}mm_{velocity:r/min}rpm".
+    """
+
+    files: str | tuple[str, ...] | None = None
+    pattern: str | None = None
+    channels: dict[str, ColumnMap] = Field(default_factory=dict)
+    likelihood: Literal["runs", "whole"] = "runs"
+    prepare: Preparation = Preparation()
+
+    @property
+    def fits_offsets(self) -> bool:
+        """Whether the load cells are tared by the fit."""
+        return self.prepare.tare == "fitted"
+
+
+def contradiction(settings: RecordingsTable | None, description: Description) -> str:
+    """Recordings without a table, or a table without any."""
+    if settings is None and description.recording:
+        return "[[recording]] needs recordings = {} under [tables], where what they share can be said"
+    if settings is not None and not (description.recording or settings.files):
+        return 'the table recordings names no file: write files = "recordings/*.csv", or a [[recording]] with its file'
+    return ""
+
+
+def quantities_of(settings: RecordingsTable, description: Description) -> list[Stated]:
+    """Quantities in the table of recordings and in the recordings, with where they stand and what they must measure."""
+    pages = [("tables, recordings, prepare", settings.prepare)]
+    quantities: list[Stated] = []
+    for entry in description.recording:
+        where = f"recording {entry.file!r}"
+        quantities += [(f"{where}, wrap_angles, {name}", angle, "angle") for name, angle in entry.wrap_angles.items()]
+        if entry.velocity is not None:
+            quantities.append((f"{where}, velocity", entry.velocity, speed_dimension(entry.velocity.unit)))
+        if entry.prepare is not None:
+            pages.append((f"{where}, prepare", entry.prepare))
+    for where, page in pages:
+        for name, value in (("delay", page.delay), ("block", page.block)):
+            if isinstance(value, QuantityValue):
+                quantities.append((f"{where}, {name}", value, "time"))
+    return quantities

@@ -56,7 +56,7 @@ class Reply:
 
     Args:
         text: For people.
-        page: For programs, made only where `--json` asks for it.
+        page: Gives the answer for programs, asked only for `--json`.
         notes: Lines beside the answer, on standard error.
         exit_code: 0, or 3 for an answer that must not be trusted.
     """

@@ -9,7 +9,7 @@ import click
 
 from bowdenfit.cli.keywords import Keyword, keywords_of
 from bowdenfit.cli.progress import watched
-from bowdenfit.verb import Argument, Verb
+from bowdenfit.verb import Argument, Reply, Verb
 
 if TYPE_CHECKING:
     from bowdenfit.front_desk import Fit
@@ -50,12 +50,19 @@ def _run(verb: Verb, keywords: tuple[Keyword, ...], given: dict[str, Any], as_js
         with watched(asked["output"], verb.watch) as progress:
             answer = verb.function(**asked, **verb.behind, progress=progress)
     reply = verb.reply(answer, asked)
-    click.echo(json.dumps(reply.page(), indent=1) + "\n" if as_json and reply.page else reply.text, nl=False)
+    click.echo(_page(reply) if as_json else reply.text, nl=False)
     for note in reply.notes:
         click.echo(note, err=True)
     if verb.warns and found is not None and (troubles := asked[found].verdict().troubles):
         click.echo(f"Warning: this fit is {' and '.join(troubles)}; see bowdenfit summary {given[found]}.", err=True)
     return reply.exit_code
+
+
+def _page(reply: Reply) -> str:
+    """An answer as JSON."""
+    from bowdenfit.results.plain import plain
+
+    return json.dumps(plain(reply.page()), indent=1) + "\n" if reply.page else reply.text
 
 
 def _loaded(results: Path | tuple[Path, ...]) -> "Fit | dict[str, Fit]":

@@ -2,7 +2,7 @@
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field
-from typing import Literal
+from typing import Any, Literal
 
 import numpy as np
 
@@ -33,6 +33,10 @@ class Prediction:
     error: np.ndarray = field(default_factory=lambda: np.zeros(0))
     readings: tuple[tuple[str, str], ...] = ()
     how: tuple[How, ...] = ()
+
+    def of_reading(self, i: int) -> dict[str, Any]:
+        """What is known of one reading, as plain data."""
+        return {"elpd": self.elpd[i], "monte_carlo_error": self.error[i], "pareto_k": self.pareto_k[i], "how": self.how[i]}
 
     @property
     def unreliable(self) -> int:

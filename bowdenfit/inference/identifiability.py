@@ -12,7 +12,7 @@ References:
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import Any
+from typing import Any, ClassVar
 
 import jax
 import jax.numpy as jnp
@@ -55,6 +55,8 @@ class Known:
     correlation: float
     inflation: float
 
+    JSON: ClassVar = (..., "contraction")
+
     @property
     def share(self) -> float:
         """Share of the prior variance that is left; 0 where the measurements decide, 1 where the prior does."""
@@ -81,6 +83,8 @@ class Combination:
     value: float
     sd: float
     share: float
+
+    JSON: ClassVar = (..., "information", "words")
 
     @property
     def information(self) -> float:
@@ -116,6 +120,8 @@ class Knowledge:
     sharpest: Combination | None
     collinearity: float
 
+    JSON: ClassVar = ("parameters", "directions", ("determined", "sums"), ("resting_on_prior", "resting"), "collinearity")
+
     @property
     def by_themselves(self) -> tuple[Known, ...]:
         """Parameters that are known each by itself."""
@@ -125,6 +131,16 @@ class Knowledge:
     def on_prior(self) -> tuple[Known, ...]:
         """Parameters that rest on their priors and belong to no combination that is determined."""
         return tuple(p for p in self._left if p.share > RESTS_ON_PRIOR)
+
+    @property
+    def sums(self) -> list[str]:
+        """Combinations that are determined, in words."""
+        return [combination.words for combination in self.determined]
+
+    @property
+    def resting(self) -> list[str]:
+        """Names of the parameters that rest on their priors."""
+        return [p.name for p in self.on_prior]
 
     @property
     def partly(self) -> tuple[Known, ...]:

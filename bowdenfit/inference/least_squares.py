@@ -8,6 +8,7 @@ posterior at the noise scales' prior medians.
 from collections.abc import Sequence
 from dataclasses import dataclass
 from itertools import product
+from typing import ClassVar
 
 import numpy as np
 
@@ -69,6 +70,13 @@ class Estimate:
     lower: float = float("nan")
     upper: float = float("nan")
     at_bound: bool = False
+
+    JSON: ClassVar = (..., "open")
+
+    @property
+    def open(self) -> list[str]:
+        """The sides on which nothing limits it."""
+        return [side for side in ("lower", "upper") if np.isinf(getattr(self, side))]
 
 
 @dataclass(frozen=True)

@@ -3,7 +3,7 @@
 from collections.abc import Mapping
 from dataclasses import dataclass
 from statistics import NormalDist
-from typing import Any
+from typing import Any, ClassVar
 
 import numpy as np
 
@@ -30,6 +30,8 @@ class SamplerDifference:
     sds: float
     error: float
 
+    JSON: ClassVar = (..., "errors")
+
     @property
     def errors(self) -> float:
         """The difference in Monte Carlo standard errors."""
@@ -53,6 +55,17 @@ class SamplerAgreement:
     second: str
     differences: tuple[SamplerDifference, ...]
     limit: float
+
+    false_alarm: ClassVar = FALSE_ALARM
+    noticeable_sds: ClassVar = NOTICEABLE
+    JSON: ClassVar = (
+        "samplers", "agree", "sentence", "false_alarm", ("limit_errors", "limit"), "noticeable_sds", "differences",
+    )  # fmt: skip
+
+    @property
+    def samplers(self) -> tuple[str, str]:
+        """Names of both."""
+        return self.first, self.second
 
     @property
     def beyond_chance(self) -> tuple[SamplerDifference, ...]:
@@ -94,18 +107,6 @@ class SamplerAgreement:
             f"on the {first.summary} of {first.quantity}, by {abs(first.sds):.2f} standard deviations, {first.errors:.0f} "
             f"times the Monte Carlo error{more}"
         )
-
-    def page(self) -> dict[str, Any]:
-        """As plain data, for summary.json."""
-        return {
-            "samplers": [self.first, self.second],
-            "agree": self.agree,
-            "sentence": self.sentence(),
-            "false_alarm": FALSE_ALARM,
-            "limit_errors": self.limit,
-            "noticeable_sds": NOTICEABLE,
-            "differences": [d.__dict__ | {"errors": d.errors} for d in self.differences],
-        }
 
 
 @dataclass(frozen=True)

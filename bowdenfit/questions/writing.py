@@ -18,13 +18,13 @@ def files_of(folder: str | Path, name: str) -> list[Path]:
     return [Path(folder) / f"{name}.{ending}" for ending in (PAGE, TEXT, *FIGURES)]
 
 
-def write_answer(folder: str | Path, name: str, page: Any, text: str, draw: Callable[[], Any]) -> list[Path]:
+def write_answer(folder: str | Path, name: str, answer: Any, text: str, draw: Callable[[], Any]) -> list[Path]:
     """Write an answer as text, as a figure and, last, as JSON; a folder that has the JSON has everything.
 
     Args:
         folder: Where to; made if missing. Earlier files of these names are replaced.
         name: Of the files.
-        page: Plain data.
+        answer: The answer.
         text: For people.
         draw: Gives the figure.
 
@@ -36,6 +36,7 @@ def write_answer(folder: str | Path, name: str, page: Any, text: str, draw: Call
     """
     from bowdenfit.plots.write import write
     from bowdenfit.results.folder import made, write_text
+    from bowdenfit.results.plain import plain
 
     page_file, text_file, *figures = files = files_of(folder, name)
     with made(Path(folder)):
@@ -43,5 +44,5 @@ def write_answer(folder: str | Path, name: str, page: Any, text: str, draw: Call
         figure = draw()
         for path in figures:
             write(figure, path)
-        write_text(page_file, json.dumps(page, indent=1) + "\n")
+        write_text(page_file, json.dumps(plain(answer), indent=1) + "\n")
     return files

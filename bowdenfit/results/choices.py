@@ -1,6 +1,7 @@
 """From draws to a decision: what can be bought, what it costs not to have the best, and what is good enough."""
 
 from dataclasses import dataclass
+from typing import ClassVar
 
 import numpy as np
 
@@ -37,6 +38,8 @@ class Window:
     probability: float
     start: float
     stop: float
+
+    JSON: ClassVar = ("within", "probability", ("from", "start"), ("to", "stop"))
 
 
 def at_edge(lengths: np.ndarray, limits: tuple[float, float]) -> np.ndarray:

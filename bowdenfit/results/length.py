@@ -2,6 +2,7 @@
 
 from dataclasses import dataclass
 from html import escape
+from typing import ClassVar
 
 import numpy as np
 
@@ -31,6 +32,13 @@ class OptimalLength:
     at_edge: float
     window: Window
     choices: tuple[Choice, ...]
+
+    JSON: ClassVar = (("route", "variable"), "unit", ("length", "length_at_edge"), "efficiency", "window", "choices")
+
+    @property
+    def length_at_edge(self) -> dict[str, float]:
+        """The length with the share of draws at an end."""
+        return vars(self.length) | {"at_edge": self.at_edge}
 
     @property
     def best_choice(self) -> Choice | None:

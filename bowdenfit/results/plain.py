@@ -1,6 +1,6 @@
 """Any answer as plain data for JSON, and stored data back as what they were: one pair for every dataclass."""
 
-from collections.abc import Mapping
+from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import fields, is_dataclass
 from types import NoneType, UnionType
 from typing import Any, get_args, get_origin, get_type_hints
@@ -14,8 +14,11 @@ from bowdenfit.types import Flags, Labels, Matrix
 def plain(answer: Any) -> Any:
     """An answer as programs read it: what is no finite number is None.
 
+    A dataclass gives its fields, or what its `JSON` lists: names of attributes and methods, where `...` stands for all fields,
+    ("key", "name") for an attribute under another key, and "name?" for one that is left out where it is None.
+
     Args:
-        answer: Of a dataclass the fields are given, or the attributes that its `JSON` names; arrays become lists.
+        answer: Dataclasses, dictionaries, sequences, arrays and numbers, one in the other.
     """
     return _plain(answer, keep=False)
 
@@ -27,8 +30,7 @@ def stored(data: Any) -> Any:
 
 def _plain(data: Any, keep: bool) -> Any:
     if is_dataclass(data):
-        names = [f.name for f in fields(data)]
-        data = {name: getattr(data, name) for name in (names if keep else getattr(data, "JSON", names))}
+        data = dict(_attributes(data, (...,) if keep else getattr(data, "JSON", (...,))))
     if isinstance(data, Mapping):
         return {key: _plain(value, keep) for key, value in data.items()}
     if isinstance(data, np.ndarray | np.generic):
@@ -38,6 +40,19 @@ def _plain(data: Any, keep: bool) -> Any:
     if isinstance(data, float) and not np.isfinite(data):
         return None if np.isnan(data) or not keep else "Infinity" if data > 0 else "-Infinity"
     return data
+
+
+def _attributes(data: Any, listed: Iterable[Any]) -> Iterator[tuple[str, Any]]:
+    """Keys and values of a dataclass."""
+    for entry in listed:
+        if entry is ...:
+            yield from ((f.name, getattr(data, f.name)) for f in fields(data))
+            continue
+        key, name = entry if isinstance(entry, tuple) else (entry.removesuffix("?"), entry)
+        value = getattr(data, name.removesuffix("?"))
+        value = value() if callable(value) else value
+        if value is not None or not name.endswith("?"):
+            yield key, value
 
 
 def rebuilt(kind: Any, value: Any) -> Any:

@@ -2,8 +2,8 @@
 
 from collections import Counter
 from collections.abc import Mapping, Sequence
-from dataclasses import asdict, dataclass
-from typing import Any
+from dataclasses import dataclass
+from typing import ClassVar
 
 import numpy as np
 
@@ -64,6 +64,8 @@ class Checked:
     bias_error: float
     shrinkage: float
 
+    JSON: ClassVar = (..., "is_calibrated", "fault")
+
     @property
     def is_calibrated(self) -> bool:
         """Whether its ranks are uniform and its intervals hold the truth as often as they claim."""
@@ -113,6 +115,9 @@ class Calibration:
     redrawn: dict[str, int]
     seconds: float
 
+    level: ClassVar = LEVEL
+    JSON: ClassVar = (..., "is_calibrated", "ranked", "level")
+
     @property
     def ranked(self) -> int:
         """How many replications were ranked."""
@@ -132,12 +137,6 @@ class Calibration:
     def is_calibrated(self) -> bool:
         """Whether every quantity is."""
         return self.is_judged and not self.faults
-
-    def page(self) -> dict[str, Any]:
-        """As plain data."""
-        quantities = [asdict(q) | {"is_calibrated": q.is_calibrated, "fault": q.fault} for q in self.quantities]
-        verdict = {"is_calibrated": self.is_calibrated, "ranked": self.ranked, "level": LEVEL}
-        return asdict(self) | verdict | {"quantities": quantities}
 
 
 def findings(

@@ -1,8 +1,8 @@
 """One replication: truth from the prior, tables simulated with it, a fit, and the rank of the truth among the draws."""
 
 import time
-from collections.abc import Callable, Mapping
-from dataclasses import asdict, dataclass, field
+from collections.abc import Callable
+from dataclasses import dataclass, field
 from functools import cached_property
 from typing import Any
 
@@ -78,16 +78,6 @@ class Replication:
     ranked: dict[str, Ranked]
     seconds: float
     steps: int = 0
-
-    def page(self) -> dict[str, Any]:
-        """As plain data."""
-        return asdict(self)
-
-    @classmethod
-    def of_page(cls, page: Mapping[str, Any]) -> "Replication":
-        """Back from plain data."""
-        ranked = {name: Ranked(**each) for name, each in page["ranked"].items()}
-        return cls(**{**page, "reasons": tuple(page["reasons"]), "ranked": ranked})
 
 
 @dataclass(frozen=True)

@@ -9,6 +9,7 @@ from typing import Any
 from bowdenfit.errors import StoreError
 from bowdenfit.questions.calibrate.replication import Replication
 from bowdenfit.results.folder import FIGURES, REPLICATIONS, SUMMARY_TEXT
+from bowdenfit.results.plain import rebuilt, stored
 
 CALIBRATION = "calibration.json"
 _WHAT = {"description": "the description", "sha256": "an input file", "seed": "the seed", "assumed": "what is assumed"}
@@ -69,7 +70,7 @@ def _resumed(path: Path, fingerprint: Mapping[str, Any]) -> dict[int, Replicatio
         )
     # A line that was being written when the program was stopped is made again.
     path.write_text("".join(json.dumps(line) + "\n" for line in (before, *pages)), encoding="utf-8")
-    found = [Replication.of_page(page) for page in pages]
+    found = [rebuilt(Replication, page) for page in pages]
     return {each.number: each for each in found}
 
 
@@ -89,4 +90,4 @@ def _lines(path: Path) -> list[dict[str, Any]]:
 def keep(folder: Path, replication: Replication) -> None:
     """Add a finished replication."""
     with (folder / REPLICATIONS).open("a", encoding="utf-8") as file:
-        file.write(json.dumps(replication.page()) + "\n")
+        file.write(json.dumps(stored(replication)) + "\n")

@@ -178,18 +178,19 @@ def _write(found: "Calibration", folder: Path) -> None:
     from bowdenfit.questions.calibrate.store import CALIBRATION
     from bowdenfit.questions.calibrate.words import calibration_text
     from bowdenfit.results.folder import FIGURES, SUMMARY_TEXT, write_text
+    from bowdenfit.results.plain import plain
 
     write_text(folder / SUMMARY_TEXT, calibration_text(found))
     if found.quantities:
         draw_calibration(found, folder / FIGURES)
-    write_text(folder / CALIBRATION, json.dumps(found.page(), indent=1) + "\n")
+    write_text(folder / CALIBRATION, json.dumps(plain(found), indent=1) + "\n")
 
 
 def _reply(found: "Calibration", asked: dict[str, Any]) -> Reply:
     from bowdenfit.questions.calibrate.words import calibration_text
 
     exit_code = 0 if found.is_calibrated else NOT_CALIBRATED
-    return Reply(calibration_text(found), found.page, (f"Wrote {asked['output']}.",), exit_code)
+    return Reply(calibration_text(found), lambda: found, (f"Wrote {asked['output']}.",), exit_code)
 
 
 def _show(bar: Any, done: int, total: int) -> None:

@@ -1,8 +1,8 @@
 """Several fits of the same measurements side by side."""
 
 from collections.abc import Callable, Mapping
-from dataclasses import asdict, dataclass
-from typing import Any
+from dataclasses import dataclass
+from typing import Any, ClassVar
 
 import numpy as np
 
@@ -61,6 +61,15 @@ class Comparison:
     optimal_length: dict[str, tuple[Interval, str]]
     rate_effects: dict[str, RateEffect]
 
+    JSON: ClassVar = (
+        "fits",
+        ("readings", "predicted_readings"),
+        ("not_compared", "omitted"),
+        ("parameters", "intervals"),
+        ("optimal_length", "optimal_lengths"),
+        ("rate_effect", "rate_effects"),
+    )
+
     @property
     def best(self) -> str:
         """The fit that predicts best."""
@@ -84,43 +93,41 @@ class Comparison:
         """Whether the data can tell a fit from the best: "clear", "leaning" or "open"."""
         return self.differences[name].verdict(len(self.readings))
 
-    def page(self) -> dict[str, Any]:
-        """The same as plain data."""
-        return {
-            "fits": [
-                {
-                    "name": name,
-                    "model": self.described[name],
-                    "elpd": float(self.predictions[name].elpd.sum()),
-                    "elpd_difference": d.elpd,
-                    "standard_error": _finite(d.standard_error),
-                    "monte_carlo_error": _finite(float(np.sqrt(np.sum(self.predictions[name].error ** 2)))),
-                    "stacking_weight": self.weights[name],
-                    "unreliable_readings": d.unreliable,
-                    "verdict": "best" if name == self.best else self.verdict(name),
-                }
-                for name, d in self.differences.items()
-            ],
-            "readings": [
-                {"table": table, "label": label, "fits": {name: self._reading(name, i) for name in self.differences}}
-                for i, (table, label) in enumerate(self.readings)
-            ],
-            "not_compared": [asdict(part) | {"sentence": part.sentence()} for part in self.omitted],
-            "parameters": {
-                p: {name: asdict(i) for name, i in row.by_fit.items()} for p, row in self.parameters.items()
-            },
-            "optimal_length": {name: asdict(i) | {"unit": unit} for name, (i, unit) in self.optimal_length.items()},
-            "rate_effect": {name: asdict(effect) for name, effect in self.rate_effects.items()},
-        }
+    @property
+    def fits(self) -> list[dict[str, Any]]:
+        """How well each predicts, the best first."""
+        return [
+            {
+                "name": name,
+                "model": self.described[name],
+                "elpd": self.predictions[name].elpd.sum(),
+                "elpd_difference": d.elpd,
+                "standard_error": d.standard_error,
+                "monte_carlo_error": np.sqrt(np.sum(self.predictions[name].error ** 2)),
+                "stacking_weight": self.weights[name],
+                "unreliable_readings": d.unreliable,
+                "verdict": "best" if name == self.best else self.verdict(name),
+            }
+            for name, d in self.differences.items()
+        ]
 
-    def _reading(self, name: str, i: int) -> dict[str, Any]:
-        p = self.predictions[name]
-        numbers = {"elpd": p.elpd[i], "monte_carlo_error": p.error[i], "pareto_k": p.pareto_k[i]}
-        return {what: _finite(float(value)) for what, value in numbers.items()} | {"how": p.how[i]}
+    @property
+    def predicted_readings(self) -> list[dict[str, Any]]:
+        """What each fit says of each reading."""
+        return [
+            {"table": table, "label": label, "fits": {name: p.of_reading(i) for name, p in self.predictions.items()}}
+            for i, (table, label) in enumerate(self.readings)
+        ]
 
+    @property
+    def intervals(self) -> dict[str, dict[str, Interval]]:
+        """Parameters by name and fit."""
+        return {name: row.by_fit for name, row in self.parameters.items()}
 
-def _finite(value: float) -> float | None:
-    return value if np.isfinite(value) else None
+    @property
+    def optimal_lengths(self) -> dict[str, Any]:
+        """Optimal lengths by fit, with their unit."""
+        return {name: vars(interval) | {"unit": unit} for name, (interval, unit) in self.optimal_length.items()}
 
 
 def compare(fits: Mapping[str, Record], report: Report | None = None) -> Comparison:

@@ -6,6 +6,7 @@ the limit" where it is censored, a reading of 0 deg where it counts as zero, and
 
 from collections.abc import Mapping
 from dataclasses import dataclass
+from typing import ClassVar
 
 import numpy as np
 
@@ -36,6 +37,8 @@ class Omitted:
     shared: int
     most: int
     why: str
+
+    JSON: ClassVar = (..., "sentence")
 
     def sentence(self) -> str:
         """What is left out of the comparison, and why."""

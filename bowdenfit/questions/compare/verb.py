@@ -45,7 +45,7 @@ def compare(
     with jax.enable_x64(True):
         found = compared(fits, report)
     if output is not None:
-        write_answer(output, NAME, found.page(), comparison_text(found), lambda: comparison(found))
+        write_answer(output, NAME, found, comparison_text(found), lambda: comparison(found))
     return found
 
 
@@ -72,7 +72,7 @@ def refuse_to_replace(folder: Path, force: bool) -> None:
 def _reply(found: "Comparison", asked: dict[str, Any]) -> Reply:
     from bowdenfit.questions.compare.words import comparison_text
 
-    return Reply(comparison_text(found), found.page, (f"Wrote {asked['output']}.",) if asked["output"] else ())
+    return Reply(comparison_text(found), lambda: found, (f"Wrote {asked['output']}.",) if asked["output"] else ())
 
 
 VERB = Verb(

@@ -1,8 +1,8 @@
 """What the measurements of a cable determine, before any force is measured and after a fit, in words."""
 
 from collections.abc import Mapping
-from dataclasses import asdict, dataclass
-from typing import Any
+from dataclasses import dataclass
+from typing import Any, ClassVar
 
 import jax
 import jax.numpy as jnp
@@ -22,6 +22,11 @@ GROUPS: Mapping[str, tuple[str, ...]] = {
     "elastic": ("elastic",),
     CURVES: ("curve",),
 }
+_REMEDY = (
+    "Coefficients rub at the same time, so only their weighted sum is seen; they come apart where the wrap angles change in "
+    "different proportions: measure at lengths (or routes) where one contact turns much more than the others, or measure one "
+    "coefficient separately and state it under [friction.NAME] as measured."
+)
 
 
 @dataclass(frozen=True)
@@ -42,15 +47,22 @@ class Identifiability:
     groups: dict[str, Knowledge]
     profiles: tuple[Profile, ...] = ()
 
-    def page(self) -> dict[str, Any]:
-        """The same as plain data."""
-        return {
-            "name": self.name,
-            "basis": self.basis,
-            "sentences": sentences(self),
-            "groups": {name: _page(found) for name, found in self.groups.items()},
-            "profiles": {p.name: {"value": p.values.tolist(), "rise": p.rise.tolist()} for p in self.profiles},
-        }
+    JSON: ClassVar = ("name", "basis", "sentences", "groups", ("profiles", "rises"))
+
+    def sentences(self) -> list[str]:
+        """What is known, in words: friction first, and a remedy where something is not."""
+        friction, elastic = (self.groups.get(group) for group in ("friction", "elastic"))
+        said = [determined(friction, self.measured)] if friction else []
+        if elastic is not None:
+            said.append(determined(elastic, self.measured, "Of stretch and preload they determine"))
+        if friction is not None and (friction.undetermined or friction.determined):
+            said.append(_REMEDY)
+        return said
+
+    @property
+    def rises(self) -> dict[str, Any]:
+        """Profiles by the name of their coefficient."""
+        return {p.name: {"value": p.values, "rise": p.rise} for p in self.profiles}
 
 
 @once
@@ -119,22 +131,6 @@ def _groups(model: Model, value: np.ndarray, covariance: np.ndarray, prior_sd: n
     return found
 
 
-def sentences(found: Identifiability) -> list[str]:
-    """What is known, in words: friction first, and a remedy where something is not."""
-    friction = found.groups.get("friction")
-    said = [determined(friction, found.measured)] if friction else []
-    elastic = found.groups.get("elastic")
-    if elastic is not None:
-        said.append(determined(elastic, found.measured, "Of stretch and preload they determine"))
-    if friction is not None and (friction.undetermined or friction.determined):
-        said.append(
-            "Coefficients rub at the same time, so only their weighted sum is seen; they come apart where the wrap angles "
-            "change in different proportions: measure at lengths (or routes) where one contact turns much more than the "
-            "others, or measure one coefficient separately and state it under [friction.NAME] as measured."
-        )
-    return [sentence for sentence in said if sentence]
-
-
 def determined(found: Knowledge, measured: bool, opening: str = "") -> str:
     """What some parameters are known to, in one sentence.
 
@@ -147,13 +143,13 @@ def determined(found: Knowledge, measured: bool, opening: str = "") -> str:
     parts = [f"{p.name} {_to(p)}" for p in found.by_themselves]
     parts += [f"{c.words} {_to(c)}" for c in found.determined]
     said = f"{opening} {listed(parts)}" if parts else f"{opening} no coefficient by itself"
-    resting, half = found.on_prior, found.partly
+    resting, half = found.resting, found.partly
     if half:
         verb = "owes" if len(half) == 1 else "owe"
         said += f"; {listed([p.name for p in half])} {verb} about as much to the prior as to them"
     if resting:
         verb = "rests on its prior" if len(resting) == 1 else "rest on their priors"
-        said += f"; {listed([p.name for p in resting])} {verb}"
+        said += f"; {listed(resting)} {verb}"
     if found.sharpest is not None and not found.determined:
         said += f"; sharpest of all is {found.sharpest.words}, {_to(found.sharpest)}"
     return said + "."
@@ -211,13 +207,3 @@ def _in_words(lost: list[str], known: Combination | None) -> str:
 def _stated(fit: Record, name: str) -> bool:
     """Whether the description says something of a coefficient beyond naming it."""
     return name in fit.dataset.description.friction
-
-
-def _page(found: Knowledge) -> dict[str, Any]:
-    return {
-        "parameters": [asdict(p) | {"contraction": p.contraction} for p in found.parameters],
-        "directions": [asdict(d) | {"information": d.information, "words": d.words} for d in found.directions],
-        "determined": [d.words for d in found.determined],
-        "resting_on_prior": [p.name for p in found.on_prior],
-        "collinearity": found.collinearity,
-    }

@@ -2,6 +2,7 @@
 
 from dataclasses import dataclass
 from itertools import combinations
+from typing import ClassVar
 
 import numpy as np
 
@@ -33,6 +34,8 @@ class Confounded:
     first_sd: float
     second_sd: float
     correlation: float
+
+    JSON: ClassVar = (..., "combination")
 
     @property
     def combination(self) -> str:

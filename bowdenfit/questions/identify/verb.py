@@ -138,14 +138,14 @@ def _write(found: "Identifiability", folder: str | Path) -> None:
     from bowdenfit.questions.identify.words import identifiability_text
 
     text = identifiability_text(found)
-    write_answer(folder, NAME, found.page(), text, lambda: identifiability(found.groups, found.profiles))
+    write_answer(folder, NAME, found, text, lambda: identifiability(found.groups, found.profiles))
 
 
 def _reply(found: "Identifiability", asked: dict[str, Any]) -> Reply:
     from bowdenfit.questions.identify.words import identifiability_text
 
     notes = tuple(f"Wrote {path}." for path in files_of(asked["output"], NAME)) if asked["output"] else ()
-    return Reply(identifiability_text(found), found.page, notes)
+    return Reply(identifiability_text(found), lambda: found, notes)
 
 
 VERB = Verb(

@@ -1,7 +1,7 @@
 """What `bowdenfit identify` prints."""
 
 from bowdenfit.inference.identifiability import OWN, RESTS_ON_PRIOR, Combination, Knowledge, Known
-from bowdenfit.questions.identify.answer import CURVES, Identifiability, sentences
+from bowdenfit.questions.identify.answer import CURVES, Identifiability
 from bowdenfit.words import decimals, filled, table
 
 _HARD = 1000.0  # condition number beyond which parameters are hardly told apart
@@ -11,7 +11,7 @@ def identifiability_text(found: Identifiability) -> str:
     """What measurements determine, for people: the sentence first, then parameters and combinations."""
     blocks = [
         f"{found.name}\n{'=' * len(found.name)}\n" + filled(f"Judged at {found.basis}."),
-        "\n".join(filled(sentence) for sentence in sentences(found)),
+        "\n".join(filled(sentence) for sentence in found.sentences()),
     ]
     for name, group in found.groups.items():
         blocks.append(_parameters(name, group))

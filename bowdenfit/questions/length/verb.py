@@ -22,9 +22,7 @@ def length(found: Annotated["Record", Argument("RESULTS", results=True)]) -> "Op
 
 
 def _reply(answer: "OptimalLength", _: object) -> Reply:
-    from bowdenfit.questions.summary.page import optimal_page
-
-    return Reply(f"{answer}\n", lambda: optimal_page(answer))
+    return Reply(f"{answer}\n", lambda: answer)
 
 
 VERB = Verb(

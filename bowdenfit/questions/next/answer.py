@@ -1,7 +1,7 @@
 """What to measure next, as plain data: candidates in order, repeats of the best, and what is best after it."""
 
-from dataclasses import asdict, dataclass
-from typing import Any
+from dataclasses import dataclass
+from typing import ClassVar
 
 from bowdenfit.questions.next.possible_readings import Candidate
 from bowdenfit.questions.next.target import Answer
@@ -36,6 +36,18 @@ class Ranked:
     as_good: bool
     cost: float | None = None
 
+    JSON: ClassVar = (
+        ("candidate", "name"),
+        "words",
+        ("variance_reduction", "share"),
+        ("standard_error", "error"),
+        ("sd_after", "sd"),
+        ("sd_after_standard_error", "sd_error"),
+        ("as_good_as_best", "as_good"),
+        "cost",
+        ("variance_reduction_per_cost", "share_per_cost"),
+    )
+
     @property
     def is_noticeable(self) -> bool:
         """Whether it would do anything worth the trouble."""
@@ -45,6 +57,11 @@ class Ranked:
     def worth(self) -> float:
         """What the ranking goes by: the share of the variance, for each unit of cost where there are costs."""
         return self.share / (self.cost or 1.0)
+
+    @property
+    def share_per_cost(self) -> float | None:
+        """The same; None where nothing was said of costs."""
+        return None if self.cost is None else self.worth
 
 
 @dataclass(frozen=True)
@@ -101,23 +118,18 @@ class NextMeasurement:
     route_range: tuple[float, float]
     converged: bool
 
+    JSON: ClassVar = ("answer", ("best", "best_name"), ("candidates", "ranked"), "repeats", "plan", "converged")
+
     @property
     def best(self) -> Ranked | None:
         """The candidate most worth measuring; None where none would narrow the answer noticeably."""
         first = self.ranked[0]
         return first if first.is_noticeable else None
 
-    def page(self) -> dict[str, Any]:
-        """Everything, for programs."""
-        answer = {"name": self.answer.name, "words": self.answer.words, "unit": self.answer.unit, "sd": self.answer.sd}
-        return {
-            "answer": answer,
-            "best": self.best.name if self.best else None,
-            "candidates": [_row(r) for r in self.ranked],
-            "repeats": asdict(self.repeats) if self.repeats else None,
-            "plan": [asdict(step) for step in self.plan],
-            "converged": self.converged,
-        }
+    @property
+    def best_name(self) -> str | None:
+        """Its name."""
+        return self.best.name if self.best else None
 
     def __str__(self) -> str:
         best = self.best
@@ -127,18 +139,3 @@ class NextMeasurement:
 def is_noticeable(share: float, error: float) -> bool:
     """Whether a share of the variance is worth the trouble, and more than the error of its estimate."""
     return share > max(LEAST_SHARE, WITHIN * error)
-
-
-def _row(ranked: Ranked) -> dict[str, Any]:
-    """A candidate as plain data."""
-    return {
-        "candidate": ranked.name,
-        "words": ranked.words,
-        "variance_reduction": ranked.share,
-        "standard_error": ranked.error,
-        "sd_after": ranked.sd,
-        "sd_after_standard_error": ranked.sd_error,
-        "as_good_as_best": ranked.as_good,
-        "cost": ranked.cost,
-        "variance_reduction_per_cost": None if ranked.cost is None else ranked.worth,
-    }

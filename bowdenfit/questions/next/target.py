@@ -1,6 +1,7 @@
 """The answer that the next measurement is to narrow: the best length, an efficiency or a parameter."""
 
 from dataclasses import dataclass
+from typing import ClassVar
 
 import numpy as np
 
@@ -23,6 +24,8 @@ class Answer:
     words: str
     unit: str
     draws: np.ndarray
+
+    JSON: ClassVar = ("name", "words", "unit", "sd")
 
     @property
     def sd(self) -> float:

@@ -54,7 +54,7 @@ def next_measurement(
     ranking = ranked(fit, answer, candidates, costs)
     if output is not None:
         text = next_measurement_text(ranking, top)
-        write_answer(output, NAME, ranking.page(), text, lambda: drawn(ranking))
+        write_answer(output, NAME, ranking, text, lambda: drawn(ranking))
     return ranking
 
 
@@ -62,7 +62,7 @@ def _reply(found: "NextMeasurement", asked: dict[str, Any]) -> Reply:
     from bowdenfit.questions.next.words import next_measurement_text
 
     notes = tuple(f"Wrote {path}." for path in files_of(asked["output"], NAME)) if asked["output"] else ()
-    return Reply(next_measurement_text(found, asked["top"]), found.page, notes)
+    return Reply(next_measurement_text(found, asked["top"]), lambda: found, notes)
 
 
 VERB = Verb(

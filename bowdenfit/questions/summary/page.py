@@ -1,13 +1,11 @@
 """The one page that programs read: `summary.json`; people's versions are made from the same numbers."""
 
-from dataclasses import asdict
 from typing import Any
 
 import numpy as np
 
 from bowdenfit.inference.diagnostics import shortfalls
 from bowdenfit.inference.interval import Interval
-from bowdenfit.inference.least_squares import Estimate
 from bowdenfit.inference.samplers import recommendation
 from bowdenfit.kinds.recordings.accounts import accounts
 from bowdenfit.model import EFFICIENCY_TERMS
@@ -18,7 +16,6 @@ from bowdenfit.questions.identify.confounding import confounded
 from bowdenfit.questions.identify.contradiction import agreement_page
 from bowdenfit.questions.recorded.rate import rate_effect
 from bowdenfit.questions.summary.verdict import verdict
-from bowdenfit.results.length import OptimalLength
 from bowdenfit.results.plain import plain
 from bowdenfit.results.record import Draws, Record
 
@@ -48,7 +45,7 @@ def summarize(fit: Record) -> dict[str, Any]:
         "agreement": agreement_page(fit),
         "measured": measured_against_predicted(fit),
         "friction_model": fit.dataset.description.friction_model,
-        "confounded": [asdict(c) | {"combination": c.combination} for c in confounded(fit)],
+        "confounded": confounded(fit),
         "seed": fit.provenance.seed,
         "versions": dict(fit.provenance.versions),
     }
@@ -60,13 +57,13 @@ def summarize(fit: Record) -> dict[str, Any]:
         page["checks"] = checks
     effect = rate_effect(fit)
     if effect is not None:
-        page["rate_effect"] = asdict(effect)
+        page["rate_effect"] = effect
     if fit.posterior is not None:
         page["sampler"] = _sampler(fit, fit.posterior)
         if fit.posterior.agreement is not None:
-            page["samplers"] = fit.posterior.agreement.page()
+            page["samplers"] = fit.posterior.agreement
         if fit.dataset.description.route is not None:
-            page["optimal"] = optimal_page(fit.optimal_length())
+            page["optimal"] = fit.optimal_length()
     everything: dict[str, Any] = plain(page)
     return everything
 
@@ -94,10 +91,10 @@ def _parameter(fit: Record, name: str) -> dict[str, Any]:
     if parameter.fixed is not None:
         row["fixed"] = parameter.fixed * parameter.shown_scale
     if name in fit.least_squares.estimates:
-        row["least_squares"] = _estimate_page(fit.least_squares.estimates[name])
+        row["least_squares"] = fit.least_squares.estimates[name]
     if fit.posterior is not None and name in fit.posterior.values:
         draws, diagnostics = fit.posterior.values[name], fit.posterior.diagnostics[name]
-        row |= asdict(Interval.of(draws)) | {
+        row |= vars(Interval.of(draws)) | {
             "ess_bulk": diagnostics.ess_bulk,
             "ess_tail": diagnostics.ess_tail,
             "r_hat": diagnostics.r_hat,
@@ -105,11 +102,6 @@ def _parameter(fit: Record, name: str) -> dict[str, Any]:
             "contraction": contraction(fit, name),
         }
     return row
-
-
-def _estimate_page(estimate: Estimate) -> dict[str, Any]:
-    """An estimate with its interval; `open` names the sides on which nothing limits it."""
-    return asdict(estimate) | {"open": [side for side in ("lower", "upper") if np.isinf(getattr(estimate, side))]}
 
 
 def contraction(fit: Record, name: str) -> float:
@@ -155,20 +147,3 @@ def measured_against_predicted(fit: Record) -> list[dict[str, Any]]:
             row["relative_error"] = row["measured"] / row["predicted"] - 1
             rows.append(row)
     return rows
-
-
-def optimal_page(answer: OptimalLength) -> dict[str, Any]:
-    """The design answer as plain data."""
-    return {
-        "route": answer.variable,
-        "unit": answer.unit,
-        "length": asdict(answer.length) | {"at_edge": answer.at_edge},
-        "efficiency": asdict(answer.efficiency),
-        "window": {
-            "within": answer.window.within,
-            "probability": answer.window.probability,
-            "from": answer.window.start,
-            "to": answer.window.stop,
-        },
-        "choices": [asdict(choice) for choice in answer.choices],
-    }

@@ -1,0 +1,55 @@
+"""No file of the package imports, by however many steps, a file that imports it: lazy imports and those for types count."""
+
+import ast
+from pathlib import Path
+
+PACKAGE = Path(__file__).parents[2] / "bowdenfit"
+
+
+def modules() -> dict[str, Path]:
+    """Every file of the package by the name it is imported by."""
+    paths = {path.relative_to(PACKAGE.parent).with_suffix(""): path for path in PACKAGE.rglob("*.py")}
+    return {".".join(p.parts).removesuffix(".__init__"): path for p, path in paths.items()}
+
+
+def imported(path: Path, known: dict[str, Path]) -> set[str]:
+    """Names of the package's files that a file imports, anywhere in it."""
+    found: set[str] = set()
+    for node in ast.walk(ast.parse(path.read_text(encoding="utf-8"))):
+        if isinstance(node, ast.Import):
+            found |= {alias.name for alias in node.names}
+        elif isinstance(node, ast.ImportFrom):
+            assert node.level == 0, f"{path} imports by a relative name"
+            # A name may be a file of its own; otherwise it is something inside the file.
+            found |= {name if (name := f"{node.module}.{a.name}") in known else str(node.module) for a in node.names}
+    return found & set(known)
+
+
+def circles(arrows: dict[str, set[str]]) -> list[set[str]]:
+    """Groups of nodes that reach each other, and single ones that reach themselves, along arrows."""
+    reached = {node: _reached(node, arrows) for node in arrows}
+    groups = {frozenset(b for b in reached[a] if a in reached[b]) for a in arrows}
+    return [set(group) for group in groups if group]
+
+
+def _reached(start: str, arrows: dict[str, set[str]]) -> set[str]:
+    """Nodes at the end of any path of one step or more."""
+    found: set[str] = set()
+    todo = list(arrows[start])
+    while todo:
+        node = todo.pop()
+        if node not in found:
+            found.add(node)
+            todo += arrows[node]
+    return found
+
+
+def test_circles_are_found():
+    found = circles({"a": {"b"}, "b": {"c"}, "c": {"b"}, "d": {"d"}, "e": set()})
+    assert sorted(map(sorted, found)) == [["b", "c"], ["d"]]
+
+
+def test_no_files_import_each_other():
+    known = modules()
+    arrows = {name: imported(path, known) for name, path in known.items()}
+    assert [sorted(group) for group in circles(arrows)] == []

@@ -21,13 +21,10 @@ from bowdenfit.description import (
 from bowdenfit.errors import DescriptionError, nearest
 from bowdenfit.kinds.measured_cable import measured_cable
 from bowdenfit.kinds.measurements import Measurements
-from bowdenfit.kinds.recordings.blocks import RECORDED
 from bowdenfit.kinds.term import Term
 from bowdenfit.kinds.terms import measured_kinds, parameters_asked_for
 from bowdenfit.parameters.priors import HalfNormal, LogNormal, Normal, Prior, TruncatedNormal, Uniform
 from bowdenfit.parameters.space import Parameter, ParameterSpace
-
-EFFICIENCY_TERMS = ("efficiency", "run_efficiency", RECORDED)  # terms whose readings are efficiencies
 
 
 @dataclass(frozen=True)

@@ -10,6 +10,7 @@ from bowdenfit.kinds.kind import Kind
 from bowdenfit.kinds.loop import LOOP
 from bowdenfit.kinds.measurements import Measurements
 from bowdenfit.kinds.preload import PRELOAD
+from bowdenfit.kinds.readings import Readings
 from bowdenfit.kinds.recordings import RECORDINGS
 from bowdenfit.kinds.stretch import STRETCH
 
@@ -25,3 +26,9 @@ def each_table(measurements: Measurements) -> Iterator[tuple[Kind[Any], Any]]:
         table = measurements.table(kind.table)
         if table is not None:
             yield kind, table
+
+
+def readings_called(name: str) -> Readings:
+    """What readings of this name are called; by their name where no kind has such."""
+    known = (readings for kind in KINDS.values() for readings in kind.readings if readings.name == name)
+    return next(known, Readings(name, name, name, "{}", name))

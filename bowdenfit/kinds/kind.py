@@ -13,6 +13,7 @@ from bowdenfit.errors import DatasetError
 from bowdenfit.files.columns import ColumnSource
 from bowdenfit.kinds.design import Design
 from bowdenfit.kinds.measurements import Measurements
+from bowdenfit.kinds.readings import Readings
 from bowdenfit.kinds.rows import Conditions
 from bowdenfit.types import Vector
 
@@ -101,6 +102,7 @@ class Kind(Generic[AnyTable]):
     Args:
         name: What it is called under [tables] in cable.toml, and in fit.json.
         table: The class of its tables; no two kinds share one.
+        readings: What its readings are called, by the names that its terms give them.
         read: Reads its files.
         settings: What may stand under its name in [tables].
         contradiction: What a description says that cannot be, in a sentence without its full stop; its settings are None
@@ -124,6 +126,7 @@ class Kind(Generic[AnyTable]):
 
     name: str
     table: type[AnyTable]
+    readings: tuple[Readings, ...]
     read: Callable[[Source], Found[AnyTable]]
     describe: Callable[[AnyTable, Description], list[str]]
     settings: type[TableSettings] = Table

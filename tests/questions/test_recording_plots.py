@@ -352,12 +352,15 @@ def test_without_draws_there_are_lines_and_no_intervals():
 
 
 def test_recorded_efficiencies_are_drawn_like_those_of_runs():
-    from bowdenfit.questions.length.efficiency_figure import KINDS
+    from bowdenfit.kinds import readings_called
+    from bowdenfit.kinds.recordings.blocks import RECORDED
 
-    (what,) = (w for w in KINDS if w.startswith("recorded"))
-    assert KINDS[what] == KINDS["run_efficiency"]
+    assert readings_called(RECORDED).are_runs
+    assert readings_called(RECORDED).axis == readings_called("run_efficiency").axis
     route = np.array([450.0, 500.0])
-    points = EfficiencyPoints(what, ("a", "b"), route, 0.8 + 0 * route, np.full((5, 2), 0.79), np.ones(2, dtype=bool))
+    points = EfficiencyPoints(
+        RECORDED, ("a", "b"), route, 0.8 + 0 * route, np.full((5, 2), 0.79), np.ones(2, dtype=bool)
+    )
     assert FIGURES["residuals"].applies(dataclasses.replace(data_of([]), points=(points,)))
 
 

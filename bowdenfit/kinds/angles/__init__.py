@@ -12,10 +12,12 @@ from bowdenfit.kinds.angles.table import (
     warnings_of,
 )
 from bowdenfit.kinds.kind import Kind
+from bowdenfit.kinds.readings import Readings
 
 ANGLES = Kind(
     name="angles",
     table=AngleTable,
+    readings=(Readings("wrap_angle", "angles", "wrap angles", "{}", "Wrap angle (deg)", "deg"),),
     read=read_angles,
     settings=AngleSettings,
     contradiction=contradiction,

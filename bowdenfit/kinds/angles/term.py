@@ -87,7 +87,11 @@ class AnglesTerm:
 def angles_term(cable: Cable, table: AngleTable) -> AnglesTerm:
     """The term of an angle table, with undetected angles entering as the description says."""
     description = cable.description
-    settings, route, published = description.table(AngleSettings), description.route, description.geometry == "published"
+    settings, route, published = (
+        description.table(AngleSettings),
+        description.route,
+        description.geometry == "published",
+    )
     assert settings is not None and route is not None  # an angle table is read only with both
     readings: list[tuple[float, float, str]] = []
     routes: dict[str, np.ndarray] = {}

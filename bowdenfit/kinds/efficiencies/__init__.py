@@ -2,11 +2,13 @@
 
 from bowdenfit.kinds.efficiencies.table import EfficiencyTable, describe, empty, implausible, page, read_efficiencies
 from bowdenfit.kinds.kind import Kind, itself
+from bowdenfit.kinds.readings import efficiencies
 from bowdenfit.kinds.wrap_angles import check_rows
 
 EFFICIENCIES = Kind(
     name="efficiencies",
     table=EfficiencyTable,
+    readings=(efficiencies("efficiency", "efficiencies", "efficiencies", "efficiency at {}"),),
     read=read_efficiencies,
     check=check_rows,
     describe=describe,

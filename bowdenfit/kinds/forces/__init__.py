@@ -5,11 +5,16 @@ import numpy as np
 from bowdenfit.kinds.forces.table import ForceTable, read_forces
 from bowdenfit.kinds.forces.words import count, describe, empty, implausible, page
 from bowdenfit.kinds.kind import Kind, itself
+from bowdenfit.kinds.readings import Readings, efficiencies
 from bowdenfit.kinds.wrap_angles import check_rows
 
 FORCES = Kind(
     name="forces",
     table=ForceTable,
+    readings=(
+        efficiencies("run_efficiency", "forces", "force runs", "run {}", are_runs=True),
+        Readings("held_ratio", "held forces", "held forces", "{}", "Input over output force"),
+    ),
     read=read_forces,
     check=check_rows,
     describe=describe,

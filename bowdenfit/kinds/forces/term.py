@@ -210,4 +210,10 @@ def _drawn_table(_: Description, table: ForceTable, drawn: Mapping[str, np.ndarr
     return replace(table, input_force=drawn["input_force"], output_force=drawn["output_force"])
 
 
-FORCES = TermKind("forces", force_terms, _parameters, Bench(_draw, _drawn_table), tells_mountings=True)
+FORCES = TermKind(
+    "forces",
+    force_terms,
+    _parameters,
+    Bench(_draw, _drawn_table),
+    tells_mountings=True,
+)

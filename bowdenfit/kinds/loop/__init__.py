@@ -3,11 +3,13 @@
 from bowdenfit.kinds.kind import Kind, itself
 from bowdenfit.kinds.loop.table import LoopTable, read_loop
 from bowdenfit.kinds.loop.words import contradiction, describe, empty, implausible, page, warnings_of
+from bowdenfit.kinds.readings import Readings
 from bowdenfit.kinds.wrap_angles import check_rows
 
 LOOP = Kind(
     name="loop",
     table=LoopTable,
+    readings=(Readings("loop_output_force", "loop", "loop", "output force in {}", "Output force (N)"),),
     read=read_loop,
     contradiction=contradiction,
     check=check_rows,

@@ -163,4 +163,9 @@ def _draw(
     }
 
 
-LOOP = TermKind("loop", lambda cable, table, angles: (loop_term(cable, table, angles),), _parameters, Bench(_draw))
+LOOP = TermKind(
+    "loop",
+    lambda cable, table, angles: (loop_term(cable, table, angles),),
+    _parameters,
+    Bench(_draw),
+)

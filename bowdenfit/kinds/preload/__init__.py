@@ -3,10 +3,12 @@
 from bowdenfit.kinds.kind import Kind
 from bowdenfit.kinds.preload.table import PreloadTable, PreloadTableSettings, read_preload
 from bowdenfit.kinds.preload.words import describe, empty, implausible, page, warnings_of
+from bowdenfit.kinds.readings import Readings
 
 PRELOAD = Kind(
     name="preload",
     table=PreloadTable,
+    readings=(Readings("measured_preload", "preload", "preload", "preload at {}", "Preload (N)"),),
     read=read_preload,
     settings=PreloadTableSettings,
     describe=describe,

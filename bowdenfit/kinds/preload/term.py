@@ -56,4 +56,9 @@ def _draw(
     return {"preload": jnp.maximum(cable.elasticity.preload(values, bend)[0] + noise, 0.0)}
 
 
-PRELOAD = TermKind("preload", lambda cable, table, _: (preload_term(cable, table),), _parameters, Bench(_draw))
+PRELOAD = TermKind(
+    "preload",
+    lambda cable, table, _: (preload_term(cable, table),),
+    _parameters,
+    Bench(_draw),
+)

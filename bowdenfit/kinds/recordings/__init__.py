@@ -3,6 +3,7 @@
 import numpy as np
 
 from bowdenfit.kinds.kind import Kind
+from bowdenfit.kinds.readings import Readings, efficiencies
 from bowdenfit.kinds.recordings.angles import check_angles, recorded_angles
 from bowdenfit.kinds.recordings.settings import RecordingsTable, contradiction, quantities_of
 from bowdenfit.kinds.recordings.table import read_recordings
@@ -20,6 +21,10 @@ def _forces(recordings: Recordings) -> Vector:
 RECORDINGS = Kind(
     name="recordings",
     table=Recordings,
+    readings=(
+        efficiencies("recorded_efficiency", "recordings", "recordings", "recording {}", are_runs=True),
+        Readings("recorded_loss", "recordings", "recordings", "recording {}", "Force lost (N)"),
+    ),
     read=read_recordings,
     settings=RecordingsTable,
     contradiction=contradiction,

@@ -1,12 +1,14 @@
 """Stretch of the rope under load."""
 
 from bowdenfit.kinds.kind import Kind
+from bowdenfit.kinds.readings import Readings
 from bowdenfit.kinds.stretch.table import StretchTable, read_stretch
 from bowdenfit.kinds.stretch.words import describe, empty, implausible, page, warnings_of
 
 STRETCH = Kind(
     name="stretch",
     table=StretchTable,
+    readings=(Readings("stretch", "stretch", "stretch", "stretch under {}", "Stretch (mm)"),),
     read=read_stretch,
     describe=describe,
     warnings=warnings_of,

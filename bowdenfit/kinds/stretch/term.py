@@ -80,4 +80,9 @@ def _draw(
     return {"stretch": term.expected(values, jax.tree.map(jnp.asarray, term.data)) + noise}
 
 
-STRETCH = TermKind("stretch", lambda cable, table, _: (stretch_term(cable, table),), _parameters, Bench(_draw))
+STRETCH = TermKind(
+    "stretch",
+    lambda cable, table, _: (stretch_term(cable, table),),
+    _parameters,
+    Bench(_draw),
+)

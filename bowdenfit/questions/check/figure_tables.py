@@ -3,20 +3,10 @@
 import numpy as np
 
 from bowdenfit.inference.psis import RELIABLE_K
+from bowdenfit.kinds import readings_called
 from bowdenfit.questions.check.answer import Checks, TableChecks
 from bowdenfit.questions.check.figure_data import CheckedTable
 
-TABLE_NAMES = {
-    "wrap_angle": "wrap angles",
-    "efficiency": "efficiencies",
-    "run_efficiency": "force runs",
-    "held_ratio": "held forces",
-    "recorded_efficiency": "recordings",
-    "recorded_loss": "recordings",
-    "stretch": "stretch",
-    "measured_preload": "preload",
-    "loop_output_force": "loop",
-}
 _SHOWN = 2  # places that deviations are shown against
 
 
@@ -37,7 +27,7 @@ def _checked(table: TableChecks, outlier: list[bool]) -> CheckedTable:
         at = judged.at
         off, low, high = (part - at for part in (judged.share, judged.low, judged.high))
     return CheckedTable(
-        TABLE_NAMES.get(table.table, table.table),
+        readings_called(table.table).words,
         table.z_score,
         dict(list(table.places.numbers.items())[:_SHOWN]),
         table.places.group,

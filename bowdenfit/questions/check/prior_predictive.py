@@ -10,24 +10,16 @@ from jax import Array
 from bowdenfit.dataset import Dataset
 from bowdenfit.inference.draws import for_each_draw
 from bowdenfit.inference.log_density import LogDensity
+from bowdenfit.kinds import readings_called
 from bowdenfit.kinds.term import Term
-from bowdenfit.model import EFFICIENCY_TERMS, Model, build_model
+from bowdenfit.model import Model, build_model
 from bowdenfit.questions.check.answer import readings_of
 from bowdenfit.questions.check.figure_data import PriorPredictive, PriorTable
-from bowdenfit.questions.check.figure_tables import TABLE_NAMES
 from bowdenfit.questions.check.residual_places import places_of
 from bowdenfit.results.optimum import route_grid
 
 QUANTILES = (0.005, 0.05, 0.5, 0.95, 0.995)
 _DRAWS = 4096
-_AXES = {
-    "wrap_angle": "Wrap angle (deg)",
-    "held_ratio": "Input over output force",
-    "recorded_loss": "Force lost (N)",
-    "stretch": "Stretch (mm)",
-    "measured_preload": "Preload (N)",
-    "loop_output_force": "Output force (N)",
-} | dict.fromkeys(EFFICIENCY_TERMS, "Efficiency (%)")
 
 
 def prior_predictive(dataset: Dataset, seed: int = 0) -> PriorPredictive:
@@ -72,13 +64,13 @@ def _quantiles(draws: np.ndarray) -> np.ndarray:
 
 def _table(dataset: Dataset, term: Term, drawn: np.ndarray) -> PriorTable:
     """One table's readings beside their quantiles; a reading that is only a bound is outside where it is too low for them."""
-    scale = 100.0 if term.name in EFFICIENCY_TERMS else 1.0
-    reading, at_most = readings_of(term)
+    called = readings_called(term.name)
+    scale, (reading, at_most) = called.shown_scale, readings_of(term)
     quantiles, reading = scale * _quantiles(drawn), scale * reading
     outside = (reading < quantiles[0]) | (~at_most & (reading > quantiles[-1]))
     places = places_of(dataset, term)
     place, numbers = next(iter(places.numbers.items()))
     return PriorTable(
-        TABLE_NAMES.get(term.name, term.name), _AXES.get(term.name, term.name), numbers, place, places.group,
+        called.words, called.axis, numbers, place, places.group,
         term.labels, np.where(at_most, np.nan, reading), quantiles, outside,
     )  # fmt: skip

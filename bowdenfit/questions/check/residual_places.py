@@ -38,7 +38,7 @@ def places_of(dataset: Dataset, term: Term) -> Places:
     """
     n, route = len(term.labels), dataset.description.route
     numbers, back = _elastic(dataset, term)
-    at = _route_values(term)
+    at = route_values(term)
     inside = np.ones(n, dtype=bool)
     if route is not None and at is not None and np.isfinite(at).all():
         numbers = {route.label: at} | numbers
@@ -61,7 +61,7 @@ def _elastic(dataset: Dataset, term: Term) -> tuple[dict[str, np.ndarray], np.nd
     return {}, nothing
 
 
-def _route_values(term: Term) -> np.ndarray | None:
+def route_values(term: Term) -> np.ndarray | None:
     """Route value of each reading: of its row, of its curve's reading, or the mean over its run."""
     data, n = term.data, len(term.labels)
     at = data.get("route")

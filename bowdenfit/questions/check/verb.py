@@ -127,7 +127,9 @@ def describe(
     if prior_predictive is not None:
         from bowdenfit.questions.check.prior_words import prior_predictive_text
 
-        text += prior_predictive_text(show_priors(found, prior_predictive)) + f"Wrote the figure to {prior_predictive}.\n"
+        text += (
+            prior_predictive_text(show_priors(found, prior_predictive)) + f"Wrote the figure to {prior_predictive}.\n"
+        )
     return Reply(text)
 
 

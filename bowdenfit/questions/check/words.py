@@ -3,21 +3,10 @@
 from collections.abc import Iterable, Mapping
 from typing import Any
 
-from bowdenfit.model import EFFICIENCY_TERMS
-from bowdenfit.questions.check.figure_tables import TABLE_NAMES
+from bowdenfit.kinds import readings_called
 from bowdenfit.words import decimals, filled, listed
 
 _FEW = 3  # readings of a kind that are named; of more, the rest is counted
-_NAMES = {
-    "wrap_angle": "{}",
-    "efficiency": "efficiency at {}",
-    "run_efficiency": "run {}",
-    "recorded_efficiency": "recording {}",
-    "recorded_loss": "recording {}",
-    "stretch": "stretch under {}",
-    "measured_preload": "preload at {}",
-    "loop_output_force": "output force in {}",
-}
 _HEADING = """Fit checks: every reading against its prediction from all the others
 (z is its deviation in standard deviations, k how far the fit leans on it: too far beyond 0.7)"""
 _ANSWERS = {"optimal_length": "the best length", "optimal_efficiency": "the efficiency there"}
@@ -37,15 +26,13 @@ def checks_text(page: Mapping[str, Any]) -> str:
 
 def named(reading: Mapping[str, Any]) -> str:
     """A reading in words."""
-    return _NAMES.get(reading["table"], "{}").format(reading["label"])
+    return readings_called(reading["table"]).one.format(reading["label"])
 
 
 def _scatter(page: Mapping[str, Any]) -> str:
     """How many readings their intervals hold, and which tables scatter otherwise than predicted."""
     n, held = (sum(t[key] for t in page["tables"]) for key in ("readings", "in_interval"))
-    faults = [
-        f"the readings of {TABLE_NAMES.get(t['table'], t['table'])} {t['fault']}" for t in page["tables"] if t["fault"]
-    ]
+    faults = [f"the readings of {readings_called(t['table']).words} {t['fault']}" for t in page["tables"] if t["fault"]]
     start = f"The 90 % intervals of these predictions hold {held} of {n} readings."
     if not faults:
         return start
@@ -80,7 +67,7 @@ def _told(reading: Mapping[str, Any]) -> str:
 
 def _shown(reading: Mapping[str, Any], value: float) -> str:
     """A value of a reading's kind with its unit."""
-    if reading["table"] in EFFICIENCY_TERMS:
+    if readings_called(reading["table"]).are_efficiencies:
         return f"{100 * value:.{decimals(100 * reading['sd'])}f} %"
     unit = "" if reading["unit"] == "1" else f" {reading['unit']}"
     return f"{value:.{decimals(reading['sd'])}f}{unit}"
@@ -89,7 +76,7 @@ def _shown(reading: Mapping[str, Any], value: float) -> str:
 def _trends(page: Mapping[str, Any]) -> str:
     parts = []
     for t in page["trends"]:
-        what = t["group"] or TABLE_NAMES.get(t["table"], t["table"])
+        what = t["group"] or readings_called(t["table"]).words
         along = "" if t["against"] == "Stroke" else f" with the {t['against'].split(' (')[0].lower()}"
         parts.append(f"those of {what} {t['shape']}{along if t['shape'] in {'grow', 'fall'} else _over(along)}")
     if not parts:

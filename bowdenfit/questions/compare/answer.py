@@ -12,13 +12,13 @@ from bowdenfit.inference.comparison import Difference, Prediction, differences, 
 from bowdenfit.inference.interval import Interval
 from bowdenfit.inference.leave_one_out import Readings, leave_one_out
 from bowdenfit.inference.log_density import LogDensity as Density
+from bowdenfit.kinds import readings_called
 from bowdenfit.kinds.angles.table import AngleSettings
 from bowdenfit.questions.compare.common_readings import ANGLES, Common, Omitted, common_readings
 from bowdenfit.questions.recorded.rate import RateEffect, rate_effect
 from bowdenfit.results.record import Draws, Record
 
 _SHOWN_ROLES = {"friction", "friction_model", "sensor"}
-_OF_RUNS = {"run_efficiency", "recorded_efficiency"}  # tables whose readings are whole runs
 Report = Callable[[str], None]
 
 
@@ -83,7 +83,7 @@ class Comparison:
     @property
     def counts_runs(self) -> bool:
         """Whether some of the readings are whole runs."""
-        return any(table in _OF_RUNS for table, _ in self.readings)
+        return any(readings_called(table).are_runs for table, _ in self.readings)
 
     def pointwise(self, name: str) -> np.ndarray:
         """How much worse a fit predicts each reading than the best one does."""

@@ -4,19 +4,11 @@ from dataclasses import asdict
 from typing import Any
 
 from bowdenfit.inference.disagreement import WORTH_SAYING, Disagreement
+from bowdenfit.kinds import readings_called
 from bowdenfit.results.record import Record
 from bowdenfit.words import decimals
 
 _AS_MUCH = 0.8  # of the largest conflict: beyond that either table may be the odd one out
-_TABLES = {
-    "wrap_angle": "angles",
-    "efficiency": "efficiencies",
-    "run_efficiency": "forces",
-    "held_ratio": "held forces",
-    "recorded_efficiency": "recordings",
-    "measured_preload": "preload",
-    "loop_output_force": "loop",
-}
 
 
 def agreement_page(fit: Record) -> list[dict[str, Any]]:
@@ -31,22 +23,19 @@ def contradiction(fit: Record) -> str:
     if worst is None or worst.sds < WORTH_SAYING:
         return ""
     unit, digits = _unit(fit, worst), decimals(worst.rest_sd)
-    others = [
-        d.table for d in fit.least_squares.disagreements if d is not worst and d.conflict > _AS_MUCH * worst.conflict
-    ]
-    or_else = f" (or {' or '.join(f'that of {_name(table)}' for table in others)})" if others else ""
+    name, *others = (
+        readings_called(d.table).table
+        for d in (worst, *(d for d in fit.least_squares.disagreements if d is not worst))
+        if d.conflict > _AS_MUCH * worst.conflict
+    )
+    or_else = f" (or {' or '.join(f'that of {other}' for other in others)})" if others else ""
     together = f"{worst.together:.{digits}f}{unit}"
     return (
-        f"The table of {_name(worst.table)}{or_else} disagrees with everything else by {worst.sds:.1f} standard deviations: "
+        f"The table of {name}{or_else} disagrees with everything else by {worst.sds:.1f} standard deviations: "
         f"without it {worst.parameter} would be {worst.rest:.{digits}f} +- {worst.rest_sd:.{digits}f}{unit}, with it the fit "
         f"is at {together}. Look at the units and wrap angles of that table and at how it was measured: the numbers below "
         "are a compromise between readings that cannot all be right."
     )
-
-
-def _name(table: str) -> str:
-    """A table as the description calls it."""
-    return _TABLES.get(table, table)
 
 
 def _unit(fit: Record, found: Disagreement) -> str:

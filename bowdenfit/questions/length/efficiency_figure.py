@@ -6,6 +6,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from bowdenfit.kinds import readings_called
 from bowdenfit.plots.bands import draw_band, route_limits, shade_outside
 from bowdenfit.plots.densities import GRID_POINTS, density
 from bowdenfit.plots.layout import TITLE, legend_above, panels
@@ -27,9 +28,8 @@ if TYPE_CHECKING:
     from bowdenfit.questions.summary.figure_data import EfficiencyPoints, FigureData
     from bowdenfit.results.length import OptimalLength
 
-# marker, its size [pt] and label by table
-RUN = ("D", 2.8, "Measured, mean of a run")
-KINDS = {"efficiency": ("o", 4.5, "Measured"), "run_efficiency": RUN, "recorded_efficiency": RUN}
+# marker, its size [pt] and label
+READING, RUN = ("o", 4.5, "Measured"), ("D", 2.8, "Measured, mean of a run")
 MOST_NUMBERS, LEAST_NUMBER = 16, 0.5  # so many bars have numbers over them, if they are so many percent high
 LEAST_AT_EDGE = 0.005
 
@@ -74,7 +74,7 @@ def _curve_and_points(axes: Axes, data: FigureData) -> None:
 
 def _measured(axes: Axes, points: EfficiencyPoints, where: np.ndarray, fill: str, note: str) -> None:
     """Some of the measured points; the note is added to their label."""
-    marker, size, label = KINDS[points.what]
+    marker, size, label = RUN if readings_called(points.what).are_runs else READING
     if where.any():
         axes.plot(
             points.route[where], 100 * points.measured[where], marker, color=BLACK, markerfacecolor=fill,

@@ -5,10 +5,12 @@ import jax.numpy as jnp
 import numpy as np
 
 from bowdenfit.inference.draws import curves_of
-from bowdenfit.model import EFFICIENCY_TERMS, Model
+from bowdenfit.kinds import readings_called
+from bowdenfit.model import Model
 from bowdenfit.questions.bends.figures import elastic_figures
 from bowdenfit.questions.check.answer import checks_of
 from bowdenfit.questions.check.figure_tables import checked_tables
+from bowdenfit.questions.check.residual_places import route_values
 from bowdenfit.questions.recorded.traces import dependences, traces, velocity_unit
 from bowdenfit.questions.summary.figure_data import (
     BAND_QUANTILES,
@@ -82,13 +84,11 @@ def _angle_curve(fit: Record, column: str, band: Band) -> AngleCurve:
 def _points(fit: Record) -> tuple[EfficiencyPoints, ...]:
     route, points = fit.dataset.description.route, []
     for term in fit.model.terms:
-        if term.name not in EFFICIENCY_TERMS:
+        if not readings_called(term.name).are_efficiencies:
             continue
-        at = np.asarray(term.data["route"], dtype=float)
-        if term.name != "efficiency":
-            at = np.array([at[term.data["run"] == run].mean() for run in range(len(term.labels))])
-        if route is None:
-            at = np.full(len(at), np.nan)
+        at = route_values(term)
+        if route is None or at is None:
+            at = np.full(len(term.labels), np.nan)
         predicted = fit.least_squares.readings[term.name][None]
         if fit.posterior is not None:
             predicted = np.quantile(fit.posterior.replicated[term.name], BAND_QUANTILES, axis=(0, 1))

@@ -7,8 +7,8 @@ import numpy as np
 from bowdenfit.inference.diagnostics import shortfalls
 from bowdenfit.inference.interval import Interval
 from bowdenfit.inference.samplers import recommendation
+from bowdenfit.kinds import readings_called
 from bowdenfit.kinds.recordings.accounts import accounts
-from bowdenfit.model import EFFICIENCY_TERMS
 from bowdenfit.questions.bends.page import elastic_page
 from bowdenfit.questions.check.answer import checks_of
 from bowdenfit.questions.check.page import checks_page
@@ -132,7 +132,7 @@ def measured_against_predicted(fit: Record) -> list[dict[str, Any]]:
     """
     rows = []
     for term in fit.model.terms:
-        if term.name not in EFFICIENCY_TERMS:
+        if not readings_called(term.name).are_efficiencies:
             continue
         observed = term.observed()
         for i, label in enumerate(term.labels):

@@ -3,10 +3,9 @@
 from typing import Any
 
 from bowdenfit.cable.load_cells import RUN_SCATTER
-from bowdenfit.kinds import each_table
+from bowdenfit.kinds import each_table, readings_called
 from bowdenfit.kinds.angles.table import AngleSettings
 from bowdenfit.kinds.recordings.words import recordings_text
-from bowdenfit.model import EFFICIENCY_TERMS
 from bowdenfit.questions.bends.words import elastic_text
 from bowdenfit.questions.check.words import checks_text
 from bowdenfit.questions.identify.answer import determined, identifiability
@@ -220,12 +219,12 @@ def _curves(fit: Record, page: dict[str, Any]) -> str:
 
 
 def _scatter(page: dict[str, Any]) -> str:
-    units = {"wrap_angle": "deg"} | dict.fromkeys(EFFICIENCY_TERMS, "% of the force")
-    parts = []
-    for term, sd in page["least_squares"]["residual_sd"].items():
-        if sd is not None and term in units:
-            value = f"{sd:.2f} {units[term]}" if term == "wrap_angle" else f"{100 * sd:.2f} {units[term]}"
-            parts.append(f"{term.replace('_', ' ')} {value}")
+    found = [(readings_called(name), sd) for name, sd in page["least_squares"]["residual_sd"].items() if sd is not None]
+    parts = [
+        f"{called.name.replace('_', ' ')} {called.shown_scale * sd:.2f} {called.scatter_unit}"
+        for called, sd in found
+        if called.scatter_unit
+    ]
     return filled(f"Residual standard deviation of least squares: {listed(parts)}.") if parts else ""
 
 
@@ -233,7 +232,7 @@ def _mountings(fit: Record, page: dict[str, Any]) -> str:
     """The scatter from mounting to mounting, in words."""
     tau, runs = (
         page["parameters"].get(RUN_SCATTER, {}),
-        {r["label"] for r in page["measured"] if r["table"] != "efficiency"},
+        {r["label"] for r in page["measured"] if readings_called(r["table"]).are_runs},
     )
     if "median" not in tau or not runs:
         return ""
@@ -288,7 +287,7 @@ def _measured(fit: Record, page: dict[str, Any]) -> str:
     rows = []
     for row in page["measured"]:
         interval = [f"{row['q05']:.2%} to {row['q95']:.2%}"] if drawn else []
-        what = "" if row["table"] == "efficiency" else "run "
+        what = "run " if readings_called(row["table"]).are_runs else ""
         rows.append(
             [
                 what + row["label"],

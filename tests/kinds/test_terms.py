@@ -1,0 +1,41 @@
+"""What every kind of measurement declares of its half in the likelihood."""
+
+from pathlib import Path
+
+import pytest
+
+from bowdenfit.dataset import load_dataset
+from bowdenfit.kinds import KINDS, each_table, readings_called
+from bowdenfit.kinds.terms import TERMS
+from bowdenfit.model import build_model
+
+READINGS = [(name, readings) for name, kind in KINDS.items() for readings in kind.readings]
+
+
+def test_every_kind_of_table_has_a_term_of_the_same_name():
+    assert list(TERMS) == list(KINDS)
+
+
+def test_no_two_kinds_call_their_readings_alike():
+    names = [readings.name for _, readings in READINGS]
+    assert len(names) == len(set(names))
+
+
+@pytest.mark.parametrize(("kind", "readings"), READINGS, ids=lambda value: getattr(value, "name", value))
+def test_every_table_is_called_as_the_description_calls_it(kind, readings):
+    assert readings.table.split()[-1] == kind
+    assert readings_called(readings.name) is readings
+
+
+@pytest.mark.parametrize(("kind", "readings"), READINGS, ids=lambda value: getattr(value, "name", value))
+def test_readings_say_all_that_sentences_and_figures_need(kind, readings):
+    assert readings.one.count("{}") == 1
+    assert readings.words
+    assert readings.axis[0].isupper()
+
+
+@pytest.mark.parametrize("name", ["on-body-exoskeleton", "synthetic-bench", "synthetic-haptic-loop"])
+def test_every_term_is_named_by_its_kind(name):
+    dataset = load_dataset(Path(__file__).parents[2] / "datasets" / name)
+    named = {readings.name for kind, _ in each_table(dataset.measurements) for readings in kind.readings}
+    assert {term.name for term in build_model(dataset).terms} <= named

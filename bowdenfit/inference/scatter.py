@@ -7,6 +7,7 @@ import numpy as np
 from bowdenfit.kinds.term import Term
 
 _FREEDOM = 0.5  # degrees of freedom below which the scatter of a table cannot be estimated
+_DECIDES = 1e-6  # leverage from which a residual is that of a reading
 
 
 def scatter_about(
@@ -42,5 +43,7 @@ def _blocks(
         first = start
         for count, independent in term.residual_blocks:
             rows, values = slice(start, start + count), residuals[term.name][start - first : start - first + count]
-            yield term.name, rows, values, min(int(np.count_nonzero(values)), independent) - float(leverage[rows].sum())
+            # A reading that parameters of its own fit exactly is one whatever rounding leaves; a bound that is met is none.
+            read = int(np.count_nonzero((values != 0) | (leverage[rows] > _DECIDES)))
+            yield term.name, rows, values, min(read, independent) - float(leverage[rows].sum())
             start = rows.stop

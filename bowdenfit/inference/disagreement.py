@@ -132,7 +132,7 @@ def _disagreement(
         parameters: The free parameters.
         best: Where everything together puts them.
     """
-    from scipy.stats import chi2, f, norm
+    from scipy.special import chdtrc, fdtrc, ndtri
 
     rest = np.linalg.inv(of_rest)
     allowed = np.diag(rest) - np.diag(covariance)
@@ -145,8 +145,8 @@ def _disagreement(
     if not told.any() or not len(moved):
         return None
     total, n = float(np.sum(along**2 / shares[told])), int(told.sum())
-    chance = f.sf(total / n, n, max(freedom, 1.0)) if np.isfinite(freedom) else chi2.sf(total, n)
-    sds = float(norm.isf(chance / 2))
+    chance = fdtrc(n, max(freedom, 1.0), total / n) if np.isfinite(freedom) else chdtrc(n, total)
+    sds = -float(ndtri(chance / 2))
     farthest = moved[np.argmax(np.abs(move[moved]) / np.sqrt(allowed[moved]))]
     p = parameters[farthest]
 

@@ -1,6 +1,7 @@
 """The residuals of a posterior as the solver sees them: which parameters are pinned, and whether priors count."""
 
 from collections.abc import Callable
+from concurrent.futures import ThreadPoolExecutor
 from typing import Any
 
 import jax
@@ -10,7 +11,7 @@ from jax import Array
 
 from bowdenfit.inference.compilation import compiled
 from bowdenfit.inference.log_density import LogDensity
-from bowdenfit.inference.solver import minimize
+from bowdenfit.inference.solver import minimize, prepare
 from bowdenfit.parameters.priors import HalfNormal, LogNormal, TruncatedNormal, Uniform
 from bowdenfit.parameters.space import Parameter
 
@@ -31,24 +32,26 @@ def make_objective(posterior: LogDensity) -> Objective:
     """
     space = posterior.model.space
     vector = jax.ShapeDtypeStruct((space.size,), jnp.float64)
-    program = compiled(_program(posterior), vector, vector, posterior.data, run_once=True)
+    evaluated = _program(posterior)
+    shape = jax.eval_shape(evaluated, vector, vector, posterior.data)["jacobian"].shape
+    with ThreadPoolExecutor(1) as thread:
+        thread.submit(prepare, *shape)
+        program = compiled(evaluated, vector, vector, posterior.data, run_once=True)
 
     def objective(
         start: np.ndarray, pinned: np.ndarray, pin: np.ndarray, weight: np.ndarray, data: Any, quick: bool = False
     ) -> Solution:
-        free, at_start, on_device = np.flatnonzero(~pinned), np.where(pinned, pin, start), jax.device_put(data)
+        on_device = jax.device_put(data)
 
-        def everywhere(part: np.ndarray) -> np.ndarray:
-            z = at_start.copy()
-            z[free] = part
-            return z
+        def everything(z: np.ndarray) -> Solution:
+            return program(np.where(pinned, pin, z), weight, on_device)
 
-        def evaluate(part: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-            found = program(everywhere(part), weight, on_device)
-            return np.asarray(found["stacked"]), np.asarray(found["jacobian"])[:, free]
+        def evaluate(z: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+            found = everything(z)
+            return np.asarray(found["stacked"]), np.where(pinned, 0.0, found["jacobian"])
 
-        minimum = minimize(evaluate, at_start[free], quick)
-        found = jax.tree.map(np.asarray, program(everywhere(minimum.x), weight, on_device))
+        minimum = minimize(evaluate, np.where(pinned, pin, start), quick)
+        found = jax.tree.map(np.asarray, everything(minimum.x))
         sensitivity = found["jacobian"][: -space.size]
         jacobian = np.where(pinned, 0.0, sensitivity)
         return found | {"jacobian": jacobian, "sensitivity": sensitivity, "succeeded": minimum.succeeded}

@@ -1,19 +1,17 @@
-"""The least-squares solver: MINPACK's Levenberg-Marquardt, SciPy's trust region where that fails, and a last polish.
+"""The least-squares solver: Levenberg-Marquardt by optimistix, with a bolder first step where that fails, and a last polish.
 
-Both see the residuals and their Jacobian by automatic differentiation, and scale each parameter by its own column. The
-polish takes undamped Gauss-Newton steps while what is left of the gradient shrinks. It buys the last digits; and where the
-weights of readings follow the parameters without being differentiated, it finds the point at which the weighted gradient is
-zero, which a method that only compares sums of squares can miss.
+It sees the residuals and their Jacobian by automatic differentiation. The polish takes undamped Gauss-Newton steps while what
+is left of the gradient shrinks. It buys the last digits; and where the weights of readings follow the parameters without being
+differentiated, it finds the point at which the weighted gradient is zero, which a method that only compares sums of squares
+can miss.
 
 References:
-    Moré, The Levenberg-Marquardt algorithm: implementation and theory, Lecture Notes in Mathematics 630 (1978), 105.
     Bates and Watts, A relative offset orthogonality convergence criterion for nonlinear least squares, Technometrics 23
     (1981), 179.
 """
 
 from collections.abc import Callable
-from dataclasses import dataclass
-from typing import Literal
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -30,7 +28,7 @@ _STRAIGHT = (
 _SMOOTH = 1e-3  # part of the residuals along the tangent plane above which a point is no smooth minimum
 _SHRINKS = 0.8  # factor by which each step of the polish must shorten what is left of the gradient
 _SINGULAR = 1e-13  # of scaled singular values; a direction below it takes no step
-_LOST = 1e100  # stands for a residual that cannot be computed, so that no step goes there
+_RADIUS, _BOLD_RADIUS = 0.3, 100.0  # of the first step, as part of the length of the scaled parameters
 
 
 @dataclass(frozen=True)
@@ -63,16 +61,30 @@ def minimize(evaluate: Evaluate, start: np.ndarray, quick: bool = False) -> Mini
         start: Parameters to start from.
         quick: Whether eight digits of the sum of squares are enough, instead of all that rounding leaves.
     """
-    tolerance, exact = _QUICK if quick else _PRECISE
-    first = evaluate(start)
-    if not len(start) or not np.all(np.isfinite(first[0])):
-        return Minimum(start, *first, not len(start))
-    found = _polished(evaluate, _by(evaluate, start, "lm", tolerance), exact)
+    first = Minimum(start, *evaluate(start), not len(start))
+    if not len(start) or not np.all(np.isfinite(first.residuals)):
+        return first
+    found = _polish(evaluate, _descend(evaluate, first, quick, _RADIUS), quick)
     if found.succeeded and _gauss_newton(found)[1] <= _SMOOTH * np.linalg.norm(found.residuals):
         return found
     # It has stopped short: at a kink of the residuals, or in a long bend.
-    others = [_polished(evaluate, _by(evaluate, x, "trf", tolerance), exact) for x in (start, found.x)]
+    others = [_polish(evaluate, _descend(evaluate, at, quick, _BOLD_RADIUS), quick) for at in (first, found)]
     return min([found, *others], key=lambda m: (not m.succeeded, m.sum_of_squares))
+
+
+def prepare(rows: int, columns: int) -> None:
+    """Compile what solves of a shape need, in a thread beside something else; the first of them does it otherwise.
+
+    Args:
+        rows: Number of residuals.
+        columns: Number of parameters.
+    """
+    import jax
+
+    from bowdenfit.inference.levenberg_marquardt import stepper
+
+    with jax.enable_x64(True):  # the setting is each thread's own
+        stepper(rows, columns)
 
 
 def orthogonal(jacobian: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
@@ -88,35 +100,26 @@ def orthogonal(jacobian: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     return q, np.linalg.inv(r) / size[:, None]
 
 
-def _by(evaluate: Evaluate, start: np.ndarray, method: Literal["lm", "trf"], tolerance: float) -> Minimum:
-    """What one of SciPy's methods finds."""
-    from scipy.optimize import least_squares
+def _descend(evaluate: Evaluate, at: Minimum, quick: bool, radius: float) -> Minimum:
+    """Where Levenberg-Marquardt from a point ends."""
+    from bowdenfit.inference.levenberg_marquardt import stepper
 
-    last: list[tuple[np.ndarray, tuple[np.ndarray, np.ndarray]]] = []
-
-    def at(x: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        if not last or not np.array_equal(last[0][0], x):
-            last[:] = [(x.copy(), evaluate(x))]
-        return last[0][1]
-
-    with np.errstate(over="ignore", invalid="ignore"):
-        found = least_squares(
-            lambda x: np.where(np.isfinite(at(x)[0]), at(x)[0], _LOST),
-            start,
-            lambda x: np.where(np.isfinite(at(x)[1]), at(x)[1], 0.0),
-            method=method,
-            x_scale="jac",
-            ftol=tolerance,
-            xtol=tolerance,
-            gtol=tolerance,
-            max_nfev=_MOST_EVALUATIONS,
-        )
-    return Minimum(found.x, *at(found.x), found.status > 0 and bool(np.all(np.isfinite(at(found.x)[0]))))
+    settings = (*(_QUICK if quick else _PRECISE), radius)
+    advance, state = stepper(*at.jacobian.shape)
+    best, x = replace(at, succeeded=False), at.x
+    with np.errstate(over="ignore", invalid="ignore"):  # a step may go where nothing can be computed, and is taken back
+        for count in range(_MOST_EVALUATIONS):
+            x, state, trial, done = advance(settings, count == 0, x, state, at.residuals, at.jacobian)
+            best = at if np.array_equal(x, at.x) else best
+            if done:
+                return replace(best, succeeded=bool(np.all(np.isfinite(best.residuals))))
+            at = Minimum(np.asarray(trial), *evaluate(np.asarray(trial)), False)
+    return best
 
 
-def _polished(evaluate: Evaluate, found: Minimum, exact: float) -> Minimum:
+def _polish(evaluate: Evaluate, found: Minimum, quick: bool) -> Minimum:
     """Gauss-Newton steps from where a method stopped, as long as each shortens what is left of the gradient."""
-    step, left = _gauss_newton(found)
+    exact, (step, left) = (_QUICK if quick else _PRECISE)[1], _gauss_newton(found)
     for _ in range(_MOST_POLISHING):
         if left <= exact * np.linalg.norm(found.residuals) or np.any(np.abs(step) > np.maximum(np.abs(found.x), 1.0)):
             break
@@ -136,7 +139,6 @@ def _gauss_newton(found: Minimum) -> tuple[np.ndarray, float]:
     """The undamped step, and the length of the residuals along the tangent plane, which it would take off."""
     jacobian = np.where(np.isfinite(found.jacobian), found.jacobian, 0.0)
     size = np.linalg.norm(jacobian, axis=0)
-    size = np.where(size > 0, size, 1.0)
-    u, s, vt = np.linalg.svd(jacobian / size, full_matrices=False)
-    along = np.where(s > _SINGULAR * s[0], u.T @ found.residuals, 0.0)
-    return -(vt.T @ (along / np.maximum(s, 1e-300))) / size, float(np.linalg.norm(along))
+    size = np.where(size > 0, size, np.inf)
+    step = -np.linalg.lstsq(jacobian / size, found.residuals, _SINGULAR)[0] / size
+    return step, float(np.linalg.norm(jacobian @ step))

@@ -25,7 +25,7 @@ from bowdenfit.run.helpers import Assistants, load_ahead
 from bowdenfit.run.sampling import implied_program, libraries, sampled, sampling_programs
 from bowdenfit.run.stopwatch import Stopwatch
 
-VERSIONED = ("bowdenfit", "jax", "emcee", "blackjax", "arviz-stats", "numpy", "scipy")
+VERSIONED = ("bowdenfit", "jax", "optimistix", "emcee", "blackjax", "arviz-stats", "numpy", "scipy")
 
 
 def run(

@@ -1,0 +1,220 @@
+"""Levenberg-Marquardt composed of optimistix's parts: a descent that scales parameters, and a search by MINPACK's rules.
+
+Optimistix's own method damps all parameters alike, and ends where a step changes little, which every heavily damped step does.
+Here a step is damped in units of each parameter's own column, and no longer than a radius; the radius follows how well the
+last step did; and the end is where little is left of the residuals along the tangent plane.
+
+The model is no part of the program: who steps the solver evaluates it, and a linear function with the same residuals and
+Jacobian at that point takes its place, which is all that a step asks for. So one small program of the shapes alone serves
+every model.
+
+References:
+    Moré, The Levenberg-Marquardt algorithm: implementation and theory, Lecture Notes in Mathematics 630 (1978), 105.
+    Rader, Lyons and Kidger, Optimistix: modular optimisation in JAX and Equinox (2024), arXiv:2402.09983.
+"""
+
+from collections.abc import Callable
+from functools import cache
+from typing import Any
+
+import equinox as eqx
+import jax
+import jax.numpy as jnp
+import numpy as np
+import optimistix as optx
+from jax import Array
+
+from bowdenfit.inference.compilation import compiled
+
+_SINGULAR = 1e-13  # of scaled singular values; a direction below it takes no step
+_LOST = 1e100  # stands for a residual that cannot be computed, so that no step goes there
+_BISECTIONS = 40
+_LONGER = 1.1  # an undamped step may be longer than the radius by this factor
+_ACCEPTED = 1e-4  # part of the predicted fall of the sum of squares that a step must reach
+_PLAIN: Any = optx.RESULTS.successful
+
+
+class _Tangent(eqx.Module):
+    """The tangent plane: sizes of its columns, singular values of the scaled ones, and what of the residuals lies along."""
+
+    size: Array
+    singular: Array
+    directions: Array
+    along: Array
+
+
+class ScaledDescent(optx.AbstractDescent):
+    """Damped steps up to a length to which each parameter counts by the largest size that its column has had."""
+
+    def init(self, y: Array, f_info_struct: Any) -> _Tangent:
+        """Nothing yet."""
+        rank = min(len(f_info_struct.residual), len(y))
+        return _Tangent(jnp.zeros_like(y), jnp.zeros(rank), jnp.zeros((rank, len(y))), jnp.zeros(rank))
+
+    def query(self, y: Array, f_info: Any, state: _Tangent) -> _Tangent:  # noqa: ARG002
+        """Singular values at an accepted point, after which a step of any radius is a division."""
+        jacobian = f_info.jac.as_matrix()
+        size = _largest(jacobian, state.size)
+        left, singular, directions = jnp.linalg.svd(_scaled(jacobian, size), full_matrices=False)
+        kept = singular > _SINGULAR * singular[0]
+        return _Tangent(
+            size, jnp.where(kept, singular, 1.0), directions, jnp.where(kept, left.T @ f_info.residual, 0.0)
+        )
+
+    def step(self, step_size: Array, state: _Tangent) -> tuple[Array, Any]:
+        """The undamped step, or where that is too long the one that is damped to the radius."""
+        slope = state.singular * state.along
+
+        def damped(by: Array | float) -> Array:
+            return slope / (state.singular**2 + by)
+
+        def halved(_: int, ends: tuple[Array, Array]) -> tuple[Array, Array]:
+            middle = jnp.sqrt(ends[0] * ends[1])
+            longer = _norm(damped(middle)) > step_size
+            return jnp.where(longer, middle, ends[0]), jnp.where(longer, ends[1], middle)
+
+        most = _norm(slope) / step_size
+        _, damping = jax.lax.fori_loop(0, _BISECTIONS, halved, (1e-12 * most, most))
+        step = damped(jnp.where(_norm(damped(0.0)) <= _LONGER * step_size, 0.0, damping))
+        return -_scaled(state.directions.T @ step, state.size), _PLAIN
+
+
+class _Radius(eqx.Module):
+    """How long the next step may be, and by which parts the last one was to lower the sum of squares, and did."""
+
+    radius: Array
+    size: Array
+    predicted: Array
+    actual: Array
+
+
+class RadiusSearch(optx.AbstractSearch):
+    """MINPACK's rules for the radius, with both changes of the sum of squares computed so that nothing cancels.
+
+    Args:
+        first: Radius of the first step, as part of the length of the scaled parameters.
+    """
+
+    first: Any
+
+    def init(self, y: Array, f_info_struct: Any) -> _Radius:  # noqa: ARG002
+        """Nothing yet."""
+        return _Radius(jnp.ones(()), jnp.zeros_like(y), jnp.ones(()), jnp.ones(()))
+
+    def step(
+        self, first_step: Array, y: Array, y_eval: Array, f_info: Any, f_eval_info: Any, state: _Radius
+    ) -> tuple[Array, Array, Any, _Radius]:
+        """Whether to go there, and how far to go next."""
+        before, after, moved = f_info.residual, f_eval_info.residual, y_eval - y
+        linear, total = f_info.jac.mv(moved), jnp.maximum(before @ before, 1e-300)
+        slope = linear @ before / total
+        predicted = -2 * linear @ (before + linear / 2) / total
+        actual = (before - after) @ (before + after) / total
+        ratio = jnp.where(predicted > 0, actual / jnp.where(predicted > 0, predicted, 1.0), 0.0)
+        accepted = first_step | (ratio >= _ACCEPTED)
+        length = _norm(state.size * moved)
+        shrinks = jnp.clip(jnp.where(actual >= 0, 0.5, slope / (2 * slope + actual)), 0.1, 0.5)
+        grows = (ratio >= 0.75) | (length < 0.9 * state.radius)
+        radius = jnp.where(grows, 2 * length, state.radius)
+        radius = jnp.where(ratio > 0.25, radius, shrinks * jnp.minimum(state.radius, 10 * length))
+        size = jnp.where(accepted, _largest(f_eval_info.jac.as_matrix(), state.size), state.size)
+        extent = _norm(size * y_eval)
+        radius = jnp.where(first_step, self.first * jnp.where(extent > 0, extent, 1.0), radius)
+        predicted, actual = (jnp.where(first_step, 1.0, change) for change in (predicted, actual))
+        return radius, accepted, _PLAIN, _Radius(radius, size, predicted, actual)
+
+
+class LevenbergMarquardt(optx.AbstractGaussNewton):
+    """Both, to an end by the gradient, or where neither parameters nor the sum of squares change any more.
+
+    Args:
+        change: Relative change of parameters and of the sum of squares that is none.
+        gradient: Part of the residuals along the tangent plane that is none.
+        radius: Of the first step, as part of the length of the scaled parameters.
+    """
+
+    rtol: Any
+    atol: Any
+    norm: Callable[[Any], Array]
+    descent: ScaledDescent
+    search: RadiusSearch
+    verbose: Callable[..., None]
+
+    def __init__(self, change: Array, gradient: Array, radius: Array) -> None:
+        self.rtol, self.atol, self.norm, self.verbose = change, gradient, optx.two_norm, _silent
+        self.descent, self.search = ScaledDescent(), RadiusSearch(radius)
+
+    def terminate(self, fn: Any, y: Array, args: Any, options: Any, state: Any, tags: Any) -> tuple[Array, Any]:  # noqa: ARG002
+        """Whether this is the end."""
+        last = state.search_state
+        smooth = _norm(state.descent_state.along) <= self.atol * _norm(state.f_info.residual)
+        flat = (jnp.abs(last.actual) <= self.rtol) & (last.predicted <= self.rtol) & (last.actual <= 2 * last.predicted)
+        still = last.radius <= self.rtol * _norm(last.size * y)
+        return ~state.first_step & (smooth | flat | still), state.result
+
+
+@cache
+def stepper(rows: int, columns: int) -> tuple[Callable[..., Any], list[np.ndarray]]:
+    """The compiled step of a solve, and its state before the first.
+
+    A step takes what the solver does, whether it is the first, the accepted parameters, the state, and residuals
+    and Jacobian where the step before has asked for them; it gives the accepted parameters, the state, where to evaluate
+    next, and whether this is the end.
+
+    Args:
+        rows: Number of residuals.
+        columns: Number of parameters.
+    """
+    number, *arrays = (jax.ShapeDtypeStruct(shape, jnp.float64) for shape in ((), (columns,), (rows,), (rows, columns)))
+    flag, settings = jax.ShapeDtypeStruct((), jnp.bool_), (number, number, number)
+    state = jax.eval_shape(lambda *given: _leaves(_ready(*given)[2]), settings, *arrays)
+    program = compiled(_step, settings, flag, arrays[0], state, *arrays[1:], run_once=True)
+    return program, [np.zeros(leaf.shape, leaf.dtype) for leaf in state]
+
+
+def _step(
+    settings: tuple[Array, ...], first: Array, y: Array, leaves: list[Array], residuals: Array, jacobian: Array
+) -> tuple[Array, list[Array], Array, Array]:
+    """One step of the solver."""
+    solver, linear, state = _ready(settings, y, residuals, jacobian)
+    tree, static = jax.tree.structure(eqx.filter(state, eqx.is_array)), eqx.filter(state, eqx.is_array, inverse=True)
+    held = [jnp.where(first, *pair) for pair in zip(_leaves(state), leaves, strict=True)]
+    state = eqx.combine(jax.tree.unflatten(tree, held), static)
+    y, state, _ = solver.step(linear, y, state.y_eval, {}, state, frozenset())
+    done, _ = solver.terminate(linear, y, y, {}, state, frozenset())
+    return y, _leaves(state), state.y_eval, done
+
+
+def _ready(settings: tuple[Array, ...], y: Array, residuals: Array, jacobian: Array) -> tuple[Any, Any, Any]:
+    """The solver, the linear function in the model's place, and the state before the first step."""
+    values = jnp.where(jnp.isfinite(residuals), residuals, _LOST)
+    slopes = jnp.where(jnp.isfinite(jacobian), jacobian, 0.0)
+
+    def linear(x: Array, at: Array) -> tuple[Array, None]:
+        return values + slopes @ (x - at), None
+
+    solver, shape = LevenbergMarquardt(*settings), jax.eval_shape(lambda: values)
+    return solver, linear, solver.init(linear, y, y, {}, shape, None, frozenset())
+
+
+def _leaves(state: Any) -> list[Array]:
+    """What of a state changes from step to step."""
+    return jax.tree.leaves(eqx.filter(state, eqx.is_array))
+
+
+def _largest(jacobian: Array, before: Array) -> Array:
+    """The largest length that each column has had."""
+    return jnp.maximum(before, jnp.sqrt(jnp.sum(jacobian**2, axis=0)))
+
+
+def _scaled(x: Array, size: Array) -> Array:
+    """Over the sizes of columns; zero where a column has always been."""
+    return x / jnp.where(size > 0, size, jnp.inf)
+
+
+def _norm(x: Array) -> Array:
+    return jnp.sqrt(jnp.sum(x**2))
+
+
+def _silent(**_: Any) -> None:
+    """What the solver would print."""

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -12,9 +13,21 @@ from bowdenfit.plots.style import BLUE, GRAY, LEAST_SQUARES, LIGHT, MEDIAN, NARR
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
 
-    from bowdenfit.questions.summary.figure_data import Band
-
+BAND_QUANTILES = (0.05, 0.25, 0.5, 0.75, 0.95)
 OUTSIDE = "Outside the range of the curves"
+
+
+@dataclass(frozen=True)
+class Band:
+    """Quantiles (`BAND_QUANTILES`, first axis) against the route; one row, the least-squares line, without draws."""
+
+    route: np.ndarray
+    quantiles: np.ndarray
+
+    @property
+    def is_line(self) -> bool:
+        """Whether there is only the least-squares line."""
+        return len(self.quantiles) == 1
 
 
 def draw_band(axes: Axes, band: Band, scale: float = 1.0) -> None:

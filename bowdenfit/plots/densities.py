@@ -25,9 +25,9 @@ def limits(draws: np.ndarray, share: float = 0.996) -> tuple[float, float]:
     return (max(low - room, 0.0) if np.min(draws) >= 0 else low - room), high + room
 
 
-def support(*samples: np.ndarray | None) -> float:
+def support(*samples: np.ndarray) -> float:
     """Zero where no draw is below it, the usual bound of a positive quantity; otherwise minus infinity."""
-    return 0.0 if all(sample is None or np.min(sample) >= 0 for sample in samples) else -np.inf
+    return 0.0 if all(np.min(sample) >= 0 for sample in samples) else -np.inf
 
 
 def density(draws: np.ndarray, grid: np.ndarray, lower: float = -np.inf, upper: float = np.inf) -> np.ndarray:

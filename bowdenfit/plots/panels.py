@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Sequence
+from collections.abc import Iterable, Sequence
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -13,8 +13,6 @@ from bowdenfit.plots.style import MEDIUM, SMALL, WIDE
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
-
-    from bowdenfit.questions.summary.figure_data import FigureData, RecordedTrace
 
 MOST = 8  # recordings in a figure
 ALIKE = 4.0  # ranges share an axis if all of them together are so many times the shortest at most
@@ -49,13 +47,6 @@ def set_limits(flat: list[Axes], spans: Sequence[tuple[float, float]], which: st
     everywhere = (min(s[0] for s in spans), max(s[1] for s in spans))
     for axes, own in zip(flat, spans, strict=True):
         axes.set(**{f"{which}lim": everywhere if shared else own})
-
-
-def chosen(data: FigureData, shows: Callable[[RecordedTrace], bool]) -> tuple[list[RecordedTrace], list[RecordedTrace]]:
-    """The recordings to draw, evenly from all that have what a figure shows, and all of these."""
-    every = [r for r in data.recordings if shows(r)]
-    places = np.linspace(0, len(every) - 1, min(len(every), MOST)).round().astype(int)
-    return [every[i] for i in places.tolist()], every
 
 
 def recording_panels(
@@ -96,12 +87,6 @@ def label_outer(flat: list[Axes], columns: int, x_label: str, y_label: str) -> N
         if i + columns >= len(flat):
             axes.set_xlabel(x_label)
             axes.tick_params(labelbottom=True)
-
-
-def say_how_many(axes: Axes, drawn: int, of: int) -> None:
-    """An entry of the legend that says so where not all recordings are drawn."""
-    if drawn < of:
-        axes.plot([], [], " ", label=f"{drawn} of {of} recordings shown")
 
 
 def enlarge_marks(figure: Figure) -> None:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+from collections.abc import Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -16,6 +17,11 @@ OPTIONS: dict[str, dict[str, Any]] = {
     "png": {"pil_kwargs": {"compress_level": 2}},  # half the time of the usual 6, a tenth more bytes
     "svg": {"metadata": {"Date": None}},
 }
+
+
+def write_all(figure: Figure, folder: Path, name: str, formats: Sequence[str] = FORMATS) -> list[Path]:
+    """Write a figure into a folder in every format; the files."""
+    return [write(figure, folder / f"{name}.{ending}") for ending in formats]
 
 
 @in_paper_style

@@ -7,12 +7,8 @@ from contextlib import ExitStack, contextmanager
 from dataclasses import dataclass
 from importlib import import_module
 from multiprocessing import get_context
-from pathlib import Path
 from threading import Thread
-from typing import TYPE_CHECKING, Any
-
-if TYPE_CHECKING:
-    from bowdenfit.questions.summary.figure_data import FigureData
+from typing import Any
 
 STATISTICS = (
     "arviz_stats.base",
@@ -25,8 +21,7 @@ DRAWING = (
     "matplotlib.figure",
     "matplotlib.backends.backend_agg",
     "matplotlib.backends.backend_svg",
-    "bowdenfit.questions.summary.gallery",
-    "bowdenfit.questions.summary.figure_data",
+    "bowdenfit.questions.figures",
 )
 
 
@@ -77,13 +72,6 @@ def _process(modules: tuple[str, ...]) -> Executor:
     pool = ProcessPoolExecutor(1, get_context("spawn"), initializer=_ready, initargs=(modules,))
     pool.submit(len, ())  # it starts with its first job
     return pool
-
-
-def draw(data: "FigureData", folder: Path) -> list[Path]:
-    """Draw all figures that apply; loads matplotlib, and no model."""
-    from bowdenfit.questions.summary.gallery import draw_all
-
-    return draw_all(data, folder)
 
 
 def _ready(modules: tuple[str, ...]) -> None:

@@ -11,7 +11,7 @@ from bowdenfit.description import Sampler
 from bowdenfit.errors import DescriptionError, StoreError, UsageError
 from bowdenfit.kinds.settings import parse_description
 from bowdenfit.results.folder import CHAIN, clear, read_checkpoint, refuse_to_overwrite, start_checkpoint
-from bowdenfit.run.helpers import Assistants, draw
+from bowdenfit.run.helpers import Assistants
 from bowdenfit.verb import LARGEST_SEED
 
 if TYPE_CHECKING:
@@ -20,7 +20,7 @@ if TYPE_CHECKING:
 
 def write_results(found: "Fit", folder: Path, figures: bool, helpers: Assistants) -> None:
     """All files of the results folder, as far as possible at the same time; fit.json comes last of the fit's own."""
-    from bowdenfit.questions.summary.figures import figure_data
+    from bowdenfit.questions.figures import draw_figure, figures_of
     from bowdenfit.questions.summary.words import summary_text
     from bowdenfit.results.folder import FIGURES, POSTERIOR, SUMMARY_TEXT, write_text
     from bowdenfit.results.netcdf import write_groups
@@ -31,11 +31,12 @@ def write_results(found: "Fit", folder: Path, figures: bool, helpers: Assistants
         written: Future[None] | None = None
     else:
         written = helpers.statistics.submit(write_groups, folder / POSTERIOR, *posterior_page(found))
-    drawn = helpers.drawing.submit(draw, figure_data(found), folder / FIGURES) if figures else None
+    shown, place = figures_of(found) if figures else (), folder / FIGURES
+    drawn = [helpers.drawing.submit(draw_figure, name, data, place) for name, data in shown]  # while the next is worked out
     save(found, found.summary(), folder, force=True, write_posterior=written.result if written else None)
     write_text(folder / SUMMARY_TEXT, summary_text(found))
-    if drawn is not None:
-        drawn.result()
+    for figure in drawn:
+        figure.result()
 
 
 def sampled_by(data: Dataset, method: str | None) -> Dataset:

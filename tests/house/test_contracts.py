@@ -37,7 +37,7 @@ def test_layers_import_only_downward():
         ("import bowdenfit.cli", {"jax", "emcee", "matplotlib", "pint", "pydantic", "numpy"}),
         ("import bowdenfit as bf; bf.read('datasets/on-body-exoskeleton')", {"jax", "emcee", "matplotlib"}),
         (
-            "import bowdenfit.questions.summary.gallery, bowdenfit.questions.summary.figure_data",
+            "import bowdenfit.questions.figures",
             {"jax", "emcee", "scipy", "pint", "matplotlib"},
         ),
         ("import bowdenfit.inference.diagnostics, bowdenfit.results.netcdf", {"jax", "emcee", "matplotlib"}),

@@ -18,17 +18,14 @@ from bowdenfit.inference.log_density import LogDensity as Density
 from bowdenfit.inference.predictive_checks import LeftOut, left_out_readings, placed_at_random, uniformity
 from bowdenfit.inference.prior_sensitivity import SENSITIVE, sensitivities
 from bowdenfit.model import build_model
+from bowdenfit.questions.check import checks_figure, prior_figure
 from bowdenfit.questions.check.answer import TableChecks, checks_of, diagnosis, trends_of
-from bowdenfit.questions.check.figure import checks as checks_figure
-from bowdenfit.questions.check.figure_data import CheckedTable
-from bowdenfit.questions.check.figure_tables import checked_tables
+from bowdenfit.questions.check.checks_figure import CheckedTable, checked_tables
 from bowdenfit.questions.check.page import checks_page
-from bowdenfit.questions.check.prior_figure import prior_predictive as prior_figure
 from bowdenfit.questions.check.prior_predictive import prior_predictive
 from bowdenfit.questions.check.prior_words import prior_predictive_text
 from bowdenfit.questions.check.residual_places import Places
 from bowdenfit.questions.check.words import checks_text
-from bowdenfit.questions.summary.figure_data import FigureData
 from bowdenfit.results.record import Draws, Provenance, Record
 
 DRAWS = 8000
@@ -254,17 +251,9 @@ def test_an_angle_misread_by_ten_sds_is_the_one_that_is_named(on_body):
     assert [table.labels[i] for table, i in found.outliers] == ["free_sheath_angle at 490 mm"]
     text = " ".join(checks_text(checks_page(found)).split())
     assert "Outlier: free_sheath_angle at 490 mm: measured 61.0 deg, expected" in text
-    figure = checks_figure_of(found)
+    figure = checks_figure.draw(checked_tables(found))
     check_words(figure, "an outlier")
     assert "free_sheath_angle at 490 mm" in {text.get_text() for axes in figure.axes for text in axes.texts}
-
-
-def checks_figure_of(found):
-    return figure_of(checked_tables(found))
-
-
-def figure_of(tables):
-    return checks_figure(FigureData("cable", "", (0.0, 0.0), (), None, (), None, None, None, (), 0, checks=tables))
 
 
 @pytest.fixture(scope="module")
@@ -316,13 +305,13 @@ def many_tables():
 
 
 def test_a_figure_of_many_tables_has_no_words_that_overlap():
-    figure = figure_of(many_tables())
+    figure = checks_figure.draw(many_tables())
     check_words(figure, "many tables")
     assert len(figure.axes) == 3 + 4
 
 
 def test_the_figure_of_the_checks_has_no_words_that_overlap(fit):
-    figure = checks_figure_of(fit.checks)
+    figure = checks_figure.draw(checks_figure.data(fit))
     check_words(figure, "on body")
     titles = {axes.get_title() for axes in figure.axes} - {""}
     assert titles == {"Wrap angles: 22 readings", "Efficiencies: 4 readings"}
@@ -345,7 +334,7 @@ def test_stretch_in_the_wrong_unit_is_seen_before_the_fit(on_body):
     assert f"of {len(table.load)} readings (stretch: " in text
     assert "The usual cause is a unit" in text
     assert "preload:" not in text
-    check_words(prior_figure(found), "stretch in micrometers")
+    check_words(prior_figure.draw(found), "stretch in micrometers")
 
 
 ROWS = 1024  # draws of a fit that are looked at in one go

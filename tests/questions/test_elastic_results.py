@@ -16,9 +16,9 @@ from bowdenfit.dataset import Dataset
 from bowdenfit.inference.least_squares import least_squares, make_objective, maximum_posterior
 from bowdenfit.inference.log_density import LogDensity
 from bowdenfit.model import build_model
+from bowdenfit.questions.figures import figures_of
 from bowdenfit.questions.simulate.simulation import empty_tables, simulate, true_values
 from bowdenfit.questions.simulate.tables import read_bench
-from bowdenfit.questions.summary.figures import figure_data
 from bowdenfit.questions.summary.words import summary_text
 from bowdenfit.results.optimum import optimum_of
 
@@ -111,18 +111,18 @@ def test_the_summary_says_what_each_wrap_angle_does(fit):
 def test_all_figures_of_the_elastic_side_are_drawn(fit, tmp_path):
     names = {path.stem for path in bf.plot(fit, tmp_path)}
     assert {"stretch", "preload", "bending_loss", "loops", "preload_window"} <= names
-    shown = figure_data(fit).elastic
-    assert [curve.wrap_angle for curve in shown.stretch] == pytest.approx([0, 45, 90, 135, 180])
-    for curve in shown.stretch:
+    shown = dict(figures_of(fit))
+    assert [curve.wrap_angle for curve in shown["stretch"]] == pytest.approx([0, 45, 90, 135, 180])
+    for curve in shown["stretch"]:
         assert np.all(np.diff(curve.loading[1]) > 0)
         assert np.all(curve.unloading[1] >= curve.loading[1] - 1e-12)
         assert curve.unloading[1][-1] == pytest.approx(curve.loading[1][-1])
-    assert shown.preload.slack_probability[0] > 0.5
-    assert shown.preload.slack_probability[-1] == 0
-    assert shown.bending_loss.fitted[1][-1] < shown.bending_loss.fitted_capstan[-1]
-    assert [loop.label for loop in shown.loops] == ["45 deg", "90 deg", "135 deg", "180 deg"]
-    assert shown.window.taut_probability[0] == 0
-    assert shown.window.taut_probability[-1] == 1
+    assert shown["preload"].slack_probability[0] > 0.5
+    assert shown["preload"].slack_probability[-1] == 0
+    assert shown["bending_loss"].fitted[1][-1] < shown["bending_loss"].fitted_capstan[-1]
+    assert [loop.label for loop in shown["loops"]] == ["45 deg", "90 deg", "135 deg", "180 deg"]
+    assert shown["preload_window"].taut_probability[0] == 0
+    assert shown["preload_window"].taut_probability[-1] == 1
 
 
 def table(printed: str) -> list[dict[str, str]]:

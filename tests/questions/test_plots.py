@@ -1,8 +1,10 @@
 """The figures: what they draw, what they leave out, and how they are written."""
 
 import dataclasses
+import pickle
 import subprocess
 import sys
+from types import SimpleNamespace
 
 import matplotlib as mpl
 import numpy as np
@@ -10,22 +12,27 @@ import pytest
 from figure_words import words
 from matplotlib.collections import PolyCollection
 
+import bowdenfit as bf
 from bowdenfit.inference.interval import Interval
+from bowdenfit.plots.bands import BAND_QUANTILES, Band
 from bowdenfit.plots.densities import BINS, bin_numbers, density, enclosed_share
 from bowdenfit.plots.sheet import ticks
 from bowdenfit.plots.write import write
-from bowdenfit.questions.summary.figure_data import (
-    BAND_QUANTILES,
-    AngleCurve,
-    Band,
-    EfficiencyPoints,
-    FigureData,
-    ParameterDraws,
-)
-from bowdenfit.questions.summary.gallery import FIGURES, draw_all
+from bowdenfit.questions.figures import FIGURES, draw_figure, figures_of
+from bowdenfit.questions.length.efficiency_figure import AlongRoute, EfficiencyPoints
+from bowdenfit.questions.length.wrap_angles_figure import AngleCurve, WrapAngles
+from bowdenfit.questions.summary import pairs_figure
+from bowdenfit.questions.summary.coefficients_figure import Coefficient
+from bowdenfit.questions.summary.pairs_figure import Pairs
+from bowdenfit.questions.summary.quantities import Quantity
+from bowdenfit.questions.summary.residuals_figure import Residuals
+from bowdenfit.questions.summary.traces_figure import Paths
 from bowdenfit.results.choices import Choice, Window
 from bowdenfit.results.length import OptimalLength
+from bowdenfit.results.record import OPTIMAL_EFFICIENCY, OPTIMAL_LENGTH
 
+QUICK = ("sampler.n_walkers=64", "sampler.target_ess=100", "sampler.target_r_hat=1.05", "sampler.max_steps=2000")
+LABEL = "Cable length (mm)"
 RANGE = (430.0, 530.0)
 GRID = np.linspace(*RANGE, 41)
 WALKERS, DRAWS, ENSEMBLES = 32, 10, 4
@@ -33,11 +40,23 @@ SPREAD = np.array([-1.6, -0.7, 0.0, 0.7, 1.6])[:, None]
 EFFICIENCIES = np.array([0.77, 0.785, 0.753, 0.678])
 
 
-def parameter(name, symbol, middle, sd, role="friction", unit="1", estimate=None):
+def coefficient(name, symbol, middle, sd, unit="1", estimate=None):
     rng = np.random.default_rng(len(name))
     draws = np.abs(middle + sd * rng.standard_normal((WALKERS, DRAWS)))
     prior = np.abs(middle + 5 * sd * rng.standard_normal((1, 500)))
-    return ParameterDraws(name, symbol, unit, role, draws, prior, middle if estimate is None else estimate, sd)
+    return Coefficient(symbol, unit, draws, prior, middle if estimate is None else estimate, sd)
+
+
+def positive(one):
+    """A coefficient as the pair plot and the paths of the ensembles show it."""
+    return Quantity(one.symbol if one.unit == "1" else f"{one.symbol} ({one.unit})", one.draws, (0.0, np.inf))
+
+
+def best(lengths, efficiency):
+    return [
+        Quantity("Optimum (mm)", lengths, RANGE),
+        Quantity("Efficiency at\noptimum (%)", 100 * efficiency, (0, 100)),
+    ]
 
 
 def angle_curve(contact, at_start, at_end, outside):
@@ -61,48 +80,59 @@ def optimum(draws):
 
 
 def paper_data(length_draws=None):
-    """Figure data like those of the on-body data set."""
+    """What the figures of the on-body data set show, by name."""
     rng = np.random.default_rng(7)
     route = np.array([440.0, 470.0, 510.0, 550.0])
     points = EfficiencyPoints(
-        "efficiency", tuple(f"{r:g} mm" for r in route), route, EFFICIENCIES,
+        False, tuple(f"{r:g} mm" for r in route), route, EFFICIENCIES,
         EFFICIENCIES + 0.002 + 0.01 * SPREAD, route <= RANGE[1],
     )  # fmt: skip
     lengths = 470 + 4.5 * rng.standard_normal((WALKERS, DRAWS)) if length_draws is None else length_draws
-    return FigureData(
-        "On-body", "Cable length (mm)", RANGE,
-        (angle_curve("free sheath", 5.0, 118.0, [108.0, 100.0]), angle_curve("squeezed sheath", 58.0, 5.0, [28.0, 37.0])),
-        Band(GRID, 0.79 - 1e-5 * (GRID - 470) ** 2 + 0.01 * SPREAD), (points,), optimum(lengths), lengths,
-        0.79 + 0.008 * rng.standard_normal((WALKERS, DRAWS)),
-        (
-            parameter("mu1", r"$\mu_1$", 0.084, 0.01), parameter("mu22", r"$\mu_2$", 0.123, 0.02),
-            parameter("mu333", r"$\mu_3$", 0.17, 0.05, estimate=float("nan")),
-            parameter("sigma_theta", r"$\sigma_\theta$", 2.3, 0.5, "noise", "deg"),
-            parameter("tau", r"$\tau$", 0.0, 0.012, "noise"),
-            parameter("free_sheath_angle_a", r"$a_\mathrm{fs}$", 3.2, 0.05, "curve", "log rad"),
-        ),
-        ENSEMBLES,
+    curves = (
+        angle_curve("free sheath", 5.0, 118.0, [108.0, 100.0]), angle_curve("squeezed sheath", 58.0, 5.0, [28.0, 37.0])
     )  # fmt: skip
+    friction = (
+        coefficient("mu1", r"$\mu_1$", 0.084, 0.01), coefficient("mu22", r"$\mu_2$", 0.123, 0.02),
+        coefficient("mu333", r"$\mu_3$", 0.17, 0.05, estimate=float("nan")),
+    )  # fmt: skip
+    noise = coefficient("sigma_theta", r"$\sigma_\theta$", 2.3, 0.5, "deg"), coefficient("tau", r"$\tau$", 0.0, 0.012)
+    shape = coefficient("free_sheath_angle_a", r"$a_\mathrm{fs}$", 3.2, 0.05, "log rad")
+    band = Band(GRID, 0.79 - 1e-5 * (GRID - 470) ** 2 + 0.01 * SPREAD)
+    answer = best(lengths, 0.79 + 0.008 * rng.standard_normal((WALKERS, DRAWS)))
+    return {
+        "wrap_angles": WrapAngles(curves, LABEL, RANGE),
+        "efficiency": AlongRoute(LABEL, RANGE, band, (points,), optimum(lengths), lengths),
+        "coefficients": friction,
+        "pairs": Pairs([positive(c) for c in (*friction, *noise)] + answer, "cable length"),
+        "traces": Paths([positive(c) for c in (*friction, *noise, shape)] + answer[:1], ENSEMBLES),
+        "residuals": Residuals((points,), curves, LABEL),
+    }
 
 
 def without_route(data):
-    points = tuple(dataclasses.replace(p, route=np.full(4, np.nan), inside=np.ones(4, dtype=bool)) for p in data.points)
-    return dataclasses.replace(
-        data, route_label="", route_range=(0.0, 0.0), angles=(), efficiency=None, points=points, optimum=None,
-        optimal_length=None, optimal_efficiency=None, parameters=data.parameters[:1],
-    )  # fmt: skip
+    (points,), first = data["residuals"].points, data["coefficients"][:1]
+    points = dataclasses.replace(points, route=np.full(4, np.nan), inside=np.ones(4, dtype=bool))
+    paths = Paths([positive(first[0])], ENSEMBLES)
+    return {"coefficients": first, "traces": paths, "residuals": Residuals((points,))}
 
 
 def without_draws(data):
     def line(band):
         return Band(band.route, band.quantiles[2:3])
 
-    return dataclasses.replace(
-        data, angles=tuple(dataclasses.replace(c, band=line(c.band)) for c in data.angles),
-        efficiency=line(data.efficiency), optimum=None, optimal_length=None, optimal_efficiency=None, n_ensembles=0,
-        points=tuple(dataclasses.replace(p, predicted=p.predicted[2:3]) for p in data.points),
-        parameters=tuple(dataclasses.replace(p, draws=None, prior=None) for p in data.parameters),
-    )  # fmt: skip
+    (points,), along = data["residuals"].points, data["efficiency"]
+    curves = tuple(dataclasses.replace(c, band=line(c.band)) for c in data["residuals"].curves)
+    points = (dataclasses.replace(points, predicted=points.predicted[2:3]),)
+    return {
+        "wrap_angles": WrapAngles(curves, LABEL, RANGE),
+        "efficiency": AlongRoute(LABEL, RANGE, line(along.efficiency), points),
+        "residuals": Residuals(points, curves, LABEL),
+    }
+
+
+def changed(data, name, **parts):
+    """The same with parts of what one figure shows replaced."""
+    return data | {name: dataclasses.replace(data[name], **parts)}
 
 
 def with_many_runs(data):
@@ -110,23 +140,36 @@ def with_many_runs(data):
     measured = np.resize(EFFICIENCIES[:3], 40)
     labels = tuple(f"forces/2024-05-03_bench_a.csv, run {i}" for i in range(40))
     runs = EfficiencyPoints(
-        "run_efficiency", labels, route, measured, measured + 0.01 * SPREAD, np.ones(40, dtype=bool)
+        True, labels, route, measured, measured + 0.01 * SPREAD, np.ones(40, dtype=bool)
     )
-    return dataclasses.replace(data, points=(*data.points, runs))
+    points = (*data["residuals"].points, runs)
+    return changed(changed(data, "efficiency", points=points), "residuals", points=points)
 
 
 def with_five_contacts(data):
-    more = tuple(dataclasses.replace(data.angles[0], contact=f"contact {i}") for i in range(3))
-    friction = tuple(parameter(f"mu{'4' * i}", rf"$\mu_{i}$", 0.1, 0.01) for i in range(4, 9))
-    return dataclasses.replace(data, angles=data.angles + more, parameters=friction + data.parameters)
+    curves = data["wrap_angles"].curves
+    curves += tuple(dataclasses.replace(curves[0], contact=f"contact {i}") for i in range(3))
+    friction = tuple(coefficient(f"mu{'4' * i}", rf"$\mu_{i}$", 0.1, 0.01) for i in range(4, 9))
+    sampled = [positive(c) for c in friction]
+    data = data | {"coefficients": friction + data["coefficients"]}
+    data = changed(changed(data, "wrap_angles", curves=curves), "residuals", curves=curves)
+    pairs = sampled + data["pairs"].quantities
+    data = changed(data, "pairs", quantities=pairs[: pairs_figure.MOST - 2] + pairs[-2:])
+    return changed(data, "traces", quantities=sampled + data["traces"].quantities)
 
 
 def with_constant_draws(data):
-    constant = tuple(dataclasses.replace(p, draws=np.full((WALKERS, DRAWS), 0.1)) for p in data.parameters)
-    return dataclasses.replace(
-        data, parameters=constant, optimal_length=np.full((WALKERS, DRAWS), 470.0),
-        optimal_efficiency=np.full((WALKERS, DRAWS), 0.79),
-    )  # fmt: skip
+    def constant(quantity, value=0.1):
+        return dataclasses.replace(quantity, draws=np.full((WALKERS, DRAWS), value))
+
+    def all_constant(quantities):
+        values = {"Optimum (mm)": 470.0, "Efficiency at\noptimum (%)": 79.0}
+        return [constant(q, values.get(q.label, 0.1)) for q in quantities]
+
+    data = data | {"coefficients": tuple(map(constant, data["coefficients"]))}
+    data = changed(data, "efficiency", optimal_length=np.full((WALKERS, DRAWS), 470.0))
+    data = changed(data, "pairs", quantities=all_constant(data["pairs"].quantities))
+    return changed(data, "traces", quantities=all_constant(data["traces"].quantities))
 
 
 def at_the_edge():
@@ -143,42 +186,54 @@ CASES = {
     "constant draws": lambda: with_constant_draws(paper_data()),
     "optimum at the edge": at_the_edge,
 }
-APPLY = {
-    "on body": ["wrap_angles", "efficiency", "coefficients", "pairs", "traces", "residuals"],
-    "no route": ["coefficients", "traces", "residuals"],
-    "least squares only": ["wrap_angles", "efficiency", "residuals"],
-}
+ALL = ["wrap_angles", "efficiency", "coefficients", "pairs", "traces", "residuals"]
 
 
 def drawn(name, data=None):
-    return FIGURES[name].draw(paper_data() if data is None else data)
+    return FIGURES[name].draw((paper_data() if data is None else data)[name])
 
 
 def line(axes, label):
     return next(artist for artist in axes.get_lines() if artist.get_label() == label)
 
 
-@pytest.mark.parametrize("case", APPLY)
-def test_only_figures_that_apply_are_drawn(case):
-    data = CASES[case]()
-    assert [name for name, entry in FIGURES.items() if entry.applies(data)] == APPLY[case]
+@pytest.fixture(scope="module")
+def fit(on_body):
+    return bf.fit(on_body, seed=1, settings=QUICK)
 
 
-def test_a_single_draw_of_each_walker_has_no_trace_but_all_else():
-    data = paper_data()
-    single = tuple(dataclasses.replace(p, draws=p.draws[:, :1]) for p in data.parameters)
-    data = dataclasses.replace(data, parameters=single, optimal_length=data.optimal_length[:, :1])
-    assert not FIGURES["traces"].applies(data)
-    assert FIGURES["coefficients"].applies(data)
+def test_only_figures_that_apply_are_drawn(fit, on_body):
+    assert [name for name, _ in figures_of(fit)] == [*ALL, "checks"]
+    squares = bf.fit(on_body, mcmc=False)
+    assert [name for name, _ in figures_of(squares)] == ["wrap_angles", "efficiency", "residuals"]
+    without = bf.fit(on_body.parent / "yarn-on-cylinder", mcmc=False)
+    assert [name for name, _ in figures_of(without)] == ["residuals"]
+
+
+def test_a_single_draw_of_each_walker_has_no_trace_but_all_else(fit):
+    def first(draws):
+        return {name: values[:, :1] for name, values in draws.items()}
+
+    draws = fit.posterior
+    single = dataclasses.replace(draws, z=draws.z[:, :1], values=first(draws.values), optimum=first(draws.optimum))
+    single = dataclasses.replace(fit, posterior=single)
+    assert FIGURES["traces"].data(single) is None
+    assert FIGURES["coefficients"].data(single) is not None
+    assert FIGURES["pairs"].data(single) is not None
+
+
+def test_another_process_reads_what_figures_show_without_a_model_or_matplotlib(fit):
+    program = "import pickle, sys; pickle.load(sys.stdin.buffer); print({'jax', 'matplotlib'} & set(sys.modules))"
+    data = pickle.dumps(dict(figures_of(fit)))
+    done = subprocess.run([sys.executable, "-c", program], input=data, capture_output=True, check=True)
+    assert done.stdout.strip() == b"set()"
 
 
 @pytest.mark.parametrize("case", CASES)
 def test_no_words_overlap_or_leave_the_page(case):
     data = CASES[case]()
-    for name, entry in FIGURES.items():
-        if not entry.applies(data):
-            continue
-        figure = entry.draw(data)
+    for name in data:
+        figure = drawn(name, data)
         boxes, page = words(figure), figure.bbox.padded(1.0)
         for i, (text, box) in enumerate(boxes):
             inside = page.x0 <= box.x0 and box.x1 <= page.x1 and page.y0 <= box.y0 and box.y1 <= page.y1
@@ -190,8 +245,8 @@ def test_no_words_overlap_or_leave_the_page(case):
 @pytest.mark.parametrize("case", CASES)
 def test_every_axis_says_what_it_shows_or_shares_one_that_does(case):
     data = CASES[case]()
-    for name in ("wrap_angles", "efficiency", "coefficients", "residuals"):
-        for axes in FIGURES[name].draw(data).axes if FIGURES[name].applies(data) else ():
+    for name in data.keys() - {"pairs", "traces"}:
+        for axes in drawn(name, data).axes:
             assert any(other.get_xlabel() for other in axes.get_shared_x_axes().get_siblings(axes))
             lists_rows = "Measured efficiency" in axes.get_xlabel()
             assert lists_rows or any(other.get_ylabel() for other in axes.get_shared_y_axes().get_siblings(axes))
@@ -215,7 +270,7 @@ def test_names_and_units_are_the_same_everywhere(name, labels):
 def test_wrap_angles_show_every_reading_as_what_it_is():
     data = paper_data()
     axes = drawn("wrap_angles", data).axes[0]
-    curve = data.angles[0]
+    curve = data["wrap_angles"].curves[0]
     np.testing.assert_array_equal(line(axes, "Reading").get_xydata().T, [curve.route, curve.angle])
     np.testing.assert_array_equal(
         line(axes, "Not detected, at its limit").get_xydata().T, [curve.undetected_route, curve.limit]
@@ -229,7 +284,7 @@ def test_wrap_angles_show_every_reading_as_what_it_is():
 def test_bands_hold_the_quantiles_of_the_curve():
     data = paper_data()
     axes = drawn("wrap_angles", data).axes[0]
-    low, _, median, _, high = data.angles[0].band.quantiles
+    low, _, median, _, high = data["wrap_angles"].curves[0].band.quantiles
     np.testing.assert_array_equal(line(axes, "Median").get_ydata(), median)
     widest = next(c for c in axes.collections if c.get_label() == "90 % interval")
     heights = widest.get_paths()[0].vertices[:, 1]
@@ -262,7 +317,7 @@ def test_efficiency_marks_points_outside_with_their_prediction():
     np.testing.assert_allclose(outside.get_xydata(), [[550.0, 67.8]])
     (container,) = axes.containers
     (bar,) = container[2][0].get_segments()
-    np.testing.assert_allclose(bar[:, 1], 100 * data.points[0].predicted[[0, -1], 3])
+    np.testing.assert_allclose(bar[:, 1], 100 * data["efficiency"].points[0].predicted[[0, -1], 3])
 
 
 def test_optimum_window_and_choices_stand_below_the_efficiency():
@@ -271,18 +326,18 @@ def test_optimum_window_and_choices_stand_below_the_efficiency():
     window = next(p for p in where.patches if "best with 95 %" in p.get_label())
     assert (window.get_x(), window.get_x() + window.get_width()) == (455.0, 484.0)
     heights = [bar.get_height() for bar in which.containers[0]]
-    assert heights == [100 * choice.probability_best for choice in data.optimum.choices]
+    assert heights == [100 * choice.probability_best for choice in data["efficiency"].optimum.choices]
 
 
 def test_a_missing_window_is_not_drawn():
     data = paper_data()
-    nowhere = dataclasses.replace(data.optimum, window=Window(0.01, 0.95, float("nan"), float("nan")))
-    figure = drawn("efficiency", dataclasses.replace(data, optimum=nowhere))
+    nowhere = dataclasses.replace(data["efficiency"].optimum, window=Window(0.01, 0.95, float("nan"), float("nan")))
+    figure = drawn("efficiency", changed(data, "efficiency", optimum=nowhere))
     assert not [text for text, _ in words(figure) if "probability" in text]
 
 
 def test_an_optimum_at_the_edge_is_said_to_be_there():
-    share = at_the_edge().optimum.at_edge
+    share = at_the_edge()["efficiency"].optimum.at_edge
     assert share > 0.1
     assert f"{100 * share:.3g} % of the draws at an end of the range" in [
         t for t, _ in words(drawn("efficiency", at_the_edge()))
@@ -293,10 +348,10 @@ def test_coefficients_show_prior_posterior_and_least_squares():
     data = paper_data()
     axes = drawn("coefficients", data).axes
     assert len(axes) == 3
-    for panel, p in zip(axes, data.parameters, strict=False):
+    for panel, p in zip(axes, data["coefficients"], strict=True):
         assert {"Posterior", "Prior"} <= {artist.get_label() for artist in panel.get_lines()}
         low, median, high = (f"{q:.3f}" for q in np.quantile(p.draws, (0.05, 0.5, 0.95)))
-        if p.name == "mu1":
+        if p.symbol == r"$\mu_1$":
             assert panel.get_title() == f"Median {median}\n90 % interval {low} to {high}"
     (bar,) = axes[0].containers[0][2][0].get_segments()
     np.testing.assert_allclose(bar[:, 0], [0.074, 0.094])
@@ -305,14 +360,27 @@ def test_coefficients_show_prior_posterior_and_least_squares():
 
 def test_a_far_least_squares_estimate_is_written_not_drawn():
     data = paper_data()
-    far = dataclasses.replace(data.parameters[0], least_squares=5.0)
-    (axes,) = drawn("coefficients", dataclasses.replace(data, parameters=(far,))).axes
+    far = dataclasses.replace(data["coefficients"][0], least_squares=5.0)
+    (axes,) = drawn("coefficients", {"coefficients": (far,)}).axes
     assert not axes.containers
     assert [t.get_text() for t in axes.texts] == ["Least squares: off the axis, 5"]
 
 
+def fit_of_nine():
+    """As much of a fit of nine coefficients as the pair plot asks for."""
+    draws = {f"mu{i}": np.random.default_rng(i).uniform(0.1, 0.2, (WALKERS, DRAWS)) for i in range(9)}
+    free = [SimpleNamespace(name=name, symbol=f"${name}$", unit="1", role="friction") for name in draws]
+    lengths = np.random.default_rng(9).uniform(460.0, 480.0, (WALKERS, DRAWS))
+    optimum = {OPTIMAL_LENGTH: lengths, OPTIMAL_EFFICIENCY: np.full(lengths.shape, 0.79) + 1e-4 * lengths}
+    route = SimpleNamespace(variable="cable_length", unit="mm", range=RANGE)
+    return SimpleNamespace(
+        posterior=SimpleNamespace(values=draws, optimum=optimum), model=SimpleNamespace(space=SimpleNamespace(free=free)),
+        dataset=SimpleNamespace(description=SimpleNamespace(route=route)),
+    )  # fmt: skip
+
+
 def test_pair_plot_shows_at_most_eight_and_keeps_the_optimum():
-    texts = [text for text, _ in words(drawn("pairs", with_five_contacts(paper_data())))]
+    texts = [text for text, _ in words(drawn("pairs", {"pairs": pairs_figure.data(fit_of_nine())}))]
     assert texts.count("Optimum (mm)") == 2  # below its column and left of its row
     symbols = {text for text in texts if text.startswith("$")}
     assert len(symbols) == 6
@@ -320,10 +388,11 @@ def test_pair_plot_shows_at_most_eight_and_keeps_the_optimum():
 
 def test_traces_tell_a_stray_ensemble():
     data = paper_data()
-    stray = data.parameters[0].draws.copy()
+    first = data["traces"].quantities[0]
+    stray = first.draws.copy()
     stray[: WALKERS // ENSEMBLES] += 0.05
-    moved = dataclasses.replace(data.parameters[0], draws=stray)
-    figure = drawn("traces", dataclasses.replace(data, parameters=(moved,), optimum=None))
+    moved = dataclasses.replace(first, draws=stray)
+    figure = drawn("traces", {"traces": Paths([moved], ENSEMBLES)})
     medians = [c.get_segments()[0][:, 1].mean() for c in figure.axes[0].collections if c.get_linewidth()[0] == 1.0]
     assert len(medians) == ENSEMBLES
     assert medians[0] > max(medians[1:]) + 0.1  # in
@@ -372,23 +441,22 @@ def test_ticks_are_round_and_within_the_axis(limits):
 
 def test_all_figures_are_written_in_both_formats_and_nothing_else(tmp_path):
     before = dict(mpl.rcParams)
-    written = draw_all(paper_data(), tmp_path / "figures")
-    assert [path.name for path in written] == [
-        f"{name}.{ending}" for name in APPLY["on body"] for ending in ("png", "svg")
-    ]
+    written = [path for name, data in paper_data().items() for path in draw_figure(name, data, tmp_path / "figures")]
+    assert [path.name for path in written] == [f"{name}.{ending}" for name in ALL for ending in ("png", "svg")]
     assert sorted(written) == sorted((tmp_path / "figures").iterdir())
     assert all(1_000 < path.stat().st_size < 500_000 for path in written)
     assert dict(mpl.rcParams) == before
 
 
-def test_only_the_figures_asked_for_are_written(tmp_path):
-    written = draw_all(without_route(paper_data()), tmp_path, formats=("svg",), names=("efficiency", "coefficients"))
+def test_only_the_formats_asked_for_are_written(tmp_path):
+    written = draw_figure("coefficients", paper_data()["coefficients"], tmp_path, formats=("svg",))
     assert [path.name for path in written] == ["coefficients.svg"]
 
 
 def test_the_same_data_give_the_same_bytes_with_words_as_text(tmp_path):
     for folder in ("first", "second"):
-        draw_all(paper_data(), tmp_path / folder, formats=("svg",))
+        for name, data in paper_data().items():
+            draw_figure(name, data, tmp_path / folder, formats=("svg",))
     for path in (tmp_path / "first").iterdir():
         assert path.read_bytes() == (tmp_path / "second" / path.name).read_bytes()
     assert "Wrap angle (deg)</text>" in (tmp_path / "first" / "wrap_angles.svg").read_text(encoding="utf-8")
@@ -403,12 +471,13 @@ def test_a_failed_write_leaves_the_old_file_and_no_temporary_one(tmp_path):
     assert path.read_text() == "old"
 
 
-def test_drawing_loads_neither_jax_nor_pyplot():
+def test_drawing_loads_neither_jax_nor_pyplot(tmp_path):
     program = (
-        "import sys, bowdenfit.questions.summary.gallery\n"
+        "import sys, bowdenfit.questions.figures as figures, bowdenfit.plots.layout as layout\n"
+        "figures.write_all(layout.empty_page(1, 1), __import__('pathlib').Path(sys.argv[1]), 'empty')\n"
         "print(*sorted({'jax', 'scipy', 'arviz_base', 'matplotlib.pyplot'} & set(sys.modules)))"
     )
-    done = subprocess.run([sys.executable, "-c", program], capture_output=True, text=True, check=True)
+    done = subprocess.run([sys.executable, "-c", program, str(tmp_path)], capture_output=True, text=True, check=True)
     assert done.stdout.strip() == ""
 
 

@@ -14,9 +14,9 @@ from bowdenfit.inference.comparison import Difference, Prediction, differences
 from bowdenfit.kinds.design import Design
 from bowdenfit.questions.check.data_set_words import check_text
 from bowdenfit.questions.identify.confounding import confounded
+from bowdenfit.questions.recorded import dependence_figure
 from bowdenfit.questions.recorded.rate import RateEffect, rate_effect
-from bowdenfit.questions.summary.figure_data import RecordedTrace
-from bowdenfit.questions.summary.figures import figure_data
+from bowdenfit.questions.recorded.traces import traces
 from bowdenfit.questions.summary.words import summary_text
 
 QUICK = ("sampler.n_walkers=128", "sampler.target_ess=200", "sampler.target_r_hat=1.05", "sampler.max_steps=2000")
@@ -113,16 +113,14 @@ def test_check_shows_the_recordings_and_has_no_false_warning(recorded):
 
 
 def test_figures_of_a_fit_show_every_recording_with_a_band_that_holds_most_of_it(plain):
-    data = figure_data(plain[0])
-    assert len(data.recordings) == 7
-    for trace in data.recordings:
-        assert isinstance(trace, RecordedTrace)
+    found = traces(plain[0])
+    assert len(found) == 7
+    for trace in found:
         low, _, high = trace.predicted[:, trace.used]
         inside = (trace.output_force[trace.used] > low - 1.0) & (trace.output_force[trace.used] < high + 1.0)
         assert inside.mean() > 0.85  # a 90 % band of mountings, give or take the noise of a block
         off = np.abs(trace.fitted - trace.output_force)[trace.used] / trace.output_force[trace.used]
         assert np.median(off) < 0.01
-    assert data.velocity_unit == "r/min"
 
 
 def test_speed_is_answered_with_its_difference_and_interval(with_rate):
@@ -134,8 +132,8 @@ def test_speed_is_answered_with_its_difference_and_interval(with_rate):
     page = json.loads((folder / "summary.json").read_text())
     assert page["rate_effect"]["difference"]["median"] == pytest.approx(effect.difference.median)
     assert "Efficiency at 470 mm at 60 r/min less that at 20 r/min" in " ".join(summary_text(fit).split())
-    (dependence,) = figure_data(fit).dependences
-    assert dependence.what == "speed"
+    (dependence,) = dependence_figure.data(fit)
+    assert (dependence.what, dependence.label) == ("speed", "Speed (r/min)")
     assert len(dependence.points_x) == 4
 
 

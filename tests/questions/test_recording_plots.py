@@ -8,11 +8,16 @@ import pytest
 from figure_words import check_words, words
 
 from bowdenfit.plots.panels import extremes
-from bowdenfit.questions.recorded.recordings_figure import POINTS, beginning
-from bowdenfit.questions.recorded.sample_efficiency_figure import sample_efficiencies
-from bowdenfit.questions.summary.figure_data import Dependence, EfficiencyPoints, FigureData, RecordedTrace
-from bowdenfit.questions.summary.gallery import FIGURES, draw_all
+from bowdenfit.questions.figures import FIGURES, draw_figure
+from bowdenfit.questions.length.efficiency_figure import EfficiencyPoints
+from bowdenfit.questions.recorded.autocorrelation_figure import Autocorrelation, autocorrelation
+from bowdenfit.questions.recorded.dependence_figure import Dependence
+from bowdenfit.questions.recorded.hysteresis_figure import ForceLoop
+from bowdenfit.questions.recorded.recordings_figure import POINTS, OverTime, beginning
+from bowdenfit.questions.recorded.sample_efficiency_figure import Samples, sample_efficiencies
+from bowdenfit.questions.summary.residuals_figure import Residuals
 
+PER_BLOCK = ("time", "input_force", "output_force", "stroke", "saturated", "predicted", "fitted")
 NAMES = ("recordings", "hysteresis", "sample_efficiency", "autocorrelation", "dependence")
 EXPONENT, NOISE, BLOCKS = 0.24, 0.15, 1000
 LONG_NAME = "recordings/2024-05-03_bench_a/second_mounting_after_lunch/cable_length_470_mm_slow_"
@@ -25,6 +30,16 @@ def operator(input_force, exponent, start):
         force = min(max(force, low), high)
         path.append(force)
     return np.array(path)
+
+
+@dataclasses.dataclass(frozen=True)
+class Recorded:
+    """One recording, and what each figure shows of it."""
+
+    over_time: OverTime
+    hysteresis: ForceLoop
+    samples: Samples
+    autocorrelation: Autocorrelation
 
 
 def trace(number=0, n=BLOCKS, name=None, draws=True, cycles=2, seconds=40.0):
@@ -40,33 +55,43 @@ def trace(number=0, n=BLOCKS, name=None, draws=True, cycles=2, seconds=40.0):
     near = np.convolve(np.abs(np.diff(stroke, prepend=stroke[0])), np.ones(9), mode="same") > 0
     spread = np.array([-0.02, 0.0, 0.02]) if draws else np.zeros(1)
     lag = 0.4 * np.arange(25)
+    name, used = name or f"run_{number:02d}", (stroke != 0) & ~near
     low, middle, high = np.exp(-EXPONENT - 0.02 * np.array([1, 0, -1]))
-    return RecordedTrace(
-        name=name or f"run_{number:02d}", run=f"mounting {number // 2}", time=time, input_force=motor,
-        output_force=output, velocity=np.full(n, np.nan) if number % 2 else np.gradient(motor, time), stroke=stroke,
-        used=(stroke != 0) & ~near, saturated=output > 0.998 * output.max(),
+    over_time = OverTime(
+        name=name, loop=False, time=time, input_force=motor, output_force=output, stroke=stroke,
+        saturated=output > 0.998 * output.max(),
         predicted=np.stack([operator(motor, EXPONENT - s, 20.0) for s in spread]), fitted=true_output,
-        exponent=EXPONENT + (spread if draws else np.zeros(3)), own_exponent=exponent,
-        efficiency=np.array([low, middle, high]) if draws else np.full(1, middle), own_efficiency=np.exp(-exponent),
-        own_efficiency_sd=0.002, lag=lag,
-        autocorrelation=np.exp(-lag) + 0.03 * rng.standard_normal(len(lag)) * (lag > 0),
         flagged_kind=("dropout", "spike", "spike", "saturated", "quiet"),
         flagged_time=seconds * np.array([0.2, 0.35, 0.6, 0.75, 0.99]),
         flagged_input=np.array([np.nan, 60.0, 5e3, 100.0, 10.0]),
         flagged_output=np.array([np.nan, 70.0, 40.0, 90.0, 18.0]),
     )  # fmt: skip
+    correlation = np.exp(-lag) + 0.03 * rng.standard_normal(len(lag)) * (lag > 0)
+    return Recorded(
+        over_time,
+        ForceLoop(name, motor, output, stroke, EXPONENT + spread, exponent),
+        Samples(
+            name, *sample_efficiencies(motor, output, stroke * used),
+            np.array([low, middle, high]) if draws else np.full(1, middle), np.exp(-exponent), 0.002,
+        ),
+        Autocorrelation(name, lag, correlation, int(used.sum())),
+    )  # fmt: skip
 
 
 def one_way(number=0):
     """A recording that only pulls."""
-    whole = trace(number)
-    here = slice(80, 250)
-    per_block = ("time", "input_force", "output_force", "velocity", "stroke", "used", "saturated", "fitted")
-    cut = {name: getattr(whole, name)[here] for name in per_block}
-    return dataclasses.replace(
-        whole, **cut, predicted=whole.predicted[:, here], name="pulling only", flagged_kind=(),
-        flagged_time=np.zeros(0), flagged_input=np.zeros(0), flagged_output=np.zeros(0),
-    )  # fmt: skip
+    whole, here, name = trace(number), slice(80, 250), "pulling only"
+    cut = {name: getattr(whole.over_time, name)[..., here] for name in PER_BLOCK}
+    none = dict.fromkeys(("flagged_time", "flagged_input", "flagged_output"), np.zeros(0))
+    over_time = dataclasses.replace(whole.over_time, name=name, **cut, **none, flagged_kind=())
+    forces = {n: cut[n] for n in ("input_force", "output_force", "stroke")}
+    efficiency, stroke = sample_efficiencies(**forces)
+    return Recorded(
+        over_time,
+        dataclasses.replace(whole.hysteresis, name=name, **forces),
+        dataclasses.replace(whole.samples, name=name, efficiency=efficiency, stroke=stroke),
+        dataclasses.replace(whole.autocorrelation, name=name, n_blocks=len(stroke)),
+    )
 
 
 def dependence_on(what, label, x, draws=True, runs=3):
@@ -83,12 +108,13 @@ def dependence_on(what, label, x, draws=True, runs=3):
 LOADS, SPEEDS = np.linspace(10.0, 120.0, 40), np.geomspace(1.0, 300.0, 40)
 
 
-def data_of(recordings, dependences=()):
-    return FigureData(
-        name="Bench", route_label="", route_range=(0.0, 0.0), angles=(), efficiency=None, points=(), optimum=None,
-        optimal_length=None, optimal_efficiency=None, parameters=(), n_ensembles=0, recordings=tuple(recordings),
-        velocity_unit="mm/s", dependences=tuple(dependences),
-    )  # fmt: skip
+def data_of(recorded, dependences=()):
+    """What the figures show, by name."""
+    parts = dict(zip(NAMES, ("over_time", "hysteresis", "samples", "autocorrelation"), strict=False))
+    recorded = tuple(recorded)
+    return {name: tuple(getattr(r, part) for r in recorded) for name, part in parts.items()} | {
+        "dependence": tuple(dependences)
+    }
 
 
 def both(draws=True, runs=3):
@@ -99,14 +125,18 @@ def both(draws=True, runs=3):
 def unlike():
     """Recordings of other lengths, loads and clocks."""
     first, second, third = trace(0), trace(1, n=120, seconds=3.0), trace(2)
-    stronger = {n: 20 * getattr(third, n) for n in ("input_force", "output_force", "predicted", "fitted")}
-    late = {n: getattr(third, n) + 1000.0 for n in ("time", "flagged_time")}
-    return first, second, dataclasses.replace(third, **stronger, **late)
+    stronger = {n: 20 * getattr(third.over_time, n) for n in ("input_force", "output_force", "predicted", "fitted")}
+    late = {n: getattr(third.over_time, n) + 1000.0 for n in ("time", "flagged_time")}
+    forces = {n: stronger[n] for n in ("input_force", "output_force")}
+    over_time = dataclasses.replace(third.over_time, **stronger, **late)
+    hysteresis = dataclasses.replace(third.hysteresis, **forces)
+    return first, second, dataclasses.replace(third, over_time=over_time, hysteresis=hysteresis)
 
 
 def with_a_gap():
     whole = trace(3)
-    return dataclasses.replace(whole, time=whole.time + 15.0 * (whole.time > 20))
+    time = whole.over_time.time
+    return dataclasses.replace(whole, over_time=dataclasses.replace(whole.over_time, time=time + 15.0 * (time > 20)))
 
 
 CASES = {
@@ -122,7 +152,7 @@ CASES = {
 
 
 def drawn(name, case="four"):
-    return FIGURES[name].draw(CASES[case]() if isinstance(case, str) else case)
+    return FIGURES[name].draw((CASES[case]() if isinstance(case, str) else case)[name])
 
 
 def line(axes, label):
@@ -137,7 +167,7 @@ def legend_of(figure):
 def test_no_words_overlap_or_leave_the_page(case):
     data = CASES[case]()
     for name in NAMES:
-        check_words(FIGURES[name].draw(data), name)
+        check_words(drawn(name, data), name)
 
 
 @pytest.mark.parametrize("name", NAMES)
@@ -154,11 +184,15 @@ def test_every_axis_is_labeled_or_shares_one_that_is(name, case):
         assert place.rowspan.stop < lowest or axes.get_xlabel()
 
 
-def test_figures_apply_only_where_there_is_what_they_show():
-    assert not any(FIGURES[name].applies(data_of([])) for name in NAMES)
-    assert all(FIGURES[name].applies(CASES["one"]()) for name in NAMES)
-    bare = dataclasses.replace(trace(), used=np.zeros(BLOCKS, dtype=bool), lag=np.zeros(0), autocorrelation=np.zeros(0))
-    assert [name for name in NAMES if FIGURES[name].applies(data_of([bare]))] == ["recordings", "hysteresis"]
+@pytest.mark.parametrize("blocks", [np.zeros(0), np.ones(7), np.zeros(100)])
+def test_few_or_constant_deviations_have_no_autocorrelation(blocks):
+    assert autocorrelation(blocks).tolist() == [1.0]
+
+
+def test_deviations_that_alternate_are_correlated_in_turn():
+    correlation = autocorrelation(np.resize([1.0, -1.0], 400))
+    assert len(correlation) == 60
+    np.testing.assert_allclose(correlation, np.resize([1.0, -1.0], 60) * (400 - np.arange(60)) / 400)
 
 
 @pytest.mark.parametrize("name", NAMES[:4])
@@ -179,7 +213,7 @@ def test_fewer_recordings_take_fewer_columns(case, columns):
 
 def test_recordings_show_forces_fit_and_interval():
     data = CASES["one"]()
-    (recording,) = data.recordings
+    (recording,) = data["recordings"]
     (axes,) = drawn("recordings", data).axes
     start = recording.time[0]
     np.testing.assert_allclose(line(axes, "Input").get_xydata().T, [recording.time - start, recording.input_force])
@@ -191,8 +225,8 @@ def test_recordings_show_forces_fit_and_interval():
 
 
 def test_phases_are_shaded_where_the_rope_is_in_them_in_fills_that_differ_in_gray():
-    recording = trace()
-    (axes,) = drawn("recordings", data_of([recording])).axes
+    data = data_of([trace()])
+    ((recording,), (axes,)) = data["recordings"], drawn("recordings", data).axes
     fills = {c.get_label(): c for c in axes.collections}
     for stroke, name in ((1, "Pulling"), (-1, "Returning"), (0, "Switching or held")):
         inside = np.zeros(BLOCKS, dtype=bool)
@@ -237,7 +271,7 @@ def test_of_many_cycles_only_the_first_are_shown_and_this_is_said():
     many = trace(n=4000, cycles=40, seconds=200.0)
     figure = drawn("recordings", data_of([many]))
     assert "First 8 cycles shown" in legend_of(figure)
-    shown = beginning(many)
+    shown = beginning(many.over_time)
     assert shown.time[-1] == pytest.approx(8 * 5.0, abs=1.5)
     assert shown.predicted.shape == (3, len(shown.time)) == (3, len(shown.stroke))
     assert shown.flagged_kind == ("dropout",) and shown.flagged_time.tolist() == [40.0]
@@ -252,12 +286,12 @@ def test_thinned_lines_keep_every_peak():
     long = trace(n=20_000)
     (axes,) = drawn("recordings", data_of([long])).axes
     assert len(line(axes, "Output").get_ydata()) <= POINTS
-    assert line(axes, "Output").get_ydata().max() == long.output_force.max()
+    assert line(axes, "Output").get_ydata().max() == long.over_time.output_force.max()
 
 
 def test_hysteresis_shows_the_loop_between_both_capstan_lines():
-    recording = trace()
-    (axes,) = drawn("hysteresis", data_of([recording])).axes
+    recording = trace().hysteresis
+    (axes,) = drawn("hysteresis", {"hysteresis": (recording,)}).axes
     assert axes.get_xlim() == axes.get_ylim()
     box = axes.get_window_extent()
     assert box.width == pytest.approx(box.height, rel=1e-3)
@@ -274,7 +308,8 @@ def test_hysteresis_shows_the_loop_between_both_capstan_lines():
 
 
 def test_hysteresis_writes_the_exponent_and_its_interval():
-    (text,) = drawn("hysteresis", data_of([dataclasses.replace(trace(), own_exponent=0.25)])).axes[0].texts
+    exact = dataclasses.replace(trace().hysteresis, own_exponent=0.25)
+    (text,) = drawn("hysteresis", {"hysteresis": (exact,)}).axes[0].texts
     assert text.get_text() == r"$\Lambda$ here 0.250" + "\n" + r"$\Lambda$ expected 0.240" + "\n(0.220 to 0.260)"
     (text,) = drawn("hysteresis", data_of([trace(draws=False)])).axes[0].texts
     assert "(" not in text.get_text()
@@ -294,22 +329,22 @@ def test_the_exponent_is_written_clear_of_the_loop(case):
 
 
 def test_sample_efficiencies_are_below_one_both_ways():
-    values, stroke = sample_efficiencies(trace())
+    values, stroke = trace().samples.efficiency, trace().samples.stroke
     assert set(stroke.tolist()) == {-1, 1}
     for way in (-1, 1):
         assert values[stroke == way].mean() == pytest.approx(np.exp(-EXPONENT), abs=0.02)
 
 
 def test_sample_efficiency_shows_samples_mean_and_expectation_in_percent():
-    recording = trace()
-    (axes,) = drawn("sample_efficiency", data_of([recording])).axes
-    values, stroke = sample_efficiencies(recording)
+    recording = trace().samples
+    (axes,) = drawn("sample_efficiency", {"sample_efficiency": (recording,)}).axes
+    values, stroke = recording.efficiency, recording.stroke
     np.testing.assert_allclose(line(axes, "Returning").get_ydata(), 100 * values[stroke == -1])
-    assert line(axes, "Mean of the run").get_ydata()[0] == 100 * recording.own_efficiency
+    assert line(axes, "Mean of the run").get_ydata()[0] == 100 * recording.mean
     band = next(c for c in axes.collections if "from the readings" in c.get_label())
     assert np.ptp(band.get_paths()[0].vertices[:, 1]) == pytest.approx(2 * 1.645 * 0.2)
     (bar,) = axes.containers[0][2][0].get_segments()
-    np.testing.assert_allclose(bar[:, 1], 100 * recording.efficiency[[0, 2]])
+    np.testing.assert_allclose(bar[:, 1], 100 * recording.expected[[0, 2]])
     assert bar[0, 0] > line(axes, "Returning").get_xdata().max()
 
 
@@ -320,17 +355,25 @@ def test_a_recording_of_one_phase_has_one_mark():
 
 def test_an_unknown_mean_or_exponent_is_left_out():
     nan = float("nan")
-    data = data_of([dataclasses.replace(trace(), own_efficiency=nan, own_efficiency_sd=nan, own_exponent=nan)])
+    whole = trace()
+    samples = dataclasses.replace(whole.samples, mean=nan, sd=nan)
+    data = data_of(
+        [
+            dataclasses.replace(
+                whole, samples=samples, hysteresis=dataclasses.replace(whole.hysteresis, own_exponent=nan)
+            )
+        ]
+    )
     assert "Mean of the run" not in legend_of(drawn("sample_efficiency", data))
     assert "nan" not in "".join(text for text, _ in words(drawn("hysteresis", data)))
 
 
 def test_autocorrelation_has_the_band_of_its_own_number_of_blocks():
-    recording = trace()
-    (axes,) = drawn("autocorrelation", data_of([recording])).axes
+    recording = trace().autocorrelation
+    (axes,) = drawn("autocorrelation", {"autocorrelation": (recording,)}).axes
     band = next(p for p in axes.patches if "95 %" in p.get_label())
-    assert 2 * 1.96 / np.sqrt(recording.used.sum()) == pytest.approx(band.get_height())
-    np.testing.assert_array_equal(line(axes, "Deviations from the fit").get_ydata(), recording.autocorrelation)
+    assert 2 * 1.96 / np.sqrt(recording.n_blocks) == pytest.approx(band.get_height())
+    np.testing.assert_array_equal(line(axes, "Deviations from the fit").get_ydata(), recording.correlation)
 
 
 def test_dependence_shows_curve_constant_and_points():
@@ -358,17 +401,15 @@ def test_recorded_efficiencies_are_drawn_like_those_of_runs():
     assert readings_called(RECORDED).are_runs
     assert readings_called(RECORDED).axis == readings_called("run_efficiency").axis
     route = np.array([450.0, 500.0])
-    points = EfficiencyPoints(
-        RECORDED, ("a", "b"), route, 0.8 + 0 * route, np.full((5, 2), 0.79), np.ones(2, dtype=bool)
-    )
-    assert FIGURES["residuals"].applies(dataclasses.replace(data_of([]), points=(points,)))
+    points = EfficiencyPoints(True, ("a", "b"), route, 0.8 + 0 * route, np.full((5, 2), 0.79), np.ones(2, dtype=bool))
+    assert {"a", "b"} <= {text for text, _ in words(drawn("residuals", {"residuals": Residuals((points,))}))}
 
 
 def test_the_same_data_give_the_same_small_files(tmp_path):
     before = dict(mpl.rcParams)
     data = CASES["twenty, long names"]()
     for folder in ("first", "second"):
-        written = draw_all(data, tmp_path / folder, names=NAMES)
+        written = [path for name in NAMES for path in draw_figure(name, data[name], tmp_path / folder)]
     assert [path.name for path in written] == [f"{name}.{ending}" for name in NAMES for ending in ("png", "svg")]
     for path in (tmp_path / "first").iterdir():
         assert path.read_bytes() == (tmp_path / "second" / path.name).read_bytes()

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -14,27 +15,109 @@ from bowdenfit.plots.style import BLACK, EFFICIENCY, GRAY, MEDIUM, WIDE, WRAP_AN
 
 if TYPE_CHECKING:
     from bowdenfit.plots.layout import Axes, Figure
-    from bowdenfit.questions.bends.figure_data import BendingLoss, EfficiencyLine
-    from bowdenfit.questions.summary.figure_data import FigureData
+    from bowdenfit.results.record import Record
 
 DASHES = (0, (4, 1.6))
 MARKERS = ("o", "s", "^", "D", "v", "P")
 MARKS = 4  # on each line
 LINES_IN_A_ROW = 2  # of a panel's legend
+TIMES_COEFFICIENT, TIMES_PRELOAD = (0.5, 1.0, 2.0), (0.0, 0.5, 1.0, 2.0)  # times what was fitted
 # What a panel varies, and the color map its lines are from, so that neither panel's legend holds for the other.
 COEFFICIENTS, PRELOADS, FITTED = ("Friction", "YlOrRd"), ("Preload", "GnBu"), ("Efficiency", "Greys")
 
 
-def has_bending_loss(data: FigureData) -> bool:
-    """Whether efficiency against the wrap angle is known for a loop or a rope with preload."""
-    return data.elastic.bending_loss is not None
+@dataclass(frozen=True)
+class EfficiencyLine:
+    """Efficiency [1] against the wrap angle under stated conditions, and by the capstan equation alone.
+
+    Args:
+        label: The conditions in words, such as "preload 20 N".
+        efficiency: Of the cable.
+        capstan: Of the capstan equation with the same coefficient.
+    """
+
+    label: str
+    efficiency: np.ndarray
+    capstan: np.ndarray
+
+
+@dataclass(frozen=True)
+class BendingLoss:
+    """Efficiency against the wrap angle.
+
+    Args:
+        wrap_angle: Of the lines [deg].
+        input_force: Force at which efficiency is meant [N].
+        fitted: Quantiles of the cable as fitted, with its own preload [1].
+        fitted_capstan: Median of the capstan equation with the fitted coefficients [1].
+        fitted_label: Words for it, such as "as fitted, preload 22 N".
+        coefficients: Lines for several friction coefficients, with the fitted preload.
+        preloads: Lines for several preloads, with the fitted coefficients.
+    """
+
+    wrap_angle: np.ndarray
+    input_force: float
+    fitted: np.ndarray
+    fitted_capstan: np.ndarray
+    fitted_label: str
+    coefficients: tuple[EfficiencyLine, ...]
+    preloads: tuple[EfficiencyLine, ...]
+
+
+def data(fit: Record) -> BendingLoss | None:
+    """What is shown; None of a cable that is no loop with preload, or was measured at no bend."""
+    import jax.numpy as jnp
+
+    from bowdenfit.physics.friction import transmission_efficiency
+    from bowdenfit.physics.loop import loop_output_force
+    from bowdenfit.questions.bends.answer import elastic_answers, typical_preload
+    from bowdenfit.questions.bends.curves import POINTS, Values, of_draws, quantiles, range_of_bends, reference_angle
+
+    bends = range_of_bends(fit)
+    if bends is None:
+        return None
+    elastic, typical = elastic_answers(fit), typical_preload(fit)
+    angles, force = np.linspace(0, bends[1], POINTS), elastic.reference_force
+    preloads = np.unique([float(f"{typical * factor:.2g}") for factor in TIMES_PRELOAD])
+    bent = elastic.bent(angles)
+
+    def curves(values: Values) -> dict[str, Any]:
+        exponent, own = bent.exponent(values), bent.preload(values)[0]
+
+        def efficiency(preload: Any, factor: Any = 1.0) -> Any:
+            return loop_output_force(jnp.asarray(force), preload, factor * exponent, jnp.asarray(1.0)) / force
+
+        return {
+            "fitted": efficiency(own),
+            "exponent": exponent,
+            "coefficients": efficiency(own, jnp.asarray(TIMES_COEFFICIENT)[:, None]),
+            "preloads": efficiency(bent.preloads(values, jnp.asarray(preloads))),
+        }
+
+    draws = of_draws(fit, curves)
+    lines = {name: np.median(drawn, axis=0) for name, drawn in draws.items()}
+    coefficient = lines["exponent"][-1] / angles[-1]
+    capstan = np.asarray(transmission_efficiency(jnp.asarray(lines["exponent"])))
+    return BendingLoss(
+        np.rad2deg(angles),
+        force,
+        quantiles(draws["fitted"]),
+        capstan,
+        " ".join(filter(None, (f"as fitted, preload {typical:.3g} N", reference_angle(fit)))),
+        tuple(
+            EfficiencyLine(f"coefficient {factor * coefficient:.2g}", line, capstan**factor)
+            for factor, line in zip(TIMES_COEFFICIENT, lines["coefficients"], strict=True)
+        ),
+        tuple(
+            EfficiencyLine(f"preload {preload:g} N", line, capstan)
+            for preload, line in zip(preloads, lines["preloads"], strict=True)
+        ),
+    )
 
 
 @in_paper_style
-def bending_loss(data: FigureData) -> Figure:
+def draw(loss: BendingLoss) -> Figure:
     """Efficiency [%] against the wrap angle [deg]: several friction coefficients, and several preloads."""
-    loss = data.elastic.bending_loss
-    assert loss is not None
     sides = [(*COEFFICIENTS, loss.coefficients), (*PRELOADS, loss.preloads)]
     sides = [side for side in sides if side[2]] or [(*FITTED, ())]
     rows = max(-(-len(lines) // LINES_IN_A_ROW) for _, _, lines in sides)

@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -13,8 +14,7 @@ from bowdenfit.plots.style import BLACK, BLUE, GRAY, LEAST_SQUARES, MEDIAN, PURP
 
 if TYPE_CHECKING:
     from bowdenfit.plots.layout import Axes, Figure
-    from bowdenfit.questions.bends.figure_data import LoopCurve
-    from bowdenfit.questions.summary.figure_data import FigureData
+    from bowdenfit.results.record import Record
 
 MOST, MOST_COLUMNS = 6, 3
 WORD_ROOM = 0.075  # share of a panel's width that a word along the line takes
@@ -26,15 +26,87 @@ STROKES = (
 )
 
 
-def has_loops(data: FigureData) -> bool:
-    """Whether the cable is a loop with preload."""
-    return bool(data.elastic.loops)
+@dataclass(frozen=True)
+class LoopCurve:
+    """Output against input force of a loop at one wrap angle.
+
+    Args:
+        label: Wrap angle in words, such as "180 deg".
+        input_force: Of the curves [N].
+        forward, back: Quantiles of the output force while moving forward and back [N].
+        capstan: Median output force of a rope without preload, moving forward [N].
+        slack_load: Quantiles of the input force at which the return side goes slack [N].
+        points_input, points_output: Readings [N].
+        points_stroke: +1 forward, -1 back, 0 of a recording.
+    """
+
+    label: str
+    input_force: np.ndarray
+    forward: np.ndarray
+    back: np.ndarray
+    capstan: np.ndarray
+    slack_load: np.ndarray
+    points_input: np.ndarray
+    points_output: np.ndarray
+    points_stroke: np.ndarray
+
+
+def data(fit: Record) -> tuple[LoopCurve, ...] | None:
+    """A curve for each wrap angle that a loop with preload was moved at; None of anything else."""
+    import jax.numpy as jnp
+
+    from bowdenfit.physics.loop import loop_band, slack_load
+    from bowdenfit.questions.bends.answer import elastic_answers, some_of
+    from bowdenfit.questions.bends.curves import POINTS, Values, loop_bends, of_draws, quantiles
+
+    bends = loop_bends(fit)
+    if bends is None:
+        return None
+    elastic, (angle, force_in, force_out, stroke) = elastic_answers(fit), _points(fit, bends)
+    angles = some_of(np.unique(np.round(angle, 9)) if len(angle) else bends, MOST)
+    ends = np.append(force_in, 0.0) if len(angle) else np.array([0.0, 2 * elastic.reference_force])
+    forces = np.linspace(1.05 * ends.min(), 1.05 * ends.max(), POINTS)
+    bent = elastic.bent(angles)
+
+    def curves(values: Values) -> dict[str, Any]:
+        exponent, preload = bent.exponent(values), bent.preload(values)[0]
+        force = jnp.broadcast_to(jnp.asarray(forces), (len(angles), POINTS))
+        forward, back = loop_band(force, preload[:, None], exponent[:, None])
+        capstan = loop_band(force, jnp.zeros_like(exponent)[:, None], exponent[:, None])[0]
+        return {"forward": forward, "back": back, "capstan": capstan, "slack": slack_load(preload, exponent)}
+
+    draws, found = of_draws(fit, curves), []
+    for i, bend in enumerate(angles):
+        forward, back, slack = (quantiles(draws[name][:, i]) for name in ("forward", "back", "slack"))
+        here = np.isclose(angle, bend)
+        points = force_in[here], force_out[here], stroke[here]
+        capstan = np.median(draws["capstan"][:, i], axis=0)
+        found.append(LoopCurve(f"{np.rad2deg(bend):.4g} deg", forces, forward, back, capstan, slack, *points))
+    return tuple(found)
+
+
+def _points(fit: Record, bends: np.ndarray) -> np.ndarray:
+    """Wrap angle [rad], input force, output force [N] and stroke (0 of a recording) of every recorded block and reading."""
+    from bowdenfit.kinds.tables import LoopTable
+    from bowdenfit.questions.bends.answer import elastic_answers
+    from bowdenfit.questions.recorded.loop_traces import loop_points
+
+    contact, table = elastic_answers(fit).contact, fit.dataset.measurements.table(LoopTable)
+    parts = [
+        [np.full(len(p.input_force), p.wrap_angle), p.input_force, p.output_force, np.zeros(len(p.input_force))]
+        for p in loop_points(fit, contact)
+    ]
+    if table is not None:
+        column = fit.dataset.description.contact[contact].wrap_angle.column
+        angle = np.full(len(table.stroke), bends[0]) if column is None else np.nan_to_num(table.own.column(column)[0])
+        parts.append([angle, table.input_force, table.output_force, table.stroke])
+    return np.concatenate([np.zeros((4, 0)), *parts], axis=1)
 
 
 @in_paper_style
-def loops(data: FigureData) -> Figure:
+def draw(loops: tuple[LoopCurve, ...]) -> Figure:
     """Output against input force [N], a panel for each of at most six wrap angles."""
-    shown = evenly(data.elastic.loops, MOST)
+    shown = evenly(loops, MOST)
     across = [span([loop.input_force, loop.points_input], room=0.03) for loop in shown]
     up = [span([loop.forward, loop.back, loop.points_output]) for loop in shown]
     share_x, share_y = alike(across), alike(up)
@@ -48,7 +120,7 @@ def loops(data: FigureData) -> Figure:
         _readings(axes, loop)
         _slack(axes, loop)
     label_outer(flat, columns, "Input force (N)", "Output force (N)")
-    say_of_how_many(flat[-1], len(shown), len(data.elastic.loops), "wrap angles")
+    say_of_how_many(flat[-1], len(shown), len(loops), "wrap angles")
     legend_above(figure, flat, columns={1: 2, 2: 3}.get(columns, 4))
     enlarge_marks(figure)
     return figure

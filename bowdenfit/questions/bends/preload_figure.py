@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -13,24 +14,72 @@ from bowdenfit.plots.style import BLACK, BLUE, LEAST_SQUARES, LIGHT, MEDIAN, MED
 
 if TYPE_CHECKING:
     from bowdenfit.plots.layout import Axes, Figure
-    from bowdenfit.questions.bends.figure_data import PreloadCurve
-    from bowdenfit.questions.summary.figure_data import FigureData
+    from bowdenfit.results.record import Record
 
 DARK = "#C4C4C4"
 PERHAPS, RATHER = 0.05, 0.5  # probabilities of being slack from which on a region is shaded lightly and darkly
 PLACES = 2001  # along the wrap angle, for the ends of the regions
 
 
-def has_preload(data: FigureData) -> bool:
-    """Whether preload depends on the wrap angle."""
-    return data.elastic.preload is not None
+@dataclass(frozen=True)
+class PreloadCurve:
+    """Preload against the wrap angle between fixed ends.
+
+    Args:
+        wrap_angle: Of the curves [deg].
+        preload: Quantiles of the preload [N].
+        slack: Quantiles of the slack [mm].
+        slack_probability: Share of the draws that are slack.
+        points_wrap_angle, points_preload: Readings [deg, N].
+    """
+
+    wrap_angle: np.ndarray
+    preload: np.ndarray
+    slack: np.ndarray
+    slack_probability: np.ndarray
+    points_wrap_angle: np.ndarray
+    points_preload: np.ndarray
+
+
+def data(fit: Record) -> PreloadCurve | None:
+    """What is shown; None where preload does not depend on the wrap angle."""
+    import jax.numpy as jnp
+
+    from bowdenfit.kinds.tables import PreloadTable
+    from bowdenfit.questions.bends.curves import POINTS, Values, of_draws, quantiles
+    from bowdenfit.questions.bends.equations import knows_preload
+
+    if not fit.dataset.description.preload_follows_stretch or not knows_preload(fit.model):
+        return None
+    angles = np.linspace(0.0, _largest_bend(fit), POINTS)
+
+    def curves(values: Values) -> dict[str, Any]:
+        preload, slack = fit.model.cable.elasticity.preload(values, jnp.asarray(angles))
+        return {"preload": preload, "slack": slack}
+
+    draws, table = of_draws(fit, curves), fit.dataset.measurements.table(PreloadTable)
+    points = (np.zeros(0), np.zeros(0)) if table is None else (np.rad2deg(table.wrap_angle), table.preload)
+    probability = np.mean(draws["slack"] > 0, axis=0)
+    return PreloadCurve(
+        np.rad2deg(angles), quantiles(draws["preload"]), quantiles(draws["slack"]), probability, *points
+    )
+
+
+def _largest_bend(fit: Record) -> float:
+    """Largest total wrap angle of any reading [rad]; pi without one."""
+    from bowdenfit.kinds.tables import LoopTable, PreloadTable, StretchTable
+
+    tables = fit.dataset.measurements
+    found = [t.wrap_angle for t in (tables.table(PreloadTable), tables.table(StretchTable)) if t is not None]
+    loop = tables.table(LoopTable)
+    if loop is not None:
+        found.append(np.nansum(np.nan_to_num(loop.own.angle), axis=1))
+    return max([float(a.max()) for a in found], default=np.pi)
 
 
 @in_paper_style
-def preload(data: FigureData) -> Figure:
+def draw(curve: PreloadCurve) -> Figure:
     """Preload [N] against the wrap angle [deg], and below it the slack [mm] where there is any."""
-    curve = data.elastic.preload
-    assert curve is not None
     ever_slack = bool(np.max(curve.slack) > 0)
     figure, flat = panels([2.2, 0.9] if ever_slack else [2.6], 1, 0.02, (0, 0.16), MEDIUM, sharex=True)
     _preload(flat[0], curve)

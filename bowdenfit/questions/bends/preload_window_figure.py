@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -25,22 +26,75 @@ from bowdenfit.questions.bends.preload_figure import stretches
 
 if TYPE_CHECKING:
     from bowdenfit.plots.layout import Axes, Figure
-    from bowdenfit.questions.bends.figure_data import PreloadWindow
-    from bowdenfit.questions.summary.figure_data import FigureData
+    from bowdenfit.results.record import Record
 
+COARSE, FINE = 25, 401  # preloads: friction against them is smooth, the probability of slack is not
 ENOUGH = 0.95  # probability of staying taut from which on a preload is within the window
 
 
-def has_preload_window(data: FigureData) -> bool:
-    """Whether the cable is a loop whose preload can be chosen."""
-    return data.elastic.window is not None
+@dataclass(frozen=True)
+class PreloadWindow:
+    """What a preload costs and what it buys.
+
+    Args:
+        preload: At the reference wrap angle [N].
+        reference: That wrap angle in words, such as "at 0 deg"; empty where preload is the same at all.
+        friction: Quantiles of what is felt in free motion at the bend where it is largest, in `friction_unit`.
+        friction_unit: "N*mm" with a pulley radius, else "N".
+        taut_probability: Share of the draws in which both sides stay taut over all bends.
+        lowest: 5 %, 50 % and 95 % quantiles of the lowest preload that keeps both sides taut [N].
+        bends: Range of wrap angles [deg].
+        input_force: Largest input force against which the return side must stay taut [N].
+    """
+
+    preload: np.ndarray
+    reference: str
+    friction: np.ndarray
+    friction_unit: str
+    taut_probability: np.ndarray
+    lowest: np.ndarray
+    bends: tuple[float, float]
+    input_force: float
+
+
+def data(fit: Record) -> PreloadWindow | None:
+    """What is shown; None of a cable that is no loop with preload, or was measured at no bend."""
+    import jax.numpy as jnp
+
+    from bowdenfit.physics.loop import free_motion_loss
+    from bowdenfit.questions.bends.answer import elastic_answers, friction_arm, typical_preload
+    from bowdenfit.questions.bends.curves import QUANTILES, Values, of_draws, quantiles, range_of_bends, reference_angle
+
+    bends = range_of_bends(fit)
+    if bends is None:
+        return None
+    elastic = elastic_answers(fit)
+    bent, coarse = (
+        elastic.bent(np.linspace(*bends, COARSE)),
+        np.linspace(0.0, max(2.5 * typical_preload(fit), 1.0), COARSE),
+    )
+
+    def curves(values: Values) -> dict[str, Any]:
+        friction = free_motion_loss(bent.preloads(values, jnp.asarray(coarse)), bent.exponent(values))
+        return {"friction": jnp.max(friction, axis=-1), "lowest": bent.lowest_preload(values, elastic.window_force)}
+
+    draws, (arm, unit) = of_draws(fit, curves), friction_arm(fit)
+    preloads, (low, high) = np.linspace(coarse[0], coarse[-1], FINE), np.rad2deg(bends)
+    return PreloadWindow(
+        preloads,
+        reference_angle(fit),
+        arm * np.stack([np.interp(preloads, coarse, line) for line in quantiles(draws["friction"])]),
+        unit,
+        np.mean(draws["lowest"][:, None] <= preloads, axis=0),
+        np.quantile(draws["lowest"], QUANTILES),
+        (float(low), float(high)),
+        elastic.window_force,
+    )
 
 
 @in_paper_style
-def preload_window(data: FigureData) -> Figure:
+def draw(window: PreloadWindow) -> Figure:
     """Friction felt in free motion, and the probability that both sides stay taut [%], against preload [N]."""
-    window = data.elastic.window
-    assert window is not None
     figure, (cost, gain) = panels([1.6, 1.3], 1, TITLE, (0, 0.16), MEDIUM, sharex=True)
     cost.set_title(_title(window))
     draw_quantiles(cost, window.preload, window.friction, BLUE, label=_name(window))

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -14,8 +15,7 @@ from bowdenfit.plots.style import BLACK, GRAY, LEAST_SQUARES, MEDIAN, MEDIUM, in
 
 if TYPE_CHECKING:
     from bowdenfit.plots.layout import Axes, Figure
-    from bowdenfit.questions.bends.figure_data import StretchCurve
-    from bowdenfit.questions.summary.figure_data import FigureData
+    from bowdenfit.results.record import Record
 
 MOST, MOST_COLUMNS = 8, 4  # wrap angles in a panel, and columns of its legend
 DARKEST, LIGHTEST = 0.0, 0.86  # ends of the color map in use; what follows is too light on white
@@ -23,15 +23,61 @@ DASHES = (0, (4, 1.6))
 MARKERS = ("o", "s", "^", "D", "v", "p", "<", "h")  # whose open forms can be told from the filled ones
 
 
-def has_stretch(data: FigureData) -> bool:
-    """Whether the rope's stretch is known at any wrap angle."""
-    return bool(data.elastic.stretch)
+@dataclass(frozen=True)
+class StretchCurve:
+    """Stretch at one wrap angle against the load.
+
+    Args:
+        wrap_angle: Total wrap angle [deg].
+        load: Loads of the curves [N].
+        loading: Quantiles of the stretch while the load grows [mm].
+        unloading: Quantiles while it comes down from the largest load [mm]; None if no row was read so.
+        points_load, points_stretch: Readings [N, mm].
+        points_unloading: Whether each was read while the load came down.
+    """
+
+    wrap_angle: float
+    load: np.ndarray
+    loading: np.ndarray
+    unloading: np.ndarray | None
+    points_load: np.ndarray
+    points_stretch: np.ndarray
+    points_unloading: np.ndarray
+
+
+def data(fit: Record) -> tuple[StretchCurve, ...] | None:
+    """A curve for each wrap angle that stretch was read at; None without such readings."""
+    import jax.numpy as jnp
+
+    from bowdenfit.kinds.tables import StretchTable
+    from bowdenfit.questions.bends.curves import POINTS, Values, of_draws, quantiles
+
+    table = fit.dataset.measurements.table(StretchTable)
+    if table is None:
+        return None
+    angles, loads = np.unique(table.wrap_angle), np.linspace(0.0, table.load.max(), POINTS)
+
+    def curves(values: Values) -> dict[str, Any]:
+        elastic, load = fit.model.cable.elasticity, jnp.broadcast_to(jnp.asarray(loads), (len(angles), POINTS))
+        angle, peak = jnp.broadcast_to(jnp.asarray(angles)[:, None], load.shape), jnp.full_like(load, loads[-1])
+        stretched = {"loading": load, "unloading": peak}
+        return {way: elastic.stretch(values, load, angle, highest) for way, highest in stretched.items()}
+
+    both = {way: quantiles(draws) for way, draws in of_draws(fit, curves).items()}
+    found = []
+    for i, angle in enumerate(angles):
+        here = table.wrap_angle == angle
+        down = table.unloading[here]
+        back = both["unloading"][:, i] if down.any() else None
+        points = table.load[here], table.stretch[here], down
+        found.append(StretchCurve(float(np.rad2deg(angle)), loads, both["loading"][:, i], back, *points))
+    return tuple(found)
 
 
 @in_paper_style
-def stretch(data: FigureData) -> Figure:
+def draw(stretch: tuple[StretchCurve, ...]) -> Figure:
     """Stretch [mm] against load [N], a color for each wrap angle."""
-    every = sorted(data.elastic.stretch, key=lambda curve: curve.wrap_angle)
+    every = sorted(stretch, key=lambda curve: curve.wrap_angle)
     shown = evenly(every, MOST)
     figure, (axes,) = panels([2.9], 1, 0.02, (0, 0), MEDIUM)
     axes.axhline(0.0, color=BLACK, linewidth=0.6)

@@ -10,7 +10,7 @@ import numpy as np
 
 from bowdenfit.plots.layout import TITLE, legend_above, panels
 from bowdenfit.plots.style import BLUE, GRAY, LIGHT, VERMILLION, in_paper_style
-from bowdenfit.plots.write import FORMATS, write
+from bowdenfit.plots.write import FORMATS, write_all
 from bowdenfit.questions.calibrate.uniformity import Uniformity
 
 if TYPE_CHECKING:
@@ -33,7 +33,7 @@ def draw_calibration(found: Calibration, folder: Path, formats: Sequence[str] = 
     """
     folder.mkdir(parents=True, exist_ok=True)
     drawn = {"ranks": ranks(found), "coverage": coverage(found), "sharpness": sharpness(found)}
-    return [write(figure, folder / f"{name}.{ending}") for name, figure in drawn.items() for ending in formats]
+    return [path for name, figure in drawn.items() for path in write_all(figure, folder, name, formats)]
 
 
 @in_paper_style

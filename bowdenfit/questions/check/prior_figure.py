@@ -11,7 +11,7 @@ from bowdenfit.plots.style import BLACK, BLUE, EFFICIENCY, SERIES_MARKERS, VERMI
 
 if TYPE_CHECKING:
     from bowdenfit.plots.layout import Axes, Figure
-    from bowdenfit.questions.check.figure_data import PriorPredictive, PriorTable
+    from bowdenfit.questions.check.prior_predictive import PriorPredictive, PriorTable
 
 ROW, COLUMNS = 1.9, 2  # in; panels in a row
 WIDEST = "99 % interval by the priors"
@@ -23,7 +23,7 @@ SHIFT = 0.006  # of the axis, between contacts whose readings would hide each ot
 
 
 @in_paper_style
-def prior_predictive(data: PriorPredictive) -> Figure:
+def draw(data: PriorPredictive) -> Figure:
     """Efficiency along the route by the priors, and a panel for each table with its readings."""
     n = len(data.tables) + (data.efficiency is not None)
     rows = -(-n // COLUMNS)

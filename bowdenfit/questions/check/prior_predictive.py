@@ -1,5 +1,6 @@
 """What the priors alone hold possible, beside what was measured: the check to make before a fit."""
 
+from dataclasses import dataclass
 from typing import Any
 
 import jax
@@ -14,12 +15,57 @@ from bowdenfit.kinds import readings_called
 from bowdenfit.kinds.term import Term
 from bowdenfit.model import Model, build_model
 from bowdenfit.questions.check.answer import readings_of
-from bowdenfit.questions.check.figure_data import PriorPredictive, PriorTable
 from bowdenfit.questions.check.residual_places import places_of
 from bowdenfit.results.optimum import route_grid
 
 QUANTILES = (0.005, 0.05, 0.5, 0.95, 0.995)
 _DRAWS = 4096
+
+
+@dataclass(frozen=True)
+class PriorTable:
+    """Readings of one table beside what the priors alone hold possible.
+
+    Args:
+        name: What they are, in words.
+        label: Axis label of the readings.
+        numbers: Where they were taken, the first that varies.
+        place: Its axis label.
+        group: Contact or the like of each reading.
+        labels: Each reading in words.
+        reading: As measured; NaN of readings that are only a bound.
+        quantiles: 0.5 %, 5 %, 50 %, 95 % and 99.5 % quantiles (first axis) of readings by the priors.
+        outside: Whether each reading lies outside the widest of these intervals.
+    """
+
+    name: str
+    label: str
+    numbers: np.ndarray
+    place: str
+    group: tuple[str, ...]
+    labels: tuple[str, ...]
+    reading: np.ndarray
+    quantiles: np.ndarray
+    outside: np.ndarray
+
+
+@dataclass(frozen=True)
+class PriorPredictive:
+    """What the priors alone hold possible.
+
+    Args:
+        name: Name of the cable.
+        tables: By table.
+        route_label: Axis label of the route; empty without one.
+        route: Route values of the curve.
+        efficiency: Quantiles (first axis, as in `PriorTable`) of the efficiency there; empty without a route.
+    """
+
+    name: str
+    tables: tuple[PriorTable, ...]
+    route_label: str = ""
+    route: np.ndarray | None = None
+    efficiency: np.ndarray | None = None
 
 
 def prior_predictive(dataset: Dataset, seed: int = 0) -> PriorPredictive:

@@ -1,6 +1,6 @@
 """What the priors alone hold possible, in words: which readings lie outside, and what the usual cause is."""
 
-from bowdenfit.questions.check.figure_data import PriorPredictive, PriorTable
+from bowdenfit.questions.check.prior_predictive import PriorPredictive, PriorTable
 from bowdenfit.words import filled, listed
 
 WORTH_WARNING = (

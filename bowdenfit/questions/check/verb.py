@@ -10,7 +10,7 @@ from bowdenfit.verb import Argument, Option, Reply, Verb
 if TYPE_CHECKING:
     from bowdenfit.dataset import Dataset
     from bowdenfit.files.channels import ChannelFile
-    from bowdenfit.questions.check.figure_data import PriorPredictive
+    from bowdenfit.questions.check.prior_predictive import PriorPredictive
     from bowdenfit.recordings.recording import Recordings
 
 FIGURE = "prior_predictive"
@@ -88,17 +88,15 @@ def show_priors(dataset: "Dataset", folder: str | Path, seed: int = 0) -> "Prior
     """
     import jax
 
-    from bowdenfit.plots.write import FORMATS, write
-    from bowdenfit.questions.check.prior_figure import prior_predictive as drawn
+    from bowdenfit.plots.write import write_all
+    from bowdenfit.questions.check.prior_figure import draw
     from bowdenfit.questions.check.prior_predictive import prior_predictive
     from bowdenfit.results.folder import made
 
     with jax.enable_x64(True):
         found = prior_predictive(dataset, seed)
-    figure = drawn(found)
     with made(Path(folder)) as place:
-        for ending in FORMATS:
-            write(figure, place / f"{FIGURE}.{ending}")
+        write_all(draw(found), place, FIGURE)
     return found
 
 

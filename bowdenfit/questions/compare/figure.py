@@ -36,7 +36,7 @@ _GAP = 0.62
 
 
 @in_paper_style
-def comparison(found: Comparison) -> Figure:
+def draw(found: Comparison) -> Figure:
     """Differences of elpd with standard errors, their contributions by reading, and parameters side by side."""
     cells = _cells(found)
     names = [_shortened(name) for name in found.differences]

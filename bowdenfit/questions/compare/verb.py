@@ -37,7 +37,7 @@ def compare(
     import jax
 
     from bowdenfit.questions.compare.answer import compare as compared
-    from bowdenfit.questions.compare.figure import comparison
+    from bowdenfit.questions.compare.figure import draw
     from bowdenfit.questions.compare.words import comparison_text
 
     if output is not None:
@@ -45,7 +45,7 @@ def compare(
     with jax.enable_x64(True):
         found = compared(fits, report)
     if output is not None:
-        write_answer(output, NAME, found, comparison_text(found), lambda: comparison(found))
+        write_answer(output, NAME, found, comparison_text(found), lambda: draw(found))
     return found
 
 

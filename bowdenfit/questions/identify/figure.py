@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -14,6 +13,7 @@ if TYPE_CHECKING:
     from bowdenfit.inference.identifiability import Knowledge
     from bowdenfit.inference.profiles import Profile
     from bowdenfit.plots.layout import Axes, Figure
+    from bowdenfit.questions.identify.answer import Identifiability
 
 _ROW, _TOP, _BOTTOM, _NAMES, _GAP = 0.24, 0.34, 0.5, 1.75, 0.35  # in
 _PROFILE, _ACROSS = 1.75, 4  # height of a row of profiles [in], and how many are in it
@@ -22,13 +22,12 @@ _MOST = 0.05  # weight below which a cell of the map is left empty
 
 
 @in_paper_style
-def identifiability(groups: Mapping[str, Knowledge], profiles: Sequence[Profile] = ()) -> Figure:
+def draw(found: Identifiability) -> Figure:
     """One row of panels for each group of parameters: who speaks for each, and what each combination consists of.
 
-    Args:
-        groups: Knowledge by group.
-        profiles: Of the friction coefficients; a last row of panels.
+    Profiles of the friction coefficients are a last row of panels.
     """
+    groups, profiles = found.groups, found.profiles
     heights = [_ROW * len(group.parameters) + _TOP + _BOTTOM for group in groups.values()]
     rows = -(-len(profiles) // _ACROSS)
     total = sum(heights) + rows * _PROFILE

@@ -134,11 +134,11 @@ def _of_plan(path: Path) -> "Identifiability":
 
 
 def _write(found: "Identifiability", folder: str | Path) -> None:
-    from bowdenfit.questions.identify.figure import identifiability
+    from bowdenfit.questions.identify.figure import draw
     from bowdenfit.questions.identify.words import identifiability_text
 
     text = identifiability_text(found)
-    write_answer(folder, NAME, found, text, lambda: identifiability(found.groups, found.profiles))
+    write_answer(folder, NAME, found, text, lambda: draw(found))
 
 
 def _reply(found: "Identifiability", asked: dict[str, Any]) -> Reply:

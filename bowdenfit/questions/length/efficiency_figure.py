@@ -2,12 +2,12 @@
 
 from __future__ import annotations
 
+from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING
 
 import numpy as np
 
-from bowdenfit.kinds import readings_called
-from bowdenfit.plots.bands import draw_band, route_limits, shade_outside
+from bowdenfit.plots.bands import BAND_QUANTILES, Band, draw_band, route_limits, shade_outside
 from bowdenfit.plots.densities import GRID_POINTS, density
 from bowdenfit.plots.layout import TITLE, legend_above, panels
 from bowdenfit.plots.style import (
@@ -25,8 +25,8 @@ from bowdenfit.plots.style import (
 
 if TYPE_CHECKING:
     from bowdenfit.plots.layout import Axes, Figure
-    from bowdenfit.questions.summary.figure_data import EfficiencyPoints, FigureData
     from bowdenfit.results.length import OptimalLength
+    from bowdenfit.results.record import Record
 
 # marker, its size [pt] and label
 READING, RUN = ("o", 4.5, "Measured"), ("D", 2.8, "Measured, mean of a run")
@@ -34,13 +34,85 @@ MOST_NUMBERS, LEAST_NUMBER = 16, 0.5  # so many bars have numbers over them, if 
 LEAST_AT_EDGE = 0.005
 
 
-def has_route(data: FigureData) -> bool:
-    """Whether there is a route to draw against."""
-    return data.efficiency is not None
+@dataclass(frozen=True)
+class EfficiencyPoints:
+    """Measured efficiencies [1].
+
+    Args:
+        of_runs: Whether each is the mean of a run.
+        labels: Each in words.
+        route: Route value; NaN without a route.
+        measured: Efficiency.
+        predicted: Quantiles (`BAND_QUANTILES`, first axis) of readings drawn anew; one row, least squares', without
+            draws.
+        inside: Whether it lies within the range of the curves.
+    """
+
+    of_runs: bool
+    labels: tuple[str, ...]
+    route: np.ndarray
+    measured: np.ndarray
+    predicted: np.ndarray
+    inside: np.ndarray
+
+
+@dataclass(frozen=True)
+class AlongRoute:
+    """Efficiency along the route, and its optimum.
+
+    Args:
+        route_label: Axis label of the route with unit, such as "Cable length (mm)".
+        route_range: Where the curves hold.
+        efficiency: The curve.
+        points: Measured efficiencies.
+        optimum: The design answer; None without draws.
+        optimal_length: Its draws; None likewise.
+    """
+
+    route_label: str
+    route_range: tuple[float, float]
+    efficiency: Band
+    points: tuple[EfficiencyPoints, ...]
+    optimum: OptimalLength | None = None
+    optimal_length: np.ndarray | None = None
+
+
+def data(fit: Record) -> AlongRoute | None:
+    """What is shown; None without a route."""
+    from bowdenfit.questions.length.curves import along_route
+    from bowdenfit.results.record import OPTIMAL_LENGTH
+
+    route, posterior = fit.dataset.description.route, fit.posterior
+    if route is None:
+        return None
+    shown = AlongRoute(route.label, route.range, along_route(fit)["efficiency"], efficiency_points(fit))
+    if posterior is None:
+        return shown
+    return replace(shown, optimum=fit.optimal_length(), optimal_length=posterior.optimum[OPTIMAL_LENGTH])
+
+
+def efficiency_points(fit: Record) -> tuple[EfficiencyPoints, ...]:
+    """Every measured efficiency, by table."""
+    from bowdenfit.kinds import readings_called
+    from bowdenfit.questions.check.residual_places import route_values
+
+    route, points = fit.dataset.description.route, []
+    for term in fit.model.terms:
+        called, at = readings_called(term.name), route_values(term)
+        if not called.are_efficiencies:
+            continue
+        if route is None or at is None:
+            at = np.full(len(term.labels), np.nan)
+        predicted = fit.least_squares.readings[term.name][None]
+        if fit.posterior is not None:
+            predicted = np.quantile(fit.posterior.replicated[term.name], BAND_QUANTILES, axis=(0, 1))
+        inside = (at >= route.range[0]) & (at <= route.range[1]) if route else np.ones(len(at), dtype=bool)
+        points.append(EfficiencyPoints(called.are_runs, term.labels, at, term.observed(), predicted, inside))
+    return tuple(points)
 
 
 @in_paper_style
-def efficiency(data: FigureData) -> Figure:
+def draw(data: AlongRoute) -> Figure:
     """Efficiency [%] against the route, the density of the optimal length, and each choice's chance to be the best."""
     below = 0 if data.optimum is None else 2 if data.optimum.choices else 1
     figure, flat = panels([2.3] + [0.75] * below, 1, 0.08, (0.0, TITLE + 0.12), sharex=True)
@@ -59,8 +131,7 @@ def efficiency(data: FigureData) -> Figure:
     return figure
 
 
-def _curve_and_points(axes: Axes, data: FigureData) -> None:
-    assert data.efficiency is not None  # has_route
+def _curve_and_points(axes: Axes, data: AlongRoute) -> None:
     draw_band(axes, data.efficiency, scale=100.0)
     for points in data.points:
         _measured(axes, points, points.inside, BLACK, "")
@@ -74,7 +145,7 @@ def _curve_and_points(axes: Axes, data: FigureData) -> None:
 
 def _measured(axes: Axes, points: EfficiencyPoints, where: np.ndarray, fill: str, note: str) -> None:
     """Some of the measured points; the note is added to their label."""
-    marker, size, label = RUN if readings_called(points.what).are_runs else READING
+    marker, size, label = RUN if points.of_runs else READING
     if where.any():
         axes.plot(
             points.route[where], 100 * points.measured[where], marker, color=BLACK, markerfacecolor=fill,
@@ -95,7 +166,7 @@ def _predicted(axes: Axes, points: EfficiencyPoints, where: np.ndarray) -> None:
     )  # fmt: skip
 
 
-def _optimum(axes: Axes, data: FigureData, optimum: OptimalLength) -> None:
+def _optimum(axes: Axes, data: AlongRoute, optimum: OptimalLength) -> None:
     assert data.optimal_length is not None  # comes with the optimum
     grid = np.linspace(*data.route_range, 2 * GRID_POINTS)
     height = density(data.optimal_length, grid, *data.route_range)

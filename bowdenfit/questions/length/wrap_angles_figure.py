@@ -2,43 +2,103 @@
 
 from __future__ import annotations
 
+from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 import numpy as np
 
-from bowdenfit.plots.bands import draw_band, route_limits, shade_outside
+from bowdenfit.plots.bands import Band, draw_band, route_limits, shade_outside
 from bowdenfit.plots.layout import TITLE, drop_unused, legend_above, panels
 from bowdenfit.plots.style import BLACK, MEDIUM, WIDE, WRAP_ANGLE, in_paper_style
 
 if TYPE_CHECKING:
     from bowdenfit.plots.layout import Axes, Figure
-    from bowdenfit.questions.summary.figure_data import AngleCurve, FigureData
+    from bowdenfit.results.record import Record
 
 MOST_COLUMNS = 3
 
 
-def has_curves(data: FigureData) -> bool:
-    """Whether a contact's wrap angle is a curve."""
-    return bool(data.angles)
+@dataclass(frozen=True)
+class AngleCurve:
+    """One contact's wrap angle [deg]: the curve, and the readings by how they entered.
+
+    Args:
+        contact: Name of the contact.
+        band: The curve.
+        route, angle: Detected readings inside the range of the curve.
+        undetected_route, limit: Readings below the detection limit inside the range.
+        outside_route, outside_angle: Readings outside the range, which the curve does not use.
+    """
+
+    contact: str
+    band: Band
+    route: np.ndarray
+    angle: np.ndarray
+    undetected_route: np.ndarray
+    limit: np.ndarray
+    outside_route: np.ndarray
+    outside_angle: np.ndarray
+
+
+@dataclass(frozen=True)
+class WrapAngles:
+    """The curves of all curved contacts, the axis label of the route, and where the curves hold."""
+
+    curves: tuple[AngleCurve, ...]
+    route_label: str
+    route_range: tuple[float, float]
+
+
+def data(fit: Record) -> WrapAngles | None:
+    """What is shown; None where no contact's wrap angle is a curve."""
+    route, curves = fit.dataset.description.route, angle_curves(fit)
+    return WrapAngles(curves, route.label, route.range) if route is not None and curves else None
+
+
+def angle_curves(fit: Record) -> tuple[AngleCurve, ...]:
+    """The curve and the readings of each curved contact."""
+    from bowdenfit.questions.length.curves import along_route
+
+    return tuple(_angle_curve(fit, column, along_route(fit)[column]) for column in fit.model.cable.curves)
+
+
+def _angle_curve(fit: Record, column: str, band: Band) -> AngleCurve:
+    from bowdenfit.kinds.tables import AngleTable
+
+    table, route = fit.dataset.measurements.table(AngleTable), fit.dataset.description.route
+    assert table is not None and route is not None  # a curve has both
+    angle, limit = table.column(column)
+    inside, detected = (table.route >= route.range[0]) & (table.route <= route.range[1]), np.isfinite(angle)
+    contact = next(c.name for c in fit.dataset.description.curved if c.wrap_angle.column == column)
+    return AngleCurve(
+        contact,
+        band,
+        table.route[inside & detected],
+        np.rad2deg(angle[inside & detected]),
+        table.route[inside & ~detected],
+        np.rad2deg(limit[inside & ~detected]),
+        table.route[~inside & detected],
+        np.rad2deg(angle[~inside & detected]),
+    )
 
 
 @in_paper_style
-def wrap_angles(data: FigureData) -> Figure:
+def draw(data: WrapAngles) -> Figure:
     """Wrap angle [deg] of each curved contact against the route, a panel each."""
-    columns = min(MOST_COLUMNS, len(data.angles))
-    rows = -(-len(data.angles) // columns)
+    columns = min(MOST_COLUMNS, len(data.curves))
+    rows = -(-len(data.curves) // columns)
     page = WIDE if columns > 1 else MEDIUM
     figure, flat = panels([1.8] * rows, columns, TITLE, (0.2, TITLE + 0.26), page, sharex=True, sharey=True)
-    flat = drop_unused(flat, len(data.angles))
-    everywhere = [route for c in data.angles for route in (c.route, c.undetected_route, c.outside_route)]
+    flat = drop_unused(flat, len(data.curves))
+    everywhere = [route for c in data.curves for route in (c.route, c.undetected_route, c.outside_route)]
     shown = route_limits(data.route_range, *everywhere)
-    for axes, curve in zip(flat, data.angles, strict=True):
+    for axes, curve in zip(flat, data.curves, strict=True):
         draw_band(axes, curve.band)
         _readings(axes, curve)
         _undetected(axes, curve, data.route_range, _spacing(everywhere, shown))
         shade_outside(axes, data.route_range, shown)
         axes.set_title(curve.contact)
-    flat[0].set_ylim(0, _highest(data.angles))
+    flat[0].set_ylim(0, _highest(data.curves))
     flat[0].locator_params(axis="y", nbins=7)
     _label(flat, columns, data.route_label)
     legend_above(figure, flat, columns=4 if columns > 1 else 2)

@@ -30,7 +30,7 @@ _PER_LETTER = 0.058  # in, of a label's width
 
 
 @in_paper_style
-def next_measurement(found: NextMeasurement) -> Figure:
+def draw(found: NextMeasurement) -> Figure:
     """Expected standard deviation of the answer, against the route with a line for each kind; else a row a candidate."""
     along = [r for r in found.ranked if math.isfinite(r.candidate.route) and math.isnan(r.candidate.load)]
     places = {r.candidate.route for r in along}

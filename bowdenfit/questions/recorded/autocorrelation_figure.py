@@ -2,36 +2,70 @@
 
 from __future__ import annotations
 
+from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 import numpy as np
 
+from bowdenfit.plots.bands import evenly, say_of_how_many
 from bowdenfit.plots.layout import legend_above
-from bowdenfit.plots.panels import alike, chosen, label_outer, recording_panels, say_how_many, set_limits
+from bowdenfit.plots.panels import MOST, alike, label_outer, recording_panels, set_limits
 from bowdenfit.plots.style import BLUE, GRAY, in_paper_style
 
 if TYPE_CHECKING:
     from bowdenfit.plots.layout import Axes, Figure
-    from bowdenfit.questions.summary.figure_data import FigureData, RecordedTrace
+    from bowdenfit.results.record import Record
 
 MOST_COLUMNS = 4
+LEAST_BLOCKS, MOST_LAGS = 8, 60
 NORMAL_95 = 1.96
 MOST_STEMS = 60  # lags that have a stem each; with more, a line alone
 
 
-def has_autocorrelation(data: FigureData) -> bool:
-    """Whether the deviations of a recording were correlated with each other."""
-    return any(map(_has_lags, data.recordings))
+@dataclass(frozen=True)
+class Autocorrelation:
+    """How deviations from the fit hang together in one recording.
+
+    Args:
+        name: Name of the recording.
+        lag: From one block to another [s].
+        correlation: Autocorrelation there.
+        n_blocks: Number of blocks that are used.
+    """
+
+    name: str
+    lag: np.ndarray
+    correlation: np.ndarray
+    n_blocks: int
 
 
-def _has_lags(recording: RecordedTrace) -> bool:
-    return len(recording.lag) > 1 and bool(np.isfinite(recording.autocorrelation).any())
+def data(fit: Record) -> tuple[Autocorrelation, ...] | None:
+    """Every recording whose deviations were correlated with each other; None without any."""
+    from bowdenfit.questions.recorded.traces import traces
+
+    found = []
+    for trace in traces(fit):
+        correlation = autocorrelation(trace.deviation)
+        if len(correlation) > 1:
+            lag = float(np.median(np.diff(trace.time))) * np.arange(len(correlation))
+            found.append(Autocorrelation(trace.recording.name, lag, correlation, int(trace.used.sum())))
+    return tuple(found) or None
+
+
+def autocorrelation(deviation: np.ndarray) -> np.ndarray:
+    """Autocorrelation at lags from 0; just the first where there are too few blocks."""
+    centered = deviation - deviation.mean() if len(deviation) else deviation
+    if len(centered) < LEAST_BLOCKS or not np.any(centered):
+        return np.ones(1)
+    lags = min(MOST_LAGS, len(centered) // 3)
+    products = [float(np.dot(centered[: len(centered) - k], centered[k:])) for k in range(lags)]
+    return np.array(products) / products[0]
 
 
 @in_paper_style
-def autocorrelation(data: FigureData) -> Figure:
+def draw(recordings: tuple[Autocorrelation, ...]) -> Figure:
     """Autocorrelation against the lag [s], a panel a recording, and the band that noise without memory would keep to."""
-    shown, every = chosen(data, _has_lags)
+    shown = evenly(recordings, MOST)
     lags = [(float(-0.02 * r.lag.max()), float(1.02 * r.lag.max())) for r in shown]
     share_x = alike(lags)
     figure, flat, columns = recording_panels([r.name for r in shown], MOST_COLUMNS, 1.2, share_x, share_y=True)
@@ -39,21 +73,21 @@ def autocorrelation(data: FigureData) -> Figure:
     for axes, recording in zip(flat, shown, strict=True):
         _panel(axes, recording)
         axes.locator_params(axis="x", nbins=4)
-    lowest = min(min(float(np.nanmin(r.autocorrelation)), -_bound(r)) for r in shown)
+    lowest = min(min(float(np.nanmin(r.correlation)), -_bound(r)) for r in shown)
     flat[0].set_ylim(max(-1.05, min(-0.2, 1.15 * lowest)), 1.05)
     label_outer(flat, columns, "Lag (s)", "Autocorrelation")
-    say_how_many(flat[0], len(shown), len(every))
+    say_of_how_many(flat[0], len(shown), len(recordings), "recordings")
     legend_above(figure, flat, columns=3 if columns > 1 else 2)
     return figure
 
 
-def _bound(recording: RecordedTrace) -> float:
+def _bound(recording: Autocorrelation) -> float:
     """What 95 % of the autocorrelations of so many independent blocks are within."""
-    return NORMAL_95 / float(np.sqrt(max(int(recording.used.sum()), 1)))
+    return NORMAL_95 / float(np.sqrt(max(recording.n_blocks, 1)))
 
 
-def _panel(axes: Axes, recording: RecordedTrace) -> None:
-    lag, correlation = recording.lag, recording.autocorrelation
+def _panel(axes: Axes, recording: Autocorrelation) -> None:
+    lag, correlation = recording.lag, recording.correlation
     bound = _bound(recording)
     axes.axhspan(-bound, bound, facecolor="#D5D5D5", linewidth=0, zorder=0.6, label="95 % of noise without memory")
     axes.axhline(0, color=GRAY, linewidth=0.7, zorder=0.9)

@@ -2,18 +2,19 @@
 
 from __future__ import annotations
 
+from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 import numpy as np
 
+from bowdenfit.plots.bands import evenly, say_of_how_many
 from bowdenfit.plots.layout import legend_above
 from bowdenfit.plots.panels import (
+    MOST,
     alike,
-    chosen,
     enlarge_marks,
     label_outer,
     recording_panels,
-    say_how_many,
     set_limits,
     span,
 )
@@ -28,11 +29,10 @@ from bowdenfit.plots.style import (
     in_paper_style,
     rounded,
 )
-from bowdenfit.questions.recorded.recordings_figure import is_loop
 
 if TYPE_CHECKING:
     from bowdenfit.plots.layout import Axes, Figure
-    from bowdenfit.questions.summary.figure_data import FigureData, RecordedTrace
+    from bowdenfit.results.record import Record
 
 MOST_COLUMNS = 4
 WITHOUT_INTERVAL = 0.05  # uncertainty of an exponent whose digits are to be shown
@@ -44,21 +44,42 @@ STROKES = (
 )
 
 
-def has_hysteresis(data: FigureData) -> bool:
-    """Whether forces were recorded of a single rope; those of a loop are in the figure of loops."""
-    return any(map(_has_forces, data.recordings))
+@dataclass(frozen=True)
+class ForceLoop:
+    """The forces of one recording of a single rope, and its friction.
+
+    Args:
+        name: Name of the recording.
+        input_force, output_force: Mean forces of each block [N].
+        stroke: +1 pulling, -1 returning, 0 switching or held.
+        exponent: Friction exponent of the cable here, 5 %, 50 % and 95 % quantiles; one number without draws.
+        own_exponent: Friction exponent of this recording by itself [1].
+    """
+
+    name: str
+    input_force: np.ndarray
+    output_force: np.ndarray
+    stroke: np.ndarray
+    exponent: np.ndarray
+    own_exponent: float
 
 
-def _has_forces(recording: RecordedTrace) -> bool:
-    return not is_loop(recording) and bool(
-        np.any(np.isfinite(recording.input_force) & np.isfinite(recording.output_force))
-    )
+def data(fit: Record) -> tuple[ForceLoop, ...] | None:
+    """Every recording of a single rope; None without any: those of a loop are in the figure of loops."""
+    from bowdenfit.questions.recorded.traces import traces
+
+    found = []
+    for trace in traces(fit):
+        forces, strokes = (trace.input_force, trace.output_force), trace.recording.strokes
+        if not trace.loop and np.any(np.isfinite(sum(forces))):
+            found.append(ForceLoop(trace.recording.name, *forces, trace.stroke, trace.exponent, strokes.exponent))
+    return tuple(found) or None
 
 
 @in_paper_style
-def hysteresis(data: FigureData) -> Figure:
+def draw(recordings: tuple[ForceLoop, ...]) -> Figure:
     """Output against input force [N] on equal axes, a panel a recording."""
-    shown, every = chosen(data, _has_forces)
+    shown = evenly(recordings, MOST)
     limits = [span([r.input_force, r.output_force]) for r in shown]
     shared = alike(limits)
     figure, flat, columns = recording_panels([r.name for r in shown], MOST_COLUMNS, None, shared, shared)
@@ -73,13 +94,13 @@ def hysteresis(data: FigureData) -> Figure:
             linespacing=1.1, zorder=5,
         )  # fmt: skip
     label_outer(flat, columns, "Input force (N)", "Output force (N)")
-    say_how_many(flat[0], len(shown), len(every))
+    say_of_how_many(flat[0], len(shown), len(recordings), "recordings")
     legend_above(figure, flat, columns=4 if columns > 1 else 2)
     enlarge_marks(figure)
     return figure
 
 
-def _loop(axes: Axes, recording: RecordedTrace) -> None:
+def _loop(axes: Axes, recording: ForceLoop) -> None:
     """The blocks by stroke."""
     for stroke, name, marker, size, color in STROKES:
         here = recording.stroke == stroke
@@ -90,11 +111,11 @@ def _loop(axes: Axes, recording: RecordedTrace) -> None:
             )  # fmt: skip
 
 
-def _capstan_lines(axes: Axes, recording: RecordedTrace) -> None:
+def _capstan_lines(axes: Axes, recording: ForceLoop) -> None:
     """F_out = F_in exp(-Lambda) when pulling, F_in exp(Lambda) when returning, and the diagonal between."""
     force = np.array(axes.get_xlim())
     low, middle, high = _exponent(recording)
-    drawn = len(recording.predicted) > 1
+    drawn = len(recording.exponent) > 1
     for sign in (-1.0, 1.0):
         if drawn:
             axes.fill_between(
@@ -106,7 +127,7 @@ def _capstan_lines(axes: Axes, recording: RecordedTrace) -> None:
     axes.plot(force, force, color=GRAY, linewidth=0.6, linestyle=(0, (4, 2)), label="No friction")
 
 
-def _words(recording: RecordedTrace) -> str:
+def _words(recording: ForceLoop) -> str:
     """The exponent of this recording by itself, and that of the cable; in short lines, which fit below the loop."""
     low, middle, high = _exponent(recording)
     own, width = recording.own_exponent, high - low
@@ -116,7 +137,7 @@ def _words(recording: RecordedTrace) -> str:
     return "\n".join(lines)
 
 
-def _exponent(recording: RecordedTrace) -> tuple[float, float, float]:
+def _exponent(recording: ForceLoop) -> tuple[float, float, float]:
     """Ends and middle of the interval of the cable's exponent, all the same without draws."""
     exponent = recording.exponent.tolist()
     return exponent[0], exponent[len(exponent) // 2], exponent[-1]

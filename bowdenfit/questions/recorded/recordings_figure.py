@@ -3,18 +3,19 @@
 from __future__ import annotations
 
 import dataclasses
+from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 import numpy as np
 
+from bowdenfit.plots.bands import evenly, say_of_how_many
 from bowdenfit.plots.layout import legend_above
 from bowdenfit.plots.panels import (
+    MOST,
     alike,
-    chosen,
     extremes,
     label_outer,
     recording_panels,
-    say_how_many,
     set_limits,
     span,
 )
@@ -34,14 +35,13 @@ from bowdenfit.plots.style import (
 
 if TYPE_CHECKING:
     from bowdenfit.plots.layout import Axes, Figure
-    from bowdenfit.questions.summary.figure_data import FigureData, RecordedTrace
+    from bowdenfit.questions.recorded.traces import Trace
+    from bowdenfit.results.record import Record
 
 POINTS = 3200  # of each line, all panels together, which is what a page can show
 GAP_STEPS = 5
 MOST_CYCLES = 8  # of each recording over time
-PER_BLOCK = (
-    "time", "input_force", "output_force", "velocity", "stroke", "used", "saturated", "predicted", "fitted",
-)  # fmt: skip
+PER_BLOCK = ("time", "input_force", "output_force", "stroke", "saturated", "predicted", "fitted")
 FORCE, TIME = "Force (N)", "Time from the start (s)"
 # stroke, name and fill, which differ in lightness too
 PHASES = ((1, "Pulling", "#F1F6FC"), (-1, "Returning", "#F3E4CE"), (0, "Switching or held", "#D4D4D4"))
@@ -51,24 +51,68 @@ OTHER_FLAG = ("+", GREEN)
 MARK_GRID = (160, 60)  # across and up a panel, marks of a kind that it can show
 
 
-def has_recordings(data: FigureData) -> bool:
-    """Whether forces were recorded."""
-    return any(map(_has_blocks, data.recordings))
+@dataclass(frozen=True)
+class OverTime:
+    """One recording over time, and what the fit says of it.
+
+    Args:
+        name: Name of the recording.
+        loop: Whether it is of a pull-pull loop.
+        time: Middle of each block [s].
+        input_force, output_force: Mean forces of each block [N].
+        stroke: +1 pulling, -1 returning, 0 switching or held.
+        saturated: Blocks at the end of a load cell's range.
+        predicted: Output force [N] of each block that the cable gives at the measured input force, 5 %, 50 % and 95 %
+            quantiles (first axis) over draws and over new mountings; one row, least squares', without draws.
+        fitted: Output force [N] of each block with this run's own mounting effect.
+        flagged_kind, flagged_time, flagged_input, flagged_output: Samples left out: why, when [s], and what was read [N].
+    """
+
+    name: str
+    loop: bool
+    time: np.ndarray
+    input_force: np.ndarray
+    output_force: np.ndarray
+    stroke: np.ndarray
+    saturated: np.ndarray
+    predicted: np.ndarray
+    fitted: np.ndarray
+    flagged_kind: tuple[str, ...]
+    flagged_time: np.ndarray
+    flagged_input: np.ndarray
+    flagged_output: np.ndarray
 
 
-def is_loop(recording: RecordedTrace) -> bool:
-    """Whether it is of a pull-pull loop, which has no efficiency that is the same at all loads."""
-    return not len(recording.efficiency)
+def data(fit: Record) -> tuple[OverTime, ...] | None:
+    """Every recording; None without any of two blocks."""
+    from bowdenfit.questions.recorded.traces import traces
+
+    return tuple(_over_time(trace) for trace in traces(fit) if len(trace.shown) > 1) or None
 
 
-def _has_blocks(recording: RecordedTrace) -> bool:
-    return len(recording.time) > 1
+def _over_time(trace: Trace) -> OverTime:
+    recording, flagged = trace.recording, trace.recording.account.flagged
+    return OverTime(
+        recording.name,
+        trace.loop,
+        trace.time,
+        trace.input_force,
+        trace.output_force,
+        trace.stroke,
+        recording.blocks.saturated[trace.shown],
+        trace.predicted,
+        trace.fitted,
+        flagged.kind,
+        flagged.time,
+        flagged.input_force,
+        flagged.output_force,
+    )
 
 
 @in_paper_style
-def recordings(data: FigureData) -> Figure:
+def draw(recordings: tuple[OverTime, ...]) -> Figure:
     """Input and output force [N] over time, what the cable would give at this input, and the samples left out."""
-    whole, every = chosen(data, _has_blocks)
+    whole = evenly(recordings, MOST)
     shown = [beginning(r) for r in whole]
     times = [span([r.time - _start(r), r.flagged_time - _start(r)], room=0.0) for r in shown]
     forces = [_force_limits(r) for r in shown]
@@ -81,14 +125,14 @@ def recordings(data: FigureData) -> Figure:
         _forces(axes, recording, POINTS // (2 * len(shown)))
         _left_out(axes, recording)
     label_outer(flat, columns, TIME, FORCE)
-    say_how_many(flat[0], len(shown), len(every))
+    say_of_how_many(flat[0], len(shown), len(recordings), "recordings")
     if any(len(a.time) < len(b.time) for a, b in zip(shown, whole, strict=True)):
         flat[0].plot([], [], " ", label=f"First {MOST_CYCLES} cycles shown")
     legend_above(figure, flat, columns=4)
     return figure
 
 
-def beginning(recording: RecordedTrace) -> RecordedTrace:
+def beginning(recording: OverTime) -> OverTime:
     """A recording up to the last of as many cycles as can be told apart over time."""
     sliding = np.flatnonzero(recording.stroke)
     turns = sliding[1:][np.diff(recording.stroke[sliding]) != 0]
@@ -104,12 +148,12 @@ def beginning(recording: RecordedTrace) -> RecordedTrace:
     )
 
 
-def _start(recording: RecordedTrace) -> float:
+def _start(recording: OverTime) -> float:
     """Time of the first block or sample [s]."""
     return float(min(recording.time[0], recording.flagged_time.min(initial=np.inf)))
 
 
-def _force_limits(recording: RecordedTrace) -> tuple[float, float]:
+def _force_limits(recording: OverTime) -> tuple[float, float]:
     """Limits that show what was measured and fitted, and the interval unless it is far away."""
     low, high = span([recording.input_force, recording.output_force, recording.fitted])
     band_low, band_high = span([recording.predicted])
@@ -117,7 +161,7 @@ def _force_limits(recording: RecordedTrace) -> tuple[float, float]:
     return max(min(low, band_low), low - room), min(max(high, band_high), high + room)
 
 
-def _phases(axes: Axes, recording: RecordedTrace) -> None:
+def _phases(axes: Axes, recording: OverTime) -> None:
     """Shade what the rope does, from the middle between two blocks to the next such; not where nothing was recorded."""
     time, stroke = recording.time - _start(recording), recording.stroke
     gap = _after_gaps(time)
@@ -127,7 +171,7 @@ def _phases(axes: Axes, recording: RecordedTrace) -> None:
     starts = np.append(time[:1], np.where(recorded, middle, after))
     stops = np.append(np.where(recorded, middle, before), time[-1:])
     of = stroke[np.append(0, change)]
-    names = LOOP_PHASES if is_loop(recording) else tuple(name for _, name, _ in PHASES)
+    names = LOOP_PHASES if recording.loop else tuple(name for _, name, _ in PHASES)
     for (value, _, fill), name in zip(PHASES, names, strict=True):
         spans = [(a, b - a) for a, b in zip(starts[of == value], stops[of == value], strict=True)]
         if spans:
@@ -142,7 +186,7 @@ def _after_gaps(time: np.ndarray) -> np.ndarray:
     return np.flatnonzero(steps > GAP_STEPS * np.median(steps)) + 1
 
 
-def _forces(axes: Axes, recording: RecordedTrace, most: int) -> None:
+def _forces(axes: Axes, recording: OverTime, most: int) -> None:
     """What was measured, predicted and fitted, broken where nothing was recorded."""
     time = recording.time - _start(recording)
     gaps = _after_gaps(time)
@@ -171,7 +215,7 @@ def _forces(axes: Axes, recording: RecordedTrace, most: int) -> None:
     line(broken(recording.fitted), color=VERMILLION, linewidth=0.7, label="Output fitted")
 
 
-def _left_out(axes: Axes, recording: RecordedTrace) -> None:
+def _left_out(axes: Axes, recording: OverTime) -> None:
     """Samples left out, by kind, those beyond the axes or without a reading on their edge; and blocks at a range's end."""
     kinds, start = np.array(recording.flagged_kind, dtype=str), _start(recording)
     for kind in dict.fromkeys(recording.flagged_kind):

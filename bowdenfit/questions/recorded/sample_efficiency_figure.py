@@ -6,12 +6,14 @@ References:
 
 from __future__ import annotations
 
+from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 import numpy as np
 
+from bowdenfit.plots.bands import evenly, say_of_how_many
 from bowdenfit.plots.layout import legend_above
-from bowdenfit.plots.panels import alike, chosen, enlarge_marks, label_outer, recording_panels, say_how_many
+from bowdenfit.plots.panels import MOST, alike, enlarge_marks, label_outer, recording_panels
 from bowdenfit.plots.style import (
     BLACK,
     BLUE,
@@ -23,11 +25,10 @@ from bowdenfit.plots.style import (
     WIDE_INTERVAL,
     in_paper_style,
 )
-from bowdenfit.questions.recorded.recordings_figure import is_loop
 
 if TYPE_CHECKING:
     from bowdenfit.plots.layout import Axes, Figure
-    from bowdenfit.questions.summary.figure_data import FigureData, RecordedTrace
+    from bowdenfit.results.record import Record
 
 MOST_COLUMNS = 4
 NORMAL_90 = 1.645  # standard errors to either end of a 90 % interval
@@ -35,33 +36,74 @@ EDGE = 0.12  # of the panel's width, right of the samples
 SHARE = 0.998  # of the samples, within the axis
 
 
-def has_sample_efficiency(data: FigureData) -> bool:
-    """Whether a recording of a single rope has blocks inside a sliding phase."""
-    return any(map(_has_samples, data.recordings))
+@dataclass(frozen=True)
+class Samples:
+    """Efficiencies [1] of one recording of a single rope.
+
+    Args:
+        name: Name of the recording.
+        efficiency: Of each block inside a sliding phase.
+        stroke: +1 pulling, -1 returning, of these.
+        expected: Of the run, 5 %, 50 % and 95 % quantiles; one number without draws.
+        mean: Of the run as measured.
+        sd: Its standard error from the readings alone.
+    """
+
+    name: str
+    efficiency: np.ndarray
+    stroke: np.ndarray
+    expected: np.ndarray
+    mean: float
+    sd: float
 
 
-def _has_samples(recording: RecordedTrace) -> bool:
-    return not is_loop(recording) and bool(_sliding(recording).any())
+def data(fit: Record) -> tuple[Samples, ...] | None:
+    """Every recording of a single rope with blocks inside a sliding phase; None without any."""
+    from bowdenfit.questions.recorded.traces import traces
+
+    recordings, found = [t for t in traces(fit) if not t.loop], []
+    runs = _runs(fit) if recordings else {}
+    for trace in recordings:
+        efficiency, stroke = sample_efficiencies(trace.input_force, trace.output_force, trace.stroke * trace.used)
+        if len(efficiency):
+            found.append(Samples(trace.recording.name, efficiency, stroke, *runs[trace.recording.run]))
+    return tuple(found) or None
 
 
-def _sliding(recording: RecordedTrace) -> np.ndarray:
-    """The blocks whose forces tell the efficiency."""
-    forces = np.minimum(recording.input_force, recording.output_force)
-    return recording.used & (recording.stroke != 0) & (forces > 0)
+def sample_efficiencies(
+    input_force: np.ndarray, output_force: np.ndarray, stroke: np.ndarray
+) -> tuple[np.ndarray, np.ndarray]:
+    """Efficiency [1] of each block in a stroke, F_out / F_in when pulling and F_in / F_out when returning; and its stroke."""
+    here = (stroke != 0) & (np.minimum(input_force, output_force) > 0)
+    stroke = stroke[here]
+    return (output_force[here] / input_force[here]) ** stroke.astype(float), stroke
 
 
-def sample_efficiencies(recording: RecordedTrace) -> tuple[np.ndarray, np.ndarray]:
-    """Efficiency [1] of each used block, F_out / F_in when pulling and F_in / F_out when returning; and its stroke."""
-    here = _sliding(recording)
-    stroke = recording.stroke[here]
-    return (recording.output_force[here] / recording.input_force[here]) ** stroke.astype(float), stroke
+def _runs(fit: Record) -> dict[str, tuple[np.ndarray, float, float]]:
+    """Of each run: efficiency as expected, as measured, and the standard error of that from its readings alone."""
+    from bowdenfit.cable.load_cells import BLOCK_NOISE
+    from bowdenfit.kinds.recordings.blocks import RECORDED
+    from bowdenfit.questions.recorded.traces import QUANTILES
+    from bowdenfit.recordings.recording import Recordings
+
+    recordings, posterior = fit.dataset.measurements.table(Recordings), fit.posterior
+    assert recordings is not None  # the caller has traces of them
+    term = next(t for t in fit.model.terms if t.name == RECORDED)
+    observed = term.observed()
+    weight = np.asarray(term.data.get("run_weight", np.full(len(observed), np.nan)), dtype=float)
+    expected, sigma = fit.least_squares.readings[RECORDED][None], float("nan")
+    if posterior is not None:
+        expected = np.quantile(posterior.expected[RECORDED], QUANTILES, axis=(0, 1))
+        sigma = float(np.median(posterior.values[BLOCK_NOISE]))
+    sd = observed * sigma / np.sqrt(weight)
+    return {run: (expected[:, i], float(observed[i]), float(sd[i])) for i, run in enumerate(recordings.runs)}
 
 
 @in_paper_style
-def sample_efficiency(data: FigureData) -> Figure:
+def draw(recordings: tuple[Samples, ...]) -> Figure:
     """Efficiency [%] of each used block against its number, a panel a recording on one efficiency axis."""
-    shown, every = chosen(data, _has_samples)
-    counts = [(0.0, float(_sliding(r).sum())) for r in shown]
+    shown = evenly(recordings, MOST)
+    counts = [(0.0, float(len(r.stroke))) for r in shown]
     share_x = alike(counts)
     figure, flat, columns = recording_panels([r.name for r in shown], MOST_COLUMNS, 1.6, share_x, share_y=True)
     longest = max(count for _, count in counts)
@@ -75,15 +117,15 @@ def sample_efficiency(data: FigureData) -> Figure:
     flat[0].set_ylim(*_limits(shown))
     flat[0].locator_params(axis="y", nbins=7)
     label_outer(flat, columns, "Number of the sample", EFFICIENCY)
-    say_how_many(flat[0], len(shown), len(every))
+    say_of_how_many(flat[0], len(shown), len(recordings), "recordings")
     legend_above(figure, flat, columns=3 if columns > 1 else 2)
     enlarge_marks(figure)
     return figure
 
 
-def _samples(axes: Axes, recording: RecordedTrace) -> None:
+def _samples(axes: Axes, recording: Samples) -> None:
     """A mark a block, by stroke."""
-    values, stroke = sample_efficiencies(recording)
+    values, stroke = recording.efficiency, recording.stroke
     number = 1 + np.arange(len(values))
     for sign, label, marker, color in ((1, "Pulling", "o", BLUE), (-1, "Returning", "s", VERMILLION)):
         here = stroke == sign
@@ -94,9 +136,9 @@ def _samples(axes: Axes, recording: RecordedTrace) -> None:
             )  # fmt: skip
 
 
-def _mean(axes: Axes, recording: RecordedTrace, count: float) -> None:
+def _mean(axes: Axes, recording: Samples, count: float) -> None:
     """The run's efficiency as measured, with the uncertainty from its readings."""
-    mean, off = 100 * recording.own_efficiency, 100 * NORMAL_90 * recording.own_efficiency_sd
+    mean, off = 100 * recording.mean, 100 * NORMAL_90 * recording.sd
     if not np.isfinite(mean):
         return
     across = [0.5, count + 0.5]
@@ -108,12 +150,12 @@ def _mean(axes: Axes, recording: RecordedTrace, count: float) -> None:
         )  # fmt: skip
 
 
-def _expected(axes: Axes, recording: RecordedTrace) -> None:
+def _expected(axes: Axes, recording: Samples) -> None:
     """What is expected of the cable, at the right edge."""
-    efficiency = 100 * recording.efficiency
+    efficiency = 100 * recording.expected
     low, middle, high = efficiency[0], efficiency[len(efficiency) // 2], efficiency[-1]
     right = axes.get_xlim()[1] * (1 - 0.4 * EDGE)
-    drawn = len(recording.predicted) > 1
+    drawn = len(efficiency) > 1
     words = f"{MEDIAN.lower()} with {WIDE_INTERVAL}" if drawn else LEAST_SQUARES.lower()
     axes.errorbar(
         [right], [middle], [[middle - low], [high - middle]] if drawn else None, fmt="D", color=GREEN, markersize=3.2,
@@ -121,10 +163,10 @@ def _expected(axes: Axes, recording: RecordedTrace) -> None:
     )  # fmt: skip
 
 
-def _limits(shown: list[RecordedTrace]) -> tuple[float, float]:
+def _limits(shown: list[Samples]) -> tuple[float, float]:
     """Efficiency axis [%] that shows nearly all samples, every mean and every expectation."""
-    ends = [np.quantile(sample_efficiencies(r)[0], (0.5 - SHARE / 2, 0.5 + SHARE / 2)) for r in shown]
-    means = np.array([r.own_efficiency for r in shown])
-    values = 100 * np.concatenate([*ends, *(r.efficiency for r in shown), means[np.isfinite(means)]])
+    ends = [np.quantile(r.efficiency, (0.5 - SHARE / 2, 0.5 + SHARE / 2)) for r in shown]
+    means = np.array([r.mean for r in shown])
+    values = 100 * np.concatenate([*ends, *(r.expected for r in shown), means[np.isfinite(means)]])
     room = 0.06 * float(np.ptp(values)) or 1.0
     return float(values.min() - room), float(values.max() + room)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -25,26 +26,48 @@ from bowdenfit.plots.style import (
 
 if TYPE_CHECKING:
     from bowdenfit.plots.layout import Axes, Figure
-    from bowdenfit.questions.summary.figure_data import FigureData, ParameterDraws
+    from bowdenfit.results.record import Record
 
 ROLES = ("friction", "friction_model", "angle", "sensor")
 MOST_COLUMNS = 3
 
 
-def shown_coefficients(data: FigureData) -> list[ParameterDraws]:
-    """The parameters with draws that belong to friction, constant angles or sensors."""
-    return [p for role in ROLES for p in data.parameters if p.role == role and p.draws is not None]
+@dataclass(frozen=True)
+class Coefficient:
+    """One free parameter in its shown unit.
+
+    Args:
+        symbol: In matplotlib's math notation.
+        unit: Unit.
+        draws: From the posterior, walkers by draws.
+        prior: From the prior.
+        least_squares: Estimate; NaN where not identified.
+        standard_error: Its standard error.
+    """
+
+    symbol: str
+    unit: str
+    draws: np.ndarray
+    prior: np.ndarray
+    least_squares: float = float("nan")
+    standard_error: float = float("nan")
 
 
-def has_coefficients(data: FigureData) -> bool:
-    """Whether a coefficient was sampled."""
-    return bool(shown_coefficients(data))
+def data(fit: Record) -> tuple[Coefficient, ...] | None:
+    """The parameters that belong to friction, constant angles or sensors; None where none was sampled."""
+    drawn, estimates, found = fit.posterior, fit.least_squares.estimates, []
+    if drawn is None:
+        return None
+    for p in (p for role in ROLES for p in fit.model.space.free if p.role == role):
+        estimate = estimates.get(p.name)
+        squares = (estimate.value, estimate.standard_error) if estimate else ()
+        found.append(Coefficient(p.symbol, p.unit, drawn.values[p.name], drawn.prior[p.name], *squares))
+    return tuple(found) or None
 
 
 @in_paper_style
-def coefficients(data: FigureData) -> Figure:
+def draw(parameters: tuple[Coefficient, ...]) -> Figure:
     """Posterior density of each coefficient against its prior, and the least-squares estimate with standard error."""
-    parameters = shown_coefficients(data)
     columns = min(MOST_COLUMNS, len(parameters))
     rows = -(-len(parameters) // columns)
     figure, flat = panels([1.35] * rows, columns, TITLE + 0.14, (0.68, TITLE + 0.64), WIDE if columns > 1 else MEDIUM)
@@ -55,33 +78,30 @@ def coefficients(data: FigureData) -> Figure:
     return figure
 
 
-def _panel(axes: Axes, parameter: ParameterDraws) -> None:
-    draws = parameter.draws
-    assert draws is not None  # shown_coefficients
-    shown = _axis(parameter, draws)
+def _panel(axes: Axes, parameter: Coefficient) -> None:
+    draws, shown = parameter.draws, _axis(parameter)
     grid, lower = np.linspace(*shown, GRID_POINTS), support(draws, parameter.prior)
     posterior = density(draws, grid, lower)
     axes.fill_between(grid, posterior, color=BLUE, alpha=0.38, linewidth=0)
     axes.plot(grid, posterior, color=BLUE, label="Posterior")
-    if parameter.prior is not None:
-        prior = density(parameter.prior, grid, lower)
-        axes.plot(grid, prior, color=BLACK, linestyle="--", linewidth=1.0, label="Prior")
+    prior = density(parameter.prior, grid, lower)
+    axes.plot(grid, prior, color=BLACK, linestyle="--", linewidth=1.0, label="Prior")
     _least_squares(axes, parameter, shown, 0.08 * posterior.max())
     axes.set(xlim=shown, ylim=(0, 1.2 * posterior.max()), xlabel=labeled(parameter.symbol, parameter.unit))
     axes.set_ylabel("Density" if parameter.unit == "1" else f"Density (1/{parameter.unit})")
-    axes.set_title(_title(parameter, draws))
+    axes.set_title(_title(parameter))
 
 
-def _axis(parameter: ParameterDraws, draws: np.ndarray) -> tuple[float, float]:
+def _axis(parameter: Coefficient) -> tuple[float, float]:
     """Limits that show the posterior, and the least-squares estimate unless it is far away."""
-    low, high = limits(draws)
+    low, high = limits(parameter.draws)
     value, width = parameter.least_squares, high - low
     if np.isfinite(value) and low - width < value < high + width:
         low, high = min(low, value - 0.05 * width), max(high, value + 0.05 * width)
     return low, high
 
 
-def _least_squares(axes: Axes, parameter: ParameterDraws, shown: tuple[float, float], height: float) -> None:
+def _least_squares(axes: Axes, parameter: Coefficient, shown: tuple[float, float], height: float) -> None:
     """The estimate with its standard error, or a note where there is none to draw."""
     value, error = parameter.least_squares, parameter.standard_error
     if shown[0] <= value <= shown[1]:
@@ -98,8 +118,8 @@ def _least_squares(axes: Axes, parameter: ParameterDraws, shown: tuple[float, fl
     )  # fmt: skip
 
 
-def _title(parameter: ParameterDraws, draws: np.ndarray) -> str:
-    low, middle, high = (float(q) for q in np.quantile(draws, (0.05, 0.5, 0.95)))
+def _title(parameter: Coefficient) -> str:
+    low, middle, high = (float(q) for q in np.quantile(parameter.draws, (0.05, 0.5, 0.95)))
     low_text, median, high_text = rounded((low, middle, high), high - low)
     unit = "" if parameter.unit == "1" else f" {parameter.unit}"
     return f"{MEDIAN} {median}{unit}\n{WIDE_INTERVAL} {low_text} to {high_text}{unit}"

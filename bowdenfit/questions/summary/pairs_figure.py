@@ -2,19 +2,20 @@
 
 from __future__ import annotations
 
+from dataclasses import dataclass
 from itertools import combinations
 from typing import TYPE_CHECKING
 
 import numpy as np
 
 from bowdenfit.plots.densities import BINS, bin_numbers, enclosed_share
-from bowdenfit.plots.quantities import Quantity, optimum, sampled
 from bowdenfit.plots.sheet import Panel, Sheet
 from bowdenfit.plots.style import BLUE, SMALL, WIDE, in_paper_style
+from bowdenfit.questions.summary.quantities import Quantity, optimum, sampled
 
 if TYPE_CHECKING:
     from bowdenfit.plots.layout import Figure
-    from bowdenfit.questions.summary.figure_data import FigureData
+    from bowdenfit.results.record import Record
 
 MOST = 8
 SHARE = 0.996  # of the draws, within the axes
@@ -23,28 +24,36 @@ FILLS = {0.68: "#5E9FCB", 0.95: "#C3DCEE"}
 MARGIN, GAP, LARGEST = 0.62, 0.09, 1.45  # in
 
 
-def shown_quantities(data: FigureData) -> list[Quantity]:
-    """Coefficients first, what may be confounded with them next, then noise; at most eight together with the optimum."""
-    answer = optimum(data)
-    return sampled(data, ROLES)[: MOST - len(answer)] + answer
+@dataclass(frozen=True)
+class Pairs:
+    """Draws of what is shown, and what the optimum is the best of, such as "cable length"; empty without one."""
+
+    quantities: list[Quantity]
+    best: str = ""
 
 
-def has_pairs(data: FigureData) -> bool:
-    """Whether there are two quantities to draw against each other."""
-    return len(shown_quantities(data)) > 1
+def data(fit: Record) -> Pairs | None:
+    """Coefficients first, what may be confounded with them next, then noise; at most eight together with the optimum.
+
+    None where there are no two to draw against each other.
+    """
+    answer, route = optimum(fit), fit.dataset.description.route
+    quantities = sampled(fit, ROLES)[: MOST - len(answer)] + answer
+    best = route.variable.replace("_", " ") if route is not None and answer else ""
+    return Pairs(quantities, best) if len(quantities) > 1 else None
 
 
 @in_paper_style
-def pairs(data: FigureData) -> Figure:
+def draw(data: Pairs) -> Figure:
     """Joint and marginal posterior of coefficients, noise and optimum."""
-    quantities = shown_quantities(data)
+    quantities = data.quantities
     size = min(LARGEST, (WIDE - MARGIN - GAP) / len(quantities))
     sheet = Sheet(MARGIN + GAP + size * len(quantities), MARGIN + 2 * GAP + size * len(quantities))
     panels = _panels(quantities, size)
     _marginals(sheet, quantities, panels)
     _regions(sheet, quantities, panels)
     _axes(sheet, quantities, panels)
-    _words(sheet, data, panels)
+    _words(sheet, data.best, panels)
     return sheet.finished()
 
 
@@ -109,7 +118,7 @@ def _axes(sheet: Sheet, quantities: list[Quantity], panels: dict[tuple[int, int]
             sheet.text(0.16, middle, quantity.label, ha="center", va="center", rotation=90, fontsize=SMALL)
 
 
-def _words(sheet: Sheet, data: FigureData, panels: dict[tuple[int, int], Panel]) -> None:
+def _words(sheet: Sheet, best: str, panels: dict[tuple[int, int], Panel]) -> None:
     """The key, in the empty corner right of the first panel."""
     first = panels[0, 0]
     x, y = first.left + first.width + 2.5 * GAP, first.bottom + first.height
@@ -119,7 +128,7 @@ def _words(sheet: Sheet, data: FigureData, panels: dict[tuple[int, int], Panel])
         sheet.areas([np.array([(x, top), (x + 0.2, top), (x + 0.2, top - 0.1), (x, top - 0.1)])], facecolor=color)
         sheet.text(x + 0.26, top - 0.05, words, va="center_baseline", fontsize=SMALL)
     lines = ["Dashed: median and 90 % interval"]
-    if data.optimum is not None:
-        lines.append(f"Optimum: best {data.optimum.variable.replace('_', ' ')}")
+    if best:
+        lines.append(f"Optimum: best {best}")
     for i, words in enumerate(lines, start=len(entries)):
         sheet.text(x, y - 0.17 * i - 0.05, words, va="center_baseline", fontsize=SMALL)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -21,25 +22,38 @@ from bowdenfit.plots.style import (
     WIDE_INTERVAL,
     in_paper_style,
 )
+from bowdenfit.questions.length.efficiency_figure import EfficiencyPoints, efficiency_points
+from bowdenfit.questions.length.wrap_angles_figure import AngleCurve, angle_curves
 
 if TYPE_CHECKING:
     from bowdenfit.plots.layout import Axes, Figure
-    from bowdenfit.questions.summary.figure_data import AngleCurve, EfficiencyPoints, FigureData
+    from bowdenfit.results.record import Record
 
 ROW, LEAST, MOST = 0.155, 1.8, 8.0  # in, height of a labeled row and of the panels
 CONTACT, GAP, BELOW = 0.8, 0.32, 0.6  # in, least height of a contact's panel, between two, below all
 LONGEST, CHARACTER = 26, 0.064  # characters of a label, and width of one [in]
 
 
-def has_residuals(data: FigureData) -> bool:
-    """Whether anything measured is compared with a prediction."""
-    return bool(data.points) or any(len(c.route) for c in data.angles)
+@dataclass(frozen=True)
+class Residuals:
+    """Efficiencies with their predictions, curves with readings that they follow, and the axis label of their route."""
+
+    points: tuple[EfficiencyPoints, ...]
+    curves: tuple[AngleCurve, ...] = ()
+    route_label: str = ""
+
+
+def data(fit: Record) -> Residuals | None:
+    """What is shown; None where nothing measured is compared with a prediction."""
+    points, curves = efficiency_points(fit), tuple(c for c in angle_curves(fit) if len(c.route))
+    route = fit.dataset.description.route
+    return Residuals(points, curves, route.label if route else "") if points or curves else None
 
 
 @in_paper_style
-def residuals(data: FigureData) -> Figure:
+def draw(data: Residuals) -> Figure:
     """Efficiencies by label with their predictive intervals, and angles against the route."""
-    curves = [c for c in data.angles if len(c.route)]
+    curves = data.curves
     labels = [_short(label) for points in data.points for label in points.labels]
     inner = float(np.clip(max(ROW * len(labels), (CONTACT + GAP) * len(curves) - GAP), LEAST, MOST))
     width, top = (WIDE if labels and curves else MEDIUM), (TITLE if curves else 0.08)
@@ -87,7 +101,7 @@ def _efficiencies(axes: Axes, tables: tuple[EfficiencyPoints, ...], labels: list
     axes.set_xlabel(f"Measured efficiency minus\n{what} (percentage points)")
 
 
-def _angles(figure: Figure, grid: Any, curves: list[AngleCurve], route_label: str) -> None:
+def _angles(figure: Figure, grid: Any, curves: tuple[AngleCurve, ...], route_label: str) -> None:
     """A panel a contact, below each other, on one route axis."""
     first: Axes | None = None
     for i, curve in enumerate(curves):

@@ -2,17 +2,18 @@
 
 from __future__ import annotations
 
+from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 import numpy as np
 
-from bowdenfit.plots.quantities import Quantity, optimal_length, sampled
 from bowdenfit.plots.sheet import Panel, Sheet
 from bowdenfit.plots.style import SERIES_COLORS, SERIES_LINES, SMALL, WIDE, WIDE_INTERVAL, in_paper_style
+from bowdenfit.questions.summary.quantities import Quantity, optimum, sampled
 
 if TYPE_CHECKING:
     from bowdenfit.plots.layout import Figure
-    from bowdenfit.questions.summary.figure_data import FigureData
+    from bowdenfit.results.record import Record
 
 MOST_DRAWS = 40  # shown of each walker
 STRETCHES = 20  # that the path of a chain without other walkers is cut into
@@ -22,23 +23,29 @@ LEFT, RIGHT, BOTTOM, TOP = 0.66, 0.08, 0.42, 0.5  # in, margins; LEFT of each of
 PANEL, ROW, MARGINAL = 0.68, 0.84, 0.5  # in, height of a panel, of a row, width of a marginal
 
 
-def shown_quantities(data: FigureData) -> list[Quantity]:
-    """Every sampled parameter, and the optimal length."""
-    return sampled(data) + optimal_length(data)
+@dataclass(frozen=True)
+class Paths:
+    """Draws (walkers, ordered by ensemble, first) of every sampled parameter and of the optimal length."""
+
+    quantities: list[Quantity]
+    n_ensembles: int
 
 
-def has_traces(data: FigureData) -> bool:
-    """Whether there are paths to draw."""
-    return data.n_ensembles > 0 and any(q.draws.shape[1] > 1 for q in shown_quantities(data))
+def data(fit: Record) -> Paths | None:
+    """What is shown; None where no walker has a path."""
+    quantities = sampled(fit) + optimum(fit)[:1]
+    if fit.posterior is None or all(q.draws.shape[1] == 1 for q in quantities):
+        return None
+    return Paths(quantities, fit.posterior.n_ensembles)
 
 
 @in_paper_style
-def traces(data: FigureData) -> Figure:
+def draw(data: Paths) -> Figure:
     """Median and 90 % of the walkers of each ensemble against the draw, and the marginal of each ensemble.
 
     A chain that has no other walkers is summarized over stretches of its path.
     """
-    quantities = shown_quantities(data)
+    quantities = data.quantities
     rows = -(-len(quantities) // 2)
     sheet = Sheet(WIDE, TOP + BOTTOM + rows * ROW - (ROW - PANEL))
     panels = [_panel(q, i // rows, rows - 1 - i % rows) for i, q in enumerate(quantities)]

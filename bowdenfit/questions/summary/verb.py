@@ -58,8 +58,7 @@ def plot(
         StoreError: The folder cannot be written.
     """
     from bowdenfit.errors import UsageError
-    from bowdenfit.questions.summary.figures import figure_data
-    from bowdenfit.questions.summary.gallery import draw_all
+    from bowdenfit.questions.figures import draw_figure, figures_of
     from bowdenfit.results.folder import FIGURES, made
     from bowdenfit.results.store import load
 
@@ -68,7 +67,7 @@ def plot(
     if output is None:
         raise UsageError("a fit by itself has no folder; name one for the figures.")
     with made(Path(output)) as place:
-        return draw_all(figure_data(found), place)
+        return [path for name, data in figures_of(found) for path in draw_figure(name, data, place)]
 
 
 SUMMARY_VERB = Verb(

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -11,27 +12,94 @@ from bowdenfit.plots.style import BLACK, BLUE, GRAY, LIGHT, SERIES_COLORS, SERIE
 
 if TYPE_CHECKING:
     from bowdenfit.plots.layout import Axes, Figure
-    from bowdenfit.questions.check.figure_data import CheckedTable
-    from bowdenfit.questions.summary.figure_data import FigureData
+    from bowdenfit.questions.check.answer import Checks, TableChecks
+    from bowdenfit.results.record import Record
 
 ROW = 1.35  # in
 MOST_NAMED = 3  # outliers of a panel that are named
 BACK = "Read on the way back"
 LEAST_LIMIT = 3.2  # standard deviations that the axis shows at least
+MOST_PLACES = 2  # that deviations are shown against
 
 
-def has_checks(data: FigureData) -> bool:
-    """Whether readings were predicted without themselves."""
-    return bool(data.checks)
+@dataclass(frozen=True)
+class CheckedTable:
+    """Readings of one table against their predictions from all the others.
+
+    Args:
+        name: What they are, in words.
+        z_score: Deviations in standard deviations of the predictions; NaN of readings that are only a bound.
+        numbers: Where the readings were taken, by axis label: the first two that vary.
+        group: Contact or the like of each reading; empty where all are of one kind.
+        back: Whether each was taken on the way back, or while unloading.
+        decisive: Whether the fit leans on it.
+        outlier: Whether it is an outlier.
+        labels: Each in words.
+        at: Places in the predictions at which their distribution was looked at; empty of few readings.
+        off, low, high: Share of readings up to there less what it should be, and the band of that.
+        probability: Probability that it stays in the band.
+    """
+
+    name: str
+    z_score: np.ndarray
+    numbers: dict[str, np.ndarray]
+    group: tuple[str, ...]
+    back: np.ndarray
+    decisive: np.ndarray
+    outlier: np.ndarray
+    labels: tuple[str, ...]
+    at: np.ndarray
+    off: np.ndarray
+    low: np.ndarray
+    high: np.ndarray
+    probability: float
+
+
+def data(fit: Record) -> tuple[CheckedTable, ...] | None:
+    """Every table; None without draws."""
+    from bowdenfit.questions.check.answer import checks_of
+
+    found = checks_of(fit)
+    return (checked_tables(found) or None) if found is not None else None
+
+
+def checked_tables(found: Checks) -> tuple[CheckedTable, ...]:
+    """The readings of each table as they are shown."""
+    outliers = {(table.table, i) for table, i in found.outliers}
+    return tuple(_checked(t, [(t.table, i) in outliers for i in range(len(t.labels))]) for t in found.tables)
+
+
+def _checked(table: TableChecks, outlier: list[bool]) -> CheckedTable:
+    from bowdenfit.inference.psis import RELIABLE_K
+    from bowdenfit.kinds import readings_called
+
+    found, off, low, high = table.uniformity, *[np.zeros(0)] * 3
+    if found is not None:
+        off, low, high = (part - found.at for part in (found.share, found.low, found.high))
+    return CheckedTable(
+        readings_called(table.table).words,
+        table.z_score,
+        dict(list(table.places.numbers.items())[:MOST_PLACES]),
+        table.places.group,
+        table.places.back,
+        ~(table.predicted.pareto_k <= RELIABLE_K),
+        np.array(outlier),
+        table.labels,
+        found.at if found else off,
+        off,
+        low,
+        high,
+        found.probability if found else float("nan"),
+    )
 
 
 @in_paper_style
-def checks(data: FigureData) -> Figure:
+def draw(tables: tuple[CheckedTable, ...]) -> Figure:
     """One row a table: distribution of the readings in their predictions, and deviations by where they were taken."""
-    columns = 1 + max(len(table.numbers) for table in data.checks)
-    figure, flat = panels([ROW] * len(data.checks), columns, TITLE, (0.62, 0.74))
+    columns = 1 + max(len(table.numbers) for table in tables)
+    figure, flat = panels([ROW] * len(tables), columns, TITLE, (0.62, 0.74))
     used = []
-    for row, table in enumerate(data.checks):
+    for row, table in enumerate(tables):
         here = flat[row * columns : (row + 1) * columns]
         _distribution(here[0], table)
         used.append(here[0])

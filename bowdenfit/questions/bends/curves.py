@@ -1,0 +1,68 @@
+"""Curves of many draws of a cable that stretches or has preload, for figures; and of which bends they are.
+
+Quantiles have the 5 %, 50 % and 95 % quantiles of the draws as first axis; one row, the least-squares line, without draws.
+"""
+
+from collections.abc import Callable, Mapping
+from typing import Any
+
+import jax
+import numpy as np
+from jax import Array
+
+from bowdenfit.errors import UsageError
+from bowdenfit.inference.draws import BATCH, for_each_draw
+from bowdenfit.questions.bends.answer import elastic_answers
+from bowdenfit.questions.bends.equations import knows_preload
+from bowdenfit.results.record import Record
+
+QUANTILES = (0.05, 0.5, 0.95)
+POINTS = 61  # of a line
+_LEAST_BEND = 0.1  # rad; a figure against the wrap angle needs a range
+
+Values = Mapping[str, Array]
+
+
+def of_draws(fit: Record, curves: Callable[[Values], dict[str, Any]]) -> dict[str, np.ndarray]:
+    """Curves of one draw, for some of the draws (rows), or for least squares alone.
+
+    Args:
+        fit: The fit.
+        curves: Function of the values of one draw.
+    """
+    space, posterior = fit.model.space, fit.posterior
+    z = fit.least_squares.z[None]
+    if posterior is not None:
+        z = posterior.flat_z[np.linspace(0, len(posterior.flat_z) - 1, BATCH).astype(int)]
+    with jax.enable_x64(True):
+        found: dict[str, np.ndarray] = for_each_draw(
+            lambda one: curves(space.constrain(one)), space.size, run_once=True
+        )(z)
+    return found
+
+
+def quantiles(draws: np.ndarray) -> np.ndarray:
+    """5 %, 50 % and 95 % quantiles over the draws; the one line without draws."""
+    return draws if len(draws) == 1 else np.quantile(draws, QUANTILES, axis=0)
+
+
+def loop_bends(fit: Record) -> np.ndarray | None:
+    """Wrap angles that a loop with preload was measured at [rad]; None of anything else."""
+    if not fit.model.cable.is_loop or not knows_preload(fit.model):
+        return None
+    try:
+        return elastic_answers(fit).measured_bends
+    except UsageError:  # no wrap angle says which of several contacts is bent
+        return None
+
+
+def range_of_bends(fit: Record) -> tuple[float, float] | None:
+    """The smallest and the largest of them; None where nothing can be shown against the wrap angle."""
+    bends = loop_bends(fit)
+    return (float(bends[0]), float(bends[-1])) if bends is not None and len(bends) and bends[-1] > _LEAST_BEND else None
+
+
+def reference_angle(fit: Record) -> str:
+    """'at 0 deg', where preload depends on the wrap angle."""
+    settings, follows = fit.dataset.description.preload, fit.dataset.description.preload_follows_stretch
+    return f"at {settings.wrap_angle.value:g} {settings.wrap_angle.unit}" if follows else ""

@@ -1,0 +1,27 @@
+"""Efficiency and wrap angles along the route with their uncertainty."""
+
+import jax
+import jax.numpy as jnp
+import numpy as np
+
+from bowdenfit.inference.draws import curves_of
+from bowdenfit.plots.bands import BAND_QUANTILES, Band
+from bowdenfit.results.optimum import route_grid
+from bowdenfit.results.record import Record, once
+
+_DRAWS = 5000  # enough for a line's width of accuracy
+
+
+@once
+def along_route(fit: Record) -> dict[str, Band]:
+    """The efficiency [1] and every curved wrap angle [deg], by name; empty without a route."""
+    if fit.dataset.description.route is None:
+        return {}
+    if fit.posterior is not None:
+        grid, draws = fit.curves()
+        every = max(1, len(fit.posterior.flat_z) // _DRAWS)
+        return {name: Band(grid, np.quantile(d[::every], BAND_QUANTILES, axis=0)) for name, d in draws.items()}
+    grid = route_grid(fit.model)
+    with jax.enable_x64(True):
+        lines = jax.jit(curves_of(fit.model, grid))(jnp.asarray(fit.least_squares.z))
+    return {name: Band(grid, np.asarray(line)[None]) for name, line in lines.items()}

@@ -1,0 +1,56 @@
+"""What the pair plot and the paths of the ensembles show: parameters and the optimum alike, as draws with a label."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from bowdenfit.plots.densities import density, limits, support
+from bowdenfit.plots.style import labeled
+
+if TYPE_CHECKING:
+    from bowdenfit.results.record import Record
+
+
+@dataclass(frozen=True)
+class Quantity:
+    """Draws (walkers by draws) of something between bounds, and its symbol with unit."""
+
+    label: str
+    draws: np.ndarray
+    bounds: tuple[float, float]
+
+    def limits(self, share: float) -> tuple[float, float]:
+        """An axis that shows the given share of the draws, within the bounds."""
+        low, high = limits(self.draws, share)
+        return max(low, self.bounds[0]), min(high, self.bounds[1])
+
+    def density(self, grid: np.ndarray, draws: np.ndarray | None = None) -> np.ndarray:
+        """Density of the draws, or of some of them, with its highest point at 1."""
+        height = density(self.draws if draws is None else draws, grid, *self.bounds)
+        return height / height.max()
+
+
+def sampled(fit: Record, roles: tuple[str, ...] = ()) -> list[Quantity]:
+    """The sampled parameters, of the given roles in the given order, or all; none without draws."""
+    if fit.posterior is None:
+        return []
+    free, values = fit.model.space.free, fit.posterior.values
+    wanted = [p for role in roles for p in free if p.role == role] if roles else free
+    return [Quantity(labeled(p.symbol, p.unit), values[p.name], (support(values[p.name]), np.inf)) for p in wanted]
+
+
+def optimum(fit: Record) -> list[Quantity]:
+    """The optimal length and the efficiency there [%], where there are such."""
+    from bowdenfit.results.record import OPTIMAL_EFFICIENCY, OPTIMAL_LENGTH
+
+    route, posterior = fit.dataset.description.route, fit.posterior
+    if route is None or posterior is None:
+        return []
+    length, efficiency = posterior.optimum[OPTIMAL_LENGTH], 100 * posterior.optimum[OPTIMAL_EFFICIENCY]
+    return [
+        Quantity(labeled("Optimum", route.unit), length, route.range),
+        Quantity("Efficiency at\noptimum (%)", efficiency, (0.0, 100.0)),
+    ]

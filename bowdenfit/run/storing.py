@@ -31,7 +31,7 @@ def write_results(found: "Fit", folder: Path, figures: bool, helpers: Assistants
         written: Future[None] | None = None
     else:
         written = helpers.statistics.submit(write_groups, folder / POSTERIOR, *posterior_page(found))
-    shown, place = figures_of(found) if figures else (), folder / FIGURES
+    place, shown = folder / FIGURES, figures_of(found) if figures else ()
     drawn = [helpers.drawing.submit(draw_figure, name, data, place) for name, data in shown]  # while the next is worked out
     save(found, found.summary(), folder, force=True, write_posterior=written.result if written else None)
     write_text(folder / SUMMARY_TEXT, summary_text(found))

@@ -16,9 +16,7 @@ from bowdenfit.model import build_model
 from bowdenfit.questions.check.verb import check
 from bowdenfit.questions.next.target import answer_of
 from bowdenfit.questions.simulate.simulation import true_values
-from bowdenfit.questions.summary.coefficients_figure import shown_coefficients
-from bowdenfit.questions.summary.figures import figure_data
-from bowdenfit.questions.summary.pairs_figure import shown_quantities
+from bowdenfit.questions.summary import coefficients_figure, pairs_figure
 
 MU, WOBBLE = 0.13, np.deg2rad(35.0)
 FOLDER = """
@@ -155,9 +153,8 @@ def test_summary_and_check_name_the_law(tmp_path, run):
 
 
 def test_figures_show_the_parameter_of_a_law(fitted):
-    data = figure_data(fitted)
-    assert [p.symbol for p in shown_coefficients(data)] == [r"$\mu$", r"$w_\mathrm{sheath}$"]
-    assert any("w_" in quantity.label and "deg" in quantity.label for quantity in shown_quantities(data))
+    assert [p.symbol for p in coefficients_figure.data(fitted)] == [r"$\mu$", r"$w_\mathrm{sheath}$"]
+    assert any("w_" in quantity.label and "deg" in quantity.label for quantity in pairs_figure.data(fitted).quantities)
 
 
 def test_identifiability_and_the_next_measurement_know_the_parameter_of_a_law(fitted):

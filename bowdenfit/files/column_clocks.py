@@ -19,7 +19,7 @@ def with_column_clocks(channels: Sequence[Channel]) -> tuple[Channel, ...]:
         members.setdefault(_group(channel.name), []).append(place)
     result = list(channels)
     for group, places in members.items():
-        for around in _outward(group):
+        for around in groups_around(group + "channel"):
             lenders = [channels[place] for place in members.get(around, []) if around != group]
             clocked = _clocked([*lenders, *(result[place] for place in places)])[len(lenders) :]
             for place, channel in zip(places, clocked, strict=True):
@@ -33,12 +33,12 @@ def with_lone_clock(channels: Sequence[Channel]) -> tuple[Channel, ...]:
     return tuple(_clocked(list(channels))) if len(clocks) == 1 else tuple(channels)
 
 
-def _outward(group: str) -> Iterator[str]:
-    """The group itself and those around it, to the file as a whole."""
-    yield group
-    while group:
-        group = _group(group[:-1])
-        yield group
+def groups_around(name: str) -> Iterator[str]:
+    """The group of a channel and those around it, to the file as a whole: "rec.run.", "rec." and "" of "rec.run.F"."""
+    while name:
+        name = _group(name)
+        yield name
+        name = name[:-1]
 
 
 def _clocked(channels: list[Channel]) -> list[Channel]:

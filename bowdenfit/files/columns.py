@@ -7,11 +7,12 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 
 from bowdenfit.errors import DatasetError
-from bowdenfit.files.csv_table import Cell, RawTable
+from bowdenfit.files.cells import Cell
+from bowdenfit.files.csv_table import RawTable
+from bowdenfit.files.headings import bracketed
 from bowdenfit.units import conversion_factor, is_unit, route_conversion_factor, speed_dimension
 from bowdenfit.words import quoted, shown
 
-_BRACKETED = re.compile(r"^(?P<name>.*?)[\s_]*[\[(](?P<unit>[^\])]*)[\])]\s*$")
 _LONGEST_HEADING = 200
 
 
@@ -148,23 +149,20 @@ def meanings(heading: str, wanted: tuple[Quantity, ...]) -> list[tuple[Quantity,
     """Every quantity that the heading can mean, with the unit written in it; exact names win over name and unit."""
     if len(heading) > _LONGEST_HEADING:
         return []
-    match = _BRACKETED.match(heading)
-    name, unit = (match["name"], match["unit"].strip() or None) if match else (heading, None)
+    name, unit = bracketed(heading)
     exact = [(q, unit or _suffix(name, q.name)) for q in wanted if _plain(name) == _plain(q.name)]
     whole = [(q, None) for q in wanted if _plain(heading) == _plain(q.name)]
-    named = exact or whole or [(q, unit) for q in wanted if (unit := _suffix(heading, q.name)) is not None]
+    named = exact or whole or [(q, behind) for q in wanted if (behind := _suffix(heading, q.name)) is not None]
     return [(q, unit) for q, unit in named if not (q.dimension == "text" and unit and is_unit(unit))]
 
 
 def _suffix(heading: str, name: str) -> str | None:
     """Unit behind the name in `input_force_N` or "Input force N", case kept; None where it is no unit."""
-    words, unit = re.split(r"[\s_\-]+", heading.strip()), None
-    for split in range(1, len(words)):
-        if _plain("_".join(words[:split])) == _plain(name):
-            unit = "_".join(words[split:])
-    if unit is None:
+    words = re.split(r"[\s_\-]+", heading.strip())
+    units = ["_".join(words[i:]) for i in range(1, len(words)) if _plain("_".join(words[:i])) == _plain(name)]
+    if not units:
         return None
-    candidate = unit.replace("_per_", "/").replace("_", "*")
+    candidate = units[-1].replace("_per_", "/").replace("_", "*")
     if candidate.lower() in {"pct", "percent"}:
         return "%"
     return candidate if is_unit(candidate) else None
@@ -222,6 +220,5 @@ def _check_sources(table: RawTable, known: list[str], sources: Mapping[str, Colu
 
 
 def _named_column(table: RawTable, quantity: Quantity, source: ColumnSource) -> Column:
-    match = _BRACKETED.match(source.name[:_LONGEST_HEADING])
     written = next((unit for _, unit in meanings(source.name, (quantity,)) if unit), None)
-    return _column(table, source.name, quantity, source.unit or written or (match and match["unit"].strip()) or None)
+    return _column(table, source.name, quantity, source.unit or written or bracketed(source.name)[1] or None)

@@ -66,8 +66,8 @@ def read(path: Path) -> ChannelFile:
     return ChannelFile(path, "CSV", timed, (*left_out, *broken, *remarks, *clock))
 
 
-def _long(path: Path, sheet: Sheet, stop: int) -> dict[int, np.ndarray] | None:
-    """The columns up to a byte as pandas reads them, dates as text; None where it meets a cell that it cannot."""
+def _long(path: Path, sheet: Sheet, stop: int) -> dict[int, list[np.ndarray]] | None:
+    """The pieces of each column up to a byte as pandas reads them, dates as text; None where it meets a cell that it cannot."""
     pandas = load("pandas", "CSV")
     kinds = sheet.layout.kinds
     used = [i for i, kind in enumerate(kinds) if kind != "text"]
@@ -99,7 +99,7 @@ def _long(path: Path, sheet: Sheet, stop: int) -> dict[int, np.ndarray] | None:
                     pieces[i].append(values.to_numpy(copy=True))
         except (ValueError, Warning, csv.Error):
             return None
-    return {i: np.concatenate(pieces.pop(i)) for i in used if pieces[i]}
+    return pieces
 
 
 def _exactly(version: str) -> dict[str, Any]:
@@ -108,7 +108,7 @@ def _exactly(version: str) -> dict[str, Any]:
     return {"float_precision": "round_trip"} if (int(major), int(minor)) < (3, 1) else {}
 
 
-def _rows(path: Path, sheet: Sheet, start: int, stop: int, before: dict[int, np.ndarray] | None) -> SheetRows:
+def _rows(path: Path, sheet: Sheet, start: int, stop: int, before: dict[int, list[np.ndarray]] | None) -> SheetRows:
     """The rows of a section of the file [bytes], to be read cell by cell behind what has been read before."""
     spaces = "\r\n\t ".replace(sheet.separator, "")
 

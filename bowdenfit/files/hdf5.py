@@ -9,7 +9,7 @@ import numpy as np
 from bowdenfit.files.channels import Channel, ChannelFile
 from bowdenfit.files.column_clocks import with_column_clocks, with_lone_clock
 from bowdenfit.files.outcome import LeftOut, channel_file, damage_refused, is_numeric, numbers, refuse_too_large
-from bowdenfit.files.sampling import interval_from, with_interval
+from bowdenfit.files.sampling import with_interval
 
 MOST_COLUMNS = 64
 _UNITS = ("unit", "units", "Unit", "Units")
@@ -31,8 +31,8 @@ def read(path: Path) -> ChannelFile:
         chosen = [each for each in _datasets(file, left_out) if _is_recording(each, left_out)]
         refuse_too_large(path, sum(2 * each.size * max(1, len(each.dtype.names or ())) for each in chosen))
         channels = [channel for each in chosen for channel in _channels(each, left_out)]
-        intervals = {each.name.lstrip("/"): _interval(each) for each in chosen}
-    clocked, remarks = with_interval(with_column_clocks(channels), lambda name: _nearest(name, intervals))
+        settings = {path: values for each in chosen for path, values in _settings(each).items()}
+    clocked, remarks = with_interval(with_column_clocks(channels), settings)
     return channel_file(path, "HDF5", with_lone_clock(clocked), left_out, remarks)
 
 
@@ -98,18 +98,7 @@ def _unit(dataset: Any) -> str:
     return text.strip() if isinstance(text, str) else ""
 
 
-def _interval(dataset: Any) -> tuple[float, str] | None:
-    """Seconds between samples, by the nearest attribute that says so, and the name of that attribute."""
-    holder = dataset
-    while True:
-        if found := interval_from({str(name): holder.attrs[name] for name in holder.attrs}):
-            return found
-        if holder.name == "/":
-            return None
-        holder = holder.parent
-
-
-def _nearest(name: str, intervals: dict[str, tuple[float, str] | None]) -> tuple[float, str] | None:
-    """What belongs to the data set that a channel is from: its own name, or that before the column."""
-    owner = name if name in intervals else max((each for each in intervals if name.startswith(each)), key=len)
-    return intervals[owner]
+def _settings(holder: Any) -> dict[str, dict[str, Any]]:
+    """The attributes of a data set and of the groups around it, by their paths."""
+    own = {holder.name.strip("/"): {str(name): holder.attrs[name] for name in holder.attrs}}
+    return own if holder.name == "/" else own | _settings(holder.parent)

@@ -8,6 +8,7 @@ from bowdenfit.files.clocks import names_time
 from bowdenfit.units import is_unit
 
 _BRACKETED = re.compile(r"^(?P<name>.*?)[\s_]*[\[(](?P<unit>[^\])]*)[\])]\s*$")
+_LONGEST = 200
 _NUMBER = re.compile(r"[+-]?\d+(?:[.,]\d+)?")
 # `F_in` is no force in inches, nor `cell_A` one in ampere: behind a name only what cannot be a word counts as unit.
 _SUFFIXES = (
@@ -35,10 +36,16 @@ def heading_of(text: str, unit: str = "") -> Heading:
     plain = " ".join(text.split())
     if unit := unbracketed(unit):
         return Heading(plain, unit)
-    match = _BRACKETED.match(plain[:200])
-    if match and match["name"] and is_unit(match["unit"]) and match["unit"].strip() not in {"", "-", "1"}:
-        return Heading(match["name"], match["unit"].strip())
+    name, unit = bracketed(plain)
+    if name and unit not in {"", "-", "1"} and is_unit(unit):
+        return Heading(name, unit)
     return Heading(plain, _unit_behind(plain))
+
+
+def bracketed(heading: str) -> tuple[str, str]:
+    """The name and what stands in brackets behind it; all of the heading where nothing does."""
+    match = _BRACKETED.match(heading[:_LONGEST])
+    return (match["name"], match["unit"].strip()) if match else (heading, "")
 
 
 def unbracketed(unit: str) -> str:

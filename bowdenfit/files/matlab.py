@@ -21,7 +21,7 @@ from bowdenfit.files.outcome import (
     numbers,
     refuse_too_large,
 )
-from bowdenfit.files.sampling import interval_from, with_interval
+from bowdenfit.files.sampling import with_interval
 
 MOST_COLUMNS = 64
 _TEXT = "they are text"
@@ -40,18 +40,18 @@ class _Variables:
 
     Args:
         channels: Vectors, and the columns of narrow matrices.
-        settings: Single numbers by name, such as "fs" or "rec.fs".
+        settings: Single numbers by name, such as "fs" or "rec.fs", of the file ("") and of each structure ("rec").
         left_out: What is neither.
     """
 
     channels: list[Channel] = field(default_factory=list)
-    settings: dict[str, float] = field(default_factory=dict)
+    settings: dict[str, dict[str, float]] = field(default_factory=dict)
     left_out: LeftOut = field(default_factory=LeftOut)
 
     def add(self, name: str, values: np.ndarray) -> None:
         """Sort in one array of numbers, in the orientation that MATLAB shows."""
         if values.size == 1:
-            self.settings[name] = float(values.reshape(-1)[0])
+            self.settings.setdefault(name.rpartition(".")[0], {})[name] = float(values.reshape(-1)[0])
         elif values.size == 0:
             self.left_out.add(name, "they are empty")
         elif values.ndim > 2 or (values.ndim == 2 and min(values.shape) > MOST_COLUMNS):
@@ -73,9 +73,7 @@ def read(path: Path) -> ChannelFile:
         modern = file.read(520).endswith(b"\x89HDF\r\n\x1a\n")
     with damage_refused(path):
         variables = _read_hdf5(path) if modern else _read_classic(path)
-    clocked, remarks = with_interval(
-        with_column_clocks(variables.channels), lambda name: _interval(name, variables.settings)
-    )
+    clocked, remarks = with_interval(with_column_clocks(variables.channels), variables.settings)
     return channel_file(path, "MATLAB", with_lone_clock(clocked), variables.left_out, remarks)
 
 
@@ -87,19 +85,6 @@ def _columns(name: str, values: np.ndarray) -> Iterator[tuple[str, np.ndarray]]:
     tall = values.shape[0] >= values.shape[1]
     for number, column in enumerate(values.T if tall else values, start=1):
         yield f"{name}(:,{number})" if tall else f"{name}({number},:)", column
-
-
-def _interval(name: str, settings: dict[str, float]) -> tuple[float, str] | None:
-    """The time between samples, by a setting of the same structure or of those around it."""
-    owner = name.rpartition(".")[0]
-    while True:
-        prefix = f"{owner}." if owner else ""
-        near = {each: settings[each] for each in settings if each.rpartition(".")[0] == owner}
-        if found := interval_from({each.removeprefix(prefix): value for each, value in near.items()}):
-            return found[0], f"{prefix}{found[1]}"
-        if not owner:
-            return None
-        owner = owner.rpartition(".")[0]
 
 
 def _read_classic(path: Path) -> _Variables:

@@ -19,6 +19,7 @@ from bowdenfit.files.outcome import (
     cut_off,
     damage_refused,
     is_numeric,
+    kept_of_cut,
     numbers,
     refuse_too_large,
 )
@@ -47,7 +48,8 @@ def read(path: Path) -> ChannelFile:
     kept = max((len(channel.values) for channel in channels), default=0)
     if places and expected and not kept and not left_out.names:
         raise cut_off(path, "it ends before the first whole record")
-    return channel_file(path, kind, channels, left_out, _remarks(path, kept, expected))
+    remarks = [kept_of_cut(path, f"{kept} of its {expected} records")] if 0 < kept < expected else []
+    return channel_file(path, kind, channels, left_out, remarks)
 
 
 @contextmanager
@@ -147,13 +149,3 @@ def _clock(file: Any, group: int) -> str:
         return ""
     master = file.groups[group].channels[index]
     return "" if getattr(master, "sync_type", 1) in _NOT_TIME else str(master.name)
-
-
-def _remarks(path: Path, kept: int, expected: int) -> tuple[str, ...]:
-    """What is said of a file that ends before its records do."""
-    if not 0 < kept < expected:
-        return ()
-    return (
-        f"{path.name} is cut off: {kept} of its {expected} records were kept. Copy the file again from the acquisition "
-        "computer if there should be more.",
-    )

@@ -66,6 +66,14 @@ def cut_off(path: Path, seen: str) -> DatasetError:
     return DatasetError(f"{path.name} is cut off or damaged ({words}); copy it again from the acquisition computer.")
 
 
+def kept_of_cut(path: Path, what: str) -> str:
+    """The remark on a file that ends early, of which `what` could be read."""
+    return (
+        f"{path.name} is cut off: {what} were kept. Copy the file again from the acquisition computer if there should be "
+        "more."
+    )
+
+
 def refuse_too_large(path: Path, n_samples: int, what: str = "") -> None:
     """Refuse a file before it fills the memory.
 

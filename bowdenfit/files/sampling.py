@@ -1,6 +1,7 @@
 """Sampling rates that stand beside the samples as single numbers, and the clocks they make."""
 
-from collections.abc import Callable, Iterable, Mapping
+import re
+from collections.abc import Iterable, Mapping
 from dataclasses import replace
 from typing import Any
 
@@ -8,6 +9,7 @@ import numpy as np
 
 from bowdenfit.files.channels import Channel
 from bowdenfit.files.clocks import is_clock
+from bowdenfit.files.column_clocks import groups_around
 
 _RATES = {
     "fs", "f_s", "rate", "samplingrate", "samplerate", "samplefrequency", "samplingfrequency", "sampfreq", "fsample",
@@ -17,39 +19,24 @@ _INTERVALS = {
     "dt", "deltat", "ts", "tsample", "sampletime", "sampletimes", "samplinginterval", "sampleinterval", "samplingtime",
     "timestep", "samplingperiod", "sampleperiod",
 }  # fmt: skip
-_Interval = tuple[float, str]
+_INDEX = re.compile(r"[\[(][\d:,]+[\])]$")
+Settings = Mapping[str, Mapping[str, Any]]
+"""Single values by name, such as the attributes of a data set, for each data set and group: "bench" or "rec.run"."""
 
 
-def interval_from(settings: Mapping[str, Any]) -> tuple[float, str] | None:
-    """Seconds between samples by the first setting that says so, and the name of that setting.
-
-    Args:
-        settings: Single values by name, such as the attributes of a data set: rates [1/s] and intervals [s].
-    """
-    for name, value in settings.items():
-        number = _positive(value)
-        if number is not None and _plain(name) in _RATES:
-            return 1 / number, name
-        if number is not None and _plain(name) in _INTERVALS:
-            return number, name
-    return None
-
-
-def with_interval(
-    channels: Iterable[Channel], interval_of: Callable[[str], _Interval | None]
-) -> tuple[tuple[Channel, ...], tuple[str, ...]]:
+def with_interval(channels: Iterable[Channel], settings: Settings) -> tuple[tuple[Channel, ...], tuple[str, ...]]:
     """Give channels without a clock the times that follow from their sampling rate, and say so.
 
     Args:
         channels: The channels of a file.
-        interval_of: From the name of a channel to the time between its samples [s] and the setting that says so.
+        settings: Where rates [1/s] and intervals [s] may stand.
 
     Returns:
         All channels in their order, and a remark on each setting that was used.
     """
     result, used = [], dict[str, float]()
     for channel in channels:
-        found = interval_of(channel.name) if channel.time is None and not is_clock(channel) else None
+        found = _nearest(channel.name, settings) if channel.time is None and not is_clock(channel) else None
         if found:
             interval, name = found
             used[name] = interval
@@ -60,6 +47,21 @@ def with_interval(
         "second)."
         for name, interval in used.items()
     )
+
+
+def _nearest(name: str, settings: Settings) -> tuple[float, str] | None:
+    """Seconds between samples, by the first setting of a channel itself, its group or those around it, and its name."""
+    owners = (_INDEX.sub("", name), *(group[:-1] for group in groups_around(name)))
+    found = (_interval(*setting) for owner in owners for setting in settings.get(owner, {}).items())
+    return next((each for each in found if each), None)
+
+
+def _interval(name: str, value: Any) -> tuple[float, str] | None:
+    """Seconds between samples by one setting, and its name; None if it says nothing of them."""
+    number, words = _positive(value), {_plain(name), _plain(name.rpartition(".")[2])}
+    if number is not None and words & _RATES:
+        return 1 / number, name
+    return (number, name) if number is not None and words & _INTERVALS else None
 
 
 def _plain(name: str) -> str:

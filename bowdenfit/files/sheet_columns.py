@@ -35,7 +35,7 @@ class SheetRows:
         number: The number in the file of the row at a position, from 0.
         decimal: Decimal mark of numbers that are text.
         of_text: Whether they are lines of text, of which blank ones are only space and none may have too many cells.
-        before: Numbers or dates of the columns that have been read from the rows before.
+        before: Numbers or dates of each column that have been read from the rows before, in pieces.
     """
 
     place: str
@@ -44,7 +44,7 @@ class SheetRows:
     number: Callable[[int], int]
     decimal: str = "."
     of_text: bool = False
-    before: Mapping[int, np.ndarray] | None = None
+    before: Mapping[int, list[np.ndarray]] | None = None
 
 
 @dataclass(frozen=True)
@@ -85,11 +85,12 @@ def columns_of(sheet: SheetRows) -> tuple[list[Vector | None], list[str]]:
     before = sheet.before or {}
     for i, values in (cells.numbers | cells.dates).items():
         found = np.array(values[:stop], dtype=object if i in cells.dates else float)[kept]
-        whole = np.concatenate([before[i], found]) if i in before else found
+        whole = np.concatenate([*before.get(i, ()), found])
         if i in cells.dates:
             columns[i] = seconds_of_dates(whole, f"{sheet.place}, column {shown(sheet.layout.name(i))}")
         else:
-            columns[i] = np.where(np.isfinite(whole), whole, np.nan)
+            whole[~np.isfinite(whole)] = np.nan
+            columns[i] = whole
     return columns, _remarks(sheet, cells.letters, stop)
 
 

@@ -17,6 +17,7 @@ from bowdenfit.files.outcome import (
     cut_off,
     damage_refused,
     is_numeric,
+    kept_of_cut,
     numbers,
     refuse_too_large,
 )
@@ -48,7 +49,8 @@ def read(path: Path) -> ChannelFile:
             left_out.add(_name(channel), "they are empty")
     if incomplete and not channels:
         raise cut_off(path, "it ends before the first whole sample")
-    remarks = _remarks(path, max(map(_n_samples, channels), default=0)) if incomplete else ()
+    kept = max((len(channel.values) for channel in channels), default=0)
+    remarks = [kept_of_cut(path, f"the {kept} whole samples before the end")] if incomplete else []
     return channel_file(path, "TDMS", with_lone_clock(with_column_clocks(channels)), left_out, remarks)
 
 
@@ -121,16 +123,3 @@ def _unit(properties: Mapping[str, Any]) -> str:
 def _seconds(dates: np.ndarray) -> np.ndarray:
     """Dates as seconds from the first."""
     return (dates - dates[0]) / np.timedelta64(1, "s")
-
-
-def _n_samples(channel: Channel) -> int:
-    """Length of a channel."""
-    return len(channel.values)
-
-
-def _remarks(path: Path, kept: int) -> tuple[str, ...]:
-    """What is said of a file that was cut off."""
-    return (
-        f"{path.name} is cut off in its last segment; the {kept} whole samples before the end were kept. Copy the file "
-        "again from the acquisition computer if there should be more.",
-    )

@@ -50,29 +50,23 @@ def _checked_ending(path: Path) -> str:
     """The ending of a file that is what it says."""
     content = recognized(path, first_bytes(path, 1024))
     ending = path.suffix.lower()
-    if ending not in FORMATS:
-        raise _unknown_ending(path, content)
-    if not content.suits(ending):
-        raise _wrong_ending(path, content)
+    if ending not in FORMATS or not content.suits(ending):
+        raise _refusal(path, content)
     return ending
 
 
-def _unknown_ending(path: Path, content: Content) -> DatasetError:
-    """What to do with an ending that nobody reads."""
+def _refusal(path: Path, content: Content) -> DatasetError:
+    """What a file really is, where its ending says something else or nothing."""
+    ending, known = path.suffix, path.suffix.lower() in FORMATS
     if content is not UNKNOWN:
-        return DatasetError(f"{path.name} is {content.what}; {content.advice}.")
-    ending = f"the ending {path.suffix}" if path.suffix else "no ending"
+        what = f"not a {ending} file but {content.what}" if known else content.what
+        return DatasetError(f"{path.name} is {what}; {content.advice}.")
+    if known:
+        return DatasetError(
+            f"{path.name} does not start as a {ending} file does: it is damaged or of another kind; copy it again from "
+            "the acquisition computer, or export the recording as CSV."
+        )
     return DatasetError(
-        f"{path.name} has {ending}, which says nothing about its content; export the recording as CSV, or rename it to "
-        f"what it is: {', '.join(FORMATS)}."
-    )
-
-
-def _wrong_ending(path: Path, content: Content) -> DatasetError:
-    """What the file really is."""
-    if content is not UNKNOWN:
-        return DatasetError(f"{path.name} is not a {path.suffix} file but {content.what}; {content.advice}.")
-    return DatasetError(
-        f"{path.name} does not start as a {path.suffix} file does: it is damaged or of another kind; copy it again from "
-        "the acquisition computer, or export the recording as CSV."
+        f"{path.name} has {f'the ending {ending}' if ending else 'no ending'}, which says nothing about its content; export "
+        f"the recording as CSV, or rename it to what it is: {', '.join(FORMATS)}."
     )

@@ -1,7 +1,7 @@
 """Which columns of a recording are clocks, and the time that each channel takes from them."""
 
 import re
-from collections.abc import Iterable, Sequence
+from collections.abc import Callable, Iterable, Sequence
 from dataclasses import replace
 from itertools import groupby
 
@@ -27,7 +27,9 @@ _DATE = re.compile(r"\d{4}[-/]\d\d?[-/]\d\d?(?:[ T].*)?|\d\d?[./-]\d\d?[./-]\d{4
 _TIME_OF_DAY = re.compile(r"\d{1,3}:\d\d(?::\d\d(?:[.,]\d+)?)?")
 
 
-def with_clocks(channels: Sequence[Channel]) -> tuple[Channel, ...]:
+def with_clocks(
+    channels: Sequence[Channel], groups: Callable[[str], Iterable[str]] = lambda _: ("",)
+) -> tuple[Channel, ...]:
     """The channels, each with the time that its clock gives.
 
     The clock of a channel is the nearest clock to its left that has as many samples, so that sheets with a pair of
@@ -37,16 +39,22 @@ def with_clocks(channels: Sequence[Channel]) -> tuple[Channel, ...]:
 
     Args:
         channels: Channels in the order of the file.
+        groups: From the name of a channel to what stands before it in names of its group and of those around it, in which
+            it looks for a clock one after the other.
     """
-    clocks = {i: channel for i, channel in enumerate(channels) if is_clock(channel)}
-    seconds = {i: _seconds(clock) for i, clock in clocks.items()}
+    own = [next(iter(groups(channel.name)), "") for channel in channels]
+    clocks = [i for i, c in enumerate(channels) if is_clock(replace(c, name=c.name.removeprefix(own[i])))]
+    seconds = {i: seconds_of(channels[i]) for i in clocks}
 
     def timed(position: int, channel: Channel) -> Channel:
-        fitting = [i for i, clock in clocks.items() if len(clock.values) == len(channel.values)]
-        if channel.time is not None or position in clocks or not fitting:
+        if channel.time is not None or position in clocks:
             return channel
-        nearest = max((i for i in fitting if i < position), default=fitting[0])
-        return replace(channel, time=seconds[nearest], clock=clocks[nearest].name)
+        alike = [i for i in clocks if len(channels[i].values) == len(channel.values)]
+        fitting = next((near for group in groups(channel.name) if (near := [i for i in alike if own[i] == group])), [])
+        nearest = max((i for i in fitting if i < position), default=fitting[0] if fitting else None)
+        if nearest is None:
+            return channel
+        return replace(channel, time=seconds[nearest], clock=channels[nearest].name)
 
     return tuple(timed(i, channel) for i, channel in enumerate(channels))
 
@@ -153,7 +161,8 @@ def _time_factor(unit: str) -> float | None:
         return None
 
 
-def _seconds(clock: Channel) -> Vector:
+def seconds_of(clock: Channel) -> Vector:
+    """The times that a clock shows, from its first where they can only be dates [s]."""
     finite = clock.values[np.isfinite(clock.values)]
     largest = float(np.max(np.abs(finite))) if len(finite) else 0.0
     factor = _time_factor(clock.unit)

@@ -16,7 +16,7 @@ from bowdenfit.files.csv_rows import cells_of
 from bowdenfit.files.csv_start import Sheet, start_of
 from bowdenfit.files.layout import is_summary
 from bowdenfit.files.libraries import load
-from bowdenfit.files.outcome import refuse_larger
+from bowdenfit.files.outcome import LeftOut, channel_file, refuse_larger
 from bowdenfit.files.sheet_columns import SheetRows, columns_of
 from bowdenfit.files.sheets import channels_of, with_rate
 from bowdenfit.files.text_file import Line, Section, first_bytes, last_lines, lines_between, rows_before
@@ -58,12 +58,10 @@ def read(path: Path) -> ChannelFile:
     long = _long(path, sheet, split) if split > sheet.start else {}
     columns, remarks = columns_of(_rows(path, sheet, sheet.start if long is None else split, stop, long))
     channels, left_out = channels_of(sheet.layout, columns)
-    if not channels:
-        raise DatasetError(f"{path.name} has no column of numbers; check that it is the file of the recording.")
     timed, clock = with_rate(channels, sheet.metadata)
     row = rows_before(path, stop) + 1 if cut else 0
     broken = [f"The file breaks off in row {row}; that row was left out."] if cut else []
-    return ChannelFile(path, "CSV", timed, (*left_out, *broken, *remarks, *clock))
+    return channel_file(path, "CSV", timed, LeftOut(), (*left_out, *broken, *remarks, *clock))
 
 
 def _long(path: Path, sheet: Sheet, stop: int) -> dict[int, list[np.ndarray]] | None:

@@ -35,7 +35,7 @@ def channels_of(layout: Layout, columns: Sequence[Vector | None]) -> tuple[tuple
     remarks: list[str] = []
     nameless = [not heading.name for heading in layout.headings]
     for i, (heading, values) in enumerate(zip(layout.headings, columns, strict=True)):
-        place = f"column {i + 1}" if nameless[i] else f"the column {shown(heading.name)}"
+        place = f"Column {i + 1}" if nameless[i] else f"The column {shown(heading.name)}"
         if values is None:
             remarks.append(f"{place} holds text and was left out.")
         elif not np.isfinite(values).any():
@@ -45,9 +45,9 @@ def channels_of(layout: Layout, columns: Sequence[Vector | None]) -> tuple[tuple
         else:
             kept.append(Channel(layout.name(i), heading.unit, values))
     if not layout.named:
-        remarks.append("there is no row of headings; the columns are called column1, column2, ... from the left.")
+        remarks.append("There is no row of headings; the columns are called column1, column2, ... from the left.")
     found = with_unique_names(kept)
-    return with_clocks(without_tails(found)) if found else (), [_sentence(remark) for remark in remarks]
+    return with_clocks(without_tails(found)) if found else (), remarks
 
 
 def stated_rate(lines: Sequence[str]) -> tuple[float, str] | None:
@@ -74,7 +74,3 @@ def with_rate(channels: Sequence[Channel], lines: Sequence[str]) -> tuple[tuple[
     rate, line = stated
     timed = tuple(replace(c, time=np.arange(len(c.values)) / rate, clock=line) for c in channels)
     return timed, [f"There is no column of time; it comes from the line {shown(line)}: {rate:g} samples a second."]
-
-
-def _sentence(text: str) -> str:
-    return text[0].upper() + text[1:]

@@ -3,10 +3,9 @@
 An option is one class here and one line in `FRICTION_OPTIONS`; options combine with `+`, as in "drag+rate-dependent".
 """
 
+from abc import ABC, abstractmethod
 from collections.abc import Mapping
 from dataclasses import dataclass
-from types import MappingProxyType
-from typing import Any, Protocol, runtime_checkable
 
 import jax.numpy as jnp
 import numpy as np
@@ -25,22 +24,44 @@ STRIBECK, STRIBECK_SPEED, VISCOUS = "stribeck", "stribeck_speed", "viscous"
 _SHOWN_SPEED = {"mm/s": ("mm/s", 1.0), "rad/s": ("r/min", 30 / np.pi), "": ("mm/s", 1.0)}
 
 
-@runtime_checkable
-class FrictionOption(Protocol):
-    """What an option must offer: the parameters it adds."""
+class FrictionOption(ABC):
+    """One way in which friction may depend on load or speed: the parameters it adds, and what they do.
 
+    Options that depend on load change the scale g on which friction is a shift; those that depend on speed are factors on
+    every coefficient. Several add up, or multiply.
+    """
+
+    of_load = False
+    of_rate = False
+
+    @abstractmethod
     def parameters(self, conditions: Conditions, defaults: PriorDefaults) -> list[Parameter]:
         """Its parameters.
 
         Raises:
             DescriptionError: The measurements lack what the option needs.
         """
-        ...
+
+    def load_exponent(self, values: Mapping[str, Array]) -> Array:
+        """What it adds to the exponent p of the scale g, see `bowdenfit.physics.friction.force_scale` [1]."""
+        del values
+        return jnp.zeros(())
+
+    def drag(self, values: Mapping[str, Array]) -> Array:
+        """What it adds to the drag D of that scale [N]."""
+        del values
+        return jnp.zeros(())
+
+    def factor(self, values: Mapping[str, Array], speed: Float[Array, "*batch"]) -> Float[Array, "*batch"]:
+        """Its factor on every coefficient at a speed, up to a constant [1]."""
+        del values
+        return jnp.ones_like(speed)
 
 
-@dataclass(frozen=True)
-class Drag:
+class Drag(FrictionOption):
     """A part of the tension that the load cells do not show: adhesion, seals, bending stiffness, preload tared away."""
+
+    of_load = True
 
     def parameters(self, conditions: Conditions, defaults: PriorDefaults) -> list[Parameter]:
         """The drag in newtons."""
@@ -48,10 +69,16 @@ class Drag:
         meaning = "drag: tension that the load cells do not show"
         return [Parameter(DRAG, "$D$", meaning, "friction_model", HalfNormal(defaults.drag_newtons), "N")]
 
+    def drag(self, values: Mapping[str, Array]) -> Array:
+        """D"""
+        return values[DRAG]
 
-@dataclass(frozen=True)
-class LoadDependent:
+
+
+class LoadDependent(FrictionOption):
     """Friction coefficients that fall with the load, mu(F) = mu (F/F_ref)^-p."""
+
+    of_load = True
 
     def parameters(self, conditions: Conditions, defaults: PriorDefaults) -> list[Parameter]:
         """The exponent."""
@@ -60,10 +87,16 @@ class LoadDependent:
         meaning = f"load exponent: how friction falls with the load, mu as stated at {conditions.reference_force:g} N"
         return [Parameter(LOAD_EXPONENT, "$p$", meaning, "friction_model", Uniform(0.0, 1.0))]
 
+    def load_exponent(self, values: Mapping[str, Array]) -> Array:
+        """P"""
+        return values[LOAD_EXPONENT]
 
-@dataclass(frozen=True)
-class RateDependent:
+
+
+class RateDependent(FrictionOption):
     """Friction coefficients that change with the speed of the rope (Stribeck and viscous)."""
+
+    of_rate = True
 
     def parameters(self, conditions: Conditions, defaults: PriorDefaults) -> list[Parameter]:
         """Stribeck rise, Stribeck speed and viscous coefficient."""
@@ -92,10 +125,17 @@ class RateDependent:
             ),
         ]  # fmt: skip
 
+    def factor(self, values: Mapping[str, Array], speed: Float[Array, "*batch"]) -> Float[Array, "*batch"]:
+        """1 + a exp(-(v/v_s)^2) + c |v|"""
+        return rate_factor(speed, values[STRIBECK], values[STRIBECK_SPEED], values[VISCOUS])
 
-FRICTION_OPTIONS: Mapping[str, FrictionOption] = MappingProxyType(
-    {"drag": Drag(), "load-dependent": LoadDependent(), "rate-dependent": RateDependent()}
-)
+
+
+FRICTION_OPTIONS: dict[str, FrictionOption] = {
+    "drag": Drag(),
+    "load-dependent": LoadDependent(),
+    "rate-dependent": RateDependent(),
+}
 
 
 def friction_options(text: str) -> tuple[str, ...]:
@@ -130,20 +170,26 @@ class FrictionModel:
     @property
     def depends_on_load(self) -> bool:
         """Whether the log ratio of the forces depends on the force."""
-        return "drag" in self.options or "load-dependent" in self.options
+        return any(option.of_load for option in self._options)
 
     @property
     def depends_on_rate(self) -> bool:
         """Whether friction depends on speed."""
-        return "rate-dependent" in self.options
+        return any(option.of_rate for option in self._options)
 
     def parameters(self, defaults: PriorDefaults) -> list[Parameter]:
         """Parameters of all options."""
-        return [p for name in self.options for p in FRICTION_OPTIONS[name].parameters(self.conditions, defaults)]
+        return [p for option in self._options for p in option.parameters(self.conditions, defaults)]
 
-    def _scale(self, values: Mapping[str, Array]) -> tuple[Any, Any, float]:
-        zero = jnp.zeros(())
-        return values.get(LOAD_EXPONENT, zero), values.get(DRAG, zero), self.conditions.reference_force
+    @property
+    def _options(self) -> list[FrictionOption]:
+        return [FRICTION_OPTIONS[name] for name in self.options]
+
+    def _scale(self, values: Mapping[str, Array]) -> tuple[Array, Array, float]:
+        exponent, drag = jnp.zeros(()), jnp.zeros(())
+        for option in self._options:
+            exponent, drag = exponent + option.load_exponent(values), drag + option.drag(values)
+        return exponent, drag, self.conditions.reference_force
 
     def scaled(self, values: Mapping[str, Array], force: Float[Array, "*batch"]) -> Float[Array, "*batch"]:
         """The scale g of forces [1]."""
@@ -173,8 +219,8 @@ class FrictionModel:
             return jnp.ones_like(speed)
         reference = jnp.asarray(self.conditions.reference_speed)
         known = jnp.where(jnp.isnan(speed), reference, speed)
-        parameters = (values[STRIBECK], values[STRIBECK_SPEED], values[VISCOUS])
-        return rate_factor(known, *parameters) / rate_factor(reference, *parameters)
+        factors = [option.factor(values, known) / option.factor(values, reference) for option in self._options]
+        return jnp.prod(jnp.stack(factors), axis=0)
 
     def efficiency(self, values: Mapping[str, Array], exponent: Float[Array, "*batch"]) -> Float[Array, "*batch"]:
         """Efficiency while pulling with the reference force at the reference speed [1]."""

@@ -20,3 +20,7 @@ class Interval:
         """Of draws of any shape."""
         q05, median, q95 = (float(q) for q in np.quantile(draws, (0.05, 0.5, 0.95)))
         return cls(float(np.mean(draws)), float(np.std(draws)), median, q05, q95)
+
+    def times(self, factor: float) -> "Interval":
+        """In a unit that makes it larger by a factor."""
+        return Interval(*(factor * value for value in vars(self).values()))

@@ -11,7 +11,7 @@ from bowdenfit.inference.other_minima import contested, fitting_as_well
 from bowdenfit.kinds.design import Design, ElasticDesign
 from bowdenfit.kinds.settings import parse_description
 from bowdenfit.model import build_model
-from bowdenfit.questions.bends.page import products_with_preload
+from bowdenfit.questions.bends.overview import products_with_preload
 from bowdenfit.questions.check.data_set_words import warnings_of
 from bowdenfit.questions.summary.words import summary_text
 

@@ -71,19 +71,6 @@ def test_a_saved_fit_gives_the_same_answers_again(fit, folder, tmp_path):
         )
 
 
-@pytest.mark.parametrize("schema", [1, 2])
-def test_results_of_older_schemas_are_read(on_body, tmp_path, schema):
-    bf.fit(on_body, output=tmp_path / "fit", mcmc=False, figures=False)
-    page = json.loads((tmp_path / "fit" / "fit.json").read_text())
-    assert page["schema"] == 4
-    page["schema"] = schema
-    gone = ["stretch", "preload", "loop"] + (["recordings"] if schema == 1 else [])
-    page["measurements"] = {k: v for k, v in page["measurements"].items() if k not in gone}
-    del page["least_squares"]["disagreements"]
-    (tmp_path / "fit" / "fit.json").write_text(json.dumps(page))
-    assert bf.load(tmp_path / "fit").least_squares.estimates["mu1"].identified
-
-
 def test_the_summary_says_what_each_wrap_angle_does(fit):
     text = summary_text(fit)
     assert "Fitted to 105 readings of stretch, 8 preloads and 64 readings of a loop." in text

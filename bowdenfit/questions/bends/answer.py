@@ -14,38 +14,11 @@ from bowdenfit.errors import UsageError
 from bowdenfit.inference.draws import for_each_draw
 from bowdenfit.inference.interval import Interval
 from bowdenfit.questions.bends.equations import Bent, bending_contact, knows_preload, knows_stretch
+from bowdenfit.questions.bends.preload_window import TAUT, PreloadAnswer
 from bowdenfit.results.record import Record, once
 
-TAUT = 0.95  # probability with which the recommended preload keeps both sides taut
 _BENDS = 25  # wrap angles at which a range of bends is looked at
 _SHOWN = 5  # wrap angles of a summary
-
-
-@dataclass(frozen=True)
-class PreloadAnswer:
-    """Which preloads will do.
-
-    Args:
-        bends: Lowest and highest wrap angle that the cable is bent to [rad].
-        reference_angle: Wrap angle at which preloads are meant [rad]; NaN where preload is the same at all.
-        input_force: Largest input force against which both sides must stay taut [N].
-        friction: Limit of what may be felt in free motion [N]; infinite without one.
-        lowest: Lowest preload that keeps both sides taut [N].
-        highest: Highest preload that is felt as no more than the limit [N]; None without one.
-        best: Preload that keeps both sides taut with probability `TAUT`, and is felt least of those [N].
-        felt: What it is felt as in free motion, at the bend where that is most [N].
-        possible: Probability that some preload satisfies both; 1 without a limit.
-    """
-
-    bends: tuple[float, float]
-    reference_angle: float
-    input_force: float
-    friction: float
-    lowest: Interval
-    highest: Interval | None
-    best: float
-    felt: Interval
-    possible: float
 
 
 @dataclass(frozen=True)
@@ -230,15 +203,18 @@ class Elastic:
         bent, best = self.bent(np.linspace(*bends, _BENDS)), float(np.quantile(lowest, TAUT))
         felt = self.over(lambda values, preload: jnp.max(bent.friction(values, preload)), np.array(best))
         follows, limited = self.fit.dataset.description.preload_follows_stretch, np.isfinite(limit)
+        low, high = np.rad2deg(bends)
+        arm, unit = friction_arm(self.fit)
         return PreloadAnswer(
-            bends,
-            self.fit.model.cable.elasticity.reference_angle if follows else float("nan"),
+            (float(low), float(high)),
+            float(np.rad2deg(self.fit.model.cable.elasticity.reference_angle)) if follows else float("nan"),
             input_force,
-            limit,
+            arm * limit,
+            unit,
             Interval.of(lowest),
             Interval.of(highest) if limited else None,
             best,
-            Interval.of(felt),
+            Interval.of(felt).times(arm),
             float(np.mean(possible)) if limited else 1.0,
         )
 

@@ -10,7 +10,6 @@ import numpy as np
 from bowdenfit.errors import DatasetError, UsageError
 from bowdenfit.inference.interval import Interval
 from bowdenfit.questions.bends.answer import elastic_answers, friction_arm
-from bowdenfit.questions.bends.page import window_page, window_sentence
 from bowdenfit.results.record import Record
 from bowdenfit.units import conversion_factor
 
@@ -168,14 +167,16 @@ def _window(fit: Record, asked: Question) -> list[Row]:
     ends = float(asked.wrap_angles.min()), float(asked.wrap_angles.max())
     force = asked.input_force if asked.stated_force else 0.0
     found = elastic_answers(fit).preload_window(ends, force, asked.friction)
-    page = window_page(fit, found)
-    row: Row = {"from_deg": page["bends"][0], "to_deg": page["bends"][1], "input_force_N": force}
-    row |= {f"lowest_{name}_N": page["lowest"][name] for name in ("median", "q05", "q95")}
-    if page["highest"] is not None:
-        row |= {f"highest_{name}_N": page["highest"][name] for name in ("median", "q05", "q95")}
-    unit = friction_arm(fit)[1].replace("*", "_")
-    row |= {"best_N": page["best"]} | {f"felt_{name}_{unit}": page["felt"][name] for name in ("median", "q05", "q95")}
-    return [row | {"possible": page["possible"], "in_words": window_sentence(fit, found)}]
+    row: Row = {"from_deg": found.bends[0], "to_deg": found.bends[1], "input_force_N": force}
+    row |= _quantiles("lowest", found.lowest, "N")
+    if found.highest is not None:
+        row |= _quantiles("highest", found.highest, "N")
+    row |= {"best_N": found.best} | _quantiles("felt", found.felt, found.friction_unit.replace("*", "_"))
+    return [row | {"possible": found.possible, "in_words": found.sentence()}]
+
+
+def _quantiles(what: str, known: Interval, unit: str) -> Row:
+    return {f"{what}_{name}_{unit}": getattr(known, name) for name in ("median", "q05", "q95")}
 
 
 QUANTITIES: Mapping[str, Callable[[Record, Question], list[Row]]] = MappingProxyType(

@@ -9,7 +9,7 @@ from bowdenfit.inference.interval import Interval
 from bowdenfit.inference.samplers import recommendation
 from bowdenfit.kinds import readings_called
 from bowdenfit.kinds.recordings.accounts import accounts
-from bowdenfit.questions.bends.page import elastic_page
+from bowdenfit.questions.bends.overview import elastic_overview
 from bowdenfit.questions.check.answer import checks_of
 from bowdenfit.questions.check.page import checks_page
 from bowdenfit.questions.identify.confounding import confounded
@@ -51,7 +51,7 @@ def summarize(fit: Record) -> dict[str, Any]:
     }
     if fit.dataset.measurements.recordings is not None:
         page["recordings"] = accounts(fit.dataset.measurements.recordings)
-    if elastic := elastic_page(fit):
+    if elastic := elastic_overview(fit):
         page["elastic"] = elastic
     if checks := checks_page(checks_of(fit)):
         page["checks"] = checks

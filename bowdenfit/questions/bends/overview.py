@@ -1,0 +1,83 @@
+"""What a fit says of stretch and preload at the wrap angles that were measured at."""
+
+from dataclasses import dataclass
+from typing import Any, ClassVar
+
+import numpy as np
+
+from bowdenfit.description.elastic import PRELOAD
+from bowdenfit.errors import UsageError
+from bowdenfit.inference.interval import Interval
+from bowdenfit.questions.bends.answer import elastic_answers, friction_arm, has_elastic_answers
+from bowdenfit.questions.bends.equations import bending_contact
+from bowdenfit.questions.bends.preload_window import PreloadAnswer
+from bowdenfit.results.record import Record, once
+
+_CLOSE = -0.9  # correlation of logarithms beyond which only a product is said to be known
+
+
+@dataclass(frozen=True)
+class ElasticOverview:
+    """Answers about stretch and preload.
+
+    Args:
+        input_force: Force at the motor side under which they hold [N].
+        friction_unit: Unit of what is felt in free motion.
+        bends: One row a wrap angle [deg], with intervals by quantity; in the units that are shown.
+        preload_window: Which preloads will do; None where nothing tells.
+        sentences: What else there is to say.
+    """
+
+    input_force: float
+    friction_unit: str
+    bends: tuple[dict[str, Any], ...]
+    preload_window: PreloadAnswer | None
+    sentences: tuple[str, ...]
+
+    JSON: ClassVar = ("input_force", "friction_unit", "bends", "preload_window?", "sentences")
+
+
+@once
+def elastic_overview(fit: Record) -> ElasticOverview | None:
+    """Answers at the wrap angles that were measured at; None without draws, or of a cable that has none."""
+    if fit.posterior is None or not has_elastic_answers(fit):
+        return None
+    answers, (arm, unit) = elastic_answers(fit), friction_arm(fit)
+    bends, draws, window = answers.usual if has_bends(fit) else (np.zeros(0), {}, None)
+    scale = {"friction": arm, "efficiency": 100.0}
+    rows = tuple(
+        {"wrap_angle": float(f"{angle:.6g}")}
+        | {name: Interval.of(scale.get(name, 1.0) * drawn[:, i]) for name, drawn in draws.items()}
+        for i, angle in enumerate(np.rad2deg(bends))
+    )
+    sharp = fit.dataset.description.cable.sharp_bend
+    sentences = [window.sentence()] if window is not None else []
+    sentences += [f"Warning: {sharp}"] if sharp else []
+    return ElasticOverview(answers.reference_force, unit, rows, window, (*sentences, *products_with_preload(fit)))
+
+
+def has_bends(fit: Record) -> bool:
+    """Whether there are answers at wrap angles, and a wrap angle says which contact is bent."""
+    try:
+        bending_contact(fit.model)
+    except UsageError:
+        return False
+    return has_elastic_answers(fit)
+
+
+def products_with_preload(fit: Record) -> list[str]:
+    """What to say of coefficients of friction of which only the product with the preload is known, as in free motion."""
+    names = [p.name for p in fit.model.space.free]
+    if fit.posterior is None or PRELOAD not in names:
+        return []
+    preload, sentences = fit.posterior.values[PRELOAD].ravel(), []
+    for name in (n for n in fit.dataset.description.coefficients if n in names):
+        friction = fit.posterior.values[name].ravel()
+        if np.corrcoef(np.log(preload), np.log(friction))[0, 1] > _CLOSE:
+            continue
+        known = Interval.of(preload * friction)
+        sentences.append(
+            f"The measurements hardly tell {PRELOAD} and {name} apart; what they do determine is {PRELOAD} x {name} = "
+            f"{known.median:.3g} N (90 % interval {known.q05:.3g} to {known.q95:.3g} N)."
+        )
+    return sentences

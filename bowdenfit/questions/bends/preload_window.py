@@ -1,0 +1,59 @@
+"""Which preloads will do: without slack, and without more friction than may be felt."""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from bowdenfit.inference.interval import Interval
+
+TAUT = 0.95  # probability with which the recommended preload keeps both sides taut
+
+
+@dataclass(frozen=True)
+class PreloadAnswer:
+    """Which preloads will do.
+
+    Args:
+        bends: Lowest and highest wrap angle that the cable is bent to [deg].
+        reference_angle: Wrap angle at which preloads are meant [deg]; NaN where preload is the same at all.
+        input_force: Largest input force against which both sides must stay taut [N].
+        friction_limit: Limit of what may be felt in free motion; infinite without one.
+        friction_unit: Unit of what is felt.
+        lowest: Lowest preload that keeps both sides taut [N].
+        highest: Highest preload that is felt as no more than the limit [N]; None without one.
+        best: Preload that keeps both sides taut with probability `TAUT`, and is felt least of those [N].
+        felt: What it is felt as in free motion, at the bend where that is most.
+        possible: Probability that some preload satisfies both; 1 without a limit.
+    """
+
+    bends: tuple[float, float]
+    reference_angle: float
+    input_force: float
+    friction_limit: float
+    friction_unit: str
+    lowest: Interval
+    highest: Interval | None
+    best: float
+    felt: Interval
+    possible: float
+
+    def sentence(self) -> str:
+        """The answer in words."""
+        low, high = (f"{angle:.4g}" for angle in self.bends)
+        at = "" if np.isnan(self.reference_angle) else f" at {self.reference_angle:.4g} deg"
+        under = f" under up to {self.input_force:g} N" if self.input_force > 0 else ""
+        lowest, felt, unit = self.lowest, self.felt, self.friction_unit
+        parts = [
+            f"Over bends from {low} to {high} deg{under} the cable stays taut from a preload of {lowest.median:.3g} N{at} on "
+            f"(90 % interval {lowest.q05:.3g} to {lowest.q95:.3g} N). Least friction is felt without slack, with {TAUT:.0%} "
+            f"probability, at {self.best:.3g} N: then free motion takes {felt.median:.3g} {unit} "
+            f"({felt.q05:.3g} to {felt.q95:.3g}) at the bend where it is most."
+        ]
+        if self.highest is not None:
+            parts.append(
+                f"To be felt as no more than {self.friction_limit:.3g} {unit}, preload must not exceed "
+                f"{self.highest.median:.3g} N{at} ({self.highest.q05:.3g} to {self.highest.q95:.3g} N)."
+            )
+            if self.possible < TAUT:
+                parts.append(f"That leaves a preload that does both with a probability of only {self.possible:.0%}.")
+        return " ".join(parts)

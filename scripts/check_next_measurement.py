@@ -35,11 +35,12 @@ from bowdenfit.inference.draws import curves_of, for_each_draw, named_values
 from bowdenfit.inference.ensemble import sample
 from bowdenfit.inference.least_squares import make_objective, maximum_posterior
 from bowdenfit.inference.log_density import LogDensity
+from bowdenfit.kinds.candidate import Candidate
 from bowdenfit.kinds.design import Design
 from bowdenfit.kinds.settings import parse_description
 from bowdenfit.kinds.tables import AngleTable, EfficiencyTable, Measurements, OwnAngles, Provenance
 from bowdenfit.model import Model, build_model
-from bowdenfit.questions.next.possible_readings import Candidate, simulated_readings
+from bowdenfit.questions.next.simulated_readings import simulated_readings
 from bowdenfit.questions.next.variance_reduction import explained
 from bowdenfit.questions.simulate.simulation import empty_tables, simulate, true_values
 from bowdenfit.results.optimum import optimum_of
@@ -130,7 +131,7 @@ class Bench:
         posterior = LogDensity(build_model(dataset))
         z = self._draws(posterior, seed)
         length = self._program(posterior, "optimum", self._optimum)(z)[0]
-        readings = simulated_readings(posterior.model, dataset.measurements, CANDIDATES, None, z, seed)
+        readings = simulated_readings(posterior.model, dataset.measurements, CANDIDATES, z, seed)
         expected = np.array([explained(reading[:, 0], length).share for reading in readings])
         generator = np.random.default_rng(seed)
         draws, base = generator.choice(len(z), OUTCOMES, replace=False), generator.choice(len(z), BASE, replace=False)

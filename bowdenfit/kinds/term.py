@@ -10,6 +10,7 @@ from jax import Array
 from bowdenfit.cable.cable import Cable
 from bowdenfit.cable.noise import NoiseLaw, noise_law
 from bowdenfit.description import Description, PriorDefaults
+from bowdenfit.kinds.candidate import CandidateKind
 from bowdenfit.kinds.measurements import Measurements
 from bowdenfit.kinds.tables import AngleTable
 from bowdenfit.parameters.space import Parameter, ParameterSpace
@@ -142,6 +143,7 @@ class TermKind:
         terms: Terms of a table against a cable; wrap angles that were measured hold outside the range of the curves.
         parameters: The parameters that they need, those that other kinds share included.
         bench: How such a table is measured again on the computer.
+        candidate: The measurement that could be made next for such a table; None where another kind offers it.
         tells_mountings: Whether its readings tell how mountings scatter.
         check: Whether parameters that the user fixed leave the table a model.
     """
@@ -150,5 +152,6 @@ class TermKind:
     terms: Callable[[Cable, Any, AngleTable | None], Sequence[Term]]
     parameters: Callable[[Any, Circumstances], list[Parameter]]
     bench: Bench
+    candidate: CandidateKind | None = None
     tells_mountings: bool = False
     check: Callable[[Any, ParameterSpace], None] = _always

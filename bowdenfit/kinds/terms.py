@@ -24,6 +24,7 @@ from bowdenfit.cable.load_cells import (
 )
 from bowdenfit.kinds import each_table
 from bowdenfit.kinds.angles.term import ANGLES
+from bowdenfit.kinds.candidate import CandidateKind
 from bowdenfit.kinds.efficiencies.term import EFFICIENCIES
 from bowdenfit.kinds.forces.term import FORCES
 from bowdenfit.kinds.loop.term import LOOP, LOOP_MOUNTING
@@ -60,3 +61,9 @@ def parameters_asked_for(cable: Cable, measurements: Measurements) -> list[Param
     asked = {p.name: p for kind, table in kinds for p in kind.parameters(table, circumstances)}
     asked |= {p.name: p for p in gain_error(cable.description)}
     return sorted(asked.values(), key=lambda p: _ORDER.index(p.name) if p.name in _ORDER else len(_ORDER))
+
+
+def candidate_kinds() -> dict[str, CandidateKind]:
+    """What can be measured next, by its name."""
+    offered = (kind.candidate for kind in TERMS.values() if kind.candidate is not None)
+    return {candidate.name: candidate for candidate in sorted(offered, key=lambda candidate: candidate.order)}

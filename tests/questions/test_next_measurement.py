@@ -19,16 +19,16 @@ from bowdenfit.errors import UsageError
 from bowdenfit.front_desk import Fit
 from bowdenfit.inference.draws import curves_of, for_each_draw, named_values
 from bowdenfit.inference.log_density import LogDensity as Density
+from bowdenfit.kinds.candidate import Candidate
 from bowdenfit.kinds.design import Design
+from bowdenfit.kinds.next_run import typical_run
 from bowdenfit.kinds.tables import AngleTable, EfficiencyTable, OwnAngles, Provenance
 from bowdenfit.model import Model, build_model
 from bowdenfit.questions.next import verb
 from bowdenfit.questions.next.candidate_names import parsed_candidates
-from bowdenfit.questions.next.candidates import default_candidates
-from bowdenfit.questions.next.possible_candidates import name_of, words_of
-from bowdenfit.questions.next.possible_readings import Candidate, simulated_readings
-from bowdenfit.questions.next.possible_runs import RunDesign, typical_run
+from bowdenfit.questions.next.candidates import default_candidates, name_of, words_of
 from bowdenfit.questions.next.ranking import next_measurement
+from bowdenfit.questions.next.simulated_readings import simulated_readings
 from bowdenfit.questions.next.variance_reduction import error_of_difference, explained, mean_and_spread
 from bowdenfit.questions.next.words import next_measurement_text
 from bowdenfit.questions.simulate.simulation import empty_tables
@@ -199,7 +199,7 @@ def test_an_angle_that_cannot_be_detected_tells_nothing(on_body):
     dataset = load_dataset(on_body, ["tables.angles.detection_limit.value=179"])
     model = build_model(dataset)
     z = 0.1 * np.random.default_rng(1).standard_normal((64, model.space.size))
-    (reading,) = simulated_readings(model, dataset.measurements, [Candidate("angle", 470.0)], None, z, 1)
+    (reading,) = simulated_readings(model, dataset.measurements, [Candidate("angle", 470.0)], z, 1)
     assert reading.shape == (64, 1, 2)
     np.testing.assert_allclose(reading, 179.0)
 
@@ -209,51 +209,45 @@ def test_readings_of_the_published_geometry_are_of_the_curves_that_hold_there(on
     model = build_model(dataset)
     z = 0.1 * np.random.default_rng(1).standard_normal((8, model.space.size))
     candidates = [Candidate("angle", at) for at in (440.0, 470.0, 520.0)]
-    readings = simulated_readings(model, dataset.measurements, candidates, None, z, 1)
+    readings = simulated_readings(model, dataset.measurements, candidates, z, 1)
     assert [r.shape[2] for r in readings] == [1, 2, 1]
 
 
-def _quiet(**more: Any) -> tuple[Dataset, Model]:
+def _quiet(design: Design = DESIGN, **more: Any) -> tuple[Dataset, Model]:
     """A cable whose load cells read almost without noise."""
     sensors = {"gain_error_sd": 0.02, "force_noise": {"value": 1e-6, "unit": "N"}}
     description = cable(2, sensors=sensors, **more)
-    dataset = Dataset(description, empty_tables(description, DESIGN), {})
+    dataset = Dataset(description, empty_tables(description, design), {})
     return dataset, build_model(dataset)
 
 
-def _runs(dataset: Dataset, model: Model, design: RunDesign, repeats: int = 1, **values: float) -> np.ndarray:
+def _runs(dataset: Dataset, model: Model, repeats: int = 1, **values: float) -> np.ndarray:
     """Runs at 500 mm of one cable, repeats by columns."""
     middle = {p.name: float(p.prior.constrain(jnp.zeros(()))) for p in model.space.free}
     z = np.asarray(model.space.unconstrain(middle | values))[None]
-    (runs,) = simulated_readings(
-        model, dataset.measurements, [Candidate("force", 500.0)], design, z, 1, repeats=repeats
-    )
+    (runs,) = simulated_readings(model, dataset.measurements, [Candidate("force", 500.0)], z, 1, repeats=repeats)
     return runs[0]
 
 
 def test_a_run_of_both_strokes_tells_the_exponent_free_of_the_gain_error():
     """Noise is made negligible: the gain error is all in the difference of the strokes, and in the mean of a pull alone."""
-    dataset, model = _quiet()
-    design = typical_run(dataset.measurements)
-    pull = design.stroke > 0
-    only = RunDesign(design.input_force[pull], design.stroke[pull], design.velocity[pull], design.worth[pull])
-    without, both = (_runs(dataset, model, design, tau=1e-9, gain_error=g)[0] for g in (1e-9, 0.03))
+    without, both = (_runs(*_quiet(), tau=1e-9, gain_error=g)[0] for g in (1e-9, 0.03))
     np.testing.assert_allclose(both - without, [0.0, 0.03], atol=1e-5)
-    (pulled,) = _runs(dataset, model, only, tau=1e-9, gain_error=0.03)
+    (pulled,) = _runs(*_quiet(replace(DESIGN, strokes=(1,))), tau=1e-9, gain_error=0.03)
     np.testing.assert_allclose(pulled, [without[0] + 0.03], atol=1e-5)
 
 
 def test_every_repeat_of_a_run_is_mounted_anew():
     """The scatter of 400 runs is tau: known to 3.5 %, and more than 15 % off in fewer than 1 of 10 000 runs."""
     dataset, model = _quiet()
-    runs = _runs(dataset, model, typical_run(dataset.measurements), repeats=400, tau=0.05)
+    runs = _runs(dataset, model, repeats=400, tau=0.05)
     assert runs[:, 0].std() == pytest.approx(0.05, rel=0.15)
     assert runs[:, 1].std() < 1e-4  # both strokes of a run are of one mounting
 
 
 def test_a_run_where_friction_depends_on_the_load_also_tells_how_it_changes_with_it():
     dataset, model = _quiet(friction_model="drag")
-    (run,) = _runs(dataset, model, typical_run(dataset.measurements), drag=2.0)
+    (run,) = _runs(dataset, model, drag=2.0)
     assert len(run) == 3  # mean, difference of the strokes, slope with the load
     assert -0.1 < run[2] < -0.001  # drag makes friction look larger at small loads
 
@@ -538,7 +532,7 @@ def test_refits_with_the_readings_added_narrow_the_best_length_as_expected():
     length = for_each_draw(optimum_of(density.model), density.model.space.size)
     before, generator = length(z)[0], np.random.default_rng(2)
     candidates = [Candidate("efficiency", 400.0), Candidate("efficiency", 500.0), Candidate("angle", 500.0)]
-    readings = simulated_readings(density.model, dataset.measurements, candidates, None, z, 1)
+    readings = simulated_readings(density.model, dataset.measurements, candidates, z, 1)
     realized, expected = {}, {}
     for candidate, reading in zip(candidates, readings, strict=True):
         expected[candidate] = explained(reading[:, 0], before).share

@@ -1,10 +1,9 @@
 """Angle tables: each reading against its curve; what was too small to detect enters as exactly that."""
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
-import jax
 import jax.numpy as jnp
 import numpy as np
 from jax import Array
@@ -12,9 +11,9 @@ from jaxtyping import Float
 
 from bowdenfit.cable.cable import ANGLE_NOISE, Cable
 from bowdenfit.cable.noise import noise_law, scatter
-from bowdenfit.description import Description
-from bowdenfit.errors import DatasetError
+from bowdenfit.kinds.angles.bench import detection_limit, drawn_angles
 from bowdenfit.kinds.angles.table import AngleSettings
+from bowdenfit.kinds.candidate import Candidate, CandidateKind, Simulation, Situation
 from bowdenfit.kinds.tables import AngleTable
 from bowdenfit.kinds.term import Bench, Circumstances, TermKind
 from bowdenfit.parameters.priors import HalfNormal
@@ -134,58 +133,23 @@ def _parameters(table: AngleTable, at: Circumstances) -> list[Parameter]:
     return [*curves, noise]
 
 
-def drawn_angles(
-    cable: Cable,
-    table: AngleTable,
-    angles: AngleTable | None,
-    values: Mapping[str, jax.Array],
-    key: jax.Array,
-    scale: float,
-    everywhere: bool = False,
-) -> dict[str, jax.Array]:
-    """Wrap angles and detection limits of an angle table [rad].
-
-    Args:
-        cable: The cable.
-        table: The table.
-        angles: The same.
-        values: True values [internal units].
-        key: Random key of the bench.
-        scale: Factor on all noise.
-        everywhere: Whether rows outside the range of the curves are drawn too; else they are kept.
-    """
-    del angles
-    key, route = jax.random.split(key, 3)[0], jnp.asarray(table.route)
-    theta = jnp.stack([curve.wrap_angle(values, route) for curve in cable.curves.values()], axis=-1)
-    reading = theta + scale * values[ANGLE_NOISE] * scatter(key, theta.shape, cable.description)
-    limit = detection_limit(cable.description, table)
-    low, high = cable.description.route.range if cable.description.route else (-np.inf, np.inf)
-    kept = np.zeros(len(table.route), dtype=bool) if everywhere else (table.route < low) | (table.route > high)
-    undetected = reading < limit
-    angle = jnp.where(undetected, jnp.nan, jnp.maximum(reading, 0.0))
-    return {
-        "angle": jnp.where(kept[:, None], table.angle, angle),
-        "limit": jnp.where(kept[:, None], table.limit, jnp.where(undetected, limit, jnp.nan)),
-    }
+def _simulation(at: Situation, wanted: Sequence[Candidate]) -> Simulation:
+    """Angles of all curved contacts; what is read below the detection limit is not detected."""
+    columns, settings = tuple(at.cable.curves), at.cable.description.table(AngleSettings)
+    route, _, origin = at.rows(wanted)
+    shape = (len(wanted), len(columns))
+    table = AngleTable(route, columns, np.full(shape, np.deg2rad(30)), np.full(shape, np.nan), origin)
+    term = angles_term(at.cable, table)
+    # Every row is detected, so readings are curve by curve; a curve may hold over a part of the range only.
+    read_at = np.concatenate([term.data["route"][column] for column in columns])
+    limit = settings.detection_limit.to("angle") if settings and settings.detection_limit else 0.0
+    found = [tuple(int(k) for k in np.flatnonzero(read_at == length)) for length in route]
+    return Simulation(term.simulate, term.data, found, float(np.rad2deg(limit)))
 
 
-def detection_limit(description: Description, table: AngleTable) -> float:
-    """The angle below which nothing is detected [rad]: that of the description, or the one in the table's cells.
-
-    Raises:
-        DatasetError: The cells name several, so that it is not known which one holds where an angle was detected.
-    """
-    settings = description.table(AngleSettings)
-    if settings is not None and settings.detection_limit is not None:
-        return settings.detection_limit.to("angle")
-    limits = np.unique(table.limit[np.isfinite(table.limit)])
-    if len(limits) > 1:
-        shown = " and ".join(f"<{limit:.3g}" for limit in np.rad2deg(limits[:2]))
-        raise DatasetError(
-            f"{table.origin.files[0]} has cells with different detection limits ({shown} deg), so that it is not known what "
-            "would be detected in the other cells; state detection_limit for the table in cable.toml."
-        )
-    return float(limits[0]) if len(limits) else -np.inf
+def _unknown(at: Situation) -> str:
+    known = ANGLE_NOISE in at.parameters and at.cable.curves
+    return "" if known else "no contact of this cable has a curve that an angle could tell of."
 
 
 ANGLES = TermKind(
@@ -193,4 +157,18 @@ ANGLES = TermKind(
     lambda cable, table, _: (angles_term(cable, table),),
     _parameters,
     Bench(drawn_angles, check=detection_limit),
+    CandidateKind(
+        name="angle",
+        phrase="an angle",
+        words=lambda cable: "the wrap angles" if len(cable.curves) > 1 else "the wrap angle",
+        example="angle@450",
+        title="Wrap angles",
+        order=0,
+        unknown=_unknown,
+        offered=lambda at: [Candidate("angle", length) for length in at.lengths] if at.angles is not None else [],
+        simulation=_simulation,
+        along_route=True,
+        tells_curves=True,
+        angles="none",
+    ),
 )

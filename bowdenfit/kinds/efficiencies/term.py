@@ -1,6 +1,6 @@
 """Efficiency tables: the logarithm of each measured efficiency against the friction exponent at its length."""
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from typing import Any
 
@@ -15,6 +15,7 @@ from bowdenfit.cable.load_cells import RUN_SCATTER, LoadCells
 from bowdenfit.cable.noise import noise_law, scatter
 from bowdenfit.description import Description
 from bowdenfit.errors import DescriptionError
+from bowdenfit.kinds.candidate import UNKNOWN_SCATTER, Candidate, CandidateKind, Simulation, Situation, one_reading_each
 from bowdenfit.kinds.resolve_angles import resolve_angles
 from bowdenfit.kinds.row_angles import row_angles
 from bowdenfit.kinds.shared_parameters import run_scatter
@@ -131,11 +132,39 @@ def _drawn_table(_: Description, table: EfficiencyTable, drawn: Mapping[str, np.
     return replace(table, efficiency=efficiency, sd=table.sd / table.efficiency * efficiency)
 
 
+def _offered(at: Situation) -> list[Candidate]:
+    table = at.measurements.table(EfficiencyTable)
+    return at.along_cable("efficiency", table.own) if table is not None else []
+
+
+def _simulation(at: Situation, wanted: Sequence[Candidate]) -> Simulation:
+    route, own, origin = at.rows(wanted)
+    table = EfficiencyTable(route, np.full(len(wanted), 0.8), np.zeros(len(wanted)), own, origin)
+    return one_reading_each(efficiencies_term(at.cable, table, at.angles))
+
+
+def _unknown(at: Situation) -> str:
+    return "" if RUN_SCATTER in at.parameters else f"{UNKNOWN_SCATTER}; fit with a table of efficiencies or forces."
+
+
 EFFICIENCIES = TermKind(
     "efficiencies",
     lambda cable, table, angles: (efficiencies_term(cable, table, angles),),
     lambda _, at: [run_scatter(at)],
     Bench(_draw, _drawn_table),
+    CandidateKind(
+        name="efficiency",
+        phrase="an efficiency",
+        words=lambda _: "the efficiency",
+        example="efficiency@470",
+        title="Efficiency",
+        order=2,
+        unknown=_unknown,
+        offered=_offered,
+        simulation=_simulation,
+        along_route=True,
+        mounted_anew=True,
+    ),
     tells_mountings=True,
     check=_check_run_scatter,
 )

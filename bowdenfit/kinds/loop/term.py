@@ -1,7 +1,7 @@
 """Tables of forces at both ends of a pull-pull loop while it moves."""
 
-from collections.abc import Mapping
-from dataclasses import dataclass
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
 from typing import Any
 
 import jax
@@ -11,9 +11,11 @@ from jax import Array
 from jaxtyping import Float
 
 from bowdenfit.cable.cable import Cable
+from bowdenfit.cable.elasticity import PRELOAD as REFERENCE_PRELOAD
 from bowdenfit.cable.elasticity import spread_matrix
 from bowdenfit.cable.load_cells import FORCE_NOISE, RUN_SCATTER, LoadCells
 from bowdenfit.cable.noise import noise_law, scatter
+from bowdenfit.kinds.candidate import Candidate, CandidateKind, Simulation, Situation, one_reading_each, some_loads
 from bowdenfit.kinds.resolve_angles import resolve_angles
 from bowdenfit.kinds.row_angles import row_angles
 from bowdenfit.kinds.shared_parameters import force_noise, offsets, preload
@@ -163,9 +165,45 @@ def _draw(
     }
 
 
+def _offered(at: Situation) -> list[Candidate]:
+    """Every input force along the cable."""
+    table = at.measurements.table(LoopTable)
+    if table is None:
+        return []
+    loads = some_loads(np.abs(table.input_force))
+    return [replace(case, load=load) for case in at.along_cable("loop", table.own) for load in loads]
+
+
+def _simulation(at: Situation, wanted: Sequence[Candidate]) -> Simulation:
+    (route, own, origin), load = at.rows(wanted), np.array([c.load for c in wanted])
+    forward, nothing = np.ones(len(wanted), dtype=int), np.full(len(wanted), np.nan)
+    return one_reading_each(
+        loop_term(at.cable, LoopTable(route, load, 0.8 * load, forward, nothing, own, origin), at.angles)
+    )
+
+
+def _unknown(at: Situation) -> str:
+    if at.cable.is_loop and {FORCE_NOISE, REFERENCE_PRELOAD} <= at.parameters:
+        return ""
+    return "only a pull-pull loop with a table of its forces, and a preload of its own, has such readings."
+
+
 LOOP = TermKind(
     "loop",
     lambda cable, table, angles: (loop_term(cable, table, angles),),
     _parameters,
     Bench(_draw),
+    CandidateKind(
+        name="loop",
+        phrase="a loop under load",
+        words=lambda _: "the loop's output force",
+        example="loop@90deg,30N",
+        title="Loop under load",
+        order=5,
+        unknown=_unknown,
+        offered=_offered,
+        simulation=_simulation,
+        along_route=True,
+        loaded=True,
+    ),
 )

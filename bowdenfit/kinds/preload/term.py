@@ -1,6 +1,6 @@
 """Preload tables: the tension between fixed ends, at wrap angles."""
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from typing import Any
 
 import jax
@@ -11,6 +11,15 @@ from jaxtyping import Float
 
 from bowdenfit.cable.cable import Cable
 from bowdenfit.cable.noise import scatter
+from bowdenfit.kinds.candidate import (
+    UNKNOWN_SCATTER,
+    Candidate,
+    CandidateKind,
+    Simulation,
+    Situation,
+    one_reading_each,
+    some_bends,
+)
 from bowdenfit.kinds.elastic_term import ElasticTerm
 from bowdenfit.kinds.shared_parameters import preload
 from bowdenfit.kinds.tables import AngleTable, PreloadTable
@@ -56,9 +65,31 @@ def _draw(
     return {"preload": jnp.maximum(cable.elasticity.preload(values, bend)[0] + noise, 0.0)}
 
 
+def _offered(at: Situation) -> list[Candidate]:
+    table = at.measurements.table(PreloadTable)
+    return [Candidate("preload", angles=(bend,)) for bend in some_bends(table.wrap_angle)] if table is not None else []
+
+
+def _simulation(at: Situation, wanted: Sequence[Candidate]) -> Simulation:
+    bend, (_, _, origin) = np.array([sum(c.angles) for c in wanted]), at.rows(wanted)
+    return one_reading_each(preload_term(at.cable, PreloadTable(bend, np.full(len(wanted), 20.0), origin)))
+
+
 PRELOAD = TermKind(
     "preload",
     lambda cable, table, _: (preload_term(cable, table),),
     _parameters,
     Bench(_draw),
+    CandidateKind(
+        name="preload",
+        phrase="a preload",
+        words=lambda _: "the preload",
+        example="preload@90deg",
+        title="Preload",
+        order=4,
+        unknown=lambda at: "" if PRELOAD_NOISE in at.parameters else f"{UNKNOWN_SCATTER}; fit with a table of preload.",
+        offered=_offered,
+        simulation=_simulation,
+        angles="total",
+    ),
 )

@@ -1,6 +1,6 @@
 """Stretch tables: how far the rope gives at its loaded end, under loads and at wrap angles."""
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from typing import Any
 
 import jax
@@ -12,6 +12,16 @@ from jaxtyping import Float
 from bowdenfit.cable.cable import Cable
 from bowdenfit.cable.elasticity import STRETCH_FRICTION, STRETCH_ZERO, rope_parameters, spread_matrix
 from bowdenfit.cable.noise import scatter
+from bowdenfit.kinds.candidate import (
+    UNKNOWN_SCATTER,
+    Candidate,
+    CandidateKind,
+    Simulation,
+    Situation,
+    one_reading_each,
+    some_bends,
+    some_loads,
+)
 from bowdenfit.kinds.elastic_term import ElasticTerm
 from bowdenfit.kinds.tables import AngleTable, StretchTable
 from bowdenfit.kinds.term import Bench, Circumstances, TermKind
@@ -80,9 +90,38 @@ def _draw(
     return {"stretch": term.expected(values, jax.tree.map(jnp.asarray, term.data)) + noise}
 
 
+def _offered(at: Situation) -> list[Candidate]:
+    """Every load at every wrap angle."""
+    table = at.measurements.table(StretchTable)
+    if table is None:
+        return []
+    bends, loads = some_bends(table.wrap_angle), some_loads(table.load)
+    return [Candidate("stretch", angles=(bend,), load=load) for bend in bends for load in loads]
+
+
+def _simulation(at: Situation, wanted: Sequence[Candidate]) -> Simulation:
+    load, bend = (np.array(v) for v in ([c.load for c in wanted], [sum(c.angles) for c in wanted]))
+    up, alone, (_, _, origin) = np.zeros(len(wanted), dtype=bool), np.arange(len(wanted)), at.rows(wanted)
+    table = StretchTable(load, bend, 0.01 * load, up, load, alone, tuple(str(i) for i in alone), origin)
+    return one_reading_each(stretch_term(at.cable, table))
+
+
 STRETCH = TermKind(
     "stretch",
     lambda cable, table, _: (stretch_term(cable, table),),
     _parameters,
     Bench(_draw),
+    CandidateKind(
+        name="stretch",
+        phrase="a stretch",
+        words=lambda _: "the stretch",
+        example="stretch@90deg,50N",
+        title="Stretch",
+        order=3,
+        unknown=lambda at: "" if STRETCH_NOISE in at.parameters else f"{UNKNOWN_SCATTER}; fit with a table of stretch.",
+        offered=_offered,
+        simulation=_simulation,
+        angles="total",
+        loaded=True,
+    ),
 )

@@ -3,7 +3,7 @@
 from dataclasses import dataclass
 from typing import ClassVar
 
-from bowdenfit.questions.next.possible_readings import Candidate
+from bowdenfit.kinds.candidate import Candidate
 from bowdenfit.questions.next.target import Answer
 
 WITHIN = 2.0  # standard errors within which two candidates are as good as each other

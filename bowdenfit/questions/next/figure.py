@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from bowdenfit.kinds.terms import candidate_kinds
 from bowdenfit.plots.bands import route_limits, shade_outside
 from bowdenfit.plots.layout import LEFT, TITLE, legend_above, panels
 from bowdenfit.plots.style import BLACK, GRAY, SERIES_COLORS, SERIES_LINES, SERIES_MARKERS, in_paper_style
@@ -18,14 +19,6 @@ if TYPE_CHECKING:
 PAGE = 5.6  # in
 MOST = 14  # candidates in the figure without a route
 ROW = 0.19  # in, of each of them
-KINDS = {
-    "angle": "Wrap angles",
-    "force": "Force run",
-    "efficiency": "Efficiency",
-    "stretch": "Stretch",
-    "preload": "Preload",
-    "loop": "Loop under load",
-}
 _PER_LETTER = 0.058  # in, of a label's width
 
 
@@ -58,15 +51,15 @@ def _limits(found: NextMeasurement) -> tuple[float, float]:
 
 def _along_route(found: NextMeasurement, along: list[Ranked]) -> Figure:
     figure, (axes,) = panels([2.4], 1, TITLE, (0, 0), PAGE)
-    kinds = [kind for kind in KINDS if any(r.candidate.kind == kind for r in along)]
+    kinds = [kind for kind in candidate_kinds().values() if any(r.candidate.kind == kind.name for r in along)]
     for i, kind in enumerate(kinds):
-        here = sorted((r for r in along if r.candidate.kind == kind), key=lambda r: r.candidate.route)
+        here = sorted((r for r in along if r.candidate.kind == kind.name), key=lambda r: r.candidate.route)
         at, sd, error = (
             np.array(v) for v in zip(*((r.candidate.route, r.sd, 2 * r.sd_error) for r in here), strict=True)
         )
         axes.errorbar(
             at, sd, error, marker=SERIES_MARKERS[i], linestyle=SERIES_LINES[i % len(SERIES_LINES)],
-            color=SERIES_COLORS[i], capsize=2, linewidth=1.1, elinewidth=0.7, label=f"{KINDS[kind]} measured here next",
+            color=SERIES_COLORS[i], capsize=2, linewidth=1.1, elinewidth=0.7, label=f"{kind.title} measured here next",
         )  # fmt: skip
     shade_outside(
         axes, found.route_range, route_limits(found.route_range, np.array([r.candidate.route for r in along]))

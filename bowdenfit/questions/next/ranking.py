@@ -6,12 +6,11 @@ import jax
 import numpy as np
 
 from bowdenfit.errors import UsageError, nearest
+from bowdenfit.kinds.candidate import Candidate
 from bowdenfit.questions.next.answer import LEAST_SHARE, WITHIN, NextMeasurement, Ranked, Repeats, Step, is_noticeable
 from bowdenfit.questions.next.candidate_names import parsed_candidates
-from bowdenfit.questions.next.candidates import default_candidates
-from bowdenfit.questions.next.possible_candidates import name_of, words_of
-from bowdenfit.questions.next.possible_readings import Candidate, simulated_readings
-from bowdenfit.questions.next.possible_runs import typical_run
+from bowdenfit.questions.next.candidates import default_candidates, name_of, words_of
+from bowdenfit.questions.next.simulated_readings import simulated_readings
 from bowdenfit.questions.next.target import Answer, answer_of
 from bowdenfit.questions.next.variance_reduction import Explained, error_of_difference, explained, mean_and_spread
 from bowdenfit.results.record import Record
@@ -57,7 +56,7 @@ def _readings(fit: Record, chosen: Sequence[Candidate], repeats: int) -> list[np
     measured, z = fit.dataset.measurements, fit.draws().flat_z
     with jax.enable_x64(True):
         seed = fit.provenance.seed + _SEED
-        return simulated_readings(fit.model, measured, chosen, typical_run(measured), z, seed, repeats)
+        return simulated_readings(fit.model, measured, chosen, z, seed, repeats)
 
 
 def _ranked(

@@ -1,9 +1,9 @@
 """What `bowdenfit next` prints."""
 
+from bowdenfit.kinds.terms import candidate_kinds
 from bowdenfit.questions.next.answer import NextMeasurement, Ranked
 from bowdenfit.words import decimals, filled, listed, table
 
-_MOUNTED = ("force", "efficiency")  # kinds that mean mounting the cable anew
 _MOST_NAMED = 3  # candidates as good as the best that are named in the sentence
 
 
@@ -82,7 +82,7 @@ def _repeated(found: NextMeasurement) -> list[str]:
     if best is None or repeats is None:
         return []
     half, most = repeats.to_halve(found.answer.sd), repeats.times[-1]
-    anew = ", mounted anew each time," if best.candidate.kind in _MOUNTED else ""
+    anew = ", mounted anew each time," if candidate_kinds()[best.candidate.kind].mounted_anew else ""
     if half == 1:
         return []
     if half is not None:

@@ -1,6 +1,6 @@
 """A force run that could be made next: what its readings say once the effect of its mounting is in them."""
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -12,10 +12,14 @@ from jax import Array
 from bowdenfit.cable.cable import Cable
 from bowdenfit.cable.load_cells import BLOCK_NOISE, FORCE_NOISE, LEAST_FORCE, RUN_SCATTER, LoadCells
 from bowdenfit.cable.noise import scatter
+from bowdenfit.kinds.candidate import UNKNOWN_SCATTER, Candidate, CandidateKind, Simulation, Situation
+from bowdenfit.kinds.forces.table import ForceTable
 from bowdenfit.kinds.measurements import Measurements
+from bowdenfit.kinds.recordings.angles import recorded_angles
 from bowdenfit.kinds.recordings.blocks import positive, worth_of
 from bowdenfit.kinds.resolve_angles import resolve_angles
-from bowdenfit.kinds.tables import ForceTable
+from bowdenfit.kinds.row_angles import row_angles
+from bowdenfit.kinds.rows import OwnAngles
 from bowdenfit.recordings.recording import Recordings
 from bowdenfit.types import Vector
 
@@ -44,9 +48,9 @@ class RunDesign:
 
 def typical_run(measurements: Measurements) -> RunDesign | None:
     """The design of the runs made so far: that of the run of median length; None where none slides."""
-    if measurements.forces is not None and np.any(measurements.forces.stroke != 0):
-        return _of_table(measurements.forces)
-    recordings = measurements.recordings
+    forces, recordings = measurements.table(ForceTable), measurements.table(Recordings)
+    if forces is not None and np.any(forces.stroke != 0):
+        return _of_table(forces)
     if recordings is not None and not recordings.loop:
         return _of_recordings(recordings)
     return None
@@ -131,3 +135,50 @@ def _straight_line(cable: Cable, design: RunDesign) -> np.ndarray:
     lines = np.column_stack(columns)
     lines[:, 1:] -= np.average(lines[:, 1:], axis=0, weights=weight**2)
     return np.asarray(np.linalg.pinv(lines * weight[:, None]) * weight).T
+
+
+def _offered(at: Situation) -> list[Candidate]:
+    """Runs at the lengths, or at the wrap angles of the runs made so far."""
+    forces, recordings = at.measurements.table(ForceTable), at.measurements.table(Recordings)
+    if typical_run(at.measurements) is None:
+        return []
+    own = forces.own if forces is not None else recorded_angles(recordings).own if recordings is not None else None
+    return at.along_cable("force", own)
+
+
+def _unknown(at: Situation) -> str:
+    design = typical_run(at.measurements)
+    known = design is not None and {RUN_SCATTER, design.noise} <= at.parameters
+    return "" if known else f"{UNKNOWN_SCATTER}; name an efficiency instead, or fit with a table of forces."
+
+
+def _simulation(at: Situation, wanted: Sequence[Candidate]) -> Simulation:
+    design = typical_run(at.measurements)
+    assert design is not None  # else there are no candidates
+    route, own, _ = at.rows(wanted)
+    simulate, width = run_readings(at.cable, design)
+    columns = [tuple(range(n * width, (n + 1) * width)) for n in range(len(wanted))]
+    return Simulation(simulate, row_angles(at.cable.description, _Rows(route, own), at.angles).data, columns)
+
+
+@dataclass(frozen=True)
+class _Rows:
+    """Where runs are made."""
+
+    route: np.ndarray
+    own: OwnAngles
+
+
+FORCE_RUN = CandidateKind(
+    name="force",
+    phrase="a force run",
+    words=lambda _: "a force run",
+    example="force@470",
+    title="Force run",
+    order=1,
+    unknown=_unknown,
+    offered=_offered,
+    simulation=_simulation,
+    along_route=True,
+    mounted_anew=True,
+)

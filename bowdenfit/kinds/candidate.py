@@ -1,0 +1,180 @@
+"""One reading, or one run, that could be taken next: what a kind of measurement offers, and how it would be read."""
+
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass
+from typing import Any, Literal
+
+import numpy as np
+from jax import Array
+
+from bowdenfit.cable.cable import Cable
+from bowdenfit.kinds.angles.table import AngleTable
+from bowdenfit.kinds.measurements import Measurements
+from bowdenfit.kinds.rows import OwnAngles, Provenance
+
+UNKNOWN_SCATTER = "the fit does not know how such readings scatter, because it has no table of them"
+GRID, MOST_ANGLES, MOST_LOADS = 11, 9, 5  # lengths without choices; wrap angles and loads of default candidates
+Simulate = Callable[[Mapping[str, Array], Any, Array], Array]
+
+
+@dataclass(frozen=True, eq=False)
+class Candidate:
+    """One reading, or one run, that could be taken next.
+
+    Args:
+        kind: Name of its `CandidateKind`.
+        route: Value of the route variable; NaN without one.
+        angles: Wrap angles [rad]: of the contacts measured row by row, in the order of their columns, or the total one.
+        load: Load of the rope, or input force of a loop [N]; NaN where the kind has none.
+    """
+
+    kind: str
+    route: float = float("nan")
+    angles: tuple[float, ...] = ()
+    load: float = float("nan")
+
+    def __eq__(self, other: object) -> bool:
+        return isinstance(other, Candidate) and self._key == other._key
+
+    def __hash__(self) -> int:
+        return hash(self._key)
+
+    @property
+    def _key(self) -> tuple[object, ...]:
+        """What makes two the same; NaN equals nothing, None does."""
+        route, load = (None if np.isnan(value) else value for value in (self.route, self.load))
+        return self.kind, route, self.angles, load
+
+
+@dataclass(frozen=True)
+class Situation:
+    """What is known before the next measurement.
+
+    Args:
+        cable: The cable.
+        measurements: What was measured so far, whose angles hold outside the range of the curves.
+        parameters: Names of the model's parameters.
+    """
+
+    cable: Cable
+    measurements: Measurements
+    parameters: frozenset[str]
+
+    @property
+    def angles(self) -> AngleTable | None:
+        """Measured wrap angles."""
+        return self.measurements.table(AngleTable)
+
+    @property
+    def columns_without_curve(self) -> tuple[str, ...]:
+        """Columns of contacts whose wrap angle is measured row by row."""
+        return tuple(name for name in self.cable.description.angle_columns if name not in self.cable.curves)
+
+    @property
+    def lengths(self) -> list[float]:
+        """Lengths that can be bought, or a grid over the range; none without a route."""
+        route = self.cable.description.route
+        return [] if route is None else [float(at) for at in (route.choices or np.linspace(*route.range, GRID))]
+
+    def along_cable(self, kind: str, own: OwnAngles | None) -> list[Candidate]:
+        """At each length, also those outside the range at which angles were read; without a route at angles measured before."""
+        route = self.cable.description.route
+        if route is not None:
+            read = self.angles.route if self.angles is not None else np.zeros(0)
+            beyond = np.unique(read[(read < route.range[0]) | (read > route.range[1])])
+            return [Candidate(kind, at) for at in sorted({*self.lengths, *(float(at) for at in beyond)})]
+        if own is None or not self.columns_without_curve:
+            return [Candidate(kind)]
+        angles = np.column_stack([own.column(name)[0] for name in self.columns_without_curve])
+        cases = np.unique(np.deg2rad(np.rad2deg(angles[np.isfinite(angles).all(axis=1)]).round(1)), axis=0)
+        chosen = cases[_evenly(len(cases), MOST_ANGLES)] if len(cases) else cases
+        return [Candidate(kind, angles=tuple(float(angle) for angle in case)) for case in chosen]
+
+    def rows(self, wanted: Sequence[Candidate]) -> tuple[np.ndarray, OwnAngles, Provenance]:
+        """Route values and wrap angles of a table with one row a candidate, and where its rows stand."""
+        n, names = len(wanted), self.cable.description.angle_columns
+        own = OwnAngles.none(names, n)
+        for row, candidate in enumerate(wanted):
+            for name, angle in zip(self.columns_without_curve, candidate.angles, strict=False):
+                own.angle[row, names.index(name)] = angle
+        return np.array([c.route for c in wanted]), own, Provenance.below_heading("next", n)
+
+
+@dataclass(frozen=True)
+class Simulation:
+    """Readings of all candidates of one kind together.
+
+    Args:
+        simulate: Function of parameter values, data and a random key: all readings.
+        data: Its data.
+        columns: Which readings belong to each candidate.
+        lowest: Reading below which nothing can be told but that it is below; minus infinity without one.
+    """
+
+    simulate: Simulate
+    data: Any
+    columns: Sequence[tuple[int, ...]]
+    lowest: float = float("-inf")
+
+
+@dataclass(frozen=True)
+class CandidateKind:
+    """A measurement that can be made next.
+
+    Args:
+        name: As users write it before the @.
+        phrase: One of them in a sentence, such as "a stretch".
+        words: What is measured, such as "the stretch".
+        example: As users write it.
+        title: Heading in figures.
+        order: Place among the kinds where none is named.
+        unknown: Why such readings cannot be simulated; empty where they can.
+        offered: Those that the tables of the description can hold.
+        simulation: How candidates would be read.
+        along_route: Whether it is made at a value of the route, where there is one.
+        tells_curves: Whether it is of the wrap angles themselves, so that no measured angle can stand in.
+        angles: Which wrap angles name it where there is no route: none, those measured row by row, or the total one.
+        loaded: Whether it is made under a load.
+        mounted_anew: Whether each means mounting the cable anew.
+    """
+
+    name: str
+    phrase: str
+    words: Callable[[Cable], str]
+    example: str
+    title: str
+    order: int
+    unknown: Callable[[Situation], str]
+    offered: Callable[[Situation], list[Candidate]]
+    simulation: Callable[[Situation, Sequence[Candidate]], Simulation]
+    along_route: bool = False
+    tells_curves: bool = False
+    angles: Literal["none", "columns", "total"] = "columns"
+    loaded: bool = False
+    mounted_anew: bool = False
+
+
+def one_reading_each(term: Any) -> Simulation:
+    """How candidates are read that are the rows of a term, one each."""
+    return Simulation(term.simulate, term.data, [(row,) for row in range(len(term.labels))])
+
+
+def some_loads(loads: np.ndarray) -> list[float]:
+    """Some of the loads measured at, to two digits: as they were meant, without the noise of their reading."""
+    return _some(np.array([float(f"{load:.2g}") for load in loads if load > 0]), MOST_LOADS)
+
+
+def some_bends(angles: np.ndarray) -> list[float]:
+    """Some of the wrap angles measured at [rad], to a tenth of a degree."""
+    return _some(np.deg2rad(np.rad2deg(angles).round(1)), MOST_ANGLES)
+
+
+def _some(values: np.ndarray, most: int) -> list[float]:
+    """Distinct values, evenly chosen where there are many."""
+    different = np.unique(values)
+    return [float(v) for v in different[_evenly(len(different), most)]] if len(different) else []
+
+
+def _evenly(n: int, most: int) -> np.ndarray:
+    """Places of at most so many of n things."""
+    return np.unique(np.linspace(0, n - 1, most).round().astype(int))

@@ -1,0 +1,55 @@
+"""Readings that could be taken next: what each draw of the posterior would give as the reading of each candidate."""
+
+from collections.abc import Sequence
+from typing import Any
+
+import jax
+import jax.numpy as jnp
+import numpy as np
+from jax import Array
+
+from bowdenfit.inference.draws import for_each_draw
+from bowdenfit.kinds.candidate import Candidate
+from bowdenfit.kinds.measurements import Measurements
+from bowdenfit.kinds.terms import candidate_kinds
+from bowdenfit.model import Model
+from bowdenfit.questions.next.candidates import situation_of
+
+
+def simulated_readings(
+    model: Model,
+    measurements: Measurements,
+    candidates: Sequence[Candidate],
+    z: np.ndarray,
+    seed: int,
+    repeats: int = 1,
+) -> list[np.ndarray]:
+    """The reading of each candidate as each draw would give it: arrays over draws, repeats and columns.
+
+    Args:
+        model: The fitted model; its parameters stay as they are.
+        measurements: What was measured so far, whose angles hold outside the range of the curves.
+        candidates: The candidates.
+        z: Draws of the posterior, one a row.
+        seed: Seed of the noise.
+        repeats: How often each reading is taken, each time with a new mounting where it has one.
+    """
+    wanted: dict[str, list[Candidate]] = {}
+    for candidate in candidates:
+        wanted.setdefault(candidate.kind, []).append(candidate)
+    at, kinds = situation_of(model, measurements), candidate_kinds()
+    parts = {name: kinds[name].simulation(at, of_kind) for name, of_kind in wanted.items()}
+    data, key = {name: part.data for name, part in parts.items()}, jax.random.key(seed)
+
+    def readings(z_and_number: Array, data: Any) -> dict[str, Array]:
+        values, number = model.space.constrain(z_and_number[:-1]), z_and_number[-1].astype(jnp.uint32)
+        keys = jax.random.split(jax.random.fold_in(key, number), (len(parts), repeats))
+        return {
+            name: jax.vmap(lambda k, part=part, name=name: part.simulate(values, data[name], k))(keys[i])
+            for i, (name, part) in enumerate(parts.items())
+        }
+
+    program = for_each_draw(readings, model.space.size + 1, data, run_once=True)
+    drawn = program(np.column_stack([z, np.arange(len(z), dtype=float)]))
+    columns = {name: iter(part.columns) for name, part in parts.items()}
+    return [np.maximum(drawn[c.kind][:, :, list(next(columns[c.kind]))], parts[c.kind].lowest) for c in candidates]

@@ -11,11 +11,11 @@ from bowdenfit.cable.registry import check_names
 from bowdenfit.description import Description
 from bowdenfit.description.file import overridden
 from bowdenfit.errors import DescriptionError
-from bowdenfit.files.columns import ColumnSource
 from bowdenfit.kinds import KINDS, each_table
 from bowdenfit.kinds.kind import Source
 from bowdenfit.kinds.measurements import Measurements
 from bowdenfit.kinds.settings import load_description, parse_description
+from bowdenfit.units import ColumnSource
 
 DESCRIPTION_FILE = "cable.toml"
 

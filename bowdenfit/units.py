@@ -4,6 +4,8 @@ import re
 from functools import cache
 from typing import TYPE_CHECKING
 
+from pydantic import BaseModel, ConfigDict
+
 from bowdenfit.errors import DatasetError
 from bowdenfit.words import shown
 
@@ -34,6 +36,15 @@ _AS_PINT_SAYS = {"r/min": "rpm", "rev/min": "rpm", "1/min": "rpm", "u/min": "rpm
 # Names with products, quotients and small powers. Pint would compute whatever else it is given, such as 9**9**9.
 _WRITTEN = re.compile(r"[\w°%‰/*^().·\s-]{1,40}")
 _NO_UNIT = re.compile(r"\d\d|%%|(?:\*\*|\^)[\s(-]*\d[\s)]*(?:\*\*|\^)")
+
+
+class ColumnSource(BaseModel):
+    """Where the user says a quantity stands: the heading as written in the file, and its unit."""
+
+    model_config = ConfigDict(frozen=True, extra="forbid")
+
+    name: str
+    unit: str | None = None
 
 
 @cache

@@ -5,7 +5,7 @@ from typing import Annotated, Any, Literal, TypeVar
 from pydantic import ConfigDict, Field, field_validator, model_validator
 
 from bowdenfit.description.elastic import CableSettings, PreloadSettings, StretchSettings
-from bowdenfit.description.recordings import ColumnMap, ForceLimits, Phase, Preparation, RecordingFile
+from bowdenfit.description.recordings import ForceLimits, Phase, Preparation, RecordingFile
 from bowdenfit.description.values import (
     Finite,
     FrictionSetting,
@@ -22,12 +22,12 @@ from bowdenfit.description.values import (
     UniformPrior,
 )
 from bowdenfit.errors import nearest
+from bowdenfit.units import ColumnSource
 from bowdenfit.words import listed
 
 __all__ = [
     "SCHEMA",
     "CableSettings",
-    "ColumnMap",
     "Contact",
     "Description",
     "Finite",
@@ -169,7 +169,7 @@ class Table(TableSettings):
 
     file: str | None = None
     files: str | tuple[str, ...] | None = None
-    columns: dict[str, ColumnMap] = Field(default_factory=dict)
+    columns: dict[str, ColumnSource] = Field(default_factory=dict)
 
     @model_validator(mode="after")
     def _one_source(self) -> "Table":

@@ -5,13 +5,7 @@ from typing import Literal
 from pydantic import Field, model_validator
 
 from bowdenfit.description.values import Finite, Frozen, QuantityValue
-
-
-class ColumnMap(Frozen):
-    """Where a quantity stands in a file."""
-
-    name: str
-    unit: str | None = None
+from bowdenfit.units import ColumnSource, conversion_factor
 
 
 class ForceLimits(Frozen):
@@ -20,6 +14,12 @@ class ForceLimits(Frozen):
     low: Finite
     high: Finite
     unit: str
+
+    @property
+    def newtons(self) -> tuple[float, float]:
+        """Both ends [N]."""
+        factor = conversion_factor(self.unit, "force")
+        return self.low * factor, self.high * factor
 
 
 class Preparation(Frozen):
@@ -73,7 +73,7 @@ class RecordingFile(Frozen):
     at: Finite | None = None
     wrap_angles: dict[str, QuantityValue] = Field(default_factory=dict)
     velocity: QuantityValue | None = None
-    channels: dict[str, ColumnMap] = Field(default_factory=dict)
+    channels: dict[str, ColumnSource] = Field(default_factory=dict)
     where: dict[str, Finite] = Field(default_factory=dict)
     prepare: Preparation | None = None
     strokes: tuple[Phase, ...] = ()

@@ -10,7 +10,7 @@ from bowdenfit.errors import DatasetError
 from bowdenfit.files.cells import Cell
 from bowdenfit.files.csv_table import RawTable
 from bowdenfit.files.headings import bracketed
-from bowdenfit.units import conversion_factor, is_unit, route_conversion_factor, speed_dimension
+from bowdenfit.units import ColumnSource, conversion_factor, is_unit, route_conversion_factor, speed_dimension
 from bowdenfit.words import quoted, shown
 
 _LONGEST_HEADING = 200
@@ -30,14 +30,6 @@ class Quantity:
     name: str
     dimension: str
     to: str | None = None
-
-
-@dataclass(frozen=True)
-class ColumnSource:
-    """Where the user says a quantity stands: the heading as written in the file, and its unit."""
-
-    name: str
-    unit: str | None = None
 
 
 @dataclass(frozen=True)
@@ -87,7 +79,7 @@ def find_columns(
         DatasetError: A heading fits two quantities or two headings fit one; a unit is missing, unknown or of the
             wrong dimension; a named column is not there, or is named for what the table cannot have.
     """
-    sources = {name: ColumnSource(_one_space(source.name), source.unit) for name, source in (sources or {}).items()}
+    sources = {name: ColumnSource(name=_one_space(source.name), unit=source.unit) for name, source in (sources or {}).items()}
     _check_sources(table, [*(quantity.name for quantity in wanted), *unused], sources)
     found: dict[str, Column] = {}
     taken = {source.name for source in sources.values()}

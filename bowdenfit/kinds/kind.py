@@ -10,12 +10,12 @@ import numpy as np
 from bowdenfit.description import Description, Table, TableSettings
 from bowdenfit.description.file import Stated
 from bowdenfit.errors import DatasetError
-from bowdenfit.files.columns import ColumnSource
 from bowdenfit.kinds.design import Design
 from bowdenfit.kinds.measurements import Measurements
 from bowdenfit.kinds.readings import Readings
 from bowdenfit.kinds.rows import Conditions
 from bowdenfit.types import Vector
+from bowdenfit.units import ColumnSource
 
 Page = tuple[list[str], list[list[str]]]  # headings and rows
 AnyTable = TypeVar("AnyTable")
@@ -69,11 +69,6 @@ class Source:
         if len(paths) != 1:
             raise DatasetError(f"the table {self.kind} must be one file; cable.toml names {len(paths)}.")
         return paths[0]
-
-    @property
-    def columns(self) -> dict[str, ColumnSource]:
-        """Columns that do not carry the usual names."""
-        return {name: ColumnSource(column.name, column.unit) for name, column in self.settings.columns.items()}
 
     def name_of(self, path: Path) -> str:
         """A file as seen from the folder."""

@@ -10,9 +10,9 @@ import numpy as np
 from bowdenfit.description.pulleys import Pulleys
 from bowdenfit.errors import DatasetError, nearest
 from bowdenfit.files.channels import Channel, ChannelFile
-from bowdenfit.files.columns import ColumnSource, Quantity, meanings
+from bowdenfit.files.columns import Quantity, meanings
 from bowdenfit.recordings.recording import RawRecording
-from bowdenfit.units import INTERNAL_UNITS, conversion_factor, speed_dimension
+from bowdenfit.units import INTERNAL_UNITS, ColumnSource, conversion_factor, speed_dimension
 from bowdenfit.words import quoted, shown
 
 WANTED = (
@@ -73,6 +73,7 @@ def to_recording(
             forces["output_force"],
             clocks.get("velocity", np.zeros(0)),
             velocity,
+            pulleys is not None,
         ),
         unit,
     )
@@ -301,7 +302,7 @@ def parsed_channels(texts: Sequence[str]) -> dict[str, ColumnSource]:
                 f"--channel names {quantity.strip()} twice, as {shown(sources[quantity.strip()].name)} and {shown(rest)}; "
                 "keep one of them."
             )
-        sources[quantity.strip()] = ColumnSource(name.strip(), unit.strip() or None)
+        sources[quantity.strip()] = ColumnSource(name=name.strip(), unit=unit.strip() or None)
     return sources
 
 

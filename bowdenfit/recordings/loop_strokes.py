@@ -5,10 +5,10 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from bowdenfit.description import Phase
 from bowdenfit.errors import DatasetError, DescriptionError
 from bowdenfit.recordings.recording import PULL, RETURN, SWITCH, Blocks, Strokes
 from bowdenfit.recordings.strokes import (
-    Span,
     check_length,
     correlation_time,
     covered,
@@ -58,7 +58,7 @@ class ForceLoop:
 
 
 def find_loop_strokes(
-    blocks: Blocks, file: str, name: str, by_hand: Sequence[Span] = (), preload: float | None = None
+    blocks: Blocks, file: str, name: str, by_hand: Sequence[Phase] = (), preload: float | None = None
 ) -> Strokes:
     """The phases of a loop's recording, from the contact state of its play operator and, where recorded, the velocity.
 
@@ -200,7 +200,7 @@ def _told(force_in: Vector, force_out: Vector, fit: ForceLoop, correlation: floa
     return (fit.loss if loss_told else float("nan")), (fit.exponent if exponent_told else float("nan"))
 
 
-def _check_none_ignored(by_hand: Sequence[Span], file: str) -> None:
+def _check_none_ignored(by_hand: Sequence[Phase], file: str) -> None:
     ignored = next((span for span in by_hand if span.stroke == "ignore"), None)
     if ignored is not None:
         raise DescriptionError(

@@ -1,12 +1,11 @@
 """Force recordings: two load cells sampled while a motor pulls, stops, reverses and returns.
 
-Three stages, each a frozen class: what a file holds (`RawRecording`), how it is to be prepared (`PreparationSettings`), and
-what a fit uses (`Recording`: means of short blocks, with the number of samples that went into each, and an account of all
+Three stages, each a frozen class: what a file holds (`RawRecording`), how it is to be prepared (`description.Preparation`),
+and what a fit uses (`Recording`: means of short blocks, with the number of samples that went into each, and an account of all
 the others).
 """
 
 from dataclasses import dataclass, field
-from typing import Literal
 
 import numpy as np
 from jaxtyping import Float
@@ -29,6 +28,7 @@ class RawRecording:
         output_force: Force at the load side [N]; NaN where a sample is missing.
         velocity_time: Time of each sample of the velocity [s]; empty without one.
         velocity: Velocity of the rope, positive toward the motor [mm/s], or of the motor [rad/s]; empty without one.
+        loop: Whether the forces are those of a pull-pull loop, differences of two tensions: of either sign.
     """
 
     name: str
@@ -39,32 +39,6 @@ class RawRecording:
     output_force: Float[np.ndarray, " of_output"]
     velocity_time: Float[np.ndarray, " of_velocity_clock"] = field(default_factory=lambda: np.zeros(0))
     velocity: Float[np.ndarray, " of_velocity"] = field(default_factory=lambda: np.zeros(0))
-
-
-@dataclass(frozen=True)
-class PreparationSettings:
-    """Which steps of the preparation are done, and with what; defaults are in the description.
-
-    Args:
-        tare: Whether the mean of the quiet interval is subtracted ("interval") or nothing ("none").
-        quiet: Start and end of an interval without load [s]; None without one.
-        delay: "estimate", "none", or how much later the output channel is than the input channel [s].
-        saturation: "flag" readings at the end of a load cell's range, or "keep" them as they are.
-        limits: Lowest and highest force that the load cells can show [N]; None to look for clipping in the data.
-        dropouts: Whether missing and frozen samples are flagged.
-        spikes: Whether single samples far off their neighbors are flagged.
-        block: Length of the blocks that samples are averaged over [s]; "auto" to choose it from the data; 0 for none.
-        loop: Whether the forces are those of a pull-pull loop, differences of two tensions: of either sign.
-    """
-
-    tare: Literal["interval", "none"]
-    quiet: tuple[float, float] | None
-    delay: Literal["estimate", "none"] | float
-    saturation: Literal["flag", "keep"]
-    limits: tuple[float, float] | None
-    dropouts: bool
-    spikes: bool
-    block: Literal["auto"] | float
     loop: bool = False
 
 

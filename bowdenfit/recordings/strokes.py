@@ -2,10 +2,10 @@
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import Literal
 
 import numpy as np
 
+from bowdenfit.description import Phase
 from bowdenfit.errors import DatasetError
 from bowdenfit.recordings.preparation.play import play
 from bowdenfit.recordings.recording import PULL, RETURN, SWITCH, Blocks, Strokes
@@ -22,17 +22,7 @@ _CLEARLY = 0.5  # a fit the other way round must leave less than this fraction o
 _WELL = 1.5  # cost up to which a loop follows its recording as well as noise lets it
 _ONE_PHASE = 4.0  # spread of the log ratio, in units of its noise, below which there is only one phase
 
-Word = Literal["pull", "return", "hold", "ignore"]
 _SIGNS: dict[str, int] = {"pull": PULL, "return": RETURN, "hold": SWITCH, "ignore": SWITCH}
-
-
-@dataclass(frozen=True)
-class Span:
-    """A stretch of time whose stroke the user has set [s]."""
-
-    start: float
-    end: float
-    stroke: Word
 
 
 @dataclass(frozen=True)
@@ -56,7 +46,7 @@ class Loop:
     cost: float
 
 
-def find_strokes(blocks: Blocks, file: str, name: str, by_hand: Sequence[Span] = ()) -> Strokes:
+def find_strokes(blocks: Blocks, file: str, name: str, by_hand: Sequence[Phase] = ()) -> Strokes:
     """The phases of a recording, from the contact state of the play operator and, where recorded, the velocity.
 
     Args:
@@ -190,13 +180,13 @@ def inside_sliding(state: Labels) -> Flags:
     return (state != SWITCH) & np.append(True, same) & np.append(same, True)
 
 
-def covered(time: Vector, by_hand: Sequence[Span]) -> Flags:
+def covered(time: Vector, by_hand: Sequence[Phase]) -> Flags:
     """Blocks whose phase the user has set."""
     return np.any([(time >= span.start) & (time <= span.end) for span in by_hand], axis=0)
 
 
 def overridden(
-    time: Vector, state: Labels, used: Flags, usable: Flags, by_hand: Sequence[Span]
+    time: Vector, state: Labels, used: Flags, usable: Flags, by_hand: Sequence[Phase]
 ) -> tuple[Labels, Flags]:
     """Phases as the user has set them, where they were set; what was found, elsewhere."""
     state, used = state.copy(), used.copy()
@@ -207,7 +197,7 @@ def overridden(
     return state, used
 
 
-def check_length(blocks: Blocks, file: str, name: str, by_hand: Sequence[Span]) -> None:
+def check_length(blocks: Blocks, file: str, name: str, by_hand: Sequence[Phase]) -> None:
     """Refuse a recording of a few blocks, and phases that lie outside it."""
     if len(blocks.time) < _FEWEST:
         raise DatasetError(

@@ -23,7 +23,8 @@ from bowdenfit.dataset import Dataset
 from bowdenfit.description import Description, SamplerSettings
 from bowdenfit.inference.log_density import LogDensity
 from bowdenfit.kinds.measurements import Measurements
-from bowdenfit.kinds.recordings.table import _File, _prepared, _recording, preparation_settings
+from bowdenfit.kinds.recordings.settings import RecordingsTable
+from bowdenfit.kinds.recordings.table import _File, _prepared, _recording
 from bowdenfit.kinds.settings import parse_description
 from bowdenfit.model import build_model
 from bowdenfit.questions.calibrate.refit import Laboratory as Fits
@@ -128,9 +129,9 @@ def as_read(recording: SimulatedRecording, file: str) -> RawRecording:
 
 def prepared(description: Description, cable: Cable) -> Dataset:
     """The data set that reading the recordings' files would give."""
-    table = description.tables.recordings
+    table = description.table(RecordingsTable)
     assert table is not None
-    settings, delay = preparation_settings(table.prepare), table.prepare.delay
+    settings, delay = table.prepare, table.prepare.delay
     sd = 0.0 if isinstance(delay, str) else delay.sd_to("time") or 0.0
     files = [
         _File(as_read(recording, entry.file), entry, settings, sd, "")

@@ -12,6 +12,7 @@ from scipy import integrate, stats
 
 import bowdenfit as bf
 from bowdenfit.dataset import load_dataset
+from bowdenfit.description import Phase, Preparation
 from bowdenfit.errors import DatasetError, DescriptionError
 from bowdenfit.kinds.recordings.loops import LoopRecordingsTerm
 from bowdenfit.model import build_model
@@ -24,13 +25,12 @@ from bowdenfit.questions.recorded.traces import traces
 from bowdenfit.recordings.forces import parsed_channels
 from bowdenfit.recordings.loop_strokes import find_loop_strokes
 from bowdenfit.recordings.preparation import prepare
-from bowdenfit.recordings.recording import PreparationSettings, RawRecording
-from bowdenfit.recordings.strokes import Span
+from bowdenfit.recordings.recording import RawRecording
 from bowdenfit.results.store import _measurements, _measurements_page
 
 PRELOAD, MU, RATE = 20.0, 0.12, 200.0
 HALF_TURN = MU * math.pi
-SETTINGS = PreparationSettings("none", None, "estimate", "flag", None, True, True, "auto", loop=True)
+SETTINGS = Preparation()
 SLACK_FROM = 2 * PRELOAD * HALF_TURN / (1 - math.exp(-HALF_TURN))
 
 
@@ -82,7 +82,7 @@ def folder_of(path, each, *, angles=None, cable="", more="", entry=""):
 def prepared(columns, settings=SETTINGS):
     time = columns["time_s"]
     forces = columns["input_force_N"], columns["output_force_N"]
-    return prepare(RawRecording("run", "run.csv", time, forces[0], time, forces[1]), settings)
+    return prepare(RawRecording("run", "run.csv", time, forces[0], time, forces[1], loop=True), settings)
 
 
 def strokes_of(columns, *more, **named):
@@ -199,7 +199,11 @@ def test_load_cells_that_disagree_shift_the_center_and_not_the_loss():
 def test_phases_set_by_hand_replace_those_found():
     columns = recorded()
     blocks, _ = prepared(columns)
-    spans = (Span(1.0, 2.0, "hold"), Span(3.0, 3.5, "return"), Span(5.0, 5.5, "pull"))
+    spans = (
+        Phase(start=1.0, end=2.0, stroke="hold"),
+        Phase(start=3.0, end=3.5, stroke="return"),
+        Phase(start=5.0, end=5.5, stroke="pull"),
+    )
     found = find_loop_strokes(blocks, "run.csv", "run", spans)
     plain = find_loop_strokes(blocks, "run.csv", "run")
     inside = [(blocks.time >= s.start) & (blocks.time <= s.end) for s in spans]

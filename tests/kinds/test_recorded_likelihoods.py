@@ -11,6 +11,7 @@ from scipy import integrate, stats
 
 from bowdenfit.cable.cable import Cable
 from bowdenfit.dataset import Dataset
+from bowdenfit.description import Preparation
 from bowdenfit.inference.least_squares import LeastSquares, least_squares, make_objective, maximum_posterior
 from bowdenfit.inference.log_density import LogDensity
 from bowdenfit.kinds import runs as runs_of_model
@@ -25,7 +26,7 @@ from bowdenfit.physics.friction import rate_factor
 from bowdenfit.questions.simulate.bench import BenchFriction, BenchSettings, Faults, Profile, simulate_recording, to_raw
 from bowdenfit.recordings.preparation import prepare
 from bowdenfit.recordings.preparation.play import play
-from bowdenfit.recordings.recording import PreparationSettings, Recording, Recordings
+from bowdenfit.recordings.recording import Recording, Recordings
 from bowdenfit.recordings.strokes import find_strokes
 
 MU, REFERENCE = 0.15, 50.0
@@ -218,7 +219,7 @@ def test_bins_of_the_load_do_not_take_the_change_of_friction_within_a_bin_for_no
 
 # Whole recordings -------------------------------------------------------------------------------------------------
 
-AS_READ = PreparationSettings("none", None, "none", "keep", None, False, False, 0.0)
+AS_READ = Preparation(delay="none", saturation="kept", dropouts=False, spikes=False, block="none")
 SHORT = Profile(speed=2.0, lead_in=0.5, cycles=1)
 CAPSTAN, NO_FAULTS = BenchFriction(), Faults()
 
@@ -335,7 +336,7 @@ def test_the_mounting_effect_of_a_whole_recording_integrates_out(name):
     assert found == pytest.approx(exact, abs=1e-8 if name == "capstan" else 1e-4)
 
 
-FLAGGING = replace(AS_READ, saturation="flag")
+FLAGGING = AS_READ.model_copy(update={"saturation": "left out"})
 
 
 def test_a_saturated_block_speaks_against_whatever_would_have_shown_less():

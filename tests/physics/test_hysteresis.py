@@ -6,11 +6,11 @@ import numpy as np
 import pytest
 from scipy.optimize import minimize_scalar
 
+from bowdenfit.description import Preparation
 from bowdenfit.physics.hysteresis import play_operator, play_operator_with_slope
 from bowdenfit.questions.simulate.bench import BenchFriction, BenchSettings, Faults, Profile, simulate_recording, to_raw
 from bowdenfit.recordings.preparation import prepare
 from bowdenfit.recordings.preparation.play import play
-from bowdenfit.recordings.recording import PreparationSettings
 
 STEPS, BAND = 300, 0.25
 operator = jax.jit(play_operator)
@@ -172,7 +172,7 @@ def test_a_rest_in_contact_keeps_the_derivative_of_the_stroke_before():
 
 # Noise ------------------------------------------------------------------------------------------------------------
 
-AS_READ = PreparationSettings("none", None, "none", "keep", None, False, False, "auto")
+AS_READ = Preparation(delay="none", saturation="kept", dropouts=False, spikes=False)
 
 
 def _noisy(noise):

@@ -8,6 +8,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from bowdenfit.description import ForceLimits, Preparation, QuantityValue
 from bowdenfit.errors import DatasetError
 from bowdenfit.questions.simulate.bench import BenchFriction, BenchSettings, Faults, Profile, simulate_recording
 from bowdenfit.recordings.preparation import prepare
@@ -19,11 +20,18 @@ from bowdenfit.recordings.preparation.noise import correlation_time, noise_about
 from bowdenfit.recordings.preparation.play import play
 from bowdenfit.recordings.preparation.segments import Segments
 from bowdenfit.recordings.preparation.tare import tare_of
-from bowdenfit.recordings.recording import PreparationSettings, RawRecording
+from bowdenfit.recordings.recording import RawRecording
 
 EXPONENT, DELAY, RANGE = 0.24, 0.02, 500.0
-OFF = PreparationSettings("none", None, "none", "keep", None, False, False, 0.0)
-ON = PreparationSettings("none", None, "none", "flag", None, True, True, "auto")
+
+
+def seconds(value: float) -> QuantityValue:
+    """A time of the preparation."""
+    return QuantityValue(value=value, unit="s")
+
+
+OFF = Preparation(delay="none", saturation="kept", dropouts=False, spikes=False, block="none")
+ON = Preparation(delay="none")
 
 
 def motor(rate=1000.0, cycles=3, pause=0.5, partial=True, speed=15.0, ramp=0.1, lead=1.0):
@@ -79,7 +87,7 @@ def with_lengths(raw, **channels):
 def flags_of(raw, side, **switches):
     """Faults of one channel of a recording."""
     mine, other = (raw.input_force, raw.output_force) if side == "input" else (raw.output_force, raw.input_force)
-    return flag(raw.input_time, mine, raw.input_time, other, replace(ON, **switches))
+    return flag(raw.input_time, mine, raw.input_time, other, ON.model_copy(update=switches))
 
 
 def score(found, put_in):
@@ -161,7 +169,7 @@ def test_the_tare_is_the_mean_of_the_quiet_interval_and_its_error_covers_it():
 
 def test_the_tare_is_subtracted_and_its_samples_are_left_out():
     raw = replace(RAW, input_force=RAW.input_force + 7, output_force=RAW.output_force - 5)
-    blocks, account = prepare(raw, replace(OFF, tare="interval", quiet=(0.1, 0.9)))
+    blocks, account = prepare(raw, OFF.model_copy(update={"tare": "interval", "quiet": (0.1, 0.9)}))
     assert account.tare == pytest.approx((27.0, 15.0), abs=0.1)
     assert account.counts["quiet"] == 801 and account.counts["used"] == account.samples - 801
     assert blocks.input_force[0] == raw.input_force[0] - account.tare[0]
@@ -178,7 +186,7 @@ def test_the_tare_is_subtracted_and_its_samples_are_left_out():
 )
 def test_an_interval_that_is_not_quiet_is_refused(quiet, words):
     with pytest.raises(DatasetError, match=words):
-        prepare(RAW, replace(OFF, tare="interval", quiet=quiet))
+        prepare(RAW, OFF.model_copy(update={"tare": "interval", "quiet": quiet}))
 
 
 # --- flags
@@ -244,7 +252,7 @@ def test_samples_interpolated_over_a_gap_of_the_other_clock_are_dropouts():
     _, account = prepare(raw, ON)
     assert account.counts["dropout"] == 501
     assert any("output_force has 1 gaps" in r for r in account.remarks)
-    assert prepare(raw, replace(ON, dropouts=False))[1].counts["dropout"] == 0
+    assert prepare(raw, ON.model_copy(update={"dropouts": False}))[1].counts["dropout"] == 0
 
 
 @pytest.mark.parametrize("side", ["input", "output"])
@@ -255,11 +263,11 @@ def test_readings_at_the_end_of_the_range_are_found(side, stated, noise):
     force = getattr(raw, f"{side}_force")
     top = quantised(0.8 * force.max())
     clipped = replace(raw, **{f"{side}_force": np.minimum(force, top)})
-    channel, ends = flags_of(clipped, side, limits=(-top, top) if stated else None)
+    channel, ends = flags_of(clipped, side, limits=ForceLimits(low=-top, high=top, unit="N") if stated else None)
     hits, false = score(channel.fault == SATURATED, force >= top - (RANGE / 4096 * 1.01 if stated else 0))
     assert hits >= 0.95 and false < 1e-3
     assert ends[1] == pytest.approx(top)
-    assert not np.any(flags_of(clipped, side, saturation="keep")[0].fault)
+    assert not np.any(flags_of(clipped, side, saturation="kept")[0].fault)
 
 
 def test_an_ordinary_plateau_of_a_quantised_force_is_not_clipping():
@@ -281,7 +289,7 @@ def test_an_ordinary_plateau_of_a_quantised_force_is_not_clipping():
 )
 @pytest.mark.parametrize("delay", [DELAY, -0.06])
 def test_the_delay_is_found_within_its_error(seed, profile, delay):
-    _, account = prepare(recording(seed=seed, delay=delay, **profile), replace(ON, delay="estimate"))
+    _, account = prepare(recording(seed=seed, delay=delay, **profile), ON.model_copy(update={"delay": "estimated"}))
     assert account.delay_sd < 0.005
     assert abs(account.delay - delay) < 3 * account.delay_sd
 
@@ -317,13 +325,13 @@ def test_a_rest_at_the_start_has_no_weight_in_the_delay_until_the_rope_slides(ra
 
 def test_the_error_of_the_delay_covers_strong_noise_too():
     for seed in range(3):
-        _, account = prepare(recording(noise=2.0, seed=seed), replace(ON, delay="estimate"))
+        _, account = prepare(recording(noise=2.0, seed=seed), ON.model_copy(update={"delay": "estimated"}))
         assert abs(account.delay - DELAY) < 3 * account.delay_sd < 0.015
 
 
 def test_a_load_cell_with_a_wrong_gain_does_not_shift_the_delay():
     raw = replace(RAW, output_force=1.1 * RAW.output_force)
-    assert prepare(raw, replace(ON, delay="estimate"))[1].delay == pytest.approx(DELAY, abs=0.003)
+    assert prepare(raw, ON.model_copy(update={"delay": "estimated"}))[1].delay == pytest.approx(DELAY, abs=0.003)
 
 
 def test_a_recording_without_reversal_does_not_tell_the_delay():
@@ -334,7 +342,7 @@ def test_a_recording_without_reversal_does_not_tell_the_delay():
 
 
 def test_a_given_delay_is_applied_as_it_is():
-    blocks, account = prepare(RAW, replace(OFF, delay=0.02))
+    blocks, account = prepare(RAW, OFF.model_copy(update={"delay": seconds(0.02)}))
     assert account.delay == 0.02 and np.isnan(account.delay_sd)
     assert account.counts["no overlap"] == 20
     np.testing.assert_allclose(blocks.output_force, RAW.output_force[20:], atol=1e-9)
@@ -353,15 +361,15 @@ def test_readings_at_other_times_lie_on_straight_lines_and_inherit_faults():
     assert fault.tolist() == [5, 0, 0, 3, 0, 5]
 
 
-@pytest.mark.parametrize("block", ["auto", 0.05, 0.0])
+@pytest.mark.parametrize("block", ["auto", seconds(0.05), "none"])
 def test_a_clean_recording_loses_no_sample(block):
-    blocks, account = prepare(RAW, replace(ON, block=block))
+    blocks, account = prepare(RAW, ON.model_copy(update={"block": block}))
     assert account.counts["used"] == account.samples == len(RAW.input_force) == blocks.samples.sum()
     assert not account.flagged.kind and not account.remarks
 
 
 def test_block_means_are_exactly_the_means():
-    blocks, account = prepare(RAW, replace(ON, block=0.05))
+    blocks, account = prepare(RAW, ON.model_copy(update={"block": seconds(0.05)}))
     whole = len(RAW.input_force) // 50
     assert account.block == pytest.approx(0.05)
     for mean, all_of_them in (
@@ -384,7 +392,8 @@ def test_everything_switched_off_leaves_the_samples_alone():
 
 
 @pytest.mark.parametrize(
-    "settings", [ON, replace(ON, delay="estimate"), replace(ON, tare="interval", quiet=(0.0, 0.9))]
+    "settings",
+    [ON, ON.model_copy(update={"delay": "estimated"}), ON.model_copy(update={"tare": "interval", "quiet": (0.0, 0.9)})],
 )
 def test_every_sample_of_a_faulty_recording_is_accounted_for(settings):
     force = np.minimum(RAW.output_force, quantised(200.0))
@@ -404,7 +413,7 @@ def test_every_sample_of_a_faulty_recording_is_accounted_for(settings):
 def test_a_slower_channel_is_read_on_the_clock_of_the_faster():
     slow = slice(None, None, 10)
     raw = with_lengths(RAW, input_time=RAW.input_time[slow], input_force=RAW.input_force[slow])
-    blocks, account = prepare(raw, replace(OFF, block=0.01))
+    blocks, account = prepare(raw, OFF.model_copy(update={"block": seconds(0.01)}))
     assert account.samples == len(RAW.output_time) and account.rate == pytest.approx(1000)
     last = RAW.output_time[-1] - raw.input_time[-1]
     assert account.counts["no overlap"] == round(last * 1000)
@@ -415,7 +424,8 @@ def test_blocks_are_equal_stretches_of_time_across_a_gap():
     keep = (RAW.input_time < 5) | (RAW.input_time > 6.2)
     cut = {k: getattr(RAW, k)[keep] for k in ("input_time", "input_force", "output_time", "output_force")}
     blocks, account = prepare(
-        with_lengths(RAW, **cut, velocity=np.zeros(0), velocity_time=np.zeros(0)), replace(ON, block=0.05)
+        with_lengths(RAW, **cut, velocity=np.zeros(0), velocity_time=np.zeros(0)),
+        ON.model_copy(update={"block": seconds(0.05)}),
     )
     steps = np.diff(blocks.time) / 0.05
     np.testing.assert_allclose(steps, np.round(steps), atol=1e-6)
@@ -433,7 +443,7 @@ def test_the_block_follows_the_noise_and_stays_within_its_bounds():
 def test_no_recording_has_more_than_four_thousand_blocks_unless_asked():
     long = recording(cycles=10, bits=0)
     assert len(prepare(long, ON)[0].time) <= 4000
-    assert len(prepare(long, replace(ON, block=0.002))[0].time) == -(-len(long.input_time) // 2)
+    assert len(prepare(long, ON.model_copy(update={"block": seconds(0.002)}))[0].time) == -(-len(long.input_time) // 2)
 
 
 def test_noise_that_a_filter_smoothed_does_not_raise_the_bandwidth():

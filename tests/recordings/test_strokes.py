@@ -6,6 +6,7 @@ from typing import Any
 import numpy as np
 import pytest
 
+from bowdenfit.description import Phase, Preparation, QuantityValue
 from bowdenfit.errors import DatasetError
 from bowdenfit.questions.simulate.bench import (
     BenchFriction,
@@ -17,11 +18,17 @@ from bowdenfit.questions.simulate.bench import (
     to_raw,
 )
 from bowdenfit.recordings.preparation import prepare
-from bowdenfit.recordings.recording import PULL, RETURN, SWITCH, Blocks, PreparationSettings, RawRecording, Strokes
-from bowdenfit.recordings.strokes import Span, correlation_time, find_strokes
+from bowdenfit.recordings.recording import PULL, RETURN, SWITCH, Blocks, RawRecording, Strokes
+from bowdenfit.recordings.strokes import correlation_time, find_strokes
 from bowdenfit.types import Flags, Labels, Vector
 
-SETTINGS = PreparationSettings("none", None, "none", "flag", None, True, True, "auto")
+
+def seconds(value: float) -> QuantityValue:
+    """A time of the preparation."""
+    return QuantityValue(value=value, unit="s")
+
+
+SETTINGS = Preparation(delay="none")
 PARTIAL = ((20.0, 8.0), (35.0, 10.0))
 CASES: dict[str, dict[str, Any]] = {
     "plain": {},
@@ -96,7 +103,7 @@ def swapped(raw: RawRecording) -> RawRecording:
 
 
 def found(
-    velocity: str = "recorded", by_hand: tuple[Span, ...] = (), block: float | None = None, **settings: Any
+    velocity: str = "recorded", by_hand: tuple[Phase, ...] = (), block: float | None = None, **settings: Any
 ) -> Found:
     recording = simulated(**settings)
     raw = to_raw(recording, "run", "run.csv")
@@ -104,7 +111,7 @@ def found(
         raw = without_velocity(raw)
     elif velocity == "turned around":
         raw = replace(raw, velocity=-raw.velocity)
-    blocks, _ = prepare(raw, replace(SETTINGS, block=block or "auto"))
+    blocks, _ = prepare(raw, SETTINGS.model_copy(update={"block": seconds(block) if block else "auto"}))
     return Found(recording, blocks, find_strokes(blocks, "run.csv", "run", by_hand))
 
 
@@ -165,7 +172,12 @@ def test_blocks_beside_a_change_of_the_contact_are_not_used():
 def test_phases_set_by_hand_come_before_those_found():
     alone = found(noise=0.5)
     time = alone.blocks.time
-    spans = (Span(0.2, 0.5, "return"), Span(1.0, 1.2, "hold"), Span(1.2001, 1.4, "ignore"), Span(2.0, 2.3, "pull"))
+    spans = (
+        Phase(start=0.2, end=0.5, stroke="return"),
+        Phase(start=1.0, end=1.2, stroke="hold"),
+        Phase(start=1.2001, end=1.4, stroke="ignore"),
+        Phase(start=2.0, end=2.3, stroke="pull"),
+    )
     strokes = found(noise=0.5, by_hand=spans).strokes
     assert strokes.by_hand
     assert not alone.strokes.by_hand
@@ -184,14 +196,14 @@ def test_a_phase_by_hand_does_not_use_saturated_blocks():
     result = found(noise=0.5)
     saturated = (result.blocks.time > 0.5) & (result.blocks.time < 0.7)
     blocks = replace(result.blocks, saturated=saturated)
-    strokes = find_strokes(blocks, "run.csv", "run", (Span(0.4, 0.8, "pull"),))
+    strokes = find_strokes(blocks, "run.csv", "run", (Phase(start=0.4, end=0.8, stroke="pull"),))
     assert not strokes.used_sliding[saturated].any()
     assert strokes.used_sliding[(result.blocks.time > 0.42) & (result.blocks.time < 0.48)].all()
 
 
 def test_a_phase_outside_the_recording_is_refused():
     with pytest.raises(DatasetError, match=r"from 100 to 200 s holds nothing of the recording, which goes from"):
-        found(by_hand=(Span(100.0, 200.0, "pull"),))
+        found(by_hand=(Phase(start=100.0, end=200.0, stroke="pull"),))
 
 
 def test_a_recording_of_a_few_blocks_is_refused():

@@ -4,9 +4,9 @@ from typing import Literal
 
 from pydantic import Field
 
-from bowdenfit.description import ColumnMap, Description, Preparation, QuantityValue, TableSettings
+from bowdenfit.description import Description, Preparation, QuantityValue, TableSettings
 from bowdenfit.description.file import Stated
-from bowdenfit.units import speed_dimension
+from bowdenfit.units import ColumnSource, speed_dimension
 
 
 class RecordingsTable(TableSettings):
@@ -17,7 +17,7 @@ class RecordingsTable(TableSettings):
 
     files: str | tuple[str, ...] | None = None
     pattern: str | None = None
-    channels: dict[str, ColumnMap] = Field(default_factory=dict)
+    channels: dict[str, ColumnSource] = Field(default_factory=dict)
     likelihood: Literal["runs", "whole"] = "runs"
     prepare: Preparation = Preparation()
 
@@ -28,11 +28,28 @@ class RecordingsTable(TableSettings):
 
 
 def contradiction(settings: RecordingsTable | None, description: Description) -> str:
-    """Recordings without a table, or a table without any."""
+    """Recordings without a table, a table without any, or a preparation that cannot be."""
     if settings is None and description.recording:
         return "[[recording]] needs recordings = {} under [tables], where what they share can be said"
     if settings is not None and not (description.recording or settings.files):
         return 'the table recordings names no file: write files = "recordings/*.csv", or a [[recording]] with its file'
+    pages = [settings.prepare] if settings is not None else []
+    pages += [entry.prepare for entry in description.recording if entry.prepare is not None]
+    return next((said for page in pages if (said := _impossible(page))), "")
+
+
+def _impossible(page: Preparation) -> str:
+    limits, block = page.limits, page.block
+    if limits is not None and not limits.low < limits.high:
+        return (
+            f"prepare, limits: low = {limits.low:g} must be below high = {limits.high:g}; they are the lowest and "
+            "the highest force that the load cells can show"
+        )
+    if isinstance(block, QuantityValue) and block.value <= 0:
+        return (
+            f"prepare, block: {block.value:g} {block.unit} is no length of a block; write a positive "
+            'one, or block = "none" to average nothing'
+        )
     return ""
 
 
@@ -51,4 +68,7 @@ def quantities_of(settings: RecordingsTable, description: Description) -> list[S
         for name, value in (("delay", page.delay), ("block", page.block)):
             if isinstance(value, QuantityValue):
                 quantities.append((f"{where}, {name}", value, "time"))
+        if page.limits is not None:
+            lowest = QuantityValue(value=page.limits.low, unit=page.limits.unit)
+            quantities.append((f"{where}, limits", lowest, "force"))
     return quantities

@@ -26,7 +26,7 @@ from bowdenfit.physics.hysteresis import play_operator
 from bowdenfit.physics.loop_motion import loop_play_with_slope
 from bowdenfit.recordings.loop_strokes import find_loop_strokes
 from bowdenfit.recordings.recording import Blocks, Recording, Recordings, Strokes
-from bowdenfit.recordings.strokes import Span, find_strokes
+from bowdenfit.recordings.strokes import find_strokes
 
 
 def drawn_recordings(
@@ -150,7 +150,7 @@ def recorded_again(description: Description, recordings: Recordings, drawn: Mapp
 
 def _strokes(description: Description, loop: bool, recording: Recording, blocks: Blocks) -> Strokes:
     spans = [
-        Span(phase.start, phase.end, phase.stroke)
+        phase
         for entry in description.recording
         if entry.file == recording.file and recording.strokes.by_hand
         for phase in entry.strokes

@@ -3,15 +3,12 @@
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
-from types import MappingProxyType
-from typing import Literal
 
 import numpy as np
 
-from bowdenfit.description import ColumnMap, Description, Preparation, QuantityValue, RecordingFile
+from bowdenfit.description import Description, Preparation, QuantityValue, RecordingFile
 from bowdenfit.errors import DatasetError, DescriptionError, nearest
 from bowdenfit.files import read_channels
-from bowdenfit.files.columns import ColumnSource
 from bowdenfit.kinds.kind import Found, Source
 from bowdenfit.kinds.recordings.angles import check_placed
 from bowdenfit.kinds.recordings.settings import RecordingsTable
@@ -19,10 +16,10 @@ from bowdenfit.recordings.forces import TORQUES, WANTED, matched_name, pattern_f
 from bowdenfit.recordings.loop_strokes import find_loop_strokes
 from bowdenfit.recordings.preparation import NO_DELAY_OF_LOOPS, averaged, inspected
 from bowdenfit.recordings.preparation.delay import COMMON_ERROR
-from bowdenfit.recordings.recording import Account, Blocks, PreparationSettings, RawRecording, Recording, Recordings
-from bowdenfit.recordings.strokes import Span, find_strokes
+from bowdenfit.recordings.recording import Account, Blocks, RawRecording, Recording, Recordings
+from bowdenfit.recordings.strokes import find_strokes
 from bowdenfit.types import Vector
-from bowdenfit.units import INTERNAL_UNITS, conversion_factor, speed_dimension
+from bowdenfit.units import INTERNAL_UNITS, ColumnSource, conversion_factor, speed_dimension
 
 
 def read_recordings(source: Source) -> Found[Recordings]:
@@ -59,7 +56,7 @@ class _File:
 
     raw: RawRecording
     entry: RecordingFile
-    settings: PreparationSettings
+    settings: Preparation
     delay_sd: float
     velocity_unit: str
 
@@ -71,11 +68,11 @@ def _prepared(files: Sequence[_File]) -> tuple[list[tuple[Blocks, Account]], flo
     put together; an error of it shifts the friction of all of them alike, in proportion to how fast the force changes.
     """
     found = [inspected(f.raw, f.settings) for f in files]
-    told = [i.delay for i in found if i.settings.delay == "estimate" and i.delay.sd > 0]
+    told = [i.delay for i in found if i.settings.delay == "estimated" and i.delay.sd > 0]
     if not told:
         return [averaged(i) for i in found], max((f.delay_sd for f in files), default=0.0)
     delay, sd = _pooled(np.array([d.value for d in told]), np.array([d.sd for d in told]))
-    return [averaged(i, (delay, sd) if i.settings.delay == "estimate" else None) for i in found], sd
+    return [averaged(i, (delay, sd) if i.settings.delay == "estimated" else None) for i in found], sd
 
 
 def _said_once(prepared: Sequence[tuple[Blocks, Account]]) -> list[tuple[Blocks, Account]]:
@@ -170,23 +167,21 @@ def _name(path: Path, entry: RecordingFile) -> str:
 def _to_read(description: Description, path: Path, entry: RecordingFile, channels: Mapping[str, ColumnSource]) -> _File:
     table = description.table(RecordingsTable)
     assert table is not None  # the caller asked
-    page, sources = entry.prepare or table.prepare, {**_sources(table.channels), **_sources(entry.channels), **channels}
+    page, sources = entry.prepare or table.prepare, {**_known(table.channels), **_known(entry.channels), **channels}
     pulleys = description.cable.pulleys if description.cable.kind == "loop" else None
     raw, unit = to_recording(rows_where(read_channels(path), entry.where), _name(path, entry), sources, pulleys)
     stated = page.delay.sd_to("time") if isinstance(page.delay, QuantityValue) else None
     if entry.velocity is not None and not unit:
         unit = INTERNAL_UNITS[speed_dimension(entry.velocity.unit)]
-    settings = replace(preparation_settings(page), loop=pulleys is not None)
-    return _File(raw, entry, settings, stated or 0.0, unit)
+    return _File(raw, entry, page, stated or 0.0, unit)
 
 
 def _recording(description: Description, file: _File, blocks: Blocks, account: Account) -> Recording:
     raw, entry = file.raw, file.entry
-    spans = [Span(phase.start, phase.end, phase.stroke) for phase in entry.strokes]
     if description.cable.kind == "loop":
-        strokes = find_loop_strokes(blocks, raw.file, raw.name, spans, _stated_preload(description))
+        strokes = find_loop_strokes(blocks, raw.file, raw.name, entry.strokes, _stated_preload(description))
     else:
-        strokes = find_strokes(blocks, raw.file, raw.name, spans)
+        strokes = find_strokes(blocks, raw.file, raw.name, entry.strokes)
     if entry.velocity is not None and not len(raw.velocity):
         speed = entry.velocity.to(speed_dimension(entry.velocity.unit))
         blocks = replace(blocks, velocity=np.full(len(blocks.time), speed))
@@ -201,47 +196,15 @@ def _stated_preload(description: Description) -> float | None:
     return stated.to("force") if stated is not None and not description.preload_follows_stretch else None
 
 
-def _sources(channels: Mapping[str, ColumnMap]) -> dict[str, ColumnSource]:
+def _known(channels: Mapping[str, ColumnSource]) -> Mapping[str, ColumnSource]:
+    """Channels of the description, if they are of quantities that a recording has."""
     known = [quantity.name for quantity in (*WANTED, *TORQUES)]
     for name in channels:
         if name not in known:
             raise DescriptionError(
                 f"cable.toml, channels of recordings: no quantity is called {name!r}{nearest(name, known)}"
             )
-    return {name: ColumnSource(channel.name, channel.unit) for name, channel in channels.items()}
-
-
-def preparation_settings(page: Preparation) -> PreparationSettings:
-    """The preparation that a description asks for, in internal units.
-
-    Raises:
-        DescriptionError: The limits or the block contradict themselves.
-    """
-    limits = page.limits
-    newtons = _factor(limits.unit, "force", "cable.toml, prepare, limits") if limits is not None else 1.0
-    if limits is not None and not limits.low < limits.high:
-        raise DescriptionError(
-            f"cable.toml, prepare, limits: low = {limits.low:g} must be below high = {limits.high:g}; they are the lowest and "
-            "the highest force that the load cells can show."
-        )
-    if isinstance(page.block, QuantityValue) and page.block.value <= 0:
-        raise DescriptionError(
-            f"cable.toml, prepare, block: {page.block.value:g} {page.block.unit} is no length of a block; write a positive "
-            'one, or block = "none" to average nothing.'
-        )
-    return PreparationSettings(
-        "interval" if page.tare == "interval" else "none",
-        page.quiet,
-        page.delay.to("time") if isinstance(page.delay, QuantityValue) else _DELAYS[page.delay],
-        "keep" if page.saturation == "kept" else "flag",
-        (limits.low * newtons, limits.high * newtons) if limits is not None else None,
-        page.dropouts,
-        page.spikes,
-        page.block.to("time") if isinstance(page.block, QuantityValue) else "auto" if page.block == "auto" else 0.0,
-    )
-
-
-_DELAYS: Mapping[str, Literal["estimate", "none"]] = MappingProxyType({"estimated": "estimate", "none": "none"})
+    return channels
 
 
 def _own_angles(description: Description, entry: RecordingFile) -> tuple[np.ndarray, np.ndarray]:

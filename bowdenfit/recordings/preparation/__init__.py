@@ -8,6 +8,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from bowdenfit.description import Preparation, QuantityValue
 from bowdenfit.errors import DatasetError
 from bowdenfit.recordings.preparation.bandwidth import bandwidth_of
 from bowdenfit.recordings.preparation.blocks import Common, average, block_samples
@@ -17,7 +18,7 @@ from bowdenfit.recordings.preparation.delay import Delay, estimate_delay
 from bowdenfit.recordings.preparation.flags import flag
 from bowdenfit.recordings.preparation.noise import noise_about_trend
 from bowdenfit.recordings.preparation.tare import tare_of
-from bowdenfit.recordings.recording import Account, Blocks, Flagged, PreparationSettings, RawRecording
+from bowdenfit.recordings.recording import Account, Blocks, Flagged, RawRecording
 from bowdenfit.types import Flags, Vector
 
 _SHOWN_FLAGS = 300
@@ -39,7 +40,7 @@ class _Cleaned:
     tare_sd: tuple[float, float]
 
 
-def prepare(raw: RawRecording, settings: PreparationSettings) -> tuple[Blocks, Account]:
+def prepare(raw: RawRecording, settings: Preparation) -> tuple[Blocks, Account]:
     """Check a recording, leave out what is no reading, shift the output back by its delay, and average in blocks.
 
     Args:
@@ -70,19 +71,19 @@ class Inspected:
     """
 
     raw: RawRecording
-    settings: PreparationSettings
+    settings: Preparation
     remarks: tuple[str, ...]
     cleaned: _Cleaned
     together: Common
     delay: Delay
 
 
-def inspected(raw: RawRecording, settings: PreparationSettings) -> Inspected:
+def inspected(raw: RawRecording, settings: Preparation) -> Inspected:
     """The steps before averaging, so that several recordings can be given one delay; see `prepare`."""
     remarks = check(raw)
     cleaned = _clean(raw, settings)
     together = _together(raw, cleaned, settings, 0.0)
-    return Inspected(raw, settings, remarks, cleaned, together, _delay(together, settings))
+    return Inspected(raw, settings, remarks, cleaned, together, _delay(raw.loop, together, settings))
 
 
 def averaged(found: Inspected, one_for_all: tuple[float, float] | None = None) -> tuple[Blocks, Account]:
@@ -97,9 +98,9 @@ def averaged(found: Inspected, one_for_all: tuple[float, float] | None = None) -
     common = _together(raw, cleaned, settings, delay.value) if delay.value else found.together
     _require_some_good(raw, common)
     filled = [_filled(force, common.fault == GOOD) for force in (common.input_force, common.output_force)]
-    bandwidth = bandwidth_of(filled[0], filled[1], 1 / common.step, settings.loop)
+    bandwidth = bandwidth_of(filled[0], filled[1], 1 / common.step, raw.loop)
     noise = _noise(cleaned.input, bandwidth), _noise(cleaned.output, bandwidth)
-    samples = _samples_of_block(common, cleaned, settings, bandwidth, noise)
+    samples = _samples_of_block(raw.loop, common, cleaned, settings, bandwidth, noise)
     blocks, counts = average(common, samples)
     account = Account(
         counts=counts,
@@ -119,7 +120,7 @@ def averaged(found: Inspected, one_for_all: tuple[float, float] | None = None) -
     return blocks, account
 
 
-def _clean(raw: RawRecording, settings: PreparationSettings) -> _Cleaned:
+def _clean(raw: RawRecording, settings: Preparation) -> _Cleaned:
     """Flag and tare each channel on its own clock, and check its sign."""
     times = spread(raw.input_time), spread(raw.output_time)
     forces = raw.input_force, raw.output_force
@@ -129,14 +130,14 @@ def _clean(raw: RawRecording, settings: PreparationSettings) -> _Cleaned:
     tares = [_tare(raw.file, name, channel, settings) for name, (channel, _) in zip(names, found, strict=True)]
     channels = [replace(c, force=c.force - tare) for (c, _), (tare, _) in zip(found, tares, strict=True)]
     for name, channel in zip(names, channels, strict=True):
-        if not settings.loop:
+        if not raw.loop:
             check_sign(raw.file, name, channel.force)
     ends = max(e[0] for _, e in found), min(e[1] for _, e in found)
     return _Cleaned(channels[0], channels[1], ends, (tares[0][0], tares[1][0]), (tares[0][1], tares[1][1]))
 
 
-def _tare(file: str, name: str, channel: Sampled, settings: PreparationSettings) -> tuple[float, float]:
-    if settings.tare == "none":
+def _tare(file: str, name: str, channel: Sampled, settings: Preparation) -> tuple[float, float]:
+    if settings.tare != "interval":
         return 0.0, 0.0
     if settings.quiet is None:
         raise DatasetError(
@@ -146,7 +147,7 @@ def _tare(file: str, name: str, channel: Sampled, settings: PreparationSettings)
     return tare_of(file, name, channel.time, channel.force, settings.quiet, channel.fault == GOOD)
 
 
-def _together(raw: RawRecording, cleaned: _Cleaned, settings: PreparationSettings, delay: float) -> Common:
+def _together(raw: RawRecording, cleaned: _Cleaned, settings: Preparation, delay: float) -> Common:
     """Both channels on the clock of the one with more samples, the output shifted back by the delay."""
     output = replace(cleaned.output, time=cleaned.output.time - delay)
     time = cleaned.input.time if len(cleaned.input.time) >= len(output.time) else output.time
@@ -169,15 +170,20 @@ def _velocity(raw: RawRecording, time: Vector) -> Vector:
     return np.interp(time, clock[there], raw.velocity[there], left=np.nan, right=np.nan)
 
 
-def _delay(common: Common, settings: PreparationSettings) -> Delay:
+def _delay(loop: bool, common: Common, settings: Preparation) -> Delay:
     if settings.delay == "none":
         return Delay(0.0, math.nan, math.nan)
-    if settings.delay != "estimate":
-        return Delay(float(settings.delay), math.nan, math.nan)
-    if settings.loop:
+    if isinstance(settings.delay, QuantityValue):
+        return Delay(settings.delay.to("time"), math.nan, math.nan)
+    if loop:
         return Delay(0.0, math.nan, math.nan, NO_DELAY_OF_LOOPS)
-    shortest = settings.block if settings.block != "auto" else _USUAL_BLOCK
-    return estimate_delay(common.time, common.input_force, common.output_force, common.fault == GOOD, float(shortest))
+    shortest = _USUAL_BLOCK if settings.block == "auto" else _stated_block(settings)
+    return estimate_delay(common.time, common.input_force, common.output_force, common.fault == GOOD, shortest)
+
+
+def _stated_block(settings: Preparation) -> float:
+    """Length of a block [s], 0 for none."""
+    return settings.block.to("time") if isinstance(settings.block, QuantityValue) else 0.0
 
 
 def _require_some_good(raw: RawRecording, common: Common) -> None:
@@ -202,14 +208,15 @@ def _noise(channel: Sampled, bandwidth: float) -> float:
 
 
 def _samples_of_block(
-    common: Common, cleaned: _Cleaned, settings: PreparationSettings, bandwidth: float, noise: tuple[float, float]
+    loop: bool, common: Common, cleaned: _Cleaned, settings: Preparation, bandwidth: float, noise: tuple[float, float]
 ) -> int:
     """Samples of a block of the common clock, 0 for no blocks; a slower channel counts with fewer samples."""
     if settings.block == "auto":
         thinned = [step_of(channel.time) / common.step for channel in (cleaned.input, cleaned.output)]
         each = noise[0] * math.sqrt(thinned[0]), noise[1] * math.sqrt(thinned[1])
-        return block_samples(common, bandwidth, each, settings.loop)
-    return max(1, round(settings.block / common.step)) if settings.block > 0 else 0
+        return block_samples(common, bandwidth, each, loop)
+    block = _stated_block(settings)
+    return max(1, round(block / common.step)) if block > 0 else 0
 
 
 def _flagged(common: Common) -> Flagged:

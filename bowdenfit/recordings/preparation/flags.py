@@ -5,11 +5,11 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from bowdenfit.description import Preparation
 from bowdenfit.recordings.preparation.clock import DROPOUT, GOOD, SATURATED, SPIKE, Sampled, gaps_of, step_of
 from bowdenfit.recordings.preparation.delay import RANGE
 from bowdenfit.recordings.preparation.noise import noise_of, quantum_of
 from bowdenfit.recordings.preparation.shapes import ChosenFlags, ChosenVector, OtherVector, Places
-from bowdenfit.recordings.recording import PreparationSettings
 from bowdenfit.types import Flags, Labels, Vector
 
 _SPIKE_SDS = 8.0
@@ -49,7 +49,7 @@ def runs_of(values: Vector) -> Runs:
 
 
 def flag(
-    time: Vector, force: Vector, other_time: OtherVector, other_force: OtherVector, settings: PreparationSettings
+    time: Vector, force: Vector, other_time: OtherVector, other_force: OtherVector, settings: Preparation
 ) -> tuple[Sampled, tuple[float, float]]:
     """Find what is wrong with the samples of one channel; the readings stay as they are.
 
@@ -71,9 +71,10 @@ def flag(
     other_noise = resolution(other_force[there])
     off = spikes(force)
     lag = round(RANGE / step_of(time))
-    ends, at_end = saturation(np.where(off, np.nan, force), other, other_noise, settings.limits, lag)
+    limits = settings.limits.newtons if settings.limits else None
+    ends, at_end = saturation(np.where(off, np.nan, force), other, other_noise, limits, lag)
     fault = np.full(len(force), GOOD)
-    if settings.saturation == "flag":
+    if settings.saturation != "kept":
         fault[at_end] = SATURATED
     if settings.spikes:
         fault[off] = SPIKE

@@ -1,0 +1,125 @@
+"""A newcomer adds one of everything in a package of their own, with a line in a registry each, and fits with it."""
+
+import json
+import sys
+from functools import partial
+
+import numpy as np
+import pytest
+from click.testing import CliRunner
+from conftest import ROOT
+from scratch import format as bars
+from scratch import law, option, shares
+from scratch.losses import LOSSES
+from scratch.losses import term as losses_term
+
+import bowdenfit as bf
+from bowdenfit.cable.friction import FRICTION_OPTIONS
+from bowdenfit.cable.registry import CONTACT_LAWS
+from bowdenfit.cli.commands import command
+from bowdenfit.files import FORMATS
+from bowdenfit.kinds import KINDS
+from bowdenfit.kinds.terms import TERMS
+from bowdenfit.questions.check.data_set_words import check_text
+from bowdenfit.questions.figures import FIGURES
+
+MU, ANGLE = 0.1, np.deg2rad(180.0)
+DESCRIPTION = """name = "scratch"
+[[contact]]
+name = "sheath"
+friction = "mu"
+{law}
+wrap_angle = {{ value = 180, unit = "deg" }}
+[tables]
+{table} = {{ file = "{table}.csv" }}
+"""
+QUICK = ("sampler.n_walkers=32", "sampler.target_ess=100", "sampler.max_steps=1000", "sampler.target_r_hat=1.2")
+
+
+@pytest.fixture
+def data_set(tmp_path):
+    """Writes a data set of one table: its columns, and what its cable.toml says of the contact's law."""
+
+    def write(table, heads, columns, says=""):
+        (tmp_path / "cable.toml").write_text(DESCRIPTION.format(table=table, law=says))
+        rows = [",".join(f"{cell}" for cell in row) for row in zip(*columns, strict=True)]
+        (tmp_path / f"{table}.csv").write_text("\n".join([heads, *rows]) + "\n")
+        return tmp_path
+
+    return write
+
+
+def pulled(exponent, hidden=0.0, n=12):
+    """Input and output forces while pulling, one run a row, mountings scattering by a percent."""
+    force = np.linspace(10.0, 80.0, n)
+    scatter = 0.01 * np.random.default_rng(1).standard_normal(n)
+    return force, (force + hidden) * np.exp(-exponent - scatter) - hidden
+
+
+def forces(data_set, exponent, says="", hidden=0.0):
+    """A table of such forces."""
+    force, output = pulled(exponent, hidden)
+    runs = [f"run {i}" for i in range(len(force))]
+    return data_set("forces", "input_force_N,output_force_N,run", (force, output, runs), says)
+
+
+def test_a_new_kind_of_table_is_a_folder_and_two_lines(data_set, monkeypatch, tmp_path):
+    monkeypatch.setitem(KINDS, "losses", LOSSES)
+    monkeypatch.setitem(TERMS, "losses", losses_term.LOSSES)
+    force = np.linspace(10.0, 80.0, 15)
+    loss = force * -np.expm1(-MU * ANGLE) + 0.2 * np.random.default_rng(2).standard_normal(15)
+    folder = data_set("losses", "input_force_N,loss_N", (force, loss))
+    assert "15 lost forces" in check_text(bf.read(folder))
+    found = bf.fit(folder, output=tmp_path / "fit", seed=1, settings=QUICK)
+    interval = found.parameter("mu")
+    assert abs(interval.mean - MU) < 4 * interval.sd
+    assert "15 lost forces" in (tmp_path / "fit" / "summary.txt").read_text()
+    assert {"checks.png", "coefficients.png", "pairs.png"} <= {path.name for path in (tmp_path / "fit" / "figures").iterdir()}
+    again = bf.load(tmp_path / "fit")
+    assert json.dumps(again.summary()) == json.dumps(found.summary())
+
+
+def test_a_kind_that_is_not_registered_is_refused_by_name(data_set):
+    with pytest.raises(bf.DescriptionError, match="losses"):
+        bf.read(data_set("losses", "input_force_N,loss_N", ([1.0], [0.1])))
+
+
+def test_a_new_contact_law_is_a_class_and_a_line(data_set, monkeypatch):
+    monkeypatch.setitem(CONTACT_LAWS, "threshold", f"{law.__name__}:{law.Threshold.__name__}")
+    found = bf.fit(forces(data_set, MU * (ANGLE - 0.1), 'law = "threshold"'), mcmc=False)
+    estimate = found.least_squares.estimates["mu"]
+    assert abs(estimate.value - MU) < 4 * estimate.standard_error
+
+
+def test_a_new_option_of_the_friction_model_is_a_class_and_a_line(data_set, monkeypatch):
+    monkeypatch.setitem(FRICTION_OPTIONS, "hidden", option.HiddenTension())
+    found = bf.fit(forces(data_set, MU * ANGLE, hidden=4.0), mcmc=False, friction="hidden", settings=["prior.tau.fixed=0.01"])
+    estimates = found.least_squares.estimates
+    assert abs(estimates["mu"].value - MU) < 4 * estimates["mu"].standard_error
+    assert abs(estimates["hidden"].value - 4.0) < 4 * estimates["hidden"].standard_error
+
+
+def test_a_new_file_format_is_a_module_and_a_line(monkeypatch, tmp_path):
+    monkeypatch.setitem(FORMATS, ".bars", bars.__name__)
+    source = ROOT / "datasets" / "synthetic-recordings" / "recordings" / "470mm_20rpm.csv"
+    heads, *rows = source.read_text().splitlines()
+    units = {"time_s": "time:s", "input_force_N": "input_force:N", "output_force_N": "output_force:N"}
+    path = tmp_path / "pull.bars"
+    kept = [i for i, head in enumerate(heads.split(",")) if head in units]
+    lines = [[units[head] for head in heads.split(",") if head in units]]
+    lines += [[row.split(",")[i] or "nan" for i in kept] for row in rows]
+    path.write_text("\n".join("|".join(line) for line in lines))
+    fit = partial(bf.fit, wrap_angle=(180.0, "deg"), mcmc=False)
+    assert fit(path).least_squares.estimates["mu"].value == pytest.approx(
+        fit(source).least_squares.estimates["mu"].value, rel=1e-9
+    )
+
+
+def test_a_new_question_and_its_figure_are_a_file_and_a_line_each(data_set, monkeypatch, tmp_path):
+    monkeypatch.setitem(FIGURES, "shares", sys.modules[shares.__name__])
+    found = bf.fit(forces(data_set, MU * ANGLE), output=tmp_path / "fit", seed=1, settings=QUICK)
+    assert (tmp_path / "fit" / "figures" / "shares.png").exists()
+    assert [each.contact for each in shares.shares(found)] == ["sheath"]
+    asked = CliRunner().invoke(command(shares.VERB), [str(tmp_path / "fit")])
+    assert asked.output == "sheath: 100% of the loss\n"
+    assert json.loads(CliRunner().invoke(command(shares.VERB), [str(tmp_path / "fit"), "--json"]).output) == {"sheath": 1.0}

@@ -1,0 +1,49 @@
+"""A question: which contact takes what share of the loss? With its figure."""
+
+from dataclasses import dataclass
+from typing import Annotated, Any
+
+import numpy as np
+
+from bowdenfit.inference.interval import Interval
+from bowdenfit.verb import Argument, Reply, Verb
+
+
+@dataclass(frozen=True)
+class Share:
+    """Share of one contact in the friction exponent."""
+
+    contact: str
+    share: Interval
+
+
+def shares(found: Annotated[Any, Argument("RESULTS", results=True)]) -> tuple[Share, ...]:
+    """Shares of all contacts with a constant wrap angle."""
+    contacts = found.dataset.description.contact
+    parts = [found.draws().values[c.friction] * c.wrap_angle.constant.to("angle") for c in contacts]
+    whole = np.sum(parts, axis=0)
+    return tuple(Share(c.name, Interval.of(part / whole)) for c, part in zip(contacts, parts, strict=True))
+
+
+def words(answer, _):
+    """A line a contact."""
+    lines = [f"{each.contact}: {each.share.median:.0%} of the loss" for each in answer]
+    return Reply("\n".join(lines) + "\n", lambda: {each.contact: each.share.median for each in answer})
+
+
+VERB = Verb(shares, words, "Shares of the loss.", "Which contact takes what share of the loss?")
+
+
+def data(fit):
+    """What the figure shows."""
+    return shares(fit) if fit.posterior is not None else None
+
+
+def draw(answer):
+    """A bar a contact."""
+    from bowdenfit.plots.layout import panels
+
+    figure, (axes,) = panels([1.5], 1, 0.1, (0, 0))
+    axes.bar([each.contact for each in answer], [each.share.median for each in answer])
+    axes.set_ylabel("Share of the loss")
+    return figure

@@ -41,7 +41,7 @@ class Cable:
         """The curve of each curved contact, by its column."""
         route = self.description.route
         return {
-            source.column: class_at(CURVES[source.curve])(source.column, route)
+            source.column: class_at(CURVES[source.curve].place)(source.column, route)
             for source in (c.wrap_angle for c in self.description.contact)
             if route is not None and source.column is not None and source.curve is not None
         }

@@ -1,11 +1,12 @@
 """Curve families: how the wrap angle of a contact depends on the route variable.
 
 A new family is one class here or in a file beside it, and one line in `bowdenfit.cable.registry`; the contract tests pick
-it up.
+it up. Every family works in z, the route variable from -1 to 1 over the range, where data can see its coefficients.
 """
 
+from abc import ABC, abstractmethod
 from collections.abc import Mapping
-from typing import Protocol, runtime_checkable
+from typing import ClassVar
 
 import jax.numpy as jnp
 import numpy as np
@@ -13,65 +14,98 @@ from jax import Array
 from jaxtyping import Float
 
 from bowdenfit.description import PriorDefaults, Route
-from bowdenfit.parameters.priors import HalfNormal, Normal
+from bowdenfit.parameters.priors import HalfNormal, Normal, Prior, Uniform
 from bowdenfit.parameters.space import Parameter
-from bowdenfit.physics.geometry import gaussian_coefficients, log_quadratic_wrap_angle
+from bowdenfit.physics.geometry import (
+    gaussian_coefficients,
+    line_wrap_angle,
+    log_quadratic_wrap_angle,
+    logistic_coefficients,
+    logistic_wrap_angle,
+)
 from bowdenfit.types import Vector
 
-
-@runtime_checkable
-class Curve(Protocol):
-    """What a curve family must offer; an instance is the curve of one contact."""
-
-    def __init__(self, column: str, route: Route) -> None: ...
-
-    def parameters(self, detected: Vector, defaults: PriorDefaults) -> tuple[Parameter, ...]:
-        """Its parameters, with priors that may use the detected angles [rad]."""
-        ...
-
-    def wrap_angle(self, values: Mapping[str, Array], route: Float[Array, " rows"]) -> Float[Array, " rows"]:
-        """Wrap angle [rad] at values of the route variable."""
-        ...
-
-    def derived(self, values: Mapping[str, Array]) -> dict[str, Array]:
-        """Derived quantities by name, in the units of `derived_units`."""
-        ...
-
-    def derived_units(self) -> dict[str, tuple[str, str]]:
-        """Unit and symbol of each derived quantity."""
-        ...
+_DEGREE = float(np.deg2rad(1.0))
 
 
-class GaussianCurve:
-    """`theta = A exp(-((l - B)/C)^2)` in log-quadratic coordinates (on-body paper, equation 8; see `physics.geometry`)."""
+class Curve(ABC):
+    """The curve of one contact; a family says its coefficients, its angle, and how people read it.
+
+    Args:
+        column: Column of its angles.
+        route: Route variable and the range over which the curve holds.
+    """
+
+    coefficients: ClassVar[tuple[str, ...]]
+    """Endings of the names of its parameters, after the column."""
+    heading: ClassVar[str]
+    """What the summary calls a table of its derived quantities."""
+    not_limited: ClassVar[str] = ""
+    """What it means that a derived quantity goes to infinity; empty where none can."""
 
     def __init__(self, column: str, route: Route) -> None:
         self.column, self.middle, self.half_width, self.unit = column, route.middle, route.half_width, route.unit
-        self.names = tuple(f"{column}_{letter}" for letter in "abc")
+        self.what = column.replace("_", " ")
+        self.names = tuple(f"{column}_{ending}" for ending in self.coefficients)
+
+    @abstractmethod
+    def parameters(self, detected: Vector, defaults: PriorDefaults) -> tuple[Parameter, ...]:
+        """Its parameters, with priors that may use the detected angles [rad]."""
+
+    @abstractmethod
+    def at(self, z: Float[Array, " rows"], *coefficients: Array) -> Float[Array, " rows"]:
+        """Wrap angle [rad] at z, -1 to 1 over the range, for its coefficients."""
+
+    def derived(self, values: Mapping[str, Array]) -> dict[str, Array]:
+        """Derived quantities by name, in the units of `derived_units`."""
+        del values
+        return {}
+
+    def derived_units(self) -> dict[str, tuple[str, str]]:
+        """Unit and symbol of each derived quantity."""
+        return {}
+
+    def wrap_angle(self, values: Mapping[str, Array], route: Float[Array, " rows"]) -> Float[Array, " rows"]:
+        """Wrap angle [rad] at values of the route variable."""
+        return self.at((route - self.middle) / self.half_width, *(values[name] for name in self.names))
+
+    def _parameter(
+        self, ending: str, letter: str, meaning: str, prior: Prior, unit: str = "1", scale: float = 1.0, words: str = ""
+    ) -> Parameter:
+        name, symbol = f"{self.column}_{ending}", self._symbol(letter)
+        return Parameter(name, symbol, meaning, "curve", prior, unit, scale, prior_words=words)
+
+    def _symbol(self, letter: str) -> str:
+        """The letter with the first word of the column for a subscript."""
+        return rf"${letter}_\mathrm{{{self.column.split('_')[0]}}}$"
+
+    def _level(self, detected: Vector, defaults: PriorDefaults) -> Parameter:
+        """Logarithm of the angle in the middle of the range, about that of the median angle."""
+        level, sd = _median(detected, defaults), defaults.curve_level_sd
+        words = f"Normal(log {np.rad2deg(level):.3g} deg, {sd:g})"
+        meaning = f"logarithm of the {self.what} in the middle of the range"
+        return self._parameter("a", "a", meaning, Normal(float(np.log(level)), sd), "log rad", words=words)
+
+
+class GaussianCurve(Curve):
+    """A bell, `A exp(-((l - B)/C)^2)`, in log-quadratic coordinates (on-body paper, equation 8; see `physics.geometry`)."""
+
+    coefficients = ("a", "b", "c")
+    heading = "Gaussian curves A exp(-((l - B)/C)^2)"
+    not_limited = "the data also allow an exponential, at which A, B and C are infinite; a, b and c above say it all."
 
     def parameters(self, detected: Vector, defaults: PriorDefaults) -> tuple[Parameter, ...]:
         """Level a (log rad), slope b and curvature c >= 0 of the logarithm of the angle."""
-        level = float(np.median(detected)) if len(detected) else np.deg2rad(defaults.curve_level_degrees_without_data)
-        what, symbols = self.column.replace("_", " "), [rf"${x}_\mathrm{{{_short(self.column)}}}$" for x in "abc"]
-        level_sd, slope_sd, curvature_sd = defaults.curve_level_sd, defaults.curve_slope_sd, defaults.curve_curvature_sd
+        slope, curvature = Normal(0.0, defaults.curve_slope_sd), HalfNormal(defaults.curve_curvature_sd)
         return (
-            Parameter(
-                self.names[0],
-                symbols[0],
-                f"logarithm of the {what} in the middle of the range",
-                "curve",
-                Normal(float(np.log(level)), level_sd),
-                "log rad",
-                prior_words=f"Normal(log {np.rad2deg(level):.3g} deg, {level_sd:g})",
-            ),
-            Parameter(self.names[1], symbols[1], f"slope of log {what}", "curve", Normal(0.0, slope_sd)),
-            Parameter(self.names[2], symbols[2], f"curvature of log {what}", "curve", HalfNormal(curvature_sd)),
+            self._level(detected, defaults),
+            self._parameter("b", "b", f"slope of log {self.what}", slope),
+            self._parameter("c", "c", f"curvature of log {self.what}", curvature),
         )
 
-    def wrap_angle(self, values: Mapping[str, Array], route: Float[Array, " rows"]) -> Float[Array, " rows"]:
+    def at(self, z: Float[Array, " rows"], *coefficients: Array) -> Float[Array, " rows"]:
         """exp(a + b z - c z^2)"""
-        a, b, c = (values[name] for name in self.names)
-        return log_quadratic_wrap_angle((route - self.middle) / self.half_width, a, b, c)
+        return log_quadratic_wrap_angle(z, *coefficients)
 
     def derived(self, values: Mapping[str, Array]) -> dict[str, Array]:
         """A, B and C as papers print them; infinite where the curve is an exponential (c = 0)."""
@@ -82,9 +116,78 @@ class GaussianCurve:
     def derived_units(self) -> dict[str, tuple[str, str]]:
         """A in degrees, B and C in the unit of the route."""
         units = {"A": "deg", "B": self.unit, "C": self.unit}
-        return {f"{self.column}_{x}": (u, rf"${x}_\mathrm{{{_short(self.column)}}}$") for x, u in units.items()}
+        return {f"{self.column}_{x}": (unit, self._symbol(x)) for x, unit in units.items()}
 
 
-def _short(column: str) -> str:
-    """First word of a column name, as a subscript."""
-    return column.split("_")[0]
+class LineCurve(Curve):
+    """A straight line between the angles at both ends of the range, neither of which is negative."""
+
+    coefficients = ("start", "end")
+    heading = "Straight lines: angle in the middle of the range, and slope"
+
+    def parameters(self, detected: Vector, defaults: PriorDefaults) -> tuple[Parameter, ...]:
+        """The angle at the start and at the end of the range."""
+        prior, unit = HalfNormal(defaults.curve_end_over_median * _median(detected, defaults)), ("deg", 1 / _DEGREE)
+        words, ends = prior.text(*unit, digits=3), (self.middle - self.half_width, self.middle + self.half_width)
+        return tuple(
+            self._parameter(
+                ending, rf"\theta^\mathrm{{{ending}}}", f"{self.what} at {end:g} {self.unit}", prior, *unit, words
+            )
+            for ending, end in zip(self.coefficients, ends, strict=True)
+        )
+
+    def at(self, z: Float[Array, " rows"], *coefficients: Array) -> Float[Array, " rows"]:
+        """Start (1 - z)/2 + end (1 + z)/2, and 0 where that is negative, outside the range."""
+        return line_wrap_angle(z, *coefficients)
+
+    def derived(self, values: Mapping[str, Array]) -> dict[str, Array]:
+        """The angle in the middle [deg] and the slope [deg per unit of the route]."""
+        start, end = (jnp.rad2deg(values[name]) for name in self.names)
+        slope = (end - start) / (2 * self.half_width)
+        return {f"{self.column}_middle": (start + end) / 2, f"{self.column}_slope": slope}
+
+    def derived_units(self) -> dict[str, tuple[str, str]]:
+        """Degrees, and degrees per unit of the route."""
+        return {
+            f"{self.column}_middle": ("deg", self._symbol("M")),
+            f"{self.column}_slope": (f"deg/{self.unit}", self._symbol("S")),
+        }
+
+
+class LogisticCurve(Curve):
+    """A rise or fall between 0 and a plateau, `A / (1 + exp(-(l - B)/C))` (Verhulst 1838; see `physics.geometry`)."""
+
+    coefficients = ("a", "k", "s")
+    heading = "Logistic curves A / (1 + exp(-(l - B)/C))"
+    not_limited = "the data also allow an exponential, at which A and B are infinite; a, k and s above say it all."
+
+    def parameters(self, detected: Vector, defaults: PriorDefaults) -> tuple[Parameter, ...]:
+        """Level a (log rad), steepness k, and the share s of the plateau that the middle of the range has reached."""
+        steepness = Normal(0.0, defaults.curve_steepness_sd)
+        return (
+            self._level(detected, defaults),
+            self._parameter("k", "k", f"steepness of the {self.what}", steepness),
+            self._parameter(
+                "s", "s", f"share of its plateau that the {self.what} has in the middle", Uniform(0.0, 1.0)
+            ),
+        )
+
+    def at(self, z: Float[Array, " rows"], *coefficients: Array) -> Float[Array, " rows"]:
+        """exp(a) / (s + (1 - s) exp(-k z))"""
+        return logistic_wrap_angle(z, *coefficients)
+
+    def derived(self, values: Mapping[str, Array]) -> dict[str, Array]:
+        """Plateau A, place B of half of it and length C of the e-fold; A and B infinite of an exponential (s = 0)."""
+        a, k, s = (values[name] for name in self.names)
+        A, B, C = logistic_coefficients(a, k, s, self.middle, self.half_width)
+        return {f"{self.column}_A": jnp.rad2deg(A), f"{self.column}_B": B, f"{self.column}_C": C}
+
+    def derived_units(self) -> dict[str, tuple[str, str]]:
+        """A in degrees, B and C in the unit of the route."""
+        units = {"A": "deg", "B": self.unit, "C": self.unit}
+        return {f"{self.column}_{x}": (unit, self._symbol(x)) for x, unit in units.items()}
+
+
+def _median(detected: Vector, defaults: PriorDefaults) -> float:
+    """The median detected angle [rad], or a usual one where none was detected."""
+    return float(np.median(detected)) if len(detected) else defaults.curve_level_degrees_without_data * _DEGREE

@@ -1,17 +1,36 @@
 """Contact laws and curve families by name, and where their classes stand.
 
-Nothing is loaded before a cable needs it, so that a description can be judged without JAX. A new one is one line here, of the
-form "module:Class".
+Nothing is loaded before a cable needs it, so that a description can be judged without JAX. A new one is one line here, with
+the place of its class as "module:Class".
 """
 
+from dataclasses import dataclass
 from importlib import import_module
 from typing import Any
 
 from bowdenfit.description import Description
 from bowdenfit.errors import DescriptionError, nearest
 
+
+@dataclass(frozen=True)
+class Family:
+    """A family of curves.
+
+    Args:
+        place: Where its class stands.
+        coefficients: How many a curve of it has.
+    """
+
+    place: str
+    coefficients: int
+
+
 CONTACT_LAWS = {"capstan": "bowdenfit.cable.laws:Capstan", "wobble": "bowdenfit.cable.laws:Wobble"}
-CURVES = {"gaussian": "bowdenfit.cable.curves:GaussianCurve"}
+CURVES = {
+    "gaussian": Family("bowdenfit.cable.curves:GaussianCurve", 3),
+    "line": Family("bowdenfit.cable.curves:LineCurve", 2),
+    "logistic": Family("bowdenfit.cable.curves:LogisticCurve", 3),
+}
 
 
 def check_names(description: Description) -> None:
@@ -21,10 +40,11 @@ def check_names(description: Description) -> None:
         DescriptionError: One is unknown.
     """
     for contact in description.contact:
-        for what, name, known in (("law", contact.law, CONTACT_LAWS), ("curve", contact.wrap_angle.curve, CURVES)):
+        named = (("law", contact.law, list(CONTACT_LAWS)), ("curve", contact.wrap_angle.curve, list(CURVES)))
+        for what, name, known in named:
             if name is not None and name not in known:
                 raise DescriptionError(
-                    f"cable.toml, contact {contact.name!r}: the {what} {name!r} is unknown{nearest(name, list(known))}"
+                    f"cable.toml, contact {contact.name!r}: the {what} {name!r} is unknown{nearest(name, known)}"
                 )
 
 

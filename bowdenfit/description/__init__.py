@@ -225,6 +225,8 @@ class PriorDefaults(Frozen):
     curve_level_degrees_without_data: Positive = 30.0
     curve_slope_sd: Positive = 3.0
     curve_curvature_sd: Positive = 0.5
+    curve_steepness_sd: Positive = 5.0
+    curve_end_over_median: Positive = 3.0
     angle_noise_degrees: Positive = 5.0
     run_scatter: Positive = 0.02
     force_noise_newtons: Positive = 2.0

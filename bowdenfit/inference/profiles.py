@@ -97,12 +97,17 @@ class Basin:
         return there["stacked"][: -len(z)] @ there["sensitivity"]
 
     def rise(self, index: int) -> Callable[[float], float]:
-        """By how much the sum of squares is larger where z of a parameter is pinned; not a number where it has none."""
+        """By how much the sum of squares is larger where z of a parameter is pinned; not a number where it has none.
+
+        Each solve starts from the nearest one on the way from the minimum: one from beyond may lie in another valley.
+        """
         known, lowest = [self.found["z"]], _total(self.found)
+        center = float(self.found["z"][index])
 
         @cache
         def at(z: float) -> float:
-            found = self.moved(index, z, min(known, key=lambda other: abs(other[index] - z)))
+            way = [other for other in known if abs(other[index] - center) <= abs(z - center)]
+            found = self.moved(index, z, min(way, key=lambda other: abs(other[index] - z)))
             if not np.isfinite(_total(found)):
                 return float("nan")
             known.append(found["z"])

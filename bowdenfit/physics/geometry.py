@@ -1,4 +1,4 @@
-"""Wrap angle against cable length: the Gaussian curve, in the coordinates that data can see and in the printed ones."""
+"""Wrap angle against cable length: curves in the coordinates that data can see, and in the printed ones."""
 
 import jax.numpy as jnp
 from jax import Array
@@ -93,3 +93,73 @@ def log_quadratic_coefficients(
     c = (half_width / C) ** 2
     b = 2 * c * (B - middle) / half_width
     return jnp.log(A) - b**2 / (4 * c), b, c
+
+
+def line_wrap_angle(
+    z: Float[Array, "*batch"], start: Float[Array, "*#batch"], end: Float[Array, "*#batch"]
+) -> Float[Array, "*batch"]:
+    r"""A straight line, by its angles at the ends of the measured range; 0 where it would be negative, outside the range.
+
+    .. math:: \theta = \frac{1 - z}{2} \theta_\text{start} + \frac{1 + z}{2} \theta_\text{end}
+
+    Args:
+        z: Cable length, -1 and +1 at the ends of the measured range [1].
+        start: Wrap angle at z = -1, not negative [rad].
+        end: Wrap angle at z = +1, not negative [rad].
+
+    Returns:
+        Wrap angle [rad].
+    """
+    return jnp.maximum((1 - z) / 2 * start + (1 + z) / 2 * end, 0.0)
+
+
+def logistic_wrap_angle(
+    z: Float[Array, "*batch"], a: Float[Array, "*#batch"], k: Float[Array, "*#batch"], s: Float[Array, "*#batch"]
+) -> Float[Array, "*batch"]:
+    r"""A rise (or, with k < 0, a fall) between 0 and a plateau, by what it is in the middle of the measured range.
+
+    .. math:: \theta = \frac{e^a}{s + (1 - s) e^{-k z}}
+
+    At s = 0 the curve is an exponential of the length, at s = 1 or k = 0 constant. It stays finite however steep it is.
+
+    Args:
+        z: Cable length, 0 in the middle of the measured range and +-1 at its ends [1].
+        a: Logarithm of the wrap angle in the middle [log rad].
+        k: Steepness: slope of the logarithm of the angle far from the plateau [1].
+        s: Share of the plateau that is reached in the middle, 0 to 1 [1].
+
+    Returns:
+        Wrap angle [rad].
+
+    References:
+        P. F. Verhulst, Notice sur la loi que la population suit dans son accroissement (1838), in other coordinates.
+    """
+    return jnp.exp(a) / (s + (1 - s) * jnp.exp(-k * z))
+
+
+def logistic_coefficients(
+    a: Float[Array, "*batch"],
+    k: Float[Array, "*batch"],
+    s: Float[Array, "*batch"],
+    middle: float,
+    half_width: float,
+) -> tuple[Float[Array, "*batch"], Float[Array, "*batch"], Float[Array, "*batch"]]:
+    r"""A, B and C of :math:`A / (1 + e^{-(l - B)/C})` from the coefficients of `logistic_wrap_angle`.
+
+    .. math::
+        A = \frac{e^a}{s}, \quad B = l_\text{mid} + \frac{l_\text{half}}{k} \log\frac{1 - s}{s}, \quad
+        C = \frac{l_\text{half}}{k}
+
+    A and B go to infinity as s goes to 0; callers must say so instead of printing the number.
+
+    Args:
+        a: Logarithm of the wrap angle in the middle [log rad].
+        k: Steepness [1].
+        s: Share of the plateau that is reached in the middle [1].
+        middle: Middle of the measured range [mm].
+        half_width: Half the measured range [mm].
+
+    Returns:
+        A [rad], B [mm], C [mm].
+    """
+    return jnp.exp(a) / s, middle + half_width / k * jnp.log((1 - s) / s), half_width / k

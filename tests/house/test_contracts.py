@@ -97,7 +97,7 @@ def test_parameters_of_a_contact_law_are_fully_declared_and_named_after_the_cont
 
 @pytest.mark.parametrize("name", CURVES)
 def test_a_curve_gives_positive_finite_angles_over_the_prior(name):
-    curve = class_at(CURVES[name])("sheath_angle", ROUTE)
+    curve = class_at(CURVES[name].place)("sheath_angle", ROUTE)
     parameters = curve.parameters(np.array([0.3, 0.5, 0.9]), DEFAULTS)
     for z in np.random.default_rng(0).standard_normal((200, len(parameters))):
         values = {p.name: p.prior.constrain(jnp.array(x)) for p, x in zip(parameters, z, strict=True)}
@@ -108,7 +108,7 @@ def test_a_curve_gives_positive_finite_angles_over_the_prior(name):
 
 @pytest.mark.parametrize("name", CURVES)
 def test_a_curve_names_the_unit_of_every_derived_quantity(name):
-    curve = class_at(CURVES[name])("sheath_angle", ROUTE)
+    curve = class_at(CURVES[name].place)("sheath_angle", ROUTE)
     parameters = curve.parameters(np.array([0.3, 0.5, 0.9]), DEFAULTS)
     values = {p.name: p.prior.constrain(jnp.array(0.3)) for p in parameters}
     assert set(curve.derived(values)) == set(curve.derived_units())
@@ -116,7 +116,7 @@ def test_a_curve_names_the_unit_of_every_derived_quantity(name):
 
 @pytest.mark.parametrize("name", CURVES)
 def test_parameters_of_a_curve_are_fully_declared(name):
-    for p in class_at(CURVES[name])("sheath_angle", ROUTE).parameters(np.zeros(0), DEFAULTS):
+    for p in class_at(CURVES[name].place)("sheath_angle", ROUTE).parameters(np.zeros(0), DEFAULTS):
         assert p.symbol.startswith("$")
         assert p.meaning
         assert p.prior_text

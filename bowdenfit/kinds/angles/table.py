@@ -5,6 +5,7 @@ from typing import Literal
 
 import numpy as np
 
+from bowdenfit.cable.registry import CURVES
 from bowdenfit.description import Description, QuantityValue, Table
 from bowdenfit.files.columns import Column, Quantity, find_columns, require
 from bowdenfit.files.csv_table import Cell, read_csv
@@ -22,7 +23,8 @@ from bowdenfit.kinds.rows import (
 )
 from bowdenfit.types import Matrix, Vector
 
-_FEWEST = 3  # detected angles below which a curve's shape rests on its priors; as many as it has coefficients
+_FEWEST = 3  # detected angles that a plausible table has of each curve
+_NUMBERS = {2: "two", 3: "three"}
 
 
 class AngleSettings(Table):
@@ -141,10 +143,11 @@ def warnings_of(table: AngleTable, description: Description, measurements: Measu
     inside, warnings = (table.route >= low) & (table.route <= high), []
     for contact in description.curved:
         n = int(np.isfinite(table.column(contact.wrap_angle.column or "")[0][inside]).sum())
-        if n < _FEWEST:
+        coefficients = CURVES[contact.wrap_angle.curve or ""].coefficients
+        if n < coefficients:
             warnings.append(
-                f"the curve of {contact.name!r} has three coefficients and {n} detected angles in the range; "
-                "its shape will rest on the priors."
+                f"the curve of {contact.name!r} has {_NUMBERS.get(coefficients, coefficients)} coefficients "
+                f"and {n} detected angles in the range; its shape will rest on the priors."
             )
     return warnings
 

@@ -7,6 +7,7 @@ from typing import Any, ClassVar
 import numpy as np
 
 from bowdenfit.cable.load_cells import RUN_SCATTER
+from bowdenfit.description import Description
 from bowdenfit.errors import UsageError
 from bowdenfit.inference.comparison import Difference, Prediction, differences, stacking_weights
 from bowdenfit.inference.interval import Interval
@@ -17,6 +18,7 @@ from bowdenfit.kinds.angles.table import AngleSettings
 from bowdenfit.questions.compare.common_readings import ANGLES, Common, Omitted, common_readings
 from bowdenfit.questions.recorded.rate import RateEffect, rate_effect
 from bowdenfit.results.record import Draws, Record
+from bowdenfit.words import listed
 
 _SHOWN_ROLES = {"friction", "friction_model", "sensor"}
 Report = Callable[[str], None]
@@ -153,7 +155,7 @@ def compare(fits: Mapping[str, Record], report: Report | None = None) -> Compari
         {name: weights[name] for name in order},
         {name: predictions[name] for name in order},
         common.omitted,
-        {name: _described(fit) for name, fit in ordered.items()},
+        _described_all(ordered),
         _parameters(ordered),
         {
             n: (f.optimal_length().length, f.dataset.description.route.unit)
@@ -210,6 +212,19 @@ def _predicted(name: str, fit: Record, drawn: Draws, common: Common, report: Rep
 def _effective(drawn: Draws) -> float:
     """Effective number of draws: the smallest of any quantity."""
     return min((d.ess_bulk for d in drawn.diagnostics.values()), default=float(drawn.z[..., 0].size))
+
+
+def _described_all(fits: Mapping[str, Record]) -> dict[str, str]:
+    """What sets each fit apart; the families of its curves where the fits do not agree on them."""
+    families = {name: _families(fit.dataset.description) for name, fit in fits.items()}
+    differ = len(set(families.values())) > 1
+    return {name: _described(fit) + (f", {families[name]}" if differ else "") for name, fit in fits.items()}
+
+
+def _families(description: Description) -> str:
+    """Families of its curves, one word where all are of one, else in the order of the contacts."""
+    curves = [c.wrap_angle.curve or "" for c in description.curved]
+    return f"{listed(curves if len(set(curves)) > 1 else curves[:1])} curves"
 
 
 def _described(fit: Record) -> str:

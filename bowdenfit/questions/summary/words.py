@@ -2,6 +2,7 @@
 
 from typing import Any
 
+from bowdenfit.cable.curves import Curve
 from bowdenfit.cable.load_cells import RUN_SCATTER
 from bowdenfit.kinds import each_table, readings_called
 from bowdenfit.kinds.angles.table import AngleSettings
@@ -203,19 +204,26 @@ def _rests_on_prior(page: dict[str, Any]) -> str:
 
 
 def _curves(fit: Record, page: dict[str, Any]) -> str:
-    if not page["curves"] or fit.posterior is None:
+    """Derived quantities of the curves, a table for each family."""
+    if fit.posterior is None:
         return ""
-    lines = ["Gaussian curves A exp(-((l - B)/C)^2), median (90 % interval):"]
-    for name, c in page["curves"].items():
-        unlimited = any(c[q] is None or abs(c[q]) > _UNLIMITED for q in ("q05", "median", "q95"))
-        interval = (
-            f"{c['median']:.4g} ({c['q05']:.4g} to {c['q95']:.4g}) {c['unit']}" if not unlimited else "not limited"
+    families: dict[type[Curve], list[str]] = {}
+    for curve in fit.model.cable.curves.values():
+        families.setdefault(type(curve), []).extend(curve.derived_units())
+    return "\n\n".join(_family(family, names, page["curves"]) for family, names in families.items() if names)
+
+
+def _family(family: type[Curve], names: list[str], page: dict[str, Any]) -> str:
+    lines, note = [f"{family.heading}, median (90 % interval):"], False
+    for name in names:
+        c = page[name]
+        unlimited = bool(family.not_limited) and any(
+            c[q] is None or abs(c[q]) > _UNLIMITED for q in ("q05", "median", "q95")
         )
+        interval = "not limited" if unlimited else f"{c['median']:.4g} ({c['q05']:.4g} to {c['q95']:.4g}) {c['unit']}"
         lines.append(f"  {name:<30} {interval}")
-    if any(line.endswith("not limited") for line in lines):
-        note = "Not limited: the data also allow an exponential, at which A, B and C are infinite; a, b and c above say it all."
-        lines.append(filled(note, indent="  "))
-    return "\n".join(lines)
+        note = note or unlimited
+    return "\n".join([*lines, *([filled(f"Not limited: {family.not_limited}", indent="  ")] if note else [])])
 
 
 def _scatter(page: dict[str, Any]) -> str:

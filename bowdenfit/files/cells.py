@@ -141,11 +141,10 @@ class Cell:
 
 def number_of(text: str, decimal: str) -> float | None:
     """The number of a recording with one decimal mark, NaN where it is missing, None where there is text."""
-    plain = _plain(text)
-    if plain.lower() in MISSING:
-        return math.nan
-    match = _NUMBER.fullmatch(plain)
-    return float(plain.replace(",", ".")) if match and match["mark"] in (None, decimal) else None
+    match = _NUMBER.fullmatch(text) or _NUMBER.fullmatch(_plain(text))
+    if match:
+        return float(match[0].replace(",", ".")) if match["mark"] in (None, decimal) else None
+    return math.nan if _plain(text).lower() in MISSING else None
 
 
 def kind_of(text: str, decimal: str) -> Kind:

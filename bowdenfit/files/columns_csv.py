@@ -19,7 +19,16 @@ from bowdenfit.files.libraries import load
 from bowdenfit.files.outcome import LeftOut, channel_file, refuse_larger
 from bowdenfit.files.sheet_columns import SheetRows, columns_of
 from bowdenfit.files.sheets import channels_of, with_rate
-from bowdenfit.files.text_file import Line, Section, first_bytes, last_lines, lines_between, rows_before
+from bowdenfit.files.text_file import (
+    Line,
+    Section,
+    comment_mark,
+    first_bytes,
+    is_blank,
+    last_lines,
+    lines_between,
+    rows_before,
+)
 
 LARGEST_BYTES = 2 << 30
 _FIRST_BYTES = 1 << 18
@@ -112,9 +121,8 @@ def _rows(path: Path, sheet: Sheet, start: int, stop: int, before: dict[int, lis
 
     def cells() -> Iterator[Sequence[str] | None]:
         for text in lines_between(path, sheet.encoding, start, stop):
-            line = Line(0, 0, text)
-            filled = [""] if line.blank else cells_of(text, sheet.separator)
-            yield None if line.comment else filled if text.strip(spaces) else []
+            filled = [""] if is_blank(text) else cells_of(text, sheet.separator)
+            yield None if comment_mark(text) else filled if text.strip(spaces) else []
 
     def number(position: int) -> int:
         return rows_before(path, start) + position + 1

@@ -3,7 +3,7 @@
 import math
 import re
 from array import array
-from collections.abc import Callable, Iterable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass
 from datetime import timedelta
 from typing import Any
@@ -11,7 +11,7 @@ from typing import Any
 import numpy as np
 
 from bowdenfit.files.cells import Cell, kind_of, number_of
-from bowdenfit.files.clocks import is_date, seconds_of_dates
+from bowdenfit.files.clocks import seconds_of_dates
 from bowdenfit.files.csv_rows import too_many_cells
 from bowdenfit.files.layout import Layout, is_summary
 from bowdenfit.types import Vector
@@ -35,7 +35,7 @@ class SheetRows:
         number: The number in the file of the row at a position, from 0.
         decimal: Decimal mark of numbers that are text.
         of_text: Whether they are lines of text, of which blank ones are only space and none may have too many cells.
-        before: Numbers or dates of each column that have been read from the rows before, in pieces.
+        before: Numbers or dates of each column that have been read from the rows before, in pieces; taken out.
     """
 
     place: str
@@ -44,7 +44,7 @@ class SheetRows:
     number: Callable[[int], int]
     decimal: str = "."
     of_text: bool = False
-    before: Mapping[int, list[np.ndarray]] | None = None
+    before: dict[int, list[np.ndarray]] | None = None
 
 
 @dataclass(frozen=True)
@@ -85,7 +85,7 @@ def columns_of(sheet: SheetRows) -> tuple[list[Vector | None], list[str]]:
     before = sheet.before or {}
     for i, values in (cells.numbers | cells.dates).items():
         found = np.array(values[:stop], dtype=object if i in cells.dates else float)[kept]
-        whole = np.concatenate([*before.get(i, ()), found])
+        whole = np.concatenate([*before.pop(i, ()), found])
         if i in cells.dates:
             columns[i] = seconds_of_dates(whole, f"{sheet.place}, column {shown(sheet.layout.name(i))}")
         else:
@@ -96,10 +96,12 @@ def columns_of(sheet: SheetRows) -> tuple[list[Vector | None], list[str]]:
 
 def text_of(cell: object) -> str:
     """A cell as text: dates as ISO dates, true and false as words."""
+    if isinstance(cell, str):
+        return cell
     if isinstance(cell, timedelta):
         return repr(cell.total_seconds())
-    if cell is None or isinstance(cell, str):
-        return cell or ""
+    if cell is None:
+        return ""
     return repr(cell) if isinstance(cell, bool | int | float) else str(cell)
 
 
@@ -109,31 +111,24 @@ def _read(sheet: SheetRows) -> _Cells:
     cells = _Cells(numbers, {i: [] for i, kind in enumerate(kinds) if kind == "date"}, [], bytearray())
     for position, row in enumerate(sheet.rows):
         known, filled = len(cells.words), row or ()
-        if sheet.of_text and any(map(str.strip, filled[len(kinds) :])):
+        if sheet.of_text and len(filled) > len(kinds) and any(map(str.strip, filled[len(kinds) :])):
             cells.words.append((position, len(kinds), filled))
         for i, column in cells.numbers.items():
             cell = filled[i] if i < len(filled) else None
-            column.append(cell if type(cell) is float else _number(cells, position, i, cell, sheet.decimal))
+            column.append(cell if type(cell) in (float, int) else _number(cells, position, i, cell, sheet.decimal))
         for i, texts in cells.dates.items():
             texts.append(text_of(filled[i]) if i < len(filled) else "")
-            if texts[-1] and not is_date(texts[-1].strip()):
+            if kind_of(texts[-1], sheet.decimal) == "text":
                 cells.words.append((position, i, texts[-1]))
         cells.letters.append(_letter(row, sheet, len(cells.words) > known))
     return cells
 
 
 def _number(cells: _Cells, row: int, column: int, cell: object, decimal: str) -> float:
-    if cell is None:
-        return math.nan
-    if isinstance(cell, float | int) and not isinstance(cell, bool):
-        return float(cell)
-    if isinstance(cell, timedelta):
-        return cell.total_seconds()
-    value = None if isinstance(cell, bool) else number_of(str(cell), decimal)
+    value = number_of(text_of(cell), decimal)
     if value is None:
-        cells.words.append((row, column, str(cell)))
-        return math.nan
-    return value
+        cells.words.append((row, column, text_of(cell)))
+    return math.nan if value is None else value
 
 
 def _letter(row: Sequence[Any] | None, sheet: SheetRows, worded: bool) -> int:

@@ -57,16 +57,13 @@ def read(path: Path) -> ChannelFile:
 @contextmanager
 def _quiet() -> Iterator[None]:
     """Keep the library's own warnings off the terminal; what they say becomes a remark."""
-    logger = logging.getLogger("nptdms")
-    chatty = [logger, *(logging.getLogger(name) for name in ("nptdms.reader", "nptdms.tdms_segment", "nptdms.tdms"))]
-    levels = [each.level for each in chatty]
-    for each in chatty:
-        each.setLevel(logging.CRITICAL)
+    manager = load("nptdms.log", "TDMS").log_manager
+    level = manager.log_level
+    manager.set_level(logging.CRITICAL)
     try:
         yield
     finally:
-        for each, level in zip(chatty, levels, strict=True):
-            each.setLevel(level)
+        manager.set_level(level)
 
 
 def _name(channel: Any) -> str:

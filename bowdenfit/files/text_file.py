@@ -37,13 +37,12 @@ class Line:
     @property
     def blank(self) -> bool:
         """Whether it holds nothing but separators."""
-        return not self.text.strip(" \t\r\n;,|\"'")
+        return is_blank(self.text)
 
     @property
     def comment(self) -> str:
-        """The mark (# or %) that makes it a comment, else nothing; a row of data may begin with Excel's #N/A."""
-        match = _COMMENT.match(self.text)
-        return match["mark"] if match else ""
+        """The mark that makes it a comment, else nothing."""
+        return comment_mark(self.text)
 
 
 class Section(io.RawIOBase):
@@ -137,6 +136,17 @@ def rows_before(path: Path, stop: int) -> int:
         while stop > 0 and (data := file.read(min(_PIECE, stop))):
             feeds, returns, stop = feeds + data.count(b"\n"), returns + data.count(b"\r"), stop - len(data)
     return feeds or returns
+
+
+def is_blank(line: str) -> bool:
+    """Whether a line holds nothing but separators."""
+    return not line.strip(" \t\r\n;,|\"'")
+
+
+def comment_mark(line: str) -> str:
+    """The mark (# or %) that makes a line a comment, else nothing; a row of data may begin with Excel's #N/A."""
+    match = _COMMENT.match(line)
+    return match["mark"] if match else ""
 
 
 def _encoding(data: bytes, name: str, whole: bool) -> tuple[str, int]:

@@ -10,12 +10,14 @@ References:
 
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
+from typing import ClassVar
 
 import numpy as np
 
 from bowdenfit.inference.psis import RELIABLE_K, smoothed
 
 SENSITIVE = 0.05  # from which a quantity is said to be sensitive
+_CONFLICT = 2.0  # prior standard deviations from the prior's median to the posterior, beyond which the two are at odds
 _POWERS = (0.99, 1.01)
 _WIDER = 0.5  # power at which a prior is sqrt(2) times as wide
 
@@ -42,6 +44,17 @@ class Sensitivity:
     sd: float
     wider: float
     prior_sds: float
+
+    JSON: ClassVar = (..., "diagnosis")
+
+    @property
+    def diagnosis(self) -> str:
+        """What it means: "readings decide", "prior decides", "conflict", or "both count"."""
+        if not self.prior > SENSITIVE:
+            return "readings decide"
+        if not self.likelihood > SENSITIVE:
+            return "prior decides"
+        return "conflict" if abs(self.prior_sds) > _CONFLICT else "both count"
 
 
 def sensitivities(

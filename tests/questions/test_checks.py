@@ -19,12 +19,12 @@ from bowdenfit.inference.predictive_checks import LeftOut, left_out_readings, pl
 from bowdenfit.inference.prior_sensitivity import SENSITIVE, sensitivities
 from bowdenfit.model import build_model
 from bowdenfit.questions.check import checks_figure, prior_figure
-from bowdenfit.questions.check.answer import TableChecks, checks_of, diagnosis, trends_of
+from bowdenfit.questions.check.answer import Checks, checks_of, trends_of
 from bowdenfit.questions.check.checks_figure import CheckedTable, checked_tables
-from bowdenfit.questions.check.page import checks_page
 from bowdenfit.questions.check.prior_predictive import prior_predictive
 from bowdenfit.questions.check.prior_words import prior_predictive_text
 from bowdenfit.questions.check.residual_places import Places
+from bowdenfit.questions.check.table_checks import TableChecks
 from bowdenfit.questions.check.words import checks_text
 from bowdenfit.results.record import Draws, Provenance, Record
 
@@ -136,7 +136,7 @@ def test_power_scaling_tells_what_decides(reading, sd, expected):
     (found,) = sensitivities(
         {"mu": 0.1 + 0.01 * z}, {"mu": z, "other": z[::-1] * 0 + normal_posterior(0, 0.1, 1)[0]}, log_likelihood
     )
-    assert diagnosis(found) == expected
+    assert found.diagnosis == expected
     assert found.parameter == "mu"
     assert (found.prior > SENSITIVE) == (expected != "readings decide")
 
@@ -172,13 +172,13 @@ def test_deviations_that_depend_on_load_or_stroke_are_named(planted, words):
     """Noise alone gives a trend in 1 of 100 tables; the planted ones are 4 sds and more; the seed is fixed."""
     load, back = np.tile(np.linspace(0, 100, 40), 2), np.repeat([False, True], 40)
     z = np.random.default_rng(2).standard_normal(80) + planted(load, back)
-    page = {"trends": [dataclasses.asdict(t) for t in trends_of((stretch_table(z, load, back),))]}
-    text = checks_text({"readings": READINGS, "tables": [], "sensitivities": []} | page)
+    tables = (stretch_table(z, load, back),)
+    trends = trends_of(tables)
+    text = checks_text(Checks(tables, trends, ()))
     assert all(each in " ".join(text.split()) for each in words)
-    assert len(page["trends"]) == len(words)
+    assert len(trends) == len(words)
 
 
-READINGS = [{"outlier": False, "decisive": False, "inside": True}]
 QUICK = ("sampler.n_walkers=128", "sampler.target_ess=200", "sampler.target_r_hat=1.05", "sampler.max_steps=3000")
 
 
@@ -190,7 +190,7 @@ def fit(on_body):
 
 def said(fit):
     """What the summary says of the checks, in one line."""
-    return " ".join(checks_text(fit.summary()["checks"]).split())
+    return " ".join(checks_text(fit.checks).split())
 
 
 def test_the_on_body_fit_has_no_outlier_and_says_so_of_550_mm(fit):
@@ -204,7 +204,7 @@ def test_the_on_body_fit_has_no_outlier_and_says_so_of_550_mm(fit):
     text = said(fit)
     assert "No reading is an outlier." in text
     assert "Outside the range of the curves: efficiency at 550 mm: measured 67.8 %, expected 68." in text
-    assert len(checks_text(page).splitlines()) <= 10
+    assert len(checks_text(fit.checks).splitlines()) <= 10
 
 
 def test_every_reading_has_a_row_and_undetected_angles_are_bounds(fit):
@@ -225,14 +225,13 @@ def test_every_reading_has_a_row_and_undetected_angles_are_bounds(fit):
 def test_the_same_fit_gives_the_same_checks_and_so_does_the_saved_one(fit, tmp_path):
     fit.save(tmp_path / "fit")
     assert bf.load(tmp_path / "fit").summary()["checks"] == fit.summary()["checks"]
-    assert checks_page(checks_of(fit)) is not checks_page(checks_of(fit))
 
 
 def test_without_draws_there_are_no_checks(on_body):
     squares = bf.fit(on_body, mcmc=False)
     assert squares.checks is None
     assert "checks" not in squares.summary()
-    assert checks_text({}) == ""
+    assert checks_text(squares.checks) == ""
 
 
 def changed(dataset, table, column, row, by):
@@ -248,8 +247,8 @@ def test_an_angle_misread_by_ten_sds_is_the_one_that_is_named(on_body):
     right = bf.read(on_body, settings=QUICK)
     row = int(np.flatnonzero(right.measurements.angles.route == 490.0)[0])
     found = bf.fit(changed(right, "angles", "angle", (row, 0), np.deg2rad(21.0)), seed=1).checks
-    assert [table.labels[i] for table, i in found.outliers] == ["free_sheath_angle at 490 mm"]
-    text = " ".join(checks_text(checks_page(found)).split())
+    assert [reading.label for reading in found.outliers] == ["free_sheath_angle at 490 mm"]
+    text = " ".join(checks_text(found).split())
     assert "Outlier: free_sheath_angle at 490 mm: measured 61.0 deg, expected" in text
     figure = checks_figure.draw(checked_tables(found))
     check_words(figure, "an outlier")
@@ -278,7 +277,7 @@ def test_a_prior_that_is_wrong_and_narrow_is_reported_as_a_conflict(forces, prio
     assert ("Prior and readings contradict each other about mu" in text) == conflict
     assert ("Check the prior, its unit first." in text) == conflict
     (found,) = fit.checks.sensitivities
-    assert (diagnosis(found) == "conflict") == conflict
+    assert (found.diagnosis == "conflict") == conflict
     assert not conflict or found.wider < found.median
 
 

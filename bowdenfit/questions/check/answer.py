@@ -1,71 +1,21 @@
 """Checks of a fit against its own readings: outliers, readings that decide by themselves, trends, and weight of the priors."""
 
 from dataclasses import dataclass
+from functools import cached_property
+from typing import ClassVar
 
 import numpy as np
 
-from bowdenfit.inference.predictive_checks import (
-    LeftOut,
-    Uniformity,
-    left_out_readings,
-    placed_at_random,
-    uniformity,
-)
-from bowdenfit.inference.prior_sensitivity import SENSITIVE, Sensitivity, sensitivities
-from bowdenfit.inference.psis import RELIABLE_K
+from bowdenfit.inference.predictive_checks import left_out_readings, placed_at_random, uniformity
+from bowdenfit.inference.prior_sensitivity import Sensitivity, sensitivities
 from bowdenfit.kinds.term import Term
-from bowdenfit.questions.check.residual_places import STROKE, Places, places_of
+from bowdenfit.questions.check.residual_places import STROKE, places_of
+from bowdenfit.questions.check.table_checks import FALSE_ALARM, CheckedReading, TableChecks
 from bowdenfit.results.record import Draws, Record, once
 
-FALSE_ALARM = 0.01  # chance that a healthy fit is said to have an outlier; the same for the other kinds of alarm
 _LEAST_READINGS = 8  # of a table, below which neither its distribution nor a trend can be judged
-_CONFLICT = 2.0  # prior standard deviations from the prior's median to the posterior, beyond which the two are at odds
 _DRAWS = 5000  # that sensitivity to the priors is worked out from
 _STREAM = 5  # of the fit's random numbers
-
-
-@dataclass(frozen=True)
-class TableChecks:
-    """Readings of one table, each beside what everything else says of it.
-
-    Args:
-        table: Name of the readings in results.
-        unit: Their unit.
-        labels: Each in words.
-        reading: The readings; the bound of those that are only known to be at most so.
-        at_most: Whether a reading is such a bound.
-        predicted: Each reading's prediction without itself.
-        places: Where each was taken.
-        probability: Where each lies in its prediction, uniform between 0 and 1 if all is right.
-        uniformity: Whether these are uniform; None of few readings.
-    """
-
-    table: str
-    unit: str
-    labels: tuple[str, ...]
-    reading: np.ndarray
-    at_most: np.ndarray
-    predicted: LeftOut
-    places: Places
-    probability: np.ndarray
-    uniformity: Uniformity | None
-
-    @property
-    def z_score(self) -> np.ndarray:
-        """Deviations from the predictions in their standard deviations; NaN of a bound."""
-        return np.where(self.at_most, np.nan, (self.reading - self.predicted.mean) / self.predicted.sd)
-
-    @property
-    def chance(self) -> np.ndarray:
-        """Probability of a deviation as large, of each reading; where the weights fail, as if predictions were normal.
-
-        Weights that lean on few draws leave much of the reading's own effect in its prediction, which is then too wide.
-        """
-        from scipy.stats import norm
-
-        as_normal = 2 * norm.sf(np.abs(np.nan_to_num(self.z_score)))
-        failing = ~(self.predicted.pareto_k <= RELIABLE_K)
-        return np.where(failing, np.minimum(as_normal, self.predicted.tail), self.predicted.tail)
 
 
 @dataclass(frozen=True)
@@ -101,41 +51,29 @@ class Checks:
     trends: tuple[Trend, ...]
     sensitivities: tuple[Sensitivity, ...]
 
-    @property
-    def n_readings(self) -> int:
-        """Number of readings that were predicted."""
-        return sum(len(table.labels) for table in self.tables)
+    false_alarm: ClassVar = FALSE_ALARM
+    JSON: ClassVar = ("false_alarm", "tables", "readings", "trends", "sensitivities")
+
+    @cached_property
+    def readings(self) -> tuple[CheckedReading, ...]:
+        """Every reading of every table."""
+        among = sum(len(table.labels) for table in self.tables)
+        return tuple(reading for table in self.tables for reading in table.readings(among))
 
     @property
-    def outliers(self) -> list[tuple[TableChecks, int]]:
+    def outliers(self) -> list[CheckedReading]:
         """Readings so far out that chance does as much in one healthy fit of a hundred, the farthest first."""
-        found = [(t, i) for t in self.tables for i in np.flatnonzero(t.chance * self.n_readings < FALSE_ALARM).tolist()]
-        return sorted(found, key=lambda item: float(item[0].chance[item[1]]))
+        return sorted((r for r in self.readings if r.outlier), key=lambda r: r.chance)
 
     @property
-    def decisive(self) -> list[tuple[TableChecks, int]]:
+    def decisive(self) -> list[CheckedReading]:
         """Readings without which the fit would be a markedly different one, the most decisive first."""
-        found = [(t, i) for t in self.tables for i in np.flatnonzero(~(t.predicted.pareto_k <= RELIABLE_K)).tolist()]
-        return sorted(found, key=lambda item: -float(item[0].predicted.pareto_k[item[1]]))
-
-    @property
-    def outside(self) -> list[tuple[TableChecks, int]]:
-        """Readings taken outside the range in which the curves hold."""
-        return [(t, i) for t in self.tables for i in np.flatnonzero(~t.places.inside).tolist()]
+        return sorted((r for r in self.readings if r.decisive), key=lambda r: -r.pareto_k)
 
     @property
     def conflicts(self) -> list[Sensitivity]:
         """Quantities that a prior and the readings pull to different values."""
-        return [s for s in self.sensitivities if diagnosis(s) == "conflict"]
-
-
-def diagnosis(found: Sensitivity) -> str:
-    """What a sensitivity means: "readings decide", "prior decides", "conflict", or "both count"."""
-    if not found.prior > SENSITIVE:
-        return "readings decide"
-    if not found.likelihood > SENSITIVE:
-        return "prior decides"
-    return "conflict" if abs(found.prior_sds) > _CONFLICT else "both count"
+        return [s for s in self.sensitivities if s.diagnosis == "conflict"]
 
 
 @once

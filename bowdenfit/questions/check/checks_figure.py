@@ -65,12 +65,10 @@ def data(fit: Record) -> tuple[CheckedTable, ...] | None:
 
 def checked_tables(found: Checks) -> tuple[CheckedTable, ...]:
     """The readings of each table as they are shown."""
-    outliers = {(table.table, i) for table, i in found.outliers}
-    return tuple(_checked(t, [(t.table, i) in outliers for i in range(len(t.labels))]) for t in found.tables)
+    return tuple(_checked(t, [r.outlier for r in found.readings if r.table == t.table]) for t in found.tables)
 
 
 def _checked(table: TableChecks, outlier: list[bool]) -> CheckedTable:
-    from bowdenfit.inference.psis import RELIABLE_K
     from bowdenfit.kinds import readings_called
 
     found, off, low, high = table.uniformity, *[np.zeros(0)] * 3
@@ -82,7 +80,7 @@ def _checked(table: TableChecks, outlier: list[bool]) -> CheckedTable:
         dict(list(table.places.numbers.items())[:MOST_PLACES]),
         table.places.group,
         table.places.back,
-        ~(table.predicted.pareto_k <= RELIABLE_K),
+        table.decisive,
         np.array(outlier),
         table.labels,
         found.at if found else off,

@@ -11,7 +11,6 @@ from bowdenfit.kinds import readings_called
 from bowdenfit.kinds.recordings.accounts import accounts
 from bowdenfit.questions.bends.overview import elastic_overview
 from bowdenfit.questions.check.answer import checks_of
-from bowdenfit.questions.check.page import checks_page
 from bowdenfit.questions.identify.confounding import confounded
 from bowdenfit.questions.identify.contradiction import agreement_page
 from bowdenfit.questions.recorded.rate import rate_effect
@@ -53,7 +52,7 @@ def summarize(fit: Record) -> dict[str, Any]:
         page["recordings"] = accounts(fit.dataset.measurements.recordings)
     if elastic := elastic_overview(fit):
         page["elastic"] = elastic
-    if checks := checks_page(checks_of(fit)):
+    if checks := checks_of(fit):
         page["checks"] = checks
     effect = rate_effect(fit)
     if effect is not None:

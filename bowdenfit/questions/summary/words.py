@@ -8,6 +8,7 @@ from bowdenfit.kinds import each_table, readings_called
 from bowdenfit.kinds.angles.table import AngleSettings
 from bowdenfit.kinds.recordings.words import recordings_text
 from bowdenfit.questions.bends.words import elastic_text
+from bowdenfit.questions.check.answer import checks_of
 from bowdenfit.questions.check.words import checks_text
 from bowdenfit.questions.identify.answer import determined, identifiability
 from bowdenfit.questions.identify.confounding import confounded
@@ -40,7 +41,7 @@ def summary_text(fit: Record) -> str:
         _mountings(fit, page),
         _recordings(fit),
         _measured(fit, page),
-        checks_text(page.get("checks", {})),
+        checks_text(checks_of(fit)),
         _friction_model(fit),
         elastic_text(fit),
         _answer(fit),

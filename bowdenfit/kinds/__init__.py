@@ -28,7 +28,14 @@ def each_table(measurements: Measurements) -> Iterator[tuple[Kind[Any], Any]]:
             yield kind, table
 
 
+def kind_of(readings: str) -> Kind[Any] | None:
+    """The kind whose readings have a name in results; None if none has."""
+    return next((kind for kind in KINDS.values() if any(one.name == readings for one in kind.readings)), None)
+
+
 def readings_called(name: str) -> Readings:
     """What readings of this name are called; by their name where no kind has such."""
-    known = (readings for kind in KINDS.values() for readings in kind.readings if readings.name == name)
-    return next(known, Readings(name, name, name, "{}", name))
+    kind = kind_of(name)
+    return next(
+        (one for one in (kind.readings if kind else ()) if one.name == name), Readings(name, name, name, "{}", name)
+    )

@@ -112,6 +112,7 @@ class Kind(Generic[AnyTable]):
             one might.
         page: Its table as the headings and rows of a file; None where it is written otherwise.
         empty: A table of a design's shape with unremarkable readings, as of a file of some name; None where a design has none.
+        bends: Total wrap angles at which the rope itself was measured [rad]; None if it was not.
         conditions: Where and at which wrap angles friction was measured; None if it was not.
         forces: Forces that friction acted on [N].
         speeds: Speeds of sliding [mm/s or rad/s].
@@ -134,6 +135,7 @@ class Kind(Generic[AnyTable]):
     implausible: Callable[[AnyTable, AnyTable], str] = lambda *_: ""
     page: Callable[[AnyTable, Description], Page] | None = None
     empty: Callable[[Design, Description, str], AnyTable] | None = None
+    bends: Callable[[AnyTable], Vector] | None = None
     conditions: Callable[[AnyTable], Conditions] | None = None
     forces: Callable[[AnyTable], Vector] = lambda _: np.zeros(0)
     speeds: Callable[[AnyTable], Vector] = lambda _: np.zeros(0)

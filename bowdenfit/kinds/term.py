@@ -103,6 +103,7 @@ class Circumstances:
         return noise_law(self.cable.description)
 
 
+LOAD, WRAP_ANGLE = "Load (N)", "Wrap angle (deg)"  # labels of places
 Draw = Callable[[Cable, Any, AngleTable | None, Mapping[str, Array], Array, float], dict[str, Array]]
 
 
@@ -134,6 +135,55 @@ class Bench:
     check: Callable[[Description, Any], object] = _always
 
 
+def what_was_read(term: Term, description: Description) -> np.ndarray:
+    """The readings, and of how many samples each was made."""
+    del description
+    return np.column_stack([term.observed(), term.data["n"]] if "n" in term.data else [term.observed()])
+
+
+def why_not_alike(name: str, descriptions: Mapping[str, Description]) -> str:
+    """That other readings are missing somewhere."""
+    del name, descriptions
+    return "the others are not in all fits"
+
+
+@dataclass(frozen=True)
+class Events:
+    """Which events readings are: models can be compared only by how well they predict the same ones.
+
+    Args:
+        said: Of each reading of a term, numbers that are the same wherever it is the same event; NaN where it is a limit
+            alone.
+        why_not_alike: Why readings of a name are not the same events under several descriptions, by the names of the fits.
+        choice: What sets a description apart from others of the same files; empty where it is as usual.
+        chosen: Whether descriptions choose which rows are readings.
+    """
+
+    said: Callable[[Term, Description], np.ndarray] = what_was_read
+    why_not_alike: Callable[[str, Mapping[str, Description]], str] = why_not_alike
+    choice: Callable[[Description], str] = lambda _: ""
+    chosen: bool = False
+
+
+@dataclass(frozen=True)
+class Where:
+    """Where the readings of a term were taken.
+
+    Args:
+        numbers: By axis label, such as "Load (N)".
+        back: Whether a reading was taken on the way back, or while unloading.
+    """
+
+    numbers: Mapping[str, np.ndarray]
+    back: np.ndarray
+
+
+def _nowhere_else(table: Any, term: Term) -> Where:
+    """Nothing but lengths and runs, which the term knows."""
+    del table
+    return Where({}, np.zeros(len(term.labels), dtype=bool))
+
+
 @dataclass(frozen=True)
 class TermKind:
     """What a kind of measurement adds to the likelihood.
@@ -146,6 +196,9 @@ class TermKind:
         candidate: The measurement that could be made next for such a table; None where another kind offers it.
         tells_mountings: Whether its readings tell how mountings scatter.
         check: Whether parameters that the user fixed leave the table a model.
+        count: How many readings of a term entered, in words; empty where they are those that were read.
+        where: Loads and wrap angles of a term's readings.
+        events: Which events they are.
     """
 
     name: str
@@ -155,3 +208,6 @@ class TermKind:
     candidate: CandidateKind | None = None
     tells_mountings: bool = False
     check: Callable[[Any, ParameterSpace], None] = _always
+    count: Callable[[Term, Description], str] = lambda *_: ""
+    where: Callable[[Any, Term], Where] = _nowhere_else
+    events: Events = field(default_factory=Events)

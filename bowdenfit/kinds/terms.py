@@ -22,7 +22,7 @@ from bowdenfit.cable.load_cells import (
     OUTPUT_OFFSET,
     RUN_SCATTER,
 )
-from bowdenfit.kinds import each_table
+from bowdenfit.kinds import each_table, kind_of
 from bowdenfit.kinds.angles.term import ANGLES
 from bowdenfit.kinds.candidate import CandidateKind
 from bowdenfit.kinds.efficiencies.term import EFFICIENCIES
@@ -67,3 +67,13 @@ def candidate_kinds() -> dict[str, CandidateKind]:
     """What can be measured next, by its name."""
     offered = (kind.candidate for kind in TERMS.values() if kind.candidate is not None)
     return {candidate.name: candidate for candidate in sorted(offered, key=lambda candidate: candidate.order)}
+
+
+def term_kind(readings: str) -> TermKind:
+    """The kind whose readings have a name in results.
+
+    Raises:
+        KeyError: None has.
+    """
+    kind = kind_of(readings)
+    return TERMS[kind.name if kind is not None else readings]

@@ -1,5 +1,7 @@
 """Forces at both ends of a pull-pull loop while it moves."""
 
+import numpy as np
+
 from bowdenfit.kinds.kind import Kind, itself
 from bowdenfit.kinds.loop.table import LoopTable, read_loop
 from bowdenfit.kinds.loop.words import contradiction, describe, empty, implausible, page, warnings_of
@@ -19,6 +21,7 @@ LOOP = Kind(
     page=page,
     empty=empty,
     count=lambda table: f"{len(table.stroke)} readings of a loop",
+    bends=lambda table: np.nansum(table.own.angle, axis=1),
     conditions=itself,
     forces=lambda table: table.input_force * table.stroke,
 )

@@ -20,7 +20,7 @@ from bowdenfit.kinds.resolve_angles import resolve_angles
 from bowdenfit.kinds.row_angles import row_angles
 from bowdenfit.kinds.shared_parameters import force_noise, offsets, preload
 from bowdenfit.kinds.tables import AngleTable, LoopTable
-from bowdenfit.kinds.term import Bench, Circumstances, TermKind
+from bowdenfit.kinds.term import LOAD, WRAP_ANGLE, Bench, Circumstances, Term, TermKind, Where
 from bowdenfit.parameters.priors import Normal
 from bowdenfit.parameters.space import Parameter
 from bowdenfit.physics.loop import free_motion_loss, loop_output_force, loop_response, loop_response_from
@@ -188,6 +188,11 @@ def _unknown(at: Situation) -> str:
     return "only a pull-pull loop with a table of its forces, and a preload of its own, has such readings."
 
 
+def _where(table: LoopTable, _: Term) -> Where:
+    angle = np.rad2deg(np.nansum(np.nan_to_num(table.own.angle), axis=1))
+    return Where({LOAD: table.input_force, WRAP_ANGLE: angle}, table.stroke < 0)
+
+
 LOOP = TermKind(
     "loop",
     lambda cable, table, angles: (loop_term(cable, table, angles),),
@@ -206,4 +211,5 @@ LOOP = TermKind(
         along_route=True,
         loaded=True,
     ),
+    where=_where,
 )

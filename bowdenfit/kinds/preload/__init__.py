@@ -17,4 +17,5 @@ PRELOAD = Kind(
     page=page,
     empty=empty,
     count=lambda table: f"{len(table.preload)} preloads",
+    bends=lambda table: table.wrap_angle,
 )

@@ -23,7 +23,7 @@ from bowdenfit.kinds.candidate import (
 from bowdenfit.kinds.elastic_term import ElasticTerm
 from bowdenfit.kinds.shared_parameters import preload
 from bowdenfit.kinds.tables import AngleTable, PreloadTable
-from bowdenfit.kinds.term import Bench, Circumstances, TermKind
+from bowdenfit.kinds.term import WRAP_ANGLE, Bench, Circumstances, TermKind, Where
 from bowdenfit.parameters.priors import HalfNormal
 from bowdenfit.parameters.space import Parameter
 
@@ -91,5 +91,8 @@ PRELOAD = TermKind(
         offered=_offered,
         simulation=_simulation,
         angles="total",
+    ),
+    where=lambda _, term: Where(
+        {WRAP_ANGLE: np.rad2deg(term.data["wrap_angle"])}, np.zeros(len(term.labels), dtype=bool)
     ),
 )

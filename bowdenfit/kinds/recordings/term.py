@@ -24,6 +24,7 @@ from bowdenfit.kinds.recordings.blocks import (
     standing_share,
     worth_of,
 )
+from bowdenfit.kinds.recordings.events import EVENTS
 from bowdenfit.kinds.recordings.loops import LoopRecordingsTerm, loop_recordings_term
 from bowdenfit.kinds.recordings.settings import RecordingsTable
 from bowdenfit.kinds.recordings.simulation import drawn_recordings, recorded_again, refuse_saturated
@@ -194,4 +195,5 @@ RECORDINGS = TermKind(
     _parameters,
     Bench(drawn_recordings, recorded_again, refuse_saturated),
     tells_mountings=True,
+    events=EVENTS,
 )

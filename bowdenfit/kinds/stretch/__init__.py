@@ -16,4 +16,5 @@ STRETCH = Kind(
     page=page,
     empty=empty,
     count=lambda table: f"{len(table.load)} readings of stretch",
+    bends=lambda table: table.wrap_angle,
 )

@@ -24,7 +24,7 @@ from bowdenfit.kinds.candidate import (
 )
 from bowdenfit.kinds.elastic_term import ElasticTerm
 from bowdenfit.kinds.tables import AngleTable, StretchTable
-from bowdenfit.kinds.term import Bench, Circumstances, TermKind
+from bowdenfit.kinds.term import LOAD, WRAP_ANGLE, Bench, Circumstances, TermKind, Where
 from bowdenfit.parameters.priors import HalfNormal, LogNormal, Normal
 from bowdenfit.parameters.space import Parameter
 
@@ -124,4 +124,5 @@ STRETCH = TermKind(
         angles="total",
         loaded=True,
     ),
+    where=lambda table, _: Where({LOAD: table.load, WRAP_ANGLE: np.rad2deg(table.wrap_angle)}, table.unloading),
 )

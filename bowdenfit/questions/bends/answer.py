@@ -13,6 +13,7 @@ from bowdenfit.cable.elasticity import PRELOAD
 from bowdenfit.errors import UsageError
 from bowdenfit.inference.draws import for_each_draw
 from bowdenfit.inference.interval import Interval
+from bowdenfit.kinds import each_table
 from bowdenfit.questions.bends.equations import Bent, bending_contact, knows_preload, knows_stretch
 from bowdenfit.questions.bends.preload_window import TAUT, PreloadAnswer
 from bowdenfit.results.record import Record, once
@@ -61,18 +62,15 @@ class Elastic:
     @cached_property
     def measured_bends(self) -> np.ndarray:
         """Different wrap angles that anything was measured at [rad]."""
-        tables = self.fit.dataset.measurements
         contact = self.fit.dataset.description.contact[self.contact]
-        column = contact.wrap_angle.column
-        found = [t.wrap_angle for t in (tables.stretch, tables.preload) if t is not None]
-        for table in (tables.loop, tables.forces, tables.efficiencies):
-            if table is not None and column is not None:
-                found.append(table.own.column(column)[0])
+        column, found = contact.wrap_angle.column, []
+        for kind, table in each_table(self.fit.dataset.measurements):
+            if kind.conditions is not None:
+                found += [] if column is None else [kind.conditions(table).own.column(column)[0]]
+            elif kind.bends is not None:
+                found.append(kind.bends(table))
         if contact.wrap_angle.constant is not None:
             found.append(np.array([contact.wrap_angle.constant.to("angle")]))
-        if tables.recordings is not None and column is not None:
-            k = tables.recordings.columns.index(column)
-            found.append(np.array([r.own_angle[k] for r in tables.recordings.each]))
         angles = np.concatenate(found) if found else np.zeros(0)
         return np.unique(np.round(angles[np.isfinite(angles)], 9))
 

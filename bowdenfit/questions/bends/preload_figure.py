@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from bowdenfit.kinds import each_table
 from bowdenfit.plots.bands import draw_quantiles, name_band
 from bowdenfit.plots.layout import legend_above, panels
 from bowdenfit.plots.panels import span
@@ -67,13 +68,7 @@ def data(fit: Record) -> PreloadCurve | None:
 
 def _largest_bend(fit: Record) -> float:
     """Largest total wrap angle of any reading [rad]; pi without one."""
-    from bowdenfit.kinds.tables import LoopTable, PreloadTable, StretchTable
-
-    tables = fit.dataset.measurements
-    found = [t.wrap_angle for t in (tables.table(PreloadTable), tables.table(StretchTable)) if t is not None]
-    loop = tables.table(LoopTable)
-    if loop is not None:
-        found.append(np.nansum(np.nan_to_num(loop.own.angle), axis=1))
+    found = [kind.bends(table) for kind, table in each_table(fit.dataset.measurements) if kind.bends is not None]
     return max([float(a.max()) for a in found], default=np.pi)
 
 

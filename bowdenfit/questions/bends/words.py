@@ -40,8 +40,7 @@ def _answers(found: ElasticOverview, columns: tuple[tuple[str, str, int], ...]) 
     under = f", {found.input_force:g} N" if any(key in _UNDER_LOAD for key, _, _ in there) else ""
     heads = [f"at (deg){under}", *(head.format(unit=found.friction_unit) for _, head, _ in there)]
     rows = [
-        [f"{bend['wrap_angle']:g}", *(_interval(bend[key], digits) for key, _, digits in there)]
-        for bend in found.bends
+        [f"{bend['wrap_angle']:g}", *(_interval(bend[key], digits) for key, _, digits in there)] for bend in found.bends
     ]
     return table(heads, rows)
 

@@ -7,9 +7,11 @@ from typing import Any
 import numpy as np
 
 from bowdenfit.dataset import Dataset
+from bowdenfit.kinds import kind_of
 from bowdenfit.kinds.term import Term
+from bowdenfit.kinds.terms import term_kind
 
-LOAD, WRAP_ANGLE, RUN, STROKE = "Load (N)", "Wrap angle (deg)", "Run", "Stroke"
+RUN, STROKE = "Run", "Stroke"
 
 
 @dataclass(frozen=True)
@@ -37,28 +39,24 @@ def places_of(dataset: Dataset, term: Term) -> Places:
         term: One table of its model.
     """
     n, route = len(term.labels), dataset.description.route
-    numbers, back = _elastic(dataset, term)
+    numbers, back = _of_kind(dataset, term)
     at = route_values(term)
     inside = np.ones(n, dtype=bool)
     if route is not None and at is not None and np.isfinite(at).all():
-        numbers = {route.label: at} | numbers
+        numbers = {route.label: at, **numbers}
         inside = (at >= route.range[0]) & (at <= route.range[1])
     varying = {label: values for label, values in numbers.items() if len(np.unique(values)) > 1}
     return Places(varying or {RUN: np.arange(1.0, n + 1)}, _groups(term), back, inside)
 
 
-def _elastic(dataset: Dataset, term: Term) -> tuple[dict[str, np.ndarray], np.ndarray]:
+def _of_kind(dataset: Dataset, term: Term) -> tuple[Mapping[str, np.ndarray], np.ndarray]:
     """Loads and wrap angles of the tables that have them."""
-    tables, nothing = dataset.measurements, np.zeros(len(term.labels), dtype=bool)
-    if term.name == "stretch" and tables.stretch is not None:
-        table = tables.stretch
-        return {LOAD: table.load, WRAP_ANGLE: np.rad2deg(table.wrap_angle)}, table.unloading
-    if term.name == "measured_preload":
-        return {WRAP_ANGLE: np.rad2deg(term.data["wrap_angle"])}, nothing
-    if term.name == "loop_output_force" and tables.loop is not None:
-        angle = np.rad2deg(np.nansum(np.nan_to_num(tables.loop.own.angle), axis=1))
-        return {LOAD: tables.loop.input_force, WRAP_ANGLE: angle}, tables.loop.stroke < 0
-    return {}, nothing
+    kind = kind_of(term.name)
+    table = dataset.measurements.table(kind.table) if kind is not None else None
+    if table is None:
+        return {}, np.zeros(len(term.labels), dtype=bool)
+    where = term_kind(term.name).where(table, term)
+    return where.numbers, where.back
 
 
 def route_values(term: Term) -> np.ndarray | None:

@@ -14,8 +14,8 @@ from bowdenfit.inference.interval import Interval
 from bowdenfit.inference.leave_one_out import Readings, leave_one_out
 from bowdenfit.inference.log_density import LogDensity as Density
 from bowdenfit.kinds import readings_called
-from bowdenfit.kinds.angles.table import AngleSettings
-from bowdenfit.questions.compare.common_readings import ANGLES, Common, Omitted, common_readings
+from bowdenfit.kinds.terms import measured_kinds, term_kind
+from bowdenfit.questions.compare.common_readings import Common, Omitted, common_readings
 from bowdenfit.questions.recorded.rate import RateEffect, rate_effect
 from bowdenfit.results.record import Draws, Record
 from bowdenfit.words import listed
@@ -191,9 +191,9 @@ def _common(fits: Mapping[str, Record]) -> Common:
 
 
 def _inputs(fit: Record) -> tuple[list[tuple[str, str]], list[tuple[str, tuple[str, ...]]]]:
-    """Files that were read, description aside, with their checksums; and the readings of every table but angles."""
+    """Files that were read, description aside, with their checksums; and the readings that they leave no choice of."""
     files = sorted((file, digest) for file, digest in fit.dataset.sha256.items() if not file.endswith(".toml"))
-    return files, [(term.name, term.labels) for term in fit.model.terms if term.name != ANGLES]
+    return files, [(term.name, term.labels) for term in fit.model.terms if not term_kind(term.name).events.chosen]
 
 
 def _predicted(name: str, fit: Record, drawn: Draws, common: Common, report: Report | None) -> Prediction:
@@ -234,9 +234,9 @@ def _described(fit: Record) -> str:
     if description.curved:
         parts.append(f"{description.geometry} geometry")
     parts += [description.noise_in_words] if description.noise != "normal" else []
-    angles = description.table(AngleSettings)
-    if angles is not None and angles.undetected != "censored" and description.geometry != "published":
-        parts.append({"zero": "undetected angles as zeros", "dropped": "undetected angles dropped"}[angles.undetected])
+    parts += [
+        choice for kind, _ in measured_kinds(fit.dataset.measurements) if (choice := kind.events.choice(description))
+    ]
     without_runs = [p for p in fit.model.space.fixed if p.name == RUN_SCATTER and p.fixed == 0.0]
     fixed = [p.name for p in fit.model.space.fixed if p not in without_runs]
     parts += ["no run effect"] if without_runs else []

@@ -5,8 +5,8 @@ from typing import Any
 from bowdenfit.cable.curves import Curve
 from bowdenfit.cable.load_cells import RUN_SCATTER
 from bowdenfit.kinds import each_table, readings_called
-from bowdenfit.kinds.angles.table import AngleSettings
 from bowdenfit.kinds.recordings.words import recordings_text
+from bowdenfit.kinds.terms import term_kind
 from bowdenfit.questions.bends.words import elastic_text
 from bowdenfit.questions.check.answer import checks_of
 from bowdenfit.questions.check.words import checks_text
@@ -53,11 +53,8 @@ def summary_text(fit: Record) -> str:
 def _title(fit: Record) -> str:
     description = fit.dataset.description
     tables = fit.dataset.measurements
-    counts = []
-    for term in fit.model.terms:
-        if term.name == "wrap_angle":
-            counts += _angle_counts(fit, len(term.data["angle"]), len(term.data["limit"]))
-    counts += [count for kind, table in each_table(tables) if (count := kind.count(table))]
+    entered = [term_kind(term.name).count(term, description) for term in fit.model.terms]
+    counts = [count for count in (*entered, *(kind.count(table) for kind, table in each_table(tables))) if count]
     line = f"{fit.name}\n{'=' * len(fit.name)}"
     geometry = f"; {description.geometry} geometry" if description.curved else ""
     model = f"; friction model {description.friction_model}" if description.friction_model != "capstan" else ""
@@ -66,19 +63,6 @@ def _title(fit: Record) -> str:
     fitted = filled(f"Fitted to {listed(counts)}{geometry}{laws}{model}{noise}.")
     remarks = [filled(remark) for remark in tables.remarks]
     return "\n".join([line, fitted, *remarks])
-
-
-def _angle_counts(fit: Record, entered: int, censored: int) -> list[str]:
-    """How many readings the curves were fitted to, and how those too small to detect entered."""
-    settings, published = fit.dataset.description.table(AngleSettings), fit.dataset.description.geometry == "published"
-    way = "zero" if published or settings is None else settings.undetected
-    how = {
-        "censored": "",
-        "zero": ", those too small to detect taken as 0",
-        "dropped": ", those too small to detect left out",
-    }
-    below = f" and {censored} too small to detect (known to be below the limit)" if censored else how[way]
-    return [f"{entered} wrap angles{below}"]
 
 
 def _verdict(fit: Record, page: dict[str, Any]) -> str:

@@ -8,14 +8,14 @@ import numpy as np
 import pytest
 from click.testing import CliRunner
 from conftest import ROOT
+from scratch import curve, law, option, shares
 from scratch import format as bars
-from scratch import law, option, shares
 from scratch.losses import LOSSES
 from scratch.losses import term as losses_term
 
 import bowdenfit as bf
 from bowdenfit.cable.friction import FRICTION_OPTIONS
-from bowdenfit.cable.registry import CONTACT_LAWS
+from bowdenfit.cable.registry import CONTACT_LAWS, CURVES, Family
 from bowdenfit.cli.commands import command
 from bowdenfit.files import FORMATS
 from bowdenfit.kinds import KINDS
@@ -32,6 +32,16 @@ friction = "mu"
 wrap_angle = {{ value = 180, unit = "deg" }}
 [tables]
 {table} = {{ file = "{table}.csv" }}
+"""
+ROUTED = """name = "scratch"
+[route]
+range = [400, 500]
+[[contact]]
+name = "sheath"
+friction = "mu"
+wrap_angle = { curve = "square", column = "sheath_angle" }
+[tables]
+angles = { file = "angles.csv" }
 """
 QUICK = ("sampler.n_walkers=32", "sampler.target_ess=100", "sampler.max_steps=1000", "sampler.target_r_hat=1.2")
 
@@ -74,7 +84,9 @@ def test_a_new_kind_of_table_is_a_folder_and_two_lines(data_set, monkeypatch, tm
     interval = found.parameter("mu")
     assert abs(interval.mean - MU) < 4 * interval.sd
     assert "15 lost forces" in (tmp_path / "fit" / "summary.txt").read_text()
-    assert {"checks.png", "coefficients.png", "pairs.png"} <= {path.name for path in (tmp_path / "fit" / "figures").iterdir()}
+    assert {"checks.png", "coefficients.png", "pairs.png"} <= {
+        path.name for path in (tmp_path / "fit" / "figures").iterdir()
+    }
     again = bf.load(tmp_path / "fit")
     assert json.dumps(again.summary()) == json.dumps(found.summary())
 
@@ -91,9 +103,23 @@ def test_a_new_contact_law_is_a_class_and_a_line(data_set, monkeypatch):
     assert abs(estimate.value - MU) < 4 * estimate.standard_error
 
 
+def test_a_new_curve_family_is_a_class_and_a_line(monkeypatch, tmp_path):
+    monkeypatch.setitem(CURVES, "square", Family(f"{curve.__name__}:{curve.Square.__name__}", 1))
+    length = np.linspace(400.0, 500.0, 11)
+    angle = 120.0 * ((length - 400.0) / 100.0) ** 2 + np.random.default_rng(3).standard_normal(11)
+    (tmp_path / "cable.toml").write_text(ROUTED)
+    rows = [f"{at:g},{reading:.3f}" for at, reading in zip(length, np.abs(angle), strict=True)]
+    (tmp_path / "angles.csv").write_text("\n".join(["cable_length_mm,sheath_angle_deg", *rows]))
+    found = bf.fit(tmp_path, mcmc=False)
+    estimate = found.least_squares.estimates["sheath_angle_end"]
+    assert abs(estimate.value - np.deg2rad(120.0)) < 4 * estimate.standard_error
+
+
 def test_a_new_option_of_the_friction_model_is_a_class_and_a_line(data_set, monkeypatch):
     monkeypatch.setitem(FRICTION_OPTIONS, "hidden", option.HiddenTension())
-    found = bf.fit(forces(data_set, MU * ANGLE, hidden=4.0), mcmc=False, friction="hidden", settings=["prior.tau.fixed=0.01"])
+    found = bf.fit(
+        forces(data_set, MU * ANGLE, hidden=4.0), mcmc=False, friction="hidden", settings=["prior.tau.fixed=0.01"]
+    )
     estimates = found.least_squares.estimates
     assert abs(estimates["mu"].value - MU) < 4 * estimates["mu"].standard_error
     assert abs(estimates["hidden"].value - 4.0) < 4 * estimates["hidden"].standard_error
@@ -122,4 +148,6 @@ def test_a_new_question_and_its_figure_are_a_file_and_a_line_each(data_set, monk
     assert [each.contact for each in shares.shares(found)] == ["sheath"]
     asked = CliRunner().invoke(command(shares.VERB), [str(tmp_path / "fit")])
     assert asked.output == "sheath: 100% of the loss\n"
-    assert json.loads(CliRunner().invoke(command(shares.VERB), [str(tmp_path / "fit"), "--json"]).output) == {"sheath": 1.0}
+    assert json.loads(CliRunner().invoke(command(shares.VERB), [str(tmp_path / "fit"), "--json"]).output) == {
+        "sheath": 1.0
+    }

@@ -83,7 +83,8 @@ VERB = Verb(
 
     RESULTS are results folders, such as of the same data set fitted with and without --friction rate-dependent; then the
     comparison says whether efficiency depends on speed. Likewise --geometry published against the continuous one, --noise
-    student, or --set prior.tau.fixed=0 for a cable whose mountings are all alike.
+    student, --set prior.tau.fixed=0 for a cable whose mountings are all alike, or --set contact.0.wrap_angle.curve=logistic
+    (the first contact) for a route whose wrap angle is no bell.
 
     Readings that would move the posterior take longer: it is fitted again without them.
     """,

@@ -9,6 +9,8 @@ def read(path):
     """All columns."""
     heads, *rows = (line.split("|") for line in path.read_text(encoding="utf-8").splitlines())
     numbers = np.array(rows, dtype=float)
-    return ChannelFile(path, "bars", tuple(
-        Channel(name, unit, numbers[:, k]) for k, (name, unit) in enumerate(head.split(":") for head in heads)
-    ))
+    return ChannelFile(
+        path,
+        "bars",
+        tuple(Channel(name, unit, numbers[:, k]) for k, (name, unit) in enumerate(head.split(":") for head in heads)),
+    )

@@ -92,15 +92,13 @@ def _points(fit: Record, bends: np.ndarray) -> np.ndarray:
     from bowdenfit.questions.recorded.loop_traces import loop_points
 
     contact, table = elastic_answers(fit).contact, fit.dataset.measurements.table(LoopTable)
-    parts = [
-        [np.full(len(p.input_force), p.wrap_angle), p.input_force, p.output_force, np.zeros(len(p.input_force))]
-        for p in loop_points(fit, contact)
-    ]
+    recorded = loop_points(fit, contact)
+    parts = [np.concatenate([recorded, np.zeros((1, recorded.shape[1]))])]
     if table is not None:
         column = fit.dataset.description.contact[contact].wrap_angle.column
         angle = np.full(len(table.stroke), bends[0]) if column is None else np.nan_to_num(table.own.column(column)[0])
-        parts.append([angle, table.input_force, table.output_force, table.stroke])
-    return np.concatenate([np.zeros((4, 0)), *parts], axis=1)
+        parts.append(np.stack([angle, table.input_force, table.output_force, table.stroke]))
+    return np.concatenate(parts, axis=1)
 
 
 @in_paper_style

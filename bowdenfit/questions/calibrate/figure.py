@@ -8,7 +8,8 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from bowdenfit.plots.layout import TITLE, legend_above, panels
+from bowdenfit.plots.layout import TITLE, drop_unused, legend_above, panels
+from bowdenfit.plots.panels import label_outer
 from bowdenfit.plots.style import BLUE, GRAY, LIGHT, VERMILLION, in_paper_style
 from bowdenfit.plots.write import FORMATS, write_all
 from bowdenfit.questions.calibrate.uniformity import Uniformity
@@ -49,7 +50,8 @@ def ranks(found: Calibration) -> Figure:
     by_chance = Uniformity(found.ranked)
     places, (low, high) = by_chance.places, by_chance.band(_BAND)
     reach = max(0.01, float(max(np.max(high - places), np.max(places - low))))
-    for axes, q in zip(flat, found.quantities, strict=False):
+    flat = drop_unused(flat, n)
+    for axes, q in zip(flat, found.quantities, strict=True):
         difference = by_chance.below(np.array(q.ranks)) / found.ranked - places
         color = BLUE if q.is_calibrated else VERMILLION
         axes.fill_between(places, low - places, high - places, color=LIGHT, lw=0, label="Uniform ranks, 99 %")
@@ -58,21 +60,9 @@ def ranks(found: Calibration) -> Figure:
         axes.set_title(f"{q.symbol}   p = {q.corrected:.2g}")
         axes.set_xlim(0, 1)
         axes.set_ylim(-1.15 * max(reach, np.max(np.abs(difference))), 1.15 * max(reach, np.max(np.abs(difference))))
-    for axes in flat[n:]:
-        axes.remove()
-    _label_edges(flat[:n], min(_COLUMNS, n), "Rank of the truth", "ECDF less uniform")
-    legend_above(figure, flat[:n], 2)
+    label_outer(flat, min(_COLUMNS, n), "Rank of the truth", "ECDF less uniform")
+    legend_above(figure, flat, 2)
     return figure
-
-
-def _label_edges(flat: Sequence[Axes], columns: int, below: str, left: str) -> None:
-    """Axis labels where no panel is below or to the left."""
-    for i, axes in enumerate(flat):
-        if i + columns >= len(flat):
-            axes.set_xlabel(below)
-            axes.tick_params(labelbottom=True)
-        if i % columns == 0:
-            axes.set_ylabel(left)
 
 
 @in_paper_style

@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from bowdenfit.plots.layout import TITLE, empty_page, legend_above, place_labels
+from bowdenfit.plots.panels import short
 from bowdenfit.plots.style import (
     BLACK,
     GRAY,
@@ -39,7 +40,7 @@ _GAP = 0.62
 def draw(found: Comparison) -> Figure:
     """Differences of elpd with standard errors, their contributions by reading, and parameters side by side."""
     cells = _cells(found)
-    names = [_shortened(name) for name in found.differences]
+    names = [short(name, LONGEST_NAME) for name in found.differences]
     left = max(0.66, 0.2 + _CHARACTER * max(map(len, names)))
     height_of_fits = 0.25 + _ROW * len(names)
     columns = min(MOST_COLUMNS, len(cells)) if cells else 0
@@ -59,10 +60,6 @@ def draw(found: Comparison) -> Figure:
     if len(names) > 2:
         legend_above(figure, [middle], columns=4)
     return figure
-
-
-def _shortened(name: str) -> str:
-    return name if len(name) <= LONGEST_NAME else "\N{HORIZONTAL ELLIPSIS}" + name[-LONGEST_NAME + 1 :]
 
 
 def _label_room(found: Comparison) -> float:

@@ -9,6 +9,7 @@ import numpy as np
 
 from bowdenfit.plots.bands import Band, draw_band, route_limits, shade_outside
 from bowdenfit.plots.layout import TITLE, drop_unused, legend_above, panels
+from bowdenfit.plots.panels import label_outer
 from bowdenfit.plots.style import BLACK, MEDIUM, WIDE, WRAP_ANGLE, in_paper_style
 
 if TYPE_CHECKING:
@@ -100,7 +101,7 @@ def draw(data: WrapAngles) -> Figure:
         axes.set_title(curve.contact)
     flat[0].set_ylim(0, _highest(data.curves))
     flat[0].locator_params(axis="y", nbins=7)
-    _label(flat, columns, data.route_label)
+    label_outer(flat, columns, data.route_label, WRAP_ANGLE)
     legend_above(figure, flat, columns=4 if columns > 1 else 2)
     return figure
 
@@ -139,13 +140,3 @@ def _highest(curves: tuple[AngleCurve, ...]) -> float:
     readings = np.concatenate([values for c in curves for values in (c.angle, c.limit, c.outside_angle)])
     band, reading = max(c.band.quantiles.max() for c in curves), readings.max(initial=0.0)
     return 1.06 * float(max(reading, min(band, 2 * reading) if reading else band))
-
-
-def _label(flat: list[Axes], columns: int, route_label: str) -> None:
-    """Names and units on the outer panels; a panel with nothing below it is an outer one."""
-    for i, axes in enumerate(flat):
-        if i % columns == 0:
-            axes.set_ylabel(WRAP_ANGLE)
-        if i + columns >= len(flat):
-            axes.set_xlabel(route_label)
-            axes.tick_params(labelbottom=True)

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from bowdenfit.plots.layout import TITLE, legend_above, panels
+from bowdenfit.plots.layout import TITLE, drop_unused, legend_above, panels
 from bowdenfit.plots.panels import short, span
 from bowdenfit.plots.style import (
     BLACK,
@@ -28,7 +28,7 @@ if TYPE_CHECKING:
     import jax
 
     from bowdenfit.plots.layout import Axes, Figure
-    from bowdenfit.recordings.recording import Recording, Recordings
+    from bowdenfit.recordings.recording import Recording
     from bowdenfit.results.record import Record
 
 GRID, BINS = 60, 12  # places of a curve, and points a run that are shown against the load
@@ -37,6 +37,8 @@ MOST_COLUMNS = 2
 MOST_NAMES, LONGEST = 8, 34  # runs that have a mark each, and characters of their names
 WIDE_RANGE = 30.0  # highest over lowest x, beyond which the axis is logarithmic
 POINT_COLORS = (BLACK, *SERIES_COLORS[2:4], *SERIES_COLORS[5:8], BLACK, BLACK)  # not those of the curves
+
+Points = tuple[np.ndarray, np.ndarray, list[str]]  # x, efficiencies, and the run of each
 
 
 @dataclass(frozen=True)
@@ -67,68 +69,57 @@ class Dependence:
 
 def data(fit: Record) -> tuple[Dependence, ...] | None:
     """On load, and on speed, as far as the friction model lets efficiency depend on them; None where it does not at all."""
+    from bowdenfit.questions.recorded.rate import SHOWN_SPEED, place_of
     from bowdenfit.recordings.recording import Recordings
 
     friction, recordings = fit.model.cable.friction, fit.dataset.measurements.table(Recordings)
-    if recordings is None:
+    if recordings is None or not friction.options:
         return None
-    wanted = ((friction.depends_on_load, _on_load), (friction.depends_on_rate, _on_speed))
-    return tuple(on(fit, recordings) for depends, on in wanted if depends) or None
+    (at, place), found = place_of(fit), []
+    here = [r for r in recordings.each if not place or r.route == at]
+    if friction.depends_on_load:
+        points = [_by_load(r) for r in here if _pulling(r).any()]
+        forces = np.concatenate([r.blocks.input_force[_pulling(r)] for r in here])
+        low, high = (forces.min(), forces.max()) if len(forces) else (10.0, 100.0)
+        grid = np.linspace(max(low, 1e-3), high, GRID)
+        quantiles, constant = _curves(fit, at, grid, None)
+        found.append(Dependence("load", "Input force (N)", grid, quantiles, constant, *_joined(points), place))
+    if friction.depends_on_rate:
+        (unit, scale), (low, high) = SHOWN_SPEED[recordings.velocity_unit], friction.conditions.speeds
+        grid = np.linspace(low * 0.5, high * 1.05, GRID)
+        points = [_at_speed(r, scale) for r in here]
+        quantiles, constant = _curves(fit, at, None, grid)
+        found.append(Dependence("speed", f"Speed ({unit})", grid * scale, quantiles, constant, *_joined(points), place))
+    return tuple(found) or None
 
 
-def _place(fit: Record, recordings: Recordings) -> tuple[float, list[Recording], str]:
-    """The route value with most recordings, those recordings, and the place in words."""
-    from bowdenfit.questions.recorded.rate import place_of
-
-    at, place = place_of(fit)
-    return at, [r for r in recordings.each if not place or r.route == at], place
+def _pulling(recording: Recording) -> np.ndarray:
+    """The blocks that are used and in which the motor pulls."""
+    return recording.strokes.used_sliding & (recording.strokes.stroke > 0)
 
 
-def _on_load(fit: Record, recordings: Recordings) -> Dependence:
-    from bowdenfit.recordings.recording import PULL
-
-    at, here, place = _place(fit, recordings)
-    used = [(r, r.strokes.used_sliding & (r.strokes.stroke == PULL)) for r in here]
-    forces = np.concatenate([r.blocks.input_force[u] for r, u in used] or [np.array([10.0, 100.0])])
-    grid = np.linspace(max(forces.min(), 1e-3), forces.max(), GRID)
-    points = [_binned(r, u) for r, u in used if u.any()]
-    quantiles, constant = _curves(fit, at, grid, None)
-    x, y, label = _joined(points, [r.run for r, u in used if u.any()])
-    return Dependence("load", "Input force (N)", grid, quantiles, constant, x, y, label, place)
-
-
-def _on_speed(fit: Record, recordings: Recordings) -> Dependence:
-    from bowdenfit.questions.recorded.rate import SHOWN_SPEED
-    from bowdenfit.recordings.recording import PULL
-
-    at, here, place = _place(fit, recordings)
-    unit, scale = SHOWN_SPEED[recordings.velocity_unit]
-    low, high = fit.model.cable.friction.conditions.speeds
-    grid = np.linspace(low * 0.5, high * 1.05, GRID)
-    points = []
-    for r in here:
-        used = r.strokes.used_sliding & (r.strokes.stroke == PULL) & np.isfinite(r.blocks.velocity)
-        ratio = np.log(r.blocks.output_force[used] / r.blocks.input_force[used])
-        points.append((np.array([np.abs(r.blocks.velocity[used]).mean() * scale]), np.exp([ratio.mean()])))
-    quantiles, constant = _curves(fit, at, None, grid)
-    x, y, label = _joined(points, [r.run for r in here])
-    return Dependence("speed", f"Speed ({unit})", grid * scale, quantiles, constant, x, y, label, place)
-
-
-def _joined(
-    points: list[tuple[np.ndarray, np.ndarray]], runs: list[str]
-) -> tuple[np.ndarray, np.ndarray, tuple[str, ...]]:
-    labels = tuple(run for (x, _), run in zip(points, runs, strict=True) for _ in x)
-    nothing = [np.zeros(0)]
-    return np.concatenate([x for x, _ in points] or nothing), np.concatenate([y for _, y in points] or nothing), labels
-
-
-def _binned(recording: Recording, used: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+def _by_load(recording: Recording) -> Points:
     """Mean input force and mean efficiency of blocks of similar load."""
+    used = _pulling(recording)
     force = recording.blocks.input_force[used]
     efficiency = recording.blocks.output_force[used] / force
     order = np.array_split(np.argsort(force), min(BINS, len(force)))
-    return np.array([force[part].mean() for part in order]), np.array([efficiency[part].mean() for part in order])
+    means = [np.array([values[part].mean() for part in order]) for values in (force, efficiency)]
+    return means[0], means[1], [recording.run] * len(order)
+
+
+def _at_speed(recording: Recording, scale: float) -> Points:
+    """Mean speed in the unit that is shown, and mean efficiency."""
+    blocks = recording.blocks
+    used = _pulling(recording) & np.isfinite(blocks.velocity)
+    ratio = np.log(blocks.output_force[used] / blocks.input_force[used])
+    speed = np.abs(blocks.velocity[used]).mean() * scale
+    return np.array([speed]), np.exp([ratio.mean()]), [recording.run]
+
+
+def _joined(points: list[Points]) -> tuple[np.ndarray, np.ndarray, tuple[str, ...]]:
+    x, y, runs = zip((np.zeros(0), np.zeros(0), []), *points, strict=True)
+    return np.concatenate(x), np.concatenate(y), tuple(run for each in runs for run in each)
 
 
 def _curves(fit: Record, at: float, forces: np.ndarray | None, speeds: np.ndarray | None) -> tuple[np.ndarray, float]:
@@ -167,9 +158,7 @@ def draw(dependences: tuple[Dependence, ...]) -> Figure:
     rows = -(-len(dependences) // columns)
     page = WIDE if columns > 1 else MEDIUM
     figure, flat = panels([2.1] * rows, columns, TITLE, (0.2, TITLE + 0.45), page, sharey=True)
-    for axes in flat[len(dependences) :]:
-        axes.remove()
-    flat = flat[: len(dependences)]
+    flat = drop_unused(flat, len(dependences))
     runs = list(dict.fromkeys(label for d in dependences for label in d.points_label))
     for i, (axes, one) in enumerate(zip(flat, dependences, strict=True)):
         _curve(axes, one)

@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from bowdenfit.plots.layout import RIGHT, TITLE, empty_page, legend_above, place_labels
+from bowdenfit.plots.panels import short
 from bowdenfit.plots.style import (
     BLACK,
     BLUE,
@@ -54,7 +55,7 @@ def data(fit: Record) -> Residuals | None:
 def draw(data: Residuals) -> Figure:
     """Efficiencies by label with their predictive intervals, and angles against the route."""
     curves = data.curves
-    labels = [_short(label) for points in data.points for label in points.labels]
+    labels = [short(label, LONGEST) for points in data.points for label in points.labels]
     inner = float(np.clip(max(ROW * len(labels), (CONTACT + GAP) * len(curves) - GAP), LEAST, MOST))
     width, top = (WIDE if labels and curves else MEDIUM), (TITLE if curves else 0.08)
     height = inner + BELOW + top
@@ -124,8 +125,3 @@ def _symmetric(off: np.ndarray) -> tuple[float, float]:
     """Limits around zero."""
     top = 1.2 * float(np.max(np.abs(off))) or 1.0
     return -top, top
-
-
-def _short(label: str) -> str:
-    """The end of a label, which tells rows of one file apart."""
-    return label if len(label) <= LONGEST else "\N{HORIZONTAL ELLIPSIS}" + label[1 - LONGEST :]

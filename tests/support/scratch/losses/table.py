@@ -22,7 +22,7 @@ def read(source):
     """Read the table."""
     path = source.file
     table = read_csv(path)
-    found = find_columns(table, (Quantity("input_force", "force"), Quantity("loss", "force")), source.columns)
+    found = find_columns(table, (Quantity("input_force", "force"), Quantity("loss", "force")), source.settings.columns)
     force, loss = (require(table, found, name, f"{name}_N").numbers() for name in ("input_force", "loss"))
     return Found(LossTable(np.array(force), np.array(loss)), {path.name: path})
 

@@ -53,7 +53,7 @@ class Chain:
     trajectories: Trajectories | None = None
 
 
-def judged(
+def diagnose_draws(
     posterior: LogDensity,
     z: np.ndarray,
     n_ensembles: int,
@@ -77,7 +77,7 @@ def judged(
     return derived, diagnostics, shortfalls(diagnostics, settings.target_r_hat, settings.target_ess)
 
 
-def stuck(z: np.ndarray, what: str = "walkers") -> tuple[str, ...]:
+def stuck_walkers(z: np.ndarray, what: str = "walkers") -> tuple[str, ...]:
     """Walkers that never moved in half their path; a few of them far out pass every other check."""
     count = int(np.sum(np.ptp(z[..., 0], axis=1) == 0)) if z.shape[1] > 1 and z.shape[2] else 0
     if not count:

@@ -36,7 +36,12 @@ class Prediction:
 
     def of_reading(self, i: int) -> dict[str, Any]:
         """What is known of one reading, as plain data."""
-        return {"elpd": self.elpd[i], "monte_carlo_error": self.error[i], "pareto_k": self.pareto_k[i], "how": self.how[i]}
+        return {
+            "elpd": self.elpd[i],
+            "monte_carlo_error": self.error[i],
+            "pareto_k": self.pareto_k[i],
+            "how": self.how[i],
+        }
 
     @property
     def unreliable(self) -> int:
@@ -80,7 +85,7 @@ class Difference:
         return "leaning" if n_readings < SMALL and self.elpd < 2 * _DECISIVE * self.standard_error else "clear"
 
 
-def left_out(log_likelihood: Mapping[str, np.ndarray], n_effective: float) -> Prediction:
+def weigh_without_each(log_likelihood: Mapping[str, np.ndarray], n_effective: float) -> Prediction:
     """Leave-one-out by Pareto-smoothed importance sampling.
 
     Args:

@@ -12,7 +12,7 @@ import emcee
 import numpy as np
 
 from bowdenfit.description import SamplerSettings
-from bowdenfit.inference.chain import Chain, Diagnose, Progress, Quantities, judged, stuck, worst
+from bowdenfit.inference.chain import Chain, Diagnose, Progress, Quantities, diagnose_draws, stuck_walkers, worst
 from bowdenfit.inference.diagnostics import diagnose_all
 from bowdenfit.inference.least_squares import MaximumPosterior
 from bowdenfit.inference.log_density import LogDensity
@@ -160,10 +160,10 @@ def _summarized(
     kept = np.unique(np.linspace(stored // 2, stored - 1, _KEPT_PER_WALKER).round().astype(int))
     # In this order in memory, as in a loaded fit: sums must agree to the last bit.
     z = np.ascontiguousarray(np.asarray(backend.get_chain()[kept]).transpose(1, 0, 2))
-    derived, diagnostics, reasons = judged(posterior, z, settings.n_ensembles, settings, quantities, diagnose)
+    derived, diagnostics, reasons = diagnose_draws(posterior, z, settings.n_ensembles, settings, quantities, diagnose)
     if stored < _FIRST_LOOK:
         too_short = f"each walker took {stored * THIN} steps, and {_FIRST_LOOK * THIN} are the least that can be judged"
         reasons = (too_short, *reasons)
-    reasons = (*reasons, *stuck(z))
+    reasons = (*reasons, *stuck_walkers(z))
     acceptance = float(np.mean(backend.accepted)) / stored
     return Chain(z, derived, diagnostics, settings.n_ensembles, stored * THIN, acceptance, reasons)

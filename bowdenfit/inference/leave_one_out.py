@@ -12,13 +12,13 @@ from jax import Array
 from jaxtyping import Float
 
 from bowdenfit.description import SamplerSettings
-from bowdenfit.inference.comparison import How, Prediction, left_out
+from bowdenfit.inference.comparison import How, Prediction, weigh_without_each
 from bowdenfit.inference.compilation import compiled
 from bowdenfit.inference.diagnostics import Diagnostics, diagnose_all
 from bowdenfit.inference.least_squares import MaximumPosterior
 from bowdenfit.inference.log_density import LogDensity
-from bowdenfit.inference.moment_matching import matched
-from bowdenfit.inference.psis import reliable_k, smoothed
+from bowdenfit.inference.moment_matching import match_moments
+from bowdenfit.inference.psis import reliable_k, smooth_weights
 
 # A refit is asked for one number, to a few hundredths: fewer walkers than for the answers of a fit.
 REFIT = SamplerSettings(n_ensembles=4, n_walkers=64, max_steps=4000, target_r_hat=1.02, target_ess=400)
@@ -27,7 +27,7 @@ _LARGEST_ERROR = 0.3  # Monte Carlo error of a log density beyond which it is ca
 
 
 @dataclass(frozen=True)
-class Readings:
+class ReadingsToLeaveOut:
     """The readings of a posterior, any of which may be left out of its density; compiled once for all of them.
 
     Args:
@@ -88,7 +88,7 @@ class Readings:
 
 
 def leave_one_out(
-    readings: Readings,
+    readings: ReadingsToLeaveOut,
     z: np.ndarray,
     log_likelihood: Mapping[str, np.ndarray],
     n_effective: float,
@@ -115,19 +115,19 @@ def leave_one_out(
     chosen = list(range(each.shape[-1])) if wanted is None else list(wanted)
     draws, limit = z.reshape(-1, z.shape[-1]), reliable_k(z.shape[0] * z.shape[1])
     share = min(n_effective / len(draws), 1.0)
-    quick = left_out({"": each[..., chosen]}, n_effective)
+    quick = weigh_without_each({"": each[..., chosen]}, n_effective)
     elpd, error = quick.elpd.copy(), quick.error.copy()
     how: list[How] = ["importance sampling"] * len(chosen)
     for place in np.flatnonzero(~(quick.pareto_k <= limit)):
         reading = chosen[place]
         if report is not None:
             report(f"leaving out {' '.join(readings.names[reading])}")
-        elpd[place], error[place], how[place] = treated(readings, draws, reading, share, limit, seed)
+        elpd[place], error[place], how[place] = leave_out(readings, draws, reading, share, limit, seed)
     return Prediction(elpd, quick.pareto_k, error, tuple(readings.names[i] for i in chosen), tuple(how))
 
 
-def treated(
-    readings: Readings, draws: np.ndarray, reading: int, share: float, limit: float, seed: int
+def leave_out(
+    readings: ReadingsToLeaveOut, draws: np.ndarray, reading: int, share: float, limit: float, seed: int
 ) -> tuple[float, float, How]:
     """Expected log density of a reading whose importance weights fail, its Monte Carlo error, and how it was found.
 
@@ -144,14 +144,16 @@ def treated(
         density, each = readings.evaluate(at)
         return density, each[:, reading]
 
-    elpd, k, error = matched(draws, evaluate, share)
+    elpd, k, error = match_moments(draws, evaluate, share)
     if k <= limit:
         return elpd, error, "moment matching"
-    elpd, error, settled = refitted(readings, draws, reading, share, seed)
+    elpd, error, settled = refit_without(readings, draws, reading, share, seed)
     return elpd, error, "refit" if settled else "rough"
 
 
-def refitted(readings: Readings, draws: np.ndarray, reading: int, share: float, seed: int) -> tuple[float, float, bool]:
+def refit_without(
+    readings: ReadingsToLeaveOut, draws: np.ndarray, reading: int, share: float, seed: int
+) -> tuple[float, float, bool]:
     """Expected log density of a reading by a fit without it, its Monte Carlo error, and whether that fit converged.
 
     Args:
@@ -164,7 +166,7 @@ def refitted(readings: Readings, draws: np.ndarray, reading: int, share: float, 
     from bowdenfit.inference.ensemble import sample
 
     each = readings.evaluate(draws)[1][:, reading]
-    weights = np.exp(smoothed(-each, share)[0])
+    weights = np.exp(smooth_weights(-each, share)[0])
     start = MaximumPosterior(weights @ draws, np.atleast_2d(np.cov(draws.T)))
     top = float(np.max(each))
 

@@ -9,7 +9,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from bowdenfit.inference.psis import smoothed, weighted_elpd
+from bowdenfit.inference.psis import smooth_weights, weighted_elpd
 
 _MOST_STEPS = 30
 _FLOOR = 1e-12
@@ -46,7 +46,7 @@ class Affine:
         return float(np.linalg.slogdet(self.matrix)[1])
 
 
-def matched(draws: np.ndarray, evaluate: Evaluate, share: float) -> tuple[float, float, float]:
+def match_moments(draws: np.ndarray, evaluate: Evaluate, share: float) -> tuple[float, float, float]:
     """Expected log density of one reading left out, its Pareto k, and its Monte Carlo standard error.
 
     Args:
@@ -78,7 +78,7 @@ def best_map(draws: np.ndarray, log_density: np.ndarray, evaluate: Evaluate, sha
 
     def weighed(candidate: Affine) -> tuple[np.ndarray, float]:
         density, likelihood = evaluate(candidate(draws))
-        return smoothed(density - likelihood - log_density, share)
+        return smooth_weights(density - likelihood - log_density, share)
 
     log_weights, k = weighed(found)
     for _ in range(_MOST_STEPS):

@@ -25,7 +25,7 @@ from blackjax.mcmc import nuts
 from jax import Array
 
 from bowdenfit.description import SamplerSettings
-from bowdenfit.inference.chain import Chain, Diagnose, Progress, Quantities, judged, stuck, worst
+from bowdenfit.inference.chain import Chain, Diagnose, Progress, Quantities, diagnose_draws, stuck_walkers, worst
 from bowdenfit.inference.compilation import compiled
 from bowdenfit.inference.diagnostics import diagnose_all
 from bowdenfit.inference.least_squares import MaximumPosterior
@@ -206,7 +206,7 @@ def _summarized(
     kept = np.unique(np.linspace(0, steps - 1, min(steps, max(_KEPT // chains, 1))).round().astype(int))
     z = np.ascontiguousarray(drawn["z"][kept].transpose(1, 0, 2))
     statistics = {name: np.ascontiguousarray(drawn[name][kept].T) for name in _STATISTICS}
-    derived, diagnostics, reasons = judged(posterior, z, chains, settings, quantities, diagnose)
+    derived, diagnostics, reasons = diagnose_draws(posterior, z, chains, settings, quantities, diagnose)
     trajectories = Trajectories(
         WARM_UP * BLOCK,
         steps * chains,
@@ -219,7 +219,7 @@ def _summarized(
         int(sum(b["n_steps"].sum() for b in blocks)),
         statistics,
     )
-    reasons = (*reasons, *stuck(z[:, z.shape[1] // 2 :], "chains"))
+    reasons = (*reasons, *stuck_walkers(z[:, z.shape[1] // 2 :], "chains"))
     acceptance, could_improve = float(drawn["acceptance_rate"].mean()), bool(reasons)
     reasons = (*reasons, *trajectory_shortfalls(trajectories))
     return Chain(z, derived, diagnostics, chains, steps, acceptance, reasons, "nuts", trajectories), could_improve

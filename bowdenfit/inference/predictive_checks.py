@@ -15,7 +15,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from bowdenfit.inference.psis import smoothed
+from bowdenfit.inference.psis import smooth_weights
 
 _TAIL = 0.02  # share of the weight on either side that a Pareto distribution is fitted to
 _LEAST_TAIL = 20  # draws that such a fit takes
@@ -47,7 +47,7 @@ class LeftOut:
     pareto_k: np.ndarray
 
 
-def left_out_readings(
+def predict_without_each(
     log_likelihood: np.ndarray, replicated: np.ndarray, observed: np.ndarray, at_most: np.ndarray, n_effective: float
 ) -> LeftOut:
     """Predictions of the readings of one table, each from everything else.
@@ -62,13 +62,13 @@ def left_out_readings(
     share, every = min(n_effective / len(log_likelihood), 1.0), max(1, len(log_likelihood) // _DRAWS)
     rows = []
     for likelihood, drawn, reading, bound in zip(log_likelihood.T, replicated.T, observed, at_most, strict=True):
-        log_weights, k = smoothed(-likelihood, share)
+        log_weights, k = smooth_weights(-likelihood, share)
         weights = np.exp(log_weights - log_weights.max())[::every]
-        rows.append((*_placed(drawn[::every], weights / weights.sum(), float(reading), bool(bound)), k))
+        rows.append((*_place(drawn[::every], weights / weights.sum(), float(reading), bool(bound)), k))
     return LeftOut(*np.array(rows).reshape(-1, 9).T)
 
 
-def _placed(drawn: np.ndarray, weights: np.ndarray, reading: float, at_most: bool) -> tuple[float, ...]:
+def _place(drawn: np.ndarray, weights: np.ndarray, reading: float, at_most: bool) -> tuple[float, ...]:
     """The fields of `LeftOut` of one reading, but for its Pareto k."""
     order = np.argsort(drawn)
     x, w = drawn[order], weights[order]
@@ -119,7 +119,7 @@ def _pareto_survival(excess: float, shape: float) -> float:
     return float(np.exp(-excess) if shape < 1e-6 else (1 + shape * excess) ** (-1 / shape))
 
 
-def placed_at_random(found: LeftOut, generator: np.random.Generator) -> np.ndarray:
+def place_at_random(found: LeftOut, generator: np.random.Generator) -> np.ndarray:
     """Where each reading lies in its prediction, as a number that is uniform between 0 and 1 if all is right.
 
     Of a bound only an interval is known; it takes a place at random inside.

@@ -14,7 +14,7 @@ from typing import ClassVar
 
 import numpy as np
 
-from bowdenfit.inference.psis import RELIABLE_K, smoothed
+from bowdenfit.inference.psis import RELIABLE_K, smooth_weights
 
 SENSITIVE = 0.05  # from which a quantity is said to be sensitive
 _CONFLICT = 2.0  # prior standard deviations from the prior's median to the posterior, beyond which the two are at odds
@@ -104,7 +104,7 @@ def _scaled(part: np.ndarray) -> Callable[[np.ndarray], float]:
 
 def _median_with_wider_prior(values: np.ndarray, log_prior: np.ndarray) -> float:
     """Median under weights that undo half of one prior; NaN where these lean on few draws."""
-    log_weights, pareto_k = smoothed((_WIDER - 1) * log_prior)
+    log_weights, pareto_k = smooth_weights((_WIDER - 1) * log_prior)
     if not pareto_k <= RELIABLE_K:
         return float("nan")
     order = np.argsort(values)

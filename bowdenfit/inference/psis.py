@@ -16,7 +16,7 @@ def reliable_k(n_draws: int) -> float:
     return min(1 - 1 / np.log10(n_draws), RELIABLE_K) if n_draws > 10 else 0.0
 
 
-def smoothed(log_ratio: np.ndarray, share: float = 1.0) -> tuple[np.ndarray, float]:
+def smooth_weights(log_ratio: np.ndarray, share: float = 1.0) -> tuple[np.ndarray, float]:
     """Smoothed log weights of sum 1, and Pareto k.
 
     Ratios that cannot be computed have no weight; those that are all alike have equal weights and k = 0. So much weight on a
@@ -48,7 +48,7 @@ def weighted_elpd(log_ratio: np.ndarray, log_likelihood: np.ndarray, share: floa
         log_likelihood: Of the reading, at every draw.
         share: Effective draws a draw.
     """
-    log_weights, k = smoothed(log_ratio, share)
+    log_weights, k = smooth_weights(log_ratio, share)
     parts = log_weights + log_likelihood
     top = float(np.max(parts))
     elpd = top + float(np.log(np.sum(np.exp(parts - top))))

@@ -35,11 +35,11 @@ def write_answer(folder: str | Path, name: str, answer: Any, text: str, draw: Ca
         StoreError: The folder cannot be written.
     """
     from bowdenfit.plots.write import write
-    from bowdenfit.results.folder import made, write_text
+    from bowdenfit.results.folder import folder_to_write, write_text
     from bowdenfit.results.plain import plain
 
     page_file, text_file, *figures = files = files_of(folder, name)
-    with made(Path(folder)):
+    with folder_to_write(Path(folder)):
         write_text(text_file, text)
         figure = draw()
         for path in figures:

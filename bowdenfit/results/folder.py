@@ -19,7 +19,7 @@ REPLICATIONS = "replications.jsonl"  # of a calibration
 
 
 @contextmanager
-def written_whole(path: Path) -> Iterator[Path]:
+def replace_when_whole(path: Path) -> Iterator[Path]:
     """A temporary name beside `path` to write to; it becomes `path` only if nothing went wrong."""
     temporary = path.with_name(f".{path.name}.partial")
     try:
@@ -30,7 +30,7 @@ def written_whole(path: Path) -> Iterator[Path]:
 
 
 @contextmanager
-def made(folder: Path) -> Iterator[Path]:
+def folder_to_write(folder: Path) -> Iterator[Path]:
     """A folder to write into, made if missing.
 
     Args:
@@ -49,7 +49,7 @@ def made(folder: Path) -> Iterator[Path]:
 
 def write_text(path: Path, text: str) -> None:
     """Write a text file whole."""
-    with written_whole(path) as temporary:
+    with replace_when_whole(path) as temporary:
         temporary.write_text(text, encoding="utf-8")
 
 

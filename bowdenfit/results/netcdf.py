@@ -7,7 +7,7 @@ from typing import TypeAlias
 
 import numpy as np
 
-from bowdenfit.results.folder import written_whole
+from bowdenfit.results.folder import replace_when_whole
 
 Groups: TypeAlias = dict[str, dict[str, np.ndarray]]
 Coordinates: TypeAlias = Mapping[str, tuple[str, ...]]
@@ -45,7 +45,7 @@ def write_groups(
     for group in ("posterior", "prior"):
         for name in map(str, tree[group].data_vars):
             tree[group][name].attrs |= dict(variable_attributes.get(name, {}))
-    with written_whole(path) as temporary:
+    with replace_when_whole(path) as temporary:
         tree.to_netcdf(temporary, engine="h5netcdf")
 
 

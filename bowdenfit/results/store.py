@@ -15,7 +15,7 @@ from bowdenfit.inference.least_squares import LeastSquares
 from bowdenfit.kinds import KINDS, each_table
 from bowdenfit.kinds.measurements import Measurements
 from bowdenfit.kinds.settings import parse_description
-from bowdenfit.results.folder import CHAIN, FIT, POSTERIOR, SUMMARY, made, write_text
+from bowdenfit.results.folder import CHAIN, FIT, POSTERIOR, SUMMARY, folder_to_write, write_text
 from bowdenfit.results.netcdf import EXPECTED, Coordinates, Groups, read_groups, write_groups
 from bowdenfit.results.plain import rebuilt, stored
 from bowdenfit.results.record import OPTIMAL_EFFICIENCY, OPTIMAL_LENGTH, Draws, Provenance, Record
@@ -47,7 +47,7 @@ def save(
     """
     if not force and (folder / FIT).exists():
         raise StoreError(f"{folder} holds a finished fit already; add --force (force=True) to replace it.")
-    with made(folder):
+    with folder_to_write(folder):
         if fit.posterior is None:
             (folder / POSTERIOR).unlink(missing_ok=True)
         elif write_posterior is None:

@@ -281,10 +281,10 @@ def test_one_ensemble_across_both_modes_does_jump():
 
 def test_walkers_that_never_move_are_a_reason_not_to_trust_the_draws():
     """Three of 256 far out pass R-hat, effective sample size and drift, and spoil standard deviations."""
-    from bowdenfit.inference.chain import stuck
+    from bowdenfit.inference.chain import stuck_walkers
 
     z = np.random.default_rng(0).normal(size=(256, 20, 3))
-    assert stuck(z) == ()
+    assert stuck_walkers(z) == ()
     z[:3] = z[:3, :1] + 30.0
-    (reason,) = stuck(z)
+    (reason,) = stuck_walkers(z)
     assert reason.startswith("3 of 256 walkers did not move")

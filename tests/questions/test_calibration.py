@@ -25,9 +25,9 @@ from bowdenfit.questions.calibrate.acceptable_tables import refusal
 from bowdenfit.questions.calibrate.answer import Calibration, findings
 from bowdenfit.questions.calibrate.figure import coverage, ranks, sharpness
 from bowdenfit.questions.calibrate.refit import Laboratory
-from bowdenfit.questions.calibrate.replication import Plan, Ranked, Replication, Workbench
-from bowdenfit.questions.calibrate.store import begun, keep
-from bowdenfit.questions.calibrate.uniformity import Uniformity, holm
+from bowdenfit.questions.calibrate.replication import Plan, RankedTruth, Replication, Workbench
+from bowdenfit.questions.calibrate.store import keep, open_replications
+from bowdenfit.questions.calibrate.uniformity import UniformRanks, holm
 from bowdenfit.questions.calibrate.words import calibration_text
 from bowdenfit.questions.simulate.simulation import empty_tables, simulated_again, with_readings
 
@@ -220,7 +220,7 @@ def test_tables_that_no_bench_would_hand_in_are_drawn_again(name, table, column,
 
 def test_p_values_of_uniform_ranks_are_uniform_and_agree_with_the_band():
     """Of 400 samples of 100: the share below 0.05 is rejected by a binomial test at 1e-4, by chance once in 10 000 seeds."""
-    by_chance, generator = Uniformity(100), np.random.default_rng(1)
+    by_chance, generator = UniformRanks(100), np.random.default_rng(1)
     low, high = by_chance.band(0.95)
     rejected, outside = 0, 0
     for _ in range(400):
@@ -236,7 +236,7 @@ def test_p_values_of_uniform_ranks_are_uniform_and_agree_with_the_band():
 
 def test_ranks_heaped_in_the_middle_or_at_an_end_are_not_uniform():
     spread = np.linspace(0.01, 0.99, 100)
-    by_chance = Uniformity(100)
+    by_chance = UniformRanks(100)
     assert by_chance.p_value(spread) > 0.9
     assert by_chance.p_value(0.5 + 0.6 * (spread - 0.5)) < 0.001
     assert by_chance.p_value(spread**2) < 0.001
@@ -253,7 +253,7 @@ def replications(n: int, sd: float = 1.0, shift: float = 0.0, seed: int = 0, bad
     found = []
     for i in range(n):
         error = 0.3 * generator.standard_normal() + 0.3 * shift
-        ranked = Ranked(0.0, error, 0.3 * sd, float(stats.norm.cdf(-error / (0.3 * sd))))
+        ranked = RankedTruth(0.0, error, 0.3 * sd, float(stats.norm.cdf(-error / (0.3 * sd))))
         reasons = ("R-hat of mu is 1.2 and should be below 1.03",) if i < bad else ()
         found.append(
             Replication(i, {"an efficiency is below 20 %": 1} if i % 7 == 0 else {}, reasons, {"mu": ranked}, 2.0)
@@ -310,31 +310,31 @@ FINGERPRINT = {"description": {"name": "a"}, "sha256": {}, "seed": 3, "assumed":
 def test_replications_are_kept_one_by_one_and_a_torn_line_is_made_again(tmp_path):
     folder = tmp_path / "new" / "calibration"
     made = replications(3)
-    assert begun(folder, FINGERPRINT, resume=False, force=False) == {}
+    assert open_replications(folder, FINGERPRINT, resume=False, force=False) == {}
     for each in made:
         keep(folder, each)
     file = folder / "replications.jsonl"
     file.write_text(file.read_text()[:-20])
-    assert begun(folder, FINGERPRINT, resume=True, force=False) == {0: made[0], 1: made[1]}
+    assert open_replications(folder, FINGERPRINT, resume=True, force=False) == {0: made[0], 1: made[1]}
     keep(folder, made[2])
-    assert begun(folder, FINGERPRINT, resume=True, force=False)[2] == made[2]
+    assert open_replications(folder, FINGERPRINT, resume=True, force=False)[2] == made[2]
 
 
 def test_another_seed_or_a_folder_of_something_else_is_refused(tmp_path):
-    begun(tmp_path / "c", FINGERPRINT, resume=False, force=False)
+    open_replications(tmp_path / "c", FINGERPRINT, resume=False, force=False)
     with pytest.raises(StoreError, match="the seed changed"):
-        begun(tmp_path / "c", FINGERPRINT | {"seed": 4}, resume=True, force=False)
+        open_replications(tmp_path / "c", FINGERPRINT | {"seed": 4}, resume=True, force=False)
     with pytest.raises(StoreError, match="--resume, or start over with --force"):
-        begun(tmp_path / "c", FINGERPRINT, resume=False, force=False)
+        open_replications(tmp_path / "c", FINGERPRINT, resume=False, force=False)
     with pytest.raises(StoreError, match="holds no calibration to resume"):
-        begun(tmp_path / "none", FINGERPRINT, resume=True, force=False)
+        open_replications(tmp_path / "none", FINGERPRINT, resume=True, force=False)
     (tmp_path / "c" / "replications.jsonl").write_text("nothing\n")
     with pytest.raises(StoreError, match="damaged"):
-        begun(tmp_path / "c", FINGERPRINT, resume=True, force=False)
+        open_replications(tmp_path / "c", FINGERPRINT, resume=True, force=False)
     (tmp_path / "other").mkdir()
     (tmp_path / "other" / "notes.txt").write_text("mine")
     with pytest.raises(StoreError, match="holds no calibration"):
-        begun(tmp_path / "other", FINGERPRINT, resume=False, force=True)
+        open_replications(tmp_path / "other", FINGERPRINT, resume=False, force=True)
     assert (tmp_path / "other" / "notes.txt").read_text() == "mine"
 
 
@@ -431,7 +431,7 @@ def test_an_interrupted_calibration_says_how_to_go_on(run, tmp_path, monkeypatch
     def interrupted(*_):
         raise KeyboardInterrupt
 
-    monkeypatch.setattr("bowdenfit.questions.calibrate.processes.replicated", interrupted)
+    monkeypatch.setattr("bowdenfit.questions.calibrate.processes.replicate", interrupted)
     code, _, err = run("calibrate", ROOT / "datasets" / "yarn-on-cylinder", "-o", tmp_path / "c")
     assert code == 130
     assert "run the same command with --resume" in err

@@ -15,7 +15,7 @@ import bowdenfit as bf
 from bowdenfit.inference.compilation import compiled
 from bowdenfit.inference.diagnostics import Diagnostics
 from bowdenfit.inference.log_density import LogDensity as Density
-from bowdenfit.inference.predictive_checks import LeftOut, left_out_readings, placed_at_random, uniformity
+from bowdenfit.inference.predictive_checks import LeftOut, place_at_random, predict_without_each, uniformity
 from bowdenfit.inference.prior_sensitivity import SENSITIVE, sensitivities
 from bowdenfit.model import build_model
 from bowdenfit.questions.check import checks_figure, prior_figure
@@ -61,7 +61,7 @@ def test_predictions_without_a_reading_are_those_of_the_textbook():
     x = np.linspace(-1, 1, 15)
     y = 1 + 2 * x + 0.3 * np.random.default_rng(1).standard_normal(15)
     log_likelihood, replicated = line_through(x, y, 0.3)
-    found = left_out_readings(log_likelihood, replicated, y, np.zeros(15, dtype=bool), DRAWS)
+    found = predict_without_each(log_likelihood, replicated, y, np.zeros(15, dtype=bool), DRAWS)
     mean, sd = textbook(x, y, 0.3)
     np.testing.assert_allclose((found.mean - mean) / sd, 0.0, atol=0.06)
     np.testing.assert_allclose(found.sd / sd, 1.0, atol=0.06)
@@ -74,21 +74,21 @@ def test_a_tail_beyond_all_draws_is_small_but_never_smaller_than_a_normal_one(z)
     """The Pareto tail is exponential at the least, so it errs to the side of no alarm, and by less than two sds."""
     draws = np.random.default_rng(0).standard_normal((20_000, 1))
     flat = np.zeros_like(draws)
-    (tail,) = left_out_readings(flat, draws, np.array([z]), np.zeros(1, dtype=bool), 20_000).tail
+    (tail,) = predict_without_each(flat, draws, np.array([z]), np.zeros(1, dtype=bool), 20_000).tail
     assert 0.7 * 2 * stats.norm.sf(z) < tail < 2 * stats.norm.sf(z - 1.0)
-    (other,) = left_out_readings(flat, draws, np.array([-z]), np.zeros(1, dtype=bool), 20_000).tail
+    (other,) = predict_without_each(flat, draws, np.array([-z]), np.zeros(1, dtype=bool), 20_000).tail
     assert other == pytest.approx(tail, rel=1.0)
 
 
 def test_a_bound_takes_a_place_below_itself_and_stands_out_only_where_more_was_expected():
     draws = np.random.default_rng(0).normal(20.0, 2.0, (8000, 2))
     at_most = np.array([True, True])
-    found = left_out_readings(np.zeros_like(draws), draws, np.array([22.0, 10.0]), at_most, 8000)
+    found = predict_without_each(np.zeros_like(draws), draws, np.array([22.0, 10.0]), at_most, 8000)
     assert found.below[0] == 0.0
     assert found.up_to[0] == pytest.approx(stats.norm.cdf(1.0), abs=0.02)
     assert found.tail[0] == pytest.approx(found.up_to[0], abs=1e-9)
     assert found.tail[1] < 1e-3
-    places = [placed_at_random(found, np.random.default_rng(i))[0] for i in range(200)]
+    places = [place_at_random(found, np.random.default_rng(i))[0] for i in range(200)]
     assert min(places) > 0.0
     assert max(places) < found.up_to[0]
 
@@ -97,7 +97,7 @@ def test_a_reading_that_hangs_on_one_draw_is_decisive_and_one_that_says_nothing_
     draws = np.random.default_rng(0).standard_normal((4000, 2))
     log_likelihood = np.zeros((4000, 2))
     log_likelihood[7, 0] = -800.0
-    found = left_out_readings(log_likelihood, draws, np.zeros(2), np.zeros(2, dtype=bool), 4000)
+    found = predict_without_each(log_likelihood, draws, np.zeros(2), np.zeros(2, dtype=bool), 4000)
     assert np.isinf(found.pareto_k[0])
     assert found.pareto_k[1] == 0.0
     np.testing.assert_allclose(found.median, 0.0, atol=0.06)

@@ -11,10 +11,10 @@ from scipy import stats
 
 import bowdenfit as bf
 from bowdenfit.errors import DescriptionError, UsageError
-from bowdenfit.inference.comparison import Difference, Prediction, differences, left_out, stacking_weights
-from bowdenfit.inference.leave_one_out import REFIT, Readings, leave_one_out, refitted
+from bowdenfit.inference.comparison import Difference, Prediction, differences, stacking_weights, weigh_without_each
+from bowdenfit.inference.leave_one_out import REFIT, ReadingsToLeaveOut, leave_one_out, refit_without
 from bowdenfit.inference.log_density import LogDensity
-from bowdenfit.inference.moment_matching import Affine, best_map, matched
+from bowdenfit.inference.moment_matching import Affine, best_map, match_moments
 from bowdenfit.inference.psis import reliable_k
 from bowdenfit.kinds.design import Design
 from bowdenfit.model import build_model
@@ -77,7 +77,7 @@ def drawn(on_a_grid):
 
 @pytest.fixture(scope="module")
 def readings(outlier):
-    return Readings(outlier)
+    return ReadingsToLeaveOut(outlier)
 
 
 def test_leave_one_out_with_fall_backs_is_what_integrals_give(readings, drawn, exact):
@@ -88,22 +88,22 @@ def test_leave_one_out_with_fall_backs_is_what_integrals_give(readings, drawn, e
     assert found.pareto_k[-1] > 0.7
     assert found.how[:-1] == ("importance sampling",) * 7
     assert np.all(np.abs(found.elpd - exact) < 4 * found.error + 0.005)
-    plain = left_out({"efficiency": each.reshape(4, 1000, -1)}, 4000.0)
+    plain = weigh_without_each({"efficiency": each.reshape(4, 1000, -1)}, 4000.0)
     assert abs(found.elpd[-1] - exact[-1]) < abs(plain.elpd[-1] - exact[-1])
 
 
 def test_a_fit_without_a_reading_gives_its_exact_density(readings, drawn, exact):
     """Fails by chance for one seed in 15 000: two readings within four standard errors, and 0.005 for the grid."""
     for i in (0, 7):
-        elpd, error, settled = refitted(readings, drawn.reshape(-1, 2), i, 1.0, 5)
+        elpd, error, settled = refit_without(readings, drawn.reshape(-1, 2), i, 1.0, 5)
         assert settled
         assert 0 < error < 0.1
         assert elpd == pytest.approx(exact[i], abs=4 * error + 0.005)
 
 
 def test_a_refit_that_is_stopped_too_early_is_called_rough(outlier, drawn):
-    hasty = Readings(outlier, REFIT.model_copy(update={"max_steps": 200}))
-    _, _, settled = refitted(hasty, drawn.reshape(-1, 2), 7, 1.0, 5)
+    hasty = ReadingsToLeaveOut(outlier, REFIT.model_copy(update={"max_steps": 200}))
+    _, _, settled = refit_without(hasty, drawn.reshape(-1, 2), 7, 1.0, 5)
     assert not settled
     assert Prediction(np.zeros(2), np.array([0.9, 0.9]), how=("rough", "refit")).unreliable == 1
 
@@ -126,11 +126,11 @@ def test_moment_matching_finds_a_posterior_that_lies_elsewhere():
 
     truth = stats.norm.logpdf(4.0, 0.0, 2.0)
     density, likelihood = evaluate(draws)
-    elpd, k, error = matched(draws, evaluate, 1.0)
+    elpd, k, error = match_moments(draws, evaluate, 1.0)
     assert k < 0.5
     assert error < 0.1
     assert elpd == pytest.approx(truth, abs=4 * error)
-    plain = left_out({"": likelihood[None, :, None]}, 8000.0)
+    plain = weigh_without_each({"": likelihood[None, :, None]}, 8000.0)
     assert plain.pareto_k[0] > 0.7
     assert abs(plain.elpd[0] - truth) > 0.3
     found = best_map(draws, density, evaluate, 1.0)
@@ -159,7 +159,7 @@ def test_weights_are_those_of_arviz_and_do_not_mind_a_constant():
         n: stats.norm.logpdf(y, m, 1.0) + np.zeros((4, 500, 1)) for n, m in zip(names, means, strict=True)
     }
     log_likelihood = {n: v + 1e-3 * generator.normal(size=v.shape) for n, v in log_likelihood.items()}
-    predictions = {n: left_out({"y": v}, 2000.0) for n, v in log_likelihood.items()}
+    predictions = {n: weigh_without_each({"y": v}, 2000.0) for n, v in log_likelihood.items()}
     weights = stacking_weights(predictions)
     trees = {
         n: arviz_base.from_dict({"posterior": {"x": generator.normal(size=(4, 500))}, "log_likelihood": {"y": v}})
@@ -319,7 +319,7 @@ def test_published_and_continuous_geometry_are_compared_on_what_both_have(geomet
 
 def test_the_order_of_tables_in_a_stored_fit_does_not_matter(geometries):
     fit = bf.load(geometries / "continuous")
-    readings, of_table = Readings(LogDensity(fit.model)), fit.posterior.log_likelihood
+    readings, of_table = ReadingsToLeaveOut(LogDensity(fit.model)), fit.posterior.log_likelihood
     sound = [i for i, (_, label) in enumerate(readings.names) if "430" not in label and "at 4" in label]
     found = [
         leave_one_out(readings, fit.posterior.z, tables, 2000.0, 1, sound)
@@ -363,12 +363,12 @@ def test_every_reading_of_the_on_body_data_is_predicted_as_by_a_fit_without_it(o
     below 0.5; between 0.5 and 0.7 the weights have no finite variance and a quarter of a nat is allowed besides.
     """
     fit = bf.fit(on_body, seed=1)
-    readings = Readings(LogDensity(fit.model))
+    readings = ReadingsToLeaveOut(LogDensity(fit.model))
     effective = min(d.ess_bulk for d in fit.posterior.diagnostics.values())
     found = leave_one_out(readings, fit.posterior.z, fit.posterior.log_likelihood, effective, 1)
     assert found.unreliable == 0
     for i in range(len(found.readings)):
-        elpd, error, settled = refitted(readings, fit.posterior.flat_z, i, 0.15, 9)
+        elpd, error, settled = refit_without(readings, fit.posterior.flat_z, i, 0.15, 9)
         assert settled, found.readings[i]
         heavy = 0.25 if found.pareto_k[i] > 0.5 else 0.0
         assert abs(elpd - found.elpd[i]) < 5 * np.hypot(error, found.error[i]) + heavy, found.readings[i]

@@ -13,7 +13,7 @@ from bowdenfit.errors import UsageError
 from bowdenfit.inference.comparison import Difference, Prediction, differences
 from bowdenfit.kinds.design import Design
 from bowdenfit.questions.check.data_set_words import check_text
-from bowdenfit.questions.identify.confounding import confounded
+from bowdenfit.questions.identify.confounding import confounded_pairs
 from bowdenfit.questions.recorded import dependence_figure
 from bowdenfit.questions.recorded.rate import RateEffect, rate_effect
 from bowdenfit.questions.recorded.traces import traces
@@ -193,13 +193,13 @@ def test_leave_one_out_of_a_normal_mean_is_what_leaving_one_out_gives():
     """Conjugate: readings Normal(mu, 1), flat prior; leaving y_i out its density is Normal(mean of others, 1 + 1/(n - 1))."""
     from scipy import stats
 
-    from bowdenfit.inference.comparison import left_out
+    from bowdenfit.inference.comparison import weigh_without_each
 
     generator = np.random.default_rng(5)
     readings = generator.normal(size=12)
     draws = generator.normal(readings.mean(), 1 / np.sqrt(12), size=(8, 4000))
     log_likelihood = stats.norm.logpdf(readings, draws[..., None], 1.0)
-    found = left_out({"readings": log_likelihood}, draws.size)
+    found = weigh_without_each({"readings": log_likelihood}, draws.size)
     others = [np.delete(readings, i).mean() for i in range(12)]
     expected = stats.norm.logpdf(readings, others, np.sqrt(1 + 1 / 11))
     np.testing.assert_allclose(found.elpd, expected, atol=0.02)
@@ -218,7 +218,7 @@ def pulls_only():
 
 def test_a_gain_error_and_a_constant_angle_are_said_to_be_confounded_with_what_is_known_of_them(pulls_only):
     fit, values = pulls_only
-    (pair,) = confounded(fit)
+    (pair,) = confounded_pairs(fit)
     assert {pair.first, pair.second} == {"mu_edge", "gain_error"}
     assert pair.factor == pytest.approx(1 / np.deg2rad(45), rel=0.1)
     truth = values["mu_edge"] + pair.factor * values["gain_error"]
@@ -231,7 +231,7 @@ def test_a_gain_error_and_a_constant_angle_are_said_to_be_confounded_with_what_i
 
 
 def test_parameters_that_the_data_tell_apart_are_not_called_confounded(plain):
-    assert confounded(plain[0]) == []
+    assert confounded_pairs(plain[0]) == []
 
 
 def _csv(path, columns, rows):

@@ -8,7 +8,7 @@ from typing import ClassVar
 import numpy as np
 
 from bowdenfit.questions.calibrate.replication import Replication
-from bowdenfit.questions.calibrate.uniformity import Uniformity, holm
+from bowdenfit.questions.calibrate.uniformity import UniformRanks, holm
 
 LEVEL = 0.01  # at which a quantity is rejected, corrected for the number of quantities
 INTERVALS = (0.5, 0.9)
@@ -159,11 +159,11 @@ def findings(
     replications = sorted(replications, key=lambda r: r.number)
     good = [r for r in replications if not r.reasons]
     names = list(good[0].ranked) if good else []
-    by_chance = Uniformity(len(good))
+    by_chance = UniformRanks(len(good))
     ranks = [np.array([r.ranked[q].rank for r in good]) for q in names]
     p_values = [by_chance.p_value(r) for r in ranks]
     quantities = tuple(
-        _checked(q, symbols.get(q, q), r, (p, c), len(names), good)
+        _check_quantity(q, symbols.get(q, q), r, (p, c), len(names), good)
         for q, r, p, c in zip(names, ranks, p_values, holm(p_values), strict=True)
     )
     redrawn: Counter[str] = Counter()
@@ -174,7 +174,7 @@ def findings(
     return Calibration(name, assumed, seed, len(replications), quantities, unconverged, dict(redrawn), seconds)
 
 
-def _checked(
+def _check_quantity(
     name: str, symbol: str, ranks: np.ndarray, p: tuple[float, float], n_quantities: int, good: Sequence[Replication]
 ) -> Checked:
     found = [r.ranked[name] for r in good]

@@ -12,7 +12,7 @@ from bowdenfit.plots.layout import TITLE, drop_unused, legend_above, panels
 from bowdenfit.plots.panels import label_outer
 from bowdenfit.plots.style import BLUE, GRAY, LIGHT, VERMILLION, in_paper_style
 from bowdenfit.plots.write import FORMATS, write_all
-from bowdenfit.questions.calibrate.uniformity import Uniformity
+from bowdenfit.questions.calibrate.uniformity import UniformRanks
 
 if TYPE_CHECKING:
     from bowdenfit.plots.layout import Axes, Figure
@@ -47,7 +47,7 @@ def ranks(found: Calibration) -> Figure:
     n = len(found.quantities)
     rows = -(-n // _COLUMNS)
     figure, flat = panels([1.15] * rows, min(_COLUMNS, n), TITLE, (0.5, 0.5), sharex=True)
-    by_chance = Uniformity(found.ranked)
+    by_chance = UniformRanks(found.ranked)
     places, (low, high) = by_chance.places, by_chance.band(_BAND)
     reach = max(0.01, float(max(np.max(high - places), np.max(places - low))))
     flat = drop_unused(flat, n)

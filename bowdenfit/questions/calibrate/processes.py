@@ -22,7 +22,7 @@ _ONE_THREAD = {
 }
 
 
-def replicated(plan: "Plan", numbers: Sequence[int], workers: int) -> "Iterator[Replication]":
+def replicate(plan: "Plan", numbers: Sequence[int], workers: int) -> "Iterator[Replication]":
     """Replications as they are done: in processes that start cleanly, or here if there is one worker.
 
     Args:

@@ -22,7 +22,7 @@ SAMPLER = SamplerSettings(n_ensembles=2, n_walkers=128, max_steps=6000, target_e
 
 
 @dataclass(frozen=True)
-class Programs:
+class RefitPrograms:
     """What is compiled once for all data of one shape; nothing in it depends on the data."""
 
     posterior: LogDensity
@@ -54,7 +54,7 @@ class Laboratory:
     """
 
     sampler: SamplerSettings = SAMPLER
-    programs: dict[str, Programs] = field(default_factory=dict)
+    programs: dict[str, RefitPrograms] = field(default_factory=dict)
 
     def chain(self, posterior: LogDensity, seed: int) -> Chain:
         """Draws of a posterior.
@@ -64,13 +64,15 @@ class Laboratory:
         """
         programs = self.programs_for(posterior)
         start = maximum_posterior(posterior, programs.objective)
-        return sample(posterior, programs.log_density, start, self.sampler, seed, _no_quantities, diagnose=diagnosed)
+        return sample(
+            posterior, programs.log_density, start, self.sampler, seed, _no_quantities, diagnose=diagnose_few_draws
+        )
 
-    def programs_for(self, posterior: LogDensity) -> Programs:
+    def programs_for(self, posterior: LogDensity) -> RefitPrograms:
         """The programs for data of this shape."""
         shapes = str(jax.tree.map(lambda array: (array.shape, str(array.dtype)), posterior.data))
         key = shapes + str(posterior.model.space)
-        return self.programs.setdefault(key, Programs(posterior, self.sampler))
+        return self.programs.setdefault(key, RefitPrograms(posterior, self.sampler))
 
 
 def _no_quantities(z: np.ndarray) -> dict[str, np.ndarray]:
@@ -78,7 +80,7 @@ def _no_quantities(z: np.ndarray) -> dict[str, np.ndarray]:
     return {}
 
 
-def diagnosed(draws: Mapping[str, np.ndarray], n_ensembles: int) -> dict[str, Diagnostics]:
+def diagnose_few_draws(draws: Mapping[str, np.ndarray], n_ensembles: int) -> dict[str, Diagnostics]:
     """Diagnostics of a few hundred effective draws.
 
     Two halves of n effective draws differ by 2.5 / sqrt(n) of their spread by chance alone, which at a thousand is all that

@@ -43,7 +43,7 @@ class Plan:
 
 
 @dataclass(frozen=True)
-class Ranked:
+class RankedTruth:
     """Truth and posterior of one quantity; of a parameter in z, where its prior is a standard normal.
 
     Args:
@@ -75,7 +75,7 @@ class Replication:
     number: int
     redrawn: dict[str, int]
     reasons: tuple[str, ...]
-    ranked: dict[str, Ranked]
+    ranked: dict[str, RankedTruth]
     seconds: float
     steps: int = 0
 
@@ -165,7 +165,7 @@ class Workbench:
             return "a recording has no strokes"
         return "held readings would have slipped" if slipped(drawn) else self.refusal(self.plan.stated, dataset)
 
-    def _ranked_parameters(self, z_true: np.ndarray, z: np.ndarray) -> dict[str, Ranked]:
+    def _ranked_parameters(self, z_true: np.ndarray, z: np.ndarray) -> dict[str, RankedTruth]:
         """Parameters that both descriptions have and that are fitted."""
         stated, assumed = self.stated.space, self.assumed.space
         truth = dict(zip((p.name for p in stated.free), z_true, strict=True))
@@ -177,12 +177,14 @@ class Workbench:
                 if p.name in values
             }
         return {
-            name: ranked(float(value), z[:, assumed.index[name]])
+            name: rank_truth(float(value), z[:, assumed.index[name]])
             for name, value in truth.items()
             if name in assumed.index
         }
 
-    def _ranked_optimum(self, posterior: LogDensity, z_true: np.ndarray, z: np.ndarray, tie: float) -> dict[str, Ranked]:
+    def _ranked_optimum(
+        self, posterior: LogDensity, z_true: np.ndarray, z: np.ndarray, tie: float
+    ) -> dict[str, RankedTruth]:
         """Optimal length and the efficiency there, for a cable with a route.
 
         An optimum at an end of the range has probability of its own there; a truth at the same end takes a place at random
@@ -193,10 +195,10 @@ class Workbench:
         truth = self._optimum_of_truth(z_true[None])
         draws = self.laboratory.programs_for(posterior).optimum(z)
         names = (OPTIMAL_LENGTH, OPTIMAL_EFFICIENCY)
-        return {name: ranked(float(t[0]), d, tie) for name, t, d in zip(names, truth, draws, strict=True)}
+        return {name: rank_truth(float(t[0]), d, tie) for name, t, d in zip(names, truth, draws, strict=True)}
 
 
-def ranked(truth: float, draws: np.ndarray, tie: float = 0.0) -> Ranked:
+def rank_truth(truth: float, draws: np.ndarray, tie: float = 0.0) -> RankedTruth:
     """Where the truth is among the draws; of draws equal to it the share `tie` counts as below."""
     rank = float(np.mean(draws < truth) + tie * np.mean(draws == truth))
-    return Ranked(truth, float(np.mean(draws)), float(np.std(draws)), rank)
+    return RankedTruth(truth, float(np.mean(draws)), float(np.std(draws)), rank)

@@ -15,7 +15,9 @@ CALIBRATION = "calibration.json"
 _WHAT = {"description": "the description", "sha256": "an input file", "seed": "the seed", "assumed": "what is assumed"}
 
 
-def begun(folder: Path, fingerprint: Mapping[str, Any], resume: bool, force: bool) -> dict[int, Replication]:
+def open_replications(
+    folder: Path, fingerprint: Mapping[str, Any], resume: bool, force: bool
+) -> dict[int, Replication]:
     """The replications that a folder holds already, in a folder that is ready for more.
 
     Args:
@@ -29,7 +31,7 @@ def begun(folder: Path, fingerprint: Mapping[str, Any], resume: bool, force: boo
     """
     path = folder / REPLICATIONS
     if resume:
-        return _resumed(path, fingerprint)
+        return _read_replications(path, fingerprint)
     if path.exists() and not force:
         raise StoreError(f"{folder} holds a calibration already; go on with --resume, or start over with --force.")
     if folder.exists() and not path.exists() and any(folder.iterdir()):
@@ -60,7 +62,7 @@ def seed_of(folder: Path) -> int:
     return int(_lines(folder / REPLICATIONS)[0]["seed"])
 
 
-def _resumed(path: Path, fingerprint: Mapping[str, Any]) -> dict[int, Replication]:
+def _read_replications(path: Path, fingerprint: Mapping[str, Any]) -> dict[int, Replication]:
     before, *pages = _lines(path)
     changed = [name for name in _WHAT if before.get(name) != fingerprint[name]]
     if changed:

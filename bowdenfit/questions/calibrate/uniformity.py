@@ -12,7 +12,7 @@ _SEED = 20_220_728
 
 
 @dataclass(frozen=True)
-class Uniformity:
+class UniformRanks:
     """What the distribution function of n uniform ranks looks like.
 
     The statistic of a sample is the smallest two-sided binomial probability of its distribution function over all places;

@@ -66,12 +66,12 @@ def calibrate(
 
     from bowdenfit.questions.calibrate.answer import findings
     from bowdenfit.questions.calibrate.replication import Plan
-    from bowdenfit.questions.calibrate.store import begun
+    from bowdenfit.questions.calibrate.store import open_replications
 
     plan = Plan(stated, assumed, seed)
     with jax.enable_x64(True):
-        symbols = checked(plan)
-    done = {} if folder is None else begun(folder, _fingerprint(plan, assume), resume, force)
+        symbols = symbols_of(plan)
+    done = {} if folder is None else open_replications(folder, _fingerprint(plan, assume), resume, force)
     _replicate(plan, done, replications, workers, folder, progress)
     found = findings(tuple(done.values()), symbols, name=stated.description.name, assumed=tuple(assume), seed=seed)
     if folder is not None:
@@ -104,11 +104,11 @@ def _replicate(
     progress: Report | None,
 ) -> None:
     """Do what is not done yet, and keep each as it ends."""
-    from bowdenfit.questions.calibrate.processes import replicated
+    from bowdenfit.questions.calibrate.processes import replicate
     from bowdenfit.questions.calibrate.store import keep
 
     missing = [number for number in range(replications) if number not in done]
-    for each in replicated(plan, missing, workers or os.cpu_count() or 1):
+    for each in replicate(plan, missing, workers or os.cpu_count() or 1):
         done[each.number] = each
         if folder is not None:
             keep(folder, each)
@@ -127,7 +127,7 @@ def _seed(folder: Path | None, seed: int | None, resume: bool) -> int:
     return seed_of(folder)
 
 
-def checked(plan: "Plan") -> dict[str, str]:
+def symbols_of(plan: "Plan") -> dict[str, str]:
     """Symbols of what will be ranked, once it is clear that the data set can be replicated.
 
     Raises:

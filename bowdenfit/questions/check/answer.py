@@ -6,7 +6,7 @@ from typing import ClassVar
 
 import numpy as np
 
-from bowdenfit.inference.predictive_checks import left_out_readings, placed_at_random, uniformity
+from bowdenfit.inference.predictive_checks import place_at_random, predict_without_each, uniformity
 from bowdenfit.inference.prior_sensitivity import Sensitivity, sensitivities
 from bowdenfit.kinds.term import Term
 from bowdenfit.questions.check.residual_places import STROKE, places_of
@@ -95,8 +95,8 @@ def _table(
         part[term.name].reshape(-1, n) for part in (posterior.log_likelihood, posterior.replicated)
     )
     reading, at_most = readings_of(term)
-    predicted = left_out_readings(log_likelihood, replicated, reading, at_most, effective_draws(posterior))
-    placed = placed_at_random(predicted, generator)
+    predicted = predict_without_each(log_likelihood, replicated, reading, at_most, effective_draws(posterior))
+    placed = place_at_random(predicted, generator)
     uniform = uniformity(placed, probability) if n >= _LEAST_READINGS else None
     places = places_of(fit.dataset, term)
     return TableChecks(term.name, term.unit, term.labels, reading, at_most, predicted, places, placed, uniform)

@@ -91,11 +91,11 @@ def show_priors(dataset: "Dataset", folder: str | Path, seed: int = 0) -> "Prior
     from bowdenfit.plots.write import write_all
     from bowdenfit.questions.check.prior_figure import draw
     from bowdenfit.questions.check.prior_predictive import prior_predictive
-    from bowdenfit.results.folder import made
+    from bowdenfit.results.folder import folder_to_write
 
     with jax.enable_x64(True):
         found = prior_predictive(dataset, seed)
-    with made(Path(folder)) as place:
+    with folder_to_write(Path(folder)) as place:
         write_all(draw(found), place, FIGURE)
     return found
 

@@ -27,7 +27,7 @@ def checks_text(found: Checks | None) -> str:
     return "\n".join([_HEADING, *(filled(sentence) for sentence in sentences if sentence)])
 
 
-def named(reading: CheckedReading) -> str:
+def _name(reading: CheckedReading) -> str:
     """A reading in words."""
     return readings_called(reading.table).one.format(reading.label)
 
@@ -48,20 +48,22 @@ def _outliers(found: Checks) -> str:
         return "No reading is an outlier."
     more = f", and {len(far) - _FEW} more" if len(far) > _FEW else ""
     what = "Outlier" if len(far) == 1 else f"{len(far)} outliers"
-    return f"{what}: {'; '.join(_told(r) for r in far[:_FEW])}{more}. Look at how they were measured and written down."
+    return (
+        f"{what}: {'; '.join(_sentence(r) for r in far[:_FEW])}{more}. Look at how they were measured and written down."
+    )
 
 
-def _told(reading: CheckedReading) -> str:
+def _sentence(reading: CheckedReading) -> str:
     """'efficiency at 550 mm: measured 67.8 %, expected 68.1 % without it (90 % interval ..., z = -0.2, k = 0.6)'"""
-    expected, low, high = (_shown(reading, getattr(reading, key)) for key in ("expected", "q05", "q95"))
-    measured = f"{'at most' if reading.is_bound else 'measured'} {_shown(reading, reading.reading)}"
+    expected, low, high = (_with_unit(reading, getattr(reading, key)) for key in ("expected", "q05", "q95"))
+    measured = f"{'at most' if reading.is_bound else 'measured'} {_with_unit(reading, reading.reading)}"
     z = f", z = {reading.z:+.1f}" if isfinite(reading.z) else ""
     k = f"= {reading.pareto_k:.2f}" if isfinite(reading.pareto_k) else "far above 1"
     interval = f"90 % interval {low} to {high}{z}, k {k}"
-    return f"{named(reading)}: {measured}, expected {expected} without it ({interval})"
+    return f"{_name(reading)}: {measured}, expected {expected} without it ({interval})"
 
 
-def _shown(reading: CheckedReading, value: float) -> str:
+def _with_unit(reading: CheckedReading, value: float) -> str:
     """A value of a reading's kind with its unit."""
     if readings_called(reading.table).are_efficiencies:
         return f"{100 * value:.{decimals(100 * reading.sd)}f} %"
@@ -92,7 +94,7 @@ def _decisive(found: Checks) -> str:
     if not decisive:
         return ""
     return (
-        f"The fit leans on {_few(named(r) for r in decisive)} (k above 0.7): without {_one(len(decisive))} it would be "
+        f"The fit leans on {_few(_name(r) for r in decisive)} (k above 0.7): without {_one(len(decisive))} it would be "
         "markedly different, so measure there again first if in doubt."
     )
 
@@ -113,7 +115,7 @@ def _outside(found: Checks) -> str:
     if not outside:
         return ""
     more = f"; and {len(outside) - _FEW} more" if len(outside) > _FEW else ""
-    return f"Outside the range of the curves: {'; '.join(_told(r) for r in outside[:_FEW])}{more}."
+    return f"Outside the range of the curves: {'; '.join(_sentence(r) for r in outside[:_FEW])}{more}."
 
 
 def _priors(found: Checks) -> str:
@@ -126,10 +128,10 @@ def _priors(found: Checks) -> str:
         far = max(abs(s.prior_sds) for s in conflicts)
         parts.append(
             f"Prior and readings contradict each other about {listed(parameters)}: what was found lies {far:.1f} standard "
-            f"deviations of the prior from its middle{_moved(conflicts)}. Check the prior, its unit first."
+            f"deviations of the prior from its middle{_with_wider_prior(conflicts)}. Check the prior, its unit first."
         )
     if felt:
-        parts.append(f"The prior counts for {listed([_answer(s) for s in felt])}{_moved(felt)}.")
+        parts.append(f"The prior counts for {listed([_answer(s) for s in felt])}{_with_wider_prior(felt)}.")
     if not parts and every:
         answers = " and the design answer" if any(s.quantity in _ANSWERS for s in every) else ""
         parts.append(f"Priors hardly count for the coefficients{answers}; the readings decide.")
@@ -141,7 +143,7 @@ def _answer(s: Sensitivity) -> str:
     return name if s.parameter == s.quantity else f"{name} (that of {s.parameter})"
 
 
-def _moved(found: list[Sensitivity]) -> str:
+def _with_wider_prior(found: list[Sensitivity]) -> str:
     """How far the quantity that moves most would move with a wider prior."""
     known = [s for s in found if isfinite(s.wider) and s.sd]
     if not known:

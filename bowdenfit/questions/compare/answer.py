@@ -11,7 +11,7 @@ from bowdenfit.description import Description
 from bowdenfit.errors import UsageError
 from bowdenfit.inference.comparison import Difference, Prediction, differences, stacking_weights
 from bowdenfit.inference.interval import Interval
-from bowdenfit.inference.leave_one_out import Readings, leave_one_out
+from bowdenfit.inference.leave_one_out import ReadingsToLeaveOut, leave_one_out
 from bowdenfit.inference.log_density import LogDensity as Density
 from bowdenfit.kinds import readings_called
 from bowdenfit.kinds.terms import measured_kinds, term_kind
@@ -144,9 +144,9 @@ def compare(fits: Mapping[str, Record], report: Report | None = None) -> Compari
     """
     if len(fits) < 2:
         raise UsageError("a comparison needs at least two fits; name their results folders.")
-    drawn = {name: _drawn(name, fit) for name, fit in fits.items()}
+    drawn = {name: _draws_of(name, fit) for name, fit in fits.items()}
     common = _common(fits)
-    predictions = {name: _predicted(name, fit, drawn[name], common, report) for name, fit in fits.items()}
+    predictions = {name: _leave_out_each(name, fit, drawn[name], common, report) for name, fit in fits.items()}
     order = differences(predictions)
     ordered = {name: fits[name] for name in order}
     weights = stacking_weights(predictions)
@@ -166,7 +166,7 @@ def compare(fits: Mapping[str, Record], report: Report | None = None) -> Compari
     )
 
 
-def _drawn(name: str, fit: Record) -> Draws:
+def _draws_of(name: str, fit: Record) -> Draws:
     if fit.posterior is None:
         raise UsageError(f"{name} has no posterior, because it was made without MCMC; fit it again without --no-mcmc.")
     return fit.posterior
@@ -196,10 +196,10 @@ def _inputs(fit: Record) -> tuple[list[tuple[str, str]], list[tuple[str, tuple[s
     return files, [(term.name, term.labels) for term in fit.model.terms if not term_kind(term.name).events.chosen]
 
 
-def _predicted(name: str, fit: Record, drawn: Draws, common: Common, report: Report | None) -> Prediction:
+def _leave_out_each(name: str, fit: Record, drawn: Draws, common: Common, report: Report | None) -> Prediction:
     said: Report | None = None if report is None else lambda sentence: report(f"{name}: {sentence}")
     return leave_one_out(
-        Readings(Density(fit.model)),
+        ReadingsToLeaveOut(Density(fit.model)),
         drawn.z,
         drawn.log_likelihood,
         _effective(drawn),
@@ -218,7 +218,7 @@ def _described_all(fits: Mapping[str, Record]) -> dict[str, str]:
     """What sets each fit apart; the families of its curves where the fits do not agree on them."""
     families = {name: _families(fit.dataset.description) for name, fit in fits.items()}
     differ = len(set(families.values())) > 1
-    return {name: _described(fit) + (f", {families[name]}" if differ else "") for name, fit in fits.items()}
+    return {name: _describe(fit) + (f", {families[name]}" if differ else "") for name, fit in fits.items()}
 
 
 def _families(description: Description) -> str:
@@ -227,7 +227,7 @@ def _families(description: Description) -> str:
     return f"{listed(curves if len(set(curves)) > 1 else curves[:1])} curves"
 
 
-def _described(fit: Record) -> str:
+def _describe(fit: Record) -> str:
     """What sets a fit apart from others of the same data."""
     description = fit.dataset.description
     parts = [description.friction_model, *([description.laws_in_words] if description.laws_in_words else [])]

@@ -52,9 +52,9 @@ class Identifiability:
     def sentences(self) -> list[str]:
         """What is known, in words: friction first, and a remedy where something is not."""
         friction, elastic = (self.groups.get(group) for group in ("friction", "elastic"))
-        said = [determined(friction, self.measured)] if friction else []
+        said = [say_what_is_determined(friction, self.measured)] if friction else []
         if elastic is not None:
-            said.append(determined(elastic, self.measured, "Of stretch and preload they determine"))
+            said.append(say_what_is_determined(elastic, self.measured, "Of stretch and preload they determine"))
         if friction is not None and (friction.undetermined or friction.determined):
             said.append(_REMEDY)
         return said
@@ -131,7 +131,7 @@ def _groups(model: Model, value: np.ndarray, covariance: np.ndarray, prior_sd: n
     return found
 
 
-def determined(found: Knowledge, measured: bool, opening: str = "") -> str:
+def say_what_is_determined(found: Knowledge, measured: bool, opening: str = "") -> str:
     """What some parameters are known to, in one sentence.
 
     Args:
@@ -162,7 +162,7 @@ def _to(known: Known | Combination) -> str:
     return f"to +- {known.sd:.{decimals(known.sd)}f}"
 
 
-def unidentified(fit: Record) -> str:
+def say_what_is_not_determined(fit: Record) -> str:
     """Which friction coefficients the measurements do not tell, in a sentence; empty where they tell all.
 
     Only coefficients with the weak default prior count: who states a coefficient as measured, or gives it a prior, knows

@@ -53,7 +53,7 @@ class Confounded:
         )
 
 
-def confounded(fit: Record) -> list[Confounded]:
+def confounded_pairs(fit: Record) -> list[Confounded]:
     """Pairs of parameters whose draws lie along a line, the closest first; empty without draws."""
     if fit.posterior is None:
         return []

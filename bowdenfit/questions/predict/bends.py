@@ -80,7 +80,7 @@ def _internal(stated: tuple[float, str], dimension: str, option: str, least: flo
     return value
 
 
-def predicted_at_bends(fit: Record, quantity: str, asked: Question) -> list[Row]:
+def predict_at_bends(fit: Record, quantity: str, asked: Question) -> list[Row]:
     """One row a wrap angle, or one row in all for the preload window.
 
     Args:

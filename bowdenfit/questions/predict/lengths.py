@@ -16,7 +16,7 @@ from bowdenfit.units import conversion_factor
 _STROKES = {"pull": 1, "return": -1}
 
 
-def predicted_rows(
+def predict_at_lengths(
     fit: Record, lengths: np.ndarray, input_force: tuple[float, str] | None, stroke: str
 ) -> list[dict[str, Any]]:
     """Efficiency, or output force, at route values.

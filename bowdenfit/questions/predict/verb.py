@@ -44,19 +44,19 @@ def predict(
     import numpy as np
 
     from bowdenfit.errors import UsageError
-    from bowdenfit.questions.predict.lengths import predicted_rows
+    from bowdenfit.questions.predict.lengths import predict_at_lengths
 
     route = found.dataset.description.route
     if quantity is None:
         quantity = "efficiency" if input_force is None else "output-force"
     if wrap_angles or quantity not in AT_LENGTHS or (route is None and found.model.cable.is_loop):
-        from bowdenfit.questions.predict.bends import predicted_at_bends, question
+        from bowdenfit.questions.predict.bends import predict_at_bends, question
 
         if lengths:
             raise UsageError("predict at lengths or at wrap angles, not at both; leave one of them out.")
         found.draws()
         asked = question(found, wrap_angles, input_force, preload, friction_limit, stroke)
-        return predicted_at_bends(found, quantity, asked)
+        return predict_at_bends(found, quantity, asked)
     if preload is not None or friction_limit is not None:
         raise UsageError(
             "--preload and --friction-limit belong to predictions at wrap angles; name some, as --wrap-angle 90deg."
@@ -68,7 +68,7 @@ def predict(
     if not lengths and route is not None and not route.choices:
         raise UsageError("the description has no choices; name the lengths to predict at.")
     wanted = np.asarray(lengths or (route.choices if route else [0.0]), dtype=float)
-    return predicted_rows(found, wanted, input_force, stroke)
+    return predict_at_lengths(found, wanted, input_force, stroke)
 
 
 def _table(rows: list[dict[str, Any]]) -> str:

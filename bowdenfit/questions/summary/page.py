@@ -11,7 +11,7 @@ from bowdenfit.kinds import readings_called
 from bowdenfit.kinds.recordings.accounts import accounts
 from bowdenfit.questions.bends.overview import elastic_overview
 from bowdenfit.questions.check.answer import checks_of
-from bowdenfit.questions.identify.confounding import confounded
+from bowdenfit.questions.identify.confounding import confounded_pairs
 from bowdenfit.questions.identify.contradiction import agreement_page
 from bowdenfit.questions.recorded.rate import rate_effect
 from bowdenfit.questions.summary.verdict import verdict
@@ -42,9 +42,9 @@ def summarize(fit: Record) -> dict[str, Any]:
             "converged": fit.least_squares.converged,
         },
         "agreement": agreement_page(fit),
-        "measured": measured_against_predicted(fit),
+        "measured": _measured_efficiencies(fit),
         "friction_model": fit.dataset.description.friction_model,
-        "confounded": confounded(fit),
+        "confounded": confounded_pairs(fit),
         "seed": fit.provenance.seed,
         "versions": dict(fit.provenance.versions),
     }
@@ -124,7 +124,7 @@ def _curve_coefficient(fit: Record, name: str) -> dict[str, Any]:
     return row
 
 
-def measured_against_predicted(fit: Record) -> list[dict[str, Any]]:
+def _measured_efficiencies(fit: Record) -> list[dict[str, Any]]:
     """Every measured efficiency beside what the fit says of it (as section 3.2 of the on-body paper does).
 
     The relative error is measured over predicted, less 1. Without draws the prediction is least squares'.

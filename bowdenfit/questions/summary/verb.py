@@ -59,14 +59,14 @@ def plot(
     """
     from bowdenfit.errors import UsageError
     from bowdenfit.questions.figures import draw_figure, figures_of
-    from bowdenfit.results.folder import FIGURES, made
+    from bowdenfit.results.folder import FIGURES, folder_to_write
     from bowdenfit.results.store import load
 
     if isinstance(found, str | Path):
         output, found = output or Path(found) / FIGURES, load(Path(found))
     if output is None:
         raise UsageError("a fit by itself has no folder; name one for the figures.")
-    with made(Path(output)) as place:
+    with folder_to_write(Path(output)) as place:
         return [path for name, data in figures_of(found) for path in draw_figure(name, data, place)]
 
 

@@ -2,7 +2,7 @@
 
 from dataclasses import dataclass
 
-from bowdenfit.questions.identify.answer import unidentified
+from bowdenfit.questions.identify.answer import say_what_is_not_determined
 from bowdenfit.questions.identify.contradiction import contradiction
 from bowdenfit.results.record import Record, once
 
@@ -35,7 +35,7 @@ def verdict(fit: Record) -> Verdict:
     """The verdict on a fit."""
     troubles = {
         NOT_CONVERGED: () if fit.converged else fit.reasons or ("the fit did not converge",),
-        NOT_IDENTIFIABLE: _sentences(unidentified(fit)),
+        NOT_IDENTIFIABLE: _sentences(say_what_is_not_determined(fit)),
         CONTRADICTORY: _sentences(contradiction(fit)),
     }
     return Verdict({kind: sentences for kind, sentences in troubles.items() if sentences})

@@ -10,8 +10,8 @@ from bowdenfit.kinds.terms import term_kind
 from bowdenfit.questions.bends.words import elastic_text
 from bowdenfit.questions.check.answer import checks_of
 from bowdenfit.questions.check.words import checks_text
-from bowdenfit.questions.identify.answer import determined, identifiability
-from bowdenfit.questions.identify.confounding import confounded
+from bowdenfit.questions.identify.answer import identifiability, say_what_is_determined
+from bowdenfit.questions.identify.confounding import confounded_pairs
 from bowdenfit.questions.recorded.rate import SHOWN_SPEED, rate_effect
 from bowdenfit.questions.summary.page import summarize
 from bowdenfit.questions.summary.sampler_words import sampler_sentences, sampler_text
@@ -77,7 +77,7 @@ def _verdict(fit: Record, page: dict[str, Any]) -> str:
     lines += [filled(f"- {reason}", indent="  ") for reason in found.reasons]
     lines += [filled(sentence) for sentence in sampler_sentences(page)]
     if NOT_IDENTIFIABLE not in found.troubles:  # which says so of the same parameters
-        lines += [filled(c.sentence()) for c in confounded(fit)]
+        lines += [filled(c.sentence()) for c in confounded_pairs(fit)]
     return "\n".join(lines)
 
 
@@ -173,7 +173,7 @@ def _trouble(estimate: dict[str, Any]) -> str:
 def _known(fit: Record) -> str:
     """Which coefficients the measurements determine, in a sentence."""
     friction = identifiability(fit).groups.get("friction") if fit.posterior is not None else None
-    return filled(determined(friction, measured=True)) if friction is not None else ""
+    return filled(say_what_is_determined(friction, measured=True)) if friction is not None else ""
 
 
 def _rests_on_prior(page: dict[str, Any]) -> str:

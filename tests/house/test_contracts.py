@@ -116,7 +116,9 @@ def test_a_curve_names_the_unit_of_every_derived_quantity(name):
 
 @pytest.mark.parametrize("name", CURVES)
 def test_parameters_of_a_curve_are_fully_declared(name):
-    for p in class_at(CURVES[name].place)("sheath_angle", ROUTE).parameters(np.zeros(0), DEFAULTS):
+    parameters = class_at(CURVES[name].place)("sheath_angle", ROUTE).parameters(np.zeros(0), DEFAULTS)
+    assert len(parameters) == CURVES[name].coefficients
+    for p in parameters:
         assert p.symbol.startswith("$")
         assert p.meaning
         assert p.prior_text

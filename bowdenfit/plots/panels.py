@@ -18,6 +18,7 @@ MOST = 8  # recordings in a figure
 ALIKE = 4.0  # ranges share an axis if all of them together are so many times the shortest at most
 CHARACTER = 0.064  # in, width of one in a title
 LEGEND_MARK = 4.0  # pt
+MARK_GRID = (160, 60)  # across and up a panel, marks of a kind that it can show
 
 
 def finite(values: Iterable[np.ndarray]) -> np.ndarray:
@@ -96,6 +97,30 @@ def enlarge_marks(figure: Figure) -> None:
     for handle in figure.legends[0].legend_handles:
         if isinstance(handle, Line2D) and handle.get_linestyle() == "None":
             handle.set_markersize(max(handle.get_markersize(), LEGEND_MARK))
+
+
+def draw_marks(
+    axes: Axes, x: np.ndarray, y: np.ndarray, mark: tuple[str, str], label: str, fill: str | None = None
+) -> None:
+    """As many marks as can be told apart, those beyond the axes or without a place on their edge.
+
+    Args:
+        axes: Panel to draw on.
+        x, y: Of the marks.
+        mark: Marker and color.
+        label: Entry of the legend.
+        fill: Color of the inside, if another.
+    """
+    (left, right), (low, high) = axes.get_xlim(), axes.get_ylim()
+    y = np.clip(np.where(np.isfinite(y), y, low), low, high)
+    across, up = MARK_GRID
+    column, row = np.round(across * (x - left) / (right - left)), np.round(up * (y - low) / (high - low))
+    _, first = np.unique(column * (up + 1) + row, return_index=True)
+    marker, color = mark
+    axes.plot(
+        x[first], y[first], marker, color=color, markersize=3, markerfacecolor=fill or color, markeredgewidth=0.8,
+        clip_on=False, zorder=4, label=label, rasterized=len(first) > MARK_GRID[1],
+    )  # fmt: skip
 
 
 def extremes(values: np.ndarray, most: int) -> np.ndarray:

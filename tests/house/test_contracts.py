@@ -12,6 +12,7 @@ import pytest
 from bowdenfit.cable.laws import Capstan, ContactLaw
 from bowdenfit.cable.registry import CONTACT_LAWS, CURVES, class_at
 from bowdenfit.description import PriorDefaults, Route
+from bowdenfit.questions.figures import FIGURES
 
 ROOT = Path(__file__).parents[2]
 ROUTE = Route(variable="cable_length", unit="mm", range=(400.0, 600.0))
@@ -47,6 +48,13 @@ def test_imports_load_nothing_heavy(code, heavy):
     listing = f"{code}\nimport sys; print(*sys.modules)"
     found = subprocess.run([sys.executable, "-c", listing], cwd=ROOT, capture_output=True, text=True, check=True)
     assert not heavy & set(found.stdout.split())
+
+
+def test_every_figure_file_of_a_fit_is_listed():
+    files = (ROOT / "bowdenfit" / "questions").glob("*/*_figure.py")
+    of_fits = {path.stem.removesuffix("_figure") for path in files if "\ndef data(fit:" in path.read_text(encoding="utf-8")}
+    assert of_fits == set(FIGURES)
+    assert all(callable(figure.draw) for figure in FIGURES.values())
 
 
 def test_importing_changes_no_global_setting():

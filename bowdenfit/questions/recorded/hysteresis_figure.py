@@ -9,15 +9,7 @@ import numpy as np
 
 from bowdenfit.plots.bands import evenly, say_of_how_many
 from bowdenfit.plots.layout import legend_above
-from bowdenfit.plots.panels import (
-    MOST,
-    alike,
-    enlarge_marks,
-    label_outer,
-    recording_panels,
-    set_limits,
-    span,
-)
+from bowdenfit.plots.panels import MOST, alike, enlarge_marks, label_outer, recording_panels, set_limits, span
 from bowdenfit.plots.style import (
     BLACK,
     BLUE,

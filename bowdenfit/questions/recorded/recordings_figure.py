@@ -10,15 +10,7 @@ import numpy as np
 
 from bowdenfit.plots.bands import evenly, say_of_how_many
 from bowdenfit.plots.layout import legend_above
-from bowdenfit.plots.panels import (
-    MOST,
-    alike,
-    extremes,
-    label_outer,
-    recording_panels,
-    set_limits,
-    span,
-)
+from bowdenfit.plots.panels import MOST, alike, draw_marks, extremes, label_outer, recording_panels, set_limits, span
 from bowdenfit.plots.style import (
     BLACK,
     BLUE,
@@ -48,7 +40,6 @@ PHASES = ((1, "Pulling", "#F1F6FC"), (-1, "Returning", "#F3E4CE"), (0, "Switchin
 LOOP_PHASES = ("Moving forward", "Moving back", "Between")
 FLAGS = {"dropout": ("x", VERMILLION), "spike": ("^", PURPLE), "saturated": ("s", ORANGE), "quiet": (".", GRAY)}
 OTHER_FLAG = ("+", GREEN)
-MARK_GRID = (160, 60)  # across and up a panel, marks of a kind that it can show
 
 
 @dataclass(frozen=True)
@@ -92,21 +83,9 @@ def data(fit: Record) -> tuple[OverTime, ...] | None:
 
 def _over_time(trace: Trace) -> OverTime:
     recording, flagged = trace.recording, trace.recording.account.flagged
-    return OverTime(
-        recording.name,
-        trace.loop,
-        trace.time,
-        trace.input_force,
-        trace.output_force,
-        trace.stroke,
-        recording.blocks.saturated[trace.shown],
-        trace.predicted,
-        trace.fitted,
-        flagged.kind,
-        flagged.time,
-        flagged.input_force,
-        flagged.output_force,
-    )
+    blocks = trace.time, trace.input_force, trace.output_force, trace.stroke, recording.blocks.saturated[trace.shown]
+    left_out = flagged.kind, flagged.time, flagged.input_force, flagged.output_force
+    return OverTime(recording.name, trace.loop, *blocks, trace.predicted, trace.fitted, *left_out)
 
 
 @in_paper_style
@@ -222,24 +201,10 @@ def _left_out(axes: Axes, recording: OverTime) -> None:
         here = kinds == kind
         x = np.tile(recording.flagged_time[here] - start, 2)
         y = np.concatenate([recording.flagged_input[here], recording.flagged_output[here]])
-        _marks(axes, x, y, FLAGS.get(kind, OTHER_FLAG), f"Left out: {kind}")
+        draw_marks(axes, x, y, FLAGS.get(kind, OTHER_FLAG), f"Left out: {kind}")
     at = recording.saturated.astype(bool)
     if at.any():
         on_edge = np.full(int(at.sum()), np.nan)
-        _marks(axes, recording.time[at] - start, on_edge, FLAGS["saturated"], "Block at the end of a range", "white")
-
-
-def _marks(
-    axes: Axes, x: np.ndarray, y: np.ndarray, mark: tuple[str, str], label: str, fill: str | None = None
-) -> None:
-    """As many marks as can be told apart."""
-    (left, right), (low, high) = axes.get_xlim(), axes.get_ylim()
-    y = np.clip(np.where(np.isfinite(y), y, low), low, high)
-    across, up = MARK_GRID
-    column, row = np.round(across * (x - left) / (right - left)), np.round(up * (y - low) / (high - low))
-    _, first = np.unique(column * (up + 1) + row, return_index=True)
-    marker, color = mark
-    axes.plot(
-        x[first], y[first], marker, color=color, markersize=3, markerfacecolor=fill or color, markeredgewidth=0.8,
-        clip_on=False, zorder=4, label=label, rasterized=len(first) > MARK_GRID[1],
-    )  # fmt: skip
+        draw_marks(
+            axes, recording.time[at] - start, on_edge, FLAGS["saturated"], "Block at the end of a range", "white"
+        )

@@ -54,7 +54,7 @@ from bowdenfit.dataset import Dataset
 from bowdenfit.inference.log_density import LogDensity
 from bowdenfit.kinds.settings import load_description
 from bowdenfit.model import build_model
-from bowdenfit.physics.hysteresis import play_operator, play_operator_with_slope
+from bowdenfit.physics.hysteresis import play_operator
 from bowdenfit.questions.simulate.recordings import make_recordings, parse_recordings_plan, write_recordings
 from bowdenfit.recordings.preparation.play import play
 
@@ -201,7 +201,7 @@ def play_tables(simulated: Simulated) -> list[Table]:
     with jax.enable_x64(True):
         for name, function in jax_operators().items():
             times[f"JAX, {name}"] = milliseconds(jax.jit(function), jnp.asarray(x), BAND, x[0])
-        expected = np.asarray(jax.jit(play_operator)(x, BAND, x[0]))
+        expected = np.asarray(jax.jit(output)(x, BAND, x[0]))
     loop = numba_loop()
     if loop is not None:
         warn_if_apart("numba", loop(x, BAND, x[0]), expected)
@@ -216,20 +216,25 @@ def play_tables(simulated: Simulated) -> list[Table]:
     return [rows if loop is not None else [*rows, ["numba is not installed", "-", "-", "-"]]]
 
 
+def output(x: jax.Array, band: float, start: float) -> jax.Array:
+    """What the operator gives, without its slope."""
+    return play_operator(x - band, x + band, start)[0]
+
+
 def jax_operators() -> dict[str, Callable[..., Any]]:
     """The operator, with three ways to its derivative by the friction exponent."""
 
+    def with_slope(x: jax.Array, band: float, start: float) -> Any:
+        return play_operator(x - band, x + band, start)
+
     def forward(x: jax.Array, band: float, start: float) -> Any:
-        return jax.jvp(lambda b: play_operator(x, b, start), (band,), (1.0,))
+        return jax.jvp(lambda b: output(x, b, start), (band,), (1.0,))
 
     def reverse(x: jax.Array, band: float, start: float) -> Any:
-        return jax.value_and_grad(lambda b: jnp.sum(play_operator(x, b, start) * x))(band)
-
-    def with_slope(x: jax.Array, band: float, start: float) -> Any:
-        return play_operator_with_slope(x, band, start, jnp.full_like(x, jnp.nan))
+        return jax.value_and_grad(lambda b: jnp.sum(output(x, b, start) * x))(band)
 
     return {
-        "value": play_operator,
+        "value": output,
         "value with its slope": with_slope,
         "value, forward derivative": forward,
         "weighted sum, reverse derivative": reverse,

@@ -7,69 +7,46 @@ from jaxtyping import Float
 
 
 def play_operator(
-    x: Float[Array, "time *batch"], band: Float[Array, "..."], start: Float[Array, "*batch"]
-) -> Float[Array, "time *batch"]:
-    r"""Output of a quasi-static rope on the scale g on which friction is a shift.
+    low: Float[Array, "time *batch"],
+    high: Float[Array, "time *batch"],
+    start: Float[Array, "*batch"],
+    slopes: tuple[Float[Array, "..."] | float, Float[Array, "..."] | float] = (-1.0, 1.0),
+    restart: Float[Array, "time *batch"] | None = None,
+) -> tuple[Float[Array, "time *batch"], Float[Array, "time *batch"]]:
+    r"""Output of a quasi-static rope that stands still between two limits, and its derivative by the friction exponent.
 
-    .. math:: y_t = \text{clip}(y_{t-1},\ x_t - \Lambda,\ x_t + \Lambda), \quad x = g(F_\text{in}),\ y = g(F_\text{out})
+    .. math:: y_t = \text{clip}(y_{t-1},\ f_-(x_t),\ f_+(x_t))
 
-    While pulling the output follows at :math:`x - \Lambda`, on the return at :math:`x + \Lambda`, and in between it
-    stands still, however the input moves inside the band. It remembers noise peaks of the input as if the rope had moved:
-    average recordings down to the mechanical bandwidth first.
+    Of a single rope the limits are :math:`x \mp \Lambda` on the scale g on which friction is a shift, x = g(F_in) and
+    y = g(F_out): while pulling the output follows at :math:`x - \Lambda`, on the return at :math:`x + \Lambda`, and in
+    between it stands still, however the input moves inside the band. It remembers noise peaks of the input as if the rope
+    had moved: average recordings down to the mechanical bandwidth first.
+
+    The slope is that of the limit that was touched last, where it was touched: kept while the output stands still, and 0
+    before the rope has slid at all.
 
     Args:
-        x: Input force on the scale g [1], time first.
-        band: Friction exponent [1], the same for all times or one for each.
-        start: Output on the scale g before the first sample [1]; clipped into the band of the first sample.
+        low: Output while sliding toward the motor, time first.
+        high: Output while sliding back.
+        start: Output before the first sample; clipped into the band there.
+        slopes: Derivatives of both limits by the friction exponent; those of a single rope if omitted.
+        restart: Output where it must be set anew, because the input before was not known; NaN elsewhere.
 
     Returns:
-        Output force on the scale g [1].
+        Output and its slope.
 
     References:
         On-body paper, figure 12 (its three phases are this operator's three states).
     """
-    bands = jnp.broadcast_to(band, x.shape)
+    by_low, by_high = (jnp.broadcast_to(jnp.asarray(slope, low.dtype), low.shape) for slope in slopes)
+    anew = jnp.full(low.shape, jnp.nan) if restart is None else restart
 
-    def step(y: Array, now: tuple[Array, Array]) -> tuple[Array, Array]:
-        y = jnp.clip(y, now[0] - now[1], now[0] + now[1])
-        return y, y
-
-    return jax.lax.scan(step, jnp.broadcast_to(start, x.shape[1:]).astype(x.dtype), (x, bands))[1]
-
-
-def play_operator_with_slope(
-    x: Float[Array, "time *batch"],
-    band: Float[Array, "..."],
-    start: Float[Array, "*batch"],
-    restart: Float[Array, "time *batch"],
-) -> tuple[Float[Array, "time *batch"], Float[Array, "time *batch"]]:
-    r"""The play operator, and the derivative of its output by the friction exponent.
-
-    The output is linear in :math:`\Lambda` between changes of contact: its slope is -1 from the moment the rope slides
-    toward the motor, +1 from the moment it slides back, each kept while it stands still, and 0 before it has slid at all.
-
-    Args:
-        x: Input force on the scale g [1], time first.
-        band: Friction exponent [1], the same for all times or one for each.
-        start: Output on the scale g before the first sample [1].
-        restart: Output on the scale g where it must be set anew, because the input before was not known [1]; NaN elsewhere.
-
-    Returns:
-        Output on the scale g, and its slope [1].
-    """
-    bands = jnp.broadcast_to(band, x.shape)
-
-    def step(
-        carry: tuple[Array, Array], now: tuple[Array, Array, Array]
-    ) -> tuple[tuple[Array, Array], tuple[Array, Array]]:
-        y, slope = carry
-        anew = ~jnp.isnan(now[2])
-        y, slope = jnp.where(anew, now[2], y), jnp.where(anew, 0.0, slope)
-        low, high = now[0] - now[1], now[0] + now[1]
-        slope = jnp.where(y < low, -1.0, jnp.where(y > high, 1.0, slope))
+    def step(carry: tuple[Array, Array], now: tuple[Array, ...]) -> tuple[tuple[Array, Array], tuple[Array, Array]]:
+        (y, slope), (low, high, by_low, by_high, anew) = carry, now
+        y, slope = jnp.where(jnp.isnan(anew), y, anew), jnp.where(jnp.isnan(anew), slope, 0.0)
+        slope = jnp.where(y < low, by_low, jnp.where(y > high, by_high, slope))
         y = jnp.clip(y, low, high)
         return (y, slope), (y, slope)
 
-    begin = jnp.broadcast_to(start, x.shape[1:]).astype(x.dtype)
-    _, (y, slope) = jax.lax.scan(step, (begin, jnp.zeros_like(begin)), (x, bands, restart))
-    return y, slope
+    begin = jnp.broadcast_to(start, low.shape[1:]).astype(low.dtype)
+    return jax.lax.scan(step, (begin, jnp.zeros_like(begin)), (low, high, by_low, by_high, anew))[1]

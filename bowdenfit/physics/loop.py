@@ -4,7 +4,6 @@ Forces are differences of the two sides' tensions, positive where they pull the 
 slip, a linear elastic rope, and a loop of fixed length, so that the mean tensions of both sides add up to twice the preload.
 """
 
-import jax
 import jax.numpy as jnp
 from jax import Array
 from jaxtyping import Float
@@ -26,7 +25,8 @@ def loop_output_force(
     driving the motor (F_in < 0) and the way back follow by exchanging the sides and the ends:
     :math:`F_\text{out} = s \min(s F_\text{in} - 2 P \Lambda,\ s F_\text{in} e^{-\Lambda},\ s F_\text{in} e^{\Lambda})`.
 
-    Not to be trusted while nothing moves (see `loop_play`), nor for a rope much stiffer at high than at low load, where
+    Not to be trusted while nothing moves (see `bowdenfit.cable.drive.Loop`), nor for a rope much stiffer at high than at low
+    load, where
     mean tensions do not quite add up to 2P.
 
     Args:
@@ -88,33 +88,6 @@ def loop_response_from(
     is_taut = taut < slack
     by_exponent = jnp.where(is_taut, twice_preload, jnp.abs(slack))
     return stroke * jnp.minimum(taut, slack), jnp.where(is_taut, 1.0, growth), -stroke * by_exponent
-
-
-def loop_play(
-    input_force: Float[Array, "time *batch"],
-    preload: Float[Array, "..."],
-    friction_exponent: Float[Array, "..."],
-    start: Float[Array, "*batch"],
-) -> Float[Array, "time *batch"]:
-    """Output force of a loop through any motion [N]: a play operator whose width is the loss.
-
-    Exact while the loop moves on. At a reversal the slip fronts of the two sides cross the cable at different times: against
-    a stiff load the output begins to change when about nine tenths of the band are crossed, against a soft one at its end.
-
-    Args:
-        input_force: Time first [N].
-        preload: P [N], the same for all times or one for each.
-        friction_exponent: Lambda of one side [1], likewise.
-        start: Output force before the first time [N]; clipped into the band there.
-    """
-    band = loop_band(input_force, jnp.asarray(preload), jnp.asarray(friction_exponent))
-
-    def step(y: Array, now: tuple[Array, Array]) -> tuple[Array, Array]:
-        y = jnp.clip(y, *now)
-        return y, y
-
-    begin = jnp.broadcast_to(start, input_force.shape[1:]).astype(input_force.dtype)
-    return jax.lax.scan(step, begin, band)[1]
 
 
 def free_motion_loss(

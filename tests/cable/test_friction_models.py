@@ -187,7 +187,7 @@ def test_all_samples_of_the_simulated_bench_follow_the_play_operator_on_the_mode
     def predicted(values):
         x = model.scaled(values, jnp.asarray(recording.input_force))
         start = model.scaled(values, jnp.asarray(recording.output_force[0]))
-        return model.force(values, play_operator(x, jnp.asarray(LAMBDA), start))
+        return model.force(values, play_operator(x - LAMBDA, x + LAMBDA, start)[0])
 
     np.testing.assert_allclose(predicted(values), recording.output_force, rtol=2e-4)
 

@@ -11,13 +11,12 @@ import pytest
 from scipy import integrate, stats
 
 import bowdenfit as bf
+from bowdenfit.cable.drive import Loop
 from bowdenfit.dataset import load_dataset
 from bowdenfit.description import Phase, Preparation
 from bowdenfit.errors import DatasetError, DescriptionError
 from bowdenfit.kinds.recordings.loops import LoopRecordingsTerm
 from bowdenfit.model import build_model
-from bowdenfit.physics.loop import loop_play
-from bowdenfit.physics.loop_motion import loop_play_with_slope
 from bowdenfit.questions.check.data_set_words import check_text
 from bowdenfit.questions.figures import FIGURES, figures_of
 from bowdenfit.questions.recorded.loop_traces import loop_points
@@ -355,15 +354,14 @@ def test_the_slope_of_the_operator_is_its_derivative():
     force = jnp.asarray(np.cumsum(generator.standard_normal((400, 3)), axis=0) * 4)
     preload, exponent = jnp.array([5.0, 20.0, 0.0]), jnp.array([0.4, 0.2, 0.3])
     start, step = force[0], 1e-7
-    never = jnp.full(force.shape, jnp.nan)
-    y, slope = loop_play_with_slope(force, preload, exponent, start, never)
-    np.testing.assert_allclose(y, loop_play(force, preload, exponent, start), atol=1e-12)
-    more, less = (loop_play(force, preload, exponent + s, start) for s in (step, -step))
+    drive, never = Loop(preload, exponent), jnp.full(force.shape, jnp.nan)
+    y, slope = drive.follow(force, jnp.zeros(3), start)
+    more, less = (drive.follow(force, jnp.full(3, s), start)[0] for s in (step, -step))
     same = np.isclose((more + less) / 2, y, atol=1e-9)
     assert same.mean() > 0.99
     np.testing.assert_allclose(np.asarray(slope)[same], np.asarray((more - less) / (2 * step))[same], atol=1e-5)
     anew = never.at[200].set(force[200] + 0.1)
-    restarted, _ = loop_play_with_slope(force, preload, exponent, start, anew)
+    restarted, _ = drive.follow(force, jnp.zeros(3), start, anew)
     np.testing.assert_allclose(restarted[200], force[200] + 0.1)
     np.testing.assert_allclose(restarted[:200], y[:200])
 

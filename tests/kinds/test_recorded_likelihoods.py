@@ -18,7 +18,8 @@ from bowdenfit.kinds import runs as runs_of_model
 from bowdenfit.kinds.measured_cable import measured_cable
 from bowdenfit.kinds.measurements import Measurements
 from bowdenfit.kinds.recordings.angles import recorded_angles
-from bowdenfit.kinds.recordings.whole import WholeRecordingsTerm, joined, padded
+from bowdenfit.kinds.recordings.side_by_side import joined
+from bowdenfit.kinds.recordings.whole import WholeRecordingsTerm, padded
 from bowdenfit.kinds.row_angles import row_angles
 from bowdenfit.kinds.runs import RunsTerm, SlidingRows, run_sums
 from bowdenfit.model import Model, build_model
@@ -325,7 +326,7 @@ def test_the_mounting_effect_of_a_whole_recording_integrates_out(name):
     def log_joint(m):
         y, _ = play(x, MU * 2.5 + m, float(start))
         shown = (np.exp(y) - drag) * np.exp(-gain) + of_output
-        squares = np.sum(data["weight"] * (data["log_output"] - np.log(shown)) ** 2)
+        squares = np.sum(data["weight"] * (data["reading"] - np.log(shown)) ** 2)
         return float(-squares / (2 * noise**2) + stats.norm.logpdf(m, 0.0, tau))
 
     constant = data["log_weights"] / 2 - data["n"] * np.log(noise * np.sqrt(2 * np.pi))
@@ -422,6 +423,6 @@ def test_joining_the_blocks_of_a_long_recording_keeps_the_ends_of_its_phases():
 def test_a_joined_recording_gives_the_same_coefficient(monkeypatch):
     recordings = [_recorded(angle, faults=NOISY) for angle in (1.0, 2.0, 3.0)]
     whole = _fitted(_model(recordings, "whole", friction_model="drag")).estimates["mu"]
-    monkeypatch.setattr("bowdenfit.kinds.recordings.whole._MOST_BLOCKS", 80)
+    monkeypatch.setattr("bowdenfit.kinds.recordings.side_by_side.MOST_BLOCKS", 80)
     joined = _fitted(_model(recordings, "whole", friction_model="drag")).estimates["mu"]
     assert joined.value == pytest.approx(whole.value, abs=0.3 * whole.standard_error)

@@ -7,19 +7,24 @@ import pytest
 from scipy.optimize import minimize_scalar
 
 from bowdenfit.description import Preparation
-from bowdenfit.physics.hysteresis import play_operator, play_operator_with_slope
+from bowdenfit.physics.hysteresis import play_operator
 from bowdenfit.questions.simulate.bench import BenchFriction, BenchSettings, Faults, Profile, simulate_recording, to_raw
 from bowdenfit.recordings.preparation import prepare
 from bowdenfit.recordings.preparation.play import play
 
 STEPS, BAND = 300, 0.25
-operator = jax.jit(play_operator)
 
 
 @jax.jit
 def with_slope(x, band, start):
-    """The operator that is never set anew."""
-    return play_operator_with_slope(x, band, start, jnp.full(x.shape, jnp.nan))
+    """The operator of a single rope, with its slope."""
+    return play_operator(x - band, x + band, start)
+
+
+@jax.jit
+def operator(x, band, start):
+    """Its output alone."""
+    return with_slope(x, band, start)[0]
 
 
 def _walk(seed, *batch):
@@ -134,7 +139,7 @@ def test_the_slope_is_the_derivative_of_the_output_by_the_exponent(seed):
 
 
 def _misfit(x, band, start, target):
-    return jnp.sum((play_operator(x, band, start) - target) ** 2)
+    return jnp.sum((operator(x, band, start) - target) ** 2)
 
 
 def test_gradients_agree_with_finite_differences_in_input_band_and_start():
@@ -164,9 +169,9 @@ def test_forward_and_reverse_mode_agree():
 def test_a_rest_in_contact_keeps_the_derivative_of_the_stroke_before():
     """While the input rests the output is at the very edge of the band, where a clip has two derivatives."""
     x = jnp.array([0.0, 1.0, 1.0, 1.0, 1.0])
-    last = jax.jit(jax.jacfwd(lambda band: play_operator(x, band, jnp.zeros(()))))(jnp.asarray(BAND))
+    last = jax.jit(jax.jacfwd(lambda band: operator(x, band, jnp.zeros(()))))(jnp.asarray(BAND))
     np.testing.assert_array_equal(last, [0.0, -1.0, -1.0, -1.0, -1.0])
-    back = jax.jit(jax.grad(lambda band: play_operator(x, band, jnp.zeros(()))[-1]))(jnp.asarray(BAND))
+    back = jax.jit(jax.grad(lambda band: operator(x, band, jnp.zeros(()))[-1]))(jnp.asarray(BAND))
     assert float(back) == -1.0
 
 
@@ -225,7 +230,7 @@ def test_without_noise_raw_samples_and_block_means_say_the_same():
 def test_an_operator_set_anew_forgets_what_was_before():
     x = jnp.asarray(np.random.default_rng(8).normal(size=200).cumsum() * 0.05)
     restart = jnp.full(200, jnp.nan).at[120].set(float(x[120]) + 0.01)
-    y, slope = play_operator_with_slope(x, jnp.asarray(BAND), x[0], restart)
+    y, slope = play_operator(x - BAND, x + BAND, x[0], restart=restart)
     before, slope_before = with_slope(x[:120], np.asarray(BAND), x[0])
     after, slope_after = with_slope(x[120:], np.asarray(BAND), x[120] + 0.01)
     np.testing.assert_array_equal(y, np.concatenate([before, after]))

@@ -13,6 +13,7 @@ import jax.numpy as jnp
 import numpy as np
 
 from bowdenfit.cable.cable import Cable
+from bowdenfit.cable.drive import Loop, Rope, drive_of
 from bowdenfit.cable.load_cells import BLOCK_NOISE, LEAST_FORCE, RUN_SCATTER, LoadCells
 from bowdenfit.cable.noise import scatter
 from bowdenfit.description import Description
@@ -22,8 +23,6 @@ from bowdenfit.kinds.recordings.blocks import worth_of
 from bowdenfit.kinds.resolve_angles import resolve_angles
 from bowdenfit.kinds.row_angles import row_angles
 from bowdenfit.kinds.tables import AngleTable
-from bowdenfit.physics.hysteresis import play_operator
-from bowdenfit.physics.loop_motion import loop_play_with_slope
 from bowdenfit.recordings.loop_strokes import find_loop_strokes
 from bowdenfit.recordings.recording import Blocks, Recording, Recordings, Strokes
 from bowdenfit.recordings.strokes import find_strokes
@@ -57,52 +56,28 @@ def drawn_recordings(
     run = np.array([recordings.runs.index(r.run) for r in recordings.each])
     mounting = values[RUN_SCATTER] * scatter(of_run, (len(recordings.runs),), cable.description)[run]
     exponent = cable.friction_exponent(values, angles + scale * error)
-    force = _beside([r.blocks.input_force for r in recordings.each])
-    cells, output = LoadCells.of(values), _loop_output if recordings.loop else _rope_output
-    shown = output(cable, recordings, values, force, exponent, scale * mounting, jnp.sum(angles, axis=-1))
+    force, velocity = (
+        jnp.asarray(_beside([getattr(r.blocks, name) for r in recordings.each])) for name in ("input_force", "velocity")
+    )
+    cells, drive = LoadCells.of(values), drive_of(cable, values, angles, velocity, exponent)
+    at_least = jnp.maximum(force, drive.least_force)
+    output, _ = drive.follow(at_least, scale * mounting, _starts(drive, recordings, at_least, scale * mounting))
     places = _beside([_readings_of(r) for r in recordings.each]).astype(int)
     shape, noise = (places.max() + 1, len(recordings.each)), scale * values[BLOCK_NOISE]
     errors = [noise * jax.random.normal(k, shape)[places, np.arange(shape[1])] for k in (of_input, of_output)]
     return {
-        "input_force": cells.shown_input(jnp.asarray(force)) + errors[0],
-        "output_force": cells.shown_output(shown),
+        "input_force": cells.shown_input(force) + errors[0],
+        "output_force": cells.shown_output(output),
         "output_error": errors[1],
         "delay_error": jnp.asarray(scale * cells.delay_error),
     }
 
 
-def _rope_output(
-    cable: Cable,
-    recordings: Recordings,
-    values: Mapping[str, jax.Array],
-    force: np.ndarray,
-    exponent: jax.Array,
-    mounting: jax.Array,
-    bend: jax.Array,
-) -> jax.Array:
-    """Output of the play operator, which starts where it was in the band when it was measured."""
-    del bend
-    friction, velocity = cable.friction, _beside([r.blocks.velocity for r in recordings.each])
-    band = jnp.maximum(exponent * friction.rate(values, jnp.asarray(velocity)) + mounting, 0.0)
-    x = friction.scaled(values, jnp.maximum(jnp.asarray(force), LEAST_FORCE))
-    y = play_operator(x, band, x[0] + band[0] * np.array([_start(r) for r in recordings.each]))
-    return jnp.maximum(friction.force(values, y), LEAST_FORCE)
-
-
-def _loop_output(
-    cable: Cable,
-    recordings: Recordings,
-    values: Mapping[str, jax.Array],
-    force: np.ndarray,
-    exponent: jax.Array,
-    mounting: jax.Array,
-    bend: jax.Array,
-) -> jax.Array:
-    """Output of a pull-pull loop, which starts at the force where it was measured, or at the edge of its band."""
-    start = jnp.array([r.blocks.output_force[0] for r in recordings.each])
-    preload = cable.elasticity.preload(values, bend)[0]
-    loss = jnp.maximum(exponent + mounting, 0.0)
-    return loop_play_with_slope(jnp.asarray(force), preload, loss, start, jnp.full(force.shape, jnp.nan))[0]
+def _starts(drive: Rope | Loop, recordings: Recordings, force: jax.Array, mounting: jax.Array) -> jax.Array:
+    """Where the operator starts: a rope where it was in its band when measured, a loop at the force that was measured."""
+    if isinstance(drive, Loop):
+        return jnp.array([r.blocks.output_force[0] for r in recordings.each])
+    return drive.scaled(force)[0] + drive.band(mounting)[0] * np.array([_start(r) for r in recordings.each])
 
 
 def _start(recording: Recording) -> float:

@@ -9,21 +9,18 @@ import numpy as np
 from jax import Array
 from jaxtyping import Float
 
-from bowdenfit.cable.load_cells import LEAST_FORCE, LoadCells
+from bowdenfit.cable.drive import Loop, Rope, drive_of
+from bowdenfit.cable.load_cells import LoadCells
 from bowdenfit.inference.compilation import compiled
 from bowdenfit.kinds.recordings.angles import recorded_angles
 from bowdenfit.kinds.resolve_angles import resolve_angles
 from bowdenfit.kinds.row_angles import row_angles
 from bowdenfit.kinds.tables import AngleTable
 from bowdenfit.model import Model
-from bowdenfit.physics.hysteresis import play_operator
 from bowdenfit.recordings.recording import Recordings
-
-Follow = Callable[[Array, Array, Mapping[str, Any]], tuple[Array, Array]]
 
 DRAWS = 200  # enough for the edges of a band
 MOST_BLOCKS = 1000  # of a recording in a figure
-_LEAST_BAND = 1e-9
 
 
 def blocks_shown(n_blocks: int) -> np.ndarray:
@@ -32,29 +29,19 @@ def blocks_shown(n_blocks: int) -> np.ndarray:
 
 
 class Follower:
-    """Follows all recordings of a data set with the play operator, for `DRAWS` draws at a time; compiled once.
+    """Follows all recordings of a data set with the cable's play operator, for `DRAWS` draws at a time; compiled once.
 
     Args:
         model: The model.
         recordings: The recordings.
         angles: The angle table, for recordings outside the curves.
-        follow: Function of a model that gives what it makes of one z, of mounting effects and of the blocks; that of a
-            single rope if omitted.
-        scale: What of an output force a delay shifts in proportion to its rate: its logarithm if omitted.
     """
 
-    def __init__(
-        self,
-        model: Model,
-        recordings: Recordings,
-        angles: AngleTable | None,
-        follow: Callable[[Model], Follow] | None = None,
-        scale: Callable[[np.ndarray], np.ndarray] = lambda force: np.log(np.maximum(force, LEAST_FORCE)),
-    ) -> None:
-        self._data = _arrays(model, recordings, angles, scale)
+    def __init__(self, model: Model, recordings: Recordings, angles: AngleTable | None) -> None:
+        self._data = _arrays(model, recordings, angles)
         z = jax.ShapeDtypeStruct((DRAWS, model.space.size), jnp.float64)
         mounting = jax.ShapeDtypeStruct((DRAWS, len(recordings.each)), jnp.float64)
-        function = jax.vmap((follow or _followed)(model), in_axes=(0, 0, None))
+        function = jax.vmap(_followed(model), in_axes=(0, 0, None))
         self._program: Callable[..., Any] = compiled(function, z, mounting, self._data)
 
     def __call__(
@@ -70,9 +57,7 @@ class Follower:
         return np.asarray(force), np.asarray(exponent)
 
 
-def _arrays(
-    model: Model, recordings: Recordings, angles: AngleTable | None, scale: Callable[[np.ndarray], np.ndarray]
-) -> dict[str, Any]:
+def _arrays(model: Model, recordings: Recordings, angles: AngleTable | None) -> dict[str, Any]:
     """Blocks of all recordings side by side, the shorter ones standing still at their end."""
     shown = [blocks_shown(len(r.blocks.time)) for r in recordings.each]
     longest = max(len(s) for s in shown)
@@ -81,8 +66,10 @@ def _arrays(
         parts = [getattr(r.blocks, name)[s] for r, s in zip(recordings.each, shown, strict=True)]
         return np.stack([np.pad(part, (0, longest - len(part)), "edge") for part in parts], axis=1)
 
+    drive = Loop if model.cable.is_loop else Rope
     rates = [
-        np.gradient(scale(r.blocks.output_force), r.blocks.time)[s] for r, s in zip(recordings.each, shown, strict=True)
+        np.gradient(drive.reading(r.blocks.output_force), r.blocks.time)[s]
+        for r, s in zip(recordings.each, shown, strict=True)
     ]
     rows = row_angles(model.description, recorded_angles(recordings), angles).data
     return rows | {name: side_by_side(name) for name in ("input_force", "output_force", "velocity")} | {
@@ -90,19 +77,15 @@ def _arrays(
     }  # fmt: skip
 
 
-def _followed(model: Model) -> Follow:
+def _followed(model: Model) -> Callable[[Array, Array, Mapping[str, Any]], tuple[Array, Array]]:
     """Function of one z, of mounting effects and of the blocks."""
-    friction = model.cable.friction
 
     def follow(z: Array, mounting: Array, data: Mapping[str, Any]) -> tuple[Array, Array]:
         values = model.space.constrain(z)
-        angles, _ = resolve_angles(model.cable, values, data)
-        exponent, cells = model.cable.friction_exponent(values, angles), LoadCells.of(values)
-        input_force = cells.true_input(data["input_force"], LEAST_FORCE)
-        first = cells.true_output(data["output_force"][0], LEAST_FORCE)
-        band = jnp.maximum(exponent * friction.rate(values, data["velocity"]) + mounting, _LEAST_BAND)
-        y = play_operator(friction.scaled(values, input_force), band, friction.scaled(values, first))
-        shown = cells.shown_output(friction.force(values, y))
-        return shown * jnp.exp(-cells.late(data["drift"])), exponent
+        drive = drive_of(model.cable, values, resolve_angles(model.cable, values, data)[0], data["velocity"])
+        cells, least = LoadCells.of(values), drive.least_force
+        start = drive.scaled(cells.true_output(data["output_force"][0], least))
+        output, _ = drive.follow(cells.true_input(data["input_force"], least), mounting, start)
+        return drive.without_delay(cells.shown_output(output), cells.late(data["drift"])), drive.exponent
 
     return follow

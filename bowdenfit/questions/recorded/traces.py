@@ -9,7 +9,6 @@ from bowdenfit.cable.load_cells import RUN_SCATTER
 from bowdenfit.cable.noise import noise_law
 from bowdenfit.kinds.tables import AngleTable
 from bowdenfit.questions.recorded.equations import DRAWS, Follower, blocks_shown
-from bowdenfit.questions.recorded.loop_equations import loop_follower
 from bowdenfit.recordings.recording import Recording, Recordings
 from bowdenfit.results.record import Record, once
 
@@ -76,8 +75,7 @@ def traces(fit: Record) -> tuple[Trace, ...]:
     if recordings is None:
         return ()
     with jax.enable_x64(True):
-        kind = loop_follower if recordings.loop else Follower
-        follower = kind(fit.model, recordings, fit.dataset.measurements.table(AngleTable))
+        follower = Follower(fit.model, recordings, fit.dataset.measurements.table(AngleTable))
         predicted, exponent = _predicted(fit, recordings, follower)
         fitted = _fitted(fit, recordings, follower)
     found = []

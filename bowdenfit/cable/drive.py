@@ -1,0 +1,156 @@
+"""A single rope or a pull-pull loop as a recording shows it: from the input force through any motion to the output force.
+
+Both follow the play operator, each on a scale of its own: a rope on the scale g on which friction is a shift, a loop on
+that of the force itself. What a load cell shows of the output is compared as a logarithm of a rope, whose force is
+positive, and as it is of a loop, whose force passes through zero.
+"""
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+
+import jax
+import jax.numpy as jnp
+import numpy as np
+from jax import Array
+from jaxtyping import Float
+
+from bowdenfit.cable.cable import Cable
+from bowdenfit.cable.friction import FrictionModel
+from bowdenfit.cable.load_cells import LEAST_FORCE, LoadCells
+from bowdenfit.physics.hysteresis import play_operator
+from bowdenfit.physics.loop import loop_band
+from bowdenfit.types import Vector
+
+LEAST_EXPONENT = 1e-9  # below which friction would push, with whatever the mounting does to it
+
+Recorded = Float[Array, "time recordings"]
+Each = Float[Array, " recordings"]
+
+
+@dataclass(frozen=True)
+class Rope:
+    """A single rope at given parameters, in several recordings.
+
+    Args:
+        friction: How friction depends on load and speed.
+        values: Values of the parameters.
+        exponent: Friction exponent of each recording at the reference speed [1].
+        rate: Factor on it at each time [1].
+    """
+
+    friction: FrictionModel
+    values: Mapping[str, Array]
+    exponent: Each
+    rate: Recorded
+    least_force = LEAST_FORCE
+
+    def band(self, mounting: Each) -> Recorded:
+        """Half the width of the friction band on the scale g [1], with an effect of the mounting on the exponent."""
+        return jnp.maximum(self.exponent * self.rate + mounting, LEAST_EXPONENT)
+
+    def scaled(self, force: Float[Array, "*batch"]) -> Float[Array, "*batch"]:
+        """The scale on which the operator works [1]."""
+        return self.friction.scaled(self.values, force)
+
+    def follow(
+        self, input_force: Recorded, mounting: Each, start: Each, restart: Recorded | None = None
+    ) -> tuple[Recorded, Recorded]:
+        """Output force [N], and the derivative of its `scaled` by the friction exponent [1].
+
+        Args:
+            input_force: Time first [N].
+            mounting: Effect of the mounting on the friction exponent [1].
+            start: `scaled` of the output force before the first time.
+            restart: The same where it must be set anew, because the input before was not known; NaN elsewhere.
+        """
+        x, band = self.scaled(input_force), self.band(mounting)
+        y, slope = play_operator(x - band, x + band, start, restart=restart)
+        return jnp.maximum(self.friction.force(self.values, y), LEAST_FORCE), slope
+
+    def shown(self, cells: LoadCells, output_force: Recorded, slope: Recorded) -> tuple[Recorded, Recorded]:
+        """Logarithm of what the output's cell shows, and its derivative by the friction exponent, of what `follow` gave."""
+        shown = cells.shown_output(output_force, LEAST_FORCE)
+        return jnp.log(shown), cells.shown_change(slope) / (self.friction.slope(self.values, output_force) * shown)
+
+    @staticmethod
+    def reading(shown: Vector) -> Vector:
+        """What is compared of a shown output force: its logarithm."""
+        return np.log(np.maximum(shown, LEAST_FORCE))
+
+    @staticmethod
+    def without_delay(shown: Recorded, late: Recorded) -> Recorded:
+        """A shown output force [N] less what a delay added to its `reading`."""
+        return shown * jnp.exp(-late)
+
+
+@dataclass(frozen=True)
+class Loop:
+    """A pull-pull loop at given parameters, in several recordings: a play operator whose width is the loss.
+
+    Exact while the loop moves on. At a reversal the slip fronts of the two sides cross the cable at different times: against
+    a stiff load the output begins to change when about nine tenths of the band are crossed, against a soft one at its end.
+
+    Args:
+        preload: P of each recording [N].
+        exponent: Friction exponent of one side, of each [1].
+    """
+
+    preload: Each
+    exponent: Each
+    least_force = -jnp.inf
+
+    def band(self, mounting: Each) -> Each:
+        """Friction exponent of one side with an effect of the mounting [1]."""
+        return jnp.maximum(self.exponent + mounting, LEAST_EXPONENT)
+
+    def scaled(self, force: Float[Array, "*batch"]) -> Float[Array, "*batch"]:
+        """The scale on which the operator works: the force itself [N]."""
+        return force
+
+    def follow(
+        self, input_force: Recorded, mounting: Each, start: Each, restart: Recorded | None = None
+    ) -> tuple[Recorded, Recorded]:
+        """Output force and its derivative by the friction exponent [N]; arguments as of `Rope.follow`."""
+        exponent = self.band(mounting)
+
+        def limits(exponent: Each) -> tuple[Recorded, Recorded]:
+            return loop_band(input_force, self.preload, exponent)
+
+        (low, high), slopes = jax.jvp(limits, (exponent,), (jnp.ones_like(exponent),))
+        return play_operator(low, high, start, slopes, restart)
+
+    def shown(self, cells: LoadCells, output_force: Recorded, slope: Recorded) -> tuple[Recorded, Recorded]:
+        """What the output's cell shows, and its derivative by the friction exponent, of what `follow` gave [N]."""
+        return cells.shown_output(output_force), cells.shown_change(slope)
+
+    @staticmethod
+    def reading(shown: Vector) -> Vector:
+        """What is compared of a shown output force: itself [N]."""
+        return shown
+
+    @staticmethod
+    def without_delay(shown: Recorded, late: Recorded) -> Recorded:
+        """A shown output force [N] less what a delay added to it."""
+        return shown - late
+
+
+def drive_of(
+    cable: Cable,
+    values: Mapping[str, Array],
+    wrap_angles: Float[Array, "recordings contacts"],
+    velocity: Recorded,
+    exponent: Each | None = None,
+) -> Rope | Loop:
+    """The cable as it lies in each recording.
+
+    Args:
+        cable: The cable.
+        values: Values of the parameters.
+        wrap_angles: Wrap angle of each contact in each recording [rad].
+        velocity: At each time; NaN where it is not known.
+        exponent: Friction exponents, if they are not those of the wrap angles [1].
+    """
+    exponent = cable.friction_exponent(values, wrap_angles) if exponent is None else exponent
+    if cable.is_loop:
+        return Loop(cable.elasticity.preload(values, jnp.sum(wrap_angles, axis=-1))[0], exponent)
+    return Rope(cable.friction, values, exponent, cable.friction.rate(values, velocity))

@@ -2,9 +2,7 @@
 
 import hashlib
 from collections.abc import Mapping, Sequence
-from contextlib import nullcontext
 from dataclasses import dataclass
-from itertools import islice
 from pathlib import Path
 
 from bowdenfit.cable.registry import check_names
@@ -15,6 +13,7 @@ from bowdenfit.kinds import KINDS, each_table
 from bowdenfit.kinds.kind import Source
 from bowdenfit.kinds.measurements import Measurements
 from bowdenfit.kinds.settings import load_description, parse_description
+from bowdenfit.kinds.single_file import kind_of
 from bowdenfit.units import ColumnSource
 
 DESCRIPTION_FILE = "cable.toml"
@@ -80,40 +79,15 @@ def single_file_dataset(
     Raises:
         DescriptionError, DatasetError: The angle, a setting or the file is wrong.
     """
-    kind = kind or _kind_of(path, bool(channels))
+    kind = kind or kind_of(path, bool(channels))
     angle = {"value": wrap_angle[0], "unit": wrap_angle[1]}
     raw = {
         "name": path.stem,
         "source": path.name,
         "contact": [{"name": "cable", "friction": "mu", "wrap_angle": angle}],
-        "tables": {kind: {"files" if kind == "recordings" else "file": path.name}},
+        "tables": {kind: {"files": path.name}},
     }
     return read_dataset(parse_description(overridden(raw, overrides), "--wrap-angle"), path.parent, {}, channels)
-
-
-_LONG = 200  # rows beyond which a table of forces is a recording
-
-
-def _kind_of(path: Path, has_channels: bool) -> str:
-    """Which kind of table a file without a description is.
-
-    A CSV file is a recording if it is long, or if its rows have a time and neither a run nor a stroke.
-    """
-    if has_channels or path.suffix.lower() not in {".csv", ".txt", ".tsv"}:
-        return "recordings"
-    from bowdenfit.files.columns import Quantity, meanings
-    from bowdenfit.files.csv_table import read_csv
-
-    with path.open("rb") if path.is_file() else nullcontext() as file:
-        lines = sum(1 for _ in islice(file, _LONG + 1)) if file is not None else 0
-    if lines > _LONG:
-        return "recordings"
-    header = read_csv(path).header
-    if any("efficiency" in heading.lower() for heading in header):
-        return "efficiencies"
-    wanted = (Quantity("time", "time"), Quantity("run", "text"), Quantity("stroke", "text"))
-    found = {quantity.name for heading in header for quantity, _ in meanings(heading, wanted)}
-    return "recordings" if found == {"time"} else "forces"
 
 
 def read_dataset(

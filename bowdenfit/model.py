@@ -19,6 +19,7 @@ from bowdenfit.description import (
     UniformPrior,
 )
 from bowdenfit.errors import DescriptionError, nearest
+from bowdenfit.kinds.angles.table import AngleTable
 from bowdenfit.kinds.measured_cable import measured_cable
 from bowdenfit.kinds.measurements import Measurements
 from bowdenfit.kinds.term import Term
@@ -50,7 +51,7 @@ def build_model(dataset: Dataset) -> Model:
     description, measurements = dataset.description, dataset.measurements
     cable = measured_cable(description, measurements)
     kinds = list(measured_kinds(measurements))
-    terms = [term for kind, table in kinds for term in kind.terms(cable, table, measurements.angles)]
+    terms = [term for kind, table in kinds for term in kind.terms(cable, table, measurements.table(AngleTable))]
     space = _space(cable, measurements)
     for kind, table in kinds:
         kind.check(table, space)

@@ -35,10 +35,13 @@ from bowdenfit.inference.draws import curves_of, for_each_draw, named_values
 from bowdenfit.inference.ensemble import sample
 from bowdenfit.inference.least_squares import make_objective, maximum_posterior
 from bowdenfit.inference.log_density import LogDensity
+from bowdenfit.kinds.angles.table import AngleTable
 from bowdenfit.kinds.candidate import Candidate
 from bowdenfit.kinds.design import Design
+from bowdenfit.kinds.efficiencies.table import EfficiencyTable
+from bowdenfit.kinds.measurements import Measurements
+from bowdenfit.kinds.rows import OwnAngles, Provenance
 from bowdenfit.kinds.settings import parse_description
-from bowdenfit.kinds.tables import AngleTable, EfficiencyTable, Measurements, OwnAngles, Provenance
 from bowdenfit.model import Model, build_model
 from bowdenfit.questions.next.simulated_readings import simulated_readings
 from bowdenfit.questions.next.variance_reduction import explained
@@ -210,13 +213,13 @@ class Bench:
 def _extended(measured: Measurements, candidate: Candidate, reading: np.ndarray) -> Measurements:
     """The measurements with one more row."""
     if candidate.kind == "angle":
-        table = measured.angles
+        table = measured.table(AngleTable)
         assert table is not None  # as described above
         angle = np.vstack([table.angle, np.deg2rad(reading)])
         route = np.append(table.route, candidate.route)
         more = AngleTable(route, table.names, angle, np.full(angle.shape, np.nan), _origin(len(route)))
         return replace(measured, angles=more)
-    rows = measured.efficiencies
+    rows = measured.table(EfficiencyTable)
     assert rows is not None  # as described above
     route, n = np.append(rows.route, candidate.route), len(rows.route) + 1
     nothing = np.full((n, len(rows.own.names)), np.nan)

@@ -7,6 +7,7 @@ import numpy as np
 
 from bowdenfit.cable.cable import Cable
 from bowdenfit.description import Description
+from bowdenfit.kinds.angles.table import AngleTable
 from bowdenfit.kinds.measurements import Measurements
 from bowdenfit.kinds.terms import measured_kinds
 
@@ -26,7 +27,7 @@ def drawn_readings(
         scale: Factor on all noise.
     """
     return {
-        kind.name: kind.bench.draw(cable, table, tables.angles, values, key, scale)
+        kind.name: kind.bench.draw(cable, table, tables.table(AngleTable), values, key, scale)
         for kind, table in measured_kinds(tables)
     }
 

@@ -70,6 +70,11 @@ class Source:
             raise DatasetError(f"the table {self.kind} must be one file; cable.toml names {len(paths)}.")
         return paths[0]
 
+    @property
+    def columns(self) -> dict[str, ColumnSource]:
+        """Columns that do not carry the usual names."""
+        return self.settings.columns
+
     def name_of(self, path: Path) -> str:
         """A file as seen from the folder."""
         return path.relative_to(self.folder).as_posix() if path.is_relative_to(self.folder) else path.name
@@ -116,6 +121,7 @@ class Kind(Generic[AnyTable]):
         conditions: Where and at which wrap angles friction was measured; None if it was not.
         forces: Forces that friction acted on [N].
         speeds: Speeds of sliding [mm/s or rad/s].
+        typical_speeds: Of its recordings or runs, in the same unit.
         velocity_unit: Which of the two; empty without velocities.
         takes_channels: Whether channels can be named on the command line.
     """
@@ -139,6 +145,7 @@ class Kind(Generic[AnyTable]):
     conditions: Callable[[AnyTable], Conditions] | None = None
     forces: Callable[[AnyTable], Vector] = lambda _: np.zeros(0)
     speeds: Callable[[AnyTable], Vector] = lambda _: np.zeros(0)
+    typical_speeds: Callable[[AnyTable], list[float]] = lambda _: []
     velocity_unit: Callable[[AnyTable], str] = lambda _: ""
     takes_channels: bool = False
 

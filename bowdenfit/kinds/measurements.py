@@ -27,15 +27,3 @@ class Measurements:
         new = {type(table): table for table in tables if table is not None}
         kept = {type(table): table for table in self.tables}
         return replace(self, tables=tuple((kept | new).values()))
-
-    # Until everything asks by class:
-    angles = property(lambda self: self._named("AngleTable"))
-    efficiencies = property(lambda self: self._named("EfficiencyTable"))
-    forces = property(lambda self: self._named("ForceTable"))
-    recordings = property(lambda self: self._named("Recordings"))
-    stretch = property(lambda self: self._named("StretchTable"))
-    preload = property(lambda self: self._named("PreloadTable"))
-    loop = property(lambda self: self._named("LoopTable"))
-
-    def _named(self, name: str) -> Any:
-        return next((table for table in self.tables if type(table).__name__ == name), None)

@@ -10,9 +10,9 @@ from jax import Array
 from bowdenfit.cable.cable import Cable
 from bowdenfit.cable.noise import NoiseLaw, noise_law
 from bowdenfit.description import Description, PriorDefaults
+from bowdenfit.kinds.angles.table import AngleTable
 from bowdenfit.kinds.candidate import CandidateKind
 from bowdenfit.kinds.measurements import Measurements
-from bowdenfit.kinds.tables import AngleTable
 from bowdenfit.parameters.space import Parameter, ParameterSpace
 
 

@@ -11,9 +11,10 @@ from bowdenfit.cable.conditions import Conditions
 from bowdenfit.cable.friction import FrictionModel, friction_options
 from bowdenfit.dataset import Dataset
 from bowdenfit.errors import DescriptionError
+from bowdenfit.kinds.forces.table import ForceTable
 from bowdenfit.kinds.forces.term import HeldForcesTerm
 from bowdenfit.kinds.measurements import Measurements
-from bowdenfit.kinds.tables import ForceTable, OwnAngles, Provenance
+from bowdenfit.kinds.rows import OwnAngles, Provenance
 from bowdenfit.model import Model, build_model
 from bowdenfit.physics.friction import force_from_scale, force_scale, force_scale_slope, rate_factor
 from bowdenfit.physics.hysteresis import play_operator

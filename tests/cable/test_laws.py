@@ -12,6 +12,7 @@ import bowdenfit as bf
 from bowdenfit.dataset import Dataset
 from bowdenfit.errors import DescriptionError
 from bowdenfit.kinds.settings import parse_description
+from bowdenfit.kinds.stretch.table import StretchTable
 from bowdenfit.model import build_model
 from bowdenfit.questions.check.verb import check
 from bowdenfit.questions.next.target import answer_of
@@ -107,7 +108,7 @@ def test_the_stretch_of_the_rope_asks_the_law_of_its_contact():
     truth = TRUTH | {"wobble_housing": 35.0}
     description = elastic_cable(("stretch",), kind="single", contact=[HOUSING | {"law": "wobble"}])
     dataset, _ = bench(description, truth, noise=False)
-    rows = dataset.measurements.stretch
+    rows = dataset.measurements.table(StretchTable)
     loading, exponent = ~rows.unloading, truth["mu"] * (rows.wrap_angle + WOBBLE)
     tension = rows.load * -np.expm1(-exponent) / exponent
     bedded = truth["bedding_stretch"] * -np.expm1(-tension / truth["bedding_load"])

@@ -15,6 +15,7 @@ import pytest
 from bowdenfit.dataset import Dataset, read_dataset
 from bowdenfit.inference.least_squares import LeastSquares, least_squares, make_objective, maximum_posterior
 from bowdenfit.inference.log_density import LogDensity
+from bowdenfit.kinds.efficiencies.table import EfficiencyTable
 from bowdenfit.kinds.settings import parse_description
 from bowdenfit.model import Model, build_model
 from bowdenfit.physics.geometry import log_quadratic_coefficients
@@ -181,5 +182,5 @@ def test_least_squares_of_the_coefficients_on_the_four_efficiencies(on_body, tmp
     _, found = _fitted(dataset)
     values = [found.estimates[name].value for name in ("mu1", "mu2", "mu3")]
     np.testing.assert_allclose(values, [0.0804, 0.1130, 0.2228], atol=5e-5)
-    residuals = found.readings["efficiency"] - dataset.measurements.efficiencies.efficiency
+    residuals = found.readings["efficiency"] - dataset.measurements.table(EfficiencyTable).efficiency
     assert np.all(np.abs(residuals) < 0.001)

@@ -14,6 +14,7 @@ from scipy import stats
 import bowdenfit
 from bowdenfit.dataset import Dataset
 from bowdenfit.front_desk import Fit
+from bowdenfit.kinds.forces.table import ForceTable
 
 FOLDER = Path(__file__).parents[2] / "datasets" / "yarn-on-cylinder"
 NOMINAL = np.repeat([45, 90, 135, 180, 225, 270, 315], 3)
@@ -55,7 +56,7 @@ def log_ratio(trials: dict[str, np.ndarray]) -> np.ndarray:
 
 def test_the_table_has_three_pulling_trials_at_each_of_seven_angles_each_a_run_of_its_own():
     data = bowdenfit.read(FOLDER)
-    forces = data.measurements.forces
+    forces = data.measurements.table(ForceTable)
     assert len(forces.run_names) == len(forces.input_force) == 21
     assert np.all(forces.stroke == 1) and np.all(forces.output_force < forces.input_force)
     angle, sd = forces.own.column("wrap_angle")
@@ -93,7 +94,7 @@ def test_a_short_chain_gives_the_printed_intervals(fit, readme):
 
 def with_samples(data: Dataset, n_samples: int, independent: bool) -> Dataset:
     """Each trial drawn out to its window of samples, sensor noise added; each sample a run if independent."""
-    forces = data.measurements.forces
+    forces = data.measurements.table(ForceTable)
     rows = np.repeat(np.arange(21), n_samples)
     noise = np.random.default_rng(1).normal(0.0, SENSOR_NOISE, (21, n_samples))
     held = forces.output_force[:, None] + noise - noise.mean(axis=1, keepdims=True)
@@ -191,7 +192,7 @@ def held_posterior(trials: dict[str, np.ndarray]) -> np.ndarray:
 def test_taken_as_held_the_readings_only_bound_the_coefficient_from_below(fit, trials, readme):
     low, median, high = held_posterior(trials)
     assert f"the posterior is {median:.2f} ({low:.3f} to {high:.2f})" in readme
-    forces = fit.dataset.measurements.forces
+    forces = fit.dataset.measurements.table(ForceTable)
     held = replace(forces, stroke=np.zeros_like(forces.stroke))
     as_held = replace(fit.dataset, measurements=fit.dataset.measurements.with_tables(held))
     assert not bowdenfit.fit(as_held, mcmc=False, seed=1).least_squares.estimates["mu"].identified

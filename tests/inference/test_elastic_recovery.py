@@ -23,9 +23,12 @@ from scipy import stats
 from bowdenfit.dataset import Dataset, load_dataset
 from bowdenfit.description import Description, SamplerSettings
 from bowdenfit.inference.log_density import LogDensity
+from bowdenfit.kinds import KINDS
+from bowdenfit.kinds.angles.table import AngleTable
 from bowdenfit.kinds.design import Design
 from bowdenfit.kinds.measurements import Measurements
 from bowdenfit.kinds.settings import parse_description
+from bowdenfit.kinds.stretch.table import StretchTable
 from bowdenfit.model import build_model
 from bowdenfit.questions.simulate.simulation import empty_tables, simulate, true_values
 
@@ -72,7 +75,7 @@ def written(dataset: Dataset) -> Dataset:
     rounded = [
         replace(rows, **{reading: np.round(getattr(rows, reading), 10)})
         for name, reading in (("stretch", "stretch"), ("preload", "preload"), ("loop", "output_force"))
-        if (rows := getattr(tables, name)) is not None
+        if (rows := tables.table(KINDS[name].table)) is not None
     ]
     return replace(dataset, measurements=tables.with_tables(*rounded))
 
@@ -146,7 +149,7 @@ def test_over_two_hundred_loops_ranks_are_uniform():
 
 def all_on_the_way_up(dataset: Dataset) -> Dataset:
     """Stretch read while the load came down, taken for stretch read while it grew."""
-    rows = dataset.measurements.stretch
+    rows = dataset.measurements.table(StretchTable)
     loading = replace(rows, unloading=np.zeros_like(rows.unloading))
     return replace(dataset, measurements=dataset.measurements.with_tables(loading))
 
@@ -181,7 +184,7 @@ def test_stretch_and_loop_together_tell_friction_better_than_either_alone(labora
     both = bench(told_by("stretch", "loop"), TRUTH, 3, design=few)[0].measurements
     sd = []
     for names in (("stretch", "loop"), ("stretch",), ("loop",)):
-        alone = Measurements().with_tables(*(getattr(both, name) for name in names))
+        alone = Measurements().with_tables(*(both.table(KINDS[name].table) for name in names))
         estimate = laboratory.least_squares(Dataset(told_by(*names), alone, {})).estimates["mu"]
         assert estimate.value == pytest.approx(TRUTH["mu"], abs=4 * estimate.standard_error)
         sd.append(estimate.standard_error)
@@ -206,7 +209,7 @@ def stretched_on_body(on_body):
         truth = {name: TRUTH[name] for name in ROPE} | ({friction: 0.085} if friction else {})
         design = Design(angles=(450.0, 500.0), efficiencies=(470.0,), elastic=ELASTIC)
         values = true_values(description, empty_tables(description, design), truth, jax.random.key(1))
-        rows = simulate(description, design, values, jax.random.key(2)).measurements.stretch
+        rows = simulate(description, design, values, jax.random.key(2)).measurements.table(StretchTable)
         return Dataset(description, alone.measurements.with_tables(rows), {})
 
     return alone, joined
@@ -246,8 +249,8 @@ def test_a_stretch_table_leaves_the_coefficients_of_the_other_tables_as_they_wer
     assert shared["mu1"].standard_error < 0.5 * before["mu1"].standard_error
 
 
-KINDS = ("angles", "efficiencies", "forces", "stretch", "preload")
-MIXTURES = list(chain.from_iterable(combinations(KINDS, n) for n in range(1, len(KINDS) + 1)))
+MIXED = ("angles", "efficiencies", "forces", "stretch", "preload")
+MIXTURES = list(chain.from_iterable(combinations(MIXED, n) for n in range(1, len(MIXED) + 1)))
 
 
 def mixture(tables: tuple[str, ...]) -> Dataset:
@@ -269,9 +272,9 @@ def test_any_mixture_of_tables_makes_one_posterior_that_is_the_sum_of_its_parts(
     posterior = LogDensity(build_model(dataset))
     z = 0.3 * np.random.default_rng(len(tables)).standard_normal(posterior.model.space.size)
     values, total = posterior.model.space.constrain(jnp.asarray(z)), float(np.sum(stats.norm.logpdf(z)))
-    angles = dataset.measurements.angles
+    angles = dataset.measurements.table(AngleTable)
     for name in tables:
-        alone = Measurements().with_tables(angles, getattr(dataset.measurements, name))
+        alone = Measurements().with_tables(angles, dataset.measurements.table(KINDS[name].table))
         terms = build_model(Dataset(dataset.description, alone, {})).terms
         part = [t for t in terms if (t.name == "wrap_angle") == (name == "angles")]
         total += sum(float(jnp.sum(t.log_likelihood(values, arrays(t.data)))) for t in part)

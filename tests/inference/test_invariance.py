@@ -8,6 +8,8 @@ from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
 import bowdenfit as bf
+from bowdenfit.kinds.angles.table import AngleTable
+from bowdenfit.kinds.forces.table import ForceTable
 
 ANGLES = [
     (430, 58, None),
@@ -138,7 +140,7 @@ PLAIN = {
 
 def sorted_tables(data):
     """All numbers of a data set, rows in a fixed order."""
-    angles, forces = data.measurements.angles, data.measurements.forces
+    angles, forces = data.measurements.table(AngleTable), data.measurements.table(ForceTable)
     one = np.nan_to_num(np.column_stack([angles.route, angles.angle, angles.limit]), nan=-1.0)
     names = np.array([ord(name) for name in forces.run_names])[forces.run]
     two = np.column_stack([forces.route, names, forces.stroke, forces.input_force, forces.output_force])

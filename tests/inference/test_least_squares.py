@@ -16,6 +16,8 @@ from bowdenfit.inference.compilation import compiled
 from bowdenfit.inference.least_squares import LeastSquares, Objective, least_squares, make_objective, maximum_posterior
 from bowdenfit.inference.log_density import LogDensity
 from bowdenfit.inference.solver import minimize
+from bowdenfit.kinds.angles.table import AngleTable
+from bowdenfit.kinds.efficiencies.table import EfficiencyTable
 from bowdenfit.model import build_model
 
 
@@ -129,7 +131,7 @@ def test_readings_and_scatter_are_those_of_the_fit():
     """The scatter of an efficiency table is that of its log efficiencies; of an angle table, that of its angles."""
     dataset, _ = measured(cable(2, ("angles", "efficiencies")), seed=1)
     _, found = fitted(dataset)
-    angles, efficiencies = dataset.measurements.angles, dataset.measurements.efficiencies
+    angles, efficiencies = dataset.measurements.table(AngleTable), dataset.measurements.table(EfficiencyTable)
     loss = np.log(efficiencies.efficiency / found.readings["efficiency"])
     assert found.residual_sd["efficiency"] == pytest.approx(np.sqrt(np.sum(loss**2) / (len(loss) - 2)), rel=0.2)
     readings = found.readings["wrap_angle"].reshape(2, -1).T
@@ -184,7 +186,7 @@ def test_a_contact_without_wrap_says_nothing_of_its_coefficient():
 
 def test_a_coefficient_that_would_be_negative_is_not_given_a_number():
     dataset, _ = measured(cable(2, ("angles", "efficiencies")), seed=1, noise=False)
-    table = dataset.measurements.efficiencies  # all loss grows with the free angle, and falls with the squeezed one
+    table = dataset.measurements.table(EfficiencyTable)  # all loss grows with the free angle, and falls with the squeezed one
     loss = np.linspace(0.1, 0.9, len(table.route))
     changed = dataset.measurements.with_tables(replace(table, efficiency=np.exp(-loss)))
     _, found = fitted(replace(dataset, measurements=changed))

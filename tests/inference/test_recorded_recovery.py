@@ -231,7 +231,7 @@ def test_the_estimated_delay_is_as_good_as_its_standard_error_says(twenty: list[
 
     By chance it is rejected in fewer than one of a thousand seeds.
     """
-    found = [(cable.delay, dataset.measurements.recordings) for cable, dataset in twenty]
+    found = [(cable.delay, dataset.measurements.table(Recordings)) for cable, dataset in twenty]
     z = [(r.each[0].account.delay - delay) / r.delay_sd for delay, r in found if r is not None]
     hits = int(np.sum(np.abs(z) < stats.norm.ppf((1 + PROBABILITY) / 2)))
     assert p_value(hits, len(twenty)) > 0.001, z
@@ -266,8 +266,8 @@ def test_recordings_read_from_files_are_those_that_were_recorded(tmp_path: Path)
         np.savetxt(tmp_path / entry.file, columns, "%.17g", ",", header=heading, comments="")
     (tmp_path / "cable.toml").write_text(text())
     read, expected = (
-        bowdenfit.read(tmp_path).measurements.recordings,
-        prepared(description, cable).measurements.recordings,
+        bowdenfit.read(tmp_path).measurements.table(Recordings),
+        prepared(description, cable).measurements.table(Recordings),
     )
     assert read is not None
     assert expected is not None

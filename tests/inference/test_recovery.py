@@ -20,6 +20,7 @@ from scipy import stats
 
 from bowdenfit.dataset import Dataset
 from bowdenfit.description import Description, SamplerSettings
+from bowdenfit.kinds.forces.table import ForceTable
 
 
 def _normal(mean: float, sd: float) -> dict[str, Any]:
@@ -83,7 +84,7 @@ def test_over_two_hundred_cables_ranks_are_uniform():
 
 def independent_samples(dataset: Dataset) -> Dataset:
     """Every row a run of its own: the mounting effect taken for noise of the single sample."""
-    forces = dataset.measurements.forces
+    forces = dataset.measurements.table(ForceTable)
     n = len(forces.run)
     alone = replace(forces, run=np.arange(n), run_names=tuple(str(i) for i in range(n)))
     return replace(dataset, measurements=dataset.measurements.with_tables(alone))

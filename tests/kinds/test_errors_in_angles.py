@@ -18,6 +18,7 @@ from scipy import optimize
 from bowdenfit.dataset import Dataset
 from bowdenfit.inference.least_squares import LeastSquares, least_squares, make_objective
 from bowdenfit.inference.log_density import LogDensity
+from bowdenfit.kinds.forces.table import ForceTable
 from bowdenfit.model import build_model
 
 MU, TAU = 0.14, 0.01
@@ -107,7 +108,7 @@ def test_force_runs_agree_with_unknown_true_angles():
 
 def _with_angle_errors(dataset: Dataset, misread: np.ndarray, sd: np.ndarray) -> Dataset:
     """Force runs whose angles were misread, with their standard deviations as the table states them [rad]."""
-    forces = dataset.measurements.forces
+    forces = dataset.measurements.table(ForceTable)
     angle = np.maximum(forces.own.angle[:, 0] + misread[forces.run], 0.01)
     own = replace(forces.own, angle=angle[:, None], sd=sd[forces.run][:, None])
     return replace(dataset, measurements=dataset.measurements.with_tables(replace(forces, own=own)))
@@ -115,7 +116,7 @@ def _with_angle_errors(dataset: Dataset, misread: np.ndarray, sd: np.ndarray) ->
 
 def _runs(dataset: Dataset) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     """Wrap angle of each run, its loss, and the standard deviation of that without the angle's error."""
-    model, forces = build_model(dataset), dataset.measurements.forces
+    model, forces = build_model(dataset), dataset.measurements.table(ForceTable)
     (term,) = model.terms
     values = model.space.constrain(jnp.zeros(model.space.size))
     loss_sd = np.sqrt(float(values["tau"]) ** 2 + float(values["sigma_F"]) ** 2 / term.data["run_weight"])

@@ -13,11 +13,13 @@ import bowdenfit as bf
 from bowdenfit.dataset import Dataset, load_dataset, read_dataset
 from bowdenfit.inference.compilation import compiled
 from bowdenfit.inference.log_density import LogDensity
+from bowdenfit.kinds.efficiencies.table import EfficiencyTable
+from bowdenfit.kinds.forces.table import ForceTable
 from bowdenfit.kinds.forces.term import HeldForcesTerm
 from bowdenfit.kinds.measurements import Measurements
+from bowdenfit.kinds.rows import OwnAngles, Provenance
 from bowdenfit.kinds.runs import RunsTerm
 from bowdenfit.kinds.settings import load_description
-from bowdenfit.kinds.tables import EfficiencyTable, ForceTable, OwnAngles, Provenance
 from bowdenfit.model import Model, build_model
 
 VALUES = {"mu": 0.15, "tau": 0.03, "sigma_F": 0.7}
@@ -341,7 +343,7 @@ def test_an_undetected_angle_outside_the_curves_counts_as_half_the_limit_give_or
 
 def test_a_row_s_own_angle_comes_before_the_curve_with_its_stated_error_or_none(on_body):
     dataset = load_dataset(on_body)
-    table: EfficiencyTable = dataset.measurements.efficiencies
+    table: EfficiencyTable = dataset.measurements.table(EfficiencyTable)
     own = OwnAngles(
         ("free_sheath_angle", "squeezed_sheath_angle"),
         np.array([[np.nan, 0.7], [np.nan] * 2, [np.nan] * 2, [1.0, 0.5]]),

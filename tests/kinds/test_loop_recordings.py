@@ -24,7 +24,7 @@ from bowdenfit.questions.recorded.traces import traces
 from bowdenfit.recordings.forces import parsed_channels
 from bowdenfit.recordings.loop_strokes import find_loop_strokes
 from bowdenfit.recordings.preparation import prepare
-from bowdenfit.recordings.recording import RawRecording
+from bowdenfit.recordings.recording import RawRecording, Recordings
 from bowdenfit.results.store import _measurements, _measurements_page
 
 PRELOAD, MU, RATE = 20.0, 0.12, 200.0
@@ -275,9 +275,9 @@ OUT_RADIUS = 'output_pulley_radius = { value = 1.2, unit = "cm" }'
 def test_torques_over_the_radii_are_forces(tmp_path):
     columns = recorded(seconds=6.0)
     (tmp_path / "a").mkdir()
-    forces = load_dataset(folder_of(tmp_path, [columns])).measurements.recordings
+    forces = load_dataset(folder_of(tmp_path, [columns])).measurements.table(Recordings)
     torques = folder_of(tmp_path / "a", [as_torques(columns, unit="N_mm")], cable=f"{IN_RADIUS}\n{OUT_RADIUS}")
-    found = load_dataset(torques).measurements.recordings
+    found = load_dataset(torques).measurements.table(Recordings)
     assert forces is not None and found is not None
     for end in ("input_force", "output_force"):
         one, other = (getattr(r.each[0].blocks, end) for r in (forces, found))
@@ -292,7 +292,7 @@ def test_a_torque_at_one_end_only_and_a_named_channel_are_read(tmp_path):
         "output_force_N": columns["output_force_N"],
     }
     path = folder_of(tmp_path, [mixed], cable=IN_RADIUS)
-    found = load_dataset(path, channels=parsed_channels(["input_torque=motor:-N*mm"])).measurements.recordings
+    found = load_dataset(path, channels=parsed_channels(["input_torque=motor:-N*mm"])).measurements.table(Recordings)
     assert found is not None
     assert found.each[0].blocks.input_force.max() == pytest.approx(columns["input_force_N"].max(), abs=2.0)
 
@@ -333,14 +333,14 @@ def test_a_delay_is_not_estimated_but_a_stated_one_is_applied(tmp_path):
         "output_force_N": np.interp(columns["time_s"] - 0.05, columns["time_s"], columns["output_force_N"])
     }
     plain = load_dataset(folder_of(tmp_path, [late, recorded(seconds=6.0, seed=1)])).measurements
-    assert plain.recordings is not None
-    assert [r.account.delay for r in plain.recordings.each] == [0.0, 0.0]
+    assert plain.table(Recordings) is not None
+    assert [r.account.delay for r in plain.table(Recordings).each] == [0.0, 0.0]
     assert sum("not estimated for a loop" in remark for remark in plain.remarks) == 1
     assert any('delay = { value = 10, unit = "ms" }' in remark for remark in plain.remarks)
     stated = 'recordings = { prepare = { delay = { value = 50, unit = "ms", sd = 2 } } }'
     found = load_dataset(folder_of(tmp_path, [late], more=f"[tables]\n{stated}"))
-    assert found.measurements.recordings is not None
-    strokes = found.measurements.recordings.each[0].strokes
+    assert found.measurements.table(Recordings) is not None
+    strokes = found.measurements.table(Recordings).each[0].strokes
     assert strokes.exponent == pytest.approx(HALF_TURN, rel=0.02)
     assert "delay_error" in {p.name for p in build_model(found).space.free}
     assert not any("not estimated" in remark for remark in found.measurements.remarks)
@@ -521,9 +521,9 @@ def test_a_short_posterior_holds_the_truth(sampled):
 def test_recordings_of_a_loop_come_back_from_a_saved_fit(sampled):
     measurements = sampled.dataset.measurements
     page = json.loads(json.dumps(_measurements_page(measurements), allow_nan=False))
-    again = _measurements(page).recordings
+    again = _measurements(page).table(Recordings)
     assert again.loop
-    for one, other in zip(again.each, measurements.recordings.each, strict=True):
+    for one, other in zip(again.each, measurements.table(Recordings).each, strict=True):
         assert one.strokes.drag == other.strokes.drag
         np.testing.assert_equal(one.strokes.exponent, other.strokes.exponent)
         assert np.array_equal(one.blocks.output_force, other.blocks.output_force)

@@ -18,8 +18,10 @@ from bowdenfit.dataset import Dataset, load_dataset
 from bowdenfit.inference.compilation import compiled
 from bowdenfit.inference.least_squares import make_objective, maximum_posterior
 from bowdenfit.inference.log_density import LogDensity
+from bowdenfit.kinds.forces.table import ForceTable
 from bowdenfit.kinds.measurements import Measurements
-from bowdenfit.kinds.tables import ForceTable, OwnAngles, Provenance
+from bowdenfit.kinds.preload.table import PreloadTable
+from bowdenfit.kinds.rows import OwnAngles, Provenance
 from bowdenfit.model import Model, build_model
 from bowdenfit.physics.student import log_student_cdf, log_student_density, student_bound_residual, student_residual
 
@@ -141,7 +143,7 @@ def _forces(noise: str, table: ForceTable) -> Model:
 
 def _with_a_slack_row(dataset: Dataset) -> Dataset:
     """The data set, with a preload table whose first row reads 0."""
-    table = dataset.measurements.preload
+    table = dataset.measurements.table(PreloadTable)
     slack = replace(table, preload=np.where(np.arange(len(table.preload)) == 0, 0.0, table.preload))
     return replace(dataset, measurements=dataset.measurements.with_tables(slack))
 

@@ -15,9 +15,12 @@ from bowdenfit.dataset import Dataset, load_dataset
 from bowdenfit.description import Description, SamplerSettings
 from bowdenfit.errors import DatasetError, StoreError
 from bowdenfit.inference.compilation import compiled
+from bowdenfit.kinds import KINDS
+from bowdenfit.kinds.angles.table import AngleTable
 from bowdenfit.kinds.angles.term import detection_limit
 from bowdenfit.kinds.design import Design
 from bowdenfit.kinds.drawn_readings import drawn_readings
+from bowdenfit.kinds.forces.table import ForceTable
 from bowdenfit.kinds.forces.term import HeldForcesTerm
 from bowdenfit.kinds.recordings.simulation import refuse_saturated
 from bowdenfit.model import build_model
@@ -30,6 +33,7 @@ from bowdenfit.questions.calibrate.store import keep, open_replications
 from bowdenfit.questions.calibrate.uniformity import UniformRanks, holm
 from bowdenfit.questions.calibrate.words import calibration_text
 from bowdenfit.questions.simulate.simulation import empty_tables, simulated_again, with_readings
+from bowdenfit.recordings.recording import Recordings
 
 DATA_SETS = (
     "on-body-exoskeleton",
@@ -77,16 +81,16 @@ def test_tables_drawn_anew_keep_the_design_and_change_the_readings(name):
         ("preload", ("wrap_angle",), "preload"),
         ("loop", ("stroke",), "output_force"),
     ):
-        before, after = (getattr(d.measurements, table) for d in (dataset, again))
+        before, after = (d.measurements.table(KINDS[table].table) for d in (dataset, again))
         assert (before is None) == (after is None)
         if before is not None:
             for column in kept:
                 np.testing.assert_array_equal(getattr(before, column), getattr(after, column))
             assert getattr(before, read).shape == getattr(after, read).shape
             assert not np.array_equal(getattr(before, read), getattr(after, read), equal_nan=True)
-    recordings = again.measurements.recordings
+    recordings = again.measurements.table(Recordings)
     if recordings is not None:
-        for one, other in zip(dataset.measurements.recordings.each, recordings.each, strict=True):
+        for one, other in zip(dataset.measurements.table(Recordings).each, recordings.each, strict=True):
             np.testing.assert_array_equal(one.blocks.time, other.blocks.time)
             assert not np.array_equal(one.blocks.output_force, other.blocks.output_force)
     build_model(again)
@@ -95,7 +99,7 @@ def test_tables_drawn_anew_keep_the_design_and_change_the_readings(name):
 def test_angles_outside_the_range_of_the_curves_stay_as_measured(on_body):
     dataset = load_dataset(on_body)
     again = simulated_again(dataset, plausible_values(dataset), jax.random.key(1))
-    table, drawn = dataset.measurements.angles, again.measurements.angles
+    table, drawn = dataset.measurements.table(AngleTable), again.measurements.table(AngleTable)
     outside = table.route > 530
     np.testing.assert_array_equal(table.angle[outside], drawn.angle[outside])
     assert np.all(np.isfinite(drawn.limit) == np.isnan(drawn.angle))
@@ -121,7 +125,7 @@ def test_recordings_drawn_without_noise_show_the_friction_exponent_that_they_wer
     again = drawn_anew(dataset, values, scale=0.0)
     named = {name: jnp.asarray(value) for name, value in values.items()}
     cable = build_model(dataset).cable
-    for recording in again.measurements.recordings.each:
+    for recording in again.measurements.table(Recordings).each:
         if recording.route <= 530:
             expected = float(cable.exponent_at(named, jnp.array([recording.route]))[0])
             assert recording.strokes.exponent == pytest.approx(expected, rel=0.01)
@@ -130,7 +134,7 @@ def test_recordings_drawn_without_noise_show_the_friction_exponent_that_they_wer
 def held_at(forces: tuple[float, ...]) -> Dataset:
     """Forces that were read while nothing slid, on a cable of one known angle."""
     description = cable(1, ("forces",), contact=[CONTACTS[2]])
-    table = empty_tables(description, Design(runs=(450.0,), input_forces=forces, strokes=(1,))).forces
+    table = empty_tables(description, Design(runs=(450.0,), input_forces=forces, strokes=(1,))).table(ForceTable)
     held = replace(table, stroke=np.zeros(len(forces), dtype=int), output_force=np.full(len(forces), forces[0]))
     return Dataset(description, empty_tables(description, Design()).with_tables(held), {})
 
@@ -151,13 +155,13 @@ def test_held_readings_slip_as_often_as_their_likelihood_says():
     for count, p in zip(held, probability, strict=True):
         assert stats.binomtest(int(count), 2000, float(p)).pvalue > 1e-4
     drawn = drawn_readings(model.cable, dataset.measurements, named, jax.random.key(1))
-    forces = with_readings(dataset, drawn).measurements.forces
-    np.testing.assert_array_equal(forces.input_force, dataset.measurements.forces.input_force)
+    forces = with_readings(dataset, drawn).measurements.table(ForceTable)
+    np.testing.assert_array_equal(forces.input_force, dataset.measurements.table(ForceTable).input_force)
 
 
 def test_a_table_of_several_detection_limits_is_refused_unless_one_is_stated(on_body):
     dataset = load_dataset(on_body)
-    table = dataset.measurements.angles
+    table = dataset.measurements.table(AngleTable)
     limits = np.where(np.isnan(table.limit), np.nan, np.linspace(0.1, 0.2, len(table.route))[:, None])
     assert detection_limit(dataset.description, table) == pytest.approx(np.deg2rad(10))
     silent = dataset.description.tables.angles.model_copy(update={"detection_limit": None})
@@ -170,7 +174,7 @@ def test_a_table_of_several_detection_limits_is_refused_unless_one_is_stated(on_
 
 def test_recordings_with_clipped_readings_are_refused():
     dataset = data_set("synthetic-recordings")
-    description, recordings = dataset.description, dataset.measurements.recordings
+    description, recordings = dataset.description, dataset.measurements.table(Recordings)
     refuse_saturated(description, recordings)
     first = recordings.each[0]
     clipped = replace(first, blocks=replace(first.blocks, saturated=first.blocks.input_force > 100))
@@ -188,7 +192,7 @@ def test_measured_tables_pass_the_rule_that_simulated_ones_must_pass(name):
 
 
 def changed(dataset: Dataset, table: str, **columns: object) -> Dataset:
-    rows = getattr(dataset.measurements, table)
+    rows = dataset.measurements.table(KINDS[table].table)
     new = {name: change(getattr(rows, name)) for name, change in columns.items()}
     return replace(dataset, measurements=dataset.measurements.with_tables(replace(rows, **new)))
 

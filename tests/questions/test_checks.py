@@ -17,6 +17,9 @@ from bowdenfit.inference.diagnostics import Diagnostics
 from bowdenfit.inference.log_density import LogDensity as Density
 from bowdenfit.inference.predictive_checks import LeftOut, place_at_random, predict_without_each, uniformity
 from bowdenfit.inference.prior_sensitivity import SENSITIVE, sensitivities
+from bowdenfit.kinds import KINDS
+from bowdenfit.kinds.angles.table import AngleTable
+from bowdenfit.kinds.stretch.table import StretchTable
 from bowdenfit.model import build_model
 from bowdenfit.questions.check import checks_figure, prior_figure
 from bowdenfit.questions.check.answer import Checks, checks_of, trends_of
@@ -236,7 +239,7 @@ def test_without_draws_there_are_no_checks(on_body):
 
 def changed(dataset, table, column, row, by):
     """The data set with one reading of a table moved."""
-    old = getattr(dataset.measurements, table)
+    old = dataset.measurements.table(KINDS[table].table)
     values = getattr(old, column).copy()
     values[row] += by
     tables = dataset.measurements.with_tables(dataclasses.replace(old, **{column: values}))
@@ -245,7 +248,7 @@ def changed(dataset, table, column, row, by):
 
 def test_an_angle_misread_by_ten_sds_is_the_one_that_is_named(on_body):
     right = bf.read(on_body, settings=QUICK)
-    row = int(np.flatnonzero(right.measurements.angles.route == 490.0)[0])
+    row = int(np.flatnonzero(right.measurements.table(AngleTable).route == 490.0)[0])
     found = bf.fit(changed(right, "angles", "angle", (row, 0), np.deg2rad(21.0)), seed=1).checks
     assert [reading.label for reading in found.outliers] == ["free_sheath_angle at 490 mm"]
     text = " ".join(checks_text(found).split())
@@ -326,7 +329,7 @@ def test_all_priors_of_the_on_body_data_allow_what_was_measured(on_body, run, tm
 
 def test_stretch_in_the_wrong_unit_is_seen_before_the_fit(on_body):
     right = bf.read(on_body.parent / "synthetic-haptic-loop")
-    table = right.measurements.stretch
+    table = right.measurements.table(StretchTable)
     found = prior_predictive(changed(right, "stretch", "stretch", slice(None), 999 * table.stretch))
     text = " ".join(prior_predictive_text(found).split())
     assert text.startswith("Warning: ")

@@ -17,6 +17,7 @@ from bowdenfit.inference.log_density import LogDensity
 from bowdenfit.inference.moment_matching import Affine, best_map, match_moments
 from bowdenfit.inference.psis import reliable_k
 from bowdenfit.kinds.design import Design
+from bowdenfit.kinds.efficiencies.table import EfficiencyTable
 from bowdenfit.model import build_model
 from bowdenfit.questions.compare.answer import Comparison
 from bowdenfit.questions.compare.common_readings import Common, Omitted, common_readings
@@ -33,9 +34,9 @@ def outlier():
     """Eight efficiencies of one contact, the last far from the others: two parameters, so that integrals are exact."""
     description = cable(1, ("efficiencies",), contact=[EDGE])
     dataset, _ = measured(description, 3, design=Design(efficiencies=tuple(np.linspace(400.0, 600.0, 8))))
-    efficiency = dataset.measurements.efficiencies.efficiency.copy()
+    efficiency = dataset.measurements.table(EfficiencyTable).efficiency.copy()
     efficiency[-1] *= 0.93
-    table = replace(dataset.measurements.efficiencies, efficiency=efficiency)
+    table = replace(dataset.measurements.table(EfficiencyTable), efficiency=efficiency)
     return LogDensity(build_model(replace(dataset, measurements=dataset.measurements.with_tables(table))))
 
 

@@ -15,6 +15,8 @@ from bowdenfit import predict
 from bowdenfit.dataset import Dataset
 from bowdenfit.inference.least_squares import least_squares, make_objective, maximum_posterior
 from bowdenfit.inference.log_density import LogDensity
+from bowdenfit.kinds import KINDS
+from bowdenfit.kinds.loop.table import LoopTable
 from bowdenfit.model import build_model
 from bowdenfit.questions.figures import figures_of
 from bowdenfit.questions.simulate.simulation import empty_tables, simulate, true_values
@@ -64,7 +66,7 @@ def test_a_saved_fit_gives_the_same_answers_again(fit, folder, tmp_path):
     )
     measured, before = again.dataset.measurements, fit.dataset.measurements
     for table in ("stretch", "preload", "loop"):
-        ours, theirs = (jax.tree.leaves(dataclasses.asdict(getattr(m, table))) for m in (measured, before))
+        ours, theirs = (jax.tree.leaves(dataclasses.asdict(m.table(KINDS[table].table))) for m in (measured, before))
         assert all(
             np.array_equal(a, b, equal_nan=a.dtype.kind == "f")
             for a, b in zip(map(np.asarray, ours), map(np.asarray, theirs), strict=True)
@@ -240,7 +242,7 @@ def test_tables_of_one_cable_seldom_disagree(plan, solved):
 
 def test_a_loop_measured_at_another_preload_is_named_with_its_distance(plan, solved):
     right, other = simulated(plan, 1), simulated(plan, 1, preload=19.0)
-    mixed = right.measurements.with_tables(other.measurements.loop)
+    mixed = right.measurements.with_tables(other.measurements.table(LoopTable))
     found = solved(dataclasses.replace(right, measurements=mixed)).disagreements
     loop = next(d for d in found if d.table == "loop_output_force")
     assert loop.conflict > 0.8 * max(d.conflict for d in found)

@@ -19,10 +19,12 @@ from bowdenfit.errors import UsageError
 from bowdenfit.front_desk import Fit
 from bowdenfit.inference.draws import curves_of, for_each_draw, named_values
 from bowdenfit.inference.log_density import LogDensity as Density
+from bowdenfit.kinds.angles.table import AngleTable
 from bowdenfit.kinds.candidate import Candidate
 from bowdenfit.kinds.design import Design
+from bowdenfit.kinds.efficiencies.table import EfficiencyTable
 from bowdenfit.kinds.next_run import typical_run
-from bowdenfit.kinds.tables import AngleTable, EfficiencyTable, OwnAngles, Provenance
+from bowdenfit.kinds.rows import OwnAngles, Provenance
 from bowdenfit.model import Model, build_model
 from bowdenfit.questions.next import verb
 from bowdenfit.questions.next.candidate_names import parsed_candidates
@@ -497,7 +499,7 @@ def test_a_fit_without_a_posterior_is_told_to_sample(on_body, tmp_path):
 
 
 def _with_efficiency(dataset: Dataset, at: float, reading: float) -> Dataset:
-    rows = dataset.measurements.efficiencies
+    rows = dataset.measurements.table(EfficiencyTable)
     n = len(rows.route) + 1
     nothing = np.full((n, len(rows.own.names)), np.nan)
     table = EfficiencyTable(
@@ -508,7 +510,7 @@ def _with_efficiency(dataset: Dataset, at: float, reading: float) -> Dataset:
 
 
 def _with_angles(dataset: Dataset, at: float, reading: np.ndarray) -> Dataset:
-    rows = dataset.measurements.angles
+    rows = dataset.measurements.table(AngleTable)
     angle = np.vstack([rows.angle, np.deg2rad(reading)])
     table = AngleTable(np.append(rows.route, at), rows.names, angle, np.full(angle.shape, np.nan), _origin(len(angle)))
     return replace(dataset, measurements=dataset.measurements.with_tables(table))

@@ -12,12 +12,14 @@ from bowdenfit.cli import bowdenfit as command
 from bowdenfit.errors import UsageError
 from bowdenfit.inference.comparison import Difference, Prediction, differences
 from bowdenfit.kinds.design import Design
+from bowdenfit.kinds.forces.table import ForceTable
 from bowdenfit.questions.check.data_set_words import check_text
 from bowdenfit.questions.identify.confounding import confounded_pairs
 from bowdenfit.questions.recorded import dependence_figure
 from bowdenfit.questions.recorded.rate import RateEffect, rate_effect
 from bowdenfit.questions.recorded.traces import traces
 from bowdenfit.questions.summary.words import summary_text
+from bowdenfit.recordings.recording import Recordings
 
 QUICK = ("sampler.n_walkers=128", "sampler.target_ess=200", "sampler.target_r_hat=1.05", "sampler.max_steps=2000")
 
@@ -78,7 +80,7 @@ def test_a_saved_fit_of_recordings_comes_back_bit_for_bit(plain):
     again = bf.load(folder)
     assert summary_text(again) == summary_text(fit)
     for before, after in zip(
-        fit.dataset.measurements.recordings.each, again.dataset.measurements.recordings.each, strict=True
+        fit.dataset.measurements.table(Recordings).each, again.dataset.measurements.table(Recordings).each, strict=True
     ):
         np.testing.assert_array_equal(before.blocks.input_force, after.blocks.input_force)
         np.testing.assert_array_equal(before.strokes.stroke, after.strokes.stroke)
@@ -90,14 +92,14 @@ def test_a_saved_fit_of_recordings_comes_back_bit_for_bit(plain):
 def test_no_sample_disappears_without_being_counted(plain):
     fit, folder = plain
     page = json.loads((folder / "summary.json").read_text())
-    lengths = {r.file: r.account.samples for r in fit.dataset.measurements.recordings.each}
+    lengths = {r.file: r.account.samples for r in fit.dataset.measurements.table(Recordings).each}
     for row in page["recordings"]:
         assert sum(row["counts"].values()) == row["samples"] == lengths[row["file"]]
 
 
 def test_the_summary_says_where_the_samples_went_and_how_much_mountings_differ(plain):
     text = " ".join(summary_text(plain[0]).split())
-    samples = sum(r.account.samples for r in plain[0].dataset.measurements.recordings.each)
+    samples = sum(r.account.samples for r in plain[0].dataset.measurements.table(Recordings).each)
     assert f"{samples} samples of 7 recordings in 7 runs" in text
     assert "From one mounting of the cable to the next the efficiency scatters by" in text
     assert "% of itself" in text
@@ -168,7 +170,7 @@ def test_compare_answers_whether_speed_matters_on_the_command_line(plain, with_r
 
 def test_compare_refuses_fits_of_different_readings_one_fit_and_fits_without_draws(plain, recorded):
     fit, _ = plain
-    recordings = fit.dataset.measurements.recordings
+    recordings = fit.dataset.measurements.table(Recordings)
     fewer = fit.dataset.measurements.with_tables(replace(recordings, each=recordings.each[:5]))
     other = replace(fit, dataset=replace(fit.dataset, measurements=fewer))
     with pytest.raises(UsageError, match="same readings"):
@@ -250,7 +252,7 @@ def test_recordings_one_below_the_other_in_one_file_are_told_apart_by_a_column(r
     )
     contact = '[[contact]]\nname = "c"\nfriction = "mu"\nwrap_angle = { value = 90, unit = "deg" }\n'
     (tmp_path / "cable.toml").write_text(f'name = "two"\n{contact}[tables]\nrecordings = {{}}\n{entries}')
-    first, second = bf.read(tmp_path).measurements.recordings.each
+    first, second = bf.read(tmp_path).measurements.table(Recordings).each
     assert (first.name, second.name) == ("a", "b")
     assert first.account.samples == second.account.samples == 1200
     assert first.strokes.exponent == pytest.approx(0.2746, abs=0.004)
@@ -261,16 +263,16 @@ def test_a_short_table_with_a_clock_and_no_runs_is_a_recording_and_one_with_stro
     rows = np.loadtxt(recorded / "recordings" / "470mm_60rpm.csv", delimiter=",", skiprows=1)[100:290]
     _csv(tmp_path / "clock.csv", ("time_s", "input_force_N", "output_force_N"), rows[:, :3])
     found = bf.read(tmp_path / "clock.csv", wrap_angle=(180.0, "deg")).measurements
-    assert found.recordings is not None
-    assert found.forces is None
+    assert found.table(Recordings) is not None
+    assert found.table(ForceTable) is None
     _csv(
         tmp_path / "strokes.csv",
         ("stroke", "input_force_N", "output_force_N"),
         np.abs(rows[:5, [3, 1, 2]]) * [0, 1, 1] + [1, 0, 0],
     )
     found = bf.read(tmp_path / "strokes.csv", wrap_angle=(180.0, "deg")).measurements
-    assert found.recordings is None
-    assert len(found.forces.run) == 5
+    assert found.table(Recordings) is None
+    assert len(found.table(ForceTable).run) == 5
 
 
 def test_check_of_a_file_alone_lists_channels_and_what_it_is_as_a_recording(recorded):

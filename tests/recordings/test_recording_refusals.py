@@ -16,7 +16,7 @@ from bowdenfit.errors import DatasetError
 from bowdenfit.files import columns_csv
 from bowdenfit.kinds.recordings.angles import check_angles
 from bowdenfit.questions.simulate.bench import BenchFriction, BenchSettings, Faults, Profile, simulate_recording
-from bowdenfit.recordings.recording import PULL, RETURN
+from bowdenfit.recordings.recording import PULL, RETURN, Recordings
 
 NEWTONS_PER_POUND = 4.4482216152605
 SWAP = ["--channel input_force=OUTPUT_CHANNEL --channel output_force=INPUT_CHANNEL", "swapped"]
@@ -467,8 +467,8 @@ def test_a_recording_outside_the_curves_needs_a_row_of_angles(columns, tmp_path,
     write(tmp_path / "run.csv", columns)
     spoil(tmp_path)
     data = load_dataset(tmp_path)
-    moved = replace(data.measurements.recordings.each[0], route=float(at))
-    recordings = replace(data.measurements.recordings, each=(moved,))
+    moved = replace(data.measurements.table(Recordings).each[0], route=float(at))
+    recordings = replace(data.measurements.table(Recordings), each=(moved,))
     if not refused:
         check_angles(recordings, data.description, data.measurements)
         return
@@ -530,9 +530,9 @@ def test_a_run_of_which_nothing_can_be_used_is_refused(on_body, likelihood):
 
     folder = on_body.parent / "synthetic-recordings"
     data = load_dataset(folder, [f'tables.recordings.likelihood="{likelihood}"'])
-    first, *others = data.measurements.recordings.each
+    first, *others = data.measurements.table(Recordings).each
     blocks = replace(first.blocks, output_force=-np.abs(first.blocks.output_force))
-    recordings = replace(data.measurements.recordings, each=(replace(first, blocks=blocks), *others))
+    recordings = replace(data.measurements.table(Recordings), each=(replace(first, blocks=blocks), *others))
     bad = replace(data, measurements=data.measurements.with_tables(recordings))
     with jax.enable_x64(True), pytest.raises(DatasetError, match=r"nothing of the run .* can be used") as error:
         build_model(bad)

@@ -86,7 +86,7 @@ def read_angles(source: Source) -> Found[AngleTable]:
     detection_limit = stated.to("angle") if stated else None
     table = read_csv(path)
     wanted = (route_column(route), *(Quantity(c, "angle") for c in contacts))
-    found = find_columns(table, wanted, source.settings.columns)
+    found = find_columns(table, wanted, source.columns)
     lengths = require(table, found, route.variable, f"{route.variable}_{route.unit}")
     columns = [require(table, found, name, f"{name}_deg") for name in contacts]
     cells = [[_angle_or_limit(cell, c, detection_limit) for cell in c.cells] for c in columns]

@@ -12,10 +12,9 @@ from jaxtyping import Float
 from bowdenfit.cable.cable import ANGLE_NOISE, Cable
 from bowdenfit.cable.noise import noise_law, scatter
 from bowdenfit.kinds.angles.bench import detection_limit, drawn_angles
-from bowdenfit.kinds.angles.table import AngleSettings
+from bowdenfit.kinds.angles.table import AngleSettings, AngleTable
 from bowdenfit.kinds.angles.undetected import EVENTS, count
 from bowdenfit.kinds.candidate import Candidate, CandidateKind, Simulation, Situation
-from bowdenfit.kinds.tables import AngleTable
 from bowdenfit.kinds.term import Bench, Circumstances, TermKind
 from bowdenfit.parameters.priors import HalfNormal
 from bowdenfit.parameters.space import Parameter

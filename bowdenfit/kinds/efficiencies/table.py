@@ -54,7 +54,7 @@ def read_efficiencies(source: Source) -> Found[EfficiencyTable]:
     path, route, contacts = source.file, source.description.route, source.description.angle_columns
     table = read_csv(path)
     names = (Quantity("efficiency", "ratio"), Quantity("efficiency_sd", "ratio"))
-    found = find_columns(table, (*names, *shared_columns(route, contacts)), source.settings.columns)
+    found = find_columns(table, (*names, *shared_columns(route, contacts)), source.columns)
     column = require(table, found, "efficiency", "efficiency (0 to 1) or efficiency_percent")
     spread = found.get("efficiency_sd")
     efficiency = [_efficiency(cell, column) for cell in column.cells]

@@ -15,11 +15,12 @@ from bowdenfit.cable.load_cells import RUN_SCATTER, LoadCells
 from bowdenfit.cable.noise import noise_law, scatter
 from bowdenfit.description import Description
 from bowdenfit.errors import DescriptionError
+from bowdenfit.kinds.angles.table import AngleTable
 from bowdenfit.kinds.candidate import UNKNOWN_SCATTER, Candidate, CandidateKind, Simulation, Situation, one_reading_each
+from bowdenfit.kinds.efficiencies.table import EfficiencyTable
 from bowdenfit.kinds.resolve_angles import resolve_angles
 from bowdenfit.kinds.row_angles import row_angles
 from bowdenfit.kinds.shared_parameters import run_scatter
-from bowdenfit.kinds.tables import AngleTable, EfficiencyTable
 from bowdenfit.kinds.term import Bench, TermKind
 from bowdenfit.parameters.space import ParameterSpace
 from bowdenfit.physics.friction import transmission_efficiency

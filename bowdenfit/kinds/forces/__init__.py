@@ -8,6 +8,13 @@ from bowdenfit.kinds.kind import Kind, itself
 from bowdenfit.kinds.readings import Readings, efficiencies
 from bowdenfit.kinds.wrap_angles import check_rows
 
+
+def _typical_speeds(table: ForceTable) -> list[float]:
+    """The lowest and the highest."""
+    known = np.abs(table.velocity[np.isfinite(table.velocity)])
+    return [float(known.min()), float(known.max())] if len(known) else []
+
+
 FORCES = Kind(
     name="forces",
     table=ForceTable,
@@ -25,5 +32,6 @@ FORCES = Kind(
     conditions=itself,
     forces=lambda table: np.concatenate([table.input_force, table.output_force]),
     speeds=lambda table: np.abs(table.velocity),
+    typical_speeds=_typical_speeds,
     velocity_unit=lambda table: table.velocity_unit,
 )

@@ -114,7 +114,7 @@ def _read_force_file(path: Path, source: Source) -> tuple[ForceTable, list[str]]
     table, route, contacts = read_csv(path), source.description.route, source.description.angle_columns
     forces = (Quantity("input_force", "force"), Quantity("output_force", "force"))
     others = (Quantity("run", "text"), Quantity("stroke", "text"), Quantity("velocity", "speed"))
-    found = find_columns(table, (*forces, *others, *shared_columns(route, contacts)), source.settings.columns, _UNUSED)
+    found = find_columns(table, (*forces, *others, *shared_columns(route, contacts)), source.columns, _UNUSED)
     columns = [require(table, found, q.name, f"{q.name}_N") for q in forces]
     input_force, output_force = (np.array([_force(cell, c) for cell in c.cells]) for c in columns)
     own = read_own_angles(table, found, contacts)

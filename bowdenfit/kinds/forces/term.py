@@ -12,13 +12,14 @@ from bowdenfit.cable.cable import Cable
 from bowdenfit.cable.load_cells import FORCE_NOISE, RUN_SCATTER, LoadCells
 from bowdenfit.cable.noise import scatter
 from bowdenfit.description import Description
+from bowdenfit.kinds.angles.table import AngleTable
 from bowdenfit.kinds.forces.held import HeldForcesTerm
+from bowdenfit.kinds.forces.table import ForceTable
 from bowdenfit.kinds.next_run import FORCE_RUN
 from bowdenfit.kinds.resolve_angles import resolve_angles
 from bowdenfit.kinds.row_angles import row_angles
 from bowdenfit.kinds.runs import ROW_ARRAYS, RunsTerm, SlidingRows, run_sums
 from bowdenfit.kinds.shared_parameters import force_noise, offsets, run_scatter
-from bowdenfit.kinds.tables import AngleTable, ForceTable
 from bowdenfit.kinds.term import Bench, Circumstances, TermKind
 from bowdenfit.parameters.space import Parameter
 

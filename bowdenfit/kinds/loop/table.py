@@ -64,7 +64,7 @@ def read_loop(source: Source) -> Found[LoopTable]:
     table, pulleys = read_csv(path), source.description.cable.pulleys
     ends = [Quantity(f"{end}_{what}", what) for end in ("input", "output") for what in ("force", "torque")]
     others = (Quantity("stroke", "text"), Quantity("preload", "force"))
-    found = find_columns(table, (*ends, *others, *shared_columns(route, contacts)), source.settings.columns, _UNUSED)
+    found = find_columns(table, (*ends, *others, *shared_columns(route, contacts)), source.columns, _UNUSED)
     check_spelling(table, found, others)
     input_force, output_force = (_end(table, found, end, pulleys) for end in ("input", "output"))
     stroke = read_strokes(found, len(table.rows), held="")

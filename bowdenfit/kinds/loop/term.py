@@ -15,11 +15,12 @@ from bowdenfit.cable.elasticity import PRELOAD as REFERENCE_PRELOAD
 from bowdenfit.cable.elasticity import spread_matrix
 from bowdenfit.cable.load_cells import FORCE_NOISE, RUN_SCATTER, LoadCells
 from bowdenfit.cable.noise import noise_law, scatter
+from bowdenfit.kinds.angles.table import AngleTable
 from bowdenfit.kinds.candidate import Candidate, CandidateKind, Simulation, Situation, one_reading_each, some_loads
+from bowdenfit.kinds.loop.table import LoopTable
 from bowdenfit.kinds.resolve_angles import resolve_angles
 from bowdenfit.kinds.row_angles import row_angles
 from bowdenfit.kinds.shared_parameters import force_noise, offsets, preload
-from bowdenfit.kinds.tables import AngleTable, LoopTable
 from bowdenfit.kinds.term import LOAD, WRAP_ANGLE, Bench, Circumstances, Term, TermKind, Where
 from bowdenfit.parameters.priors import Normal
 from bowdenfit.parameters.space import Parameter

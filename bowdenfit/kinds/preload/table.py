@@ -50,7 +50,7 @@ def read_preload(source: Source) -> Found[PreloadTable]:
     path = source.file
     table = read_csv(path)
     wanted = (Quantity("preload", "force"), Quantity("wrap_angle", "angle"))
-    found = find_columns(table, wanted, source.settings.columns, _UNUSED)
+    found = find_columns(table, wanted, source.columns, _UNUSED)
     angles = require(table, found, "wrap_angle", "wrap_angle_deg")
     preloads = require(table, found, "preload", "preload_N")
     rows = PreloadTable(

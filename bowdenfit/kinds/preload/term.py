@@ -11,6 +11,7 @@ from jaxtyping import Float
 
 from bowdenfit.cable.cable import Cable
 from bowdenfit.cable.noise import scatter
+from bowdenfit.kinds.angles.table import AngleTable
 from bowdenfit.kinds.candidate import (
     UNKNOWN_SCATTER,
     Candidate,
@@ -21,8 +22,8 @@ from bowdenfit.kinds.candidate import (
     some_bends,
 )
 from bowdenfit.kinds.elastic_term import ElasticTerm
+from bowdenfit.kinds.preload.table import PreloadTable
 from bowdenfit.kinds.shared_parameters import preload
-from bowdenfit.kinds.tables import AngleTable, PreloadTable
 from bowdenfit.kinds.term import WRAP_ANGLE, Bench, Circumstances, TermKind, Where
 from bowdenfit.parameters.priors import HalfNormal
 from bowdenfit.parameters.space import Parameter

@@ -18,6 +18,12 @@ def _forces(recordings: Recordings) -> Vector:
     return np.concatenate([f[f > 0.2 * f.max()] for f in read] if recordings.loop else read)
 
 
+def _typical_speeds(recordings: Recordings) -> list[float]:
+    """The median of each recording."""
+    used = [np.abs(r.blocks.velocity[r.strokes.used_sliding]) for r in recordings.each]
+    return [float(np.nanmedian(speeds)) for speeds in used if np.isfinite(speeds).any()]
+
+
 RECORDINGS = Kind(
     name="recordings",
     table=Recordings,
@@ -39,6 +45,7 @@ RECORDINGS = Kind(
     speeds=lambda recordings: np.concatenate(
         [np.abs(r.blocks.velocity[r.strokes.used_sliding]) for r in recordings.each]
     ),
+    typical_speeds=_typical_speeds,
     velocity_unit=lambda recordings: recordings.velocity_unit,
     takes_channels=True,
 )

@@ -18,11 +18,11 @@ from bowdenfit.cable.load_cells import BLOCK_NOISE, LEAST_FORCE, RUN_SCATTER, Lo
 from bowdenfit.cable.noise import scatter
 from bowdenfit.description import Description
 from bowdenfit.errors import DatasetError
+from bowdenfit.kinds.angles.table import AngleTable
 from bowdenfit.kinds.recordings.angles import recorded_angles
 from bowdenfit.kinds.recordings.blocks import worth_of
 from bowdenfit.kinds.resolve_angles import resolve_angles
 from bowdenfit.kinds.row_angles import row_angles
-from bowdenfit.kinds.tables import AngleTable
 from bowdenfit.recordings.loop_strokes import find_loop_strokes
 from bowdenfit.recordings.recording import Blocks, Recording, Recordings, Strokes
 from bowdenfit.recordings.strokes import find_strokes

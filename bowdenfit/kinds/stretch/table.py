@@ -62,7 +62,7 @@ def read_stretch(source: Source) -> Found[StretchTable]:
     table = read_csv(path)
     wanted = (Quantity("load", "force"), Quantity("wrap_angle", "angle"), Quantity("stretch", "length"))
     optional = (Quantity("branch", "text"), Quantity("cycle", "text"))
-    found = find_columns(table, (*wanted, *optional), source.settings.columns, _UNUSED)
+    found = find_columns(table, (*wanted, *optional), source.columns, _UNUSED)
     check_spelling(table, found, optional)
     loads, angles, stretches = (
         require(table, found, name, f"{name}_{unit}")

@@ -12,6 +12,7 @@ from jaxtyping import Float
 from bowdenfit.cable.cable import Cable
 from bowdenfit.cable.elasticity import STRETCH_FRICTION, STRETCH_ZERO, rope_parameters, spread_matrix
 from bowdenfit.cable.noise import scatter
+from bowdenfit.kinds.angles.table import AngleTable
 from bowdenfit.kinds.candidate import (
     UNKNOWN_SCATTER,
     Candidate,
@@ -23,7 +24,7 @@ from bowdenfit.kinds.candidate import (
     some_loads,
 )
 from bowdenfit.kinds.elastic_term import ElasticTerm
-from bowdenfit.kinds.tables import AngleTable, StretchTable
+from bowdenfit.kinds.stretch.table import StretchTable
 from bowdenfit.kinds.term import LOAD, WRAP_ANGLE, Bench, Circumstances, TermKind, Where
 from bowdenfit.parameters.priors import HalfNormal, LogNormal, Normal
 from bowdenfit.parameters.space import Parameter

@@ -87,7 +87,7 @@ def data(fit: Record) -> tuple[LoopCurve, ...] | None:
 
 def _points(fit: Record, bends: np.ndarray) -> np.ndarray:
     """Wrap angle [rad], input force, output force [N] and stroke (0 of a recording) of every recorded block and reading."""
-    from bowdenfit.kinds.tables import LoopTable
+    from bowdenfit.kinds.loop.table import LoopTable
     from bowdenfit.questions.bends.answer import elastic_answers
     from bowdenfit.questions.recorded.loop_traces import loop_points
 

@@ -46,7 +46,7 @@ def data(fit: Record) -> PreloadCurve | None:
     """What is shown; None where preload does not depend on the wrap angle."""
     import jax.numpy as jnp
 
-    from bowdenfit.kinds.tables import PreloadTable
+    from bowdenfit.kinds.preload.table import PreloadTable
     from bowdenfit.questions.bends.curves import POINTS, Values, of_draws, quantiles
     from bowdenfit.questions.bends.equations import knows_preload
 

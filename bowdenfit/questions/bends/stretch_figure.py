@@ -49,7 +49,7 @@ def data(fit: Record) -> tuple[StretchCurve, ...] | None:
     """A curve for each wrap angle that stretch was read at; None without such readings."""
     import jax.numpy as jnp
 
-    from bowdenfit.kinds.tables import StretchTable
+    from bowdenfit.kinds.stretch.table import StretchTable
     from bowdenfit.questions.bends.curves import POINTS, Values, of_draws, quantiles
 
     table = fit.dataset.measurements.table(StretchTable)

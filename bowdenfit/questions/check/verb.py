@@ -29,11 +29,13 @@ def check(dataset: "str | Path | Dataset", **reading: Unpack[Reading]) -> "Datas
     Raises:
         DescriptionError, DatasetError: What is wrong, in a sentence.
     """
+    from bowdenfit.recordings.recording import Recordings
+
     data = read(dataset, **reading)
     description = data.description
     if (
         description.friction_model != "capstan"
-        or data.measurements.recordings
+        or data.measurements.table(Recordings) is not None
         or description.prior
         or any(setting.prior for setting in description.friction.values())
     ):
@@ -63,13 +65,14 @@ def channels_of(path: str | Path, channels: Sequence[str] = ()) -> "tuple[Channe
     from bowdenfit.errors import DatasetError
     from bowdenfit.files import read_channels
     from bowdenfit.recordings.forces import parsed_channels
+    from bowdenfit.recordings.recording import Recordings
 
     file = read_channels(Path(path))
     try:
         data = single_file_dataset(Path(path), (0.0, "deg"), (), parsed_channels(channels), kind="recordings")
     except DatasetError as error:
         return file, None, str(error)
-    return file, data.measurements.recordings, ""
+    return file, data.measurements.table(Recordings), ""
 
 
 def show_priors(dataset: "Dataset", folder: str | Path, seed: int = 0) -> "PriorPredictive":

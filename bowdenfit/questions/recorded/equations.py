@@ -12,10 +12,10 @@ from jaxtyping import Float
 from bowdenfit.cable.drive import Loop, Rope, drive_of
 from bowdenfit.cable.load_cells import LoadCells
 from bowdenfit.inference.compilation import compiled
+from bowdenfit.kinds.angles.table import AngleTable
 from bowdenfit.kinds.recordings.angles import recorded_angles
 from bowdenfit.kinds.resolve_angles import resolve_angles
 from bowdenfit.kinds.row_angles import row_angles
-from bowdenfit.kinds.tables import AngleTable
 from bowdenfit.model import Model
 from bowdenfit.recordings.recording import Recordings
 

@@ -4,10 +4,10 @@ import jax
 import jax.numpy as jnp
 import numpy as np
 
+from bowdenfit.kinds.angles.table import AngleTable
 from bowdenfit.kinds.recordings.angles import recorded_angles
 from bowdenfit.kinds.resolve_angles import resolve_angles
 from bowdenfit.kinds.row_angles import row_angles
-from bowdenfit.kinds.tables import AngleTable
 from bowdenfit.questions.recorded.equations import blocks_shown
 from bowdenfit.recordings.recording import Blocks, Recordings
 from bowdenfit.results.record import Record

@@ -7,6 +7,8 @@ import jax.numpy as jnp
 import numpy as np
 
 from bowdenfit.inference.interval import Interval
+from bowdenfit.kinds import each_table
+from bowdenfit.recordings.recording import Recordings
 from bowdenfit.results.record import Record
 
 _SURE = 0.99  # probability from which a dependence on speed is called one
@@ -66,21 +68,13 @@ def rate_effect(fit: Record) -> RateEffect | None:
 
 def _typical_speeds(fit: Record) -> tuple[float, float]:
     """The lowest and the highest typical speed of a recording or run, internal unit."""
-    measured, speeds = fit.dataset.measurements, []
-    if measured.recordings is not None:
-        for r in measured.recordings.each:
-            used = np.abs(r.blocks.velocity[r.strokes.used_sliding])
-            if np.isfinite(used).any():
-                speeds.append(float(np.nanmedian(used)))
-    if measured.forces is not None and np.isfinite(measured.forces.velocity).any():
-        known = np.abs(measured.forces.velocity[np.isfinite(measured.forces.velocity)])
-        speeds += [float(known.min()), float(known.max())]
+    speeds = [speed for kind, table in each_table(fit.dataset.measurements) for speed in kind.typical_speeds(table)]
     return min(speeds), max(speeds)
 
 
 def place_of(fit: Record) -> tuple[float, str]:
     """Where to answer: at the length with most recordings inside the range, else in its middle."""
-    route, recordings = fit.dataset.description.route, fit.dataset.measurements.recordings
+    route, recordings = fit.dataset.description.route, fit.dataset.measurements.table(Recordings)
     if route is None:
         return 0.0, ""
     each = recordings.each if recordings is not None else ()

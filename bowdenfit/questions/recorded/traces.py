@@ -7,7 +7,7 @@ import numpy as np
 
 from bowdenfit.cable.load_cells import RUN_SCATTER
 from bowdenfit.cable.noise import noise_law
-from bowdenfit.kinds.tables import AngleTable
+from bowdenfit.kinds.angles.table import AngleTable
 from bowdenfit.questions.recorded.equations import DRAWS, Follower, blocks_shown
 from bowdenfit.recordings.recording import Recording, Recordings
 from bowdenfit.results.record import Record, once

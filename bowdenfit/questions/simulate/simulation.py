@@ -6,6 +6,7 @@ Both draw readings as the likelihood takes them to scatter, so that a posterior 
 
 from collections.abc import Mapping
 from dataclasses import replace
+from typing import Any
 
 import jax
 import jax.numpy as jnp
@@ -15,6 +16,7 @@ from bowdenfit.dataset import Dataset
 from bowdenfit.description import Description
 from bowdenfit.errors import UsageError
 from bowdenfit.kinds import KINDS
+from bowdenfit.kinds.angles.table import AngleTable
 from bowdenfit.kinds.angles.term import drawn_angles
 from bowdenfit.kinds.design import Design
 from bowdenfit.kinds.drawn_readings import drawn_readings, with_drawn_readings
@@ -90,10 +92,10 @@ def simulated_again(
     """
     named = {name: jnp.asarray(value, dtype=float) for name, value in values.items()}
     cable, scale = build_model(dataset).cable, 1.0 if noise else 0.0
-    angles, beyond = dataset.measurements.angles, {}
+    angles, beyond = dataset.measurements.table(AngleTable), {}
     if beyond_curves and angles is not None:
         beyond = {"angles": drawn_angles(cable, angles, angles, named, key, scale, everywhere=True)}
-        drawn = {name: np.asarray(array) for name, array in beyond["angles"].items()}
+        drawn: dict[str, Any] = {name: np.asarray(array) for name, array in beyond["angles"].items()}
         dataset = replace(dataset, measurements=dataset.measurements.with_tables(replace(angles, **drawn)))
     return with_readings(dataset, drawn_readings(cable, dataset.measurements, named, key, scale) | beyond)
 

@@ -15,6 +15,7 @@ from bowdenfit.questions.identify.confounding import confounded_pairs
 from bowdenfit.questions.identify.contradiction import agreement_page
 from bowdenfit.questions.recorded.rate import rate_effect
 from bowdenfit.questions.summary.verdict import verdict
+from bowdenfit.recordings.recording import Recordings
 from bowdenfit.results.plain import plain
 from bowdenfit.results.record import Draws, Record
 
@@ -48,8 +49,8 @@ def summarize(fit: Record) -> dict[str, Any]:
         "seed": fit.provenance.seed,
         "versions": dict(fit.provenance.versions),
     }
-    if fit.dataset.measurements.recordings is not None:
-        page["recordings"] = accounts(fit.dataset.measurements.recordings)
+    if (recordings := fit.dataset.measurements.table(Recordings)) is not None:
+        page["recordings"] = accounts(recordings)
     if elastic := elastic_overview(fit):
         page["elastic"] = elastic
     if checks := checks_of(fit):

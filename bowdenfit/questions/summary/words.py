@@ -16,6 +16,7 @@ from bowdenfit.questions.recorded.rate import SHOWN_SPEED, rate_effect
 from bowdenfit.questions.summary.page import summarize
 from bowdenfit.questions.summary.sampler_words import sampler_sentences, sampler_text
 from bowdenfit.questions.summary.verdict import CONTRADICTORY, NOT_CONVERGED, NOT_IDENTIFIABLE, Verdict, verdict
+from bowdenfit.recordings.recording import Recordings
 from bowdenfit.results.record import Record
 from bowdenfit.words import decimals, filled, listed, table
 
@@ -245,7 +246,7 @@ def _mountings(fit: Record, page: dict[str, Any]) -> str:
 
 
 def _recordings(fit: Record) -> str:
-    recordings = fit.dataset.measurements.recordings
+    recordings = fit.dataset.measurements.table(Recordings)
     return "Recordings\n" + "\n".join(recordings_text(recordings)) if recordings is not None else ""
 
 

@@ -12,9 +12,8 @@ from bowdenfit.cable.cable import ANGLE_NOISE, Cable
 from bowdenfit.cable.load_cells import FORCE_NOISE, GAIN_ERROR, INPUT_OFFSET, OUTPUT_OFFSET, RUN_SCATTER
 from bowdenfit.dataset import Dataset
 from bowdenfit.description import PriorDefaults
-from bowdenfit.kinds.angles.table import AngleSettings
+from bowdenfit.kinds.angles.table import AngleSettings, AngleTable
 from bowdenfit.kinds.design import Design
-from bowdenfit.kinds.tables import AngleTable
 from bowdenfit.model import build_model
 from bowdenfit.questions.simulate.bench import Faults, SimulatedRecording, simulate_recording
 from bowdenfit.questions.simulate.recordings.plan import RecordingsPlan
@@ -81,12 +80,10 @@ def make_recordings(plan: RecordingsPlan, seed: int, noise: bool = True) -> Made
         wrap = dict(zip(contacts, map(float, angles[i]), strict=True))
         each.append(MadeRecording(planned, faults, simulated, exponent, effect, wrap))
     dataset = simulate(plan.description, design, values, of_readings, noise) if plan.angles else None
-    table = (
-        dataset
-        and dataset.measurements.angles
-        and _with_measured(dataset.measurements.angles, plan, values[ANGLE_NOISE] * noise, of_angles)
-    )
-    return MadeRecordings(plan, seed, {**truth, **_common_truth(each)}, table or None, tuple(each))
+    table = dataset.measurements.table(AngleTable) if dataset else None
+    if table is not None:
+        table = _with_measured(table, plan, values[ANGLE_NOISE] * noise, of_angles)
+    return MadeRecordings(plan, seed, {**truth, **_common_truth(each)}, table, tuple(each))
 
 
 def _common_truth(each: Sequence[MadeRecording]) -> dict[str, float]:

@@ -1,0 +1,52 @@
+"""Nobody outside kinds/ knows which kinds of measurement there are: what is said of one is a field of that kind."""
+
+import ast
+from pathlib import Path
+
+import bowdenfit
+from bowdenfit.kinds import KINDS
+
+PACKAGE = Path(bowdenfit.__file__).parent
+OTHER_MEANINGS = {
+    "description/elastic.py": "a loop is a kind of cable too, preload a parameter, and stretch a model of preload",
+    "questions/simulate/recordings/plan.py": "a plan of recordings lists route values of angles, and refuses other tables",
+}
+"""Files whose words are names of kinds by chance, or that are about one kind and what it needs of others."""
+
+
+def kinds_named(tree: ast.Module) -> set[str]:
+    """Kinds that code names: as a whole string, or as the folder that it imports from; no attribute is called like one."""
+    documentation = {
+        id(node.body[0].value)
+        for node in ast.walk(tree)
+        if isinstance(node, ast.Module | ast.ClassDef | ast.FunctionDef)
+        and node.body
+        and isinstance(node.body[0], ast.Expr)
+    }
+    words: set[str] = set()
+    for node in ast.walk(tree):
+        match node:
+            case ast.Constant(value=str(text)) if id(node) not in documentation:
+                words.add(text)
+            case ast.ImportFrom(module=str(module)) if module.startswith("bowdenfit.kinds."):
+                words.add(module.split(".")[2])
+    return words & set(KINDS)
+
+
+def test_nobody_outside_kinds_names_three_kinds_of_measurement():
+    found = {
+        path.relative_to(PACKAGE).as_posix(): kinds
+        for path in PACKAGE.rglob("*.py")
+        if "kinds" not in path.relative_to(PACKAGE).parts
+        and len(kinds := kinds_named(ast.parse(path.read_text(encoding="utf-8")))) >= 3
+    }
+    assert set(found) == set(OTHER_MEANINGS), {name: sorted(kinds) for name, kinds in found.items()}
+
+
+def test_the_search_finds_names_of_kinds_wherever_code_may_have_them():
+    code = '''
+"""stretch"""
+from bowdenfit.kinds.loop.table import LoopTable
+def forces(): return tables["preload"], "a sentence on recordings"
+'''
+    assert kinds_named(ast.parse(code)) == {"loop", "preload"}

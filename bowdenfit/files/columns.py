@@ -79,7 +79,9 @@ def find_columns(
         DatasetError: A heading fits two quantities or two headings fit one; a unit is missing, unknown or of the
             wrong dimension; a named column is not there, or is named for what the table cannot have.
     """
-    sources = {name: ColumnSource(name=_one_space(source.name), unit=source.unit) for name, source in (sources or {}).items()}
+    sources = {
+        name: ColumnSource(name=_one_space(source.name), unit=source.unit) for name, source in (sources or {}).items()
+    }
     _check_sources(table, [*(quantity.name for quantity in wanted), *unused], sources)
     found: dict[str, Column] = {}
     taken = {source.name for source in sources.values()}

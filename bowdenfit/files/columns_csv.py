@@ -117,7 +117,7 @@ def _exactly(version: str) -> dict[str, Any]:
 
 def _rows(path: Path, sheet: Sheet, start: int, stop: int, before: dict[int, list[np.ndarray]] | None) -> SheetRows:
     """The rows of a section of the file [bytes], to be read cell by cell behind what has been read before."""
-    spaces = "\r\n\t ".replace(sheet.separator, "")
+    spaces = "\r\n " if sheet.separator == "\t" else "\r\n\t "
 
     def cells() -> Iterator[Sequence[str] | None]:
         for text in lines_between(path, sheet.encoding, start, stop):
@@ -132,8 +132,8 @@ def _rows(path: Path, sheet: Sheet, start: int, stop: int, before: dict[int, lis
 
 def _is_cut(lines: Sequence[Line], separator: str) -> bool:
     """Whether a file breaks off in the last of its lines: it has no end, and fewer cells or digits than those before."""
-    *whole, last = [cells_of(line.text, separator) for line in lines if not line.blank] or [[]]
-    if not whole or lines[-1].ended or lines[-1].blank or lines[-1].comment or is_summary(last):
+    *whole, last = [cells_of(line.text, separator) for line in lines if not is_blank(line.text)] or [[]]
+    if not whole or lines[-1].ended or is_blank(lines[-1].text) or comment_mark(lines[-1].text) or is_summary(last):
         return False
     if len(last) < min(map(len, whole)):
         return True

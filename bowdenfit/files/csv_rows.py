@@ -6,7 +6,7 @@ from dataclasses import dataclass
 from itertools import chain
 
 from bowdenfit.errors import DatasetError
-from bowdenfit.files.text_file import Line
+from bowdenfit.files.text_file import Line, comment_mark, is_blank
 from bowdenfit.words import shown
 
 SEPARATORS = ("\t", ";", ",", "|", " ")
@@ -43,7 +43,7 @@ def declared_separator(lines: list[Line], name: str) -> tuple[str | None, list[L
     Raises:
         DatasetError: It declares what separates nothing.
     """
-    first = next((i for i, line in enumerate(lines) if not line.blank and line.comment != "#"), 0)
+    first = next((i for i, line in enumerate(lines) if not is_blank(line.text) and comment_mark(line.text) != "#"), 0)
     text = lines[first].text.strip().strip('"').lower() if lines else ""
     if not text.startswith("sep=") or len(text) > 5:
         return None, lines

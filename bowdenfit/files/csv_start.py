@@ -8,7 +8,7 @@ from bowdenfit.errors import DatasetError
 from bowdenfit.files.csv_rows import SEPARATORS, Record, cells_of, declared_separator, records, too_many_cells
 from bowdenfit.files.headings import Heading, heading_of
 from bowdenfit.files.layout import Layout, layout_of
-from bowdenfit.files.text_file import Line, first_lines
+from bowdenfit.files.text_file import Line, comment_mark, first_lines
 
 _FIRST_LINES = 300
 _HEADING_LINES = 12
@@ -48,7 +48,7 @@ def start_of(path: Path, data: bytes) -> Sheet:
     if len(lines) > 1 and not lines[-1].ended:
         lines = lines[:-1]
     declared, lines = declared_separator(lines, path.name)
-    texts = [line for line in lines if not line.comment]
+    texts = [line for line in lines if not comment_mark(line.text)]
     rows = {s: list(records(texts, s, _HEADING_LINES)) for s in SEPARATORS if declared in (None, s)}
     readings = [(layout_of([row.cells for row in rows[s]], d), s, d) for s, d in _HABITS if s in rows]
     found = [(layout, separator, decimal) for layout, separator, decimal in readings if layout is not None]
@@ -80,7 +80,7 @@ def _fitting(path: Path, layout: Layout, below: Sequence[Record], separator: str
 
 def _from_comment(layout: Layout, separator: str, above: Sequence[Line]) -> Layout:
     width = len(layout.kinds)
-    for line in reversed([line for line in above if line.comment]):
+    for line in reversed([line for line in above if comment_mark(line.text)]):
         cells = cells_of(line.text.strip().lstrip("#% "), separator)
         if len(cells) == width and all(cell.strip() for cell in cells):
             return replace(layout, named=True, headings=tuple(map(heading_of, cells)))

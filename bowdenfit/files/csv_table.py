@@ -9,10 +9,9 @@ from bowdenfit.errors import DatasetError
 from bowdenfit.files.cells import Cell, Decimals, is_plain_number
 from bowdenfit.files.contents import UNKNOWN, recognized
 from bowdenfit.files.csv_rows import SEPARATORS, Record, declared_separator, records, too_many_cells
-from bowdenfit.files.text_file import Line, first_bytes, first_lines
+from bowdenfit.files.text_file import Line, comment_mark, first_bytes, first_lines, is_blank
 from bowdenfit.words import shown
 
-__all__ = ["Cell", "RawTable", "read_csv"]
 _FIRST_ROWS = 20
 
 
@@ -46,7 +45,7 @@ def read_csv(path: Path) -> RawTable:
     _, lines = first_lines(data, name, whole=True)
     declared, lines = declared_separator(lines, name)
     lines = list(
-        dropwhile(lambda line: line.blank, (line for line in lines if line.comment != "#"))
+        dropwhile(lambda line: is_blank(line.text), (line for line in lines if comment_mark(line.text) != "#"))
     )  # % may be a heading
     separator = declared or max(SEPARATORS[:-1], key=lambda each: _fitness(lines, each))
     rows = [row for row in records(lines, separator, len(lines)) if not row.blank]

@@ -34,16 +34,6 @@ class Line:
         """Whether an end of line stands behind it; only the last line of a file may lack one."""
         return self.text.endswith(("\n", "\r"))
 
-    @property
-    def blank(self) -> bool:
-        """Whether it holds nothing but separators."""
-        return is_blank(self.text)
-
-    @property
-    def comment(self) -> str:
-        """The mark that makes it a comment, else nothing."""
-        return comment_mark(self.text)
-
 
 class Section(io.RawIOBase):
     """A file from one byte to another, as a stream that never holds more than a reader asks for."""

@@ -9,8 +9,9 @@ import numpy as np
 
 from bowdenfit.description import Description, Route
 from bowdenfit.errors import DatasetError
+from bowdenfit.files.cells import Cell
 from bowdenfit.files.columns import Column, Quantity, require
-from bowdenfit.files.csv_table import Cell, RawTable
+from bowdenfit.files.csv_table import RawTable
 from bowdenfit.types import Labels, Matrix, Vector
 from bowdenfit.words import shown
 

@@ -59,6 +59,7 @@ HABITS = {
     "tab and decimal comma": HEADER.replace(",", "\t") + rows_of("\t", ",") + "\n",
     "bar": HEADER.replace(",", "|") + rows_of("|") + "\n",
     "blanks": "time[s]  input_force[N]  output_force[N]\n" + "\n".join("  " + r for r in rows_of("   ").split("\n")) + "\n",
+    "lines of blanks": HEADER.replace(",", "  ").replace(" [", "[") + rows_of("  ").replace("\n", "\n   \n", 2) + "\n",
     "blank after the comma": '"time (s)", "input_force (N)", "output_force (N)"\n' + rows_of(", ") + "\n",
     "blank before the comma": HEADER + rows_of(" , ") + "\n",
     "trailing separators": HEADER.replace("\n", ",\n") + rows_of().replace("\n", ",\n") + ",\n",

@@ -7,8 +7,9 @@ import numpy as np
 
 from bowdenfit.cable.registry import CURVES
 from bowdenfit.description import Description, QuantityValue, Table
+from bowdenfit.files.cells import Cell
 from bowdenfit.files.columns import Column, Quantity, find_columns, require
-from bowdenfit.files.csv_table import Cell, read_csv
+from bowdenfit.files.csv_table import read_csv
 from bowdenfit.kinds.design import Design
 from bowdenfit.kinds.kind import Found, Page, Source
 from bowdenfit.kinds.measurements import Measurements

@@ -7,8 +7,9 @@ from pathlib import Path
 import numpy as np
 
 from bowdenfit.errors import DatasetError
+from bowdenfit.files.cells import Cell
 from bowdenfit.files.columns import Column, Quantity, find_columns, require
-from bowdenfit.files.csv_table import Cell, read_csv
+from bowdenfit.files.csv_table import read_csv
 from bowdenfit.kinds.kind import Found, Source
 from bowdenfit.kinds.rows import (
     OwnAngles,

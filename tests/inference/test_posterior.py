@@ -88,20 +88,21 @@ def bench(on_body) -> Bench:
 
 @pytest.fixture(scope="module")
 def by_nuts(bench) -> Draws:
-    """64 chains of 500 draws; mass matrix adapted, because the three coefficients share one ridge.
+    """64 chains of 1000 draws; mass matrix adapted, because the three coefficients share one ridge.
 
-    130 000 draws of 16 longer chains at a target of 0.98 gave the same within 3 % of every standard deviation.
+    130 000 draws of 16 longer chains at a target of 0.98 gave the same within 3 % of every standard deviation. At a target of
+    0.9 chains now and then stay in the neck of the funnel: of two seeds one gave a standard deviation that was a fifth off.
     """
     posterior, chains = bench.posterior, 64
     data = jax.tree.map(jnp.asarray, posterior.data)
     kernel = NUTS(
         potential_fn=lambda z: -posterior.log_density(z, data),
-        target_accept_prob=0.9,
+        target_accept_prob=0.97,
         dense_mass=True,
-        max_tree_depth=6,
+        max_tree_depth=8,
     )
     mcmc = MCMC(
-        kernel, num_warmup=300, num_samples=500, num_chains=chains, chain_method="vectorized", progress_bar=False
+        kernel, num_warmup=400, num_samples=1000, num_chains=chains, chain_method="vectorized", progress_bar=False
     )
     starts = 0.5 * jax.random.normal(jax.random.key(1), (chains, posterior.model.space.size))
     mcmc.run(jax.random.key(2), init_params=starts)

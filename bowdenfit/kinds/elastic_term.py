@@ -75,10 +75,12 @@ class ElasticTerm:
         law = noise_law(self.cable.description)
         return jnp.concatenate([law.residual(deviation), law.bound_residual(u)])
 
-    def simulate(self, values: Mapping[str, Array], data: Mapping[str, Any], key: Array) -> Float[Array, " rows"]:
-        """Readings drawn at given parameters [mm] or [N]."""
+    def simulate(
+        self, values: Mapping[str, Array], data: Mapping[str, Any], key: Array, scale: float = 1.0
+    ) -> Float[Array, " rows"]:
+        """Readings drawn at given parameters [mm] or [N], with their noise times `scale`."""
         expected = self.expected(values, data)
-        drawn = expected + values[self.noise] * scatter(key, expected.shape, self.cable.description)
+        drawn = expected + scale * values[self.noise] * scatter(key, expected.shape, self.cable.description)
         return drawn if self.lowest is None else jnp.maximum(drawn, self.lowest)
 
     def observed(self) -> np.ndarray:

@@ -4,6 +4,8 @@ from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from typing import Any, Protocol, runtime_checkable
 
+import jax
+import jax.numpy as jnp
 import numpy as np
 from jax import Array
 
@@ -115,6 +117,26 @@ def _with_fields(description: Description, table: Any, drawn: Mapping[str, np.nd
     """The table with the arrays that were drawn in place of its own."""
     del description
     return replace(table, **drawn)
+
+
+def drawn_by_term(
+    term_of: Callable[[Cable, Any, AngleTable | None], Any], reading: str, own_key: Callable[[Array], Array]
+) -> Draw:
+    """The draw of a kind whose tables hold just what its term replicates, given the same rows.
+
+    Args:
+        term_of: Term of a table; its `simulate` takes a factor on the noise.
+        reading: What the table calls the readings.
+        own_key: The kind's own key, of that of the bench.
+    """
+
+    def draw(
+        cable: Cable, table: Any, angles: AngleTable | None, values: Mapping[str, Array], key: Array, scale: float
+    ) -> dict[str, Array]:
+        term = term_of(cable, table, angles)
+        return {reading: term.simulate(values, jax.tree.map(jnp.asarray, term.data), own_key(key), scale)}
+
+    return draw
 
 
 @dataclass(frozen=True)

@@ -11,6 +11,7 @@ import bowdenfit as bf
 from bowdenfit.cli import bowdenfit as command
 from bowdenfit.errors import UsageError
 from bowdenfit.inference.comparison import Difference, Prediction, differences
+from bowdenfit.inference.interval import Interval
 from bowdenfit.kinds.design import Design
 from bowdenfit.kinds.forces.table import ForceTable
 from bowdenfit.questions.check.data_set_words import check_text
@@ -149,7 +150,7 @@ def test_speed_is_answered_with_its_difference_and_interval(with_rate):
     ],
 )
 def test_the_sentence_on_speed_says_no_more_than_the_interval(q05, q95, probability_lower, words):
-    interval = bf.results.answers.Interval((q05 + q95) / 2, 0.001, (q05 + q95) / 2, q05, q95)
+    interval = Interval((q05 + q95) / 2, 0.001, (q05 + q95) / 2, q05, q95)
     effect = RateEffect(20.0, 60.0, "r/min", "at 470 mm", interval, probability_lower)
     assert words in effect.sentence()
 

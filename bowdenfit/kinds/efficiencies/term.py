@@ -21,7 +21,7 @@ from bowdenfit.kinds.efficiencies.table import EfficiencyTable
 from bowdenfit.kinds.resolve_angles import resolve_angles
 from bowdenfit.kinds.row_angles import row_angles
 from bowdenfit.kinds.shared_parameters import run_scatter
-from bowdenfit.kinds.term import Bench, TermKind
+from bowdenfit.kinds.term import Bench, TermKind, drawn_by_term
 from bowdenfit.parameters.space import ParameterSpace
 from bowdenfit.physics.friction import transmission_efficiency
 
@@ -80,10 +80,12 @@ class EfficienciesTerm:
         """Expected efficiencies [1]."""
         return transmission_efficiency(self._mean_and_sd(values, data, values)[0])
 
-    def simulate(self, values: Mapping[str, Array], data: Mapping[str, Any], key: Array) -> Float[Array, " rows"]:
-        """Efficiencies as the bench would give them [1]."""
+    def simulate(
+        self, values: Mapping[str, Array], data: Mapping[str, Any], key: Array, scale: float = 1.0
+    ) -> Float[Array, " rows"]:
+        """Efficiencies as the bench would give them [1], with all that makes them scatter times `scale`."""
         mean, sd = self._mean_and_sd(values, data, values)
-        return transmission_efficiency(mean + sd * scatter(key, mean.shape, self.cable.description))
+        return transmission_efficiency(mean + scale * sd * scatter(key, mean.shape, self.cable.description))
 
     def observed(self) -> np.ndarray:
         """Measured efficiencies [1]."""
@@ -112,21 +114,6 @@ def _check_run_scatter(table: EfficiencyTable, space: ParameterSpace) -> None:
         )
 
 
-def _draw(
-    cable: Cable,
-    table: EfficiencyTable,
-    angles: AngleTable | None,
-    values: Mapping[str, Array],
-    key: Array,
-    scale: float,
-) -> dict[str, Array]:
-    """Efficiencies with all that makes them scatter."""
-    term = efficiencies_term(cable, table, angles)
-    mean, sd = term._mean_and_sd(values, jax.tree.map(jnp.asarray, term.data), values)
-    noise = scale * sd * scatter(jax.random.split(key, 3)[1], mean.shape, cable.description)
-    return {"efficiency": jnp.exp(-(mean + noise))}
-
-
 def _drawn_table(_: Description, table: EfficiencyTable, drawn: Mapping[str, np.ndarray]) -> EfficiencyTable:
     """A stated standard deviation is taken to be in proportion to the efficiency."""
     efficiency = drawn["efficiency"]
@@ -152,7 +139,7 @@ EFFICIENCIES = TermKind(
     "efficiencies",
     lambda cable, table, angles: (efficiencies_term(cable, table, angles),),
     lambda _, at: [run_scatter(at)],
-    Bench(_draw, _drawn_table),
+    Bench(drawn_by_term(efficiencies_term, "efficiency", lambda key: jax.random.split(key, 3)[1]), _drawn_table),
     CandidateKind(
         name="efficiency",
         phrase="an efficiency",

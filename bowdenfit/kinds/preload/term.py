@@ -1,16 +1,15 @@
 """Preload tables: the tension between fixed ends, at wrap angles."""
 
 from collections.abc import Mapping, Sequence
+from dataclasses import replace
 from typing import Any
 
 import jax
-import jax.numpy as jnp
 import numpy as np
 from jax import Array
 from jaxtyping import Float
 
 from bowdenfit.cable.cable import Cable
-from bowdenfit.cable.noise import scatter
 from bowdenfit.kinds.angles.table import AngleTable
 from bowdenfit.kinds.candidate import (
     UNKNOWN_SCATTER,
@@ -24,7 +23,7 @@ from bowdenfit.kinds.candidate import (
 from bowdenfit.kinds.elastic_term import ElasticTerm
 from bowdenfit.kinds.preload.table import PreloadTable
 from bowdenfit.kinds.shared_parameters import preload
-from bowdenfit.kinds.term import WRAP_ANGLE, Bench, Circumstances, TermKind, Where
+from bowdenfit.kinds.term import WRAP_ANGLE, Bench, Circumstances, TermKind, Where, drawn_by_term
 from bowdenfit.parameters.priors import HalfNormal
 from bowdenfit.parameters.space import Parameter
 
@@ -52,18 +51,9 @@ def _parameters(_: PreloadTable, at: Circumstances) -> list[Parameter]:
     return [*preload(at), noise]
 
 
-def _draw(
-    cable: Cable,
-    table: PreloadTable,
-    angles: AngleTable | None,
-    values: Mapping[str, Array],
-    key: Array,
-    scale: float,
-) -> dict[str, Array]:
-    del angles
-    bend, key = jnp.asarray(table.wrap_angle), jax.random.split(jax.random.fold_in(key, 3), 3)[1]
-    noise = scale * values[PRELOAD_NOISE] * scatter(key, bend.shape, cable.description)
-    return {"preload": jnp.maximum(cable.elasticity.preload(values, bend)[0] + noise, 0.0)}
+def _unread(cable: Cable, table: PreloadTable, _: AngleTable | None) -> ElasticTerm:
+    """The term of a table yet to be read, of which nobody knows which rows will be slack."""
+    return preload_term(cable, replace(table, preload=np.ones(len(table.preload))))
 
 
 def _offered(at: Situation) -> list[Candidate]:
@@ -80,7 +70,7 @@ PRELOAD = TermKind(
     "preload",
     lambda cable, table, _: (preload_term(cable, table),),
     _parameters,
-    Bench(_draw),
+    Bench(drawn_by_term(_unread, "preload", lambda key: jax.random.split(jax.random.fold_in(key, 3), 3)[1])),
     CandidateKind(
         name="preload",
         phrase="a preload",

@@ -15,7 +15,7 @@ from bowdenfit.cable.drive import Each, Loop
 from bowdenfit.cable.load_cells import LoadCells
 from bowdenfit.cable.noise import scatter
 from bowdenfit.kinds.recordings.blocks_term import BlocksTerm, Data, Values
-from bowdenfit.kinds.recordings.side_by_side import side_by_side, thinned
+from bowdenfit.kinds.recordings.side_by_side import beside, side_by_side, thinned
 from bowdenfit.physics.loop import loop_output_force
 from bowdenfit.recordings.loop_strokes import loop_limits
 from bowdenfit.recordings.recording import Recording, Recordings
@@ -92,7 +92,7 @@ def loop_recordings_term(
     """
     parts = [_blocks(r, censored) for r in recordings.each]
     data = side_by_side(recordings, parts, angles)
-    moving = np.stack([np.pad(p["moving"], (0, len(data["weight"]) - len(p["moving"]))) for p in parts], axis=1)
+    moving = beside([p["moving"] for p in parts], "constant")
     of_run = np.bincount(data["run"], np.abs(moving).sum(axis=0))
     loss, exponent = (np.array([getattr(r.strokes, name) for r in recordings.each]) for name in ("drag", "exponent"))
     return LoopRecordingsTerm(

@@ -2,7 +2,7 @@
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-from typing import Any
+from typing import Any, Literal
 
 import numpy as np
 
@@ -104,24 +104,27 @@ def side_by_side(
         parts: Arrays of each: those of `Thinned.arrays`, and the weight.
         angles: `ROW_ARRAYS` of each.
     """
-    longest = max(len(p["weight"]) for p in parts)
-
-    def beside(name: str, mode: str) -> np.ndarray:
-        return np.stack([np.pad(p[name], (0, longest - len(p[name])), mode) for p in parts], axis=1)  # type: ignore[call-overload]
-
     runs = recordings.runs
     run = np.array([runs.index(r.run) for r in recordings.each])
-    free = {name: beside(name, "constant") for name in _FREE}
+    free = {name: beside([p[name] for p in parts], "constant") for name in _FREE}
     worth = free.pop("worth")
     counted = free["weight"] > 0
     ratio = np.where(counted, free["weight"], 1.0) / np.where(counted, worth, 1.0)
     log_weights = np.where(counted, worth * np.log(ratio), 0.0)
-    arrays = {name: angles[name] for name in ROW_ARRAYS} | {name: beside(name, "edge") for name in _HELD} | free
+    arrays = (
+        {name: angles[name] for name in ROW_ARRAYS} | {name: beside([p[name] for p in parts]) for name in _HELD} | free
+    )
     return arrays | {
         "run": run,
         "n": np.bincount(run, worth.sum(axis=0)),
         "log_weights": np.bincount(run, log_weights.sum(axis=0)),
     }
+
+
+def beside(columns: Sequence[np.ndarray], mode: Literal["edge", "constant"] = "edge") -> np.ndarray:
+    """Columns side by side, the shorter ones kept at their last value or ("constant") followed by zeros."""
+    longest = max(len(column) for column in columns)
+    return np.stack([np.pad(column, (0, longest - len(column)), mode) for column in columns], axis=1)
 
 
 def joined(state: np.ndarray, most: int) -> np.ndarray:

@@ -5,7 +5,7 @@ makes the output force of it, all sensors' errors and the noise of blocks are ad
 reader finds them. What happens before blocks are made (clipping, spikes, sampling) is not simulated.
 """
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from dataclasses import replace
 
 import jax
@@ -21,6 +21,7 @@ from bowdenfit.errors import DatasetError
 from bowdenfit.kinds.angles.table import AngleTable
 from bowdenfit.kinds.recordings.angles import recorded_angles
 from bowdenfit.kinds.recordings.blocks import worth_of
+from bowdenfit.kinds.recordings.side_by_side import beside
 from bowdenfit.kinds.resolve_angles import resolve_angles
 from bowdenfit.kinds.row_angles import row_angles
 from bowdenfit.recordings.loop_strokes import find_loop_strokes
@@ -57,12 +58,12 @@ def drawn_recordings(
     mounting = values[RUN_SCATTER] * scatter(of_run, (len(recordings.runs),), cable.description)[run]
     exponent = cable.friction_exponent(values, angles + scale * error)
     force, velocity = (
-        jnp.asarray(_beside([getattr(r.blocks, name) for r in recordings.each])) for name in ("input_force", "velocity")
+        jnp.asarray(beside([getattr(r.blocks, name) for r in recordings.each])) for name in ("input_force", "velocity")
     )
     cells, drive = LoadCells.of(values), drive_of(cable, values, angles, velocity, exponent)
     at_least = jnp.maximum(force, drive.least_force)
     output, _ = drive.follow(at_least, scale * mounting, _starts(drive, recordings, at_least, scale * mounting))
-    places = _beside([_readings_of(r) for r in recordings.each]).astype(int)
+    places = beside([_readings_of(r) for r in recordings.each]).astype(int)
     shape, noise = (places.max() + 1, len(recordings.each)), scale * values[BLOCK_NOISE]
     errors = [noise * jax.random.normal(k, shape)[places, np.arange(shape[1])] for k in (of_input, of_output)]
     return {
@@ -91,12 +92,6 @@ def _readings_of(recording: Recording) -> np.ndarray:
     """Number of the independent reading that each block belongs to."""
     worth = worth_of(recording, np.arange(len(recording.blocks.time)))
     return np.floor(np.cumsum(np.minimum(worth, 1.0)) - 1e-9)
-
-
-def _beside(columns: Sequence[np.ndarray]) -> np.ndarray:
-    """Columns side by side, the shorter ones kept at their last value."""
-    longest = max(len(column) for column in columns)
-    return np.stack([np.pad(column, (0, longest - len(column)), "edge") for column in columns], axis=1)
 
 
 def recorded_again(description: Description, recordings: Recordings, drawn: Mapping[str, np.ndarray]) -> Recordings:

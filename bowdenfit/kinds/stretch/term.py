@@ -4,14 +4,12 @@ from collections.abc import Mapping, Sequence
 from typing import Any
 
 import jax
-import jax.numpy as jnp
 import numpy as np
 from jax import Array
 from jaxtyping import Float
 
 from bowdenfit.cable.cable import Cable
 from bowdenfit.cable.elasticity import STRETCH_FRICTION, STRETCH_ZERO, rope_parameters, spread_matrix
-from bowdenfit.cable.noise import scatter
 from bowdenfit.kinds.angles.table import AngleTable
 from bowdenfit.kinds.candidate import (
     UNKNOWN_SCATTER,
@@ -25,14 +23,14 @@ from bowdenfit.kinds.candidate import (
 )
 from bowdenfit.kinds.elastic_term import ElasticTerm
 from bowdenfit.kinds.stretch.table import StretchTable
-from bowdenfit.kinds.term import LOAD, WRAP_ANGLE, Bench, Circumstances, TermKind, Where
+from bowdenfit.kinds.term import LOAD, WRAP_ANGLE, Bench, Circumstances, TermKind, Where, drawn_by_term
 from bowdenfit.parameters.priors import HalfNormal, LogNormal, Normal
 from bowdenfit.parameters.space import Parameter
 
 STRETCH_NOISE = "sigma_L"
 
 
-def stretch_term(cable: Cable, table: StretchTable) -> ElasticTerm:
+def stretch_term(cable: Cable, table: StretchTable, _: AngleTable | None = None) -> ElasticTerm:
     """The term of a table of stretch."""
     angles, at = np.unique(table.wrap_angle, return_inverse=True)
     data = {
@@ -77,20 +75,6 @@ def _parameters(_: StretchTable, at: Circumstances) -> list[Parameter]:
     ]  # fmt: skip
 
 
-def _draw(
-    cable: Cable,
-    table: StretchTable,
-    angles: AngleTable | None,
-    values: Mapping[str, Array],
-    key: Array,
-    scale: float,
-) -> dict[str, Array]:
-    del angles
-    term, key = stretch_term(cable, table), jax.random.split(jax.random.fold_in(key, 3), 3)[0]
-    noise = scale * values[STRETCH_NOISE] * scatter(key, table.load.shape, cable.description)
-    return {"stretch": term.expected(values, jax.tree.map(jnp.asarray, term.data)) + noise}
-
-
 def _offered(at: Situation) -> list[Candidate]:
     """Every load at every wrap angle."""
     table = at.measurements.table(StretchTable)
@@ -109,9 +93,9 @@ def _simulation(at: Situation, wanted: Sequence[Candidate]) -> Simulation:
 
 STRETCH = TermKind(
     "stretch",
-    lambda cable, table, _: (stretch_term(cable, table),),
+    lambda *of: (stretch_term(*of),),
     _parameters,
-    Bench(_draw),
+    Bench(drawn_by_term(stretch_term, "stretch", lambda key: jax.random.split(jax.random.fold_in(key, 3), 3)[0])),
     CandidateKind(
         name="stretch",
         phrase="a stretch",

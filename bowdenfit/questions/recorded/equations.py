@@ -14,6 +14,7 @@ from bowdenfit.cable.load_cells import LoadCells
 from bowdenfit.inference.compilation import compiled
 from bowdenfit.kinds.angles.table import AngleTable
 from bowdenfit.kinds.recordings.angles import recorded_angles
+from bowdenfit.kinds.recordings.side_by_side import beside
 from bowdenfit.kinds.resolve_angles import resolve_angles
 from bowdenfit.kinds.row_angles import row_angles
 from bowdenfit.model import Model
@@ -60,21 +61,15 @@ class Follower:
 def _arrays(model: Model, recordings: Recordings, angles: AngleTable | None) -> dict[str, Any]:
     """Blocks of all recordings side by side, the shorter ones standing still at their end."""
     shown = [blocks_shown(len(r.blocks.time)) for r in recordings.each]
-    longest = max(len(s) for s in shown)
-
-    def side_by_side(name: str) -> np.ndarray:
-        parts = [getattr(r.blocks, name)[s] for r, s in zip(recordings.each, shown, strict=True)]
-        return np.stack([np.pad(part, (0, longest - len(part)), "edge") for part in parts], axis=1)
-
+    both = list(zip(recordings.each, shown, strict=True))
     drive = Loop if model.cable.is_loop else Rope
-    rates = [
-        np.gradient(drive.reading(r.blocks.output_force), r.blocks.time)[s]
-        for r, s in zip(recordings.each, shown, strict=True)
-    ]
+    rates = [np.gradient(drive.reading(r.blocks.output_force), r.blocks.time)[s] for r, s in both]
     rows = row_angles(model.description, recorded_angles(recordings), angles).data
-    return rows | {name: side_by_side(name) for name in ("input_force", "output_force", "velocity")} | {
-        "drift": np.stack([np.pad(rate, (0, longest - len(rate))) for rate in rates], axis=1)
-    }  # fmt: skip
+    held = {
+        name: beside([getattr(r.blocks, name)[s] for r, s in both])
+        for name in ("input_force", "output_force", "velocity")
+    }
+    return rows | held | {"drift": beside(rates, "constant")}
 
 
 def _followed(model: Model) -> Callable[[Array, Array, Mapping[str, Any]], tuple[Array, Array]]:

@@ -44,11 +44,14 @@ def _run(verb: Verb, keywords: tuple[Keyword, ...], given: dict[str, Any], as_js
         asked[found] = _loaded(given[found])
     if verb.results and asked["output"] is None:
         asked["output"] = Path(verb.results) / _name_of(Path(asked["dataset"]))
+    behind = dict(verb.behind)
+    if "report" in inspect.signature(verb.function).parameters:
+        behind["report"] = lambda sentence: click.echo(sentence, err=True)
     if verb.watch is None:
-        answer = verb.function(**asked, **verb.behind)
+        answer = verb.function(**asked, **behind)
     else:
         with watched(asked["output"], verb.watch) as progress:
-            answer = verb.function(**asked, **verb.behind, progress=progress)
+            answer = verb.function(**asked, **behind, progress=progress)
     reply = verb.reply(answer, asked)
     click.echo(_page(reply) if as_json else reply.text, nl=False)
     for note in reply.notes:

@@ -62,6 +62,11 @@ class Draws:
     agreement: SamplerAgreement | None = None
 
     @property
+    def n_effective(self) -> float:
+        """Effective number of the draws, by the worst quantity."""
+        return min((d.ess_bulk for d in self.diagnostics.values()), default=float(self.z[..., 0].size))
+
+    @property
     def flat_z(self) -> np.ndarray:
         """All draws, one a row."""
         return self.z.reshape(-1, self.z.shape[-1])

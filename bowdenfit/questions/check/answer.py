@@ -95,7 +95,7 @@ def _table(
         part[term.name].reshape(-1, n) for part in (posterior.log_likelihood, posterior.replicated)
     )
     reading, at_most = readings_of(term)
-    predicted = predict_without_each(log_likelihood, replicated, reading, at_most, effective_draws(posterior))
+    predicted = predict_without_each(log_likelihood, replicated, reading, at_most, posterior.n_effective)
     placed = place_at_random(predicted, generator)
     uniform = uniformity(placed, probability) if n >= _LEAST_READINGS else None
     places = places_of(fit.dataset, term)
@@ -111,11 +111,6 @@ def readings_of(term: Term) -> tuple[np.ndarray, np.ndarray]:
     if bounds:
         at_most[len(at_most) - bounds :] = True
     return reading, at_most
-
-
-def effective_draws(posterior: Draws) -> float:
-    """Effective number of the draws, by the worst quantity."""
-    return min((d.ess_bulk for d in posterior.diagnostics.values()), default=float(posterior.z[..., 0].size))
 
 
 def trends_of(tables: tuple[TableChecks, ...]) -> tuple[Trend, ...]:

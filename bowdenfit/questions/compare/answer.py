@@ -202,16 +202,11 @@ def _leave_out_each(name: str, fit: Record, drawn: Draws, common: Common, report
         ReadingsToLeaveOut(Density(fit.model)),
         drawn.z,
         drawn.log_likelihood,
-        _effective(drawn),
+        drawn.n_effective,
         fit.provenance.seed,
         common.positions[name],
         said,
     )
-
-
-def _effective(drawn: Draws) -> float:
-    """Effective number of draws: the smallest of any quantity."""
-    return min((d.ess_bulk for d in drawn.diagnostics.values()), default=float(drawn.z[..., 0].size))
 
 
 def _described_all(fits: Mapping[str, Record]) -> dict[str, str]:

@@ -94,7 +94,7 @@ def _parameter(fit: Record, name: str) -> dict[str, Any]:
         row["least_squares"] = fit.least_squares.estimates[name]
     if fit.posterior is not None and name in fit.posterior.values:
         draws, diagnostics = fit.posterior.values[name], fit.posterior.diagnostics[name]
-        row |= vars(Interval.of(draws)) | {
+        row |= vars(fit.parameter(name)) | {
             "ess_bulk": diagnostics.ess_bulk,
             "ess_tail": diagnostics.ess_tail,
             "r_hat": diagnostics.r_hat,

@@ -14,15 +14,14 @@ from bowdenfit.questions.identify.answer import identifiability, say_what_is_det
 from bowdenfit.questions.identify.confounding import confounded_pairs
 from bowdenfit.questions.recorded.rate import SHOWN_SPEED, rate_effect
 from bowdenfit.questions.summary.page import summarize
+from bowdenfit.questions.summary.parameter_words import parameters_text
 from bowdenfit.questions.summary.sampler_words import sampler_sentences, sampler_text
 from bowdenfit.questions.summary.verdict import CONTRADICTORY, NOT_CONVERGED, NOT_IDENTIFIABLE, Verdict, verdict
 from bowdenfit.recordings.recording import Recordings
 from bowdenfit.results.record import Record
-from bowdenfit.words import decimals, filled, listed, table
+from bowdenfit.words import filled, listed, table
 
 _UNLIMITED = 2000.0  # an angle in degrees or a length in mm beyond which a curve coefficient is no longer a finding
-PROFILED = "90 % profile interval"
-_WIDE = 2.5  # standard errors to each side beyond which an interval needs a word; of many readings it is 1.6
 _RESTS_ON_PRIOR = 0.2  # contraction below which a parameter is said to rest on its prior alone
 
 
@@ -32,7 +31,7 @@ def summary_text(fit: Record) -> str:
     blocks = [
         _title(fit),
         _verdict(fit, page),
-        _coefficients(page),
+        parameters_text(fit),
         _known(fit),
         _rests_on_prior(page),
         _curves(fit, page),
@@ -88,87 +87,6 @@ def _untrusted(found: Verdict) -> str:
     if NOT_CONVERGED in found.troubles:
         return "NOT CONVERGED; do not use these numbers"
     return f"{listed([kinds[kind] for kind in found.troubles])}; do not use these numbers before reading why"
-
-
-def _coefficients(page: dict[str, Any]) -> str:
-    heads = ("parameter", "median", "90 % interval", "mean +- sd", "least squares +- s.e.", PROFILED, "prior", "unit")
-    sampled = any("median" in p for p in page["parameters"].values())
-    rows = []
-    for name, p in page["parameters"].items():
-        drawn = "median" in p
-        median, interval, moments = "", "", ""
-        if drawn:
-            digits = decimals(p["sd"])
-            median, interval = f"{p['median']:.{digits}f}", f"{p['q05']:.{digits}f} to {p['q95']:.{digits}f}"
-            moments = f"{p['mean']:.{digits}f} +- {p['sd']:.{digits}f}"
-        unit = "" if p["unit"] == "1" else p["unit"]
-        # Beside a posterior's intervals there is no room for others; those are in summary.json.
-        profiled = "" if sampled else _profiled(p)
-        rows.append((name, median, interval, moments, _least_squares(p), profiled, p["prior"], unit))
-    keep = [i for i in range(len(heads)) if i in (0, 4, 6) or any(row[i] for row in rows)]
-    return table([heads[i] for i in keep], [[row[i] for i in keep] for row in rows]) + _not_identified(page)
-
-
-def _least_squares(p: dict[str, Any]) -> str:
-    estimate = p.get("least_squares")
-    if "fixed" in p:
-        return f"{p['fixed']:.4g} (fixed)"
-    if estimate is None:
-        return ""
-    if not estimate["identified"]:
-        return "at bound" if estimate["at_bound"] else "not identified"
-    digits = decimals(estimate["standard_error"] or abs(estimate["value"]) / 1000)
-    return f"{estimate['value']:.{digits}f} +- {estimate['standard_error']:.{digits}f}"
-
-
-def _profiled(p: dict[str, Any]) -> str:
-    """Profile interval of least squares."""
-    estimate = p.get("least_squares")
-    if estimate is None or all(estimate[side] is None and side not in estimate["open"] for side in ("lower", "upper")):
-        return ""
-    finite = [estimate[side] for side in ("lower", "upper") if estimate[side] is not None]
-    digits = decimals(estimate["standard_error"] or (finite[-1] - finite[0] if len(finite) > 1 else 0.0) / 3 or 1.0)
-    shown = [f"{limit:.{digits}f}" for limit in finite]
-    if not shown:
-        return "not limited"
-    if estimate["open"]:
-        return f"{shown[0]} or more" if "upper" in estimate["open"] else f"{shown[0]} or less"
-    return " to ".join(shown)
-
-
-def _not_identified(page: dict[str, Any]) -> str:
-    notes = [
-        filled(f"{name} is {_trouble(p['least_squares'])}: {p['least_squares']['remark']}.")
-        for name, p in page["parameters"].items()
-        if p.get("least_squares") and not p["least_squares"]["identified"]
-    ]
-    condition = page["least_squares"]["condition_number"]
-    shown = "infinite" if condition is None else f"{condition:.3g}"
-    return "\n" + "\n".join(
-        [*notes, f"Condition number of the least-squares problem: {shown}.", *_about_intervals(page)]
-    )
-
-
-def _about_intervals(page: dict[str, Any]) -> list[str]:
-    """What the profile intervals are, where they are shown and much wider than the standard errors."""
-    wide = [name for name, p in page["parameters"].items() if p.get("least_squares") and _is_wide(p["least_squares"])]
-    if not wide or any("median" in p for p in page["parameters"].values()):
-        return []
-    return [
-        filled(
-            f"The intervals of {listed(wide)} are wider than their standard errors suggest: hardly more readings than unknowns "
-            "leave little to tell the scatter from, or the sum of squares is lopsided."
-        )
-    ]
-
-
-def _is_wide(estimate: dict[str, Any]) -> bool:
-    ends = estimate["lower"], estimate["upper"], estimate["standard_error"]
-    return estimate["identified"] and None not in ends and ends[1] - ends[0] > 2 * _WIDE * ends[2]
-
-
-def _trouble(estimate: dict[str, Any]) -> str:
-    return "at its bound in least squares" if estimate["at_bound"] else "not identified by least squares"
 
 
 def _known(fit: Record) -> str:

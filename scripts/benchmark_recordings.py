@@ -55,7 +55,9 @@ from bowdenfit.inference.log_density import LogDensity
 from bowdenfit.kinds.settings import load_description
 from bowdenfit.model import build_model
 from bowdenfit.physics.hysteresis import play_operator
-from bowdenfit.questions.simulate.recordings import make_recordings, parse_recordings_plan, write_recordings
+from bowdenfit.questions.simulate.recordings.making import make_recordings
+from bowdenfit.questions.simulate.recordings.plan import parse_recordings_plan
+from bowdenfit.questions.simulate.recordings.writing import write_recordings
 from bowdenfit.recordings.preparation.play import play
 
 PLAN = ROOT / "datasets" / "synthetic-recordings" / "bench.toml"

@@ -64,7 +64,7 @@ def validated(raw: Mapping[str, Any], model: type[Description], file: str) -> De
     try:
         description = model.model_validate(dict(raw))
     except ValidationError as error:
-        raise DescriptionError(_explained(error, model, file)) from None
+        raise DescriptionError(explained(error, model, file)) from None
     check_quantities(_quantities(description), file)
     _check_route(description.route, file)
     _check_elastic(description, file)
@@ -164,8 +164,13 @@ def _set(raw: dict[str, Any], override: str) -> None:
     node[last] = value
 
 
-def _explained(error: ValidationError, model: type[Description], file: str) -> str:
-    """The first thing that is wrong, as a sentence."""
+def explained(
+    error: ValidationError,
+    model: type[BaseModel],
+    file: str,
+    remedy: str = "`bowdenfit init` writes a template that has it",
+) -> str:
+    """The first thing that is wrong in a file, as a sentence; `remedy` is for a key that is missing."""
     first = next((e for e in error.errors() if e["type"] == "extra_forbidden"), error.errors()[0])
     where = [str(part) for part in first["loc"]]
     place = f"{file}, {'.'.join(where)}" if where else file
@@ -176,7 +181,7 @@ def _explained(error: ValidationError, model: type[Description], file: str) -> s
             f"{place}: the unit is missing; write one, such as {_with_unit(first['input'].get('value'), where[:-1])}."
         )
     if first["type"] == "missing":
-        return f"{file}: the key {'.'.join(where)!r} is missing; `bowdenfit init` writes a template that has it."
+        return f"{file}: the key {'.'.join(where)!r} is missing; {remedy}."
     if first["type"] == "model_type":
         return f"{place}: {_written_as(first, where)}"
     message = first["msg"].removeprefix("Value error, ")

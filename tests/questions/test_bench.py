@@ -11,12 +11,9 @@ from conftest import ROOT
 
 from bowdenfit.errors import DescriptionError, UsageError
 from bowdenfit.questions.simulate.bench import BenchFriction, BenchSettings, Faults, Profile, simulate_recording, to_raw
-from bowdenfit.questions.simulate.recordings import (
-    make_recordings,
-    parse_recordings_plan,
-    read_recordings_plan,
-    write_recordings,
-)
+from bowdenfit.questions.simulate.recordings.making import make_recordings
+from bowdenfit.questions.simulate.recordings.plan import parse_recordings_plan, read_recordings_plan
+from bowdenfit.questions.simulate.recordings.writing import write_recordings
 
 PLAN = ROOT / "datasets" / "synthetic-recordings" / "bench.toml"
 EXPONENT = 0.25

@@ -1,6 +1,7 @@
 """Data sets made from known truth: the plan (`bench.toml`), and the folder that comes of it."""
 
 import json
+import re
 import tomllib
 from collections.abc import Mapping
 from dataclasses import dataclass
@@ -14,13 +15,13 @@ from bowdenfit.description import Description
 from bowdenfit.errors import DescriptionError
 from bowdenfit.kinds import each_table
 from bowdenfit.kinds.design import Design, read_design
-from bowdenfit.kinds.kind import Page
 from bowdenfit.kinds.measurements import Measurements
 from bowdenfit.kinds.settings import parse_description
 from bowdenfit.questions.simulate.simulation import empty_tables, simulate, true_values
 from bowdenfit.results.store import write_text
 
 TRUTH_FILE = "truth.json"
+_HEADING = re.compile(r"\s*\[\[?\s*([A-Za-z\"'][^\],]*?)\s*\]\]?\s*(#.*)?")
 
 
 @dataclass(frozen=True)
@@ -48,6 +49,15 @@ def plan_page(path: Path) -> tuple[str, dict[str, Any]]:
         raise DescriptionError(f"{path.name} is not valid TOML: {error}.") from None
 
 
+def truth_of(raw: Mapping[str, Any], file: str) -> Mapping[str, float]:
+    """[truth] of a plan, all of it numbers."""
+    truth: Mapping[str, float] = raw.get("truth", {})
+    for name, value in truth.items():
+        if isinstance(value, bool) or not isinstance(value, int | float):
+            raise DescriptionError(f"{file}, truth.{name}: {value!r} is not a number.")
+    return truth
+
+
 def read_bench(path: Path) -> Bench:
     """Read a plan.
 
@@ -60,16 +70,9 @@ def read_bench(path: Path) -> Bench:
             f"{path.name} has no [design]: say where to measure, such as angles = [430, 440, 450], runs = [440, 470], "
             "input_forces = [20, 40, 60] (in N)."
         )
-    truth = raw.pop("truth", {})
-    for name, value in truth.items():
-        if not isinstance(value, int | float):
-            raise DescriptionError(f"{path.name}, truth.{name}: {value!r} is not a number.")
-    return Bench(
-        text,
-        parse_description({k: v for k, v in raw.items() if k != "design"}, path.name),
-        read_design(raw["design"], path.name),
-        truth,
-    )
+    truth = truth_of(raw, path.name)
+    cable = {name: value for name, value in raw.items() if name not in {"design", "truth"}}
+    return Bench(text, parse_description(cable, path.name), read_design(raw["design"], path.name), truth)
 
 
 def make(bench: Bench, key: jax.Array, noise: bool) -> tuple[Dataset, dict[str, float]]:
@@ -91,41 +94,43 @@ def make(bench: Bench, key: jax.Array, noise: bool) -> tuple[Dataset, dict[str, 
 
 
 def write(bench: Bench, dataset: Dataset, truth: Mapping[str, float], folder: Path, seed: int) -> None:
-    """Write cable.toml, the tables and truth.json.
-
-    Args:
-        bench: The plan.
-        dataset: The data set.
-        truth: True values [shown units].
-        folder: Where to.
-        seed: Seed it was made from.
-    """
-    folder.mkdir(parents=True, exist_ok=True)
-    write_text(folder / DESCRIPTION_FILE, _description_only(bench.text))
-    for name, (heads, rows) in table_pages(bench.description, dataset.measurements).items():
-        write_text(folder / name, "\n".join(",".join(row) for row in [heads, *rows]) + "\n")
-    write_text(folder / TRUTH_FILE, json.dumps({"seed": seed, "truth": dict(truth)}, indent=1) + "\n")
+    """Write cable.toml, the tables and truth.json, with true values in shown units and the seed they were made from."""
+    cable = "\n".join(description_lines(bench.text, "bowdenfit simulate", "design")) + "\n"
+    write_folder(
+        folder, cable, table_texts(bench.description, dataset.measurements), {"seed": seed, "truth": dict(truth)}
+    )
 
 
-def table_pages(description: Description, measured: Measurements) -> dict[str, Page]:
-    """Headings and rows of every table, by file name."""
-    pages = {}
+def write_folder(folder: Path, cable: str, files: Mapping[str, str], truth: Mapping[str, Any]) -> None:
+    """Write cable.toml, the other files by their names, and truth.json."""
+    texts = {DESCRIPTION_FILE: cable, **files, TRUTH_FILE: json.dumps(truth, indent=1) + "\n"}
+    for name, text in texts.items():
+        (folder / name).parent.mkdir(parents=True, exist_ok=True)
+        write_text(folder / name, text)
+
+
+def table_texts(description: Description, measured: Measurements) -> dict[str, str]:
+    """Every table as the text of its file, by file name."""
+    texts = {}
     for kind, table in each_table(measured):
         settings = description.tables.stated.get(kind.name)
         if settings and kind.page:
-            pages[kind.file_name(settings)] = kind.page(table, description)
-    return pages
+            heads, rows = kind.page(table, description)
+            texts[kind.file_name(settings)] = "\n".join(",".join(row) for row in [heads, *rows]) + "\n"
+    return texts
 
 
-def _description_only(text: str) -> str:
-    """The plan's text without its opening comment and its [truth] and [design] tables."""
+def description_lines(text: str, command: str, design: str) -> list[str]:
+    """The plan without its opening comment and without the tables of its truth and its design."""
     lines = text.splitlines()
     while lines and lines[0].lstrip().startswith("#"):
         lines = lines[1:]
-    kept, skipping = ["# Written by `bowdenfit simulate`; the truth is in truth.json."], False
+    kept, skipping = [f"# Written by `{command}`; the truth is in truth.json."], False
     for line in lines:
-        if line.strip().startswith("["):
-            skipping = line.strip().strip("[]").split(".")[0] in {"truth", "design"}
+        if heading := _HEADING.fullmatch(line):
+            skipping = heading[1].split(".")[0].strip("\"' ") in {"truth", design}
         if not skipping:
             kept.append(line)
-    return "\n".join(kept).rstrip() + "\n"
+    while not kept[-1].strip():
+        kept.pop()
+    return kept

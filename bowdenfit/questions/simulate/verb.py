@@ -54,7 +54,9 @@ def _simulated_recordings(bench: Path, output: str | Path | None, seed: int, noi
 
     from bowdenfit.dataset import load_dataset
     from bowdenfit.errors import UsageError
-    from bowdenfit.questions.simulate.recordings import make_recordings, read_recordings_plan, write_recordings
+    from bowdenfit.questions.simulate.recordings.making import make_recordings
+    from bowdenfit.questions.simulate.recordings.plan import read_recordings_plan
+    from bowdenfit.questions.simulate.recordings.writing import write_recordings
 
     if output is None:
         raise UsageError("simulated recordings are files; name a folder for them with output.")

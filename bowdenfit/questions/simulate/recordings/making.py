@@ -3,6 +3,7 @@
 import dataclasses
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
+from typing import Any
 
 import jax
 import jax.numpy as jnp
@@ -14,8 +15,9 @@ from bowdenfit.dataset import Dataset
 from bowdenfit.description import PriorDefaults
 from bowdenfit.kinds.angles.table import AngleSettings, AngleTable
 from bowdenfit.kinds.design import Design
+from bowdenfit.kinds.measurements import Measurements
 from bowdenfit.model import build_model
-from bowdenfit.questions.simulate.bench import Faults, SimulatedRecording, simulate_recording
+from bowdenfit.questions.simulate.bench import SimulatedRecording, simulate_recording
 from bowdenfit.questions.simulate.recordings.plan import RecordingsPlan
 from bowdenfit.questions.simulate.recordings.planned import RPM, PlannedRecording
 from bowdenfit.questions.simulate.simulation import empty_tables, simulate, true_values
@@ -23,10 +25,9 @@ from bowdenfit.questions.simulate.simulation import empty_tables, simulate, true
 
 @dataclass(frozen=True)
 class MadeRecording:
-    """One recording and its truth: friction exponent without and with the effect of its run, wrap angles [rad]."""
+    """One recording and its truth: friction exponent without the effect of its run, that effect, wrap angles [rad]."""
 
     planned: PlannedRecording
-    faults: Faults
     simulated: SimulatedRecording
     exponent: float
     run_effect: float
@@ -40,7 +41,7 @@ class MadeRecordings:
     plan: RecordingsPlan
     seed: int
     truth: Mapping[str, float]
-    angles: AngleTable | None
+    tables: Measurements
     each: tuple[MadeRecording, ...]
 
 
@@ -58,7 +59,8 @@ def make_recordings(plan: RecordingsPlan, seed: int, noise: bool = True) -> Made
     of_truth, of_readings = jax.random.split(jax.random.key(seed))
     of_noise, of_runs, of_angles, *of_each = np.random.default_rng(seed).spawn(3 + len(plan.recordings))
     lengths = np.array([r.length for r in plan.recordings])
-    design = _design(plan)
+    route = plan.description.route
+    design = Design(angles=plan.angles, efficiencies=(route.middle if route else 0.0,))  # where all curves hold
     tables, given = empty_tables(plan.description, design), dict(plan.truth)
     force_noise = given.pop(FORCE_NOISE, abs(of_noise.standard_normal()) * PriorDefaults().force_noise_newtons)
     values = true_values(plan.description, tables, given, of_truth)
@@ -72,18 +74,15 @@ def make_recordings(plan: RecordingsPlan, seed: int, noise: bool = True) -> Made
     contacts = [c.name for c in plan.description.contact]
     each = []
     for i, (planned, generator) in enumerate(zip(plan.recordings, of_each, strict=True)):
-        faults = _faults(planned, float(force_noise), values.get(GAIN_ERROR, 0.0), noise)
-        exponent, effect = float(exponents[i]), effects[planned.run]
-        simulated = simulate_recording(
-            exponent, planned.friction, planned.profile, planned.bench, faults, generator, effect
-        )
+        one = _with_faults(planned, float(force_noise), values.get(GAIN_ERROR, 0.0), noise)
+        exponent, effect = float(exponents[i]), effects[one.run]
+        simulated = simulate_recording(exponent, one.friction, one.profile, one.bench, one.faults, generator, effect)
         wrap = dict(zip(contacts, map(float, angles[i]), strict=True))
-        each.append(MadeRecording(planned, faults, simulated, exponent, effect, wrap))
+        each.append(MadeRecording(one, simulated, exponent, effect, wrap))
     dataset = simulate(plan.description, design, values, of_readings, noise) if plan.angles else None
     table = dataset.measurements.table(AngleTable) if dataset else None
-    if table is not None:
-        table = _with_measured(table, plan, values[ANGLE_NOISE] * noise, of_angles)
-    return MadeRecordings(plan, seed, {**truth, **_common_truth(each)}, table, tuple(each))
+    made = () if table is None else (_with_measured(table, plan, values[ANGLE_NOISE] * noise, of_angles),)
+    return MadeRecordings(plan, seed, {**truth, **_common_truth(each)}, Measurements(made), tuple(each))
 
 
 def _common_truth(each: Sequence[MadeRecording]) -> dict[str, float]:
@@ -97,16 +96,10 @@ def _common_truth(each: Sequence[MadeRecording]) -> dict[str, float]:
         if len(values) == 1 and switched_on and 0.0 not in values:
             found[name] = values.pop() * shown.get(name, 1.0)
     for name in (GAIN_ERROR, INPUT_OFFSET, OUTPUT_OFFSET):
-        values = {getattr(recording.faults, name) for recording in each}
+        values = {getattr(recording.planned.faults, name) for recording in each}
         if len(values) == 1 and 0.0 not in values:
             found[name] = values.pop()
     return found
-
-
-def _design(plan: RecordingsPlan) -> Design:
-    """Tables from which the parameters are declared; one efficiency at a place where all curves hold."""
-    route = plan.description.route
-    return Design(angles=plan.angles, efficiencies=(route.middle if route else 0.0,))
 
 
 def _true_angles(
@@ -121,16 +114,13 @@ def _true_angles(
     return angles
 
 
-def _faults(planned: PlannedRecording, force_noise: float, gain_error: float, noise: bool) -> Faults:
-    """The faults of a recording, with what the truth says of noise and gain where the plan says nothing."""
-    faults = planned.faults
-    if not planned.states_noise[0]:
-        faults = dataclasses.replace(faults, input_noise=force_noise)
-    if not planned.states_noise[1]:
-        faults = dataclasses.replace(faults, output_noise=force_noise)
-    if not planned.states_gain:
-        faults = dataclasses.replace(faults, gain_error=gain_error)
-    return faults if noise else dataclasses.replace(faults, input_noise=0.0, output_noise=0.0, spikes=0.0, dropouts=0.0)
+def _with_faults(planned: PlannedRecording, force_noise: float, gain_error: float, noise: bool) -> PlannedRecording:
+    """The recording with what the truth says of noise and gain where the plan says nothing."""
+    true: dict[str, Any] = {"input_noise": force_noise, "output_noise": force_noise, "gain_error": gain_error}
+    faults = dataclasses.replace(planned.faults, **{k: v for k, v in true.items() if k not in planned.stated_faults})
+    if not noise:
+        faults = dataclasses.replace(faults, input_noise=0.0, output_noise=0.0, spikes=0.0, dropouts=0.0)
+    return planned.model_copy(update={"faults": faults})
 
 
 def _with_measured(table: AngleTable, plan: RecordingsPlan, noise: float, generator: np.random.Generator) -> AngleTable:

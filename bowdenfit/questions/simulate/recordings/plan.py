@@ -8,14 +8,21 @@ from typing import Any
 import numpy as np
 from pydantic import ValidationError
 
-from bowdenfit.description import Description
-from bowdenfit.errors import DescriptionError, nearest
+from bowdenfit.description import Description, QuantityValue
+from bowdenfit.description.file import explained
+from bowdenfit.description.values import Frozen
+from bowdenfit.errors import DatasetError, DescriptionError, nearest
 from bowdenfit.kinds.settings import parse_description
-from bowdenfit.questions.simulate.recordings.page import Page, explained, with_reference_force
-from bowdenfit.questions.simulate.recordings.planned import PlannedRecording, planned_recordings
-from bowdenfit.questions.simulate.tables import plan_page
+from bowdenfit.questions.simulate.recordings.planned import Page, PlannedRecording, planned_recordings
+from bowdenfit.questions.simulate.tables import plan_page, truth_of
 
 _FITTED_FRICTION = ("friction_model", "reference_force", "reference_velocity")
+
+
+class _Plan(Frozen):
+    """What of a plan is about recordings."""
+
+    recordings: Page
 
 
 @dataclass(frozen=True)
@@ -66,17 +73,14 @@ def parse_recordings_plan(raw: Mapping[str, Any], text: str, file: str = "bench.
         raise DescriptionError(
             f'{file} has no [recordings]: say what to record, such as lengths = [440, 470], speeds = ["20 r/min"].'
         )
-    truth = raw.get("truth", {})
-    for name, value in truth.items():
-        if isinstance(value, bool) or not isinstance(value, int | float):
-            raise DescriptionError(f"{file}, truth.{name}: {value!r} is not a number.")
-    description = _description(raw, file)
+    truth, description = truth_of(raw, file), _description(raw, file)
     try:
-        page = Page.model_validate(raw["recordings"])
+        page = _Plan.model_validate({"recordings": raw["recordings"]}).recordings
     except ValidationError as error:
-        raise DescriptionError(explained(error, file)) from None
+        remedy = 'write it, such as speeds = ["20 r/min"]'
+        raise DescriptionError(explained(error, _Plan, file, remedy)) from None
     measured = _measured_angles(page, description, file)
-    recordings = planned_recordings(with_reference_force(page, raw, file), description, file)
+    recordings = planned_recordings(_with_reference_force(page, raw, file), description, file)
     _check_lengths(recordings, measured, description, file)
     if description.curved and not page.angles:
         raise DescriptionError(
@@ -110,6 +114,19 @@ def _description(raw: Mapping[str, Any], file: str) -> Description:
                 "this contact has only a column."
             )
     return description
+
+
+def _with_reference_force(page: Page, raw: Mapping[str, Any], file: str) -> Page:
+    """The page with the description's reference force, where it states one and the page does not."""
+    if "reference_force" not in raw or "reference_force" in page.friction:
+        return page
+    try:
+        force = QuantityValue.model_validate(raw["reference_force"]).to("force")
+    except (ValidationError, DatasetError):
+        raise DescriptionError(
+            f'{file}, reference_force: write a force, such as reference_force = {{ value = 50, unit = "N" }}.'
+        ) from None
+    return page.model_copy(update={"friction": {**page.friction, "reference_force": force}})
 
 
 def _measured_angles(page: Page, description: Description, file: str) -> dict[float, dict[str, float]]:

@@ -1,25 +1,53 @@
 """The recordings that a plan asks for, one by one: their settings, and names and files that tell them apart."""
 
+import dataclasses
 import re
 from collections.abc import Sequence
-from dataclasses import dataclass
 from pathlib import Path
+from typing import Annotated, Any
 
 import numpy as np
+from pydantic import Field, ValidationError
 
-from bowdenfit.description import Description
-from bowdenfit.errors import DescriptionError, UsageError
+from bowdenfit.description import Description, Finite
+from bowdenfit.description.values import Frozen
+from bowdenfit.errors import DescriptionError, UsageError, nearest
 from bowdenfit.questions.simulate.bench import BenchFriction, BenchSettings, Faults, Profile, check_settings
-from bowdenfit.questions.simulate.recordings.page import Also, Page, settings_of
 
 RECORDINGS_FOLDER = "recordings"
 RPM = 2 * np.pi / 60  # rad/s
 _SPEED = re.compile(r"\s*([0-9]*\.?[0-9]+)\s*(r/min|rpm|rad/s)\s*")
-_SECTIONS = ("profile", "bench", "friction", "faults")
 
 
-@dataclass(frozen=True)
-class PlannedRecording:
+class Sections(Frozen):
+    """How a recording is made, as written: what is missing is that of all recordings, or the default."""
+
+    profile: dict[str, Any] = Field(default_factory=dict)
+    bench: dict[str, Any] = Field(default_factory=dict)
+    friction: dict[str, Any] = Field(default_factory=dict)
+    faults: dict[str, Any] = Field(default_factory=dict)
+
+
+class Also(Sections):
+    """[[recordings.also]]: one more recording, and in what it differs from the others."""
+
+    length: Finite | None = None
+    speed: str | None = None
+    run: str | None = None
+
+
+class Page(Sections):
+    """[recordings] as written: one recording for each length at each speed, and then those of `also`."""
+
+    lengths: tuple[Finite, ...] = ()
+    speeds: Annotated[tuple[str, ...], Field(min_length=1)]
+    angles: tuple[Finite, ...] = ()
+    measured_angles: tuple[dict[str, Finite], ...] = ()
+    decimals: Annotated[int, Field(ge=0, le=9)] = 3
+    also: tuple[Also, ...] = ()
+
+
+class PlannedRecording(Frozen):
     """One recording to be made.
 
     Args:
@@ -28,8 +56,7 @@ class PlannedRecording:
         length: Route value; NaN without a route.
         speed: Motor speed as written.
         profile, bench, friction, faults: How it is made.
-        states_noise: Whether the plan gives the noise of the cells, instead of the truth's sigma_F.
-        states_gain: Whether the plan gives the gain error.
+        stated_faults: Faults that the plan gives; noise and gain error are otherwise those of the truth.
     """
 
     run: str
@@ -40,8 +67,7 @@ class PlannedRecording:
     bench: BenchSettings
     friction: BenchFriction
     faults: Faults
-    states_noise: tuple[bool, bool]
-    states_gain: bool
+    stated_faults: frozenset[str]
 
 
 def planned_recordings(page: Page, description: Description, file: str) -> tuple[PlannedRecording, ...]:
@@ -64,27 +90,45 @@ def _one(
     also: Also, page: Page, description: Description, place: str, earlier: Sequence[PlannedRecording]
 ) -> PlannedRecording:
     speed = also.speed or page.speeds[0]
-    raw = {name: {**getattr(page, name), **getattr(also, name)} for name in _SECTIONS}
-    profile = settings_of(Profile, raw["profile"], f"{place}, profile", speed=_motor_speed(speed, place))
-    bench = settings_of(BenchSettings, raw["bench"], f"{place}, bench")
-    friction = settings_of(BenchFriction, raw["friction"], f"{place}, friction")
-    faults = settings_of(Faults, raw["faults"], f"{place}, faults")
-    try:
-        check_settings(profile, faults)
-    except UsageError as error:
-        raise DescriptionError(f"{place}: {error}") from None
-    unit = description.route.unit if description.route else ""
-    name = f"{also.length:g} {unit}, {speed}" if also.length is not None else speed
+    sections = {name: {**getattr(page, name), **getattr(also, name)} for name in Sections.model_fields}
+    if "speed" in sections["profile"]:
+        raise DescriptionError(f"{place}, profile: unknown key 'speed'; write speeds or speed beside [profile].")
+    sections["profile"]["speed"] = _motor_speed(speed, place)
+    name = (
+        f"{also.length:g} {description.route.unit}, {speed}" if also.length is not None and description.route else speed
+    )
     stem = _stem(name)
     taken = sum(re.sub(r"_\d+$", "", Path(p.file).stem) == stem for p in earlier)
-    suffix = f" ({taken + 1})" if taken else ""
-    file = f"{RECORDINGS_FOLDER}/{stem}{f'_{taken + 1}' if taken else ''}.csv"
-    length = float("nan") if also.length is None else also.length
-    states = ("input_noise" in raw["faults"], "output_noise" in raw["faults"])
-    gain = "gain_error" in raw["faults"]
-    return PlannedRecording(
-        also.run or name + suffix, file, length, speed, profile, bench, friction, faults, states, gain
-    )
+    run, number = (f"{name} ({taken + 1})", f"_{taken + 1}") if taken else (name, "")
+    try:
+        planned = PlannedRecording.model_validate(
+            {
+                "run": also.run or run,
+                "file": f"{RECORDINGS_FOLDER}/{stem}{number}.csv",
+                "length": float("nan") if also.length is None else also.length,
+                "speed": speed,
+                "stated_faults": frozenset(sections["faults"]),
+                **sections,
+            }
+        )
+        check_settings(planned.profile, planned.faults)
+    except ValidationError as error:
+        raise DescriptionError(f"{place}, {_explained(error)}") from None
+    except UsageError as error:
+        raise DescriptionError(f"{place}: {error}") from None
+    return planned
+
+
+def _explained(error: ValidationError) -> str:
+    """The first thing that is wrong with the sections of a recording."""
+    first = next((e for e in error.errors() if e["type"] == "unexpected_keyword_argument"), error.errors()[0])
+    section, *where = map(str, first["loc"])
+    if first["type"] == "unexpected_keyword_argument":
+        kind: Any = PlannedRecording.model_fields[section].annotation
+        known = [field.name for field in dataclasses.fields(kind) if field.name != "speed" or kind is not Profile]
+        return f"{section}: unknown key {where[0]!r}{nearest(where[0], known)}"
+    message = f"{first['msg'][:1].lower()}{first['msg'][1:]}"
+    return f"{section}, {'.'.join(where)}: {message} (found {first['input']!r})."
 
 
 def _motor_speed(text: str, place: str) -> float:

@@ -1,5 +1,7 @@
 """What a cable's output force does when the motor reverses: nothing, until the slip front has crossed the cable."""
 
+from typing import Any
+
 import jax
 import jax.numpy as jnp
 from jax import Array
@@ -10,7 +12,7 @@ def play_operator(
     low: Float[Array, "time *batch"],
     high: Float[Array, "time *batch"],
     start: Float[Array, "*batch"],
-    slopes: tuple[Float[Array, "..."] | float, Float[Array, "..."] | float] = (-1.0, 1.0),
+    slopes: tuple[Float[Array, "time *batch"], Float[Array, "time *batch"]] | None = None,
     restart: Float[Array, "time *batch"] | None = None,
 ) -> tuple[Float[Array, "time *batch"], Float[Array, "time *batch"]]:
     r"""Output of a quasi-static rope that stands still between two limits, and its derivative by the friction exponent.
@@ -29,7 +31,7 @@ def play_operator(
         low: Output while sliding toward the motor, time first.
         high: Output while sliding back.
         start: Output before the first sample; clipped into the band there.
-        slopes: Derivatives of both limits by the friction exponent; those of a single rope if omitted.
+        slopes: Derivatives of both limits by the friction exponent; those of a single rope, -1 and 1, if omitted.
         restart: Output where it must be set anew, because the input before was not known; NaN elsewhere.
 
     Returns:
@@ -38,15 +40,15 @@ def play_operator(
     References:
         On-body paper, figure 12 (its three phases are this operator's three states).
     """
-    by_low, by_high = (jnp.broadcast_to(jnp.asarray(slope, low.dtype), low.shape) for slope in slopes)
     anew = jnp.full(low.shape, jnp.nan) if restart is None else restart
 
-    def step(carry: tuple[Array, Array], now: tuple[Array, ...]) -> tuple[tuple[Array, Array], tuple[Array, Array]]:
-        (y, slope), (low, high, by_low, by_high, anew) = carry, now
+    def step(carry: tuple[Array, Array], now: tuple[Any, ...]) -> tuple[tuple[Array, Array], tuple[Array, Array]]:
+        (y, slope), (low, high, own, anew) = carry, now
+        by_low, by_high = (-1.0, 1.0) if own is None else own
         y, slope = jnp.where(jnp.isnan(anew), y, anew), jnp.where(jnp.isnan(anew), slope, 0.0)
         slope = jnp.where(y < low, by_low, jnp.where(y > high, by_high, slope))
         y = jnp.clip(y, low, high)
         return (y, slope), (y, slope)
 
     begin = jnp.broadcast_to(start, low.shape[1:]).astype(low.dtype)
-    return jax.lax.scan(step, (begin, jnp.zeros_like(begin)), (low, high, by_low, by_high, anew))[1]
+    return jax.lax.scan(step, (begin, jnp.zeros_like(begin)), (low, high, slopes, anew))[1]

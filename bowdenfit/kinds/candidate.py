@@ -123,14 +123,16 @@ class CandidateKind:
 
     Args:
         name: As users write it before the @.
-        phrase: One of them in a sentence, such as "a stretch".
-        words: What is measured, such as "the stretch".
         example: As users write it.
-        title: Heading in figures.
         order: Place among the kinds where none is named.
-        unknown: Why such readings cannot be simulated; empty where they can.
+        needs: Parameters without which such readings cannot be simulated.
+        unknown: Why they then cannot, in a sentence.
         offered: Those that the tables of the description can hold.
         simulation: How candidates would be read.
+        possible: Whether the cable is one that has such readings.
+        noun: What one is called, if not by its name.
+        words: What is measured, if not "the" with its noun.
+        title: Heading in figures, if not its noun.
         along_route: Whether it is made at a value of the route, where there is one.
         tells_curves: Whether it is of the wrap angles themselves, so that no measured angle can stand in.
         angles: Which wrap angles name it where there is no route: none, those measured row by row, or the total one.
@@ -139,19 +141,44 @@ class CandidateKind:
     """
 
     name: str
-    phrase: str
-    words: Callable[[Cable], str]
     example: str
-    title: str
     order: int
-    unknown: Callable[[Situation], str]
+    needs: tuple[str, ...]
+    unknown: str
     offered: Callable[[Situation], list[Candidate]]
     simulation: Callable[[Situation, Sequence[Candidate]], Simulation]
+    possible: Callable[[Situation], bool] = lambda _: True
+    noun: str = ""
+    words: Callable[[Cable], str] | None = None
+    title: str = ""
     along_route: bool = False
     tells_curves: bool = False
     angles: Literal["none", "columns", "total"] = "columns"
     loaded: bool = False
     mounted_anew: bool = False
+
+    @property
+    def called(self) -> str:
+        """Its noun."""
+        return self.noun or self.name
+
+    @property
+    def phrase(self) -> str:
+        """One of them in a sentence, such as "a stretch"."""
+        return f"{'an' if self.called[0] in 'aeiou' else 'a'} {self.called}"
+
+    @property
+    def heading(self) -> str:
+        """What figures say of it."""
+        return self.title or self.called[0].upper() + self.called[1:]
+
+    def measured(self, cable: Cable) -> str:
+        """What is measured, such as "the stretch"."""
+        return self.words(cable) if self.words is not None else f"the {self.called}"
+
+    def why_unknown(self, at: Situation) -> str:
+        """Why such readings cannot be simulated; empty where they can."""
+        return "" if set(self.needs) <= at.parameters and self.possible(at) else self.unknown
 
 
 def one_reading_each(term: Any) -> Simulation:

@@ -8,6 +8,7 @@ import numpy as np
 from bowdenfit.cable.cable import Cable
 from bowdenfit.description import Description
 from bowdenfit.kinds.angles.table import AngleTable
+from bowdenfit.kinds.bench import Truth
 from bowdenfit.kinds.measurements import Measurements
 from bowdenfit.kinds.terms import measured_kinds
 
@@ -26,10 +27,8 @@ def drawn_readings(
         key: Random key.
         scale: Factor on all noise.
     """
-    return {
-        kind.name: kind.bench.draw(cable, table, tables.table(AngleTable), values, key, scale)
-        for kind, table in measured_kinds(tables)
-    }
+    truth = Truth(cable, tables.table(AngleTable), values, key, scale)
+    return {kind.name: kind.bench.draw(table, truth) for kind, table in measured_kinds(tables)}
 
 
 def slipped(readings: Mapping[str, Mapping[str, jax.Array]]) -> bool:

@@ -146,12 +146,6 @@ def _offered(at: Situation) -> list[Candidate]:
     return at.along_cable("force", own)
 
 
-def _unknown(at: Situation) -> str:
-    design = typical_run(at.measurements)
-    known = design is not None and {RUN_SCATTER, design.noise} <= at.parameters
-    return "" if known else f"{UNKNOWN_SCATTER}; name an efficiency instead, or fit with a table of forces."
-
-
 def _simulation(at: Situation, wanted: Sequence[Candidate]) -> Simulation:
     design = typical_run(at.measurements)
     assert design is not None  # else there are no candidates
@@ -171,12 +165,13 @@ class _Rows:
 
 FORCE_RUN = CandidateKind(
     name="force",
-    phrase="a force run",
+    noun="force run",
     words=lambda _: "a force run",
     example="force@470",
-    title="Force run",
     order=1,
-    unknown=_unknown,
+    needs=(RUN_SCATTER,),
+    possible=lambda at: typical_run(at.measurements) is not None,
+    unknown=f"{UNKNOWN_SCATTER}; name an efficiency instead, or fit with a table of forces.",
     offered=_offered,
     simulation=_simulation,
     along_route=True,

@@ -1,11 +1,9 @@
 """A kind's half in the likelihood: what a term is, and what a kind declares of its terms."""
 
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field
 from typing import Any, Protocol, runtime_checkable
 
-import jax
-import jax.numpy as jnp
 import numpy as np
 from jax import Array
 
@@ -13,6 +11,7 @@ from bowdenfit.cable.cable import Cable
 from bowdenfit.cable.noise import NoiseLaw, noise_law
 from bowdenfit.description import Description, PriorDefaults
 from bowdenfit.kinds.angles.table import AngleTable
+from bowdenfit.kinds.bench import Bench
 from bowdenfit.kinds.candidate import CandidateKind
 from bowdenfit.kinds.measurements import Measurements
 from bowdenfit.parameters.space import Parameter, ParameterSpace
@@ -106,55 +105,6 @@ class Circumstances:
 
 
 LOAD, WRAP_ANGLE = "Load (N)", "Wrap angle (deg)"  # labels of places
-Draw = Callable[[Cable, Any, AngleTable | None, Mapping[str, Array], Array, float], dict[str, Array]]
-
-
-def _always(*_: Any) -> None:
-    """Nothing to object to."""
-
-
-def _with_fields(description: Description, table: Any, drawn: Mapping[str, np.ndarray]) -> Any:
-    """The table with the arrays that were drawn in place of its own."""
-    del description
-    return replace(table, **drawn)
-
-
-def drawn_by_term(
-    term_of: Callable[[Cable, Any, AngleTable | None], Any], reading: str, own_key: Callable[[Array], Array]
-) -> Draw:
-    """The draw of a kind whose tables hold just what its term replicates, given the same rows.
-
-    Args:
-        term_of: Term of a table; its `simulate` takes a factor on the noise.
-        reading: What the table calls the readings.
-        own_key: The kind's own key, of that of the bench.
-    """
-
-    def draw(
-        cable: Cable, table: Any, angles: AngleTable | None, values: Mapping[str, Array], key: Array, scale: float
-    ) -> dict[str, Array]:
-        term = term_of(cable, table, angles)
-        return {reading: term.simulate(values, jax.tree.map(jnp.asarray, term.data), own_key(key), scale)}
-
-    return draw
-
-
-@dataclass(frozen=True)
-class Bench:
-    """How a table is measured again on the computer, as its likelihood takes readings to scatter.
-
-    Args:
-        draw: New readings by name, of a function that JAX can compile. It takes the cable, the table, measured wrap angles,
-            true values [internal units], a random key and a factor on all noise. The key is that of the whole bench: a kind
-            makes one of its own of it that no other uses, so that its readings do not depend on which other tables there
-            are. An array called "slipped" says which readings a bench could not have taken as it says it did.
-        table: The table with what was drawn.
-        check: Refuses a table that cannot be measured again.
-    """
-
-    draw: Draw
-    table: Callable[[Description, Any, Mapping[str, np.ndarray]], Any] = _with_fields
-    check: Callable[[Description, Any], object] = _always
 
 
 def what_was_read(term: Term, description: Description) -> np.ndarray:
@@ -188,25 +138,6 @@ class Events:
 
 
 @dataclass(frozen=True)
-class Where:
-    """Where the readings of a term were taken.
-
-    Args:
-        numbers: By axis label, such as "Load (N)".
-        back: Whether a reading was taken on the way back, or while unloading.
-    """
-
-    numbers: Mapping[str, np.ndarray]
-    back: np.ndarray
-
-
-def _nowhere_else(table: Any, term: Term) -> Where:
-    """Nothing but lengths and runs, which the term knows."""
-    del table
-    return Where({}, np.zeros(len(term.labels), dtype=bool))
-
-
-@dataclass(frozen=True)
 class TermKind:
     """What a kind of measurement adds to the likelihood.
 
@@ -219,7 +150,8 @@ class TermKind:
         tells_mountings: Whether its readings tell how mountings scatter.
         check: Whether parameters that the user fixed leave the table a model.
         count: How many readings of a term entered, in words; empty where they are those that were read.
-        where: Loads and wrap angles of a term's readings.
+        where: Loads and wrap angles of a term's readings, by axis label.
+        back: Which rows were read on the way back, or while unloading; None where none was.
         events: Which events they are.
     """
 
@@ -229,7 +161,8 @@ class TermKind:
     bench: Bench
     candidate: CandidateKind | None = None
     tells_mountings: bool = False
-    check: Callable[[Any, ParameterSpace], None] = _always
+    check: Callable[[Any, ParameterSpace], None] = lambda *_: None
     count: Callable[[Term, Description], str] = lambda *_: ""
-    where: Callable[[Any, Term], Where] = _nowhere_else
+    where: Callable[[Any, Term], Mapping[str, np.ndarray]] = lambda *_: {}
+    back: Callable[[Any], np.ndarray] | None = None
     events: Events = field(default_factory=Events)

@@ -1,42 +1,27 @@
 """Angle tables measured again on the computer."""
 
-from collections.abc import Mapping
-
 import jax
 import jax.numpy as jnp
 import numpy as np
 
-from bowdenfit.cable.cable import ANGLE_NOISE, Cable
-from bowdenfit.cable.noise import scatter
+from bowdenfit.cable.cable import ANGLE_NOISE
 from bowdenfit.description import Description
 from bowdenfit.errors import DatasetError
 from bowdenfit.kinds.angles.table import AngleSettings, AngleTable
+from bowdenfit.kinds.bench import Truth
 
 
-def drawn_angles(
-    cable: Cable,
-    table: AngleTable,
-    angles: AngleTable | None,
-    values: Mapping[str, jax.Array],
-    key: jax.Array,
-    scale: float,
-    everywhere: bool = False,
-) -> dict[str, jax.Array]:
+def drawn_angles(table: AngleTable, truth: Truth, everywhere: bool = False) -> dict[str, jax.Array]:
     """Wrap angles and detection limits of an angle table [rad].
 
     Args:
-        cable: The cable.
         table: The table.
-        angles: The same.
-        values: True values [internal units].
-        key: Random key of the bench.
-        scale: Factor on all noise.
+        truth: What it is measured with.
         everywhere: Whether rows outside the range of the curves are drawn too; else they are kept.
     """
-    del angles
-    key, route = jax.random.split(key, 3)[0], jnp.asarray(table.route)
-    theta = jnp.stack([curve.wrap_angle(values, route) for curve in cable.curves.values()], axis=-1)
-    reading = theta + scale * values[ANGLE_NOISE] * scatter(key, theta.shape, cable.description)
+    cable, key, route = truth.cable, jax.random.split(truth.key, 3)[0], jnp.asarray(table.route)
+    theta = jnp.stack([curve.wrap_angle(truth.values, route) for curve in cable.curves.values()], axis=-1)
+    reading = theta + truth.scale * truth.values[ANGLE_NOISE] * truth.scatter(key, theta.shape)
     limit = detection_limit(cable.description, table)
     low, high = cable.description.route.range if cable.description.route else (-np.inf, np.inf)
     kept = np.zeros(len(table.route), dtype=bool) if everywhere else (table.route < low) | (table.route > high)

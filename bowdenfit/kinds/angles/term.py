@@ -14,8 +14,9 @@ from bowdenfit.cable.noise import noise_law, scatter
 from bowdenfit.kinds.angles.bench import detection_limit, drawn_angles
 from bowdenfit.kinds.angles.table import AngleSettings, AngleTable
 from bowdenfit.kinds.angles.undetected import EVENTS, count
+from bowdenfit.kinds.bench import Bench
 from bowdenfit.kinds.candidate import Candidate, CandidateKind, Simulation, Situation
-from bowdenfit.kinds.term import Bench, Circumstances, TermKind
+from bowdenfit.kinds.term import Circumstances, TermKind
 from bowdenfit.parameters.priors import HalfNormal
 from bowdenfit.parameters.space import Parameter
 
@@ -147,11 +148,6 @@ def _simulation(at: Situation, wanted: Sequence[Candidate]) -> Simulation:
     return Simulation(term.simulate, term.data, found, float(np.rad2deg(limit)))
 
 
-def _unknown(at: Situation) -> str:
-    known = ANGLE_NOISE in at.parameters and at.cable.curves
-    return "" if known else "no contact of this cable has a curve that an angle could tell of."
-
-
 ANGLES = TermKind(
     "angles",
     lambda cable, table, _: (angles_term(cable, table),),
@@ -159,12 +155,13 @@ ANGLES = TermKind(
     Bench(drawn_angles, check=detection_limit),
     CandidateKind(
         name="angle",
-        phrase="an angle",
+        title="Wrap angles",
         words=lambda cable: "the wrap angles" if len(cable.curves) > 1 else "the wrap angle",
         example="angle@450",
-        title="Wrap angles",
         order=0,
-        unknown=_unknown,
+        needs=(ANGLE_NOISE,),
+        possible=lambda at: bool(at.cable.curves),
+        unknown="no contact of this cable has a curve that an angle could tell of.",
         offered=lambda at: [Candidate("angle", length) for length in at.lengths] if at.angles is not None else [],
         simulation=_simulation,
         along_route=True,

@@ -16,12 +16,13 @@ from bowdenfit.cable.noise import noise_law, scatter
 from bowdenfit.description import Description
 from bowdenfit.errors import DescriptionError
 from bowdenfit.kinds.angles.table import AngleTable
+from bowdenfit.kinds.bench import Bench, drawn_by_term
 from bowdenfit.kinds.candidate import UNKNOWN_SCATTER, Candidate, CandidateKind, Simulation, Situation, one_reading_each
 from bowdenfit.kinds.efficiencies.table import EfficiencyTable
 from bowdenfit.kinds.resolve_angles import resolve_angles
 from bowdenfit.kinds.row_angles import row_angles
 from bowdenfit.kinds.shared_parameters import run_scatter
-from bowdenfit.kinds.term import Bench, TermKind, drawn_by_term
+from bowdenfit.kinds.term import TermKind
 from bowdenfit.parameters.space import ParameterSpace
 from bowdenfit.physics.friction import transmission_efficiency
 
@@ -131,10 +132,6 @@ def _simulation(at: Situation, wanted: Sequence[Candidate]) -> Simulation:
     return one_reading_each(efficiencies_term(at.cable, table, at.angles))
 
 
-def _unknown(at: Situation) -> str:
-    return "" if RUN_SCATTER in at.parameters else f"{UNKNOWN_SCATTER}; fit with a table of efficiencies or forces."
-
-
 EFFICIENCIES = TermKind(
     "efficiencies",
     lambda cable, table, angles: (efficiencies_term(cable, table, angles),),
@@ -142,12 +139,10 @@ EFFICIENCIES = TermKind(
     Bench(drawn_by_term(efficiencies_term, "efficiency", lambda key: jax.random.split(key, 3)[1]), _drawn_table),
     CandidateKind(
         name="efficiency",
-        phrase="an efficiency",
-        words=lambda _: "the efficiency",
         example="efficiency@470",
-        title="Efficiency",
         order=2,
-        unknown=_unknown,
+        needs=(RUN_SCATTER,),
+        unknown=f"{UNKNOWN_SCATTER}; fit with a table of efficiencies or forces.",
         offered=_offered,
         simulation=_simulation,
         along_route=True,

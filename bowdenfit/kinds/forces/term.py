@@ -10,17 +10,16 @@ from jax import Array
 
 from bowdenfit.cable.cable import Cable
 from bowdenfit.cable.load_cells import FORCE_NOISE, RUN_SCATTER, LoadCells
-from bowdenfit.cable.noise import scatter
 from bowdenfit.description import Description
 from bowdenfit.kinds.angles.table import AngleTable
+from bowdenfit.kinds.bench import Bench, Truth
 from bowdenfit.kinds.forces.held import HeldForcesTerm
 from bowdenfit.kinds.forces.table import ForceTable
 from bowdenfit.kinds.next_run import FORCE_RUN
-from bowdenfit.kinds.resolve_angles import resolve_angles
 from bowdenfit.kinds.row_angles import row_angles
 from bowdenfit.kinds.runs import ROW_ARRAYS, RunsTerm, SlidingRows, run_sums
 from bowdenfit.kinds.shared_parameters import force_noise, offsets, run_scatter
-from bowdenfit.kinds.term import Bench, Circumstances, TermKind
+from bowdenfit.kinds.term import Circumstances, TermKind
 from bowdenfit.parameters.space import Parameter
 
 
@@ -72,23 +71,15 @@ def _parameters(_: ForceTable, at: Circumstances) -> list[Parameter]:
     return [run_scatter(at), force_noise(at, "standard deviation of a force reading"), *offsets(at)]
 
 
-def _draw(
-    cable: Cable,
-    table: ForceTable,
-    angles: AngleTable | None,
-    values: Mapping[str, Array],
-    key: Array,
-    scale: float,
-) -> dict[str, Array]:
+def _draw(table: ForceTable, truth: Truth) -> dict[str, Array]:
     """Forces of sliding rows with noise in both cells around true ones; all rows of a run share its mounting and angles."""
-    held_key, key = jax.random.fold_in(key, 5), jax.random.split(key, 3)[2]
+    cable, values, scale, key = truth.cable, truth.values, truth.scale, jax.random.split(truth.key, 3)[2]
     of_run, of_input, of_output = jax.random.split(key, 3)
     runs, run = len(table.run_names), jnp.asarray(table.run)
-    rows = {name: jnp.asarray(array) for name, array in row_angles(cable.description, table, angles).data.items()}
-    bends, variance = resolve_angles(cable, values, rows)
+    bends, variance = truth.wrap_angles(table)
     of_angles = jax.random.normal(jax.random.fold_in(key, 3), (runs, bends.shape[1]))
     bends = bends + scale * jnp.sqrt(variance) * of_angles[run]
-    mounting = scale * values[RUN_SCATTER] * scatter(of_run, (runs,), cable.description)
+    mounting = scale * values[RUN_SCATTER] * truth.scatter(of_run, (runs,))
     exponent = cable.friction_exponent(values, bends) * cable.friction.rate(values, jnp.asarray(table.velocity))
     stroke, force = jnp.asarray(table.stroke, dtype=float), jnp.asarray(table.input_force)
     output = cable.friction.output_force(values, force, exponent + mounting[run], stroke)
@@ -101,16 +92,14 @@ def _draw(
             cells.shown_output(output) + noise * jax.random.normal(of_output, force.shape),
             table.output_force,
         ),
-        "slipped": _slipped(cable, table, angles, values, held_key),
+        "slipped": _slipped(table, truth, jax.random.fold_in(truth.key, 5)),
     }
 
 
-def _slipped(
-    cable: Cable, table: ForceTable, angles: AngleTable | None, values: Mapping[str, Array], key: Array
-) -> Array:
+def _slipped(table: ForceTable, truth: Truth, key: Array) -> Array:
     """Which held readings would have slipped: their likelihood is the probability that friction holds their forces."""
-    held = [t for t in force_terms(cable, table, angles) if isinstance(t, HeldForcesTerm)]
-    log_probability = [term.log_likelihood(values, jax.tree.map(jnp.asarray, term.data)) for term in held]
+    held = [t for t in force_terms(truth.cable, table, truth.angles) if isinstance(t, HeldForcesTerm)]
+    log_probability = [term.log_likelihood(truth.values, jax.tree.map(jnp.asarray, term.data)) for term in held]
     slipped = [jnp.log(jax.random.uniform(key, p.shape)) > p for p in log_probability]
     return jnp.concatenate([*slipped, jnp.zeros(0, dtype=bool)])
 

@@ -16,12 +16,13 @@ from bowdenfit.cable.elasticity import spread_matrix
 from bowdenfit.cable.load_cells import FORCE_NOISE, RUN_SCATTER, LoadCells
 from bowdenfit.cable.noise import noise_law, scatter
 from bowdenfit.kinds.angles.table import AngleTable
+from bowdenfit.kinds.bench import Bench, Truth
 from bowdenfit.kinds.candidate import Candidate, CandidateKind, Simulation, Situation, one_reading_each, some_loads
 from bowdenfit.kinds.loop.table import LoopTable
 from bowdenfit.kinds.resolve_angles import resolve_angles
 from bowdenfit.kinds.row_angles import row_angles
 from bowdenfit.kinds.shared_parameters import force_noise, offsets, preload
-from bowdenfit.kinds.term import LOAD, WRAP_ANGLE, Bench, Circumstances, Term, TermKind, Where
+from bowdenfit.kinds.term import LOAD, WRAP_ANGLE, Circumstances, TermKind
 from bowdenfit.parameters.priors import Normal
 from bowdenfit.parameters.space import Parameter
 from bowdenfit.physics.loop import free_motion_loss, loop_output_force, loop_response, loop_response_from
@@ -138,19 +139,12 @@ def _parameters(_: LoopTable, at: Circumstances) -> list[Parameter]:
     return [*preload(at), *([mounting] if at.mountings_scatter else []), noise, *offsets(at)]
 
 
-def _draw(
-    cable: Cable,
-    table: LoopTable,
-    angles: AngleTable | None,
-    values: Mapping[str, Array],
-    key: Array,
-    scale: float,
-) -> dict[str, Array]:
+def _draw(table: LoopTable, truth: Truth) -> dict[str, Array]:
     """Forces of a loop with noise in both cells; rows without an input force are of free motion."""
-    key = jax.random.split(jax.random.fold_in(key, 3), 3)[2]
+    cable, values, scale = truth.cable, truth.values, truth.scale
+    key = jax.random.split(jax.random.fold_in(truth.key, 3), 3)[2]
     of_input, of_output = jax.random.split(key)
-    rows = {name: jnp.asarray(array) for name, array in row_angles(cable.description, table, angles).data.items()}
-    bends, variance = resolve_angles(cable, values, rows)
+    bends, variance = truth.wrap_angles(table)
     own = cable.elasticity.preload(values, jnp.sum(bends, axis=-1))[0]
     preload = jnp.where(jnp.isnan(table.preload), own, jnp.nan_to_num(table.preload))
     bends = bends + scale * jnp.sqrt(variance) * jax.random.normal(jax.random.fold_in(key, 2), bends.shape)
@@ -162,7 +156,7 @@ def _draw(
     cells, noise = LoadCells.of(values), scale * values[FORCE_NOISE]
     return {
         "input_force": cells.shown_input(force) + noise * jax.random.normal(of_input, force.shape),
-        "output_force": cells.shown_output(output) + noise * scatter(of_output, force.shape, cable.description),
+        "output_force": cells.shown_output(output) + noise * truth.scatter(of_output, force.shape),
     }
 
 
@@ -183,17 +177,6 @@ def _simulation(at: Situation, wanted: Sequence[Candidate]) -> Simulation:
     )
 
 
-def _unknown(at: Situation) -> str:
-    if at.cable.is_loop and {FORCE_NOISE, REFERENCE_PRELOAD} <= at.parameters:
-        return ""
-    return "only a pull-pull loop with a table of its forces, and a preload of its own, has such readings."
-
-
-def _where(table: LoopTable, _: Term) -> Where:
-    angle = np.rad2deg(np.nansum(np.nan_to_num(table.own.angle), axis=1))
-    return Where({LOAD: table.input_force, WRAP_ANGLE: angle}, table.stroke < 0)
-
-
 LOOP = TermKind(
     "loop",
     lambda cable, table, angles: (loop_term(cable, table, angles),),
@@ -201,16 +184,18 @@ LOOP = TermKind(
     Bench(_draw),
     CandidateKind(
         name="loop",
-        phrase="a loop under load",
+        noun="loop under load",
         words=lambda _: "the loop's output force",
         example="loop@90deg,30N",
-        title="Loop under load",
         order=5,
-        unknown=_unknown,
+        needs=(FORCE_NOISE, REFERENCE_PRELOAD),
+        possible=lambda at: at.cable.is_loop,
+        unknown="only a pull-pull loop with a table of its forces, and a preload of its own, has such readings.",
         offered=_offered,
         simulation=_simulation,
         along_route=True,
         loaded=True,
     ),
-    where=_where,
+    where=lambda table, _: {LOAD: table.input_force, WRAP_ANGLE: np.rad2deg(np.nansum(table.own.angle, axis=1))},
+    back=lambda table: table.stroke < 0,
 )

@@ -11,6 +11,7 @@ from jaxtyping import Float
 
 from bowdenfit.cable.cable import Cable
 from bowdenfit.kinds.angles.table import AngleTable
+from bowdenfit.kinds.bench import Bench, drawn_by_term
 from bowdenfit.kinds.candidate import (
     UNKNOWN_SCATTER,
     Candidate,
@@ -23,7 +24,7 @@ from bowdenfit.kinds.candidate import (
 from bowdenfit.kinds.elastic_term import ElasticTerm
 from bowdenfit.kinds.preload.table import PreloadTable
 from bowdenfit.kinds.shared_parameters import preload
-from bowdenfit.kinds.term import WRAP_ANGLE, Bench, Circumstances, TermKind, Where, drawn_by_term
+from bowdenfit.kinds.term import WRAP_ANGLE, Circumstances, TermKind
 from bowdenfit.parameters.priors import HalfNormal
 from bowdenfit.parameters.space import Parameter
 
@@ -73,17 +74,13 @@ PRELOAD = TermKind(
     Bench(drawn_by_term(_unread, "preload", lambda key: jax.random.split(jax.random.fold_in(key, 3), 3)[1])),
     CandidateKind(
         name="preload",
-        phrase="a preload",
-        words=lambda _: "the preload",
         example="preload@90deg",
-        title="Preload",
         order=4,
-        unknown=lambda at: "" if PRELOAD_NOISE in at.parameters else f"{UNKNOWN_SCATTER}; fit with a table of preload.",
+        needs=(PRELOAD_NOISE,),
+        unknown=f"{UNKNOWN_SCATTER}; fit with a table of preload.",
         offered=_offered,
         simulation=_simulation,
         angles="total",
     ),
-    where=lambda _, term: Where(
-        {WRAP_ANGLE: np.rad2deg(term.data["wrap_angle"])}, np.zeros(len(term.labels), dtype=bool)
-    ),
+    where=lambda _, term: {WRAP_ANGLE: np.rad2deg(term.data["wrap_angle"])},
 )

@@ -12,50 +12,35 @@ import jax
 import jax.numpy as jnp
 import numpy as np
 
-from bowdenfit.cable.cable import Cable
 from bowdenfit.cable.drive import Loop, Rope, drive_of
 from bowdenfit.cable.load_cells import BLOCK_NOISE, LEAST_FORCE, RUN_SCATTER, LoadCells
-from bowdenfit.cable.noise import scatter
 from bowdenfit.description import Description
 from bowdenfit.errors import DatasetError
-from bowdenfit.kinds.angles.table import AngleTable
+from bowdenfit.kinds.bench import Truth
 from bowdenfit.kinds.recordings.angles import recorded_angles
 from bowdenfit.kinds.recordings.blocks import worth_of
 from bowdenfit.kinds.recordings.side_by_side import beside
-from bowdenfit.kinds.resolve_angles import resolve_angles
-from bowdenfit.kinds.row_angles import row_angles
 from bowdenfit.recordings.loop_strokes import find_loop_strokes
 from bowdenfit.recordings.recording import Blocks, Recording, Recordings, Strokes
 from bowdenfit.recordings.strokes import find_strokes
 
 
-def drawn_recordings(
-    cable: Cable,
-    recordings: Recordings,
-    measured: AngleTable | None,
-    values: Mapping[str, jax.Array],
-    key: jax.Array,
-    scale: float,
-) -> dict[str, jax.Array]:
+def drawn_recordings(recordings: Recordings, truth: Truth) -> dict[str, jax.Array]:
     """Forces of every block (rows) of every recording (columns), padded to the longest, and the delay's error [s].
 
     All recordings of a run share the effect of its mounting. Noise is as the likelihood counts it: blocks that together
     are worth one independent reading share one error.
 
     Args:
-        cable: The cable.
         recordings: The recordings as measured.
-        measured: Wrap angles measured at lengths.
-        values: True values [internal units].
-        key: Random key of the bench.
-        scale: Factor on all noise.
+        truth: What they are measured with.
     """
-    of_run, of_angles, of_input, of_output = jax.random.split(jax.random.fold_in(key, 4), 4)
-    rows = row_angles(cable.description, recorded_angles(recordings), measured).data
-    angles, variance = resolve_angles(cable, values, {name: jnp.asarray(array) for name, array in rows.items()})
+    cable, values, scale = truth.cable, truth.values, truth.scale
+    of_run, of_angles, of_input, of_output = jax.random.split(jax.random.fold_in(truth.key, 4), 4)
+    angles, variance = truth.wrap_angles(recorded_angles(recordings))
     error = jnp.sqrt(variance) * jax.random.normal(of_angles, angles.shape)
     run = np.array([recordings.runs.index(r.run) for r in recordings.each])
-    mounting = values[RUN_SCATTER] * scatter(of_run, (len(recordings.runs),), cable.description)[run]
+    mounting = values[RUN_SCATTER] * truth.scatter(of_run, (len(recordings.runs),))[run]
     exponent = cable.friction_exponent(values, angles + scale * error)
     force, velocity = (
         jnp.asarray(beside([getattr(r.blocks, name) for r in recordings.each])) for name in ("input_force", "velocity")

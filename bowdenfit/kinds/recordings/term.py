@@ -13,6 +13,7 @@ from bowdenfit.cable.cable import Cable
 from bowdenfit.cable.load_cells import BLOCK_NOISE, DELAY_ERROR
 from bowdenfit.errors import DatasetError
 from bowdenfit.kinds.angles.table import AngleTable
+from bowdenfit.kinds.bench import Bench
 from bowdenfit.kinds.recordings.angles import recorded_angles
 from bowdenfit.kinds.recordings.blocks import (
     RECORDED,
@@ -33,7 +34,7 @@ from bowdenfit.kinds.recordings.whole import WholeRecordingsTerm, padded
 from bowdenfit.kinds.row_angles import row_angles
 from bowdenfit.kinds.runs import ROW_ARRAYS, RunsTerm, SlidingRows, run_sums
 from bowdenfit.kinds.shared_parameters import offsets, preload, run_scatter
-from bowdenfit.kinds.term import Bench, Circumstances, TermKind
+from bowdenfit.kinds.term import Circumstances, TermKind
 from bowdenfit.parameters.priors import HalfNormal, Normal
 from bowdenfit.parameters.space import Parameter
 from bowdenfit.recordings.preparation.play import play

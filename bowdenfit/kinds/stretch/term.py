@@ -11,6 +11,7 @@ from jaxtyping import Float
 from bowdenfit.cable.cable import Cable
 from bowdenfit.cable.elasticity import STRETCH_FRICTION, STRETCH_ZERO, rope_parameters, spread_matrix
 from bowdenfit.kinds.angles.table import AngleTable
+from bowdenfit.kinds.bench import Bench, drawn_by_term
 from bowdenfit.kinds.candidate import (
     UNKNOWN_SCATTER,
     Candidate,
@@ -23,7 +24,7 @@ from bowdenfit.kinds.candidate import (
 )
 from bowdenfit.kinds.elastic_term import ElasticTerm
 from bowdenfit.kinds.stretch.table import StretchTable
-from bowdenfit.kinds.term import LOAD, WRAP_ANGLE, Bench, Circumstances, TermKind, Where, drawn_by_term
+from bowdenfit.kinds.term import LOAD, WRAP_ANGLE, Circumstances, TermKind
 from bowdenfit.parameters.priors import HalfNormal, LogNormal, Normal
 from bowdenfit.parameters.space import Parameter
 
@@ -98,16 +99,15 @@ STRETCH = TermKind(
     Bench(drawn_by_term(stretch_term, "stretch", lambda key: jax.random.split(jax.random.fold_in(key, 3), 3)[0])),
     CandidateKind(
         name="stretch",
-        phrase="a stretch",
-        words=lambda _: "the stretch",
         example="stretch@90deg,50N",
-        title="Stretch",
         order=3,
-        unknown=lambda at: "" if STRETCH_NOISE in at.parameters else f"{UNKNOWN_SCATTER}; fit with a table of stretch.",
+        needs=(STRETCH_NOISE,),
+        unknown=f"{UNKNOWN_SCATTER}; fit with a table of stretch.",
         offered=_offered,
         simulation=_simulation,
         angles="total",
         loaded=True,
     ),
-    where=lambda table, _: Where({LOAD: table.load, WRAP_ANGLE: np.rad2deg(table.wrap_angle)}, table.unloading),
+    where=lambda table, _: {LOAD: table.load, WRAP_ANGLE: np.rad2deg(table.wrap_angle)},
+    back=lambda table: table.unloading,
 )

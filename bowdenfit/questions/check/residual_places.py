@@ -55,8 +55,9 @@ def _of_kind(dataset: Dataset, term: Term) -> tuple[Mapping[str, np.ndarray], np
     table = dataset.measurements.table(kind.table) if kind is not None else None
     if table is None:
         return {}, np.zeros(len(term.labels), dtype=bool)
-    where = term_kind(term.name).where(table, term)
-    return where.numbers, where.back
+    declared = term_kind(term.name)
+    nowhere = np.zeros(len(term.labels), dtype=bool)
+    return declared.where(table, term), nowhere if declared.back is None else declared.back(table)
 
 
 def route_values(term: Term) -> np.ndarray | None:

@@ -35,7 +35,7 @@ def why_not(fit: Record, candidate: Candidate) -> str:
     """Why a candidate makes no sense for this cable; empty where it does."""
     at, kind = situation_of(fit.model, fit.dataset.measurements), candidate_kinds()[candidate.kind]
     route = fit.dataset.description.route
-    reason = kind.unknown(at)
+    reason = kind.why_unknown(at)
     if reason or route is None or not (kind.along_route and at.cable.curves and np.isfinite(candidate.route)):
         return reason
     low, high = route.range
@@ -62,7 +62,7 @@ def route_words(fit: Record) -> str:
 def words_of(fit: Record, candidate: Candidate) -> str:
     """A candidate in words, such as "the wrap angles at 450 mm"."""
     route = fit.dataset.description.route
-    what = candidate_kinds()[candidate.kind].words(fit.model.cable)
+    what = candidate_kinds()[candidate.kind].measured(fit.model.cable)
     if route is not None and np.isfinite(candidate.route):
         what += f" at {candidate.route:g} {route.unit}"
     if candidate.angles:

@@ -59,7 +59,7 @@ def _along_route(found: NextMeasurement, along: list[Ranked]) -> Figure:
         )
         axes.errorbar(
             at, sd, error, marker=SERIES_MARKERS[i], linestyle=SERIES_LINES[i % len(SERIES_LINES)],
-            color=SERIES_COLORS[i], capsize=2, linewidth=1.1, elinewidth=0.7, label=f"{kind.title} measured here next",
+            color=SERIES_COLORS[i], capsize=2, linewidth=1.1, elinewidth=0.7, label=f"{kind.heading} measured here next",
         )  # fmt: skip
     shade_outside(
         axes, found.route_range, route_limits(found.route_range, np.array([r.candidate.route for r in along]))

@@ -6,7 +6,6 @@ Both draw readings as the likelihood takes them to scatter, so that a posterior 
 
 from collections.abc import Mapping
 from dataclasses import replace
-from typing import Any
 
 import jax
 import jax.numpy as jnp
@@ -16,8 +15,9 @@ from bowdenfit.dataset import Dataset
 from bowdenfit.description import Description
 from bowdenfit.errors import UsageError
 from bowdenfit.kinds import KINDS
+from bowdenfit.kinds.angles.bench import drawn_angles
 from bowdenfit.kinds.angles.table import AngleTable
-from bowdenfit.kinds.angles.term import drawn_angles
+from bowdenfit.kinds.bench import Truth
 from bowdenfit.kinds.design import Design
 from bowdenfit.kinds.drawn_readings import drawn_readings, with_drawn_readings
 from bowdenfit.kinds.measurements import Measurements
@@ -94,9 +94,10 @@ def simulated_again(
     cable, scale = build_model(dataset).cable, 1.0 if noise else 0.0
     angles, beyond = dataset.measurements.table(AngleTable), {}
     if beyond_curves and angles is not None:
-        beyond = {"angles": drawn_angles(cable, angles, angles, named, key, scale, everywhere=True)}
-        drawn: dict[str, Any] = {name: np.asarray(array) for name, array in beyond["angles"].items()}
-        dataset = replace(dataset, measurements=dataset.measurements.with_tables(replace(angles, **drawn)))
+        beyond = {"angles": drawn_angles(angles, Truth(cable, angles, named, key, scale), everywhere=True)}
+        angle, limit = (np.asarray(beyond["angles"][name]) for name in ("angle", "limit"))
+        tables = dataset.measurements.with_tables(replace(angles, angle=angle, limit=limit))
+        dataset = replace(dataset, measurements=tables)
     return with_readings(dataset, drawn_readings(cable, dataset.measurements, named, key, scale) | beyond)
 
 

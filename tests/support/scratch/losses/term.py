@@ -7,7 +7,8 @@ import jax
 import jax.numpy as jnp
 
 from bowdenfit.cable.cable import Cable
-from bowdenfit.kinds.term import Bench, TermKind
+from bowdenfit.kinds.bench import Bench
+from bowdenfit.kinds.term import TermKind
 from bowdenfit.parameters.priors import HalfNormal
 from bowdenfit.parameters.space import Parameter
 
@@ -57,10 +58,10 @@ def _parameters(table, circumstances):
     return [Parameter(NOISE, r"$\sigma_\mathrm{loss}$", "noise of a lost force", "noise", HalfNormal(1.0), "N")]
 
 
-def _draw(cable, table, angles, values, key, scale):
-    term = _terms(cable, table, angles)[0]
-    expected = term.expected(values, {name: jnp.asarray(array) for name, array in term.data.items()})
-    return {"loss": expected + scale * values[NOISE] * jax.random.normal(key, expected.shape)}
+def _draw(table, truth):
+    (term,) = _terms(truth.cable, table, truth.angles)
+    expected = term.expected(truth.values, {name: jnp.asarray(array) for name, array in term.data.items()})
+    return {"loss": expected + truth.scale * truth.values[NOISE] * truth.scatter(truth.key, expected.shape)}
 
 
 LOSSES = TermKind("losses", _terms, _parameters, Bench(_draw))

@@ -4,8 +4,11 @@ from typing import Annotated, Any, Literal, TypeVar
 
 from pydantic import ConfigDict, Field, field_validator, model_validator
 
+from bowdenfit.description.contacts import Contact, Route, WrapAngle
+from bowdenfit.description.defaults import PriorDefaults, Sampler, SamplerSettings, Sensors
 from bowdenfit.description.elastic import CableSettings, PreloadSettings, StretchSettings
 from bowdenfit.description.recordings import ForceLimits, Phase, Preparation, RecordingFile
+from bowdenfit.description.tables import Table, Tables, TableSettings
 from bowdenfit.description.values import (
     Finite,
     FrictionSetting,
@@ -22,7 +25,6 @@ from bowdenfit.description.values import (
     UniformPrior,
 )
 from bowdenfit.errors import nearest
-from bowdenfit.units import ColumnSource
 from bowdenfit.words import listed
 
 __all__ = [
@@ -64,187 +66,7 @@ __all__ = [
 SCHEMA = 1
 Geometry = Literal["continuous", "published"]
 Noise = Literal["normal", "student"]
-Sampler = Literal["emcee", "nuts", "both"]
 AnySettings = TypeVar("AnySettings")
-
-
-class Route(Frozen):
-    """What the design question varies: a column of the tables, and where the angle curves hold."""
-
-    variable: str = "cable_length"
-    unit: str = "mm"
-    range: tuple[Finite, Finite]
-    choices: tuple[Finite, ...] = ()
-
-    @model_validator(mode="after")
-    def _ordered(self) -> "Route":
-        if not self.range[0] < self.range[1]:
-            raise ValueError("range must be [lowest, highest]")
-        outside = [c for c in self.choices if not self.range[0] <= c <= self.range[1]]
-        if outside:
-            raise ValueError(f"choices must lie inside range; {outside[0]:g} does not")
-        return self
-
-    @property
-    def middle(self) -> float:
-        """Middle of the range."""
-        return (self.range[0] + self.range[1]) / 2
-
-    @property
-    def half_width(self) -> float:
-        """Half the range."""
-        return (self.range[1] - self.range[0]) / 2
-
-    @property
-    def label(self) -> str:
-        """Name and unit for an axis or a heading."""
-        return f"{self.variable.replace('_', ' ').capitalize()} ({self.unit})"
-
-
-class WrapAngle(Frozen):
-    """Where a contact's wrap angle comes from: a curve through the angle table, each row, or a constant."""
-
-    curve: str | None = None
-    column: str | None = None
-    published_range: tuple[Finite, Finite] | None = None
-    nominal: QuantityValue | None = None
-    value: NonNegative | None = None
-    unit: str | None = None
-    sd: Positive | None = None
-
-    @model_validator(mode="after")
-    def _one_source(self) -> "WrapAngle":
-        if (self.value is None) == (self.column is None):
-            raise ValueError(
-                'write either { value = 45, unit = "deg" } or { column = "..." }, with curve where it has one'
-            )
-        if self.value is not None and (self.unit is None or self.curve is not None):
-            raise ValueError('a constant wrap angle needs a unit and no curve, such as { value = 45, unit = "deg" }')
-        if self.column is not None and (self.unit is not None or self.sd is not None):
-            raise ValueError("unit and sd belong to a constant angle; a column carries its unit in its heading")
-        if self.published_range is not None and self.curve is None:
-            raise ValueError("published_range belongs to a curve")
-        if self.nominal is not None and self.curve is not None:
-            raise ValueError("nominal belongs to an angle measured in each row, without a curve")
-        return self
-
-    @property
-    def constant(self) -> QuantityValue | None:
-        """The constant angle, if it is one."""
-        if self.value is None or self.unit is None:
-            return None
-        return QuantityValue(value=self.value, unit=self.unit, sd=self.sd)
-
-
-class Contact(Frozen):
-    """One place where rope rubs."""
-
-    name: str
-    friction: str
-    law: str = "capstan"
-    wrap_angle: WrapAngle
-
-    @property
-    def special_law(self) -> str:
-        """Its law where that is not the usual one; empty otherwise."""
-        return "" if self.law == type(self).model_fields["law"].default else self.law
-
-
-class TableSettings(Frozen):
-    """What all that stands under [tables] has in common."""
-
-    @property
-    def fits_offsets(self) -> bool:
-        """Whether it asks for the load cells' offsets to be parameters."""
-        return False
-
-    @property
-    def tells_preload(self) -> bool:
-        """Whether its readings tell how preload depends on the wrap angle."""
-        return False
-
-
-class Table(TableSettings):
-    """One table: its file or files, and columns that do not carry the usual names."""
-
-    file: str | None = None
-    files: str | tuple[str, ...] | None = None
-    columns: dict[str, ColumnSource] = Field(default_factory=dict)
-
-    @model_validator(mode="after")
-    def _one_source(self) -> "Table":
-        if (self.file is None) == (self.files is None):
-            raise ValueError('write either file = "name.csv" or files = "folder/*.csv"')
-        return self
-
-
-class Tables(Frozen):
-    """The tables of a data set by their kinds, which `bowdenfit.kinds.settings` adds as fields."""
-
-    @model_validator(mode="after")
-    def _some(self) -> "Tables":
-        if not self.model_fields_set:
-            raise ValueError('name at least one table, such as efficiencies = { file = "efficiencies.csv" }')
-        return self
-
-    @property
-    def stated(self) -> dict[str, Any]:
-        """What is said of each table that there is, by the name of its kind."""
-        return {name: said for name in type(self).model_fields if (said := getattr(self, name)) is not None}
-
-
-class Sensors(Frozen):
-    """What the data sheets of the load cells say."""
-
-    force_noise: QuantityValue | None = None
-    gain_error_sd: Positive | None = None
-    offset_sd: QuantityValue | None = None
-
-
-class SamplerSettings(Frozen):
-    """How long and how carefully the posterior is sampled, by emcee's ensembles of walkers, by NUTS, or by both.
-
-    `max_steps` is that of each walker or chain, and does not count the warm-up of NUTS.
-    """
-
-    method: Sampler = "emcee"
-    n_ensembles: Annotated[int, Field(ge=2)] = 4
-    n_walkers: Annotated[int, Field(ge=16, multiple_of=2)] = 256
-    n_chains: Annotated[int, Field(ge=4)] = 16
-    target_acceptance: Annotated[float, Field(ge=0.6, lt=1)] = 0.98
-    max_steps: Annotated[int, Field(ge=200)] = 12000
-    target_r_hat: Annotated[float, Field(gt=1)] = 1.01
-    target_ess: Annotated[int, Field(ge=100)] = 1000
-
-
-class PriorDefaults(Frozen):
-    """The weak priors of everything the user says nothing of; angles in degrees, forces in N."""
-
-    friction: LogNormalPrior = LogNormalPrior(median=0.12, log_sd=0.7)
-    curve_level_sd: Positive = 1.5
-    curve_level_degrees_without_data: Positive = 30.0
-    curve_slope_sd: Positive = 3.0
-    curve_curvature_sd: Positive = 0.5
-    curve_steepness_sd: Positive = 5.0
-    curve_end_over_median: Positive = 3.0
-    angle_noise_degrees: Positive = 5.0
-    run_scatter: Positive = 0.02
-    force_noise_newtons: Positive = 2.0
-    block_noise_newtons: Positive = 0.5
-    offset_newtons: Positive = 1.0
-    drag_newtons: Positive = 5.0
-    wobble_degrees: Positive = 30.0
-    stribeck: Positive = 0.3
-    viscous_at_highest_speed: Positive = 0.5
-    stribeck_speed_log_sd: Positive = 1.0
-    stiffness: LogNormalPrior = LogNormalPrior(median=50.0, log_sd=1.5)
-    bedding_stretch_mm: Positive = 2.0
-    bedding_load: LogNormalPrior = LogNormalPrior(median=20.0, log_sd=1.0)
-    lengthening_mm_per_radian: Positive = 1.0
-    stretch_zero_mm: Positive = 5.0
-    preload: LogNormalPrior = LogNormalPrior(median=20.0, log_sd=1.0)
-    stretch_noise_mm: Positive = 0.1
-    preload_noise_newtons: Positive = 2.0
 
 
 class Description(Frozen):

@@ -1,9 +1,11 @@
 """What a description says of a cable's kind and sizes, of its stretch and of its preload."""
 
+from collections.abc import Mapping
 from typing import Literal
 
 from bowdenfit.description.pulleys import Pulleys
-from bowdenfit.description.values import Frozen, QuantityValue
+from bowdenfit.description.values import Frozen, ParameterSetting, QuantityValue
+from bowdenfit.errors import DescriptionError
 
 PRELOAD = "preload"
 LOWEST = {"stiffness": False, "bedding_load": False, "bedding_stretch": True, "lengthening": True, PRELOAD: True}
@@ -62,3 +64,19 @@ class PreloadSettings(Frozen):
     model: Literal["constant", "stretch"] | None = None
     wrap_angle: QuantityValue = QuantityValue(value=0.0, unit="deg")
     value: QuantityValue | None = None
+
+
+def check_elastic(preload: PreloadSettings, prior: Mapping[str, ParameterSetting], file: str) -> None:
+    """Preload is stated once, and no elastic parameter is fixed where it cannot be."""
+    if preload.value is not None and PRELOAD in prior:
+        raise DescriptionError(
+            f"{file} states the preload twice, as value under [preload] and under [prior.{PRELOAD}]; leave one of them out."
+        )
+    for name, setting in prior.items():
+        if name not in LOWEST or setting.fixed is None:
+            continue
+        if setting.fixed < 0 or (setting.fixed == 0 and not LOWEST[name]):
+            least = "0 or more" if LOWEST[name] else "more than 0"
+            raise DescriptionError(
+                f"{file}, prior.{name}.fixed: {setting.fixed:g} is not possible; it must be {least}."
+            )

@@ -8,7 +8,7 @@ from typing import Any
 from pydantic import BaseModel, ValidationError
 
 from bowdenfit.description import SCHEMA, Description, ParameterSetting, QuantityValue, Route
-from bowdenfit.description.elastic import LOWEST, PRELOAD
+from bowdenfit.description.elastic import check_elastic
 from bowdenfit.errors import DatasetError, DescriptionError, nearest
 from bowdenfit.units import route_conversion_factor
 
@@ -67,7 +67,7 @@ def validated(raw: Mapping[str, Any], model: type[Description], file: str) -> De
         raise DescriptionError(explained(error, model, file)) from None
     check_quantities(_quantities(description), file)
     _check_route(description.route, file)
-    _check_elastic(description, file)
+    check_elastic(description.preload, description.prior, file)
     return description
 
 
@@ -78,22 +78,6 @@ def _check_route(route: Route | None, file: str) -> None:
         route_conversion_factor(route.unit, route.unit)
     except DatasetError as error:
         raise DescriptionError(f"{file}, route, unit: {error}.") from None
-
-
-def _check_elastic(description: Description, file: str) -> None:
-    """Preload is stated once, and no elastic parameter is fixed where it cannot be."""
-    if description.preload.value is not None and PRELOAD in description.prior:
-        raise DescriptionError(
-            f"{file} states the preload twice, as value under [preload] and under [prior.{PRELOAD}]; leave one of them out."
-        )
-    for name, setting in description.prior.items():
-        if name not in LOWEST or setting.fixed is None:
-            continue
-        if setting.fixed < 0 or (setting.fixed == 0 and not LOWEST[name]):
-            least = "0 or more" if LOWEST[name] else "more than 0"
-            raise DescriptionError(
-                f"{file}, prior.{name}.fixed: {setting.fixed:g} is not possible; it must be {least}."
-            )
 
 
 def _quantities(description: Description) -> list[Stated]:

@@ -12,12 +12,12 @@ from bowdenfit.description.file import Stated
 from bowdenfit.errors import DatasetError
 from bowdenfit.kinds.design import Design
 from bowdenfit.kinds.measurements import Measurements
+from bowdenfit.kinds.pages import Page
 from bowdenfit.kinds.readings import Readings
 from bowdenfit.kinds.rows import Conditions
 from bowdenfit.types import Vector
 from bowdenfit.units import ColumnSource
 
-Page = tuple[list[str], list[list[str]]]  # headings and rows
 AnyTable = TypeVar("AnyTable")
 
 

@@ -7,7 +7,7 @@ from typing import Protocol
 
 import numpy as np
 
-from bowdenfit.description import Description, Route
+from bowdenfit.description import Route
 from bowdenfit.errors import DatasetError
 from bowdenfit.files.cells import Cell
 from bowdenfit.files.columns import Column, Quantity, require
@@ -17,7 +17,6 @@ from bowdenfit.words import shown
 
 LARGEST_ANGLE = float(np.deg2rad(2000.0)) * (1 + 1e-12)
 _ALIKE = 0.75  # likeness from which an unknown heading is taken for a misspelled one
-STROKE_NAMES = {1: "pull", -1: "return"}
 _STROKES = {
     **dict.fromkeys(("pull", "pulling", "+1", "1", "+1.0", "1.0"), 1),
     **dict.fromkeys(("return", "returning", "release", "-1", "-1.0"), -1),
@@ -178,22 +177,6 @@ def provenance_of(table: RawTable) -> Provenance:
     """Where the rows of one file stand."""
     rows = np.array([row[0].row for row in table.rows])
     return Provenance((table.file,), np.zeros(len(rows), dtype=int), rows)
-
-
-def in_words(values: np.ndarray, unit: str) -> str:
-    """The range of values, or their one value."""
-    low, high = float(values.min()), float(values.max())
-    return f"{low:.4g} {unit}" if low == high else f"{low:.4g} to {high:.4g} {unit}"
-
-
-def route_heading(description: Description) -> list[str]:
-    """Heading of the route variable's column in a file that is written; none without a route."""
-    return [f"{description.route.variable}_{description.route.unit}"] if description.route else []
-
-
-def route_cells(route: float, description: Description) -> list[str]:
-    """A row's cell in that column."""
-    return [f"{route:g}"] if description.route else []
 
 
 def read_tension(cell: Cell, column: Column, what: str) -> float:

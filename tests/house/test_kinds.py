@@ -15,7 +15,7 @@ OTHER_MEANINGS = {
 
 
 def kinds_named(tree: ast.Module) -> set[str]:
-    """Kinds that code names: as a whole string, or as the folder that it imports from; no attribute is called like one."""
+    """Kinds that code names as a whole string, or by a class or a folder that it imports; no attribute is called so."""
     documentation = {
         id(node.body[0].value)
         for node in ast.walk(tree)
@@ -23,11 +23,13 @@ def kinds_named(tree: ast.Module) -> set[str]:
         and node.body
         and isinstance(node.body[0], ast.Expr)
     }
-    words: set[str] = set()
+    words, classes = set[str](), {kind.table.__name__: name for name, kind in KINDS.items()}
     for node in ast.walk(tree):
         match node:
             case ast.Constant(value=str(text)) if id(node) not in documentation:
                 words.add(text)
+            case ast.alias(name=name) if name in classes:
+                words.add(classes[name])
             case ast.ImportFrom(module=str(module)) if module.startswith("bowdenfit.kinds."):
                 words.add(module.split(".")[2])
     return words & set(KINDS)
@@ -47,6 +49,7 @@ def test_the_search_finds_names_of_kinds_wherever_code_may_have_them():
     code = '''
 """stretch"""
 from bowdenfit.kinds.loop.table import LoopTable
+from bowdenfit.recordings.recording import Recordings
 def forces(): return tables["preload"], "a sentence on recordings"
 '''
-    assert kinds_named(ast.parse(code)) == {"loop", "preload"}
+    assert kinds_named(ast.parse(code)) == {"loop", "preload", "recordings"}

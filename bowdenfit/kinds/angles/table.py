@@ -11,17 +11,10 @@ from bowdenfit.files.cells import Cell
 from bowdenfit.files.columns import Column, Quantity, find_columns, require
 from bowdenfit.files.csv_table import read_csv
 from bowdenfit.kinds.design import Design
-from bowdenfit.kinds.kind import Found, Page, Source
+from bowdenfit.kinds.kind import Found, Source
 from bowdenfit.kinds.measurements import Measurements
-from bowdenfit.kinds.rows import (
-    LARGEST_ANGLE,
-    Provenance,
-    provenance_of,
-    read_angle,
-    rounded,
-    route_column,
-    route_heading,
-)
+from bowdenfit.kinds.pages import Page, route_heading
+from bowdenfit.kinds.rows import LARGEST_ANGLE, Provenance, provenance_of, read_angle, rounded, route_column
 from bowdenfit.types import Matrix, Vector
 
 _FEWEST = 3  # detected angles that a plausible table has of each curve

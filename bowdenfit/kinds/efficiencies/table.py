@@ -9,18 +9,10 @@ from bowdenfit.files.cells import Cell
 from bowdenfit.files.columns import Column, Quantity, find_columns, require
 from bowdenfit.files.csv_table import read_csv
 from bowdenfit.kinds.design import Design
-from bowdenfit.kinds.kind import Found, Page, Source
+from bowdenfit.kinds.kind import Found, Source
+from bowdenfit.kinds.pages import Page, route_cells, route_heading
 from bowdenfit.kinds.plausibility import beyond
-from bowdenfit.kinds.rows import (
-    OwnAngles,
-    Provenance,
-    provenance_of,
-    read_own_angles,
-    read_route,
-    route_cells,
-    route_heading,
-    shared_columns,
-)
+from bowdenfit.kinds.rows import OwnAngles, Provenance, provenance_of, read_own_angles, read_route, shared_columns
 from bowdenfit.types import Vector
 
 

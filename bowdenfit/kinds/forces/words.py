@@ -5,9 +5,9 @@ import numpy as np
 from bowdenfit.description import Description
 from bowdenfit.kinds.design import Design
 from bowdenfit.kinds.forces.table import ForceTable
-from bowdenfit.kinds.kind import Page
+from bowdenfit.kinds.pages import STROKE_NAMES, Page, route_cells, route_heading
 from bowdenfit.kinds.plausibility import SCATTER, beyond, parts
-from bowdenfit.kinds.rows import STROKE_NAMES, OwnAngles, Provenance, route_cells, route_heading
+from bowdenfit.kinds.rows import OwnAngles, Provenance
 
 
 def count(table: ForceTable) -> str:

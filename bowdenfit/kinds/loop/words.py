@@ -5,12 +5,12 @@ import numpy as np
 from bowdenfit.description import Description, Table
 from bowdenfit.description.elastic import PRELOAD
 from bowdenfit.kinds.design import Design
-from bowdenfit.kinds.kind import Page
 from bowdenfit.kinds.loop.table import LoopTable
 from bowdenfit.kinds.measurements import Measurements
+from bowdenfit.kinds.pages import STROKE_NAMES, Page, in_words
 from bowdenfit.kinds.plausibility import HIGHEST, LOWEST
 from bowdenfit.kinds.preload.table import PreloadTable
-from bowdenfit.kinds.rows import STROKE_NAMES, OwnAngles, Provenance, in_words
+from bowdenfit.kinds.rows import OwnAngles, Provenance
 from bowdenfit.kinds.stretch.table import StretchTable
 
 _FREE = 0.25  # output over input force below which a loop moves all but freely

@@ -4,11 +4,11 @@ import numpy as np
 
 from bowdenfit.description import Description
 from bowdenfit.kinds.design import Design
-from bowdenfit.kinds.kind import Page
 from bowdenfit.kinds.measurements import Measurements
+from bowdenfit.kinds.pages import Page, in_words
 from bowdenfit.kinds.plausibility import within_factor
 from bowdenfit.kinds.preload.table import PreloadTable
-from bowdenfit.kinds.rows import Provenance, in_words
+from bowdenfit.kinds.rows import Provenance
 from bowdenfit.kinds.stretch.table import StretchTable
 from bowdenfit.kinds.stretch.words import one_angle_warning
 

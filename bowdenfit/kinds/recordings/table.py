@@ -11,15 +11,16 @@ from bowdenfit.errors import DatasetError, DescriptionError, nearest
 from bowdenfit.files import read_channels
 from bowdenfit.kinds.kind import Found, Source
 from bowdenfit.kinds.recordings.angles import check_placed
+from bowdenfit.kinds.recordings.names import said_by_name
 from bowdenfit.kinds.recordings.settings import RecordingsTable
-from bowdenfit.recordings.forces import TORQUES, WANTED, matched_name, pattern_fields, rows_where, to_recording
+from bowdenfit.recordings.forces import TORQUES, WANTED, rows_where, to_recording
 from bowdenfit.recordings.loop_strokes import find_loop_strokes
 from bowdenfit.recordings.preparation import NO_DELAY_OF_LOOPS, averaged, inspected
 from bowdenfit.recordings.preparation.delay import COMMON_ERROR
 from bowdenfit.recordings.recording import Account, Blocks, RawRecording, Recording, Recordings
 from bowdenfit.recordings.strokes import find_strokes
 from bowdenfit.types import Vector
-from bowdenfit.units import INTERNAL_UNITS, ColumnSource, conversion_factor, speed_dimension
+from bowdenfit.units import INTERNAL_UNITS, ColumnSource, speed_dimension
 
 
 def read_recordings(source: Source) -> Found[Recordings]:
@@ -106,49 +107,8 @@ def _entries(source: Source) -> list[tuple[Path, RecordingFile]]:
     named = {path.resolve() for path, _ in entries}
     for path in source.files:
         if path.resolve() not in named:
-            entries.append((path, _from_name(description, source.settings.pattern, path, source.name_of(path))))
+            entries.append((path, said_by_name(description, source.settings.pattern, path, source.name_of(path))))
     return entries
-
-
-def _from_name(description: Description, pattern: str | None, path: Path, file: str) -> RecordingFile:
-    """What the name of a file says, by the table's pattern."""
-    if pattern is None:
-        return RecordingFile(file=file)
-    _check_pattern(description, pattern)
-    values = matched_name(pattern, path)
-    angles = {
-        name: QuantityValue(value=float(text), unit=unit or "deg")
-        for name, (text, unit) in values.items()
-        if name in description.angle_columns
-    }
-    velocity = values.get("velocity")
-    return RecordingFile(
-        file=file,
-        run=values["run"][0] if "run" in values else None,
-        at=float(values["at"][0]) if "at" in values else None,
-        velocity=QuantityValue(value=float(velocity[0]), unit=velocity[1] or "mm/s") if velocity else None,
-        wrap_angles=angles,
-    )
-
-
-def _check_pattern(description: Description, pattern: str) -> None:
-    """A pattern names only what a recording can be told, in units of the right kind."""
-    known = ["at", "run", "velocity", *description.angle_columns]
-    place = "cable.toml, tables.recordings.pattern"
-    for name, unit in pattern_fields(pattern):
-        if name not in known:
-            raise DescriptionError(f"{place}: {name!r} is unknown{nearest(name, known)}")
-        if unit and name != "at" and name != "run":
-            dimension = speed_dimension(unit) if name == "velocity" else "angle"
-            _factor(unit, dimension, f"{place}, {{{name}:{unit}}}")
-
-
-def _factor(unit: str, dimension: str, place: str) -> float:
-    """Factor to the internal unit; an error says where the unit stands."""
-    try:
-        return conversion_factor(unit, dimension)
-    except DatasetError as error:
-        raise DescriptionError(f"{place}: {error}.") from None
 
 
 def _check_names(entries: list[tuple[Path, RecordingFile]]) -> None:

@@ -43,3 +43,34 @@ def run(monkeypatch, capsys):
         return stop.value.code, printed.out, printed.err
 
     return call
+
+
+@pytest.fixture
+def refuse(run, tmp_path):
+    """Run the command line on bad input, and return its one sentence; nothing may be written."""
+
+    def call(*arguments):
+        before = sorted(tmp_path.rglob("*"))
+        code, out, err = run(*arguments)
+        assert code == 2, (out, err)
+        assert out == ""
+        assert err.startswith("Error: ")
+        assert err.count("\n") == 1
+        assert err.rstrip()[-1] in ".?"
+        assert "inside bowdenfit" not in err
+        assert sorted(tmp_path.rglob("*")) == before
+        return err
+
+    return call
+
+
+@pytest.fixture
+def accept(run):
+    """Run the command line on input that is good enough, and return what it prints."""
+
+    def call(*arguments):
+        code, out, err = run(*arguments)
+        assert code == 0, (out, err)
+        return out
+
+    return call

@@ -3,6 +3,7 @@
 import numpy as np
 import pytest
 from cables import measured
+from spoiling import copied, spoil
 
 import bowdenfit as bf
 from bowdenfit.inference.least_squares import least_squares, make_objective, maximum_posterior
@@ -26,35 +27,10 @@ LOOP = """wrap_angle_deg,stroke,input_force_N,output_force_N,preload_N
 @pytest.fixture
 def haptic(on_body, tmp_path):
     """A copy of the synthetic haptic loop to spoil, with forces in place of torques."""
-    folder = tmp_path / "cable"
-    folder.mkdir()
-    for name in NAMES:
-        (folder / name).write_bytes((on_body.parent / "synthetic-haptic-loop" / name).read_bytes())
+    folder = copied(on_body.parent / "synthetic-haptic-loop", NAMES, tmp_path / "cable")
     (folder / "torques.csv").write_bytes((folder / "loop.csv").read_bytes())
     (folder / "loop.csv").write_text(LOOP)
     return folder
-
-
-@pytest.fixture
-def refused(run):
-    """Run the command line on spoiled input and return its one sentence."""
-
-    def call(*arguments):
-        code, out, err = run(*arguments)
-        assert code == 2, (out, err)
-        assert out == ""
-        assert err.startswith("Error: ")
-        assert err.count("\n") == 1
-        assert err.rstrip()[-1] in ".?"
-        return err
-
-    return call
-
-
-def spoil(path, old, new):
-    text = path.read_text(encoding="utf-8")
-    assert old in text, f"{path.name} has no {old!r}"
-    path.write_text(text.replace(old, new), encoding="utf-8")
 
 
 FIRST = "0,load,1,-0.2569"
@@ -108,9 +84,9 @@ TABLES = [
 
 
 @pytest.mark.parametrize(("file", "old", "new", "names"), TABLES)
-def test_a_spoiled_elastic_table_is_refused_by_name(haptic, refused, file, old, new, names):
+def test_a_spoiled_elastic_table_is_refused_by_name(haptic, refuse, file, old, new, names):
     spoil(haptic / file, old, new)
-    said = refused("check", haptic)
+    said = refuse("check", haptic)
     for name in [file, *names]:
         assert name in said, said
 
@@ -124,12 +100,12 @@ HEADS = {
 
 @pytest.mark.parametrize("file", HEADS)
 @pytest.mark.parametrize(("rows", "names"), [("", "no measurements"), (None, "empty"), (False, "does not exist")])
-def test_an_elastic_table_without_rows_is_refused(haptic, refused, file, rows, names):
+def test_an_elastic_table_without_rows_is_refused(haptic, refuse, file, rows, names):
     if rows is False:
         (haptic / file).unlink()
     else:
         (haptic / file).write_text("" if rows is None else HEADS[file] + "\n")
-    said = refused("check", haptic)
+    said = refuse("check", haptic)
     assert file in said
     assert names in said
 
@@ -142,9 +118,9 @@ FALLING = [
 
 
 @pytest.mark.parametrize(("rows", "row"), FALLING)
-def test_stretch_that_falls_with_load_is_refused_at_all_angles_or_at_one(haptic, refused, rows, row):
+def test_stretch_that_falls_with_load_is_refused_at_all_angles_or_at_one(haptic, refuse, rows, row):
     (haptic / S).write_text(f"{HEADS[S]}\n{rows}")
-    said = refused("check", haptic)
+    said = refuse("check", haptic)
     for name in (S, row, "stretch_mm", "the stretch falls", "write stretch as positive"):
         assert name in said, said
 
@@ -156,18 +132,18 @@ def test_stretch_that_falls_in_a_single_pair_may_be_noise_and_is_warned_of(hapti
     assert "Warning: in stretch.csv the stretch falls while the load grows, from row 2 to row 3" in out
 
 
-def test_output_ahead_of_input_is_refused(haptic, refused):
+def test_output_ahead_of_input_is_refused(haptic, refuse):
     (haptic / L).write_text(LOOP.replace("20,18", "18,20").replace("20,22", "22,20").replace("40,33", "33,40"))
-    said = refused("check", haptic)
+    said = refuse("check", haptic)
     for name in (L, "row 4", "input 33 N", "output 40 N", "swapped"):
         assert name in said, said
 
 
 @pytest.mark.parametrize("end", ["input", "output"])
-def test_torque_without_radius_is_refused_with_the_line_to_write(haptic, refused, end):
+def test_torque_without_radius_is_refused_with_the_line_to_write(haptic, refuse, end):
     spoil(haptic / "cable.toml", f'{end}_pulley_radius = {{ value = 20, unit = "mm" }}\n', "")
     (haptic / L).write_bytes((haptic / "torques.csv").read_bytes())
-    said = refused("check", haptic)
+    said = refuse("check", haptic)
     assert f"{end}_torque" in said
     assert f'{end}_pulley_radius = {{ value = 15, unit = "mm" }}' in said
 
@@ -182,11 +158,11 @@ def test_torque_without_radius_is_refused_with_the_line_to_write(haptic, refused
         ("cable.toml", 'kind = "loop"', 'kind = "single"'),
     ],
 )
-def test_nothing_is_written_after_a_refused_elastic_table(haptic, refused, tmp_path, verb, file, old, new):
+def test_nothing_is_written_after_a_refused_elastic_table(haptic, refuse, tmp_path, verb, file, old, new):
     spoil(haptic / file, old, new)
     output = ["--output", tmp_path / "results"] if verb == "fit" else []
     before = sorted(tmp_path.rglob("*"))
-    refused(verb, haptic, *output)
+    refuse(verb, haptic, *output)
     assert sorted(tmp_path.rglob("*")) == before
 
 
@@ -229,24 +205,24 @@ DESCRIPTIONS = [
 
 
 @pytest.mark.parametrize(("old", "new", "names"), DESCRIPTIONS)
-def test_a_spoiled_elastic_description_is_refused_by_key(haptic, refused, old, new, names):
+def test_a_spoiled_elastic_description_is_refused_by_key(haptic, refuse, old, new, names):
     spoil(haptic / "cable.toml", old, new)
-    said = refused("check", haptic)
+    said = refuse("check", haptic)
     for name in ["cable.toml", *names]:
         assert name in said, said
 
 
-def test_a_preload_that_is_stated_twice_is_refused(haptic, refused):
+def test_a_preload_that_is_stated_twice_is_refused(haptic, refuse):
     spoil(haptic / "cable.toml", 'model = "stretch"', 'value = { value = 10, unit = "N" }')
     spoil(haptic / "cable.toml", "[tables]", "[prior.preload]\nfixed = 3\n[tables]")
-    assert "states the preload twice" in refused("check", haptic)
+    assert "states the preload twice" in refuse("check", haptic)
 
 
-def test_a_table_of_keys_given_as_a_word_is_refused_with_how_to_write_it(haptic, refused):
+def test_a_table_of_keys_given_as_a_word_is_refused_with_how_to_write_it(haptic, refuse):
     spoil(haptic / "cable.toml", "[stretch]\n", "")
     spoil(haptic / "cable.toml", STRETCH, "")
     spoil(haptic / "cable.toml", "[cable]", 'stretch = "mu"\n[cable]')
-    assert "write them under [stretch]" in refused("check", haptic)
+    assert "write them under [stretch]" in refuse("check", haptic)
 
 
 @pytest.mark.parametrize(

@@ -4,6 +4,7 @@ import sys
 from pathlib import Path
 
 import pytest
+from spoiling import copied, spoil
 
 from bowdenfit import cli
 from bowdenfit.dataset import read_dataset
@@ -15,36 +16,11 @@ from bowdenfit.kinds.settings import parse_description
 @pytest.fixture
 def dataset(on_body, tmp_path):
     """A copy of the on-body data set to spoil."""
-    folder = tmp_path / "cable"
-    folder.mkdir()
-    for name in ("cable.toml", "angles.csv", "efficiencies.csv"):
-        (folder / name).write_bytes((on_body / name).read_bytes())
+    folder = copied(on_body, ("cable.toml", "angles.csv", "efficiencies.csv"), tmp_path / "cable")
     (folder / "forces.csv").write_text(
         "cable_length_mm,run,stroke,input_force_N,output_force_N\n440,1,pull,50,38\n470,2,return,50,62\n"
     )
     return folder
-
-
-@pytest.fixture
-def refuse(run):
-    """Run the command line on spoiled input and return its one sentence."""
-
-    def call(*arguments):
-        code, out, err = run(*arguments)
-        assert code == 2, (out, err)
-        assert out == ""
-        assert err.startswith("Error: ")
-        assert err.count("\n") == 1
-        assert err.rstrip()[-1] in ".?"
-        return err
-
-    return call
-
-
-def spoil(path, old, new, encoding="utf-8"):
-    text = path.read_text(encoding="utf-8")
-    assert old in text
-    path.write_text(text.replace(old, new), encoding=encoding)
 
 
 FORCES = ('efficiencies = { file = "efficiencies.csv" }', 'forces = { files = "forces.csv" }')

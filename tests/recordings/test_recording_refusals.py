@@ -10,6 +10,7 @@ import numpy as np
 import pandas
 import pytest
 import scipy.io
+from spoiling import replaced
 
 from bowdenfit.dataset import load_dataset
 from bowdenfit.errors import DatasetError
@@ -63,37 +64,6 @@ def columns(simulated):
         "output_force_N": simulated.output_force,
         "velocity_mm/s": simulated.velocity,
     }
-
-
-@pytest.fixture
-def refuse(run, tmp_path):
-    """Run the command line on bad input, and return its one sentence."""
-
-    def call(*arguments):
-        before = sorted(tmp_path.rglob("*"))
-        code, out, err = run(*arguments)
-        assert code == 2, (out, err)
-        assert out == ""
-        assert err.startswith("Error: ")
-        assert err.count("\n") == 1
-        assert len(err) < 520
-        assert "inside bowdenfit" not in err
-        assert sorted(tmp_path.rglob("*")) == before
-        return err
-
-    return call
-
-
-@pytest.fixture
-def accept(run):
-    """Run the command line on input that is good enough, and return what it prints."""
-
-    def call(*arguments):
-        code, out, err = run(*arguments)
-        assert code == 0, (out, err)
-        return out
-
-    return call
 
 
 def write(path, columns):
@@ -206,14 +176,14 @@ def test_a_lone_return_is_refused_unless_set_by_hand(columns, simulated, refuse,
     for part in ("run.csv", "return stroke alone", "cable.toml", 'stroke = "return"', *SWAP):
         assert part in said
     start, end = simulated.time[np.flatnonzero(simulated.stroke == RETURN)[[0, -1]]]
-    spoil(tmp_path, ("at = 470", f'at = 470\nstrokes = [{{ start = {start}, end = {end}, stroke = "return" }}]'))
-    spoil(tmp_path, ('"whole"', '"runs"'), text=(tmp_path / "cable.toml").read_text())
+    describe(tmp_path, ("at = 470", f'at = 470\nstrokes = [{{ start = {start}, end = {end}, stroke = "return" }}]'))
+    describe(tmp_path, ('"whole"', '"runs"'), text=(tmp_path / "cable.toml").read_text())
     assert "run is returning throughout" in accept("check", tmp_path)
 
 
 def test_a_whole_recording_without_a_reversal_is_refused(columns, simulated, refuse, tmp_path):
     write(tmp_path / "run.csv", during(columns, simulated, PULL))
-    spoil(tmp_path)
+    describe(tmp_path)
     said = refuse("fit", tmp_path, "--output", tmp_path / "results")
     for part in ("run.csv", "no reversal", 'likelihood = "runs"'):
         assert part in said
@@ -362,18 +332,15 @@ def test_a_file_that_is_too_large_is_refused(columns, refuse, tmp_path, monkeypa
         assert part in said
 
 
-def spoil(folder, *changes, text=TOML):
+def describe(folder, *changes, text=TOML):
     """Write a description in which something is replaced, and the table of angles."""
-    for old, new in changes:
-        assert old in text
-        text = text.replace(old, new)
-    (folder / "cable.toml").write_text(text)
+    (folder / "cable.toml").write_text(replaced(text, *changes))
     (folder / "angles.csv").write_text("cable_length_mm,angle_deg\n430,60\n450,70\n470,90\n500,110\n530,140\n550,150\n")
 
 
 def test_the_description_that_is_spoiled_below_is_a_good_one(columns, accept, tmp_path):
     write(tmp_path / "run.csv", columns)
-    spoil(tmp_path)
+    describe(tmp_path)
     assert "Recordings:" in accept("check", tmp_path)
 
 
@@ -447,7 +414,7 @@ DESCRIPTIONS = [
 @pytest.mark.parametrize(("changes", "parts"), DESCRIPTIONS)
 def test_a_spoiled_description_of_recordings_is_refused(columns, refuse, tmp_path, changes, parts):
     write(tmp_path / "run.csv", columns)
-    spoil(tmp_path, *changes)
+    describe(tmp_path, *changes)
     said = refuse("check", tmp_path)
     for part in parts:
         assert part in said, said
@@ -456,7 +423,7 @@ def test_a_spoiled_description_of_recordings_is_refused(columns, refuse, tmp_pat
 def test_velocities_of_the_rope_and_of_the_motor_do_not_mix(columns, refuse, tmp_path):
     write(tmp_path / "run.csv", columns)
     write(tmp_path / "motor.csv", renamed(columns, "mm/s", "rpm"))
-    spoil(tmp_path, *with_key('[[recording]]\nfile = "motor.csv"\nat = 500'))
+    describe(tmp_path, *with_key('[[recording]]\nfile = "motor.csv"\nat = 500'))
     said = refuse("check", tmp_path)
     for part in ("run.csv and motor.csv", "rope", "motor", "mm/s or both in r/min"):
         assert part in said
@@ -465,7 +432,7 @@ def test_velocities_of_the_rope_and_of_the_motor_do_not_mix(columns, refuse, tmp
 @pytest.mark.parametrize(("at", "refused"), [(470, False), (550, False), (640, True)])
 def test_a_recording_outside_the_curves_needs_a_row_of_angles(columns, tmp_path, at, refused):
     write(tmp_path / "run.csv", columns)
-    spoil(tmp_path)
+    describe(tmp_path)
     data = load_dataset(tmp_path)
     moved = replace(data.measurements.table(Recordings).each[0], route=float(at))
     recordings = replace(data.measurements.table(Recordings), each=(moved,))

@@ -59,7 +59,7 @@ def check_sign(file: str, name: str, force: Vector) -> None:
         raise DatasetError(
             f"{file}: {100 * negative:.0f} % of the readings of {name} under load are negative, down to "
             f"{finite.min():.4g} N, but a rope can only pull; the usual cause is the sign convention of the load cell. "
-            f"Turn the sign by mapping the channel with a minus before its unit: --channel {name}=NAME:-N"
+            f"Turn the sign by mapping the channel with a minus before its unit, such as --channel {name}=NAME:-N."
         )
 
 

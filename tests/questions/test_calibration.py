@@ -10,6 +10,7 @@ import pytest
 from cables import CONTACTS, DESIGN, cable
 from conftest import ROOT
 from scipy import stats
+from spoiling import copied
 
 from bowdenfit.dataset import Dataset, load_dataset
 from bowdenfit.description import Description, SamplerSettings
@@ -450,6 +451,16 @@ def test_what_cannot_be_assumed_or_replicated_is_refused_in_a_sentence(run, tmp_
     assert code == 2
     assert "mu9" in err
     assert not (tmp_path / "c").exists()
+
+
+def test_a_table_that_only_the_assumption_names_is_refused(run, tmp_path):
+    names = ("cable.toml", "angles.csv", "efficiencies.csv")
+    folder = copied(ROOT / "datasets" / "on-body-exoskeleton", names, tmp_path / "cable")
+    (folder / "forces.csv").write_text("cable_length_mm,run,input_force_N,output_force_N\n440,1,50,38\n470,2,50,40\n")
+    assumption = 'tables.forces={file="forces.csv"}'
+    code, _, err = run("calibrate", folder, "-o", tmp_path / "c", "-n", 2, "-j", 1, "--assume", assumption)
+    assert code == 2
+    assert "--assume changes which tables" in err
 
 
 @pytest.mark.slow

@@ -1,27 +1,18 @@
-"""Phases of a pull-pull loop's recording, by its own play operator: moving forward, moving back, between."""
+"""What a recording of a pull-pull loop says of its phases: the play operator of its two sides that follows it best."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from typing import ClassVar
 
 import numpy as np
 
 from bowdenfit.description import Phase
 from bowdenfit.errors import DatasetError, DescriptionError
-from bowdenfit.recordings.recording import PULL, RETURN, SWITCH, Blocks, Strokes
-from bowdenfit.recordings.strokes import (
-    check_length,
-    correlation_time,
-    covered,
-    inside_sliding,
-    moving_steadily,
-    overridden,
-    toward_motor,
-    white_noise,
-)
-from bowdenfit.types import Labels, Vector
+from bowdenfit.recordings.preparation.play import Hysteresis, play_between, white_noise
+from bowdenfit.recordings.recording import PULL, Blocks
+from bowdenfit.types import Flags, Labels, Vector
 
 _FIT_BLOCKS = 2000  # more than these say no more about the loop
-_FEWEST = 10  # blocks
 _LOSSES = (0.03, 0.1, 0.25, 0.45, 0.7, 0.9, 1.0)  # of the largest difference of the forces, where the fit is begun
 _EXPONENTS = (0.2, 0.5, 0.8, 1.0, 1.2)  # of the one that explains that difference without preload
 _LARGEST_SHARE = 0.95  # of the input force, that friction may take
@@ -35,75 +26,50 @@ _LEAST = 1e-9
 
 
 @dataclass(frozen=True)
-class ForceLoop:
-    """The play operator of a pull-pull loop that follows a recording best.
+class LoopStrokes:
+    """The steps of `strokes.find_strokes` that a pull-pull loop takes in its own way.
 
     Args:
-        loss: Force lost while both sides are taut, 2 P Lambda [N].
-        exponent: Friction exponent of one side, Lambda [1].
-        center: Input less output force in the middle of the loop, what sensors add [N].
-        deviation: Of the output force from the operator, block by block [N].
-        followed: Output of the operator [N].
-        state: +1 at the lower limit (moving forward), -1 at the upper (moving back), 0 between.
-        cost: Robust sum of squares of the deviations, in units of their noise, over two.
-    """
-
-    loss: float
-    exponent: float
-    center: float
-    deviation: Vector
-    followed: Vector
-    state: Labels
-    cost: float
-
-
-def find_loop_strokes(
-    blocks: Blocks, file: str, name: str, by_hand: Sequence[Phase] = (), preload: float | None = None
-) -> Strokes:
-    """The phases of a loop's recording, from the contact state of its play operator and, where recorded, the velocity.
-
-    `Strokes.drag` is the force lost while both sides are taut and `Strokes.exponent` the friction exponent, each NaN where
-    the recording by itself does not tell it: without load beyond the taut branch only the loss is told, and the exponent
-    is that of the stated preload.
-
-    Args:
-        blocks: The prepared recording.
-        file: File name, for errors.
-        name: Name of the recording, for errors and remarks.
-        by_hand: Phases set by the user, "pull" for moving forward and "return" for back; they replace what is found.
         preload: Preload that the user states, the same at all wrap angles [N].
-
-    Raises:
-        DatasetError: It is too short; a phase lies outside it; the loop never moves; input and output are swapped, or one
-            has its sign turned round.
-        DescriptionError: A phase is to be ignored.
     """
-    check_length(blocks, file, name, by_hand)
-    _check_none_ignored(by_hand, file)
-    usable = ~blocks.saturated
-    if usable.sum() < _FEWEST:
-        raise DatasetError(
-            f"{file}: only {int(usable.sum())} blocks of the recording {name!r} are inside the range of the load cells; "
-            "correct the limits under prepare in cable.toml, or leave the recording out."
-        )
-    force_in, force_out = blocks.input_force[usable], blocks.output_force[usable]
-    fit = fit_force_loop(force_in, force_out)
-    if not by_hand:
-        _check_ends(force_in, force_out, fit, file, name)
-    _check_moves(force_in, force_out, fit, file, name)
-    velocity = toward_motor(blocks.velocity[usable], fit.state)
-    state, moving = np.zeros(len(usable), dtype=int), np.ones(len(usable), dtype=bool)
-    state[usable], moving[usable] = fit.state, moving_steadily(velocity, fit.state)
-    used = inside_sliding(state) & usable & moving
-    if by_hand:
-        state, used = overridden(blocks.time, state, used & ~covered(blocks.time, by_hand), usable, by_hand)
-    correlation = correlation_time(fit.deviation[used[usable]]) if used.any() else 1.0
-    loss, exponent = _told(force_in, force_out, fit, correlation)
-    remarks = _remarks(name, state[used], fit, loss, exponent, preload)
-    if preload and np.isnan(exponent):
-        exponent = loss / (2 * preload)
-    noise = float(1.4826 * np.median(np.abs(fit.deviation))) or 1e-12
-    return Strokes(state, used, exponent, fit.center, loss, noise, correlation, bool(by_hand), remarks)
+
+    preload: float | None = None
+
+    unusable: ClassVar = (
+        "are inside the range of the load cells; correct the limits under prepare in cable.toml, or leave the recording "
+        "out."
+    )
+
+    def usable(self, blocks: Blocks) -> Flags:
+        """Blocks inside the range of the load cells."""
+        return ~blocks.saturated
+
+    def follow(self, force_in: Vector, force_out: Vector) -> Hysteresis:
+        """The play operator that follows forces of either sign best."""
+        return fit_force_loop(force_in, force_out)
+
+    def refuse(self, loop: Hysteresis, velocity: Vector, file: str, name: str, by_hand: Sequence[Phase]) -> None:
+        """Refuse phases to be ignored, channels that are the wrong way round, and a loop that never moves."""
+        del velocity
+        _check_none_ignored(by_hand, file)
+        if not by_hand:
+            _check_ends(loop, file, name)
+        _check_moves(loop, file, name)
+
+    def told(
+        self, loop: Hysteresis, state: Labels, found: set[int], correlation: float, name: str
+    ) -> tuple[float, float, float, tuple[str, ...]]:
+        """Exponent, center, the force lost while both sides are taut, and remarks.
+
+        Exponent and loss are NaN where the recording by itself does not tell them: without load beyond the taut branch only
+        the loss is told, and the exponent is that of the stated preload.
+        """
+        del state
+        loss, exponent = _told(loop, correlation)
+        remarks = _remarks(name, found, loop, loss, exponent, self.preload)
+        if self.preload and np.isnan(exponent):
+            exponent = loss / (2 * self.preload)
+        return exponent, loop.center, loss, remarks
 
 
 def loop_limits(force: Vector, loss: float, exponent: float) -> tuple[Vector, Vector]:
@@ -118,21 +84,7 @@ def loop_limits(force: Vector, loss: float, exponent: float) -> tuple[Vector, Ve
     return np.minimum(force - loss, np.minimum(less, more)), np.maximum(force + loss, np.maximum(less, more))
 
 
-def follow(lower: Vector, upper: Vector, start: float) -> tuple[Vector, Labels]:
-    """The play operator between two limits, and its contact: +1 at the lower, -1 at the upper, 0 between."""
-    y, output, state = start, [], []
-    for low, high in zip(lower.tolist(), upper.tolist(), strict=True):
-        contact = SWITCH
-        if y <= low:
-            y, contact = low, PULL
-        elif y >= high:
-            y, contact = high, RETURN
-        output.append(y)
-        state.append(contact)
-    return np.array(output), np.array(state, dtype=int)
-
-
-def fit_force_loop(force_in: Vector, force_out: Vector, taut: bool = True, slack: bool = True) -> ForceLoop:
+def fit_force_loop(force_in: Vector, force_out: Vector, taut: bool = True, slack: bool = True) -> Hysteresis:
     """The loop's play operator that follows the output force best, with loss, friction exponent and center free.
 
     Args:
@@ -162,8 +114,8 @@ def fit_force_loop(force_in: Vector, force_out: Vector, taut: bool = True, slack
     fits = [least_squares(residuals, start, loss="soft_l1", x_scale=[0.1, 0.1, 0.1], max_nfev=40) for start in starts]
     best = min(fits, key=lambda fit: float(fit.cost))
     loss, exponent, center = parameters(best.x)
-    deviation, followed, state = _deviation(force_in, force_out, loss, exponent, center)
-    return ForceLoop(loss, exponent, center, deviation, followed, state, float(best.cost) * len(force_in) / len(x))
+    found = _deviation(force_in, force_out, loss, exponent, center)
+    return Hysteresis(force_in, force_out, exponent, center, loss, *found, float(best.cost) / len(x))
 
 
 def _starts(x: Vector, y: Vector, scale: float) -> list[np.ndarray]:
@@ -182,7 +134,7 @@ def _starts(x: Vector, y: Vector, scale: float) -> list[np.ndarray]:
 
 def _deviation(x: Vector, y: Vector, loss: float, exponent: float, center: float) -> tuple[Vector, Vector, Labels]:
     """Deviation of the output from the operator, the operator's output, and its contact."""
-    followed, state = follow(*loop_limits(x, loss, exponent), float(y[0]) + center)
+    followed, state = play_between(*loop_limits(x, loss, exponent), float(y[0]) + center)
     return y + center - followed, followed, state
 
 
@@ -192,12 +144,12 @@ def _noise(force_in: Vector, force_out: Vector) -> float:
     return float(np.hypot(max(white_noise(force_in), 1e-6 * level), max(white_noise(force_out), 1e-6 * level))) or 1e-12
 
 
-def _told(force_in: Vector, force_out: Vector, fit: ForceLoop, correlation: float) -> tuple[float, float]:
+def _told(fit: Hysteresis, correlation: float) -> tuple[float, float]:
     """Loss and exponent, each NaN where the recording is followed as well without it."""
-    enough = _SURE * correlation
-    loss_told = fit_force_loop(force_in, force_out, taut=False).cost - fit.cost > enough
-    exponent_told = fit_force_loop(force_in, force_out, slack=False).cost - fit.cost > enough
-    return (fit.loss if loss_told else float("nan")), (fit.exponent if exponent_told else float("nan"))
+    enough = _SURE * correlation / len(fit.force_in)
+    loss_told = fit_force_loop(fit.force_in, fit.force_out, taut=False).cost - fit.cost > enough
+    exponent_told = fit_force_loop(fit.force_in, fit.force_out, slack=False).cost - fit.cost > enough
+    return (fit.lost if loss_told else float("nan")), (fit.exponent if exponent_told else float("nan"))
 
 
 def _check_none_ignored(by_hand: Sequence[Phase], file: str) -> None:
@@ -210,9 +162,10 @@ def _check_none_ignored(by_hand: Sequence[Phase], file: str) -> None:
         )
 
 
-def _check_ends(force_in: Vector, force_out: Vector, fit: ForceLoop, file: str, name: str) -> None:
+def _check_ends(fit: Hysteresis, file: str, name: str) -> None:
     """Refuse channels that are the wrong way round, or of which one counts the other direction as positive."""
-    if fit.cost < _WELL * len(force_in):  # it follows to within its noise, which neither could
+    force_in, force_out = fit.force_in, fit.force_out
+    if fit.cost < _WELL:  # it follows to within its noise, which neither could
         return
     if np.ptp(force_in) > 0 and np.ptp(force_out) > 0 and np.corrcoef(force_in, force_out)[0, 1] < _OPPOSITE:
         raise DatasetError(
@@ -228,12 +181,13 @@ def _check_ends(force_in: Vector, force_out: Vector, fit: ForceLoop, file: str, 
         )
 
 
-def _check_moves(force_in: Vector, force_out: Vector, fit: ForceLoop, file: str, name: str) -> None:
+def _check_moves(fit: Hysteresis, file: str, name: str) -> None:
     """Refuse a recording in which the output force just stands, somewhere inside the friction band."""
+    force_in, force_out = fit.force_in, fit.force_out
     noise = max(white_noise(force_out), 1e-12)
     still = np.sum(np.sqrt(1 + ((force_out - np.median(force_out)) / _noise(force_in, force_out)) ** 2) - 1)
     moved = np.ptp(fit.followed) > _CLEAR_OF_NOISE * noise and fit.state.any()
-    if not moved or float(still) - fit.cost < _SURE:
+    if not moved or float(still) - fit.cost * len(force_in) < _SURE:
         raise DatasetError(
             f"{file}: the output force of {name!r} stands still, at {np.median(force_out):.4g} N, while the input force goes "
             f"from {force_in.min():.4g} to {force_in.max():.4g} N: all inside the friction band, so that it tells no more of "
@@ -243,10 +197,9 @@ def _check_moves(force_in: Vector, force_out: Vector, fit: ForceLoop, file: str,
 
 
 def _remarks(
-    name: str, used: np.ndarray, fit: ForceLoop, loss: float, exponent: float, preload: float | None
+    name: str, found: set[int], fit: Hysteresis, loss: float, exponent: float, preload: float | None
 ) -> tuple[str, ...]:
     remarks = []
-    found = set(used.tolist())
     if not found:
         remarks.append(f"{name}: no block lies safely inside a phase of motion.")
     elif len(found) == 1:
@@ -254,7 +207,7 @@ def _remarks(
         remarks.append(
             f"{name} moves {which} throughout: offsets of the load cells cannot be told from friction by it."
         )
-    if len(found) == 2 and abs(fit.center) > _CENTER_SD * max(fit.loss, _LEAST):
+    if len(found) == 2 and abs(fit.center) > _CENTER_SD * max(fit.lost, _LEAST):
         remarks.append(
             f"{name}: the input force is off the output force by {fit.center:+.3g} N in the middle of the loop; the usual "
             "cause is a load cell with a wrong tare: give [sensors] an offset_sd, or tare the recording."

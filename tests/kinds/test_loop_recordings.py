@@ -22,9 +22,10 @@ from bowdenfit.questions.figures import FIGURES, figures_of
 from bowdenfit.questions.recorded.loop_traces import loop_points
 from bowdenfit.questions.recorded.traces import traces
 from bowdenfit.recordings.forces import parsed_channels
-from bowdenfit.recordings.loop_strokes import find_loop_strokes
+from bowdenfit.recordings.loop_strokes import LoopStrokes
 from bowdenfit.recordings.preparation import prepare
 from bowdenfit.recordings.recording import RawRecording, Recordings
+from bowdenfit.recordings.strokes import find_strokes
 from bowdenfit.results.store import _measurements, _measurements_page
 
 PRELOAD, MU, RATE = 20.0, 0.12, 200.0
@@ -84,8 +85,8 @@ def prepared(columns, settings=SETTINGS):
     return prepare(RawRecording("run", "run.csv", time, forces[0], time, forces[1], loop=True), settings)
 
 
-def strokes_of(columns, *more, **named):
-    return find_loop_strokes(prepared(columns)[0], "run.csv", "run", *more, **named)
+def strokes_of(columns, by_hand=(), preload=None):
+    return find_strokes(prepared(columns)[0], "run.csv", "run", by_hand, LoopStrokes(preload))
 
 
 def term_of(folder) -> LoopRecordingsTerm:
@@ -135,7 +136,7 @@ def test_loss_and_exponent_of_a_recording_without_noise_are_found(shape):
 def test_phases_are_where_the_loop_moves(amplitude):
     columns = recorded(amplitude=amplitude, noise=0.3)
     blocks, _ = prepared(columns)
-    found = find_loop_strokes(blocks, "run.csv", "run")
+    found = find_strokes(blocks, "run.csv", "run", cable=LoopStrokes())
     time, force = motor("sine", amplitude)
     rate = np.interp(blocks.time, time, np.gradient(output_of(force, PRELOAD, HALF_TURN), time))
     assert found.used_sliding.any()
@@ -203,8 +204,8 @@ def test_phases_set_by_hand_replace_those_found():
         Phase(start=3.0, end=3.5, stroke="return"),
         Phase(start=5.0, end=5.5, stroke="pull"),
     )
-    found = find_loop_strokes(blocks, "run.csv", "run", spans)
-    plain = find_loop_strokes(blocks, "run.csv", "run")
+    found = find_strokes(blocks, "run.csv", "run", spans, LoopStrokes())
+    plain = find_strokes(blocks, "run.csv", "run", cable=LoopStrokes())
     inside = [(blocks.time >= s.start) & (blocks.time <= s.end) for s in spans]
     assert [set(found.stroke[part]) for part in inside] == [{0}, {-1}, {1}]
     assert not found.used_sliding[inside[0]].any()
@@ -256,7 +257,7 @@ def test_a_phase_to_be_ignored_is_refused(tmp_path):
 def test_a_recording_beyond_the_range_of_its_load_cells_is_refused():
     with pytest.raises(DatasetError, match="inside the range of the load cells"):
         blocks, _ = prepared(recorded())
-        find_loop_strokes(replace(blocks, saturated=np.arange(len(blocks.time)) > 5), "run.csv", "run")
+        find_strokes(replace(blocks, saturated=np.arange(len(blocks.time)) > 5), "run.csv", "run", cable=LoopStrokes())
 
 
 def as_torques(columns, input_radius=15.0, output_radius=12.0, unit="N_m"):

@@ -20,9 +20,8 @@ from bowdenfit.kinds.bench import Truth
 from bowdenfit.kinds.recordings.angles import recorded_angles
 from bowdenfit.kinds.recordings.blocks import worth_of
 from bowdenfit.kinds.recordings.side_by_side import beside
-from bowdenfit.recordings.loop_strokes import find_loop_strokes
 from bowdenfit.recordings.recording import Blocks, Recording, Recordings, Strokes
-from bowdenfit.recordings.strokes import find_strokes
+from bowdenfit.recordings.strokes import cable_of, find_strokes
 
 
 def drawn_recordings(recordings: Recordings, truth: Truth) -> dict[str, jax.Array]:
@@ -98,24 +97,19 @@ def recorded_again(description: Description, recordings: Recordings, drawn: Mapp
         shown, error = drawn["output_force"][:n, i], drawn["output_error"][:n, i]
         late = shown - float(drawn["delay_error"]) * np.gradient(shown, time)
         blocks = replace(recording.blocks, input_force=drawn["input_force"][:n, i], output_force=late + error)
-        strokes = _strokes(description, recordings.loop, recording, blocks)
+        strokes = _strokes(description, recording, blocks)
         each.append(replace(recording, blocks=blocks, strokes=strokes))
     return replace(recordings, each=tuple(each))
 
 
-def _strokes(description: Description, loop: bool, recording: Recording, blocks: Blocks) -> Strokes:
+def _strokes(description: Description, recording: Recording, blocks: Blocks) -> Strokes:
     spans = [
         phase
         for entry in description.recording
         if entry.file == recording.file and recording.strokes.by_hand
         for phase in entry.strokes
     ]
-    if loop:
-        stated = description.preload.value
-        preload = stated.to("force") if stated is not None and not description.preload_follows_stretch else None
-        found = find_loop_strokes(blocks, recording.file, recording.name, spans, preload)
-    else:
-        found = find_strokes(blocks, recording.file, recording.name, spans)
+    found = find_strokes(blocks, recording.file, recording.name, spans, cable_of(description))
     return replace(found, correlation=recording.strokes.correlation)
 
 

@@ -14,11 +14,10 @@ from bowdenfit.kinds.recordings.angles import check_placed
 from bowdenfit.kinds.recordings.names import said_by_name
 from bowdenfit.kinds.recordings.settings import RecordingsTable
 from bowdenfit.recordings.forces import TORQUES, WANTED, rows_where, to_recording
-from bowdenfit.recordings.loop_strokes import find_loop_strokes
 from bowdenfit.recordings.preparation import NO_DELAY_OF_LOOPS, averaged, inspected
 from bowdenfit.recordings.preparation.delay import COMMON_ERROR
 from bowdenfit.recordings.recording import Account, Blocks, RawRecording, Recording, Recordings
-from bowdenfit.recordings.strokes import find_strokes
+from bowdenfit.recordings.strokes import cable_of, find_strokes
 from bowdenfit.types import Vector
 from bowdenfit.units import INTERNAL_UNITS, ColumnSource, speed_dimension
 
@@ -138,22 +137,13 @@ def _to_read(description: Description, path: Path, entry: RecordingFile, channel
 
 def _recording(description: Description, file: _File, blocks: Blocks, account: Account) -> Recording:
     raw, entry = file.raw, file.entry
-    if description.cable.kind == "loop":
-        strokes = find_loop_strokes(blocks, raw.file, raw.name, entry.strokes, _stated_preload(description))
-    else:
-        strokes = find_strokes(blocks, raw.file, raw.name, entry.strokes)
+    strokes = find_strokes(blocks, raw.file, raw.name, entry.strokes, cable_of(description))
     if entry.velocity is not None and not len(raw.velocity):
         speed = entry.velocity.to(speed_dimension(entry.velocity.unit))
         blocks = replace(blocks, velocity=np.full(len(blocks.time), speed))
     angle, sd = _own_angles(description, entry)
     route = float("nan") if entry.at is None else entry.at
     return Recording(raw.name, raw.file, entry.run or raw.name, route, angle, sd, blocks, strokes, account)
-
-
-def _stated_preload(description: Description) -> float | None:
-    """The preload that is stated for all wrap angles [N]."""
-    stated = description.preload.value
-    return stated.to("force") if stated is not None and not description.preload_follows_stretch else None
 
 
 def _known(channels: Mapping[str, ColumnSource]) -> Mapping[str, ColumnSource]:

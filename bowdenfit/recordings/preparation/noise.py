@@ -55,12 +55,20 @@ def correlation_time(values: Vector) -> float:
     References:
         Sokal, Monte Carlo methods in statistical mechanics (1997), section 3: the window is five times the time itself.
     """
-    n = len(values)
-    centered = values - np.mean(values)
-    if n < 4 or not np.any(centered):
+    n, correlation = len(values), autocorrelation(values)
+    if n < 4 or correlation is None:
         return 1.0
-    spectrum = np.abs(np.fft.rfft(centered, 1 << (2 * n - 1).bit_length())) ** 2
-    covariance = np.fft.irfft(spectrum)[: n // 2]
-    times = 2 * np.cumsum(covariance / covariance[0]) - 1
+    times = 2 * np.cumsum(correlation[: n // 2]) - 1
     wide_enough = np.arange(len(times)) >= 5 * times
     return max(1.0, float(times[np.argmax(wide_enough)] if wide_enough.any() else times[-1]))
+
+
+def autocorrelation(values: Vector) -> Vector | None:
+    """Correlation of a series with itself by lag [1]; None for one that does not change."""
+    n = len(values)
+    centered = values - np.mean(values)
+    if not np.any(centered):
+        return None
+    spectrum = np.abs(np.fft.rfft(centered, 1 << (2 * n - 1).bit_length())) ** 2
+    covariance = np.fft.irfft(spectrum)[:n]
+    return covariance / covariance[0]

@@ -1,0 +1,153 @@
+"""What a recording of a single rope says of its phases: the capstan's play operator, with drag, that follows it best."""
+
+from collections.abc import Sequence
+from typing import ClassVar
+
+import numpy as np
+
+from bowdenfit.description import Phase
+from bowdenfit.errors import DatasetError
+from bowdenfit.recordings.preparation.play import Hysteresis, play, white_noise
+from bowdenfit.recordings.recording import PULL, RETURN, SWITCH, Blocks
+from bowdenfit.types import Flags, Labels, Vector
+
+_FIT_BLOCKS = 1000  # more than these say no more about the loop
+_GAIN_SD = 0.02  # how far two load cells may disagree before the loop is believed to be off center
+_LEAST_EXPONENT = 1e-3
+_CLEAR_OF_NOISE = 5.0  # a force below this many standard deviations of its noise may be that of a slack rope
+_CLEARLY = 0.5  # a fit the other way round must leave less than this fraction of the deviations to be believed
+_WELL = 1.5  # cost up to which a loop follows its recording as well as noise lets it
+_ONE_PHASE = 4.0  # spread of the log ratio, in units of its noise, below which there is only one phase
+
+
+class RopeStrokes:
+    """The steps of `strokes.find_strokes` that a single rope takes in its own way."""
+
+    unusable: ClassVar = (
+        "have both forces above their noise and inside the range of the load cells; the usual cause is a sign, a unit or a "
+        "tare that is wrong: see bowdenfit check."
+    )
+
+    def usable(self, blocks: Blocks) -> Flags:
+        """Where both forces stand clear of their noise, so that their logarithms say something."""
+        forces = (blocks.input_force, blocks.output_force)
+        return ~blocks.saturated & np.all([force > _CLEAR_OF_NOISE * white_noise(force) for force in forces], axis=0)
+
+    def follow(self, force_in: Vector, force_out: Vector) -> Hysteresis:
+        """The play operator that follows forces above 0 best."""
+        return fit_loop(force_in, force_out)
+
+    def refuse(self, loop: Hysteresis, velocity: Vector, file: str, name: str, by_hand: Sequence[Phase]) -> None:
+        """Refuse a recording whose channels are the wrong way round, or that holds nothing but the return."""
+        if by_hand:
+            return
+        swap = (
+            "if they are swapped, map them the other way round, such as --channel input_force=OUTPUT_CHANNEL --channel "
+            "output_force=INPUT_CHANNEL"
+        )
+        pulling = velocity > 0
+        if pulling.any() and np.median((loop.force_out - loop.force_in)[pulling]) > 0:
+            raise DatasetError(
+                f"{file}: the output force is above the input force while the rope of {name!r} is pulled toward the motor, "
+                f"which friction cannot do; {swap}."
+            )
+        if set(loop.state) - {SWITCH} and np.mean(loop.force_out > loop.force_in) > 0.95:
+            raise DatasetError(
+                f"{file}: in {name!r} the output force is above the input force nearly throughout, as in a return stroke "
+                f"alone; {swap}. If it really is a return without its pull, set its phase by hand in cable.toml, under its "
+                '[[recording]]: strokes = [{ start = ..., end = ..., stroke = "return" }].'
+            )
+        if loop.cost < _WELL:  # it follows to within its noise, which a swapped one could not
+            return
+        other = fit_loop(loop.force_out, loop.force_in)
+        if other.cost < _CLEARLY * loop.cost and {PULL, RETURN} <= set(other.state):
+            raise DatasetError(
+                f"{file}: at the reversals of {name!r} the input force stands still while the output force moves, which is the "
+                f"wrong way round; {swap}."
+            )
+
+    def told(
+        self, loop: Hysteresis, state: Labels, found: set[int], correlation: float, name: str
+    ) -> tuple[float, float, float, tuple[str, ...]]:
+        """Exponent and center by the medians of the two branches, drag, and remarks."""
+        del correlation
+        ratio = np.log(loop.force_in / loop.force_out)
+        return *_plain_loop(ratio, state), loop.lost, _remarks(name, found, loop)
+
+
+def fit_loop(force_in: Vector, force_out: Vector) -> Hysteresis:
+    """The play operator that follows the output force best, with friction exponent, center and drag free.
+
+    Args:
+        force_in: Input force, all above 0 [N].
+        force_out: Output force, all above 0 [N].
+    """
+    from scipy.optimize import least_squares
+
+    thin = slice(None, None, -(-len(force_in) // _FIT_BLOCKS))
+    few_in, few_out = force_in[thin], force_out[thin]
+    ratio = np.log(few_in / few_out)
+    low, high = np.quantile(ratio, (0.05, 0.95))
+    width, center = max((high - low) / 2, _LEAST_EXPONENT), (high + low) / 2
+    level = float(np.median(few_out))
+    noise_in, noise_out = (max(white_noise(force), 1e-6 * level) for force in (few_in, few_out))
+    noise = float(np.median(np.hypot(noise_in / few_in, noise_out / few_out)))
+    if high - low < _ONE_PHASE * noise or low > 0 or high < 0:  # one phase: all of the ratio is friction
+        width, center = max(abs(float(np.median(ratio))), _LEAST_EXPONENT), 0.0
+
+    def deviations(p: np.ndarray) -> Vector:
+        exponent, middle, drag = float(np.exp(p[0])), float(p[1]), level * float(p[2]) ** 2
+        deviation = _follow(few_in, few_out, exponent, middle, drag)[0]
+        return deviation / np.hypot(noise_in / (few_in + drag), noise_out / (few_out + drag))
+
+    def residuals(p: np.ndarray) -> np.ndarray:
+        weak = np.sqrt(len(few_in)) * 0.1
+        return np.append(deviations(p), [weak * p[1] / _GAIN_SD, weak * p[2] ** 2])
+
+    fits = []
+    for start in ([np.log(width), center, 0.05], [np.log(width * 0.8), 0.0, 0.3]):
+        fits.append(least_squares(residuals, start, loss="soft_l1", x_scale=[0.1, 0.02, 0.1], max_nfev=40))
+        if fits[-1].cost < _WELL * len(few_in):
+            break
+    best = min(fits, key=lambda fit: float(fit.cost))
+    exponent, middle, drag = float(np.exp(best.x[0])), float(best.x[1]), level * float(best.x[2]) ** 2
+    found = _follow(force_in, force_out, exponent, middle, drag)
+    return Hysteresis(force_in, force_out, exponent, middle, drag, *found, float(best.cost) / len(few_in))
+
+
+def _plain_loop(ratio: Vector, state: Labels) -> tuple[float, float]:
+    """Half the width of the loop and its middle, as log ratios, from the medians of its two branches."""
+    pull, back = ratio[state == PULL], ratio[state == RETURN]
+    if not len(pull) or not len(back):
+        one = pull if len(pull) else -back
+        return max(float(np.median(one)) if len(one) else 0.0, _LEAST_EXPONENT), 0.0
+    upper, lower = float(np.median(pull)), float(np.median(back))
+    return max((upper - lower) / 2, _LEAST_EXPONENT), (upper + lower) / 2
+
+
+def _follow(
+    force_in: Vector, force_out: Vector, exponent: float, center: float, drag: float
+) -> tuple[Vector, Vector, Labels]:
+    """Deviation of the output from the operator, the operator's output, and its contact."""
+    x, y = np.log(force_in + drag), np.log(force_out + drag)
+    followed, state = play(x, exponent, float(y[0] + center))
+    return y + center - followed, followed, state
+
+
+def _remarks(name: str, found: set[int], loop: Hysteresis) -> tuple[str, ...]:
+    remarks = []
+    if not found:
+        remarks.append(
+            f"{name}: no block lies safely inside a sliding phase, so the recording says nothing of friction."
+        )
+    elif len(found) == 1:
+        which = "pulling" if PULL in found else "returning"
+        remarks.append(
+            f"{name} is {which} throughout: a gain error of the load cells cannot be told from friction by it."
+        )
+    if abs(loop.center) > 2.5 * _GAIN_SD and len(found) == 2:
+        remarks.append(
+            f"{name}: the hysteresis loop is off center by {loop.center:+.1%} of the force; the usual cause is a load cell "
+            "with a wrong calibration or tare: give [sensors] a gain_error_sd or an offset_sd, or tare the recording."
+        )
+    return tuple(remarks)

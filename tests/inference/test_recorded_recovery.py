@@ -16,6 +16,7 @@ from pathlib import Path
 import jax
 import numpy as np
 import pytest
+from raw_recordings import to_raw
 from scipy import stats
 
 import bowdenfit
@@ -35,7 +36,6 @@ from bowdenfit.questions.simulate.bench import (
     Profile,
     SimulatedRecording,
     simulate_recording,
-    to_raw,
 )
 from bowdenfit.recordings.recording import RawRecording, Recordings
 

@@ -7,6 +7,7 @@ import jax.numpy as jnp
 import numpy as np
 import pytest
 from cables import cable
+from raw_recordings import to_raw
 from scipy import integrate, stats
 
 from bowdenfit.cable.cable import Cable
@@ -24,7 +25,7 @@ from bowdenfit.kinds.row_angles import row_angles
 from bowdenfit.kinds.runs import RunsTerm, SlidingRows, run_sums
 from bowdenfit.model import Model, build_model
 from bowdenfit.physics.friction import rate_factor
-from bowdenfit.questions.simulate.bench import BenchFriction, BenchSettings, Faults, Profile, simulate_recording, to_raw
+from bowdenfit.questions.simulate.bench import BenchFriction, BenchSettings, Faults, Profile, simulate_recording
 from bowdenfit.recordings.preparation import prepare
 from bowdenfit.recordings.preparation.play import play
 from bowdenfit.recordings.recording import Recording, Recordings

@@ -4,11 +4,12 @@ import jax
 import jax.numpy as jnp
 import numpy as np
 import pytest
+from raw_recordings import to_raw
 from scipy.optimize import minimize_scalar
 
 from bowdenfit.description import Preparation
 from bowdenfit.physics.hysteresis import play_operator
-from bowdenfit.questions.simulate.bench import BenchFriction, BenchSettings, Faults, Profile, simulate_recording, to_raw
+from bowdenfit.questions.simulate.bench import BenchFriction, BenchSettings, Faults, Profile, simulate_recording
 from bowdenfit.recordings.preparation import prepare
 from bowdenfit.recordings.preparation.play import play
 

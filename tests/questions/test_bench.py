@@ -8,9 +8,10 @@ import jax
 import numpy as np
 import pytest
 from conftest import ROOT
+from raw_recordings import to_raw
 
 from bowdenfit.errors import DescriptionError, UsageError
-from bowdenfit.questions.simulate.bench import BenchFriction, BenchSettings, Faults, Profile, simulate_recording, to_raw
+from bowdenfit.questions.simulate.bench import BenchFriction, BenchSettings, Faults, Profile, simulate_recording
 from bowdenfit.questions.simulate.recordings.making import make_recordings
 from bowdenfit.questions.simulate.recordings.plan import parse_recordings_plan, read_recordings_plan
 from bowdenfit.questions.simulate.recordings.writing import write_recordings

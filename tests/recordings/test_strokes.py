@@ -5,6 +5,7 @@ from typing import Any
 
 import numpy as np
 import pytest
+from raw_recordings import to_raw
 
 from bowdenfit.description import Phase, Preparation, QuantityValue
 from bowdenfit.errors import DatasetError
@@ -15,7 +16,6 @@ from bowdenfit.questions.simulate.bench import (
     Profile,
     SimulatedRecording,
     simulate_recording,
-    to_raw,
 )
 from bowdenfit.recordings.preparation import prepare
 from bowdenfit.recordings.recording import PULL, RETURN, SWITCH, Blocks, RawRecording, Strokes

@@ -3,11 +3,9 @@
 import multiprocessing
 import os
 import signal
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterator, Sequence
 from concurrent.futures import ProcessPoolExecutor, as_completed
 from contextlib import contextmanager
-from dataclasses import dataclass, field
-from functools import lru_cache
 from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
@@ -20,6 +18,7 @@ _ONE_THREAD = {
     "MKL_NUM_THREADS": "1",
     "XLA_FLAGS": "--xla_cpu_multi_thread_eigen=false",
 }
+_benches: "list[Workbench]" = []  # of a process for one plan
 
 
 def replicate(plan: "Plan", numbers: Sequence[int], workers: int) -> "Iterator[Replication]":
@@ -41,19 +40,18 @@ def replicate(plan: "Plan", numbers: Sequence[int], workers: int) -> "Iterator[R
                 replication = bench.replication(number)
             yield replication
         return
-    job = _Job(f"seed {plan.seed}", plan)
-    with _pool(min(workers, len(numbers))) as pool:
-        for done in as_completed([pool.submit(_replication, job, number) for number in numbers]):
+    with _pool(plan, min(workers, len(numbers))) as pool:
+        for done in as_completed([pool.submit(_replication, number) for number in numbers]):
             yield done.result()
 
 
 @contextmanager
-def _pool(workers: int) -> Iterator[ProcessPoolExecutor]:
+def _pool(plan: "Plan", workers: int) -> Iterator[ProcessPoolExecutor]:
     """Processes of one thread each, ended at once when this one is interrupted."""
-    before = {name: os.environ.get(name) for name in _ONE_THREAD}
-    os.environ |= {name: value for name, value in _ONE_THREAD.items() if name not in os.environ}
+    added = {name: value for name, value in _ONE_THREAD.items() if name not in os.environ}
+    os.environ |= added
     context = multiprocessing.get_context("spawn")
-    pool = ProcessPoolExecutor(workers, context, initializer=signal.signal, initargs=(signal.SIGINT, signal.SIG_IGN))
+    pool = ProcessPoolExecutor(workers, context, initializer=_start, initargs=(plan,))
     try:
         yield pool
     except BaseException:
@@ -63,35 +61,20 @@ def _pool(workers: int) -> Iterator[ProcessPoolExecutor]:
         raise
     finally:
         pool.shutdown(cancel_futures=True)
-        _restore(before)
-
-
-def _restore(environment: Mapping[str, str | None]) -> None:
-    for name, value in environment.items():
-        if value is None:
+        for name in added:
             os.environ.pop(name, None)
-        else:
-            os.environ[name] = value
 
 
-@dataclass(frozen=True)
-class _Job:
-    """What a process works on; two of one key are the same."""
+def _start(plan: "Plan") -> None:
+    """A process for one plan, which keeps what it has compiled; an interruption is for the process that started it."""
+    from bowdenfit.questions.calibrate.replication import Workbench
 
-    key: str
-    plan: "Plan" = field(compare=False, repr=False)
+    signal.signal(signal.SIGINT, signal.SIG_IGN)
+    _benches[:] = [Workbench(plan)]
 
 
-def _replication(job: _Job, number: int) -> "Replication":
-    """One replication, in a process that keeps what it has compiled for the next."""
+def _replication(number: int) -> "Replication":
     import jax
 
     with jax.enable_x64(True):
-        return _workbench(job).replication(number)
-
-
-@lru_cache(maxsize=1)
-def _workbench(job: _Job) -> "Workbench":
-    from bowdenfit.questions.calibrate.replication import Workbench
-
-    return Workbench(job.plan)
+        return _benches[0].replication(number)

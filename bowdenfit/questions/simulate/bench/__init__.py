@@ -7,7 +7,7 @@ What the motor does is in `profile`, rope, friction and spring are in `mechanics
 from bowdenfit.questions.simulate.bench.faults import Faults
 from bowdenfit.questions.simulate.bench.mechanics import BenchFriction, BenchSettings
 from bowdenfit.questions.simulate.bench.profile import Profile
-from bowdenfit.questions.simulate.bench.recording import SimulatedRecording, check_settings, simulate_recording, to_raw
+from bowdenfit.questions.simulate.bench.recording import SimulatedRecording, check_settings, simulate_recording
 
 __all__ = [
     "BenchFriction",
@@ -17,5 +17,4 @@ __all__ = [
     "SimulatedRecording",
     "check_settings",
     "simulate_recording",
-    "to_raw",
 ]

@@ -9,6 +9,7 @@ from pydantic import Field
 from bowdenfit.description import Finite, NonNegative, Positive
 from bowdenfit.errors import UsageError
 from bowdenfit.questions.simulate.bench.profile import Motion, Profile
+from bowdenfit.recordings.preparation.play import play_between
 from bowdenfit.recordings.recording import SWITCH
 from bowdenfit.types import Labels, Vector
 
@@ -94,7 +95,7 @@ class Mechanics:
         asked = np.searchsorted(clock, np.maximum(time, 0.0))
         position, velocity = self.motion.at(clock)
         exponent = self._exponent(velocity)
-        x = _play(self._boundary(position, exponent), self._boundary(position, -exponent))
+        x, _ = play_between(self._boundary(position, exponent), self._boundary(position, -exponent), 0.0)
         stroke = np.sign(np.diff(x, prepend=0.0)).astype(int)
         bench, loaded = self.bench, np.maximum(time, 0.0) >= self.profile.unloaded
         input_force = bench.rope_stiffness * (position - x) + bench.preload
@@ -132,12 +133,3 @@ class Mechanics:
             if np.all(np.abs(step) <= 1e-14 * (1 + position) + (x == 0) * np.abs(step)):
                 break
         return x
-
-
-def _play(low: Vector, high: Vector) -> Vector:
-    """The play operator `x_t = clip(x_{t-1}, low_t, high_t)`, from rest at 0."""
-    x, path = 0.0, []
-    for lowest, highest in zip(low.tolist(), high.tolist(), strict=True):
-        x = lowest if x < lowest else highest if x > highest else x
-        path.append(x)
-    return np.array(path)

@@ -1,7 +1,6 @@
 """One recording of the bench: the true forces under a motion of the motor, and what the load cells make of them."""
 
 from dataclasses import dataclass
-from typing import Literal
 
 import numpy as np
 
@@ -9,7 +8,6 @@ from bowdenfit.errors import UsageError
 from bowdenfit.questions.simulate.bench.faults import Faults, readings
 from bowdenfit.questions.simulate.bench.mechanics import BenchFriction, BenchSettings, Mechanics
 from bowdenfit.questions.simulate.bench.profile import Profile, motion_of
-from bowdenfit.recordings.recording import RawRecording
 from bowdenfit.types import Labels, Vector
 
 
@@ -102,22 +100,6 @@ def simulate_recording(
         motion.reversals,
         profile.drum_radius,
     )
-
-
-def to_raw(
-    simulated: SimulatedRecording, name: str, file: str, velocity: Literal["rope", "motor"] = "rope"
-) -> RawRecording:
-    """The recording as a reader of files would hand it on.
-
-    Args:
-        simulated: The recording.
-        name: Its name.
-        file: File name for errors.
-        velocity: Whether the velocity is the rope's [mm/s] or the motor's [rad/s].
-    """
-    time = simulated.time
-    shown = simulated.velocity if velocity == "rope" else simulated.motor_speed
-    return RawRecording(name, file, time, simulated.input_force, time, simulated.output_force, time, shown)
 
 
 def check_settings(profile: Profile, faults: Faults) -> None:

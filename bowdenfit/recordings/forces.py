@@ -217,12 +217,12 @@ def _converted(
 
 def _unit(file: ChannelFile, channel: Channel, quantity: str, source: ColumnSource | None) -> tuple[float, str]:
     """Sign and unit of a channel, as the user says, else the file, else the channel's name."""
+    named = [
+        unit for q in (*WANTED, *TORQUES) if q.name == quantity for _, unit in meanings(channel.name, (q,)) if unit
+    ]
     # A heading such as input_torque_N_m was read as one in m, which only the name of the quantity can tell.
-    of_torque = [unit for q in TORQUES if q.name == quantity for _, unit in meanings(channel.name, (q,)) if unit]
-    stated = (source.unit if source else None) or next(iter(of_torque), None) or channel.unit
-    if not stated:
-        named = [unit for q in WANTED if q.name == quantity for _, unit in meanings(channel.name, (q,)) if unit]
-        stated = named[0] if named else ""
+    read = [*named, channel.unit] if quantity.endswith("torque") else [channel.unit, *named]
+    stated = next((unit for unit in (source.unit if source else None, *read) if unit), "")
     if not stated:
         units = {"velocity": "mm/s", "time": "s", "input_torque": "N*m", "output_torque": "N*m"}
         example = units.get(quantity, "N")

@@ -25,53 +25,6 @@ _OPPOSITE = -0.5  # correlation of the two forces below which one of them has it
 _LEAST = 1e-9
 
 
-@dataclass(frozen=True)
-class LoopStrokes:
-    """The steps of `strokes.find_strokes` that a pull-pull loop takes in its own way.
-
-    Args:
-        preload: Preload that the user states, the same at all wrap angles [N].
-    """
-
-    preload: float | None = None
-
-    unusable: ClassVar = (
-        "are inside the range of the load cells; correct the limits under prepare in cable.toml, or leave the recording "
-        "out."
-    )
-
-    def usable(self, blocks: Blocks) -> Flags:
-        """Blocks inside the range of the load cells."""
-        return ~blocks.saturated
-
-    def follow(self, force_in: Vector, force_out: Vector) -> Hysteresis:
-        """The play operator that follows forces of either sign best."""
-        return fit_force_loop(force_in, force_out)
-
-    def refuse(self, loop: Hysteresis, velocity: Vector, file: str, name: str, by_hand: Sequence[Phase]) -> None:
-        """Refuse phases to be ignored, channels that are the wrong way round, and a loop that never moves."""
-        del velocity
-        _check_none_ignored(by_hand, file)
-        if not by_hand:
-            _check_ends(loop, file, name)
-        _check_moves(loop, file, name)
-
-    def told(
-        self, loop: Hysteresis, state: Labels, found: set[int], correlation: float, name: str
-    ) -> tuple[float, float, float, tuple[str, ...]]:
-        """Exponent, center, the force lost while both sides are taut, and remarks.
-
-        Exponent and loss are NaN where the recording by itself does not tell them: without load beyond the taut branch only
-        the loss is told, and the exponent is that of the stated preload.
-        """
-        del state
-        loss, exponent = _told(loop, correlation)
-        remarks = _remarks(name, found, loop, loss, exponent, self.preload)
-        if self.preload and np.isnan(exponent):
-            exponent = loss / (2 * self.preload)
-        return exponent, loop.center, loss, remarks
-
-
 def loop_limits(force: Vector, loss: float, exponent: float) -> tuple[Vector, Vector]:
     """Output force while moving forward and while moving back [N]; see `bowdenfit.physics.loop.loop_band`.
 
@@ -116,6 +69,50 @@ def fit_force_loop(force_in: Vector, force_out: Vector, taut: bool = True, slack
     loss, exponent, center = parameters(best.x)
     found = _deviation(force_in, force_out, loss, exponent, center)
     return Hysteresis(force_in, force_out, exponent, center, loss, *found, float(best.cost) / len(x))
+
+
+@dataclass(frozen=True)
+class LoopStrokes:
+    """The steps of `strokes.find_strokes` that a pull-pull loop takes in its own way.
+
+    Args:
+        preload: Preload that the user states, the same at all wrap angles [N].
+    """
+
+    preload: float | None = None
+
+    follow = staticmethod(fit_force_loop)
+    unusable: ClassVar = (
+        "are inside the range of the load cells; correct the limits under prepare in cable.toml, or leave the recording "
+        "out."
+    )
+
+    def usable(self, blocks: Blocks) -> Flags:
+        """Blocks inside the range of the load cells."""
+        return ~blocks.saturated
+
+    def refuse(self, loop: Hysteresis, velocity: Vector, file: str, name: str, by_hand: Sequence[Phase]) -> None:
+        """Refuse phases to be ignored, channels that are the wrong way round, and a loop that never moves."""
+        del velocity
+        _check_none_ignored(by_hand, file)
+        if not by_hand:
+            _check_ends(loop, file, name)
+        _check_moves(loop, file, name)
+
+    def told(
+        self, loop: Hysteresis, state: Labels, found: set[int], correlation: float, name: str
+    ) -> tuple[float, float, float, tuple[str, ...]]:
+        """Exponent, center, the force lost while both sides are taut, and remarks.
+
+        Exponent and loss are NaN where the recording by itself does not tell them: without load beyond the taut branch only
+        the loss is told, and the exponent is that of the stated preload.
+        """
+        del state
+        loss, exponent = _told(loop, correlation)
+        remarks = _remarks(name, found, loop, loss, exponent, self.preload)
+        if self.preload and np.isnan(exponent):
+            exponent = loss / (2 * self.preload)
+        return exponent, loop.center, loss, remarks
 
 
 def _starts(x: Vector, y: Vector, scale: float) -> list[np.ndarray]:

@@ -20,61 +20,6 @@ _WELL = 1.5  # cost up to which a loop follows its recording as well as noise le
 _ONE_PHASE = 4.0  # spread of the log ratio, in units of its noise, below which there is only one phase
 
 
-class RopeStrokes:
-    """The steps of `strokes.find_strokes` that a single rope takes in its own way."""
-
-    unusable: ClassVar = (
-        "have both forces above their noise and inside the range of the load cells; the usual cause is a sign, a unit or a "
-        "tare that is wrong: see bowdenfit check."
-    )
-
-    def usable(self, blocks: Blocks) -> Flags:
-        """Where both forces stand clear of their noise, so that their logarithms say something."""
-        forces = (blocks.input_force, blocks.output_force)
-        return ~blocks.saturated & np.all([force > _CLEAR_OF_NOISE * white_noise(force) for force in forces], axis=0)
-
-    def follow(self, force_in: Vector, force_out: Vector) -> Hysteresis:
-        """The play operator that follows forces above 0 best."""
-        return fit_loop(force_in, force_out)
-
-    def refuse(self, loop: Hysteresis, velocity: Vector, file: str, name: str, by_hand: Sequence[Phase]) -> None:
-        """Refuse a recording whose channels are the wrong way round, or that holds nothing but the return."""
-        if by_hand:
-            return
-        swap = (
-            "if they are swapped, map them the other way round, such as --channel input_force=OUTPUT_CHANNEL --channel "
-            "output_force=INPUT_CHANNEL"
-        )
-        pulling = velocity > 0
-        if pulling.any() and np.median((loop.force_out - loop.force_in)[pulling]) > 0:
-            raise DatasetError(
-                f"{file}: the output force is above the input force while the rope of {name!r} is pulled toward the motor, "
-                f"which friction cannot do; {swap}."
-            )
-        if set(loop.state) - {SWITCH} and np.mean(loop.force_out > loop.force_in) > 0.95:
-            raise DatasetError(
-                f"{file}: in {name!r} the output force is above the input force nearly throughout, as in a return stroke "
-                f"alone; {swap}. If it really is a return without its pull, set its phase by hand in cable.toml, under its "
-                '[[recording]]: strokes = [{ start = ..., end = ..., stroke = "return" }].'
-            )
-        if loop.cost < _WELL:  # it follows to within its noise, which a swapped one could not
-            return
-        other = fit_loop(loop.force_out, loop.force_in)
-        if other.cost < _CLEARLY * loop.cost and {PULL, RETURN} <= set(other.state):
-            raise DatasetError(
-                f"{file}: at the reversals of {name!r} the input force stands still while the output force moves, which is the "
-                f"wrong way round; {swap}."
-            )
-
-    def told(
-        self, loop: Hysteresis, state: Labels, found: set[int], correlation: float, name: str
-    ) -> tuple[float, float, float, tuple[str, ...]]:
-        """Exponent and center by the medians of the two branches, drag, and remarks."""
-        del correlation
-        ratio = np.log(loop.force_in / loop.force_out)
-        return *_plain_loop(ratio, state), loop.lost, _remarks(name, found, loop)
-
-
 def fit_loop(force_in: Vector, force_out: Vector) -> Hysteresis:
     """The play operator that follows the output force best, with friction exponent, center and drag free.
 
@@ -113,6 +58,58 @@ def fit_loop(force_in: Vector, force_out: Vector) -> Hysteresis:
     exponent, middle, drag = float(np.exp(best.x[0])), float(best.x[1]), level * float(best.x[2]) ** 2
     found = _follow(force_in, force_out, exponent, middle, drag)
     return Hysteresis(force_in, force_out, exponent, middle, drag, *found, float(best.cost) / len(few_in))
+
+
+class RopeStrokes:
+    """The steps of `strokes.find_strokes` that a single rope takes in its own way."""
+
+    follow = staticmethod(fit_loop)
+    unusable: ClassVar = (
+        "have both forces above their noise and inside the range of the load cells; the usual cause is a sign, a unit or a "
+        "tare that is wrong: see bowdenfit check."
+    )
+
+    def usable(self, blocks: Blocks) -> Flags:
+        """Where both forces stand clear of their noise, so that their logarithms say something."""
+        forces = (blocks.input_force, blocks.output_force)
+        return ~blocks.saturated & np.all([force > _CLEAR_OF_NOISE * white_noise(force) for force in forces], axis=0)
+
+    def refuse(self, loop: Hysteresis, velocity: Vector, file: str, name: str, by_hand: Sequence[Phase]) -> None:
+        """Refuse a recording whose channels are the wrong way round, or that holds nothing but the return."""
+        if by_hand:
+            return
+        swap = (
+            "if they are swapped, map them the other way round, such as --channel input_force=OUTPUT_CHANNEL --channel "
+            "output_force=INPUT_CHANNEL"
+        )
+        pulling = velocity > 0
+        if pulling.any() and np.median((loop.force_out - loop.force_in)[pulling]) > 0:
+            raise DatasetError(
+                f"{file}: the output force is above the input force while the rope of {name!r} is pulled toward the motor, "
+                f"which friction cannot do; {swap}."
+            )
+        if set(loop.state) - {SWITCH} and np.mean(loop.force_out > loop.force_in) > 0.95:
+            raise DatasetError(
+                f"{file}: in {name!r} the output force is above the input force nearly throughout, as in a return stroke "
+                f"alone; {swap}. If it really is a return without its pull, set its phase by hand in cable.toml, under its "
+                '[[recording]]: strokes = [{ start = ..., end = ..., stroke = "return" }].'
+            )
+        if loop.cost < _WELL:  # it follows to within its noise, which a swapped one could not
+            return
+        other = fit_loop(loop.force_out, loop.force_in)
+        if other.cost < _CLEARLY * loop.cost and {PULL, RETURN} <= set(other.state):
+            raise DatasetError(
+                f"{file}: at the reversals of {name!r} the input force stands still while the output force moves, which is the "
+                f"wrong way round; {swap}."
+            )
+
+    def told(
+        self, loop: Hysteresis, state: Labels, found: set[int], correlation: float, name: str
+    ) -> tuple[float, float, float, tuple[str, ...]]:
+        """Exponent and center by the medians of the two branches, drag, and remarks."""
+        del correlation
+        ratio = np.log(loop.force_in / loop.force_out)
+        return *_plain_loop(ratio, state), loop.lost, _remarks(name, found, loop)
 
 
 def _plain_loop(ratio: Vector, state: Labels) -> tuple[float, float]:

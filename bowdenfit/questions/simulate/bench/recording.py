@@ -21,7 +21,7 @@ class SimulatedRecording:
         velocity: Velocity of the rope at the drum, positive toward the motor [mm/s].
         position: Rope pulled in by the motor [mm].
         stroke: +1 sliding toward the motor, -1 sliding back, 0 stuck.
-        true_input_force, true_output_force: Forces at the time of the sample, before any fault [N].
+        true_output_force: Force at the time of the sample, before any fault [N].
         reversals: Times at which the motor sets out in the other direction [s].
         drum_radius: Radius of the drum [mm].
     """
@@ -32,7 +32,6 @@ class SimulatedRecording:
     velocity: Vector
     position: Vector
     stroke: Labels
-    true_input_force: Vector
     true_output_force: Vector
     reversals: tuple[float, ...]
     drum_radius: float
@@ -95,7 +94,6 @@ def simulate_recording(
         velocity,
         position,
         stroke,
-        true_input,
         true_output,
         motion.reversals,
         profile.drum_radius,

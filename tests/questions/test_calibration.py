@@ -350,7 +350,7 @@ SMALL_NOISE = {"sigma_F": {"prior": {"half_normal": {"sd": 0.3}}}}
 
 
 def calibrated(plan: Plan, n: int, **changes: object) -> Calibration:
-    bench = Workbench(plan, Laboratory(plan.sampler), **changes)
+    bench = Workbench(plan, Laboratory(QUICK), **changes)
     return findings([bench.replication(i) for i in range(n)], {})
 
 
@@ -369,7 +369,7 @@ def two_coefficients(**prior: object) -> Dataset:
 def test_a_small_calibration_of_the_right_likelihood_passes():
     """Of forces with a run effect, twelve times; it fails by chance for one seed in fifty or less."""
     dataset = two_coefficients()
-    found = calibrated(Plan(dataset, dataset, 5, QUICK), 12)
+    found = calibrated(Plan(dataset, dataset, 5), 12)
     assert not found.faults, found.faults
     assert {q.name for q in found.quantities} >= {"mu_edge", "mu_clamp", "tau", "sigma_F"}
 
@@ -380,7 +380,7 @@ def test_a_small_calibration_catches_samples_of_a_run_taken_for_independent():
     A right likelihood would be rejected once in a hundred seeds.
     """
     wrong = two_coefficients(tau={"fixed": 1e-6})
-    found = calibrated(Plan(two_coefficients(), wrong, 5, QUICK), 8)
+    found = calibrated(Plan(two_coefficients(), wrong, 5), 8)
     assert found.quantities
     assert {"mu_edge", "mu_clamp"} & set(found.faults)
     assert "too narrow" in " ".join(found.faults.values())
@@ -397,14 +397,14 @@ def angles_alone(undetected: str) -> Dataset:
 
 def test_a_small_calibration_catches_zeros_in_the_place_of_angles_too_small_to_detect():
     """Zeros pull the curve down: eight replications reject a parameter at 0.01; a right likelihood, one seed in a hundred."""
-    found = calibrated(Plan(angles_alone("censored"), angles_alone("zero"), 5, QUICK), 8)
+    found = calibrated(Plan(angles_alone("censored"), angles_alone("zero"), 5), 8)
     assert found.quantities
     assert found.faults
 
 
 def test_a_replication_depends_on_its_number_alone():
     dataset = data_set("yarn-on-cylinder")
-    plan = Plan(dataset, dataset, 3, QUICK)
+    plan = Plan(dataset, dataset, 3)
     bench = Workbench(plan)
     _, second = bench.replication(0), bench.replication(1)
     alone = Workbench(plan, bench.laboratory).replication(1)

@@ -49,7 +49,7 @@ class Laboratory:
         key = description.model_dump_json() + repr(design)
         if key not in self.benches:
             dataset = Dataset(description, empty_tables(description, design), {})
-            plan = Plan(dataset, dataset, SEED, self.fits.sampler)
+            plan = Plan(dataset, dataset, SEED)
             self.benches[key] = Workbench(plan, self.fits, self.disturb, anything)
         return {name: each.rank for name, each in self.benches[key].replication(seed).ranked.items()}
 

@@ -11,14 +11,13 @@ import jax.numpy as jnp
 import numpy as np
 
 from bowdenfit.dataset import Dataset
-from bowdenfit.description import SamplerSettings
 from bowdenfit.errors import ConvergenceError, DatasetError, UsageError
 from bowdenfit.inference.compilation import compiled
 from bowdenfit.inference.log_density import LogDensity
 from bowdenfit.kinds.drawn_readings import drawn_readings, slipped
 from bowdenfit.model import Model, build_model
 from bowdenfit.questions.calibrate.acceptable_tables import refusal
-from bowdenfit.questions.calibrate.refit import SAMPLER, Laboratory, with_parameters_of
+from bowdenfit.questions.calibrate.refit import Laboratory, with_parameters_of
 from bowdenfit.questions.simulate.simulation import with_readings
 from bowdenfit.results.record import OPTIMAL_EFFICIENCY, OPTIMAL_LENGTH
 
@@ -33,13 +32,11 @@ class Plan:
         stated: The data set whose description and design are replicated; its readings give way to simulated ones.
         assumed: The data set with the description that is fitted; the same for a calibration proper.
         seed: Seed; replication i is the same whatever else is run.
-        sampler: How carefully each replication is sampled.
     """
 
     stated: Dataset
     assumed: Dataset
     seed: int
-    sampler: SamplerSettings = SAMPLER
 
 
 @dataclass(frozen=True)
@@ -148,22 +145,20 @@ class Workbench:
             z = generator.standard_normal(self.stated.space.size)
             words = generator.integers(2**32, size=2, dtype=np.uint32)
             drawn = self._readings(z, words)
-            why = self._refused(drawn)
-            if not why:
-                return z, with_readings(self.plan.stated, drawn), redrawn
+            try:
+                dataset = with_readings(self.plan.stated, drawn)
+            except DatasetError:
+                why = "a recording has no strokes"
+            else:
+                why = "held readings would have slipped" if slipped(drawn) else self.refusal(self.plan.stated, dataset)
+                if not why:
+                    return z, dataset, redrawn
             redrawn[why] = redrawn.get(why, 0) + 1
         most = max(redrawn, key=lambda why: redrawn[why])
         raise UsageError(
             f"none of {MOST_DRAWN} data sets drawn from the priors looks like one from a bench, mostly because {most}; the "
             "usual cause is a prior far wider than what a cable can be: narrow it under [friction] or [prior] in cable.toml."
         )
-
-    def _refused(self, drawn: Any) -> str:
-        try:
-            dataset = with_readings(self.plan.stated, drawn)
-        except DatasetError:
-            return "a recording has no strokes"
-        return "held readings would have slipped" if slipped(drawn) else self.refusal(self.plan.stated, dataset)
 
     def _ranked_parameters(self, z_true: np.ndarray, z: np.ndarray) -> dict[str, RankedTruth]:
         """Parameters that both descriptions have and that are fitted."""

@@ -30,12 +30,14 @@ from scipy import stats
 
 from bowdenfit.dataset import Dataset
 from bowdenfit.description import Description, SamplerSettings
+from bowdenfit.inference.chain import Sampling
 from bowdenfit.inference.compilation import compiled
 from bowdenfit.inference.draws import curves_of, for_each_draw, named_values
 from bowdenfit.inference.ensemble import sample
-from bowdenfit.inference.least_squares import make_objective, maximum_posterior
+from bowdenfit.inference.least_squares import maximum_posterior
 from bowdenfit.inference.log_density import LogDensity
 from bowdenfit.kinds.angles.table import AngleTable
+from bowdenfit.inference.objective import make_objective
 from bowdenfit.kinds.candidate import Candidate
 from bowdenfit.kinds.design import Design
 from bowdenfit.kinds.efficiencies.table import EfficiencyTable
@@ -194,7 +196,7 @@ class Bench:
         batch = SAMPLER.n_ensembles * SAMPLER.n_walkers // 2
         density = self._program(posterior, "density", lambda p: p.batched_log_density(batch))
         start = maximum_posterior(posterior, objective)
-        z = sample(posterior, density, start, SAMPLER, seed, lambda _: {}).z
+        z = sample(Sampling(posterior, start, SAMPLER, seed), density).z
         return z.reshape(-1, posterior.model.space.size)
 
     def _refit(

@@ -2,17 +2,15 @@
 
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
-from typing import TypeAlias
+from pathlib import Path
+from typing import Any
 
 import numpy as np
 
 from bowdenfit.description import SamplerSettings
-from bowdenfit.inference.diagnostics import Diagnostics, shortfalls
+from bowdenfit.inference.diagnostics import Diagnostics, Trajectories, diagnose_all, shortfalls
+from bowdenfit.inference.least_squares import MaximumPosterior
 from bowdenfit.inference.log_density import LogDensity
-from bowdenfit.inference.trajectories import Trajectories
-
-Diagnose: TypeAlias = Callable[[Mapping[str, np.ndarray], int], dict[str, Diagnostics]]
-Quantities: TypeAlias = Callable[[np.ndarray], Mapping[str, np.ndarray]]
 
 
 @dataclass(frozen=True)
@@ -53,28 +51,40 @@ class Chain:
     trajectories: Trajectories | None = None
 
 
-def diagnose_draws(
-    posterior: LogDensity,
-    z: np.ndarray,
-    n_ensembles: int,
-    settings: SamplerSettings,
-    quantities: Quantities,
-    diagnose: Diagnose,
-) -> tuple[dict[str, np.ndarray], dict[str, Diagnostics], tuple[str, ...]]:
-    """Derived quantities of draws, diagnostics of them and of the parameters, and why they should not be trusted.
+@dataclass(frozen=True)
+class Sampling:
+    """What a sampler is asked for: to sample until converged, or until the stated maximum of steps.
 
     Args:
-        posterior: What was sampled.
-        z: Draws, (walker, draw, parameter), ordered by ensemble.
-        n_ensembles: Number of independent ensembles.
-        settings: Targets.
-        quantities: Derived quantities of many z.
-        diagnose: What diagnoses all quantities.
+        posterior: What is sampled.
+        start: Center and covariance of the start.
+        settings: Ensembles or chains, maximum of steps and targets.
+        seed: Seed of everything random here.
+        quantities: Derived quantities of many z; they must converge too.
+        checkpoint: HDF5 file that every stored state is written to.
+        resume: Go on from the states in `checkpoint`.
+        report: Called after every block.
+        diagnose: What diagnoses all quantities; `diagnose_all`, or something that has another process do it.
     """
-    derived = {k: np.asarray(q).reshape(z.shape[:2]) for k, q in quantities(z.reshape(-1, z.shape[-1])).items()}
-    draws = {p.name: z[..., i] for i, p in enumerate(posterior.model.space.free)} | derived
-    diagnostics = diagnose(draws, n_ensembles)
-    return derived, diagnostics, shortfalls(diagnostics, settings.target_r_hat, settings.target_ess)
+
+    posterior: LogDensity
+    start: MaximumPosterior
+    settings: SamplerSettings
+    seed: int
+    quantities: Callable[[np.ndarray], Mapping[str, np.ndarray]] = lambda _: {}
+    checkpoint: Path | None = None
+    resume: bool = False
+    report: Callable[[Progress], None] = lambda _: None
+    diagnose: Callable[[Mapping[str, np.ndarray], int], dict[str, Diagnostics]] = diagnose_all
+
+    def diagnosed(self, z: np.ndarray, n_ensembles: int, **of_sampler: Any) -> Chain:
+        """Draws (walker, draw, parameter), ordered by ensemble, with derived quantities, diagnostics, and their shortfalls."""
+        flat = self.quantities(z.reshape(-1, z.shape[-1]))
+        derived = {name: np.asarray(values).reshape(z.shape[:2]) for name, values in flat.items()}
+        draws = {p.name: z[..., i] for i, p in enumerate(self.posterior.model.space.free)} | derived
+        diagnostics = self.diagnose(draws, n_ensembles)
+        reasons = shortfalls(diagnostics, self.settings.target_r_hat, self.settings.target_ess)
+        return Chain(z, derived, diagnostics, n_ensembles, reasons=reasons, **of_sampler)
 
 
 def stuck_walkers(z: np.ndarray, what: str = "walkers") -> tuple[str, ...]:

@@ -13,10 +13,11 @@ References:
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 
-from bowdenfit.inference.scatter import scatter_about
+from bowdenfit.inference.linearized import scatter_about
 from bowdenfit.kinds.term import Term
 from bowdenfit.parameters.space import Parameter
 
@@ -50,36 +51,32 @@ class Disagreement:
 
 
 def disagreements(
-    terms: Sequence[Term],
-    residuals: Mapping[str, np.ndarray],
-    jacobians: Mapping[str, np.ndarray],
-    parameters: Sequence[Parameter],
-    z: np.ndarray,
+    terms: Sequence[Term], parameters: Sequence[Parameter], found: Mapping[str, Any]
 ) -> tuple[Disagreement, ...]:
     """How well each of several tables agrees with the others; empty of one table alone.
 
     Args:
         terms: The tables.
-        residuals: Standardized residuals of each.
-        jacobians: Their derivatives by z.
         parameters: The free parameters.
-        z: Where both were computed; near the best fit.
+        found: Residuals of each table, and the Jacobian of all, at a z near the best fit.
     """
-    finite = all(np.isfinite(part).all() for part in (*residuals.values(), *jacobians.values()))
-    if len(terms) < 2 or not finite:
+    residuals, z = [found["residuals"][term.name] for term in terms], found["z"]
+    if len(terms) < 2 or not all(np.isfinite(part).all() for part in (*residuals, found["jacobian"])):
         return ()
-    weighed = _weighed(terms, residuals, jacobians)
+    jacobians = np.split(found["jacobian"], np.cumsum([len(r) for r in residuals])[:-1])
+    together = np.linalg.inv(sum((j.T @ j for j in jacobians), np.eye(len(z))))
+    weighed = [_weighed(*table, together) for table in zip(terms, residuals, jacobians, strict=True)]
     information = [w.jacobian.T @ w.jacobian for w in weighed]
     scores = [w.jacobian.T @ w.residuals for w in weighed]
     whole = sum(information, np.eye(len(z)))
     best, covariance = z - np.linalg.solve(whole, sum(scores, z)), np.linalg.inv(whole)
-    found = []
+    said = []
     for term, table, own in zip(terms, weighed, information, strict=True):
         # Summed up, not subtracted: digits would cancel where one table says almost everything.
         of_rest = sum((i for i in information if i is not own), np.eye(len(z)))
         move = -np.linalg.solve(of_rest, table.jacobian.T @ (table.residuals + table.jacobian @ (best - z)))
-        found.append(_disagreement(term.name, move, of_rest, covariance, table.freedom, parameters, best))
-    return tuple(d for d in found if d is not None)
+        said.append(_disagreement(term.name, move, of_rest, covariance, table.freedom, parameters, best))
+    return tuple(d for d in said if d is not None)
 
 
 @dataclass(frozen=True)
@@ -91,25 +88,16 @@ class _Weighed:
     freedom: float
 
 
-def _weighed(
-    terms: Sequence[Term], residuals: Mapping[str, np.ndarray], jacobians: Mapping[str, np.ndarray]
-) -> list[_Weighed]:
-    whole = sum((j.T @ j for j in jacobians.values()), np.eye(next(iter(jacobians.values())).shape[1]))
-    together = np.linalg.inv(whole)
-    found = []
-    for term in terms:
-        r, j = residuals[term.name], jacobians[term.name]
-        u, s, _ = np.linalg.svd(j, full_matrices=False)
-        u = u[:, s > 1e-8 * max(s.max(initial=0.0), 1e-30)]
-        of_itself, of_all = np.sum(u**2, axis=1), np.sum((j @ together) * j, axis=1)
-        many = len(r) - of_itself.sum() >= _MANY
-        about, leverage = (r - u @ (u.T @ r), of_itself) if many else (r, of_all)
-        scale, spread = scatter_about([term], {term.name: about}, leverage)
-        known = np.isfinite(spread[term.name])
-        scale = np.maximum(scale, _LEAST_SCATTER)
-        freedom = float(term.residual_blocks[0][1] - leverage.sum()) if known else np.inf
-        found.append(_Weighed(r / scale, j / scale[:, None], freedom))
-    return found
+def _weighed(term: Term, residuals: np.ndarray, jacobian: np.ndarray, together: np.ndarray) -> _Weighed:
+    u, s, _ = np.linalg.svd(jacobian, full_matrices=False)
+    u = u[:, s > 1e-8 * max(s.max(initial=0.0), 1e-30)]
+    of_itself, of_all = np.sum(u**2, axis=1), np.sum((jacobian @ together) * jacobian, axis=1)
+    many = len(residuals) - of_itself.sum() >= _MANY
+    about, leverage = (residuals - u @ (u.T @ residuals), of_itself) if many else (residuals, of_all)
+    scale, spread = scatter_about([term], {term.name: about}, leverage)
+    scale, known = np.maximum(scale, _LEAST_SCATTER), np.isfinite(spread[term.name])
+    freedom = float(term.residual_blocks[0][1] - leverage.sum()) if known else np.inf
+    return _Weighed(residuals / scale, jacobian / scale[:, None], freedom)
 
 
 def _disagreement(
@@ -124,7 +112,7 @@ def _disagreement(
     """What a move says; None where the table says nothing that anything else says something of.
 
     Args:
-        table: Name of the table.
+        table: Its name.
         move: How far it moves the parameters, in z.
         of_rest: Information of everything else.
         covariance: Inverse of the information of everything.

@@ -23,16 +23,18 @@ def for_each_draw(function: Function, size: int, *data: Any, run_once: bool = Fa
     over_rows = jax.vmap(function, in_axes=(0, *(None for _ in data)))
     program = compiled(over_rows, jax.ShapeDtypeStruct((BATCH, size), jnp.float64), *data, run_once=run_once)
 
-    def apply(z: np.ndarray) -> Any:
-        parts = []
-        for start in range(0, len(z), BATCH):
-            part = z[start : start + BATCH]
-            padded = np.concatenate([part, np.repeat(part[-1:], BATCH - len(part), axis=0)])
-            parts.append(jax.tree.map(np.asarray, program(padded, *data)))
-        whole = jax.tree.map(lambda *x: np.concatenate(x), *parts)
-        return jax.tree.map(lambda x: x[: len(z)], whole)
+    return lambda z: in_batches(lambda part: program(part, *data), BATCH, z)
 
-    return apply
+
+def in_batches(program: Function, batch: int, z: np.ndarray) -> Any:
+    """What a program compiled for so many rows gives for any number of them."""
+    parts = []
+    for start in range(0, len(z), batch):
+        part = z[start : start + batch]
+        padded = np.concatenate([part, np.repeat(part[-1:], batch - len(part), axis=0)])
+        parts.append(jax.tree.map(np.asarray, program(padded)))
+    whole = jax.tree.map(lambda *x: np.concatenate(x), *parts)
+    return jax.tree.map(lambda x: x[: len(z)], whole)
 
 
 def named_values(model: Model) -> Callable[[Float[Array, " free"]], dict[str, Array]]:

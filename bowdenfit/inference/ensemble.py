@@ -5,17 +5,15 @@ does not sample the density it is given, and every ensemble agrees on the wrong 
 """
 
 from collections.abc import Callable, Sequence
-from pathlib import Path
+from dataclasses import replace
 from typing import Any
 
 import emcee
 import numpy as np
 
 from bowdenfit.description import SamplerSettings
-from bowdenfit.inference.chain import Chain, Diagnose, Progress, Quantities, diagnose_draws, stuck_walkers, worst
-from bowdenfit.inference.diagnostics import diagnose_all
+from bowdenfit.inference.chain import Chain, Progress, Sampling, stuck_walkers, worst
 from bowdenfit.inference.least_squares import MaximumPosterior
-from bowdenfit.inference.log_density import LogDensity
 
 THIN = 20  # steps from one stored state to the next
 _BLOCK = 10  # stored states between two reports
@@ -73,45 +71,21 @@ def starting_points(start: MaximumPosterior, settings: SamplerSettings, generato
     return start.z + (centers + walkers) @ root.T
 
 
-def sample(
-    posterior: LogDensity,
-    log_density: Callable[[np.ndarray, Any], Any],
-    start: MaximumPosterior,
-    settings: SamplerSettings,
-    seed: int,
-    quantities: Quantities,
-    checkpoint: Path | None = None,
-    resume: bool = False,
-    report: Callable[[Progress], None] | None = None,
-    moves: Moves | None = None,
-    diagnose: Diagnose = diagnose_all,
-) -> Chain:
-    """Sample until converged, or until the stated maximum of steps.
+def sample(asked: Sampling, program: Callable[..., Any], moves: Moves | None = None) -> Chain:
+    """Sample by ensembles of walkers.
 
     Args:
-        posterior: The posterior.
-        log_density: Its compiled log density for batches of half of all walkers.
-        start: Center and covariance of the start.
-        settings: Ensembles, walkers, maximum of steps and targets.
-        seed: Seed of everything random here.
-        quantities: Derived quantities of many z; they must converge too.
-        checkpoint: HDF5 file that every stored state is written to.
-        resume: Go on from the states in `checkpoint`.
-        report: Called after every block.
+        asked: What of, how long, and so on.
+        program: Compiled log density for batches of half of all walkers.
         moves: Proposals and their weights; `default_moves()` if omitted.
-        diagnose: What diagnoses all quantities; `diagnose_all`, or something that has another process do it.
     """
+    settings, start, seed = asked.settings, asked.start, asked.seed
     points = starting_points(start, settings, np.random.default_rng([seed, 0])).reshape(-1, len(start.z))
-    backend = _backend(checkpoint, resume, points.shape)
-    sampler = emcee.EnsembleSampler(
-        *points.shape,
-        _in_halves(log_density, posterior.data, len(points) // 2),
-        vectorize=True,
-        backend=backend,
-        moves=[(SideBySide(move, settings.n_ensembles), weight) for move, weight in moves or default_moves()],
-    )
+    backend, log_density = _backend(asked, points.shape), _in_halves(program, asked.posterior.data, len(points) // 2)
+    moved = [(SideBySide(move, settings.n_ensembles), weight) for move, weight in moves or default_moves()]
+    sampler = emcee.EnsembleSampler(*points.shape, log_density, vectorize=True, backend=backend, moves=moved)
     # emcee's wrapper prints a traceback of whatever stops an evaluation, the user's interrupt included.
-    sampler.log_prob_fn = _in_halves(log_density, posterior.data, len(points) // 2)
+    sampler.log_prob_fn = log_density
     generator = np.random.RandomState(np.random.MT19937(np.random.SeedSequence([seed, 1])))
     state = None if backend.iteration else emcee.State(points, random_state=generator.get_state())
     limit = max(settings.max_steps // THIN, 2)
@@ -121,49 +95,36 @@ def sample(
         while (missing := target - int(backend.iteration)) > 0:
             sampler.run_mcmc(state, min(missing, _BLOCK), thin_by=THIN, skip_initial_state_check=True)
             state = None
-            if report is not None:
-                report(Progress(int(backend.iteration) * THIN, settings.max_steps, *seen))
-        chain = _summarized(posterior, backend, settings, quantities, diagnose)
+            asked.report(Progress(int(backend.iteration) * THIN, settings.max_steps, *seen))
+        chain = _summarized(asked, backend)
         seen = worst(chain)
-        if report is not None:
-            report(Progress(chain.steps, settings.max_steps, *seen))
+        asked.report(Progress(chain.steps, settings.max_steps, *seen))
         if not chain.reasons or target >= limit:
             return chain
         target = min(target + target // 3, limit)
 
 
-def _backend(checkpoint: Path | None, resume: bool, shape: tuple[int, ...]) -> emcee.backends.Backend:
-    backend = emcee.backends.Backend() if checkpoint is None else emcee.backends.HDFBackend(str(checkpoint))
-    if checkpoint is None or not (resume and checkpoint.exists() and backend.initialized):
+def _backend(asked: Sampling, shape: tuple[int, ...]) -> emcee.backends.Backend:
+    path = asked.checkpoint
+    backend = emcee.backends.Backend() if path is None else emcee.backends.HDFBackend(str(path))
+    if path is None or not (asked.resume and path.exists() and backend.initialized):
         backend.reset(*shape)
     return backend
 
 
-def _in_halves(log_density: Callable[..., Any], data: Any, half: int) -> Callable[[np.ndarray], np.ndarray]:
+def _in_halves(program: Callable[..., Any], data: Any, half: int) -> Callable[[np.ndarray], np.ndarray]:
     """Log density in batches of half of all walkers, so that one compiled shape serves the start and every step."""
-
-    def evaluate(z: np.ndarray) -> np.ndarray:
-        return np.concatenate([np.asarray(log_density(part, data)) for part in z.reshape(-1, half, z.shape[1])])
-
-    return evaluate
+    return lambda z: np.concatenate([np.asarray(program(part, data)) for part in z.reshape(-1, half, z.shape[1])])
 
 
-def _summarized(
-    posterior: LogDensity,
-    backend: emcee.backends.Backend,
-    settings: SamplerSettings,
-    quantities: Quantities,
-    diagnose: Diagnose,
-) -> Chain:
+def _summarized(asked: Sampling, backend: emcee.backends.Backend) -> Chain:
     """Draws from the second half of every walker's path, with their diagnostics."""
     stored = int(backend.iteration)
     kept = np.unique(np.linspace(stored // 2, stored - 1, _KEPT_PER_WALKER).round().astype(int))
     # In this order in memory, as in a loaded fit: sums must agree to the last bit.
     z = np.ascontiguousarray(np.asarray(backend.get_chain()[kept]).transpose(1, 0, 2))
-    derived, diagnostics, reasons = diagnose_draws(posterior, z, settings.n_ensembles, settings, quantities, diagnose)
-    if stored < _FIRST_LOOK:
-        too_short = f"each walker took {stored * THIN} steps, and {_FIRST_LOOK * THIN} are the least that can be judged"
-        reasons = (too_short, *reasons)
-    reasons = (*reasons, *stuck_walkers(z))
     acceptance = float(np.mean(backend.accepted)) / stored
-    return Chain(z, derived, diagnostics, settings.n_ensembles, stored * THIN, acceptance, reasons)
+    chain = asked.diagnosed(z, asked.settings.n_ensembles, steps=stored * THIN, acceptance=acceptance)
+    too_short = f"each walker took {stored * THIN} steps, and {_FIRST_LOOK * THIN} are the least that can be judged"
+    first = (too_short,) if stored < _FIRST_LOOK else ()
+    return replace(chain, reasons=(*first, *chain.reasons, *stuck_walkers(z)))

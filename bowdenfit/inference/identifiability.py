@@ -22,6 +22,7 @@ from jax import Array
 from bowdenfit.inference.compilation import compiled
 from bowdenfit.inference.least_squares import MaximumPosterior
 from bowdenfit.inference.log_density import LogDensity
+from bowdenfit.inference.objective import noise_scales
 
 OWN = 0.25  # share of the prior variance below which a parameter may be known by itself: half the prior's sd
 RESTS_ON_PRIOR = 0.8  # share above which the prior alone speaks
@@ -120,7 +121,13 @@ class Knowledge:
     sharpest: Combination | None
     collinearity: float
 
-    JSON: ClassVar = ("parameters", "directions", ("determined", "sums"), ("resting_on_prior", "resting"), "collinearity")
+    JSON: ClassVar = (
+        "parameters",
+        "directions",
+        ("determined", "sums"),
+        ("resting_on_prior", "resting"),
+        "collinearity",
+    )
 
     @property
     def by_themselves(self) -> tuple[Known, ...]:
@@ -174,8 +181,7 @@ def information_at(posterior: LogDensity, z: np.ndarray) -> MaximumPosterior:
     jacobian = compiled(
         jax.jacfwd(residuals), jax.ShapeDtypeStruct(z.shape, jnp.float64), posterior.data, run_once=True
     )
-    noise = np.array([p.role == "noise" for p in posterior.model.space.free], dtype=bool)
-    slopes = np.where(noise, 0.0, np.asarray(jacobian(z, posterior.data)))
+    slopes = np.where(noise_scales(posterior), 0.0, np.asarray(jacobian(z, posterior.data)))
     return MaximumPosterior(z, np.linalg.inv(slopes.T @ slopes + np.eye(len(z))))
 
 

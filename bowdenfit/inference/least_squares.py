@@ -5,7 +5,7 @@ on any residual, is reported as not identified. With priors (z itself as further
 posterior at the noise scales' prior medians.
 """
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from itertools import product
 from typing import ClassVar
@@ -14,22 +14,11 @@ import numpy as np
 
 from bowdenfit.errors import ConvergenceError
 from bowdenfit.inference.disagreement import Disagreement, disagreements
-from bowdenfit.inference.linearized import linearized
+from bowdenfit.inference.linearized import linearized, scatter_about
 from bowdenfit.inference.log_density import LogDensity
-from bowdenfit.inference.objective import (
-    LOWER_END,
-    Objective,
-    Solution,
-    make_objective,
-    may_end,
-    noise_scales,
-    prior_weights,
-    solve,
-    sum_of_squares,
-)
+from bowdenfit.inference.objective import LOWER_END, Objective, Problem, Solution, may_end, sum_of_squares
 from bowdenfit.inference.other_minima import PINS, contested, fitting_as_well
 from bowdenfit.inference.profiles import Basin, limits
-from bowdenfit.inference.scatter import scatter_about
 from bowdenfit.parameters.priors import Uniform
 from bowdenfit.parameters.space import Parameter
 
@@ -37,16 +26,6 @@ UNDETERMINED = "the measurements do not determine it"
 _SUSPECT = -2.0  # below this z an estimate may be on its way to the lower end, above its negative to the upper
 _UNKNOWN = (float("nan"), float("nan"))
 _FAR = 50.0  # standard error in units of the prior's sd beyond which data say nothing of a parameter
-
-__all__ = [
-    "Estimate",
-    "LeastSquares",
-    "MaximumPosterior",
-    "Objective",
-    "least_squares",
-    "make_objective",
-    "maximum_posterior",
-]
 
 
 @dataclass(frozen=True)
@@ -122,9 +101,8 @@ def maximum_posterior(posterior: LogDensity, objective: Objective) -> MaximumPos
     Raises:
         ConvergenceError: The residuals are not finite at the start.
     """
-    noise = noise_scales(posterior)
-    n = len(noise)
-    found = solve(posterior, objective, np.zeros(n), noise, np.zeros(n), prior_weights(noise, True))
+    n = posterior.model.space.size
+    found = Problem(posterior, objective, with_priors=True).solve(np.zeros(n))
     if not all(np.all(np.isfinite(r)) for r in found["residuals"].values()):
         raise ConvergenceError(
             "the model cannot be computed at the prior medians; the usual cause is a prior or a fixed value that is "
@@ -149,32 +127,48 @@ def least_squares(
         start: z to start from.
         intervals: Whether to compute the profile intervals, which take some twenty solves a parameter.
     """
-    found, at_end = _minimum(posterior, objective, start)
-    trials = _pinned_elsewhere(posterior, objective, start)
-    noise = noise_scales(posterior)
-    basin = Basin(posterior, objective, found, noise, at_end, prior_weights(noise, False))
-    return _summarized(basin, trials, intervals)
+    basin = _minimum(Problem(posterior, objective), start)
+    found, space, terms = basin.found, posterior.model.space, posterior.model.terms
+    active = np.flatnonzero(~basin.problem.noise & ~basin.at_end)
+    about = linearized(found["jacobian"][:, active])
+    scale, residual_sd = scatter_about(terms, found["residuals"], about.leverage)
+    rivals = fitting_as_well(found, _pinned_elsewhere(basin.problem, start), scale, about.readings.shape[1])
+    error, determined = np.full(space.size, np.nan), basin.at_end.copy()
+    error[active] = np.linalg.norm(about.moves(scale), axis=1)
+    determined[active] = about.determined & (np.abs(found["z"][active]) <= _FAR) & (about.unit_error <= _FAR)
+    estimates = _estimates(basin, error, determined, rivals, limits(basin, scale, determined) if intervals else {})
+    shown = {p.name: v * p.shown_scale for p, v in zip(space.free, found["values"], strict=True)}
+    shown |= {p.name: (p.fixed or 0.0) * p.shown_scale for p in space.fixed}
+    return LeastSquares(
+        estimates | {p.name: Estimate(shown[p.name], np.nan, True, "fixed") for p in space.fixed},
+        {t.name: residual_sd[t.name] * float(shown[t.noise]) for t in terms},
+        found["readings"],
+        about.condition_number,
+        sum_of_squares(found),
+        found["z"],
+        bool(found["succeeded"]),
+        "" if found["succeeded"] else "the solver stopped before it met its tolerance",
+        disagreements(terms, space.free, found),
+    )
 
 
-def _minimum(posterior: LogDensity, objective: Objective, start: np.ndarray) -> tuple[Solution, np.ndarray]:
+def _minimum(problem: Problem, start: np.ndarray) -> Basin:
     """The minimum without priors, and which parameters have run to an end of their range there."""
-    parameters, noise = posterior.model.space.free, noise_scales(posterior)
-    pin, weight = np.zeros(len(noise)), prior_weights(noise, False)
-    found = solve(posterior, objective, start, noise, pin, weight)
-    at_end = np.zeros_like(noise)
-    for i in np.flatnonzero(_suspect(parameters, found["z"]) & ~noise):
-        this, end = np.arange(len(noise)) == i, np.copysign(LOWER_END, found["z"][i])
+    parameters, n = problem.posterior.model.space.free, len(start)
+    pin, at_end, found = np.zeros(n), np.zeros(n, dtype=bool), problem.solve(start)
+    for i in np.flatnonzero(_suspect(parameters, found["z"]) & ~problem.noise):
+        this, end = np.arange(n) == i, np.copysign(LOWER_END, found["z"][i])
         # A step can leap over the minimum into the flat tail of the map from z; only what ends there from the middle too
         # has its minimum there.
-        again = solve(posterior, objective, np.where(this, 0.0, found["z"]), noise | at_end, pin, weight)
+        again = problem.solve(np.where(this, 0.0, found["z"]), at_end, pin)
         found = min(found, again, key=sum_of_squares)
         if not _suspect(parameters, found["z"])[i]:
             continue
         trial_pin = np.where(this, end, pin)
-        trial = solve(posterior, objective, found["z"], noise | at_end | this, trial_pin, weight)
+        trial = problem.solve(found["z"], at_end | this, trial_pin)
         if sum_of_squares(trial) <= sum_of_squares(found) * (1 + 1e-7) + 1e-14:
             at_end, pin, found = at_end | this, trial_pin, trial
-    return found, at_end
+    return Basin(problem, found, at_end)
 
 
 def _suspect(parameters: tuple[Parameter, ...], z: np.ndarray) -> np.ndarray:
@@ -183,72 +177,40 @@ def _suspect(parameters: tuple[Parameter, ...], z: np.ndarray) -> np.ndarray:
     return (may_end(parameters) & (z < _SUSPECT)) | (limited & (z > -_SUSPECT))
 
 
-def _pinned_elsewhere(posterior: LogDensity, objective: Objective, start: np.ndarray) -> list[Solution]:
+def _pinned_elsewhere(problem: Problem, start: np.ndarray) -> list[Solution]:
     """Solutions with one parameter of the elastic side, or of friction beside it, pinned away from the minimum."""
-    parameters, noise = posterior.model.space.free, noise_scales(posterior)
+    parameters = problem.posterior.model.space.free
     roles = ["friction", "elastic"] if any(p.role == "elastic" for p in parameters) else []
-    weight, trials = prior_weights(noise, False), []
-    for i, z in product([i for i, p in enumerate(parameters) if p.role in roles], PINS):
-        this = np.arange(len(noise)) == i
-        trials.append(solve(posterior, objective, start, noise | this, np.where(this, z, 0.0), weight))
-    return trials
+    each = [np.arange(len(start)) == i for i, p in enumerate(parameters) if p.role in roles]
+    return [problem.solve(start, this, np.where(this, z, 0.0)) for this, z in product(each, PINS)]
 
 
-def _summarized(basin: Basin, trials: Sequence[Solution], intervals: bool) -> LeastSquares:
-    posterior, found, at_end = basin.posterior, basin.found, basin.at_end
-    space, terms = posterior.model.space, posterior.model.terms
-    active = np.flatnonzero(~basin.pinned & ~at_end)
-    about = linearized(found["jacobian"][:, active])
-    scale, residual_sd = scatter_about(terms, found["residuals"], about.leverage)
-    rivals = fitting_as_well(found, trials, scale, about.readings.shape[1])
-    error, determined = np.full(space.size, np.nan), at_end.copy()
-    error[active] = np.linalg.norm(about.moves(scale), axis=1)
-    determined[active] = about.determined & (np.abs(found["z"][active]) <= _FAR) & (about.unit_error <= _FAR)
-    profiled = limits(basin, scale, determined) if intervals else {}
-    estimates: dict[str, Estimate] = {}
-    for i, p in enumerate(space.free):
-        value, limit = float(found["values"][i] * p.shown_scale), profiled.get(p.name, _UNKNOWN)
-        if basin.pinned[i]:
+def _estimates(
+    basin: Basin,
+    error: np.ndarray,
+    determined: np.ndarray,
+    rivals: Sequence[Solution],
+    profiled: Mapping[str, tuple[float, float]],
+) -> dict[str, Estimate]:
+    """Estimates of the free parameters but for noise scales, from their standard errors in z and their limits."""
+    found, estimates = basin.found, {}
+    for i, p in enumerate(basin.parameters):
+        if basin.problem.noise[i]:
             continue
-        if at_end[i]:
-            estimates[p.name] = Estimate(
-                np.nan, np.nan, False, _at_bound(value, limit, found["z"][i] > 0), *limit, at_bound=True
-            )
+        value, limit = float(found["values"][i] * p.shown_scale), profiled.get(p.name, _UNKNOWN)
+        sd = float(abs(found["slope"][i] * error[i]) * p.shown_scale)
+        others = [float(r["values"][i]) * p.shown_scale for r in rivals]
+        if basin.at_end[i]:
+            remark = _at_bound(value, limit, found["z"][i] > 0)
+            estimates[p.name] = Estimate(np.nan, np.nan, False, remark, *limit, at_bound=True)
         elif not determined[i]:
             estimates[p.name] = Estimate(np.nan, np.nan, False, UNDETERMINED)
+        elif (ends := contested(value, sd, others)) is not None:
+            remark = f"values from {ends[0]:.3g} to {ends[1]:.3g} fit about as well"
+            estimates[p.name] = Estimate(np.nan, np.nan, False, remark, *limit)
         else:
-            sd = float(abs(found["slope"][i] * error[i]) * p.shown_scale)
-            others = [float(r["values"][i]) * p.shown_scale for r in rivals]
-            estimates[p.name] = _estimate(value, sd, others, limit)
-    for p in space.fixed:
-        estimates[p.name] = Estimate((p.fixed or 0.0) * p.shown_scale, np.nan, True, "fixed")
-    message = "" if found["succeeded"] else "the solver stopped before it met its tolerance"
-    total = sum_of_squares(found)
-    scales = {p.name: v * p.shown_scale for p, v in zip(space.free, found["values"], strict=True)}
-    scales |= {p.name: (p.fixed or 0.0) * p.shown_scale for p in space.fixed}
-    residual_sd = {t.name: residual_sd[t.name] * float(scales[t.noise]) for t in posterior.model.terms}
-    agreement = disagreements(
-        posterior.model.terms, found["residuals"], _by_term(posterior, found), space.free, found["z"]
-    )
-    return LeastSquares(
-        estimates,
-        residual_sd,
-        found["readings"],
-        about.condition_number,
-        total,
-        found["z"],
-        bool(found["succeeded"]),
-        message,
-        agreement,
-    )
-
-
-def _estimate(value: float, sd: float, rivals: Sequence[float], limit: tuple[float, float]) -> Estimate:
-    """An estimate, unless solutions that fit about as well lie far outside its standard error."""
-    ends = contested(value, sd, rivals)
-    if ends is None:
-        return Estimate(value, sd, True, "", *limit)
-    return Estimate(np.nan, np.nan, False, f"values from {ends[0]:.3g} to {ends[1]:.3g} fit about as well", *limit)
+            estimates[p.name] = Estimate(value, sd, True, "", *limit)
+    return estimates
 
 
 def _at_bound(value: float, limit: tuple[float, float], at_upper_end: bool) -> str:
@@ -259,10 +221,3 @@ def _at_bound(value: float, limit: tuple[float, float], at_upper_end: bool) -> s
         return f"no minimum inside its range: runs to its upper end, {value:.3g}{least}"
     most = "" if np.isnan(upper) else "; nothing limits it above" if np.isinf(upper) else f"; at most {upper:.3g}"
     return f"no finite minimum: runs to its lower end, {value:.3g}{most}"
-
-
-def _by_term(posterior: LogDensity, found: Solution) -> dict[str, np.ndarray]:
-    """The Jacobian's rows of each table."""
-    names = [term.name for term in posterior.model.terms]
-    ends = np.cumsum([len(found["residuals"][name]) for name in names])
-    return dict(zip(names, np.split(found["jacobian"], ends[:-1]), strict=True))

@@ -12,9 +12,11 @@ from jax import Array
 from jaxtyping import Float
 
 from bowdenfit.description import SamplerSettings
+from bowdenfit.inference.chain import Sampling
 from bowdenfit.inference.comparison import How, Prediction, weigh_without_each
 from bowdenfit.inference.compilation import compiled
 from bowdenfit.inference.diagnostics import Diagnostics, diagnose_all
+from bowdenfit.inference.draws import in_batches
 from bowdenfit.inference.least_squares import MaximumPosterior
 from bowdenfit.inference.log_density import LogDensity
 from bowdenfit.inference.moment_matching import match_moments
@@ -71,20 +73,70 @@ class ReadingsToLeaveOut:
 
     def evaluate(self, z: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """Log posterior density, up to a constant, and log likelihood of every reading, at any number of z (rows)."""
-        counts, batch, parts = self._counts(None), self.batch, []
-        for start in range(0, len(z), batch):
-            part = z[start : start + batch]
-            padded = np.concatenate([part, np.repeat(part[-1:], batch - len(part), axis=0)])
-            parts.append(
-                [np.asarray(found)[: len(part)] for found in self._program(padded, self.posterior.data, counts)]
-            )
-        density, each = (np.concatenate(part) for part in zip(*parts, strict=True))
+        counts = self._counts(None)
+        density, each = in_batches(lambda part: self._program(part, self.posterior.data, counts), self.batch, z)
         return density, each
 
     def without(self, reading: int) -> Callable[[np.ndarray, Any], Any]:
         """Log posterior density without a reading, for batches, as the sampler calls it."""
         counts = self._counts(reading)
         return lambda z, data: self._program(z, data, counts)[0]
+
+
+@dataclass(frozen=True)
+class LeavingOut:
+    """Draws of the posterior with all readings, and what finds out how it predicts one of them without it.
+
+    Args:
+        readings: The readings.
+        z: The draws, one a row.
+        share: Effective draws a draw.
+        seed: Seed of the refits.
+    """
+
+    readings: ReadingsToLeaveOut
+    z: np.ndarray
+    share: float
+    seed: int
+
+    def without(self, reading: int, limit: float) -> tuple[float, float, How]:
+        """Expected log density of a reading whose importance weights fail, its Monte Carlo error, and how it was found.
+
+        Args:
+            reading: Its position.
+            limit: Pareto k that is good enough.
+        """
+
+        def evaluate(at: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+            density, each = self.readings.evaluate(at)
+            return density, each[:, reading]
+
+        elpd, k, error = match_moments(self.z, evaluate, self.share)
+        if k <= limit:
+            return elpd, error, "moment matching"
+        elpd, error, settled = self.refit_without(reading)
+        return elpd, error, "refit" if settled else "rough"
+
+    def refit_without(self, reading: int) -> tuple[float, float, bool]:
+        """Expected log density of a reading by a fit without it, its Monte Carlo error, and whether that fit converged."""
+        from bowdenfit.inference.ensemble import sample
+
+        readings = self.readings
+        each = readings.evaluate(self.z)[1][:, reading]
+        weights = np.exp(smooth_weights(-each, self.share)[0])
+        start = MaximumPosterior(weights @ self.z, np.atleast_2d(np.cov(self.z.T)))
+        top = float(np.max(each))
+
+        def likelihood(z: np.ndarray) -> dict[str, np.ndarray]:
+            return {_RATIO: np.exp(readings.evaluate(z)[1][:, reading] - top)}
+
+        settings = readings.settings.model_copy(update={"n_walkers": readings.walkers})
+        own_seed = int(np.random.SeedSequence([self.seed, reading]).generate_state(1)[0])
+        asked = Sampling(readings.posterior, start, settings, own_seed, likelihood, diagnose=_without_drift)
+        chain = sample(asked, readings.without(reading))
+        mean = float(chain.quantities[_RATIO].mean())
+        error = chain.diagnostics[_RATIO].mcse_mean / mean if mean > 0 else float("nan")
+        return top + float(np.log(mean)) if mean > 0 else -np.inf, error, not chain.reasons and error < _LARGEST_ERROR
 
 
 def leave_one_out(
@@ -94,7 +146,7 @@ def leave_one_out(
     n_effective: float,
     seed: int,
     wanted: Sequence[int] | None = None,
-    report: Callable[[str], None] | None = None,
+    report: Callable[[str], None] = lambda _: None,
 ) -> Prediction:
     """Leave-one-out, with readings whose importance weights cannot be trusted treated one by one.
 
@@ -110,77 +162,17 @@ def leave_one_out(
         wanted: Positions of the readings in question among `readings.names`; all if omitted.
         report: Called with a sentence before each reading that takes longer.
     """
-    tables = [log_likelihood[term.name] for term in readings.posterior.model.terms]
-    each = np.concatenate(tables, axis=-1)
+    each = np.concatenate([log_likelihood[term.name] for term in readings.posterior.model.terms], axis=-1)
     chosen = list(range(each.shape[-1])) if wanted is None else list(wanted)
-    draws, limit = z.reshape(-1, z.shape[-1]), reliable_k(z.shape[0] * z.shape[1])
-    share = min(n_effective / len(draws), 1.0)
+    flat, limit = z.reshape(-1, z.shape[-1]), reliable_k(z.shape[0] * z.shape[1])
+    leaving_out = LeavingOut(readings, flat, min(n_effective / len(flat), 1.0), seed)
     quick = weigh_without_each({"": each[..., chosen]}, n_effective)
     elpd, error = quick.elpd.copy(), quick.error.copy()
     how: list[How] = ["importance sampling"] * len(chosen)
     for place in np.flatnonzero(~(quick.pareto_k <= limit)):
-        reading = chosen[place]
-        if report is not None:
-            report(f"leaving out {' '.join(readings.names[reading])}")
-        elpd[place], error[place], how[place] = leave_out(readings, draws, reading, share, limit, seed)
+        report(f"leaving out {' '.join(readings.names[chosen[place]])}")
+        elpd[place], error[place], how[place] = leaving_out.without(chosen[place], limit)
     return Prediction(elpd, quick.pareto_k, error, tuple(readings.names[i] for i in chosen), tuple(how))
-
-
-def leave_out(
-    readings: ReadingsToLeaveOut, draws: np.ndarray, reading: int, share: float, limit: float, seed: int
-) -> tuple[float, float, How]:
-    """Expected log density of a reading whose importance weights fail, its Monte Carlo error, and how it was found.
-
-    Args:
-        readings: The readings.
-        draws: Draws of the posterior with all of them, one a row.
-        reading: Position of the one left out.
-        share: Effective draws a draw.
-        limit: Pareto k that is good enough.
-        seed: Seed of a refit.
-    """
-
-    def evaluate(at: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        density, each = readings.evaluate(at)
-        return density, each[:, reading]
-
-    elpd, k, error = match_moments(draws, evaluate, share)
-    if k <= limit:
-        return elpd, error, "moment matching"
-    elpd, error, settled = refit_without(readings, draws, reading, share, seed)
-    return elpd, error, "refit" if settled else "rough"
-
-
-def refit_without(
-    readings: ReadingsToLeaveOut, draws: np.ndarray, reading: int, share: float, seed: int
-) -> tuple[float, float, bool]:
-    """Expected log density of a reading by a fit without it, its Monte Carlo error, and whether that fit converged.
-
-    Args:
-        readings: The readings.
-        draws: Draws of the posterior with all of them, one a row: where the fit starts, weighted as if it were left out.
-        reading: Position of the one left out.
-        share: Effective draws a draw.
-        seed: Seed of the fit.
-    """
-    from bowdenfit.inference.ensemble import sample
-
-    each = readings.evaluate(draws)[1][:, reading]
-    weights = np.exp(smooth_weights(-each, share)[0])
-    start = MaximumPosterior(weights @ draws, np.atleast_2d(np.cov(draws.T)))
-    top = float(np.max(each))
-
-    def likelihood(z: np.ndarray) -> dict[str, np.ndarray]:
-        return {_RATIO: np.exp(readings.evaluate(z)[1][:, reading] - top)}
-
-    settings = readings.settings.model_copy(update={"n_walkers": readings.walkers})
-    own_seed = int(np.random.SeedSequence([seed, reading]).generate_state(1)[0])
-    chain = sample(
-        readings.posterior, readings.without(reading), start, settings, own_seed, likelihood, diagnose=_without_drift
-    )
-    mean = float(chain.quantities[_RATIO].mean())
-    error = chain.diagnostics[_RATIO].mcse_mean / mean if mean > 0 else float("nan")
-    return top + float(np.log(mean)) if mean > 0 else -np.inf, error, not chain.reasons and error < _LARGEST_ERROR
 
 
 def _without_drift(draws: Mapping[str, np.ndarray], n_ensembles: int) -> dict[str, Diagnostics]:

@@ -1,12 +1,16 @@
-"""What the Jacobian at a minimum says: which parameters the readings determine, and how errors of readings move them."""
+"""What the Jacobian and the residuals at a minimum say: which parameters the readings determine, and how readings scatter."""
 
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
 
 from bowdenfit.inference.solver import orthogonal
+from bowdenfit.kinds.term import Term
 
 _SINGULAR = 1e-8  # singular values below this fraction of the largest carry no information
+_FREEDOM = 0.5  # degrees of freedom below which the scatter of a table cannot be estimated
+_DECIDES = 1e-6  # leverage from which a residual is that of a reading
 
 
 @dataclass(frozen=True)
@@ -52,3 +56,36 @@ def linearized(jacobian: np.ndarray) -> Linearized:
         return Linearized(*orthogonal(jacobian), np.ones(n, dtype=bool), float(s[0] / s[-1]))
     determined = np.sum(vt[~informed] ** 2, axis=0) <= 1e-6
     return Linearized(u[:rows, informed], vt[informed].T / s[informed], determined, float("inf"))
+
+
+def scatter_about(
+    terms: Sequence[Term], residuals: Mapping[str, np.ndarray], leverage: np.ndarray
+) -> tuple[np.ndarray, dict[str, float]]:
+    """Scatter of the standardized residuals about the fit: for each residual, and by table (of its first block)."""
+    scale = np.ones(len(leverage))
+    by_table: dict[str, float] = {}
+    for name, rows, values, freedom in blocks(terms, residuals, leverage):
+        spread = float(np.sqrt(np.sum(values**2) / freedom)) if np.isfinite(freedom) else float("nan")
+        scale[rows] = spread if np.isfinite(spread) else 1.0
+        by_table.setdefault(name, spread)
+    return scale, by_table
+
+
+def blocks(
+    terms: Sequence[Term], residuals: Mapping[str, np.ndarray], leverage: np.ndarray
+) -> Iterator[tuple[str, slice, np.ndarray, float]]:
+    """Table, rows, residuals and degrees of freedom of every block of residuals that scatter alike.
+
+    A block whose residuals are all used up by parameters has no scatter of its own; its weight stands, to infinitely many
+    degrees of freedom.
+    """
+    start = 0
+    for term in terms:
+        first = start
+        for count, independent in term.residual_blocks:
+            rows, values = slice(start, start + count), residuals[term.name][start - first : start - first + count]
+            # A reading that parameters of its own fit exactly is one whatever rounding leaves; a bound that is met is none.
+            read = int(np.count_nonzero((values != 0) | (leverage[rows] > _DECIDES)))
+            freedom = min(read, independent) - float(leverage[rows].sum())
+            yield term.name, rows, values, freedom if freedom > _FREEDOM else float("inf")
+            start = rows.stop

@@ -13,6 +13,7 @@ References:
 """
 
 from collections.abc import Callable, Sequence
+from dataclasses import replace
 from itertools import accumulate
 from pathlib import Path
 from typing import Any, TypeAlias
@@ -25,21 +26,15 @@ from blackjax.mcmc import nuts
 from jax import Array
 
 from bowdenfit.description import SamplerSettings
-from bowdenfit.inference.chain import Chain, Diagnose, Progress, Quantities, diagnose_draws, stuck_walkers, worst
+from bowdenfit.inference.chain import Chain, Progress, Sampling, stuck_walkers, worst
 from bowdenfit.inference.compilation import compiled
-from bowdenfit.inference.diagnostics import diagnose_all
+from bowdenfit.inference.diagnostics import Trajectories, energy_mixing, trajectory_shortfalls
 from bowdenfit.inference.least_squares import MaximumPosterior
 from bowdenfit.inference.log_density import LogDensity
-from bowdenfit.inference.trajectories import Trajectories, energy_mixing, trajectory_shortfalls
+from bowdenfit.inference.objective import noise_scales
 
 BLOCK = 50  # steps between two reports
-WINDOWS = (
-    1,
-    1,
-    2,
-    4,
-    2,
-)  # blocks of warm-up with one mass matrix each; after the last only the step size is taken over
+WINDOWS = (1, 1, 2, 4, 2)  # blocks of warm-up with one mass matrix each; the last leaves only its step size
 WARM_UP = sum(WINDOWS)
 MOST_DOUBLINGS = 10  # of a trajectory
 FINE_EVERY, FINER = 10, 16  # every so many trajectories one with so much shorter steps; a block has a whole number
@@ -49,10 +44,9 @@ _FIRST_STEP, _STREAM = 0.1, 3
 _STATISTICS = ("diverging", "energy", "acceptance_rate", "tree_depth", "n_steps")
 
 Block: TypeAlias = dict[str, np.ndarray]  # positions and statistics of its steps, and the tuning at its end
-Program: TypeAlias = Callable[..., Any]
 
 
-def make_program(posterior: LogDensity, settings: SamplerSettings) -> Program:
+def make_program(posterior: LogDensity, settings: SamplerSettings) -> Callable[..., Any]:
     """Compiled: `BLOCK` steps of every chain; what it makes depends on the seed and the number of the block alone.
 
     Args:
@@ -109,55 +103,34 @@ def starting_points(
     """
     spread = np.sqrt(2) * generator.standard_normal((settings.n_chains, len(start.z)))
     z = start.z + spread @ np.linalg.cholesky(start.covariance).T
-    noise = np.array([p.role == "noise" for p in posterior.model.space.free], dtype=bool)
-    return np.where(noise, np.abs(z), z)
+    return np.where(noise_scales(posterior), np.abs(z), z)
 
 
-def sample(
-    posterior: LogDensity,
-    program: Program,
-    start: MaximumPosterior,
-    settings: SamplerSettings,
-    seed: int,
-    quantities: Quantities,
-    checkpoint: Path | None = None,
-    resume: bool = False,
-    report: Callable[[Progress], None] | None = None,
-    diagnose: Diagnose = diagnose_all,
-) -> Chain:
-    """Sample until converged, or until the stated maximum of steps.
+def sample(asked: Sampling, program: Callable[..., Any]) -> Chain:
+    """Sample by chains of trajectories.
 
     Args:
-        posterior: The posterior.
+        asked: What of, how long, and so on.
         program: What `make_program` made for it.
-        start: Center and covariance of the start.
-        settings: Chains, maximum of steps and targets.
-        seed: Seed of everything random here.
-        quantities: Derived quantities of many z; they must converge too.
-        checkpoint: HDF5 file that every block is written to.
-        resume: Go on from the blocks in `checkpoint`.
-        report: Called after every block.
-        diagnose: What diagnoses all quantities; `diagnose_all`, or something that has another process do it.
     """
-    points = starting_points(posterior, start, settings, np.random.default_rng([seed, _STREAM]))
-    blocks = _stored(checkpoint) if checkpoint is not None and resume else []
+    posterior, settings, seed = asked.posterior, asked.settings, asked.seed
+    points = starting_points(posterior, asked.start, settings, np.random.default_rng([seed, _STREAM]))
+    blocks = _stored(asked.checkpoint) if asked.checkpoint is not None and asked.resume else []
     limit = WARM_UP + max(settings.max_steps // BLOCK, 1)
     target = min(max(WARM_UP + _FIRST_LOOK, len(blocks)), limit)
     seen: tuple[float | None, float | None] = (None, None)
     while True:
         while len(blocks) < target:
-            z, tuning, mass = _before(blocks, points, start.covariance)
+            z, tuning, mass = _before(blocks, points, asked.start.covariance)
             numbers = np.uint32(seed), np.uint32(len(blocks))
             done = program(*numbers, z, tuning, np.bool_(len(blocks) < WARM_UP), mass, posterior.data)
             blocks.append(jax.tree.map(np.asarray, done))
-            if checkpoint is not None:
-                _store(checkpoint, blocks)
-            if report is not None:
-                report(Progress(len(blocks) * BLOCK, limit * BLOCK, *seen, "nuts"))
-        chain, could_improve = _summarized(posterior, blocks, settings, quantities, diagnose)
+            if asked.checkpoint is not None:
+                _store(asked.checkpoint, blocks)
+            asked.report(Progress(len(blocks) * BLOCK, limit * BLOCK, *seen, "nuts"))
+        chain, could_improve = _summarized(asked, blocks)
         seen = worst(chain)
-        if report is not None:
-            report(Progress(len(blocks) * BLOCK, limit * BLOCK, *seen, "nuts"))
+        asked.report(Progress(len(blocks) * BLOCK, limit * BLOCK, *seen, "nuts"))
         if not could_improve or target >= limit:
             return chain
         target = min(target + (target - WARM_UP + 2) // 3, limit)
@@ -192,21 +165,13 @@ def _shrunk(draws: np.ndarray) -> np.ndarray:
     return n / (n + 5) * np.cov(draws.T).reshape(size, size) + 1e-3 * 5 / (n + 5) * np.eye(size)
 
 
-def _summarized(
-    posterior: LogDensity,
-    blocks: Sequence[Block],
-    settings: SamplerSettings,
-    quantities: Quantities,
-    diagnose: Diagnose,
-) -> tuple[Chain, bool]:
+def _summarized(asked: Sampling, blocks: Sequence[Block]) -> tuple[Chain, bool]:
     """The draws after warm-up, with their diagnostics, and whether more of them could change what those say."""
     drawn = {name: np.concatenate([b[name] for b in blocks[WARM_UP:]]) for name in ("z", *_STATISTICS)}
     steps, chains = drawn["energy"].shape
     fine = _fine(steps)
     kept = np.unique(np.linspace(0, steps - 1, min(steps, max(_KEPT // chains, 1))).round().astype(int))
     z = np.ascontiguousarray(drawn["z"][kept].transpose(1, 0, 2))
-    statistics = {name: np.ascontiguousarray(drawn[name][kept].T) for name in _STATISTICS}
-    derived, diagnostics, reasons = diagnose_draws(posterior, z, chains, settings, quantities, diagnose)
     trajectories = Trajectories(
         WARM_UP * BLOCK,
         steps * chains,
@@ -217,12 +182,12 @@ def _summarized(
         energy_mixing(drawn["energy"].T),
         float(np.exp(blocks[-1]["tuning"][1, 0])),
         int(sum(b["n_steps"].sum() for b in blocks)),
-        statistics,
+        {name: np.ascontiguousarray(drawn[name][kept].T) for name in _STATISTICS},
     )
-    reasons = (*reasons, *stuck_walkers(z[:, z.shape[1] // 2 :], "chains"))
-    acceptance, could_improve = float(drawn["acceptance_rate"].mean()), bool(reasons)
-    reasons = (*reasons, *trajectory_shortfalls(trajectories))
-    return Chain(z, derived, diagnostics, chains, steps, acceptance, reasons, "nuts", trajectories), could_improve
+    went = {"acceptance": float(drawn["acceptance_rate"].mean()), "sampler": "nuts", "trajectories": trajectories}
+    chain = asked.diagnosed(z, chains, steps=steps, **went)
+    reasons = (*chain.reasons, *stuck_walkers(z[:, z.shape[1] // 2 :], "chains"))
+    return replace(chain, reasons=(*reasons, *trajectory_shortfalls(trajectories))), bool(reasons)
 
 
 def _store(path: Path, blocks: Sequence[Block]) -> None:

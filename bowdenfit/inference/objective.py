@@ -2,6 +2,8 @@
 
 from collections.abc import Callable
 from concurrent.futures import ThreadPoolExecutor
+from dataclasses import dataclass
+from functools import cached_property
 from typing import Any
 
 import jax
@@ -80,17 +82,32 @@ def _program(posterior: LogDensity) -> Callable[..., Solution]:
     return evaluated
 
 
-def solve(
-    posterior: LogDensity,
-    objective: Objective,
-    start: np.ndarray,
-    pinned: np.ndarray,
-    pin: np.ndarray,
-    weight: np.ndarray,
-    quick: bool = False,
-) -> Solution:
-    """The minimum of the posterior's own data; see `make_objective`."""
-    return objective(start, pinned, pin, weight, posterior.data, quick)
+@dataclass(frozen=True)
+class Problem:
+    """Least squares of one posterior, whose noise scales stay at their prior medians.
+
+    Args:
+        posterior: The posterior.
+        objective: What `make_objective` compiled for data of its shape.
+        with_priors: Whether the priors count as measurements of the parameters.
+    """
+
+    posterior: LogDensity
+    objective: Objective
+    with_priors: bool = False
+
+    @cached_property
+    def noise(self) -> np.ndarray:
+        """Which free parameters are noise scales."""
+        return noise_scales(self.posterior)
+
+    def solve(
+        self, start: np.ndarray, pinned: np.ndarray | bool = False, pin: np.ndarray | None = None, quick: bool = False
+    ) -> Solution:
+        """The minimum with further parameters pinned; without priors z weighs so little that it only breaks ties."""
+        weight = np.where(self.noise, 0.0, 1.0 if self.with_priors else _TIE)
+        at = np.zeros(len(start)) if pin is None else pin
+        return self.objective(start, self.noise | pinned, at, weight, self.posterior.data, quick)
 
 
 def sum_of_squares(found: Solution) -> float:
@@ -99,13 +116,8 @@ def sum_of_squares(found: Solution) -> float:
 
 
 def noise_scales(posterior: LogDensity) -> np.ndarray:
-    """Which free parameters are noise scales, held at their prior median in least squares."""
+    """Which free parameters are noise scales."""
     return np.array([p.role == "noise" for p in posterior.model.space.free], dtype=bool)
-
-
-def prior_weights(noise: np.ndarray, with_priors: bool) -> np.ndarray:
-    """Weight of each z as a residual: 1 with priors; without them so little that it decides only where nothing else does."""
-    return np.where(noise, 0.0, 1.0 if with_priors else _TIE)
 
 
 def may_end(parameters: tuple[Parameter, ...]) -> np.ndarray:

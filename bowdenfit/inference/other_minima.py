@@ -5,17 +5,16 @@ side is always slack, stiffness of a rope read at one load), curvature says noth
 parameter in question is pinned at values that its prior holds possible, and the others are fitted again.
 """
 
-from collections.abc import Mapping, Sequence
-from typing import Any
+from collections.abc import Sequence
 
 import numpy as np
+
+from bowdenfit.inference.objective import Solution
 
 PINS = (-2.5, 2.5)  # z at which a parameter is pinned
 _AS_WELL = 0.97725  # probability up to which a deviation counts as chance: two standard errors of a normal reading
 _EXACT = 1e-6  # scatter of readings that fit without any
 _APART = 4.0  # standard errors beyond which it is another answer; were the errors normal, 2 could not be passed
-
-Solution = Mapping[str, Any]
 
 
 def fitting_as_well(found: Solution, trials: Sequence[Solution], scale: np.ndarray, n_informed: int) -> list[Solution]:

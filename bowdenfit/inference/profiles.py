@@ -24,11 +24,11 @@ from functools import cache
 
 import numpy as np
 
-from bowdenfit.inference.linearized import linearized
+from bowdenfit.inference.linearized import blocks, linearized
 from bowdenfit.inference.log_density import LogDensity
-from bowdenfit.inference.objective import LOWER_END, Objective, Solution, may_end, noise_scales, prior_weights, solve
-from bowdenfit.inference.scatter import freedom_by_block
+from bowdenfit.inference.objective import LOWER_END, Objective, Problem, Solution, may_end
 from bowdenfit.parameters.priors import Uniform
+from bowdenfit.parameters.space import Parameter
 
 PROBABILITY = 0.9
 FARTHEST = -LOWER_END
@@ -58,42 +58,41 @@ class Profile:
 
 @dataclass(frozen=True)
 class Basin:
-    """A minimum, and what stays pinned while one of its parameters is moved.
+    """A minimum, from which one of its parameters is moved.
 
     Args:
-        posterior: The posterior.
-        objective: Its compiled solve.
+        problem: What it is the minimum of.
         found: The minimum.
-        pinned: Noise scales.
         at_end: Parameters at an end of their range, which may leave it when another is moved.
-        weight: Weight of each z as a residual of its own.
     """
 
-    posterior: LogDensity
-    objective: Objective
+    problem: Problem
     found: Solution
-    pinned: np.ndarray
     at_end: np.ndarray
-    weight: np.ndarray
+
+    @property
+    def parameters(self) -> tuple[Parameter, ...]:
+        """The free parameters."""
+        return self.problem.posterior.model.space.free
 
     def moved(self, index: int, z: float, start: np.ndarray) -> Solution:
         """The minimum with one parameter pinned at z; others leave the end of their range where that is better."""
-        this = np.arange(len(self.pinned)) == index
+        this = np.arange(len(start)) == index
         ended = self.at_end & ~this
         pin = np.where(this, z, self.found["z"])
-        found = self._solved(start, self.pinned | this | ended, pin)
+        found = self._solved(start, this | ended, pin)
         side = np.sign(self.found["z"])
         inside = np.where(ended, side * _INSIDE, found["z"])
         if not ended.any() or not np.any(ended & (side * self._gradient(inside) > 0)):
             return found
-        return min(found, self._solved(inside, self.pinned | this, pin), key=_total)
+        return min(found, self._solved(inside, this, pin), key=_total)
 
-    def _solved(self, start: np.ndarray, pinned: np.ndarray, pin: np.ndarray) -> Solution:
-        return solve(self.posterior, self.objective, start, pinned, pin, self.weight, quick=True)
+    def _solved(self, start: np.ndarray, pinned: np.ndarray | bool, pin: np.ndarray) -> Solution:
+        return self.problem.solve(start, pinned, pin, quick=True)
 
     def _gradient(self, z: np.ndarray) -> np.ndarray:
         """Of half the sum of squares."""
-        there = self._solved(z, np.ones_like(self.pinned), z)
+        there = self._solved(z, True, z)
         return there["stacked"][: -len(z)] @ there["sensitivity"]
 
     def rise(self, index: int) -> Callable[[float], float]:
@@ -117,13 +116,13 @@ class Basin:
 
     def value(self, index: int, z: float) -> float:
         """Value of a parameter at z, in its shown unit; infinite where its range has no end."""
-        parameter = self.posterior.model.space.free[index]
+        parameter = self.parameters[index]
         if z > 0 and not (isinstance(parameter.prior, Uniform) or np.isfinite(z)):
             return float("inf")
         if z < 0 and not (may_end((parameter,))[0] or np.isfinite(z)):
             return float("-inf")
-        every, at = np.ones_like(self.pinned), np.clip(np.full(len(self.pinned), z), -FARTHEST, FARTHEST)
-        values = self._solved(at, every, at)["values"]
+        at = np.clip(np.full(len(self.parameters), z), -FARTHEST, FARTHEST)
+        values = self._solved(at, True, at)["values"]
         return float(values[index]) * parameter.shown_scale
 
 
@@ -145,11 +144,9 @@ def profile(
         z: Where the parameter is pinned, as z; 25 values over the central 99.9 % of its prior if omitted.
         with_priors: Whether the priors count as measurements of the parameters.
     """
-    space, noise = posterior.model.space, noise_scales(posterior)
-    index, nothing = space.index[name], np.zeros(space.size)
-    weight = prior_weights(noise, with_priors)
-    found = solve(posterior, objective, start, noise, nothing, weight)
-    basin = Basin(posterior, objective, found, noise, np.zeros_like(noise), weight)
+    problem, index = Problem(posterior, objective, with_priors), posterior.model.space.index[name]
+    found = problem.solve(start)
+    basin = Basin(problem, found, np.zeros_like(problem.noise))
     rise = basin.rise(index)
     pins = [float(pin) for pin in np.sort(np.linspace(-3.3, 3.3, 25) if z is None else np.asarray(z, dtype=float))]
     rises = {pin: rise(pin) for pin in sorted(pins, key=lambda pin: abs(pin - found["z"][index]))}  # outward
@@ -164,14 +161,12 @@ def limits(basin: Basin, scale: np.ndarray, determined: np.ndarray) -> dict[str,
         scale: Scatter of each standardized residual about it.
         determined: Which parameters are.
     """
-    space, found = basin.posterior.model.space, {}
-    cheap = basin.found["jacobian"].size <= _SMALL
-    for i, p in enumerate(space.free):
-        if determined[i] and not basin.pinned[i] and (cheap or p.role in _ALWAYS):
+    found, cheap = {}, basin.found["jacobian"].size <= _SMALL
+    for i, p in enumerate(basin.parameters):
+        if determined[i] and not basin.problem.noise[i] and (cheap or p.role in _ALWAYS):
             error, ratio, freedom = _spread(basin, scale, i)
-            center = float(basin.found["z"][i])
             if ratio > 0:
-                ends = interval(basin.rise(i), center, error, ratio, freedom)
+                ends = interval(basin.rise(i), float(basin.found["z"][i]), error, ratio, freedom)
                 found[p.name] = basin.value(i, ends[0]), basin.value(i, ends[1])
     return found
 
@@ -181,19 +176,21 @@ def _spread(basin: Basin, scale: np.ndarray, index: int) -> tuple[float, float, 
 
     Not numbers where the readings say nothing of it, not even a little inside its range.
     """
-    found, terms = basin.found, basin.posterior.model.terms
+    found, terms = basin.found, basin.problem.posterior.model.terms
     if basin.at_end[index]:  # where z has no influence; a little inside its range
         found = basin.moved(index, float(np.copysign(_INSIDE, basin.found["z"][index])), basin.found["z"])
-    columns = np.flatnonzero(~basin.pinned & ~basin.at_end | (np.arange(len(basin.pinned)) == index))
+    columns = np.flatnonzero(~basin.problem.noise & ~basin.at_end | (np.arange(len(basin.at_end)) == index))
     about = linearized(found["sensitivity"][:, columns])
     place = int(np.searchsorted(columns, index))
     if not about.determined[place] or not about.unit_error[place] > 0:
         return float("nan"), float("nan"), 1.0
     moves = about.moves(scale)[place] ** 2
-    rows, freedom = freedom_by_block(terms, basin.found["residuals"], about.leverage)
+    parts = [
+        (np.sum(moves[rows]), freedom)
+        for _, rows, _, freedom in blocks(terms, basin.found["residuals"], about.leverage)
+    ]
     variance = float(np.sum(moves))
-    unit = float(about.unit_error[place]) ** 2
-    return float(np.sqrt(variance)), variance / unit, freedom_of(np.array([np.sum(moves[r]) for r in rows]), freedom)
+    return float(np.sqrt(variance)), variance / float(about.unit_error[place]) ** 2, freedom_of(*np.array(parts).T)
 
 
 def interval(

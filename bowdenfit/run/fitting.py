@@ -10,20 +10,14 @@ import jax
 
 from bowdenfit.dataset import Dataset
 from bowdenfit.front_desk import Fit
-from bowdenfit.inference.least_squares import (
-    LeastSquares,
-    MaximumPosterior,
-    Objective,
-    least_squares,
-    make_objective,
-    maximum_posterior,
-)
+from bowdenfit.inference.chain import Sampling
+from bowdenfit.inference.least_squares import LeastSquares, least_squares, maximum_posterior
 from bowdenfit.inference.log_density import LogDensity as Density
+from bowdenfit.inference.objective import make_objective
 from bowdenfit.model import build_model
 from bowdenfit.results.record import Provenance
-from bowdenfit.run.helpers import Assistants, load_ahead
-from bowdenfit.run.sampling import implied_program, libraries, sampled, sampling_programs
-from bowdenfit.run.stopwatch import Stopwatch
+from bowdenfit.run.helpers import Assistants, Stopwatch, load_ahead
+from bowdenfit.run.sampling import LIBRARIES, draws_of, implied_program, samplers, sampling_programs
 
 VERSIONED = ("bowdenfit", "jax", "optimistix", "emcee", "blackjax", "arviz-stats", "numpy", "scipy")
 
@@ -50,31 +44,33 @@ def run(
     """
     watch = Stopwatch()
     density = Density(build_model(data))
+
+    def classical() -> LeastSquares:
+        with jax.enable_x64(True), watch.stage("least squares"):  # the setting is each thread's own
+            return least_squares(density, objective, start.z)
+
     with ThreadPoolExecutor(1) as thread:
         if mcmc:
-            load_ahead("scipy.stats", *libraries(data.description.sampler.method), "arviz_stats.base")
+            libraries = [LIBRARIES[name] for name in samplers(data.description.sampler.method)]
+            load_ahead("scipy.stats", *libraries, "arviz_stats.base")
             programs = thread.submit(sampling_programs, density)
         with watch.stage("compile least squares"):
             objective = make_objective(density)
         with watch.stage("maximum of the posterior"):
             start = maximum_posterior(density, objective)
         # Sampling does not need least squares, so they are done beside it.
-        classical = thread.submit(_least_squares, density, objective, start, watch)
+        estimated = thread.submit(classical)
         if not mcmc:
-            squares = classical.result()
+            squares = estimated.result()
             reasons: tuple[str, ...] = () if squares.converged else (squares.message,)
             return Fit(data, squares, None, not reasons, reasons, provenance(seed, watch))
         with watch.stage("compile the posterior"):
             compiled, implied = programs.result(), thread.submit(implied_program, density, seed)
-        files = begin(), resume
-        posterior, reasons = sampled(density, compiled, implied, start, seed, *files, progress, watch, helpers)
-        squares = classical.result()
+        settings, files = data.description.sampler, (begin(), resume)
+        asked = Sampling(density, start, settings, seed, compiled.quantities, *files, progress or (lambda _: None))
+        posterior, reasons = draws_of(compiled, implied, asked, watch, helpers)
+        squares = estimated.result()
     return Fit(data, squares, posterior, not reasons, reasons, provenance(seed, watch))
-
-
-def _least_squares(density: Density, objective: Objective, start: MaximumPosterior, watch: Stopwatch) -> LeastSquares:
-    with jax.enable_x64(True), watch.stage("least squares"):  # the setting is each thread's own
-        return least_squares(density, objective, start.z)
 
 
 def provenance(seed: int, watch: Stopwatch) -> Provenance:

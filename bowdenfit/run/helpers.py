@@ -1,10 +1,11 @@
-"""What runs beside a fit: libraries are loaded while XLA compiles, figures are drawn while files are written."""
+"""What runs beside a fit: a stopwatch, libraries loaded while XLA compiles, figures drawn while files are written."""
 
 import signal
+import time
 from collections.abc import Callable, Iterator
 from concurrent.futures import Executor, Future, ProcessPoolExecutor
 from contextlib import ExitStack, contextmanager
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from importlib import import_module
 from multiprocessing import get_context
 from threading import Thread
@@ -84,3 +85,19 @@ def _ready(modules: tuple[str, ...]) -> None:
 def load_ahead(*modules: str) -> None:
     """Load modules in a thread, which gets its time while XLA compiles."""
     Thread(target=lambda: [import_module(name) for name in modules], daemon=True).start()
+
+
+@dataclass
+class Stopwatch:
+    """Seconds spent in each stage of a fit."""
+
+    seconds: dict[str, float] = field(default_factory=dict)
+
+    @contextmanager
+    def stage(self, name: str) -> Iterator[None]:
+        """Time what runs inside."""
+        start = time.perf_counter()
+        try:
+            yield
+        finally:
+            self.seconds[name] = self.seconds.get(name, 0.0) + time.perf_counter() - start

@@ -16,7 +16,7 @@ import pytest
 
 import bowdenfit as bf
 from bowdenfit.cli.progress import watched
-from bowdenfit.inference.ensemble import Progress
+from bowdenfit.inference.chain import Progress
 from bowdenfit.verbs import FIT
 
 ROOT = Path(__file__).parents[2]

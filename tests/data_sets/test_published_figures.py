@@ -13,9 +13,10 @@ import numpy as np
 import pytest
 
 from bowdenfit.dataset import Dataset, read_dataset
-from bowdenfit.inference.least_squares import LeastSquares, least_squares, make_objective, maximum_posterior
+from bowdenfit.inference.least_squares import LeastSquares, least_squares, maximum_posterior
 from bowdenfit.inference.log_density import LogDensity
 from bowdenfit.kinds.efficiencies.table import EfficiencyTable
+from bowdenfit.inference.objective import make_objective
 from bowdenfit.kinds.settings import parse_description
 from bowdenfit.model import Model, build_model
 from bowdenfit.physics.geometry import log_quadratic_coefficients

@@ -13,8 +13,9 @@ from scipy import optimize
 from bowdenfit.dataset import Dataset
 from bowdenfit.inference import solver
 from bowdenfit.inference.compilation import compiled
-from bowdenfit.inference.least_squares import LeastSquares, Objective, least_squares, make_objective, maximum_posterior
+from bowdenfit.inference.least_squares import LeastSquares, least_squares, maximum_posterior
 from bowdenfit.inference.log_density import LogDensity
+from bowdenfit.inference.objective import Objective, make_objective
 from bowdenfit.inference.solver import minimize
 from bowdenfit.kinds.angles.table import AngleTable
 from bowdenfit.kinds.efficiencies.table import EfficiencyTable

@@ -9,9 +9,10 @@ from cables import cable, measured
 from strd import digits_alike, problem
 
 from bowdenfit.inference import solver
-from bowdenfit.inference.least_squares import least_squares, make_objective
+from bowdenfit.inference.least_squares import least_squares
 from bowdenfit.inference.levenberg_marquardt import LevenbergMarquardt, RadiusSearch, ScaledDescent
 from bowdenfit.inference.log_density import LogDensity
+from bowdenfit.inference.objective import make_objective
 from bowdenfit.inference.solver import minimize
 from bowdenfit.model import build_model
 

@@ -13,9 +13,10 @@ from scipy import stats
 import bowdenfit as bf
 from bowdenfit.description import SamplerSettings
 from bowdenfit.inference import nuts
+from bowdenfit.inference.chain import Sampling
+from bowdenfit.inference.diagnostics import Trajectories, energy_mixing, trajectory_shortfalls
 from bowdenfit.inference.least_squares import MaximumPosterior
 from bowdenfit.inference.samplers import FALSE_ALARM, Drawn, SamplerAgreement, compare_samplers, recommendation
-from bowdenfit.inference.trajectories import Trajectories, energy_mixing, trajectory_shortfalls
 from bowdenfit.parameters.priors import Normal
 from bowdenfit.parameters.space import Parameter
 from bowdenfit.questions.summary.words import summary_text
@@ -48,7 +49,7 @@ class Target:
 
 def sampled(target: Target, covariance: np.ndarray, seed: int = 1, settings: SamplerSettings = SETTINGS):
     start = MaximumPosterior(np.zeros(target.model.space.size), covariance)
-    return nuts.sample(target, nuts.make_program(target, settings), start, settings, seed, lambda z: {})
+    return nuts.sample(Sampling(target, start, settings, seed), nuts.make_program(target, settings))
 
 
 def log_funnel(z):
@@ -108,9 +109,8 @@ def normal():
 
 def test_nuts_reproduces_correlated_normals_of_unlike_scales(normal):
     """Started from the wrong covariance; p = 1e-4 by chance."""
-    chain = nuts.sample(
-        normal.target, normal.program, MaximumPosterior(np.zeros(3), np.eye(3)), SETTINGS, 1, lambda z: {}
-    )
+    asked = Sampling(normal.target, MaximumPosterior(np.zeros(3), np.eye(3)), SETTINGS, 1)
+    chain = nuts.sample(asked, normal.program)
     truths = [(lambda z, i=i: z[..., i], 0.0) for i in range(3)]
     truths += [(lambda z, i=i: z[..., i] ** 2, SCALES[i] ** 2) for i in range(3)]
     truths += [(lambda z: z[..., 0] * z[..., 2], 0.9)]
@@ -274,7 +274,7 @@ def test_resumed_chains_equal_those_that_were_never_interrupted(normal, tmp_path
     def run(**options):
         settings = replace_settings(max_steps=300, target_ess=100)
         start = MaximumPosterior(np.zeros(3), np.eye(3))
-        return nuts.sample(normal.target, normal.program, start, settings, 1, lambda z: {}, **options)
+        return nuts.sample(Sampling(normal.target, start, settings, 1, **options), normal.program)
 
     path = tmp_path / "chain.h5"
     with pytest.raises(Stop):

@@ -13,10 +13,12 @@ from scipy import stats
 import bowdenfit as bf
 from bowdenfit.dataset import load_dataset
 from bowdenfit.description import SamplerSettings
+from bowdenfit.inference.chain import Chain, Sampling, stuck_walkers
 from bowdenfit.inference.draws import for_each_draw, named_values
-from bowdenfit.inference.ensemble import Chain, SideBySide, default_moves, sample
-from bowdenfit.inference.least_squares import make_objective, maximum_posterior
+from bowdenfit.inference.ensemble import SideBySide, default_moves, sample
+from bowdenfit.inference.least_squares import maximum_posterior
 from bowdenfit.inference.log_density import LogDensity
+from bowdenfit.inference.objective import make_objective
 from bowdenfit.model import build_model
 from bowdenfit.results.optimum import optimum_of
 
@@ -78,7 +80,7 @@ class Bench:
 
     def sample(self, settings: SamplerSettings, seed: int, moves=None) -> Chain:
         log_density = self._log_density(settings.n_ensembles * settings.n_walkers // 2)
-        return sample(self.posterior, log_density, self._start, settings, seed, lambda z: {}, moves=moves)
+        return sample(Sampling(self.posterior, self._start, settings, seed), log_density, moves)
 
 
 @pytest.fixture(scope="module")
@@ -282,8 +284,6 @@ def test_one_ensemble_across_both_modes_does_jump():
 
 def test_walkers_that_never_move_are_a_reason_not_to_trust_the_draws():
     """Three of 256 far out pass R-hat, effective sample size and drift, and spoil standard deviations."""
-    from bowdenfit.inference.chain import stuck_walkers
-
     z = np.random.default_rng(0).normal(size=(256, 20, 3))
     assert stuck_walkers(z) == ()
     z[:3] = z[:3, :1] + 30.0

@@ -12,8 +12,9 @@ from strd import Problem, problem
 
 from bowdenfit.dataset import Dataset
 from bowdenfit.inference.compilation import compiled
-from bowdenfit.inference.least_squares import LeastSquares, Objective, least_squares, make_objective, maximum_posterior
+from bowdenfit.inference.least_squares import LeastSquares, least_squares, maximum_posterior
 from bowdenfit.inference.log_density import LogDensity
+from bowdenfit.inference.objective import Objective, make_objective
 from bowdenfit.inference.profiles import freedom_of, interval, profile
 from bowdenfit.inference.solver import minimize, orthogonal
 from bowdenfit.model import build_model

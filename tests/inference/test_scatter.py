@@ -5,7 +5,7 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
-from bowdenfit.inference.scatter import scatter_about
+from bowdenfit.inference.linearized import scatter_about
 
 RESIDUALS = np.array([0.5, -0.5, 0.3, 0.0, 0.0])
 LEVERAGE = np.array([0.0, 0.0, 0.0, 1.0, 0.0])  # the fourth has a parameter to itself; the fifth is a bound that is met

@@ -6,8 +6,9 @@ from cables import measured
 from spoiling import copied, spoil
 
 import bowdenfit as bf
-from bowdenfit.inference.least_squares import least_squares, make_objective, maximum_posterior
+from bowdenfit.inference.least_squares import least_squares, maximum_posterior
 from bowdenfit.inference.log_density import LogDensity
+from bowdenfit.inference.objective import make_objective
 from bowdenfit.inference.other_minima import contested, fitting_as_well
 from bowdenfit.kinds.design import Design, ElasticDesign
 from bowdenfit.kinds.settings import parse_description

@@ -13,8 +13,9 @@ from scipy import integrate, stats
 from bowdenfit.cable.cable import Cable
 from bowdenfit.dataset import Dataset
 from bowdenfit.description import Preparation
-from bowdenfit.inference.least_squares import LeastSquares, least_squares, make_objective, maximum_posterior
+from bowdenfit.inference.least_squares import LeastSquares, least_squares, maximum_posterior
 from bowdenfit.inference.log_density import LogDensity
+from bowdenfit.inference.objective import make_objective
 from bowdenfit.kinds import runs as runs_of_model
 from bowdenfit.kinds.measured_cable import measured_cable
 from bowdenfit.kinds.measurements import Measurements

@@ -12,7 +12,7 @@ from scipy import stats
 import bowdenfit as bf
 from bowdenfit.errors import DescriptionError, UsageError
 from bowdenfit.inference.comparison import Difference, Prediction, differences, stacking_weights, weigh_without_each
-from bowdenfit.inference.leave_one_out import REFIT, ReadingsToLeaveOut, leave_one_out, refit_without
+from bowdenfit.inference.leave_one_out import REFIT, LeavingOut, ReadingsToLeaveOut, leave_one_out
 from bowdenfit.inference.log_density import LogDensity
 from bowdenfit.inference.moment_matching import Affine, best_map, match_moments
 from bowdenfit.inference.psis import reliable_k
@@ -96,7 +96,7 @@ def test_leave_one_out_with_fall_backs_is_what_integrals_give(readings, drawn, e
 def test_a_fit_without_a_reading_gives_its_exact_density(readings, drawn, exact):
     """Fails by chance for one seed in 15 000: two readings within four standard errors, and 0.005 for the grid."""
     for i in (0, 7):
-        elpd, error, settled = refit_without(readings, drawn.reshape(-1, 2), i, 1.0, 5)
+        elpd, error, settled = LeavingOut(readings, drawn.reshape(-1, 2), 1.0, 5).refit_without(i)
         assert settled
         assert 0 < error < 0.1
         assert elpd == pytest.approx(exact[i], abs=4 * error + 0.005)
@@ -104,7 +104,7 @@ def test_a_fit_without_a_reading_gives_its_exact_density(readings, drawn, exact)
 
 def test_a_refit_that_is_stopped_too_early_is_called_rough(outlier, drawn):
     hasty = ReadingsToLeaveOut(outlier, REFIT.model_copy(update={"max_steps": 200}))
-    _, _, settled = refit_without(hasty, drawn.reshape(-1, 2), 7, 1.0, 5)
+    _, _, settled = LeavingOut(hasty, drawn.reshape(-1, 2), 1.0, 5).refit_without(7)
     assert not settled
     assert Prediction(np.zeros(2), np.array([0.9, 0.9]), how=("rough", "refit")).unreliable == 1
 
@@ -370,7 +370,7 @@ def test_every_reading_of_the_on_body_data_is_predicted_as_by_a_fit_without_it(o
     found = leave_one_out(readings, fit.posterior.z, fit.posterior.log_likelihood, effective, 1)
     assert found.unreliable == 0
     for i in range(len(found.readings)):
-        elpd, error, settled = refit_without(readings, fit.posterior.flat_z, i, 0.15, 9)
+        elpd, error, settled = LeavingOut(readings, fit.posterior.flat_z, 0.15, 9).refit_without(i)
         assert settled, found.readings[i]
         heavy = 0.25 if found.pareto_k[i] > 0.5 else 0.0
         assert abs(elpd - found.elpd[i]) < 5 * np.hypot(error, found.error[i]) + heavy, found.readings[i]

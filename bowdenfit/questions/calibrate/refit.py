@@ -10,11 +10,13 @@ import numpy as np
 
 from bowdenfit.dataset import Dataset
 from bowdenfit.description import SamplerSettings
+from bowdenfit.inference.chain import Chain, Sampling
 from bowdenfit.inference.diagnostics import MAXIMUM_DRIFT, Diagnostics, diagnose_all
 from bowdenfit.inference.draws import for_each_draw
-from bowdenfit.inference.ensemble import Chain, sample
-from bowdenfit.inference.least_squares import make_objective, maximum_posterior
+from bowdenfit.inference.ensemble import sample
+from bowdenfit.inference.least_squares import maximum_posterior
 from bowdenfit.inference.log_density import LogDensity
+from bowdenfit.inference.objective import make_objective
 from bowdenfit.model import Model, build_model
 from bowdenfit.results.optimum import optimum_of
 
@@ -64,20 +66,14 @@ class Laboratory:
         """
         programs = self.programs_for(posterior)
         start = maximum_posterior(posterior, programs.objective)
-        return sample(
-            posterior, programs.log_density, start, self.sampler, seed, _no_quantities, diagnose=diagnose_few_draws
-        )
+        asked = Sampling(posterior, start, self.sampler, seed, diagnose=diagnose_few_draws)
+        return sample(asked, programs.log_density)
 
     def programs_for(self, posterior: LogDensity) -> RefitPrograms:
         """The programs for data of this shape."""
         shapes = str(jax.tree.map(lambda array: (array.shape, str(array.dtype)), posterior.data))
         key = shapes + str(posterior.model.space)
         return self.programs.setdefault(key, RefitPrograms(posterior, self.sampler))
-
-
-def _no_quantities(z: np.ndarray) -> dict[str, np.ndarray]:
-    del z
-    return {}
 
 
 def diagnose_few_draws(draws: Mapping[str, np.ndarray], n_ensembles: int) -> dict[str, Diagnostics]:

@@ -197,7 +197,6 @@ def _inputs(fit: Record) -> tuple[list[tuple[str, str]], list[tuple[str, tuple[s
 
 
 def _leave_out_each(name: str, fit: Record, drawn: Draws, common: Common, report: Report | None) -> Prediction:
-    said: Report | None = None if report is None else lambda sentence: report(f"{name}: {sentence}")
     return leave_one_out(
         ReadingsToLeaveOut(Density(fit.model)),
         drawn.z,
@@ -205,7 +204,7 @@ def _leave_out_each(name: str, fit: Record, drawn: Draws, common: Common, report
         drawn.n_effective,
         fit.provenance.seed,
         common.positions[name],
-        said,
+        lambda sentence: report(f"{name}: {sentence}") if report else None,
     )
 
 

@@ -72,8 +72,9 @@ def _is_plan(path: Path) -> bool:
 
 
 def _of_fit(found: "Record") -> "Identifiability":
-    from bowdenfit.inference.least_squares import make_objective, maximum_posterior
+    from bowdenfit.inference.least_squares import maximum_posterior
     from bowdenfit.inference.log_density import LogDensity
+    from bowdenfit.inference.objective import make_objective
     from bowdenfit.questions.identify.answer import identifiability
 
     known = identifiability(found)
@@ -96,8 +97,9 @@ def _profiles(posterior: Any, objective: Any, best: Any) -> tuple[Any, ...]:
 
 def _of_tables(data: "Dataset") -> "Identifiability":
     from bowdenfit.dataset import DESCRIPTION_FILE
-    from bowdenfit.inference.least_squares import make_objective, maximum_posterior
+    from bowdenfit.inference.least_squares import maximum_posterior
     from bowdenfit.inference.log_density import LogDensity
+    from bowdenfit.inference.objective import make_objective
     from bowdenfit.model import build_model
     from bowdenfit.questions.identify.answer import of_maximum
 

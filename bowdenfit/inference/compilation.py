@@ -17,8 +17,6 @@ def compiled(function: Callable[..., Any], *shapes: Any, run_once: bool = False)
     """`function` compiled for arguments of the given shapes.
 
     Args:
-        function: Function of arrays.
-        shapes: Example arguments or their shapes.
         run_once: Whether compiling costs more than running, so that optimization does not pay.
     """
     lowered = jax.jit(function).lower(*shapes)

@@ -53,13 +53,7 @@ class Disagreement:
 def disagreements(
     terms: Sequence[Term], parameters: Sequence[Parameter], found: Mapping[str, Any]
 ) -> tuple[Disagreement, ...]:
-    """How well each of several tables agrees with the others; empty of one table alone.
-
-    Args:
-        terms: The tables.
-        parameters: The free parameters.
-        found: Residuals of each table, and the Jacobian of all, at a z near the best fit.
-    """
+    """How well each of several tables agrees with the others by what was found near the best fit; empty of one table."""
     residuals, z = [found["residuals"][term.name] for term in terms], found["z"]
     if len(terms) < 2 or not all(np.isfinite(part).all() for part in (*residuals, found["jacobian"])):
         return ()
@@ -109,17 +103,7 @@ def _disagreement(
     parameters: Sequence[Parameter],
     best: np.ndarray,
 ) -> Disagreement | None:
-    """What a move says; None where the table says nothing that anything else says something of.
-
-    Args:
-        table: Its name.
-        move: How far it moves the parameters, in z.
-        of_rest: Information of everything else.
-        covariance: Inverse of the information of everything.
-        freedom: Degrees of freedom of the table's scatter.
-        parameters: The free parameters.
-        best: Where everything together puts them.
-    """
+    """What a move says; None where the table says nothing that anything else says something of."""
     from scipy.special import chdtrc, fdtrc, ndtri
 
     rest = np.linalg.inv(of_rest)

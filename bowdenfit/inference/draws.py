@@ -60,10 +60,6 @@ def replicator(posterior: LogDensity, seed: int) -> Callable[[np.ndarray], dict[
 
     Its answer has, by group ("values", "log_likelihood", "expected", "replicated") and name, arrays over draws and
     readings: named values, log likelihood of every reading, expected readings, and readings drawn anew.
-
-    Args:
-        posterior: The posterior.
-        seed: Seed of the readings drawn anew.
     """
     model = posterior.model
     names, key = named_values(model), jax.random.key(seed)
@@ -121,12 +117,6 @@ def output_force_at(
 
 
 def efficiency_at(model: Model, z: np.ndarray, route: np.ndarray) -> np.ndarray:
-    """Efficiency of every draw (rows) at route values (columns).
-
-    Args:
-        model: The model.
-        z: Draws, one a row.
-        route: Route values; any one number where the cable has no route.
-    """
+    """Efficiency of every draw (rows) at route values (columns); any one number where the cable has no route."""
     curves = curves_of(model, np.atleast_1d(np.asarray(route, dtype=float)))
     return for_each_draw(lambda one: curves(one)["efficiency"], model.space.size)(z)

@@ -10,7 +10,7 @@ References:
     2017, "The prior can often only be understood in the context of the likelihood" (Entropy 19).
 """
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from typing import Any, ClassVar
 
@@ -95,9 +95,9 @@ class Combination:
     @property
     def words(self) -> str:
         """Such as "mu2 + 0.8 mu1"."""
-        lead, *others = self.weights.items()
-        signed = [f"{'-' if weight < 0 else '+'} {_factor(abs(weight))}{name}" for name, weight in others]
-        return " ".join([lead[0], *signed])
+        lead, *others = self.weights
+        factors = {name: "" if abs(w) == 1 else f"{abs(w):.2g} " for name, w in self.weights.items()}
+        return " ".join([lead, *(f"{'-' if self.weights[n] < 0 else '+'} {factors[n]}{n}" for n in others)])
 
 
 @dataclass(frozen=True)
@@ -168,12 +168,7 @@ class Knowledge:
 
 
 def information_at(posterior: LogDensity, z: np.ndarray) -> MaximumPosterior:
-    """A point and the covariance that measurements would leave there, at the noise scales of that point.
-
-    Args:
-        posterior: The posterior, of readings without noise.
-        z: The true values, in z.
-    """
+    """True values z, and the covariance that readings without noise would leave there, at the noise scales of that point."""
 
     def residuals(at: Array, data: Any) -> Array:
         return jnp.concatenate(list(posterior.residuals(at, data).values()))
@@ -186,27 +181,26 @@ def information_at(posterior: LogDensity, z: np.ndarray) -> MaximumPosterior:
 
 
 def knowledge(names: Sequence[str], value: np.ndarray, covariance: np.ndarray, prior_sd: np.ndarray) -> Knowledge:
-    """What a covariance says of parameters whose priors are independent.
-
-    Args:
-        names: Of the parameters.
-        value: Their estimates.
-        covariance: That measurements and priors leave.
-        prior_sd: Standard deviations of the priors, at the estimates.
-    """
+    """What the covariance that measurements leave says of parameters, by their estimates and independent priors."""
     scaled = covariance / np.outer(prior_sd, prior_sd)
-    directions = _combinations(names, value, covariance, prior_sd, np.arange(len(names)))
-    tangled = _tangled(scaled)
-    determined = tuple(
-        c
-        for c in _combinations(names, value, covariance, prior_sd, tangled)
-        if c.share < _DETERMINED and len(c.weights) > 1
-    )
+
+    def combinations(which: np.ndarray) -> Iterator[Combination]:
+        """Independent combinations of some of the parameters, the best determined first."""
+        if len(which):
+            shares, vectors = np.linalg.eigh(scaled[np.ix_(which, which)])
+            for share, vector in zip(shares, vectors.T, strict=True):
+                weights = np.zeros(len(names))
+                weights[which], kept = _as_printed(vector, prior_sd[which])
+                sd = float(np.sqrt(max(weights @ covariance @ weights, 0.0)))
+                by_name = {names[i]: float(weights[i]) for i in which[kept]}
+                yield Combination(by_name, float(weights @ value), sd, float(np.clip(share, 0.0, 1.0)))
+
+    directions, tangled = tuple(combinations(np.arange(len(names)))), _tangled(scaled)
     return Knowledge(
-        tuple(_known(names, value, covariance, prior_sd, i) for i in range(len(names))),
+        _one_by_one(names, value, covariance, prior_sd),
         tuple(names[i] for i in tangled),
         directions,
-        determined,
+        tuple(c for c in combinations(tangled) if c.share < _DETERMINED and len(c.weights) > 1),
         _sharpest(directions, value, covariance),
         _collinearity(scaled),
     )
@@ -224,40 +218,14 @@ def _tangled(scaled: np.ndarray) -> np.ndarray:
     return np.flatnonzero((share >= OWN) | open_ends | bounded)
 
 
-def _combinations(
-    names: Sequence[str], value: np.ndarray, covariance: np.ndarray, prior_sd: np.ndarray, which: np.ndarray
-) -> tuple[Combination, ...]:
-    """Independent combinations of some of the parameters, the best determined first."""
-    if not len(which):
-        return ()
-    scaled = (covariance / np.outer(prior_sd, prior_sd))[np.ix_(which, which)]
-    shares, vectors = np.linalg.eigh(scaled)
-    return tuple(
-        _combination(names, value, covariance, prior_sd, which, vectors[:, i], float(shares[i]))
-        for i in range(len(which))
-    )
-
-
-def _combination(
-    names: Sequence[str],
-    value: np.ndarray,
-    covariance: np.ndarray,
-    prior_sd: np.ndarray,
-    which: np.ndarray,
-    vector: np.ndarray,
-    share: float,
-) -> Combination:
-    """The combination of one eigenvector, as it is printed: small parts dropped, weights of two digits."""
+def _as_printed(vector: np.ndarray, prior_sd: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Weights of an eigenvector's parameters, small parts dropped, of two digits; and which were kept, the largest first."""
     lead = int(np.argmax(np.abs(vector)))
-    weights = np.zeros(len(names))
-    weights[which] = (vector / prior_sd[which]) / (vector[lead] / prior_sd[which[lead]])
-    kept = sorted(np.flatnonzero(np.abs(vector) >= _PART), key=lambda i: -abs(vector[i]))
-    rounded = np.zeros(len(names))
-    for i in which[kept]:
-        rounded[i] = float(f"{weights[i]:.2g}")
-    sd = float(np.sqrt(max(rounded @ covariance @ rounded, 0.0)))
-    by_name = {names[i]: float(rounded[i]) for i in which[kept]}
-    return Combination(by_name, float(rounded @ value), sd, float(np.clip(share, 0.0, 1.0)))
+    weights = (vector / prior_sd) / (vector[lead] / prior_sd[lead])
+    kept = np.array(sorted(np.flatnonzero(np.abs(vector) >= _PART), key=lambda i: -abs(vector[i])), dtype=int)
+    rounded = np.zeros(len(vector))
+    rounded[kept] = [float(f"{weights[i]:.2g}") for i in kept]
+    return rounded, kept
 
 
 def _sharpest(directions: Sequence[Combination], value: np.ndarray, covariance: np.ndarray) -> Combination | None:
@@ -269,15 +237,21 @@ def _sharpest(directions: Sequence[Combination], value: np.ndarray, covariance: 
     return best if best.sd / best.value < _SHARPER * singly else None
 
 
-def _known(names: Sequence[str], value: np.ndarray, covariance: np.ndarray, prior_sd: np.ndarray, i: int) -> Known:
-    sd = np.sqrt(np.diag(covariance))
-    correlation = covariance[i] / np.maximum(sd[i] * sd, 1e-300)
-    correlation[i] = 0.0
-    other = int(np.argmax(np.abs(correlation))) if len(names) > 1 else -1
-    # Information on one parameter with all others known: that of the measurements and that of the prior.
-    alone = float(np.linalg.inv(covariance)[i, i])
-    alike = (names[other], float(correlation[other])) if other >= 0 else ("", 0.0)
-    return Known(names[i], float(value[i]), float(sd[i]), float(prior_sd[i]), *alike, float(covariance[i, i] * alone))
+def _one_by_one(
+    names: Sequence[str], value: np.ndarray, covariance: np.ndarray, prior_sd: np.ndarray
+) -> tuple[Known, ...]:
+    sd, found = np.sqrt(np.diag(covariance)), []
+    for i, name in enumerate(names):
+        correlation = covariance[i] / np.maximum(sd[i] * sd, 1e-300)
+        correlation[i] = 0.0
+        other = int(np.argmax(np.abs(correlation)))
+        alike = (names[other], float(correlation[other])) if len(names) > 1 else ("", 0.0)
+        # Information on one parameter with all others known: that of the measurements and that of the prior.
+        alone = float(np.linalg.inv(covariance)[i, i])
+        found.append(
+            Known(name, float(value[i]), float(sd[i]), float(prior_sd[i]), *alike, float(covariance[i, i] * alone))
+        )
+    return tuple(found)
 
 
 def _collinearity(scaled: np.ndarray) -> float:
@@ -288,7 +262,3 @@ def _collinearity(scaled: np.ndarray) -> float:
         return float("inf") if len(size) else 1.0
     values = np.linalg.eigvalsh(information / np.outer(size, size))
     return float(values[-1] / values[0]) if values[0] > 1e-12 * values[-1] else float("inf")
-
-
-def _factor(weight: float) -> str:
-    return "" if weight == 1 else f"{weight:.2g} "

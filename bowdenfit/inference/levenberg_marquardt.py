@@ -160,10 +160,6 @@ def stepper(rows: int, columns: int) -> tuple[Callable[..., Any], list[np.ndarra
     A step takes what the solver does, whether it is the first, the accepted parameters, the state, and residuals
     and Jacobian where the step before has asked for them; it gives the accepted parameters, the state, where to evaluate
     next, and whether this is the end.
-
-    Args:
-        rows: Number of residuals.
-        columns: Number of parameters.
     """
     number, *arrays = (jax.ShapeDtypeStruct(shape, jnp.float64) for shape in ((), (columns,), (rows,), (rows, columns)))
     flag, settings = jax.ShapeDtypeStruct((), jnp.bool_), (number, number, number)

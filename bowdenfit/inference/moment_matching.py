@@ -20,13 +20,7 @@ Evaluate = Callable[[np.ndarray], tuple[np.ndarray, np.ndarray]]
 
 @dataclass(frozen=True)
 class Affine:
-    """The map from u to matrix (u - center) + center + shift.
-
-    Args:
-        matrix: Linear part.
-        shift: Of the center.
-        center: Mean of the draws.
-    """
+    """The map from u to matrix (u - center) + center + shift, where the center is the mean of the draws."""
 
     matrix: np.ndarray
     shift: np.ndarray
@@ -59,20 +53,16 @@ def match_moments(draws: np.ndarray, evaluate: Evaluate, share: float) -> tuple[
         31). arviz_stats.loo_moment_match is the same in intention; its version 0.8, the last for Python 3.11, subtracts the
         shift twice where it maps draws back, and its weights are then not those of the mixture.
     """
-    with_reading = evaluate(draws)[0]
-    found = best_map(draws, with_reading, evaluate, share)
-    return _split(draws, found, evaluate, share)
+    found = best_map(draws, evaluate(draws)[0], evaluate, share)
+    # Every other draw is moved, and all are weighted against the mixture of where both kinds come from.
+    mixed = np.where(np.arange(len(draws))[:, None] % 2 == 0, found(draws), draws)
+    density, likelihood = evaluate(mixed)
+    from_moved = evaluate(found.back(mixed))[0] - found.log_volume
+    return weighted_elpd(density - likelihood - np.logaddexp(density, from_moved), likelihood, share)
 
 
 def best_map(draws: np.ndarray, log_density: np.ndarray, evaluate: Evaluate, share: float) -> Affine:
-    """The affine map with the least Pareto k that moments of the weighted draws lead to, step by step.
-
-    Args:
-        draws: See `matched`.
-        log_density: At the draws.
-        evaluate: See `matched`.
-        share: See `matched`.
-    """
+    """The affine map with the least Pareto k that moments of the weighted draws lead to, step by step; see `match_moments`."""
     size, center = draws.shape[1], draws.mean(axis=0)
     found = Affine(np.eye(size), np.zeros(size), center)
 
@@ -110,12 +100,3 @@ def _steps(found: Affine, draws: np.ndarray, weights: np.ndarray) -> Iterator[Af
 
 def _covariance(draws: np.ndarray, weights: np.ndarray | None = None) -> np.ndarray:
     return np.atleast_2d(np.cov(draws.T, aweights=weights, ddof=0))
-
-
-def _split(draws: np.ndarray, found: Affine, evaluate: Evaluate, share: float) -> tuple[float, float, float]:
-    """Every other draw moved, all weighted against the mixture of where both kinds come from."""
-    moved = np.arange(len(draws)) % 2 == 0
-    mixed = np.where(moved[:, None], found(draws), draws)
-    density, likelihood = evaluate(mixed)
-    from_moved = evaluate(found.back(mixed))[0] - found.log_volume
-    return weighted_elpd(density - likelihood - np.logaddexp(density, from_moved), likelihood, share)

@@ -88,11 +88,6 @@ def _beyond(x: np.ndarray, weights: np.ndarray, reading: float) -> float:
 
     .. math:: P(X > y) = P(X > u) \left(1 + \xi \frac{y - u}{s}\right)^{-1/\xi}
 
-    Args:
-        x: Draws, ascending.
-        weights: Their weights.
-        reading: The reading y.
-
     References:
         Hosking and Wallis, Parameter and quantile estimation for the generalized Pareto distribution, Technometrics 29
         (1987), 339: probability-weighted moments.
@@ -123,10 +118,6 @@ def place_at_random(found: LeftOut, generator: np.random.Generator) -> np.ndarra
     """Where each reading lies in its prediction, as a number that is uniform between 0 and 1 if all is right.
 
     Of a bound only an interval is known; it takes a place at random inside.
-
-    Args:
-        found: The predictions.
-        generator: Source of random numbers.
     """
     return np.clip(generator.uniform(found.below, np.maximum(found.up_to, found.below)), 0.0, 1.0)
 

@@ -154,13 +154,7 @@ def profile(
 
 
 def limits(basin: Basin, scale: np.ndarray, determined: np.ndarray) -> dict[str, tuple[float, float]]:
-    """90 % intervals by parameter, in their shown units; without those of parameters that are not determined.
-
-    Args:
-        basin: The minimum.
-        scale: Scatter of each standardized residual about it.
-        determined: Which parameters are.
-    """
+    """90 % intervals of determined parameters, in shown units, by the scatter of each residual about the minimum."""
     found, cheap = {}, basin.found["jacobian"].size <= _SMALL
     for i, p in enumerate(basin.parameters):
         if determined[i] and not basin.problem.noise[i] and (cheap or p.role in _ALWAYS):

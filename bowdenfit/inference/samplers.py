@@ -140,14 +140,10 @@ class Drawn:
 
 
 def compare_samplers(first: Drawn, second: Drawn) -> SamplerAgreement:
-    """Whether two samplers agree on every quantity.
+    """Whether two samplers, the first of which drew the result, agree on every quantity.
 
     The limit is Bonferroni's over all comparisons, so that two samplers that are right are said to disagree once in a
     thousand comparisons of fits at the most.
-
-    Args:
-        first: The sampler whose draws are the result.
-        second: The other, with draws of the same quantities.
     """
     scales = first.error_scale(), second.error_scale()
     found = tuple(d for name in first.draws for d in _differences(name, first, second, scales))
@@ -187,13 +183,7 @@ def _errors(draws: np.ndarray) -> list[float]:
 
 
 def recommendation(sampler: str, n_parameters: int, short: bool) -> str:
-    """A sentence that recommends the other sampler where emcee does badly, or is likely to; empty otherwise.
-
-    Args:
-        sampler: What sampled.
-        n_parameters: Number of free parameters.
-        short: Whether its draws fall short of what was asked for.
-    """
+    """A sentence that recommends the other sampler where emcee does badly, or is likely to; empty otherwise."""
     if sampler != "emcee":
         return ""
     if short:

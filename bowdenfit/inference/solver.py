@@ -33,14 +33,7 @@ _RADIUS, _BOLD_RADIUS = 0.3, 100.0  # of the first step, as part of the length o
 
 @dataclass(frozen=True)
 class Minimum:
-    """Where the solver stopped.
-
-    Args:
-        x: Parameters.
-        residuals: There.
-        jacobian: Their derivatives.
-        succeeded: Whether it is a minimum.
-    """
+    """Where the solver stopped: parameters, residuals, their derivatives, and whether it is a minimum."""
 
     x: np.ndarray
     residuals: np.ndarray
@@ -73,12 +66,7 @@ def minimize(evaluate: Evaluate, start: np.ndarray, quick: bool = False) -> Mini
 
 
 def prepare(rows: int, columns: int) -> None:
-    """Compile what solves of a shape need, in a thread beside something else; the first of them does it otherwise.
-
-    Args:
-        rows: Number of residuals.
-        columns: Number of parameters.
-    """
+    """Compile what solves of a shape need, in a thread beside something else; the first of them does it otherwise."""
     import jax
 
     from bowdenfit.inference.levenberg_marquardt import stepper

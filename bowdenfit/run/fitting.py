@@ -31,17 +31,7 @@ def run(
     progress: Callable[..., None] | None,
     helpers: Assistants,
 ) -> Fit:
-    """Least squares, and the posterior if `mcmc`; see `bowdenfit.run.verb.fit`.
-
-    Args:
-        data: What is fitted.
-        begin: Called when sampling starts; gives the checkpoint to write, if any.
-        mcmc: Whether to sample.
-        seed: Seed.
-        resume: Whether the checkpoint has states to go on from.
-        progress: Called while sampling.
-        helpers: Who does the statistics.
-    """
+    """Least squares, and the posterior if `mcmc`, for which `begin` gives the checkpoint; see `bowdenfit.run.verb.fit`."""
     watch = Stopwatch()
     density = Density(build_model(data))
 

@@ -55,10 +55,6 @@ def assistants(statistics: bool, drawing: bool) -> Iterator[Assistants]:
 
     A started process imports the main module again, so only a program that guards its start may ask for one: the command
     line does, the library does not unless told to.
-
-    Args:
-        statistics: Whether to start a process for statistics.
-        drawing: Whether to start a process for drawing.
     """
     with ExitStack() as open_pools:
         pools = [

@@ -79,15 +79,7 @@ def draws_of(
     watch: Stopwatch,
     helpers: Assistants,
 ) -> tuple[Draws, tuple[str, ...]]:
-    """The posterior, and why it should not be trusted.
-
-    Args:
-        programs: Compiled for it.
-        implied: What `implied_program` gives, once that is compiled.
-        asked: What the samplers are asked for.
-        watch: Records the stages' times.
-        helpers: Who does the statistics.
-    """
+    """The posterior by each of the samplers, and why it should not be trusted."""
     asked = replace(asked, diagnose=lambda *a: helpers.statistics.submit(diagnose_all, *a).result())
     model, chains = asked.posterior.model, list[Chain]()
     for name, program in programs.samplers.items():

@@ -2,24 +2,27 @@
 
 import platform
 from collections.abc import Callable
-from concurrent.futures import ThreadPoolExecutor
+from concurrent.futures import Future, ThreadPoolExecutor
 from datetime import UTC, datetime
 from pathlib import Path
+from typing import Any, TypeVar
 
 import jax
 
 from bowdenfit.dataset import Dataset
 from bowdenfit.front_desk import Fit
 from bowdenfit.inference.chain import Sampling
+from bowdenfit.inference.draws import replicator
 from bowdenfit.inference.least_squares import LeastSquares, least_squares, maximum_posterior
 from bowdenfit.inference.log_density import LogDensity as Density
 from bowdenfit.inference.objective import make_objective
 from bowdenfit.model import build_model
 from bowdenfit.results.record import Provenance
 from bowdenfit.run.helpers import Assistants, Stopwatch, load_ahead
-from bowdenfit.run.sampling import LIBRARIES, draws_of, implied_program, samplers, sampling_programs
+from bowdenfit.run.sampling import LIBRARIES, draws_of, samplers, sampling_programs
 
 VERSIONED = ("bowdenfit", "jax", "optimistix", "emcee", "blackjax", "arviz-stats", "numpy", "scipy")
+Answer = TypeVar("Answer")
 
 
 def run(
@@ -35,27 +38,34 @@ def run(
     watch = Stopwatch()
     density = Density(build_model(data))
 
+    def beside(function: Callable[..., Answer], *arguments: Any) -> "Future[Answer]":
+        def in_64_bits() -> Answer:
+            with jax.enable_x64(True):  # the setting is each thread's own
+                return function(*arguments)
+
+        return thread.submit(in_64_bits)
+
     def classical() -> LeastSquares:
-        with jax.enable_x64(True), watch.stage("least squares"):  # the setting is each thread's own
+        with watch.stage("least squares"):
             return least_squares(density, objective, start.z)
 
     with ThreadPoolExecutor(1) as thread:
         if mcmc:
             libraries = [LIBRARIES[name] for name in samplers(data.description.sampler.method)]
             load_ahead("scipy.stats", *libraries, "arviz_stats.base")
-            programs = thread.submit(sampling_programs, density)
+            programs = beside(sampling_programs, density)
         with watch.stage("compile least squares"):
             objective = make_objective(density)
         with watch.stage("maximum of the posterior"):
             start = maximum_posterior(density, objective)
         # Sampling does not need least squares, so they are done beside it.
-        estimated = thread.submit(classical)
+        estimated = beside(classical)
         if not mcmc:
             squares = estimated.result()
             reasons: tuple[str, ...] = () if squares.converged else (squares.message,)
             return Fit(data, squares, None, not reasons, reasons, provenance(seed, watch))
         with watch.stage("compile the posterior"):
-            compiled, implied = programs.result(), thread.submit(implied_program, density, seed)
+            compiled, implied = programs.result(), beside(replicator, density, seed)
         settings, files = data.description.sampler, (begin(), resume)
         asked = Sampling(density, start, settings, seed, compiled.quantities, *files, progress or (lambda _: None))
         posterior, reasons = draws_of(compiled, implied, asked, watch, helpers)

@@ -11,7 +11,7 @@ import numpy as np
 
 from bowdenfit.inference.chain import Chain, Sampling
 from bowdenfit.inference.diagnostics import diagnose_all
-from bowdenfit.inference.draws import for_each_draw, replicator
+from bowdenfit.inference.draws import for_each_draw
 from bowdenfit.inference.log_density import LogDensity as Density
 from bowdenfit.inference.samplers import NAMES, Drawn, compare_samplers
 from bowdenfit.model import Model
@@ -49,27 +49,14 @@ class Programs:
 
 
 def sampling_programs(density: Density) -> Programs:
-    """The programs that sampling needs; called in a thread, for which 64-bit floats are switched on here."""
-    model, settings = density.model, density.model.description.sampler
-    with jax.enable_x64(True):
-        programs = {name: _program(density, name) for name in samplers(settings.method)}
-        optimum = for_each_draw(optimum_of(model), model.space.size) if model.description.route else None
-    return Programs(programs, optimum)
-
-
-def _program(density: Density, sampler: str) -> Callable[..., Any]:
-    settings = density.model.description.sampler
-    if sampler == "emcee":
-        return density.batched_log_density(settings.n_ensembles * settings.n_walkers // 2)
-    from bowdenfit.inference.nuts import make_program
-
-    return make_program(density, settings)
-
-
-def implied_program(density: Density, seed: int) -> Callable[[np.ndarray], Any]:
-    """What computes everything else that a draw implies; called in a thread."""
-    with jax.enable_x64(True):
-        return replicator(density, seed)
+    """The programs that sampling needs."""
+    model, settings, programs = density.model, density.model.description.sampler, dict[str, Callable[..., Any]]()
+    for name in samplers(settings.method):
+        if name == "emcee":
+            programs[name] = density.batched_log_density(settings.n_ensembles * settings.n_walkers // 2)
+        else:
+            programs[name] = import_module(_MODULES[name]).make_program(density, settings)
+    return Programs(programs, for_each_draw(optimum_of(model), model.space.size) if model.description.route else None)
 
 
 def draws_of(

@@ -15,8 +15,8 @@ import pytest
 from bowdenfit.dataset import Dataset, read_dataset
 from bowdenfit.inference.least_squares import LeastSquares, least_squares, maximum_posterior
 from bowdenfit.inference.log_density import LogDensity
-from bowdenfit.kinds.efficiencies.table import EfficiencyTable
 from bowdenfit.inference.objective import make_objective
+from bowdenfit.kinds.efficiencies.table import EfficiencyTable
 from bowdenfit.kinds.settings import parse_description
 from bowdenfit.model import Model, build_model
 from bowdenfit.physics.geometry import log_quadratic_coefficients

@@ -18,8 +18,8 @@ from scipy import optimize
 from bowdenfit.dataset import Dataset
 from bowdenfit.inference.least_squares import LeastSquares, least_squares
 from bowdenfit.inference.log_density import LogDensity
-from bowdenfit.kinds.forces.table import ForceTable
 from bowdenfit.inference.objective import make_objective
+from bowdenfit.kinds.forces.table import ForceTable
 from bowdenfit.model import build_model
 
 MU, TAU = 0.14, 0.01

@@ -18,8 +18,8 @@ from bowdenfit.dataset import Dataset, load_dataset
 from bowdenfit.inference.compilation import compiled
 from bowdenfit.inference.least_squares import maximum_posterior
 from bowdenfit.inference.log_density import LogDensity
-from bowdenfit.kinds.forces.table import ForceTable
 from bowdenfit.inference.objective import make_objective
+from bowdenfit.kinds.forces.table import ForceTable
 from bowdenfit.kinds.measurements import Measurements
 from bowdenfit.kinds.preload.table import PreloadTable
 from bowdenfit.kinds.rows import OwnAngles, Provenance

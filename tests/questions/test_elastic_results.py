@@ -15,9 +15,9 @@ from bowdenfit import predict
 from bowdenfit.dataset import Dataset
 from bowdenfit.inference.least_squares import least_squares, maximum_posterior
 from bowdenfit.inference.log_density import LogDensity
+from bowdenfit.inference.objective import make_objective
 from bowdenfit.kinds import KINDS
 from bowdenfit.kinds.loop.table import LoopTable
-from bowdenfit.inference.objective import make_objective
 from bowdenfit.model import build_model
 from bowdenfit.questions.figures import figures_of
 from bowdenfit.questions.simulate.simulation import empty_tables, simulate, true_values

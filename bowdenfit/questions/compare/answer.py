@@ -204,7 +204,7 @@ def _leave_out_each(name: str, fit: Record, drawn: Draws, common: Common, report
         drawn.n_effective,
         fit.provenance.seed,
         common.positions[name],
-        lambda sentence: report(f"{name}: {sentence}") if report else None,
+        lambda sentence: report(f"{name}: {sentence}") if report is not None else None,
     )
 
 

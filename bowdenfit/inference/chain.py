@@ -77,7 +77,7 @@ class Sampling:
     report: Callable[[Progress], None] = lambda _: None
     diagnose: Callable[[Mapping[str, np.ndarray], int], dict[str, Diagnostics]] = diagnose_all
 
-    def diagnosed(self, z: np.ndarray, n_ensembles: int, **of_sampler: Any) -> Chain:
+    def chain_of(self, z: np.ndarray, n_ensembles: int, **of_sampler: Any) -> Chain:
         """Draws (walker, draw, parameter), ordered by ensemble, with derived quantities, diagnostics, and their shortfalls."""
         flat = self.quantities(z.reshape(-1, z.shape[-1]))
         derived = {name: np.asarray(values).reshape(z.shape[:2]) for name, values in flat.items()}

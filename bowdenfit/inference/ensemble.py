@@ -124,7 +124,7 @@ def _summarized(asked: Sampling, backend: emcee.backends.Backend) -> Chain:
     # In this order in memory, as in a loaded fit: sums must agree to the last bit.
     z = np.ascontiguousarray(np.asarray(backend.get_chain()[kept]).transpose(1, 0, 2))
     acceptance = float(np.mean(backend.accepted)) / stored
-    chain = asked.diagnosed(z, asked.settings.n_ensembles, steps=stored * THIN, acceptance=acceptance)
+    chain = asked.chain_of(z, asked.settings.n_ensembles, steps=stored * THIN, acceptance=acceptance)
     too_short = f"each walker took {stored * THIN} steps, and {_FIRST_LOOK * THIN} are the least that can be judged"
     first = (too_short,) if stored < _FIRST_LOOK else ()
     return replace(chain, reasons=(*first, *chain.reasons, *stuck_walkers(z)))

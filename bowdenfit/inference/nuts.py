@@ -185,7 +185,7 @@ def _summarized(asked: Sampling, blocks: Sequence[Block]) -> tuple[Chain, bool]:
         {name: np.ascontiguousarray(drawn[name][kept].T) for name in _STATISTICS},
     )
     went = {"acceptance": float(drawn["acceptance_rate"].mean()), "sampler": "nuts", "trajectories": trajectories}
-    chain = asked.diagnosed(z, chains, steps=steps, **went)
+    chain = asked.chain_of(z, chains, steps=steps, **went)
     reasons = (*chain.reasons, *stuck_walkers(z[:, z.shape[1] // 2 :], "chains"))
     return replace(chain, reasons=(*reasons, *trajectory_shortfalls(trajectories))), bool(reasons)
 

@@ -131,7 +131,7 @@ def profile(
     objective: Objective,
     name: str,
     start: np.ndarray,
-    z: Sequence[float] | np.ndarray | None = None,
+    z: Sequence[float] | np.ndarray,
     with_priors: bool = False,
 ) -> Profile:
     """The profile of one free parameter, for figures and for questions of identifiability.
@@ -141,14 +141,14 @@ def profile(
         objective: Its compiled solve.
         name: Name of the parameter.
         start: z to start from, such as that of the maximum of the posterior.
-        z: Where the parameter is pinned, as z; 25 values over the central 99.9 % of its prior if omitted.
+        z: Where the parameter is pinned, as z.
         with_priors: Whether the priors count as measurements of the parameters.
     """
     problem, index = Problem(posterior, objective, with_priors), posterior.model.space.index[name]
     found = problem.solve(start)
     basin = Basin(problem, found, np.zeros_like(problem.noise))
     rise = basin.rise(index)
-    pins = [float(pin) for pin in np.sort(np.linspace(-3.3, 3.3, 25) if z is None else np.asarray(z, dtype=float))]
+    pins = [float(pin) for pin in np.sort(z)]
     rises = {pin: rise(pin) for pin in sorted(pins, key=lambda pin: abs(pin - found["z"][index]))}  # outward
     return Profile(name, np.array([basin.value(index, pin) for pin in pins]), np.array([rises[pin] for pin in pins]))
 

@@ -93,20 +93,16 @@ class SamplerAgreement:
                 f"parameter and answer differ by at most {abs(most.sds):.2f} standard deviations ({most.summary} of "
                 f"{most.quantity}, whose Monte Carlo error is {most.error:.2f}).{sharper}"
             )
-        return f"{one} and {two} disagree {self._where()}; one of them has missed part of the posterior."
+        first, *others = self.beyond_chance
+        more = f" and on {len(others)} more" if others else ""
+        return (
+            f"{one} and {two} disagree on the {first.summary} of {first.quantity}, by {abs(first.sds):.2f} standard "
+            f"deviations, {first.errors:.0f} times the Monte Carlo error{more}; one of them has missed part of the posterior."
+        )
 
     def reasons(self) -> tuple[str, ...]:
         """Why the draws should not be trusted; empty if the samplers agree."""
         return () if self.agree else (self.sentence().removesuffix("."),)
-
-    def _where(self) -> str:
-        seen = self.beyond_chance
-        first = seen[0]
-        more = f" and on {len(seen) - 1} more" if len(seen) > 1 else ""
-        return (
-            f"on the {first.summary} of {first.quantity}, by {abs(first.sds):.2f} standard deviations, {first.errors:.0f} "
-            f"times the Monte Carlo error{more}"
-        )
 
 
 @dataclass(frozen=True)

@@ -10,12 +10,11 @@ import numpy as np
 
 from bowdenfit.dataset import Dataset
 from bowdenfit.errors import UsageError
-from bowdenfit.inference.diagnostics import Diagnostics
+from bowdenfit.inference.diagnostics import Diagnostics, Trajectories
 from bowdenfit.inference.draws import curves_of, efficiency_at, for_each_draw
 from bowdenfit.inference.interval import Interval
 from bowdenfit.inference.least_squares import LeastSquares
 from bowdenfit.inference.samplers import SamplerAgreement
-from bowdenfit.inference.trajectories import Trajectories
 from bowdenfit.model import Model, build_model
 from bowdenfit.results.choices import at_edge, best_window, rank_choices
 from bowdenfit.results.length import OptimalLength

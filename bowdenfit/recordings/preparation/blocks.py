@@ -5,7 +5,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from bowdenfit.recordings.preparation.clock import DROPOUT, GOOD, KINDS, SATURATED
-from bowdenfit.recordings.preparation.shapes import ChosenFlags, ChosenVector, OtherVector, Places
+from bowdenfit.recordings.preparation.shapes import ChosenFlags, ChosenVector, Places
 from bowdenfit.recordings.recording import Blocks
 from bowdenfit.types import Flags, Labels, Vector
 
@@ -48,32 +48,19 @@ def block_samples(common: Common, bandwidth: float, noise: tuple[float, float], 
         loop: Whether the forces are of a pull-pull loop, whose friction band is one of differences.
     """
     samples = len(common.time)
-    quiet = _quiet_enough_for_loop if loop else _quiet_enough
-    wanted = max(round(1 / (2 * bandwidth * common.step)), quiet(common, noise))
+    wanted = max(round(1 / (2 * bandwidth * common.step)), _quiet_enough(common, noise, loop))
     span = float(common.time[-1] - common.time[0]) / common.step + 1
     return max(1, min(wanted, samples // FEWEST_BLOCKS), int(np.ceil(span / MOST_BLOCKS)))
 
 
-def _quiet_enough(common: Common, noise: tuple[float, float]) -> int:
-    """Samples over which the noise of the mean log ratio comes down to a tenth of half the friction band."""
-    good = (common.fault == GOOD) & (common.input_force > 0) & (common.output_force > 0)
+def _quiet_enough(common: Common, noise: tuple[float, float], loop: bool) -> int:
+    """Samples over which the noise of how far the forces are apart comes down to a tenth of half the friction band."""
+    good = (common.fault == GOOD) & (loop | ((common.input_force > 0) & (common.output_force > 0)))
     if not good.any():
         return 1
-    forces = common.input_force[good], common.output_force[good]
-    single = float(np.median(np.hypot(noise[0] / forces[0], noise[1] / forces[1])))
-    return _enough(np.log(forces[0] / forces[1]), single)
-
-
-def _quiet_enough_for_loop(common: Common, noise: tuple[float, float]) -> int:
-    """Samples over which the noise of the mean difference of the forces comes down to a tenth of half the friction band."""
-    good = common.fault == GOOD
-    if not good.any():
-        return 1
-    return _enough(common.input_force[good] - common.output_force[good], float(np.hypot(*noise)))
-
-
-def _enough(apart: OtherVector, single: float) -> int:
-    """Samples that bring the noise of one down to a tenth of half the spread of how far the two forces are apart."""
+    pulled, given = common.input_force[good], common.output_force[good]
+    apart = pulled - given if loop else np.log(pulled / given)
+    single = float(np.hypot(*noise) if loop else np.median(np.hypot(noise[0] / pulled, noise[1] / given)))
     low, high = np.quantile(apart, (0.1, 0.9))
     band = np.sqrt(max(((high - low) / 2) ** 2 - single**2, single**2 / 100))
     return int(np.ceil((single / (_NOISE_IN_BAND * band)) ** 2)) if single > 0 else 1

@@ -36,10 +36,7 @@ class Runs:
 
     def covered(self, chosen: ChosenFlags, samples: int) -> Flags:
         """Samples that lie in the chosen stretches."""
-        edges = np.zeros(samples + 1, dtype=int)
-        edges[self.start[chosen]] += 1
-        edges[self.start[chosen] + self.length[chosen]] -= 1
-        return np.cumsum(edges[:-1]) > 0
+        return _from_to(self.start[chosen], self.start[chosen] + self.length[chosen], samples)
 
 
 def runs_of(values: Vector) -> Runs:
@@ -165,10 +162,13 @@ def _closed(flags: Flags) -> Flags:
     if not len(where):
         return flags
     near = np.flatnonzero(np.diff(where) <= _CLOSED + 1)
-    edges = np.zeros(len(flags) + 1, dtype=int)
-    np.add.at(edges, where[near], 1)
-    np.add.at(edges, where[near + 1], -1)
-    return flags | (np.cumsum(edges[:-1]) > 0)
+    return flags | _from_to(where[near], where[near + 1], len(flags))
+
+
+def _from_to(start: Places, end: Places, samples: int) -> Flags:
+    """Samples from any start up to its end."""
+    edges = np.bincount(start, minlength=samples + 1) - np.bincount(end, minlength=samples + 1)
+    return np.cumsum(edges[:-1]) > 0
 
 
 def spikes(force: Vector) -> Flags:

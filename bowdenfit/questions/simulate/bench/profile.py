@@ -37,11 +37,6 @@ class Profile:
     lead_in: NonNegative = 0.0
     unloaded: NonNegative = 0.0
 
-    @property
-    def rope_speed(self) -> float:
-        """Speed of the rope at the drum [mm/s]."""
-        return self.speed * self.drum_radius
-
 
 @dataclass(frozen=True)
 class Motion:
@@ -91,7 +86,7 @@ def _waypoints(profile: Profile, number: int) -> list[float]:
 
 def _move(profile: Profile, clock: float, start: float, end: float) -> list[tuple[float, float, float, float]]:
     """One trapezoidal move, or a triangular one where the way is too short for the full speed, and the rest after it."""
-    distance, speed, ramp = abs(end - start), profile.rope_speed, profile.acceleration_time
+    distance, speed, ramp = abs(end - start), profile.speed * profile.drum_radius, profile.acceleration_time
     if speed * ramp > distance:
         speed, ramp = float(np.sqrt(distance * speed / ramp)), float(np.sqrt(distance * ramp / speed))
     cruise = max(distance / speed - ramp, 0.0)

@@ -83,8 +83,9 @@ def parse_recordings_plan(raw: Mapping[str, Any], text: str, file: str = "bench.
     recordings = planned_recordings(_with_reference_force(page, raw, file), description, file)
     _check_lengths(recordings, measured, description, file)
     if description.curved and not page.angles:
+        variable = description.route.variable if description.route else "the route variable"
         raise DescriptionError(
-            f"{file}, recordings: the angle curves need angles, the values of {_route_name(description)} at which wrap "
+            f"{file}, recordings: the angle curves need angles, the values of {variable} at which wrap "
             "angles are read, such as angles = [430, 450, 470]."
         )
     angles = page.angles if description.curved else ()
@@ -148,10 +149,6 @@ def _measured_angles(page: Page, description: Description, file: str) -> dict[fl
 
 def _inside(description: Description, length: float) -> bool:
     return description.route is None or description.route.range[0] <= length <= description.route.range[1]
-
-
-def _route_name(description: Description) -> str:
-    return description.route.variable if description.route else "the route variable"
 
 
 def _check_lengths(

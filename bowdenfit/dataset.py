@@ -7,7 +7,7 @@ from pathlib import Path
 
 from bowdenfit.cable.registry import check_names
 from bowdenfit.description import Description
-from bowdenfit.description.file import overridden
+from bowdenfit.description.file import override
 from bowdenfit.errors import DescriptionError
 from bowdenfit.kinds import KINDS, each_table
 from bowdenfit.kinds.kind import Source
@@ -87,7 +87,7 @@ def single_file_dataset(
         "contact": [{"name": "cable", "friction": "mu", "wrap_angle": angle}],
         "tables": {kind: {"files": path.name}},
     }
-    return read_dataset(parse_description(overridden(raw, overrides), "--wrap-angle"), path.parent, {}, channels)
+    return read_dataset(parse_description(override(raw, overrides), "--wrap-angle"), path.parent, {}, channels)
 
 
 def read_dataset(

@@ -58,7 +58,7 @@ def read(dataset: "str | Path | Dataset", **reading: Unpack[Reading]) -> "Datase
     """
     from bowdenfit.dataset import Dataset, load_dataset, single_file_dataset
     from bowdenfit.errors import UsageError, nearest
-    from bowdenfit.recordings.forces import parsed_channels
+    from bowdenfit.recordings.forces import parse_channels
 
     for name in reading:
         if name not in Reading.__annotations__:
@@ -67,7 +67,7 @@ def read(dataset: "str | Path | Dataset", **reading: Unpack[Reading]) -> "Datase
         return dataset
     stated = {key: reading.get(name) for name, key in _SETTINGS.items()}
     changes = [*reading.get("settings", ()), *(f'{key}="{value}"' for key, value in stated.items() if value is not None)]
-    sources = parsed_channels(reading.get("channels", ()))
+    sources = parse_channels(reading.get("channels", ()))
     wrap_angle = reading.get("wrap_angle")
     if wrap_angle is not None:
         return single_file_dataset(Path(dataset), wrap_angle, changes, sources)

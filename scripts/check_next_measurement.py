@@ -31,7 +31,7 @@ from scipy import stats
 from bowdenfit.dataset import Dataset
 from bowdenfit.description import Description, SamplerSettings
 from bowdenfit.inference.chain import Sampling
-from bowdenfit.inference.compilation import compiled
+from bowdenfit.inference.compilation import compile_program
 from bowdenfit.inference.draws import curves_of, for_each_draw, named_values
 from bowdenfit.inference.ensemble import sample
 from bowdenfit.inference.least_squares import maximum_posterior
@@ -42,11 +42,11 @@ from bowdenfit.kinds.candidate import Candidate
 from bowdenfit.kinds.design import Design
 from bowdenfit.kinds.efficiencies.table import EfficiencyTable
 from bowdenfit.kinds.measurements import Measurements
-from bowdenfit.kinds.rows import OwnAngles, Provenance
+from bowdenfit.kinds.rows import OwnAngles, RowOrigin
 from bowdenfit.kinds.settings import parse_description
 from bowdenfit.model import Model, build_model
 from bowdenfit.questions.next.simulated_readings import simulated_readings
-from bowdenfit.questions.next.variance_reduction import explained
+from bowdenfit.questions.next.variance_reduction import explained_share
 from bowdenfit.questions.simulate.simulation import empty_tables, simulate, true_values
 from bowdenfit.results.optimum import optimum_of
 
@@ -137,7 +137,7 @@ class Bench:
         z = self._draws(posterior, seed)
         length = self._program(posterior, "optimum", self._optimum)(z)[0]
         readings = simulated_readings(posterior.model, dataset.measurements, CANDIDATES, z, seed)
-        expected = np.array([explained(reading[:, 0], length).share for reading in readings])
+        expected = np.array([explained_share(reading[:, 0], length).share for reading in readings])
         generator = np.random.default_rng(seed)
         draws, base = generator.choice(len(z), OUTCOMES, replace=False), generator.choice(len(z), BASE, replace=False)
         weighted = self._weighted(posterior, z[base], length[base], [r[draws, 0] for r in readings])
@@ -208,7 +208,7 @@ class Bench:
         arguments = (base, root, jax.random.key_data(key), posterior.data, extended.data)
         shapes = "refit" + str(jax.tree.map(np.shape, (posterior.data, extended.data)))
         if shapes not in self.programs:
-            self.programs[shapes] = compiled(_refitted(posterior, extended), *arguments)
+            self.programs[shapes] = compile_program(_refitted(posterior, extended), *arguments)
         return np.asarray(self.programs[shapes](*arguments))
 
 
@@ -230,8 +230,8 @@ def _extended(measured: Measurements, candidate: Candidate, reading: np.ndarray)
     return replace(measured, efficiencies=longer)
 
 
-def _origin(n: int) -> Provenance:
-    return Provenance(("simulated",), np.zeros(n, dtype=int), np.arange(2, n + 2))
+def _origin(n: int) -> RowOrigin:
+    return RowOrigin(("simulated",), np.zeros(n, dtype=int), np.arange(2, n + 2))
 
 
 def _refitted(posterior: LogDensity, extended: LogDensity) -> Callable[..., Any]:

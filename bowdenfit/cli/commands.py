@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 import click
 
 from bowdenfit.cli.keywords import Keyword, keywords_of
-from bowdenfit.cli.progress import watched
+from bowdenfit.cli.progress import watch_verb
 from bowdenfit.verb import Argument, Reply, Verb
 
 if TYPE_CHECKING:
@@ -50,7 +50,7 @@ def _run(verb: Verb, keywords: tuple[Keyword, ...], given: dict[str, Any], as_js
     if verb.watch is None:
         answer = verb.function(**asked, **behind)
     else:
-        with watched(asked["output"], verb.watch) as progress:
+        with watch_verb(asked["output"], verb.watch) as progress:
             answer = verb.function(**asked, **behind, progress=progress)
     reply = verb.reply(answer, asked)
     click.echo(_page(reply) if as_json else reply.text, nl=False)

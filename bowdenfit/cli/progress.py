@@ -17,7 +17,7 @@ Report: TypeAlias = Callable[..., None]
 
 
 @contextmanager
-def watched(folder: Path, watch: Watch) -> Iterator[Report]:
+def watch_verb(folder: Path, watch: Watch) -> Iterator[Report]:
     """Gives what to call while something long runs; says how to go on when the user (or the system) stops it.
 
     An interrupt that arrives inside a callback of the garbage collector is lost: Python prints it and goes on. So it is

@@ -36,10 +36,10 @@ def read_toml(path: Path, overrides: Sequence[str] = ()) -> dict[str, Any]:
         raise DescriptionError(f"{path.name} is not valid TOML: {error}.") from None
     except OSError as error:
         raise DescriptionError(f"{path} cannot be read ({error.strerror}).") from None
-    return overridden(raw, overrides)
+    return override(raw, overrides)
 
 
-def overridden(raw: dict[str, Any], overrides: Sequence[str]) -> dict[str, Any]:
+def override(raw: dict[str, Any], overrides: Sequence[str]) -> dict[str, Any]:
     """Plain data of a description with settings from the command line put in.
 
     Raises:
@@ -50,7 +50,7 @@ def overridden(raw: dict[str, Any], overrides: Sequence[str]) -> dict[str, Any]:
     return raw
 
 
-def validated(raw: Mapping[str, Any], model: type[Description], file: str) -> Description:
+def validate(raw: Mapping[str, Any], model: type[Description], file: str) -> Description:
     """A description from plain data, with errors that name the key; `kinds.settings` parses those with tables.
 
     Args:
@@ -64,7 +64,7 @@ def validated(raw: Mapping[str, Any], model: type[Description], file: str) -> De
     try:
         description = model.model_validate(dict(raw))
     except ValidationError as error:
-        raise DescriptionError(explained(error, model, file)) from None
+        raise DescriptionError(explain(error, model, file)) from None
     check_quantities(_quantities(description), file)
     _check_route(description.route, file)
     check_elastic(description.preload, description.prior, file)
@@ -148,7 +148,7 @@ def _set(raw: dict[str, Any], override: str) -> None:
     node[last] = value
 
 
-def explained(
+def explain(
     error: ValidationError,
     model: type[BaseModel],
     file: str,

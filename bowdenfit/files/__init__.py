@@ -6,7 +6,7 @@ from pathlib import Path
 
 from bowdenfit.errors import DatasetError
 from bowdenfit.files.channels import ChannelFile
-from bowdenfit.files.contents import TEXT, UNKNOWN, Content, recognized
+from bowdenfit.files.contents import TEXT, UNKNOWN, Content, recognize
 from bowdenfit.files.text_file import first_bytes
 
 FORMATS: dict[str, str | Callable[[Path], ChannelFile]] = {
@@ -48,7 +48,7 @@ def _is_ros2_folder(path: Path) -> bool:
 
 def _checked_ending(path: Path) -> str:
     """The ending of a file that is what it says."""
-    content = recognized(path, first_bytes(path, 1024))
+    content = recognize(path, first_bytes(path, 1024))
     ending = path.suffix.lower()
     if ending not in FORMATS or not content.suits(ending):
         raise _refusal(path, content)

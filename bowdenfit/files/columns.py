@@ -9,7 +9,7 @@ from dataclasses import dataclass
 from bowdenfit.errors import DatasetError
 from bowdenfit.files.cells import Cell
 from bowdenfit.files.csv_table import RawTable
-from bowdenfit.files.headings import bracketed
+from bowdenfit.files.headings import split_brackets
 from bowdenfit.units import ColumnSource, conversion_factor, is_unit, route_conversion_factor, speed_dimension
 from bowdenfit.words import quoted, shown
 
@@ -143,7 +143,7 @@ def meanings(heading: str, wanted: tuple[Quantity, ...]) -> list[tuple[Quantity,
     """Every quantity that the heading can mean, with the unit written in it; exact names win over name and unit."""
     if len(heading) > _LONGEST_HEADING:
         return []
-    name, unit = bracketed(heading)
+    name, unit = split_brackets(heading)
     exact = [(q, unit or _suffix(name, q.name)) for q in wanted if _plain(name) == _plain(q.name)]
     whole = [(q, None) for q in wanted if _plain(heading) == _plain(q.name)]
     named = exact or whole or [(q, behind) for q in wanted if (behind := _suffix(heading, q.name)) is not None]
@@ -215,4 +215,4 @@ def _check_sources(table: RawTable, known: list[str], sources: Mapping[str, Colu
 
 def _named_column(table: RawTable, quantity: Quantity, source: ColumnSource) -> Column:
     written = next((unit for _, unit in meanings(source.name, (quantity,)) if unit), None)
-    return _column(table, source.name, quantity, source.unit or written or bracketed(source.name)[1] or None)
+    return _column(table, source.name, quantity, source.unit or written or split_brackets(source.name)[1] or None)

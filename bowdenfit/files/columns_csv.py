@@ -16,7 +16,7 @@ from bowdenfit.files.csv_rows import cells_of
 from bowdenfit.files.csv_start import Sheet, start_of
 from bowdenfit.files.layout import is_summary
 from bowdenfit.files.libraries import load
-from bowdenfit.files.outcome import LeftOut, channel_file, refuse_larger
+from bowdenfit.files.outcome import UnreadNames, channel_file, refuse_larger
 from bowdenfit.files.sheet_columns import SheetRows, columns_of
 from bowdenfit.files.sheets import channels_of, with_rate
 from bowdenfit.files.text_file import (
@@ -70,7 +70,7 @@ def read(path: Path) -> ChannelFile:
     timed, clock = with_rate(channels, sheet.metadata)
     row = rows_before(path, stop) + 1 if cut else 0
     broken = [f"The file breaks off in row {row}; that row was left out."] if cut else []
-    return channel_file(path, "CSV", timed, LeftOut(), (*left_out, *broken, *remarks, *clock))
+    return channel_file(path, "CSV", timed, UnreadNames(), (*left_out, *broken, *remarks, *clock))
 
 
 def _long(path: Path, sheet: Sheet, stop: int) -> dict[int, list[np.ndarray]] | None:

@@ -68,7 +68,7 @@ _XML = Content("an XML file, such as those of Logger Pro (.cmbl)", (".cmbl",), _
 _CONTENTS = (UNKNOWN, *_STARTS.values(), _ZIP, _XML)
 
 
-def recognized(path: Path, head: bytes) -> Content:
+def recognize(path: Path, head: bytes) -> Content:
     """What the file is by its first bytes.
 
     Args:

@@ -16,7 +16,7 @@ _END = "\x00"  # stands in no text file, and so only in a row of its own unless 
 
 
 @dataclass(frozen=True)
-class Record:
+class CsvRecord:
     """The cells of one row.
 
     Args:
@@ -55,14 +55,14 @@ def declared_separator(lines: list[Line], name: str) -> tuple[str | None, list[L
     return separator, lines[first + 1 :]
 
 
-def records(lines: Sequence[Line], separator: str, most: int) -> Iterator[Record]:
+def records(lines: Sequence[Line], separator: str, most: int) -> Iterator[CsvRecord]:
     """Each record of some lines; a quoted cell may run over up to `most` of them."""
     i = 0
     while i < len(lines):
         following = (lines[k].text.rstrip("\r\n") + "\n" for k in range(i, min(i + most, len(lines))))
         whole = _whole_record(following, separator)
         count, cells = whole or (1, cells_of(lines[i].text, separator))
-        yield Record(lines[i].row, lines[i].start, cells, whole is not None)
+        yield CsvRecord(lines[i].row, lines[i].start, cells, whole is not None)
         i += count
 
 

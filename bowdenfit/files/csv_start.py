@@ -5,7 +5,7 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 
 from bowdenfit.errors import DatasetError
-from bowdenfit.files.csv_rows import SEPARATORS, Record, cells_of, declared_separator, records, too_many_cells
+from bowdenfit.files.csv_rows import SEPARATORS, CsvRecord, cells_of, declared_separator, records, too_many_cells
 from bowdenfit.files.headings import Heading, heading_of
 from bowdenfit.files.layout import Layout, layout_of
 from bowdenfit.files.text_file import Line, comment_mark, first_lines
@@ -65,7 +65,7 @@ def start_of(path: Path, data: bytes) -> Sheet:
     return Sheet(encoding, separator, decimal, below[0].start, layout, tuple(line.text for line in above))
 
 
-def _fitting(path: Path, layout: Layout, below: Sequence[Record], separator: str, above: Sequence[Line]) -> Layout:
+def _fitting(path: Path, layout: Layout, below: Sequence[CsvRecord], separator: str, above: Sequence[Line]) -> Layout:
     """The layout with as many headings as columns; headings may stand in a comment.
 
     Raises:

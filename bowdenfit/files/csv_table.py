@@ -7,8 +7,8 @@ from pathlib import Path
 
 from bowdenfit.errors import DatasetError
 from bowdenfit.files.cells import Cell, Decimals, is_plain_number
-from bowdenfit.files.contents import UNKNOWN, recognized
-from bowdenfit.files.csv_rows import SEPARATORS, Record, declared_separator, records, too_many_cells
+from bowdenfit.files.contents import UNKNOWN, recognize
+from bowdenfit.files.csv_rows import SEPARATORS, CsvRecord, declared_separator, records, too_many_cells
 from bowdenfit.files.text_file import Line, comment_mark, first_bytes, first_lines, is_blank
 from bowdenfit.words import shown
 
@@ -39,7 +39,7 @@ def read_csv(path: Path) -> RawTable:
             than the header.
     """
     name, data = path.name, first_bytes(path)
-    content = recognized(path, data[:1024])
+    content = recognize(path, data[:1024])
     if content is not UNKNOWN:
         raise DatasetError(f"{name} is {content.what}, not a CSV file; save the table as CSV and name that file.")
     _, lines = first_lines(data, name, whole=True)
@@ -73,7 +73,7 @@ def _fitness(lines: Sequence[Line], separator: str) -> tuple[bool, int]:
     return widths[0] > 1 and len(set(widths)) == 1 and all(row.closed for row in rows), widths[0]
 
 
-def _header(row: Record, file: str) -> tuple[str, ...]:
+def _header(row: CsvRecord, file: str) -> tuple[str, ...]:
     """The headings, without the empty ones behind the last."""
     header = tuple(" ".join(cell.split()) for cell in row.cells)
     while not header[-1]:
@@ -94,7 +94,7 @@ def _header(row: Record, file: str) -> tuple[str, ...]:
     return header
 
 
-def _cells(file: str, header: tuple[str, ...], row: Record, decimals: Decimals) -> tuple[Cell, ...]:
+def _cells(file: str, header: tuple[str, ...], row: CsvRecord, decimals: Decimals) -> tuple[Cell, ...]:
     too_many_cells(file, row.row, row.cells, len(header))
     padded = row.cells + [""] * (len(header) - len(row.cells))
     return tuple(

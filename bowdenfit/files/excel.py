@@ -11,7 +11,7 @@ from bowdenfit.errors import DatasetError
 from bowdenfit.files.channels import Channel, ChannelFile
 from bowdenfit.files.layout import layout_of
 from bowdenfit.files.libraries import load
-from bowdenfit.files.outcome import damage_refused, refuse_larger
+from bowdenfit.files.outcome import refuse_damage, refuse_larger
 from bowdenfit.files.sheet_columns import SheetRows, columns_of, text_of
 from bowdenfit.files.sheets import channels_of
 from bowdenfit.words import shown
@@ -75,7 +75,7 @@ def _sheets(openpyxl: Any, path: Path) -> Iterator[tuple[str, Iterator[_Cells]]]
     """Title and rows of each sheet; what the library cannot read becomes one sentence."""
     with warnings.catch_warnings():
         warnings.simplefilter("ignore", UserWarning)  # on styles and validations, which do not matter here
-        with damage_refused(path):
+        with refuse_damage(path):
             workbook = openpyxl.load_workbook(path, read_only=True, data_only=True)
         try:
             for sheet in workbook.worksheets:
@@ -86,7 +86,7 @@ def _sheets(openpyxl: Any, path: Path) -> Iterator[tuple[str, Iterator[_Cells]]]
 
 
 def _rows(path: Path, sheet: Any) -> Iterator[_Cells]:
-    with damage_refused(path):
+    with refuse_damage(path):
         yield from sheet.iter_rows(values_only=True)
 
 

@@ -8,7 +8,7 @@ import numpy as np
 
 from bowdenfit.files.channels import Channel, ChannelFile
 from bowdenfit.files.column_clocks import with_column_clocks, with_lone_clock
-from bowdenfit.files.outcome import LeftOut, channel_file, damage_refused, is_numeric, numbers, refuse_too_large
+from bowdenfit.files.outcome import UnreadNames, channel_file, is_numeric, numbers, refuse_damage, refuse_too_large
 from bowdenfit.files.sampling import with_interval
 
 MOST_COLUMNS = 64
@@ -26,8 +26,8 @@ def read(path: Path) -> ChannelFile:
     """
     import h5py
 
-    left_out = LeftOut()
-    with damage_refused(path), h5py.File(path, "r") as file:
+    left_out = UnreadNames()
+    with refuse_damage(path), h5py.File(path, "r") as file:
         chosen = [each for each in _datasets(file, left_out) if _is_recording(each, left_out)]
         refuse_too_large(path, sum(2 * each.size * max(1, len(each.dtype.names or ())) for each in chosen))
         channels = [channel for each in chosen for channel in _channels(each, left_out)]
@@ -36,7 +36,7 @@ def read(path: Path) -> ChannelFile:
     return channel_file(path, "HDF5", with_lone_clock(clocked), left_out, remarks)
 
 
-def _datasets(group: Any, left_out: LeftOut) -> Iterator[Any]:
+def _datasets(group: Any, left_out: UnreadNames) -> Iterator[Any]:
     """All data sets, in the order of the file; links that lead nowhere or out of the file are left alone."""
     import h5py
 
@@ -51,7 +51,7 @@ def _datasets(group: Any, left_out: LeftOut) -> Iterator[Any]:
             yield member
 
 
-def _is_recording(dataset: Any, left_out: LeftOut) -> bool:
+def _is_recording(dataset: Any, left_out: UnreadNames) -> bool:
     """Whether a data set is a vector or a narrow table of numbers."""
     name = dataset.name.lstrip("/")
     shape = dataset.shape or ()
@@ -67,7 +67,7 @@ def _is_recording(dataset: Any, left_out: LeftOut) -> bool:
     return False
 
 
-def _channels(dataset: Any, left_out: LeftOut) -> Iterator[Channel]:
+def _channels(dataset: Any, left_out: UnreadNames) -> Iterator[Channel]:
     """The columns of a data set; the longer side of a table is the time."""
     name, unit = dataset.name.lstrip("/"), _unit(dataset)
     values = dataset[()]
@@ -81,7 +81,7 @@ def _channels(dataset: Any, left_out: LeftOut) -> Iterator[Channel]:
             yield Channel(f"{name}[:,{number}]" if tall else f"{name}[{number},:]", unit, numbers(column))
 
 
-def _fields(name: str, unit: str, values: np.ndarray, left_out: LeftOut) -> Iterator[Channel]:
+def _fields(name: str, unit: str, values: np.ndarray, left_out: UnreadNames) -> Iterator[Channel]:
     """The numeric columns of a table whose rows are records."""
     for field in values.dtype.names or ():
         if values[field].ndim == 1 and is_numeric(values[field].dtype):

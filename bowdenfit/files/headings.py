@@ -34,28 +34,28 @@ def heading_of(text: str, unit: str = "") -> Heading:
         unit: Unit from a line of its own under the heading; empty if there is none.
     """
     plain = " ".join(text.split())
-    if unit := unbracketed(unit):
+    if unit := without_brackets(unit):
         return Heading(plain, unit)
-    name, unit = bracketed(plain)
+    name, unit = split_brackets(plain)
     if name and unit not in {"", "-", "1"} and is_unit(unit):
         return Heading(name, unit)
     return Heading(plain, _unit_behind(plain))
 
 
-def bracketed(heading: str) -> tuple[str, str]:
+def split_brackets(heading: str) -> tuple[str, str]:
     """The name and what stands in brackets behind it; all of the heading where nothing does."""
     match = _BRACKETED.match(heading[:_LONGEST])
     return (match["name"], match["unit"].strip()) if match else (heading, "")
 
 
-def unbracketed(unit: str) -> str:
+def without_brackets(unit: str) -> str:
     """A unit without the brackets around it."""
     return unit.strip().strip("[]()").strip()
 
 
 def is_units_row(cells: Sequence[str]) -> bool:
     """Whether a row holds nothing but units, as "s;N;N" or "[s],[N]"; LVM and others leave some blank."""
-    written = [unbracketed(cell) for cell in cells if cell.strip()]
+    written = [without_brackets(cell) for cell in cells if cell.strip()]
     return bool(written) and all(is_unit(unit) for unit in written) and not all(map(names_time, written))
 
 
@@ -73,7 +73,7 @@ def without_label(cells: Sequence[str]) -> list[str]:
     return list(cells)
 
 
-def paired(headings: Sequence[Heading], rising: Sequence[bool], numeric: Sequence[bool]) -> tuple[Heading, ...]:
+def pair_clocks(headings: Sequence[Heading], rising: Sequence[bool], numeric: Sequence[bool]) -> tuple[Heading, ...]:
     """Names for the nameless clocks of sheets that have one heading for each pair of time and force.
 
     The heading stands over the force, over the time (as a merged cell does), or over both.

@@ -8,7 +8,7 @@ from itertools import pairwise
 import numpy as np
 
 from bowdenfit.files.cells import Kind, kind_of, number_of
-from bowdenfit.files.headings import Heading, heading_of, is_number, is_units_row, paired, without_label
+from bowdenfit.files.headings import Heading, heading_of, is_number, is_units_row, pair_clocks, without_label
 from bowdenfit.types import Vector
 
 Rows = Sequence[Sequence[str]]
@@ -83,7 +83,7 @@ def layout_of(rows: Rows, decimal: str) -> Layout | None:
     written = [heading_of(name, unit) for name, unit in zip(names, [*units, *[""] * width], strict=False)][:width]
     return Layout(
         start,
-        paired(written, rising, [kind == "number" for kind in columns]),
+        pair_clocks(written, rising, [kind == "number" for kind in columns]),
         columns,
         True,
         score,

@@ -8,7 +8,7 @@ import numpy as np
 from bowdenfit.errors import DatasetError
 from bowdenfit.files.channels import Channel, ChannelFile
 from bowdenfit.files.clocks import with_clocks
-from bowdenfit.files.outcome import LeftOut, channel_file, damage_refused, refuse_larger
+from bowdenfit.files.outcome import UnreadNames, channel_file, refuse_damage, refuse_larger
 from bowdenfit.types import Vector
 
 LARGEST_BYTES = 512 * 1024**2
@@ -27,7 +27,7 @@ def read(path: Path) -> ChannelFile:
         DatasetError: It is too large, damaged, or holds no numbers.
     """
     refuse_larger(path, LARGEST_BYTES, "export the run as CSV from Logger Pro")
-    with damage_refused(path):
+    with refuse_damage(path):
         root = _parsed(path)
     columns = [(name, column) for name, run in _runs(root) for column in run.iter("DataColumn")]
     several = len({name for name, _ in columns}) > 1
@@ -39,7 +39,7 @@ def read(path: Path) -> ChannelFile:
         for (run, c), v in zip(columns, cells, strict=True)
         if np.isfinite(v).any()
     ]
-    return channel_file(path, "Logger Pro", with_clocks(channels), LeftOut())
+    return channel_file(path, "Logger Pro", with_clocks(channels), UnreadNames())
 
 
 def _parsed(path: Path) -> Element:

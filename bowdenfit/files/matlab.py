@@ -14,11 +14,11 @@ from bowdenfit.files.channels import Channel, ChannelFile
 from bowdenfit.files.column_clocks import with_column_clocks, with_lone_clock
 from bowdenfit.files.outcome import (
     BYTES_PER_SAMPLE,
-    LeftOut,
+    UnreadNames,
     channel_file,
-    damage_refused,
     is_numeric,
     numbers,
+    refuse_damage,
     refuse_too_large,
 )
 from bowdenfit.files.sampling import with_interval
@@ -46,7 +46,7 @@ class _Variables:
 
     channels: list[Channel] = field(default_factory=list)
     settings: dict[str, dict[str, float]] = field(default_factory=dict)
-    left_out: LeftOut = field(default_factory=LeftOut)
+    left_out: UnreadNames = field(default_factory=UnreadNames)
 
     def add(self, name: str, values: np.ndarray) -> None:
         """Sort in one array of numbers, in the orientation that MATLAB shows."""
@@ -71,7 +71,7 @@ def read(path: Path) -> ChannelFile:
     """
     with path.open("rb") as file:
         modern = file.read(520).endswith(b"\x89HDF\r\n\x1a\n")
-    with damage_refused(path):
+    with refuse_damage(path):
         variables = _read_hdf5(path) if modern else _read_classic(path)
     clocked, remarks = with_interval(with_column_clocks(variables.channels), variables.settings)
     return channel_file(path, "MATLAB", with_lone_clock(clocked), variables.left_out, remarks)
@@ -104,7 +104,7 @@ def _read_classic(path: Path) -> _Variables:
     return variables
 
 
-def _is_wanted(name: str, kind: str, left_out: LeftOut) -> bool:
+def _is_wanted(name: str, kind: str, left_out: UnreadNames) -> bool:
     """Whether a variable may hold recordings, by its class."""
     if name == "__function_workspace__":
         return False
@@ -184,7 +184,7 @@ def _read_hdf5(path: Path) -> _Variables:
     return variables
 
 
-def _stored(group: Any, left_out: LeftOut, prefix: str = "") -> Iterator[tuple[str, Any]]:
+def _stored(group: Any, left_out: UnreadNames, prefix: str = "") -> Iterator[tuple[str, Any]]:
     """The numeric variables of a group and of the structures in it, with their names."""
     import h5py
 

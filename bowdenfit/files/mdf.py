@@ -14,13 +14,13 @@ import numpy as np
 from bowdenfit.files.channels import Channel, ChannelFile
 from bowdenfit.files.libraries import load
 from bowdenfit.files.outcome import (
-    LeftOut,
+    UnreadNames,
     channel_file,
     cut_off,
-    damage_refused,
     is_numeric,
     kept_of_cut,
     numbers,
+    refuse_damage,
     refuse_too_large,
 )
 
@@ -36,8 +36,8 @@ def read(path: Path) -> ChannelFile:
         DatasetError: The file is damaged, too large or without numeric channels, or asammdf is not installed.
     """
     asammdf = load("asammdf", "MDF4")
-    left_out = LeftOut()
-    with damage_refused(path), _opened(asammdf, path) as file:
+    left_out = UnreadNames()
+    with refuse_damage(path), _opened(asammdf, path) as file:
         places = _places(file, left_out)
         refuse_too_large(path, sum(2 * _n_records(file, group) for group, _ in places))
         names = _names(file, places)
@@ -83,7 +83,7 @@ def _half_read_dropped() -> Iterator[None]:
         sys.unraisablehook = hook
 
 
-def _places(file: Any, left_out: LeftOut) -> list[tuple[int, int]]:
+def _places(file: Any, left_out: UnreadNames) -> list[tuple[int, int]]:
     """Group and index of each channel that may be a recording."""
     return [
         (group, index)
@@ -93,7 +93,7 @@ def _places(file: Any, left_out: LeftOut) -> list[tuple[int, int]]:
     ]
 
 
-def _may_be_recorded(file: Any, group: int, channel: Any, left_out: LeftOut) -> bool:
+def _may_be_recorded(file: Any, group: int, channel: Any, left_out: UnreadNames) -> bool:
     """Whether a channel holds samples of its own."""
     kind = getattr(channel, "channel_type", 0)
     if kind in _MASTERS and group in file.masters_db:
@@ -126,7 +126,7 @@ def _group_name(file: Any, group: int) -> str:
     return str(getattr(file.groups[group].channel_group, "acq_name", "") or f"group {group + 1}")
 
 
-def _channel(file: Any, group: int, index: int, name: str, left_out: LeftOut) -> Channel | None:
+def _channel(file: Any, group: int, index: int, name: str, left_out: UnreadNames) -> Channel | None:
     """One channel, or None if it is no column of numbers; samples that the logger called invalid are NaN."""
     # "Ignoring" the bits hands them over; otherwise the library drops these samples, and channels lose their alignment.
     signal = file.get(group=group, index=index, ignore_invalidation_bits=True)

@@ -20,7 +20,7 @@ BYTES_PER_SAMPLE = 8
 
 
 @dataclass(frozen=True)
-class LeftOut:
+class UnreadNames:
     """Names of what was not read, by reason.
 
     Args:
@@ -39,7 +39,7 @@ class LeftOut:
 
 
 @contextmanager
-def damage_refused(path: Path) -> Iterator[None]:
+def refuse_damage(path: Path) -> Iterator[None]:
     """Turn whatever a library raises about a file into one sentence about that file.
 
     Raises:
@@ -117,7 +117,7 @@ def numbers(values: np.ndarray) -> Vector:
 
 
 def channel_file(
-    path: Path, kind: str, channels: Sequence[Channel], left_out: LeftOut, remarks: Sequence[str] = ()
+    path: Path, kind: str, channels: Sequence[Channel], left_out: UnreadNames, remarks: Sequence[str] = ()
 ) -> ChannelFile:
     """The channels of a file with unique names, and the remarks on it.
 

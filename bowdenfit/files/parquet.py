@@ -9,7 +9,7 @@ from bowdenfit.files.channels import Channel, ChannelFile, with_unique_names
 from bowdenfit.files.clocks import with_clocks
 from bowdenfit.files.headings import Heading, heading_of
 from bowdenfit.files.libraries import load
-from bowdenfit.files.outcome import LeftOut, channel_file, damage_refused, refuse_too_large
+from bowdenfit.files.outcome import UnreadNames, channel_file, refuse_damage, refuse_too_large
 from bowdenfit.types import Vector
 from bowdenfit.words import shown
 
@@ -32,7 +32,7 @@ def read(path: Path) -> ChannelFile:
     """
     pyarrow = load("pyarrow", "Parquet")
     parquet = load("pyarrow.parquet", "Parquet")
-    with damage_refused(path), parquet.ParquetFile(path) as file:
+    with refuse_damage(path), parquet.ParquetFile(path) as file:
         fields = list(file.schema_arrow)
         used = [field for field in fields if _is_readable(pyarrow, field.type)]
         rows = file.metadata.num_rows
@@ -45,7 +45,7 @@ def read(path: Path) -> ChannelFile:
         for field in fields
         if not _is_readable(pyarrow, field.type)
     ]
-    return channel_file(path, "Parquet", with_clocks(with_unique_names(channels)), LeftOut(), remarks)
+    return channel_file(path, "Parquet", with_clocks(with_unique_names(channels)), UnreadNames(), remarks)
 
 
 def _is_readable(pyarrow: Any, kind: Any) -> bool:

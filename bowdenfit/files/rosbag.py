@@ -10,7 +10,7 @@ import numpy as np
 
 from bowdenfit.files.channels import Channel, ChannelFile
 from bowdenfit.files.libraries import load
-from bowdenfit.files.outcome import LeftOut, channel_file, damage_refused, refuse_too_large
+from bowdenfit.files.outcome import UnreadNames, channel_file, refuse_damage, refuse_too_large
 
 MOST_ELEMENTS = 64
 _HEADER = "header"
@@ -69,9 +69,9 @@ def read(path: Path) -> ChannelFile:
         DatasetError: The bag is damaged, too large or without numeric fields, or rosbags is not installed.
     """
     highlevel, typesys = load("rosbags.highlevel", "ROS bag"), load("rosbags.typesys", "ROS bag")
-    left_out = LeftOut()
+    left_out = UnreadNames()
     fallback = typesys.get_typestore(typesys.Stores.ROS2_HUMBLE)
-    with damage_refused(path), highlevel.AnyReader([path], default_typestore=fallback) as reader:
+    with refuse_damage(path), highlevel.AnyReader([path], default_typestore=fallback) as reader:
         leaves = {name: found for name in reader.topics if (found := _leaves_of(reader, name, left_out))}
         refuse_too_large(path, sum(reader.topics[name].msgcount * (len(leaves[name]) + 1) for name in leaves))
         topics = [_topic(reader, name, leaves[name]) for name in leaves]
@@ -86,7 +86,7 @@ def _messages(reader: Any, topic: str) -> Iterator[tuple[int, Any]]:
         yield received, reader.deserialize(raw, connection.msgtype)
 
 
-def _leaves_of(reader: Any, topic: str, left_out: LeftOut) -> tuple[_Leaf, ...]:
+def _leaves_of(reader: Any, topic: str, left_out: UnreadNames) -> tuple[_Leaf, ...]:
     """Which numbers the messages of a topic have, by the first of them."""
     if not any(each.msgtype in reader.typestore.fielddefs for each in reader.topics[topic].connections):
         left_out.add(topic, "the bag does not describe their messages")

@@ -12,13 +12,13 @@ from bowdenfit.files.channels import Channel, ChannelFile
 from bowdenfit.files.column_clocks import with_column_clocks, with_lone_clock
 from bowdenfit.files.libraries import load
 from bowdenfit.files.outcome import (
-    LeftOut,
+    UnreadNames,
     channel_file,
     cut_off,
-    damage_refused,
     is_numeric,
     kept_of_cut,
     numbers,
+    refuse_damage,
     refuse_too_large,
 )
 
@@ -36,9 +36,9 @@ def read(path: Path) -> ChannelFile:
         DatasetError: The file is damaged, too large or without numeric channels, or npTDMS is not installed.
     """
     nptdms = load("nptdms", "TDMS")
-    with damage_refused(path), _quiet(), nptdms.TdmsFile.open(path) as file:
+    with refuse_damage(path), _quiet(), nptdms.TdmsFile.open(path) as file:
         stored = [channel for group in file.groups() for channel in group.channels()]
-        left_out = LeftOut()
+        left_out = UnreadNames()
         chosen = [channel for channel in stored if _is_recording(channel, left_out)]
         refuse_too_large(path, sum(2 * len(channel) for channel in chosen))
         lengths = _whole_lengths(chosen, file.file_status)
@@ -71,7 +71,7 @@ def _name(channel: Any) -> str:
     return f"{channel.group_name}/{channel.name}"
 
 
-def _is_recording(channel: Any, left_out: LeftOut) -> bool:
+def _is_recording(channel: Any, left_out: UnreadNames) -> bool:
     """Whether this channel holds numbers; times of the day count as such."""
     if not (is_numeric(channel.dtype) or channel.dtype.kind == "M"):
         left_out.add(_name(channel), "they are text or complex numbers")

@@ -13,7 +13,7 @@ _OPTIONS: dict[str, Any] = {"xla_cpu_use_fusion_emitters": False, "xla_cpu_paral
 _RUN_ONCE: dict[str, Any] = _OPTIONS | {"xla_backend_optimization_level": 0}
 
 
-def compiled(function: Callable[..., Any], *shapes: Any, run_once: bool = False) -> Callable[..., Any]:
+def compile_program(function: Callable[..., Any], *shapes: Any, run_once: bool = False) -> Callable[..., Any]:
     """`function` compiled for arguments of the given shapes.
 
     Args:

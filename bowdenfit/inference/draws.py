@@ -9,7 +9,7 @@ import numpy as np
 from jax import Array
 from jaxtyping import Float
 
-from bowdenfit.inference.compilation import compiled
+from bowdenfit.inference.compilation import compile_program
 from bowdenfit.inference.log_density import LogDensity
 from bowdenfit.model import Model
 
@@ -21,7 +21,7 @@ Function = Callable[..., Any]
 def for_each_draw(function: Function, size: int, *data: Any, run_once: bool = False) -> Callable[[np.ndarray], Any]:
     """`function` of one z (and of data that are the same for all), compiled to be applied to any number of z (rows)."""
     over_rows = jax.vmap(function, in_axes=(0, *(None for _ in data)))
-    program = compiled(over_rows, jax.ShapeDtypeStruct((BATCH, size), jnp.float64), *data, run_once=run_once)
+    program = compile_program(over_rows, jax.ShapeDtypeStruct((BATCH, size), jnp.float64), *data, run_once=run_once)
 
     return lambda z: in_batches(lambda part: program(part, *data), BATCH, z)
 

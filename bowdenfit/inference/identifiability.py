@@ -19,7 +19,7 @@ import jax.numpy as jnp
 import numpy as np
 from jax import Array
 
-from bowdenfit.inference.compilation import compiled
+from bowdenfit.inference.compilation import compile_program
 from bowdenfit.inference.least_squares import MaximumPosterior
 from bowdenfit.inference.log_density import LogDensity
 from bowdenfit.inference.objective import noise_scales
@@ -173,7 +173,7 @@ def information_at(posterior: LogDensity, z: np.ndarray) -> MaximumPosterior:
     def residuals(at: Array, data: Any) -> Array:
         return jnp.concatenate(list(posterior.residuals(at, data).values()))
 
-    jacobian = compiled(
+    jacobian = compile_program(
         jax.jacfwd(residuals), jax.ShapeDtypeStruct(z.shape, jnp.float64), posterior.data, run_once=True
     )
     slopes = np.where(noise_scales(posterior), 0.0, np.asarray(jacobian(z, posterior.data)))

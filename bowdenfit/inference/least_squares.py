@@ -14,10 +14,10 @@ import numpy as np
 
 from bowdenfit.errors import ConvergenceError
 from bowdenfit.inference.disagreement import Disagreement, disagreements
-from bowdenfit.inference.linearized import linearized, scatter_about
+from bowdenfit.inference.linearized import linearize, scatter_about
 from bowdenfit.inference.log_density import LogDensity
 from bowdenfit.inference.objective import LOWER_END, Objective, Problem, Solution, may_end, sum_of_squares
-from bowdenfit.inference.other_minima import PINS, contested, fitting_as_well
+from bowdenfit.inference.other_minima import PINS, fitting_as_well, range_of_minima
 from bowdenfit.inference.profiles import Basin, limits
 from bowdenfit.parameters.priors import Uniform
 from bowdenfit.parameters.space import Parameter
@@ -130,7 +130,7 @@ def least_squares(
     basin = _minimum(Problem(posterior, objective), start)
     found, space, terms = basin.found, posterior.model.space, posterior.model.terms
     active = np.flatnonzero(~basin.problem.noise & ~basin.at_end)
-    about = linearized(found["jacobian"][:, active])
+    about = linearize(found["jacobian"][:, active])
     scale, residual_sd = scatter_about(terms, found["residuals"], about.leverage)
     rivals = fitting_as_well(found, _pinned_elsewhere(basin.problem, start), scale, about.readings.shape[1])
     error, determined = np.full(space.size, np.nan), basin.at_end.copy()
@@ -205,7 +205,7 @@ def _estimates(
             estimates[p.name] = Estimate(np.nan, np.nan, False, remark, *limit, at_bound=True)
         elif not determined[i]:
             estimates[p.name] = Estimate(np.nan, np.nan, False, UNDETERMINED)
-        elif (ends := contested(value, sd, others)) is not None:
+        elif (ends := range_of_minima(value, sd, others)) is not None:
             remark = f"values from {ends[0]:.3g} to {ends[1]:.3g} fit about as well"
             estimates[p.name] = Estimate(np.nan, np.nan, False, remark, *limit)
         else:

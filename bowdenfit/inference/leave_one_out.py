@@ -14,7 +14,7 @@ from jaxtyping import Float
 from bowdenfit.description import SamplerSettings
 from bowdenfit.inference.chain import Sampling
 from bowdenfit.inference.comparison import How, Prediction, weigh_without_each
-from bowdenfit.inference.compilation import compiled
+from bowdenfit.inference.compilation import compile_program
 from bowdenfit.inference.diagnostics import Diagnostics, diagnose_all
 from bowdenfit.inference.draws import in_batches
 from bowdenfit.inference.least_squares import MaximumPosterior
@@ -66,7 +66,7 @@ class ReadingsToLeaveOut:
 
         shape = jax.ShapeDtypeStruct((self.batch, self.posterior.model.space.size), jnp.float64)
         counts = jax.ShapeDtypeStruct((len(self.names),), jnp.float64)
-        return compiled(jax.vmap(density, in_axes=(0, None, None)), shape, self.posterior.data, counts)
+        return compile_program(jax.vmap(density, in_axes=(0, None, None)), shape, self.posterior.data, counts)
 
     def _counts(self, without: int | None) -> np.ndarray:
         return np.array([float(i != without) for i in range(len(self.names))])

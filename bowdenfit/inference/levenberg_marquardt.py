@@ -24,7 +24,7 @@ import numpy as np
 import optimistix as optx
 from jax import Array
 
-from bowdenfit.inference.compilation import compiled
+from bowdenfit.inference.compilation import compile_program
 
 _SINGULAR = 1e-13  # of scaled singular values; a direction below it takes no step
 _LOST = 1e100  # stands for a residual that cannot be computed, so that no step goes there
@@ -164,7 +164,7 @@ def stepper(rows: int, columns: int) -> tuple[Callable[..., Any], list[np.ndarra
     number, *arrays = (jax.ShapeDtypeStruct(shape, jnp.float64) for shape in ((), (columns,), (rows,), (rows, columns)))
     flag, settings = jax.ShapeDtypeStruct((), jnp.bool_), (number, number, number)
     state = jax.eval_shape(lambda *given: _leaves(_ready(*given)[2]), settings, *arrays)
-    program = compiled(_step, settings, flag, arrays[0], state, *arrays[1:], run_once=True)
+    program = compile_program(_step, settings, flag, arrays[0], state, *arrays[1:], run_once=True)
     return program, [np.zeros(leaf.shape, leaf.dtype) for leaf in state]
 
 

@@ -44,7 +44,7 @@ class Linearized:
         return self.parameters @ (self.readings.T * scale)
 
 
-def linearized(jacobian: np.ndarray) -> Linearized:
+def linearize(jacobian: np.ndarray) -> Linearized:
     """The problem about its minimum: by QR, or by singular values where these find directions undetermined."""
     rows, n = jacobian.shape
     if n == 0:

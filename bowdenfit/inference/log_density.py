@@ -9,7 +9,7 @@ import jax.numpy as jnp
 from jax import Array
 from jaxtyping import Float
 
-from bowdenfit.inference.compilation import compiled
+from bowdenfit.inference.compilation import compile_program
 from bowdenfit.model import Model
 
 
@@ -55,4 +55,4 @@ class LogDensity:
         """Compiled log density of a batch of z; of one shape only, so that it is compiled once."""
         function = jax.vmap(self.log_density, in_axes=(0, None))
         shape = jax.ShapeDtypeStruct((batch, self.model.space.size), jnp.float64)
-        return compiled(function, shape, self.data)
+        return compile_program(function, shape, self.data)

@@ -27,7 +27,7 @@ from jax import Array
 
 from bowdenfit.description import SamplerSettings
 from bowdenfit.inference.chain import Chain, Progress, Sampling, stuck_walkers, worst
-from bowdenfit.inference.compilation import compiled
+from bowdenfit.inference.compilation import compile_program
 from bowdenfit.inference.diagnostics import Trajectories, energy_mixing, trajectory_shortfalls
 from bowdenfit.inference.least_squares import MaximumPosterior
 from bowdenfit.inference.log_density import LogDensity
@@ -85,7 +85,7 @@ def make_program(posterior: LogDensity, settings: SamplerSettings) -> Callable[.
 
     whole, flag = jax.ShapeDtypeStruct((), jnp.uint32), jax.ShapeDtypeStruct((), jnp.bool_)
     shapes = [jax.ShapeDtypeStruct(shape, jnp.float64) for shape in ((chains, size), (5, chains), (size, size))]
-    return compiled(block, whole, whole, shapes[0], shapes[1], flag, shapes[2], posterior.data)
+    return compile_program(block, whole, whole, shapes[0], shapes[1], flag, shapes[2], posterior.data)
 
 
 def _fine(steps: int) -> np.ndarray:

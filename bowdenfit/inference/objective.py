@@ -11,7 +11,7 @@ import jax.numpy as jnp
 import numpy as np
 from jax import Array
 
-from bowdenfit.inference.compilation import compiled
+from bowdenfit.inference.compilation import compile_program
 from bowdenfit.inference.log_density import LogDensity
 from bowdenfit.inference.solver import minimize, prepare
 from bowdenfit.parameters.priors import HalfNormal, LogNormal, TruncatedNormal, Uniform
@@ -38,7 +38,7 @@ def make_objective(posterior: LogDensity) -> Objective:
     shape = jax.eval_shape(evaluated, vector, vector, posterior.data)["jacobian"].shape
     with ThreadPoolExecutor(1) as thread:
         thread.submit(prepare, *shape)
-        program = compiled(evaluated, vector, vector, posterior.data, run_once=True)
+        program = compile_program(evaluated, vector, vector, posterior.data, run_once=True)
 
     def objective(
         start: np.ndarray, pinned: np.ndarray, pin: np.ndarray, weight: np.ndarray, data: Any, quick: bool = False

@@ -36,7 +36,7 @@ def fitting_as_well(found: Solution, trials: Sequence[Solution], scale: np.ndarr
     return [trial for trial in trials if _scaled(trial, scale) <= limit]
 
 
-def contested(value: float, error: float, rivals: Sequence[float]) -> tuple[float, float] | None:
+def range_of_minima(value: float, error: float, rivals: Sequence[float]) -> tuple[float, float] | None:
     """Lowest and highest value that fit about as well, where one lies further off than the error allows; else None."""
     if all(abs(rival - value) <= _APART * error for rival in rivals):
         return None

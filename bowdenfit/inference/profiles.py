@@ -24,7 +24,7 @@ from functools import cache
 
 import numpy as np
 
-from bowdenfit.inference.linearized import blocks, linearized
+from bowdenfit.inference.linearized import blocks, linearize
 from bowdenfit.inference.log_density import LogDensity
 from bowdenfit.inference.objective import LOWER_END, Objective, Problem, Solution, may_end
 from bowdenfit.parameters.priors import Uniform
@@ -174,7 +174,7 @@ def _spread(basin: Basin, scale: np.ndarray, index: int) -> tuple[float, float, 
     if basin.at_end[index]:  # where z has no influence; a little inside its range
         found = basin.moved(index, float(np.copysign(_INSIDE, basin.found["z"][index])), basin.found["z"])
     columns = np.flatnonzero(~basin.problem.noise & ~basin.at_end | (np.arange(len(basin.at_end)) == index))
-    about = linearized(found["sensitivity"][:, columns])
+    about = linearize(found["sensitivity"][:, columns])
     place = int(np.searchsorted(columns, index))
     if not about.determined[place] or not about.unit_error[place] > 0:
         return float("nan"), float("nan"), 1.0

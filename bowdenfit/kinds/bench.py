@@ -15,7 +15,7 @@ from bowdenfit.description import Description
 from bowdenfit.kinds.angles.table import AngleTable
 from bowdenfit.kinds.resolve_angles import resolve_angles
 from bowdenfit.kinds.row_angles import row_angles
-from bowdenfit.kinds.rows import Conditions
+from bowdenfit.kinds.rows import ForceRows
 
 
 @dataclass(frozen=True)
@@ -41,7 +41,7 @@ class Truth:
         """Deviations of readings in units of their scale."""
         return scatter(key, shape, self.cable.description)
 
-    def wrap_angles(self, rows: Conditions) -> tuple[Array, Array]:
+    def wrap_angles(self, rows: ForceRows) -> tuple[Array, Array]:
         """Wrap angle [rad] of each row and contact without its error, and the error's variance [rad^2]."""
         data = row_angles(self.cable.description, rows, self.angles).data
         return resolve_angles(self.cable, self.values, {name: jnp.asarray(array) for name, array in data.items()})
@@ -73,7 +73,7 @@ def drawn_by_term(
 
 
 @dataclass(frozen=True)
-class Bench:
+class Remeasurement:
     """How a table is measured again on the computer, as its likelihood takes readings to scatter.
 
     Args:

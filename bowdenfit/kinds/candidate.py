@@ -10,7 +10,7 @@ from jax import Array
 from bowdenfit.cable.cable import Cable
 from bowdenfit.kinds.angles.table import AngleTable
 from bowdenfit.kinds.measurements import Measurements
-from bowdenfit.kinds.rows import OwnAngles, Provenance
+from bowdenfit.kinds.rows import OwnAngles, RowOrigin
 
 UNKNOWN_SCATTER = "the fit does not know how such readings scatter, because it has no table of them"
 GRID, MOST_ANGLES, MOST_LOADS = 11, 9, 5  # lengths without choices; wrap angles and loads of default candidates
@@ -90,14 +90,14 @@ class Situation:
         chosen = cases[_evenly(len(cases), MOST_ANGLES)] if len(cases) else cases
         return [Candidate(kind, angles=tuple(float(angle) for angle in case)) for case in chosen]
 
-    def rows(self, wanted: Sequence[Candidate]) -> tuple[np.ndarray, OwnAngles, Provenance]:
+    def rows(self, wanted: Sequence[Candidate]) -> tuple[np.ndarray, OwnAngles, RowOrigin]:
         """Route values and wrap angles of a table with one row a candidate, and where its rows stand."""
         n, names = len(wanted), self.cable.description.angle_columns
         own = OwnAngles.none(names, n)
         for row, candidate in enumerate(wanted):
             for name, angle in zip(self.columns_without_curve, candidate.angles, strict=False):
                 own.angle[row, names.index(name)] = angle
-        return np.array([c.route for c in wanted]), own, Provenance.below_heading("next", n)
+        return np.array([c.route for c in wanted]), own, RowOrigin.below_heading("next", n)
 
 
 @dataclass(frozen=True)

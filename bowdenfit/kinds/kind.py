@@ -14,7 +14,7 @@ from bowdenfit.kinds.design import Design
 from bowdenfit.kinds.measurements import Measurements
 from bowdenfit.kinds.pages import Page
 from bowdenfit.kinds.readings import Readings
-from bowdenfit.kinds.rows import Conditions
+from bowdenfit.kinds.rows import ForceRows
 from bowdenfit.types import Vector
 from bowdenfit.units import ColumnSource
 
@@ -142,7 +142,7 @@ class Kind(Generic[AnyTable]):
     page: Callable[[AnyTable, Description], Page] | None = None
     empty: Callable[[Design, Description, str], AnyTable] | None = None
     bends: Callable[[AnyTable], Vector] | None = None
-    conditions: Callable[[AnyTable], Conditions] | None = None
+    conditions: Callable[[AnyTable], ForceRows] | None = None
     forces: Callable[[AnyTable], Vector] = lambda _: np.zeros(0)
     speeds: Callable[[AnyTable], Vector] = lambda _: np.zeros(0)
     typical_speeds: Callable[[AnyTable], list[float]] = lambda _: []

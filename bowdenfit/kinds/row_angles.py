@@ -6,7 +6,7 @@ import numpy as np
 
 from bowdenfit.description import Description
 from bowdenfit.kinds.angles.table import AngleTable
-from bowdenfit.kinds.rows import Conditions
+from bowdenfit.kinds.rows import ForceRows
 
 
 @dataclass(frozen=True)
@@ -34,7 +34,7 @@ class RowAngles:
         }
 
 
-def row_angles(description: Description, table: Conditions, angles: AngleTable | None) -> RowAngles:
+def row_angles(description: Description, table: ForceRows, angles: AngleTable | None) -> RowAngles:
     """The wrap angles of a table's rows, before any parameter is known.
 
     A row's own angle comes first; then, outside the range of the curves, the angle table's row at the same length;

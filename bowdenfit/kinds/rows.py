@@ -25,7 +25,7 @@ _STROKES = {
 
 
 @dataclass(frozen=True)
-class Provenance:
+class RowOrigin:
     """Where each row of a table was read, so that any row can be named.
 
     Args:
@@ -39,7 +39,7 @@ class Provenance:
     row: Labels
 
     @classmethod
-    def below_heading(cls, file: str, n: int) -> "Provenance":
+    def below_heading(cls, file: str, n: int) -> "RowOrigin":
         """Rows of a file that is written with one line of headings."""
         return cls((file,), np.zeros(n, dtype=int), np.arange(2, n + 2))
 
@@ -75,7 +75,7 @@ class OwnAngles:
         return self.angle[:, k], self.sd[:, k]
 
 
-class Conditions(Protocol):
+class ForceRows(Protocol):
     """Under what forces were measured, row by row."""
 
     @property
@@ -89,11 +89,11 @@ class Conditions(Protocol):
         ...
 
 
-class Rows(Conditions, Protocol):
+class Rows(ForceRows, Protocol):
     """The same of a table, whose rows can be named."""
 
     @property
-    def origin(self) -> Provenance:
+    def origin(self) -> RowOrigin:
         """Where each row was read."""
         ...
 
@@ -173,10 +173,10 @@ def _own_angle(cell: Cell, column: Column) -> float:
     return read_angle(cell, column)
 
 
-def provenance_of(table: RawTable) -> Provenance:
+def provenance_of(table: RawTable) -> RowOrigin:
     """Where the rows of one file stand."""
     rows = np.array([row[0].row for row in table.rows])
-    return Provenance((table.file,), np.zeros(len(rows), dtype=int), rows)
+    return RowOrigin((table.file,), np.zeros(len(rows), dtype=int), rows)
 
 
 def read_tension(cell: Cell, column: Column, what: str) -> float:

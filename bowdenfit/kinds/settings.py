@@ -8,7 +8,7 @@ from typing import Any
 from pydantic import create_model
 
 from bowdenfit.description import Description, Tables
-from bowdenfit.description.file import check_quantities, read_toml, validated
+from bowdenfit.description.file import check_quantities, read_toml, validate
 from bowdenfit.errors import DescriptionError
 from bowdenfit.kinds import KINDS
 from bowdenfit.kinds.kind import Kind
@@ -34,7 +34,7 @@ def parse_description(raw: Mapping[str, Any], file: str = "cable.toml") -> Descr
         DescriptionError: A key is unknown, or a value is missing or impossible.
     """
     kinds = tuple(KINDS.values())
-    description = validated(raw, _models(kinds)[0], file)
+    description = validate(raw, _models(kinds)[0], file)
     for kind in kinds:
         settings = description.tables.stated.get(kind.name)
         if said := kind.contradiction(settings, description):

@@ -11,7 +11,7 @@ from bowdenfit.cable.cable import Cable
 from bowdenfit.cable.noise import NoiseLaw, noise_law
 from bowdenfit.description import Description, PriorDefaults
 from bowdenfit.kinds.angles.table import AngleTable
-from bowdenfit.kinds.bench import Bench
+from bowdenfit.kinds.bench import Remeasurement
 from bowdenfit.kinds.candidate import CandidateKind
 from bowdenfit.kinds.measurements import Measurements
 from bowdenfit.parameters.space import Parameter, ParameterSpace
@@ -158,7 +158,7 @@ class TermKind:
     name: str
     terms: Callable[[Cable, Any, AngleTable | None], Sequence[Term]]
     parameters: Callable[[Any, Circumstances], list[Parameter]]
-    bench: Bench
+    bench: Remeasurement
     candidate: CandidateKind | None = None
     tells_mountings: bool = False
     check: Callable[[Any, ParameterSpace], None] = lambda *_: None

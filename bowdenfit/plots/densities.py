@@ -10,7 +10,7 @@ BINS = 44  # each way, in two dimensions
 ENOUGH = 40_000  # draws, beyond which more do not change a picture
 
 
-def thinned(draws: np.ndarray) -> np.ndarray:
+def thin_draws(draws: np.ndarray) -> np.ndarray:
     """All draws in one row, or every so many where there are more than enough."""
     return np.ravel(draws)[:: -(-np.size(draws) // ENOUGH)]
 
@@ -44,7 +44,7 @@ def density(draws: np.ndarray, grid: np.ndarray, lower: float = -np.inf, upper: 
     Returns:
         Density, per unit of the draws; zero outside the bounds.
     """
-    draws, step = thinned(draws), float(grid[1] - grid[0])
+    draws, step = thin_draws(draws), float(grid[1] - grid[0])
     width = bandwidth(draws, step)
     near = int(np.ceil(4 * width / step))
     everything = np.concatenate([draws, *(2 * bound - draws for bound in (lower, upper) if np.isfinite(bound))])
@@ -64,7 +64,7 @@ def bandwidth(draws: np.ndarray, least: float) -> float:
 
 def bin_numbers(draws: np.ndarray, shown: tuple[float, float]) -> np.ndarray:
     """The bin of each draw on an axis with `BINS` of them; -1 where it lies off the axis."""
-    draws, (low, high) = thinned(draws), shown
+    draws, (low, high) = thin_draws(draws), shown
     position = np.minimum((draws - low) / (high - low) * BINS, BINS - 1)
     return np.where((draws >= low) & (draws <= high), position, -1).astype(int)
 

@@ -48,7 +48,7 @@ class Panel:
         return np.column_stack([self.x(x), self.y(y)])
 
 
-class Sheet:
+class PanelSheet:
     """A figure whose only Axes measures inches from the lower left corner."""
 
     def __init__(self, width: float, height: float) -> None:

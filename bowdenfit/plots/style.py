@@ -85,12 +85,12 @@ def percent(fraction: float) -> str:
     return f"{100 * fraction:.3g} %"
 
 
-def labeled(symbol: str, unit: str) -> str:
+def axis_label(symbol: str, unit: str) -> str:
     """Symbol and unit for an axis; no unit is written where there is none."""
     return symbol if unit in {"", "1"} else f"{symbol} ({unit})"
 
 
-def rounded(values: Iterable[float], spread: float) -> list[str]:
+def rounded_texts(values: Iterable[float], spread: float) -> list[str]:
     """Numbers as text, to two significant digits of their spread."""
     decimals = 3 if not 0 < spread < math.inf else max(0, 1 - math.floor(math.log10(spread)))
     return [f"{value:.{decimals}f}".replace("-", "\N{MINUS SIGN}") for value in values]

@@ -278,7 +278,7 @@ def _velocity(file: ChannelFile, channel: Channel | None, source: ColumnSource |
     return _converted(file, channel, "velocity", source, kind), INTERNAL_UNITS[kind]
 
 
-def parsed_channels(texts: Sequence[str]) -> dict[str, ColumnSource]:
+def parse_channels(texts: Sequence[str]) -> dict[str, ColumnSource]:
     """Channels named on the command line, such as "input_force=ai0:lbf" or "time=1000Hz".
 
     Raises:
@@ -323,7 +323,7 @@ def pattern_fields(pattern: str) -> tuple[tuple[str, str], ...]:
     return fields
 
 
-def matched_name(pattern: str, path: Path) -> dict[str, tuple[str, str]]:
+def match_name(pattern: str, path: Path) -> dict[str, tuple[str, str]]:
     """What a file's name says by a pattern such as "{at}mm_{velocity:r/min}rpm": text and unit by quantity.
 
     Raises:

@@ -39,7 +39,7 @@ def write_results(found: "Fit", folder: Path, figures: bool, helpers: Assistants
         figure.result()
 
 
-def sampled_by(data: Dataset, method: str | None) -> Dataset:
+def with_sampler(data: Dataset, method: str | None) -> Dataset:
     """The same data set, to be sampled by another method than its description says; the description's if None.
 
     Raises:
@@ -72,7 +72,7 @@ def _with_defaults(description: dict[str, Any]) -> dict[str, Any]:
         return description
 
 
-def checked_seed(folder: Path | None, data: Dataset, mcmc: bool, seed: int | None, resume: bool, force: bool) -> int:
+def choose_seed(folder: Path | None, data: Dataset, mcmc: bool, seed: int | None, resume: bool, force: bool) -> int:
     """The seed, once it is clear that the results have a place, or that the checkpoint there belongs to this fit."""
     if resume and (folder is None or not mcmc):
         raise UsageError("--resume needs the results folder of a fit with MCMC; name it with --output.")

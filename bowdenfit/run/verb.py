@@ -58,13 +58,13 @@ def fit(
         BowdenfitError: What is wrong, in a sentence; nothing is written then.
     """
     from bowdenfit.run.helpers import assistants, load_ahead
-    from bowdenfit.run.storing import checked_seed, sampled_by, start_checkpointing, write_results
+    from bowdenfit.run.storing import choose_seed, start_checkpointing, with_sampler, write_results
 
     folder = Path(output) if output is not None else None
     if in_background and isinstance(dataset, str | Path):
         load_ahead("jax", "scipy.optimize")  # while recordings are read, which takes seconds
-    data = sampled_by(read(dataset, **reading), sampler)
-    seed = checked_seed(folder, data, mcmc, seed, resume, force)
+    data = with_sampler(read(dataset, **reading), sampler)
+    seed = choose_seed(folder, data, mcmc, seed, resume, force)
     with assistants(in_background and mcmc, in_background and figures and folder is not None) as helpers:
         import jax
 

@@ -57,8 +57,8 @@ def steps(folder: Path) -> dict[str, float]:
     seconds["import bowdenfit"] = time.perf_counter() - start
     timed = {
         "read the files": (table, "read_channels"),
-        "flag, tare and find delays": (table, "inspected"),
-        "average": (table, "averaged"),
+        "flag, tare and find delays": (table, "inspect_recording"),
+        "average": (table, "average_recording"),
         "find strokes": (table, "find_strokes"),
         "checksums": (dataset, "_sha256"),
     }

@@ -16,7 +16,7 @@ from bowdenfit.description import Route
 from bowdenfit.inference.least_squares import LeastSquares
 from bowdenfit.kinds.angles.table import AngleTable
 from bowdenfit.kinds.measurements import Measurements
-from bowdenfit.kinds.rows import Provenance
+from bowdenfit.kinds.rows import RowOrigin
 from bowdenfit.kinds.settings import parse_description
 from bowdenfit.physics.geometry import logistic_wrap_angle
 from bowdenfit.questions.check.verb import check
@@ -68,7 +68,7 @@ def read_off(curve: str, angle: np.ndarray, scatter: float = 0.0, least: float =
     hidden = seen < least
     reading, limit = np.where(hidden, np.nan, seen), np.where(hidden, least, np.nan)
     rows = np.arange(2, len(angle) + 2)
-    origin = Provenance(("angles.csv",), np.zeros(len(angle), dtype=int), rows)
+    origin = RowOrigin(("angles.csv",), np.zeros(len(angle), dtype=int), rows)
     table = AngleTable(LENGTHS, ("sheath_angle",), np.deg2rad(reading)[:, None], np.deg2rad(limit)[:, None], origin)
     return Dataset(described(curve), Measurements((table,)), {})
 

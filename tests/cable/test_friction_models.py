@@ -14,11 +14,11 @@ from bowdenfit.errors import DescriptionError
 from bowdenfit.kinds.forces.table import ForceTable
 from bowdenfit.kinds.forces.term import HeldForcesTerm
 from bowdenfit.kinds.measurements import Measurements
-from bowdenfit.kinds.rows import OwnAngles, Provenance
+from bowdenfit.kinds.rows import OwnAngles, RowOrigin
 from bowdenfit.model import Model, build_model
 from bowdenfit.physics.friction import force_from_scale, force_scale, force_scale_slope, rate_factor
 from bowdenfit.physics.hysteresis import play_operator
-from bowdenfit.questions.simulate.bench import BenchFriction, BenchSettings, Faults, Profile, simulate_recording
+from bowdenfit.questions.simulate.bench import BenchFriction, BenchSettings, Faults, MotorProfile, simulate_recording
 
 REFERENCE = 50.0
 FORCES = np.geomspace(0.5, 200.0, 60)
@@ -150,7 +150,7 @@ LAWS = {
         BenchFriction(0.3, REFERENCE, 2.0, 0.2, 15.0, -0.002),
     ),
 }
-PROFILE = Profile(speed=2.0, lead_in=0.5, cycles=1, partial_reversals=((30.0, 12.0),))
+PROFILE = MotorProfile(speed=2.0, lead_in=0.5, cycles=1, partial_reversals=((30.0, 12.0),))
 
 
 def _law(name):
@@ -226,7 +226,7 @@ def _table(rows, velocity=float("nan"), unit="") -> ForceTable:
     """Rows (stroke, input force, output force), each a run of its own."""
     stroke, force_in, force_out = (np.array(column) for column in zip(*rows, strict=True))
     n = len(rows)
-    origin = Provenance(("forces.csv",), np.zeros(n, dtype=int), np.arange(2, n + 2))
+    origin = RowOrigin(("forces.csv",), np.zeros(n, dtype=int), np.arange(2, n + 2))
     own = OwnAngles((), np.zeros((n, 0)), np.zeros((n, 0)))
     run, names = np.arange(n), tuple(str(i) for i in range(n))
     nowhere, speeds = np.full(n, np.nan), np.full(n, velocity)

@@ -15,7 +15,7 @@ import numpy as np
 import pytest
 
 import bowdenfit as bf
-from bowdenfit.cli.progress import watched
+from bowdenfit.cli.progress import watch_verb
 from bowdenfit.inference.chain import Progress
 from bowdenfit.verbs import FIT
 
@@ -239,7 +239,7 @@ def test_an_interrupt_that_the_garbage_collector_swallows_is_not_lost(tmp_path):
     before = {number: signal.getsignal(number) for number in (signal.SIGINT, signal.SIGTERM)}
     signal.signal(signal.SIGINT, signal.default_int_handler)
     try:
-        with pytest.raises(click.exceptions.Exit) as stopped, watched(tmp_path, FIT.watch) as report:
+        with pytest.raises(click.exceptions.Exit) as stopped, watch_verb(tmp_path, FIT.watch) as report:
             report(Progress(200, 4000, None, None))
             with contextlib.suppress(KeyboardInterrupt):
                 signal.raise_signal(signal.SIGINT)

@@ -12,7 +12,7 @@ from scipy import optimize
 
 from bowdenfit.dataset import Dataset
 from bowdenfit.inference import solver
-from bowdenfit.inference.compilation import compiled
+from bowdenfit.inference.compilation import compile_program
 from bowdenfit.inference.least_squares import LeastSquares, least_squares, maximum_posterior
 from bowdenfit.inference.log_density import LogDensity
 from bowdenfit.inference.objective import Objective, make_objective
@@ -62,7 +62,7 @@ def test_scipy_s_trust_region_with_a_jax_jacobian_finds_the_same_minimum():
         return jnp.concatenate(list(posterior.residuals(z, data).values()))
 
     start = np.zeros(len(free))
-    residuals, jacobian = (compiled(f, start, posterior.data, run_once=True) for f in (stacked, jax.jacfwd(stacked)))
+    residuals, jacobian = (compile_program(f, start, posterior.data, run_once=True) for f in (stacked, jax.jacfwd(stacked)))
     theirs = optimize.least_squares(
         lambda part: np.asarray(residuals(part, posterior.data)),
         start,

@@ -11,7 +11,7 @@ from scipy import optimize, stats
 from strd import Problem, problem
 
 from bowdenfit.dataset import Dataset
-from bowdenfit.inference.compilation import compiled
+from bowdenfit.inference.compilation import compile_program
 from bowdenfit.inference.least_squares import LeastSquares, least_squares, maximum_posterior
 from bowdenfit.inference.log_density import LogDensity
 from bowdenfit.inference.objective import Objective, make_objective
@@ -63,7 +63,7 @@ def test_of_a_curved_model_the_interval_is_that_of_a_brute_force_grid():
         return posterior.residuals(z, data)["wrap_angle"]
 
     start, data = found.z[free], posterior.data
-    residuals = compiled(stacked, start, found.z[index], data, run_once=True)
+    residuals = compile_program(stacked, start, found.z[index], data, run_once=True)
 
     def least(pin: float) -> float:
         solved = optimize.least_squares(

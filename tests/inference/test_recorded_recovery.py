@@ -33,7 +33,7 @@ from bowdenfit.questions.simulate.bench import (
     BenchFriction,
     BenchSettings,
     Faults,
-    Profile,
+    MotorProfile,
     SimulatedRecording,
     simulate_recording,
 )
@@ -50,7 +50,7 @@ ESTIMATED = 'delay = "estimated"'
 TOTAL = "total exponent"
 FAULTS = Faults(input_noise=0.5, output_noise=0.5, bits=12, input_range=(0.0, 500.0), output_range=(0.0, 500.0))
 BENCH = BenchSettings(rate=250.0)
-PROFILE = Profile(speed=1.2, stroke=45.0, cycles=4, lead_in=0.5)
+PROFILE = MotorProfile(speed=1.2, stroke=45.0, cycles=4, lead_in=0.5)
 
 
 @dataclass(frozen=True)

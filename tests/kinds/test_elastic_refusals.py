@@ -9,7 +9,7 @@ import bowdenfit as bf
 from bowdenfit.inference.least_squares import least_squares, maximum_posterior
 from bowdenfit.inference.log_density import LogDensity
 from bowdenfit.inference.objective import make_objective
-from bowdenfit.inference.other_minima import contested, fitting_as_well
+from bowdenfit.inference.other_minima import fitting_as_well, range_of_minima
 from bowdenfit.kinds.design import Design, ElasticDesign
 from bowdenfit.kinds.settings import parse_description
 from bowdenfit.model import build_model
@@ -398,6 +398,6 @@ def test_a_rival_counts_only_where_it_fits_as_well_and_lies_outside_the_error():
     found = {"residuals": {"a": residuals}}
     near, far = ({"residuals": {"a": residuals * factor}} for factor in (1.1, 5.0))
     assert fitting_as_well(found, [near, far], np.ones(6), 2) == [near]
-    assert contested(10.0, 1.0, [13.0, 7.0]) is None
-    assert contested(10.0, 1.0, [13.0, 1.0]) == (1.0, 13.0)
-    assert contested(10.0, 0.0, [10.0]) is None
+    assert range_of_minima(10.0, 1.0, [13.0, 7.0]) is None
+    assert range_of_minima(10.0, 1.0, [13.0, 1.0]) == (1.0, 13.0)
+    assert range_of_minima(10.0, 0.0, [10.0]) is None

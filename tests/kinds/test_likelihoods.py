@@ -11,13 +11,13 @@ from scipy import integrate, stats
 
 import bowdenfit as bf
 from bowdenfit.dataset import Dataset, load_dataset, read_dataset
-from bowdenfit.inference.compilation import compiled
+from bowdenfit.inference.compilation import compile_program
 from bowdenfit.inference.log_density import LogDensity
 from bowdenfit.kinds.efficiencies.table import EfficiencyTable
 from bowdenfit.kinds.forces.table import ForceTable
 from bowdenfit.kinds.forces.term import HeldForcesTerm
 from bowdenfit.kinds.measurements import Measurements
-from bowdenfit.kinds.rows import OwnAngles, Provenance
+from bowdenfit.kinds.rows import OwnAngles, RowOrigin
 from bowdenfit.kinds.runs import RunsTerm
 from bowdenfit.kinds.settings import load_description
 from bowdenfit.model import Model, build_model
@@ -34,7 +34,7 @@ def _force_table(runs, names=(), angle=None, sd=None) -> ForceTable:
         np.full((n, len(names)), np.nan) if angle is None else np.asarray(angle, dtype=float).reshape(n, -1),
         np.full((n, len(names)), np.nan) if sd is None else np.asarray(sd, dtype=float).reshape(n, -1),
     )
-    origin = Provenance(("forces.csv",), np.zeros(n, dtype=int), np.arange(2, n + 2))
+    origin = RowOrigin(("forces.csv",), np.zeros(n, dtype=int), np.arange(2, n + 2))
     labels = tuple(str(i) for i in range(int(run.max()) + 1))
     velocity = np.full(n, np.nan)
     return ForceTable(np.full(n, np.nan), force_in * 1.0, force_out * 1.0, run, labels, stroke, own, origin, velocity)
@@ -199,7 +199,7 @@ def on_body_model(on_body) -> Model:
 
 def _over_rows(function, z: np.ndarray, data):
     """A function of one z, for every row of many; compiled in haste, because it runs once."""
-    program = compiled(jax.vmap(function, in_axes=(0, None)), z, data, run_once=True)
+    program = compile_program(jax.vmap(function, in_axes=(0, None)), z, data, run_once=True)
     return jax.tree.map(np.asarray, program(z, data))
 
 

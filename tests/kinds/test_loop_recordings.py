@@ -21,7 +21,7 @@ from bowdenfit.questions.check.data_set_words import check_text
 from bowdenfit.questions.figures import FIGURES, figures_of
 from bowdenfit.questions.recorded.loop_traces import loop_points
 from bowdenfit.questions.recorded.traces import traces
-from bowdenfit.recordings.forces import parsed_channels
+from bowdenfit.recordings.forces import parse_channels
 from bowdenfit.recordings.loop_strokes import LoopStrokes
 from bowdenfit.recordings.preparation import prepare
 from bowdenfit.recordings.recording import RawRecording, Recordings
@@ -293,7 +293,7 @@ def test_a_torque_at_one_end_only_and_a_named_channel_are_read(tmp_path):
         "output_force_N": columns["output_force_N"],
     }
     path = folder_of(tmp_path, [mixed], cable=IN_RADIUS)
-    found = load_dataset(path, channels=parsed_channels(["input_torque=motor:-N*mm"])).measurements.table(Recordings)
+    found = load_dataset(path, channels=parse_channels(["input_torque=motor:-N*mm"])).measurements.table(Recordings)
     assert found is not None
     assert found.each[0].blocks.input_force.max() == pytest.approx(columns["input_force_N"].max(), abs=2.0)
 
@@ -310,7 +310,7 @@ def test_a_torque_at_one_end_only_and_a_named_channel_are_read(tmp_path):
 def test_torques_that_cannot_be_read_are_refused(tmp_path, cable, channels, says):
     path = folder_of(tmp_path, [as_torques(recorded(seconds=3.0))], cable=cable)
     with pytest.raises(DatasetError, match=says):
-        load_dataset(path, channels=parsed_channels(channels))
+        load_dataset(path, channels=parse_channels(channels))
 
 
 def test_a_file_with_both_force_and_torque_is_refused(tmp_path):
@@ -325,7 +325,7 @@ def test_a_torque_of_a_single_rope_is_refused(tmp_path):
     text = (path / "cable.toml").read_text().replace('kind = "loop"', 'kind = "single"')
     (path / "cable.toml").write_text(text)
     with pytest.raises(DatasetError, match=r'named for a single rope.*kind = "loop"'):
-        load_dataset(path, channels=parsed_channels(["input_torque=input_torque_N_m:N*m"]))
+        load_dataset(path, channels=parse_channels(["input_torque=input_torque_N_m:N*m"]))
 
 
 def test_a_delay_is_not_estimated_but_a_stated_one_is_applied(tmp_path):

@@ -20,13 +20,13 @@ from bowdenfit.kinds import runs as runs_of_model
 from bowdenfit.kinds.measured_cable import measured_cable
 from bowdenfit.kinds.measurements import Measurements
 from bowdenfit.kinds.recordings.angles import recorded_angles
-from bowdenfit.kinds.recordings.side_by_side import joined
-from bowdenfit.kinds.recordings.whole import WholeRecordingsTerm, padded
+from bowdenfit.kinds.recordings.side_by_side import first_of_groups
+from bowdenfit.kinds.recordings.whole import WholeRecordingsTerm, pad_recordings
 from bowdenfit.kinds.row_angles import row_angles
 from bowdenfit.kinds.runs import RunsTerm, SlidingRows, run_sums
 from bowdenfit.model import Model, build_model
 from bowdenfit.physics.friction import rate_factor
-from bowdenfit.questions.simulate.bench import BenchFriction, BenchSettings, Faults, Profile, simulate_recording
+from bowdenfit.questions.simulate.bench import BenchFriction, BenchSettings, Faults, MotorProfile, simulate_recording
 from bowdenfit.recordings.preparation import prepare
 from bowdenfit.recordings.preparation.play import play
 from bowdenfit.recordings.recording import Recording, Recordings
@@ -223,7 +223,7 @@ def test_bins_of_the_load_do_not_take_the_change_of_friction_within_a_bin_for_no
 # Whole recordings -------------------------------------------------------------------------------------------------
 
 AS_READ = Preparation(delay="none", saturation="kept", dropouts=False, spikes=False, block="none")
-SHORT = Profile(speed=2.0, lead_in=0.5, cycles=1)
+SHORT = MotorProfile(speed=2.0, lead_in=0.5, cycles=1)
 CAPSTAN, NO_FAULTS = BenchFriction(), Faults()
 
 
@@ -252,7 +252,7 @@ def _whole(model: Model, recordings, censored=False) -> WholeRecordingsTerm:
     """The play operator run at every evaluation, also where sums would do."""
     of_all = Recordings(("angle",), tuple(recordings), "mm/s")
     angles = row_angles(model.description, recorded_angles(of_all), None).data
-    return WholeRecordingsTerm(model.cable, padded(of_all, angles, censored), of_all.runs)
+    return WholeRecordingsTerm(model.cable, pad_recordings(of_all, angles, censored), of_all.runs)
 
 
 NOISY = Faults(input_noise=0.2, output_noise=0.2)
@@ -412,19 +412,19 @@ def test_least_squares_of_faultless_recordings_returns_what_they_were_made_with(
 
 def test_joining_the_blocks_of_a_long_recording_keeps_the_ends_of_its_phases():
     state = np.repeat([0, 1, 0, -1, 0, 1], [3, 50, 2, 41, 1, 30])
-    starts = joined(state, 30)
+    starts = first_of_groups(state, 30)
     groups = np.split(np.arange(len(state)), starts[1:])
     assert all(len(set(state[group])) == 1 for group in groups)
     edges = np.flatnonzero(np.diff(state) != 0)
     for end in (*edges, *(edges + 1)):
         assert [end] in [list(group) for group in groups]
     assert len(groups) < 60
-    np.testing.assert_array_equal(joined(state, len(state)), np.arange(len(state)))
+    np.testing.assert_array_equal(first_of_groups(state, len(state)), np.arange(len(state)))
 
 
 def test_a_joined_recording_gives_the_same_coefficient(monkeypatch):
     recordings = [_recorded(angle, faults=NOISY) for angle in (1.0, 2.0, 3.0)]
     whole = _fitted(_model(recordings, "whole", friction_model="drag")).estimates["mu"]
     monkeypatch.setattr("bowdenfit.kinds.recordings.side_by_side.MOST_BLOCKS", 80)
-    joined = _fitted(_model(recordings, "whole", friction_model="drag")).estimates["mu"]
-    assert joined.value == pytest.approx(whole.value, abs=0.3 * whole.standard_error)
+    first_of_groups = _fitted(_model(recordings, "whole", friction_model="drag")).estimates["mu"]
+    assert first_of_groups.value == pytest.approx(whole.value, abs=0.3 * whole.standard_error)

@@ -15,14 +15,14 @@ from scipy import stats
 import bowdenfit as bf
 from bowdenfit.cable.noise import NormalNoise, StudentNoise, noise_law, scatter
 from bowdenfit.dataset import Dataset, load_dataset
-from bowdenfit.inference.compilation import compiled
+from bowdenfit.inference.compilation import compile_program
 from bowdenfit.inference.least_squares import maximum_posterior
 from bowdenfit.inference.log_density import LogDensity
 from bowdenfit.inference.objective import make_objective
 from bowdenfit.kinds.forces.table import ForceTable
 from bowdenfit.kinds.measurements import Measurements
 from bowdenfit.kinds.preload.table import PreloadTable
-from bowdenfit.kinds.rows import OwnAngles, Provenance
+from bowdenfit.kinds.rows import OwnAngles, RowOrigin
 from bowdenfit.model import Model, build_model
 from bowdenfit.physics.student import log_student_cdf, log_student_density, student_bound_residual, student_residual
 
@@ -35,7 +35,7 @@ FAR = np.concatenate([[0.0], *(s * np.geomspace(1e-9, 1e30, 200) for s in (-1, 1
 def _at(function, x, freedom: int):
     """A function of one deviation and its derivative, at many."""
     both = jax.value_and_grad(lambda at: function(at, freedom))
-    return jax.tree.map(np.asarray, compiled(jax.vmap(both), x, run_once=True)(x))
+    return jax.tree.map(np.asarray, compile_program(jax.vmap(both), x, run_once=True)(x))
 
 
 # The distribution -------------------------------------------------------------------------------------------------
@@ -129,7 +129,7 @@ def _force_table(seed: int, tau: float = 0.01, strokes=(1, -1), outlier: float =
     force_out = force * np.exp(-stroke * (MU * WRAP_ANGLE + mounting[run]))
     noise, n = FORCE_NOISE * generator.standard_normal((2, len(run))), len(run)
     own = OwnAngles((), np.zeros((n, 0)), np.zeros((n, 0)))
-    origin = Provenance(("forces.csv",), np.zeros(n, dtype=int), np.arange(2, n + 2))
+    origin = RowOrigin(("forces.csv",), np.zeros(n, dtype=int), np.arange(2, n + 2))
     unknown, names = np.full(n, np.nan), tuple(str(i) for i in range(RUNS))
     return ForceTable(unknown, force + noise[0], force_out + noise[1], run, names, stroke, own, origin, unknown)
 
@@ -166,7 +166,7 @@ def _of(model: Model, z: np.ndarray):
         expected = {t.name: t.expected(values, d) for t, d in zip(model.terms, data, strict=True)}
         return posterior.log_likelihoods(z, data), posterior.residuals(z, data), expected, values
 
-    program = compiled(jax.vmap(at, in_axes=(0, None)), z, posterior.data, run_once=True)
+    program = compile_program(jax.vmap(at, in_axes=(0, None)), z, posterior.data, run_once=True)
     return jax.tree.map(np.asarray, program(z, posterior.data))
 
 
@@ -229,7 +229,7 @@ def _standardized(model: Model, name: str, draws: int) -> np.ndarray:
         return jax.vmap(lambda key: term.simulate(values, data, key))(keys), term.expected(values, data), scale
 
     keys = jax.random.split(jax.random.key(5), draws)
-    drawn, expected, scale = compiled(at, keys, term.data, run_once=True)(keys, term.data)
+    drawn, expected, scale = compile_program(at, keys, term.data, run_once=True)(keys, term.data)
     if term.unit == "1":
         return np.asarray((jnp.log(expected) - jnp.log(drawn)) / scale).ravel()
     if term.unit == "deg":
@@ -282,7 +282,7 @@ def _posteriors(outlier: float, tau: float = 0.01, seeds: int = 20) -> dict[str,
         z = np.stack(np.meshgrid(_Z_MU, _Z_TAU, indexing="ij"), axis=-1).reshape(-1, 2)
         stacked = jax.tree.map(lambda *each: np.stack(each), *data)
         over = jax.vmap(jax.vmap(posterior.log_density, in_axes=(0, None)), in_axes=(None, 0))
-        density = np.asarray(compiled(over, z, stacked, run_once=True)(z, stacked))
+        density = np.asarray(compile_program(over, z, stacked, run_once=True)(z, stacked))
         weight = np.exp(density - density.max(axis=1, keepdims=True))
         weight /= weight.sum(axis=1, keepdims=True)
         mu = np.asarray(posterior.model.space.parameters[0].prior.constrain(jnp.asarray(z[:, 0])))

@@ -11,14 +11,14 @@ from conftest import ROOT
 from raw_recordings import to_raw
 
 from bowdenfit.errors import DescriptionError, UsageError
-from bowdenfit.questions.simulate.bench import BenchFriction, BenchSettings, Faults, Profile, simulate_recording
+from bowdenfit.questions.simulate.bench import BenchFriction, BenchSettings, Faults, MotorProfile, simulate_recording
 from bowdenfit.questions.simulate.recordings.making import make_recordings
 from bowdenfit.questions.simulate.recordings.plan import parse_recordings_plan, read_recordings_plan
 from bowdenfit.questions.simulate.recordings.writing import write_recordings
 
 PLAN = ROOT / "datasets" / "synthetic-recordings" / "bench.toml"
 EXPONENT = 0.25
-PROFILE = Profile(speed=2.0, lead_in=0.5, cycles=2)
+PROFILE = MotorProfile(speed=2.0, lead_in=0.5, cycles=2)
 BENCH = BenchSettings(rate=500.0)
 CAPSTAN, NO_FAULTS = BenchFriction(), Faults()
 FRICTIONS = {

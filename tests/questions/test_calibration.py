@@ -15,7 +15,7 @@ from spoiling import copied
 from bowdenfit.dataset import Dataset, load_dataset
 from bowdenfit.description import Description, SamplerSettings
 from bowdenfit.errors import DatasetError, StoreError
-from bowdenfit.inference.compilation import compiled
+from bowdenfit.inference.compilation import compile_program
 from bowdenfit.kinds import KINDS
 from bowdenfit.kinds.angles.table import AngleTable
 from bowdenfit.kinds.angles.term import detection_limit
@@ -64,7 +64,7 @@ def drawn_anew(dataset: Dataset, values: dict[str, float], scale: float = 1.0) -
         return drawn_readings(cable, tables, values, key, scale)
 
     arguments = {name: jnp.asarray(value) for name, value in values.items()}, jax.random.key(1)
-    return with_readings(dataset, compiled(readings, *arguments, run_once=True)(*arguments))
+    return with_readings(dataset, compile_program(readings, *arguments, run_once=True)(*arguments))
 
 
 # Tables drawn anew -------------------------------------------------------------------------------------------------

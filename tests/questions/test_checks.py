@@ -12,7 +12,7 @@ from laboratory import Laboratory
 from scipy import stats
 
 import bowdenfit as bf
-from bowdenfit.inference.compilation import compiled
+from bowdenfit.inference.compilation import compile_program
 from bowdenfit.inference.diagnostics import Diagnostics
 from bowdenfit.inference.log_density import LogDensity as Density
 from bowdenfit.inference.predictive_checks import LeftOut, place_at_random, predict_without_each, uniformity
@@ -356,7 +356,7 @@ class Checked:
         kind = str(density.model.space) + str(jax.tree.map(np.shape, density.data))
         if kind not in self.programs:
             shape = jax.ShapeDtypeStruct((ROWS, z.shape[1] + 1), float)
-            self.programs[kind] = compiled(jax.vmap(self.implied(density.model), (0, None)), shape, density.data)
+            self.programs[kind] = compile_program(jax.vmap(self.implied(density.model), (0, None)), shape, density.data)
         numbered = np.column_stack([z, np.arange(len(z), dtype=float)]).reshape(-1, ROWS, z.shape[1] + 1)
         parts = [jax.tree.map(np.asarray, self.programs[kind](part, density.data)) for part in numbered]
         drawn = jax.tree.map(lambda *each: np.stack(each), *parts)

@@ -20,7 +20,7 @@ from bowdenfit.kinds.design import Design
 from bowdenfit.kinds.efficiencies.table import EfficiencyTable
 from bowdenfit.model import build_model
 from bowdenfit.questions.compare.answer import Comparison
-from bowdenfit.questions.compare.common_readings import Common, Omitted, common_readings
+from bowdenfit.questions.compare.common_readings import CommonReadings, Omitted, common_readings
 from bowdenfit.questions.compare.words import comparison_text
 
 QUICK = ("sampler.n_walkers=64", "sampler.target_ess=200", "sampler.target_r_hat=1.05", "sampler.max_steps=3000")
@@ -340,7 +340,7 @@ def test_fits_of_other_files_or_with_nothing_in_common_are_refused(geometries, b
     strange = replace(fit, dataset=replace(by_run_effect["with"].dataset, sha256=fit.dataset.sha256))
     with pytest.raises(UsageError, match="not fitted to the same readings"):
         bf.compare({"a": fit, "b": strange})
-    nothing = Common((), {}, (Omitted("wrap_angle", 0, 26, "they are taken differently"),))
+    nothing = CommonReadings((), {}, (Omitted("wrap_angle", 0, 26, "they are taken differently"),))
     monkeypatch.setattr("bowdenfit.questions.compare.answer.common_readings", lambda _: nothing)
     with pytest.raises(
         UsageError, match=r"no reading in common .* left out of the comparison: they are taken differently"

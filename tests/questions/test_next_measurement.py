@@ -24,14 +24,14 @@ from bowdenfit.kinds.candidate import Candidate
 from bowdenfit.kinds.design import Design
 from bowdenfit.kinds.efficiencies.table import EfficiencyTable
 from bowdenfit.kinds.next_run import typical_run
-from bowdenfit.kinds.rows import OwnAngles, Provenance
+from bowdenfit.kinds.rows import OwnAngles, RowOrigin
 from bowdenfit.model import Model, build_model
 from bowdenfit.questions.next import verb
 from bowdenfit.questions.next.candidate_names import parsed_candidates
 from bowdenfit.questions.next.candidates import default_candidates, name_of, words_of
 from bowdenfit.questions.next.ranking import next_measurement
 from bowdenfit.questions.next.simulated_readings import simulated_readings
-from bowdenfit.questions.next.variance_reduction import error_of_difference, explained, mean_and_spread
+from bowdenfit.questions.next.variance_reduction import error_of_difference, explained_share, mean_and_spread
 from bowdenfit.questions.next.words import next_measurement_text
 from bowdenfit.questions.simulate.simulation import empty_tables
 from bowdenfit.results.optimum import optimum_of
@@ -76,30 +76,30 @@ def test_a_linear_reading_explains_the_squared_correlation():
     generator = np.random.default_rng(1)
     answer = generator.standard_normal(N)
     for noise in (0.3, 1.0, 3.0):
-        found = explained((answer + noise * generator.standard_normal(N))[:, None], answer)
+        found = explained_share((answer + noise * generator.standard_normal(N))[:, None], answer)
         assert abs(found.share - 1 / (1 + noise**2)) < 4.5 * found.error
         assert 0 < found.error < 0.02
 
 
 def test_curved_dependence_counts_where_correlation_sees_nothing():
     x, noise = np.random.default_rng(2).standard_normal((2, N))
-    found = explained((x + 0.1 * noise)[:, None], x**2)
+    found = explained_share((x + 0.1 * noise)[:, None], x**2)
     assert abs(np.corrcoef(x, x**2)[0, 1]) < 0.05
     assert found.share > 0.95
 
 
 def test_two_columns_tell_together_what_neither_tells_alone():
     x, y = np.random.default_rng(3).standard_normal((2, N))
-    together = explained(np.column_stack([x, y]), x * y)
+    together = explained_share(np.column_stack([x, y]), x * y)
     assert together.share > 0.99
-    assert explained(x[:, None], x * y).share < 0.01
+    assert explained_share(x[:, None], x * y).share < 0.01
 
 
 def test_noise_does_not_look_like_information():
     """60 readings of pure noise, from few draws: cross-validated shares exceed 0.02 about once in 10^6 such tests."""
     generator = np.random.default_rng(4)
     answer = generator.standard_normal(1500)
-    shares = [explained(generator.standard_normal((1500, 2)), answer).share for _ in range(60)]
+    shares = [explained_share(generator.standard_normal((1500, 2)), answer).share for _ in range(60)]
     assert max(shares) < 0.02
     assert np.mean(np.array(shares) == 0) > 0.5
 
@@ -110,7 +110,7 @@ def test_the_stated_error_is_the_scatter_of_the_shares():
     found = []
     for _ in range(80):
         answer = generator.standard_normal(1280)
-        found.append(explained((answer + generator.standard_normal(1280))[:, None], answer))
+        found.append(explained_share((answer + generator.standard_normal(1280))[:, None], answer))
     stated, scatter = np.mean([f.error for f in found]), np.std([f.share for f in found])
     assert 0.7 < stated / scatter < 1.4
 
@@ -119,24 +119,24 @@ def test_draws_that_stay_alike_for_long_have_a_larger_error():
     generator = np.random.default_rng(6)
     answer = generator.standard_normal(N // 10)
     reading = answer + generator.standard_normal(N // 10)
-    alone = explained(reading[:, None], answer)
-    copies = explained(np.repeat(reading, 10)[:, None], np.repeat(answer, 10))
+    alone = explained_share(reading[:, None], answer)
+    copies = explained_share(np.repeat(reading, 10)[:, None], np.repeat(answer, 10))
     assert copies.error == pytest.approx(alone.error, rel=0.15)
     assert copies.share == pytest.approx(alone.share, abs=2 * alone.error)
 
 
 def test_a_reading_that_is_always_the_same_explains_nothing():
     answer = np.random.default_rng(7).standard_normal(N)
-    found = explained(np.full((N, 2), 10.0), answer)
+    found = explained_share(np.full((N, 2), 10.0), answer)
     assert (found.share, found.error) == (0.0, pytest.approx(0.0, abs=1e-3))
-    assert explained(answer[:, None], np.full(N, 3.0)).share == 0.0
+    assert explained_share(answer[:, None], np.full(N, 3.0)).share == 0.0
 
 
 def test_shares_from_the_same_draws_differ_by_less_than_each_errs():
     x, y = np.random.default_rng(8).standard_normal((2, N))
-    one, other = (explained((x + y + 0.01 * i)[:, None], x) for i in (0, 1))
+    one, other = (explained_share((x + y + 0.01 * i)[:, None], x) for i in (0, 1))
     assert error_of_difference(one, other) < 0.05 * one.error
-    assert error_of_difference(one, explained(y[:, None], x)) > 0.5 * one.error
+    assert error_of_difference(one, explained_share(y[:, None], x)) > 0.5 * one.error
 
 
 def test_mean_and_scatter_of_three_readings_on():
@@ -516,8 +516,8 @@ def _with_angles(dataset: Dataset, at: float, reading: np.ndarray) -> Dataset:
     return replace(dataset, measurements=dataset.measurements.with_tables(table))
 
 
-def _origin(n: int) -> Provenance:
-    return Provenance(("test",), np.zeros(n, dtype=int), np.arange(2, n + 2))
+def _origin(n: int) -> RowOrigin:
+    return RowOrigin(("test",), np.zeros(n, dtype=int), np.arange(2, n + 2))
 
 
 @pytest.mark.slow
@@ -537,7 +537,7 @@ def test_refits_with_the_readings_added_narrow_the_best_length_as_expected():
     readings = simulated_readings(density.model, dataset.measurements, candidates, z, 1)
     realized, expected = {}, {}
     for candidate, reading in zip(candidates, readings, strict=True):
-        expected[candidate] = explained(reading[:, 0], before).share
+        expected[candidate] = explained_share(reading[:, 0], before).share
         left = []
         for k, draw in enumerate(generator.choice(len(z), 10, replace=False)):
             add = _with_efficiency if candidate.kind == "efficiency" else _with_angles

@@ -24,7 +24,7 @@ from bowdenfit.questions.length.wrap_angles_figure import AngleCurve, WrapAngles
 from bowdenfit.questions.summary import pairs_figure
 from bowdenfit.questions.summary.coefficients_figure import Coefficient
 from bowdenfit.questions.summary.pairs_figure import Pairs
-from bowdenfit.questions.summary.quantities import Quantity
+from bowdenfit.questions.summary.quantities import SampledQuantity
 from bowdenfit.questions.summary.residuals_figure import Residuals
 from bowdenfit.questions.summary.traces_figure import Paths
 from bowdenfit.results.choices import Choice, Window
@@ -49,13 +49,13 @@ def coefficient(name, symbol, middle, sd, unit="1", estimate=None):
 
 def positive(one):
     """A coefficient as the pair plot and the paths of the ensembles show it."""
-    return Quantity(one.symbol if one.unit == "1" else f"{one.symbol} ({one.unit})", one.draws, (0.0, np.inf))
+    return SampledQuantity(one.symbol if one.unit == "1" else f"{one.symbol} ({one.unit})", one.draws, (0.0, np.inf))
 
 
 def best(lengths, efficiency):
     return [
-        Quantity("Optimum (mm)", lengths, RANGE),
-        Quantity("Efficiency at\noptimum (%)", 100 * efficiency, (0, 100)),
+        SampledQuantity("Optimum (mm)", lengths, RANGE),
+        SampledQuantity("Efficiency at\noptimum (%)", 100 * efficiency, (0, 100)),
     ]
 
 

@@ -12,7 +12,7 @@ from bowdenfit.questions.figures import FIGURES, draw_figure
 from bowdenfit.questions.length.efficiency_figure import EfficiencyPoints
 from bowdenfit.questions.recorded.autocorrelation_figure import Autocorrelation, autocorrelation
 from bowdenfit.questions.recorded.dependence_figure import Dependence
-from bowdenfit.questions.recorded.hysteresis_figure import ForceLoop
+from bowdenfit.questions.recorded.hysteresis_figure import LoopPanel
 from bowdenfit.questions.recorded.recordings_figure import POINTS, OverTime, beginning
 from bowdenfit.questions.recorded.sample_efficiency_figure import Samples, sample_efficiencies
 from bowdenfit.questions.summary.residuals_figure import Residuals
@@ -37,7 +37,7 @@ class Recorded:
     """One recording, and what each figure shows of it."""
 
     over_time: OverTime
-    hysteresis: ForceLoop
+    hysteresis: LoopPanel
     samples: Samples
     autocorrelation: Autocorrelation
 
@@ -69,7 +69,7 @@ def trace(number=0, n=BLOCKS, name=None, draws=True, cycles=2, seconds=40.0):
     correlation = np.exp(-lag) + 0.03 * rng.standard_normal(len(lag)) * (lag > 0)
     return Recorded(
         over_time,
-        ForceLoop(name, motor, output, stroke, EXPONENT + spread, exponent),
+        LoopPanel(name, motor, output, stroke, EXPONENT + spread, exponent),
         Samples(
             name, *sample_efficiencies(motor, output, stroke * used),
             np.array([low, middle, high]) if draws else np.full(1, middle), np.exp(-exponent), 0.002,

@@ -10,7 +10,7 @@ import pytest
 
 from bowdenfit.description import ForceLimits, Preparation, QuantityValue
 from bowdenfit.errors import DatasetError
-from bowdenfit.questions.simulate.bench import BenchFriction, BenchSettings, Faults, Profile, simulate_recording
+from bowdenfit.questions.simulate.bench import BenchFriction, BenchSettings, Faults, MotorProfile, simulate_recording
 from bowdenfit.recordings.preparation import prepare
 from bowdenfit.recordings.preparation.bandwidth import bandwidth_of
 from bowdenfit.recordings.preparation.clock import DROPOUT, GOOD, SATURATED, SPIKE, Sampled, read_at, spread
@@ -306,7 +306,7 @@ def test_noise_does_not_shift_the_delay_by_more_than_the_error_in_common(noise, 
     errors = []
     for seed in range(10):
         faults = Faults(input_noise=noise, output_noise=noise, delay=DELAY)
-        profile = Profile(speed=speed, stroke=45, cycles=4, lead_in=0.5, pause=pause)
+        profile = MotorProfile(speed=speed, stroke=45, cycles=4, lead_in=0.5, pause=pause)
         bench, generator = BenchSettings(rate=250, preload=preload), np.random.default_rng(seed)
         read = simulate_recording(0.35, BenchFriction(), profile, bench, faults, generator)
         good = np.ones(len(read.time), dtype=bool)

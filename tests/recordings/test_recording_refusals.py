@@ -16,7 +16,7 @@ from bowdenfit.dataset import load_dataset
 from bowdenfit.errors import DatasetError
 from bowdenfit.files import columns_csv
 from bowdenfit.kinds.recordings.angles import check_angles
-from bowdenfit.questions.simulate.bench import BenchFriction, BenchSettings, Faults, Profile, simulate_recording
+from bowdenfit.questions.simulate.bench import BenchFriction, BenchSettings, Faults, MotorProfile, simulate_recording
 from bowdenfit.recordings.recording import PULL, RETURN, Recordings
 
 NEWTONS_PER_POUND = 4.4482216152605
@@ -51,7 +51,7 @@ GLOB = [(ENTRY, "")]
 def simulated():
     """One cycle with little noise, friction exponent 0.3."""
     noise = Faults(input_noise=0.3, output_noise=0.3)
-    profile, generator = Profile(speed=1.0, cycles=1), np.random.default_rng(0)
+    profile, generator = MotorProfile(speed=1.0, cycles=1), np.random.default_rng(0)
     return simulate_recording(0.3, BenchFriction(), profile, BenchSettings(), noise, generator)
 
 

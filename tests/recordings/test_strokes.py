@@ -13,7 +13,7 @@ from bowdenfit.questions.simulate.bench import (
     BenchFriction,
     BenchSettings,
     Faults,
-    Profile,
+    MotorProfile,
     SimulatedRecording,
     simulate_recording,
 )
@@ -87,7 +87,7 @@ def simulated(
     return simulate_recording(
         exponent,
         friction or BenchFriction(),
-        Profile(**{"speed": 2.0, "cycles": 3, **profile}),
+        MotorProfile(**{"speed": 2.0, "cycles": 3, **profile}),
         bench or BenchSettings(),
         Faults(input_noise=noise, output_noise=noise),
         np.random.default_rng(seed),
@@ -249,7 +249,7 @@ def random_recording(seed: int) -> RawRecording:
     """A bench as it may be: any speed, stiffness, preload, noise and friction, now and then with drag or a delay."""
     g = np.random.default_rng(seed)
     noise = float(g.choice([0.0, 0.1, 0.5, 1.0]))
-    profile = Profile(
+    profile = MotorProfile(
         speed=float(np.exp(g.uniform(np.log(0.5), np.log(6.0)))),
         cycles=int(g.integers(1, 5)),
         stroke=float(g.uniform(25, 60)),

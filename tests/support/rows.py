@@ -7,7 +7,7 @@ import numpy as np
 from bowdenfit.dataset import Dataset
 from bowdenfit.kinds.efficiencies.table import EfficiencyTable
 from bowdenfit.kinds.measurements import Measurements
-from bowdenfit.kinds.rows import OwnAngles, Provenance
+from bowdenfit.kinds.rows import OwnAngles, RowOrigin
 from bowdenfit.kinds.settings import parse_description
 
 
@@ -32,6 +32,6 @@ def of_rows(loss: np.ndarray, angle: np.ndarray, angle_sd: float | np.ndarray = 
     tables = {"efficiencies": {"file": "efficiencies.csv"}}
     description = parse_description({"name": "rows", "contact": contacts, "tables": tables} | more)
     own = OwnAngles(tuple(f"angle_{i + 1}" for i in range(k)), angle, np.broadcast_to(angle_sd, angle.shape).copy())
-    origin = Provenance(("efficiencies.csv",), np.zeros(n, dtype=int), np.arange(2, n + 2))
+    origin = RowOrigin(("efficiencies.csv",), np.zeros(n, dtype=int), np.arange(2, n + 2))
     table = EfficiencyTable(np.full(n, np.nan), np.exp(-loss), np.zeros(n), own, origin)
     return Dataset(description, Measurements((table,)), {})

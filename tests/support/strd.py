@@ -10,7 +10,7 @@ import jax.numpy as jnp
 import numpy as np
 from jax import Array
 
-from bowdenfit.inference.compilation import compiled
+from bowdenfit.inference.compilation import compile_program
 from bowdenfit.inference.solver import minimize, orthogonal
 
 FOLDER = Path(__file__).parents[1] / "inference" / "nist"
@@ -41,7 +41,7 @@ class Problem:
             slopes, deviation = jax.jacfwd(residuals, has_aux=True)(b)
             return deviation, slopes
 
-        program = compiled(both, self.certified, run_once=True)
+        program = compile_program(both, self.certified, run_once=True)
         return lambda b: tuple(np.asarray(part) for part in program(b))  # type: ignore[return-value]
 
 

@@ -14,7 +14,7 @@ from bowdenfit.kinds.design import Design
 from bowdenfit.kinds.kind import Found, Source
 from bowdenfit.kinds.measurements import Measurements
 from bowdenfit.kinds.pages import Page, route_heading
-from bowdenfit.kinds.rows import LARGEST_ANGLE, Provenance, provenance_of, read_angle, rounded, route_column
+from bowdenfit.kinds.rows import LARGEST_ANGLE, RowOrigin, provenance_of, read_angle, rounded, route_column
 from bowdenfit.types import Matrix, Vector
 
 _FEWEST = 3  # detected angles that a plausible table has of each curve
@@ -57,7 +57,7 @@ class AngleTable:
     names: tuple[str, ...]
     angle: Matrix
     limit: Matrix
-    origin: Provenance
+    origin: RowOrigin
 
     def column(self, name: str) -> tuple[Vector, Vector]:
         """Angles and detection limits of one contact."""
@@ -170,4 +170,4 @@ def empty(design: Design, description: Description, file: str) -> AngleTable:
     columns = tuple(c.wrap_angle.column or "" for c in description.curved)
     shape = (len(design.angles), len(columns))
     angle, limit = np.full(shape, np.deg2rad(30)), np.full(shape, np.nan)
-    return AngleTable(np.array(design.angles), columns, angle, limit, Provenance.below_heading(file, shape[0]))
+    return AngleTable(np.array(design.angles), columns, angle, limit, RowOrigin.below_heading(file, shape[0]))

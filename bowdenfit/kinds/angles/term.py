@@ -14,7 +14,7 @@ from bowdenfit.cable.noise import noise_law, scatter
 from bowdenfit.kinds.angles.bench import detection_limit, drawn_angles
 from bowdenfit.kinds.angles.table import AngleSettings, AngleTable
 from bowdenfit.kinds.angles.undetected import EVENTS, count
-from bowdenfit.kinds.bench import Bench
+from bowdenfit.kinds.bench import Remeasurement
 from bowdenfit.kinds.candidate import Candidate, CandidateKind, Simulation, Situation
 from bowdenfit.kinds.term import Circumstances, TermKind
 from bowdenfit.parameters.priors import HalfNormal
@@ -152,7 +152,7 @@ ANGLES = TermKind(
     "angles",
     lambda cable, table, _: (angles_term(cable, table),),
     _parameters,
-    Bench(drawn_angles, check=detection_limit),
+    Remeasurement(drawn_angles, check=detection_limit),
     CandidateKind(
         name="angle",
         title="Wrap angles",

@@ -12,7 +12,7 @@ from bowdenfit.kinds.design import Design
 from bowdenfit.kinds.kind import Found, Source
 from bowdenfit.kinds.pages import Page, route_cells, route_heading
 from bowdenfit.kinds.plausibility import beyond
-from bowdenfit.kinds.rows import OwnAngles, Provenance, provenance_of, read_own_angles, read_route, shared_columns
+from bowdenfit.kinds.rows import OwnAngles, RowOrigin, provenance_of, read_own_angles, read_route, shared_columns
 from bowdenfit.types import Vector
 
 
@@ -32,7 +32,7 @@ class EfficiencyTable:
     efficiency: Vector
     sd: Vector
     own: OwnAngles
-    origin: Provenance
+    origin: RowOrigin
 
 
 def read_efficiencies(source: Source) -> Found[EfficiencyTable]:
@@ -124,5 +124,5 @@ def page(table: EfficiencyTable, description: Description) -> Page:
 def empty(design: Design, description: Description, file: str) -> EfficiencyTable:
     """A table of a design's shape with unremarkable readings."""
     n = len(design.efficiencies)
-    own, origin = OwnAngles.none(description.angle_columns, n), Provenance.below_heading(file, n)
+    own, origin = OwnAngles.none(description.angle_columns, n), RowOrigin.below_heading(file, n)
     return EfficiencyTable(np.array(design.efficiencies), np.full(n, 0.8), np.zeros(n), own, origin)

@@ -16,7 +16,7 @@ from bowdenfit.cable.noise import noise_law, scatter
 from bowdenfit.description import Description
 from bowdenfit.errors import DescriptionError
 from bowdenfit.kinds.angles.table import AngleTable
-from bowdenfit.kinds.bench import Bench, drawn_by_term
+from bowdenfit.kinds.bench import Remeasurement, drawn_by_term
 from bowdenfit.kinds.candidate import UNKNOWN_SCATTER, Candidate, CandidateKind, Simulation, Situation, one_reading_each
 from bowdenfit.kinds.efficiencies.table import EfficiencyTable
 from bowdenfit.kinds.resolve_angles import resolve_angles
@@ -136,7 +136,7 @@ EFFICIENCIES = TermKind(
     "efficiencies",
     lambda cable, table, angles: (efficiencies_term(cable, table, angles),),
     lambda _, at: [run_scatter(at)],
-    Bench(drawn_by_term(efficiencies_term, "efficiency", lambda key: jax.random.split(key, 3)[1]), _drawn_table),
+    Remeasurement(drawn_by_term(efficiencies_term, "efficiency", lambda key: jax.random.split(key, 3)[1]), _drawn_table),
     CandidateKind(
         name="efficiency",
         example="efficiency@470",

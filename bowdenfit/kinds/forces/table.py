@@ -13,7 +13,7 @@ from bowdenfit.files.csv_table import read_csv
 from bowdenfit.kinds.kind import Found, Source
 from bowdenfit.kinds.rows import (
     OwnAngles,
-    Provenance,
+    RowOrigin,
     provenance_of,
     read_own_angles,
     read_route,
@@ -50,7 +50,7 @@ class ForceTable:
     run_names: tuple[str, ...]
     stroke: Labels
     own: OwnAngles
-    origin: Provenance
+    origin: RowOrigin
     velocity: Vector
     velocity_unit: str = ""
 
@@ -89,7 +89,7 @@ def read_forces(source: Source) -> Found[ForceTable]:
         tuple(names),
         np.concatenate([t.stroke for t in tables]),
         own,
-        Provenance(
+        RowOrigin(
             tuple(path.name for path in paths),
             np.concatenate([np.full(len(t.run), i) for i, t in enumerate(tables)]),
             np.concatenate([t.origin.row for t in tables]),

@@ -12,7 +12,7 @@ from bowdenfit.cable.cable import Cable
 from bowdenfit.cable.load_cells import FORCE_NOISE, RUN_SCATTER, LoadCells
 from bowdenfit.description import Description
 from bowdenfit.kinds.angles.table import AngleTable
-from bowdenfit.kinds.bench import Bench, Truth
+from bowdenfit.kinds.bench import Remeasurement, Truth
 from bowdenfit.kinds.forces.held import HeldForcesTerm
 from bowdenfit.kinds.forces.table import ForceTable
 from bowdenfit.kinds.next_run import FORCE_RUN
@@ -112,7 +112,7 @@ FORCES = TermKind(
     "forces",
     force_terms,
     _parameters,
-    Bench(_draw, _drawn_table),
+    Remeasurement(_draw, _drawn_table),
     FORCE_RUN,
     tells_mountings=True,
 )

@@ -7,7 +7,7 @@ from bowdenfit.kinds.design import Design
 from bowdenfit.kinds.forces.table import ForceTable
 from bowdenfit.kinds.pages import STROKE_NAMES, Page, route_cells, route_heading
 from bowdenfit.kinds.plausibility import SCATTER, beyond, parts
-from bowdenfit.kinds.rows import OwnAngles, Provenance
+from bowdenfit.kinds.rows import OwnAngles, RowOrigin
 
 
 def count(table: ForceTable) -> str:
@@ -71,5 +71,5 @@ def empty(design: Design, description: Description, file: str) -> ForceTable:
             own.angle[:, k] = np.asarray(design.own_angles[name])[run]
     route = np.asarray(design.runs, dtype=float)[run]
     labels = tuple(str(i + 1) for i in range(len(design.runs)))
-    origin, velocity = Provenance.below_heading(file, len(run)), np.full(len(run), np.nan)
+    origin, velocity = RowOrigin.below_heading(file, len(run)), np.full(len(run), np.nan)
     return ForceTable(route, force, 0.8 * force, run, labels, stroke.astype(int), own, origin, velocity)

@@ -12,7 +12,7 @@ from bowdenfit.files.csv_table import RawTable, read_csv
 from bowdenfit.kinds.kind import Found, Source
 from bowdenfit.kinds.rows import (
     OwnAngles,
-    Provenance,
+    RowOrigin,
     check_spelling,
     provenance_of,
     read_own_angles,
@@ -47,7 +47,7 @@ class LoopTable:
     stroke: Labels
     preload: Vector
     own: OwnAngles
-    origin: Provenance
+    origin: RowOrigin
 
 
 def read_loop(source: Source) -> Found[LoopTable]:

@@ -16,7 +16,7 @@ from bowdenfit.cable.elasticity import spread_matrix
 from bowdenfit.cable.load_cells import FORCE_NOISE, RUN_SCATTER, LoadCells
 from bowdenfit.cable.noise import noise_law, scatter
 from bowdenfit.kinds.angles.table import AngleTable
-from bowdenfit.kinds.bench import Bench, Truth
+from bowdenfit.kinds.bench import Remeasurement, Truth
 from bowdenfit.kinds.candidate import Candidate, CandidateKind, Simulation, Situation, one_reading_each, some_loads
 from bowdenfit.kinds.loop.table import LoopTable
 from bowdenfit.kinds.resolve_angles import resolve_angles
@@ -181,7 +181,7 @@ LOOP = TermKind(
     "loop",
     lambda cable, table, angles: (loop_term(cable, table, angles),),
     _parameters,
-    Bench(_draw),
+    Remeasurement(_draw),
     CandidateKind(
         name="loop",
         noun="loop under load",

@@ -10,7 +10,7 @@ from bowdenfit.kinds.measurements import Measurements
 from bowdenfit.kinds.pages import STROKE_NAMES, Page, in_words
 from bowdenfit.kinds.plausibility import HIGHEST, LOWEST
 from bowdenfit.kinds.preload.table import PreloadTable
-from bowdenfit.kinds.rows import OwnAngles, Provenance
+from bowdenfit.kinds.rows import OwnAngles, RowOrigin
 from bowdenfit.kinds.stretch.table import StretchTable
 
 _FREE = 0.25  # output over input force below which a loop moves all but freely
@@ -92,5 +92,5 @@ def empty(design: Design, description: Description, file: str) -> LoopTable:
     if column is not None:
         own.angle[:, names.index(column)] = rows[:, 0]
     nothing = np.full(n, np.nan)
-    origin = Provenance.below_heading(file, n)
+    origin = RowOrigin.below_heading(file, n)
     return LoopTable(nothing, rows[:, 1], 0.8 * rows[:, 1], rows[:, 2].astype(int), nothing, own, origin)

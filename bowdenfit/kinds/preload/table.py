@@ -8,7 +8,7 @@ from bowdenfit.description import Table
 from bowdenfit.files.columns import Quantity, find_columns, require
 from bowdenfit.files.csv_table import read_csv
 from bowdenfit.kinds.kind import Found, Source
-from bowdenfit.kinds.rows import Provenance, provenance_of, read_angle, read_tension
+from bowdenfit.kinds.rows import RowOrigin, provenance_of, read_angle, read_tension
 from bowdenfit.types import Vector
 
 _UNUSED = ("time", "position", "run")  # columns that such a table may have and that nothing reads
@@ -35,7 +35,7 @@ class PreloadTable:
 
     wrap_angle: Vector
     preload: Vector
-    origin: Provenance
+    origin: RowOrigin
 
 
 def read_preload(source: Source) -> Found[PreloadTable]:

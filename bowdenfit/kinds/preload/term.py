@@ -11,7 +11,7 @@ from jaxtyping import Float
 
 from bowdenfit.cable.cable import Cable
 from bowdenfit.kinds.angles.table import AngleTable
-from bowdenfit.kinds.bench import Bench, drawn_by_term
+from bowdenfit.kinds.bench import Remeasurement, drawn_by_term
 from bowdenfit.kinds.candidate import (
     UNKNOWN_SCATTER,
     Candidate,
@@ -71,7 +71,7 @@ PRELOAD = TermKind(
     "preload",
     lambda cable, table, _: (preload_term(cable, table),),
     _parameters,
-    Bench(drawn_by_term(_unread, "preload", lambda key: jax.random.split(jax.random.fold_in(key, 3), 3)[1])),
+    Remeasurement(drawn_by_term(_unread, "preload", lambda key: jax.random.split(jax.random.fold_in(key, 3), 3)[1])),
     CandidateKind(
         name="preload",
         example="preload@90deg",

@@ -8,7 +8,7 @@ from bowdenfit.kinds.measurements import Measurements
 from bowdenfit.kinds.pages import Page, in_words
 from bowdenfit.kinds.plausibility import within_factor
 from bowdenfit.kinds.preload.table import PreloadTable
-from bowdenfit.kinds.rows import Provenance
+from bowdenfit.kinds.rows import RowOrigin
 from bowdenfit.kinds.stretch.table import StretchTable
 from bowdenfit.kinds.stretch.words import one_angle_warning
 
@@ -66,4 +66,4 @@ def empty(design: Design, description: Description, file: str) -> PreloadTable:
     """A table of a design's shape with unremarkable readings."""
     del description
     angles = np.asarray(design.elastic.preload_angles, dtype=float)
-    return PreloadTable(angles, np.full(len(angles), 20.0), Provenance.below_heading(file, len(angles)))
+    return PreloadTable(angles, np.full(len(angles), 20.0), RowOrigin.below_heading(file, len(angles)))

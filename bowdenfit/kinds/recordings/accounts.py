@@ -7,7 +7,7 @@ import numpy as np
 from bowdenfit.recordings.recording import PULL, RETURN, SWITCH, Recording, Recordings
 
 
-def accounts(recordings: Recordings) -> list[dict[str, Any]]:
+def preparation_pages(recordings: Recordings) -> list[dict[str, Any]]:
     """One page a recording: its samples, its preparation and its phases, in s, N and Hz."""
     return [_account(recording) for recording in recordings.each]
 

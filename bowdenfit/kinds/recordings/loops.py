@@ -15,7 +15,7 @@ from bowdenfit.cable.drive import Each, Loop
 from bowdenfit.cable.load_cells import LoadCells
 from bowdenfit.cable.noise import scatter
 from bowdenfit.kinds.recordings.blocks_term import BlocksTerm, Data, Values
-from bowdenfit.kinds.recordings.side_by_side import beside, side_by_side, thinned
+from bowdenfit.kinds.recordings.side_by_side import beside, group_blocks, side_by_side
 from bowdenfit.physics.loop import loop_output_force
 from bowdenfit.recordings.loop_strokes import loop_limits
 from bowdenfit.recordings.recording import Recording, Recordings
@@ -116,7 +116,7 @@ def _blocks(recording: Recording, censored: bool) -> dict[str, Any]:
 
     `moving` is the number of samples that show the loss, with the sign of the motion.
     """
-    blocks, strokes, groups = recording.blocks, recording.strokes, thinned(recording)
+    blocks, strokes, groups = recording.blocks, recording.strokes, group_blocks(recording)
     arrays = groups.arrays(Loop, ~blocks.saturated, censored)
     stroke = strokes.stroke[groups.starts]
     used = strokes.used_sliding & ~blocks.saturated

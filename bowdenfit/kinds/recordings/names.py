@@ -4,7 +4,7 @@ from pathlib import Path
 
 from bowdenfit.description import Description, QuantityValue, RecordingFile
 from bowdenfit.errors import DatasetError, DescriptionError, nearest
-from bowdenfit.recordings.forces import matched_name, pattern_fields
+from bowdenfit.recordings.forces import match_name, pattern_fields
 from bowdenfit.units import conversion_factor, speed_dimension
 
 
@@ -13,7 +13,7 @@ def said_by_name(description: Description, pattern: str | None, path: Path, file
     if pattern is None:
         return RecordingFile(file=file)
     _check_pattern(description, pattern)
-    values = matched_name(pattern, path)
+    values = match_name(pattern, path)
     angles = {
         name: QuantityValue(value=float(text), unit=unit or "deg")
         for name, (text, unit) in values.items()

@@ -89,9 +89,9 @@ class Thinned:
         return {"censored": np.where(beyond, end, 0.0), "share": np.where(beyond, share, 0.0)}
 
 
-def thinned(recording: Recording) -> Thinned:
+def group_blocks(recording: Recording) -> Thinned:
     """The blocks of a recording, in groups where there are more than `MOST_BLOCKS`."""
-    return Thinned(recording, joined(recording.strokes.stroke, MOST_BLOCKS))
+    return Thinned(recording, first_of_groups(recording.strokes.stroke, MOST_BLOCKS))
 
 
 def side_by_side(
@@ -127,7 +127,7 @@ def beside(columns: Sequence[np.ndarray], mode: Literal["edge", "constant"] = "e
     return np.stack([np.pad(column, (0, longest - len(column)), mode) for column in columns], axis=1)
 
 
-def joined(state: np.ndarray, most: int) -> np.ndarray:
+def first_of_groups(state: np.ndarray, most: int) -> np.ndarray:
     """First block of each group of blocks that are joined: of one phase only, its first and last block always alone.
 
     The operator stands where the end of a stroke left it, so the ends must not be averaged away.

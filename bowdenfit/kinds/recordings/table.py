@@ -14,7 +14,7 @@ from bowdenfit.kinds.recordings.angles import check_placed
 from bowdenfit.kinds.recordings.names import said_by_name
 from bowdenfit.kinds.recordings.settings import RecordingsTable
 from bowdenfit.recordings.forces import TORQUES, WANTED, rows_where, to_recording
-from bowdenfit.recordings.preparation import NO_DELAY_OF_LOOPS, averaged, inspected
+from bowdenfit.recordings.preparation import NO_DELAY_OF_LOOPS, average_recording, inspect_recording
 from bowdenfit.recordings.preparation.delay import COMMON_ERROR
 from bowdenfit.recordings.recording import Account, Blocks, RawRecording, Recording, Recordings
 from bowdenfit.recordings.strokes import cable_of, find_strokes
@@ -67,12 +67,12 @@ def _prepared(files: Sequence[_File]) -> tuple[list[tuple[Blocks, Account]], flo
     The two channels run through the same electronics in every recording, so that what each of them says of the delay is
     put together; an error of it shifts the friction of all of them alike, in proportion to how fast the force changes.
     """
-    found = [inspected(f.raw, f.settings) for f in files]
+    found = [inspect_recording(f.raw, f.settings) for f in files]
     told = [i.delay for i in found if i.settings.delay == "estimated" and i.delay.sd > 0]
     if not told:
-        return [averaged(i) for i in found], max((f.delay_sd for f in files), default=0.0)
+        return [average_recording(i) for i in found], max((f.delay_sd for f in files), default=0.0)
     delay, sd = _pooled(np.array([d.value for d in told]), np.array([d.sd for d in told]))
-    return [averaged(i, (delay, sd) if i.settings.delay == "estimated" else None) for i in found], sd
+    return [average_recording(i, (delay, sd) if i.settings.delay == "estimated" else None) for i in found], sd
 
 
 def _said_once(prepared: Sequence[tuple[Blocks, Account]]) -> list[tuple[Blocks, Account]]:

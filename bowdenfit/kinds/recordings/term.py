@@ -13,7 +13,7 @@ from bowdenfit.cable.cable import Cable
 from bowdenfit.cable.load_cells import BLOCK_NOISE, DELAY_ERROR
 from bowdenfit.errors import DatasetError
 from bowdenfit.kinds.angles.table import AngleTable
-from bowdenfit.kinds.bench import Bench
+from bowdenfit.kinds.bench import Remeasurement
 from bowdenfit.kinds.recordings.angles import recorded_angles
 from bowdenfit.kinds.recordings.blocks import (
     RECORDED,
@@ -30,7 +30,7 @@ from bowdenfit.kinds.recordings.events import EVENTS
 from bowdenfit.kinds.recordings.loops import LoopRecordingsTerm, loop_recordings_term
 from bowdenfit.kinds.recordings.settings import RecordingsTable
 from bowdenfit.kinds.recordings.simulation import drawn_recordings, recorded_again, refuse_saturated
-from bowdenfit.kinds.recordings.whole import WholeRecordingsTerm, padded
+from bowdenfit.kinds.recordings.whole import WholeRecordingsTerm, pad_recordings
 from bowdenfit.kinds.row_angles import row_angles
 from bowdenfit.kinds.runs import ROW_ARRAYS, RunsTerm, SlidingRows, run_sums
 from bowdenfit.kinds.shared_parameters import offsets, preload, run_scatter
@@ -67,7 +67,7 @@ def recordings_term(
         parts = [_all_blocks(r) for r in recordings.each]
         _needs_blocks(recordings, parts)
         return RunsTerm(cable, run_sums(cable, _rows(recordings, parts, rows)), labels, RECORDED, BLOCK_NOISE)
-    return WholeRecordingsTerm(cable, padded(recordings, rows, censored), labels)
+    return WholeRecordingsTerm(cable, pad_recordings(recordings, rows, censored), labels)
 
 
 def _censored(settings: RecordingsTable, recordings: Recordings) -> bool:
@@ -194,7 +194,7 @@ RECORDINGS = TermKind(
     "recordings",
     lambda cable, recordings, angles: (recordings_term(cable, recordings, angles),),
     _parameters,
-    Bench(drawn_recordings, recorded_again, refuse_saturated),
+    Remeasurement(drawn_recordings, recorded_again, refuse_saturated),
     tells_mountings=True,
     events=EVENTS,
 )

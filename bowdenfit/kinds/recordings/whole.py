@@ -13,7 +13,7 @@ from bowdenfit.cable.drive import Each, Rope
 from bowdenfit.cable.noise import scatter
 from bowdenfit.kinds.recordings.blocks import RECORDED, positive
 from bowdenfit.kinds.recordings.blocks_term import BlocksTerm, Data, Values
-from bowdenfit.kinds.recordings.side_by_side import side_by_side, thinned
+from bowdenfit.kinds.recordings.side_by_side import group_blocks, side_by_side
 from bowdenfit.physics.friction import transmission_efficiency
 from bowdenfit.recordings.recording import Recording, Recordings
 
@@ -66,7 +66,7 @@ class WholeRecordingsTerm(BlocksTerm):
         return np.exp(-np.bincount(run, exponent) / np.bincount(run))
 
 
-def padded(recordings: Recordings, angles: Mapping[str, np.ndarray], censored: bool) -> dict[str, Any]:
+def pad_recordings(recordings: Recordings, angles: Mapping[str, np.ndarray], censored: bool) -> dict[str, Any]:
     """Arrays over time and recordings; the shorter ones stand still at their end, with no weight."""
     data = side_by_side(recordings, [_blocks(r, censored) for r in recordings.each], angles)
     speeds = [np.abs(r.blocks.velocity[r.strokes.used_sliding]) for r in recordings.each]
@@ -80,7 +80,7 @@ def padded(recordings: Recordings, angles: Mapping[str, np.ndarray], censored: b
 
 def _blocks(recording: Recording, censored: bool) -> dict[str, Any]:
     """Blocks of one recording; while the rope stands still the input's noise is not in the output."""
-    groups = thinned(recording)
+    groups = group_blocks(recording)
     arrays = groups.arrays(Rope, positive(recording), censored)
     standing = recording.strokes.stroke[groups.starts] == 0
     variance = np.where(standing, 0.0, 1 / arrays["input_force"] ** 2) + 1 / arrays["output_force"] ** 2

@@ -5,7 +5,7 @@ from typing import Any
 import numpy as np
 
 from bowdenfit.kinds.plausibility import FACTOR, SCATTER, beyond
-from bowdenfit.kinds.recordings.accounts import accounts
+from bowdenfit.kinds.recordings.accounts import preparation_pages
 from bowdenfit.recordings.recording import PULL, RETURN, Recordings
 from bowdenfit.words import filled, listed, table
 
@@ -28,7 +28,7 @@ _LOOP_NOTE = (
 
 def recordings_text(recordings: Recordings) -> list[str]:
     """What was done to the recordings, line by line."""
-    pages = accounts(recordings)
+    pages = preparation_pages(recordings)
     losses = [(_or_dash(r.strokes.drag, ".3g", " N"),) if recordings.loop else () for r in recordings.each]
     rows = [_row(page, loss) for page, loss in zip(pages, losses, strict=True)]
     lines = table(_LOOP_HEADS if recordings.loop else _HEADS, rows, left=("left out",)).splitlines()

@@ -9,7 +9,7 @@ import numpy as np
 from bowdenfit.files.columns import Column, Quantity, find_columns, require
 from bowdenfit.files.csv_table import RawTable, read_csv
 from bowdenfit.kinds.kind import Found, Source
-from bowdenfit.kinds.rows import Provenance, check_spelling, provenance_of, read_angle, read_tension
+from bowdenfit.kinds.rows import RowOrigin, check_spelling, provenance_of, read_angle, read_tension
 from bowdenfit.types import Flags, Labels, Vector
 
 _BRANCHES = {
@@ -43,7 +43,7 @@ class StretchTable:
     peak: Vector
     cycle: Labels
     cycle_names: tuple[str, ...]
-    origin: Provenance
+    origin: RowOrigin
 
 
 def read_stretch(source: Source) -> Found[StretchTable]:

@@ -11,7 +11,7 @@ from jaxtyping import Float
 from bowdenfit.cable.cable import Cable
 from bowdenfit.cable.elasticity import STRETCH_FRICTION, STRETCH_ZERO, rope_parameters, spread_matrix
 from bowdenfit.kinds.angles.table import AngleTable
-from bowdenfit.kinds.bench import Bench, drawn_by_term
+from bowdenfit.kinds.bench import Remeasurement, drawn_by_term
 from bowdenfit.kinds.candidate import (
     UNKNOWN_SCATTER,
     Candidate,
@@ -96,7 +96,7 @@ STRETCH = TermKind(
     "stretch",
     lambda *of: (stretch_term(*of),),
     _parameters,
-    Bench(drawn_by_term(stretch_term, "stretch", lambda key: jax.random.split(jax.random.fold_in(key, 3), 3)[0])),
+    Remeasurement(drawn_by_term(stretch_term, "stretch", lambda key: jax.random.split(jax.random.fold_in(key, 3), 3)[0])),
     CandidateKind(
         name="stretch",
         example="stretch@90deg,50N",

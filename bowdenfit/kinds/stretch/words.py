@@ -10,7 +10,7 @@ from bowdenfit.kinds.measurements import Measurements
 from bowdenfit.kinds.pages import Page, in_words
 from bowdenfit.kinds.plausibility import parts, within_factor
 from bowdenfit.kinds.preload.table import PreloadTable
-from bowdenfit.kinds.rows import Provenance
+from bowdenfit.kinds.rows import RowOrigin
 from bowdenfit.kinds.stretch.table import StretchTable
 
 _LOW = 1 / 3  # share of the highest load above which a lowest load is not low
@@ -118,5 +118,5 @@ def empty(design: Design, description: Description, file: str) -> StretchTable:
     peak = np.full(len(load), loads.max(initial=0.0))
     names = tuple(f"{angle:.4g} deg" for angle in np.rad2deg(angles))
     of_cycle = np.repeat(np.arange(n), len(cycle))
-    origin = Provenance.below_heading(file, len(load))
+    origin = RowOrigin.below_heading(file, len(load))
     return StretchTable(load, wrap_angle, 0.01 * load, np.tile(down, n), peak, of_cycle, names, origin)

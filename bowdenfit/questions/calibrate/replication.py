@@ -12,7 +12,7 @@ import numpy as np
 
 from bowdenfit.dataset import Dataset
 from bowdenfit.errors import ConvergenceError, DatasetError, UsageError
-from bowdenfit.inference.compilation import compiled
+from bowdenfit.inference.compilation import compile_program
 from bowdenfit.inference.log_density import LogDensity
 from bowdenfit.kinds.drawn_readings import drawn_readings, slipped
 from bowdenfit.model import Model, build_model
@@ -112,7 +112,7 @@ class Workbench:
             return drawn_readings(model.cable, tables, values, jax.random.wrap_key_data(words))
 
         words = jax.ShapeDtypeStruct((2,), jnp.uint32)
-        return compiled(readings, jax.ShapeDtypeStruct((model.space.size,), jnp.float64), words)
+        return compile_program(readings, jax.ShapeDtypeStruct((model.space.size,), jnp.float64), words)
 
     @cached_property
     def _optimum_of_truth(self) -> Callable[..., Any]:

@@ -64,12 +64,12 @@ def channels_of(path: str | Path, channels: Sequence[str] = ()) -> "tuple[Channe
     from bowdenfit.dataset import single_file_dataset
     from bowdenfit.errors import DatasetError
     from bowdenfit.files import read_channels
-    from bowdenfit.recordings.forces import parsed_channels
+    from bowdenfit.recordings.forces import parse_channels
     from bowdenfit.recordings.recording import Recordings
 
     file = read_channels(Path(path))
     try:
-        data = single_file_dataset(Path(path), (0.0, "deg"), (), parsed_channels(channels), kind="recordings")
+        data = single_file_dataset(Path(path), (0.0, "deg"), (), parse_channels(channels), kind="recordings")
     except DatasetError as error:
         return file, None, str(error)
     return file, data.measurements.table(Recordings), ""

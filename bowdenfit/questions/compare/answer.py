@@ -15,7 +15,7 @@ from bowdenfit.inference.leave_one_out import ReadingsToLeaveOut, leave_one_out
 from bowdenfit.inference.log_density import LogDensity as Density
 from bowdenfit.kinds import readings_called
 from bowdenfit.kinds.terms import measured_kinds, term_kind
-from bowdenfit.questions.compare.common_readings import Common, Omitted, common_readings
+from bowdenfit.questions.compare.common_readings import CommonReadings, Omitted, common_readings
 from bowdenfit.questions.recorded.rate import RateEffect, rate_effect
 from bowdenfit.results.record import Draws, Record
 from bowdenfit.words import listed
@@ -172,7 +172,7 @@ def _draws_of(name: str, fit: Record) -> Draws:
     return fit.posterior
 
 
-def _common(fits: Mapping[str, Record]) -> Common:
+def _common(fits: Mapping[str, Record]) -> CommonReadings:
     """The readings that all fits share; refuses fits of other measurements."""
     first, *others = fits
     for name in others:
@@ -196,7 +196,7 @@ def _inputs(fit: Record) -> tuple[list[tuple[str, str]], list[tuple[str, tuple[s
     return files, [(term.name, term.labels) for term in fit.model.terms if not term_kind(term.name).events.chosen]
 
 
-def _leave_out_each(name: str, fit: Record, drawn: Draws, common: Common, report: Report | None) -> Prediction:
+def _leave_out_each(name: str, fit: Record, drawn: Draws, common: CommonReadings, report: Report | None) -> Prediction:
     return leave_one_out(
         ReadingsToLeaveOut(Density(fit.model)),
         drawn.z,

@@ -45,7 +45,7 @@ class Omitted:
 
 
 @dataclass(frozen=True)
-class Common:
+class CommonReadings:
     """The readings that several fits share.
 
     Args:
@@ -59,7 +59,7 @@ class Common:
     omitted: tuple[Omitted, ...]
 
 
-def common_readings(fits: Mapping[str, Record]) -> Common:
+def common_readings(fits: Mapping[str, Record]) -> CommonReadings:
     """The readings that all fits have, as the same events.
 
     Args:
@@ -74,7 +74,7 @@ def common_readings(fits: Mapping[str, Record]) -> Common:
     counts = {
         table: (_count(shared, table), max(_count(of_fit, table) for of_fit in events.values())) for table in tables
     }
-    return Common(
+    return CommonReadings(
         tuple((table, label) for table, label, _ in shared),
         {name: tuple(places[name][key] for key in shared) for name in events},
         tuple(

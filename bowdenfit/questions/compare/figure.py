@@ -18,8 +18,8 @@ from bowdenfit.plots.style import (
     SMALL,
     WIDE,
     WIDE_INTERVAL,
+    axis_label,
     in_paper_style,
-    labeled,
 )
 
 if TYPE_CHECKING:
@@ -89,11 +89,11 @@ def _cell_axes(figure: Figure, left: float, parts: list[float], i: int, columns:
 
 def _cells(found: Comparison) -> list[tuple[str, dict[str, Interval]]]:
     """What is shown of each fit: label of the axis, and intervals by fit."""
-    cells = [(labeled(row.symbol, row.unit), row.by_fit) for row in found.parameters.values()]
+    cells = [(axis_label(row.symbol, row.unit), row.by_fit) for row in found.parameters.values()]
     lengths = {name: interval for name, (interval, _) in found.optimal_length.items()}
     if lengths:
         unit = next(iter(found.optimal_length.values()))[1]
-        cells.append((labeled("$l^*$", unit), lengths))
+        cells.append((axis_label("$l^*$", unit), lengths))
     return cells
 
 

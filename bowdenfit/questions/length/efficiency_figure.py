@@ -20,7 +20,7 @@ from bowdenfit.plots.style import (
     VERMILLION,
     in_paper_style,
     percent,
-    rounded,
+    rounded_texts,
 )
 
 if TYPE_CHECKING:
@@ -187,7 +187,7 @@ def _optimum(axes: Axes, data: AlongRoute, optimum: OptimalLength) -> None:
 def _mark_optimum(axes: Axes, optimum: OptimalLength) -> None:
     """The median optimum, and the window of lengths that are good enough."""
     length, window, unit = optimum.length, optimum.window, optimum.unit
-    median, low, high = rounded((length.median, length.q05, length.q95), length.q95 - length.q05)
+    median, low, high = rounded_texts((length.median, length.q05, length.q95), length.q95 - length.q05)
     label = f"Optimum {median} {unit} (90 % interval {low} to {high} {unit})"
     axes.axvline(length.median, color=VERMILLION, linestyle="--", linewidth=1.1, label=label)
     if np.isfinite(window.start):

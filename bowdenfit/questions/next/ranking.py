@@ -12,7 +12,7 @@ from bowdenfit.questions.next.candidate_names import parsed_candidates
 from bowdenfit.questions.next.candidates import default_candidates, name_of, words_of
 from bowdenfit.questions.next.simulated_readings import simulated_readings
 from bowdenfit.questions.next.target import Answer, answer_of
-from bowdenfit.questions.next.variance_reduction import Explained, error_of_difference, explained, mean_and_spread
+from bowdenfit.questions.next.variance_reduction import Explained, error_of_difference, explained_share, mean_and_spread
 from bowdenfit.results.record import Record
 
 REPEATS = (1, 2, 4, 8, 16, 32)
@@ -41,7 +41,7 @@ def next_measurement(
     chosen = parsed_candidates(fit, candidates) if candidates else default_candidates(fit)
     _check_costs(chosen, costs)
     readings = _readings(fit, chosen, STEPS)
-    found = [explained(reading[:, 0], answer.draws) for reading in readings]
+    found = [explained_share(reading[:, 0], answer.draws) for reading in readings]
     ranked = _ranked(fit, answer, chosen, found, costs)
     route = fit.dataset.description.route
     shown = (route.label, route.range) if route else ("", (0.0, 0.0))
@@ -90,7 +90,7 @@ def _ranked(
 def _repeats(fit: Record, answer: Answer, candidate: Candidate) -> Repeats:
     """The candidate measured several times."""
     (readings,) = _readings(fit, [candidate], max(REPEATS))
-    shares = [explained(mean_and_spread(readings[:, :n]), answer.draws).share for n in REPEATS]
+    shares = [explained_share(mean_and_spread(readings[:, :n]), answer.draws).share for n in REPEATS]
     return Repeats(REPEATS, tuple(answer.sd_after(share) for share in np.maximum.accumulate(shares)))
 
 
@@ -102,7 +102,7 @@ def _plan(answer: Answer, ranked: Sequence[Ranked], readings: Mapping[Candidate,
     while len(steps) < STEPS:
         known = [readings[r.candidate][:, made[:i].count(r)] for i, r in enumerate(made)]
         shares = [
-            explained(np.column_stack([*known, readings[r.candidate][:, made.count(r)]]), answer.draws).share
+            explained_share(np.column_stack([*known, readings[r.candidate][:, made.count(r)]]), answer.draws).share
             for r in able
         ]
         before = 1 - (steps[-1].sd / answer.sd) ** 2

@@ -35,7 +35,7 @@ class Explained:
     without: Float[np.ndarray, " groups"]
 
 
-def explained(
+def explained_share(
     reading: Float[np.ndarray, "draws columns"], answer: Float[np.ndarray, " draws"], groups: int = GROUPS
 ) -> Explained:
     """Share of the variance of an answer that a reading explains.

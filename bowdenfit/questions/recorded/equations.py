@@ -11,7 +11,7 @@ from jaxtyping import Float
 
 from bowdenfit.cable.drive import Loop, Rope, drive_of
 from bowdenfit.cable.load_cells import LoadCells
-from bowdenfit.inference.compilation import compiled
+from bowdenfit.inference.compilation import compile_program
 from bowdenfit.kinds.angles.table import AngleTable
 from bowdenfit.kinds.recordings.angles import recorded_angles
 from bowdenfit.kinds.recordings.side_by_side import beside
@@ -43,7 +43,7 @@ class Follower:
         z = jax.ShapeDtypeStruct((DRAWS, model.space.size), jnp.float64)
         mounting = jax.ShapeDtypeStruct((DRAWS, len(recordings.each)), jnp.float64)
         function = jax.vmap(_followed(model), in_axes=(0, 0, None))
-        self._program: Callable[..., Any] = compiled(function, z, mounting, self._data)
+        self._program: Callable[..., Any] = compile_program(function, z, mounting, self._data)
 
     def __call__(
         self, z: Float[np.ndarray, "draws free"], mounting: Float[np.ndarray, "draws recordings"]

@@ -19,7 +19,7 @@ from bowdenfit.plots.style import (
     VERMILLION,
     WIDE_INTERVAL,
     in_paper_style,
-    rounded,
+    rounded_texts,
 )
 
 if TYPE_CHECKING:
@@ -37,7 +37,7 @@ STROKES = (
 
 
 @dataclass(frozen=True)
-class ForceLoop:
+class LoopPanel:
     """The forces of one recording of a single rope, and its friction.
 
     Args:
@@ -56,7 +56,7 @@ class ForceLoop:
     own_exponent: float
 
 
-def data(fit: Record) -> tuple[ForceLoop, ...] | None:
+def data(fit: Record) -> tuple[LoopPanel, ...] | None:
     """Every recording of a single rope; None without any: those of a loop are in the figure of loops."""
     from bowdenfit.questions.recorded.traces import traces
 
@@ -64,12 +64,12 @@ def data(fit: Record) -> tuple[ForceLoop, ...] | None:
     for trace in traces(fit):
         forces, strokes = (trace.input_force, trace.output_force), trace.recording.strokes
         if not trace.loop and np.any(np.isfinite(sum(forces))):
-            found.append(ForceLoop(trace.recording.name, *forces, trace.stroke, trace.exponent, strokes.exponent))
+            found.append(LoopPanel(trace.recording.name, *forces, trace.stroke, trace.exponent, strokes.exponent))
     return tuple(found) or None
 
 
 @in_paper_style
-def draw(recordings: tuple[ForceLoop, ...]) -> Figure:
+def draw(recordings: tuple[LoopPanel, ...]) -> Figure:
     """Output against input force [N] on equal axes, a panel a recording."""
     shown = evenly(recordings, MOST)
     limits = [span([r.input_force, r.output_force]) for r in shown]
@@ -92,7 +92,7 @@ def draw(recordings: tuple[ForceLoop, ...]) -> Figure:
     return figure
 
 
-def _loop(axes: Axes, recording: ForceLoop) -> None:
+def _loop(axes: Axes, recording: LoopPanel) -> None:
     """The blocks by stroke."""
     for stroke, name, marker, size, color in STROKES:
         here = recording.stroke == stroke
@@ -103,7 +103,7 @@ def _loop(axes: Axes, recording: ForceLoop) -> None:
             )  # fmt: skip
 
 
-def _capstan_lines(axes: Axes, recording: ForceLoop) -> None:
+def _capstan_lines(axes: Axes, recording: LoopPanel) -> None:
     """F_out = F_in exp(-Lambda) when pulling, F_in exp(Lambda) when returning, and the diagonal between."""
     force = np.array(axes.get_xlim())
     low, middle, high = _exponent(recording)
@@ -119,17 +119,17 @@ def _capstan_lines(axes: Axes, recording: ForceLoop) -> None:
     axes.plot(force, force, color=GRAY, linewidth=0.6, linestyle=(0, (4, 2)), label="No friction")
 
 
-def _words(recording: ForceLoop) -> str:
+def _words(recording: LoopPanel) -> str:
     """The exponent of this recording by itself, and that of the cable; in short lines, which fit below the loop."""
     low, middle, high = _exponent(recording)
     own, width = recording.own_exponent, high - low
-    low_text, middle_text, high_text, own_text = rounded((low, middle, high, own), width or WITHOUT_INTERVAL)
+    low_text, middle_text, high_text, own_text = rounded_texts((low, middle, high, own), width or WITHOUT_INTERVAL)
     lines = [rf"$\Lambda$ here {own_text}"] if np.isfinite(own) else []
     lines += [rf"$\Lambda$ expected {middle_text}"] + ([f"({low_text} to {high_text})"] if width else [])
     return "\n".join(lines)
 
 
-def _exponent(recording: ForceLoop) -> tuple[float, float, float]:
+def _exponent(recording: LoopPanel) -> tuple[float, float, float]:
     """Ends and middle of the interval of the cable's exponent, all the same without draws."""
     exponent = recording.exponent.tolist()
     return exponent[0], exponent[len(exponent) // 2], exponent[-1]

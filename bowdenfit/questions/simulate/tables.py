@@ -25,7 +25,7 @@ _HEADING = re.compile(r"\s*\[\[?\s*([A-Za-z\"'][^\],]*?)\s*\]\]?\s*(#.*)?")
 
 
 @dataclass(frozen=True)
-class Bench:
+class BenchPlan:
     """What to simulate: the cable, what is measured, and the truth (shown units) as far as it is given."""
 
     text: str
@@ -58,7 +58,7 @@ def truth_of(raw: Mapping[str, Any], file: str) -> Mapping[str, float]:
     return truth
 
 
-def read_bench(path: Path) -> Bench:
+def read_bench(path: Path) -> BenchPlan:
     """Read a plan.
 
     Raises:
@@ -72,10 +72,10 @@ def read_bench(path: Path) -> Bench:
         )
     truth = truth_of(raw, path.name)
     cable = {name: value for name, value in raw.items() if name not in {"design", "truth"}}
-    return Bench(text, parse_description(cable, path.name), read_design(raw["design"], path.name), truth)
+    return BenchPlan(text, parse_description(cable, path.name), read_design(raw["design"], path.name), truth)
 
 
-def make(bench: Bench, key: jax.Array, noise: bool) -> tuple[Dataset, dict[str, float]]:
+def make(bench: BenchPlan, key: jax.Array, noise: bool) -> tuple[Dataset, dict[str, float]]:
     """The data set and the true value of every parameter [shown units].
 
     Args:
@@ -93,7 +93,7 @@ def make(bench: Bench, key: jax.Array, noise: bool) -> tuple[Dataset, dict[str, 
     return simulate(bench.description, bench.design, values, of_readings, noise), shown
 
 
-def write(bench: Bench, dataset: Dataset, truth: Mapping[str, float], folder: Path, seed: int) -> None:
+def write(bench: BenchPlan, dataset: Dataset, truth: Mapping[str, float], folder: Path, seed: int) -> None:
     """Write cable.toml, the tables and truth.json, with true values in shown units and the seed they were made from."""
     cable = "\n".join(description_lines(bench.text, "bowdenfit simulate", "design")) + "\n"
     write_folder(

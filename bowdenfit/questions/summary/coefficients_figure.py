@@ -19,9 +19,9 @@ from bowdenfit.plots.style import (
     VERMILLION,
     WIDE,
     WIDE_INTERVAL,
+    axis_label,
     in_paper_style,
-    labeled,
-    rounded,
+    rounded_texts,
 )
 
 if TYPE_CHECKING:
@@ -87,7 +87,7 @@ def _panel(axes: Axes, parameter: Coefficient) -> None:
     prior = density(parameter.prior, grid, lower)
     axes.plot(grid, prior, color=BLACK, linestyle="--", linewidth=1.0, label="Prior")
     _least_squares(axes, parameter, shown, 0.08 * posterior.max())
-    axes.set(xlim=shown, ylim=(0, 1.2 * posterior.max()), xlabel=labeled(parameter.symbol, parameter.unit))
+    axes.set(xlim=shown, ylim=(0, 1.2 * posterior.max()), xlabel=axis_label(parameter.symbol, parameter.unit))
     axes.set_ylabel("Density" if parameter.unit == "1" else f"Density (1/{parameter.unit})")
     axes.set_title(_title(parameter))
 
@@ -120,6 +120,6 @@ def _least_squares(axes: Axes, parameter: Coefficient, shown: tuple[float, float
 
 def _title(parameter: Coefficient) -> str:
     low, middle, high = (float(q) for q in np.quantile(parameter.draws, (0.05, 0.5, 0.95)))
-    low_text, median, high_text = rounded((low, middle, high), high - low)
+    low_text, median, high_text = rounded_texts((low, middle, high), high - low)
     unit = "" if parameter.unit == "1" else f" {parameter.unit}"
     return f"{MEDIAN} {median}{unit}\n{WIDE_INTERVAL} {low_text} to {high_text}{unit}"

@@ -8,7 +8,7 @@ from bowdenfit.inference.diagnostics import shortfalls
 from bowdenfit.inference.interval import Interval
 from bowdenfit.inference.samplers import recommendation
 from bowdenfit.kinds import readings_called
-from bowdenfit.kinds.recordings.accounts import accounts
+from bowdenfit.kinds.recordings.accounts import preparation_pages
 from bowdenfit.questions.bends.overview import elastic_overview
 from bowdenfit.questions.check.answer import checks_of
 from bowdenfit.questions.identify.confounding import confounded_pairs
@@ -50,7 +50,7 @@ def summarize(fit: Record) -> dict[str, Any]:
         "versions": dict(fit.provenance.versions),
     }
     if (recordings := fit.dataset.measurements.table(Recordings)) is not None:
-        page["recordings"] = accounts(recordings)
+        page["recordings"] = preparation_pages(recordings)
     if elastic := elastic_overview(fit):
         page["elastic"] = elastic
     if checks := checks_of(fit):

@@ -9,9 +9,9 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from bowdenfit.plots.densities import BINS, bin_numbers, enclosed_share
-from bowdenfit.plots.sheet import Panel, Sheet
+from bowdenfit.plots.sheet import Panel, PanelSheet
 from bowdenfit.plots.style import BLUE, SMALL, WIDE, in_paper_style
-from bowdenfit.questions.summary.quantities import Quantity, optimum, sampled
+from bowdenfit.questions.summary.quantities import SampledQuantity, optimum, sampled_quantities
 
 if TYPE_CHECKING:
     from bowdenfit.plots.layout import Figure
@@ -28,7 +28,7 @@ MARGIN, GAP, LARGEST = 0.62, 0.09, 1.45  # in
 class Pairs:
     """Draws of what is shown, and what the optimum is the best of, such as "cable length"; empty without one."""
 
-    quantities: list[Quantity]
+    quantities: list[SampledQuantity]
     best: str = ""
 
 
@@ -38,7 +38,7 @@ def data(fit: Record) -> Pairs | None:
     None where there are no two to draw against each other.
     """
     answer, route = optimum(fit), fit.dataset.description.route
-    quantities = sampled(fit, ROLES)[: MOST - len(answer)] + answer
+    quantities = sampled_quantities(fit, ROLES)[: MOST - len(answer)] + answer
     best = route.variable.replace("_", " ") if route is not None and answer else ""
     return Pairs(quantities, best) if len(quantities) > 1 else None
 
@@ -48,7 +48,7 @@ def draw(data: Pairs) -> Figure:
     """Joint and marginal posterior of coefficients, noise and optimum."""
     quantities = data.quantities
     size = min(LARGEST, (WIDE - MARGIN - GAP) / len(quantities))
-    sheet = Sheet(MARGIN + GAP + size * len(quantities), MARGIN + 2 * GAP + size * len(quantities))
+    sheet = PanelSheet(MARGIN + GAP + size * len(quantities), MARGIN + 2 * GAP + size * len(quantities))
     panels = _panels(quantities, size)
     _marginals(sheet, quantities, panels)
     _regions(sheet, quantities, panels)
@@ -57,7 +57,7 @@ def draw(data: Pairs) -> Figure:
     return sheet.finished()
 
 
-def _panels(quantities: list[Quantity], size: float) -> dict[tuple[int, int], Panel]:
+def _panels(quantities: list[SampledQuantity], size: float) -> dict[tuple[int, int], Panel]:
     """The lower triangle, by row and column."""
     shown, last = [q.limits(SHARE) for q in quantities], len(quantities) - 1
     return {
@@ -69,7 +69,7 @@ def _panels(quantities: list[Quantity], size: float) -> dict[tuple[int, int], Pa
     }  # fmt: skip
 
 
-def _marginals(sheet: Sheet, quantities: list[Quantity], panels: dict[tuple[int, int], Panel]) -> None:
+def _marginals(sheet: PanelSheet, quantities: list[SampledQuantity], panels: dict[tuple[int, int], Panel]) -> None:
     """Density of each quantity alone, with its median and 90 % interval."""
     outlines, curves, middles = [], [], []
     for i, quantity in enumerate(quantities):
@@ -87,7 +87,7 @@ def _marginals(sheet: Sheet, quantities: list[Quantity], panels: dict[tuple[int,
     sheet.lines(curves, color=BLUE, linewidth=1.0)
 
 
-def _regions(sheet: Sheet, quantities: list[Quantity], panels: dict[tuple[int, int], Panel]) -> None:
+def _regions(sheet: PanelSheet, quantities: list[SampledQuantity], panels: dict[tuple[int, int], Panel]) -> None:
     """The smallest areas that hold 68 % and 95 % of the draws, of all pairs in one go."""
     if len(quantities) < 2:
         return
@@ -105,7 +105,7 @@ def _regions(sheet: Sheet, quantities: list[Quantity], panels: dict[tuple[int, i
     sheet.axes.contour(across, up, share, list(FILLS), colors=[BLUE], linewidths=0.6, zorder=1.1)
 
 
-def _axes(sheet: Sheet, quantities: list[Quantity], panels: dict[tuple[int, int], Panel]) -> None:
+def _axes(sheet: PanelSheet, quantities: list[SampledQuantity], panels: dict[tuple[int, int], Panel]) -> None:
     last = len(quantities) - 1
     sheet.frames(panels.values())
     for i, quantity in enumerate(quantities):
@@ -118,7 +118,7 @@ def _axes(sheet: Sheet, quantities: list[Quantity], panels: dict[tuple[int, int]
             sheet.text(0.16, middle, quantity.label, ha="center", va="center", rotation=90, fontsize=SMALL)
 
 
-def _words(sheet: Sheet, best: str, panels: dict[tuple[int, int], Panel]) -> None:
+def _words(sheet: PanelSheet, best: str, panels: dict[tuple[int, int], Panel]) -> None:
     """The key, in the empty corner right of the first panel."""
     first = panels[0, 0]
     x, y = first.left + first.width + 2.5 * GAP, first.bottom + first.height

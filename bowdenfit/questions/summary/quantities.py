@@ -8,14 +8,14 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from bowdenfit.plots.densities import density, limits, support
-from bowdenfit.plots.style import labeled
+from bowdenfit.plots.style import axis_label
 
 if TYPE_CHECKING:
     from bowdenfit.results.record import Record
 
 
 @dataclass(frozen=True)
-class Quantity:
+class SampledQuantity:
     """Draws (walkers by draws) of something between bounds, and its symbol with unit."""
 
     label: str
@@ -33,16 +33,16 @@ class Quantity:
         return height / height.max()
 
 
-def sampled(fit: Record, roles: tuple[str, ...] = ()) -> list[Quantity]:
+def sampled_quantities(fit: Record, roles: tuple[str, ...] = ()) -> list[SampledQuantity]:
     """The sampled parameters, of the given roles in the given order, or all; none without draws."""
     if fit.posterior is None:
         return []
     free, values = fit.model.space.free, fit.posterior.values
     wanted = [p for role in roles for p in free if p.role == role] if roles else free
-    return [Quantity(labeled(p.symbol, p.unit), values[p.name], (support(values[p.name]), np.inf)) for p in wanted]
+    return [SampledQuantity(axis_label(p.symbol, p.unit), values[p.name], (support(values[p.name]), np.inf)) for p in wanted]
 
 
-def optimum(fit: Record) -> list[Quantity]:
+def optimum(fit: Record) -> list[SampledQuantity]:
     """The optimal length and the efficiency there [%], where there are such."""
     from bowdenfit.results.record import OPTIMAL_EFFICIENCY, OPTIMAL_LENGTH
 
@@ -51,6 +51,6 @@ def optimum(fit: Record) -> list[Quantity]:
         return []
     length, efficiency = posterior.optimum[OPTIMAL_LENGTH], 100 * posterior.optimum[OPTIMAL_EFFICIENCY]
     return [
-        Quantity(labeled("Optimum", route.unit), length, route.range),
-        Quantity("Efficiency at\noptimum (%)", efficiency, (0.0, 100.0)),
+        SampledQuantity(axis_label("Optimum", route.unit), length, route.range),
+        SampledQuantity("Efficiency at\noptimum (%)", efficiency, (0.0, 100.0)),
     ]

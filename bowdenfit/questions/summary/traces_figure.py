@@ -7,9 +7,9 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from bowdenfit.plots.sheet import Panel, Sheet
+from bowdenfit.plots.sheet import Panel, PanelSheet
 from bowdenfit.plots.style import SERIES_COLORS, SERIES_LINES, SMALL, WIDE, WIDE_INTERVAL, in_paper_style
-from bowdenfit.questions.summary.quantities import Quantity, optimum, sampled
+from bowdenfit.questions.summary.quantities import SampledQuantity, optimum, sampled_quantities
 
 if TYPE_CHECKING:
     from bowdenfit.plots.layout import Figure
@@ -27,13 +27,13 @@ PANEL, ROW, MARGINAL = 0.68, 0.84, 0.5  # in, height of a panel, of a row, width
 class Paths:
     """Draws (walkers, ordered by ensemble, first) of every sampled parameter and of the optimal length."""
 
-    quantities: list[Quantity]
+    quantities: list[SampledQuantity]
     n_ensembles: int
 
 
 def data(fit: Record) -> Paths | None:
     """What is shown; None where no walker has a path."""
-    quantities = sampled(fit) + optimum(fit)[:1]
+    quantities = sampled_quantities(fit) + optimum(fit)[:1]
     if fit.posterior is None or all(q.draws.shape[1] == 1 for q in quantities):
         return None
     return Paths(quantities, fit.posterior.n_ensembles)
@@ -47,7 +47,7 @@ def draw(data: Paths) -> Figure:
     """
     quantities = data.quantities
     rows = -(-len(quantities) // 2)
-    sheet = Sheet(WIDE, TOP + BOTTOM + rows * ROW - (ROW - PANEL))
+    sheet = PanelSheet(WIDE, TOP + BOTTOM + rows * ROW - (ROW - PANEL))
     panels = [_panel(q, i // rows, rows - 1 - i % rows) for i, q in enumerate(quantities)]
     for number in range(data.n_ensembles):
         _ensemble(sheet, number, panels, quantities, data.n_ensembles)
@@ -57,7 +57,7 @@ def draw(data: Paths) -> Figure:
     return sheet.finished()
 
 
-def _panel(quantity: Quantity, column: int, row: int) -> Panel:
+def _panel(quantity: SampledQuantity, column: int, row: int) -> Panel:
     width = WIDE / 2 - LEFT - RIGHT - MARGINAL
     draws = quantity.draws.shape[1]
     return Panel(
@@ -65,7 +65,7 @@ def _panel(quantity: Quantity, column: int, row: int) -> Panel:
     )
 
 
-def _ensemble(sheet: Sheet, number: int, panels: list[Panel], quantities: list[Quantity], n_ensembles: int) -> None:
+def _ensemble(sheet: PanelSheet, number: int, panels: list[Panel], quantities: list[SampledQuantity], n_ensembles: int) -> None:
     """One ensemble in all panels."""
     color, line = SERIES_COLORS[number % len(SERIES_COLORS)], SERIES_LINES[number % len(SERIES_LINES)]
     medians, bands, edges = [], [], []
@@ -94,14 +94,14 @@ def _together(draws: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     return 1.0 + length * (np.arange(STRETCHES) + 0.5), stretches.T
 
 
-def _marginal(panel: Panel, quantity: Quantity, draws: np.ndarray) -> np.ndarray:
+def _marginal(panel: Panel, quantity: SampledQuantity, draws: np.ndarray) -> np.ndarray:
     """Density of one ensemble's draws, lying on its side right of the panel."""
     grid = np.linspace(*panel.y_limits, GRID)
     start = panel.left + panel.width + 0.04
     return np.column_stack([start + (MARGINAL - 0.06) * quantity.density(grid, draws), panel.y(grid)])
 
 
-def _axes(sheet: Sheet, quantities: list[Quantity], panels: list[Panel], rows: int, across: str) -> None:
+def _axes(sheet: PanelSheet, quantities: list[SampledQuantity], panels: list[Panel], rows: int, across: str) -> None:
     sheet.frames(panels)
     for i, (quantity, panel) in enumerate(zip(quantities, panels, strict=True)):
         last = i % rows == rows - 1 or i == len(quantities) - 1
@@ -114,7 +114,7 @@ def _axes(sheet: Sheet, quantities: list[Quantity], panels: list[Panel], rows: i
             sheet.text(middle, panel.bottom - 0.27, across, ha="center", va="center", fontsize=SMALL)
 
 
-def _legend(sheet: Sheet, n_ensembles: int, chains: bool) -> None:
+def _legend(sheet: PanelSheet, n_ensembles: int, chains: bool) -> None:
     """One entry an ensemble (or chain), and what line and band are."""
     width, height = sheet.figure.get_size_inches()
     shown = MOST_NAMES - 1 if chains and n_ensembles > MOST_NAMES else min(n_ensembles, MOST_NAMES)

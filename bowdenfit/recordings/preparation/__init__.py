@@ -11,7 +11,7 @@ import numpy as np
 from bowdenfit.description import Preparation, QuantityValue
 from bowdenfit.errors import DatasetError
 from bowdenfit.recordings.preparation.bandwidth import bandwidth_of
-from bowdenfit.recordings.preparation.blocks import Common, average, block_samples
+from bowdenfit.recordings.preparation.blocks import CommonClock, average, block_samples
 from bowdenfit.recordings.preparation.checks import check, check_sign
 from bowdenfit.recordings.preparation.clock import GOOD, KINDS, NO_OVERLAP, QUIET, Sampled, read_at, spread, step_of
 from bowdenfit.recordings.preparation.delay import Delay, estimate_delay
@@ -54,7 +54,7 @@ def prepare(raw: RawRecording, settings: Preparation) -> tuple[Blocks, Account]:
     Raises:
         DatasetError: The recording cannot be one; see `checks.check` and `tare.tare_of`.
     """
-    return averaged(inspected(raw, settings))
+    return average_recording(inspect_recording(raw, settings))
 
 
 @dataclass(frozen=True)
@@ -74,11 +74,11 @@ class Inspected:
     settings: Preparation
     remarks: tuple[str, ...]
     cleaned: _Cleaned
-    together: Common
+    together: CommonClock
     delay: Delay
 
 
-def inspected(raw: RawRecording, settings: Preparation) -> Inspected:
+def inspect_recording(raw: RawRecording, settings: Preparation) -> Inspected:
     """The steps before averaging, so that several recordings can be given one delay; see `prepare`."""
     remarks = check(raw)
     cleaned = _clean(raw, settings)
@@ -86,7 +86,7 @@ def inspected(raw: RawRecording, settings: Preparation) -> Inspected:
     return Inspected(raw, settings, remarks, cleaned, together, _delay(raw.loop, together, settings))
 
 
-def averaged(found: Inspected, one_for_all: tuple[float, float] | None = None) -> tuple[Blocks, Account]:
+def average_recording(found: Inspected, one_for_all: tuple[float, float] | None = None) -> tuple[Blocks, Account]:
     """The steps after the delay is known; see `prepare`.
 
     Args:
@@ -147,7 +147,7 @@ def _tare(file: str, name: str, channel: Sampled, settings: Preparation) -> tupl
     return tare_of(file, name, channel.time, channel.force, settings.quiet, channel.fault == GOOD)
 
 
-def _together(raw: RawRecording, cleaned: _Cleaned, settings: Preparation, delay: float) -> Common:
+def _together(raw: RawRecording, cleaned: _Cleaned, settings: Preparation, delay: float) -> CommonClock:
     """Both channels on the clock of the one with more samples, the output shifted back by the delay."""
     output = replace(cleaned.output, time=cleaned.output.time - delay)
     time = cleaned.input.time if len(cleaned.input.time) >= len(output.time) else output.time
@@ -157,7 +157,7 @@ def _together(raw: RawRecording, cleaned: _Cleaned, settings: Preparation, delay
     if settings.tare == "interval" and settings.quiet is not None:
         quiet = (time >= settings.quiet[0]) & (time <= settings.quiet[1])
         fault = np.where(quiet & (fault != NO_OVERLAP), QUIET, fault)
-    return Common(time, step_of(time), input_force, output_force, _velocity(raw, time), fault)
+    return CommonClock(time, step_of(time), input_force, output_force, _velocity(raw, time), fault)
 
 
 def _velocity(raw: RawRecording, time: Vector) -> Vector:
@@ -170,7 +170,7 @@ def _velocity(raw: RawRecording, time: Vector) -> Vector:
     return np.interp(time, clock[there], raw.velocity[there], left=np.nan, right=np.nan)
 
 
-def _delay(loop: bool, common: Common, settings: Preparation) -> Delay:
+def _delay(loop: bool, common: CommonClock, settings: Preparation) -> Delay:
     if settings.delay == "none":
         return Delay(0.0, math.nan, math.nan)
     if isinstance(settings.delay, QuantityValue):
@@ -186,7 +186,7 @@ def _stated_block(settings: Preparation) -> float:
     return settings.block.to("time") if isinstance(settings.block, QuantityValue) else 0.0
 
 
-def _require_some_good(raw: RawRecording, common: Common) -> None:
+def _require_some_good(raw: RawRecording, common: CommonClock) -> None:
     if not np.any(common.fault == GOOD):
         most = KINDS[int(np.argmax(np.bincount(common.fault, minlength=len(KINDS))))]
         raise DatasetError(
@@ -208,7 +208,7 @@ def _noise(channel: Sampled, bandwidth: float) -> float:
 
 
 def _samples_of_block(
-    loop: bool, common: Common, cleaned: _Cleaned, settings: Preparation, bandwidth: float, noise: tuple[float, float]
+    loop: bool, common: CommonClock, cleaned: _Cleaned, settings: Preparation, bandwidth: float, noise: tuple[float, float]
 ) -> int:
     """Samples of a block of the common clock, 0 for no blocks; a slower channel counts with fewer samples."""
     if settings.block == "auto":
@@ -219,7 +219,7 @@ def _samples_of_block(
     return max(1, round(block / common.step)) if block > 0 else 0
 
 
-def _flagged(common: Common) -> Flagged:
+def _flagged(common: CommonClock) -> Flagged:
     """The samples left out, evenly thinned to a few hundred of each kind, in order of time."""
     chosen = []
     for kind in range(GOOD + 1, NO_OVERLAP):

@@ -15,7 +15,7 @@ _NOISE_IN_BAND = 0.1
 
 
 @dataclass(frozen=True)
-class Common:
+class CommonClock:
     """Both channels on one clock.
 
     Args:
@@ -35,7 +35,7 @@ class Common:
     fault: Labels
 
 
-def block_samples(common: Common, bandwidth: float, noise: tuple[float, float], loop: bool = False) -> int:
+def block_samples(common: CommonClock, bandwidth: float, noise: tuple[float, float], loop: bool = False) -> int:
     """Samples of a block, chosen from the data.
 
     Half a period of the bandwidth; longer where the noise of a mean would be more than a tenth of the friction band; never so
@@ -53,7 +53,7 @@ def block_samples(common: Common, bandwidth: float, noise: tuple[float, float], 
     return max(1, min(wanted, samples // FEWEST_BLOCKS), int(np.ceil(span / MOST_BLOCKS)))
 
 
-def _quiet_enough(common: Common, noise: tuple[float, float], loop: bool) -> int:
+def _quiet_enough(common: CommonClock, noise: tuple[float, float], loop: bool) -> int:
     """Samples over which the noise of how far the forces are apart comes down to a tenth of half the friction band."""
     good = (common.fault == GOOD) & (loop | ((common.input_force > 0) & (common.output_force > 0)))
     if not good.any():
@@ -66,7 +66,7 @@ def _quiet_enough(common: Common, noise: tuple[float, float], loop: bool) -> int
     return int(np.ceil((single / (_NOISE_IN_BAND * band)) ** 2)) if single > 0 else 1
 
 
-def average(common: Common, samples: int) -> tuple[Blocks, dict[str, int]]:
+def average(common: CommonClock, samples: int) -> tuple[Blocks, dict[str, int]]:
     """Means of the good samples over equal stretches of time, and where every sample went.
 
     A block of whose readings more than half are at the end of a load cell's range is marked, and holds the means of those;
@@ -105,7 +105,7 @@ def _swept(fault: Labels, place: Labels) -> Labels:
 
 
 def _means(
-    common: Common, place: Labels, chosen: Flags
+    common: CommonClock, place: Labels, chosen: Flags
 ) -> tuple[Places, ChosenVector, ChosenVector, ChosenVector, Places]:
     """Number of each block with chosen samples, the means of the two forces and the velocity, and the counts."""
     where = np.flatnonzero(chosen)

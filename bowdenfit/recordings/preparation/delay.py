@@ -13,7 +13,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from bowdenfit.recordings.preparation.noise import correlation_time
-from bowdenfit.recordings.preparation.rests import Rests, band_of, play_rows, rests_of, shifted, sides, starts
+from bowdenfit.recordings.preparation.rests import Rests, band_of, play_rows, rests_of, shift_rows, sides, starts
 from bowdenfit.recordings.preparation.segments import Segments, reverses, segments_of
 from bowdenfit.recordings.preparation.shapes import OtherVector
 from bowdenfit.types import Flags, Matrix, Vector
@@ -116,7 +116,7 @@ def _touched(segments: Segments, point: OtherVector) -> Segments:
     """Weight only where the model knows the output: since it first touched the band in a segment."""
     output = play_rows(segments.x, starts(segments, float(point[1])), np.array([point[0]]))[0]
     _, side = sides(segments, output, float(point[0]))
-    known = shifted((side != 0).astype(float), float(point[2]) / segments.step) == 1
+    known = shift_rows((side != 0).astype(float), float(point[2]) / segments.step) == 1
     return replace(segments, weight=np.where(known, segments.weight, 0.0))
 
 
@@ -153,14 +153,14 @@ def _linearized(
     change, wide, points = 0.01 * exponent, 4.0, delay / segments.step
     exponents = np.array([exponent, exponent + change, exponent - change])
     outputs = play_rows(segments.x, starts(segments, ratio), exponents, rests)
-    model, more, less = (shifted(output, points) for output in outputs)
-    later, earlier = (shifted(outputs[0], points + shift) for shift in (wide, -wide))
+    model, more, less = (shift_rows(output, points) for output in outputs)
+    later, earlier = (shift_rows(outputs[0], points + shift) for shift in (wide, -wide))
     slopes = [(more - less) / (2 * change), np.ones_like(model), (later - earlier) / (2 * wide * segments.step)]
     stands, side = sides(segments, outputs[0], exponent)
     if rests is not None:
         rested = (rests.heading != 0) & (outputs[0] == rests.level)
         stands, side = stands | rested, np.where(rested, -rests.heading, side)
-    levels = [shifted((stands & (side == s)).astype(float), points) for s in (1, -1)]
+    levels = [shift_rows((stands & (side == s)).astype(float), points) for s in (1, -1)]
     used = weight > 0
     columns = np.stack([(c * weight)[used] for c in (segments.y - model - ratio, *slopes, *levels)], axis=1)
     free, _ = np.linalg.qr(columns[:, 4:][:, np.any(columns[:, 4:] != 0, axis=0)])

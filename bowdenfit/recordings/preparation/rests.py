@@ -63,7 +63,7 @@ def starts(segments: Segments, ratio: float) -> Vector:
     return np.mean(segments.y[:, :3], axis=1) - ratio
 
 
-def shifted(y: Matrix, points: float) -> Matrix:
+def shift_rows(y: Matrix, points: float) -> Matrix:
     """Each row later by a number of points, with straight lines between them; the ends are held."""
     whole = int(np.floor(points))
     share = points - whole
@@ -94,7 +94,7 @@ def rests_of(segments: Segments, point: OtherVector) -> Rests:
     exponent, ratio, delay = (float(value) for value in point)
     output = play_rows(segments.x, starts(segments, ratio), np.array([exponent]))[0]
     stands, side = sides(segments, output, exponent)
-    seen = shifted(segments.y, -delay / segments.step) - ratio
+    seen = shift_rows(segments.y, -delay / segments.step) - ratio
     attached = exponent - side * (segments.x - output) <= _AWAY * segments.jitter
     level, heading = np.where(side > 0, -np.inf, np.inf), np.where(attached, side, 0.0)
     margin = round(_MARGIN / segments.step)

@@ -6,14 +6,14 @@ What the motor does is in `profile`, rope, friction and spring are in `mechanics
 
 from bowdenfit.questions.simulate.bench.faults import Faults
 from bowdenfit.questions.simulate.bench.mechanics import BenchFriction, BenchSettings
-from bowdenfit.questions.simulate.bench.profile import Profile
+from bowdenfit.questions.simulate.bench.profile import MotorProfile
 from bowdenfit.questions.simulate.bench.recording import SimulatedRecording, check_settings, simulate_recording
 
 __all__ = [
     "BenchFriction",
     "BenchSettings",
     "Faults",
-    "Profile",
+    "MotorProfile",
     "SimulatedRecording",
     "check_settings",
     "simulate_recording",

@@ -8,7 +8,7 @@ from pydantic import Field
 
 from bowdenfit.description import Finite, NonNegative, Positive
 from bowdenfit.errors import UsageError
-from bowdenfit.questions.simulate.bench.profile import Motion, Profile
+from bowdenfit.questions.simulate.bench.profile import Motion, MotorProfile
 from bowdenfit.recordings.preparation.play import play_between
 from bowdenfit.recordings.recording import SWITCH
 from bowdenfit.types import Labels, Vector
@@ -85,7 +85,7 @@ class Mechanics:
     exponent: float
     run_effect: float
     friction: BenchFriction
-    profile: Profile
+    profile: MotorProfile
     bench: BenchSettings
     motion: Motion
 

@@ -11,7 +11,7 @@ from bowdenfit.types import Vector
 
 
 @dataclass(frozen=True)
-class Profile:
+class MotorProfile:
     """What the motor does: `cycles` times pull, pause, return, pause, at one speed with even acceleration.
 
     Args:
@@ -57,7 +57,7 @@ class Motion:
         return self.position[i] + (self.velocity[i] + self.acceleration[i] * since / 2) * since, velocity
 
 
-def motion_of(profile: Profile) -> Motion:
+def motion_of(profile: MotorProfile) -> Motion:
     """All moves of the profile, one after the other."""
     clock, where = profile.lead_in, 0.0
     rows, turns, reversals, heading = [(0.0, 0.0, 0.0, 0.0)], [], [], 0.0
@@ -77,14 +77,14 @@ def motion_of(profile: Profile) -> Motion:
     return Motion(start, position, velocity, acceleration, np.array(turns), tuple(reversals))
 
 
-def _waypoints(profile: Profile, number: int) -> list[float]:
+def _waypoints(profile: MotorProfile, number: int) -> list[float]:
     """Where the motor turns within one stroke [mm]; even strokes pull, odd ones return."""
     along = [point for where, back in profile.partial_reversals for point in (where, where - back)]
     along.append(profile.stroke)
     return along if number % 2 == 0 else [profile.stroke - point for point in along]
 
 
-def _move(profile: Profile, clock: float, start: float, end: float) -> list[tuple[float, float, float, float]]:
+def _move(profile: MotorProfile, clock: float, start: float, end: float) -> list[tuple[float, float, float, float]]:
     """One trapezoidal move, or a triangular one where the way is too short for the full speed, and the rest after it."""
     distance, speed, ramp = abs(end - start), profile.speed * profile.drum_radius, profile.acceleration_time
     if speed * ramp > distance:

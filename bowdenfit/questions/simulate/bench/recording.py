@@ -7,7 +7,7 @@ import numpy as np
 from bowdenfit.errors import UsageError
 from bowdenfit.questions.simulate.bench.faults import Faults, readings
 from bowdenfit.questions.simulate.bench.mechanics import BenchFriction, BenchSettings, Mechanics
-from bowdenfit.questions.simulate.bench.profile import Profile, motion_of
+from bowdenfit.questions.simulate.bench.profile import MotorProfile, motion_of
 from bowdenfit.types import Labels, Vector
 
 
@@ -51,7 +51,7 @@ class SimulatedRecording:
 def simulate_recording(
     exponent: float,
     friction: BenchFriction,
-    profile: Profile,
+    profile: MotorProfile,
     bench: BenchSettings,
     faults: Faults,
     generator: np.random.Generator,
@@ -100,7 +100,7 @@ def simulate_recording(
     )
 
 
-def check_settings(profile: Profile, faults: Faults) -> None:
+def check_settings(profile: MotorProfile, faults: Faults) -> None:
     """Refuse settings that contradict one another.
 
     Raises:

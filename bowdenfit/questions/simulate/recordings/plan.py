@@ -9,7 +9,7 @@ import numpy as np
 from pydantic import ValidationError
 
 from bowdenfit.description import Description, QuantityValue
-from bowdenfit.description.file import explained
+from bowdenfit.description.file import explain
 from bowdenfit.description.values import Frozen
 from bowdenfit.errors import DatasetError, DescriptionError, nearest
 from bowdenfit.kinds.settings import parse_description
@@ -78,7 +78,7 @@ def parse_recordings_plan(raw: Mapping[str, Any], text: str, file: str = "bench.
         page = _Plan.model_validate({"recordings": raw["recordings"]}).recordings
     except ValidationError as error:
         remedy = 'write it, such as speeds = ["20 r/min"]'
-        raise DescriptionError(explained(error, _Plan, file, remedy)) from None
+        raise DescriptionError(explain(error, _Plan, file, remedy)) from None
     measured = _measured_angles(page, description, file)
     recordings = planned_recordings(_with_reference_force(page, raw, file), description, file)
     _check_lengths(recordings, measured, description, file)

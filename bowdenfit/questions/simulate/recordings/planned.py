@@ -12,7 +12,7 @@ from pydantic import Field, ValidationError
 from bowdenfit.description import Description, Finite
 from bowdenfit.description.values import Frozen
 from bowdenfit.errors import DescriptionError, UsageError, nearest
-from bowdenfit.questions.simulate.bench import BenchFriction, BenchSettings, Faults, Profile, check_settings
+from bowdenfit.questions.simulate.bench import BenchFriction, BenchSettings, Faults, MotorProfile, check_settings
 
 RECORDINGS_FOLDER = "recordings"
 RPM = 2 * np.pi / 60  # rad/s
@@ -63,7 +63,7 @@ class PlannedRecording(Frozen):
     file: str
     length: float
     speed: str
-    profile: Profile
+    profile: MotorProfile
     bench: BenchSettings
     friction: BenchFriction
     faults: Faults
@@ -125,7 +125,7 @@ def _explained(error: ValidationError) -> str:
     section, *where = map(str, first["loc"])
     if first["type"] == "unexpected_keyword_argument":
         kind: Any = PlannedRecording.model_fields[section].annotation
-        known = [field.name for field in dataclasses.fields(kind) if field.name != "speed" or kind is not Profile]
+        known = [field.name for field in dataclasses.fields(kind) if field.name != "speed" or kind is not MotorProfile]
         return f"{section}: unknown key {where[0]!r}{nearest(where[0], known)}"
     message = f"{first['msg'][:1].lower()}{first['msg'][1:]}"
     return f"{section}, {'.'.join(where)}: {message} (found {first['input']!r})."

@@ -7,7 +7,7 @@ import jax
 import jax.numpy as jnp
 
 from bowdenfit.cable.cable import Cable
-from bowdenfit.kinds.bench import Bench
+from bowdenfit.kinds.bench import Remeasurement
 from bowdenfit.kinds.term import TermKind
 from bowdenfit.parameters.priors import HalfNormal
 from bowdenfit.parameters.space import Parameter
@@ -64,4 +64,4 @@ def _draw(table, truth):
     return {"loss": expected + truth.scale * truth.values[NOISE] * truth.scatter(truth.key, expected.shape)}
 
 
-LOSSES = TermKind("losses", _terms, _parameters, Bench(_draw))
+LOSSES = TermKind("losses", _terms, _parameters, Remeasurement(_draw))

@@ -8,6 +8,7 @@ import jax
 import jax.numpy as jnp
 import numpy as np
 
+from bowdenfit.inference.compilation import compile_program
 from bowdenfit.inference.identifiability import NOTHING, Combination, Knowledge, Known, knowledge
 from bowdenfit.inference.least_squares import UNDETERMINED, MaximumPosterior
 from bowdenfit.inference.profiles import Profile
@@ -114,7 +115,8 @@ def _with_tails(model: Model, covariance: np.ndarray) -> np.ndarray:
 
 def _linear(model: Model, z: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     """Values of the free parameters at z and their change with it, which is the prior's sd there; in shown units."""
-    value, slope = jax.jvp(model.space.vector, (jnp.asarray(z),), (jnp.ones(len(z)),))
+    one = jax.ShapeDtypeStruct((len(z),), jnp.float64)
+    value, slope = compile_program(lambda at: jax.jvp(model.space.vector, (at,), (jnp.ones_like(at),)), one, run_once=True)(z)
     scale = np.array([p.shown_scale for p in model.space.free])
     value, slope = np.asarray(value) * scale, np.abs(np.asarray(slope)) * scale
     return value, np.maximum(slope, 1e-12 * np.maximum(np.abs(value), 1.0))

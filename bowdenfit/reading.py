@@ -1,8 +1,9 @@
 """Reading a data set with changes to its description: the keywords that every verb on measurements takes."""
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
+from inspect import signature
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Literal, TypedDict, Unpack
+from typing import TYPE_CHECKING, Annotated, Any, Literal, TypedDict, Unpack
 
 from bowdenfit.verb import Option, Quantity
 
@@ -57,12 +58,9 @@ def read(dataset: "str | Path | Dataset", **reading: Unpack[Reading]) -> "Datase
         UsageError: There is no such keyword.
     """
     from bowdenfit.dataset import Dataset, load_dataset, single_file_dataset
-    from bowdenfit.errors import UsageError, nearest
     from bowdenfit.recordings.forces import parse_channels
 
-    for name in reading:
-        if name not in Reading.__annotations__:
-            raise UsageError(f"there is no keyword {name!r}{nearest(name, list(Reading.__annotations__))}")
+    refuse_unknown(read, reading)
     if isinstance(dataset, Dataset):
         return dataset
     stated = {key: reading.get(name) for name, key in _SETTINGS.items()}
@@ -72,3 +70,21 @@ def read(dataset: "str | Path | Dataset", **reading: Unpack[Reading]) -> "Datase
     if wrap_angle is not None:
         return single_file_dataset(Path(dataset), wrap_angle, changes, sources)
     return load_dataset(Path(dataset), changes, sources)
+
+
+def refuse_unknown(verb: Callable[..., Any], reading: Reading) -> None:
+    """Refuse a keyword that neither a verb nor the reading of a data set has.
+
+    Args:
+        verb: What was called.
+        reading: The keywords that it hands on.
+
+    Raises:
+        UsageError: There is no such keyword; names the nearest.
+    """
+    from bowdenfit.errors import UsageError, nearest
+
+    for name in reading:
+        if name not in Reading.__annotations__:
+            known = [k for k in signature(verb).parameters if k != "reading"] + list(Reading.__annotations__)
+            raise UsageError(f"there is no keyword {name!r}{nearest(name, known)}")

@@ -6,7 +6,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any, Literal, Unpack
 
 from bowdenfit.questions.summary.verb import reply
-from bowdenfit.reading import Reading, read
+from bowdenfit.reading import Reading, read, refuse_unknown
 from bowdenfit.results.folder import CHAIN
 from bowdenfit.verb import LARGEST_SEED, Argument, Option, Output, Reply, Verb, Watch
 
@@ -47,10 +47,9 @@ def fit(
         seed: Seed of everything random.
         resume: Go on with an interrupted or unconverged fit; refuses changed inputs.
         force: Replace an earlier fit in the results folder.
-        in_background: Whether other processes may be started for statistics and figures, which is quicker; the calling
-            program must then guard its start with `if __name__ == "__main__"`.
-        remember_compilations: Whether JAX may keep compiled programs in the user's cache folder, so that a second fit of
-            the same shape compiles nothing; this is a setting of the whole process.
+        in_background: Whether other processes may be started, which is quicker; the calling program must then guard its
+            start with `if __name__ == "__main__"`.
+        remember_compilations: Whether JAX may keep compiled programs in the user's cache folder; a setting of the process.
         progress: Called while sampling.
         reading: Keywords of `bowdenfit.read`.
 
@@ -60,6 +59,7 @@ def fit(
     from bowdenfit.run.helpers import assistants, load_ahead
     from bowdenfit.run.storing import choose_seed, start_checkpointing, with_sampler, write_results
 
+    refuse_unknown(fit, reading)
     folder = Path(output) if output is not None else None
     if in_background and isinstance(dataset, str | Path):
         load_ahead("jax", "scipy.optimize")  # while recordings are read, which takes seconds

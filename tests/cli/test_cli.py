@@ -312,3 +312,9 @@ def test_notes_in_a_results_folder_are_left_alone_and_other_files_stop_a_fit(on_
     code, _, err = run("fit", on_body, "--no-mcmc", "--output", tmp_path / "other")
     assert code == 2
     assert "is no results folder" in err
+
+
+@pytest.mark.parametrize(("verb", "wrong", "right"), [(bf.fit, "sede", "seed"), (bf.read, "fricton", "friction")])
+def test_a_misspelled_keyword_is_refused_with_the_nearest(on_body, verb, wrong, right):
+    with pytest.raises(bf.UsageError, match=f"no keyword '{wrong}'; did you mean '{right}'"):
+        verb(on_body, **{wrong: 1})

@@ -7,7 +7,7 @@ from collections.abc import Callable, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any, Unpack
 
-from bowdenfit.reading import Reading, read
+from bowdenfit.reading import Reading, read, refuse_unknown
 from bowdenfit.results.folder import REPLICATIONS
 from bowdenfit.verb import LARGEST_SEED, Argument, Option, Output, Reply, Verb, Watch
 
@@ -57,6 +57,7 @@ def calibrate(
     """
     from bowdenfit.errors import UsageError
 
+    refuse_unknown(calibrate, reading)
     folder = Path(output) if output is not None else None
     if resume and folder is None:
         raise UsageError("--resume needs the results folder of a calibration; name it with --output.")

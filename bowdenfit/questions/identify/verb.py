@@ -6,7 +6,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any, Unpack
 
 from bowdenfit.questions.writing import files_of, write_answer
-from bowdenfit.reading import Reading, read
+from bowdenfit.reading import Reading, read, refuse_unknown
 from bowdenfit.verb import Argument, Option, Output, Reply, Verb
 
 if TYPE_CHECKING:
@@ -37,6 +37,7 @@ def identify(
     """
     import jax
 
+    refuse_unknown(identify, reading)
     with jax.enable_x64(True):
         found = _identify(source, reading)
     if output is not None:

@@ -375,12 +375,12 @@ def test_a_small_calibration_of_the_right_likelihood_passes():
 
 
 def test_a_small_calibration_catches_samples_of_a_run_taken_for_independent():
-    """Without the run effect intervals are several times too narrow: eight replications reject a coefficient at 0.01.
+    """Without the run effect intervals are several times too narrow: twelve replications reject a coefficient at 0.01.
 
     A right likelihood would be rejected once in a hundred seeds.
     """
     wrong = two_coefficients(tau={"fixed": 1e-6})
-    found = calibrated(Plan(two_coefficients(), wrong, 5), 8)
+    found = calibrated(Plan(two_coefficients(), wrong, 5), 12)
     assert found.quantities
     assert {"mu_edge", "mu_clamp"} & set(found.faults)
     assert "too narrow" in " ".join(found.faults.values())

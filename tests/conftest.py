@@ -56,6 +56,7 @@ def refuse(run, tmp_path):
         assert out == ""
         assert err.startswith("Error: ")
         assert err.count("\n") == 1
+        assert len(err) < 520
         assert err.rstrip()[-1] in ".?"
         assert "inside bowdenfit" not in err
         assert sorted(tmp_path.rglob("*")) == before

@@ -304,8 +304,11 @@ def test_published_and_continuous_geometry_are_compared_on_what_both_have(geomet
     assert sum(row["stacking_weight"] for row in page["fits"]) == pytest.approx(1.0)
     assert len(page["readings"]) == 21
     by_label = {row["label"]: row["fits"] for row in page["readings"]}
-    # Which of the fits leans on it so much that weights do not do is for the draws to say: k of both is close to 0.7.
+    # Which of the fits leans on 550 mm so much that weights do not do is for the draws to say (k of both is close to 0.7);
+    # but weights serve exactly where k says so, for every reading of every fit.
     assert {fit["how"] for fit in by_label["550 mm"].values()} & {"moment matching", "refit"}
+    for fit in (fit for fits in by_label.values() for fit in fits.values()):
+        assert (fit["how"] == "importance sampling") == (fit["pareto_k"] <= 0.7), fit
     assert page["fits"][1]["elpd_difference"] == pytest.approx(page["fits"][0]["elpd"] - page["fits"][1]["elpd"])
     assert (where / "comparison.txt").read_text() == text
     assert {p.name for p in where.iterdir()} == {

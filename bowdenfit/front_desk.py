@@ -6,7 +6,8 @@ from typing import Any
 
 from bowdenfit.questions.bends.answer import Elastic, elastic_answers
 from bowdenfit.questions.check.answer import Checks, checks_of
-from bowdenfit.questions.identify.answer import Identifiability, identifiability
+from bowdenfit.questions.identify.answer import Identifiability
+from bowdenfit.questions.identify.judgment import identifiability
 from bowdenfit.questions.summary.html import fit_page
 from bowdenfit.questions.summary.page import summarize
 from bowdenfit.questions.summary.verdict import Verdict, verdict

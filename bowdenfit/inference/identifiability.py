@@ -12,17 +12,9 @@ References:
 
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
-from typing import Any, ClassVar
+from typing import ClassVar
 
-import jax
-import jax.numpy as jnp
 import numpy as np
-from jax import Array
-
-from bowdenfit.inference.compilation import compile_program
-from bowdenfit.inference.least_squares import MaximumPosterior
-from bowdenfit.inference.log_density import LogDensity
-from bowdenfit.inference.objective import noise_scales
 
 OWN = 0.25  # share of the prior variance below which a parameter may be known by itself: half the prior's sd
 RESTS_ON_PRIOR = 0.8  # share above which the prior alone speaks
@@ -165,19 +157,6 @@ class Knowledge:
         """The least known combination, where the measurements say nothing of it; else None."""
         worst = max(self.directions, key=lambda d: d.share, default=None)
         return worst if worst is not None and worst.share > NOTHING else None
-
-
-def information_at(posterior: LogDensity, z: np.ndarray) -> MaximumPosterior:
-    """True values z, and the covariance that readings without noise would leave there, at the noise scales of that point."""
-
-    def residuals(at: Array, data: Any) -> Array:
-        return jnp.concatenate(list(posterior.residuals(at, data).values()))
-
-    jacobian = compile_program(
-        jax.jacfwd(residuals), jax.ShapeDtypeStruct(z.shape, jnp.float64), posterior.data, run_once=True
-    )
-    slopes = np.where(noise_scales(posterior), 0.0, np.asarray(jacobian(z, posterior.data)))
-    return MaximumPosterior(z, np.linalg.inv(slopes.T @ slopes + np.eye(len(z))))
 
 
 def knowledge(names: Sequence[str], value: np.ndarray, covariance: np.ndarray, prior_sd: np.ndarray) -> Knowledge:

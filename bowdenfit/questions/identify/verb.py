@@ -76,7 +76,7 @@ def _of_fit(found: "Record") -> "Identifiability":
     from bowdenfit.inference.least_squares import maximum_posterior
     from bowdenfit.inference.log_density import LogDensity
     from bowdenfit.inference.objective import make_objective
-    from bowdenfit.questions.identify.answer import identifiability
+    from bowdenfit.questions.identify.judgment import identifiability
 
     known = identifiability(found)
     posterior = LogDensity(found.model)
@@ -102,7 +102,7 @@ def _of_tables(data: "Dataset") -> "Identifiability":
     from bowdenfit.inference.log_density import LogDensity
     from bowdenfit.inference.objective import make_objective
     from bowdenfit.model import build_model
-    from bowdenfit.questions.identify.answer import of_maximum
+    from bowdenfit.questions.identify.judgment import of_maximum
 
     posterior = LogDensity(build_model(data))
     objective = make_objective(posterior)
@@ -116,10 +116,10 @@ def _of_plan(path: Path) -> "Identifiability":
     import numpy as np
 
     from bowdenfit.dataset import Dataset
-    from bowdenfit.inference.identifiability import information_at
+    from bowdenfit.inference.information import information_at
     from bowdenfit.inference.log_density import LogDensity
     from bowdenfit.model import build_model
-    from bowdenfit.questions.identify.answer import of_maximum
+    from bowdenfit.questions.identify.judgment import of_maximum
     from bowdenfit.questions.simulate.simulation import empty_tables, simulate, true_values
     from bowdenfit.questions.simulate.tables import read_bench
 

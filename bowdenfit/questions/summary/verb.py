@@ -20,12 +20,13 @@ def summary(results: Annotated[Path, Argument("RESULTS")]) -> "tuple[str, str] |
         StoreError: The folder is missing, unfinished or damaged.
     """
     from bowdenfit.results.folder import FIT, SUMMARY, SUMMARY_TEXT
-    from bowdenfit.results.store import load
 
     folder = Path(results)
     if all((folder / name).exists() for name in (FIT, SUMMARY, SUMMARY_TEXT)):
         text, page = ((folder / name).read_text(encoding="utf-8") for name in (SUMMARY_TEXT, SUMMARY))
         return text, page
+    from bowdenfit.results.store import load
+
     return load(folder)
 
 

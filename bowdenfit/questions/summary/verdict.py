@@ -2,8 +2,8 @@
 
 from dataclasses import dataclass
 
-from bowdenfit.questions.identify.answer import say_what_is_not_determined
 from bowdenfit.questions.identify.contradiction import contradiction
+from bowdenfit.questions.identify.judgment import say_what_is_not_determined
 from bowdenfit.results.record import Record, once
 
 NOT_CONVERGED, NOT_IDENTIFIABLE, CONTRADICTORY = "not converged", "not identifiable", "contradictory"

@@ -10,8 +10,9 @@ from bowdenfit.kinds.terms import term_kind
 from bowdenfit.questions.bends.words import elastic_text
 from bowdenfit.questions.check.answer import checks_of
 from bowdenfit.questions.check.words import checks_text
-from bowdenfit.questions.identify.answer import identifiability, say_what_is_determined
+from bowdenfit.questions.identify.answer import say_what_is_determined
 from bowdenfit.questions.identify.confounding import confounded_pairs
+from bowdenfit.questions.identify.judgment import identifiability
 from bowdenfit.questions.recorded.rate import SHOWN_SPEED, rate_effect
 from bowdenfit.questions.summary.page import summarize
 from bowdenfit.questions.summary.parameter_words import parameters_text

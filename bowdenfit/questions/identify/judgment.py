@@ -1,0 +1,130 @@
+"""How a fit, or a plan, comes to know what its measurements determine: from draws, or from the information at one point."""
+
+import jax
+import jax.numpy as jnp
+import numpy as np
+
+from bowdenfit.inference.compilation import compile_program
+from bowdenfit.inference.identifiability import NOTHING, Combination, Knowledge, knowledge
+from bowdenfit.inference.least_squares import UNDETERMINED, MaximumPosterior
+from bowdenfit.inference.profiles import Profile
+from bowdenfit.model import Model
+from bowdenfit.questions.identify.answer import GROUPS, Identifiability, how_well
+from bowdenfit.results.record import Record, once
+from bowdenfit.words import listed
+
+DRAWS = "the draws of the posterior"
+
+
+@once
+def identifiability(fit: Record) -> Identifiability:
+    """What a fit knows, from its draws.
+
+    Args:
+        fit: A fit with a posterior.
+
+    Raises:
+        UsageError: There is no posterior.
+    """
+    drawn = fit.draws()
+    values = np.column_stack([drawn.values[p.name].ravel() for p in fit.model.space.free])
+    spread = np.cov(values, rowvar=False).reshape(values.shape[1], values.shape[1])
+    with jax.enable_x64(True):
+        _, prior_sd = _linear(fit.model, np.median(drawn.flat_z, axis=0))
+    groups = _groups(fit.model, np.mean(values, axis=0), spread, prior_sd)
+    return Identifiability(fit.name, DRAWS, True, groups)
+
+
+def of_maximum(
+    model: Model, start: MaximumPosterior, basis: str, measured: bool, profiles: tuple[Profile, ...] = ()
+) -> Identifiability:
+    """What measurements will tell, or tell before sampling: from the Fisher information at one point.
+
+    Args:
+        model: The model.
+        start: Maximum of the posterior, with the inverse of the information there.
+        basis: Where that is, in words.
+        measured: Whether readings entered.
+        profiles: Of the friction coefficients.
+    """
+    covariance = _with_tails(model, np.asarray(start.covariance))
+    with jax.enable_x64(True):
+        value, slope = _linear(model, start.z)
+    groups = _groups(model, value, covariance * np.outer(slope, slope), slope)
+    return Identifiability(model.description.name, basis, measured, groups, profiles)
+
+
+def _with_tails(model: Model, covariance: np.ndarray) -> np.ndarray:
+    """The covariance, with the information of Student-t readings: nu / (nu + 3) of what residuals near zero suggest."""
+    description = model.description
+    if description.noise != "student":
+        return covariance
+    freedom, unit = description.student_degrees_of_freedom, np.eye(len(covariance))
+    return np.linalg.inv(freedom / (freedom + 3) * (np.linalg.inv(covariance) - unit) + unit)
+
+
+def _linear(model: Model, z: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Values of the free parameters at z and their change with it, which is the prior's sd there; in shown units."""
+    one = jax.ShapeDtypeStruct((len(z),), jnp.float64)
+    value, slope = compile_program(lambda at: jax.jvp(model.space.vector, (at,), (jnp.ones_like(at),)), one, run_once=True)(z)
+    scale = np.array([p.shown_scale for p in model.space.free])
+    value, slope = np.asarray(value) * scale, np.abs(np.asarray(slope)) * scale
+    return value, np.maximum(slope, 1e-12 * np.maximum(np.abs(value), 1.0))
+
+
+def _groups(model: Model, value: np.ndarray, covariance: np.ndarray, prior_sd: np.ndarray) -> dict[str, Knowledge]:
+    """Knowledge of every group, in shown units."""
+    found = {}
+    for group, roles in GROUPS.items():
+        which = np.array([i for i, p in enumerate(model.space.free) if p.role in roles], dtype=int)
+        if len(which):
+            names = [model.space.free[i].name for i in which]
+            found[group] = knowledge(names, value[which], covariance[np.ix_(which, which)], prior_sd[which])
+    return found
+
+
+def say_what_is_not_determined(fit: Record) -> str:
+    """Which friction coefficients the measurements do not tell, in a sentence; empty where they tell all.
+
+    Only coefficients with the weak default prior count: who states a coefficient as measured, or gives it a prior, knows
+    that it rests on that. The same holds for what the data sheet of a load cell says.
+    """
+    names = [p.name for p in fit.model.space.free if p.role == "friction" and not _stated(fit, p.name)]
+    if fit.posterior is None:
+        return _in_words([name for name in names if _undetermined(fit, name)], None)
+    friction = identifiability(fit).groups.get("friction")
+    if friction is None:
+        return ""
+    share = {p.name: p.share for p in friction.parameters}
+    lost = [n for n in names if share[n] > NOTHING or (_undetermined(fit, n) and n in friction.tangled)]
+    known = next((c for c in friction.determined if set(c.weights) & set(lost)), None)
+    return _in_words(lost, known)
+
+
+def _undetermined(fit: Record, name: str) -> bool:
+    """Whether least squares without priors leaves a coefficient open altogether."""
+    estimates = fit.least_squares.estimates
+    if any(estimates[p.name].remark == UNDETERMINED for p in fit.model.space.free if p.role == "sensor"):
+        return False
+    return estimates[name].remark == UNDETERMINED
+
+
+def _in_words(lost: list[str], known: Combination | None) -> str:
+    if not lost:
+        return ""
+    them = listed(lost)
+    if known is not None:
+        said = f"The measurements do not tell {them} apart: what they determine is {known.words}, {how_well(known)}"
+    else:
+        said = f"The measurements do not determine {them}"
+    rest = "rest on their priors" if len(lost) > 1 else "rests on its prior"
+    return (
+        f"{said}; {them} by {'themselves' if len(lost) > 1 else 'itself'} {rest}. Efficiencies where you measured still hold, "
+        "the coefficients do not: measure where the wrap angles change in other proportions, or state a coefficient that was "
+        "measured separately under [friction.NAME]."
+    )
+
+
+def _stated(fit: Record, name: str) -> bool:
+    """Whether the description says something of a coefficient beyond naming it."""
+    return name in fit.dataset.description.friction

@@ -1,0 +1,26 @@
+"""Units at the border: what is usual is known without pint, and is what pint says."""
+
+import subprocess
+import sys
+
+import pytest
+
+from bowdenfit import units
+
+
+@pytest.mark.parametrize("unit", units._USUAL)
+def test_usual_units_are_what_pint_says(unit, monkeypatch):
+    dimension, factor = units._USUAL[unit]
+    assert units.is_unit(unit)
+    assert units.dimension_of(unit) == dimension
+    assert units.conversion_factor(unit, dimension) == factor
+    monkeypatch.setattr(units, "_USUAL", {})
+    assert units.dimension_of(unit) == dimension
+    assert units.conversion_factor(unit, dimension) == factor  # to the last bit
+    assert units.route_conversion_factor(unit, unit) == 1.0
+
+
+def test_a_table_in_usual_units_is_read_without_pint(on_body):
+    code = f"import sys, bowdenfit as bf; bf.read({str(on_body)!r}); print('pint' in sys.modules, 'jax' in sys.modules)"
+    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
+    assert done.stdout.split() == ["False", "False"]

@@ -9,6 +9,7 @@ from dataclasses import replace
 from typing import Any
 
 import emcee
+import jax
 import numpy as np
 
 from bowdenfit.description import SamplerSettings
@@ -24,14 +25,14 @@ Moves = Sequence[tuple[emcee.moves.RedBlueMove, float]]
 
 
 class SideBySide(emcee.moves.RedBlueMove):
-    """Independent ensembles moved side by side: proposals stay within an ensemble, evaluations are shared.
+    """Independent ensembles moved side by side: proposals stay within an ensemble, everything else is shared.
 
-    Each ensemble is split in two at random; the walkers of one half get emcee's own proposal from the other half of
-    their ensemble. All ensembles' proposals are evaluated in one call, which is why this is several times quicker than
-    one sampler after the other.
+    Each ensemble is split in two at random; the walkers of one half are proposed places by those of the other half of
+    their ensemble. All ensembles' proposals are one array, evaluated in one call, which is why this is several times
+    quicker than one sampler after the other.
 
     Args:
-        move: The proposal.
+        move: Its proposal takes and gives arrays (ensemble, walker, parameter).
         n_ensembles: Number of ensembles; walkers are ordered by ensemble.
     """
 
@@ -41,26 +42,55 @@ class SideBySide(emcee.moves.RedBlueMove):
 
     def propose(self, model: Any, state: emcee.State) -> tuple[emcee.State, np.ndarray]:
         """One step of every walker."""
-        n_walkers = len(state.coords) // self.n_ensembles
+        n, size = state.coords.shape
+        walkers = n // self.n_ensembles
         self.move.setup(state.coords)
-        order = np.stack([model.random.permutation(n_walkers) + e * n_walkers for e in range(self.n_ensembles)])
-        accepted = np.zeros(len(state.coords), dtype=bool)
+        order = np.argsort(model.random.rand(self.n_ensembles, walkers), axis=1)
+        order += walkers * np.arange(self.n_ensembles)[:, None]
+        accepted = np.zeros(n, dtype=bool)
         for moving, resting in ((order[:, ::2], order[:, 1::2]), (order[:, 1::2], order[:, ::2])):
-            pairs = zip(moving, resting, strict=True)
-            proposed = [self.move.get_proposal(state.coords[m], [state.coords[r]], model.random) for m, r in pairs]
-            coords, factors = (np.concatenate(part) for part in zip(*proposed, strict=True))
+            proposed, factors = self.move.get_proposal(state.coords[moving], [state.coords[resting]], model.random)
+            coords, which = proposed.reshape(-1, size), moving.ravel()
             log_density = model.log_prob_fn(coords)  # ours gives an array; emcee would go through it number by number
-            which = moving.ravel()
-            better = factors + log_density - state.log_prob[which] > np.log(model.random.uniform(size=len(which)))
+            gain = factors.ravel() + log_density - state.log_prob[which]
+            better = gain > np.log(model.random.uniform(size=len(which)))
             state.coords[which[better]] = coords[better]
             state.log_prob[which[better]] = log_density[better]
             accepted[which] = better
         return state, accepted
 
 
+class Stretch(emcee.moves.StretchMove):
+    """emcee's stretch move, of all ensembles at once."""
+
+    def get_proposal(
+        self, s: np.ndarray, c: Sequence[np.ndarray], random: np.random.RandomState
+    ) -> tuple[np.ndarray, np.ndarray]:
+        """Places on the lines through a walker of the other half, and the log of their volume factors."""
+        (others,), (ensembles, n, size) = c, s.shape
+        stretch = ((self.a - 1) * random.rand(ensembles, n) + 1) ** 2 / self.a
+        anchor = others[np.arange(ensembles)[:, None], random.randint(others.shape[1], size=(ensembles, n))]
+        return anchor - (anchor - s) * stretch[..., None], (size - 1) * np.log(stretch)
+
+
+class DifferentialEvolution(emcee.moves.DEMove):
+    """emcee's differential evolution, of all ensembles at once."""
+
+    def get_proposal(
+        self, s: np.ndarray, c: Sequence[np.ndarray], random: np.random.RandomState
+    ) -> tuple[np.ndarray, np.ndarray]:
+        """Places shifted by the difference of two walkers of the other half, and the log of their volume factors, 0."""
+        (others,), (ensembles, n, _) = c, s.shape
+        count, which = others.shape[1], np.arange(ensembles)[:, None]
+        first = random.randint(count, size=(ensembles, n))
+        second = (first + random.randint(1, count, size=(ensembles, n))) % count  # any but the first
+        gamma = self.g0 * (1 + self.sigma * random.randn(ensembles, n, 1))
+        return s + gamma * (others[which, second] - others[which, first]), np.zeros((ensembles, n))
+
+
 def default_moves() -> Moves:
     """Stretch moves find the bulk quickly, differential evolution mixes best there, gamma 1 jumps between modes."""
-    return [(emcee.moves.StretchMove(), 0.3), (emcee.moves.DEMove(), 0.6), (emcee.moves.DEMove(gamma0=1.0), 0.1)]
+    return [(Stretch(), 0.3), (DifferentialEvolution(), 0.6), (DifferentialEvolution(gamma0=1.0), 0.1)]
 
 
 def starting_points(start: MaximumPosterior, settings: SamplerSettings, generator: np.random.Generator) -> np.ndarray:
@@ -114,7 +144,8 @@ def _backend(asked: Sampling, shape: tuple[int, ...]) -> emcee.backends.Backend:
 
 def _in_halves(program: Callable[..., Any], data: Any, half: int) -> Callable[[np.ndarray], np.ndarray]:
     """Log density in batches of half of all walkers, so that one compiled shape serves the start and every step."""
-    return lambda z: np.concatenate([np.asarray(program(part, data)) for part in z.reshape(-1, half, z.shape[1])])
+    on_device = jax.device_put(data)
+    return lambda z: np.concatenate([program(part, on_device) for part in z.reshape(-1, half, z.shape[1])])
 
 
 def _summarized(asked: Sampling, backend: emcee.backends.Backend) -> Chain:

@@ -7,6 +7,7 @@ import jax
 import jax.numpy as jnp
 import numpy as np
 import pytest
+from emcee.moves.de import _get_nondiagonal_pairs
 from numpyro.infer import MCMC, NUTS
 from scipy import stats
 
@@ -15,7 +16,7 @@ from bowdenfit.dataset import load_dataset
 from bowdenfit.description import SamplerSettings
 from bowdenfit.inference.chain import Chain, Sampling, stuck_walkers
 from bowdenfit.inference.draws import for_each_draw, named_values
-from bowdenfit.inference.ensemble import SideBySide, default_moves, sample
+from bowdenfit.inference.ensemble import DifferentialEvolution, SideBySide, Stretch, default_moves, sample
 from bowdenfit.inference.least_squares import maximum_posterior
 from bowdenfit.inference.log_density import LogDensity
 from bowdenfit.inference.objective import make_objective
@@ -34,15 +35,17 @@ Draws = dict[str, np.ndarray]
 
 
 class InThirds(emcee.moves.DESnookerMove):
-    """Emcee's snooker move, which wants the resting walkers in three sets."""
+    """Emcee's snooker move, which wants the resting walkers in three sets, ensemble by ensemble."""
 
     def get_proposal(self, s, c, random):
-        return super().get_proposal(s, np.array_split(c[0], 3), random)
+        pairs = zip(s, c[0], strict=True)
+        each = [super(InThirds, self).get_proposal(m, np.array_split(r, 3), random) for m, r in pairs]
+        return tuple(np.stack(part) for part in zip(*each, strict=True))
 
 
 def snooker_mixture():
     """The popular mixture that samples the wrong distribution."""
-    return [(emcee.moves.DEMove(), 0.8), (InThirds(), 0.2)]
+    return [(DifferentialEvolution(), 0.8), (InThirds(), 0.2)]
 
 
 def disagreements(draws: Draws, reference: Draws) -> list[str]:
@@ -243,17 +246,65 @@ def test_the_default_moves_find_the_target_from_starts_far_outside():
     assert p_value(below_quantiles(run_side_by_side(default_moves(), log_t, start, 1500, 2)[60:])) > 0.001
 
 
-@pytest.mark.parametrize("number", range(len(default_moves())))
-def test_side_by_side_with_one_ensemble_is_distributed_as_emcee_s_own_sampler(number):
+class Told:
+    """Random numbers told beforehand, by the name of the function that is asked for them."""
+
+    def __init__(self, **numbers):
+        self.numbers = numbers
+
+    def __getattr__(self, name):
+        return lambda *_, **__: self.numbers[name]
+
+
+@pytest.fixture
+def halves() -> np.ndarray:
+    """Moving and resting walkers, (half, ensemble, walker, dimension)."""
+    return np.random.default_rng(1).standard_normal((2, 3, 8, DIMENSIONS))
+
+
+def test_stretch_moves_of_all_ensembles_are_emcee_s_own_given_the_same_random_numbers(halves):
+    moving, resting = halves
+    proposed, factors = Stretch().get_proposal(moving, [resting], np.random.RandomState(2))
+    again = np.random.RandomState(2)
+    rand, randint = again.rand(3, 8), again.randint(8, size=(3, 8))
+    for e in range(3):
+        told = Told(rand=rand[e], randint=randint[e])
+        expected = emcee.moves.StretchMove().get_proposal(moving[e], [resting[e]], told)
+        np.testing.assert_array_equal(proposed[e], expected[0])
+        np.testing.assert_array_equal(factors[e], expected[1])
+
+
+@pytest.mark.parametrize("gamma", [None, 1.0])
+def test_differential_evolution_of_all_ensembles_is_emcee_s_own_given_the_same_random_numbers(halves, gamma):
+    moving, resting = halves
+    move, theirs = DifferentialEvolution(gamma0=gamma), emcee.moves.DEMove(gamma0=gamma)
+    for each in (move, theirs):
+        each.setup(moving[0])
+    proposed, factors = move.get_proposal(moving, [resting], np.random.RandomState(2))
+    again = np.random.RandomState(2)
+    first, further, randn = again.randint(8, size=(3, 8)), again.randint(1, 8, size=(3, 8)), again.randn(3, 8, 1)
+    pairs = [tuple(pair) for pair in _get_nondiagonal_pairs(8)]
+    for e in range(3):
+        choice = [pairs.index((one, (one + more) % 8)) for one, more in zip(first[e], further[e], strict=True)]
+        expected = theirs.get_proposal(moving[e], [resting[e]], Told(choice=choice, randn=randn[e]))
+        np.testing.assert_array_equal(proposed[e], expected[0])
+        np.testing.assert_array_equal(factors[e], expected[1])
+
+
+EMCEE_MOVES = (emcee.moves.StretchMove(), emcee.moves.DEMove(), emcee.moves.DEMove(gamma0=1.0))
+
+
+@pytest.mark.parametrize(("ours", "theirs"), list(zip((move for move, _ in default_moves()), EMCEE_MOVES, strict=True)))
+def test_side_by_side_with_one_ensemble_is_distributed_as_emcee_s_own_sampler(ours, theirs):
     """8 runs of each with one move; p < 0.001 of a t-test (times the number of quantiles) once in a thousand seeds."""
-    (move, _), walkers, steps = default_moves()[number], 32, 600
+    walkers, steps = 32, 600
     shares = {"side by side": [], "emcee": []}
     for seed in range(8):
         start = draw_t(np.random.default_rng(seed), walkers)
-        ours = run_side_by_side([(move, 1.0)], log_t, start[None], steps, seed)
-        sampler = emcee.EnsembleSampler(walkers, DIMENSIONS, log_t, vectorize=True, moves=move)
-        theirs = _run(sampler, start, steps, seed + 100)[:, None]
-        for name, states in (("side by side", ours), ("emcee", theirs)):
+        alone = run_side_by_side([(ours, 1.0)], log_t, start[None], steps, seed)
+        sampler = emcee.EnsembleSampler(walkers, DIMENSIONS, log_t, vectorize=True, moves=theirs)
+        others = _run(sampler, start, steps, seed + 100)[:, None]
+        for name, states in (("side by side", alone), ("emcee", others)):
             shares[name].append(below_quantiles(states)[0])
     p = stats.ttest_ind(*shares.values(), axis=0, equal_var=False).pvalue
     assert np.nanmin(p) * p.size > 0.001

@@ -35,6 +35,14 @@ class LogDensity:
         """Data of all terms, in their order."""
         return tuple(term.data for term in self.model.terms)
 
+    @cached_property
+    def padded(self) -> tuple[dict[str, Any], ...]:
+        """The same data in shapes that hardly depend on what was read, for one program to serve many tables.
+
+        The log density is the same to rounding; what is said of single readings and residuals has other places.
+        """
+        return tuple(getattr(term, "padded", term.data) for term in self.model.terms)
+
     def log_likelihoods(self, z: Float[Array, " free"], data: Any) -> dict[str, Array]:
         """Log likelihood of every reading, by term."""
         values = self.model.space.constrain(z)

@@ -12,6 +12,7 @@ from jaxtyping import Float
 
 from bowdenfit.cable.cable import Cable
 from bowdenfit.cable.noise import noise_law, scatter
+from bowdenfit.kinds.bounds import first_less, joined, last_less
 
 Expected = Callable[[Cable, Mapping[str, Array], Mapping[str, Any]], Array]
 
@@ -52,6 +53,15 @@ class ElasticTerm:
         read = len(self.data["reading"])
         return ((read, read), (len(self.labels) - read, 0))
 
+    @property
+    def padded(self) -> dict[str, Any]:
+        """See `LogDensity.padded`: every row as one that was read and as one that is known to be at most so."""
+        if self.lowest is None:
+            return self.data
+        none_read, none_bound = (np.full(len(self.data[name]), np.nan) for name in ("at_most", "reading"))
+        reading, at_most = [self.data["reading"], none_read], [none_bound, self.data["at_most"]]
+        return self.data | {"reading": np.concatenate(reading), "at_most": np.concatenate(at_most)}
+
     def expected(self, values: Mapping[str, Array], data: Mapping[str, Any]) -> Float[Array, " rows"]:
         """Expected readings [mm] or [N]."""
         return self.law(self.cable, values, data)
@@ -60,20 +70,21 @@ class ElasticTerm:
         """Log likelihood of each row."""
         deviation, u = self._deviations(values, data, values[self.noise])
         law = noise_law(self.cable.description)
-        return jnp.concatenate([law.log_density(deviation) - jnp.log(values[self.noise]), law.log_cdf(u)])
+        read = law.log_density(deviation) - jnp.log(values[self.noise])
+        return joined((data["reading"], read), (data["at_most"], law.log_cdf(u)))
 
     def _deviations(
         self, values: Mapping[str, Array], data: Mapping[str, Any], noise: Array
     ) -> tuple[Float[Array, " read"], Float[Array, " at_most"]]:
         """Standardized deviations: of the readings, and of those that are only known to be at most so."""
-        expected, n = self.expected(values, data), data["reading"].shape[0]
-        return (data["reading"] - expected[:n]) / noise, (data["at_most"] - expected[n:]) / noise
+        expected = self.expected(values, data)
+        return first_less(data["reading"], expected) / noise, last_less(data["at_most"], expected) / noise
 
     def residuals(self, values: Mapping[str, Array], data: Mapping[str, Any]) -> Float[Array, " rows"]:
         """Standardized residuals; sqrt(-2 log likelihood) for rows known to be at most their reading."""
         deviation, u = self._deviations(values, data, jax.lax.stop_gradient(values[self.noise]))
         law = noise_law(self.cable.description)
-        return jnp.concatenate([law.residual(deviation), law.bound_residual(u)])
+        return joined((data["reading"], law.residual(deviation)), (data["at_most"], law.bound_residual(u)))
 
     def simulate(
         self, values: Mapping[str, Array], data: Mapping[str, Any], key: Array, scale: float = 1.0

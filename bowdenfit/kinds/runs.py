@@ -13,10 +13,12 @@ from jaxtyping import Float
 from bowdenfit.cable.cable import Cable
 from bowdenfit.cable.load_cells import FORCE_NOISE, LEAST_FORCE, OUTPUT_OFFSET, RUN_SCATTER, LoadCells
 from bowdenfit.cable.noise import noise_law, scatter
+from bowdenfit.kinds.padding import rounded_up
 from bowdenfit.kinds.resolve_angles import resolve_angles
 from bowdenfit.physics.friction import transmission_efficiency
 from bowdenfit.types import Labels, Vector
 
+_WEIGHTS = ("weight", "load_squares", "load_products")
 ROW_ARRAYS = ("route", "own", "is_own", "known_variance", "noisy")
 _LOAD_BINS, _SPEED_BINS, _DELAY_BINS = 24, 24, 8  # of each stroke of a run, where load, speed or a delay matters
 _ALIKE = 0.05  # speeds that differ by less than this fraction are one
@@ -65,6 +67,17 @@ class RunsTerm:
         """Runs scatter by their mounting; the cells of a run about its mean by the load cells."""
         runs, cells, filled = len(self.labels), len(self.data["mean"]), int(np.sum(self.data["weight"] > 0))
         return ((runs, runs), (cells, filled - runs))
+
+    @property
+    def padded(self) -> dict[str, Any]:
+        """See `LogDensity.padded`: each run's cells followed by weightless copies of its first."""
+        cells, each = len(self.data["mean"]), len(self.data["mean"]) // len(self.labels)
+        starts = np.arange(0, cells, each)[:, None]
+        place = np.arange(rounded_up(each))
+        source = (starts + np.where(place < each, place, 0)).ravel()
+        filled = np.tile(place < each, len(self.labels))
+        long = {name: values[source] for name, values in self.data.items() if len(values) == cells != len(starts)}
+        return self.data | long | {name: np.where(filled, long[name], 0.0) for name in _WEIGHTS if name in long}
 
     def _shown(
         self, values: Mapping[str, Array], data: Mapping[str, Any], exponent: Float[Array, " cells"]
@@ -223,7 +236,7 @@ def _rectangular(cells: dict[str, np.ndarray], run: np.ndarray) -> dict[str, np.
     source = np.where(place < counts[:, None], starts[:, None] + place, starts[:, None]).ravel()
     padded = {name: values[source] for name, values in cells.items()}
     filled = (place < counts[:, None]).ravel()
-    return padded | {name: np.where(filled, padded[name], 0.0) for name in ("weight", "load_squares", "load_products")}
+    return padded | {name: np.where(filled, padded[name], 0.0) for name in _WEIGHTS}
 
 
 def _cells(cable: Cable, rows: SlidingRows) -> tuple[np.ndarray, np.ndarray]:

@@ -15,6 +15,7 @@ from bowdenfit.kinds.angles.bench import detection_limit, drawn_angles
 from bowdenfit.kinds.angles.table import AngleSettings, AngleTable
 from bowdenfit.kinds.angles.undetected import EVENTS, count
 from bowdenfit.kinds.bench import Remeasurement
+from bowdenfit.kinds.bounds import first_less, joined, last_less
 from bowdenfit.kinds.candidate import Candidate, CandidateKind, Simulation, Situation
 from bowdenfit.kinds.term import Circumstances, TermKind
 from bowdenfit.parameters.priors import HalfNormal
@@ -32,7 +33,7 @@ class AnglesTerm:
     Args:
         cable: The cable.
         data: Route values of each curve's readings; the order that puts detected readings first; detected angles and
-            the limits of undetected ones [rad].
+            the limits of undetected ones [rad]. Where these are NaN there is none.
         labels: Each reading in words, detected ones first.
     """
 
@@ -48,6 +49,15 @@ class AnglesTerm:
         """All readings scatter alike."""
         return ((len(self.labels), len(self.labels)),)
 
+    @property
+    def padded(self) -> dict[str, Any]:
+        """See `LogDensity.padded`: every reading in its own place, as one that was detected and as one that was not."""
+        order = self.data["order"]
+        angle, limit = np.full((2, len(order)), np.nan)
+        angle[order[: len(self.data["angle"])]] = self.data["angle"]
+        limit[order[len(self.data["angle"]) :]] = self.data["limit"]
+        return self.data | {"order": np.arange(len(order)), "angle": angle, "limit": limit}
+
     def _expected(self, values: Mapping[str, Array], data: Mapping[str, Any]) -> Float[Array, " readings"]:
         curves = self.cable.curves
         parts = [curve.wrap_angle(values, data["route"][column]) for column, curve in curves.items()]
@@ -57,18 +67,19 @@ class AnglesTerm:
         self, values: Mapping[str, Array], data: Mapping[str, Any]
     ) -> tuple[Float[Array, " detected"], Float[Array, " undetected"]]:
         """Standardized deviations: of the detected readings, and of the limits of the undetected ones."""
-        theta, sigma, n = self._expected(values, data), values[ANGLE_NOISE], data["angle"].shape[0]
-        return (data["angle"] - theta[:n]) / sigma, (data["limit"] - theta[n:]) / sigma
+        theta, sigma = self._expected(values, data), values[ANGLE_NOISE]
+        return first_less(data["angle"], theta) / sigma, last_less(data["limit"], theta) / sigma
 
     def log_likelihood(self, values: Mapping[str, Array], data: Mapping[str, Any]) -> Float[Array, " readings"]:
         """Log likelihood of each reading."""
         (deviation, u), law = self._split(values, data), noise_law(self.cable.description)
-        return jnp.concatenate([law.log_density(deviation) - jnp.log(values[ANGLE_NOISE]), law.log_cdf(u)])
+        read = law.log_density(deviation) - jnp.log(values[ANGLE_NOISE])
+        return joined((data["angle"], read), (data["limit"], law.log_cdf(u)))
 
     def residuals(self, values: Mapping[str, Array], data: Mapping[str, Any]) -> Float[Array, " readings"]:
         """Standardized residuals; sqrt(-2 log likelihood) for undetected angles."""
         (deviation, u), law = self._split(values, data), noise_law(self.cable.description)
-        return jnp.concatenate([law.residual(deviation), law.bound_residual(u)])
+        return joined((data["angle"], law.residual(deviation)), (data["limit"], law.bound_residual(u)))
 
     def expected(self, values: Mapping[str, Array], data: Mapping[str, Any]) -> Float[Array, " readings"]:
         """Expected readings [deg]."""

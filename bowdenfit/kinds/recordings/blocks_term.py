@@ -19,7 +19,10 @@ from bowdenfit.cable.cable import Cable
 from bowdenfit.cable.drive import Each, Loop, Recorded, Rope, drive_of
 from bowdenfit.cable.load_cells import BLOCK_NOISE, RUN_SCATTER, LoadCells
 from bowdenfit.cable.noise import noise_law
+from bowdenfit.kinds.padding import rounded_up
+from bowdenfit.kinds.recordings.side_by_side import WITHOUT_WEIGHT
 from bowdenfit.kinds.resolve_angles import resolve_angles
+from bowdenfit.kinds.runs import ROW_ARRAYS
 from bowdenfit.physics.normal_tail import log_normal_cdf
 
 _LEAST_TOTAL = 1e-20
@@ -76,6 +79,18 @@ class BlocksTerm(ABC):
         """Runs scatter by their mounting; the blocks of a run about it by the load cells."""
         runs, blocks = len(self.labels), int(np.sum(self.data["n"]))
         return ((runs, runs), (self.data["weight"].size, max(blocks - runs, 1)))
+
+    @property
+    def padded(self) -> dict[str, Any]:
+        """See `LogDensity.padded`: recordings that stand still for longer at their end, with no weight."""
+        blocks = len(self.data["weight"])
+        missing = ((0, rounded_up(blocks) - blocks), (0, 0))
+        long = {
+            name: np.pad(values, missing, "constant" if name in WITHOUT_WEIGHT else "edge")
+            for name, values in self.data.items()
+            if np.ndim(values) == 2 and name not in ROW_ARRAYS
+        }
+        return self.data | long
 
     def _per_run(self, data: Data, blocks: Recorded) -> Float[Array, " runs"]:
         """Sum over the blocks of each run."""

@@ -20,6 +20,7 @@ from bowdenfit.recordings.recording import Recording, Recordings
 
 MOST_BLOCKS = 600  # of one recording in the play operator; more say no more once noise is averaged
 _FREE = ("weight", "worth", "censored", "share", "drift", "restart")
+WITHOUT_WEIGHT = (*_FREE, "moving")  # arrays that are 0 where a recording has ended; the others stay as they were
 _HELD = ("input_force", "output_force", "velocity")
 
 

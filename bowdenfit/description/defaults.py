@@ -1,20 +1,55 @@
 """What has a default that most users keep: load cells, the sampler, and weak priors."""
 
-from typing import Annotated, Literal
+from math import hypot
+from typing import Annotated, Any, Literal
 
-from pydantic import Field
+from pydantic import Field, model_validator
 
-from bowdenfit.description.values import Frozen, LogNormalPrior, Positive, QuantityValue
+from bowdenfit.description.values import Frozen, LogNormalPrior, NonNegative, Positive, QuantityValue
 
 Sampler = Literal["emcee", "nuts", "both"]
 
 
 class Sensors(Frozen):
-    """What the data sheets of the load cells say."""
+    """What the data sheets of the load cells say: of each cell its relative gain error, one standard deviation."""
 
     force_noise: QuantityValue | None = None
-    gain_error_sd: Positive | None = None
+    input_gain_error_sd: NonNegative | None = None
+    output_gain_error_sd: NonNegative | None = None
     offset_sd: QuantityValue | None = None
+
+    @model_validator(mode="before")
+    @classmethod
+    def _of_each_cell(cls, said: Any) -> Any:
+        """A figure for both cells together is refused; folders of results stored with an empty one are read."""
+        if not isinstance(said, dict) or "gain_error_sd" not in said:
+            return said
+        if (both := said["gain_error_sd"]) is not None:
+            raise ValueError(
+                f"gain_error_sd = {both} does not say whose error it is; write that of each load cell, as its data sheet gives "
+                f"it: input_gain_error_sd = {both} and output_gain_error_sd = {both} (0 for a hung weight)"
+            )
+        return {name: value for name, value in said.items() if name != "gain_error_sd"}
+
+    @model_validator(mode="after")
+    def _of_both_cells(self) -> "Sensors":
+        stated = {name: getattr(self, name) for name in ("input_gain_error_sd", "output_gain_error_sd")}
+        missing = [name for name, sd in stated.items() if sd is None]
+        if len(missing) == 1:
+            raise ValueError(f"write {missing[0]} too, that of the cell at the other end (0 for a hung weight)")
+        return self
+
+    @property
+    def gain_sd(self) -> float | None:
+        """Standard deviation of the log ratio of both cells' gains [1]; None where nothing is said of either."""
+        of_input, of_output = self.input_gain_error_sd, self.output_gain_error_sd
+        return None if of_input is None or of_output is None else hypot(of_input, of_output)
+
+    @property
+    def largest_force_noise(self) -> float | None:
+        """The stated noise of a force reading, with what its own error may add [N]; None where it is not stated."""
+        said = self.force_noise
+        return None if said is None else said.to("force") + 3 * (said.sd_to("force") or 0.0)
 
 
 class SamplerSettings(Frozen):

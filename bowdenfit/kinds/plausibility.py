@@ -2,6 +2,7 @@
 
 import numpy as np
 
+GAIN_ERROR = 0.01  # of a reading, that load cells may gain against each other where nothing is stated
 LOWEST, HIGHEST = 0.2, 0.99  # efficiency
 _LEAST_LOSS, _LARGEST_LOSS = -np.log(HIGHEST), -np.log(LOWEST)
 FACTOR = 10.0  # between what is simulated and what was measured, at most

@@ -43,9 +43,9 @@ def offsets(at: Circumstances) -> list[Parameter]:
 
 
 def gain_error(description: Description) -> list[Parameter]:
-    """The relative gain error between the two load cells, where the description says how large it may be."""
-    sd = description.sensors.gain_error_sd
-    if sd is None:
+    """The relative gain error between the two load cells, where the description says how large that of each may be."""
+    sd = description.sensors.gain_sd
+    if not sd:
         return []
     meaning = "relative gain error between the two load cells"
     return [Parameter(GAIN_ERROR, "$g$", meaning, "sensor", Normal(0.0, sd))]

@@ -145,6 +145,7 @@ def _remarks(name: str, found: set[int], loop: Hysteresis) -> tuple[str, ...]:
     if abs(loop.center) > 2.5 * _GAIN_SD and len(found) == 2:
         remarks.append(
             f"{name}: the hysteresis loop is off center by {loop.center:+.1%} of the force; the usual cause is a load cell "
-            "with a wrong calibration or tare: give [sensors] a gain_error_sd or an offset_sd, or tare the recording."
+            "with a wrong calibration or tare: give [sensors] input_gain_error_sd and output_gain_error_sd, or an offset_sd, "
+            "or tare the recording."
         )
     return tuple(remarks)

@@ -277,7 +277,7 @@ def test_stated_reference_force_and_velocity_come_before_the_data_s():
 THETA = np.deg2rad(150)
 VALUES = {"mu": 0.15, "tau": 0.03, "sigma_F": 0.7}
 MORE = {"drag": 3.0, "input_offset": 0.8, "output_offset": -0.5, "gain_error": 0.012}
-SENSORS = {"gain_error_sd": 0.01, "offset_sd": {"value": 1, "unit": "N"}}
+SENSORS = {"input_gain_error_sd": 0, "output_gain_error_sd": 0.01, "offset_sd": {"value": 1, "unit": "N"}}
 
 
 def _held(values, what="log_likelihood", rows=HELD, extra=()):

@@ -16,7 +16,7 @@ from bowdenfit.model import build_model
 
 ERRORS = {INPUT_OFFSET: 0.7, OUTPUT_OFFSET: -0.4, GAIN_ERROR: 0.03, DELAY_ERROR: 0.002}
 FORCES = jnp.array([0.5, 3.0, 20.0, 60.0])
-SENSORS = {"gain_error_sd": 0.05, "offset_sd": {"value": 1.0, "unit": "N"}}
+SENSORS = {"input_gain_error_sd": 0, "output_gain_error_sd": 0.05, "offset_sd": {"value": 1.0, "unit": "N"}}
 
 
 def test_what_the_cells_show_leads_back_to_the_true_forces():

@@ -168,7 +168,7 @@ def test_one_coefficient_at_two_constant_angles_is_identified():
 
 
 def test_a_gain_error_is_not_told_from_a_constant_angle_by_pulling_alone_but_is_by_both_strokes():
-    sensors = {"sensors": {"gain_error_sd": 0.02}}
+    sensors = {"sensors": {"input_gain_error_sd": 0, "output_gain_error_sd": 0.02}}
     description = cable(3, **sensors)
     _, pulling = fitted(measured(description, seed=1, design=replace(DESIGN, strokes=(1,)))[0])
     _, both = fitted(measured(description, seed=1)[0])

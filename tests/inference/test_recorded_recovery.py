@@ -90,7 +90,8 @@ def text(likelihood: str = "runs", prepare: str = STATED) -> str:
         [prior.tau]
         prior = {{ half_normal = {{ sd = {SD_TAU} }} }}
         [sensors]
-        gain_error_sd = {SD_GAIN}
+        input_gain_error_sd = 0
+        output_gain_error_sd = {SD_GAIN}
         [tables.recordings]
         likelihood = "{likelihood}"
         [tables.recordings.prepare]

@@ -83,7 +83,7 @@ def _integrated(rows, exponents, tau: float, sigma: float, gain: float = 0.0) ->
 @pytest.mark.parametrize("n", [1, 2, 30])
 def test_four_numbers_of_a_run_say_what_all_its_samples_say_with_the_mounting_integrated_out(n, gain):
     rows = _readings(1, n)
-    sensors = {"sensors": {"gain_error_sd": 0.01}} if gain else {}
+    sensors = {"sensors": {"input_gain_error_sd": 0, "output_gain_error_sd": 0.01}} if gain else {}
     model = _single_contact({"value": 150, "unit": "deg"}, _force_table(rows), **sensors)
     values = VALUES | ({"gain_error": gain} if gain else {})
     (term,) = model.terms
@@ -242,7 +242,8 @@ def _models() -> dict[str, Model]:
     }
     with_efficiencies, _ = measured(cable(3, ("angles", "efficiencies")), 1)
     with_forces, _ = measured(cable(5, tables=censored), 2)
-    with_gain, _ = measured(cable(3, ("angles", "efficiencies", "forces"), sensors={"gain_error_sd": 0.01}), 3)
+    sensors = {"input_gain_error_sd": 0, "output_gain_error_sd": 0.01}
+    with_gain, _ = measured(cable(3, ("angles", "efficiencies", "forces"), sensors=sensors), 3)
     without_forces = {"angles": censored["angles"], "efficiencies": {"file": "e.csv"}}
     robust, _ = measured(cable(2, without_forces, noise="student"), 2)
     return {

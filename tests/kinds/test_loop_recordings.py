@@ -417,7 +417,7 @@ def test_residuals_vanish_at_the_truth_of_a_recording_without_noise(tmp_path):
     truth = VALUES | {"input_offset": 0.8, "output_offset": -0.5, "gain_error": 0.02}
     columns["input_force_N"] = columns["input_force_N"] + 0.8
     columns["output_force_N"] = columns["output_force_N"] * math.exp(-0.02) - 0.5
-    sensors = '[sensors]\ngain_error_sd = 0.02\noffset_sd = { value = 1, unit = "N" }'
+    sensors = '[sensors]\ninput_gain_error_sd = 0\noutput_gain_error_sd = 0.02\noffset_sd = { value = 1, unit = "N" }'
     more = f'{sensors}\n[tables]\nrecordings = {{ prepare = {{ block = "none" }} }}'
     term = term_of(folder_of(tmp_path, [columns], more=more))
     assert np.abs(of_term(term, "residuals", truth)).max() < 1e-3
@@ -591,7 +591,7 @@ def test_traces_show_what_load_cells_with_known_errors_read(tmp_path):
     known = {"mu": MU, "preload": PRELOAD, "input_offset": 2.0, "output_offset": -1.5, "gain_error": 0.05}
     prior = "\n".join(f"{name}.fixed = {value}" for name, value in known.items() if name != "mu")
     more = f"[prior]\n{prior}\n[friction.mu]\nfixed = {MU}\n"
-    sensors = '[sensors]\ngain_error_sd = 0.1\noffset_sd = { value = 1, unit = "N" }'
+    sensors = '[sensors]\ninput_gain_error_sd = 0\noutput_gain_error_sd = 0.1\noffset_sd = { value = 1, unit = "N" }'
     fit = bf.fit(folder_of(tmp_path, [columns], more=f"{sensors}\n{more}[tables]\nrecordings = {{}}"), mcmc=False)
     trace = traces(fit)[0]
     assert len(trace.predicted) == 1

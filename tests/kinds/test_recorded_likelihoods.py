@@ -127,7 +127,7 @@ def _runs_term(cable: Cable, rows: SlidingRows) -> RunsTerm:
     return RunsTerm(cable, run_sums(cable, rows), tuple(str(run) for run in np.unique(rows.run)))
 
 
-GAIN, OFFSET = {"gain_error_sd": 0.01}, {"offset_sd": {"value": 1, "unit": "N"}}
+GAIN, OFFSET = {"input_gain_error_sd": 0, "output_gain_error_sd": 0.01}, {"offset_sd": {"value": 1, "unit": "N"}}
 LAWS = {
     "gain error": ({"sensors": GAIN}, {"gain_error": 0.013}),
     "delay": ({}, {"delay_error": 0.004}),

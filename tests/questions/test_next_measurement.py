@@ -217,7 +217,7 @@ def test_readings_of_the_published_geometry_are_of_the_curves_that_hold_there(on
 
 def _quiet(design: Design = DESIGN, **more: Any) -> tuple[Dataset, Model]:
     """A cable whose load cells read almost without noise."""
-    sensors = {"gain_error_sd": 0.02, "force_noise": {"value": 1e-6, "unit": "N"}}
+    sensors = {"input_gain_error_sd": 0, "output_gain_error_sd": 0.02, "force_noise": {"value": 1e-6, "unit": "N"}}
     description = cable(2, sensors=sensors, **more)
     dataset = Dataset(description, empty_tables(description, design), {})
     return dataset, build_model(dataset)

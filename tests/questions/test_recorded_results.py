@@ -213,7 +213,7 @@ def test_leave_one_out_of_a_normal_mean_is_what_leaving_one_out_gives():
 def pulls_only():
     """One constant angle, pulling strokes alone, and load cells that may differ in gain."""
     contact = {"name": "edge", "friction": "mu_edge", "wrap_angle": {"value": 45, "unit": "deg"}}
-    description = cable(1, ("forces",), contact=[contact], sensors={"gain_error_sd": 0.05})
+    description = cable(1, ("forces",), contact=[contact], sensors={"input_gain_error_sd": 0, "output_gain_error_sd": 0.05})
     design = Design(runs=(400.0,) * 8, input_forces=(20.0, 40.0, 60.0), strokes=(1,))
     dataset, values = measured(description, 4, design=design)
     return bf.fit(dataset, seed=2), values

@@ -11,9 +11,11 @@ from bowdenfit.files.csv_table import read_csv
 from bowdenfit.kinds.design import Design
 from bowdenfit.kinds.kind import Found, Source
 from bowdenfit.kinds.pages import Page, route_cells, route_heading
-from bowdenfit.kinds.plausibility import beyond
+from bowdenfit.kinds.plausibility import GAIN_ERROR, beyond
 from bowdenfit.kinds.rows import OwnAngles, RowOrigin, provenance_of, read_own_angles, read_route, shared_columns
 from bowdenfit.types import Vector
+
+_SDS = 4.5  # stated standard deviations above 1, which one healthy row of 300,000 exceeds
 
 
 @dataclass(frozen=True)
@@ -42,7 +44,7 @@ def read_efficiencies(source: Source) -> Found[EfficiencyTable]:
         source: Where it is.
 
     Raises:
-        DatasetError: See `read_csv` and `find_columns`; or an efficiency is not between 0 and 1.
+        DatasetError: See `read_csv` and `find_columns`; or an efficiency is not positive, or above 1 beyond its error.
     """
     path, route, contacts = source.file, source.description.route, source.description.angle_columns
     table = read_csv(path)
@@ -50,13 +52,14 @@ def read_efficiencies(source: Source) -> Found[EfficiencyTable]:
     found = find_columns(table, (*names, *shared_columns(route, contacts)), source.columns)
     column = require(table, found, "efficiency", "efficiency (0 to 1) or efficiency_percent")
     spread = found.get("efficiency_sd")
-    efficiency = [_efficiency(cell, column) for cell in column.cells]
     pairs = zip(spread.cells, column.cells, strict=True) if spread else ()
     sd = [0.0 if cell.blank else _efficiency_sd(cell, spread, beside, column) for cell, beside in pairs if spread]
+    sd = sd if spread else [0.0] * len(table.rows)
+    efficiency = [_efficiency(cell, column, error) for cell, error in zip(column.cells, sd, strict=True)]
     rows = EfficiencyTable(
         read_route(table, found, route),
         np.array(efficiency),
-        np.array(sd) if spread else np.zeros(len(table.rows)),
+        np.array(sd),
         read_own_angles(table, found, contacts),
         provenance_of(table),
     )
@@ -73,17 +76,19 @@ def _in_percent(cell: Cell, column: Column) -> bool:
     return column.factor != 1 or cell.percentage() is not None
 
 
-def _efficiency(cell: Cell, column: Column) -> float:
+def _efficiency(cell: Cell, column: Column, sd: float) -> float:
+    """An efficiency; noise may show one above 1, as it may show more force out than in."""
     value = _ratio(cell, column)
     if value <= 0:
         raise cell.refuse(f"an efficiency of {cell.shown} is not possible; it is output force over input force.")
-    if value > 1:
+    if value > 1 + GAIN_ERROR + _SDS * sd:
         usual = (
             "the usual cause is that input and output force were swapped"
             if _in_percent(cell, column)
             else "if it is in percent, name the column efficiency_percent"
         )
-        raise cell.refuse(f"an efficiency of {cell.shown} is above 1; {usual}.")
+        noise = "" if sd else ", or state its standard deviation in efficiency_sd if noise did that"
+        raise cell.refuse(f"an efficiency of {cell.shown} is above 1; {usual}{noise}.")
     return value
 
 

@@ -2,9 +2,13 @@
 
 import numpy as np
 
+from bowdenfit.description import Description
+from bowdenfit.kinds.forces.gained import check_gains
+from bowdenfit.kinds.forces.mountings import ForceSettings
 from bowdenfit.kinds.forces.table import ForceTable, read_forces
 from bowdenfit.kinds.forces.words import count, describe, empty, implausible, page
 from bowdenfit.kinds.kind import Kind, itself
+from bowdenfit.kinds.measurements import Measurements
 from bowdenfit.kinds.readings import Readings, efficiencies
 from bowdenfit.kinds.wrap_angles import check_rows
 
@@ -15,15 +19,22 @@ def _typical_speeds(table: ForceTable) -> list[float]:
     return [float(known.min()), float(known.max())] if len(known) else []
 
 
+def _check(table: ForceTable, description: Description, measurements: Measurements) -> None:
+    """Every row has its wrap angles, and none gains force."""
+    check_rows(table, description, measurements)
+    check_gains(table, description)
+
+
 FORCES = Kind(
     name="forces",
     table=ForceTable,
+    settings=ForceSettings,
     readings=(
         efficiencies("run_efficiency", "forces", "force runs", "run {}", are_runs=True),
         Readings("held_ratio", "held forces", "held forces", "{}", "Input over output force"),
     ),
     read=read_forces,
-    check=check_rows,
+    check=_check,
     describe=describe,
     implausible=implausible,
     page=page,

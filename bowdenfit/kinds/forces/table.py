@@ -10,6 +10,7 @@ from bowdenfit.errors import DatasetError
 from bowdenfit.files.cells import Cell
 from bowdenfit.files.columns import Column, Quantity, find_columns, require
 from bowdenfit.files.csv_table import read_csv
+from bowdenfit.kinds.forces.mountings import mountings, numbered_anew
 from bowdenfit.kinds.kind import Found, Source
 from bowdenfit.kinds.rows import (
     OwnAngles,
@@ -58,9 +59,9 @@ class ForceTable:
 def read_forces(source: Source) -> Found[ForceTable]:
     """Read force tables, one or several files, into one table.
 
-    A run is one mounting of the cable. It is what the `run` column says, file by file; without one, all rows of a file
-    at one route value and one set of own angles are taken for one run, which is remarked on. Without a `stroke` column
-    all rows are taken as pulling, likewise.
+    A run is one mounting of the cable. It is what the `run` column says, file by file, at one length and bend (see
+    `ForceSettings`); without one, all rows of a file at one route value and one set of own angles are taken for one run,
+    which is remarked on. Without a `stroke` column all rows are taken as pulling, likewise.
 
     Args:
         source: Where they are.
@@ -129,6 +130,11 @@ def _read_force_file(path: Path, source: Source) -> tuple[ForceTable, list[str]]
             "as one run (one mounting of the cable)."
         )
     run, run_names = _runs(found.get("run"), route_values, own)
+    if "run" in found and source.settings.run == "at one length":
+        labels = [run_names[i] for i in run]
+        run, distinct = mountings(labels, route_values, own, route)
+        run_names = tuple(distinct)
+        remarks += [said for said in [numbered_anew(labels, len(distinct), table.file, route)] if said]
     strokes, origin = read_strokes(found, len(table.rows)), provenance_of(table)
     if held := int(np.sum(strokes == 0)):
         remarks.append(

@@ -12,6 +12,7 @@ from bowdenfit.kinds.term import Term
 from bowdenfit.kinds.terms import term_kind
 
 RUN, STROKE = "Run", "Stroke"
+_ONE_PLACE = 0.02  # of all route values, within which those of a run are one
 
 
 @dataclass(frozen=True)
@@ -61,7 +62,7 @@ def _of_kind(dataset: Dataset, term: Term) -> tuple[Mapping[str, np.ndarray], np
 
 
 def route_values(term: Term) -> np.ndarray | None:
-    """Route value of each reading: of its row, of its curve's reading, or the mean over its run."""
+    """Route value of each reading: of its row, of its curve's reading, or of its run, NaN where that is at several."""
     data, n = term.data, len(term.labels)
     at = data.get("route")
     if at is None:
@@ -71,7 +72,8 @@ def route_values(term: Term) -> np.ndarray | None:
     values = np.asarray(at, dtype=float)
     if "run" not in data:
         return values if len(values) == n else None
-    return np.array([values[data["run"] == run].mean() for run in range(n)])
+    of_run = [values[data["run"] == run] for run in range(n)]
+    return np.array([each.mean() if np.ptp(each) <= _ONE_PLACE * np.ptp(values) else np.nan for each in of_run])
 
 
 def _flat(by_curve: Mapping[str, Any]) -> np.ndarray:

@@ -19,9 +19,14 @@ class LogDensity:
 
     Data are arguments of its functions, not constants inside them, so that other data of the same shape need no new
     compilation. Needs 64-bit floats: `jax.enable_x64(True)`.
+
+    Args:
+        model: The model.
+        given: Data of all terms in place of the model's own, of the same shapes.
     """
 
     model: Model
+    given: Any = None
 
     def __post_init__(self) -> None:
         if jnp.zeros(()).dtype != jnp.float64:
@@ -33,7 +38,7 @@ class LogDensity:
     @cached_property
     def data(self) -> tuple[dict[str, Any], ...]:
         """Data of all terms, in their order."""
-        return tuple(term.data for term in self.model.terms)
+        return tuple(term.data for term in self.model.terms) if self.given is None else self.given
 
     @cached_property
     def padded(self) -> tuple[dict[str, Any], ...]:

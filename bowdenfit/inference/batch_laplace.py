@@ -1,0 +1,193 @@
+"""Maxima of many posteriors at once, and mixtures of Student-t's about them to draw from.
+
+The maxima are those of the log density itself, noise scales included, climbed to from several starts. Posteriors of few
+readings are funnels: where readings scatter more, everything else is wider. So each noise scale is also held aside of its
+maximum, the density maximized over all the rest, and the curvature taken there. A few draws come from the prior, which
+bounds the importance weights.
+
+References:
+    Owen and Zhou 2000, "Safe and effective importance sampling" (Journal of the American Statistical Association 95).
+"""
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from math import lgamma
+
+import numpy as np
+
+Gradients = Callable[[np.ndarray], tuple[np.ndarray, np.ndarray]]
+
+STARTS = 4  # places that each density is climbed from: the prior medians, and draws of the prior
+_ASIDE = (-2.0, 1.5, 3.0)  # standard deviations from its maximum at which each noise scale is held
+_MOST_STEPS, _DIFFERENCE = 60, 1e-5
+_FLAT = 0.2  # least curvature that is believed; the prior's is 1
+_LONGEST = 3.0  # step, in standard deviations of the prior
+_TOP = 1e-9  # gain that a step promises at which the top is reached
+_STUCK = 1e8  # damping at which no step gains anything
+_FREEDOM = 5  # of the Student-t's
+_LEAST_SHARE, _PRIOR_SHARE = 0.02, 0.05  # of the draws, of each part and of the prior
+
+
+@dataclass(frozen=True)
+class Tops:
+    """Where climbs ended: z (cable, climb, parameter), log densities (cable, climb), and minus their second derivatives."""
+
+    z: np.ndarray
+    value: np.ndarray
+    curvature: np.ndarray
+
+
+def points_of_climb(size: int) -> int:
+    """Gradients of one density that a step of all its climbs asks for."""
+    return STARTS * (2 * size + 1)
+
+
+def climb(gradients: Gradients, z: np.ndarray, free: np.ndarray) -> Tops:
+    """Newton's method, damped, with differences of gradients; each climb by itself.
+
+    Args:
+        gradients: Log densities and their gradients, at `points_of_climb` points (cable, point, parameter).
+        z: Starts, (cable, climb, parameter).
+        free: 1 for what moves, 0 for what is held, (climb, parameter).
+    """
+    held = np.eye(z.shape[2]) * (1 - free)[:, None, :]
+    z, (value, slope, curvature) = z, _around(gradients, z)
+    damping, active = np.zeros(z.shape[:2]), np.isfinite(value)
+    for _ in range(_MOST_STEPS):
+        sizes, axes = np.linalg.eigh(curvature * free[:, :, None] * free[:, None, :] + held)
+        along = (
+            (slope * free)[..., None, :] @ axes / (np.maximum(np.abs(sizes), _FLAT) + damping[..., None])[..., None, :]
+        )
+        step = (axes @ along.swapaxes(-1, -2))[..., 0]
+        active &= (np.sum(slope * free * step, axis=-1) > _TOP) & (damping < _STUCK)
+        if not active.any():
+            break
+        step *= np.minimum(1.0, _LONGEST / np.maximum(np.abs(step).max(axis=-1, keepdims=True), _TOP))
+        trial = _around(gradients, z + step)
+        better = active & (trial[0] > value)
+        z, value = np.where(better[..., None], z + step, z), np.where(better, trial[0], value)
+        slope = np.where(better[..., None], trial[1], slope)
+        curvature = np.where(better[..., None, None], trial[2], curvature)
+        damping = np.where(better, damping / 10, np.maximum(damping, 0.1) * 10)
+    return Tops(z, value, curvature)
+
+
+def _around(gradients: Gradients, z: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Log densities, gradients and minus second derivatives; where they cannot be computed, minus infinity and 0."""
+    cables, climbs, size = z.shape
+    moves = _DIFFERENCE * np.concatenate([np.zeros((1, size)), np.eye(size), -np.eye(size)])
+    value, slope = (np.asarray(part) for part in gradients((z[:, :, None] + moves).reshape(cables, -1, size)))
+    value, slope = value.reshape(cables, climbs, -1), slope.reshape(cables, climbs, -1, size)
+    curvature = (slope[:, :, size + 1 :] - slope[:, :, 1 : size + 1]) / (2 * _DIFFERENCE)
+    curvature = (curvature + curvature.swapaxes(-1, -2)) / 2
+    known = (
+        np.isfinite(value[..., 0]) & np.isfinite(slope).all(axis=(-1, -2)) & np.isfinite(curvature).all(axis=(-1, -2))
+    )
+    known_slope = np.where(known[..., None], slope[:, :, 0], 0.0)
+    return np.where(known, value[..., 0], -np.inf), known_slope, np.where(known[..., None, None], curvature, 0.0)
+
+
+@dataclass(frozen=True)
+class Mixture:
+    """Student-t's and the prior.
+
+    Args:
+        center: Of every part, (part, parameter).
+        root: A root R of its scale matrix R R^T.
+        share: Of the draws that are not the prior's.
+    """
+
+    center: np.ndarray
+    root: np.ndarray
+    share: np.ndarray
+
+    def draw(self, generator: np.random.Generator, count: int) -> np.ndarray:
+        """So many z, one a row."""
+        size = self.center.shape[1]
+        ends = np.cumsum(self.share) * (1 - _PRIOR_SHARE)
+        part = np.searchsorted(ends, (np.arange(count) + generator.uniform()) / count)  # each part gets its share
+        z = generator.standard_normal((count, size))
+        wide = np.sqrt(_FREEDOM / generator.chisquare(_FREEDOM, count))
+        for i in range(len(self.share)):
+            here = part == i
+            z[here] = self.center[i] + wide[here, None] * (z[here] @ self.root[i].T)
+        return z
+
+    def log_density(self, z: np.ndarray) -> np.ndarray:
+        """Of every row."""
+        size = z.shape[1]
+        constant = lgamma((_FREEDOM + size) / 2) - lgamma(_FREEDOM / 2) - size / 2 * np.log(_FREEDOM * np.pi)
+        logs = [np.log(_PRIOR_SHARE) - 0.5 * np.sum(z**2 + np.log(2 * np.pi), axis=1)]
+        for center, root, share in zip(self.center, self.root, self.share, strict=True):
+            squares = np.sum(((z - center) @ np.linalg.inv(root).T) ** 2, axis=1)
+            weight = np.log(share * (1 - _PRIOR_SHARE)) + constant - np.linalg.slogdet(root)[1]
+            logs.append(weight - (_FREEDOM + size) / 2 * np.log1p(squares / _FREEDOM))
+        return np.logaddexp.reduce(logs, axis=0)
+
+
+def starting_points(size: int, seeds: np.ndarray) -> np.ndarray:
+    """Where to climb from, (cable, climb, parameter)."""
+    others = [np.random.default_rng([int(seed), 0]).standard_normal((STARTS - 1, size)) for seed in seeds]
+    return np.concatenate([np.zeros((len(seeds), 1, size)), np.stack(others)], axis=1)
+
+
+def mixtures(gradients: Gradients, noise: np.ndarray, seeds: np.ndarray) -> list[Mixture | None]:
+    """For every cable what its draws are proposed from; None where its density cannot be computed from any start.
+
+    Args:
+        gradients: See `climb`.
+        noise: Which parameters are noise scales.
+        seeds: Of every cable.
+    """
+    size = len(noise)
+    tops = climb(gradients, starting_points(size, seeds), np.ones((STARTS, size)))
+    best = tops.z[np.arange(len(seeds)), np.argmax(tops.value, axis=1)]
+    spread = np.stack([_spread(tops, cable) for cable in range(len(seeds))])
+    aside = []
+    for which in np.flatnonzero(noise):
+        unit = np.arange(size) == which
+        starts = best[:, None] + np.array([*_ASIDE, 0.0])[:, None] * spread[:, None] * unit
+        aside.append((unit.astype(float), climb(gradients, starts, np.tile(1.0 - unit, (STARTS, 1)))))
+    found = [_mixture(tops, aside, spread, cable) for cable in range(len(seeds))]
+    return [mixture if np.isfinite(tops.value[i]).any() else None for i, mixture in enumerate(found)]
+
+
+def _spread(tops: Tops, cable: int) -> np.ndarray:
+    best = int(np.argmax(tops.value[cable]))
+    return np.linalg.norm(_root(tops.curvature[cable, best]), axis=1)
+
+
+def _mixture(tops: Tops, aside: list[tuple[np.ndarray, Tops]], spread: np.ndarray, cable: int) -> Mixture:
+    """The tops of a cable and the places aside of the best, by how much mass is about each."""
+    parts = [(tops.z[cable, i], _root(tops.curvature[cable, i]), tops.value[cable, i]) for i in range(STARTS)]
+    for unit, found in aside:
+        width = float(spread[cable] @ unit)
+        parts += [
+            (found.z[cable, i], _held_root(found.curvature[cable, i], unit, width), found.value[cable, i])
+            for i in range(len(_ASIDE))
+        ]
+    center, root, value = (np.array(part) for part in zip(*parts, strict=True))
+    mass = value + np.linalg.slogdet(root)[1]
+    usable = np.isfinite(mass)
+    if not usable.any():
+        return Mixture(center, root, np.full(len(mass), 1 / len(mass)))
+    share = np.exp(mass[usable] - mass[usable].max())
+    share = np.maximum(share / share.sum(), _LEAST_SHARE)
+    return Mixture(center[usable], root[usable], share / share.sum())
+
+
+def _root(curvature: np.ndarray) -> np.ndarray:
+    """Root of the covariance of a curvature, no wider in any direction than the least that is believed."""
+    sizes, axes = np.linalg.eigh(curvature)
+    return axes / np.sqrt(np.maximum(sizes, _FLAT))
+
+
+def _held_root(curvature: np.ndarray, unit: np.ndarray, width: float) -> np.ndarray:
+    """The same where one coordinate is held at a place and spreads by a width: the others follow it."""
+    which, free = int(np.argmax(unit)), np.flatnonzero(unit == 0)
+    root = np.zeros_like(curvature)
+    rest = _root(curvature[np.ix_(free, free)])
+    root[np.ix_(free, free)] = rest
+    root[free, which] = -width * rest @ (rest.T @ curvature[free, which])
+    root[which, which] = width
+    return root

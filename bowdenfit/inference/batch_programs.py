@@ -1,0 +1,113 @@
+"""What a batch of data sets is fitted with: settings, and programs compiled once for all data of one shape."""
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, field
+from functools import cached_property
+from typing import Any
+
+import jax
+import numpy as np
+
+from bowdenfit.description import SamplerSettings
+from bowdenfit.inference.batch_ensembles import make_round
+from bowdenfit.inference.batch_laplace import points_of_climb
+from bowdenfit.inference.compilation import compile_program
+from bowdenfit.inference.log_density import LogDensity
+from bowdenfit.inference.objective import noise_scales
+
+CHUNK = 16  # data sets that a program takes at once; always as many, so that rounding is the same
+BLOCK = 512  # draws of each of them at once
+
+
+@dataclass(frozen=True)
+class BatchSettings:
+    """How carefully a batch is fitted.
+
+    Args:
+        sampler: Ensembles, their walkers (a power of two), most steps, and targets; those of NUTS where it is needed.
+        n_draws: Weighted draws of every data set.
+        n_kept: Draws of equal weight that are made of those.
+        nuts: Whether NUTS takes what the ensembles leave.
+        threads: How many chunks at once; as many as there are cores if omitted.
+    """
+
+    sampler: SamplerSettings = field(
+        default_factory=lambda: SamplerSettings(
+            n_ensembles=2, n_walkers=128, max_steps=6000, target_ess=400, target_r_hat=1.03
+        )
+    )
+    n_draws: int = 4096
+    n_kept: int = 2048
+    nuts: bool = True
+    threads: int = 0
+
+    def __post_init__(self) -> None:
+        walkers = self.sampler.n_walkers
+        if walkers & (walkers - 1):
+            raise ValueError(f"an ensemble of a batch needs a power of two of walkers, such as 128, and not {walkers}.")
+        if self.n_draws % BLOCK:
+            raise ValueError(
+                f"weighted draws of a batch come in blocks of {BLOCK}; {self.n_draws} are no multiple of it."
+            )
+
+
+@dataclass(frozen=True)
+class BatchPrograms:
+    """What is compiled for data of one shape; may serve several batches.
+
+    Args:
+        posterior: Its model is that of all data sets.
+        settings: How carefully they are fitted.
+    """
+
+    posterior: LogDensity
+    settings: BatchSettings
+
+    @cached_property
+    def _data(self) -> Any:
+        return stack([self.posterior.data] * CHUNK)
+
+    def _of_points(self, function: Callable[..., Any], count: int) -> Callable[..., Any]:
+        """Compiled: what a function of z and data gives at so many points of each data set."""
+        shape = jax.ShapeDtypeStruct((CHUNK, count, self.posterior.model.space.size), np.dtype(float))
+        return compile_program(jax.vmap(jax.vmap(function, (0, None))), shape, self._data)
+
+    @cached_property
+    def gradients(self) -> Callable[..., Any]:
+        """Log density and gradient, for climbing."""
+        points = points_of_climb(self.posterior.model.space.size)
+        return self._of_points(jax.value_and_grad(self.posterior.log_density), points)
+
+    @cached_property
+    def densities(self) -> Callable[..., Any]:
+        """Log density of a block of draws."""
+        return self._of_points(self.posterior.log_density, BLOCK)
+
+    @cached_property
+    def ensembles(self) -> Callable[..., Any]:
+        """A round of all walkers."""
+        sampler = self.settings.sampler
+        return make_round(self.posterior, sampler.n_ensembles, sampler.n_walkers, self._data)
+
+    @cached_property
+    def nuts(self) -> Callable[..., Any]:
+        """NUTS of one data set."""
+        from bowdenfit.inference.nuts import make_program
+
+        return make_program(self.posterior, self.settings.sampler)
+
+    @cached_property
+    def noise(self) -> np.ndarray:
+        """Which parameters are noise scales."""
+        return noise_scales(self.posterior)
+
+    @cached_property
+    def names(self) -> tuple[str, ...]:
+        """Of the parameters, in the order of z."""
+        return tuple(p.name for p in self.posterior.model.space.free)
+
+
+def stack(trees: Sequence[Any]) -> Any:
+    """Data of several data sets, along a new first axis, and the last again up to a whole chunk."""
+    padded = [*trees, *[trees[-1]] * (CHUNK - len(trees))]
+    return jax.tree.map(lambda *leaves: np.stack(leaves), *padded)

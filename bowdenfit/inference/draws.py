@@ -1,6 +1,6 @@
 """Everything that each draw of the posterior implies: named values, curves, replicated readings."""
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from typing import Any
 
 import jax
@@ -94,9 +94,9 @@ def curves_of(model: Model, route: np.ndarray) -> Callable[[Float[Array, " free"
 
 
 def output_force_at(
-    model: Model, z: np.ndarray, route: np.ndarray, input_force: float, stroke: int, mounting: np.ndarray
-) -> np.ndarray:
-    """Output force [N] of every draw (rows) at route values (columns), at the reference speed.
+    model: Model, z: np.ndarray, route: np.ndarray, input_force: float, stroke: int, mountings: Sequence[np.ndarray]
+) -> list[np.ndarray]:
+    """Output force [N] of every draw (rows) at route values (columns), at the reference speed, in each of some mountings.
 
     Args:
         model: The model.
@@ -104,7 +104,7 @@ def output_force_at(
         route: Route values; any one number where the cable has no route.
         input_force: Force at the motor side [N].
         stroke: +1 pulling, -1 return.
-        mounting: Effect of the mounting on the friction exponent of each draw [1].
+        mountings: Effect of each mounting on the friction exponent of each draw [1].
     """
     at = jnp.asarray(np.atleast_1d(route), dtype=float)
 
@@ -113,7 +113,8 @@ def output_force_at(
         force_in, direction = jnp.asarray(float(input_force)), jnp.asarray(float(stroke))
         return model.cable.output_force_at(values, at, force_in, direction, z_and_mounting[-1])
 
-    return for_each_draw(force, model.space.size + 1)(np.column_stack([z, mounting]))
+    program = for_each_draw(force, model.space.size + 1)
+    return [program(np.column_stack([z, mounting])) for mounting in mountings]
 
 
 def efficiency_at(model: Model, z: np.ndarray, route: np.ndarray) -> np.ndarray:

@@ -2,11 +2,14 @@
 
 from collections.abc import Mapping, Sequence
 from pathlib import Path
-from typing import Any, TypeAlias
+from typing import TYPE_CHECKING, Any, TypeAlias
 
 import numpy as np
 
 from bowdenfit.results.folder import replace_when_whole
+
+if TYPE_CHECKING:
+    import h5py
 
 Groups: TypeAlias = dict[str, dict[str, np.ndarray]]
 Coordinates: TypeAlias = Mapping[str, tuple[str, ...]]
@@ -69,11 +72,35 @@ def _text() -> Any:
 
 
 def read_groups(path: Path) -> Groups:
-    """Arrays of posterior.nc by group and name."""
-    import xarray
+    """Arrays of posterior.nc by group and name, in the order in which they were written.
 
-    with xarray.open_datatree(path, engine="h5netcdf") as tree:
+    Read as the HDF5 that they are: the libraries that give them their labels take longer to load than the draws to read.
+    """
+    import h5py
+
+    with h5py.File(path) as file:
         return {
-            group: {name: np.asarray(tree[group][name].values) for name in map(str, tree[group].data_vars)}
-            for group in tree.children
+            group: {name: _array(file[group][name]) for name in _members(file[group]) if not _is_label(file[group][name])}
+            for group in _members(file)
+            if isinstance(file[group], h5py.Group)
         }
+
+
+def _members(group: "h5py.Group") -> list[str]:
+    """Names in a group, in the order in which they came."""
+    import h5py
+
+    names: list[bytes] = []
+    group.id.links.iterate(names.append, idx_type=h5py.h5.INDEX_CRT_ORDER)
+    return [name.decode() for name in names]
+
+
+def _is_label(member: "h5py.Dataset") -> bool:
+    """Whether a dataset labels a dimension of others."""
+    import h5py
+
+    return bool(h5py.h5ds.is_scale(member.id))
+
+
+def _array(member: "h5py.Dataset") -> np.ndarray:
+    return np.asarray(member[()], dtype=bool if member.attrs.get("dtype") == "bool" else None)

@@ -18,7 +18,7 @@ from bowdenfit.inference.samplers import SamplerAgreement
 from bowdenfit.model import Model, build_model
 from bowdenfit.results.choices import at_edge, best_window, rank_choices
 from bowdenfit.results.length import OptimalLength
-from bowdenfit.results.optimum import route_grid
+from bowdenfit.results.optimum import GRID_POINTS, route_grid
 
 OPTIMAL_LENGTH, OPTIMAL_EFFICIENCY = "optimal_length", "optimal_efficiency"
 Answer = TypeVar("Answer")
@@ -133,15 +133,17 @@ class Record:
 
     @cached_property
     def _curves(self) -> dict[str, np.ndarray]:
-        """Efficiency and wrap angles of every draw on the grid of the route."""
+        """Efficiency and wrap angles of every draw on the grid of the route, and after it at the choices."""
+        route = self.dataset.description.route
+        assert route is not None  # checked by the callers
         with jax.enable_x64(True):
-            curves = curves_of(self.model, route_grid(self.model))
+            curves = curves_of(self.model, np.concatenate([route_grid(self.model), route.choices]))
             return for_each_draw(curves, self.model.space.size)(self.draws().flat_z)
 
     def curves(self) -> tuple[np.ndarray, dict[str, np.ndarray]]:
         """Route values, and by name the efficiency [1] and wrap angles [deg] of every draw (rows) there."""
         self._needs_route()
-        return route_grid(self.model), self._curves
+        return route_grid(self.model), {name: draws[:, :GRID_POINTS] for name, draws in self._curves.items()}
 
     def efficiency(self, lengths: float | Iterable[float] | None = None) -> list[Interval]:
         """Efficiency at values of the route variable, with intervals.
@@ -179,7 +181,7 @@ class Record:
         lengths, best = drawn.optimum[OPTIMAL_LENGTH].ravel(), drawn.optimum[OPTIMAL_EFFICIENCY].ravel()
         grid, curves = self.curves()
         choices = np.asarray(route.choices)
-        ranked = rank_choices(choices, self.efficiency_draws(choices)) if len(choices) else ()
+        ranked = rank_choices(choices, self._curves["efficiency"][:, GRID_POINTS:]) if len(choices) else ()
         return OptimalLength(
             route.variable,
             route.unit,

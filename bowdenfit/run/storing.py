@@ -20,6 +20,7 @@ if TYPE_CHECKING:
 def write_results(found: "Fit", folder: Path, figures: bool, helper: Assistant) -> None:
     """All files of the results folder, as far as possible at the same time; fit.json comes last of the fit's own."""
     from bowdenfit.questions.figures import draw_figure, figures_of
+    from bowdenfit.questions.kept import answers_of
     from bowdenfit.questions.summary.words import summary_text
     from bowdenfit.results.folder import FIGURES, SUMMARY_TEXT, write_text
     from bowdenfit.results.store import save
@@ -27,8 +28,11 @@ def write_results(found: "Fit", folder: Path, figures: bool, helper: Assistant) 
     if found.posterior is None:
         clear(folder)
     place, shown = folder / FIGURES, figures_of(found) if figures else ()
-    drawn = [helper.submit(draw_figure, name, data, place) for name, data in shown]  # while the next is worked out
-    save(found, found.summary(), folder, force=True)
+    data, drawn = {}, []
+    for name, one in shown:
+        data[name] = one
+        drawn.append(helper.submit(draw_figure, name, one, place))  # while the next is worked out
+    save(found, found.summary(), folder, True, answers_of(found), data)
     write_text(folder / SUMMARY_TEXT, summary_text(found))
     for figure in drawn:
         figure.result()

@@ -10,6 +10,7 @@ import matplotlib as mpl
 import numpy as np
 import pytest
 from figure_words import check_words, words
+from kept_data import assert_kept
 from matplotlib.collections import PolyCollection
 
 import bowdenfit as bf
@@ -477,3 +478,8 @@ def test_drawing_loads_neither_jax_nor_pyplot(tmp_path):
 
 def test_the_quantiles_of_the_bands_are_those_that_the_legends_name():
     assert BAND_QUANTILES == (0.05, 0.25, 0.5, 0.75, 0.95)
+
+
+@pytest.mark.parametrize("case", CASES)
+def test_data_come_back_from_the_file_in_which_they_are_kept(case, tmp_path):
+    assert_kept(CASES[case](), tmp_path / "figures.npz")

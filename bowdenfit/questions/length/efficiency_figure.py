@@ -22,10 +22,10 @@ from bowdenfit.plots.style import (
     percent,
     rounded_texts,
 )
+from bowdenfit.results.length import OptimalLength
 
 if TYPE_CHECKING:
     from bowdenfit.plots.layout import Axes, Figure
-    from bowdenfit.results.length import OptimalLength
     from bowdenfit.results.record import Record
 
 # marker, its size [pt] and label

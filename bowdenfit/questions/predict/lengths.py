@@ -38,10 +38,8 @@ def predict_at_lengths(
         per = force
     z = fit.draws().flat_z
     with jax.enable_x64(True):
-        mean, mounted = (
-            output_force_at(fit.model, z, lengths, force, sign, mounting) / per
-            for mounting in (np.zeros(len(z)), _mounting(fit, len(z)))
-        )
+        forces = output_force_at(fit.model, z, lengths, force, sign, (np.zeros(len(z)), _mounting(fit, len(z))))
+    mean, mounted = (found / per for found in forces)
     rows = []
     for i, length in enumerate(lengths):
         row: dict[str, Any] = {} if route is None else {f"{route.variable}_{route.unit}": float(length)}

@@ -33,6 +33,7 @@ from bowdenfit.files.text_file import (
 LARGEST_BYTES = 2 << 30
 _FIRST_BYTES = 1 << 18
 _LAST_BYTES = 1 << 16
+_LAST_ROWS = 200  # with all that may stand below the data
 _ROWS_AT_ONCE = 200_000
 _MARKS = sorted({form for mark in MISSING for form in (mark, mark.upper(), mark.capitalize(), mark.title())})
 
@@ -58,7 +59,7 @@ def read(path: Path) -> ChannelFile:
     data = first_bytes(path, _FIRST_BYTES)
     refuse_larger(path, LARGEST_BYTES, "convert it to Parquet with the needed columns only, or cut it into runs")
     sheet = start_of(path, data)
-    last = last_lines(path, sheet.encoding, sheet.start, _LAST_BYTES)
+    last = last_lines(path, sheet.encoding, sheet.start, _LAST_BYTES)[-_LAST_ROWS:]
     cut = _is_cut(last[-51:], sheet.separator)
     stop = last[-1].start if cut else path.stat().st_size
     if stop <= sheet.start:

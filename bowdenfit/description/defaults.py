@@ -3,17 +3,23 @@
 from math import hypot
 from typing import Annotated, Any, Literal
 
-from pydantic import Field, model_validator
+from pydantic import BeforeValidator, Field, model_validator
 
 from bowdenfit.description.values import Frozen, LogNormalPrior, NonNegative, Positive, QuantityValue
 
 Sampler = Literal["emcee", "nuts", "both"]
+_OR_ZERO = BeforeValidator(lambda said: {"value": 0.0, "unit": "N"} if said == 0 else said)  # 0 needs no unit
 
 
 class Sensors(Frozen):
-    """What the data sheets of the load cells say: of each cell its relative gain error, one standard deviation."""
+    """What the data sheets of the load cells say: of each cell its relative gain error, one standard deviation.
+
+    Both cells have the same noise unless `input_force_noise` says what the input's is: 0 of a weight that hangs there, or
+    that of a better cell, beside `force_noise`, which is then the output's.
+    """
 
     force_noise: QuantityValue | None = None
+    input_force_noise: Annotated[QuantityValue | None, _OR_ZERO] = None
     input_gain_error_sd: NonNegative | None = None
     output_gain_error_sd: NonNegative | None = None
     offset_sd: QuantityValue | None = None
@@ -38,6 +44,26 @@ class Sensors(Frozen):
         if len(missing) == 1:
             raise ValueError(f"write {missing[0]} too, that of the cell at the other end (0 for a hung weight)")
         return self
+
+    @model_validator(mode="after")
+    def _ratio_known(self) -> "Sensors":
+        of_input, of_output = self.input_force_noise, self.force_noise
+        if of_input is not None and (of_input.value < 0 or of_input.sd is not None):
+            raise ValueError("input_force_noise is a standard deviation without one of its own; write 0 or more, without sd")
+        if of_input is not None and of_input.value > 0 and (of_output is None or not of_output.value > 0):
+            raise ValueError(
+                "input_force_noise needs force_noise beside it, the noise of the output's cell, so that their ratio is known; "
+                "write 0 for a hung weight, which has none"
+            )
+        return self
+
+    @property
+    def noise_ratio(self) -> float:
+        """Noise of an input's reading over that of an output's [1]."""
+        of_input, of_output = self.input_force_noise, self.force_noise
+        if of_input is None:
+            return 1.0
+        return of_input.to("force") / of_output.to("force") if of_input.value and of_output is not None else 0.0
 
     @property
     def gain_sd(self) -> float | None:

@@ -112,7 +112,8 @@ def run_readings(
         shift = mounted[:, None] * cable.friction.rate(values, velocity)
         output = cable.friction.output_force(values, force, shift, stroke)
         cells, noise = LoadCells.of(values), values[design.noise] / jnp.sqrt(jnp.asarray(design.worth))
-        read_in = cells.shown_input(force) + noise * jax.random.normal(of_input, output.shape)
+        of_weight = noise * cable.description.sensors.noise_ratio
+        read_in = cells.shown_input(force) + of_weight * jax.random.normal(of_input, output.shape)
         read_out = cells.shown_output(output) + noise * jax.random.normal(of_output, output.shape)
         ratio = jnp.log(jnp.maximum(read_in, LEAST_FORCE) / jnp.maximum(read_out, LEAST_FORCE))
         return ((stroke * ratio) @ fit).ravel()

@@ -32,9 +32,9 @@ class RunsTerm:
 
     .. math:: r_{ij} = \rho_{ij}(\Lambda_{ij} + m_i), \quad m_i \sim \text{Normal}(0, \tau), \quad
               e_{ij} \sim \text{Normal}(0, \sigma_F / \sqrt{w_{ij}}), \quad
-              w = 1 / (F_\text{in}^{-2} + F_\text{out}^{-2})
+              w = 1 / (\rho^2 F_\text{in}^{-2} + F_\text{out}^{-2})
 
-    where rho is the log ratio that the load cells show at a friction exponent: the exponent itself, the gain error and what
+    where rho_ij is the log ratio that the load cells show at a friction exponent: the exponent itself, the gain error and what
     a delay between the two adds, for the capstan equation and exact zeros; else a function of the load, taken to first
     order in m. The mounting effect m is
     integrated out. Readings of one run at the same angles and stroke (and, where it matters, the same load and speed) are
@@ -172,8 +172,8 @@ class SlidingRows:
     """Readings taken while the rope slides, in the order of the table.
 
     Args:
-        input_force, output_force: Forces [N].
-        log_ratio: s log(F_in/F_out) [1].
+        input_force, output_force: Forces, those of tables as `expected_forces` has them [N].
+        log_ratio: s log(F_in/F_out) of the readings, without what noise adds to it [1].
         stroke: +1 pulling, -1 return.
         run: Number of the run.
         velocity: Velocity; NaN where it is not known.
@@ -196,7 +196,8 @@ class SlidingRows:
 def run_sums(cable: Cable, rows: SlidingRows) -> dict[str, Any]:
     """Readings reduced to cells, cells to runs: all that the likelihood needs, whatever the number of readings."""
     cell, first = _cells(cable, rows)
-    weight = rows.worth / (1 / rows.input_force**2 + 1 / rows.output_force**2)
+    noise_ratio = cable.description.sensors.noise_ratio
+    weight = rows.worth / (noise_ratio**2 / rows.input_force**2 + 1 / rows.output_force**2)
     cell_weight = np.bincount(cell, weight)
 
     def mean(values: np.ndarray) -> np.ndarray:

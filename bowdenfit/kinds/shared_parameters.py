@@ -16,9 +16,11 @@ def run_scatter(at: Circumstances) -> Parameter:
     return Parameter(RUN_SCATTER, r"$\tau$", meaning, "noise", HalfNormal(at.defaults.run_scatter))
 
 
-def force_noise(at: Circumstances, meaning: str) -> Parameter:
-    """Noise of a force reading: free, or as the data sheet says, with its standard deviation or without."""
+def force_noise(at: Circumstances, meaning: str = "standard deviation of a force reading") -> Parameter:
+    """Noise of a force reading, the output's: free, or as the data sheet says, with its standard deviation or without."""
     stated, prior = at.description.sensors.force_noise, HalfNormal(at.defaults.force_noise_newtons)
+    ratio = at.description.sensors.noise_ratio
+    meaning += "" if ratio == 1 else f" at the output; at the input {f'{ratio:.3g} times that' if ratio else 'none'}"
     free = Parameter(FORCE_NOISE, r"$\sigma_F$", meaning, "noise", prior, "N")
     if stated is None:
         return free

@@ -252,7 +252,7 @@ def _whole(model: Model, recordings, censored=False) -> WholeRecordingsTerm:
     """The play operator run at every evaluation, also where sums would do."""
     of_all = Recordings(("angle",), tuple(recordings), "mm/s")
     angles = row_angles(model.description, recorded_angles(of_all), None).data
-    return WholeRecordingsTerm(model.cable, pad_recordings(of_all, angles, censored), of_all.runs)
+    return WholeRecordingsTerm(model.cable, pad_recordings(of_all, angles, censored, 1.0), of_all.runs)
 
 
 NOISY = Faults(input_noise=0.2, output_noise=0.2)

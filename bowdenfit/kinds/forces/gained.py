@@ -101,7 +101,7 @@ def gains(table: ForceTable, description: Description) -> Gained | None:
     excess = log_gain - _allowed(force_in, force_out, description)
     if not np.any(excess > 0):
         return None
-    weight = 1 / (1 / force_in**2 + 1 / force_out**2)
+    weight = 1 / ((description.sensors.noise_ratio / force_in) ** 2 + 1 / force_out**2)
     places = np.nan_to_num(np.column_stack([table.route[rows], table.own.angle[rows]]))
     keys = np.column_stack([table.run[rows], stroke, places])
     cell = np.unique(keys, axis=0, return_inverse=True)[1].ravel()

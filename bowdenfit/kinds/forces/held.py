@@ -22,9 +22,10 @@ class HeldForcesTerm:
 
     .. math:: \log\left[\Phi\left(\frac{\Lambda - r}{s}\right) - \Phi\left(\frac{-\Lambda - r}{s}\right)\right],
               \quad r = g(F_\text{in}) - g(F_\text{out}), \quad
-              s^2 = \tau^2 + \sigma_F^2 (g'(F_\text{in})^2 + g'(F_\text{out})^2)
+              s^2 = \tau^2 + \sigma_F^2 (\rho^2 g'(F_\text{in})^2 + g'(F_\text{out})^2)
 
-    with g the scale on which friction is a shift, log F for the capstan equation. It is a bound, not a measurement: where
+    with g the scale on which friction is a shift, log F for the capstan equation, and rho the noise of the input over that of
+    the output. It is a bound, not a measurement: where
     inside the band a force comes to rest is not modeled, so a coefficient that rests on held readings alone has a posterior
     that is its prior above the largest of them, and its intervals must not be read as those of a measured value.
 
@@ -56,7 +57,8 @@ class HeldForcesTerm:
         friction, cells = self.cable.friction, LoadCells.of(values)
         input_force = cells.true_input(data["input_force"], LEAST_FORCE)
         output_force = cells.true_output(data["output_force"], LEAST_FORCE)
-        slopes = friction.slope(values, input_force) ** 2 + friction.slope(values, output_force) ** 2
+        of_input = self.cable.description.sensors.noise_ratio * friction.slope(values, input_force)
+        slopes = of_input**2 + friction.slope(values, output_force) ** 2
         difference = friction.scaled(values, input_force) - friction.scaled(values, output_force)
         return difference, slopes * values[FORCE_NOISE] ** 2
 

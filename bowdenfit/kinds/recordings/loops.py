@@ -90,7 +90,8 @@ def loop_recordings_term(
         labels: Each run in words.
         censored: Whether a saturated output counts as one beyond the end of the range.
     """
-    parts = [_blocks(r, censored) for r in recordings.each]
+    noise_ratio = cable.description.sensors.noise_ratio
+    parts = [_blocks(r, censored, noise_ratio) for r in recordings.each]
     data = side_by_side(recordings, parts, angles)
     moving = beside([p["moving"] for p in parts], "constant")
     of_run = np.bincount(data["run"], np.abs(moving).sum(axis=0))
@@ -111,7 +112,7 @@ def loop_recordings_term(
     )
 
 
-def _blocks(recording: Recording, censored: bool) -> dict[str, Any]:
+def _blocks(recording: Recording, censored: bool, noise_ratio: float) -> dict[str, Any]:
     """Blocks of one recording, joined inside their phases where there are many.
 
     `moving` is the number of samples that show the loss, with the sign of the motion.
@@ -121,7 +122,7 @@ def _blocks(recording: Recording, censored: bool) -> dict[str, Any]:
     stroke = strokes.stroke[groups.starts]
     used = strokes.used_sliding & ~blocks.saturated
     return arrays | {
-        "weight": arrays["worth"] / (1 + _input_share(recording, arrays["input_force"], stroke) ** 2),
+        "weight": arrays["worth"] / (1 + (noise_ratio * _input_share(recording, arrays["input_force"], stroke)) ** 2),
         "moving": stroke * np.add.reduceat(blocks.samples * used, groups.starts).astype(float),
     }
 

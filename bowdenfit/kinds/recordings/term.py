@@ -61,13 +61,13 @@ def recordings_term(
         return RunsTerm(cable, run_sums(cable, _rows(recordings, parts, rows)), labels, RECORDED, BLOCK_NOISE)
     for recording in recordings.each:
         _needs_reversal(recording)
-    censored = _censored(settings, recordings)
+    censored, noise_ratio = _censored(settings, recordings), cable.description.sensors.noise_ratio
     if not (cable.friction.options or cable.description.fits_offsets or censored):
         # On a scale that no parameter changes, the operator is linear in the exponent: it need not be run again.
-        parts = [_all_blocks(r) for r in recordings.each]
+        parts = [_all_blocks(r, noise_ratio) for r in recordings.each]
         _needs_blocks(recordings, parts)
         return RunsTerm(cable, run_sums(cable, _rows(recordings, parts, rows)), labels, RECORDED, BLOCK_NOISE)
-    return WholeRecordingsTerm(cable, pad_recordings(recordings, rows, censored), labels)
+    return WholeRecordingsTerm(cable, pad_recordings(recordings, rows, censored, noise_ratio), labels)
 
 
 def _censored(settings: RecordingsTable, recordings: Recordings) -> bool:
@@ -120,7 +120,7 @@ def _sliding_blocks(recording: Recording) -> _Part:
     return _Part(used, stroke, ratio, worth_of(recording, used))
 
 
-def _all_blocks(recording: Recording) -> _Part:
+def _all_blocks(recording: Recording, noise_ratio: float) -> _Part:
     r"""Every block after the rope first slid, as the log ratio it would show had it gone on sliding.
 
     Between contacts the output stands still where the last stroke left it, :math:`y = y(\hat\Lambda) - s (\Lambda -
@@ -134,7 +134,7 @@ def _all_blocks(recording: Recording) -> _Part:
     used, stroke = np.flatnonzero(kept_at)[kept], last[kept]
     ratio = strokes.exponent - stroke * (y - followed)[kept]
     force_in, force_out = blocks.input_force[used], blocks.output_force[used]
-    of_output_alone = np.where(state[kept] == 0, 1 + (force_out / force_in) ** 2, 1.0)
+    of_output_alone = np.where(state[kept] == 0, 1 + (noise_ratio * force_out / force_in) ** 2, 1.0)
     return _Part(used, stroke, ratio, worth_of(recording, used) * of_output_alone * standing_share(state)[kept])
 
 

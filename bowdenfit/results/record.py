@@ -178,6 +178,7 @@ class Record:
     def _optimal_length(self) -> OptimalLength:
         drawn, route = self.draws(), self.dataset.description.route
         assert route is not None  # checked by the caller
+        friction = self.model.cable.friction
         lengths, best = drawn.optimum[OPTIMAL_LENGTH].ravel(), drawn.optimum[OPTIMAL_EFFICIENCY].ravel()
         grid, curves = self.curves()
         choices = np.asarray(route.choices)
@@ -190,6 +191,7 @@ class Record:
             float(at_edge(lengths, route.range).mean()),
             best_window(grid, curves["efficiency"], best),
             ranked,
+            friction.conditions.reference_force if friction.depends_on_load else None,
         )
 
     def draws(self) -> Draws:

@@ -112,7 +112,8 @@ VERB = Verb(
     preload-window  lowest preload without slack over these bends, highest for --friction-limit, and the best
 
     The interval q05 to q95 is that of the cable's mean; mounting_q05 to mounting_q95 also holds the scatter from one
-    mounting of the cable to the next. Lengths outside the range of the curves are marked.
+    mounting of the cable to the next. A note marks what lies outside the lengths, wrap angles and loads measured, and where
+    nothing of the force is left: a rope pulls or is slack, at 0 N.
     """,
     formats=("csv", "json"),
     kept=_kept,

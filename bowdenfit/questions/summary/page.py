@@ -9,10 +9,12 @@ from bowdenfit.inference.interval import Interval
 from bowdenfit.inference.samplers import recommendation
 from bowdenfit.kinds import readings_called
 from bowdenfit.kinds.recordings.accounts import preparation_pages
+from bowdenfit.kinds.term import Term
 from bowdenfit.questions.bends.overview import elastic_overview
 from bowdenfit.questions.check.answer import checks_of
 from bowdenfit.questions.identify.confounding import confounded_pairs
 from bowdenfit.questions.identify.contradiction import agreement_page
+from bowdenfit.questions.recorded.lost_force import lost_force
 from bowdenfit.questions.recorded.rate import rate_effect
 from bowdenfit.questions.summary.verdict import verdict
 from bowdenfit.recordings.recording import Recordings
@@ -55,6 +57,8 @@ def summarize(fit: Record) -> dict[str, Any]:
         page["elastic"] = elastic
     if checks := checks_of(fit):
         page["checks"] = checks
+    if (lost := lost_force(fit)) is not None:
+        page["drag"] = lost
     effect = rate_effect(fit)
     if effect is not None:
         page["rate_effect"] = effect
@@ -125,6 +129,19 @@ def _curve_coefficient(fit: Record, name: str) -> dict[str, Any]:
     return row
 
 
+def _input_forces(fit: Record, term: Term) -> np.ndarray:
+    """At which input force each efficiency of a term holds [N], where friction depends on it: of a run, its weighted mean."""
+    friction, data = fit.model.cable.friction, term.data
+    if not friction.depends_on_load:
+        return np.zeros(0)
+    sizes = {len(data[name]) if name in data else -1 for name in ("run", "weight", "input_force")}
+    if len(sizes) > 1 or -1 in sizes:
+        return np.full(len(term.labels), friction.conditions.reference_force)
+    weight, run = np.asarray(data["weight"]), np.asarray(data["run"])
+    total = np.bincount(run, weight, len(term.labels))
+    return np.asarray(np.exp(np.bincount(run, weight * np.log(data["input_force"]), len(term.labels)) / total))
+
+
 def _measured_efficiencies(fit: Record) -> list[dict[str, Any]]:
     """Every measured efficiency beside what the fit says of it (as section 3.2 of the on-body paper does).
 
@@ -134,7 +151,7 @@ def _measured_efficiencies(fit: Record) -> list[dict[str, Any]]:
     for term in fit.model.terms:
         if not readings_called(term.name).are_efficiencies:
             continue
-        observed = term.observed()
+        observed, forces = term.observed(), _input_forces(fit, term)
         for i, label in enumerate(term.labels):
             row: dict[str, Any] = {"table": term.name, "label": label, "measured": float(observed[i])}
             if fit.posterior is not None:
@@ -144,6 +161,8 @@ def _measured_efficiencies(fit: Record) -> list[dict[str, Any]]:
                 row["predictive_q05"], row["predictive_q95"] = (float(q) for q in np.quantile(replicated, (0.05, 0.95)))
             else:
                 row["predicted"] = float(fit.least_squares.readings[term.name][i])
+            if len(forces):
+                row["input_force_N"] = float(forces[i])
             row["relative_error"] = row["measured"] / row["predicted"] - 1
             rows.append(row)
     return rows

@@ -1,7 +1,7 @@
-"""One replication: truth from the prior, tables simulated with it, a fit, and the rank of the truth among the draws."""
+"""Replications: a known truth, tables simulated with it, a fit, and the rank of the truth among the draws."""
 
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, field
 from functools import cached_property
 from typing import Any
@@ -11,16 +11,21 @@ import jax.numpy as jnp
 import numpy as np
 
 from bowdenfit.dataset import Dataset
-from bowdenfit.errors import ConvergenceError, DatasetError, UsageError
+from bowdenfit.errors import DatasetError, UsageError
+from bowdenfit.inference.batch_stages import BatchFit
 from bowdenfit.inference.compilation import compile_program
+from bowdenfit.inference.draws import for_each_draw
 from bowdenfit.inference.log_density import LogDensity
 from bowdenfit.kinds.drawn_readings import drawn_readings, slipped
 from bowdenfit.model import Model, build_model
 from bowdenfit.questions.calibrate.acceptable_tables import refusal
 from bowdenfit.questions.calibrate.refit import Laboratory, with_parameters_of
+from bowdenfit.questions.calibrate.truths import StatedTruth
 from bowdenfit.questions.simulate.simulation import with_readings
+from bowdenfit.results.optimum import optimum_of
 from bowdenfit.results.record import OPTIMAL_EFFICIENCY, OPTIMAL_LENGTH
 
+TOGETHER = 64  # replications that are fitted together: what is lost when a calibration is interrupted
 MOST_DRAWN = 5000  # tables, before a replication is given up
 
 
@@ -32,11 +37,13 @@ class Plan:
         stated: The data set whose description and design are replicated; its readings give way to simulated ones.
         assumed: The data set with the description that is fitted; the same for a calibration proper.
         seed: Seed; replication i is the same whatever else is run.
+        truths: True values that do not come from the priors.
     """
 
     stated: Dataset
     assumed: Dataset
     seed: int
+    truths: tuple[StatedTruth, ...] = ()
 
 
 @dataclass(frozen=True)
@@ -45,8 +52,8 @@ class RankedTruth:
 
     Args:
         truth: What the readings were simulated with.
-        mean: LogDensity mean.
-        sd: LogDensity standard deviation.
+        mean: Posterior mean.
+        sd: Posterior standard deviation.
         rank: Share of the posterior below the truth; uniform between 0 and 1 if all is right.
     """
 
@@ -65,8 +72,9 @@ class Replication:
         redrawn: Why tables were drawn again, with how many were.
         reasons: Why its draws should not be trusted; empty if they may.
         ranked: By quantity; empty where the fit failed.
-        seconds: What it took.
+        seconds: What it took, of those that were fitted together on average.
         steps: Steps of each walker.
+        engine: What fitted it: weighted draws ("laplace"), "ensembles" or "nuts".
     """
 
     number: int
@@ -75,6 +83,28 @@ class Replication:
     ranked: dict[str, RankedTruth]
     seconds: float
     steps: int = 0
+    engine: str = ""
+
+
+@dataclass(frozen=True)
+class Simulated:
+    """Tables that are waiting to be fitted.
+
+    Args:
+        number: Of the replication.
+        z: The truth, where priors are standard normals.
+        posterior: Of the tables.
+        redrawn: Why tables were drawn again, with how many were.
+        seed: Of the fit.
+        tie: Share of the draws equal to the truth that count as below it.
+    """
+
+    number: int
+    z: np.ndarray
+    posterior: LogDensity
+    redrawn: dict[str, int]
+    seed: int
+    tie: float
 
 
 @dataclass(frozen=True)
@@ -116,33 +146,55 @@ class Workbench:
 
     @cached_property
     def _optimum_of_truth(self) -> Callable[..., Any]:
-        return self.laboratory.programs_for(LogDensity(self.stated)).optimum
+        return for_each_draw(optimum_of(self.stated), self.stated.space.size)
 
-    def replication(self, number: int) -> Replication:
-        """Replication `number`.
+    @cached_property
+    def _optimum(self) -> Callable[..., Any]:
+        if self.assumed is self.stated:
+            return self._optimum_of_truth
+        return for_each_draw(optimum_of(self.assumed), self.assumed.space.size)
+
+    def replications(self, numbers: Sequence[int]) -> Iterator[Replication]:
+        """Replications by their numbers, as they are done.
 
         Raises:
             UsageError: Hardly any tables drawn from the prior look like ones from a bench.
         """
+        for start in range(0, len(numbers), TOGETHER):
+            with jax.enable_x64(True):
+                done = self._together(numbers[start : start + TOGETHER])
+            yield from done
+
+    def _together(self, numbers: Sequence[int]) -> list[Replication]:
         begin = time.perf_counter()
+        waiting = [self._simulated(number) for number in numbers]
+        fits = self.laboratory.fits([each.posterior for each in waiting], [each.seed for each in waiting])
+        ranked = [self._ranked(each, fit) if len(fit.z) else {} for each, fit in zip(waiting, fits, strict=True)]
+        seconds = (time.perf_counter() - begin) / len(numbers)
+        return [
+            Replication(each.number, each.redrawn, fit.reasons, found, seconds, fit.steps, fit.engine)
+            for each, fit, found in zip(waiting, fits, ranked, strict=True)
+        ]
+
+    def _simulated(self, number: int) -> Simulated:
         generator = np.random.default_rng([self.plan.seed, number])
-        z_true, dataset, redrawn = self._tables(generator)
-        seed = int(generator.integers(2**31))
+        z, dataset, redrawn = self._tables(generator)
         assumed = Dataset(self.plan.assumed.description, dataset.measurements, {})
         posterior = LogDensity(with_parameters_of(self.assumed, self.disturb(assumed)))
-        try:
-            chain = self.laboratory.chain(posterior, seed)
-        except ConvergenceError as error:
-            return Replication(number, redrawn, (str(error),), {}, time.perf_counter() - begin)
-        z = chain.z.reshape(-1, posterior.model.space.size)
-        ranked = self._ranked_parameters(z_true, z) | self._ranked_optimum(posterior, z_true, z, generator.uniform())
-        return Replication(number, redrawn, chain.reasons, ranked, time.perf_counter() - begin, chain.steps)
+        return Simulated(number, z, posterior, redrawn, int(generator.integers(2**31)), generator.uniform())
+
+    def _truth(self, generator: np.random.Generator) -> np.ndarray:
+        """Where the priors are standard normals: drawn from them, but for what is stated."""
+        z = generator.standard_normal(self.stated.space.size)
+        for stated in self.plan.truths:
+            z[self.stated.space.index[stated.parameter.name]] = stated.z(generator)
+        return z
 
     def _tables(self, generator: np.random.Generator) -> tuple[np.ndarray, Dataset, dict[str, int]]:
         """Truth and tables: drawn together until the tables, by themselves, could come from a bench."""
         redrawn: dict[str, int] = {}
         for _ in range(MOST_DRAWN):
-            z = generator.standard_normal(self.stated.space.size)
+            z = self._truth(generator)
             words = generator.integers(2**32, size=2, dtype=np.uint32)
             drawn = self._readings(z, words)
             try:
@@ -155,10 +207,16 @@ class Workbench:
                     return z, dataset, redrawn
             redrawn[why] = redrawn.get(why, 0) + 1
         most = max(redrawn, key=lambda why: redrawn[why])
+        cause = "a prior far wider than what a cable can be: narrow it under [friction] or [prior] in cable.toml"
+        if self.plan.truths:
+            cause = "a true value that no cable on this bench can have: state others in the file of --truth"
         raise UsageError(
-            f"none of {MOST_DRAWN} data sets drawn from the priors looks like one from a bench, mostly because {most}; the "
-            "usual cause is a prior far wider than what a cable can be: narrow it under [friction] or [prior] in cable.toml."
+            f"none of {MOST_DRAWN} simulated data sets looks like one from a bench, mostly because {most}; the usual cause is "
+            f"{cause}."
         )
+
+    def _ranked(self, each: Simulated, fit: BatchFit) -> dict[str, RankedTruth]:
+        return self._ranked_parameters(each.z, fit.z) | self._ranked_optimum(each.z, fit.z, each.tie)
 
     def _ranked_parameters(self, z_true: np.ndarray, z: np.ndarray) -> dict[str, RankedTruth]:
         """Parameters that both descriptions have and that are fitted."""
@@ -177,18 +235,15 @@ class Workbench:
             if name in assumed.index
         }
 
-    def _ranked_optimum(
-        self, posterior: LogDensity, z_true: np.ndarray, z: np.ndarray, tie: float
-    ) -> dict[str, RankedTruth]:
+    def _ranked_optimum(self, z_true: np.ndarray, z: np.ndarray, tie: float) -> dict[str, RankedTruth]:
         """Optimal length and the efficiency there, for a cable with a route.
 
         An optimum at an end of the range has probability of its own there; a truth at the same end takes a place at random
         within it, which keeps its rank uniform.
         """
-        if posterior.model.description.route is None:
+        if self.assumed.description.route is None:
             return {}
-        truth = self._optimum_of_truth(z_true[None])
-        draws = self.laboratory.programs_for(posterior).optimum(z)
+        truth, draws = self._optimum_of_truth(z_true[None]), self._optimum(z)
         names = (OPTIMAL_LENGTH, OPTIMAL_EFFICIENCY)
         return {name: rank_truth(float(t[0]), d, tie) for name, t, d in zip(names, truth, draws, strict=True)}
 

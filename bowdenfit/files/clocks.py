@@ -75,6 +75,8 @@ def names_time(heading: str) -> bool:
     """Whether a heading means time: "Time (s)", "t", "Zeit_ms", "45 time", "X_Value" of LabVIEW."""
     plain = heading.rpartition("/")[2].strip().lower()
     words = [word for word in re.split(r"[\W\d_]+", plain) if word]
+    if not {*words[:1], *words[-2:]} & {*_TIME_WORDS, "t"}:  # before a last word is looked up among all units
+        return plain == _LABVIEW
     named = words[:-1] if len(words) > 1 and _time_factor(words[-1]) is not None else words
     ends = {*named[:1], *named[-1:]}
     return bool(ends & _TIME_WORDS) or named == ["t"] or plain == _LABVIEW

@@ -38,7 +38,10 @@ def _plain(data: Any, keep: bool, put: Callable[[np.ndarray], Any] | None = None
     if put and isinstance(data, np.ndarray):
         return put(data)
     if isinstance(data, np.ndarray | np.generic):
+        as_it_is = data.dtype.kind in "biu" or (data.dtype.kind == "f" and np.isfinite(data).all())
         data = data.tolist()
+        if as_it_is:
+            return data
     if isinstance(data, list | tuple):
         return [_plain(value, keep, put) for value in data]
     if isinstance(data, float) and not np.isfinite(data):
@@ -93,8 +96,7 @@ def _array(kind: Any, value: list[Any]) -> np.ndarray:
 
     if kind in (Labels, Flags):
         return np.array(value, dtype=int if kind is Labels else bool)
-    numbers = [[_number(x) for x in row] if isinstance(row, list) else _number(row) for row in value]
-    array = np.array(numbers, dtype=float)
+    array = np.array(value, dtype=float)
     return array.reshape(len(value), len(value[0]) if value else 0) if kind is Matrix else array
 
 

@@ -1,6 +1,7 @@
 """From a data set to a model: the cable, its parameters and one term for each table."""
 
-from dataclasses import dataclass, replace
+from collections.abc import Mapping
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 
@@ -22,6 +23,7 @@ from bowdenfit.errors import DescriptionError, nearest
 from bowdenfit.kinds.angles.table import AngleTable
 from bowdenfit.kinds.measured_cable import measured_cable
 from bowdenfit.kinds.measurements import Measurements
+from bowdenfit.kinds.places import Places, places_of
 from bowdenfit.kinds.term import Term
 from bowdenfit.kinds.terms import measured_kinds, parameters_asked_for
 from bowdenfit.parameters.priors import HalfNormal, LogNormal, Normal, Prior, TruncatedNormal, Uniform
@@ -30,11 +32,12 @@ from bowdenfit.parameters.space import Parameter, ParameterSpace
 
 @dataclass(frozen=True)
 class Model:
-    """Everything inference needs: the cable, the parameters, and the terms of the likelihood."""
+    """Everything inference needs: cable, parameters, terms of the likelihood, and where readings were taken."""
 
     cable: Cable
     space: ParameterSpace
     terms: tuple[Term, ...]
+    places: Mapping[str, Places] = field(default_factory=dict, compare=False)
 
     @property
     def description(self) -> Description:
@@ -55,7 +58,8 @@ def build_model(dataset: Dataset) -> Model:
     space = _space(cable, measurements)
     for kind, table in kinds:
         kind.check(table, space)
-    return Model(cable, space, tuple(terms))
+    places = {term.name: places_of(description, measurements, term) for term in terms}
+    return Model(cable, space, tuple(terms), places)
 
 
 def _space(cable: Cable, measurements: Measurements) -> ParameterSpace:

@@ -13,13 +13,14 @@ from jaxtyping import Float
 from bowdenfit.cable.cable import Cable
 from bowdenfit.cable.load_cells import FORCE_NOISE, LEAST_FORCE, OUTPUT_OFFSET, RUN_SCATTER, LoadCells
 from bowdenfit.cable.noise import noise_law, scatter
+from bowdenfit.kinds.inside_runs import InsideRuns, inside_runs
 from bowdenfit.kinds.padding import rounded_up
 from bowdenfit.kinds.resolve_angles import resolve_angles
+from bowdenfit.kinds.sliding_rows import ROW_ARRAYS, SlidingRows
 from bowdenfit.physics.friction import transmission_efficiency
 from bowdenfit.types import Labels, Vector
 
 _WEIGHTS = ("weight", "load_squares", "load_products")
-ROW_ARRAYS = ("route", "own", "is_own", "known_variance", "noisy")
 _LOAD_BINS, _SPEED_BINS, _DELAY_BINS = 24, 24, 8  # of each stroke of a run, where load, speed or a delay matters
 _ALIKE = 0.05  # speeds that differ by less than this fraction are one
 
@@ -52,6 +53,7 @@ class RunsTerm:
         labels: Each run in words.
         name: Name of the readings in results.
         reading_noise: Parameter that is the standard deviation of one reading.
+        rows: The readings that the arrays sum up; None where nobody asks for them one by one.
     """
 
     cable: Cable
@@ -61,6 +63,7 @@ class RunsTerm:
     reading_noise: str = FORCE_NOISE
     unit: str = "1"
     noise: str = RUN_SCATTER
+    rows: SlidingRows | None = None
 
     @property
     def residual_blocks(self) -> tuple[tuple[int, int], ...]:
@@ -78,6 +81,19 @@ class RunsTerm:
         filled = np.tile(place < each, len(self.labels))
         long = {name: values[source] for name, values in self.data.items() if len(values) == cells != len(starts)}
         return self.data | long | {name: np.where(filled, long[name], 0.0) for name in _WEIGHTS if name in long}
+
+    @property
+    def inside(self) -> InsideRuns | None:
+        """Readings one by one, with the cell of each among the residuals inside runs."""
+        if self.rows is None:
+            return None
+        cell, first = _cells(self.cable, self.rows)
+        runs, run = np.unique(self.rows.run, return_inverse=True)
+        of_cell = np.searchsorted(runs, self.rows.run[first])
+        place = np.arange(len(first)) - np.searchsorted(of_cell, of_cell)
+        most = len(self.data["mean"]) // len(runs)
+        ratio = self.cable.description.sensors.noise_ratio
+        return inside_runs((of_cell * most + place)[cell], run, self.rows, ratio)
 
     def _shown(
         self, values: Mapping[str, Array], data: Mapping[str, Any], exponent: Float[Array, " cells"]
@@ -167,37 +183,10 @@ class _Deviations:
     inside: Array
 
 
-@dataclass(frozen=True)
-class SlidingRows:
-    """Readings taken while the rope slides, in the order of the table.
-
-    Args:
-        input_force, output_force: Forces, those of tables as `expected_forces` has them [N].
-        log_ratio: s log(F_in/F_out) of the readings, without what noise adds to it [1].
-        stroke: +1 pulling, -1 return.
-        run: Number of the run.
-        velocity: Velocity; NaN where it is not known.
-        drift: s d(log F_out)/dt, by which a delay of the output channel shifts the log ratio [1/s]; 0 without a clock.
-        worth: How many independent readings each counts for [1].
-        angles: `ROW_ARRAYS` of every row.
-    """
-
-    input_force: Vector
-    output_force: Vector
-    log_ratio: Vector
-    stroke: Labels
-    run: Labels
-    velocity: Vector
-    drift: Vector
-    worth: Vector
-    angles: Mapping[str, np.ndarray]
-
-
 def run_sums(cable: Cable, rows: SlidingRows) -> dict[str, Any]:
     """Readings reduced to cells, cells to runs: all that the likelihood needs, whatever the number of readings."""
     cell, first = _cells(cable, rows)
-    noise_ratio = cable.description.sensors.noise_ratio
-    weight = rows.worth / (noise_ratio**2 / rows.input_force**2 + 1 / rows.output_force**2)
+    weight = rows.weight(cable.description.sensors.noise_ratio)
     cell_weight = np.bincount(cell, weight)
 
     def mean(values: np.ndarray) -> np.ndarray:

@@ -19,8 +19,9 @@ from bowdenfit.kinds.forces.term import HeldForcesTerm, sliding_rows
 from bowdenfit.kinds.measurements import Measurements
 from bowdenfit.kinds.row_angles import row_angles
 from bowdenfit.kinds.rows import OwnAngles, RowOrigin
-from bowdenfit.kinds.runs import RunsTerm, SlidingRows
+from bowdenfit.kinds.runs import RunsTerm
 from bowdenfit.kinds.settings import load_description
+from bowdenfit.kinds.sliding_rows import SlidingRows
 from bowdenfit.model import Model, build_model
 
 VALUES = {"mu": 0.15, "tau": 0.03, "sigma_F": 0.7}

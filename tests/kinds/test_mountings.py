@@ -10,8 +10,8 @@ from hand_bench import BENDS, pull, write
 from bowdenfit.dataset import load_dataset
 from bowdenfit.inference.log_density import LogDensity
 from bowdenfit.kinds.forces.table import ForceTable
+from bowdenfit.kinds.places import route_values
 from bowdenfit.model import build_model
-from bowdenfit.questions.check.residual_places import route_values
 
 LENGTHS = """
 schema = 1

@@ -23,7 +23,8 @@ from bowdenfit.kinds.recordings.angles import recorded_angles
 from bowdenfit.kinds.recordings.side_by_side import first_of_groups
 from bowdenfit.kinds.recordings.whole import WholeRecordingsTerm, pad_recordings
 from bowdenfit.kinds.row_angles import row_angles
-from bowdenfit.kinds.runs import RunsTerm, SlidingRows, run_sums
+from bowdenfit.kinds.runs import RunsTerm, run_sums
+from bowdenfit.kinds.sliding_rows import SlidingRows
 from bowdenfit.model import Model, build_model
 from bowdenfit.physics.friction import rate_factor
 from bowdenfit.questions.simulate.bench import BenchFriction, BenchSettings, Faults, MotorProfile, simulate_recording

@@ -19,6 +19,7 @@ from bowdenfit.inference.predictive_checks import LeftOut, place_at_random, pred
 from bowdenfit.inference.prior_sensitivity import SENSITIVE, sensitivities
 from bowdenfit.kinds import KINDS
 from bowdenfit.kinds.angles.table import AngleTable
+from bowdenfit.kinds.places import Places
 from bowdenfit.kinds.stretch.table import StretchTable
 from bowdenfit.model import build_model
 from bowdenfit.questions.check import checks_figure, prior_figure
@@ -26,7 +27,6 @@ from bowdenfit.questions.check.answer import Checks, checks_of, trends_of
 from bowdenfit.questions.check.checks_figure import CheckedTable, checked_tables
 from bowdenfit.questions.check.prior_predictive import prior_predictive
 from bowdenfit.questions.check.prior_words import prior_predictive_text
-from bowdenfit.questions.check.residual_places import Places
 from bowdenfit.questions.check.table_checks import TableChecks
 from bowdenfit.questions.check.words import checks_text
 from bowdenfit.results.record import Draws, Provenance, Record

@@ -18,8 +18,9 @@ from bowdenfit.kinds.forces.held import HeldForcesTerm
 from bowdenfit.kinds.forces.table import ForceTable
 from bowdenfit.kinds.next_run import FORCE_RUN
 from bowdenfit.kinds.row_angles import row_angles
-from bowdenfit.kinds.runs import ROW_ARRAYS, RunsTerm, SlidingRows, run_sums
+from bowdenfit.kinds.runs import RunsTerm, run_sums
 from bowdenfit.kinds.shared_parameters import force_noise, offsets, run_scatter
+from bowdenfit.kinds.sliding_rows import ROW_ARRAYS, SlidingRows
 from bowdenfit.kinds.term import Circumstances, TermKind
 from bowdenfit.parameters.space import Parameter
 
@@ -32,7 +33,7 @@ def force_terms(cable: Cable, table: ForceTable, angles: AngleTable | None) -> t
     if len(sliding):
         readings = sliding_rows(cable.description, table, rows, sliding)
         labels = tuple(_run_label(cable, table, int(run)) for run in np.unique(readings.run))
-        terms.append(RunsTerm(cable, run_sums(cable, readings), labels))
+        terms.append(RunsTerm(cable, run_sums(cable, readings), labels, rows=readings))
     if len(held):
         data = {name: rows[name][held] for name in ROW_ARRAYS} | {
             "input_force": table.input_force[held],

@@ -15,7 +15,7 @@ from bowdenfit.kinds.recordings.blocks import (
     standing_share,
     worth_of,
 )
-from bowdenfit.kinds.runs import ROW_ARRAYS
+from bowdenfit.kinds.sliding_rows import ROW_ARRAYS
 from bowdenfit.recordings.recording import Recording, Recordings
 
 MOST_BLOCKS = 600  # of one recording in the play operator; more say no more once noise is averaged

@@ -32,8 +32,9 @@ from bowdenfit.kinds.recordings.settings import RecordingsTable
 from bowdenfit.kinds.recordings.simulation import drawn_recordings, recorded_again, refuse_saturated
 from bowdenfit.kinds.recordings.whole import WholeRecordingsTerm, pad_recordings
 from bowdenfit.kinds.row_angles import row_angles
-from bowdenfit.kinds.runs import ROW_ARRAYS, RunsTerm, SlidingRows, run_sums
+from bowdenfit.kinds.runs import RunsTerm, run_sums
 from bowdenfit.kinds.shared_parameters import offsets, preload, run_scatter
+from bowdenfit.kinds.sliding_rows import ROW_ARRAYS, SlidingRows
 from bowdenfit.kinds.term import Circumstances, TermKind
 from bowdenfit.parameters.priors import HalfNormal, Normal
 from bowdenfit.parameters.space import Parameter
@@ -58,7 +59,8 @@ def recordings_term(
     if settings is None or settings.likelihood == "runs":
         parts = [_sliding_blocks(r) for r in recordings.each]
         _needs_blocks(recordings, parts)
-        return RunsTerm(cable, run_sums(cable, _rows(recordings, parts, rows)), labels, RECORDED, BLOCK_NOISE)
+        blocks = _rows(recordings, parts, rows)
+        return RunsTerm(cable, run_sums(cable, blocks), labels, RECORDED, BLOCK_NOISE, rows=blocks)
     for recording in recordings.each:
         _needs_reversal(recording)
     censored, noise_ratio = _censored(settings, recordings), cable.description.sensors.noise_ratio
@@ -66,7 +68,8 @@ def recordings_term(
         # On a scale that no parameter changes, the operator is linear in the exponent: it need not be run again.
         parts = [_all_blocks(r, noise_ratio) for r in recordings.each]
         _needs_blocks(recordings, parts)
-        return RunsTerm(cable, run_sums(cable, _rows(recordings, parts, rows)), labels, RECORDED, BLOCK_NOISE)
+        blocks = _rows(recordings, parts, rows)
+        return RunsTerm(cable, run_sums(cable, blocks), labels, RECORDED, BLOCK_NOISE, rows=blocks)
     return WholeRecordingsTerm(cable, pad_recordings(recordings, rows, censored, noise_ratio), labels)
 
 

@@ -8,8 +8,8 @@ import numpy as np
 
 from bowdenfit.inference.predictive_checks import place_at_random, predict_without_each, uniformity
 from bowdenfit.inference.prior_sensitivity import Sensitivity, sensitivities
+from bowdenfit.kinds.places import STROKE, places_of
 from bowdenfit.kinds.term import Term
-from bowdenfit.questions.check.residual_places import STROKE, places_of
 from bowdenfit.questions.check.table_checks import FALSE_ALARM, CheckedReading, TableChecks
 from bowdenfit.results.record import Draws, Record, once
 
@@ -98,7 +98,7 @@ def _table(
     predicted = predict_without_each(log_likelihood, replicated, reading, at_most, posterior.n_effective)
     placed = place_at_random(predicted, generator)
     uniform = uniformity(placed, probability) if n >= _LEAST_READINGS else None
-    places = places_of(fit.dataset, term)
+    places = places_of(fit.dataset.description, fit.dataset.measurements, term)
     return TableChecks(term.name, term.unit, term.labels, reading, at_most, predicted, places, placed, uniform)
 
 

@@ -94,7 +94,7 @@ def data(fit: Record) -> AlongRoute | None:
 def efficiency_points(fit: Record) -> tuple[EfficiencyPoints, ...]:
     """Every measured efficiency, by table."""
     from bowdenfit.kinds import readings_called
-    from bowdenfit.questions.check.residual_places import route_values
+    from bowdenfit.kinds.places import route_values
 
     route, points = fit.dataset.description.route, []
     for term in fit.model.terms:

@@ -18,7 +18,14 @@ from bowdenfit.questions.recorded.rate import SHOWN_SPEED, rate_effect
 from bowdenfit.questions.summary.page import summarize
 from bowdenfit.questions.summary.parameter_words import parameters_text
 from bowdenfit.questions.summary.sampler_words import sampler_sentences, sampler_text
-from bowdenfit.questions.summary.verdict import CONTRADICTORY, NOT_CONVERGED, NOT_IDENTIFIABLE, Verdict, verdict
+from bowdenfit.questions.summary.verdict import (
+    CONTRADICTORY,
+    NOT_CONVERGED,
+    NOT_DESCRIBED,
+    NOT_IDENTIFIABLE,
+    Verdict,
+    verdict,
+)
 from bowdenfit.recordings.recording import Recordings
 from bowdenfit.results.record import Record
 from bowdenfit.words import filled, listed, table
@@ -85,7 +92,11 @@ def _verdict(fit: Record, page: dict[str, Any]) -> str:
 
 def _untrusted(found: Verdict) -> str:
     """What is wrong, in capitals that nobody overlooks."""
-    kinds = {NOT_IDENTIFIABLE: "COEFFICIENTS NOT IDENTIFIABLE", CONTRADICTORY: "CONTRADICTORY MEASUREMENTS"}
+    kinds = {
+        NOT_IDENTIFIABLE: "COEFFICIENTS NOT IDENTIFIABLE",
+        CONTRADICTORY: "CONTRADICTORY MEASUREMENTS",
+        NOT_DESCRIBED: "THE MODEL DOES NOT DESCRIBE THESE READINGS",
+    }
     if NOT_CONVERGED in found.troubles:
         return "NOT CONVERGED; do not use these numbers"
     return f"{listed([kinds[kind] for kind in found.troubles])}; do not use these numbers before reading why"

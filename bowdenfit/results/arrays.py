@@ -28,7 +28,9 @@ def write_arrays(path: Path, data: Mapping[str, Any]) -> None:
 
     page = np.frombuffer(json.dumps({name: stored(one, put) for name, one in data.items()}).encode(), dtype=np.uint8)
     with replace_when_whole(path) as temporary, temporary.open("wb") as file:
-        np.savez(file, allow_pickle=False, **{_PAGE: page}, **{f"{i}": array for i, array in enumerate(arrays.values())})
+        np.savez(
+            file, allow_pickle=False, **{_PAGE: page}, **{f"{i}": array for i, array in enumerate(arrays.values())}
+        )
 
 
 def read_arrays(path: Path, kinds: Mapping[str, Any]) -> dict[str, Any]:

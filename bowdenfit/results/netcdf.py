@@ -80,7 +80,9 @@ def read_groups(path: Path) -> Groups:
 
     with h5py.File(path) as file:
         return {
-            group: {name: _array(file[group][name]) for name in _members(file[group]) if not _is_label(file[group][name])}
+            group: {
+                name: _array(file[group][name]) for name in _members(file[group]) if not _is_label(file[group][name])
+            }
             for group in _members(file)
             if isinstance(file[group], h5py.Group)
         }

@@ -27,13 +27,15 @@ from bowdenfit.kinds.forces.term import HeldForcesTerm
 from bowdenfit.kinds.recordings.simulation import refuse_saturated
 from bowdenfit.model import build_model
 from bowdenfit.questions.calibrate.acceptable_tables import refusal
-from bowdenfit.questions.calibrate.answer import Calibration, Quantity, findings
+from bowdenfit.questions.calibrate.answer import Calibration, Quantity
 from bowdenfit.questions.calibrate.figure import coverage, ranks, sharpness
+from bowdenfit.questions.calibrate.findings import findings
 from bowdenfit.questions.calibrate.refit import Laboratory
-from bowdenfit.questions.calibrate.replication import Plan, RankedTruth, Replication, Workbench
+from bowdenfit.questions.calibrate.replication import RankedTruth, Replication
 from bowdenfit.questions.calibrate.store import keep, open_replications
 from bowdenfit.questions.calibrate.uniformity import UniformRanks, holm
 from bowdenfit.questions.calibrate.words import calibration_text
+from bowdenfit.questions.calibrate.workbench import Plan, Workbench
 from bowdenfit.questions.simulate.simulation import empty_tables, simulated_again, with_readings
 from bowdenfit.recordings.recording import Recordings
 
@@ -437,7 +439,7 @@ def test_an_interrupted_calibration_says_how_to_go_on(run, tmp_path, monkeypatch
     def interrupted(*_):
         raise KeyboardInterrupt
 
-    monkeypatch.setattr("bowdenfit.questions.calibrate.replication.Workbench.replications", interrupted)
+    monkeypatch.setattr("bowdenfit.questions.calibrate.workbench.Workbench.replications", interrupted)
     code, _, err = run("calibrate", ROOT / "datasets" / "yarn-on-cylinder", "-o", tmp_path / "c")
     assert code == 130
     assert "run the same command with --resume" in err

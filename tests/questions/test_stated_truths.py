@@ -10,12 +10,14 @@ from bowdenfit.errors import UsageError
 from bowdenfit.inference.batch_programs import BatchSettings
 from bowdenfit.model import build_model
 from bowdenfit.questions.calibrate import power
-from bowdenfit.questions.calibrate.answer import Quantity, findings
+from bowdenfit.questions.calibrate.answer import Quantity
+from bowdenfit.questions.calibrate.findings import findings
 from bowdenfit.questions.calibrate.power import power_of
 from bowdenfit.questions.calibrate.refit import Laboratory
-from bowdenfit.questions.calibrate.replication import Plan, RankedTruth, Replication, Workbench
+from bowdenfit.questions.calibrate.replication import RankedTruth, Replication
 from bowdenfit.questions.calibrate.truths import StatedTruth, read_truths, stated_truths
 from bowdenfit.questions.calibrate.words import calibration_text
+from bowdenfit.questions.calibrate.workbench import Plan, Workbench
 from bowdenfit.questions.simulate.simulation import empty_tables
 
 

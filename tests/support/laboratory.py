@@ -19,7 +19,7 @@ from bowdenfit.inference.objective import make_objective
 from bowdenfit.kinds.design import Design
 from bowdenfit.model import build_model
 from bowdenfit.questions.calibrate.refit import Laboratory as Fits
-from bowdenfit.questions.calibrate.replication import Plan, Workbench
+from bowdenfit.questions.calibrate.workbench import Plan, Workbench
 from bowdenfit.questions.simulate.simulation import empty_tables
 
 SAMPLER = SamplerSettings(n_ensembles=4, n_walkers=64, max_steps=1500, target_ess=500, target_r_hat=1.03)

@@ -12,8 +12,9 @@ from bowdenfit.verb import LARGEST_SEED, Argument, Option, Output, Reply, Verb, 
 
 if TYPE_CHECKING:
     from bowdenfit.dataset import Dataset
-    from bowdenfit.questions.calibrate.answer import Calibration, Quantity
-    from bowdenfit.questions.calibrate.replication import Plan, Replication
+    from bowdenfit.questions.calibrate.answer import Calibration
+    from bowdenfit.questions.calibrate.replication import Replication
+    from bowdenfit.questions.calibrate.workbench import Plan
 
 NOT_CALIBRATED = 3
 Report = Callable[[int, int], None]
@@ -72,10 +73,11 @@ def calibrate(
     import jax
 
     from bowdenfit.model import build_model
-    from bowdenfit.questions.calibrate.answer import findings
-    from bowdenfit.questions.calibrate.replication import Plan
+    from bowdenfit.questions.calibrate.findings import findings
+    from bowdenfit.questions.calibrate.quantities import quantities_of
     from bowdenfit.questions.calibrate.store import open_replications
     from bowdenfit.questions.calibrate.truths import read_truths, stated_truths
+    from bowdenfit.questions.calibrate.workbench import Plan
 
     page = {} if truth is None else read_truths(Path(truth))
     with jax.enable_x64(True):
@@ -117,8 +119,8 @@ def _replicate(
     """Do what is not done yet, and keep each as it ends."""
     from bowdenfit.inference.batch_programs import BatchSettings
     from bowdenfit.questions.calibrate.refit import Laboratory
-    from bowdenfit.questions.calibrate.replication import Workbench
     from bowdenfit.questions.calibrate.store import keep
+    from bowdenfit.questions.calibrate.workbench import Workbench
 
     missing = [number for number in range(replications) if number not in done]
     bench = Workbench(plan, Laboratory(BatchSettings(threads=workers or 0)))
@@ -139,41 +141,6 @@ def _seed(folder: Path | None, seed: int | None, resume: bool) -> int:
     from bowdenfit.questions.calibrate.store import seed_of
 
     return seed_of(folder)
-
-
-def quantities_of(plan: "Plan") -> "dict[str, Quantity]":
-    """What will be ranked, once it is clear that the data set can be replicated.
-
-    Raises:
-        DescriptionError, DatasetError, UsageError: It cannot; says why.
-    """
-    from bowdenfit.errors import DescriptionError, UsageError
-    from bowdenfit.kinds.terms import measured_kinds
-    from bowdenfit.model import build_model
-    from bowdenfit.questions.calibrate.answer import Quantity
-    from bowdenfit.results.record import OPTIMAL_EFFICIENCY, OPTIMAL_LENGTH
-
-    stated, assumed = plan.stated.description, plan.assumed.description
-    for kind, table in measured_kinds(plan.stated.measurements):
-        kind.bench.check(stated, table)
-    if stated.angle_columns != assumed.angle_columns or _kinds(plan.stated) != _kinds(plan.assumed):
-        raise DescriptionError(
-            "--assume changes which tables or columns the data set has; the fits must read what is simulated, so change "
-            "only how it is modeled."
-        )
-    space = build_model(plan.assumed).space
-    if not space.size:
-        raise UsageError(
-            "every parameter of the description is fixed, so there is nothing to calibrate; leave one free."
-        )
-    quantities = {p.name: Quantity(p.symbol, p.role == "friction") for p in space.free}
-    return quantities | {OPTIMAL_LENGTH: Quantity(r"$l^*$"), OPTIMAL_EFFICIENCY: Quantity(r"$\eta^*$")}
-
-
-def _kinds(dataset: "Dataset") -> list[str]:
-    from bowdenfit.kinds import each_table
-
-    return [kind.name for kind, _ in each_table(dataset.measurements)]
 
 
 def _fingerprint(plan: "Plan", assumptions: Sequence[str], truths: dict[str, Any]) -> dict[str, Any]:

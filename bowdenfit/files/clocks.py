@@ -165,11 +165,12 @@ def _time_factor(unit: str) -> float | None:
 
 def seconds_of(clock: Channel) -> Vector:
     """The times that a clock shows, from its first where they can only be dates [s]."""
-    finite = clock.values[np.isfinite(clock.values)]
-    largest = float(np.max(np.abs(finite))) if len(finite) else 0.0
+    finite = np.isfinite(clock.values)
+    lowest, highest = (float(end(clock.values, where=finite, initial=0.0)) for end in (np.min, np.max))
+    largest = max(-lowest, highest)
     factor = _time_factor(clock.unit)
     if factor is None:
         factor = next((factor for bound, factor in _EPOCH_UNITS if largest > bound), 1.0)
     if largest * factor > _YEARS:
         return _from_first(clock.values) * factor
-    return clock.values * factor
+    return clock.values if factor == 1 else clock.values * factor

@@ -10,6 +10,7 @@ from bowdenfit.questions.check.table_checks import CheckedReading
 from bowdenfit.words import decimals, filled, listed
 
 _FEW = 3  # readings of a kind that are named; of more, the rest is counted
+_FEW_CHANCE = "ten"  # where readings hang together, as two do of which each predicts the other
 _HEADING = """Fit checks: every reading against its prediction from all the others
 (z is its deviation in standard deviations, k how far the fit leans on it: too far beyond 0.7)"""
 _ANSWERS = {"optimal_length": "the best length", "optimal_efficiency": "the efficiency there"}
@@ -36,7 +37,8 @@ def _scatter(found: Checks) -> str:
     """How many readings their intervals hold, and which tables scatter otherwise than predicted."""
     n, held = (sum(getattr(t, key) for t in found.tables) for key in ("measured", "in_interval"))
     faults = [f"the readings of {readings_called(t.table).words} {t.fault}" for t in found.tables if t.fault]
-    start = f"The 90 % intervals of these predictions hold {held} of {n} readings."
+    few = f" Of so few, chance leaves none inside in one fit of {_FEW_CHANCE}." if held == 0 and n <= _FEW else ""
+    start = f"The 90 % intervals of these predictions hold {held} of {n} readings.{few}"
     if not faults:
         return start
     return f"{start} But {listed(faults)}, by more than chance does in one fit of a hundred."

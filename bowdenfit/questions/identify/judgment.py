@@ -5,7 +5,7 @@ import jax.numpy as jnp
 import numpy as np
 
 from bowdenfit.inference.compilation import compile_program
-from bowdenfit.inference.identifiability import NOTHING, Combination, Knowledge, knowledge
+from bowdenfit.inference.identifiability import RESTS_ON_PRIOR, Combination, Knowledge, knowledge
 from bowdenfit.inference.least_squares import UNDETERMINED, MaximumPosterior
 from bowdenfit.inference.profiles import Profile
 from bowdenfit.model import Model
@@ -96,9 +96,20 @@ def say_what_is_not_determined(fit: Record) -> str:
     if friction is None:
         return ""
     share = {p.name: p.share for p in friction.parameters}
-    lost = [n for n in names if share[n] > NOTHING or (_undetermined(fit, n) and n in friction.tangled)]
+    lost = [
+        n
+        for n in names
+        if share[n] > RESTS_ON_PRIOR or _as_wide_as_prior(fit, n) or (_undetermined(fit, n) and n in friction.tangled)
+    ]
+    if not lost and not friction.by_themselves and not friction.determined:
+        return _in_words(names, None, " in good part")
     known = next((c for c in friction.determined if set(c.weights) & set(lost)), None)
     return _in_words(lost, known)
+
+
+def _as_wide_as_prior(fit: Record, name: str) -> bool:
+    """Whether a coefficient's draws are as wide as its prior in the sampler's coordinates."""
+    return float(np.var(fit.draws().z[..., fit.model.space.index[name]])) > RESTS_ON_PRIOR
 
 
 def _undetermined(fit: Record, name: str) -> bool:
@@ -109,7 +120,7 @@ def _undetermined(fit: Record, name: str) -> bool:
     return estimates[name].remark == UNDETERMINED
 
 
-def _in_words(lost: list[str], known: Combination | None) -> str:
+def _in_words(lost: list[str], known: Combination | None, how_much: str = "") -> str:
     if not lost:
         return ""
     them = listed(lost)
@@ -119,9 +130,9 @@ def _in_words(lost: list[str], known: Combination | None) -> str:
         said = f"The measurements do not determine {them}"
     rest = "rest on their priors" if len(lost) > 1 else "rests on its prior"
     return (
-        f"{said}; {them} by {'themselves' if len(lost) > 1 else 'itself'} {rest}. Efficiencies where you measured still hold, "
-        "the coefficients do not: measure where the wrap angles change in other proportions, or state a coefficient that was "
-        "measured separately under [friction.NAME]."
+        f"{said}; {them} by {'themselves' if len(lost) > 1 else 'itself'} {rest}{how_much}. Efficiencies where you measured "
+        "still hold, the coefficients do not: measure where the wrap angles change in other proportions, or state a "
+        "coefficient that was measured separately under [friction.NAME]."
     )
 
 

@@ -20,6 +20,7 @@ from bowdenfit.questions.summary.parameter_words import parameters_text
 from bowdenfit.questions.summary.sampler_words import sampler_sentences, sampler_text
 from bowdenfit.questions.summary.verdict import (
     CONTRADICTORY,
+    IMPOSSIBLE,
     NOT_CONVERGED,
     NOT_DESCRIBED,
     NOT_IDENTIFIABLE,
@@ -95,6 +96,7 @@ def _untrusted(found: Verdict) -> str:
     kinds = {
         NOT_IDENTIFIABLE: "COEFFICIENTS NOT IDENTIFIABLE",
         CONTRADICTORY: "CONTRADICTORY MEASUREMENTS",
+        IMPOSSIBLE: "IMPOSSIBLE READINGS",
         NOT_DESCRIBED: "THE MODEL DOES NOT DESCRIBE THESE READINGS",
     }
     if NOT_CONVERGED in found.troubles:

@@ -34,24 +34,24 @@ from bowdenfit.results.kept import kept
 if TYPE_CHECKING:
     from bowdenfit.results.record import Record
 
-_FILES = (
-    wrap_angles_figure,
-    efficiency_figure,
+_FILES = (  # first those whose data are there, so that drawing begins at once
     coefficients_figure,
     pairs_figure,
     traces_figure,
     residuals_figure,
+    wrap_angles_figure,
+    efficiency_figure,
+    stretch_figure,
+    preload_figure,
+    bending_loss_figure,
+    loops_figure,
+    preload_window_figure,
     checks_figure,
     recordings_figure,
     hysteresis_figure,
     sample_efficiency_figure,
     autocorrelation_figure,
     dependence_figure,
-    stretch_figure,
-    preload_figure,
-    bending_loss_figure,
-    loops_figure,
-    preload_window_figure,
 )
 FIGURES = {file.__name__.rpartition(".")[2].removesuffix("_figure"): file for file in _FILES}
 

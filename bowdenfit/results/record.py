@@ -11,13 +11,13 @@ import numpy as np
 from bowdenfit.dataset import Dataset
 from bowdenfit.errors import UsageError
 from bowdenfit.inference.diagnostics import Diagnostics, Trajectories
-from bowdenfit.inference.draws import efficiency_at
+from bowdenfit.inference.draws import OfDraws, efficiency_at
 from bowdenfit.inference.interval import Interval
 from bowdenfit.inference.least_squares import LeastSquares
 from bowdenfit.inference.samplers import SamplerAgreement
 from bowdenfit.model import Model, build_model
 from bowdenfit.results.length import OptimalLength
-from bowdenfit.results.route_draws import RouteDraws, best_length, new_mounting, route_draws
+from bowdenfit.results.route_draws import RouteDraws, best_length, compile_along_route, new_mounting, route_draws
 
 OPTIMAL_LENGTH, OPTIMAL_EFFICIENCY = "optimal_length", "optimal_efficiency"
 Answer = TypeVar("Answer")
@@ -138,7 +138,7 @@ class Record:
             UsageError: The description has no route, or there is no posterior.
         """
         self._needs_route()
-        return route_draws(self.model, self.draws().flat_z, self.mounting())
+        return route_draws(self.model, along_route_program(self), self.draws().flat_z, self.mounting())
 
     def mounting(self) -> np.ndarray:
         """Effect of one new mounting on the friction exponent of each draw [1]."""
@@ -213,9 +213,15 @@ def once(question: Callable[[Record], Answer]) -> Callable[[Record], Answer]:
 
     @wraps(question)
     def answer(fit: Record) -> Answer:
-        if question not in fit.answers:
-            fit.answers[question] = question(fit)
-        found: Answer = fit.answers[question]
+        if answer not in fit.answers:
+            fit.answers[answer] = question(fit)
+        found: Answer = fit.answers[answer]
         return found
 
     return answer
+
+
+@once
+def along_route_program(fit: Record) -> OfDraws:
+    """See `compile_along_route`."""
+    return compile_along_route(fit.model)

@@ -1,5 +1,6 @@
 """What every draw implies along the route, in one program: curves, and efficiencies at the lengths that can be bought."""
 
+from concurrent.futures import Executor
 from dataclasses import dataclass
 from typing import Any
 
@@ -12,7 +13,7 @@ from jaxtyping import Float
 from bowdenfit.cable.load_cells import RUN_SCATTER
 from bowdenfit.cable.noise import noise_law
 from bowdenfit.description import Description, Route
-from bowdenfit.inference.draws import curves_of, for_each_draw
+from bowdenfit.inference.draws import OfDraws, curves_of, for_each_draw
 from bowdenfit.inference.interval import Interval
 from bowdenfit.model import Model
 from bowdenfit.results.choices import at_edge, best_window, rank_choices
@@ -38,13 +39,12 @@ class RouteDraws:
     mounted: np.ndarray
 
 
-def route_draws(model: Model, z: np.ndarray, mounting: np.ndarray) -> RouteDraws:
-    """Curves and efficiencies of a cable with a route.
+def compile_along_route(model: Model, beside: Executor | None = None) -> OfDraws:
+    """Curves and efficiencies of a cable with a route, of draws of z with the effect of a new mounting on the exponent.
 
     Args:
         model: The model.
-        z: Draws, one a row.
-        mounting: Effect of a new mounting on the friction exponent of each.
+        beside: See `compile_program`.
     """
     route, grid = model.description.route, route_grid(model)
     assert route is not None  # callers ask only where there is a route
@@ -61,10 +61,23 @@ def route_draws(model: Model, z: np.ndarray, mounting: np.ndarray) -> RouteDraws
         return {"curves": curves(z_and_mounting[:-1]), **of_choices}
 
     with jax.enable_x64(True):
-        found = for_each_draw(implied, model.space.size + 1)(np.column_stack([z, mounting]))
+        return for_each_draw(implied, model.space.size + 1, beside=beside)
+
+
+def route_draws(model: Model, program: OfDraws, z: np.ndarray, mounting: np.ndarray) -> RouteDraws:
+    """What draws imply along the route.
+
+    Args:
+        model: The model.
+        program: Of `compile_along_route`.
+        z: Draws, one a row.
+        mounting: Effect of a new mounting on the friction exponent of each.
+    """
+    with jax.enable_x64(True):
+        found = program(np.column_stack([z, mounting]))
     none = np.zeros((len(z), 0))
     return RouteDraws(
-        grid,
+        route_grid(model),
         {name: draws[:, :GRID_POINTS] for name, draws in found["curves"].items()},
         found["curves"]["efficiency"][:, GRID_POINTS:],
         found.get("mean", none),

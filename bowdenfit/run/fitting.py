@@ -2,6 +2,7 @@
 
 import platform
 from collections.abc import Callable, Iterator
+from concurrent.futures import ThreadPoolExecutor
 from datetime import UTC, datetime
 from pathlib import Path
 from typing import Any
@@ -40,9 +41,10 @@ def run(
     start, estimated = helper.begin(classical, density, answers=2)
     helper.prepare_to_draw()
     settings = data.description.sampler
-    load_beside(*(LIBRARIES[name] for name in samplers(settings.method)), "arviz_stats.base")
+    load_beside(*(LIBRARIES[name] for name in samplers(settings.method)), "arviz_stats.ecdf_utils")
+    compiling = ThreadPoolExecutor(1)
     with watch.stage("compile the posterior"):
-        programs = sampling_programs(density, seed)
+        programs = sampling_programs(density, seed, compiling)
     with watch.stage("wait for the start"):
         center = start.result()
     files = begin(), resume
@@ -50,7 +52,9 @@ def run(
     posterior, reasons = draws_of(programs, asked, watch)
     squares, beside = estimated.result()
     watch.seconds |= {f"{stage}, beside": seconds for stage, seconds in beside.items()}
-    return Fit(data, squares, posterior, not reasons, reasons, provenance(seed, watch))
+    found = Fit(data, squares, posterior, not reasons, reasons, provenance(seed, watch))
+    found.answers.update(programs.asked)
+    return found
 
 
 def classical(density: Density) -> Iterator[Any]:

@@ -1,6 +1,7 @@
 """Sampling within a fit: which sampler, its compiled programs, and a posterior made of its draws."""
 
 from collections.abc import Callable, Mapping
+from concurrent.futures import Executor
 from dataclasses import dataclass, replace
 from importlib import import_module
 from typing import Any
@@ -13,8 +14,10 @@ from bowdenfit.inference.draws import for_each_draw, replicator
 from bowdenfit.inference.log_density import LogDensity as Density
 from bowdenfit.inference.samplers import NAMES, Drawn, compare_samplers
 from bowdenfit.model import Model
+from bowdenfit.questions.identify.judgment import compile_slopes, slope_program
 from bowdenfit.results.optimum import optimum_of
-from bowdenfit.results.record import OPTIMAL_EFFICIENCY, OPTIMAL_LENGTH, Draws
+from bowdenfit.results.record import OPTIMAL_EFFICIENCY, OPTIMAL_LENGTH, Draws, along_route_program
+from bowdenfit.results.route_draws import compile_along_route
 from bowdenfit.run.helpers import Stopwatch
 
 PRIOR_DRAWS = 4096
@@ -35,11 +38,13 @@ class Programs:
         samplers: What each sampler runs, by its name.
         optimum: Optimal length and efficiency of many z; None without a route.
         implied: What each of many z implies for every reading.
+        asked: What questions asked `once` will need, by question.
     """
 
     samplers: dict[str, Callable[..., Any]]
     optimum: Callable[[np.ndarray], Any] | None
     implied: Callable[[np.ndarray], Any]
+    asked: dict[Callable[..., Any], Any]
 
     def quantities(self, z: np.ndarray) -> Mapping[str, np.ndarray]:
         """What must converge besides the parameters, by name, of many z."""
@@ -48,8 +53,8 @@ class Programs:
         return dict(zip((OPTIMAL_LENGTH, OPTIMAL_EFFICIENCY), self.optimum(z), strict=True))
 
 
-def sampling_programs(density: Density, seed: int) -> Programs:
-    """The programs that sampling and replicating its draws need."""
+def sampling_programs(density: Density, seed: int, beside: Executor) -> Programs:
+    """The programs that sampling needs, compiled; and those that its draws will need, compiled beside it."""
     model, settings, programs = density.model, density.model.description.sampler, dict[str, Callable[..., Any]]()
     for name in samplers(settings.method):
         if name == "emcee":
@@ -57,7 +62,15 @@ def sampling_programs(density: Density, seed: int) -> Programs:
         else:
             programs[name] = import_module(_MODULES[name]).make_program(density, settings)
     optimum = for_each_draw(optimum_of(model), model.space.size) if model.description.route else None
-    return Programs(programs, optimum, replicator(density, seed))
+    return Programs(programs, optimum, replicator(density, seed, beside), _asked_later(model, beside))
+
+
+def _asked_later(model: Model, beside: Executor) -> dict[Callable[..., Any], Any]:
+    """What the questions of every fit need, being compiled."""
+    asked: dict[Callable[..., Any], Any] = {slope_program: compile_slopes(model, beside)}
+    if model.description.route is not None:
+        asked[along_route_program] = compile_along_route(model, beside)
+    return asked
 
 
 def draws_of(programs: Programs, asked: Sampling, watch: Stopwatch) -> tuple[Draws, tuple[str, ...]]:

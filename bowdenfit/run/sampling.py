@@ -13,6 +13,7 @@ from bowdenfit.inference.chain import Chain, Sampling
 from bowdenfit.inference.draws import for_each_draw, replicator
 from bowdenfit.inference.log_density import LogDensity as Density
 from bowdenfit.inference.samplers import NAMES, Drawn, compare_samplers
+from bowdenfit.inference.value_chart import chart_values
 from bowdenfit.model import Model
 from bowdenfit.questions.identify.judgment import compile_slopes, slope_program
 from bowdenfit.results.optimum import optimum_of
@@ -59,6 +60,7 @@ def sampling_programs(density: Density, seed: int, beside: Executor) -> Programs
     for name in samplers(settings.method):
         if name == "emcee":
             programs[name] = density.batched_log_density(settings.n_ensembles * settings.n_walkers // 2)
+            chart_values(model.space)  # kept for the sampler
         else:
             programs[name] = import_module(_MODULES[name]).make_program(density, settings)
     optimum = for_each_draw(optimum_of(model), model.space.size) if model.description.route else None

@@ -58,7 +58,10 @@ def _kept(verb: Verb, asked: dict[str, Any]) -> Reply | None:
     from bowdenfit.results.kept import kept
 
     answers = kept(source)
-    reply = verb.kept(answers, asked) if answers else None
+    try:
+        reply = verb.kept(answers, asked) if answers else None
+    except (KeyError, TypeError, ValueError):  # kept when the answer had another shape
+        return None
     return _with_warning(reply, answers["troubles"], source) if reply and verb.warns else reply
 
 

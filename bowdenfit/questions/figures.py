@@ -76,7 +76,10 @@ def kept_figures(folder: Path, names: Iterable[str] = ()) -> dict[str, Any]:
     """
     if not kept(folder, FIGURE_DATA) or not (folder / FIGURE_DATA).exists():
         return {}
-    return read_arrays(folder / FIGURE_DATA, data_types(names or FIGURES))
+    try:
+        return read_arrays(folder / FIGURE_DATA, data_types(names or FIGURES))
+    except (KeyError, TypeError, ValueError):  # kept when the figure showed something else
+        return {}
 
 
 def data_types(names: Iterable[str]) -> dict[str, Any]:

@@ -13,7 +13,7 @@ from bowdenfit.questions.figures import FIGURES, figures_of, kept_figures
 from bowdenfit.questions.length.verb import VERB as LENGTH
 from bowdenfit.questions.predict.verb import VERB as PREDICT
 from bowdenfit.results.folder import ANSWERS, FIGURE_DATA
-from bowdenfit.results.kept import kept
+from bowdenfit.results.kept import keep, kept
 from bowdenfit.results.plain import stored
 
 QUICK = ("sampler.n_walkers=128", "sampler.target_ess=200", "sampler.target_r_hat=1.05", "sampler.max_steps=4000")
@@ -196,6 +196,15 @@ def test_nothing_is_read_back_of_a_folder_that_was_changed(results, tmp_path, ch
     assert kept(copy)
     change(copy)
     assert kept(copy) == {}
+
+
+@pytest.mark.parametrize("verb", ["length", "predict", "identify"])
+def test_an_answer_that_was_kept_in_another_shape_is_worked_out(results, tmp_path, run, verb):
+    copy = shutil.copytree(results, tmp_path / "copy")
+    other = kept(copy) | {"length": {"unit": "mm"}, "predict": [430.0], "identify": {"groups": {}}}
+    keep(copy, other, (copy / "fit.json").read_text())
+    assert kept(copy) == other
+    assert run(verb, copy) == run(verb, results)
 
 
 def test_an_answer_of_missing_draws_is_refused(results, tmp_path, run):

@@ -63,7 +63,7 @@ def independent(moving: np.ndarray, resting: np.ndarray, random: np.random.Rando
     root = np.linalg.cholesky(covariance * (1 + _JITTER * np.eye(size)))
     mixing = np.sqrt(_FREEDOM / random.chisquare(_FREEDOM, size=(ensembles, n, 1)))
     drawn = random.standard_normal((ensembles, n, size)) * mixing
-    present = np.linalg.solve(root, (moving - mean).transpose(0, 2, 1)).transpose(0, 2, 1)
+    present = np.matmul(moving - mean, np.linalg.inv(root).transpose(0, 2, 1))
     places = mean + np.matmul(drawn, root.transpose(0, 2, 1))
     return places, _log_t(present) - _log_t(drawn)
 

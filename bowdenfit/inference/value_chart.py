@@ -37,30 +37,30 @@ class Chart:
     values: np.ndarray
 
     @cached_property
-    def slopes(self) -> np.ndarray:
-        """Coordinate per z between nodes."""
-        return np.diff(self.values, axis=0) / _WIDTH
+    def rises(self) -> np.ndarray:
+        """From one node to the next."""
+        return np.diff(self.values, axis=0)
 
     @cached_property
     def log_slopes(self) -> np.ndarray:
-        """Log of `slopes`."""
-        return np.log(self.slopes)
+        """Log of the coordinate per z between nodes."""
+        return np.log(self.rises / _WIDTH)
 
     def from_z(self, z: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """Coordinates of z (last axis: parameters), and log of the volume of a unit of z there."""
-        along = z[..., self.which]
-        node = np.clip((along - NODES[0]) // _WIDTH, 0, len(NODES) - 2).astype(int)
-        column, found = np.arange(len(self.which)), z.copy()
-        found[..., self.which] = self.values[node, column] + (along - NODES[node]) * self.slopes[node, column]
-        return found, self.log_slopes[node, column].sum(axis=-1)
+        along, found = (z[..., self.which] - NODES[0]) / _WIDTH, z.copy()
+        node = np.clip(along, 0, len(NODES) - 2).astype(int)
+        place = node * len(self.which) + np.arange(len(self.which))
+        found[..., self.which] = self.values.take(place) + (along - node) * self.rises.take(place)
+        return found, self.log_slopes.take(place).sum(axis=-1)
 
     def to_z(self, found: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """Z of coordinates, and log of the volume of a unit of z there."""
         z, volume = found.copy(), np.zeros(found.shape[:-1])
         for column, parameter in enumerate(self.which):
-            at, values = found[..., parameter], self.values[:, column]
-            node = np.clip(np.searchsorted(values, at, side="right") - 1, 0, len(NODES) - 2)
-            z[..., parameter] = NODES[node] + (at - values[node]) / self.slopes[node, column]
+            at, values, rises = found[..., parameter], self.values[:, column], self.rises[:, column]
+            node = values[1:-1].searchsorted(at, side="right")
+            z[..., parameter] = NODES[0] + _WIDTH * (node + (at - values[node]) / rises[node])
             volume += self.log_slopes[node, column]
         return z, volume
 

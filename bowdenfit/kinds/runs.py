@@ -21,6 +21,7 @@ from bowdenfit.physics.friction import transmission_efficiency
 from bowdenfit.types import Labels, Vector
 
 _WEIGHTS = ("weight", "load_squares", "load_products")
+_OF_RUNS = ("n", "run_weight", "run_mean", "scatter", "log_weights")
 _LOAD_BINS, _SPEED_BINS, _DELAY_BINS = 24, 24, 8  # of each stroke of a run, where load, speed or a delay matters
 _ALIKE = 0.05  # speeds that differ by less than this fraction are one
 
@@ -74,13 +75,8 @@ class RunsTerm:
     @property
     def padded(self) -> dict[str, Any]:
         """See `LogDensity.padded`: each run's cells followed by weightless copies of its first."""
-        cells, each = len(self.data["mean"]), len(self.data["mean"]) // len(self.labels)
-        starts = np.arange(0, cells, each)[:, None]
-        place = np.arange(rounded_up(each))
-        source = (starts + np.where(place < each, place, 0)).ravel()
-        filled = np.tile(place < each, len(self.labels))
-        long = {name: values[source] for name, values in self.data.items() if len(values) == cells != len(starts)}
-        return self.data | long | {name: np.where(filled, long[name], 0.0) for name in _WEIGHTS if name in long}
+        runs = len(self.labels)
+        return with_cells(self.data, runs, rounded_up(len(self.data["mean"]) // runs))
 
     @property
     def inside(self) -> InsideRuns | None:
@@ -217,6 +213,22 @@ def run_sums(cable: Cable, rows: SlidingRows) -> dict[str, Any]:
         "scatter": np.bincount(run, within),
         "log_weights": np.bincount(row_run, rows.worth * np.log(weight / rows.worth)),
     }
+
+
+def with_cells(data: dict[str, Any], runs: int, each: int) -> dict[str, Any]:
+    """The same sums with more cells for each run, which have no weight.
+
+    Args:
+        data: What `run_sums` gave.
+        runs: Number of runs.
+        each: Number of cells for each.
+    """
+    cells, now = len(data["mean"]), len(data["mean"]) // runs
+    place = np.arange(each)
+    source = (np.arange(0, cells, now)[:, None] + np.where(place < now, place, 0)).ravel()
+    filled = np.tile(place < now, runs)
+    long = {name: values[source] for name, values in data.items() if name not in _OF_RUNS}
+    return data | long | {name: np.where(filled, long[name], 0.0) for name in _WEIGHTS if name in long}
 
 
 def _rectangular(cells: dict[str, np.ndarray], run: np.ndarray) -> dict[str, np.ndarray]:

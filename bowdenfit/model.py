@@ -11,6 +11,7 @@ from bowdenfit.cable.load_cells import RUN_SCATTER
 from bowdenfit.dataset import Dataset
 from bowdenfit.description import (
     Description,
+    HalfCauchyPrior,
     HalfNormalPrior,
     LogNormalPrior,
     NormalPrior,
@@ -26,7 +27,7 @@ from bowdenfit.kinds.measurements import Measurements
 from bowdenfit.kinds.places import Places, places_of
 from bowdenfit.kinds.term import Term
 from bowdenfit.kinds.terms import measured_kinds, parameters_asked_for
-from bowdenfit.parameters.priors import HalfNormal, LogNormal, Normal, Prior, TruncatedNormal, Uniform
+from bowdenfit.parameters.priors import HalfCauchy, HalfNormal, LogNormal, Normal, Prior, TruncatedNormal, Uniform
 from bowdenfit.parameters.space import Parameter, ParameterSpace
 
 
@@ -130,9 +131,9 @@ def _uncertain_constants(description: Description) -> list[Parameter]:
     return parameters
 
 
-def _set(parameter: Parameter, setting: ParameterSetting) -> Parameter:
+def _set(default: Parameter, setting: ParameterSetting) -> Parameter:
     """The parameter as the user wants it; numbers are in its shown unit."""
-    scale = parameter.shown_scale
+    parameter, scale = replace(default, scaled_by=""), default.shown_scale
     if setting.fixed is not None:
         return replace(parameter, fixed=setting.fixed / scale, prior_words="")
     if setting.measured is not None:
@@ -145,16 +146,18 @@ def _set(parameter: Parameter, setting: ParameterSetting) -> Parameter:
 
 
 def _prior(choice: PriorChoice, scale: float) -> Prior:
-    match choice.lognormal or choice.normal or choice.half_normal or choice.uniform:
+    match choice.lognormal or choice.normal or choice.half_normal or choice.half_cauchy or choice.uniform:
         case LogNormalPrior(median=median, log_sd=log_sd):
             return LogNormal(median / scale, log_sd)
         case NormalPrior(mean=mean, sd=sd):
             return Normal(mean / scale, sd / scale)
         case HalfNormalPrior(sd=sd):
             return HalfNormal(sd / scale)
+        case HalfCauchyPrior(scale=half):
+            return HalfCauchy(half / scale)
         case UniformPrior(low=low, high=high):
             return Uniform(low / scale, high / scale)
-    raise AssertionError("a choice of a prior has exactly one of the four")
+    raise AssertionError("a choice of a prior has exactly one of the five")
 
 
 def _check_support(parameter: Parameter, choice: PriorChoice) -> None:
@@ -162,6 +165,6 @@ def _check_support(parameter: Parameter, choice: PriorChoice) -> None:
     may_be_negative = choice.normal is not None or (choice.uniform is not None and choice.uniform.low < 0)
     if may_be_negative and not isinstance(parameter.prior, Normal):
         raise DescriptionError(
-            f"cable.toml: {parameter.name} cannot be negative, but its prior can; use lognormal, half_normal, a uniform "
-            "from 0 upward, or measured = { value = ..., sd = ... }."
+            f"cable.toml: {parameter.name} cannot be negative, but its prior can; use lognormal, half_normal, half_cauchy, a "
+            "uniform from 0 upward, or measured = { value = ..., sd = ... }."
         )

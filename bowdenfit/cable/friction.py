@@ -15,7 +15,7 @@ from jaxtyping import Float
 from bowdenfit.cable.conditions import Conditions
 from bowdenfit.description import PriorDefaults
 from bowdenfit.errors import DescriptionError, nearest
-from bowdenfit.parameters.priors import HalfNormal, LogNormal, Uniform
+from bowdenfit.parameters.priors import HalfCauchy, HalfNormal, LogNormal, Uniform
 from bowdenfit.parameters.space import Parameter, Role
 from bowdenfit.physics.friction import force_from_scale, force_scale, force_scale_slope, rate_factor
 
@@ -72,7 +72,9 @@ class Drag(FrictionOption):
         """The drag in newtons."""
         conditions.needs_loads("drag")
         meaning = "drag: hidden tension D, which the load cells do not show; D (1 - exp(-Lambda)) of the force is lost"
-        return [Parameter(DRAG, r"$D_\mathrm{hidden}$", meaning, "friction_model", HalfNormal(defaults.drag_newtons), "N")]
+        prior = HalfCauchy(defaults.drag_share * conditions.load.value)
+        by = conditions.load.share(defaults.drag_share)
+        return [Parameter(DRAG, r"$D_\mathrm{hidden}$", meaning, "friction_model", prior, "N", scaled_by=by)]
 
     def drag(self, values: Mapping[str, Array]) -> Array:
         """D"""

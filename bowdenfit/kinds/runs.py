@@ -11,7 +11,7 @@ from jax import Array
 from jaxtyping import Float
 
 from bowdenfit.cable.cable import Cable
-from bowdenfit.cable.load_cells import FORCE_NOISE, LEAST_FORCE, OUTPUT_OFFSET, RUN_SCATTER, LoadCells
+from bowdenfit.cable.load_cells import FORCE_NOISE, OUTPUT_OFFSET, RUN_SCATTER, LoadCells
 from bowdenfit.cable.noise import noise_law, scatter
 from bowdenfit.kinds.inside_runs import InsideRuns, inside_runs
 from bowdenfit.kinds.padding import rounded_up
@@ -100,11 +100,13 @@ class RunsTerm:
         if not (friction.depends_on_load or OUTPUT_OFFSET in values):
             return exponent + stroke * cells.gain_error + from_delay, jnp.ones_like(exponent), jnp.zeros_like(exponent)
 
+        least = friction.conditions.least_force
+
         def ratio(more: Array, load: Array) -> Array:
             read = data["input_force"] * jnp.exp(load)
-            input_force = cells.true_input(read, LEAST_FORCE)
+            input_force = cells.true_input(read, least)
             output_force = friction.output_force(values, input_force, exponent + more, stroke)
-            return stroke * jnp.log(read / cells.shown_output(output_force, LEAST_FORCE))
+            return stroke * jnp.log(read / cells.shown_output(output_force, least))
 
         zero, one = jnp.zeros_like(exponent), jnp.ones_like(exponent)
         shown, slope = jax.jvp(ratio, (zero, zero), (one, zero))

@@ -10,7 +10,6 @@ from numpyro.infer import MCMC, NUTS
 from snooker import snooker_mixture
 
 import bowdenfit as bf
-from bowdenfit.dataset import load_dataset
 from bowdenfit.description import SamplerSettings
 from bowdenfit.inference.chain import Chain, Sampling, stuck_walkers
 from bowdenfit.inference.draws import for_each_draw, named_values
@@ -29,6 +28,15 @@ STATED = {
     "optimal_length": (469.7, 4.5),
     "optimal_efficiency": (0.789, 0.008),
 }
+# The priors that this was worked out with, once the defaults.
+FIRST_PRIORS = [
+    "prior.tau.prior.half_normal.sd=0.02",
+    "prior.sigma_theta.prior.half_normal.sd=5",
+    *(f"prior.{name}_sheath_angle_c.prior.half_normal.sd=0.5" for name in ("free", "squeezed")),
+    *(f"prior.{name}_sheath_angle_b.prior.normal={{mean=0, sd=3}}" for name in ("free", "squeezed")),
+    f"prior.free_sheath_angle_a.prior.normal={{mean={np.log(np.deg2rad(40.0))}, sd=1.5}}",
+    f"prior.squeezed_sheath_angle_a.prior.normal={{mean={np.log(np.deg2rad(22.5))}, sd=1.5}}",
+]
 Draws = dict[str, np.ndarray]
 
 
@@ -72,7 +80,7 @@ class Bench:
 
 @pytest.fixture(scope="module")
 def bench(on_body) -> Bench:
-    return Bench(LogDensity(build_model(load_dataset(on_body))))
+    return Bench(LogDensity(build_model(bf.read(on_body, settings=FIRST_PRIORS))))
 
 
 @pytest.fixture(scope="module")
@@ -100,7 +108,7 @@ def by_nuts(bench) -> Draws:
 
 @pytest.fixture(scope="module")
 def by_bowdenfit(bench, on_body) -> Draws:
-    found = bf.fit(on_body, seed=20220728, settings=["sampler.target_ess=6000"])
+    found = bf.fit(on_body, seed=20220728, settings=["sampler.target_ess=6000", *FIRST_PRIORS])
     assert found.converged
     drawn = bench.quantities(found.posterior.flat_z)
     for name in ("mu1", "sigma_theta"):

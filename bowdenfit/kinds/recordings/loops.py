@@ -21,7 +21,7 @@ from bowdenfit.recordings.loop_strokes import loop_limits
 from bowdenfit.recordings.recording import Recording, Recordings
 
 RECORDED_LOSS = "recorded_loss"  # name of the readings of a loop's recordings in results
-_LEAST_PRELOAD = 1e-6  # N
+_LEAST_PRELOAD = 1e-6  # of the loads
 _LARGEST_EXPONENT = 3.0  # that a recording's own loss is taken to mean, however small the preload
 _REACH = 0.5  # of the friction exponent, that its first guess is corrected by
 
@@ -44,7 +44,8 @@ class LoopRecordingsTerm(BlocksTerm):
 
     def _first_guess(self, drive: Loop, data: Data) -> tuple[Each, Each]:
         """That with which the loop is as wide as the recording's own; none where that is not known."""
-        by_loss = data["loss"] / (2 * jnp.maximum(drive.preload, _LEAST_PRELOAD))
+        least = _LEAST_PRELOAD * self.cable.friction.conditions.load.value
+        by_loss = data["loss"] / (2 * jnp.maximum(drive.preload, least))
         own = jnp.where(data["tells_loss"], jnp.minimum(by_loss, _LARGEST_EXPONENT), data["exponent"])
         guess = jnp.where(data["tells_loss"] | data["tells_exponent"], own - drive.exponent, 0.0)
         return guess, _REACH * (drive.exponent + guess)

@@ -55,7 +55,8 @@ class Thinned:
         """
         blocks = self.recording.blocks
         force_in, force_out = (
-            np.maximum(self.mean(force), drive.least_force) for force in (blocks.input_force, blocks.output_force)
+            np.maximum(self.mean(force), drive.least_share * np.max(np.abs(force)))
+            for force in (blocks.input_force, blocks.output_force)
         )
         off = input_saturated(self.recording)
         lost = self.any_of(off)

@@ -12,8 +12,9 @@ import jax
 import jax.numpy as jnp
 import numpy as np
 
+from bowdenfit.cable.conditions import LEAST_SHARE
 from bowdenfit.cable.drive import Loop, Rope, drive_of
-from bowdenfit.cable.load_cells import BLOCK_NOISE, LEAST_FORCE, RUN_SCATTER, LoadCells
+from bowdenfit.cable.load_cells import BLOCK_NOISE, RUN_SCATTER, LoadCells
 from bowdenfit.description import Description
 from bowdenfit.errors import DatasetError
 from bowdenfit.kinds.bench import Truth
@@ -68,7 +69,8 @@ def _starts(drive: Rope | Loop, recordings: Recordings, force: jax.Array, mounti
 def _start(recording: Recording) -> float:
     """Where in its friction band a recording starts, from -1 (pulling) to 1 (returning)."""
     blocks, strokes = recording.blocks, recording.strokes
-    ratio = np.log(max(blocks.output_force[0], LEAST_FORCE) / max(blocks.input_force[0], LEAST_FORCE))
+    least = LEAST_SHARE * np.max(np.abs(blocks.input_force))
+    ratio = np.log(max(blocks.output_force[0], least) / max(blocks.input_force[0], least))
     return float(np.clip((ratio + strokes.center) / strokes.exponent, -1.0, 1.0))
 
 

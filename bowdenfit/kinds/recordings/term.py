@@ -33,10 +33,10 @@ from bowdenfit.kinds.recordings.simulation import drawn_recordings, recorded_aga
 from bowdenfit.kinds.recordings.whole import WholeRecordingsTerm, pad_recordings
 from bowdenfit.kinds.row_angles import row_angles
 from bowdenfit.kinds.runs import RunsTerm, run_sums
-from bowdenfit.kinds.shared_parameters import offsets, preload, run_scatter
+from bowdenfit.kinds.shared_parameters import noise_of_forces, offsets, preload, run_scatter
 from bowdenfit.kinds.sliding_rows import ROW_ARRAYS, SlidingRows
 from bowdenfit.kinds.term import Circumstances, TermKind
-from bowdenfit.parameters.priors import HalfNormal, Normal
+from bowdenfit.parameters.priors import Normal
 from bowdenfit.parameters.space import Parameter
 from bowdenfit.recordings.preparation.play import play
 from bowdenfit.recordings.recording import Recording, Recordings
@@ -180,11 +180,8 @@ def _rows(recordings: Recordings, parts: list[_Part], angles: Mapping[str, np.nd
 
 def _parameters(recordings: Recordings, at: Circumstances) -> list[Parameter]:
     """Scatter of mountings and blocks, what the load cells add, and of a loop its preload."""
-    sd, late = at.defaults.block_noise_newtons, recordings.delay_sd
-    block_noise = Parameter(
-        BLOCK_NOISE, r"$\sigma_B$", "standard deviation of a block's mean force", "noise",
-        HalfNormal(sd), "N",
-    )  # fmt: skip
+    late = recordings.delay_sd
+    block_noise = noise_of_forces(at, BLOCK_NOISE, r"$\sigma_B$", "standard deviation of a block's mean force")
     delay = Parameter(
         DELAY_ERROR, r"$\delta$", "error of the estimated delay between the load cells' channels", "sensor",
         Normal(0.0, late), "ms", 1000.0, prior_words=f"Normal(0, {1000 * late:.3g} ms)",

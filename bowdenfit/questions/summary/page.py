@@ -92,6 +92,8 @@ def _sampler(fit: Record, posterior: Draws) -> dict[str, Any]:
 def _parameter(fit: Record, name: str) -> dict[str, Any]:
     parameter = next(p for p in fit.model.space.parameters if p.name == name)
     row: dict[str, Any] = {"unit": parameter.unit, "meaning": parameter.meaning, "prior": parameter.prior_text}
+    if parameter.scaled_by:
+        row["prior_scaled_by"] = parameter.scaled_by
     if parameter.fixed is not None:
         row["fixed"] = parameter.fixed * parameter.shown_scale
     if name in fit.least_squares.estimates:
@@ -124,7 +126,8 @@ def curve_coefficients(fit: Record) -> dict[str, tuple[str, str]]:
 def _curve_coefficient(fit: Record, name: str) -> dict[str, Any]:
     row: dict[str, Any] = {"unit": curve_coefficients(fit)[name][0]}
     if fit.posterior is not None:
-        q05, median, q95 = np.quantile(fit.posterior.values[name], (0.05, 0.5, 0.95))
+        ordered = np.sort(fit.posterior.values[name], axis=None)  # some may be infinite, and are not to be interpolated
+        q05, median, q95 = (ordered[round(q * (len(ordered) - 1))] for q in (0.05, 0.5, 0.95))
         row |= {"median": float(median), "q05": float(q05), "q95": float(q95)}
     return row
 

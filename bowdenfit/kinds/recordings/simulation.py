@@ -50,7 +50,8 @@ def drawn_recordings(recordings: Recordings, truth: Truth) -> dict[str, jax.Arra
     output, _ = drive.follow(at_least, scale * mounting, _starts(drive, recordings, at_least, scale * mounting))
     places = beside([_readings_of(r) for r in recordings.each]).astype(int)
     shape, noise = (places.max() + 1, len(recordings.each)), scale * values[BLOCK_NOISE]
-    errors = [noise * jax.random.normal(k, shape)[places, np.arange(shape[1])] for k in (of_input, of_output)]
+    noises = ((cable.description.sensors.noise_ratio * noise, of_input), (noise, of_output))
+    errors = [sd * jax.random.normal(k, shape)[places, np.arange(shape[1])] for sd, k in noises]
     return {
         "input_force": cells.shown_input(force) + errors[0],
         "output_force": cells.shown_output(output),

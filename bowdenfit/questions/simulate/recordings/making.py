@@ -75,7 +75,8 @@ def make_recordings(plan: RecordingsPlan, seed: int, noise: bool = True) -> Made
     contacts = [c.name for c in plan.description.contact]
     each = []
     for i, (planned, generator) in enumerate(zip(plan.recordings, of_each, strict=True)):
-        one = _with_faults(planned, float(force_noise), values.get(GAIN_ERROR, 0.0), noise)
+        of_cells = plan.description.sensors.noise_ratio * float(force_noise), float(force_noise)
+        one = _with_faults(planned, of_cells, values.get(GAIN_ERROR, 0.0), noise)
         exponent, effect = float(exponents[i]), effects[one.run]
         simulated = simulate_recording(exponent, one.friction, one.profile, one.bench, one.faults, generator, effect)
         wrap = dict(zip(contacts, map(float, angles[i]), strict=True))
@@ -115,9 +116,11 @@ def _true_angles(
     return angles
 
 
-def _with_faults(planned: PlannedRecording, force_noise: float, gain_error: float, noise: bool) -> PlannedRecording:
+def _with_faults(
+    planned: PlannedRecording, of_cells: tuple[float, float], gain_error: float, noise: bool
+) -> PlannedRecording:
     """The recording with what the truth says of noise and gain where the plan says nothing."""
-    true: dict[str, Any] = {"input_noise": force_noise, "output_noise": force_noise, "gain_error": gain_error}
+    true: dict[str, Any] = {"input_noise": of_cells[0], "output_noise": of_cells[1], "gain_error": gain_error}
     faults = dataclasses.replace(planned.faults, **{k: v for k, v in true.items() if k not in planned.stated_faults})
     if not noise:
         faults = dataclasses.replace(faults, input_noise=0.0, output_noise=0.0, spikes=0.0, dropouts=0.0)

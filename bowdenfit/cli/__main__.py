@@ -1,6 +1,6 @@
 """`python -m bowdenfit.cli` is `bowdenfit`."""
 
-from bowdenfit.cli import start
+from bowdenfit.cli import main
 
 if __name__ == "__main__":
-    start()
+    main()

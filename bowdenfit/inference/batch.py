@@ -65,13 +65,13 @@ def _fit_group(
     done = {case.number: case for case in in_chunks(weigh, numbered)}
     limit = max(programs.settings.sampler.max_steps // STEPS, _FIRST_LOOK)
     target = _FIRST_LOOK
-    while walking := [case for case in done.values() if case.fit.reasons and len(case.z) and case.rounds < limit]:
+    while walking := [case for case in done.values() if len(case.fit.z) and case.fit.reasons and case.rounds < limit]:
         _ = programs.ensembles
         for _ in range(walking[0].rounds, target):
             walking = in_chunks(walk, walking)
         done |= {case.number: case for case in in_chunks(look, walking)}
         target = min(target + max(target // 3, 1), limit)
     for case in done.values():
-        if programs.settings.nuts and case.fit.reasons and len(case.z):
+        if programs.settings.nuts and len(case.fit.z) and case.fit.reasons:
             done[case.number] = replace(case, fit=by_nuts(programs, case))
     return [case.fit for case in done.values()]

@@ -1,19 +1,16 @@
-"""Maxima of many posteriors at once, and mixtures of Student-t's about them to draw from.
+"""Maxima of many posteriors at once, and mixtures about them to draw from.
 
 The maxima are those of the log density itself, noise scales included, climbed to from several starts. Posteriors of few
 readings are funnels: where readings scatter more, everything else is wider. So each noise scale is also held aside of its
-maximum, the density maximized over all the rest, and the curvature taken there. A few draws come from the prior, which
-bounds the importance weights.
-
-References:
-    Owen and Zhou 2000, "Safe and effective importance sampling" (Journal of the American Statistical Association 95).
+maximum, the density maximized over all the rest, and the curvature taken there.
 """
 
 from collections.abc import Callable
 from dataclasses import dataclass
-from math import lgamma
 
 import numpy as np
+
+from bowdenfit.inference.batch_mixture import Mixture
 
 Gradients = Callable[[np.ndarray], tuple[np.ndarray, np.ndarray]]
 
@@ -24,8 +21,7 @@ _FLAT = 0.2  # least curvature that is believed; the prior's is 1
 _LONGEST = 3.0  # step, in standard deviations of the prior
 _TOP = 1e-9  # gain that a step promises at which the top is reached
 _STUCK = 1e8  # damping at which no step gains anything
-_FREEDOM = 5  # of the Student-t's
-_LEAST_SHARE, _PRIOR_SHARE = 0.02, 0.05  # of the draws, of each part and of the prior
+_LEAST_SHARE = 0.02  # of each part in the draws
 
 
 @dataclass(frozen=True)
@@ -85,44 +81,6 @@ def _around(gradients: Gradients, z: np.ndarray) -> tuple[np.ndarray, np.ndarray
     )
     known_slope = np.where(known[..., None], slope[:, :, 0], 0.0)
     return np.where(known, value[..., 0], -np.inf), known_slope, np.where(known[..., None, None], curvature, 0.0)
-
-
-@dataclass(frozen=True)
-class Mixture:
-    """Student-t's and the prior.
-
-    Args:
-        center: Of every part, (part, parameter).
-        root: A root R of its scale matrix R R^T.
-        share: Of the draws that are not the prior's.
-    """
-
-    center: np.ndarray
-    root: np.ndarray
-    share: np.ndarray
-
-    def draw(self, generator: np.random.Generator, count: int) -> np.ndarray:
-        """So many z, one a row."""
-        size = self.center.shape[1]
-        ends = np.cumsum(self.share) * (1 - _PRIOR_SHARE)
-        part = np.searchsorted(ends, (np.arange(count) + generator.uniform()) / count)  # each part gets its share
-        z = generator.standard_normal((count, size))
-        wide = np.sqrt(_FREEDOM / generator.chisquare(_FREEDOM, count))
-        for i in range(len(self.share)):
-            here = part == i
-            z[here] = self.center[i] + wide[here, None] * (z[here] @ self.root[i].T)
-        return z
-
-    def log_density(self, z: np.ndarray) -> np.ndarray:
-        """Of every row."""
-        size = z.shape[1]
-        constant = lgamma((_FREEDOM + size) / 2) - lgamma(_FREEDOM / 2) - size / 2 * np.log(_FREEDOM * np.pi)
-        logs = [np.log(_PRIOR_SHARE) - 0.5 * np.sum(z**2 + np.log(2 * np.pi), axis=1)]
-        for center, root, share in zip(self.center, self.root, self.share, strict=True):
-            squares = np.sum(((z - center) @ np.linalg.inv(root).T) ** 2, axis=1)
-            weight = np.log(share * (1 - _PRIOR_SHARE)) + constant - np.linalg.slogdet(root)[1]
-            logs.append(weight - (_FREEDOM + size) / 2 * np.log1p(squares / _FREEDOM))
-        return np.logaddexp.reduce(logs, axis=0)
 
 
 def starting_points(size: int, seeds: np.ndarray) -> np.ndarray:

@@ -11,12 +11,12 @@ import numpy as np
 from bowdenfit.description import SamplerSettings
 from bowdenfit.inference.batch_ensembles import make_round
 from bowdenfit.inference.batch_laplace import points_of_climb
+from bowdenfit.inference.batch_weights import BLOCK
 from bowdenfit.inference.compilation import compile_program
 from bowdenfit.inference.log_density import LogDensity
 from bowdenfit.inference.objective import noise_scales
 
 CHUNK = 16  # data sets that a program takes at once; always as many, so that rounding is the same
-BLOCK = 512  # draws of each of them at once
 
 
 @dataclass(frozen=True)
@@ -25,18 +25,16 @@ class BatchSettings:
 
     Args:
         sampler: Ensembles, their walkers (a power of two), most steps, and targets; those of NUTS where it is needed.
-        n_draws: Weighted draws of every data set.
-        n_kept: Draws of equal weight that are made of those.
+        n_kept: Draws of equal weight that are made of weighted ones.
         nuts: Whether NUTS takes what the ensembles leave.
         threads: How many chunks at once; as many as there are cores if omitted.
     """
 
     sampler: SamplerSettings = field(
         default_factory=lambda: SamplerSettings(
-            n_ensembles=2, n_walkers=128, max_steps=6000, target_ess=400, target_r_hat=1.03
+            n_ensembles=2, n_walkers=64, max_steps=6000, target_ess=1000, target_r_hat=1.02
         )
     )
-    n_draws: int = 4096
     n_kept: int = 2048
     nuts: bool = True
     threads: int = 0
@@ -45,10 +43,6 @@ class BatchSettings:
         walkers = self.sampler.n_walkers
         if walkers & (walkers - 1):
             raise ValueError(f"an ensemble of a batch needs a power of two of walkers, such as 128, and not {walkers}.")
-        if self.n_draws % BLOCK:
-            raise ValueError(
-                f"weighted draws of a batch come in blocks of {BLOCK}; {self.n_draws} are no multiple of it."
-            )
 
 
 @dataclass(frozen=True)

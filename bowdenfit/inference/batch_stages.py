@@ -6,21 +6,17 @@ from typing import Any
 import numpy as np
 
 from bowdenfit.description import SamplerSettings
-from bowdenfit.inference.batch_diagnostics import (
-    diagnose_few_draws,
-    diagnose_weighted,
-    effective_draws,
-    weight_shortfalls,
-)
+from bowdenfit.inference.batch_diagnostics import diagnose_few_draws
 from bowdenfit.inference.batch_ensembles import STEPS, STORED
-from bowdenfit.inference.batch_laplace import Mixture, mixtures
-from bowdenfit.inference.batch_programs import BLOCK, CHUNK, BatchPrograms, stack
+from bowdenfit.inference.batch_laplace import mixtures
+from bowdenfit.inference.batch_programs import CHUNK, BatchPrograms, stack
+from bowdenfit.inference.batch_weights import BLOCK, Weighted, evened, resample, weighted_draws
 from bowdenfit.inference.chain import Sampling, stuck_walkers
 from bowdenfit.inference.diagnostics import Diagnostics, shortfalls
 from bowdenfit.inference.least_squares import MaximumPosterior
-from bowdenfit.inference.psis import smooth_weights
 
 _KEPT_PER_WALKER = 20
+FORGETS = 3  # effective draws that each walker makes by itself, so that where it started is forgotten
 _SPREAD = 2  # effective draws for every walker that the starts of ensembles are drawn from, at the least
 _UNKNOWN = (
     "the model cannot be computed at the prior medians or anywhere near; the usual cause is a prior or a fixed value that is "
@@ -57,9 +53,7 @@ class Case:
         number: Its place in the batch.
         data: Its data.
         seed: Its seed.
-        z: Weighted draws, with their log densities.
-        log_density: Of those.
-        log_weights: Of those, of sum 1.
+        weighted: Its weighted draws; None where nothing can be computed.
         fit: What is known so far.
         rounds: How many its walkers have gone.
         walkers: Where they are, (ensemble, walker, parameter), with their log densities.
@@ -69,9 +63,7 @@ class Case:
     number: int
     data: Any
     seed: int
-    z: np.ndarray
-    log_density: np.ndarray
-    log_weights: np.ndarray
+    weighted: Weighted | None
     fit: BatchFit
     rounds: int = 0
     walkers: tuple[np.ndarray, np.ndarray] = (np.zeros(0), np.zeros(0))
@@ -82,40 +74,38 @@ def weigh(programs: BatchPrograms, parts: list[tuple[int, Any, int]]) -> list[Ca
     """Weighted draws of a chunk of data sets."""
     seeds, data = np.array([seed for *_, seed in parts]), stack([data for _, data, _ in parts])
     padded = np.concatenate([seeds, np.repeat(seeds[-1:], CHUNK - len(seeds))])
-    found = mixtures(lambda z: programs.gradients(z, data), programs.noise, padded)
-    count, size = programs.settings.n_draws, len(programs.names)
-    generators = [np.random.default_rng([int(seed), 1]) for seed in padded]
-    z = np.stack([m.draw(g, count) if m else np.zeros((count, size)) for m, g in zip(found, generators, strict=True)])
-    blocks = [np.asarray(programs.densities(z[:, i : i + BLOCK], data)) for i in range(0, count, BLOCK)]
-    log_density = np.concatenate(blocks, axis=1)
-    return [_case(programs, part, z[i], log_density[i], found[i], generators[i]) for i, part in enumerate(parts)]
+    begun = mixtures(lambda z: programs.gradients(z, data), programs.noise, padded)
+    drawing = {
+        i: weighted_draws(
+            mixture, np.random.default_rng([int(seed), 1]), lambda w: not _by_weights(programs, w).reasons
+        )
+        for i, (mixture, seed) in enumerate(zip(begun, seeds, strict=False))
+        if mixture is not None
+    }
+    z, weighted = np.zeros((CHUNK, BLOCK, len(programs.names))), dict[int, Weighted]()
+    wanted = {i: next(one) for i, one in drawing.items()}
+    while wanted:
+        for i, rows in wanted.items():
+            z[i] = rows
+        log_density, asked, wanted = np.asarray(programs.densities(z, data)), list(wanted), {}
+        for i in asked:
+            try:
+                wanted[i] = drawing[i].send(log_density[i])
+            except StopIteration as end:
+                weighted[i] = end.value
+    return [Case(*part, weighted.get(i), _by_weights(programs, weighted.get(i))) for i, part in enumerate(parts)]
 
 
-def _case(
-    programs: BatchPrograms,
-    part: tuple[int, Any, int],
-    z: np.ndarray,
-    log_density: np.ndarray,
-    mixture: Mixture | None,
-    generator: np.random.Generator,
-) -> Case:
-    """A data set with what its weights say."""
-    sampler, none = programs.settings.sampler, np.zeros(0)
-    usable = np.isfinite(log_density)
-    if mixture is None or usable.sum() < _SPREAD * sampler.n_ensembles * sampler.n_walkers:
-        nothing = BatchFit(np.zeros((0, z.shape[1])), "laplace", float("inf"), {}, (_UNKNOWN,))
-        return Case(*part, nothing.z, none, none, nothing)
-    log_weights, k = smooth_weights(log_density - mixture.log_density(z))
-    diagnostics = diagnose_weighted(dict(zip(programs.names, z.T, strict=True)), np.exp(log_weights))
-    reasons = weight_shortfalls(k, len(z), diagnostics, sampler.target_ess)
-    kept = _resample(np.exp(log_weights), programs.settings.n_kept, generator)
-    return Case(*part, z, log_density, log_weights, BatchFit(z[kept], "laplace", k, diagnostics, reasons))
-
-
-def _resample(weights: np.ndarray, count: int, generator: np.random.Generator) -> np.ndarray:
-    """Systematic: every draw as often as its weight says, to less than one."""
-    places = (np.arange(count) + generator.uniform()) / count
-    return np.minimum(np.searchsorted(np.cumsum(weights), places), len(weights) - 1)
+def _by_weights(programs: BatchPrograms, weighted: Weighted | None) -> BatchFit:
+    """What weighted draws say, as draws of equal weight."""
+    settings = programs.settings
+    least = _SPREAD * settings.sampler.n_ensembles * settings.sampler.n_walkers
+    if weighted is None or np.isfinite(weighted.log_density).sum() < least:
+        return BatchFit(np.zeros((0, len(programs.names))), "laplace", float("inf"), {}, (_UNKNOWN,))
+    diagnostics = weighted.diagnose(programs.names)
+    reasons = weighted.shortfalls(diagnostics, settings.sampler.target_ess)
+    kept = resample(np.exp(weighted.log_weights), settings.n_kept, np.random.default_rng([settings.n_kept]))
+    return BatchFit(weighted.z[kept], "laplace", weighted.pareto_k, diagnostics, reasons)
 
 
 def walk(programs: BatchPrograms, cases: list[Case]) -> list[Case]:
@@ -138,18 +128,14 @@ def _further(case: Case, path: np.ndarray, log_density: np.ndarray) -> Case:
 
 def _on_the_way(sampler: SamplerSettings, case: Case) -> Case:
     """Walkers at different ones of the weighted draws; of few effective draws the weights are made more even."""
-    wanted = sampler.n_ensembles * sampler.n_walkers
-    generator = np.random.default_rng([case.seed, 2])
-    log_weights = np.where(np.isfinite(case.log_density), case.log_weights, -np.inf)
-    power = 1.0
-    while effective_draws(power * log_weights) < _SPREAD * wanted:
-        power *= 0.9
+    assert case.weighted is not None  # nothing walks where nothing can be computed
+    wanted, generator = sampler.n_ensembles * sampler.n_walkers, np.random.default_rng([case.seed, 2])
+    log_weights = evened(case.weighted.log_weights, _SPREAD * wanted)
     # The largest of weights times exponential numbers are a sample without replacement.
-    chosen = np.argsort(power * log_weights + generator.gumbel(size=len(log_weights)))[-wanted:]
-    chosen = generator.permutation(chosen)
-    shape = sampler.n_ensembles, sampler.n_walkers
-    walkers = case.z[chosen].reshape(*shape, -1), case.log_density[chosen].reshape(shape)
-    return replace(case, walkers=walkers)
+    chosen = np.argsort(log_weights + generator.gumbel(size=len(log_weights)))[-wanted:]
+    chosen, shape = generator.permutation(chosen), (sampler.n_ensembles, sampler.n_walkers)
+    log_density = case.weighted.log_density[chosen].reshape(shape)
+    return replace(case, walkers=(case.weighted.z[chosen].reshape(*shape, -1), log_density))
 
 
 def look(programs: BatchPrograms, cases: list[Case]) -> list[Case]:
@@ -164,7 +150,8 @@ def _by_ensembles(programs: BatchPrograms, case: Case) -> BatchFit:
     z = second[kept].transpose(1, 2, 0, 3).reshape(-1, len(kept), len(programs.names))
     draws = {name: z[..., i] for i, name in enumerate(programs.names)}
     diagnostics = diagnose_few_draws(draws, sampler.n_ensembles)
-    reasons = (*shortfalls(diagnostics, sampler.target_r_hat, sampler.target_ess), *stuck_walkers(z))
+    target = max(sampler.target_ess, FORGETS * len(z))
+    reasons = (*shortfalls(diagnostics, sampler.target_r_hat, target), *stuck_walkers(z))
     steps = case.rounds * STEPS
     return BatchFit(z.reshape(-1, z.shape[-1]), "ensembles", case.fit.pareto_k, diagnostics, reasons, steps)
 
@@ -173,9 +160,9 @@ def by_nuts(programs: BatchPrograms, case: Case) -> BatchFit:
     """What NUTS makes of it, started from the weighted draws."""
     from bowdenfit.inference.nuts import sample
 
-    weights = np.exp(case.log_weights)
-    center = weights @ case.z
-    start = MaximumPosterior(center, np.cov(case.z.T, aweights=weights).reshape(len(center), -1))
+    assert case.weighted is not None  # nor is there anything to start from
+    weights, rows = np.exp(case.weighted.log_weights), case.weighted.z
+    start = MaximumPosterior(weights @ rows, np.cov(rows.T, aweights=weights).reshape(rows.shape[1], -1))
     posterior = replace(programs.posterior, given=case.data)
     asked = Sampling(posterior, start, programs.settings.sampler, case.seed, diagnose=diagnose_few_draws)
     chain = sample(asked, programs.nuts)

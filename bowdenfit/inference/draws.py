@@ -1,8 +1,7 @@
 """Everything that each draw of the posterior implies: named values, curves, replicated readings."""
 
-from collections.abc import Callable, Mapping, Sequence
-from concurrent.futures import Executor
-from typing import Any, TypeAlias
+from collections.abc import Callable, Mapping
+from typing import Any
 
 import jax
 import jax.numpy as jnp
@@ -17,15 +16,13 @@ from bowdenfit.model import Model
 BATCH = 1024
 _SMALL = 10_000  # numbers in the data below which compiling takes longer than running
 Function = Callable[..., Any]
-OfDraws: TypeAlias = Callable[[np.ndarray], Any]
 
 
-def for_each_draw(
-    function: Function, size: int, *data: Any, run_once: bool = False, beside: Executor | None = None
-) -> OfDraws:
+def for_each_draw(function: Function, size: int, *data: Any, run_once: bool = False) -> Callable[[np.ndarray], Any]:
     """`function` of one z (and of data that are the same for all), compiled to be applied to any number of z (rows)."""
-    over_rows, rows = jax.vmap(function, in_axes=(0, *(None for _ in data))), jax.ShapeDtypeStruct((BATCH, size), float)
-    program = compile_program(over_rows, rows, *data, run_once=run_once, beside=beside)
+    over_rows = jax.vmap(function, in_axes=(0, *(None for _ in data)))
+    program = compile_program(over_rows, jax.ShapeDtypeStruct((BATCH, size), jnp.float64), *data, run_once=run_once)
+
     return lambda z: in_batches(lambda part: program(part, *data), BATCH, z)
 
 
@@ -58,7 +55,7 @@ def derived_units(model: Model) -> dict[str, tuple[str, str]]:
     return {name: unit for curve in model.cable.curves.values() for name, unit in curve.derived_units().items()}
 
 
-def replicator(posterior: LogDensity, seed: int, beside: Executor | None = None) -> OfDraws:
+def replicator(posterior: LogDensity, seed: int) -> Callable[[np.ndarray], dict[str, dict[str, np.ndarray]]]:
     """Compiled function of draws (rows): what each draw implies for every reading.
 
     Its answer has, by group ("values", "log_likelihood", "expected", "replicated") and name, arrays over draws and
@@ -80,7 +77,7 @@ def replicator(posterior: LogDensity, seed: int, beside: Executor | None = None)
         }
 
     small = sum(np.size(array) for array in jax.tree.leaves(posterior.data)) < _SMALL
-    program = for_each_draw(implied, model.space.size + 1, posterior.data, run_once=small, beside=beside)
+    program = for_each_draw(implied, model.space.size + 1, posterior.data, run_once=small)
     return lambda z: program(np.column_stack([z, np.arange(len(z), dtype=float)]))
 
 
@@ -97,9 +94,9 @@ def curves_of(model: Model, route: np.ndarray) -> Callable[[Float[Array, " free"
 
 
 def output_force_at(
-    model: Model, z: np.ndarray, route: np.ndarray, input_force: float, stroke: int, mountings: Sequence[np.ndarray]
-) -> list[np.ndarray]:
-    """Output force [N] of every draw (rows) at route values (columns), at the reference speed, in each of some mountings.
+    model: Model, z: np.ndarray, route: np.ndarray, input_force: float, stroke: int, mounting: np.ndarray
+) -> np.ndarray:
+    """Output force [N] of every draw (rows) at route values (columns), at the reference speed.
 
     Args:
         model: The model.
@@ -107,7 +104,7 @@ def output_force_at(
         route: Route values; any one number where the cable has no route.
         input_force: Force at the motor side [N].
         stroke: +1 pulling, -1 return.
-        mountings: Effect of each mounting on the friction exponent of each draw [1].
+        mounting: Effect of the mounting on the friction exponent of each draw [1].
     """
     at = jnp.asarray(np.atleast_1d(route), dtype=float)
 
@@ -116,8 +113,7 @@ def output_force_at(
         force_in, direction = jnp.asarray(float(input_force)), jnp.asarray(float(stroke))
         return model.cable.output_force_at(values, at, force_in, direction, z_and_mounting[-1])
 
-    program = for_each_draw(force, model.space.size + 1)
-    return [program(np.column_stack([z, mounting])) for mounting in mountings]
+    return for_each_draw(force, model.space.size + 1)(np.column_stack([z, mounting]))
 
 
 def efficiency_at(model: Model, z: np.ndarray, route: np.ndarray) -> np.ndarray:

@@ -6,14 +6,12 @@ from typing import Any
 
 import numpy as np
 
-from bowdenfit.description import Description
+from bowdenfit.dataset import Dataset
 from bowdenfit.kinds import kind_of
-from bowdenfit.kinds.inside_runs import STROKE as STROKE
-from bowdenfit.kinds.measurements import Measurements
 from bowdenfit.kinds.term import Term
 from bowdenfit.kinds.terms import term_kind
 
-RUN = "Run"
+RUN, STROKE = "Run", "Stroke"
 _ONE_PLACE = 0.02  # of all route values, within which those of a run are one
 
 
@@ -34,16 +32,15 @@ class Places:
     inside: np.ndarray
 
 
-def places_of(description: Description, measurements: Measurements, term: Term) -> Places:
+def places_of(dataset: Dataset, term: Term) -> Places:
     """Where the readings of a term were taken; numbered in their order where nothing else is known.
 
     Args:
-        description: What was said about the cable.
-        measurements: Everything measured on it.
+        dataset: The data set.
         term: One table of its model.
     """
-    n, route = len(term.labels), description.route
-    numbers, back = _of_kind(measurements, term)
+    n, route = len(term.labels), dataset.description.route
+    numbers, back = _of_kind(dataset, term)
     at = route_values(term)
     inside = np.ones(n, dtype=bool)
     if route is not None and at is not None and np.isfinite(at).all():
@@ -53,10 +50,10 @@ def places_of(description: Description, measurements: Measurements, term: Term) 
     return Places(varying or {RUN: np.arange(1.0, n + 1)}, _groups(term), back, inside)
 
 
-def _of_kind(measurements: Measurements, term: Term) -> tuple[Mapping[str, np.ndarray], np.ndarray]:
+def _of_kind(dataset: Dataset, term: Term) -> tuple[Mapping[str, np.ndarray], np.ndarray]:
     """Loads and wrap angles of the tables that have them."""
     kind = kind_of(term.name)
-    table = measurements.table(kind.table) if kind is not None else None
+    table = dataset.measurements.table(kind.table) if kind is not None else None
     if table is None:
         return {}, np.zeros(len(term.labels), dtype=bool)
     declared = term_kind(term.name)

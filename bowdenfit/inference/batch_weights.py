@@ -1,0 +1,169 @@
+"""Importance sampling of one posterior: a mixture follows the weights of its draws, then is held and drawn from.
+
+While it moves, draws of the last rounds are weighted together, against all the mixtures they came from: none of those has to
+be good alone. What is kept are new draws, from all those mixtures as they are then; so nothing that is kept has decided
+where it is drawn.
+
+References:
+    Cornuet, Marin, Mira and Robert 2012, "Adaptive multiple importance sampling" (Scandinavian Journal of Statistics 39);
+    Vehtari, Simpson, Gelman, Yao and Gabry 2024, "Pareto smoothed importance sampling" (JMLR 25), for when to trust it.
+"""
+
+from collections.abc import Callable, Generator, Mapping
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+
+from bowdenfit.inference.batch_mixture import Mixture
+from bowdenfit.inference.diagnostics import Diagnostics
+from bowdenfit.inference.psis import reliable_k, smooth_weights
+
+BLOCK = 2048  # draws of a round
+_POOLED = 4  # rounds that are weighted together while the mixture moves
+_MOST_MOVES = 10
+_GOOD = 0.15  # effective draws a draw at which the mixture need not move on
+_LOOKS = (1, 2, 4, 8, 16)  # rounds of the mixture that is held, at which is looked whether they are enough
+_EFFECTIVE = 20  # draws a parameter that the mixture is moved by, at the least; of fewer, weights are made more even
+_TAILS = (0.05, 0.95)
+
+
+@dataclass(frozen=True)
+class Weighted:
+    """Weighted draws.
+
+    Args:
+        z: One a row.
+        log_density: Of the posterior.
+        log_proposed: Of what they were drawn from.
+    """
+
+    z: np.ndarray
+    log_density: np.ndarray
+    log_proposed: np.ndarray
+
+    @cached_property
+    def _smooth(self) -> tuple[np.ndarray, float]:
+        return smooth_weights(self.log_density - self.log_proposed)
+
+    @property
+    def log_weights(self) -> np.ndarray:
+        """Of sum 1; minus infinity where the density cannot be computed."""
+        return np.where(np.isfinite(self.log_density), self._smooth[0], -np.inf)
+
+    @property
+    def pareto_k(self) -> float:
+        """Of the weights."""
+        return self._smooth[1]
+
+    def diagnose(self, names: tuple[str, ...]) -> dict[str, Diagnostics]:
+        """Diagnostics by parameter; weighted draws have no R-hat and no drift (section 3.2.3 for the errors)."""
+        weights = np.exp(self.log_weights)
+        return {name: _diagnose(self.z[:, i], weights) for i, name in enumerate(names)}
+
+    def shortfalls(self, diagnostics: Mapping[str, Diagnostics], target_ess: int) -> tuple[str, ...]:
+        """What keeps the draws from being trusted, in words; empty if nothing does."""
+        most, reasons = reliable_k(len(self.z)), []
+        if not self.pareto_k <= most:
+            reasons.append(
+                f"Pareto k of the importance weights is {self.pareto_k:.2f} and should be at most {most:.2f}"
+            )
+        for name, d in diagnostics.items():
+            low = min(d.ess_bulk, d.ess_tail)
+            if not low >= target_ess:
+                reasons.append(f"effective sample size of {name} is {low:.0f} and should be at least {target_ess}")
+        return tuple(reasons)
+
+
+def weighted_draws(
+    mixture: Mixture, generator: np.random.Generator, enough: Callable[[Weighted], bool]
+) -> Generator[np.ndarray, np.ndarray, Weighted]:
+    """Weighted draws of a posterior; yields z (rows) and is sent their log densities.
+
+    Args:
+        mixture: What is drawn from at first.
+        generator: Of everything random here.
+        enough: Whether draws are enough.
+    """
+    held = yield from _moved(mixture, generator)
+    z, log_density, log_proposed = np.zeros((0, mixture.center.shape[1])), np.zeros(0), np.zeros(0)
+    for look in _LOOKS:
+        while len(z) < look * BLOCK:
+            more = held.draw(generator, BLOCK)
+            z, log_density = np.concatenate([z, more]), np.concatenate([log_density, (yield more)])
+            log_proposed = np.concatenate([log_proposed, held.log_density(more)])
+        weighted = Weighted(z, log_density, log_proposed)
+        if enough(weighted):
+            break
+    return weighted
+
+
+def _moved(mixture: Mixture, generator: np.random.Generator) -> Generator[np.ndarray, np.ndarray, Mixture]:
+    """The mixtures of the last rounds, moved round by round to where the weights are."""
+    mixtures: list[Mixture] = []
+    z, log_density, proposed = (
+        np.zeros((0, BLOCK, mixture.center.shape[1])),
+        np.zeros((0, BLOCK)),
+        np.zeros((0, 0, BLOCK)),
+    )
+    for _ in range(_MOST_MOVES):
+        new = mixture.draw(generator, BLOCK)
+        known = yield new
+        first = max(len(mixtures) + 1 - _POOLED, 0)
+        mixtures, at_new = [*mixtures[first:], mixture], [old.log_density(new) for old in mixtures[first:]]
+        z, log_density = np.concatenate([z[first:], new[None]]), np.concatenate([log_density[first:], known[None]])
+        of_old = np.concatenate([proposed[first:, first:], np.array(at_new).reshape(-1, 1, BLOCK)], axis=1)
+        of_new = mixture.log_density(z.reshape(-1, z.shape[2])).reshape(1, -1, BLOCK)
+        proposed = np.concatenate([of_old, of_new])
+        pool = Weighted(z.reshape(-1, z.shape[2]), log_density.ravel(), _mean(proposed).ravel())
+        if effective_draws(pool.log_weights) > _GOOD * len(pool.z):
+            break
+        log_weights = evened(pool.log_weights, _EFFECTIVE * z.shape[2])
+        near = pool.z[resample(np.exp(log_weights), BLOCK, generator)]
+        mixture = mixture.moved_to(near, effective_draws(log_weights))
+    return Mixture.of(mixtures)
+
+
+def _mean(logs: np.ndarray) -> np.ndarray:
+    """Logarithm of the mean over the first axis."""
+    top = logs.max(axis=0)
+    return top + np.log(np.mean(np.exp(logs - top), axis=0))
+
+
+def effective_draws(log_weights: np.ndarray) -> float:
+    """How many draws of equal weight weighted ones are worth."""
+    weights = np.exp(log_weights - log_weights.max())
+    return float(weights.sum() ** 2 / np.sum(weights**2))
+
+
+def evened(log_weights: np.ndarray, wanted: float) -> np.ndarray:
+    """Log weights of sum 1, to a power at which the draws are worth so many, where they are worth fewer."""
+    power = 1.0
+    while effective_draws(power * log_weights) < min(wanted, 0.5 * np.isfinite(log_weights).sum()):
+        power *= 0.9
+    weights = np.exp(power * (log_weights - log_weights.max()))
+    with np.errstate(divide="ignore"):
+        return np.log(weights / weights.sum())
+
+
+def resample(weights: np.ndarray, count: int, generator: np.random.Generator) -> np.ndarray:
+    """Systematic: every draw as often as its weight says, to less than one."""
+    places = (np.arange(count) + generator.uniform()) / count
+    return np.minimum(np.searchsorted(np.cumsum(weights), places), len(weights) - 1)
+
+
+def _diagnose(values: np.ndarray, weights: np.ndarray) -> Diagnostics:
+    mean = float(weights @ values)
+    variance, error = weights @ (values - mean) ** 2, np.sum(weights**2 * (values - mean) ** 2)
+    order = np.argsort(values)
+    values, weights = values[order], weights[order]
+    tail = min(_effective_below(weights, probability) for probability in _TAILS)
+    bulk = float(variance / error) if error > 0 else float(len(values))
+    return Diagnostics(float("nan"), bulk, tail, float(np.sqrt(error)), float("nan"))
+
+
+def _effective_below(weights: np.ndarray, probability: float) -> float:
+    """Effective draws for the probability of being below a quantile, of draws in order."""
+    below = np.cumsum(weights) <= probability
+    error = np.sum(weights**2 * (below - probability) ** 2)
+    return float(probability * (1 - probability) / error)

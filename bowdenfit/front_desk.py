@@ -8,6 +8,7 @@ from bowdenfit.questions.bends.answer import Elastic, elastic_answers
 from bowdenfit.questions.check.answer import Checks, checks_of
 from bowdenfit.questions.identify.answer import Identifiability
 from bowdenfit.questions.identify.judgment import identifiability
+from bowdenfit.questions.kept import answers_of
 from bowdenfit.questions.summary.html import fit_page
 from bowdenfit.questions.summary.page import summarize
 from bowdenfit.questions.summary.verdict import Verdict, verdict
@@ -39,7 +40,7 @@ class Fit(Record):
         Raises:
             StoreError: The folder holds a finished fit already, or cannot be written.
         """
-        save(self, self.summary(), Path(path), force)
+        save(self, self.summary(), Path(path), force, answers=answers_of(self))
 
     @property
     def elastic(self) -> Elastic:

@@ -1,6 +1,7 @@
 """From a data set to a model: the cable, its parameters and one term for each table."""
 
-from dataclasses import dataclass, replace
+from collections.abc import Mapping
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 
@@ -10,6 +11,7 @@ from bowdenfit.cable.load_cells import RUN_SCATTER
 from bowdenfit.dataset import Dataset
 from bowdenfit.description import (
     Description,
+    HalfCauchyPrior,
     HalfNormalPrior,
     LogNormalPrior,
     NormalPrior,
@@ -22,19 +24,21 @@ from bowdenfit.errors import DescriptionError, nearest
 from bowdenfit.kinds.angles.table import AngleTable
 from bowdenfit.kinds.measured_cable import measured_cable
 from bowdenfit.kinds.measurements import Measurements
+from bowdenfit.kinds.places import Places, places_of
 from bowdenfit.kinds.term import Term
 from bowdenfit.kinds.terms import measured_kinds, parameters_asked_for
-from bowdenfit.parameters.priors import HalfNormal, LogNormal, Normal, Prior, TruncatedNormal, Uniform
+from bowdenfit.parameters.priors import HalfCauchy, HalfNormal, LogNormal, Normal, Prior, TruncatedNormal, Uniform
 from bowdenfit.parameters.space import Parameter, ParameterSpace
 
 
 @dataclass(frozen=True)
 class Model:
-    """Everything inference needs: the cable, the parameters, and the terms of the likelihood."""
+    """Everything inference needs: cable, parameters, terms of the likelihood, and where readings were taken."""
 
     cable: Cable
     space: ParameterSpace
     terms: tuple[Term, ...]
+    places: Mapping[str, Places] = field(default_factory=dict, compare=False)
 
     @property
     def description(self) -> Description:
@@ -55,7 +59,8 @@ def build_model(dataset: Dataset) -> Model:
     space = _space(cable, measurements)
     for kind, table in kinds:
         kind.check(table, space)
-    return Model(cable, space, tuple(terms))
+    places = {term.name: places_of(description, measurements, term) for term in terms}
+    return Model(cable, space, tuple(terms), places)
 
 
 def _space(cable: Cable, measurements: Measurements) -> ParameterSpace:
@@ -126,9 +131,9 @@ def _uncertain_constants(description: Description) -> list[Parameter]:
     return parameters
 
 
-def _set(parameter: Parameter, setting: ParameterSetting) -> Parameter:
+def _set(default: Parameter, setting: ParameterSetting) -> Parameter:
     """The parameter as the user wants it; numbers are in its shown unit."""
-    scale = parameter.shown_scale
+    parameter, scale = replace(default, scaled_by=""), default.shown_scale
     if setting.fixed is not None:
         return replace(parameter, fixed=setting.fixed / scale, prior_words="")
     if setting.measured is not None:
@@ -141,16 +146,18 @@ def _set(parameter: Parameter, setting: ParameterSetting) -> Parameter:
 
 
 def _prior(choice: PriorChoice, scale: float) -> Prior:
-    match choice.lognormal or choice.normal or choice.half_normal or choice.uniform:
+    match choice.lognormal or choice.normal or choice.half_normal or choice.half_cauchy or choice.uniform:
         case LogNormalPrior(median=median, log_sd=log_sd):
             return LogNormal(median / scale, log_sd)
         case NormalPrior(mean=mean, sd=sd):
             return Normal(mean / scale, sd / scale)
         case HalfNormalPrior(sd=sd):
             return HalfNormal(sd / scale)
+        case HalfCauchyPrior(scale=half):
+            return HalfCauchy(half / scale)
         case UniformPrior(low=low, high=high):
             return Uniform(low / scale, high / scale)
-    raise AssertionError("a choice of a prior has exactly one of the four")
+    raise AssertionError("a choice of a prior has exactly one of the five")
 
 
 def _check_support(parameter: Parameter, choice: PriorChoice) -> None:
@@ -158,6 +165,6 @@ def _check_support(parameter: Parameter, choice: PriorChoice) -> None:
     may_be_negative = choice.normal is not None or (choice.uniform is not None and choice.uniform.low < 0)
     if may_be_negative and not isinstance(parameter.prior, Normal):
         raise DescriptionError(
-            f"cable.toml: {parameter.name} cannot be negative, but its prior can; use lognormal, half_normal, a uniform "
-            "from 0 upward, or measured = { value = ..., sd = ... }."
+            f"cable.toml: {parameter.name} cannot be negative, but its prior can; use lognormal, half_normal, half_cauchy, a "
+            "uniform from 0 upward, or measured = { value = ..., sd = ... }."
         )

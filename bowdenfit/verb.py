@@ -100,6 +100,8 @@ class Verb:
         watch: How it is interrupted; None if it is quick.
         behind: Keywords that the command line adds.
         warns: Whether a fit that is not to be trusted is said beside the answer.
+        kept: The reply by what a fit has answered before, and the keywords; None where they ask for something else. A
+            reply without a page is for people only.
     """
 
     function: Callable[..., Any]
@@ -113,6 +115,7 @@ class Verb:
     watch: Watch | None = None
     behind: Mapping[str, Any] = field(default_factory=dict)
     warns: bool = False
+    kept: Callable[[Mapping[str, Any], Mapping[str, Any]], Reply | None] | None = None
 
 
 Output: TypeAlias = str | Path | None

@@ -1,6 +1,6 @@
 """How long recordings take: the play operator, reading, one likelihood value, and a whole fit, beside plain programs.
 
-    python scripts/benchmark_recordings.py [--quick] [--repeats N] [--only PART ...]
+    python scripts/benchmark_recordings.py [--quick] [--repeats N] [--only PART ...] [--against TREE]
 
 Run it with the Python of the environment that bowdenfit and its tests use, on a machine that does nothing else: it takes
 up to four minutes, measures everything in one go, and prints a table for each part. Recordings are simulated from the plan
@@ -20,7 +20,9 @@ fit         `bowdenfit fit` with all figures, from start to exit, with no compil
             peak sum of the resident memory of the process and those it starts, shared pages counted in each. One fit that
             is not measured comes first, so that Python's byte code and matplotlib's list of fonts exist. Below it, the
             stages as fit.json keeps them, and the steps before them as scripts/baselines/read_recordings.py times them
-            in a process of its own.
+            in a process of its own. With `--against`, another checkout fits the same in turns, and each pair gives a
+            ratio; the lowest and the highest of them stand beside their median.
+large       One CSV file of 1 GB (0.1 with `--quick`), all its channels, in a fresh process: time, and peak memory.
 
 The exit code is 0 whenever everything could be measured, whether or not the targets are met.
 """
@@ -67,7 +69,7 @@ STROKE_TIME = 2.0  # s, with its pause; a cycle is 1000 samples
 STROKE, ACCELERATION_TIME, DRUM_RADIUS, SPEED = 60.0, 0.1, 20.0, 20.0  # mm, s, mm, r/min
 SEED = 20220728
 VALUE_TARGET, GRADIENT_TARGET = 10.0, 20.0  # ms
-FIT_TARGET, MEMORY_TARGET = 20.0, 1536.0  # s, MiB
+FIT_TARGET, MEMORY_TARGET, LARGE_TARGET = 20.0, 1024.0, 1536.0  # s, MiB, MiB
 FRICTIONS = ("capstan", "drag+load-dependent")
 BAND = 0.3  # friction exponent
 PLAIN_SHARE = 10
@@ -83,11 +85,13 @@ class Size:
         samples: Samples for the play operator, and rows of a file.
         cycles: Cycles of a long recording.
         repeats: Fresh processes a number.
+        bytes: Size of a large file.
     """
 
     samples: int
     cycles: int
     repeats: int
+    bytes: int
 
 
 @dataclass(frozen=True)
@@ -96,6 +100,7 @@ class Simulated:
 
     folder: Path
     size: Size
+    against: Path | None = None
 
     @cached_property
     def short(self) -> Path:
@@ -390,13 +395,17 @@ def fit_tables(simulated: Simulated) -> Iterator[Table]:
     folders = {"CSV, long": simulated.long, "Parquet, long": simulated.long_parquet, "CSV, short": simulated.short}
     say("(one fit that is not measured)")
     fit(simulated, simulated.short, "unmeasured", "--no-mcmc")
-    fits, steps = {}, {}
+    fits, steps, others = {}, {}, {}
     for name, folder in folders.items():
-        runs = []
+        runs, against = [], []
         for i in range(simulated.size.repeats):
             say(f"fit, {name}, {i + 1} of {simulated.size.repeats}")
-            runs.append(fit(simulated, folder, f"{name} {i}".replace(", ", "_").replace(" ", "_")))
+            results = f"{name} {i}".replace(", ", "_").replace(" ", "_")
+            runs.append(fit(simulated, folder, results))
+            if simulated.against:
+                against.append(fit(simulated, folder, f"{results}_against", tree=simulated.against))
         fits[name] = typical(runs)
+        others[name] = list(zip(runs, against, strict=False))
         steps[name] = json.loads(reader(simulated, "steps", folder).output)
     samples = {name: (1000 if "short" in name else 1000 * simulated.size.cycles) for name in folders}
     rows = [["fit of ten recordings", "samples", "wall [s]", "target [s]", "peak [MiB]", "target [MiB]"]]
@@ -404,15 +413,50 @@ def fit_tables(simulated: Simulated) -> Iterator[Table]:
         numbers = [f"{len(LENGTHS) * samples[name]}", f"{run.seconds:.2f}", f"{FIT_TARGET:g}"]
         rows.append([name, *numbers, f"{run.memory:.0f}", f"{MEMORY_TARGET:.0f}"])
     yield rows
+    if simulated.against:
+        yield pair_table(others)
     yield from (step_table(fits, steps), stage_table(fits, steps))
 
 
-def fit(simulated: Simulated, folder: Path, name: str, *options: str) -> Run:
-    """Fit in a fresh process whose compilation cache is empty."""
+def pair_table(pairs: dict[str, list[tuple[Run, Run]]]) -> Table:
+    """Fits beside those of another checkout."""
+    rows = [["fit beside the other checkout's", "ratio of times", "lowest", "highest", "ratio of memory"]]
+    for name, each in pairs.items():
+        times, memory = ([getattr(a, what) / getattr(b, what) for a, b in each] for what in ("seconds", "memory"))
+        rows.append([name, *(f"{x:.2f}" for x in (np.median(times), min(times), max(times), np.median(memory)))])
+    return rows
+
+
+def fit(simulated: Simulated, folder: Path, name: str, *options: str, tree: Path = ROOT) -> Run:
+    """Fit in a fresh process whose compilation cache is empty, with the bowdenfit of a checkout."""
     results = simulated.folder / "results" / name
     environment = simulated.environment | {"XDG_CACHE_HOME": str(simulated.folder / "cache" / name)}
+    environment |= {"PYTHONPATH": str(tree), "PYTHONSAFEPATH": "1"}
     arguments = ["-m", "bowdenfit.cli", "fit", str(folder), "--seed", "1", "--output", str(results), *options]
     return measured(arguments, environment, results)
+
+
+def large_tables(simulated: Simulated) -> Iterator[Table]:
+    """Reading of one file of a size that hardly fits."""
+    file = apart(large_file, simulated.long, simulated.folder / "large.csv", simulated.size.bytes)
+    say("reading a large file")
+    run = reader(simulated, "bowdenfit", file)
+    rows = [["reading of a large CSV file", "file [MB]", "rows", "reading [s]", "peak [MiB]", "target [MiB]"]]
+    numbers = f"{file.stat().st_size / 1e6:.0f}", f"{inside(run, 'rows'):.0f}", f"{inside(run):.1f}"
+    yield [*rows, ["bowdenfit read_channels", *numbers, f"{inside(run, 'memory'):.0f}", f"{LARGE_TARGET:.0f}"]]
+
+
+def large_file(long: Path, file: Path, size: int) -> Path:
+    """The first of the long recordings again and again, with a clock that goes on."""
+    heading, *lines = min((long / "recordings").iterdir()).read_text(encoding="ascii").splitlines()
+    rows = [line.partition(",")[2] for line in lines]
+    with file.open("w", encoding="ascii") as stream:
+        stream.write(f"{heading}\n")
+        start = 0
+        while stream.tell() < size:
+            stream.writelines(f"{(start + i) / RATE:.3f},{row}\n" for i, row in enumerate(rows))
+            start += len(rows)
+    return file
 
 
 def step_table(fits: dict[str, Run], steps: dict[str, dict[str, float]]) -> list[list[str]]:
@@ -439,6 +483,7 @@ PARTS: dict[str, Callable[[Simulated], Iterable[Table]]] = {
     "reading": reading_tables,
     "likelihood": partial(apart, likelihood_tables),
     "fit": fit_tables,
+    "large": large_tables,
 }
 
 
@@ -463,12 +508,15 @@ def main() -> None:
     parser.add_argument("--quick", action="store_true", help="a tenth of the samples")
     parser.add_argument("--repeats", type=int, default=1, metavar="N", help="fresh processes a number [default: 1]")
     parser.add_argument("--only", nargs="+", choices=PARTS, default=list(PARTS), metavar="PART", help=", ".join(PARTS))
+    parser.add_argument(
+        "--against", type=Path, metavar="TREE", help="another checkout, whose fits are paired with ours"
+    )
     options = parser.parse_args()
     repeats = max(options.repeats, 1)
-    size = Size(100_000, 10, repeats) if options.quick else Size(1_000_000, 100, repeats)
+    size = Size(100_000, 10, repeats, 10**8) if options.quick else Size(1_000_000, 100, repeats, 10**9)
     start = time.monotonic()
     with tempfile.TemporaryDirectory() as folder:
-        simulated = Simulated(Path(folder), size)
+        simulated = Simulated(Path(folder), size, options.against)
         for part in options.only:
             for rows in PARTS[part](simulated):
                 show(rows)

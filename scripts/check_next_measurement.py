@@ -220,14 +220,14 @@ def _extended(measured: Measurements, candidate: Candidate, reading: np.ndarray)
         angle = np.vstack([table.angle, np.deg2rad(reading)])
         route = np.append(table.route, candidate.route)
         more = AngleTable(route, table.names, angle, np.full(angle.shape, np.nan), _origin(len(route)))
-        return replace(measured, angles=more)
+        return measured.with_tables(more)
     rows = measured.table(EfficiencyTable)
     assert rows is not None  # as described above
     route, n = np.append(rows.route, candidate.route), len(rows.route) + 1
     nothing = np.full((n, len(rows.own.names)), np.nan)
     own = OwnAngles(rows.own.names, nothing, nothing)
     longer = EfficiencyTable(route, np.append(rows.efficiency, reading), np.zeros(n), own, _origin(n))
-    return replace(measured, efficiencies=longer)
+    return measured.with_tables(longer)
 
 
 def _origin(n: int) -> RowOrigin:

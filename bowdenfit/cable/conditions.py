@@ -6,8 +6,11 @@ import numpy as np
 
 from bowdenfit.description import Description
 from bowdenfit.errors import DescriptionError
+from bowdenfit.parameters.scale import Scale
 from bowdenfit.types import Vector
 from bowdenfit.units import speed_dimension
+
+LEAST_SHARE = 1e-5  # of the loads; an offset cannot take more of a rope's reading than this leaves
 
 
 @dataclass(frozen=True)
@@ -20,6 +23,7 @@ class Conditions:
         speeds: Lowest and highest speed measured at; NaN without any.
         velocity_unit: "mm/s" or "rad/s"; empty without velocities.
         shows_loads: Whether any table shows the forces, and not their ratio alone.
+        median_load: Median of all loads measured at [N]; None where no table shows any.
     """
 
     reference_force: float
@@ -27,6 +31,19 @@ class Conditions:
     speeds: tuple[float, float]
     velocity_unit: str
     shows_loads: bool = True
+    median_load: float | None = None
+
+    @property
+    def load(self) -> Scale:
+        """What priors of forces are in proportion to."""
+        if self.median_load is None:
+            return Scale(self.reference_force, "reference force", "N")
+        return Scale(self.median_load, "median load", "N")
+
+    @property
+    def least_force(self) -> float:
+        """The least that an offset or a drag may leave of a force [N]."""
+        return LEAST_SHARE * self.load.value
 
     def needs_loads(self, option: str) -> None:
         """Refuse an option that efficiencies alone say nothing of.
@@ -41,12 +58,15 @@ class Conditions:
             )
 
 
-def make_conditions(description: Description, forces: Vector, speeds: Vector, velocity_unit: str) -> Conditions:
+def make_conditions(
+    description: Description, forces: Vector, tensions: Vector, speeds: Vector, velocity_unit: str
+) -> Conditions:
     """Reference force and speed as stated, or from the middle of the measurements.
 
     Args:
         description: What was said about the cable.
         forces: Forces of both ends, wherever they are positive [N].
+        tensions: Tensions of the rope that tables without these show, wherever they are positive [N].
         speeds: Speeds while the rope slides [mm/s or rad/s].
         velocity_unit: Which of the two; empty without velocities.
     """
@@ -56,7 +76,9 @@ def make_conditions(description: Description, forces: Vector, speeds: Vector, ve
     if description.reference_velocity is not None:
         speed = description.reference_velocity.to(speed_dimension(velocity_unit or "mm/s"))
     ends = (float(speeds.min()), float(speeds.max())) if len(speeds) else (float("nan"), float("nan"))
-    return Conditions(float(force), float(speed), ends, velocity_unit, len(forces) > 0)
+    loads = forces if len(forces) else tensions
+    typical = float(np.median(loads)) if len(loads) else None
+    return Conditions(float(force), float(speed), ends, velocity_unit, len(forces) > 0, typical)
 
 
 def _rounded(value: float) -> float:

@@ -14,7 +14,7 @@ from jax import Array
 from jaxtyping import Float
 
 from bowdenfit.description import PriorDefaults, Route
-from bowdenfit.parameters.priors import HalfNormal, Normal, Prior, Uniform
+from bowdenfit.parameters.priors import HalfCauchy, HalfNormal, Normal, Prior, Uniform
 from bowdenfit.parameters.space import Parameter
 from bowdenfit.physics.geometry import (
     gaussian_coefficients,
@@ -95,8 +95,12 @@ class GaussianCurve(Curve):
     not_limited = "the data also allow an exponential, at which A, B and C are infinite; a, b and c above say it all."
 
     def parameters(self, detected: Vector, defaults: PriorDefaults) -> tuple[Parameter, ...]:
-        """Level a (log rad), slope b and curvature c >= 0 of the logarithm of the angle."""
-        slope, curvature = Normal(0.0, defaults.curve_slope_sd), HalfNormal(defaults.curve_curvature_sd)
+        """Level a (log rad), slope b and curvature c >= 0 of the logarithm of the angle.
+
+        The prior of c is one on how many C half of the range is: as many bells are wider than half the range as narrower.
+        """
+        slope = Normal(0.0, defaults.curve_slope_sd)
+        curvature = HalfCauchy(defaults.curve_half_ranges, power=2.0)
         return (
             self._level(detected, defaults),
             self._parameter("b", "b", f"slope of log {self.what}", slope),

@@ -15,8 +15,9 @@ from jax import Array
 from jaxtyping import Float
 
 from bowdenfit.cable.cable import Cable
+from bowdenfit.cable.conditions import LEAST_SHARE
 from bowdenfit.cable.friction import FrictionModel
-from bowdenfit.cable.load_cells import LEAST_FORCE, LoadCells
+from bowdenfit.cable.load_cells import LoadCells
 from bowdenfit.physics.hysteresis import play_operator
 from bowdenfit.physics.loop import loop_band
 from bowdenfit.types import Vector
@@ -42,7 +43,12 @@ class Rope:
     values: Mapping[str, Array]
     exponent: Each
     rate: Recorded
-    least_force = LEAST_FORCE
+    least_share = LEAST_SHARE
+
+    @property
+    def least_force(self) -> float:
+        """What an offset or a drag leaves of a force at least [N]."""
+        return self.friction.conditions.least_force
 
     def band(self, mounting: Each) -> Recorded:
         """Half the width of the friction band on the scale g [1], with an effect of the mounting on the exponent."""
@@ -65,17 +71,17 @@ class Rope:
         """
         x, band = self.scaled(input_force), self.band(mounting)
         y, slope = play_operator(x - band, x + band, start, restart=restart)
-        return jnp.maximum(self.friction.force(self.values, y), LEAST_FORCE), slope
+        return jnp.maximum(self.friction.force(self.values, y), self.least_force), slope
 
     def shown(self, cells: LoadCells, output_force: Recorded, slope: Recorded) -> tuple[Recorded, Recorded]:
         """Logarithm of what the output's cell shows, and its derivative by the friction exponent, of what `follow` gave."""
-        shown = cells.shown_output(output_force, LEAST_FORCE)
+        shown = cells.shown_output(output_force, self.least_force)
         return jnp.log(shown), cells.shown_change(slope) / (self.friction.slope(self.values, output_force) * shown)
 
     @staticmethod
     def reading(shown: Vector) -> Vector:
         """What is compared of a shown output force: its logarithm."""
-        return np.log(np.maximum(shown, LEAST_FORCE))
+        return np.log(np.maximum(shown, LEAST_SHARE * np.max(np.abs(shown))))
 
     @staticmethod
     def without_delay(shown: Recorded, late: Recorded) -> Recorded:
@@ -97,7 +103,7 @@ class Loop:
 
     preload: Each
     exponent: Each
-    least_force = -jnp.inf
+    least_share = least_force = -jnp.inf
 
     def band(self, mounting: Each) -> Each:
         """Friction exponent of one side with an effect of the mounting [1]."""

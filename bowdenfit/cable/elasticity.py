@@ -9,8 +9,9 @@ from jax import Array
 from jaxtyping import Float
 
 from bowdenfit.cable.laws import ContactLaw
-from bowdenfit.description import Description, LogNormalPrior, PriorDefaults
-from bowdenfit.parameters.priors import HalfNormal, LogNormal, TruncatedNormal
+from bowdenfit.description import Description, PriorDefaults
+from bowdenfit.parameters.priors import HalfCauchy, HalfNormal, LogNormal, TruncatedNormal
+from bowdenfit.parameters.scale import Scale
 from bowdenfit.parameters.space import Parameter
 from bowdenfit.physics.stretch import (
     compliance,
@@ -128,39 +129,56 @@ def spread_matrix(at: np.ndarray) -> np.ndarray:
     return (np.arange(at.max(initial=-1) + 1)[:, None] == at).astype(float)
 
 
-def rope_parameters(defaults: PriorDefaults) -> list[Parameter]:
+@dataclass(frozen=True)
+class RopeScales:
+    """What priors of the rope are in proportion to.
+
+    Args:
+        load: Load at which it was stretched.
+        stiffness: Load over stretch.
+        stretch: How far it stretches.
+        lengthening: Stretch over wrap angle, in mm/rad.
+    """
+
+    load: Scale
+    stiffness: Scale
+    stretch: Scale
+    lengthening: Scale
+
+
+def rope_parameters(defaults: PriorDefaults, by: RopeScales) -> list[Parameter]:
     """How the rope stretches and the sheath lengthens."""
-    k, load, degree = defaults.stiffness, defaults.bedding_load, float(np.deg2rad(1.0))
-    lengthening = HalfNormal(defaults.lengthening_mm_per_radian)
+    degree, lengthening = float(np.deg2rad(1.0)), HalfCauchy(by.lengthening.value)
     return [
         Parameter(
             STIFFNESS, "$k$", "stiffness of the rope once bedded in", "elastic",
-            LogNormal(k.median, k.log_sd), "N/mm",
+            LogNormal(by.stiffness.value, defaults.stiffness_log_sd), "N/mm", scaled_by=str(by.stiffness),
         ),
         Parameter(
             BEDDING_STRETCH, "$d$", "stretch that bedding in takes up", "elastic",
-            HalfNormal(defaults.bedding_stretch_mm), "mm",
+            HalfNormal(by.stretch.value), "mm", scaled_by=str(by.stretch),
         ),
         Parameter(
             BEDDING_LOAD, "$T_c$", "load over which the rope beds in", "elastic",
-            LogNormal(load.median, load.log_sd), "N",
+            LogNormal(by.load.value, defaults.bedding_load_log_sd), "N", scaled_by=str(by.load),
         ),
         Parameter(
             LENGTHENING, "$g$", "lengthening of the sheath's center line by bending", "elastic",
-            lengthening, "mm/deg", degree, prior_words=lengthening.text("mm/deg", degree, 3),
+            lengthening, "mm/deg", degree, prior_words=lengthening.text("mm/deg", degree, 3), scaled_by=str(by.lengthening),
         ),
     ]  # fmt: skip
 
 
-def preload_parameter(description: Description, default: LogNormalPrior) -> Parameter:
+def preload_parameter(description: Description, defaults: PriorDefaults, by: Scale) -> Parameter:
     """Preload: stated with or without its standard deviation, or free."""
     settings = description.preload
     at = f" at {settings.wrap_angle.value:g} {settings.wrap_angle.unit}" if description.preload_follows_stretch else ""
     name, meaning = (PRELOAD, "$P_0$" if at else "$P$"), f"preload{at}"
-    free = Parameter(*name, meaning, "elastic", LogNormal(default.median, default.log_sd), "N")
+    prior = LogNormal(by.value, defaults.preload_log_sd)
+    free = Parameter(*name, meaning, "elastic", prior, "N", scaled_by=str(by))
     if settings.value is None:
         return free
     value, sd = settings.value.to("force"), settings.value.sd_to("force")
     if sd is None:
-        return replace(free, fixed=value, prior_words="fixed (stated)")
-    return replace(free, prior=TruncatedNormal(value, sd))
+        return replace(free, fixed=value, prior_words="fixed (stated)", scaled_by="")
+    return replace(free, prior=TruncatedNormal(value, sd), scaled_by="")

@@ -15,7 +15,7 @@ from jaxtyping import Float
 from bowdenfit.cable.conditions import Conditions
 from bowdenfit.description import PriorDefaults
 from bowdenfit.errors import DescriptionError, nearest
-from bowdenfit.parameters.priors import HalfNormal, LogNormal, Uniform
+from bowdenfit.parameters.priors import HalfCauchy, HalfNormal, LogNormal, Uniform
 from bowdenfit.parameters.space import Parameter, Role
 from bowdenfit.physics.friction import force_from_scale, force_scale, force_scale_slope, rate_factor
 
@@ -59,15 +59,22 @@ class FrictionOption(ABC):
 
 
 class Drag(FrictionOption):
-    """A part of the tension that the load cells do not show: adhesion, seals, bending stiffness, preload tared away."""
+    r"""A part D of the tension that the load cells do not show: adhesion, seals, bending stiffness, preload tared away.
+
+    .. math:: F_\text{out} = (F_\text{in} + D) e^{-\Lambda} - D = F_\text{in} e^{-\Lambda} - D (1 - e^{-\Lambda})
+
+    So the force that it costs at any load is not D but D (1 - exp(-Lambda)).
+    """
 
     of_load = True
 
     def parameters(self, conditions: Conditions, defaults: PriorDefaults) -> list[Parameter]:
         """The drag in newtons."""
         conditions.needs_loads("drag")
-        meaning = "drag: tension that the load cells do not show"
-        return [Parameter(DRAG, "$D$", meaning, "friction_model", HalfNormal(defaults.drag_newtons), "N")]
+        meaning = "drag: hidden tension D, which the load cells do not show; D (1 - exp(-Lambda)) of the force is lost"
+        prior = HalfCauchy(defaults.drag_share * conditions.load.value)
+        by = conditions.load.share(defaults.drag_share)
+        return [Parameter(DRAG, r"$D_\mathrm{hidden}$", meaning, "friction_model", prior, "N", scaled_by=by)]
 
     def drag(self, values: Mapping[str, Array]) -> Array:
         """D"""

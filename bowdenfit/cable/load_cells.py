@@ -13,7 +13,6 @@ GAIN_ERROR = "gain_error"
 BLOCK_NOISE = "sigma_block"
 DELAY_ERROR = "delay_error"
 INPUT_OFFSET, OUTPUT_OFFSET = "input_offset", "output_offset"
-LEAST_FORCE = 1e-3  # N; an offset cannot take more of a rope's reading than this leaves
 
 
 @dataclass(frozen=True)

@@ -1,6 +1,6 @@
 """`python -m bowdenfit.cli` is `bowdenfit`."""
 
-from bowdenfit.cli import main
+from bowdenfit.cli import start
 
 if __name__ == "__main__":
-    main()
+    start()

@@ -2,6 +2,8 @@
 
 import inspect
 import json
+from collections.abc import Collection
+from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -39,6 +41,32 @@ def command(verb: Verb) -> click.Command:
 def _run(verb: Verb, keywords: tuple[Keyword, ...], given: dict[str, Any], as_json: bool) -> int:
     """Ask, and print the reply."""
     asked = {keyword.name: keyword.value(given[keyword.name]) for keyword in keywords}
+    reply = _kept(verb, asked)
+    if reply is None or (as_json and reply.page is None):
+        reply = _answer(verb, keywords, given, asked)
+    click.echo(_page(reply) if as_json else reply.text, nl=False)
+    for note in reply.notes:
+        click.echo(note, err=True)
+    return reply.exit_code
+
+
+def _kept(verb: Verb, asked: dict[str, Any]) -> Reply | None:
+    """The reply where a fit has answered just this before."""
+    source = next(iter(asked.values()), None)
+    if verb.kept is None or not isinstance(source, Path):
+        return None
+    from bowdenfit.results.kept import kept
+
+    answers = kept(source)
+    try:
+        reply = verb.kept(answers, asked) if answers else None
+    except (KeyError, TypeError, ValueError):  # kept when the answer had another shape
+        return None
+    return _with_warning(reply, answers["troubles"], source) if reply and verb.warns else reply
+
+
+def _answer(verb: Verb, keywords: tuple[Keyword, ...], given: dict[str, Any], asked: dict[str, Any]) -> Reply:
+    """The reply, worked out."""
     found = next((k.name for k in keywords if isinstance(k.mark, Argument) and k.mark.results), None)
     if found is not None:
         asked[found] = _loaded(given[found])
@@ -53,12 +81,13 @@ def _run(verb: Verb, keywords: tuple[Keyword, ...], given: dict[str, Any], as_js
         with watch_verb(asked["output"], verb.watch) as progress:
             answer = verb.function(**asked, **behind, progress=progress)
     reply = verb.reply(answer, asked)
-    click.echo(_page(reply) if as_json else reply.text, nl=False)
-    for note in reply.notes:
-        click.echo(note, err=True)
-    if verb.warns and found is not None and (troubles := asked[found].verdict().troubles):
-        click.echo(f"Warning: this fit is {' and '.join(troubles)}; see bowdenfit summary {given[found]}.", err=True)
-    return reply.exit_code
+    return _with_warning(reply, asked[found].verdict().troubles, given[found]) if verb.warns and found else reply
+
+
+def _with_warning(reply: Reply, troubles: Collection[str], results: Path) -> Reply:
+    """A reply that says beside the answer where a fit is not to be trusted."""
+    said = f"Warning: this fit is {' and '.join(troubles)}; see bowdenfit summary {results}."
+    return replace(reply, notes=(*reply.notes, said)) if troubles else reply
 
 
 def _page(reply: Reply) -> str:

@@ -69,5 +69,6 @@ def _bar(watch: Watch) -> Iterator[Report]:
         return
     from tqdm import tqdm
 
+    tqdm.monitor_interval = 0  # no thread of its own: a process with threads is not copied
     with tqdm(leave=False, **watch.bar) as bar:
         yield lambda *progress: watch.show(bar, *progress)

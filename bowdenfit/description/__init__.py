@@ -6,13 +6,15 @@ from pydantic import ConfigDict, Field, field_validator, model_validator
 
 from bowdenfit.description.contacts import Contact, Route, WrapAngle
 from bowdenfit.description.defaults import PriorDefaults, Sampler, SamplerSettings, Sensors
-from bowdenfit.description.elastic import CableSettings, PreloadSettings, StretchSettings
+from bowdenfit.description.elastic import PreloadSettings, StretchSettings
 from bowdenfit.description.recordings import ForceLimits, Phase, Preparation, RecordingFile
+from bowdenfit.description.sizes import CableSettings
 from bowdenfit.description.tables import Table, Tables, TableSettings
 from bowdenfit.description.values import (
     Finite,
     FrictionSetting,
     Frozen,
+    HalfCauchyPrior,
     HalfNormalPrior,
     LogNormalPrior,
     Measured,
@@ -36,6 +38,7 @@ __all__ = [
     "ForceLimits",
     "FrictionSetting",
     "Geometry",
+    "HalfCauchyPrior",
     "HalfNormalPrior",
     "LogNormalPrior",
     "Measured",

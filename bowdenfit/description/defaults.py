@@ -3,17 +3,23 @@
 from math import hypot
 from typing import Annotated, Any, Literal
 
-from pydantic import Field, model_validator
+from pydantic import BeforeValidator, Field, model_validator
 
 from bowdenfit.description.values import Frozen, LogNormalPrior, NonNegative, Positive, QuantityValue
 
 Sampler = Literal["emcee", "nuts", "both"]
+_OR_ZERO = BeforeValidator(lambda said: {"value": 0.0, "unit": "N"} if said == 0 else said)  # 0 needs no unit
 
 
 class Sensors(Frozen):
-    """What the data sheets of the load cells say: of each cell its relative gain error, one standard deviation."""
+    """What the data sheets of the load cells say: of each cell its relative gain error, one standard deviation.
+
+    Both cells have the same noise unless `input_force_noise` says what the input's is: 0 of a weight that hangs there, or
+    that of a better cell, beside `force_noise`, which is then the output's.
+    """
 
     force_noise: QuantityValue | None = None
+    input_force_noise: Annotated[QuantityValue | None, _OR_ZERO] = None
     input_gain_error_sd: NonNegative | None = None
     output_gain_error_sd: NonNegative | None = None
     offset_sd: QuantityValue | None = None
@@ -38,6 +44,26 @@ class Sensors(Frozen):
         if len(missing) == 1:
             raise ValueError(f"write {missing[0]} too, that of the cell at the other end (0 for a hung weight)")
         return self
+
+    @model_validator(mode="after")
+    def _ratio_known(self) -> "Sensors":
+        of_input, of_output = self.input_force_noise, self.force_noise
+        if of_input is not None and (of_input.value < 0 or of_input.sd is not None):
+            raise ValueError("input_force_noise is a standard deviation without one of its own; write 0 or more, without sd")
+        if of_input is not None and of_input.value > 0 and (of_output is None or not of_output.value > 0):
+            raise ValueError(
+                "input_force_noise needs force_noise beside it, the noise of the output's cell, so that their ratio is known; "
+                "write 0 for a hung weight, which has none"
+            )
+        return self
+
+    @property
+    def noise_ratio(self) -> float:
+        """Noise of an input's reading over that of an output's [1]."""
+        of_input, of_output = self.input_force_noise, self.force_noise
+        if of_input is None:
+            return 1.0
+        return of_input.to("force") / of_output.to("force") if of_input.value and of_output is not None else 0.0
 
     @property
     def gain_sd(self) -> float | None:
@@ -69,30 +95,32 @@ class SamplerSettings(Frozen):
 
 
 class PriorDefaults(Frozen):
-    """The weak priors of everything the user says nothing of; angles in degrees, forces in N."""
+    """The weak priors of everything the user says nothing of; angles in degrees.
+
+    What has a unit of force or of stretch is in proportion to what was measured, so that no answer depends on how strong a
+    bench is. Scales of noise are half-Cauchy. That of mountings holds 90 % between 0.002 and 0.32, from mounts on dowel pins
+    to ones that nobody could repeat.
+    """
 
     friction: LogNormalPrior = LogNormalPrior(median=0.12, log_sd=0.7)
     curve_level_sd: Positive = 1.5
     curve_level_degrees_without_data: Positive = 30.0
-    curve_slope_sd: Positive = 3.0
-    curve_curvature_sd: Positive = 0.5
+    curve_slope_sd: Positive = 6.0
+    curve_half_ranges: Positive = 1.0
     curve_steepness_sd: Positive = 5.0
     curve_end_over_median: Positive = 3.0
-    angle_noise_degrees: Positive = 5.0
-    run_scatter: Positive = 0.02
-    force_noise_newtons: Positive = 2.0
-    block_noise_newtons: Positive = 0.5
-    offset_newtons: Positive = 1.0
-    drag_newtons: Positive = 5.0
+    angle_noise_degrees: Positive = 3.0
+    run_scatter: Positive = 0.025
+    noise_share: Positive = 0.01
+    offset_share: Positive = 0.025
+    drag_share: Positive = 0.05
     wobble_degrees: Positive = 30.0
     stribeck: Positive = 0.3
     viscous_at_highest_speed: Positive = 0.5
     stribeck_speed_log_sd: Positive = 1.0
-    stiffness: LogNormalPrior = LogNormalPrior(median=50.0, log_sd=1.5)
-    bedding_stretch_mm: Positive = 2.0
-    bedding_load: LogNormalPrior = LogNormalPrior(median=20.0, log_sd=1.0)
-    lengthening_mm_per_radian: Positive = 1.0
-    stretch_zero_mm: Positive = 5.0
-    preload: LogNormalPrior = LogNormalPrior(median=20.0, log_sd=1.0)
-    stretch_noise_mm: Positive = 0.1
-    preload_noise_newtons: Positive = 2.0
+    stiffness_log_sd: Positive = 1.5
+    stretch_mm_without_data: Positive = 1.0
+    bedding_load_log_sd: Positive = 1.0
+    lengthening_mm_per_radian_without_data: Positive = 1.0
+    stretch_zero_share: Positive = 2.0
+    preload_log_sd: Positive = 1.0

@@ -87,6 +87,7 @@ def _quantities(description: Description) -> list[Stated]:
         *((f"contact {c.name!r}, wrap_angle", c.wrap_angle.constant, "angle") for c in description.contact),
         *((f"contact {c.name!r}, nominal", c.wrap_angle.nominal, "angle") for c in description.contact),
         ("sensors, force_noise", sensors.force_noise, "force"),
+        ("sensors, input_force_noise", sensors.input_force_noise, "force"),
         ("sensors, offset_sd", sensors.offset_sd, "force"),
         ("reference_force", description.reference_force, "force"),
         *((f"cable, {name}", length, "length") for name, length in cable.lengths.items()),

@@ -53,6 +53,12 @@ class HalfNormalPrior(Frozen):
     sd: Positive
 
 
+class HalfCauchyPrior(Frozen):
+    """A scale of which little more than its size is known."""
+
+    scale: Positive
+
+
 class UniformPrior(Frozen):
     """Between limits."""
 
@@ -77,12 +83,13 @@ class PriorChoice(Frozen):
     lognormal: LogNormalPrior | None = None
     normal: NormalPrior | None = None
     half_normal: HalfNormalPrior | None = None
+    half_cauchy: HalfCauchyPrior | None = None
     uniform: UniformPrior | None = None
 
     @model_validator(mode="after")
     def _one(self) -> "PriorChoice":
         if _stated(self) != 1:
-            raise ValueError("write exactly one of lognormal, normal, half_normal, uniform")
+            raise ValueError("write exactly one of lognormal, normal, half_normal, half_cauchy, uniform")
         return self
 
 

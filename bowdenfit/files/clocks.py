@@ -75,6 +75,8 @@ def names_time(heading: str) -> bool:
     """Whether a heading means time: "Time (s)", "t", "Zeit_ms", "45 time", "X_Value" of LabVIEW."""
     plain = heading.rpartition("/")[2].strip().lower()
     words = [word for word in re.split(r"[\W\d_]+", plain) if word]
+    if not {*words[:1], *words[-2:]} & {*_TIME_WORDS, "t"}:  # before a last word is looked up among all units
+        return plain == _LABVIEW
     named = words[:-1] if len(words) > 1 and _time_factor(words[-1]) is not None else words
     ends = {*named[:1], *named[-1:]}
     return bool(ends & _TIME_WORDS) or named == ["t"] or plain == _LABVIEW
@@ -163,11 +165,12 @@ def _time_factor(unit: str) -> float | None:
 
 def seconds_of(clock: Channel) -> Vector:
     """The times that a clock shows, from its first where they can only be dates [s]."""
-    finite = clock.values[np.isfinite(clock.values)]
-    largest = float(np.max(np.abs(finite))) if len(finite) else 0.0
+    finite = np.isfinite(clock.values)
+    lowest, highest = (float(end(clock.values, where=finite, initial=0.0)) for end in (np.min, np.max))
+    largest = max(-lowest, highest)
     factor = _time_factor(clock.unit)
     if factor is None:
         factor = next((factor for bound, factor in _EPOCH_UNITS if largest > bound), 1.0)
     if largest * factor > _YEARS:
         return _from_first(clock.values) * factor
-    return clock.values * factor
+    return clock.values if factor == 1 else clock.values * factor

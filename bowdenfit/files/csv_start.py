@@ -43,13 +43,12 @@ def start_of(path: Path, data: bytes) -> Sheet:
     Raises:
         DatasetError: They are no text, or hold no numbers in columns.
     """
-    encoding, lines = first_lines(data, path.name, whole=False)
-    lines = lines[:_FIRST_LINES]
+    encoding, lines = first_lines(data, path.name, whole=False, most=_FIRST_LINES)
     if len(lines) > 1 and not lines[-1].ended:
         lines = lines[:-1]
     declared, lines = declared_separator(lines, path.name)
     texts = [line for line in lines if not comment_mark(line.text)]
-    rows = {s: list(records(texts, s, _HEADING_LINES)) for s in SEPARATORS if declared in (None, s)}
+    rows = {s: list(records(texts, s, _HEADING_LINES)) for s in _separators(texts, declared)}
     readings = [(layout_of([row.cells for row in rows[s]], d), s, d) for s, d in _HABITS if s in rows]
     found = [(layout, separator, decimal) for layout, separator, decimal in readings if layout is not None]
     if not found:
@@ -63,6 +62,16 @@ def start_of(path: Path, data: bytes) -> Sheet:
     above = [line for line in lines if line.start < below[0].start]
     layout = _fitting(path, layout, below, separator, above)
     return Sheet(encoding, separator, decimal, below[0].start, layout, tuple(line.text for line in above))
+
+
+def _separators(lines: Sequence[Line], declared: str | None) -> list[str]:
+    """What may separate the columns; of those that stand nowhere, which all make one column, the first, and blanks."""
+    return [
+        separator
+        for separator in SEPARATORS
+        if declared in (None, separator)
+        and (separator in (declared, SEPARATORS[0], " ") or any(separator in line.text for line in lines))
+    ]
 
 
 def _fitting(path: Path, layout: Layout, below: Sequence[CsvRecord], separator: str, above: Sequence[Line]) -> Layout:

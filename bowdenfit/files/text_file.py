@@ -91,14 +91,14 @@ def first_bytes(path: Path, most: int = -1) -> bytes:
     return data
 
 
-def first_lines(data: bytes, name: str, whole: bool) -> tuple[str, list[Line]]:
-    """The encoding of a text and its lines, by its first bytes or, if `whole`, all of them.
+def first_lines(data: bytes, name: str, whole: bool, most: int | None = None) -> tuple[str, list[Line]]:
+    """The encoding of a text and its lines, or the first of them, by its first bytes or, if `whole`, all of them.
 
     Raises:
         DatasetError: It is no text.
     """
     encoding, mark = _encoding(data, name, whole)
-    return encoding, _lines(data[mark:], encoding, mark)
+    return encoding, _lines(data[mark:], encoding, mark, most)
 
 
 def last_lines(path: Path, encoding: str, start: int, most: int) -> list[Line]:
@@ -155,13 +155,13 @@ def _encoding(data: bytes, name: str, whole: bool) -> tuple[str, int]:
     return "utf-8", 0
 
 
-def _lines(data: bytes, encoding: str, start: int) -> list[Line]:
-    """Lines of a piece of a file that starts there [bytes]; the first is called row 1."""
+def _lines(data: bytes, encoding: str, start: int, most: int | None = None) -> list[Line]:
+    """Lines of a piece of a file that starts there [bytes], or the first of them; the first is called row 1."""
     if encoding.startswith("utf-16"):
-        texts = list(io.StringIO(data.decode(encoding, errors="replace"), newline=""))
+        texts = list(io.StringIO(data.decode(encoding, errors="replace"), newline=""))[:most]
         lengths = [len(text.encode(encoding, errors="replace")) for text in texts]
     else:
-        pieces = data.splitlines(keepends=True)
+        pieces = data.splitlines(keepends=True)[:most]
         texts = [piece.decode(encoding, errors="replace") for piece in pieces]
         lengths = [len(piece) for piece in pieces]
     lines = []

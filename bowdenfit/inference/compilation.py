@@ -1,6 +1,7 @@
 """Compiling ahead of time, with what makes it quick for functions this small."""
 
 from collections.abc import Callable
+from concurrent.futures import Executor
 from functools import cache
 from typing import Any
 
@@ -13,17 +14,22 @@ _OPTIONS: dict[str, Any] = {"xla_cpu_use_fusion_emitters": False, "xla_cpu_paral
 _RUN_ONCE: dict[str, Any] = _OPTIONS | {"xla_backend_optimization_level": 0}
 
 
-def compile_program(function: Callable[..., Any], *shapes: Any, run_once: bool = False) -> Callable[..., Any]:
+def compile_program(
+    function: Callable[..., Any], *shapes: Any, run_once: bool = False, beside: Executor | None = None
+) -> Callable[..., Any]:
     """`function` compiled for arguments of the given shapes.
 
     Args:
         run_once: Whether compiling costs more than running, so that optimization does not pay.
+        beside: Compiles it while this thread goes on; the first call waits for that.
     """
     lowered = jax.jit(function).lower(*shapes)
-    if jax.default_backend() != "cpu":
-        return lowered.compile()
-    options = _RUN_ONCE if run_once else _OPTIONS
-    return lowered.compile(compiler_options={name: value for name, value in options.items() if _known(name, value)})
+    chosen = (_RUN_ONCE if run_once else _OPTIONS) if jax.default_backend() == "cpu" else {}
+    options = {name: value for name, value in chosen.items() if _known(name, value)}
+    if beside is None:
+        return lowered.compile(compiler_options=options)
+    compiled = beside.submit(lowered.compile, compiler_options=options)
+    return lambda *arguments: compiled.result()(*arguments)
 
 
 @cache

@@ -1,7 +1,8 @@
 """Everything that each draw of the posterior implies: named values, curves, replicated readings."""
 
-from collections.abc import Callable, Mapping
-from typing import Any
+from collections.abc import Callable, Mapping, Sequence
+from concurrent.futures import Executor
+from typing import Any, TypeAlias
 
 import jax
 import jax.numpy as jnp
@@ -16,13 +17,15 @@ from bowdenfit.model import Model
 BATCH = 1024
 _SMALL = 10_000  # numbers in the data below which compiling takes longer than running
 Function = Callable[..., Any]
+OfDraws: TypeAlias = Callable[[np.ndarray], Any]
 
 
-def for_each_draw(function: Function, size: int, *data: Any, run_once: bool = False) -> Callable[[np.ndarray], Any]:
+def for_each_draw(
+    function: Function, size: int, *data: Any, run_once: bool = False, beside: Executor | None = None
+) -> OfDraws:
     """`function` of one z (and of data that are the same for all), compiled to be applied to any number of z (rows)."""
-    over_rows = jax.vmap(function, in_axes=(0, *(None for _ in data)))
-    program = compile_program(over_rows, jax.ShapeDtypeStruct((BATCH, size), jnp.float64), *data, run_once=run_once)
-
+    over_rows, rows = jax.vmap(function, in_axes=(0, *(None for _ in data))), jax.ShapeDtypeStruct((BATCH, size), float)
+    program = compile_program(over_rows, rows, *data, run_once=run_once, beside=beside)
     return lambda z: in_batches(lambda part: program(part, *data), BATCH, z)
 
 
@@ -55,7 +58,7 @@ def derived_units(model: Model) -> dict[str, tuple[str, str]]:
     return {name: unit for curve in model.cable.curves.values() for name, unit in curve.derived_units().items()}
 
 
-def replicator(posterior: LogDensity, seed: int) -> Callable[[np.ndarray], dict[str, dict[str, np.ndarray]]]:
+def replicator(posterior: LogDensity, seed: int, beside: Executor | None = None) -> OfDraws:
     """Compiled function of draws (rows): what each draw implies for every reading.
 
     Its answer has, by group ("values", "log_likelihood", "expected", "replicated") and name, arrays over draws and
@@ -77,7 +80,7 @@ def replicator(posterior: LogDensity, seed: int) -> Callable[[np.ndarray], dict[
         }
 
     small = sum(np.size(array) for array in jax.tree.leaves(posterior.data)) < _SMALL
-    program = for_each_draw(implied, model.space.size + 1, posterior.data, run_once=small)
+    program = for_each_draw(implied, model.space.size + 1, posterior.data, run_once=small, beside=beside)
     return lambda z: program(np.column_stack([z, np.arange(len(z), dtype=float)]))
 
 
@@ -94,9 +97,9 @@ def curves_of(model: Model, route: np.ndarray) -> Callable[[Float[Array, " free"
 
 
 def output_force_at(
-    model: Model, z: np.ndarray, route: np.ndarray, input_force: float, stroke: int, mounting: np.ndarray
-) -> np.ndarray:
-    """Output force [N] of every draw (rows) at route values (columns), at the reference speed.
+    model: Model, z: np.ndarray, route: np.ndarray, input_force: float, stroke: int, mountings: Sequence[np.ndarray]
+) -> list[np.ndarray]:
+    """Output force [N] of every draw (rows) at route values (columns), at the reference speed, in each of some mountings.
 
     Args:
         model: The model.
@@ -104,7 +107,7 @@ def output_force_at(
         route: Route values; any one number where the cable has no route.
         input_force: Force at the motor side [N].
         stroke: +1 pulling, -1 return.
-        mounting: Effect of the mounting on the friction exponent of each draw [1].
+        mountings: Effect of each mounting on the friction exponent of each draw [1].
     """
     at = jnp.asarray(np.atleast_1d(route), dtype=float)
 
@@ -113,7 +116,8 @@ def output_force_at(
         force_in, direction = jnp.asarray(float(input_force)), jnp.asarray(float(stroke))
         return model.cable.output_force_at(values, at, force_in, direction, z_and_mounting[-1])
 
-    return for_each_draw(force, model.space.size + 1)(np.column_stack([z, mounting]))
+    program = for_each_draw(force, model.space.size + 1)
+    return [program(np.column_stack([z, mounting])) for mounting in mountings]
 
 
 def efficiency_at(model: Model, z: np.ndarray, route: np.ndarray) -> np.ndarray:

@@ -1,11 +1,13 @@
 """Sampling with emcee: several independent ensembles of walkers, started apart, run until they agree.
 
-Moves: differential evolution, and now and then its mode-jumping variant. Not `DESnookerMove`: the one in emcee 3.1.6
-does not sample the density it is given, and every ensemble agrees on the wrong answer.
+Moves: emcee's stretch and differential evolution, and draws from a distribution fitted to the other walkers, half of them in
+the values of the parameters instead of z. Not `DESnookerMove`: the one in emcee 3.1.6 does not sample the density it is given,
+and every ensemble agrees on the wrong answer.
 """
 
 from collections.abc import Callable, Sequence
 from dataclasses import replace
+from functools import partial
 from typing import Any
 
 import emcee
@@ -15,13 +17,16 @@ import numpy as np
 from bowdenfit.description import SamplerSettings
 from bowdenfit.inference.chain import Chain, Progress, Sampling, stuck_walkers, worst
 from bowdenfit.inference.least_squares import MaximumPosterior
+from bowdenfit.inference.proposals import Proposal, differential_evolution, independent, stretch
+from bowdenfit.inference.value_chart import Chart, chart_values, in_values
 
-THIN = 20  # steps from one stored state to the next
+THIN = 10  # steps from one stored state to the next
 _BLOCK = 10  # stored states between two reports
-_FIRST_LOOK = 50  # stored states before the first look
+_FIRST_LOOK = 50  # stored states before the first look; of five data sets the slowest is there after half of that
+_FITTED = 4  # walkers a parameter that a covariance is fitted to half of
 _KEPT_PER_WALKER = 20  # draws that are kept of each walker, spread over the second half of its path
 
-Moves = Sequence[tuple[emcee.moves.RedBlueMove, float]]
+Moves = Sequence[tuple[Proposal, float]]
 
 
 class SideBySide(emcee.moves.RedBlueMove):
@@ -32,24 +37,23 @@ class SideBySide(emcee.moves.RedBlueMove):
     quicker than one sampler after the other.
 
     Args:
-        move: Its proposal takes and gives arrays (ensemble, walker, parameter).
+        proposal: Where to.
         n_ensembles: Number of ensembles; walkers are ordered by ensemble.
     """
 
-    def __init__(self, move: emcee.moves.RedBlueMove, n_ensembles: int) -> None:
+    def __init__(self, proposal: Proposal, n_ensembles: int) -> None:
         super().__init__()
-        self.move, self.n_ensembles = move, n_ensembles
+        self.proposal, self.n_ensembles = proposal, n_ensembles
 
     def propose(self, model: Any, state: emcee.State) -> tuple[emcee.State, np.ndarray]:
         """One step of every walker."""
         n, size = state.coords.shape
         walkers = n // self.n_ensembles
-        self.move.setup(state.coords)
         order = np.argsort(model.random.rand(self.n_ensembles, walkers), axis=1)
         order += walkers * np.arange(self.n_ensembles)[:, None]
         accepted = np.zeros(n, dtype=bool)
         for moving, resting in ((order[:, ::2], order[:, 1::2]), (order[:, 1::2], order[:, ::2])):
-            proposed, factors = self.move.get_proposal(state.coords[moving], [state.coords[resting]], model.random)
+            proposed, factors = self.proposal(state.coords[moving], state.coords[resting], model.random)
             coords, which = proposed.reshape(-1, size), moving.ravel()
             log_density = model.log_prob_fn(coords)  # ours gives an array; emcee would go through it number by number
             gain = factors.ravel() + log_density - state.log_prob[which]
@@ -60,41 +64,34 @@ class SideBySide(emcee.moves.RedBlueMove):
         return state, accepted
 
 
-class Stretch(emcee.moves.StretchMove):
-    """emcee's stretch move, of all ensembles at once."""
+def default_moves(chart: Chart, n_walkers: int) -> Moves:
+    """What the walkers do, by measurement on every data set here.
 
-    def get_proposal(
-        self, s: np.ndarray, c: Sequence[np.ndarray], random: np.random.RandomState
-    ) -> tuple[np.ndarray, np.ndarray]:
-        """Places on the lines through a walker of the other half, and the log of their volume factors."""
-        (others,), (ensembles, n, size) = c, s.shape
-        stretch = ((self.a - 1) * random.rand(ensembles, n) + 1) ** 2 / self.a
-        anchor = others[np.arange(ensembles)[:, None], random.randint(others.shape[1], size=(ensembles, n))]
-        return anchor - (anchor - s) * stretch[..., None], (size - 1) * np.log(stretch)
+    Draws from a fitted t distribution find the bulk, and mix best where the posterior is about normal; differential evolution
+    does along bent ridges, stretch moves do in narrow ends; gamma 1 jumps between modes. Half of all is done in values.
 
-
-class DifferentialEvolution(emcee.moves.DEMove):
-    """emcee's differential evolution, of all ensembles at once."""
-
-    def get_proposal(
-        self, s: np.ndarray, c: Sequence[np.ndarray], random: np.random.RandomState
-    ) -> tuple[np.ndarray, np.ndarray]:
-        """Places shifted by the difference of two walkers of the other half, and the log of their volume factors, 0."""
-        (others,), (ensembles, n, _) = c, s.shape
-        count, which = others.shape[1], np.arange(ensembles)[:, None]
-        first = random.randint(count, size=(ensembles, n))
-        second = (first + random.randint(1, count, size=(ensembles, n))) % count  # any but the first
-        gamma = self.g0 * (1 + self.sigma * random.randn(ensembles, n, 1))
-        return s + gamma * (others[which, second] - others[which, first]), np.zeros((ensembles, n))
-
-
-def default_moves() -> Moves:
-    """Stretch moves find the bulk quickly, differential evolution mixes best there, gamma 1 jumps between modes."""
-    return [(Stretch(), 0.3), (DifferentialEvolution(), 0.6), (DifferentialEvolution(gamma0=1.0), 0.1)]
+    Args:
+        chart: Values of the parameters over z.
+        n_walkers: Walkers of an ensemble; a few cannot tell the shape of a t distribution.
+    """
+    fitted = independent if n_walkers >= _FITTED * chart.size else differential_evolution
+    return [
+        (stretch, 0.1),
+        (differential_evolution, 0.15),
+        (in_values(differential_evolution, chart), 0.2),
+        (partial(differential_evolution, gamma=1.0), 0.05),
+        (fitted, 0.2),
+        (in_values(fitted, chart), 0.3),
+    ]
 
 
 def starting_points(start: MaximumPosterior, settings: SamplerSettings, generator: np.random.Generator) -> np.ndarray:
-    """Over-dispersed starts, (ensemble, walker, parameter): each ensemble has a center of its own."""
+    """Over-dispersed starts, (ensemble, walker, parameter).
+
+    Each ensemble is drawn from the Gauss-Newton covariance about a center of its own, which is drawn from the same: twice the
+    covariance in all, and far more of a noise scale, whose start is its prior. Importance-resampled draws would begin nearer,
+    but with Pareto k at 0.5 they lack the far ends of bent ridges, and walkers spread into those no sooner than from here.
+    """
     root = np.linalg.cholesky(start.covariance)
     centers = generator.standard_normal((settings.n_ensembles, 1, len(start.z)))
     walkers = generator.standard_normal((settings.n_ensembles, settings.n_walkers, len(start.z)))
@@ -107,12 +104,13 @@ def sample(asked: Sampling, program: Callable[..., Any], moves: Moves | None = N
     Args:
         asked: What of, how long, and so on.
         program: Compiled log density for batches of half of all walkers.
-        moves: Proposals and their weights; `default_moves()` if omitted.
+        moves: Proposals and their weights; `default_moves` if omitted.
     """
     settings, start, seed = asked.settings, asked.start, asked.seed
     points = starting_points(start, settings, np.random.default_rng([seed, 0])).reshape(-1, len(start.z))
     backend, log_density = _backend(asked, points.shape), _in_halves(program, asked.posterior.data, len(points) // 2)
-    moved = [(SideBySide(move, settings.n_ensembles), weight) for move, weight in moves or default_moves()]
+    moves = moves or default_moves(chart_values(asked.posterior.model.space), settings.n_walkers)
+    moved = [(SideBySide(proposal, settings.n_ensembles), weight) for proposal, weight in moves]
     sampler = emcee.EnsembleSampler(*points.shape, log_density, vectorize=True, backend=backend, moves=moved)
     # emcee's wrapper prints a traceback of whatever stops an evaluation, the user's interrupt included.
     sampler.log_prob_fn = log_density

@@ -13,7 +13,9 @@ from typing import ClassVar
 import numpy as np
 
 from bowdenfit.errors import ConvergenceError
+from bowdenfit.inference.departure import Departure
 from bowdenfit.inference.disagreement import Disagreement, disagreements
+from bowdenfit.inference.lack_of_fit import departures
 from bowdenfit.inference.linearized import linearize, scatter_about
 from bowdenfit.inference.log_density import LogDensity
 from bowdenfit.inference.objective import LOWER_END, Objective, Problem, Solution, may_end, sum_of_squares
@@ -74,6 +76,7 @@ class LeastSquares:
         converged: Whether the solver met its tolerance.
         message: What it said.
         disagreements: How well each table agrees with everything else; empty of one table alone.
+        departures: How residuals depend on where the readings were taken, the least likely by chance first.
     """
 
     estimates: dict[str, Estimate]
@@ -85,6 +88,7 @@ class LeastSquares:
     converged: bool
     message: str
     disagreements: tuple[Disagreement, ...] = ()
+    departures: tuple[Departure, ...] = ()
 
 
 @dataclass(frozen=True)
@@ -149,6 +153,7 @@ def least_squares(
         bool(found["succeeded"]),
         "" if found["succeeded"] else "the solver stopped before it met its tolerance",
         disagreements(terms, space.free, found),
+        departures(basin, scale),
     )
 
 

@@ -1,8 +1,8 @@
 """Leave-one-out with what importance sampling cannot do done otherwise: moment matching, then a fit without the reading."""
 
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass, replace
-from functools import cached_property
+from dataclasses import dataclass, field, replace
+from functools import cached_property, partial
 from typing import Any
 
 import jax
@@ -21,6 +21,7 @@ from bowdenfit.inference.least_squares import MaximumPosterior
 from bowdenfit.inference.log_density import LogDensity
 from bowdenfit.inference.moment_matching import match_moments
 from bowdenfit.inference.psis import reliable_k, smooth_weights
+from bowdenfit.kinds.run_parts import RunParts
 
 # A refit is asked for one number, to a few hundredths: fewer walkers than for the answers of a fit.
 REFIT = SamplerSettings(n_ensembles=4, n_walkers=64, max_steps=4000, target_r_hat=1.02, target_ess=400)
@@ -35,15 +36,34 @@ class ReadingsToLeaveOut:
     Args:
         posterior: The posterior.
         settings: Of the fits without a reading.
+        parts: Parts of runs that stand in for the readings of a term, by its name.
     """
 
     posterior: LogDensity
     settings: SamplerSettings = REFIT
+    parts: Mapping[str, RunParts] = field(default_factory=dict)
 
     @cached_property
     def names(self) -> tuple[tuple[str, str], ...]:
         """Table and label of every reading."""
-        return tuple((term.name, label) for term in self.posterior.model.terms for label in term.labels)
+        terms = self.posterior.model.terms
+        return tuple((t.name, label) for t in terms for label in self.parts.get(t.name, t).labels)
+
+    def _each(
+        self, z: Float[Array, " free"], data: Any, without: Any
+    ) -> tuple[Float[Array, ""], Float[Array, " readings"]]:
+        """Log likelihood of everything, and of each reading given all others of its mounting."""
+        values, found = self.posterior.model.space.constrain(z), self.posterior.log_likelihoods(z, data)
+        each = []
+        for term in self.posterior.model.terms:
+            whole = found[term.name]
+            if term.name in self.parts:
+                log_likelihood = partial(term.log_likelihood, values)
+                rest = jax.vmap(log_likelihood)(without[term.name])  # in all runs, of which only that of the part differs
+                run = self.parts[term.name].run
+                whole = whole[run] - rest[jnp.arange(len(run)), run]
+            each.append(whole)
+        return sum((jnp.sum(part) for part in found.values()), jnp.zeros(())), jnp.concatenate(each)
 
     @property
     def walkers(self) -> int:
@@ -58,29 +78,34 @@ class ReadingsToLeaveOut:
     @cached_property
     def _program(self) -> Callable[..., Any]:
         def density(
-            z: Float[Array, " free"], data: Any, counts: Float[Array, " readings"]
+            z: Float[Array, " free"], data: Any, without: Any, counts: Float[Array, " readings"]
         ) -> tuple[Float[Array, ""], Float[Array, " readings"]]:
-            each = jnp.concatenate(list(self.posterior.log_likelihoods(z, data).values()))
-            total = jnp.sum(jnp.where(counts > 0, each, 0.0)) - 0.5 * jnp.sum(z**2)
+            everything, each = self._each(z, data, without)
+            total = everything - jnp.sum(jnp.where(counts > 0, 0.0, each)) - 0.5 * jnp.sum(z**2)
             return jnp.where(jnp.isnan(total), -jnp.inf, total), each
 
         shape = jax.ShapeDtypeStruct((self.batch, self.posterior.model.space.size), jnp.float64)
         counts = jax.ShapeDtypeStruct((len(self.names),), jnp.float64)
-        return compile_program(jax.vmap(density, in_axes=(0, None, None)), shape, self.posterior.data, counts)
+        over_rows = jax.vmap(density, in_axes=(0, None, None, None))
+        return compile_program(over_rows, shape, self.posterior.data, self._without_parts, counts)
+
+    @property
+    def _without_parts(self) -> dict[str, Any]:
+        return {name: parts.data for name, parts in self.parts.items()}
 
     def _counts(self, without: int | None) -> np.ndarray:
         return np.array([float(i != without) for i in range(len(self.names))])
 
     def evaluate(self, z: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """Log posterior density, up to a constant, and log likelihood of every reading, at any number of z (rows)."""
-        counts = self._counts(None)
-        density, each = in_batches(lambda part: self._program(part, self.posterior.data, counts), self.batch, z)
+        given = (self.posterior.data, self._without_parts, self._counts(None))
+        density, each = in_batches(lambda part: self._program(part, *given), self.batch, z)
         return density, each
 
     def without(self, reading: int) -> Callable[[np.ndarray, Any], Any]:
         """Log posterior density without a reading, for batches, as the sampler calls it."""
         counts = self._counts(reading)
-        return lambda z, data: self._program(z, data, counts)[0]
+        return lambda z, data: self._program(z, data, self._without_parts, counts)[0]
 
 
 @dataclass(frozen=True)
@@ -162,7 +187,10 @@ def leave_one_out(
         wanted: Positions of the readings in question among `readings.names`; all if omitted.
         report: Called with a sentence before each reading that takes longer.
     """
-    each = np.concatenate([log_likelihood[term.name] for term in readings.posterior.model.terms], axis=-1)
+    if readings.parts:
+        each = readings.evaluate(z.reshape(-1, z.shape[-1]))[1].reshape(*z.shape[:2], -1)
+    else:
+        each = np.concatenate([log_likelihood[term.name] for term in readings.posterior.model.terms], axis=-1)
     chosen = list(range(each.shape[-1])) if wanted is None else list(wanted)
     flat, limit = z.reshape(-1, z.shape[-1]), reliable_k(z.shape[0] * z.shape[1])
     leaving_out = LeavingOut(readings, flat, min(n_effective / len(flat), 1.0), seed)

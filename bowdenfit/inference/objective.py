@@ -14,7 +14,7 @@ from jax import Array
 from bowdenfit.inference.compilation import compile_program
 from bowdenfit.inference.log_density import LogDensity
 from bowdenfit.inference.solver import minimize, prepare
-from bowdenfit.parameters.priors import HalfNormal, LogNormal, TruncatedNormal, Uniform
+from bowdenfit.parameters.priors import HalfCauchy, HalfNormal, LogNormal, TruncatedNormal, Uniform
 from bowdenfit.parameters.space import Parameter
 
 Solution = dict[str, Any]
@@ -122,6 +122,5 @@ def noise_scales(posterior: LogDensity) -> np.ndarray:
 
 def may_end(parameters: tuple[Parameter, ...]) -> np.ndarray:
     """Which parameters have a lower end that an estimate can run to."""
-    return np.array(
-        [isinstance(p.prior, LogNormal | HalfNormal | TruncatedNormal | Uniform) for p in parameters], dtype=bool
-    )
+    bounded = LogNormal | HalfNormal | HalfCauchy | TruncatedNormal | Uniform
+    return np.array([isinstance(p.prior, bounded) for p in parameters], dtype=bool)

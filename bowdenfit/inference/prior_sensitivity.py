@@ -1,7 +1,9 @@
-r"""Would other priors, or other weight on the readings, change what was found? By power scaling, without another fit.
+r"""Would other priors, or other weight on the readings, change what was found? Without another fit, by weighted draws.
 
-The prior of every parameter is a standard normal in z, so that its share of the log prior is :math:`-z^2/2`. Raised to the
-power alpha it is the same normal, :math:`1/\sqrt\alpha` times as wide about its median. The draws are weighted accordingly.
+Power scaling says which prior counts: the prior of every parameter is a standard normal in z, so that its share of the log
+prior is :math:`-z^2/2`, and raised to the power alpha it is the same normal, :math:`1/\sqrt\alpha` times as wide. It looks at
+small changes of the whole distribution and can overlook that an interval's width follows a prior's scale one to one. So the
+width is looked at by itself, with the scale of each prior doubled and halved and the draws weighted accordingly.
 
 References:
     Kallioinen, Paananen, Bürkner and Vehtari, Detecting and diagnosing prior and likelihood sensitivity with
@@ -15,25 +17,54 @@ from typing import ClassVar
 import numpy as np
 
 from bowdenfit.inference.psis import RELIABLE_K, smooth_weights
+from bowdenfit.parameters.priors import Prior
+from bowdenfit.parameters.space import Parameter
 
 SENSITIVE = 0.05  # from which a quantity is said to be sensitive
-_CONFLICT = 2.0  # prior standard deviations from the prior's median to the posterior, beyond which the two are at odds
+FOLLOWS = 1.15  # factor by which a doubled or halved scale changes a width that is said to follow a prior
+_ODD = 2.0  # prior standard deviations from the prior's median, beyond which a prior that counts is at odds with the readings
+FAR = 3.0  # the same, beyond which any prior is
 _POWERS = (0.99, 1.01)
-_WIDER = 0.5  # power at which a prior is sqrt(2) times as wide
+_TAILS = (0.05, 0.5, 0.95)
+
+
+@dataclass(frozen=True)
+class Width:
+    """How the width of a quantity's 90 % interval follows the scale of one prior.
+
+    Args:
+        parameter: The parameter whose prior it is.
+        doubled, halved: Width with the scale of that prior doubled or halved, over the width; NaN where the draws cannot
+            tell.
+        k_doubled, k_halved: Pareto k of the weights.
+    """
+
+    parameter: str
+    doubled: float
+    halved: float
+    k_doubled: float
+    k_halved: float
+
+    @property
+    def size(self) -> float:
+        """Factor by which it changes, whichever way; NaN where nothing can be told."""
+        known = [abs(np.log(ratio)) for ratio in (self.doubled, self.halved) if ratio > 0]
+        return float(np.exp(max(known))) if known else float("nan")
 
 
 @dataclass(frozen=True)
 class Sensitivity:
-    """How much a quantity depends on one prior and on the readings.
+    """How much a quantity depends on the priors and on the readings.
 
     Args:
         quantity: Name of the quantity.
         parameter: The parameter whose prior matters most to it.
         prior, likelihood: Sensitivities to that prior, and to the weight of all readings together.
         median, sd: Of the quantity.
-        wider: Its median were that prior 1.4 times as wide; NaN where the draws cannot tell.
+        wider: Its median were the scale of that prior doubled; NaN where the draws cannot tell.
         prior_sds: How far the posterior mean of that parameter lies from the prior's median, in the prior's own
-            standard deviations (in z).
+            standard deviations (in z); 0 at an end of its range that the prior allows.
+        widths: How the width of its interval follows every prior.
     """
 
     quantity: str
@@ -44,50 +75,136 @@ class Sensitivity:
     sd: float
     wider: float
     prior_sds: float
+    widths: tuple[Width, ...] = ()
 
     JSON: ClassVar = (..., "diagnosis")
 
     @property
     def diagnosis(self) -> str:
-        """What it means: "readings decide", "prior decides", "conflict", or "both count"."""
+        """What it means: "readings decide", "prior decides", "conflict", "both count" or "prior sets the width"."""
         if not self.prior > SENSITIVE:
-            return "readings decide"
+            return "prior sets the width" if self.followed or self.untold else "readings decide"
         if not self.likelihood > SENSITIVE:
             return "prior decides"
-        return "conflict" if abs(self.prior_sds) > _CONFLICT else "both count"
+        return "conflict" if abs(self.prior_sds) > _ODD else "both count"
+
+    @property
+    def followed(self) -> list[Width]:
+        """Priors that its width follows, the strongest first."""
+        return sorted((w for w in self.widths if w.size > FOLLOWS), key=lambda w: -w.size)
+
+    @property
+    def untold(self) -> list[str]:
+        """Parameters of which the draws cannot tell whether its width follows their priors."""
+        return [w.parameter for w in self.widths if np.isnan(w.size)]
+
+
+@dataclass(frozen=True)
+class FarOut:
+    """A parameter that the readings put where its prior hardly allows it.
+
+    Args:
+        parameter: Its name.
+        prior_sds: How far the posterior median lies from the prior's, in the prior's own standard deviations (in z).
+    """
+
+    parameter: str
+    prior_sds: float
+
+
+def far_out(z: Mapping[str, np.ndarray], parameters: Mapping[str, Parameter]) -> tuple[FarOut, ...]:
+    """Parameters beyond 3 standard deviations of their priors, but for those at an end that the prior allows.
+
+    Args:
+        z: Draws of each parameter in z, by name.
+        parameters: The parameters.
+    """
+    found = [FarOut(name, _inside(parameters[name].prior, float(np.median(at)))) for name, at in z.items()]
+    return tuple(sorted((f for f in found if abs(f.prior_sds) > FAR), key=lambda f: -abs(f.prior_sds)))
 
 
 def sensitivities(
-    quantities: Mapping[str, np.ndarray], z: Mapping[str, np.ndarray], log_likelihood: np.ndarray
+    quantities: Mapping[str, np.ndarray],
+    z: Mapping[str, np.ndarray],
+    values: Mapping[str, np.ndarray],
+    log_likelihood: np.ndarray,
+    parameters: Mapping[str, Parameter],
 ) -> tuple[Sensitivity, ...]:
     """How much each quantity depends on the priors and on the readings.
 
     Args:
         quantities: Draws by name, (chain, draw).
         z: Draws of each parameter in z, by name, (chain, draw).
+        values: The same in internal units.
         log_likelihood: Sum over all readings, (chain, draw).
+        parameters: The parameters by name.
     """
     of_readings = _scaled(log_likelihood)
-    log_priors = {name: -(values**2) / 2 for name, values in z.items()}
-    of_priors = {name: _scaled(part) for name, part in log_priors.items()}
+    of_priors = {name: _scaled(-(values**2) / 2) for name, values in z.items()}
+    weighted = {name: _Weighted.of(parameters[name].prior, at.ravel()) for name, at in values.items()}
     found = []
     for name, draws in quantities.items():
         by_prior = {parameter: sense(draws) for parameter, sense in of_priors.items()}
         most = max(by_prior, key=lambda parameter: by_prior[parameter])
-        values = draws.ravel()
+        flat = draws.ravel()
+        order = np.argsort(flat)
+        plain = _quantiles(flat, order, np.ones(len(flat)))
         found.append(
             Sensitivity(
                 name,
                 most,
                 by_prior[most],
                 of_readings(draws),
-                float(np.median(values)),
-                float(np.std(values)),
-                _median_with_wider_prior(values, log_priors[most].ravel()),
-                float(np.mean(z[most])),
+                float(plain[1]),
+                float(np.std(flat)),
+                float(_quantiles(flat, order, weighted[most].doubled)[1]),
+                _inside(parameters[most].prior, float(np.mean(z[most]))),
+                tuple(w.width(parameter, flat, order, plain) for parameter, w in weighted.items()),
             )
         )
     return tuple(found)
+
+
+def _inside(prior: Prior, z: float) -> float:
+    """Z, and 0 at an end of the range that the prior allows."""
+    lower, upper = prior.allowed_ends
+    return 0.0 if (lower and z < 0) or (upper and z > 0) else z
+
+
+@dataclass(frozen=True)
+class _Weighted:
+    """Weights of the draws with the scale of one prior doubled and halved; NaN where they lean on few draws."""
+
+    doubled: np.ndarray
+    halved: np.ndarray
+    k_doubled: float
+    k_halved: float
+
+    @classmethod
+    def of(cls, prior: Prior, values: np.ndarray) -> "_Weighted":
+        """By draws of the parameter [internal units]."""
+        (doubled, k_doubled), (halved, k_halved) = (_weights(prior.widening(values, factor)) for factor in (2.0, 0.5))
+        return cls(doubled, halved, k_doubled, k_halved)
+
+    def width(self, parameter: str, values: np.ndarray, order: np.ndarray, plain: np.ndarray) -> Width:
+        """What it does to the width of a quantity's interval."""
+        wide, narrow = (_quantiles(values, order, weights) for weights in (self.doubled, self.halved))
+        doubled, halved = (float((q[2] - q[0]) / (plain[2] - plain[0])) for q in (wide, narrow))
+        return Width(parameter, doubled, halved, self.k_doubled, self.k_halved)
+
+
+def _weights(log_ratio: np.ndarray) -> tuple[np.ndarray, float]:
+    log_weights, pareto_k = smooth_weights(log_ratio)
+    reliable = pareto_k <= RELIABLE_K
+    return (np.exp(log_weights - log_weights.max()) if reliable else np.full(len(log_weights), np.nan)), pareto_k
+
+
+def _quantiles(values: np.ndarray, order: np.ndarray, weights: np.ndarray) -> np.ndarray:
+    """5 %, 50 % and 95 % quantiles of weighted draws, given the order that sorts them; NaN without weights."""
+    if np.isnan(weights[0]):
+        return np.full(len(_TAILS), np.nan)
+    share = (np.cumsum(weights[order]) - weights[order] / 2) / np.sum(weights)
+    return np.interp(_TAILS, share, values[order])
 
 
 def _scaled(part: np.ndarray) -> Callable[[np.ndarray], float]:
@@ -100,14 +217,3 @@ def _scaled(part: np.ndarray) -> Callable[[np.ndarray], float]:
         return float(array_stats.power_scale_sense(draws, lower, upper, *_POWERS))
 
     return sense
-
-
-def _median_with_wider_prior(values: np.ndarray, log_prior: np.ndarray) -> float:
-    """Median under weights that undo half of one prior; NaN where these lean on few draws."""
-    log_weights, pareto_k = smooth_weights((_WIDER - 1) * log_prior)
-    if not pareto_k <= RELIABLE_K:
-        return float("nan")
-    order = np.argsort(values)
-    weights = np.exp(log_weights - log_weights.max())[order]
-    share = (np.cumsum(weights) - weights / 2) / weights.sum()
-    return float(np.interp(0.5, share, values[order]))

@@ -1,6 +1,7 @@
 """Every table of a data set measured again on the computer, at known coefficients."""
 
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
+from typing import Any
 
 import jax
 import numpy as np
@@ -44,6 +45,17 @@ def with_drawn_readings(
     Raises:
         DatasetError: The strokes of a recording cannot be found.
     """
-    drawn = {name: {field: np.asarray(array) for field, array in of.items()} for name, of in readings.items()}
-    again = [kind.bench.table(description, table, drawn[kind.name]) for kind, table in measured_kinds(tables)]
-    return Measurements(tuple(again))
+    return Measurements(tuple(drawn_tables(description, tables, readings)))
+
+
+def drawn_tables(
+    description: Description, tables: Measurements, readings: Mapping[str, Mapping[str, jax.Array]]
+) -> Iterator[Any]:
+    """The same one by one: most that a bench would not hand in are known before the strokes of recordings are looked for.
+
+    Raises:
+        DatasetError: The strokes of a recording cannot be found.
+    """
+    for kind, table in measured_kinds(tables):
+        drawn = {field: np.asarray(array) for field, array in readings[kind.name].items()}
+        yield kind.bench.table(description, table, drawn)

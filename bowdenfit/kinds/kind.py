@@ -120,6 +120,7 @@ class Kind(Generic[AnyTable]):
         bends: Total wrap angles at which the rope itself was measured [rad]; None if it was not.
         conditions: Where and at which wrap angles friction was measured; None if it was not.
         forces: Forces that friction acted on [N].
+        tensions: Tensions of the rope where nobody asked what friction did [N].
         speeds: Speeds of sliding [mm/s or rad/s].
         typical_speeds: Of its recordings or runs, in the same unit.
         velocity_unit: Which of the two; empty without velocities.
@@ -144,6 +145,7 @@ class Kind(Generic[AnyTable]):
     bends: Callable[[AnyTable], Vector] | None = None
     conditions: Callable[[AnyTable], ForceRows] | None = None
     forces: Callable[[AnyTable], Vector] = lambda _: np.zeros(0)
+    tensions: Callable[[AnyTable], Vector] = lambda _: np.zeros(0)
     speeds: Callable[[AnyTable], Vector] = lambda _: np.zeros(0)
     typical_speeds: Callable[[AnyTable], list[float]] = lambda _: []
     velocity_unit: Callable[[AnyTable], str] = lambda _: ""

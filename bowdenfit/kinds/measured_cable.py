@@ -17,7 +17,8 @@ def measured_cable(description: Description, measurements: Measurements) -> Cabl
         DescriptionError: A curve family, contact law or friction model is unknown, or velocities are of two kinds.
     """
     unit = _velocity_unit(measurements)
-    conditions = make_conditions(description, _forces(measurements), _speeds(measurements), unit)
+    forces, tensions = (_positive(measurements, name) for name in ("forces", "tensions"))
+    conditions = make_conditions(description, forces, tensions, _speeds(measurements), unit)
     return make_cable(description, _own_angles(description, measurements), conditions)
 
 
@@ -40,9 +41,9 @@ def _velocity_unit(measurements: Measurements) -> str:
     return units.pop() if units else ""
 
 
-def _forces(measurements: Measurements) -> np.ndarray:
-    """Forces that friction acted on, wherever they are positive."""
-    forces = np.concatenate([np.zeros(0), *(kind.forces(table) for kind, table in each_table(measurements))])
+def _positive(measurements: Measurements, name: str) -> np.ndarray:
+    """Forces that friction acted on, or other tensions, wherever they are positive."""
+    forces = np.concatenate([np.zeros(0), *(getattr(kind, name)(table) for kind, table in each_table(measurements))])
     return forces[forces > 0]
 
 

@@ -10,7 +10,7 @@ import numpy as np
 from jax import Array
 
 from bowdenfit.cable.cable import Cable
-from bowdenfit.cable.load_cells import BLOCK_NOISE, FORCE_NOISE, LEAST_FORCE, RUN_SCATTER, LoadCells
+from bowdenfit.cable.load_cells import BLOCK_NOISE, FORCE_NOISE, RUN_SCATTER, LoadCells
 from bowdenfit.cable.noise import scatter
 from bowdenfit.kinds.candidate import UNKNOWN_SCATTER, Candidate, CandidateKind, Simulation, Situation
 from bowdenfit.kinds.forces.table import ForceTable
@@ -112,9 +112,11 @@ def run_readings(
         shift = mounted[:, None] * cable.friction.rate(values, velocity)
         output = cable.friction.output_force(values, force, shift, stroke)
         cells, noise = LoadCells.of(values), values[design.noise] / jnp.sqrt(jnp.asarray(design.worth))
-        read_in = cells.shown_input(force) + noise * jax.random.normal(of_input, output.shape)
+        of_weight = noise * cable.description.sensors.noise_ratio
+        read_in = cells.shown_input(force) + of_weight * jax.random.normal(of_input, output.shape)
         read_out = cells.shown_output(output) + noise * jax.random.normal(of_output, output.shape)
-        ratio = jnp.log(jnp.maximum(read_in, LEAST_FORCE) / jnp.maximum(read_out, LEAST_FORCE))
+        least = cable.friction.conditions.least_force
+        ratio = jnp.log(jnp.maximum(read_in, least) / jnp.maximum(read_out, least))
         return ((stroke * ratio) @ fit).ravel()
 
     return simulate, fit.shape[1]

@@ -11,15 +11,17 @@ from jax import Array
 from jaxtyping import Float
 
 from bowdenfit.cable.cable import Cable
-from bowdenfit.cable.load_cells import FORCE_NOISE, LEAST_FORCE, OUTPUT_OFFSET, RUN_SCATTER, LoadCells
+from bowdenfit.cable.load_cells import FORCE_NOISE, OUTPUT_OFFSET, RUN_SCATTER, LoadCells
 from bowdenfit.cable.noise import noise_law, scatter
+from bowdenfit.kinds.inside_runs import InsideRuns, inside_runs
 from bowdenfit.kinds.padding import rounded_up
 from bowdenfit.kinds.resolve_angles import resolve_angles
+from bowdenfit.kinds.sliding_rows import ROW_ARRAYS, SlidingRows
 from bowdenfit.physics.friction import transmission_efficiency
 from bowdenfit.types import Labels, Vector
 
 _WEIGHTS = ("weight", "load_squares", "load_products")
-ROW_ARRAYS = ("route", "own", "is_own", "known_variance", "noisy")
+_OF_RUNS = ("n", "run_weight", "run_mean", "scatter", "log_weights")
 _LOAD_BINS, _SPEED_BINS, _DELAY_BINS = 24, 24, 8  # of each stroke of a run, where load, speed or a delay matters
 _ALIKE = 0.05  # speeds that differ by less than this fraction are one
 
@@ -32,9 +34,9 @@ class RunsTerm:
 
     .. math:: r_{ij} = \rho_{ij}(\Lambda_{ij} + m_i), \quad m_i \sim \text{Normal}(0, \tau), \quad
               e_{ij} \sim \text{Normal}(0, \sigma_F / \sqrt{w_{ij}}), \quad
-              w = 1 / (F_\text{in}^{-2} + F_\text{out}^{-2})
+              w = 1 / (\rho^2 F_\text{in}^{-2} + F_\text{out}^{-2})
 
-    where rho is the log ratio that the load cells show at a friction exponent: the exponent itself, the gain error and what
+    where rho_ij is the log ratio that the load cells show at a friction exponent: the exponent itself, the gain error and what
     a delay between the two adds, for the capstan equation and exact zeros; else a function of the load, taken to first
     order in m. The mounting effect m is
     integrated out. Readings of one run at the same angles and stroke (and, where it matters, the same load and speed) are
@@ -52,6 +54,7 @@ class RunsTerm:
         labels: Each run in words.
         name: Name of the readings in results.
         reading_noise: Parameter that is the standard deviation of one reading.
+        rows: The readings that the arrays sum up; None where nobody asks for them one by one.
     """
 
     cable: Cable
@@ -61,6 +64,7 @@ class RunsTerm:
     reading_noise: str = FORCE_NOISE
     unit: str = "1"
     noise: str = RUN_SCATTER
+    rows: SlidingRows | None = None
 
     @property
     def residual_blocks(self) -> tuple[tuple[int, int], ...]:
@@ -71,13 +75,21 @@ class RunsTerm:
     @property
     def padded(self) -> dict[str, Any]:
         """See `LogDensity.padded`: each run's cells followed by weightless copies of its first."""
-        cells, each = len(self.data["mean"]), len(self.data["mean"]) // len(self.labels)
-        starts = np.arange(0, cells, each)[:, None]
-        place = np.arange(rounded_up(each))
-        source = (starts + np.where(place < each, place, 0)).ravel()
-        filled = np.tile(place < each, len(self.labels))
-        long = {name: values[source] for name, values in self.data.items() if len(values) == cells != len(starts)}
-        return self.data | long | {name: np.where(filled, long[name], 0.0) for name in _WEIGHTS if name in long}
+        runs = len(self.labels)
+        return with_cells(self.data, runs, rounded_up(len(self.data["mean"]) // runs))
+
+    @property
+    def inside(self) -> InsideRuns | None:
+        """Readings one by one, with the cell of each among the residuals inside runs."""
+        if self.rows is None:
+            return None
+        cell, first = _cells(self.cable, self.rows)
+        runs, run = np.unique(self.rows.run, return_inverse=True)
+        of_cell = np.searchsorted(runs, self.rows.run[first])
+        place = np.arange(len(first)) - np.searchsorted(of_cell, of_cell)
+        most = len(self.data["mean"]) // len(runs)
+        ratio = self.cable.description.sensors.noise_ratio
+        return inside_runs((of_cell * most + place)[cell], run, self.rows, ratio)
 
     def _shown(
         self, values: Mapping[str, Array], data: Mapping[str, Any], exponent: Float[Array, " cells"]
@@ -88,11 +100,13 @@ class RunsTerm:
         if not (friction.depends_on_load or OUTPUT_OFFSET in values):
             return exponent + stroke * cells.gain_error + from_delay, jnp.ones_like(exponent), jnp.zeros_like(exponent)
 
+        least = friction.conditions.least_force
+
         def ratio(more: Array, load: Array) -> Array:
             read = data["input_force"] * jnp.exp(load)
-            input_force = cells.true_input(read, LEAST_FORCE)
+            input_force = cells.true_input(read, least)
             output_force = friction.output_force(values, input_force, exponent + more, stroke)
-            return stroke * jnp.log(read / cells.shown_output(output_force, LEAST_FORCE))
+            return stroke * jnp.log(read / cells.shown_output(output_force, least))
 
         zero, one = jnp.zeros_like(exponent), jnp.ones_like(exponent)
         shown, slope = jax.jvp(ratio, (zero, zero), (one, zero))
@@ -167,36 +181,10 @@ class _Deviations:
     inside: Array
 
 
-@dataclass(frozen=True)
-class SlidingRows:
-    """Readings taken while the rope slides, in the order of the table.
-
-    Args:
-        input_force, output_force: Forces [N].
-        log_ratio: s log(F_in/F_out) [1].
-        stroke: +1 pulling, -1 return.
-        run: Number of the run.
-        velocity: Velocity; NaN where it is not known.
-        drift: s d(log F_out)/dt, by which a delay of the output channel shifts the log ratio [1/s]; 0 without a clock.
-        worth: How many independent readings each counts for [1].
-        angles: `ROW_ARRAYS` of every row.
-    """
-
-    input_force: Vector
-    output_force: Vector
-    log_ratio: Vector
-    stroke: Labels
-    run: Labels
-    velocity: Vector
-    drift: Vector
-    worth: Vector
-    angles: Mapping[str, np.ndarray]
-
-
 def run_sums(cable: Cable, rows: SlidingRows) -> dict[str, Any]:
     """Readings reduced to cells, cells to runs: all that the likelihood needs, whatever the number of readings."""
     cell, first = _cells(cable, rows)
-    weight = rows.worth / (1 / rows.input_force**2 + 1 / rows.output_force**2)
+    weight = rows.weight(cable.description.sensors.noise_ratio)
     cell_weight = np.bincount(cell, weight)
 
     def mean(values: np.ndarray) -> np.ndarray:
@@ -227,6 +215,22 @@ def run_sums(cable: Cable, rows: SlidingRows) -> dict[str, Any]:
         "scatter": np.bincount(run, within),
         "log_weights": np.bincount(row_run, rows.worth * np.log(weight / rows.worth)),
     }
+
+
+def with_cells(data: dict[str, Any], runs: int, each: int) -> dict[str, Any]:
+    """The same sums with more cells for each run, which have no weight.
+
+    Args:
+        data: What `run_sums` gave.
+        runs: Number of runs.
+        each: Number of cells for each.
+    """
+    cells, now = len(data["mean"]), len(data["mean"]) // runs
+    place = np.arange(each)
+    source = (np.arange(0, cells, now)[:, None] + np.where(place < now, place, 0)).ravel()
+    filled = np.tile(place < now, runs)
+    long = {name: values[source] for name, values in data.items() if name not in _OF_RUNS}
+    return data | long | {name: np.where(filled, long[name], 0.0) for name in _WEIGHTS if name in long}
 
 
 def _rectangular(cells: dict[str, np.ndarray], run: np.ndarray) -> dict[str, np.ndarray]:

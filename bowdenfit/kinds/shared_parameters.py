@@ -2,41 +2,54 @@
 
 from dataclasses import replace
 
-from bowdenfit.cable.elasticity import preload_parameter, rope_parameters
+import numpy as np
+
+from bowdenfit.cable.elasticity import RopeScales, preload_parameter, rope_parameters
 from bowdenfit.cable.load_cells import FORCE_NOISE, GAIN_ERROR, INPUT_OFFSET, OUTPUT_OFFSET, RUN_SCATTER
 from bowdenfit.description import Description
+from bowdenfit.kinds.loop.table import LoopTable
+from bowdenfit.kinds.preload.table import PreloadTable
+from bowdenfit.kinds.stretch.table import StretchTable
 from bowdenfit.kinds.term import Circumstances
-from bowdenfit.parameters.priors import HalfNormal, Normal, TruncatedNormal
+from bowdenfit.parameters.priors import HalfCauchy, Normal, TruncatedNormal
+from bowdenfit.parameters.scale import Scale
 from bowdenfit.parameters.space import Parameter
 
 
 def run_scatter(at: Circumstances) -> Parameter:
     """Scatter from mounting to mounting, of readings that are made of one mounting each."""
     meaning = at.noise.meaning("scatter of the log ratio from mounting to mounting")
-    return Parameter(RUN_SCATTER, r"$\tau$", meaning, "noise", HalfNormal(at.defaults.run_scatter))
+    return Parameter(RUN_SCATTER, r"$\tau$", meaning, "noise", HalfCauchy(at.defaults.run_scatter))
 
 
-def force_noise(at: Circumstances, meaning: str) -> Parameter:
-    """Noise of a force reading: free, or as the data sheet says, with its standard deviation or without."""
-    stated, prior = at.description.sensors.force_noise, HalfNormal(at.defaults.force_noise_newtons)
-    free = Parameter(FORCE_NOISE, r"$\sigma_F$", meaning, "noise", prior, "N")
+def force_noise(at: Circumstances, meaning: str = "standard deviation of a force reading") -> Parameter:
+    """Noise of a force reading, the output's: free, or as the data sheet says, with its standard deviation or without."""
+    stated, ratio = at.description.sensors.force_noise, at.description.sensors.noise_ratio
+    meaning += "" if ratio == 1 else f" at the output; at the input {f'{ratio:.3g} times that' if ratio else 'none'}"
+    free = noise_of_forces(at, FORCE_NOISE, r"$\sigma_F$", meaning)
     if stated is None:
         return free
     if stated.sd is None:
-        return replace(free, fixed=stated.to("force"), prior_words="fixed (data sheet)")
-    return replace(free, prior=TruncatedNormal(stated.to("force"), stated.sd_to("force") or 0.0))
+        return replace(free, fixed=stated.to("force"), prior_words="fixed (data sheet)", scaled_by="")
+    return replace(free, prior=TruncatedNormal(stated.to("force"), stated.sd_to("force") or 0.0), scaled_by="")
+
+
+def noise_of_forces(at: Circumstances, name: str, symbol: str, meaning: str) -> Parameter:
+    """How forces scatter, in proportion to the loads."""
+    load, part = at.cable.friction.conditions.load, at.defaults.noise_share
+    return Parameter(name, symbol, meaning, "noise", HalfCauchy(part * load.value), "N", scaled_by=load.share(part))
 
 
 def offsets(at: Circumstances) -> list[Parameter]:
     """What each load cell shows of no force, where the description says that this is fitted."""
     if not at.description.fits_offsets:
         return []
-    stated = at.description.sensors.offset_sd
-    sd = stated.to("force") if stated is not None else at.defaults.offset_newtons
+    stated, load, part = at.description.sensors.offset_sd, at.cable.friction.conditions.load, at.defaults.offset_share
+    sd, by = (stated.to("force"), "") if stated is not None else (part * load.value, load.share(part))
     return [
         Parameter(
             name, f"$b_\\mathrm{{{symbol}}}$", f"offset of the {end} load cell", "sensor",
-            Normal(0.0, sd), "N",
+            Normal(0.0, sd), "N", scaled_by=by,
         )
         for name, symbol, end in ((INPUT_OFFSET, "in", "input"), (OUTPUT_OFFSET, "out", "output"))
     ]  # fmt: skip
@@ -53,5 +66,46 @@ def gain_error(description: Description) -> list[Parameter]:
 
 def preload(at: Circumstances) -> list[Parameter]:
     """What readings that depend on the preload need: the preload, and the rope where bending changes it."""
-    rope = rope_parameters(at.defaults) if at.description.preload_follows_stretch else []
-    return [*rope, preload_parameter(at.description, at.defaults.preload)]
+    own = rope(at) if at.description.preload_follows_stretch else []
+    return [*own, preload_parameter(at.description, at.defaults, preload_scale(at))]
+
+
+def preload_scale(at: Circumstances) -> Scale:
+    """The preloads that were read, or what a loop lost of them by friction as usual, or else the loads."""
+    table, loop = at.measurements.table(PreloadTable), at.measurements.table(LoopTable)
+    taut = table.preload[table.preload > 0] if table is not None else np.zeros(0)
+    if len(taut):
+        return Scale(float(np.median(taut)), "median preload", "N")
+    if loop is not None:  # while both sides are taut it loses 2 P Lambda
+        lost = loop.stroke * (loop.input_force - loop.output_force)
+        lost, bend = lost[np.isfinite(lost)], float(np.median(np.nansum(loop.own.angle, axis=1)))
+        if len(lost) and np.median(lost) > 0 and bend > 0:
+            preload = float(np.median(lost)) / (2 * at.defaults.friction.median * bend)
+            return Scale(preload, "preload of which usual friction loses the median loss", "N")
+    return at.cable.friction.conditions.load
+
+
+def rope(at: Circumstances) -> list[Parameter]:
+    """How the rope stretches and the sheath lengthens, with priors by what was read of the stretch."""
+    return rope_parameters(at.defaults, _rope_scales(at))
+
+
+def _rope_scales(at: Circumstances) -> RopeScales:
+    """Of the stretch that was read; where none was, of the loads and a usual stretch."""
+    load, table = at.cable.friction.conditions.load, at.measurements.table(StretchTable)
+    usual, bend = at.defaults.stretch_mm_without_data, at.defaults.lengthening_mm_per_radian_without_data
+    if table is None or not (np.ptp(table.stretch) > 0 and np.ptp(table.load) > 0):
+        stiffness = Scale(load.value / usual, f"{load.name} over {usual:g} mm", "N/mm")
+        return RopeScales(load, stiffness, Scale(usual, "usual stretch", "mm"), _usual_lengthening(bend))
+    stretch, loads = float(np.ptp(table.stretch)), float(np.ptp(table.load))
+    bent = float(np.ptp(table.wrap_angle))
+    return RopeScales(
+        Scale(float(np.median(table.load)), "median load of the stretch", "N"),
+        Scale(loads / stretch, "range of loads over that of stretch", "N/mm"),
+        Scale(stretch, "range of stretch", "mm"),
+        Scale(stretch / bent, "range of stretch over that of wrap angles", "mm/rad") if bent else _usual_lengthening(bend),
+    )
+
+
+def _usual_lengthening(by_radian: float) -> Scale:
+    return Scale(by_radian, "usual lengthening", "mm/rad")

@@ -6,16 +6,16 @@ A prior's hyperparameters may be arrays, so that parameters with priors of one k
 """
 
 from dataclasses import dataclass
-from typing import Protocol, TypeAlias, runtime_checkable
+from typing import ClassVar, Protocol, TypeAlias, runtime_checkable
 
 import jax.numpy as jnp
 import numpy as np
 from jax import Array
-from jax.scipy.special import erf, erfinv, ndtr, ndtri
+from jax.scipy.special import erf, erfinv, log_ndtr, ndtr, ndtri
 from jax.scipy.stats import norm
 from jaxtyping import Float
 
-_NEAR_ZERO = 1e-4  # below this a truncated normal's quantile is better computed from three terms of its series
+_NEAR_ZERO = 1e-4  # below this quantiles are better computed from the first terms of a series
 
 Numbers: TypeAlias = Array | np.ndarray
 Real: TypeAlias = float | Float[Numbers, "*any"]
@@ -23,7 +23,10 @@ Real: TypeAlias = float | Float[Numbers, "*any"]
 
 @runtime_checkable
 class Prior(Protocol):
-    """What the parameter space needs of a prior."""
+    """What the parameter space needs of a prior, and those who ask what it does."""
+
+    allowed_ends: ClassVar[tuple[bool, bool]]
+    """Whether its density goes on undiminished to the lower and to the upper end of its range."""
 
     def constrain(self, z: Float[Numbers, "*any"]) -> Float[Numbers, "*any"]:
         """Quantile of Phi(z): from the standard normal to the parameter."""
@@ -43,6 +46,10 @@ class Prior(Protocol):
         """
         ...
 
+    def widening(self, value: np.ndarray, factor: float) -> np.ndarray:
+        """Logarithm of the density with the scale times a factor over its own, up to a constant; 0 without a scale."""
+        ...
+
 
 @dataclass(frozen=True)
 class Normal:
@@ -50,6 +57,7 @@ class Normal:
 
     mean: Real
     sd: Real
+    allowed_ends: ClassVar = False, False
 
     def constrain(self, z: Float[Numbers, "*any"]) -> Float[Numbers, "*any"]:
         """Mean + sd z"""
@@ -63,6 +71,10 @@ class Normal:
         """Normal(mean, sd) unit"""
         return f"Normal({_number(self.mean, scale, digits)}, {_number(self.sd, scale, digits)}){_suffix(unit)}"
 
+    def widening(self, value: np.ndarray, factor: float) -> np.ndarray:
+        """See `Prior`."""
+        return _widening((value - self.mean) / self.sd, factor)
+
 
 @dataclass(frozen=True)
 class LogNormal:
@@ -70,6 +82,7 @@ class LogNormal:
 
     median: Real
     log_sd: Real
+    allowed_ends: ClassVar = False, False
 
     def constrain(self, z: Float[Numbers, "*any"]) -> Float[Numbers, "*any"]:
         """Median exp(log_sd z)"""
@@ -83,12 +96,17 @@ class LogNormal:
         """LogNormal(median unit, log_sd)"""
         return f"LogNormal({_number(self.median, scale, digits)}{_suffix(unit)}, {_number(self.log_sd)})"
 
+    def widening(self, value: np.ndarray, factor: float) -> np.ndarray:
+        """See `Prior`."""
+        return _widening(np.log(value / self.median) / self.log_sd, factor)
+
 
 @dataclass(frozen=True)
 class HalfNormal:
     """HalfNormal(sd): a scale, zero allowed and small values not discouraged."""
 
     sd: Real
+    allowed_ends: ClassVar = True, False
 
     def constrain(self, z: Float[Numbers, "*any"]) -> Float[Numbers, "*any"]:
         """Upper half of a normal: through erf below the median and through the survival function above it."""
@@ -107,6 +125,59 @@ class HalfNormal:
         """HalfNormal(sd unit)"""
         return f"HalfNormal({_number(self.sd, scale, digits)}{_suffix(unit)})"
 
+    def widening(self, value: np.ndarray, factor: float) -> np.ndarray:
+        """See `Prior`."""
+        return _widening(value / self.sd, factor)
+
+
+@dataclass(frozen=True)
+class HalfCauchy:
+    r"""HalfCauchy(scale) to a power: a scale of which little more than its size is known.
+
+    .. math:: x = \left(s \tan\left(\tfrac\pi2 \Phi(z)\right)\right)^q
+
+    On the logarithm it is symmetric about its median: nine tenths of x lie between s/12.7 and 12.7 s (q = 1), and its tails
+    are so heavy that readings which want another size get it. Zero is allowed.
+
+    Args:
+        scale: s, the median where q = 1.
+        power: q; 2 of a quantity whose root is half-Cauchy.
+
+    References:
+        Gelman, Prior distributions for variance parameters in hierarchical models, Bayesian Analysis 1 (2006), 515.
+    """
+
+    scale: Real
+    power: Real = 1.0
+    allowed_ends: ClassVar = True, False
+
+    def constrain(self, z: Float[Numbers, "*any"]) -> Float[Numbers, "*any"]:
+        """Quantile of the half-Cauchy from the nearer tail."""
+        below, above = _split(z)
+        # By the logarithm of the tail, whose derivative stays finite where that of the tail's inverse does not.
+        rest = jnp.pi / 2 * ndtr(-above)
+        safe = jnp.where(rest < _NEAR_ZERO, 1.0, rest)
+        tangent_share = jnp.where(rest < _NEAR_ZERO, 1 + rest**2 / 3, jnp.tan(safe) / safe)
+        log_tangent = log_ndtr(-above) + jnp.log(jnp.pi / 2 * tangent_share)
+        ratio = jnp.where(z < 0, jnp.tan(jnp.pi / 2 * ndtr(below)), jnp.exp(-log_tangent))
+        return (self.scale * ratio) ** self.power
+
+    def unconstrain(self, value: Float[Numbers, "*any"]) -> Float[Numbers, "*any"]:
+        """Standard normal quantile of the half-Cauchy distribution function."""
+        root = value ** (1 / self.power)
+        lower, upper = 2 / jnp.pi * jnp.arctan2(root, self.scale), 2 / jnp.pi * jnp.arctan2(self.scale, root)
+        return jnp.where(root < self.scale, ndtri(lower), -ndtri(upper))
+
+    def text(self, unit: str = "", scale: float = 1.0, digits: int = 6) -> str:
+        """HalfCauchy(scale unit), with its power where that is not 1"""
+        power = "" if self.power == 1 else f"^{float(self.power):g}"
+        return f"HalfCauchy({_number(self.scale, scale, digits)}{_suffix(unit)}){power}"
+
+    def widening(self, value: np.ndarray, factor: float) -> np.ndarray:
+        """See `Prior`."""
+        ratio = value ** (1 / self.power) / self.scale
+        return np.log1p(ratio**2) - np.log1p((ratio / factor) ** 2)
+
 
 @dataclass(frozen=True)
 class Uniform:
@@ -114,6 +185,7 @@ class Uniform:
 
     low: Real
     high: Real
+    allowed_ends: ClassVar = True, True
 
     def constrain(self, z: Float[Numbers, "*any"]) -> Float[Numbers, "*any"]:
         """Low + (high - low) Phi(z), from the nearer end."""
@@ -129,6 +201,11 @@ class Uniform:
         """Uniform(low, high) unit"""
         return f"Uniform({_number(self.low, scale, digits)}, {_number(self.high, scale, digits)}){_suffix(unit)}"
 
+    def widening(self, value: np.ndarray, factor: float) -> np.ndarray:
+        """See `Prior`."""
+        del factor  # limits are no scale
+        return np.zeros(np.shape(value))
+
 
 @dataclass(frozen=True)
 class TruncatedNormal:
@@ -136,6 +213,7 @@ class TruncatedNormal:
 
     mean: Real
     sd: Real
+    allowed_ends: ClassVar = False, False
 
     def constrain(self, z: Float[Numbers, "*any"]) -> Float[Numbers, "*any"]:
         """Quantile of the truncated normal, from the nearer tail; next to 0, where digits cancel, its series."""
@@ -163,6 +241,10 @@ class TruncatedNormal:
         """Normal(mean, sd) unit, cut off at 0"""
         return f"{Normal(self.mean, self.sd).text(unit, scale, digits)}, cut off at 0"
 
+    def widening(self, value: np.ndarray, factor: float) -> np.ndarray:
+        """See `Prior`."""
+        return _widening((value - self.mean) / self.sd, factor)
+
 
 def _split(z: Float[Numbers, "*any"]) -> tuple[Float[Numbers, "*any"], Float[Numbers, "*any"]]:
     """Z for the lower and for the upper branch of a quantile, each harmless where the other branch is taken.
@@ -170,6 +252,11 @@ def _split(z: Float[Numbers, "*any"]) -> tuple[Float[Numbers, "*any"], Float[Num
     (A plain minimum or maximum would halve the derivative at z = 0, where least squares starts.)
     """
     return jnp.where(z < 0, z, -1.0), jnp.where(z < 0, 1.0, z)
+
+
+def _widening(deviation: np.ndarray, factor: float) -> np.ndarray:
+    """Of a normal, from deviations in its standard deviations."""
+    return deviation**2 * (1 - factor**-2) / 2
 
 
 def _number(value: Real, scale: float = 1.0, digits: int = 6) -> str:

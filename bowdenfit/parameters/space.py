@@ -30,6 +30,7 @@ class Parameter:
         shown_scale: Shown value over internal value.
         fixed: Value [internal unit] where it is held fixed, else None.
         prior_words: What is said of the prior instead of what it says itself in the shown unit.
+        scaled_by: What of the measurements a default prior is in proportion to; empty where it is to nothing.
     """
 
     name: str
@@ -41,6 +42,7 @@ class Parameter:
     shown_scale: float = 1.0
     fixed: float | None = None
     prior_words: str = ""
+    scaled_by: str = ""
 
     @property
     def label(self) -> str:
@@ -51,7 +53,7 @@ class Parameter:
     def prior_text(self) -> str:
         """The prior as people read it."""
         stated = self.prior_words or ("" if self.fixed is None else "fixed")
-        return stated or self.prior.text(self.unit, self.shown_scale)
+        return stated or self.prior.text(self.unit, self.shown_scale, 3 if self.scaled_by else 6)
 
 
 @dataclass(frozen=True)

@@ -4,9 +4,9 @@ A figure file has `data`, what the figure shows of a fit as plain arrays, None w
 figure of such data. Data load no matplotlib and drawing loads no JAX, so that another process can draw while this one goes on.
 """
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Collection, Iterable, Iterator, Sequence
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, get_type_hints
 
 from bowdenfit.plots.style import in_paper_style
 from bowdenfit.plots.write import FORMATS, write_all
@@ -27,41 +27,64 @@ from bowdenfit.questions.recorded import (
     sample_efficiency_figure,
 )
 from bowdenfit.questions.summary import coefficients_figure, pairs_figure, residuals_figure, traces_figure
+from bowdenfit.results.arrays import read_arrays
+from bowdenfit.results.folder import FIGURE_DATA
+from bowdenfit.results.kept import kept
 
 if TYPE_CHECKING:
     from bowdenfit.results.record import Record
 
-_FILES = (
-    wrap_angles_figure,
-    efficiency_figure,
+_FILES = (  # first those whose data are there, so that drawing begins at once
     coefficients_figure,
     pairs_figure,
     traces_figure,
     residuals_figure,
+    wrap_angles_figure,
+    efficiency_figure,
+    stretch_figure,
+    preload_figure,
+    bending_loss_figure,
+    loops_figure,
+    preload_window_figure,
     checks_figure,
     recordings_figure,
     hysteresis_figure,
     sample_efficiency_figure,
     autocorrelation_figure,
     dependence_figure,
-    stretch_figure,
-    preload_figure,
-    bending_loss_figure,
-    loops_figure,
-    preload_window_figure,
 )
 FIGURES = {file.__name__.rpartition(".")[2].removesuffix("_figure"): file for file in _FILES}
 
 
-def figures_of(fit: "Record") -> Iterator[tuple[str, Any]]:
-    """Name and data of each figure that a fit has something to show in."""
+def figures_of(fit: "Record", names: Collection[str] = ()) -> Iterator[tuple[str, Any]]:
+    """Name and data of each figure that a fit has something to show in, or of some of them."""
     import jax
 
-    for name, figure in FIGURES.items():
+    for name in names or FIGURES:
         with jax.enable_x64(True):
-            data = figure.data(fit)
+            data = FIGURES[name].data(fit)
         if data is not None:
             yield name, data
+
+
+def kept_figures(folder: Path, names: Iterable[str] = ()) -> dict[str, Any]:
+    """Data of the figures that a fit was drawn with, or of some of them; empty where they are not kept.
+
+    Args:
+        folder: Its results folder.
+        names: Which; all if omitted.
+    """
+    if not kept(folder, FIGURE_DATA) or not (folder / FIGURE_DATA).exists():
+        return {}
+    try:
+        return read_arrays(folder / FIGURE_DATA, data_types(names or FIGURES))
+    except (KeyError, TypeError, ValueError):  # kept when the figure showed something else
+        return {}
+
+
+def data_types(names: Iterable[str]) -> dict[str, Any]:
+    """Annotated type of the data of some figures, by their names."""
+    return {name: get_type_hints(FIGURES[name].data, localns={"Record": object})["return"] for name in names}
 
 
 @in_paper_style

@@ -9,8 +9,9 @@ import numpy as np
 from bowdenfit.description import Phase
 from bowdenfit.errors import DatasetError, DescriptionError
 from bowdenfit.recordings.preparation.play import Hysteresis, play_between, white_noise
+from bowdenfit.recordings.preparation.robust import robust_cost, robust_minimum
 from bowdenfit.recordings.recording import PULL, Blocks
-from bowdenfit.types import Flags, Labels, Vector
+from bowdenfit.types import Flags, Labels, Matrix, Vector
 
 _FIT_BLOCKS = 2000  # more than these say no more about the loop
 _LOSSES = (0.03, 0.1, 0.25, 0.45, 0.7, 0.9, 1.0)  # of the largest difference of the forces, where the fit is begun
@@ -23,6 +24,7 @@ _SURE = 4.5  # what a cost must grow by, in independent blocks, where something 
 _CLEAR_OF_NOISE = 5.0  # standard deviations by which an output that moves must change
 _OPPOSITE = -0.5  # correlation of the two forces below which one of them has its sign turned round
 _LEAST = 1e-9
+_LIMITS = np.array([[0.0, 0.0, -np.inf], [np.inf, 10.0, np.inf]])  # of loss, exponent and center
 
 
 def loop_limits(force: Vector, loss: float, exponent: float) -> tuple[Vector, Vector]:
@@ -45,30 +47,20 @@ def fit_force_loop(force_in: Vector, force_out: Vector, taut: bool = True, slack
         taut: Whether force is lost while both sides are taut; else the loop has no preload.
         slack: Whether the return side may go slack; else all is lost as while both sides are taut.
     """
-    from scipy.optimize import least_squares
-
     thin = slice(None, None, -(-len(force_in) // _FIT_BLOCKS))
     x, y = force_in[thin], force_out[thin]
     apart, noise = float(np.quantile(np.abs(x - y), 0.98)), _noise(x, y)
-    scale = max(apart, noise)
+    scale, told = max(apart, noise), np.array([taut, slack, True], dtype=float)
 
-    def parameters(p: np.ndarray) -> tuple[float, float, float]:
-        loss, exponent = scale * float(np.exp(p[0])), float(np.exp(p[1]))
-        return (loss if taut else 0.0), (exponent if slack else 0.0), scale * float(p[2])
+    def model(p: np.ndarray) -> tuple[Vector, Matrix]:
+        residuals, slopes = _residuals(x, y, scale, noise, p * told)
+        return residuals, slopes * told
 
-    def residuals(p: np.ndarray) -> np.ndarray:
-        deviation = _deviation(x, y, *parameters(p))[0]
-        return np.append(deviation / noise, np.sqrt(len(x)) * 0.1 * p[2] / _CENTER_SD)
-
-    def cost(p: np.ndarray) -> float:
-        return float(np.sum(np.sqrt(1 + residuals(p) ** 2) - 1))
-
-    starts = sorted(_starts(x, y, scale), key=cost)[:2]
-    fits = [least_squares(residuals, start, loss="soft_l1", x_scale=[0.1, 0.1, 0.1], max_nfev=40) for start in starts]
-    best = min(fits, key=lambda fit: float(fit.cost))
-    loss, exponent, center = parameters(best.x)
+    starts = sorted(_starts(x, y, scale), key=lambda p: robust_cost(model(p)[0]))[:2]
+    best, cost = min((robust_minimum(model, start, *_LIMITS) for start in starts), key=lambda fit: fit[1])
+    loss, exponent, center = (best * told * [scale, 1.0, scale]).tolist()
     found = _deviation(force_in, force_out, loss, exponent, center)
-    return Hysteresis(force_in, force_out, exponent, center, loss, *found, float(best.cost) / len(x))
+    return Hysteresis(force_in, force_out, exponent, center, loss, *found, cost / len(x))
 
 
 @dataclass(frozen=True)
@@ -116,13 +108,13 @@ class LoopStrokes:
 
 
 def _starts(x: Vector, y: Vector, scale: float) -> list[np.ndarray]:
-    """Where the fit may begin: log of loss over scale, log of exponent, center over scale."""
+    """Where the fit may begin: loss over scale, exponent, center over scale."""
     share = min(scale / max(float(np.abs(x).max()), scale), _LARGEST_SHARE)
     largest = -np.log1p(-share)
     low, high = np.quantile(x - y, (0.05, 0.95))
     middle = float(low + high) / 2 / scale if low < 0 < high else 0.0
     return [
-        np.array([np.log(loss), np.log(exponent * largest), center])
+        np.array([loss, exponent * largest, center])
         for loss in _LOSSES
         for exponent in _EXPONENTS
         for center in dict.fromkeys((0.0, middle))
@@ -133,6 +125,28 @@ def _deviation(x: Vector, y: Vector, loss: float, exponent: float, center: float
     """Deviation of the output from the operator, the operator's output, and its contact."""
     followed, state = play_between(*loop_limits(x, loss, exponent), float(y[0]) + center)
     return y + center - followed, followed, state
+
+
+def _residuals(x: Vector, y: Vector, scale: float, noise: float, p: np.ndarray) -> tuple[Vector, Matrix]:
+    """Deviations in units of their noise and what is known beforehand of the center, with slopes by all parameters.
+
+    Args:
+        x, y: Input and output force [N].
+        scale: Force that loss and center are measured in [N].
+        noise: Standard deviation of a deviation [N].
+        p: Loss over the scale, exponent, and center over the scale.
+    """
+    loss, exponent, center = scale * float(p[0]), float(p[1]), scale * float(p[2])
+    deviation, followed, state = _deviation(x, y, loss, exponent, center)
+    touched = np.maximum.accumulate(np.where(state != 0, np.arange(len(state)), -1))
+    known, at = touched >= 0, x[touched]
+    side = np.where(known, state[touched], 0)
+    taut = followed == at - side * loss  # else the return side is slack
+    slopes = np.stack(
+        [np.where(taut, scale * side, 0), np.where(taut, 0, side * np.abs(followed)), scale * known], axis=1
+    )
+    prior = np.sqrt(len(x)) * 0.1 / _CENTER_SD * np.array([0.0, 0.0, 1.0])
+    return np.append(deviation / noise, prior @ p), np.vstack([slopes / noise, prior])
 
 
 def _noise(force_in: Vector, force_out: Vector) -> float:

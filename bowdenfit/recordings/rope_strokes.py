@@ -8,12 +8,14 @@ import numpy as np
 from bowdenfit.description import Phase
 from bowdenfit.errors import DatasetError
 from bowdenfit.recordings.preparation.play import Hysteresis, play, white_noise
+from bowdenfit.recordings.preparation.robust import robust_minimum
 from bowdenfit.recordings.recording import PULL, RETURN, SWITCH, Blocks
-from bowdenfit.types import Flags, Labels, Vector
+from bowdenfit.types import Flags, Labels, Matrix, Vector
 
 _FIT_BLOCKS = 1000  # more than these say no more about the loop
 _GAIN_SD = 0.02  # how far two load cells may disagree before the loop is believed to be off center
 _LEAST_EXPONENT = 1e-3
+_LIMITS = np.array([[1e-9, -np.inf, 0.0], [np.inf] * 3])  # of exponent, center and drag
 _CLEAR_OF_NOISE = 5.0  # a force below this many standard deviations of its noise may be that of a slack rope
 _CLEARLY = 0.5  # a fit the other way round must leave less than this fraction of the deviations to be believed
 _WELL = 1.5  # cost up to which a loop follows its recording as well as noise lets it
@@ -27,8 +29,6 @@ def fit_loop(force_in: Vector, force_out: Vector) -> Hysteresis:
         force_in: Input force, all above 0 [N].
         force_out: Output force, all above 0 [N].
     """
-    from scipy.optimize import least_squares
-
     thin = slice(None, None, -(-len(force_in) // _FIT_BLOCKS))
     few_in, few_out = force_in[thin], force_out[thin]
     ratio = np.log(few_in / few_out)
@@ -40,24 +40,18 @@ def fit_loop(force_in: Vector, force_out: Vector) -> Hysteresis:
     if high - low < _ONE_PHASE * noise or low > 0 or high < 0:  # one phase: all of the ratio is friction
         width, center = max(abs(float(np.median(ratio))), _LEAST_EXPONENT), 0.0
 
-    def deviations(p: np.ndarray) -> Vector:
-        exponent, middle, drag = float(np.exp(p[0])), float(p[1]), level * float(p[2]) ** 2
-        deviation = _follow(few_in, few_out, exponent, middle, drag)[0]
-        return deviation / np.hypot(noise_in / (few_in + drag), noise_out / (few_out + drag))
-
-    def residuals(p: np.ndarray) -> np.ndarray:
-        weak = np.sqrt(len(few_in)) * 0.1
-        return np.append(deviations(p), [weak * p[1] / _GAIN_SD, weak * p[2] ** 2])
+    def model(p: np.ndarray) -> tuple[Vector, Matrix]:
+        return _residuals(few_in, few_out, (noise_in, noise_out), level, p)
 
     fits = []
-    for start in ([np.log(width), center, 0.05], [np.log(width * 0.8), 0.0, 0.3]):
-        fits.append(least_squares(residuals, start, loss="soft_l1", x_scale=[0.1, 0.02, 0.1], max_nfev=40))
-        if fits[-1].cost < _WELL * len(few_in):
+    for start in ([width, center, 0.0025], [width * 0.8, 0.0, 0.09]):
+        fits.append(robust_minimum(model, np.array(start), *_LIMITS))
+        if fits[-1][1] < _WELL * len(few_in):
             break
-    best = min(fits, key=lambda fit: float(fit.cost))
-    exponent, middle, drag = float(np.exp(best.x[0])), float(best.x[1]), level * float(best.x[2]) ** 2
+    best, cost = min(fits, key=lambda fit: fit[1])
+    exponent, middle, drag = float(best[0]), float(best[1]), level * float(best[2])
     found = _follow(force_in, force_out, exponent, middle, drag)
-    return Hysteresis(force_in, force_out, exponent, middle, drag, *found, float(best.cost) / len(few_in))
+    return Hysteresis(force_in, force_out, exponent, middle, drag, *found, cost / len(few_in))
 
 
 class RopeStrokes:
@@ -129,6 +123,30 @@ def _follow(
     x, y = np.log(force_in + drag), np.log(force_out + drag)
     followed, state = play(x, exponent, float(y[0] + center))
     return y + center - followed, followed, state
+
+
+def _residuals(
+    force_in: Vector, force_out: Vector, noise: tuple[float, float], level: float, p: np.ndarray
+) -> tuple[Vector, Matrix]:
+    """Deviations in units of their noise and what is known beforehand of center and drag, with slopes by all parameters.
+
+    Args:
+        force_in, force_out: Forces [N].
+        noise: Standard deviations of the forces [N].
+        level: Force that drag is measured in [N].
+        p: Friction exponent, center, and drag over the level.
+    """
+    drag = level * float(p[2])
+    deviation, _, state = _follow(force_in, force_out, float(p[0]), float(p[1]), drag)
+    touched = np.maximum.accumulate(np.where(state != 0, np.arange(len(state)), -1))
+    known, one_in, one_out = touched >= 0, 1 / (force_in + drag), 1 / (force_out + drag)
+    scale = np.hypot(noise[0] * one_in, noise[1] * one_out)
+    by_drag = one_out - np.where(known, one_in[touched], one_out[0])
+    by_drag += deviation * (noise[0] ** 2 * one_in**3 + noise[1] ** 2 * one_out**3) / scale**2
+    slopes = np.stack([np.where(known, state[touched], 0), known, level * by_drag], axis=1) / scale[:, None]
+    weak = np.sqrt(len(force_in)) * 0.1
+    prior = np.diag([0.0, weak / _GAIN_SD, weak])[1:]
+    return np.append(deviation / scale, prior @ p), np.vstack([slopes, prior])
 
 
 def _remarks(name: str, found: set[int], loop: Hysteresis) -> tuple[str, ...]:

@@ -15,6 +15,7 @@ from bowdenfit.errors import StoreError
 
 FIT, SUMMARY, SUMMARY_TEXT = "fit.json", "summary.json", "summary.txt"
 POSTERIOR, CHAIN, FIGURES = "posterior.nc", "chain.h5", "figures"
+ANSWERS, FIGURE_DATA = "answers.json", "figures.npz"
 REPLICATIONS = "replications.jsonl"  # of a calibration
 
 
@@ -79,7 +80,7 @@ def refuse_to_overwrite(folder: Path, force: bool) -> None:
 
 def clear(folder: Path) -> None:
     """Remove what an earlier fit wrote, and nothing else; the mark of a finished fit goes first."""
-    for name in (FIT, SUMMARY, SUMMARY_TEXT, POSTERIOR, CHAIN):
+    for name in (FIT, ANSWERS, SUMMARY, SUMMARY_TEXT, FIGURE_DATA, POSTERIOR, CHAIN):
         (folder / name).unlink(missing_ok=True)
     if (folder / FIGURES).is_dir():
         shutil.rmtree(folder / FIGURES)

@@ -23,6 +23,7 @@ class OptimalLength:
         at_edge: Share of draws whose optimum lies at an end of the range.
         window: Route values that are good enough.
         choices: What can be bought, in the order of the description.
+        at_input_force: Input force at which the efficiency holds [N]; None where it is the same at any.
     """
 
     variable: str
@@ -32,8 +33,11 @@ class OptimalLength:
     at_edge: float
     window: Window
     choices: tuple[Choice, ...]
+    at_input_force: float | None = None
 
-    JSON: ClassVar = (("route", "variable"), "unit", ("length", "length_at_edge"), "efficiency", "window", "choices")
+    JSON: ClassVar = (
+        ("route", "variable"), "unit", ("length", "length_at_edge"), "efficiency", "window", "choices", "at_input_force?",
+    )  # fmt: skip
 
     @property
     def length_at_edge(self) -> dict[str, float]:
@@ -50,10 +54,11 @@ class OptimalLength:
 
     def lines(self) -> list[str]:
         """The answer in sentences and a small table."""
+        at = "" if self.at_input_force is None else f" at an input force of {self.at_input_force:.3g} N"
         what, unit, length, eta = self.variable.replace("_", " "), self.unit, self.length, self.efficiency
         lines = [
             f"Best {what}: {length.median:.1f} {unit} (90 % interval {length.q05:.1f} to {length.q95:.1f} {unit}), "
-            f"efficiency there {eta.median:.1%} ({eta.q05:.1%} to {eta.q95:.1%})."
+            f"efficiency there {eta.median:.1%} ({eta.q05:.1%} to {eta.q95:.1%}){at}."
         ]
         if self.at_edge > 0.005:
             lines.append(

@@ -1,14 +1,11 @@
 """Any answer as plain data for JSON, and stored data back as what they were: one pair for every dataclass."""
 
-from collections.abc import Iterable, Iterator, Mapping
+from collections.abc import Callable, Iterable, Iterator, Mapping
 from dataclasses import fields, is_dataclass
 from types import NoneType, UnionType
 from typing import Any, get_args, get_origin, get_type_hints
 
 import numpy as np
-from jaxtyping import AbstractArray
-
-from bowdenfit.types import Flags, Labels, Matrix
 
 
 def plain(answer: Any) -> Any:
@@ -23,20 +20,30 @@ def plain(answer: Any) -> Any:
     return _plain(answer, keep=False)
 
 
-def stored(data: Any) -> Any:
-    """The same so that `rebuilt` gives it back: all fields of dataclasses, and infinity as a word."""
-    return _plain(data, keep=True)
+def stored(data: Any, put: Callable[[np.ndarray], Any] | None = None) -> Any:
+    """The same so that `rebuilt` gives it back: all fields of dataclasses, and infinity as a word.
+
+    Args:
+        data: As for `plain`.
+        put: Gives what stands for an array; its numbers do if omitted.
+    """
+    return _plain(data, keep=True, put=put)
 
 
-def _plain(data: Any, keep: bool) -> Any:
+def _plain(data: Any, keep: bool, put: Callable[[np.ndarray], Any] | None = None) -> Any:
     if is_dataclass(data):
         data = dict(_attributes(data, (...,) if keep else getattr(data, "JSON", (...,))))
     if isinstance(data, Mapping):
-        return {key: _plain(value, keep) for key, value in data.items()}
+        return {key: _plain(value, keep, put) for key, value in data.items()}
+    if put and isinstance(data, np.ndarray):
+        return put(data)
     if isinstance(data, np.ndarray | np.generic):
+        as_it_is = data.dtype.kind in "biu" or (data.dtype.kind == "f" and np.isfinite(data).all())
         data = data.tolist()
+        if as_it_is:
+            return data
     if isinstance(data, list | tuple):
-        return [_plain(value, keep) for value in data]
+        return [_plain(value, keep, put) for value in data]
     if isinstance(data, float) and not np.isfinite(data):
         return None if np.isnan(data) or not keep else "Infinity" if data > 0 else "-Infinity"
     return data
@@ -60,8 +67,10 @@ def rebuilt(kind: Any, value: Any) -> Any:
 
     Args:
         kind: The type; of an optional one the first that is not None.
-        value: Plain data.
+        value: Plain data, in which arrays may stand as they are.
     """
+    if isinstance(value, np.ndarray):
+        return value
     if value is None and NoneType in get_args(kind):
         return None
     parts, origin = [part for part in get_args(kind) if part is not NoneType], get_origin(kind)
@@ -69,22 +78,25 @@ def rebuilt(kind: Any, value: Any) -> Any:
         return rebuilt(parts[0], value)
     if origin is dict:
         return {key: rebuilt(parts[1], item) for key, item in value.items()}
+    if origin is list:
+        return [rebuilt(parts[0], item) for item in value]
     if origin is tuple:
         each = [parts[0]] * len(value) if Ellipsis in parts else parts
         return tuple(rebuilt(part, item) for part, item in zip(each, value, strict=True))
     if isinstance(kind, type) and is_dataclass(kind):
         hints = get_type_hints(kind)
         return kind(**{f.name: rebuilt(hints[f.name], value[f.name]) for f in fields(kind)})
-    if origin is np.ndarray or (isinstance(kind, type) and issubclass(kind, AbstractArray | np.ndarray)):
+    if np.ndarray in (kind, origin, getattr(kind, "array_type", None)):
         return _array(kind, value)
     return _number(value) if kind is float else value
 
 
 def _array(kind: Any, value: list[Any]) -> np.ndarray:
+    from bowdenfit.types import Flags, Labels, Matrix
+
     if kind in (Labels, Flags):
         return np.array(value, dtype=int if kind is Labels else bool)
-    numbers = [[_number(x) for x in row] if isinstance(row, list) else _number(row) for row in value]
-    array = np.array(numbers, dtype=float)
+    array = np.array(value, dtype=float)
     return array.reshape(len(value), len(value[0]) if value else 0) if kind is Matrix else array
 
 

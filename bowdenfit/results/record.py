@@ -11,14 +11,13 @@ import numpy as np
 from bowdenfit.dataset import Dataset
 from bowdenfit.errors import UsageError
 from bowdenfit.inference.diagnostics import Diagnostics, Trajectories
-from bowdenfit.inference.draws import curves_of, efficiency_at, for_each_draw
+from bowdenfit.inference.draws import OfDraws, efficiency_at
 from bowdenfit.inference.interval import Interval
 from bowdenfit.inference.least_squares import LeastSquares
 from bowdenfit.inference.samplers import SamplerAgreement
 from bowdenfit.model import Model, build_model
-from bowdenfit.results.choices import at_edge, best_window, rank_choices
 from bowdenfit.results.length import OptimalLength
-from bowdenfit.results.optimum import route_grid
+from bowdenfit.results.route_draws import RouteDraws, best_length, compile_along_route, new_mounting, route_draws
 
 OPTIMAL_LENGTH, OPTIMAL_EFFICIENCY = "optimal_length", "optimal_efficiency"
 Answer = TypeVar("Answer")
@@ -132,16 +131,23 @@ class Record:
         return Interval.of(values[name])
 
     @cached_property
-    def _curves(self) -> dict[str, np.ndarray]:
-        """Efficiency and wrap angles of every draw on the grid of the route."""
-        with jax.enable_x64(True):
-            curves = curves_of(self.model, route_grid(self.model))
-            return for_each_draw(curves, self.model.space.size)(self.draws().flat_z)
+    def along_route(self) -> RouteDraws:
+        """What every draw implies along the route.
+
+        Raises:
+            UsageError: The description has no route, or there is no posterior.
+        """
+        self._needs_route()
+        return route_draws(self.model, along_route_program(self), self.draws().flat_z, self.mounting())
+
+    def mounting(self) -> np.ndarray:
+        """Effect of one new mounting on the friction exponent of each draw [1]."""
+        drawn = self.draws()
+        return new_mounting(self.dataset.description, drawn.values, len(drawn.flat_z), self.provenance.seed)
 
     def curves(self) -> tuple[np.ndarray, dict[str, np.ndarray]]:
         """Route values, and by name the efficiency [1] and wrap angles [deg] of every draw (rows) there."""
-        self._needs_route()
-        return route_grid(self.model), self._curves
+        return self.along_route.grid, self.along_route.curves
 
     def efficiency(self, lengths: float | Iterable[float] | None = None) -> list[Interval]:
         """Efficiency at values of the route variable, with intervals.
@@ -174,21 +180,12 @@ class Record:
 
     @cached_property
     def _optimal_length(self) -> OptimalLength:
-        drawn, route = self.draws(), self.dataset.description.route
+        optimum, route = self.draws().optimum, self.dataset.description.route
         assert route is not None  # checked by the caller
-        lengths, best = drawn.optimum[OPTIMAL_LENGTH].ravel(), drawn.optimum[OPTIMAL_EFFICIENCY].ravel()
-        grid, curves = self.curves()
-        choices = np.asarray(route.choices)
-        ranked = rank_choices(choices, self.efficiency_draws(choices)) if len(choices) else ()
-        return OptimalLength(
-            route.variable,
-            route.unit,
-            Interval.of(lengths),
-            Interval.of(best),
-            float(at_edge(lengths, route.range).mean()),
-            best_window(grid, curves["efficiency"], best),
-            ranked,
-        )
+        lengths, efficiencies = (optimum[name].ravel() for name in (OPTIMAL_LENGTH, OPTIMAL_EFFICIENCY))
+        friction = self.model.cable.friction
+        force = friction.conditions.reference_force if friction.depends_on_load else None
+        return best_length(route, lengths, efficiencies, self.along_route, force)
 
     def draws(self) -> Draws:
         """The posterior.
@@ -216,9 +213,15 @@ def once(question: Callable[[Record], Answer]) -> Callable[[Record], Answer]:
 
     @wraps(question)
     def answer(fit: Record) -> Answer:
-        if question not in fit.answers:
-            fit.answers[question] = question(fit)
-        found: Answer = fit.answers[question]
+        if answer not in fit.answers:
+            fit.answers[answer] = question(fit)
+        found: Answer = fit.answers[answer]
         return found
 
     return answer
+
+
+@once
+def along_route_program(fit: Record) -> OfDraws:
+    """See `compile_along_route`."""
+    return compile_along_route(fit.model)

@@ -1,9 +1,10 @@
 """A fit to its results folder, and back bit for bit."""
 
 import json
-from collections.abc import Callable, Mapping
+from collections.abc import Mapping
 from dataclasses import asdict, replace
 from pathlib import Path
+from types import MappingProxyType
 from typing import Any, get_type_hints
 
 import numpy as np
@@ -15,7 +16,9 @@ from bowdenfit.inference.least_squares import LeastSquares
 from bowdenfit.kinds import KINDS, each_table
 from bowdenfit.kinds.measurements import Measurements
 from bowdenfit.kinds.settings import parse_description
-from bowdenfit.results.folder import CHAIN, FIT, POSTERIOR, SUMMARY, folder_to_write, write_text
+from bowdenfit.results.arrays import write_arrays
+from bowdenfit.results.folder import CHAIN, FIGURE_DATA, FIT, POSTERIOR, SUMMARY, folder_to_write, write_text
+from bowdenfit.results.kept import keep
 from bowdenfit.results.netcdf import EXPECTED, Coordinates, Groups, read_groups, write_groups
 from bowdenfit.results.plain import rebuilt, stored
 from bowdenfit.results.record import OPTIMAL_EFFICIENCY, OPTIMAL_LENGTH, Draws, Provenance, Record
@@ -31,16 +34,18 @@ def save(
     summary: Mapping[str, Any],
     folder: Path,
     force: bool = False,
-    write_posterior: Callable[..., Any] | None = None,
+    answers: Mapping[str, Any] = MappingProxyType({}),
+    figures: Mapping[str, Any] = MappingProxyType({}),
 ) -> None:
-    """Write posterior.nc, summary.json and, last, fit.json.
+    """Write posterior.nc, summary.json, what is kept of answers and figures and, last, fit.json.
 
     Args:
         fit: The fit.
         summary: Contents of summary.json.
         folder: Where to; made if missing.
         force: Whether a finished fit there may be replaced.
-        write_posterior: What writes posterior.nc, if another process does; it is written here if omitted.
+        answers: Plain data by question, from which they are answered again.
+        figures: What figures show, by their names; they are drawn again from it.
 
     Raises:
         StoreError: The folder holds a finished fit already, or cannot be written.
@@ -50,12 +55,16 @@ def save(
     with folder_to_write(folder):
         if fit.posterior is None:
             (folder / POSTERIOR).unlink(missing_ok=True)
-        elif write_posterior is None:
-            write_groups(folder / POSTERIOR, *posterior_page(fit))
         else:
-            write_posterior()
+            write_groups(folder / POSTERIOR, *posterior_page(fit))
         write_text(folder / SUMMARY, json.dumps(summary, indent=1) + "\n")
-        write_text(folder / FIT, json.dumps(_fit_page(fit), indent=1) + "\n")
+        measurements = json.dumps(_measurements_page(fit.dataset.measurements))  # long, and read by no person
+        page = f'{json.dumps(_fit_page(fit), indent=1)[:-2]},\n "measurements": {measurements}\n}}\n'
+        (folder / FIGURE_DATA).unlink(missing_ok=True)
+        if figures:
+            write_arrays(folder / FIGURE_DATA, figures)
+        keep(folder, answers, page)
+        write_text(folder / FIT, page)
 
 
 def load(folder: Path) -> Record:
@@ -110,7 +119,6 @@ def _fit_page(fit: Record) -> dict[str, Any]:
         "least_squares": stored(fit.least_squares),
         "posterior": _posterior_page(posterior) if posterior else None,
         "provenance": stored(fit.provenance),
-        "measurements": _measurements_page(fit.dataset.measurements),
     }
 
 

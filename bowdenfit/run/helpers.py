@@ -1,86 +1,217 @@
-"""What runs beside a fit: a stopwatch, libraries loaded while XLA compiles, figures drawn while files are written."""
+"""What works beside a fit: one more process, or a thread where none may be started; and a stopwatch."""
 
+import os
 import signal
+import sys
+import threading
 import time
-from collections.abc import Callable, Iterator
-from concurrent.futures import Executor, Future, ProcessPoolExecutor
-from contextlib import ExitStack, contextmanager
+import traceback
+from abc import ABC, abstractmethod
+from collections.abc import Callable, Iterable, Iterator
+from concurrent.futures import Future, ThreadPoolExecutor
+from contextlib import contextmanager
 from dataclasses import dataclass, field
 from importlib import import_module
-from multiprocessing import get_context
-from threading import Thread
-from typing import Any
+from multiprocessing import connection, get_context, parent_process
+from typing import Any, TypeAlias
 
-STATISTICS = (
-    "arviz_stats.base",
-    "arviz_base",
-    "h5netcdf",
-    "bowdenfit.inference.diagnostics",
-    "bowdenfit.results.netcdf",
-)
+from bowdenfit.errors import BowdenfitError
+
+COMPUTING = ("jax", "bowdenfit.run.fitting")  # what this process and the other both need
 DRAWING = (
     "matplotlib.figure",
     "matplotlib.backends.backend_agg",
     "matplotlib.backends.backend_svg",
     "bowdenfit.questions.figures",
 )
+Answers = tuple["Future[Any]", ...]
+Connection: TypeAlias = "connection.Connection[Any, Any]"
 
 
-class Inline(Executor):
-    """Does every job at once, where it is asked for."""
+class Assistant(ABC):
+    """Does jobs beside the fit, one after the other."""
 
-    def submit(self, function: Callable[..., Any], /, *args: Any, **keywords: Any) -> "Future[Any]":
-        """The finished job."""
-        job: Future[Any] = Future()
-        job.set_result(function(*args, **keywords))
-        return job
+    @abstractmethod
+    def begin(self, stages: Callable[..., Iterator[Any]], *arguments: Any, answers: int) -> Answers:
+        """What a generator gives, one after the other; it gives so many answers."""
+
+    @abstractmethod
+    def submit(self, function: Callable[..., Any], *arguments: Any) -> "Future[Any]":
+        """What a function gives."""
+
+    def prepare_to_draw(self) -> None:  # noqa: B027  (here figures load what they need)
+        """Load what figures need, after what was asked for so far."""
 
 
-@dataclass(frozen=True)
-class Assistants:
-    """Who does what beside the fit itself.
+class InThisProcess(Assistant):
+    """Generators in a thread, functions at once."""
+
+    def __init__(self) -> None:
+        self.thread = ThreadPoolExecutor(1)
+
+    def begin(self, stages: Callable[..., Iterator[Any]], *arguments: Any, answers: int) -> Answers:
+        """See `Assistant`."""
+
+        def in_64_bits() -> None:
+            import jax
+
+            with jax.enable_x64(True):  # the setting is each thread's own
+                _deliver(stages(*arguments), futures)
+
+        futures = tuple(Future[Any]() for _ in range(answers))
+        self.thread.submit(in_64_bits)
+        return futures
+
+    def submit(self, function: Callable[..., Any], *arguments: Any) -> "Future[Any]":
+        """See `Assistant`."""
+        done: Future[Any] = Future()
+        done.set_result(function(*arguments))
+        return done
+
+
+class InAnotherProcess(Assistant):
+    """Everything in a process that ends with this one.
 
     Args:
-        statistics: Diagnostics and posterior.nc, which need ArviZ.
-        drawing: Figures, which need matplotlib.
+        copy: Whether it begins as a copy of this one, or anew.
+        settings: Called in it first.
+        draws: Whether it will draw figures.
     """
 
-    statistics: Executor
-    drawing: Executor
+    def __init__(self, copy: bool, settings: Callable[[], None], draws: bool) -> None:
+        self.thread, self.draws = ThreadPoolExecutor(1), draws
+        context: Any = get_context("fork" if copy else "spawn")
+        self.ours, theirs = context.Pipe()
+        passed = (theirs, self.ours if copy else None, settings)
+        self.process = context.Process(target=_serve, args=passed, daemon=True)
+        self.process.start()
+        theirs.close()
+
+    def begin(self, stages: Callable[..., Iterator[Any]], *arguments: Any, answers: int) -> Answers:
+        """See `Assistant`."""
+        futures = tuple(Future[Any]() for _ in range(answers))
+        self.thread.submit(_deliver, self._asked(stages, arguments), futures)
+        return futures
+
+    def submit(self, function: Callable[..., Any], *arguments: Any) -> "Future[Any]":
+        """See `Assistant`."""
+        return self.begin(function, *arguments, answers=1)[0]
+
+    def prepare_to_draw(self) -> None:
+        """See `Assistant`."""
+        if self.draws:
+            self.submit(load, *DRAWING)
+
+    def _asked(self, function: Callable[..., Any], arguments: tuple[Any, ...]) -> Iterator[Any]:
+        try:
+            self.ours.send((function, arguments))
+            while (reply := self.ours.recv()) is not None:
+                error, answer = reply
+                if error is not None:
+                    raise error
+                yield answer
+        except (EOFError, ConnectionError):
+            raise BowdenfitError(
+                "the process that does least squares and draws figures was ended from outside; the usual cause is that "
+                "memory ran out: free some, and fit again."
+            ) from None
+
+    def end(self) -> None:
+        """End the process, whatever it does."""
+        self.process.kill()
+        self.process.join()
+        self.ours.close()
 
 
 @contextmanager
-def assistants(statistics: bool, drawing: bool) -> Iterator[Assistants]:
-    """Assistants that load their libraries in processes of their own while this one computes, or work here and now.
+def assistant(in_background: bool, settings: Callable[[], None], draws: bool) -> Iterator[Assistant]:
+    """An assistant in a process of its own, or in this one.
 
-    A started process imports the main module again, so only a program that guards its start may ask for one: the command
-    line does, the library does not unless told to.
+    A copy of this process has all its libraries and starts at once, but may be made only while nothing runs in it besides.
+    A new process imports the main module again, so only a program that guards its start may ask for one: the command line
+    does, the library does not unless told to.
+
+    Args:
+        in_background: Whether another process may be started.
+        settings: Called first, in every process that computes.
+        draws: Whether figures will be drawn.
     """
-    with ExitStack() as open_pools:
-        pools = [
-            open_pools.enter_context(_process(modules)) if wanted else Inline()
-            for wanted, modules in ((statistics, STATISTICS), (drawing, DRAWING))
-        ]
-        yield Assistants(*pools)
+    copy = sys.platform == "linux" and "jax" not in sys.modules and threading.active_count() == 1
+    load(*COMPUTING)
+    settings()
+    if not in_background:
+        helper = InThisProcess()
+        with helper.thread:
+            yield helper
+        return
+    other = InAnotherProcess(copy, settings, draws)
+    try:
+        yield other
+    finally:
+        other.end()
+        other.thread.shutdown()
 
 
-def _process(modules: tuple[str, ...]) -> Executor:
-    """A process that loads what its jobs need."""
-    pool = ProcessPoolExecutor(1, get_context("spawn"), initializer=_ready, initargs=(modules,))
-    pool.submit(len, ())  # it starts with its first job
-    return pool
+def _deliver(source: Iterable[Any], futures: Answers) -> None:
+    """Each answer to its future; an error to all that are left."""
+    try:
+        for future, answer in zip(futures, source, strict=True):
+            future.set_result(answer)
+    except BaseException as error:
+        for future in futures:
+            if not future.done():
+                future.set_exception(error)
 
 
-def _ready(modules: tuple[str, ...]) -> None:
-    """Load what the jobs need; an interrupt is the parent's to handle."""
+def _serve(requests: "Connection", theirs: "Connection | None", settings: Callable[[], None]) -> None:
+    """Do one job after the other until the process that asks for them ends; an interrupt is for that one to handle."""
     signal.signal(signal.SIGINT, signal.SIG_IGN)
-    for module in modules:
-        import_module(module)
+    signal.signal(signal.SIGTERM, signal.SIG_DFL)
+    if theirs is not None:
+        theirs.close()
+    threading.Thread(target=_end_with_parent, daemon=True).start()
+    import jax
+
+    jax.config.update("jax_platforms", "cpu")
+    settings()
+    with jax.enable_x64(True):
+        while True:
+            try:
+                function, arguments = requests.recv()
+            except EOFError:
+                os._exit(0)
+            for reply in _replies(function, arguments):
+                requests.send(reply)
 
 
-def load_ahead(*modules: str) -> None:
+def _replies(function: Callable[..., Any], arguments: tuple[Any, ...]) -> Iterator[tuple[Any, Any] | None]:
+    """Error and answer, one after the other; at last None."""
+    try:
+        found = function(*arguments)
+        for answer in found if isinstance(found, Iterator) else (found,):
+            yield None, answer
+    except Exception as error:
+        error.add_note(traceback.format_exc())
+        yield error, None
+    yield None
+
+
+def _end_with_parent() -> None:
+    parent = parent_process()
+    assert parent is not None  # this is a started process
+    connection.wait([parent.sentinel])
+    os._exit(1)
+
+
+def load(*modules: str) -> None:
+    """Load modules."""
+    for name in modules:
+        import_module(name)
+
+
+def load_beside(*modules: str) -> None:
     """Load modules in a thread, which gets its time while XLA compiles."""
-    Thread(target=lambda: [import_module(name) for name in modules], daemon=True).start()
+    threading.Thread(target=load, args=modules).start()
 
 
 @dataclass

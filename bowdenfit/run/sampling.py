@@ -1,7 +1,7 @@
 """Sampling within a fit: which sampler, its compiled programs, and a posterior made of its draws."""
 
 from collections.abc import Callable, Mapping
-from concurrent.futures import Future
+from concurrent.futures import Executor
 from dataclasses import dataclass, replace
 from importlib import import_module
 from typing import Any
@@ -10,14 +10,16 @@ import jax
 import numpy as np
 
 from bowdenfit.inference.chain import Chain, Sampling
-from bowdenfit.inference.diagnostics import diagnose_all
-from bowdenfit.inference.draws import for_each_draw
+from bowdenfit.inference.draws import for_each_draw, replicator
 from bowdenfit.inference.log_density import LogDensity as Density
 from bowdenfit.inference.samplers import NAMES, Drawn, compare_samplers
+from bowdenfit.inference.value_chart import chart_values
 from bowdenfit.model import Model
+from bowdenfit.questions.identify.judgment import compile_slopes, slope_program
 from bowdenfit.results.optimum import optimum_of
-from bowdenfit.results.record import OPTIMAL_EFFICIENCY, OPTIMAL_LENGTH, Draws
-from bowdenfit.run.helpers import Assistants, Stopwatch
+from bowdenfit.results.record import OPTIMAL_EFFICIENCY, OPTIMAL_LENGTH, Draws, along_route_program
+from bowdenfit.results.route_draws import compile_along_route
+from bowdenfit.run.helpers import Stopwatch
 
 PRIOR_DRAWS = 4096
 LIBRARIES = {"emcee": "emcee", "nuts": "blackjax"}
@@ -31,15 +33,19 @@ def samplers(method: str) -> tuple[str, ...]:
 
 @dataclass(frozen=True)
 class Programs:
-    """Compiled for sampling, while least squares is; what follows it is compiled while it runs.
+    """Compiled for sampling and what follows it, while least squares is.
 
     Args:
         samplers: What each sampler runs, by its name.
         optimum: Optimal length and efficiency of many z; None without a route.
+        implied: What each of many z implies for every reading.
+        asked: What questions asked `once` will need, by question.
     """
 
     samplers: dict[str, Callable[..., Any]]
     optimum: Callable[[np.ndarray], Any] | None
+    implied: Callable[[np.ndarray], Any]
+    asked: dict[Callable[..., Any], Any]
 
     def quantities(self, z: np.ndarray) -> Mapping[str, np.ndarray]:
         """What must converge besides the parameters, by name, of many z."""
@@ -48,26 +54,29 @@ class Programs:
         return dict(zip((OPTIMAL_LENGTH, OPTIMAL_EFFICIENCY), self.optimum(z), strict=True))
 
 
-def sampling_programs(density: Density) -> Programs:
-    """The programs that sampling needs."""
+def sampling_programs(density: Density, seed: int, beside: Executor) -> Programs:
+    """The programs that sampling needs, compiled; and those that its draws will need, compiled beside it."""
     model, settings, programs = density.model, density.model.description.sampler, dict[str, Callable[..., Any]]()
     for name in samplers(settings.method):
         if name == "emcee":
             programs[name] = density.batched_log_density(settings.n_ensembles * settings.n_walkers // 2)
+            chart_values(model.space)  # kept for the sampler
         else:
             programs[name] = import_module(_MODULES[name]).make_program(density, settings)
-    return Programs(programs, for_each_draw(optimum_of(model), model.space.size) if model.description.route else None)
+    optimum = for_each_draw(optimum_of(model), model.space.size) if model.description.route else None
+    return Programs(programs, optimum, replicator(density, seed, beside), _asked_later(model, beside))
 
 
-def draws_of(
-    programs: Programs,
-    implied: "Future[Callable[[np.ndarray], Any]]",
-    asked: Sampling,
-    watch: Stopwatch,
-    helpers: Assistants,
-) -> tuple[Draws, tuple[str, ...]]:
+def _asked_later(model: Model, beside: Executor) -> dict[Callable[..., Any], Any]:
+    """What the questions of every fit need, being compiled."""
+    asked: dict[Callable[..., Any], Any] = {slope_program: compile_slopes(model, beside)}
+    if model.description.route is not None:
+        asked[along_route_program] = compile_along_route(model, beside)
+    return asked
+
+
+def draws_of(programs: Programs, asked: Sampling, watch: Stopwatch) -> tuple[Draws, tuple[str, ...]]:
     """The posterior by each of the samplers, and why it should not be trusted."""
-    asked = replace(asked, diagnose=lambda *a: helpers.statistics.submit(diagnose_all, *a).result())
     model, chains = asked.posterior.model, list[Chain]()
     for name, program in programs.samplers.items():
         with watch.stage(f"import {LIBRARIES[name]}"):
@@ -75,12 +84,11 @@ def draws_of(
         with watch.stage(f"sample with {NAMES[name]}" if chains else "sample"):
             chains.append(sampler.sample(asked, program))
     with watch.stage("replicate"):
-        posterior = _posterior(model, chains[0], implied.result(), asked.seed)
+        posterior = _posterior(model, chains[0], programs.implied, asked.seed)
     if len(chains) == 1:
         return posterior, chains[0].reasons
     with watch.stage("compare samplers"):
-        drawn = [_drawn(model, chain) for chain in chains]
-        agreement = helpers.statistics.submit(compare_samplers, *drawn).result()
+        agreement = compare_samplers(*(_drawn(model, chain) for chain in chains))
     of_other = [f"{NAMES[chains[1].sampler]}: {reason}" for reason in chains[1].reasons]
     return replace(posterior, agreement=agreement), (*chains[0].reasons, *of_other, *agreement.reasons())
 

@@ -1,7 +1,6 @@
 """The results folder of a fit: whether it may be written, the checkpoint, and all files once the fit is done."""
 
 import secrets
-from concurrent.futures import Future
 from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, get_args
@@ -11,29 +10,29 @@ from bowdenfit.description import Sampler
 from bowdenfit.errors import DescriptionError, StoreError, UsageError
 from bowdenfit.kinds.settings import parse_description
 from bowdenfit.results.folder import CHAIN, clear, read_checkpoint, refuse_to_overwrite, start_checkpoint
-from bowdenfit.run.helpers import Assistants
+from bowdenfit.run.helpers import Assistant
 from bowdenfit.verb import LARGEST_SEED
 
 if TYPE_CHECKING:
     from bowdenfit.front_desk import Fit
 
 
-def write_results(found: "Fit", folder: Path, figures: bool, helpers: Assistants) -> None:
+def write_results(found: "Fit", folder: Path, figures: bool, helper: Assistant) -> None:
     """All files of the results folder, as far as possible at the same time; fit.json comes last of the fit's own."""
     from bowdenfit.questions.figures import draw_figure, figures_of
+    from bowdenfit.questions.kept import answers_of
     from bowdenfit.questions.summary.words import summary_text
-    from bowdenfit.results.folder import FIGURES, POSTERIOR, SUMMARY_TEXT, write_text
-    from bowdenfit.results.netcdf import write_groups
-    from bowdenfit.results.store import posterior_page, save
+    from bowdenfit.results.folder import FIGURES, SUMMARY_TEXT, write_text
+    from bowdenfit.results.store import save
 
     if found.posterior is None:
         clear(folder)
-        written: Future[None] | None = None
-    else:
-        written = helpers.statistics.submit(write_groups, folder / POSTERIOR, *posterior_page(found))
     place, shown = folder / FIGURES, figures_of(found) if figures else ()
-    drawn = [helpers.drawing.submit(draw_figure, name, data, place) for name, data in shown]  # while the next is worked out
-    save(found, found.summary(), folder, force=True, write_posterior=written.result if written else None)
+    data, drawn = {}, []
+    for name, one in shown:
+        data[name] = one
+        drawn.append(helper.submit(draw_figure, name, one, place))  # while the next is worked out
+    save(found, found.summary(), folder, True, answers_of(found), data)
     write_text(folder / SUMMARY_TEXT, summary_text(found))
     for figure in drawn:
         figure.result()

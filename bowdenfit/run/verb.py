@@ -23,9 +23,7 @@ def fit(
     *,
     output: Annotated[Output, Option(("-o",), default="fits/NAME OF DATASET")] = None,
     mcmc: Annotated[bool, Option()] = True,
-    sampler: Annotated[
-        Literal["emcee", "nuts", "both"] | None, Option(default="as in cable.toml, else emcee")
-    ] = None,
+    sampler: Annotated[Literal["emcee", "nuts", "both"] | None, Option(default="as in cable.toml, else emcee")] = None,
     figures: Annotated[bool, Option()] = True,
     seed: Annotated[int | None, Option(least=0, most=LARGEST_SEED, default="drawn, and recorded")] = None,
     resume: Annotated[bool, Option()] = False,
@@ -56,27 +54,25 @@ def fit(
     Raises:
         BowdenfitError: What is wrong, in a sentence; nothing is written then.
     """
-    from bowdenfit.run.helpers import assistants, load_ahead
+    from bowdenfit.run.helpers import assistant
     from bowdenfit.run.storing import choose_seed, start_checkpointing, with_sampler, write_results
 
     refuse_unknown(fit, reading)
     folder = Path(output) if output is not None else None
-    if in_background and isinstance(dataset, str | Path):
-        load_ahead("jax", "scipy.optimize")  # while recordings are read, which takes seconds
     data = with_sampler(read(dataset, **reading), sampler)
     seed = choose_seed(folder, data, mcmc, seed, resume, force)
-    with assistants(in_background and mcmc, in_background and figures and folder is not None) as helpers:
+    drawing = figures and folder is not None
+    settings = _remember_compilations if remember_compilations else _no_settings
+    with assistant(in_background and (mcmc or drawing), settings, drawing) as helper:
         import jax
 
         from bowdenfit.run.fitting import run
 
-        if remember_compilations:
-            _remember_compilations()
         with jax.enable_x64(True):
             begin = partial(start_checkpointing, folder, data, seed, resume)
-            found = run(data, begin, mcmc, seed, resume, progress, helpers)
+            found = run(data, begin, mcmc, seed, resume, progress, helper)
             if folder is not None:
-                write_results(found, folder, figures, helpers)
+                write_results(found, folder, figures, helper)
     return found
 
 
@@ -88,6 +84,10 @@ def _remember_compilations() -> None:
     jax.config.update("jax_compilation_cache_dir", user_cache_dir("bowdenfit"))
     jax.config.update("jax_persistent_cache_min_compile_time_secs", 0.1)
     jax.config.update("jax_persistent_cache_min_entry_size_bytes", -1)
+
+
+def _no_settings() -> None:
+    """JAX stays as it is."""
 
 
 def _reply(found: "Fit", asked: dict[str, Any]) -> Reply:

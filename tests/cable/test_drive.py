@@ -7,9 +7,10 @@ import pytest
 from cables import cable
 from elastic_cables import CONSTANT, HOUSING, elastic_cable
 
+from bowdenfit.cable.conditions import LEAST_SHARE, Conditions
 from bowdenfit.cable.drive import LEAST_EXPONENT, Loop, Rope, drive_of
-from bowdenfit.cable.friction import Conditions, FrictionModel
-from bowdenfit.cable.load_cells import LEAST_FORCE, LoadCells
+from bowdenfit.cable.friction import FrictionModel
+from bowdenfit.cable.load_cells import LoadCells
 from bowdenfit.kinds.measured_cable import measured_cable as cable_of
 from bowdenfit.kinds.measurements import Measurements
 from bowdenfit.physics.friction import force_from_scale, force_scale
@@ -100,7 +101,7 @@ def test_friction_never_pushes_whatever_the_mounting_did():
     assert np.all(Loop(jnp.ones(2), jnp.asarray(EXPONENT)).band(none) == LEAST_EXPONENT)
     force = jnp.asarray(np.abs(_forces(60.0)) + 1.0)
     np.testing.assert_allclose(_rope().follow(force, none, jnp.log(force[0]))[0], force, rtol=1e-8)
-    assert _rope().least_force == LEAST_FORCE and Loop(jnp.ones(2), jnp.ones(2)).least_force == -np.inf
+    assert _rope().least_force == LEAST_SHARE * 50.0 and Loop(jnp.ones(2), jnp.ones(2)).least_force == -np.inf
 
 
 def test_a_cable_says_what_it_is():

@@ -254,7 +254,9 @@ def test_each_option_adds_its_parameters_with_the_reference_in_words():
     model = _model(rows, 20.0, "mm/s", friction_model="drag+load-dependent+rate-dependent")
     names = {p.name: p for p in model.space.parameters if p.role == "friction_model"}
     assert set(names) == {"drag", "load_exponent", "stribeck", "stribeck_speed", "viscous"}
-    assert model.cable.friction.conditions == Conditions(24.0, 20.0, (20.0, 20.0), "mm/s")  # sqrt(600) to two digits
+    assert model.cable.friction.conditions == Conditions(
+        24.0, 20.0, (20.0, 20.0), "mm/s", median_load=25.0
+    )  # sqrt(600) to two digits
     assert "24 N" in names["load_exponent"].meaning
     assert names["viscous"].prior_text == "Uniform(-0.025, 0.025)"
     assert not [p for p in _model(rows).space.parameters if p.role == "friction_model"]

@@ -9,12 +9,13 @@ import pytest
 from cables import cable, measured
 from elastic_cables import TRUTH, bench, elastic_cable
 
-from bowdenfit.cable.load_cells import DELAY_ERROR, GAIN_ERROR, INPUT_OFFSET, LEAST_FORCE, OUTPUT_OFFSET, LoadCells
+from bowdenfit.cable.load_cells import DELAY_ERROR, GAIN_ERROR, INPUT_OFFSET, OUTPUT_OFFSET, LoadCells
 from bowdenfit.dataset import Dataset
 from bowdenfit.kinds import KINDS
 from bowdenfit.model import build_model
 
 ERRORS = {INPUT_OFFSET: 0.7, OUTPUT_OFFSET: -0.4, GAIN_ERROR: 0.03, DELAY_ERROR: 0.002}
+LEAST_FORCE = 1e-3
 FORCES = jnp.array([0.5, 3.0, 20.0, 60.0])
 SENSORS = {"input_gain_error_sd": 0, "output_gain_error_sd": 0.05, "offset_sd": {"value": 1.0, "unit": "N"}}
 

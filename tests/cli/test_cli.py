@@ -285,7 +285,8 @@ def test_a_whole_fit_in_a_process_of_its_own_and_an_interrupt(on_body, tmp_path)
     found = subprocess.run(resumed, cwd=ROOT, env=environment, capture_output=True, text=True, check=False, timeout=300)
     assert found.returncode == 0, found.stderr
     names = {p.name for p in (tmp_path / "fit").iterdir()}
-    assert names == {"fit.json", "summary.json", "summary.txt", "posterior.nc", "chain.h5", "figures"}
+    known = {"fit.json", "summary.json", "summary.txt", "answers.json", "figures.npz", "posterior.nc", "chain.h5", "figures"}
+    assert names == known
     assert len(list((tmp_path / "fit" / "figures").iterdir())) == 14
 
 

@@ -283,6 +283,13 @@ def test_a_missing_file_and_a_huge_one_are_refused(tmp_path, monkeypatch):
         read_text(tmp_path, HABITS["plain"])
 
 
+def test_a_text_file_of_too_many_numbers_is_refused_before_they_are_read(tmp_path, monkeypatch):
+    lines = [f"{i / 1000},{i % 7}" for i in range(30_000)]
+    monkeypatch.setattr(outcome, "LARGEST_BYTES", 100_000)
+    with pytest.raises(DatasetError, match=r"GiB of numbers, more than .* that are read at once"):
+        read_text(tmp_path, "\n".join(["time,input_force", *lines, ""]))
+
+
 def test_statistics_below_many_rows_are_named_by_their_rows_in_the_file(tmp_path):
     lines = [f"{i / 1000},{i % 7}.5" for i in range(30_000)]
     file = read_text(tmp_path, "\n".join(["time,input_force", *lines, "", "MAX,6.5", ""]))

@@ -37,6 +37,7 @@ def test_layers_import_only_downward():
         ("import bowdenfit", {"jax", "emcee", "matplotlib", "pint", "pydantic", "arviz_base", "scipy"}),
         ("import bowdenfit.cli", {"jax", "emcee", "matplotlib", "pint", "pydantic", "numpy"}),
         ("import bowdenfit as bf; bf.read('datasets/on-body-exoskeleton')", {"jax", "emcee", "matplotlib"}),
+        ("import bowdenfit as bf; bf.read('datasets/synthetic-recordings')", {"jax", "emcee", "scipy.optimize"}),
         (
             "import bowdenfit.questions.figures",
             {"jax", "emcee", "scipy", "pint", "matplotlib"},
@@ -104,14 +105,14 @@ def test_parameters_of_a_contact_law_are_fully_declared_and_named_after_the_cont
 
 
 @pytest.mark.parametrize("name", CURVES)
-def test_a_curve_gives_positive_finite_angles_over_the_prior(name):
+def test_a_curve_gives_finite_angles_that_are_not_negative_over_the_prior(name):
     curve = class_at(CURVES[name].place)("sheath_angle", ROUTE)
     parameters = curve.parameters(np.array([0.3, 0.5, 0.9]), DEFAULTS)
     for z in np.random.default_rng(0).standard_normal((200, len(parameters))):
         values = {p.name: p.prior.constrain(jnp.array(x)) for p, x in zip(parameters, z, strict=True)}
         angle = np.asarray(curve.wrap_angle(values, LENGTHS))
         assert np.all(np.isfinite(angle))
-        assert np.all(angle > 0)
+        assert np.all(angle >= 0)  # a bell far narrower than the range is 0 to the last digit far from its middle
 
 
 @pytest.mark.parametrize("name", CURVES)

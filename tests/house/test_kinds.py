@@ -8,7 +8,6 @@ from bowdenfit.kinds import KINDS
 
 PACKAGE = Path(bowdenfit.__file__).parent
 OTHER_MEANINGS = {
-    "description/elastic.py": "a loop is a kind of cable too, preload a parameter, and stretch a model of preload",
     "questions/simulate/recordings/plan.py": "a plan of recordings lists route values of angles, and refuses other tables",
 }
 """Files whose words are names of kinds by chance, or that are about one kind and what it needs of others."""

@@ -126,7 +126,7 @@ def test_over_twenty_loops_nine_in_ten_intervals_hold_the_truth(laboratory):
 
     That takes 12 hits or fewer of 20, so by chance one of the ten does in fewer than four of a thousand seeds.
     """
-    ranks = [laboratory.ranks(plausible(), Design(elastic=SHORT), seed) for seed in range(20)]
+    ranks = laboratory.ranks(plausible(), Design(elastic=SHORT), range(20))
     p = p_values(ranks)
     assert set(p) == set(TRUTH) - {"mu_stretch"}
     assert all(value > 0.001 for value in p.values()), table(ranks)
@@ -141,7 +141,7 @@ def test_over_two_hundred_loops_ranks_are_uniform():
     Twenty tests with the binomial ones; the smallest p times their number is below 0.001 once in a thousand seeds.
     """
     laboratory = Laboratory(sampler=QUICK)
-    ranks = [laboratory.ranks(plausible(), Design(elastic=SHORT), 1000 + seed) for seed in range(200)]
+    ranks = laboratory.ranks(plausible(), Design(elastic=SHORT), range(1000, 1200))
     p = list(p_values(ranks).values())
     p += [stats.kstest([each[name] for each in ranks], "uniform").pvalue for name in ranks[0]]
     assert min(p) * len(p) > 0.001, (table(ranks), p)
@@ -158,7 +158,7 @@ def test_the_same_test_rejects_a_model_without_the_unloading_branch(laboratory):
     """The negative control: friction that holds the stretch back while the load comes down, taken for noise."""
     wrong = Laboratory(all_on_the_way_up, QUICK)
     wrong.fits = laboratory.fits
-    p = p_values([wrong.ranks(plausible(), Design(elastic=SHORT), seed) for seed in range(6)])
+    p = p_values(wrong.ranks(plausible(), Design(elastic=SHORT), range(6)))
     assert p["sigma_L"] < 0.001
     assert p["lengthening"] < 0.001
 

@@ -186,7 +186,9 @@ def test_a_contact_without_wrap_says_nothing_of_its_coefficient():
 
 
 def test_a_coefficient_that_would_be_negative_is_not_given_a_number():
-    dataset, _ = measured(cable(2, ("angles", "efficiencies")), seed=1, noise=False)
+    weights = {"tau": 0.02, "sigma_theta": 5.0}  # so that efficiencies count enough for the angles not to give way
+    prior = {name: {"prior": {"half_normal": {"sd": sd}}} for name, sd in weights.items()}
+    dataset, _ = measured(cable(2, ("angles", "efficiencies"), prior=prior), seed=1, noise=False)
     table = dataset.measurements.table(EfficiencyTable)  # all loss grows with the free angle, and falls with the squeezed one
     loss = np.linspace(0.1, 0.9, len(table.route))
     changed = dataset.measurements.with_tables(replace(table, efficiency=np.exp(-loss)))

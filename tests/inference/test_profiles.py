@@ -73,7 +73,7 @@ def test_of_a_curved_model_the_interval_is_that_of_a_brute_force_grid():
 
     spare = len(posterior.data[0]["angle"]) - 3
     level = found.sum_of_squares * (1 + stats.f.ppf(0.9, 1, spare) / spare)
-    grid = found.z[index] + np.linspace(-3.0, 3.0, 61)
+    grid = found.z[index] + np.linspace(-1.0, 1.0, 61)
     rises = np.array([least(pin) for pin in grid]) - level
     crossings = [
         grid[i] - rises[i] * (grid[i + 1] - grid[i]) / (rises[i + 1] - rises[i])

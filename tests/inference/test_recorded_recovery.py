@@ -16,6 +16,7 @@ from pathlib import Path
 import jax
 import numpy as np
 import pytest
+from laboratory import Laboratory as Fits
 from raw_recordings import to_raw
 from scipy import stats
 
@@ -28,7 +29,6 @@ from bowdenfit.kinds.recordings.settings import RecordingsTable
 from bowdenfit.kinds.recordings.table import _File, _prepared, _recording
 from bowdenfit.kinds.settings import parse_description
 from bowdenfit.model import build_model
-from bowdenfit.questions.calibrate.refit import Laboratory as Fits
 from bowdenfit.questions.simulate.bench import (
     BenchFriction,
     BenchSettings,
@@ -147,13 +147,13 @@ class Laboratory:
     """Fits recorded cables, and keeps what was compiled for them."""
 
     def __init__(self) -> None:
-        self.fits = Fits(SAMPLER)
+        self.fits = Fits(sampler=SAMPLER)
 
     def draws(self, dataset: Dataset, seed: int) -> dict[str, np.ndarray]:
         """Draws of every parameter [internal units] and of the total exponent at the nominal angle."""
         posterior = LogDensity(build_model(dataset))
         space = posterior.model.space
-        z = self.fits.chain(posterior, seed).z.reshape(-1, space.size)
+        z = self.fits.draws(posterior, seed)
         found = dict(zip((p.name for p in space.free), np.asarray(jax.vmap(space.vector)(z)).T, strict=True))
         return found | {TOTAL: found["mu_edge"] * EDGE + found["mu_bend"] * NOMINAL}
 

@@ -52,8 +52,8 @@ def recoverable(n_contacts: int) -> Description:
 
 def recovered(per_kind: int, first_seed: int = 0) -> list[dict[str, float]]:
     laboratory = Laboratory()
-    kinds = [(n, first_seed + i) for n in (2, 3, 4, 5) for i in range(per_kind)]
-    return [laboratory.ranks(recoverable(n), DESIGN, 100 * n + seed) for n, seed in kinds]
+    seeds = {n: range(100 * n + first_seed, 100 * n + first_seed + per_kind) for n in (2, 3, 4, 5)}
+    return [ranks for n in seeds for ranks in laboratory.ranks(recoverable(n), DESIGN, seeds[n])]
 
 
 def test_over_twenty_cables_of_two_to_five_contacts_nine_in_ten_intervals_hold_the_truth():
@@ -101,6 +101,6 @@ def test_the_same_test_rejects_a_likelihood_that_takes_the_samples_of_a_run_for_
     description = cable(2, ("forces",), contact=measured_angles, friction=friction, prior=prior)
     long_runs = replace(DESIGN, input_forces=tuple(np.linspace(40.0, 90.0, 40)), strokes=(1,))
     laboratory = Laboratory(independent_samples, SamplerSettings(n_ensembles=4, n_walkers=32, max_steps=600))
-    p = p_values([laboratory.ranks(description, long_runs, seed) for seed in range(8)])
+    p = p_values(laboratory.ranks(description, long_runs, range(8)))
     assert p["mu_edge"] < 0.001
     assert p["mu_clamp"] < 0.001

@@ -466,7 +466,7 @@ def test_a_fit_without_preload_finds_the_friction(tmp_path):
     fit = bf.fit(folder_of(tmp_path, [recorded(preload=0.0, seconds=6.0)]), mcmc=False)
     estimate = fit.least_squares.estimates["mu"]
     assert estimate.value == pytest.approx(MU, abs=3 * estimate.standard_error)
-    assert estimate.standard_error < 0.05 * MU
+    assert estimate.standard_error < 0.07 * MU  # one mounting: what its prior says of tau, over half a turn
 
 
 def test_long_recordings_are_joined_to_a_few_hundred_blocks(tmp_path):

@@ -23,7 +23,8 @@ from bowdenfit.kinds.recordings.angles import recorded_angles
 from bowdenfit.kinds.recordings.side_by_side import first_of_groups
 from bowdenfit.kinds.recordings.whole import WholeRecordingsTerm, pad_recordings
 from bowdenfit.kinds.row_angles import row_angles
-from bowdenfit.kinds.runs import RunsTerm, SlidingRows, run_sums
+from bowdenfit.kinds.runs import RunsTerm, run_sums
+from bowdenfit.kinds.sliding_rows import SlidingRows
 from bowdenfit.model import Model, build_model
 from bowdenfit.physics.friction import rate_factor
 from bowdenfit.questions.simulate.bench import BenchFriction, BenchSettings, Faults, MotorProfile, simulate_recording
@@ -252,7 +253,7 @@ def _whole(model: Model, recordings, censored=False) -> WholeRecordingsTerm:
     """The play operator run at every evaluation, also where sums would do."""
     of_all = Recordings(("angle",), tuple(recordings), "mm/s")
     angles = row_angles(model.description, recorded_angles(of_all), None).data
-    return WholeRecordingsTerm(model.cable, pad_recordings(of_all, angles, censored), of_all.runs)
+    return WholeRecordingsTerm(model.cable, pad_recordings(of_all, angles, censored, 1.0), of_all.runs)
 
 
 NOISY = Faults(input_noise=0.2, output_noise=0.2)

@@ -12,7 +12,7 @@ from hypothesis import strategies as st
 from scipy import stats
 
 from bowdenfit.errors import DescriptionError
-from bowdenfit.parameters.priors import HalfNormal, LogNormal, Normal, Prior, TruncatedNormal, Uniform
+from bowdenfit.parameters.priors import HalfCauchy, HalfNormal, LogNormal, Normal, Prior, TruncatedNormal, Uniform
 from bowdenfit.parameters.space import Parameter, ParameterSpace
 
 # Each prior with the same distribution as scipy writes it.
@@ -20,6 +20,7 @@ PRIORS = {
     "normal": (Normal(0.3, 2.0), stats.norm(0.3, 2.0)),
     "lognormal": (LogNormal(0.12, 0.7), stats.lognorm(0.7, scale=0.12)),
     "half-normal": (HalfNormal(0.02), stats.halfnorm(scale=0.02)),
+    "half-Cauchy": (HalfCauchy(0.025), stats.halfcauchy(scale=0.025)),
     "uniform from 0": (Uniform(0.0, 0.4), stats.uniform(0.0, 0.4)),
     "uniform across 0": (Uniform(-2.0, 3.0), stats.uniform(-2.0, 5.0)),
     "measured well": (TruncatedNormal(0.1, 0.004), stats.truncnorm(-25.0, np.inf, 0.1, 0.004)),
@@ -42,6 +43,17 @@ QUANTILES = [
             0: 0.67448975019608174,
             3: 3.2051549205989332,
             8: 8.0849110073915441,
+        },
+    ),
+    (
+        HalfCauchy(1.0),
+        {
+            -30: 7.707448213397734e-198,
+            -8: 9.771862019201988e-16,
+            -3: 0.0021204180475455506,
+            0: 1.0,
+            3: 471.6051163389837,
+            8: 1023346418558685.6,
         },
     ),
     (

@@ -15,6 +15,7 @@ from spoiling import copied
 from bowdenfit.dataset import Dataset, load_dataset
 from bowdenfit.description import Description, SamplerSettings
 from bowdenfit.errors import DatasetError, StoreError
+from bowdenfit.inference.batch_programs import BatchSettings
 from bowdenfit.inference.compilation import compile_program
 from bowdenfit.kinds import KINDS
 from bowdenfit.kinds.angles.table import AngleTable
@@ -26,13 +27,15 @@ from bowdenfit.kinds.forces.term import HeldForcesTerm
 from bowdenfit.kinds.recordings.simulation import refuse_saturated
 from bowdenfit.model import build_model
 from bowdenfit.questions.calibrate.acceptable_tables import refusal
-from bowdenfit.questions.calibrate.answer import Calibration, findings
+from bowdenfit.questions.calibrate.answer import Calibration, Quantity
 from bowdenfit.questions.calibrate.figure import coverage, ranks, sharpness
+from bowdenfit.questions.calibrate.findings import findings
 from bowdenfit.questions.calibrate.refit import Laboratory
-from bowdenfit.questions.calibrate.replication import Plan, RankedTruth, Replication, Workbench
+from bowdenfit.questions.calibrate.replication import RankedTruth, Replication
 from bowdenfit.questions.calibrate.store import keep, open_replications
 from bowdenfit.questions.calibrate.uniformity import UniformRanks, holm
 from bowdenfit.questions.calibrate.words import calibration_text
+from bowdenfit.questions.calibrate.workbench import Plan, Workbench
 from bowdenfit.questions.simulate.simulation import empty_tables, simulated_again, with_readings
 from bowdenfit.recordings.recording import Recordings
 
@@ -268,7 +271,7 @@ def replications(n: int, sd: float = 1.0, shift: float = 0.0, seed: int = 0, bad
 
 def test_right_intervals_are_called_calibrated():
     """By chance, ranks or coverage of the one quantity are called wrong once in fifty seeds or less."""
-    found = findings(replications(200), {"mu": r"$\mu$"})
+    found = findings(replications(200), {"mu": Quantity(r"$\mu$")})
     (mu,) = found.quantities
     assert found.is_calibrated
     assert mu.shrinkage == pytest.approx(1 - 0.09)
@@ -300,7 +303,7 @@ def test_replications_that_did_not_converge_are_counted_and_named_and_too_many_l
 
 
 def test_a_calibration_s_figures_show_every_quantity():
-    found = findings(replications(50, 0.5), {"mu": r"$\mu$"})
+    found = findings(replications(50, 0.5), {"mu": Quantity(r"$\mu$")})
     for figure in (ranks(found), coverage(found), sharpness(found)):
         figure.canvas.draw()
         words = {text.get_text() for axes in figure.axes for text in (*axes.get_yticklabels(), axes.title)}
@@ -350,8 +353,8 @@ SMALL_NOISE = {"sigma_F": {"prior": {"half_normal": {"sd": 0.3}}}}
 
 
 def calibrated(plan: Plan, n: int, **changes: object) -> Calibration:
-    bench = Workbench(plan, Laboratory(QUICK), **changes)
-    return findings([bench.replication(i) for i in range(n)], {})
+    bench = Workbench(plan, Laboratory(BatchSettings(QUICK)), **changes)
+    return findings(list(bench.replications(range(n))), {})
 
 
 def designed(description: Description, design: Design) -> Dataset:
@@ -406,8 +409,8 @@ def test_a_replication_depends_on_its_number_alone():
     dataset = data_set("yarn-on-cylinder")
     plan = Plan(dataset, dataset, 3)
     bench = Workbench(plan)
-    _, second = bench.replication(0), bench.replication(1)
-    alone = Workbench(plan, bench.laboratory).replication(1)
+    _, second, _ = bench.replications(range(3))
+    (alone,) = Workbench(plan, bench.laboratory).replications([1])
     assert replace(alone, seconds=0.0) == replace(second, seconds=0.0)
 
 
@@ -436,7 +439,7 @@ def test_an_interrupted_calibration_says_how_to_go_on(run, tmp_path, monkeypatch
     def interrupted(*_):
         raise KeyboardInterrupt
 
-    monkeypatch.setattr("bowdenfit.questions.calibrate.processes.replicate", interrupted)
+    monkeypatch.setattr("bowdenfit.questions.calibrate.workbench.Workbench.replications", interrupted)
     code, _, err = run("calibrate", ROOT / "datasets" / "yarn-on-cylinder", "-o", tmp_path / "c")
     assert code == 130
     assert "run the same command with --resume" in err
@@ -464,10 +467,10 @@ def test_a_table_that_only_the_assumption_names_is_refused(run, tmp_path):
 
 
 @pytest.mark.slow
-def test_processes_give_the_replications_that_one_gives(tmp_path):
-    """Two processes that start cleanly, each with its own programs: the same ranks to the last digit."""
+def test_two_cores_give_the_replications_that_one_gives():
+    """The same ranks to the last digit."""
     from bowdenfit import calibrate
 
     data = ROOT / "datasets" / "yarn-on-cylinder"
-    one, two = (calibrate(data, replications=3, workers=workers, seed=1) for workers in (1, 2))
+    one, two = (calibrate(data, replications=40, workers=workers, seed=1) for workers in (1, 2))
     assert [q.ranks for q in one.quantities] == [q.ranks for q in two.quantities]

@@ -1,6 +1,7 @@
 """Checks of a fit against its own readings, and of the priors before a fit: what they name, and what they leave in peace."""
 
 import dataclasses
+import re
 
 import cables
 import elastic_cables
@@ -16,17 +17,19 @@ from bowdenfit.inference.compilation import compile_program
 from bowdenfit.inference.diagnostics import Diagnostics
 from bowdenfit.inference.log_density import LogDensity as Density
 from bowdenfit.inference.predictive_checks import LeftOut, place_at_random, predict_without_each, uniformity
-from bowdenfit.inference.prior_sensitivity import SENSITIVE, sensitivities
+from bowdenfit.inference.prior_sensitivity import SENSITIVE, far_out, sensitivities
 from bowdenfit.kinds import KINDS
 from bowdenfit.kinds.angles.table import AngleTable
+from bowdenfit.kinds.places import Places
 from bowdenfit.kinds.stretch.table import StretchTable
+from bowdenfit.kinds.stretch.words import warnings_of as stretch_warnings
 from bowdenfit.model import build_model
+from bowdenfit.parameters.priors import HalfCauchy, HalfNormal, LogNormal, Normal, TruncatedNormal, Uniform
+from bowdenfit.parameters.space import Parameter
 from bowdenfit.questions.check import checks_figure, prior_figure
 from bowdenfit.questions.check.answer import Checks, checks_of, trends_of
 from bowdenfit.questions.check.checks_figure import CheckedTable, checked_tables
 from bowdenfit.questions.check.prior_predictive import prior_predictive
-from bowdenfit.questions.check.prior_words import prior_predictive_text
-from bowdenfit.questions.check.residual_places import Places
 from bowdenfit.questions.check.table_checks import TableChecks
 from bowdenfit.questions.check.words import checks_text
 from bowdenfit.results.record import Draws, Provenance, Record
@@ -118,6 +121,13 @@ def test_uniform_numbers_stay_in_the_band_and_others_do_not():
     assert uniformity(stats.norm.cdf(normal - 1.5), 0.99).fault == "lie lower than the fit says"
 
 
+def parameter(name, prior):
+    return Parameter(name, "$x$", "a parameter", "friction", prior)
+
+
+STANDARD = {name: parameter(name, Normal(0.0, 1.0)) for name in ("mu", "other")}
+
+
 def normal_posterior(reading, sd, seed=0):
     """Draws of a z whose prior is standard normal, read once as `reading` with known sd, and their log likelihood."""
     width = 1 / np.sqrt(1 + 1 / sd**2)
@@ -136,20 +146,56 @@ def normal_posterior(reading, sd, seed=0):
 )
 def test_power_scaling_tells_what_decides(reading, sd, expected):
     z, log_likelihood = normal_posterior(reading, sd)
-    (found,) = sensitivities(
-        {"mu": 0.1 + 0.01 * z}, {"mu": z, "other": z[::-1] * 0 + normal_posterior(0, 0.1, 1)[0]}, log_likelihood
-    )
+    drawn = {"mu": z, "other": z[::-1] * 0 + normal_posterior(0, 0.1, 1)[0]}
+    (found,) = sensitivities({"mu": 0.1 + 0.01 * z}, drawn, drawn, log_likelihood, STANDARD)
     assert found.diagnosis == expected
     assert found.parameter == "mu"
     assert (found.prior > SENSITIVE) == (expected != "readings decide")
 
 
 def test_the_median_with_a_wider_prior_is_that_of_another_fit():
-    """Conjugate: a prior sqrt(2) times as wide puts the median at reading / (1 + sd^2 / 2); 8000 draws err by 0.01."""
+    """Conjugate: a prior twice as wide puts the median at reading / (1 + sd^2 / 4); 8000 draws err by 0.01."""
     z, log_likelihood = normal_posterior(2.0, 0.8)
-    (found,) = sensitivities({"mu": z}, {"mu": z}, log_likelihood)
+    (found,) = sensitivities({"mu": z}, {"mu": z}, {"mu": z}, log_likelihood, STANDARD)
     assert found.median == pytest.approx(2.0 / (1 + 0.8**2), abs=0.03)
-    assert found.wider == pytest.approx(2.0 / (1 + 0.8**2 / 2), abs=0.04)
+    assert found.wider == pytest.approx(2.0 / (1 + 0.8**2 / 4), abs=0.04)
+
+
+def test_widths_with_the_scale_of_a_prior_doubled_and_halved_are_those_of_other_fits():
+    """Conjugate, as above; 8000 draws know a width to 2 %, and the ratio of two from the same draws better."""
+    z, log_likelihood = normal_posterior(0.3, 0.8)
+    (found,) = sensitivities({"mu": z}, {"mu": z}, {"mu": z}, log_likelihood, STANDARD)
+    (width,) = found.widths
+    assert width.doubled == pytest.approx(np.sqrt((1 + 0.8**-2) / (1 / 4 + 0.8**-2)), rel=0.03)
+    assert width.halved == pytest.approx(np.sqrt((1 + 0.8**-2) / (4 + 0.8**-2)), rel=0.03)
+    assert max(width.k_doubled, width.k_halved) < 0.7
+
+
+def test_a_width_of_which_the_draws_cannot_tell_is_no_number_and_no_all_clear():
+    """Draws of the prior itself: twice as wide a normal would need weights without a variance."""
+    z, log_likelihood = normal_posterior(0.0, 30.0)
+    (found,) = sensitivities({"mu": z}, {"mu": z}, {"mu": z}, log_likelihood, STANDARD)
+    (width,) = found.widths
+    assert np.isnan(width.doubled) == (width.k_doubled > 0.7)
+    assert width.halved == pytest.approx(0.5, rel=0.05)
+    assert found.diagnosis == "prior decides"
+
+
+@pytest.mark.parametrize(
+    ("prior", "z", "said"),
+    [
+        (LogNormal(0.12, 0.7), -3.5, True),
+        (LogNormal(0.12, 0.7), 2.9, False),
+        (HalfNormal(0.02), 4.8, True),
+        (HalfNormal(0.02), -4.8, False),
+        (HalfCauchy(0.025), -5.0, False),
+        (Uniform(0.0, 1.0), 5.0, False),
+        (TruncatedNormal(0.1, 0.004), -4.0, True),
+    ],
+)
+def test_a_parameter_beyond_three_sds_of_its_prior_is_named_but_not_at_an_end_that_the_prior_allows(prior, z, said):
+    drawn = {"x": z + 0.1 * np.random.default_rng(0).standard_normal((4, 100))}
+    assert bool(far_out(drawn, {"x": parameter("x", prior)})) == said
 
 
 def stretch_table(z, load, back):
@@ -206,7 +252,7 @@ def test_the_on_body_fit_has_no_outlier_and_says_so_of_550_mm(fit):
     assert at_550["q95"] - at_550["q05"] > 0.04  # wider than the 3 points of a prediction that has seen it
     text = said(fit)
     assert "No reading is an outlier." in text
-    assert "Outside the range of the curves: efficiency at 550 mm: measured 67.8 %, expected 68." in text
+    assert re.search(r"Outside the range of the curves: efficiency at 550 mm: measured 67.8 %, expected 6[78]\.", text)
     assert len(checks_text(fit.checks).splitlines()) <= 10
 
 
@@ -273,7 +319,7 @@ def forces(tmp_path_factory):
     return path
 
 
-@pytest.mark.parametrize(("prior", "conflict"), [("value=0.2, sd=0.01", True), ("value=0.12, sd=0.01", False)])
+@pytest.mark.parametrize(("prior", "conflict"), [("value=0.15, sd=0.01", True), ("value=0.12, sd=0.01", False)])
 def test_a_prior_that_is_wrong_and_narrow_is_reported_as_a_conflict(forces, prior, conflict):
     fit = bf.fit(forces, wrap_angle=(180.0, "deg"), seed=2, settings=(*QUICK, f"friction.mu.measured={{{prior}}}"))
     text = said(fit)
@@ -330,13 +376,13 @@ def test_all_priors_of_the_on_body_data_allow_what_was_measured(on_body, run, tm
 def test_stretch_in_the_wrong_unit_is_seen_before_the_fit(on_body):
     right = bf.read(on_body.parent / "synthetic-haptic-loop")
     table = right.measurements.table(StretchTable)
-    found = prior_predictive(changed(right, "stretch", "stretch", slice(None), 999 * table.stretch))
-    text = " ".join(prior_predictive_text(found).split())
-    assert text.startswith("Warning: ")
-    assert f"of {len(table.load)} readings (stretch: " in text
-    assert "The usual cause is a unit" in text
-    assert "preload:" not in text
-    check_words(prior_figure.draw(found), "stretch in micrometers")
+    wrong = changed(right, "stretch", "stretch", slice(None), 999 * table.stretch)
+    of_wrong, of_right = (
+        stretch_warnings(d.measurements.table(StretchTable), d.description, d.measurements) for d in (wrong, right)
+    )
+    (said,) = set(of_wrong) - set(of_right)
+    assert "gives 4.03e+03 mm under 99 N more" in said
+    check_words(prior_figure.draw(prior_predictive(wrong)), "stretch in micrometers")
 
 
 ROWS = 1024  # draws of a fit that are looked at in one go

@@ -344,7 +344,7 @@ def test_fits_of_other_files_or_with_nothing_in_common_are_refused(geometries, b
     with pytest.raises(UsageError, match="not fitted to the same readings"):
         bf.compare({"a": fit, "b": strange})
     nothing = CommonReadings((), {}, (Omitted("wrap_angle", 0, 26, "they are taken differently"),))
-    monkeypatch.setattr("bowdenfit.questions.compare.answer.common_readings", lambda _: nothing)
+    monkeypatch.setattr("bowdenfit.questions.compare.answer.common_readings", lambda *_: nothing)
     with pytest.raises(
         UsageError, match=r"no reading in common .* left out of the comparison: they are taken differently"
     ):
@@ -355,7 +355,7 @@ def test_whole_recordings_and_runs_are_not_the_same_readings(on_body, by_run_eff
     folder = on_body.parent / "synthetic-recordings"
     data = {name: bf.read(folder, settings=(f"tables.recordings.likelihood={name}",)) for name in ("runs", "whole")}
     fits = {name: replace(by_run_effect["with"], dataset=dataset) for name, dataset in data.items()}
-    common = common_readings(fits)
+    common = common_readings(fits, {name: {} for name in fits})
     assert {table for table, _ in common.readings} == {"wrap_angle"}
     (omitted,) = common.omitted
     assert omitted.sentence().startswith("All readings of recorded efficiency are left out of the comparison")

@@ -6,6 +6,7 @@ import matplotlib as mpl
 import numpy as np
 import pytest
 from figure_words import check_words, words
+from kept_data import assert_kept
 
 from bowdenfit.plots.bands import evenly
 from bowdenfit.questions.bends.bending_loss_figure import BendingLoss, EfficiencyLine
@@ -487,3 +488,8 @@ def test_the_same_data_give_the_same_small_files(tmp_path):
         assert 1_000 < path.stat().st_size < 500_000, path.name
     assert "Stretch (mm)</text>" in (tmp_path / "first" / "stretch.svg").read_text(encoding="utf-8")
     assert dict(mpl.rcParams) == before
+
+
+@pytest.mark.parametrize("case", CASES)
+def test_data_come_back_from_the_file_in_which_they_are_kept(case, tmp_path):
+    assert_kept(CASES[case](), tmp_path / "figures.npz")

@@ -6,6 +6,7 @@ import matplotlib as mpl
 import numpy as np
 import pytest
 from figure_words import check_words, words
+from kept_data import assert_kept
 
 from bowdenfit.plots.panels import extremes
 from bowdenfit.questions.figures import FIGURES, draw_figure
@@ -416,3 +417,8 @@ def test_the_same_data_give_the_same_small_files(tmp_path):
         assert 1_000 < path.stat().st_size < 500_000, path.name
     assert "Input force (N)</text>" in (tmp_path / "first" / "hysteresis.svg").read_text(encoding="utf-8")
     assert dict(mpl.rcParams) == before
+
+
+@pytest.mark.parametrize("case", CASES)
+def test_data_come_back_from_the_file_in_which_they_are_kept(case, tmp_path):
+    assert_kept(CASES[case](), tmp_path / "figures.npz")

@@ -18,6 +18,7 @@ from bowdenfit.recordings.preparation.delay import COMMON_ERROR, _touched, estim
 from bowdenfit.recordings.preparation.flags import flag, frozen, resolution, saturation, spikes
 from bowdenfit.recordings.preparation.noise import correlation_time, noise_about_trend, noise_of, quantum_of
 from bowdenfit.recordings.preparation.play import play
+from bowdenfit.recordings.preparation.rests import Rests, play_rows
 from bowdenfit.recordings.preparation.segments import Segments
 from bowdenfit.recordings.preparation.tare import tare_of
 from bowdenfit.recordings.recording import RawRecording
@@ -481,3 +482,23 @@ def test_preparation_starts_nothing_heavy():
     code = "import sys, bowdenfit.recordings.preparation; print([m for m in ('jax', 'scipy', 'pandas') if m in sys.modules])"
     done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
     assert done.stdout.strip() == "[]"
+
+
+@pytest.mark.parametrize(("rows", "points"), [(1, 1), (2, 20), (3, 257)])
+@pytest.mark.parametrize("rested", [False, True])
+def test_all_rows_follow_the_play_operator_value_by_value(rows, points, rested):
+    generator = np.random.default_rng(8)
+    x, start = np.cumsum(0.1 * generator.normal(size=(rows, points)), axis=1), generator.normal(size=rows)
+    heading = generator.choice([-1.0, 0.0, 1.0], size=x.shape)
+    rests = Rests(generator.normal(size=x.shape), heading) if rested else None
+    exponents = np.array([0.0, 0.05, 0.3])
+    found = play_rows(x, start, exponents, rests)
+    for e, row in np.ndindex(3, rows):
+        y = start[row]
+        for t in range(points):
+            low, high = x[row, t] - exponents[e], x[row, t] + exponents[e]
+            if rests is not None and heading[row, t] != 0:
+                level = rests.level[row, t]
+                low = high = min(level, high) if heading[row, t] < 0 else max(level, low)
+            y = min(max(y, low), high)
+            assert found[e, row, t] == y

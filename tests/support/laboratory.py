@@ -1,18 +1,25 @@
 """Simulated cables, fitted: do posterior intervals hold the truth as often as they say?"""
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterable
+from typing import Any
 
+import jax
 import numpy as np
 from scipy import stats
 
 from bowdenfit.dataset import Dataset
 from bowdenfit.description import Description, SamplerSettings
+from bowdenfit.inference.batch_diagnostics import diagnose_few_draws
+from bowdenfit.inference.batch_programs import BatchSettings
+from bowdenfit.inference.chain import Sampling
+from bowdenfit.inference.ensemble import sample
 from bowdenfit.inference.least_squares import LeastSquares, least_squares, maximum_posterior
 from bowdenfit.inference.log_density import LogDensity
+from bowdenfit.inference.objective import make_objective
 from bowdenfit.kinds.design import Design
 from bowdenfit.model import build_model
 from bowdenfit.questions.calibrate.refit import Laboratory as Fits
-from bowdenfit.questions.calibrate.replication import Plan, Workbench
+from bowdenfit.questions.calibrate.workbench import Plan, Workbench
 from bowdenfit.questions.simulate.simulation import empty_tables
 
 SAMPLER = SamplerSettings(n_ensembles=4, n_walkers=64, max_steps=1500, target_ess=500, target_r_hat=1.03)
@@ -29,20 +36,33 @@ class Laboratory:
     """Simulates cables, fits them, and says for each whether its intervals hold the truth."""
 
     def __init__(self, disturb: Callable[[Dataset], Dataset] = lambda dataset: dataset, sampler=SAMPLER):
-        self.disturb, self.fits, self.benches = disturb, Fits(sampler), {}
+        self.disturb, self.sampler, self.programs = disturb, sampler, {}
+        self.fits, self.benches = Fits(BatchSettings(sampler)), {}
 
     def least_squares(self, dataset: Dataset) -> LeastSquares:
         """Classical estimates, as a fit without MCMC gives them."""
         posterior = LogDensity(build_model(dataset))
-        objective = self.fits.programs_for(posterior).objective
+        objective = self.program(posterior, make_objective)
         return least_squares(posterior, objective, maximum_posterior(posterior, objective).z)
 
     def draws(self, posterior: LogDensity, seed: int) -> np.ndarray:
-        """Draws of the posterior in z, one a row."""
-        return self.fits.chain(posterior, seed).z.reshape(-1, posterior.model.space.size)
+        """Draws of one posterior in z, one a row, by the package's usual sampler."""
+        start = maximum_posterior(posterior, self.program(posterior, make_objective))
+        walkers = self.sampler.n_ensembles * self.sampler.n_walkers
+        density = self.program(posterior, lambda p: p.batched_log_density(walkers // 2))
+        asked = Sampling(posterior, start, self.sampler, seed, diagnose=diagnose_few_draws)
+        return sample(asked, density).z.reshape(-1, posterior.model.space.size)
 
-    def ranks(self, description: Description, design: Design, seed: int) -> dict[str, float]:
-        """Share of the posterior below the truth, by parameter, and for the optimum of a cable with a route.
+    def program(self, posterior: LogDensity, make: Callable[[LogDensity], Any]) -> Any:
+        """What is compiled once for all data of one shape."""
+        shapes = jax.tree.map(lambda array: (array.shape, str(array.dtype)), posterior.data)
+        key = f"{make.__qualname__} {shapes} {posterior.model.space}"
+        if key not in self.programs:
+            self.programs[key] = make(posterior)
+        return self.programs[key]
+
+    def ranks(self, description: Description, design: Design, seeds: Iterable[int]) -> list[dict[str, float]]:
+        """Of each cable: share of the posterior below the truth, by parameter, and for the optimum of a cable with a route.
 
         Uniform between 0 and 1 if all is right.
         """
@@ -51,7 +71,8 @@ class Laboratory:
             dataset = Dataset(description, empty_tables(description, design), {})
             plan = Plan(dataset, dataset, SEED)
             self.benches[key] = Workbench(plan, self.fits, self.disturb, anything)
-        return {name: each.rank for name, each in self.benches[key].replication(seed).ranked.items()}
+        found = self.benches[key].replications(list(seeds))
+        return [{name: each.rank for name, each in replication.ranked.items()} for replication in found]
 
 
 def held(ranks: list[dict[str, float]]) -> dict[str, tuple[int, int]]:

@@ -18,7 +18,7 @@ from bowdenfit.kinds.bench import Remeasurement
 from bowdenfit.kinds.bounds import first_less, joined, last_less
 from bowdenfit.kinds.candidate import Candidate, CandidateKind, Simulation, Situation
 from bowdenfit.kinds.term import Circumstances, TermKind
-from bowdenfit.parameters.priors import HalfNormal
+from bowdenfit.parameters.priors import HalfCauchy
 from bowdenfit.parameters.space import Parameter
 
 
@@ -140,7 +140,7 @@ def _parameters(table: AngleTable, at: Circumstances) -> list[Parameter]:
     ]
     noise = Parameter(
         ANGLE_NOISE, r"$\sigma_\theta$", at.noise.meaning("standard deviation of an angle reading"), "noise",
-        HalfNormal(sd / degree), "deg", degree,
+        HalfCauchy(sd / degree), "deg", degree,
     )  # fmt: skip
     return [*curves, noise]
 

@@ -1,11 +1,7 @@
 """Refuses forces that no rope shows: more out than in while pulling, or less while returning, beyond what noise does.
 
-A rope gains no force: its log ratio s log(F_in/F_out) is not negative. Each row, the rows of each run and stroke together,
-and the whole table are tested against that, with the noise as stated or as the readings of a run scatter. Student's t says
-how likely each gain is for a rope without any friction, and Bonferroni's rule divides `FALSE_ALARM` among all these tests,
-so that fewer than one healthy table of a thousand is refused, however many rows it has. Where every reading stands alone,
-no scatter tells the noise: it is then taken to be 2 % of the force, known as well as from six readings, together with how
-readings differ from run to run; a bench that is noisier states its noise.
+A rope gains no force: its log ratio s log(F_in/F_out) is not negative. `reading_noise` says how that is tested. A row that
+stands out of its own run by a factor of two, which no noise of that run explains, is refused beside them.
 """
 
 from dataclasses import dataclass
@@ -15,27 +11,21 @@ import numpy as np
 
 from bowdenfit.description import Description
 from bowdenfit.errors import DatasetError
+from bowdenfit.kinds.forces.reading_noise import LogGains, beyond_noise, standing_out
 from bowdenfit.kinds.forces.table import ForceTable
 from bowdenfit.kinds.plausibility import GAIN_ERROR
 from bowdenfit.types import Flags, Labels, Vector
 from bowdenfit.words import shown
 
-FALSE_ALARM = 1e-3
 _ZERO_ERROR = 0.005  # of the largest force, that is allowed where nothing is stated
 _SDS = 3.0  # of stated errors of the load cells that are allowed
-_FEWEST = 4  # degrees of freedom from which scatter tells the noise
-_USUAL_NOISE, _USUAL_FREEDOM = (
-    0.02 * np.sqrt(2),
-    6.0,
-)  # of a log ratio where nothing tells it, and how well that is known
 _MOSTLY = 0.5  # of the rows of a stroke, from which a mistake is the whole table's
 _MIXED = 0.2, 0.8  # of the rows of a table of one stroke, between which the other stroke is among them
-_ABOUT = 0.3
-_TRUNCATED = 1.8  # standard deviation of a normal over that of either half, 1.66, and some more for estimating it
-_LEAST_FOR_LINE = 3  # readings of a run and stroke, above which a line is put through them
+_ABOUT = 0.3  # of what the rows of one stroke gain, that those of the other lose at least
 _FACTORS = {"lbf and N": 4.4482, "kgf and N": 9.80665, "kN and N": 1000.0}  # that ends of a cable are confused by
 _LEAST, _MOST = 0.15, 1.02  # efficiencies that such a factor must lead back to
 _NO_SWAP = 2.5  # output over input from which a unit is likelier than swapped columns
+_TYPED = "a typing error, a cell that slipped by a row, or a wrong stroke; correct the row or leave it out"
 _STROKES = {1: ("pulling", "more"), -1: ("returning", "less")}
 
 
@@ -79,34 +69,45 @@ class Gained:
 
 
 def check_gains(table: ForceTable, description: Description) -> None:
-    """Refuse a table in which friction would add force.
+    """Refuse a table in which friction would add force, or a row stands out of its run by far.
 
     Where noise = "student" says that some readings are grossly wrong, only a mistake of the whole table is refused.
 
     Raises:
         DatasetError: Says where, the usual cause and what to do.
     """
-    found = gains(table, description)
-    if found is None or not (found.beyond_noise.any() or found.together.any()):
+    if not np.any(table.stroke):
         return
-    if found.wide or description.noise != "student":
+    found, heavy = gains(table, description), description.noise == "student"
+    if found is not None and (found.beyond_noise.any() or found.together.any()) and (found.wide or not heavy):
         _refuse(table, found)
+    rows, readings = _log_gains(table, description)
+    if not heavy and (out := standing_out(readings)).any():
+        row = int(rows[np.argmax(out)])
+        raise DatasetError(
+            f"{table.origin.place(row)}: output_force {table.output_force[row]:.4g} N at input_force "
+            f"{table.input_force[row]:.4g} N is off the other readings of its run and stroke by a factor of more than two, "
+            f"which noise hardly does: the usual cause is {_TYPED}."
+        )
 
 
 def gains(table: ForceTable, description: Description) -> Gained | None:
     """Gains of force beyond what load cells explain; None where there are none."""
-    rows = np.flatnonzero(table.stroke != 0)
-    force_in, force_out, stroke = table.input_force[rows], table.output_force[rows], table.stroke[rows]
-    log_gain = -stroke * np.log(force_in / force_out)
-    excess = log_gain - _allowed(force_in, force_out, description)
+    rows, readings = _log_gains(table, description)
+    excess = readings.log_gain - _allowed(table.input_force[rows], table.output_force[rows], description)
     if not np.any(excess > 0):
         return None
-    weight = 1 / (1 / force_in**2 + 1 / force_out**2)
-    places = np.nan_to_num(np.column_stack([table.route[rows], table.own.angle[rows]]))
-    keys = np.column_stack([table.run[rows], stroke, places])
-    cell = np.unique(keys, axis=0, return_inverse=True)[1].ravel()
-    alone, together = _beyond_noise(excess, log_gain, force_in + force_out, weight, cell, description)
-    return Gained(rows, stroke, log_gain, excess, alone & (excess > 0), together & (excess > 0))
+    alone, together = beyond_noise(excess, readings, description.sensors.largest_force_noise)
+    return Gained(rows, table.stroke[rows], readings.log_gain, excess, alone & (excess > 0), together & (excess > 0))
+
+
+def _log_gains(table: ForceTable, description: Description) -> tuple[Labels, LogGains]:
+    """Numbers of the sliding rows, and what each gains."""
+    rows = np.flatnonzero(table.stroke != 0)
+    force_in, force_out, stroke = table.input_force[rows], table.output_force[rows], table.stroke[rows]
+    weight = 1 / ((description.sensors.noise_ratio / force_in) ** 2 + 1 / force_out**2)
+    cell = np.unique(np.column_stack([table.run[rows], stroke]), axis=0, return_inverse=True)[1].ravel()
+    return rows, LogGains(-stroke * np.log(force_in / force_out), force_in + force_out, weight, cell)
 
 
 def _allowed(force_in: Vector, force_out: Vector, description: Description) -> Vector:
@@ -116,72 +117,6 @@ def _allowed(force_in: Vector, force_out: Vector, description: Description) -> V
     if sensors.offset_sd is not None:
         zero = _SDS * sensors.offset_sd.to("force")
     return of_gain + zero * np.sqrt(1 / force_in**2 + 1 / force_out**2)
-
-
-def _beyond_noise(
-    excess: Vector, log_gain: Vector, load: Vector, weight: Vector, cell: Labels, description: Description
-) -> tuple[Flags, Flags]:
-    """Which rows noise does not explain, and which rows of cells, or of the whole table, whose mean it does not explain."""
-    n, total = len(excess), np.bincount(cell, weight)
-    limit = FALSE_ALARM / (n + len(total) + 1)
-    stated, of_cell = description.sensors.largest_force_noise, np.bincount(cell, weight * excess) / np.sqrt(total)
-    if stated is not None:
-        alone = _chance(excess * np.sqrt(weight) / stated, np.full(n, np.inf)) < limit
-        return alone, (_chance(of_cell / stated, np.full(len(total), np.inf)) < limit)[cell]
-    if n - len(total) < _FEWEST:
-        return _without_repeats(excess, log_gain, limit)
-    # Where pulling and returning are not told apart, gains and losses of a run are: each half scatters less.
-    halves = np.unique(2 * cell + (log_gain > 0), return_inverse=True)[1].ravel()
-    alone, together = np.zeros(n, dtype=bool), np.zeros(n, dtype=bool)
-    for group, factor in ((cell, 1.0), (halves, _TRUNCATED)):
-        noise, freedom = _scatter(log_gain, load, weight, group)
-        if np.min(freedom) >= _FEWEST - 1:
-            alone |= _chance(excess * np.sqrt(weight) / noise / factor, freedom) < limit
-            together |= _chance(of_cell[cell] / noise / factor, freedom) < limit
-    return alone, together
-
-
-def _without_repeats(excess: Vector, log_gain: Vector, limit: float) -> tuple[Flags, Flags]:
-    """The same of readings that stand alone, with the usual noise beside what their differences show."""
-    n, freedom = len(excess), _USUAL_FREEDOM + len(excess) - 1.0
-    known = _USUAL_FREEDOM * _USUAL_NOISE**2
-    squares = (log_gain - log_gain.mean()) ** 2
-    others = np.sum(squares) - squares * (n / (n - 1.0) if n > 1 else 1.0)
-    left = np.full(n, max(freedom - 1, _USUAL_FREEDOM))
-    alone = _chance(excess / np.sqrt((known + np.maximum(others, 0.0)) / left), left) < limit
-    of_table = excess.mean() * np.sqrt(n * freedom / (known + np.sum(squares)))
-    return alone, np.full(n, _chance(np.array([of_table]), np.array([freedom]))[0] < limit)
-
-
-def _scatter(values: Vector, load: Vector, weight: Vector, group: Labels) -> tuple[Vector, Vector]:
-    """For each row, the noise that all other rows show about straight lines in one over the load, and its freedom.
-
-    The line takes what zeros and hidden tension do at low loads out of the noise. The load must be one whose error has
-    nothing to do with that of the values, such as the sum of both forces of a cable with hardly any friction.
-    """
-    total = np.bincount(group, weight)
-
-    def from_mean(of: Vector) -> Vector:
-        return np.asarray(of - (np.bincount(group, weight * of) / total)[group])
-
-    x, deviation = from_mean(1 / load), from_mean(values)
-    spread = np.bincount(group, weight * x**2)
-    sloped = (np.bincount(group) > _LEAST_FOR_LINE) & (spread > 1e-12 * total * np.mean(1 / load) ** 2)
-    spread = np.where(sloped, spread, np.inf)
-    residual = deviation - x * (np.bincount(group, weight * x * deviation) / spread)[group]
-    leverage = weight * (1 / total[group] + x**2 / spread[group])
-    squares, shared = weight * residual**2, leverage < 1 - 1e-9
-    own = np.divide(squares, 1 - leverage, out=np.zeros(len(values)), where=shared)
-    left = np.maximum(len(values) - len(total) - np.sum(sloped) - shared, 1.0)
-    others = np.maximum(np.sum(squares) - own, 1e-24 * np.max(weight))
-    return np.sqrt(others / left), left
-
-
-def _chance(t: Vector, freedom: Vector) -> Vector:
-    """Probability of a larger Student's t; of a larger normal deviate where the freedom is infinite."""
-    from scipy.special import ndtr, stdtr
-
-    return np.asarray(np.where(np.isinf(freedom), ndtr(-t), stdtr(np.where(np.isinf(freedom), 1.0, freedom), -t)))
 
 
 def _refuse(table: ForceTable, found: Gained) -> NoReturn:
@@ -237,7 +172,4 @@ def _exception(table: ForceTable, found: Gained, row: int) -> str:
             f"that columns, strokes or units of the run {name} differ from the others', or that a "
             "load cell was not zeroed; correct it, or leave the run out"
         )
-    return (
-        "a typing error, a cell that slipped by a row, or a wrong stroke; correct the row or leave it out, or state a larger "
-        'noise, [sensors] force_noise = { value = ..., unit = "N" }'
-    )
+    return f'{_TYPED}, or state a larger noise, [sensors] force_noise = {{ value = ..., unit = "N" }}'

@@ -11,7 +11,7 @@ from jax import Array
 from jaxtyping import Float
 
 from bowdenfit.cable.cable import Cable
-from bowdenfit.cable.load_cells import FORCE_NOISE, LEAST_FORCE, RUN_SCATTER, LoadCells
+from bowdenfit.cable.load_cells import FORCE_NOISE, RUN_SCATTER, LoadCells
 from bowdenfit.cable.noise import noise_law, scatter
 from bowdenfit.kinds.resolve_angles import resolve_angles
 
@@ -22,9 +22,10 @@ class HeldForcesTerm:
 
     .. math:: \log\left[\Phi\left(\frac{\Lambda - r}{s}\right) - \Phi\left(\frac{-\Lambda - r}{s}\right)\right],
               \quad r = g(F_\text{in}) - g(F_\text{out}), \quad
-              s^2 = \tau^2 + \sigma_F^2 (g'(F_\text{in})^2 + g'(F_\text{out})^2)
+              s^2 = \tau^2 + \sigma_F^2 (\rho^2 g'(F_\text{in})^2 + g'(F_\text{out})^2)
 
-    with g the scale on which friction is a shift, log F for the capstan equation. It is a bound, not a measurement: where
+    with g the scale on which friction is a shift, log F for the capstan equation, and rho the noise of the input over that of
+    the output. It is a bound, not a measurement: where
     inside the band a force comes to rest is not modeled, so a coefficient that rests on held readings alone has a posterior
     that is its prior above the largest of them, and its intervals must not be read as those of a measured value.
 
@@ -53,10 +54,11 @@ class HeldForcesTerm:
         self, values: Mapping[str, Array], data: Mapping[str, Any]
     ) -> tuple[Float[Array, " rows"], Float[Array, " rows"]]:
         """Difference of the forces on the scale on which friction is a shift, and its variance from the load cells."""
-        friction, cells = self.cable.friction, LoadCells.of(values)
-        input_force = cells.true_input(data["input_force"], LEAST_FORCE)
-        output_force = cells.true_output(data["output_force"], LEAST_FORCE)
-        slopes = friction.slope(values, input_force) ** 2 + friction.slope(values, output_force) ** 2
+        friction, cells, least = self.cable.friction, LoadCells.of(values), self.cable.friction.conditions.least_force
+        input_force = cells.true_input(data["input_force"], least)
+        output_force = cells.true_output(data["output_force"], least)
+        of_input = self.cable.description.sensors.noise_ratio * friction.slope(values, input_force)
+        slopes = of_input**2 + friction.slope(values, output_force) ** 2
         difference = friction.scaled(values, input_force) - friction.scaled(values, output_force)
         return difference, slopes * values[FORCE_NOISE] ** 2
 
@@ -87,10 +89,10 @@ class HeldForcesTerm:
         self, values: Mapping[str, Array], data: Mapping[str, Any], shift: Float[Array, " rows"]
     ) -> Float[Array, " rows"]:
         """Output force that the load cell shows at a shift on the scale g; it stays positive."""
-        cells = LoadCells.of(values)
-        input_force = cells.true_input(data["input_force"], LEAST_FORCE)
+        cells, least = LoadCells.of(values), self.cable.friction.conditions.least_force
+        input_force = cells.true_input(data["input_force"], least)
         output = self.cable.friction.output_force(values, input_force, shift, jnp.ones(()))
-        return cells.shown_output(output, LEAST_FORCE)
+        return cells.shown_output(output, least)
 
     def simulate(self, values: Mapping[str, Array], data: Mapping[str, Any], key: Array) -> Float[Array, " rows"]:
         """A ratio of input to output force anywhere in the band, with noise [1]."""

@@ -13,12 +13,14 @@ from bowdenfit.cable.load_cells import FORCE_NOISE, RUN_SCATTER, LoadCells
 from bowdenfit.description import Description
 from bowdenfit.kinds.angles.table import AngleTable
 from bowdenfit.kinds.bench import Remeasurement, Truth
+from bowdenfit.kinds.expected_forces import expected_forces
 from bowdenfit.kinds.forces.held import HeldForcesTerm
 from bowdenfit.kinds.forces.table import ForceTable
 from bowdenfit.kinds.next_run import FORCE_RUN
 from bowdenfit.kinds.row_angles import row_angles
-from bowdenfit.kinds.runs import ROW_ARRAYS, RunsTerm, SlidingRows, run_sums
+from bowdenfit.kinds.runs import RunsTerm, run_sums
 from bowdenfit.kinds.shared_parameters import force_noise, offsets, run_scatter
+from bowdenfit.kinds.sliding_rows import ROW_ARRAYS, SlidingRows
 from bowdenfit.kinds.term import Circumstances, TermKind
 from bowdenfit.parameters.space import Parameter
 
@@ -29,7 +31,9 @@ def force_terms(cable: Cable, table: ForceTable, angles: AngleTable | None) -> t
     terms: list[RunsTerm | HeldForcesTerm] = []
     sliding, held = np.flatnonzero(table.stroke != 0), np.flatnonzero(table.stroke == 0)
     if len(sliding):
-        terms.append(_sliding(cable, table, rows, sliding))
+        readings = sliding_rows(cable.description, table, rows, sliding)
+        labels = tuple(_run_label(cable, table, int(run)) for run in np.unique(readings.run))
+        terms.append(RunsTerm(cable, run_sums(cable, readings), labels, rows=readings))
     if len(held):
         data = {name: rows[name][held] for name in ROW_ARRAYS} | {
             "input_force": table.input_force[held],
@@ -39,12 +43,27 @@ def force_terms(cable: Cable, table: ForceTable, angles: AngleTable | None) -> t
     return tuple(terms)
 
 
-def _sliding(cable: Cable, table: ForceTable, rows: Mapping[str, np.ndarray], used: np.ndarray) -> RunsTerm:
+def sliding_rows(
+    description: Description, table: ForceTable, rows: Mapping[str, np.ndarray], used: np.ndarray
+) -> SlidingRows:
+    """Some rows of a table with what its readings together say of their forces.
+
+    Args:
+        description: What was said about the cable.
+        table: The table.
+        rows: Wrap angles of all its rows.
+        used: Numbers of the rows.
+    """
     stroke, force_in, force_out = table.stroke[used], table.input_force[used], table.output_force[used]
-    readings = SlidingRows(
-        force_in,
-        force_out,
-        np.log(force_in / force_out) * stroke,
+    keys = np.column_stack([table.run[used], stroke, *(rows[name][used] for name in ROW_ARRAYS)])
+    group = np.unique(keys, axis=0, return_inverse=True)[1].ravel()
+    sensors = description.sensors
+    stated = None if sensors.force_noise is None else sensors.force_noise.to("force")
+    expected = expected_forces(force_in, force_out, group, sensors.noise_ratio, stated)
+    return SlidingRows(
+        expected.input_force,
+        expected.output_force,
+        (np.log(force_in / force_out) - expected.log_ratio_error) * stroke,
         stroke,
         table.run[used],
         table.velocity[used],
@@ -52,8 +71,6 @@ def _sliding(cable: Cable, table: ForceTable, rows: Mapping[str, np.ndarray], us
         np.ones(len(used)),
         {name: rows[name][used] for name in ROW_ARRAYS},
     )
-    runs = np.unique(readings.run)
-    return RunsTerm(cable, run_sums(cable, readings), tuple(_run_label(cable, table, int(run)) for run in runs))
 
 
 def _run_label(cable: Cable, table: ForceTable, run: int) -> str:
@@ -68,7 +85,7 @@ def _run_label(cable: Cable, table: ForceTable, run: int) -> str:
 
 def _parameters(_: ForceTable, at: Circumstances) -> list[Parameter]:
     """Inside a run readings are normal, whatever the noise of mountings."""
-    return [run_scatter(at), force_noise(at, "standard deviation of a force reading"), *offsets(at)]
+    return [run_scatter(at), force_noise(at), *offsets(at)]
 
 
 def _draw(table: ForceTable, truth: Truth) -> dict[str, Array]:
@@ -84,7 +101,8 @@ def _draw(table: ForceTable, truth: Truth) -> dict[str, Array]:
     stroke, force = jnp.asarray(table.stroke, dtype=float), jnp.asarray(table.input_force)
     output = cable.friction.output_force(values, force, exponent + mounting[run], stroke)
     cells, noise, slides = LoadCells.of(values), scale * values[FORCE_NOISE], table.stroke != 0
-    read = cells.shown_input(force) + noise * jax.random.normal(of_input, force.shape)
+    of_weight = noise * cable.description.sensors.noise_ratio
+    read = cells.shown_input(force) + of_weight * jax.random.normal(of_input, force.shape)
     return {
         "input_force": jnp.where(slides, read, force),
         "output_force": jnp.where(

@@ -87,7 +87,8 @@ class LoopTerm:
         output, by_force, by_exponent, angle_variance = self._response(values, data)
         if weights is not values:
             _, by_force, by_exponent, angle_variance = self._response(weights, data)
-        variance = weights[FORCE_NOISE] ** 2 * (1 + by_force**2)
+        noise_ratio = self.cable.description.sensors.noise_ratio
+        variance = weights[FORCE_NOISE] ** 2 * (1 + (noise_ratio * by_force) ** 2)
         return LoadCells.of(values).shown_output(output), jnp.sqrt(variance + by_exponent**2 * angle_variance)
 
     def expected(self, values: Mapping[str, Array], data: Mapping[str, Any]) -> Float[Array, " rows"]:
@@ -154,8 +155,9 @@ def _draw(table: LoopTable, truth: Truth) -> dict[str, Array]:
     force = jnp.where(jnp.isnan(table.input_force), free, jnp.nan_to_num(table.input_force))
     output = loop_output_force(force, preload, exponent, stroke)
     cells, noise = LoadCells.of(values), scale * values[FORCE_NOISE]
+    of_input_cell = noise * cable.description.sensors.noise_ratio
     return {
-        "input_force": cells.shown_input(force) + noise * jax.random.normal(of_input, force.shape),
+        "input_force": cells.shown_input(force) + of_input_cell * jax.random.normal(of_input, force.shape),
         "output_force": cells.shown_output(output) + noise * truth.scatter(of_output, force.shape),
     }
 

@@ -18,4 +18,5 @@ PRELOAD = Kind(
     empty=empty,
     count=lambda table: f"{len(table.preload)} preloads",
     bends=lambda table: table.wrap_angle,
+    tensions=lambda table: table.preload,
 )

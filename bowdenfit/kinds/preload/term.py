@@ -23,9 +23,9 @@ from bowdenfit.kinds.candidate import (
 )
 from bowdenfit.kinds.elastic_term import ElasticTerm
 from bowdenfit.kinds.preload.table import PreloadTable
-from bowdenfit.kinds.shared_parameters import preload
+from bowdenfit.kinds.shared_parameters import preload, preload_scale
 from bowdenfit.kinds.term import WRAP_ANGLE, Circumstances, TermKind
-from bowdenfit.parameters.priors import HalfNormal
+from bowdenfit.parameters.priors import HalfCauchy
 from bowdenfit.parameters.space import Parameter
 
 MEASURED_PRELOAD = "measured_preload"  # not the name of the parameter
@@ -47,8 +47,11 @@ def _preload(cable: Cable, values: Mapping[str, Array], data: Mapping[str, Any])
 
 def _parameters(_: PreloadTable, at: Circumstances) -> list[Parameter]:
     """The preload, and how readings scatter."""
-    sd, meaning = at.defaults.preload_noise_newtons, at.noise.meaning("standard deviation of a preload reading")
-    noise = Parameter(PRELOAD_NOISE, r"$\sigma_P$", meaning, "noise", HalfNormal(sd), "N")
+    part, by = at.defaults.noise_share, preload_scale(at)
+    noise = Parameter(
+        PRELOAD_NOISE, r"$\sigma_P$", at.noise.meaning("standard deviation of a preload reading"), "noise",
+        HalfCauchy(part * by.value), "N", scaled_by=by.share(part),
+    )  # fmt: skip
     return [*preload(at), noise]
 
 

@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from bowdenfit.cable.load_cells import LEAST_FORCE
+from bowdenfit.cable.conditions import LEAST_SHARE
 from bowdenfit.recordings.recording import Recording
 
 RECORDED = "recorded_efficiency"  # name of the readings of recordings in results
@@ -24,7 +24,8 @@ def worth_of(recording: Recording, used: np.ndarray) -> np.ndarray:
 def drift_of(recording: Recording) -> np.ndarray:
     """Change of log F_out with time [1/s], by which a delay of its channel shifts it."""
     blocks = recording.blocks
-    return np.gradient(np.log(np.maximum(blocks.output_force, LEAST_FORCE)), blocks.time)
+    least = LEAST_SHARE * np.max(np.abs(blocks.output_force))
+    return np.gradient(np.log(np.maximum(blocks.output_force, least)), blocks.time)
 
 
 def inside_phase(state: np.ndarray) -> np.ndarray:
@@ -52,7 +53,7 @@ def last_contact(state: np.ndarray) -> np.ndarray:
 def _at_limit(recording: Recording, force: np.ndarray) -> np.ndarray:
     """Saturated blocks in which this of the two forces stands at the end of the range, as its saturated samples do."""
     ends = [end for end in recording.account.limits if np.isfinite(end)]
-    near = [np.abs(force - end) <= _NEAR_LIMIT * max(abs(end), 1.0) for end in ends]
+    near = [np.abs(force - end) <= _NEAR_LIMIT * max(np.abs(ends)) for end in ends]
     return recording.blocks.saturated & (np.any(near, axis=0) if near else np.zeros(len(force), dtype=bool))
 
 

@@ -22,7 +22,7 @@ from bowdenfit.cable.noise import noise_law
 from bowdenfit.kinds.padding import rounded_up
 from bowdenfit.kinds.recordings.side_by_side import WITHOUT_WEIGHT
 from bowdenfit.kinds.resolve_angles import resolve_angles
-from bowdenfit.kinds.runs import ROW_ARRAYS
+from bowdenfit.kinds.sliding_rows import ROW_ARRAYS
 from bowdenfit.physics.normal_tail import log_normal_cdf
 
 _LEAST_TOTAL = 1e-20

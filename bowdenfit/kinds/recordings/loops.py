@@ -21,7 +21,7 @@ from bowdenfit.recordings.loop_strokes import loop_limits
 from bowdenfit.recordings.recording import Recording, Recordings
 
 RECORDED_LOSS = "recorded_loss"  # name of the readings of a loop's recordings in results
-_LEAST_PRELOAD = 1e-6  # N
+_LEAST_PRELOAD = 1e-6  # of the loads
 _LARGEST_EXPONENT = 3.0  # that a recording's own loss is taken to mean, however small the preload
 _REACH = 0.5  # of the friction exponent, that its first guess is corrected by
 
@@ -44,7 +44,8 @@ class LoopRecordingsTerm(BlocksTerm):
 
     def _first_guess(self, drive: Loop, data: Data) -> tuple[Each, Each]:
         """That with which the loop is as wide as the recording's own; none where that is not known."""
-        by_loss = data["loss"] / (2 * jnp.maximum(drive.preload, _LEAST_PRELOAD))
+        least = _LEAST_PRELOAD * self.cable.friction.conditions.load.value
+        by_loss = data["loss"] / (2 * jnp.maximum(drive.preload, least))
         own = jnp.where(data["tells_loss"], jnp.minimum(by_loss, _LARGEST_EXPONENT), data["exponent"])
         guess = jnp.where(data["tells_loss"] | data["tells_exponent"], own - drive.exponent, 0.0)
         return guess, _REACH * (drive.exponent + guess)
@@ -90,7 +91,8 @@ def loop_recordings_term(
         labels: Each run in words.
         censored: Whether a saturated output counts as one beyond the end of the range.
     """
-    parts = [_blocks(r, censored) for r in recordings.each]
+    noise_ratio = cable.description.sensors.noise_ratio
+    parts = [_blocks(r, censored, noise_ratio) for r in recordings.each]
     data = side_by_side(recordings, parts, angles)
     moving = beside([p["moving"] for p in parts], "constant")
     of_run = np.bincount(data["run"], np.abs(moving).sum(axis=0))
@@ -111,7 +113,7 @@ def loop_recordings_term(
     )
 
 
-def _blocks(recording: Recording, censored: bool) -> dict[str, Any]:
+def _blocks(recording: Recording, censored: bool, noise_ratio: float) -> dict[str, Any]:
     """Blocks of one recording, joined inside their phases where there are many.
 
     `moving` is the number of samples that show the loss, with the sign of the motion.
@@ -121,7 +123,7 @@ def _blocks(recording: Recording, censored: bool) -> dict[str, Any]:
     stroke = strokes.stroke[groups.starts]
     used = strokes.used_sliding & ~blocks.saturated
     return arrays | {
-        "weight": arrays["worth"] / (1 + _input_share(recording, arrays["input_force"], stroke) ** 2),
+        "weight": arrays["worth"] / (1 + (noise_ratio * _input_share(recording, arrays["input_force"], stroke)) ** 2),
         "moving": stroke * np.add.reduceat(blocks.samples * used, groups.starts).astype(float),
     }
 

@@ -15,7 +15,7 @@ from bowdenfit.kinds.recordings.blocks import (
     standing_share,
     worth_of,
 )
-from bowdenfit.kinds.runs import ROW_ARRAYS
+from bowdenfit.kinds.sliding_rows import ROW_ARRAYS
 from bowdenfit.recordings.recording import Recording, Recordings
 
 MOST_BLOCKS = 600  # of one recording in the play operator; more say no more once noise is averaged
@@ -55,7 +55,8 @@ class Thinned:
         """
         blocks = self.recording.blocks
         force_in, force_out = (
-            np.maximum(self.mean(force), drive.least_force) for force in (blocks.input_force, blocks.output_force)
+            np.maximum(self.mean(force), drive.least_share * np.max(np.abs(force)))
+            for force in (blocks.input_force, blocks.output_force)
         )
         off = input_saturated(self.recording)
         lost = self.any_of(off)

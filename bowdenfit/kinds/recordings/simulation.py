@@ -12,8 +12,9 @@ import jax
 import jax.numpy as jnp
 import numpy as np
 
+from bowdenfit.cable.conditions import LEAST_SHARE
 from bowdenfit.cable.drive import Loop, Rope, drive_of
-from bowdenfit.cable.load_cells import BLOCK_NOISE, LEAST_FORCE, RUN_SCATTER, LoadCells
+from bowdenfit.cable.load_cells import BLOCK_NOISE, RUN_SCATTER, LoadCells
 from bowdenfit.description import Description
 from bowdenfit.errors import DatasetError
 from bowdenfit.kinds.bench import Truth
@@ -49,7 +50,8 @@ def drawn_recordings(recordings: Recordings, truth: Truth) -> dict[str, jax.Arra
     output, _ = drive.follow(at_least, scale * mounting, _starts(drive, recordings, at_least, scale * mounting))
     places = beside([_readings_of(r) for r in recordings.each]).astype(int)
     shape, noise = (places.max() + 1, len(recordings.each)), scale * values[BLOCK_NOISE]
-    errors = [noise * jax.random.normal(k, shape)[places, np.arange(shape[1])] for k in (of_input, of_output)]
+    noises = ((cable.description.sensors.noise_ratio * noise, of_input), (noise, of_output))
+    errors = [sd * jax.random.normal(k, shape)[places, np.arange(shape[1])] for sd, k in noises]
     return {
         "input_force": cells.shown_input(force) + errors[0],
         "output_force": cells.shown_output(output),
@@ -68,7 +70,8 @@ def _starts(drive: Rope | Loop, recordings: Recordings, force: jax.Array, mounti
 def _start(recording: Recording) -> float:
     """Where in its friction band a recording starts, from -1 (pulling) to 1 (returning)."""
     blocks, strokes = recording.blocks, recording.strokes
-    ratio = np.log(max(blocks.output_force[0], LEAST_FORCE) / max(blocks.input_force[0], LEAST_FORCE))
+    least = LEAST_SHARE * np.max(np.abs(blocks.input_force))
+    ratio = np.log(max(blocks.output_force[0], least) / max(blocks.input_force[0], least))
     return float(np.clip((ratio + strokes.center) / strokes.exponent, -1.0, 1.0))
 
 

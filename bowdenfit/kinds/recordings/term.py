@@ -32,10 +32,11 @@ from bowdenfit.kinds.recordings.settings import RecordingsTable
 from bowdenfit.kinds.recordings.simulation import drawn_recordings, recorded_again, refuse_saturated
 from bowdenfit.kinds.recordings.whole import WholeRecordingsTerm, pad_recordings
 from bowdenfit.kinds.row_angles import row_angles
-from bowdenfit.kinds.runs import ROW_ARRAYS, RunsTerm, SlidingRows, run_sums
-from bowdenfit.kinds.shared_parameters import offsets, preload, run_scatter
+from bowdenfit.kinds.runs import RunsTerm, run_sums
+from bowdenfit.kinds.shared_parameters import noise_of_forces, offsets, preload, run_scatter
+from bowdenfit.kinds.sliding_rows import ROW_ARRAYS, SlidingRows
 from bowdenfit.kinds.term import Circumstances, TermKind
-from bowdenfit.parameters.priors import HalfNormal, Normal
+from bowdenfit.parameters.priors import Normal
 from bowdenfit.parameters.space import Parameter
 from bowdenfit.recordings.preparation.play import play
 from bowdenfit.recordings.recording import Recording, Recordings
@@ -58,16 +59,18 @@ def recordings_term(
     if settings is None or settings.likelihood == "runs":
         parts = [_sliding_blocks(r) for r in recordings.each]
         _needs_blocks(recordings, parts)
-        return RunsTerm(cable, run_sums(cable, _rows(recordings, parts, rows)), labels, RECORDED, BLOCK_NOISE)
+        blocks = _rows(recordings, parts, rows)
+        return RunsTerm(cable, run_sums(cable, blocks), labels, RECORDED, BLOCK_NOISE, rows=blocks)
     for recording in recordings.each:
         _needs_reversal(recording)
-    censored = _censored(settings, recordings)
+    censored, noise_ratio = _censored(settings, recordings), cable.description.sensors.noise_ratio
     if not (cable.friction.options or cable.description.fits_offsets or censored):
         # On a scale that no parameter changes, the operator is linear in the exponent: it need not be run again.
-        parts = [_all_blocks(r) for r in recordings.each]
+        parts = [_all_blocks(r, noise_ratio) for r in recordings.each]
         _needs_blocks(recordings, parts)
-        return RunsTerm(cable, run_sums(cable, _rows(recordings, parts, rows)), labels, RECORDED, BLOCK_NOISE)
-    return WholeRecordingsTerm(cable, pad_recordings(recordings, rows, censored), labels)
+        blocks = _rows(recordings, parts, rows)
+        return RunsTerm(cable, run_sums(cable, blocks), labels, RECORDED, BLOCK_NOISE, rows=blocks)
+    return WholeRecordingsTerm(cable, pad_recordings(recordings, rows, censored, noise_ratio), labels)
 
 
 def _censored(settings: RecordingsTable, recordings: Recordings) -> bool:
@@ -120,7 +123,7 @@ def _sliding_blocks(recording: Recording) -> _Part:
     return _Part(used, stroke, ratio, worth_of(recording, used))
 
 
-def _all_blocks(recording: Recording) -> _Part:
+def _all_blocks(recording: Recording, noise_ratio: float) -> _Part:
     r"""Every block after the rope first slid, as the log ratio it would show had it gone on sliding.
 
     Between contacts the output stands still where the last stroke left it, :math:`y = y(\hat\Lambda) - s (\Lambda -
@@ -134,7 +137,7 @@ def _all_blocks(recording: Recording) -> _Part:
     used, stroke = np.flatnonzero(kept_at)[kept], last[kept]
     ratio = strokes.exponent - stroke * (y - followed)[kept]
     force_in, force_out = blocks.input_force[used], blocks.output_force[used]
-    of_output_alone = np.where(state[kept] == 0, 1 + (force_out / force_in) ** 2, 1.0)
+    of_output_alone = np.where(state[kept] == 0, 1 + (noise_ratio * force_out / force_in) ** 2, 1.0)
     return _Part(used, stroke, ratio, worth_of(recording, used) * of_output_alone * standing_share(state)[kept])
 
 
@@ -177,11 +180,8 @@ def _rows(recordings: Recordings, parts: list[_Part], angles: Mapping[str, np.nd
 
 def _parameters(recordings: Recordings, at: Circumstances) -> list[Parameter]:
     """Scatter of mountings and blocks, what the load cells add, and of a loop its preload."""
-    sd, late = at.defaults.block_noise_newtons, recordings.delay_sd
-    block_noise = Parameter(
-        BLOCK_NOISE, r"$\sigma_B$", "standard deviation of a block's mean force", "noise",
-        HalfNormal(sd), "N",
-    )  # fmt: skip
+    late = recordings.delay_sd
+    block_noise = noise_of_forces(at, BLOCK_NOISE, r"$\sigma_B$", "standard deviation of a block's mean force")
     delay = Parameter(
         DELAY_ERROR, r"$\delta$", "error of the estimated delay between the load cells' channels", "sensor",
         Normal(0.0, late), "ms", 1000.0, prior_words=f"Normal(0, {1000 * late:.3g} ms)",

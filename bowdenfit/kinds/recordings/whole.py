@@ -66,9 +66,14 @@ class WholeRecordingsTerm(BlocksTerm):
         return np.exp(-np.bincount(run, exponent) / np.bincount(run))
 
 
-def pad_recordings(recordings: Recordings, angles: Mapping[str, np.ndarray], censored: bool) -> dict[str, Any]:
-    """Arrays over time and recordings; the shorter ones stand still at their end, with no weight."""
-    data = side_by_side(recordings, [_blocks(r, censored) for r in recordings.each], angles)
+def pad_recordings(
+    recordings: Recordings, angles: Mapping[str, np.ndarray], censored: bool, noise_ratio: float
+) -> dict[str, Any]:
+    """Arrays over time and recordings; the shorter ones stand still at their end, with no weight.
+
+    The noise ratio is that of the input over that of the output.
+    """
+    data = side_by_side(recordings, [_blocks(r, censored, noise_ratio) for r in recordings.each], angles)
     speeds = [np.abs(r.blocks.velocity[r.strokes.used_sliding]) for r in recordings.each]
     return data | {
         "reading": np.log(data["output_force"]),
@@ -78,10 +83,10 @@ def pad_recordings(recordings: Recordings, angles: Mapping[str, np.ndarray], cen
     }
 
 
-def _blocks(recording: Recording, censored: bool) -> dict[str, Any]:
+def _blocks(recording: Recording, censored: bool, noise_ratio: float) -> dict[str, Any]:
     """Blocks of one recording; while the rope stands still the input's noise is not in the output."""
     groups = group_blocks(recording)
     arrays = groups.arrays(Rope, positive(recording), censored)
     standing = recording.strokes.stroke[groups.starts] == 0
-    variance = np.where(standing, 0.0, 1 / arrays["input_force"] ** 2) + 1 / arrays["output_force"] ** 2
+    variance = np.where(standing, 0.0, (noise_ratio / arrays["input_force"]) ** 2) + 1 / arrays["output_force"] ** 2
     return arrays | {"weight": arrays["worth"] / variance}

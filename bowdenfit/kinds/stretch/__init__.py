@@ -17,4 +17,5 @@ STRETCH = Kind(
     empty=empty,
     count=lambda table: f"{len(table.load)} readings of stretch",
     bends=lambda table: table.wrap_angle,
+    tensions=lambda table: table.load,
 )

@@ -9,7 +9,7 @@ from jax import Array
 from jaxtyping import Float
 
 from bowdenfit.cable.cable import Cable
-from bowdenfit.cable.elasticity import STRETCH_FRICTION, STRETCH_ZERO, rope_parameters, spread_matrix
+from bowdenfit.cable.elasticity import STRETCH_FRICTION, STRETCH_ZERO, spread_matrix
 from bowdenfit.kinds.angles.table import AngleTable
 from bowdenfit.kinds.bench import Remeasurement, drawn_by_term
 from bowdenfit.kinds.candidate import (
@@ -23,9 +23,11 @@ from bowdenfit.kinds.candidate import (
     some_loads,
 )
 from bowdenfit.kinds.elastic_term import ElasticTerm
+from bowdenfit.kinds.shared_parameters import rope
 from bowdenfit.kinds.stretch.table import StretchTable
 from bowdenfit.kinds.term import LOAD, WRAP_ANGLE, Circumstances, TermKind
-from bowdenfit.parameters.priors import HalfNormal, LogNormal, Normal
+from bowdenfit.parameters.priors import HalfCauchy, LogNormal, Normal
+from bowdenfit.parameters.scale import Scale
 from bowdenfit.parameters.space import Parameter
 
 STRETCH_NOISE = "sigma_L"
@@ -55,23 +57,26 @@ def _stretch(cable: Cable, values: Mapping[str, Array], data: Mapping[str, Any])
     return cable.elasticity.stretch_of_rows(values, data)
 
 
-def _parameters(_: StretchTable, at: Circumstances) -> list[Parameter]:
+def _parameters(table: StretchTable, at: Circumstances) -> list[Parameter]:
     """The rope, what the reading calls zero, how readings scatter, and the friction of stretching if it is not a contact's."""
-    zero, noise, prior = at.defaults.stretch_zero_mm, at.defaults.stretch_noise_mm, at.defaults.friction
+    zero, noise, prior = at.defaults.stretch_zero_share, at.defaults.noise_share, at.defaults.friction
+    usual = at.defaults.stretch_mm_without_data
+    largest = Scale(float(np.max(np.abs(table.stretch))) or usual, "largest stretch", "mm")
+    spread = Scale(float(np.ptp(table.stretch)) or usual, "range of stretch", "mm")
     own_friction = Parameter(
         STRETCH_FRICTION, r"$\mu_\mathrm{stretch}$", "friction coefficient while the rope is stretched", "friction",
         LogNormal(prior.median, prior.log_sd),
     )  # fmt: skip
     return [
-        *rope_parameters(at.defaults),
+        *rope(at),
         Parameter(
             STRETCH_ZERO, r"$\Delta L_0$", "stretch that the reading calls zero", "elastic",
-            Normal(0.0, zero), "mm",
+            Normal(0.0, zero * largest.value), "mm", scaled_by=largest.share(zero),
         ),
         *([own_friction] if at.description.stretch.friction is None else []),
         Parameter(
             STRETCH_NOISE, r"$\sigma_L$", at.noise.meaning("standard deviation of a stretch reading"), "noise",
-            HalfNormal(noise), "mm",
+            HalfCauchy(noise * spread.value), "mm", scaled_by=spread.share(noise),
         ),
     ]  # fmt: skip
 

@@ -14,6 +14,7 @@ from bowdenfit.kinds.rows import RowOrigin
 from bowdenfit.kinds.stretch.table import StretchTable
 
 _LOW = 1 / 3  # share of the highest load above which a lowest load is not low
+_STIFFNESSES = (0.1, 1e5)  # N/mm; a meter of thin cord and of crane rope
 _FEWEST_LOADS = 4  # different loads from which stiffness and bedding-in can be told apart
 
 
@@ -46,6 +47,12 @@ def warnings_of(rows: StretchTable, description: Description, measurements: Meas
         warnings.append(
             f"{file} has no low loads, only {loads[0]:g} to {loads[-1]:g} N, so how the rope beds in may not be identifiable; "
             "read the stretch at some low loads too."
+        )
+    more, given = float(np.ptp(loads)), float(np.ptp(rows.stretch))
+    if more > 0 and not _STIFFNESSES[0] * given < more < _STIFFNESSES[1] * given:
+        warnings.append(
+            f"the rope of {file} gives {given:.3g} mm under {more:.3g} N more, as hardly any rope does; the usual cause is a "
+            "unit: check those of stretch and load."
         )
     falling = _falling(rows)
     if falling:

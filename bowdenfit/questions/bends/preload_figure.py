@@ -7,7 +7,6 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from bowdenfit.kinds import each_table
 from bowdenfit.plots.bands import draw_quantiles, name_band
 from bowdenfit.plots.layout import legend_above, panels
 from bowdenfit.plots.panels import span
@@ -68,6 +67,8 @@ def data(fit: Record) -> PreloadCurve | None:
 
 def _largest_bend(fit: Record) -> float:
     """Largest total wrap angle of any reading [rad]; pi without one."""
+    from bowdenfit.kinds import each_table
+
     found = [kind.bends(table) for kind, table in each_table(fit.dataset.measurements) if kind.bends is not None]
     return max([float(a.max()) for a in found], default=np.pi)
 

@@ -33,7 +33,9 @@ def draw_calibration(found: Calibration, folder: Path, formats: Sequence[str] = 
         formats: Endings; each figure is written in every one.
     """
     folder.mkdir(parents=True, exist_ok=True)
-    drawn = {"ranks": ranks(found), "coverage": coverage(found), "sharpness": sharpness(found)}
+    drawn = {"coverage": coverage(found)}
+    if not found.truths:  # else ranks need not be uniform, and there is no prior variance to compare with
+        drawn |= {"ranks": ranks(found), "sharpness": sharpness(found)}
     return [path for name, figure in drawn.items() for path in write_all(figure, folder, name, formats)]
 
 

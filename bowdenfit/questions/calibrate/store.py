@@ -13,6 +13,7 @@ from bowdenfit.results.plain import rebuilt, stored
 
 CALIBRATION = "calibration.json"
 _WHAT = {"description": "the description", "sha256": "an input file", "seed": "the seed", "assumed": "what is assumed"}
+_WHAT |= {"truths": "what is stated of the truth"}
 
 
 def open_replications(
@@ -64,7 +65,7 @@ def seed_of(folder: Path) -> int:
 
 def _read_replications(path: Path, fingerprint: Mapping[str, Any]) -> dict[int, Replication]:
     before, *pages = _lines(path)
-    changed = [name for name in _WHAT if before.get(name) != fingerprint[name]]
+    changed = [name for name in _WHAT if before.get(name, {}) != fingerprint.get(name, {})]
     if changed:
         raise StoreError(
             f"{path.parent} cannot be resumed because {_WHAT[changed[0]]} changed since; undo the change, or start over with "
@@ -84,7 +85,7 @@ def _lines(path: Path) -> list[dict[str, Any]]:
     whole = text[: text.rfind("\n") + 1].splitlines()
     try:
         lines = [json.loads(line) for line in whole]
-        return [lines[0], *({**page, "redrawn": page["redrawn"]} for page in lines[1:])]
+        return [lines[0], *({"engine": "", **page, "redrawn": page["redrawn"]} for page in lines[1:])]
     except (json.JSONDecodeError, IndexError, KeyError, TypeError):
         raise StoreError(f"{path} is damaged and cannot be resumed; start over with --force.") from None
 

@@ -1,7 +1,6 @@
-"""Many replications of one data set over all cores, each kept as soon as it is done, and what they say together."""
+"""Many replications of one data set, each kept as soon as it is done, and what they say together."""
 
 import json
-import os
 import secrets
 from collections.abc import Callable, Sequence
 from pathlib import Path
@@ -14,7 +13,8 @@ from bowdenfit.verb import LARGEST_SEED, Argument, Option, Output, Reply, Verb, 
 if TYPE_CHECKING:
     from bowdenfit.dataset import Dataset
     from bowdenfit.questions.calibrate.answer import Calibration
-    from bowdenfit.questions.calibrate.replication import Plan, Replication
+    from bowdenfit.questions.calibrate.replication import Replication
+    from bowdenfit.questions.calibrate.workbench import Plan
 
 NOT_CALIBRATED = 3
 Report = Callable[[int, int], None]
@@ -24,9 +24,10 @@ def calibrate(
     dataset: Annotated["str | Path | Dataset", Argument("DATASET")],
     *,
     replications: Annotated[int, Option(("-n",), least=2)] = 200,
-    workers: Annotated[int | None, Option(("-j",), least=1, default="one a core")] = None,
+    workers: Annotated[int | None, Option(("-j",), least=1, default="all")] = None,
     output: Annotated[Output, Option(("-o",), default="fits/calibration/NAME OF DATASET")] = None,
     assume: Annotated[Sequence[str], Option(metavar="KEY=VALUE")] = (),
+    truth: Annotated[str | Path | None, Option(metavar="FILE")] = None,
     seed: Annotated[int | None, Option(least=0, most=LARGEST_SEED, default="drawn, and recorded")] = None,
     resume: Annotated[bool, Option()] = False,
     force: Annotated[bool, Option()] = False,
@@ -37,15 +38,21 @@ def calibrate(
 
     True values are drawn from the priors, tables of the same shape are simulated with them and fitted, and the truth is
     ranked among the draws. Priors that look at the data (the level of a curve) are those of the data set as measured.
-    Every replication is written as it ends, if `output` says where. With more than one worker, the calling program must
-    guard its start with `if __name__ == "__main__"`.
+    Every replication is written as it ends, if `output` says where.
+
+    Truths that are stated instead (`truth`) show what calibration from the priors cannot see, a prior that is wrong for
+    such a cable: then the intervals of the coefficients and of the optimum must hold them as often as they claim, to what
+    chance does, and ranks need not be uniform.
 
     Args:
         dataset: See `bowdenfit.read`; its keywords are taken too.
         replications: How many.
-        workers: Processes.
+        workers: Cores that are used.
         output: Results folder.
         assume: Fit with this setting changed, while simulating without: what a wrong assumption costs; may be repeated.
+        truth: True values that do not come from the priors: a TOML file with a number or a range for each parameter, such as
+            mu1 = 0.1 and tau = [0.002, 0.3], in the units of the results. Ranges of what can be any positive number are drawn
+            log-uniformly, others uniformly; what is not named is drawn from its prior.
         seed: Seed of everything random.
         resume: Go on with an interrupted calibration, or add replications.
         force: Replace an earlier calibration in the results folder.
@@ -65,16 +72,21 @@ def calibrate(
     seed = _seed(folder, seed, resume)
     import jax
 
-    from bowdenfit.questions.calibrate.answer import findings
-    from bowdenfit.questions.calibrate.replication import Plan
+    from bowdenfit.model import build_model
+    from bowdenfit.questions.calibrate.findings import findings
+    from bowdenfit.questions.calibrate.quantities import quantities_of
     from bowdenfit.questions.calibrate.store import open_replications
+    from bowdenfit.questions.calibrate.truths import read_truths, stated_truths
+    from bowdenfit.questions.calibrate.workbench import Plan
 
-    plan = Plan(stated, assumed, seed)
+    page = {} if truth is None else read_truths(Path(truth))
     with jax.enable_x64(True):
-        symbols = symbols_of(plan)
-    done = {} if folder is None else open_replications(folder, _fingerprint(plan, assume), resume, force)
+        quantities = quantities_of(Plan(stated, assumed, seed))
+        plan = Plan(stated, assumed, seed, stated_truths(page, build_model(stated).space, str(truth)))
+    done = {} if folder is None else open_replications(folder, _fingerprint(plan, assume, page), resume, force)
     _replicate(plan, done, replications, workers, folder, progress)
-    found = findings(tuple(done.values()), symbols, name=stated.description.name, assumed=tuple(assume), seed=seed)
+    name, truths = stated.description.name, tuple(each.text for each in plan.truths)
+    found = findings(tuple(done.values()), quantities, name=name, assumed=tuple(assume), truths=truths, seed=seed)
     if folder is not None:
         _write(found, folder)
     return found
@@ -105,11 +117,14 @@ def _replicate(
     progress: Report | None,
 ) -> None:
     """Do what is not done yet, and keep each as it ends."""
-    from bowdenfit.questions.calibrate.processes import replicate
+    from bowdenfit.inference.batch_programs import BatchSettings
+    from bowdenfit.questions.calibrate.refit import Laboratory
     from bowdenfit.questions.calibrate.store import keep
+    from bowdenfit.questions.calibrate.workbench import Workbench
 
     missing = [number for number in range(replications) if number not in done]
-    for each in replicate(plan, missing, workers or os.cpu_count() or 1):
+    bench = Workbench(plan, Laboratory(BatchSettings(threads=workers or 0)))
+    for each in bench.replications(missing):
         done[each.number] = each
         if folder is not None:
             keep(folder, each)
@@ -128,47 +143,14 @@ def _seed(folder: Path | None, seed: int | None, resume: bool) -> int:
     return seed_of(folder)
 
 
-def symbols_of(plan: "Plan") -> dict[str, str]:
-    """Symbols of what will be ranked, once it is clear that the data set can be replicated.
-
-    Raises:
-        DescriptionError, DatasetError, UsageError: It cannot; says why.
-    """
-    from bowdenfit.errors import DescriptionError, UsageError
-    from bowdenfit.kinds.terms import measured_kinds
-    from bowdenfit.model import build_model
-    from bowdenfit.results.record import OPTIMAL_EFFICIENCY, OPTIMAL_LENGTH
-
-    stated, assumed = plan.stated.description, plan.assumed.description
-    for kind, table in measured_kinds(plan.stated.measurements):
-        kind.bench.check(stated, table)
-    if stated.angle_columns != assumed.angle_columns or _kinds(plan.stated) != _kinds(plan.assumed):
-        raise DescriptionError(
-            "--assume changes which tables or columns the data set has; the fits must read what is simulated, so change "
-            "only how it is modeled."
-        )
-    space = build_model(plan.assumed).space
-    if not space.size:
-        raise UsageError(
-            "every parameter of the description is fixed, so there is nothing to calibrate; leave one free."
-        )
-    symbols = {p.name: p.symbol for p in space.free}
-    return symbols | {OPTIMAL_LENGTH: r"$l^*$", OPTIMAL_EFFICIENCY: r"$\eta^*$"}
-
-
-def _kinds(dataset: "Dataset") -> list[str]:
-    from bowdenfit.kinds import each_table
-
-    return [kind.name for kind, _ in each_table(dataset.measurements)]
-
-
-def _fingerprint(plan: "Plan", assumptions: Sequence[str]) -> dict[str, Any]:
+def _fingerprint(plan: "Plan", assumptions: Sequence[str], truths: dict[str, Any]) -> dict[str, Any]:
     """What must not change between an interrupted calibration and its continuation."""
     page = {
         "description": plan.stated.description.to_json(),
         "sha256": plan.stated.sha256,
         "seed": plan.seed,
         "assumed": list(assumptions),
+        "truths": truths,
     }
     return dict(json.loads(json.dumps(page)))
 
@@ -209,7 +191,9 @@ VERB = Verb(
     wrap angles) are simulated with them and fitted. Then intervals must hold the truth as often as they claim, for every
     parameter, the optimal length and the efficiency there. What was measured enters only by the design.
 
-    Takes some seconds a replication and core. Exit code 3: not calibrated.
+    With --truth FILE the true values are those of a file, not of the priors: whether a default prior suits cables like that.
+
+    Takes a fraction of a second a replication; recordings some. Exit code 3: not calibrated.
     """,
     json="Print calibration.json instead of the summary for people.",
     results="fits/calibration",

@@ -19,10 +19,10 @@ def calibration_text(found: Calibration) -> str:
 
 def _what(found: Calibration) -> str:
     """What was done."""
+    of_rest = f"were stated ({listed(found.truths)}), the others drawn from the priors" if found.truths else ""
     done = (
-        f"{found.name}: {found.replications} times, true values were drawn from the priors, tables like the measured ones were "
-        "simulated with them and fitted (seed "
-        f"{found.seed})."
+        f"{found.name}: {found.replications} times, true values {of_rest or 'were drawn from the priors'}, tables like the "
+        f"measured ones were simulated with them and fitted (seed {found.seed})."
     )
     if found.assumed:
         done += f" The fits assumed {listed(found.assumed)}, which the simulated cable does not obey."
@@ -33,13 +33,21 @@ def _verdict(found: Calibration) -> list[str]:
     if not found.is_judged:
         few = f"at least {FEWEST} replications must converge, and at most {MOST_UNCONVERGED:.0%} may fail to"
         return [f"NOT JUDGED: {found.ranked} of {found.replications} replications converged; {few}."]
+    whose = "intervals of the coefficients and of the optimum" if found.truths else "intervals"
     if found.is_calibrated:
         return [
-            "CALIBRATED: for this description and these tables, intervals hold the truth as often as they claim, as far as "
-            f"{found.ranked} replications can tell."
+            f"CALIBRATED: for this description and these tables, {whose} hold the truth as often as they claim, as far as "
+            f"{found.ranked} replications can tell.",
+            _power(found),
         ]
     lines = ["NOT CALIBRATED: some intervals must not be taken at their word."]
-    return lines + [f"- {name}: {fault}." for name, fault in found.faults.items()]
+    return [*lines, *(f"- {name}: {fault}." for name, fault in found.faults.items()), _power(found)]
+
+
+def _power(found: Calibration) -> str:
+    """What so many replications can see."""
+    seen = listed([f"too small by {p.too_small:.0%} with probability {p.caught:.2f}" for p in found.power])
+    return f"Power: of one quantity, a posterior standard deviation {seen} is caught by {found.ranked} replications."
 
 
 def _table(found: Calibration) -> str:
@@ -48,25 +56,46 @@ def _table(found: Calibration) -> str:
     first = found.quantities[0].coverage
     bands = listed([f"{c.low:.0%} and {c.high:.0%} of the {c.probability:.0%} intervals" for c in first])
     note = (
-        f"Held: share of the intervals that hold the truth; by chance alone all quantities lie between {bands} in "
-        f"{1 - LEVEL:.0%} of calibrations. p of ranks: chance of ranks this far from uniform; corrected for the number of "
-        f"quantities, below {LEVEL:g} counts as wrong. Bias: posterior mean less truth, in posterior standard deviations. "
-        "Shrinkage: 0 where the data say nothing beyond the prior, 1 where they say all."
+        f"Held: share of the intervals that hold the truth; by chance alone all {'judged ' if found.truths else ''}quantities "
+        f"lie between {bands} in {1 - LEVEL:.0%} of calibrations. "
     )
+    if found.truths:
+        note += (
+            "Ranks of truths that do not come from the priors need not be uniform, and are not judged; nor are noise scales "
+            "and the like, in brackets, whose intervals may lean on their priors. "
+        )
+    else:
+        note += (
+            "p of ranks: chance of ranks this far from uniform; corrected for the number of quantities, below "
+            f"{LEVEL:g} counts as wrong. "
+        )
+    note += "Bias: posterior mean less truth, in posterior standard deviations."
+    if not found.truths:
+        note += " Shrinkage: 0 where the data say nothing beyond the prior, 1 where they say all."
     return table(heads, rows) + "\n\n" + filled(note)
 
 
 def _row(q: Checked) -> tuple[str, ...]:
     half, wide = q.coverage
+    by_ranks = q.judged_by == Checked.judged_by
     return (
-        q.name, f"{half.rate:.1%}", f"{wide.rate:.1%}", f"{q.p_value:.3f}", f"{q.corrected:.3f}",
-        f"{q.bias:+.2f} +- {q.bias_error:.2f}", f"{q.shrinkage:.2f}", "" if q.is_calibrated else "wrong",
+        q.name if q.judged_by else f"({q.name})", f"{half.rate:.1%}", f"{wide.rate:.1%}",
+        *((f"{q.p_value:.3f}", f"{q.corrected:.3f}") if by_ranks else ("", "")),
+        f"{q.bias:+.2f} +- {q.bias_error:.2f}", f"{q.shrinkage:.2f}" if by_ranks else "",
+        "" if q.is_calibrated else "wrong",
     )  # fmt: skip
 
 
 def _accounts(found: Calibration) -> list[str]:
     """What was left out, and why."""
-    lines = [f"A replication took {found.seconds:.1f} s (median)."]
+    lines = [f"A replication took {found.seconds:.2g} s (median)."]
+    if found.engines:
+        words = {
+            "laplace": "weighted draws about the maxima of the posterior",
+            "ensembles": "ensembles of walkers",
+            "nuts": "NUTS",
+        }
+        lines[0] += f" Fitted by {listed([f'{words.get(name, name)} ({n})' for name, n in found.engines.items()])}."
     if found.redrawn:
         n = sum(found.redrawn.values())
         why = listed(
@@ -74,7 +103,8 @@ def _accounts(found: Calibration) -> list[str]:
         )
         lines.append(
             f"{n} simulated data sets were drawn again, truth and tables together, because no bench would hand them in: {why}. "
-            "The rule looks at the simulated readings alone, so it leaves the ranks uniform."
+            "The rule looks at the simulated readings alone"
+            f"{', whatever the truth is' if found.truths else ', so it leaves the ranks uniform'}."
         )
     if found.unconverged:
         numbers = list(found.unconverged)

@@ -1,19 +1,21 @@
 """Checks of a fit against its own readings: outliers, readings that decide by themselves, trends, and weight of the priors."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from functools import cached_property
 from typing import ClassVar
 
 import numpy as np
 
 from bowdenfit.inference.predictive_checks import place_at_random, predict_without_each, uniformity
-from bowdenfit.inference.prior_sensitivity import Sensitivity, sensitivities
+from bowdenfit.inference.prior_sensitivity import FarOut, Sensitivity, far_out, sensitivities
+from bowdenfit.kinds.places import STROKE, places_of
 from bowdenfit.kinds.term import Term
-from bowdenfit.questions.check.residual_places import STROKE, places_of
+from bowdenfit.parameters.space import Parameter
 from bowdenfit.questions.check.table_checks import FALSE_ALARM, CheckedReading, TableChecks
 from bowdenfit.results.record import Draws, Record, once
 
 _LEAST_READINGS = 8  # of a table, below which neither its distribution nor a trend can be judged
+_FEW_LEFT = 4  # readings beyond the coefficients, up to which their scatter is hardly known
 _DRAWS = 5000  # that sensitivity to the priors is worked out from
 _STREAM = 5  # of the fit's random numbers
 
@@ -45,14 +47,18 @@ class Checks:
         tables: By table; held forces, which only bound the friction, are not among them.
         trends: Deviations that depend on where readings were taken, beyond what chance does.
         sensitivities: Of friction coefficients and design answers to priors and readings.
+        far_out: Parameters that the readings put where their priors hardly allow them.
+        told_by: Noise scales that few readings tell: how many readings, and how many coefficients they have to tell too.
     """
 
     tables: tuple[TableChecks, ...]
     trends: tuple[Trend, ...]
     sensitivities: tuple[Sensitivity, ...]
+    far_out: tuple[FarOut, ...] = ()
+    told_by: dict[str, tuple[int, int]] = field(default_factory=dict)
 
     false_alarm: ClassVar = FALSE_ALARM
-    JSON: ClassVar = ("false_alarm", "tables", "readings", "trends", "sensitivities")
+    JSON: ClassVar = ("false_alarm", "tables", "readings", "trends", "sensitivities", "far_out")
 
     @cached_property
     def readings(self) -> tuple[CheckedReading, ...]:
@@ -84,7 +90,20 @@ def checks_of(fit: Record) -> Checks | None:
     terms = [t for t in fit.model.terms if t.labels and t.residual_blocks[0][1] > 0]
     generator = np.random.default_rng([fit.provenance.seed, _STREAM])
     tables = tuple(_table(fit, fit.posterior, term, 1 - FALSE_ALARM / len(terms), generator) for term in terms)
-    return Checks(tables, trends_of(tables), _sensitivities(fit, fit.posterior))
+    parameters = {p.name: p for p in fit.model.space.free}
+    z = {name: fit.posterior.z[..., i] for name, i in fit.model.space.index.items()}
+    found = _sensitivities(fit, fit.posterior, parameters)
+    return Checks(tables, trends_of(tables), found, far_out(z, parameters), _told_by_few(fit))
+
+
+def _told_by_few(fit: Record) -> dict[str, tuple[int, int]]:
+    """Noise scales of which hardly more readings tell than there are coefficients."""
+    coefficients = sum(p.role == "friction" for p in fit.model.space.free)
+    readings: dict[str, int] = {}
+    for term in fit.model.terms:
+        readings[term.noise] = readings.get(term.noise, 0) + term.residual_blocks[0][1]
+    noise = [p.name for p in fit.model.space.free if p.role == "noise"]
+    return {n: (readings[n], coefficients) for n in noise if 0 < readings.get(n, 0) <= coefficients + _FEW_LEFT}
 
 
 def _table(
@@ -98,7 +117,7 @@ def _table(
     predicted = predict_without_each(log_likelihood, replicated, reading, at_most, posterior.n_effective)
     placed = place_at_random(predicted, generator)
     uniform = uniformity(placed, probability) if n >= _LEAST_READINGS else None
-    places = places_of(fit.dataset, term)
+    places = places_of(fit.dataset.description, fit.dataset.measurements, term)
     return TableChecks(term.name, term.unit, term.labels, reading, at_most, predicted, places, placed, uniform)
 
 
@@ -152,7 +171,7 @@ def _trend(table: TableChecks, group: str, against: str, x: np.ndarray, z: np.nd
     return Trend(table.table, group, against, words[int(correlation < 0)], float(chance))
 
 
-def _sensitivities(fit: Record, posterior: Draws) -> tuple[Sensitivity, ...]:
+def _sensitivities(fit: Record, posterior: Draws, parameters: dict[str, Parameter]) -> tuple[Sensitivity, ...]:
     """Of the free friction coefficients and the design answers."""
     space = fit.model.space
     every = max(1, posterior.z[..., 0].size // _DRAWS)
@@ -160,5 +179,6 @@ def _sensitivities(fit: Record, posterior: Draws) -> tuple[Sensitivity, ...]:
     quantities = {name: posterior.values[name] for name in names} | posterior.optimum
     thinned = {name: draws[:, ::every] for name, draws in quantities.items() if np.ptp(draws) > 0}
     z = {p.name: posterior.z[:, ::every, i] for i, p in enumerate(space.free)}
+    values = {name: posterior.values[name][:, ::every] / p.shown_scale for name, p in parameters.items()}
     log_likelihood = sum((np.sum(part, axis=-1) for part in posterior.log_likelihood.values()), np.zeros(()))
-    return sensitivities(thinned, z, log_likelihood[:, ::every]) if thinned else ()
+    return sensitivities(thinned, z, values, log_likelihood[:, ::every], parameters) if thinned else ()

@@ -12,10 +12,10 @@ from bowdenfit.dataset import Dataset
 from bowdenfit.inference.draws import for_each_draw
 from bowdenfit.inference.log_density import LogDensity
 from bowdenfit.kinds import readings_called
+from bowdenfit.kinds.places import places_of
 from bowdenfit.kinds.term import Term
 from bowdenfit.model import Model, build_model
 from bowdenfit.questions.check.answer import readings_of
-from bowdenfit.questions.check.residual_places import places_of
 from bowdenfit.results.optimum import route_grid
 
 QUANTILES = (0.005, 0.05, 0.5, 0.95, 0.995)
@@ -114,7 +114,7 @@ def _table(dataset: Dataset, term: Term, drawn: np.ndarray) -> PriorTable:
     scale, (reading, at_most) = called.shown_scale, readings_of(term)
     quantiles, reading = scale * _quantiles(drawn), scale * reading
     outside = (reading < quantiles[0]) | (~at_most & (reading > quantiles[-1]))
-    places = places_of(dataset, term)
+    places = places_of(dataset.description, dataset.measurements, term)
     place, numbers = next(iter(places.numbers.items()))
     return PriorTable(
         called.words, called.axis, numbers, place, places.group,

@@ -7,7 +7,7 @@ import numpy as np
 
 from bowdenfit.inference.predictive_checks import LeftOut, Uniformity
 from bowdenfit.inference.psis import RELIABLE_K
-from bowdenfit.questions.check.residual_places import Places
+from bowdenfit.kinds.places import Places
 
 FALSE_ALARM = 0.01  # chance that a healthy fit is said to have an outlier; the same for the other kinds of alarm
 

@@ -3,16 +3,16 @@
 from collections.abc import Iterable
 from math import isfinite
 
-from bowdenfit.inference.prior_sensitivity import Sensitivity
 from bowdenfit.kinds import readings_called
 from bowdenfit.questions.check.answer import Checks
+from bowdenfit.questions.check.sensitivity_words import priors_text
 from bowdenfit.questions.check.table_checks import CheckedReading
 from bowdenfit.words import decimals, filled, listed
 
 _FEW = 3  # readings of a kind that are named; of more, the rest is counted
+_FEW_CHANCE = "ten"  # where readings hang together, as two do of which each predicts the other
 _HEADING = """Fit checks: every reading against its prediction from all the others
 (z is its deviation in standard deviations, k how far the fit leans on it: too far beyond 0.7)"""
-_ANSWERS = {"optimal_length": "the best length", "optimal_efficiency": "the efficiency there"}
 
 
 def checks_text(found: Checks | None) -> str:
@@ -23,7 +23,7 @@ def checks_text(found: Checks | None) -> str:
     """
     if found is None or not found.readings:
         return ""
-    sentences = [_scatter(found), _outliers(found), _trends(found), _decisive(found), _outside(found), _priors(found)]
+    sentences = [_scatter(found), _outliers(found), _trends(found), _decisive(found), _outside(found), priors_text(found)]
     return "\n".join([_HEADING, *(filled(sentence) for sentence in sentences if sentence)])
 
 
@@ -36,7 +36,8 @@ def _scatter(found: Checks) -> str:
     """How many readings their intervals hold, and which tables scatter otherwise than predicted."""
     n, held = (sum(getattr(t, key) for t in found.tables) for key in ("measured", "in_interval"))
     faults = [f"the readings of {readings_called(t.table).words} {t.fault}" for t in found.tables if t.fault]
-    start = f"The 90 % intervals of these predictions hold {held} of {n} readings."
+    few = f" Of so few, chance leaves none inside in one fit of {_FEW_CHANCE}." if held == 0 and n <= _FEW else ""
+    start = f"The 90 % intervals of these predictions hold {held} of {n} readings.{few}"
     if not faults:
         return start
     return f"{start} But {listed(faults)}, by more than chance does in one fit of a hundred."
@@ -116,41 +117,3 @@ def _outside(found: Checks) -> str:
         return ""
     more = f"; and {len(outside) - _FEW} more" if len(outside) > _FEW else ""
     return f"Outside the range of the curves: {'; '.join(_sentence(r) for r in outside[:_FEW])}{more}."
-
-
-def _priors(found: Checks) -> str:
-    """What priors do to coefficients and design answers."""
-    every, conflicts = found.sensitivities, found.conflicts
-    felt = [s for s in every if s.diagnosis in {"prior decides", "both count"}]
-    parts = []
-    if conflicts:
-        parameters = list(dict.fromkeys(s.parameter for s in conflicts))
-        far = max(abs(s.prior_sds) for s in conflicts)
-        parts.append(
-            f"Prior and readings contradict each other about {listed(parameters)}: what was found lies {far:.1f} standard "
-            f"deviations of the prior from its middle{_with_wider_prior(conflicts)}. Check the prior, its unit first."
-        )
-    if felt:
-        parts.append(f"The prior counts for {listed([_answer(s) for s in felt])}{_with_wider_prior(felt)}.")
-    if not parts and every:
-        answers = " and the design answer" if any(s.quantity in _ANSWERS for s in every) else ""
-        parts.append(f"Priors hardly count for the coefficients{answers}; the readings decide.")
-    return " ".join(parts)
-
-
-def _answer(s: Sensitivity) -> str:
-    name = _ANSWERS.get(s.quantity, s.quantity)
-    return name if s.parameter == s.quantity else f"{name} (that of {s.parameter})"
-
-
-def _with_wider_prior(found: list[Sensitivity]) -> str:
-    """How far the quantity that moves most would move with a wider prior."""
-    known = [s for s in found if isfinite(s.wider) and s.sd]
-    if not known:
-        return ""
-    s = max(known, key=lambda s: abs(s.wider - s.median) / s.sd)
-    digits = decimals(s.sd) + 1
-    return (
-        f"; were the prior of {s.parameter} 1.4 times as wide, {_ANSWERS.get(s.quantity, s.quantity)} would be "
-        f"{s.wider:.{digits}f} instead of {s.median:.{digits}f}"
-    )

@@ -14,12 +14,14 @@ from bowdenfit.inference.interval import Interval
 from bowdenfit.inference.leave_one_out import ReadingsToLeaveOut, leave_one_out
 from bowdenfit.inference.log_density import LogDensity as Density
 from bowdenfit.kinds import readings_called
+from bowdenfit.kinds.run_parts import LeaveOut, RunParts, run_parts
 from bowdenfit.kinds.terms import measured_kinds, term_kind
 from bowdenfit.questions.compare.common_readings import CommonReadings, Omitted, common_readings
 from bowdenfit.questions.recorded.rate import RateEffect, rate_effect
 from bowdenfit.results.record import Draws, Record
 from bowdenfit.words import listed
 
+_FEW_RUNS = 5  # below which they are left out in parts, because little predicts a whole one
 _SHOWN_ROLES = {"friction", "friction_model", "sensor"}
 Report = Callable[[str], None]
 
@@ -52,6 +54,8 @@ class Comparison:
         parameters: Coefficients and the like, by parameter and fit.
         optimal_length: Of each fit with a route, with its unit.
         rate_effects: Of the fits in which friction may depend on speed.
+        left_out: What was left out at a time: a whole run, its readings at one load, or one of them.
+        few_runs: Number of runs, where so few are left out in parts unasked; 0 else.
     """
 
     differences: dict[str, Difference]
@@ -62,6 +66,8 @@ class Comparison:
     parameters: dict[str, ComparedParameter]
     optimal_length: dict[str, tuple[Interval, str]]
     rate_effects: dict[str, RateEffect]
+    left_out: LeaveOut = "run"
+    few_runs: int = 0
 
     JSON: ClassVar = (
         "fits",
@@ -70,6 +76,7 @@ class Comparison:
         ("parameters", "intervals"),
         ("optimal_length", "optimal_lengths"),
         ("rate_effect", "rate_effects"),
+        "left_out",
     )
 
     @property
@@ -85,7 +92,7 @@ class Comparison:
     @property
     def counts_runs(self) -> bool:
         """Whether some of the readings are whole runs."""
-        return any(readings_called(table).are_runs for table, _ in self.readings)
+        return self.left_out == "run" and any(readings_called(table).are_runs for table, _ in self.readings)
 
     def pointwise(self, name: str) -> np.ndarray:
         """How much worse a fit predicts each reading than the best one does."""
@@ -132,21 +139,31 @@ class Comparison:
         return {name: vars(interval) | {"unit": unit} for name, (interval, unit) in self.optimal_length.items()}
 
 
-def compare(fits: Mapping[str, Record], report: Report | None = None) -> Comparison:
+def compare(
+    fits: Mapping[str, Record], report: Report | None = None, leave_out: LeaveOut | None = None
+) -> Comparison:
     """Compare fits.
 
     Args:
         fits: By name.
         report: Called with a sentence before each reading that needs a refit or the like.
+        leave_out: What is left out of a run at a time; if omitted, the whole of it, or where runs are few its readings at
+            one load.
 
     Raises:
-        UsageError: There are fewer than two, one has no posterior, or they are not of the same readings.
+        UsageError: There are fewer than two, one has no posterior, they are not of the same readings, or nothing is left
+            once a reading is left out.
     """
     if len(fits) < 2:
         raise UsageError("a comparison needs at least two fits; name their results folders.")
     drawn = {name: _draws_of(name, fit) for name, fit in fits.items()}
-    common = _common(fits)
-    predictions = {name: _leave_out_each(name, fit, drawn[name], common, report) for name, fit in fits.items()}
+    few = _few_runs(fits) if leave_out is None else 0
+    unit: LeaveOut = leave_out or ("load" if few else "run")
+    parts = {name: _parts(fit, unit) for name, fit in fits.items()}
+    common = _common(fits, parts)
+    predictions = {
+        name: _leave_out_each(name, fit, drawn[name], common, parts[name], report) for name, fit in fits.items()
+    }
     order = differences(predictions)
     ordered = {name: fits[name] for name in order}
     weights = stacking_weights(predictions)
@@ -163,7 +180,24 @@ def compare(fits: Mapping[str, Record], report: Report | None = None) -> Compari
             if f.dataset.description.route
         },
         {name: effect for name, fit in ordered.items() if (effect := rate_effect(fit)) is not None},
+        unit,
+        few,
     )
+
+
+def _parts(fit: Record, unit: LeaveOut) -> dict[str, RunParts]:
+    """Parts of the runs of every table that has some."""
+    found = {term.name: run_parts(term, unit) for term in fit.model.terms}
+    return {name: parts for name, parts in found.items() if parts is not None}
+
+
+def _few_runs(fits: Mapping[str, Record]) -> int:
+    """Number of runs of the table with fewest, where they are too few to be left out whole and can be parted; else 0."""
+    for fit in fits.values():
+        for term in fit.model.terms:
+            if len(term.labels) < _FEW_RUNS and run_parts(term, "load") is not None:
+                return len(term.labels)
+    return 0
 
 
 def _draws_of(name: str, fit: Record) -> Draws:
@@ -172,7 +206,7 @@ def _draws_of(name: str, fit: Record) -> Draws:
     return fit.posterior
 
 
-def _common(fits: Mapping[str, Record]) -> CommonReadings:
+def _common(fits: Mapping[str, Record], parts: Mapping[str, Mapping[str, RunParts]]) -> CommonReadings:
     """The readings that all fits share; refuses fits of other measurements."""
     first, *others = fits
     for name in others:
@@ -181,11 +215,17 @@ def _common(fits: Mapping[str, Record]) -> CommonReadings:
                 f"{first} and {name} were not fitted to the same readings, so how well they predict them cannot be "
                 "compared; fit the same data set twice, such as with and without --friction rate-dependent."
             )
-    common = common_readings(fits)
+    common = common_readings(fits, parts)
     if not common.readings:
         raise UsageError(
             f"{', '.join(fits)} have no reading in common that they take for the same, so they cannot be compared. "
             + " ".join(part.sentence() for part in common.omitted)
+        )
+    if len(common.readings) < 2:
+        table, label = common.readings[0]
+        raise UsageError(
+            f"{', '.join(fits)} have one reading in common, {label} of {readings_called(table).words}, and nothing predicts it "
+            "once it is left out; read the same run at several loads, or mount the cable a second time."
         )
     return common
 
@@ -196,9 +236,12 @@ def _inputs(fit: Record) -> tuple[list[tuple[str, str]], list[tuple[str, tuple[s
     return files, [(term.name, term.labels) for term in fit.model.terms if not term_kind(term.name).events.chosen]
 
 
-def _leave_out_each(name: str, fit: Record, drawn: Draws, common: CommonReadings, report: Report | None) -> Prediction:
+def _leave_out_each(
+    name: str, fit: Record, drawn: Draws, common: CommonReadings, parts: Mapping[str, RunParts], report: Report | None
+) -> Prediction:
+    """Expected log density of every reading, had it been left out."""
     return leave_one_out(
-        ReadingsToLeaveOut(Density(fit.model)),
+        ReadingsToLeaveOut(Density(fit.model), parts=parts),
         drawn.z,
         drawn.log_likelihood,
         drawn.n_effective,

@@ -10,6 +10,7 @@ from typing import ClassVar
 
 import numpy as np
 
+from bowdenfit.kinds.run_parts import RunParts
 from bowdenfit.kinds.terms import term_kind
 from bowdenfit.results.record import Record
 
@@ -59,13 +60,14 @@ class CommonReadings:
     omitted: tuple[Omitted, ...]
 
 
-def common_readings(fits: Mapping[str, Record]) -> CommonReadings:
+def common_readings(fits: Mapping[str, Record], parts: Mapping[str, Mapping[str, RunParts]]) -> CommonReadings:
     """The readings that all fits have, as the same events.
 
     Args:
         fits: By name.
+        parts: Parts of runs that stand in for the readings of a table, by fit and table.
     """
-    events = {name: _events(fit) for name, fit in fits.items()}
+    events = {name: _events(fit, parts[name]) for name, fit in fits.items()}
     first, *others = events.values()
     shared = [key for key, event in first.items() if all(key in o and _same(event, o[key]) for o in others)]
     places = {name: {key: i for i, key in enumerate(of_fit)} for name, of_fit in events.items()}
@@ -89,12 +91,13 @@ def _count(keys: Mapping[Key, np.ndarray] | list[Key], table: str) -> int:
     return sum(key[0] == table for key in keys)
 
 
-def _events(fit: Record) -> dict[Key, np.ndarray]:
+def _events(fit: Record, parts: Mapping[str, RunParts]) -> dict[Key, np.ndarray]:
     """What each reading says, by table, label and how often that label came before; in the order of the model's terms."""
     found: dict[Key, np.ndarray] = {}
     for term in fit.model.terms:
-        said = term_kind(term.name).events.said
-        for label, event in zip(term.labels, said(term, fit.dataset.description), strict=True):
+        of_runs = parts.get(term.name)
+        said = of_runs.said if of_runs else term_kind(term.name).events.said(term, fit.dataset.description)
+        for label, event in zip((of_runs or term).labels, said, strict=True):
             earlier = sum(key[:2] == (term.name, label) for key in found)
             found[term.name, label, earlier] = event
     return found

@@ -2,7 +2,7 @@
 
 from collections.abc import Callable, Mapping
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any
+from typing import TYPE_CHECKING, Annotated, Any, Literal
 
 from bowdenfit.errors import StoreError
 from bowdenfit.questions.writing import write_answer
@@ -18,6 +18,7 @@ NAME = "comparison"
 def compare(
     fits: Annotated["Mapping[str, Record]", Argument("RESULTS", many=True, results=True)],
     *,
+    leave_out: Annotated[Literal["run", "load", "reading"] | None, Option(default="run, or load where runs are few")] = None,
     output: Annotated[Output, Option(("-o",))] = None,
     force: Annotated[bool, Option()] = False,
     report: Callable[[str], None] | None = None,
@@ -26,6 +27,8 @@ def compare(
 
     Args:
         fits: By name.
+        leave_out: What is left out of a run at a time to be predicted by the rest: the whole run, its readings at one load, or
+            one reading.
         output: Folder for comparison.json, comparison.txt and the figure; nothing is written without one.
         force: Replace a comparison in --output.
         report: Called with a sentence before each reading that takes longer, because it would move the posterior.
@@ -43,7 +46,7 @@ def compare(
     if output is not None:
         refuse_to_replace(Path(output), force)
     with jax.enable_x64(True):
-        found = compared(fits, report)
+        found = compared(fits, report, leave_out)
     if output is not None:
         write_answer(output, NAME, found, comparison_text(found), lambda: draw(found))
     return found
@@ -85,6 +88,10 @@ VERB = Verb(
     comparison says whether efficiency depends on speed. Likewise --geometry published against the continuous one, --noise
     student, --set prior.tau.fixed=0 for a cable whose mountings are all alike, or --set contact.0.wrap_angle.curve=logistic
     (the first contact) for a route whose wrap angle is no bell.
+
+    A run is one mounting, and what predicts a new mounting is the other runs. With fewer than five runs a run is left out in
+    parts instead, its readings at one load at a time: then the comparison says which model describes the cable as it was
+    mounted, not how well it foretells the next mounting.
 
     Readings that would move the posterior take longer: it is fitted again without them.
     """,

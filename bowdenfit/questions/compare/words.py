@@ -21,7 +21,7 @@ def comparison_text(found: Comparison) -> str:
         (
             name,
             found.described[name],
-            f"{d.elpd:.1f}",
+            _elpd(d.elpd),
             "" if name == found.best or np.isnan(d.standard_error) else f"{d.standard_error:.1f}",
             f"{found.weights[name]:.2f}",
         )
@@ -69,7 +69,12 @@ def _leaning(found: Comparison, name: str) -> str:
 def _difference(found: Comparison, name: str) -> str:
     d = found.differences[name]
     error = "standard error unknown, with one reading" if np.isnan(d.standard_error) else f"+- {d.standard_error:.1f}"
-    return f"elpd difference {d.elpd:.1f} {error}"
+    return f"elpd difference {_elpd(d.elpd)} {error}"
+
+
+def _elpd(value: float) -> str:
+    """A difference of log densities; one that no number holds in words."""
+    return f"{value:.1f}" if np.isfinite(value) else "beyond numbers"
 
 
 def _dominated(found: Comparison, name: str) -> str:
@@ -88,12 +93,21 @@ def _named(reading: tuple[str, str]) -> str:
 def _basis(found: Comparison) -> list[str]:
     """What is compared, and what is not."""
     counts = Counter(name for name, _ in found.readings)
-    what = listed([f"{n} of {name.replace('_', ' ')}" for name, n in counts.items()])
+    parts = "" if found.left_out == "run" else "parts "
+    what = listed([f"{n} {parts}of {name.replace('_', ' ')}" for name, n in counts.items()])
     n = len(found.readings)
     lines = [
         f"Compared by leave-one-out on {n} reading{'s' if n > 1 else ''}: {what}. The elpd is the sum of the log densities "
         "with which the others predict each; the weights make the mixture of the models that predicts best (stacking)."
     ]
+    if found.left_out != "run":
+        what = "the readings at one load" if found.left_out == "load" else "one reading"
+        runs = "is one run" if found.few_runs == 1 else f"are only {found.few_runs} runs"
+        why = f", because there {runs}" if found.few_runs else ""
+        lines.append(
+            f"Left out at a time: {what} of a run{why}; what its mounting did is known from the rest of the run. This compares "
+            "how the models describe these mountings, not how they foretell another one (--leave-out run does)."
+        )
     if found.counts_runs:
         lines.append(
             "A run of forces counts as one reading, because its samples share one mounting: it is left out as a whole."

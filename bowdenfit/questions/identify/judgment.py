@@ -1,11 +1,14 @@
 """How a fit, or a plan, comes to know what its measurements determine: from draws, or from the information at one point."""
 
+from concurrent.futures import Executor
+
 import jax
 import jax.numpy as jnp
 import numpy as np
 
 from bowdenfit.inference.compilation import compile_program
-from bowdenfit.inference.identifiability import NOTHING, Combination, Knowledge, knowledge
+from bowdenfit.inference.draws import OfDraws
+from bowdenfit.inference.identifiability import RESTS_ON_PRIOR, Combination, Knowledge, knowledge
 from bowdenfit.inference.least_squares import UNDETERMINED, MaximumPosterior
 from bowdenfit.inference.profiles import Profile
 from bowdenfit.model import Model
@@ -30,7 +33,7 @@ def identifiability(fit: Record) -> Identifiability:
     values = np.column_stack([drawn.values[p.name].ravel() for p in fit.model.space.free])
     spread = np.cov(values, rowvar=False).reshape(values.shape[1], values.shape[1])
     with jax.enable_x64(True):
-        _, prior_sd = _linear(fit.model, np.median(drawn.flat_z, axis=0))
+        _, prior_sd = _linear(fit.model, slope_program(fit), np.median(drawn.flat_z, axis=0))
     groups = _groups(fit.model, np.mean(values, axis=0), spread, prior_sd)
     return Identifiability(fit.name, DRAWS, True, groups)
 
@@ -49,7 +52,7 @@ def of_maximum(
     """
     covariance = _with_tails(model, np.asarray(start.covariance))
     with jax.enable_x64(True):
-        value, slope = _linear(model, start.z)
+        value, slope = _linear(model, compile_slopes(model), start.z)
     groups = _groups(model, value, covariance * np.outer(slope, slope), slope)
     return Identifiability(model.description.name, basis, measured, groups, profiles)
 
@@ -63,13 +66,27 @@ def _with_tails(model: Model, covariance: np.ndarray) -> np.ndarray:
     return np.linalg.inv(freedom / (freedom + 3) * (np.linalg.inv(covariance) - unit) + unit)
 
 
-def _linear(model: Model, z: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+@once
+def slope_program(fit: Record) -> OfDraws:
+    """See `compile_slopes`."""
+    return compile_slopes(fit.model)
+
+
+def compile_slopes(model: Model, beside: Executor | None = None) -> OfDraws:
+    """Values of the free parameters at z, and their change with it."""
+    return compile_program(
+        lambda at: jax.jvp(model.space.vector, (at,), (jnp.ones_like(at),)),
+        jax.ShapeDtypeStruct((model.space.size,), float),
+        run_once=True,
+        beside=beside,
+    )
+
+
+def _linear(model: Model, slopes: OfDraws, z: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     """Values of the free parameters at z and their change with it, which is the prior's sd there; in shown units."""
-    one = jax.ShapeDtypeStruct((len(z),), jnp.float64)
-    value, slope = compile_program(lambda at: jax.jvp(model.space.vector, (at,), (jnp.ones_like(at),)), one, run_once=True)(z)
     scale = np.array([p.shown_scale for p in model.space.free])
-    value, slope = np.asarray(value) * scale, np.abs(np.asarray(slope)) * scale
-    return value, np.maximum(slope, 1e-12 * np.maximum(np.abs(value), 1.0))
+    value, slope = (np.asarray(part) * scale for part in slopes(z))
+    return value, np.maximum(np.abs(slope), 1e-12 * np.maximum(np.abs(value), 1.0))
 
 
 def _groups(model: Model, value: np.ndarray, covariance: np.ndarray, prior_sd: np.ndarray) -> dict[str, Knowledge]:
@@ -96,9 +113,20 @@ def say_what_is_not_determined(fit: Record) -> str:
     if friction is None:
         return ""
     share = {p.name: p.share for p in friction.parameters}
-    lost = [n for n in names if share[n] > NOTHING or (_undetermined(fit, n) and n in friction.tangled)]
+    lost = [
+        n
+        for n in names
+        if share[n] > RESTS_ON_PRIOR or _as_wide_as_prior(fit, n) or (_undetermined(fit, n) and n in friction.tangled)
+    ]
+    if not lost and not friction.by_themselves and not friction.determined:
+        return _in_words(names, None, " in good part")
     known = next((c for c in friction.determined if set(c.weights) & set(lost)), None)
     return _in_words(lost, known)
+
+
+def _as_wide_as_prior(fit: Record, name: str) -> bool:
+    """Whether a coefficient's draws are as wide as its prior in the sampler's coordinates."""
+    return float(np.var(fit.draws().z[..., fit.model.space.index[name]])) > RESTS_ON_PRIOR
 
 
 def _undetermined(fit: Record, name: str) -> bool:
@@ -109,7 +137,7 @@ def _undetermined(fit: Record, name: str) -> bool:
     return estimates[name].remark == UNDETERMINED
 
 
-def _in_words(lost: list[str], known: Combination | None) -> str:
+def _in_words(lost: list[str], known: Combination | None, how_much: str = "") -> str:
     if not lost:
         return ""
     them = listed(lost)
@@ -119,9 +147,9 @@ def _in_words(lost: list[str], known: Combination | None) -> str:
         said = f"The measurements do not determine {them}"
     rest = "rest on their priors" if len(lost) > 1 else "rests on its prior"
     return (
-        f"{said}; {them} by {'themselves' if len(lost) > 1 else 'itself'} {rest}. Efficiencies where you measured still hold, "
-        "the coefficients do not: measure where the wrap angles change in other proportions, or state a coefficient that was "
-        "measured separately under [friction.NAME]."
+        f"{said}; {them} by {'themselves' if len(lost) > 1 else 'itself'} {rest}{how_much}. Efficiencies where you measured "
+        "still hold, the coefficients do not: measure where the wrap angles change in other proportions, or state a "
+        "coefficient that was measured separately under [friction.NAME]."
     )
 
 

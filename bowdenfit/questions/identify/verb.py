@@ -1,6 +1,7 @@
 """What measurements determine: of a fit, of tables before sampling, or of a plan before anything is measured."""
 
 import tomllib
+from collections.abc import Mapping
 from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any, Unpack
@@ -151,6 +152,20 @@ def _reply(found: "Identifiability", asked: dict[str, Any]) -> Reply:
     return Reply(identifiability_text(found), lambda: found, notes)
 
 
+def _kept(answers: Mapping[str, Any], asked: Mapping[str, Any]) -> Reply | None:
+    """For people, who are not shown the profiles, which need the model."""
+    if "identify" not in answers or any(value for name, value in asked.items() if name != "source"):
+        return None
+    from bowdenfit.inference.identifiability import Knowledge
+    from bowdenfit.questions.identify.answer import Identifiability
+    from bowdenfit.questions.identify.words import identifiability_text
+    from bowdenfit.results.plain import rebuilt
+
+    page = answers["identify"]
+    groups = rebuilt(dict[str, Knowledge], page["groups"])
+    return Reply(identifiability_text(Identifiability(page["name"], page["basis"], page["measured"], groups)))
+
+
 VERB = Verb(
     identify,
     _reply,
@@ -160,4 +175,5 @@ VERB = Verb(
     SOURCE is a plan, before anything is measured (a cable.toml with [design], the lengths and forces that you intend to
     measure at, such as datasets/synthetic-bench/bench.toml); a data set; or the results folder of a fit.
     """,
+    kept=_kept,
 )

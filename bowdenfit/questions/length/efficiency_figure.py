@@ -22,10 +22,10 @@ from bowdenfit.plots.style import (
     percent,
     rounded_texts,
 )
+from bowdenfit.results.length import OptimalLength
 
 if TYPE_CHECKING:
     from bowdenfit.plots.layout import Axes, Figure
-    from bowdenfit.results.length import OptimalLength
     from bowdenfit.results.record import Record
 
 # marker, its size [pt] and label
@@ -67,6 +67,7 @@ class AlongRoute:
         points: Measured efficiencies.
         optimum: The design answer; None without draws.
         optimal_length: Its draws; None likewise.
+        at_input_force: Input force at which the curve holds [N]; None where it is the same at any.
     """
 
     route_label: str
@@ -75,6 +76,7 @@ class AlongRoute:
     points: tuple[EfficiencyPoints, ...]
     optimum: OptimalLength | None = None
     optimal_length: np.ndarray | None = None
+    at_input_force: float | None = None
 
 
 def data(fit: Record) -> AlongRoute | None:
@@ -85,7 +87,10 @@ def data(fit: Record) -> AlongRoute | None:
     route, posterior = fit.dataset.description.route, fit.posterior
     if route is None:
         return None
-    shown = AlongRoute(route.label, route.range, along_route(fit)["efficiency"], efficiency_points(fit))
+    friction = fit.model.cable.friction
+    force = friction.conditions.reference_force if friction.depends_on_load else None
+    points = efficiency_points(fit)
+    shown = AlongRoute(route.label, route.range, along_route(fit)["efficiency"], points, at_input_force=force)
     if posterior is None:
         return shown
     return replace(shown, optimum=fit.optimal_length(), optimal_length=posterior.optimum[OPTIMAL_LENGTH])
@@ -94,7 +99,7 @@ def data(fit: Record) -> AlongRoute | None:
 def efficiency_points(fit: Record) -> tuple[EfficiencyPoints, ...]:
     """Every measured efficiency, by table."""
     from bowdenfit.kinds import readings_called
-    from bowdenfit.questions.check.residual_places import route_values
+    from bowdenfit.kinds.places import route_values
 
     route, points = fit.dataset.description.route, []
     for term in fit.model.terms:
@@ -139,7 +144,7 @@ def _curve_and_points(axes: Axes, data: AlongRoute) -> None:
         if outside.any():
             _predicted(axes, points, outside)
             _measured(axes, points, outside, "white", ", outside the range")
-    axes.set_ylabel(EFFICIENCY)
+    axes.set_ylabel(EFFICIENCY if data.at_input_force is None else f"{EFFICIENCY}\ncurve at {data.at_input_force:g} N")
     axes.locator_params(axis="y", nbins=6)
 
 

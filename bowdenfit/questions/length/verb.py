@@ -1,6 +1,7 @@
 """Asking which length is best."""
 
-from typing import TYPE_CHECKING, Annotated
+from collections.abc import Mapping
+from typing import TYPE_CHECKING, Annotated, Any
 
 from bowdenfit.verb import Argument, Reply, Verb
 
@@ -25,10 +26,20 @@ def _reply(answer: "OptimalLength", _: object) -> Reply:
     return Reply(f"{answer}\n", lambda: answer)
 
 
+def _kept(answers: Mapping[str, Any], asked: Mapping[str, Any]) -> Reply | None:
+    if "length" not in answers:
+        return None
+    from bowdenfit.results.length import OptimalLength
+    from bowdenfit.results.plain import rebuilt
+
+    return _reply(rebuilt(OptimalLength, answers["length"]), asked)
+
+
 VERB = Verb(
     length,
     _reply,
     "The design answer: which length is best.",
     "The design answer: which length is best, how sure that is, and what the lengths that can be bought cost.",
     warns=True,
+    kept=_kept,
 )

@@ -10,6 +10,7 @@ import numpy as np
 from bowdenfit.errors import DatasetError, UsageError
 from bowdenfit.inference.interval import Interval
 from bowdenfit.questions.bends.answer import elastic_answers, friction_arm
+from bowdenfit.questions.predict.outside import bends_note, measured, pulled
 from bowdenfit.results.record import Record
 from bowdenfit.units import conversion_factor
 
@@ -99,43 +100,51 @@ def predict_at_bends(fit: Record, quantity: str, asked: Question) -> list[Row]:
     return QUANTITIES[quantity](fit, asked)
 
 
-def _rows(asked: Question, columns: Mapping[str, np.ndarray]) -> list[Row]:
-    """Median, moments and interval of the first quantity, the others with their names before."""
-    rows = []
+def _rows(fit: Record, asked: Question, columns: Mapping[str, np.ndarray], words: Sequence[str] = ()) -> list[Row]:
+    """Median, moments and interval of the first quantity, the others with their names before; what `words` and ranges say."""
+    rows, outside = [], bends_note(fit)
+    of_load = measured(fit).notes(None, asked.input_force) if asked.stated_force else []
     for i, angle in enumerate(np.rad2deg(asked.wrap_angles)):
         row: Row = {"wrap_angle_deg": float(f"{angle:.9g}")}
         for k, (name, draws) in enumerate(columns.items()):
             found, before = Interval.of(draws[:, i]), "" if k == 0 else f"{name}_"
             row |= {name: found.median, f"{before}mean": found.mean, f"{before}sd": found.sd}
             row |= {f"{before}q05": found.q05, f"{before}q95": found.q95}
-        rows.append(row)
+        notes = [*words[i : i + 1], outside(asked.wrap_angles[i]), *of_load]
+        rows.append(row | {"note": "; ".join(note for note in notes if note)})
     return rows
 
 
 def _efficiency(fit: Record, asked: Question) -> list[Row]:
-    force = elastic_answers(fit).output_force(asked.wrap_angles, asked.input_force, asked.stroke, asked.preload)
-    return _rows(asked, {"efficiency": force / asked.input_force})
+    force, words = _force(fit, asked)
+    return _rows(fit, asked, {"efficiency": force / asked.input_force}, words)
 
 
 def _output_force(fit: Record, asked: Question) -> list[Row]:
+    force, words = _force(fit, asked)
+    return _rows(fit, asked, {"output_force_N": force}, words)
+
+
+def _force(fit: Record, asked: Question) -> tuple[np.ndarray, list[str]]:
+    """Output forces of every draw: a rope is slack, and a loop is held by friction, where nothing is left."""
     force = elastic_answers(fit).output_force(asked.wrap_angles, asked.input_force, asked.stroke, asked.preload)
-    return _rows(asked, {"output_force_N": force})
+    return pulled(force, asked.input_force, "held by friction" if fit.model.cable.is_loop else "slack")
 
 
 def _preload(fit: Record, asked: Question) -> list[Row]:
     preload, slack = elastic_answers(fit).preload(asked.wrap_angles, asked.preload)
-    rows = _rows(asked, {"preload_N": preload, "slack_mm": slack})
+    rows = _rows(fit, asked, {"preload_N": preload, "slack_mm": slack})
     return [row | {"slack_probability": float(np.mean(slack[:, i] > 0))} for i, row in enumerate(rows)]
 
 
 def _friction(fit: Record, asked: Question) -> list[Row]:
     felt, (arm, unit) = elastic_answers(fit).friction(asked.wrap_angles, asked.preload), friction_arm(fit)
-    return _rows(asked, {f"friction_{unit.replace('*', '_')}": arm * felt})
+    return _rows(fit, asked, {f"friction_{unit.replace('*', '_')}": arm * felt})
 
 
 def _slack_load(fit: Record, asked: Question) -> list[Row]:
     _needs_loop(fit, "slack-load")
-    return _rows(asked, {"slack_load_N": elastic_answers(fit).slack_load(asked.wrap_angles, asked.preload)})
+    return _rows(fit, asked, {"slack_load_N": elastic_answers(fit).slack_load(asked.wrap_angles, asked.preload)})
 
 
 def _needs_loop(fit: Record, quantity: str) -> None:
@@ -151,7 +160,7 @@ def _position(fit: Record, asked: Question) -> list[Row]:
     arm, unit = friction_arm(fit)
     if unit != "N":
         columns |= {"position_error_deg": np.rad2deg(error / arm), "lost_motion_deg": np.rad2deg(lost / arm)}
-    return _rows(asked, columns)
+    return _rows(fit, asked, columns)
 
 
 def _stiffness(fit: Record, asked: Question) -> list[Row]:
@@ -160,7 +169,7 @@ def _stiffness(fit: Record, asked: Question) -> list[Row]:
     arm, unit = friction_arm(fit)
     if unit != "N":
         columns["stiffness_N_m_per_rad"] = stiffness * arm**2 / 1000
-    return _rows(asked, columns)
+    return _rows(fit, asked, columns)
 
 
 def _window(fit: Record, asked: Question) -> list[Row]:

@@ -5,11 +5,10 @@ from typing import Any
 import jax
 import numpy as np
 
-from bowdenfit.cable.load_cells import RUN_SCATTER
-from bowdenfit.cable.noise import noise_law
 from bowdenfit.errors import DatasetError, UsageError
 from bowdenfit.inference.draws import output_force_at
 from bowdenfit.inference.interval import Interval
+from bowdenfit.questions.predict.outside import measured, pulled
 from bowdenfit.results.record import Record
 from bowdenfit.units import conversion_factor
 
@@ -19,7 +18,7 @@ _STROKES = {"pull": 1, "return": -1}
 def predict_at_lengths(
     fit: Record, lengths: np.ndarray, input_force: tuple[float, str] | None, stroke: str
 ) -> list[dict[str, Any]]:
-    """Efficiency, or output force, at route values.
+    """Efficiency, or output force, at route values; a note says what lies outside the measurements, and where a rope is slack.
 
     Args:
         fit: The fit.
@@ -30,18 +29,15 @@ def predict_at_lengths(
     Raises:
         UsageError: The input force is not a positive force, or there is no posterior.
     """
-    route, sign = fit.dataset.description.route, _STROKES[stroke]
+    route, sign, asked = fit.dataset.description.route, _STROKES[stroke], None
     name, force, per = "efficiency", fit.model.cable.friction.conditions.reference_force, 1.0
     if input_force is not None:
-        name, force = "output_force_N", _newtons(input_force)
+        name, force = "output_force_N", (asked := _newtons(input_force))
     else:
         per = force
-    z = fit.draws().flat_z
-    with jax.enable_x64(True):
-        mean, mounted = (
-            output_force_at(fit.model, z, lengths, force, sign, mounting) / per
-            for mounting in (np.zeros(len(z)), _mounting(fit, len(z)))
-        )
+    (mean, words), (mounted, _) = (pulled(found, force) for found in _forces(fit, lengths, force, sign))
+    mean, mounted, limits = mean / per, mounted / per, measured(fit)
+    of_load = {"at_input_force_N": force} if fit.model.cable.friction.depends_on_load and asked is None else {}
     rows = []
     for i, length in enumerate(lengths):
         row: dict[str, Any] = {} if route is None else {f"{route.variable}_{route.unit}": float(length)}
@@ -55,10 +51,29 @@ def predict_at_lengths(
             "q95": interval.q95,
         }
         row |= {"mounting_q05": float(mounting[0]), "mounting_q95": float(mounting[1])}
+        row |= of_load
+        notes = [words[i], *limits.notes(None if route is None else float(length), asked)]
         if route is not None:
             row["in_range"] = bool(route.range[0] <= length <= route.range[1])
+            notes += (
+                []
+                if row["in_range"]
+                else [f"outside the curves, {route.range[0]:g} to {route.range[1]:g} {route.unit}"]
+            )
+        row["note"] = "; ".join(note for note in notes if note)
         rows.append(row)
     return rows
+
+
+def _forces(fit: Record, lengths: np.ndarray, force: float, sign: int) -> tuple[np.ndarray, np.ndarray]:
+    """Output force [N] of every draw (rows) at route values (columns), and the same in a new mounting."""
+    route, reference = fit.dataset.description.route, fit.model.cable.friction.conditions.reference_force
+    if route is not None and (force, sign, tuple(lengths)) == (reference, 1, tuple(route.choices)):
+        return fit.along_route.mean, fit.along_route.mounted
+    z = fit.draws().flat_z
+    with jax.enable_x64(True):
+        mean, mounted = output_force_at(fit.model, z, lengths, force, sign, (np.zeros(len(z)), fit.mounting()))
+    return mean, mounted
 
 
 def _newtons(force: tuple[float, str]) -> float:
@@ -71,10 +86,3 @@ def _newtons(force: tuple[float, str]) -> float:
             f"--input-force {force[0]:g}{force[1]} is not positive; write the tension as a positive force."
         )
     return newtons
-
-
-def _mounting(fit: Record, n: int) -> np.ndarray:
-    """Effect of one new mounting on the friction exponent, for every draw."""
-    posterior = fit.posterior
-    scatter = 0.0 if posterior is None else posterior.values.get(RUN_SCATTER, np.zeros(1)).ravel()
-    return scatter * noise_law(fit.dataset.description).draw_with(np.random.default_rng([fit.provenance.seed, 3]), n)

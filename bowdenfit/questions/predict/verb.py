@@ -1,6 +1,6 @@
 """Predicting what a cable does at lengths or wrap angles."""
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from typing import TYPE_CHECKING, Annotated, Any, Literal
 
 from bowdenfit.verb import Argument, Option, Quantity, Reply, Stroke, Verb
@@ -82,6 +82,18 @@ def _cell(value: object) -> str:
     return f'"{value}"' if isinstance(value, str) else str(value).lower()
 
 
+def _kept(answers: Mapping[str, Any], asked: Mapping[str, Any]) -> Reply | None:
+    """Efficiencies while pulling, at lengths that can be bought."""
+    known = {length: row for length, row in answers.get("predict", ()) if None not in row.values()}
+    other = any(asked[name] for name in ("input_force", "wrap_angles", "preload", "friction_limit"))
+    lengths = asked["lengths"] or tuple(known)
+    if other or (asked["quantity"], asked["stroke"]) not in {(None, "pull"), (AT_LENGTHS[0], "pull")} or not lengths:
+        return None
+    if (rows := [known[length] for length in lengths if length in known]) and len(rows) == len(lengths):
+        return Reply(_table(rows), lambda: rows)
+    return None
+
+
 VERB = Verb(
     predict,
     lambda rows, _: Reply(_table(rows), lambda: rows),
@@ -100,7 +112,9 @@ VERB = Verb(
     preload-window  lowest preload without slack over these bends, highest for --friction-limit, and the best
 
     The interval q05 to q95 is that of the cable's mean; mounting_q05 to mounting_q95 also holds the scatter from one
-    mounting of the cable to the next. Lengths outside the range of the curves are marked.
+    mounting of the cable to the next. A note marks what lies outside the lengths, wrap angles and loads measured, and where
+    nothing of the force is left: a rope pulls or is slack, at 0 N.
     """,
     formats=("csv", "json"),
+    kept=_kept,
 )

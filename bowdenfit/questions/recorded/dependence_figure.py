@@ -18,6 +18,7 @@ from bowdenfit.plots.style import (
     MEDIUM,
     SERIES_COLORS,
     SERIES_MARKERS,
+    SMALL,
     VERMILLION,
     WIDE,
     WIDE_INTERVAL,
@@ -54,6 +55,7 @@ class Dependence:
         points_x, points_efficiency: Measured, load by load or speed by speed.
         points_label: Run of each point.
         place: Where on the route, in words, such as "at 470 mm"; empty without a route.
+        note: What else is to be said; empty if nothing is.
     """
 
     what: str
@@ -65,10 +67,12 @@ class Dependence:
     points_efficiency: np.ndarray
     points_label: tuple[str, ...]
     place: str
+    note: str = ""
 
 
 def data(fit: Record) -> tuple[Dependence, ...] | None:
     """On load, and on speed, as far as the friction model lets efficiency depend on them; None where it does not at all."""
+    from bowdenfit.questions.recorded.lost_force import lost_force
     from bowdenfit.questions.recorded.rate import SHOWN_SPEED, place_of
     from bowdenfit.recordings.recording import Recordings
 
@@ -83,7 +87,9 @@ def data(fit: Record) -> tuple[Dependence, ...] | None:
         low, high = (forces.min(), forces.max()) if len(forces) else (10.0, 100.0)
         grid = np.linspace(max(low, 1e-3), high, GRID)
         quantiles, constant = _curves(fit, at, grid, None)
-        found.append(Dependence("load", "Input force (N)", grid, quantiles, constant, *_joined(points), place))
+        lost = lost_force(fit)
+        note = lost.short() if lost is not None else ""
+        found.append(Dependence("load", "Input force (N)", grid, quantiles, constant, *_joined(points), place, note))
     if friction.depends_on_rate:
         (unit, scale), (low, high) = SHOWN_SPEED[recordings.velocity_unit], friction.conditions.speeds
         grid = np.linspace(low * 0.5, high * 1.05, GRID)
@@ -164,6 +170,8 @@ def draw(dependences: tuple[Dependence, ...]) -> Figure:
         _curve(axes, one)
         _points(axes, one, runs)
         axes.set_xlabel(one.label)
+        if one.note:
+            axes.text(0.97, 0.05, one.note, transform=axes.transAxes, ha="right", va="bottom", fontsize=SMALL)
         axes.set_title(" ".join(filter(None, (one.what.capitalize(), one.place))))
         if i % columns == 0:
             axes.set_ylabel(EFFICIENCY)

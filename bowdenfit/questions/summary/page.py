@@ -9,10 +9,12 @@ from bowdenfit.inference.interval import Interval
 from bowdenfit.inference.samplers import recommendation
 from bowdenfit.kinds import readings_called
 from bowdenfit.kinds.recordings.accounts import preparation_pages
+from bowdenfit.kinds.term import Term
 from bowdenfit.questions.bends.overview import elastic_overview
 from bowdenfit.questions.check.answer import checks_of
 from bowdenfit.questions.identify.confounding import confounded_pairs
 from bowdenfit.questions.identify.contradiction import agreement_page
+from bowdenfit.questions.recorded.lost_force import lost_force
 from bowdenfit.questions.recorded.rate import rate_effect
 from bowdenfit.questions.summary.verdict import verdict
 from bowdenfit.recordings.recording import Recordings
@@ -55,6 +57,8 @@ def summarize(fit: Record) -> dict[str, Any]:
         page["elastic"] = elastic
     if checks := checks_of(fit):
         page["checks"] = checks
+    if (lost := lost_force(fit)) is not None:
+        page["drag"] = lost
     effect = rate_effect(fit)
     if effect is not None:
         page["rate_effect"] = effect
@@ -88,6 +92,8 @@ def _sampler(fit: Record, posterior: Draws) -> dict[str, Any]:
 def _parameter(fit: Record, name: str) -> dict[str, Any]:
     parameter = next(p for p in fit.model.space.parameters if p.name == name)
     row: dict[str, Any] = {"unit": parameter.unit, "meaning": parameter.meaning, "prior": parameter.prior_text}
+    if parameter.scaled_by:
+        row["prior_scaled_by"] = parameter.scaled_by
     if parameter.fixed is not None:
         row["fixed"] = parameter.fixed * parameter.shown_scale
     if name in fit.least_squares.estimates:
@@ -120,9 +126,23 @@ def curve_coefficients(fit: Record) -> dict[str, tuple[str, str]]:
 def _curve_coefficient(fit: Record, name: str) -> dict[str, Any]:
     row: dict[str, Any] = {"unit": curve_coefficients(fit)[name][0]}
     if fit.posterior is not None:
-        q05, median, q95 = np.quantile(fit.posterior.values[name], (0.05, 0.5, 0.95))
+        ordered = np.sort(fit.posterior.values[name], axis=None)  # some may be infinite, and are not to be interpolated
+        q05, median, q95 = (ordered[round(q * (len(ordered) - 1))] for q in (0.05, 0.5, 0.95))
         row |= {"median": float(median), "q05": float(q05), "q95": float(q95)}
     return row
+
+
+def _input_forces(fit: Record, term: Term) -> np.ndarray:
+    """At which input force each efficiency of a term holds [N], where friction depends on it: of a run, its weighted mean."""
+    friction, data = fit.model.cable.friction, term.data
+    if not friction.depends_on_load:
+        return np.zeros(0)
+    sizes = {len(data[name]) if name in data else -1 for name in ("run", "weight", "input_force")}
+    if len(sizes) > 1 or -1 in sizes:
+        return np.full(len(term.labels), friction.conditions.reference_force)
+    weight, run = np.asarray(data["weight"]), np.asarray(data["run"])
+    total = np.bincount(run, weight, len(term.labels))
+    return np.asarray(np.exp(np.bincount(run, weight * np.log(data["input_force"]), len(term.labels)) / total))
 
 
 def _measured_efficiencies(fit: Record) -> list[dict[str, Any]]:
@@ -134,7 +154,7 @@ def _measured_efficiencies(fit: Record) -> list[dict[str, Any]]:
     for term in fit.model.terms:
         if not readings_called(term.name).are_efficiencies:
             continue
-        observed = term.observed()
+        observed, forces = term.observed(), _input_forces(fit, term)
         for i, label in enumerate(term.labels):
             row: dict[str, Any] = {"table": term.name, "label": label, "measured": float(observed[i])}
             if fit.posterior is not None:
@@ -144,6 +164,8 @@ def _measured_efficiencies(fit: Record) -> list[dict[str, Any]]:
                 row["predictive_q05"], row["predictive_q95"] = (float(q) for q in np.quantile(replicated, (0.05, 0.95)))
             else:
                 row["predicted"] = float(fit.least_squares.readings[term.name][i])
+            if len(forces):
+                row["input_force_N"] = float(forces[i])
             row["relative_error"] = row["measured"] / row["predicted"] - 1
             rows.append(row)
     return rows

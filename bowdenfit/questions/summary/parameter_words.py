@@ -37,6 +37,8 @@ def parameters_text(fit: Record) -> str:
                 "unknowns leave little to tell the scatter from, or the sum of squares is lopsided."
             )
         )
+    by = [f"{p.name} by {p.scaled_by}" for p in fit.model.space.parameters if p.scaled_by]
+    notes += [filled(f"Priors that follow the measurements: {'; '.join(by)}.")] if by else []
     return "\n".join([shown, *notes])
 
 

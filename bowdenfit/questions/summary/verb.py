@@ -1,8 +1,9 @@
 """The summary of a fit, and its figures."""
 
 import json
+from collections.abc import Sequence
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated
+from typing import TYPE_CHECKING, Annotated, Any
 
 from bowdenfit.verb import Argument, Option, Output, Reply, Verb
 
@@ -44,31 +45,54 @@ def reply(found: "tuple[str, str] | Record", _: object = None) -> Reply:
 def plot(
     found: Annotated["Record | str | Path", Argument("RESULTS")],
     output: Annotated[Output, Option(("-o",), default="RESULTS/figures")] = None,
+    *,
+    figures: Annotated[Sequence[str], Option(("--figure",), metavar="NAME")] = (),
 ) -> list[Path]:
-    """Draw all figures of a fit into a folder, PNG and SVG.
+    """Draw the figures of a fit into a folder, PNG and SVG.
 
     Args:
         found: The fit, or its results folder.
         output: Folder for the figures.
+        figures: Draw only this figure, such as efficiency; may be repeated.
 
     Returns:
         The files written.
 
     Raises:
-        UsageError: Neither a folder for the figures nor one of results is named.
-        StoreError: The folder cannot be written.
+        UsageError: Neither a folder for the figures nor one of results is named, or the fit has no such figure.
+        StoreError: The results folder is missing or damaged, or the other cannot be written.
     """
     from bowdenfit.errors import UsageError
-    from bowdenfit.questions.figures import draw_figure, figures_of
+    from bowdenfit.questions.figures import draw_figure
     from bowdenfit.results.folder import FIGURES, folder_to_write
-    from bowdenfit.results.store import load
 
     if isinstance(found, str | Path):
-        output, found = output or Path(found) / FIGURES, load(Path(found))
+        output = output or Path(found) / FIGURES
     if output is None:
         raise UsageError("a fit by itself has no folder; name one for the figures.")
+    shown = _shown(found, figures)
     with folder_to_write(Path(output)) as place:
-        return [path for name, data in figures_of(found) for path in draw_figure(name, data, place)]
+        return [path for name, data in shown.items() for path in draw_figure(name, data, place)]
+
+
+def _shown(found: "Record | str | Path", names: Sequence[str]) -> dict[str, Any]:
+    """Data of all figures of a fit, or of some; what it was drawn with before is not worked out again."""
+    from bowdenfit.errors import UsageError, nearest
+    from bowdenfit.questions.figures import FIGURES, figures_of, kept_figures
+
+    for name in names:
+        if name not in FIGURES:
+            raise UsageError(f"there is no figure {name!r}{nearest(name, list(FIGURES))}")
+    shown = kept_figures(Path(found), names) if isinstance(found, str | Path) else {}
+    if not shown:
+        if isinstance(found, str | Path):
+            from bowdenfit.results.store import load
+
+            found = load(Path(found))
+        shown = dict(figures_of(found, names))
+    if missing := [name for name in names if name not in shown]:
+        raise UsageError(f"this fit has nothing to show in the figure {missing[0]!r}; leave it out.")
+    return shown
 
 
 SUMMARY_VERB = Verb(

@@ -1,12 +1,15 @@
-"""Whether a fit may be trusted, and if not, why: not converged, not identifiable, or contradictory measurements."""
+"""Whether a fit may be trusted, and if not, why; whatever the summary says is wrong is wrong here too."""
 
 from dataclasses import dataclass
 
+from bowdenfit.questions.check.impossible import impossible_efficiencies
+from bowdenfit.questions.check.lack_of_fit import say_what_is_not_described
 from bowdenfit.questions.identify.contradiction import contradiction
 from bowdenfit.questions.identify.judgment import say_what_is_not_determined
 from bowdenfit.results.record import Record, once
 
 NOT_CONVERGED, NOT_IDENTIFIABLE, CONTRADICTORY = "not converged", "not identifiable", "contradictory"
+IMPOSSIBLE, NOT_DESCRIBED = "made of impossible readings", "not a description of its readings"
 
 
 @dataclass(frozen=True)
@@ -14,7 +17,8 @@ class Verdict:
     """Of one fit.
 
     Args:
-        troubles: What is wrong, by kind: `NOT_CONVERGED`, `NOT_IDENTIFIABLE`, `CONTRADICTORY`; each with sentences.
+        troubles: What is wrong, by kind: `NOT_CONVERGED`, `NOT_IDENTIFIABLE`, `CONTRADICTORY`, `IMPOSSIBLE`,
+            `NOT_DESCRIBED`; each with sentences.
     """
 
     troubles: dict[str, tuple[str, ...]]
@@ -37,6 +41,8 @@ def verdict(fit: Record) -> Verdict:
         NOT_CONVERGED: () if fit.converged else fit.reasons or ("the fit did not converge",),
         NOT_IDENTIFIABLE: _sentences(say_what_is_not_determined(fit)),
         CONTRADICTORY: _sentences(contradiction(fit)),
+        IMPOSSIBLE: _sentences(impossible_efficiencies(fit)),
+        NOT_DESCRIBED: say_what_is_not_described(fit),
     }
     return Verdict({kind: sentences for kind, sentences in troubles.items() if sentences})
 

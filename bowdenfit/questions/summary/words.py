@@ -13,11 +13,20 @@ from bowdenfit.questions.check.words import checks_text
 from bowdenfit.questions.identify.answer import say_what_is_determined
 from bowdenfit.questions.identify.confounding import confounded_pairs
 from bowdenfit.questions.identify.judgment import identifiability
+from bowdenfit.questions.recorded.lost_force import lost_force
 from bowdenfit.questions.recorded.rate import SHOWN_SPEED, rate_effect
 from bowdenfit.questions.summary.page import summarize
 from bowdenfit.questions.summary.parameter_words import parameters_text
 from bowdenfit.questions.summary.sampler_words import sampler_sentences, sampler_text
-from bowdenfit.questions.summary.verdict import CONTRADICTORY, NOT_CONVERGED, NOT_IDENTIFIABLE, Verdict, verdict
+from bowdenfit.questions.summary.verdict import (
+    CONTRADICTORY,
+    IMPOSSIBLE,
+    NOT_CONVERGED,
+    NOT_DESCRIBED,
+    NOT_IDENTIFIABLE,
+    Verdict,
+    verdict,
+)
 from bowdenfit.recordings.recording import Recordings
 from bowdenfit.results.record import Record
 from bowdenfit.words import filled, listed, table
@@ -84,7 +93,12 @@ def _verdict(fit: Record, page: dict[str, Any]) -> str:
 
 def _untrusted(found: Verdict) -> str:
     """What is wrong, in capitals that nobody overlooks."""
-    kinds = {NOT_IDENTIFIABLE: "COEFFICIENTS NOT IDENTIFIABLE", CONTRADICTORY: "CONTRADICTORY MEASUREMENTS"}
+    kinds = {
+        NOT_IDENTIFIABLE: "COEFFICIENTS NOT IDENTIFIABLE",
+        CONTRADICTORY: "CONTRADICTORY MEASUREMENTS",
+        IMPOSSIBLE: "IMPOSSIBLE READINGS",
+        NOT_DESCRIBED: "THE MODEL DOES NOT DESCRIBE THESE READINGS",
+    }
     if NOT_CONVERGED in found.troubles:
         return "NOT CONVERGED; do not use these numbers"
     return f"{listed([kinds[kind] for kind in found.troubles])}; do not use these numbers before reading why"
@@ -177,9 +191,12 @@ def _friction_model(fit: Record) -> str:
     conditions, lines = friction.conditions, []
     if friction.depends_on_load:
         lines.append(
-            f"Coefficients and efficiencies are stated for an input force of {conditions.reference_force:g} N, because "
-            "friction depends on the load."
+            f"Coefficients, efficiency curves and the best length are stated for an input force of "
+            f"{conditions.reference_force:g} N, because friction depends on the load; measured efficiencies hold at the force "
+            "that stands beside them."
         )
+        lost = lost_force(fit)
+        lines += [lost.sentence()] if lost is not None else []
     if friction.depends_on_rate:
         unit, scale = SHOWN_SPEED[conditions.velocity_unit]
         speed = f"{scale * conditions.reference_speed:.3g} {unit}"
@@ -196,7 +213,9 @@ def _measured(fit: Record, page: dict[str, Any]) -> str:
     if not page["measured"]:
         return ""
     drawn = fit.posterior is not None
-    heads = ["measured at", "measured", "predicted", *(["90 % interval"] if drawn else []), "measured/predicted - 1"]
+    of_load = ["at input"] if any("input_force_N" in row for row in page["measured"]) else []
+    heads = ["measured at", *of_load, "measured", "predicted", *(["90 % interval"] if drawn else [])]
+    heads += ["measured/predicted - 1"]
     rows = []
     for row in page["measured"]:
         interval = [f"{row['q05']:.2%} to {row['q95']:.2%}"] if drawn else []
@@ -204,6 +223,7 @@ def _measured(fit: Record, page: dict[str, Any]) -> str:
         rows.append(
             [
                 what + row["label"],
+                *([f"{row['input_force_N']:.3g} N"] if of_load else []),
                 f"{row['measured']:.2%}",
                 f"{row['predicted']:.2%}",
                 *interval,

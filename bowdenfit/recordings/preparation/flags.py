@@ -139,9 +139,8 @@ def _longest_by_chance(force: Vector, runs: Runs) -> float:
         return math.inf
     same = math.erf(step / (2 * math.sqrt(2) * noise))
     chance = math.log(_CHANCE / len(force)) / math.log(same) if 0 < same < 1 else 0.0
-    order = np.argsort(runs.length)
-    half = int(np.searchsorted(np.cumsum(runs.length[order]), len(force) / 2))
-    typical = int(runs.length[order[half]])
+    samples = np.bincount(runs.length) * np.arange(runs.length.max() + 1)
+    typical = int(np.searchsorted(np.cumsum(samples), len(force) / 2))
     return max(float(_SHORTEST_RUN), chance, 5.0 * typical)
 
 

@@ -36,20 +36,24 @@ class Rests:
 
 
 def play_rows(x: Matrix, start: Vector, exponent: OtherVector, rests: Rests | None = None) -> np.ndarray:
-    """Play operator along each row for each exponent at once: an array of exponents, rows and points."""
-    output = np.empty((x.shape[1], len(exponent), x.shape[0]))
-    band = exponent[:, None]
-    lower, upper = x.T[:, None, :] - band, x.T[:, None, :] + band
+    """Play operator along each row for each exponent at once: an array of exponents, rows and points.
+
+    Keeping a value between two limits, and then between two others, keeps it between two limits again: so the limits of
+    1, 2, 4, ... points before each point are joined (Blelloch 1990, "Prefix sums and their applications"), to the last bit.
+    """
+    band = exponent[:, None, None]
+    lower, upper = x - band, x + band
     if rests is not None:
-        level, heading = rests.level.T[:, None, :], rests.heading.T[:, None, :]
-        falls, rises = np.minimum(level, upper), np.maximum(level, lower)
-        seen = np.where(heading < 0, falls, rises)
-        lower, upper = np.where(heading == 0, lower, seen), np.where(heading == 0, upper, seen)
-    y = np.broadcast_to(start, output.shape[1:])
-    for here, low, high in zip(output, lower, upper, strict=True):
-        np.maximum(y, low, out=here)
-        y = np.minimum(here, high, out=here)
-    return np.moveaxis(output, 0, -1)
+        falls, rises = np.minimum(rests.level, upper), np.maximum(rests.level, lower)
+        seen = np.where(rests.heading < 0, falls, rises)
+        lower, upper = np.where(rests.heading == 0, lower, seen), np.where(rests.heading == 0, upper, seen)
+    reach = 1
+    while reach < x.shape[1]:
+        low, high = lower[..., reach:].copy(), upper[..., reach:]
+        np.clip(lower[..., :-reach], low, high, out=lower[..., reach:])
+        np.clip(upper[..., :-reach], low, high, out=high)
+        reach *= 2
+    return np.clip(start[:, None], lower, upper)
 
 
 def band_of(segments: Segments) -> tuple[float, float]:

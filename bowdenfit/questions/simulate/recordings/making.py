@@ -12,7 +12,6 @@ import numpy as np
 from bowdenfit.cable.cable import ANGLE_NOISE, Cable
 from bowdenfit.cable.load_cells import FORCE_NOISE, GAIN_ERROR, INPUT_OFFSET, OUTPUT_OFFSET, RUN_SCATTER
 from bowdenfit.dataset import Dataset
-from bowdenfit.description import PriorDefaults
 from bowdenfit.kinds.angles.table import AngleSettings, AngleTable
 from bowdenfit.kinds.design import Design
 from bowdenfit.kinds.measurements import Measurements
@@ -21,6 +20,8 @@ from bowdenfit.questions.simulate.bench import SimulatedRecording, simulate_reco
 from bowdenfit.questions.simulate.recordings.plan import RecordingsPlan
 from bowdenfit.questions.simulate.recordings.planned import RPM, PlannedRecording
 from bowdenfit.questions.simulate.simulation import empty_tables, simulate, true_values
+
+_CELL_NOISE = 2.0  # N; standard deviations of load cells of which the plan says nothing are half-normal with this one
 
 
 @dataclass(frozen=True)
@@ -62,7 +63,7 @@ def make_recordings(plan: RecordingsPlan, seed: int, noise: bool = True) -> Made
     route = plan.description.route
     design = Design(angles=plan.angles, efficiencies=(route.middle if route else 0.0,))  # where all curves hold
     tables, given = empty_tables(plan.description, design), dict(plan.truth)
-    force_noise = given.pop(FORCE_NOISE, abs(of_noise.standard_normal()) * PriorDefaults().force_noise_newtons)
+    force_noise = given.pop(FORCE_NOISE, abs(of_noise.standard_normal()) * _CELL_NOISE)
     values = true_values(plan.description, tables, given, of_truth)
     model = build_model(Dataset(plan.description, tables, {}))
     truth = {p.name: values[p.name] * p.shown_scale for p in model.space.parameters} | {FORCE_NOISE: float(force_noise)}
@@ -74,7 +75,8 @@ def make_recordings(plan: RecordingsPlan, seed: int, noise: bool = True) -> Made
     contacts = [c.name for c in plan.description.contact]
     each = []
     for i, (planned, generator) in enumerate(zip(plan.recordings, of_each, strict=True)):
-        one = _with_faults(planned, float(force_noise), values.get(GAIN_ERROR, 0.0), noise)
+        of_cells = plan.description.sensors.noise_ratio * float(force_noise), float(force_noise)
+        one = _with_faults(planned, of_cells, values.get(GAIN_ERROR, 0.0), noise)
         exponent, effect = float(exponents[i]), effects[one.run]
         simulated = simulate_recording(exponent, one.friction, one.profile, one.bench, one.faults, generator, effect)
         wrap = dict(zip(contacts, map(float, angles[i]), strict=True))
@@ -114,9 +116,11 @@ def _true_angles(
     return angles
 
 
-def _with_faults(planned: PlannedRecording, force_noise: float, gain_error: float, noise: bool) -> PlannedRecording:
+def _with_faults(
+    planned: PlannedRecording, of_cells: tuple[float, float], gain_error: float, noise: bool
+) -> PlannedRecording:
     """The recording with what the truth says of noise and gain where the plan says nothing."""
-    true: dict[str, Any] = {"input_noise": force_noise, "output_noise": force_noise, "gain_error": gain_error}
+    true: dict[str, Any] = {"input_noise": of_cells[0], "output_noise": of_cells[1], "gain_error": gain_error}
     faults = dataclasses.replace(planned.faults, **{k: v for k, v in true.items() if k not in planned.stated_faults})
     if not noise:
         faults = dataclasses.replace(faults, input_noise=0.0, output_noise=0.0, spikes=0.0, dropouts=0.0)

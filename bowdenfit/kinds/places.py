@@ -6,12 +6,14 @@ from typing import Any
 
 import numpy as np
 
-from bowdenfit.dataset import Dataset
+from bowdenfit.description import Description
 from bowdenfit.kinds import kind_of
+from bowdenfit.kinds.inside_runs import STROKE as STROKE
+from bowdenfit.kinds.measurements import Measurements
 from bowdenfit.kinds.term import Term
 from bowdenfit.kinds.terms import term_kind
 
-RUN, STROKE = "Run", "Stroke"
+RUN = "Run"
 _ONE_PLACE = 0.02  # of all route values, within which those of a run are one
 
 
@@ -32,15 +34,16 @@ class Places:
     inside: np.ndarray
 
 
-def places_of(dataset: Dataset, term: Term) -> Places:
+def places_of(description: Description, measurements: Measurements, term: Term) -> Places:
     """Where the readings of a term were taken; numbered in their order where nothing else is known.
 
     Args:
-        dataset: The data set.
+        description: What was said about the cable.
+        measurements: Everything measured on it.
         term: One table of its model.
     """
-    n, route = len(term.labels), dataset.description.route
-    numbers, back = _of_kind(dataset, term)
+    n, route = len(term.labels), description.route
+    numbers, back = _of_kind(measurements, term)
     at = route_values(term)
     inside = np.ones(n, dtype=bool)
     if route is not None and at is not None and np.isfinite(at).all():
@@ -50,10 +53,10 @@ def places_of(dataset: Dataset, term: Term) -> Places:
     return Places(varying or {RUN: np.arange(1.0, n + 1)}, _groups(term), back, inside)
 
 
-def _of_kind(dataset: Dataset, term: Term) -> tuple[Mapping[str, np.ndarray], np.ndarray]:
+def _of_kind(measurements: Measurements, term: Term) -> tuple[Mapping[str, np.ndarray], np.ndarray]:
     """Loads and wrap angles of the tables that have them."""
     kind = kind_of(term.name)
-    table = dataset.measurements.table(kind.table) if kind is not None else None
+    table = measurements.table(kind.table) if kind is not None else None
     if table is None:
         return {}, np.zeros(len(term.labels), dtype=bool)
     declared = term_kind(term.name)

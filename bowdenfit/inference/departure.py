@@ -1,0 +1,38 @@
+"""A way in which readings depart from the model, and when that is worth saying."""
+
+from dataclasses import dataclass
+
+FALSE_ALARM = 0.003  # chance that a healthy fit is said not to describe its readings
+WORTH_SAYING = 0.02  # of what is read, below which a departure is not worth a verdict
+
+
+@dataclass(frozen=True)
+class Departure:
+    """One way in which the readings of a table depart from the model.
+
+    Args:
+        table: Name of the readings.
+        group: Contact or the like that they belong to; empty where all are of one kind.
+        against: Axis label of what they depend on.
+        inside: Whether readings inside runs do; else whole runs, or single readings.
+        chance: Probability of as much by chance, times the number of departures that were asked about.
+        size: Root mean square of the departure, over that of what is read [1].
+        low, high: Where the lowest third and the highest third of the readings were taken, on average.
+        at_low, at_high: How much more than the model says is read there, over what is read [1].
+    """
+
+    table: str
+    group: str
+    against: str
+    inside: bool
+    chance: float
+    size: float
+    low: float
+    high: float
+    at_low: float
+    at_high: float
+
+    @property
+    def worth_saying(self) -> bool:
+        """Whether chance does not make it, and it matters."""
+        return self.chance < FALSE_ALARM and self.size > WORTH_SAYING

@@ -1,0 +1,128 @@
+r"""Do residuals depend on where the readings were taken? Then the model does not describe them.
+
+For each way in which a table could depart from the model (with the load, the stroke, the speed, the order, the place) the
+columns of that departure, less what the parameters can follow, are fitted to the residuals of least squares. Without a
+departure the sum of squares that they take off, over what is left, is F distributed. Where readings are many the same is
+asked with a covariance that does not trust the weights, and the weaker of the two answers counts.
+
+References:
+    Draper and Smith, Applied Regression Analysis, 3rd ed., Wiley 1998, chapters 2 and 6: lack of fit, extra sums of squares.
+    White, A heteroskedasticity-consistent covariance matrix estimator, Econometrica 48 (1980), 817.
+"""
+
+from collections.abc import Iterator, Sequence
+from dataclasses import replace
+
+import jax.numpy as jnp
+import numpy as np
+
+from bowdenfit.inference.departure import Departure
+from bowdenfit.inference.objective import Solution
+from bowdenfit.inference.profiles import Basin
+from bowdenfit.inference.testable_readings import Readings, System, readings_to_test
+from bowdenfit.kinds.inside_runs import SPEED, STROKE
+from bowdenfit.kinds.term import LOAD
+from bowdenfit.model import Model
+
+_MANY = 30  # readings from which their own scatter weighs them
+_MOST_LEVELS = 24  # loads that are each asked about
+_OF_CURVE, _OF_PLACE = 4, 2  # degree of the polynomials by which curves, and other readings, may depart
+_LEAST_FREEDOM = 2.0
+_BELIEVED = (1e-3, 1e3)  # scatter in units of what a prior expects
+_FARTHEST = 6.0  # z of a noise scale
+_FOLLOWED = 1e-3  # share of a column that is left where the parameters can follow it
+
+
+def departures(basin: Basin, scale: np.ndarray) -> tuple[Departure, ...]:
+    """Every departure that was asked about, the least likely by chance first.
+
+    Args:
+        basin: The minimum of least squares.
+        scale: Scatter of every standardized residual about it.
+    """
+    model = basin.problem.posterior.model
+    system = readings_to_test(model, _weighed_by_scatter(basin, model, scale))
+    asked = [each for readings in system.readings for each in _departures_of(system, readings)]
+    corrected = (replace(each, chance=min(each.chance * len(asked), 1.0)) for each in asked)
+    return tuple(sorted(corrected, key=lambda each: (each.chance, -each.size)))
+
+
+def _weighed_by_scatter(basin: Basin, model: Model, scale: np.ndarray) -> Solution:
+    """The minimum where each table counts by the scatter that it was found to have, not by what its prior expects.
+
+    A table that scatters far less than expected is else pulled off its own best by the others, and seems not to fit.
+    """
+    problem, found, index = basin.problem, basin.found, model.space.index
+    pin, start = np.where(problem.noise, 0.0, found["z"]), 0
+    for term in model.terms:
+        names = (term.noise, getattr(term, "reading_noise", ""))
+        for name, (count, _) in zip(names, term.residual_blocks, strict=False):
+            if name in index and count:
+                at = index[name]
+                value = np.clip(scale[start], *_BELIEVED) * found["values"][at]
+                pin[at] = np.clip(float(model.space.free[at].prior.unconstrain(jnp.asarray(value))), -_FARTHEST, _FARTHEST)
+            start += count
+    again = problem.solve(found["z"], basin.at_end, pin)
+    return again if again["succeeded"] and np.all(np.isfinite(again["jacobian"])) else found
+
+
+def _departures_of(system: System, readings: Readings) -> Iterator[Departure]:
+    """Of the readings of one table."""
+    for group in dict.fromkeys(readings.group):
+        mine = readings.used & (np.array(readings.group) == group)
+        for against, x in readings.at.items():
+            if not (mine.any() and np.all(np.isfinite(x[mine])) and np.ptp(x[mine]) > 0):
+                continue
+            for columns in _columns(against, x, mine, bool(group)):
+                tested = _tested(system, readings, np.where(mine[:, None], columns, 0.0) * readings.lever[:, None])
+                if tested is not None:
+                    yield Departure(readings.table, group, against, readings.inside, *tested, *_ends(readings, x, mine))
+
+
+def _columns(against: str, x: np.ndarray, mine: np.ndarray, of_curve: bool) -> Iterator[np.ndarray]:
+    """Columns of the ways in which readings could depend on where they were taken, (reading, column)."""
+    if against == LOAD and np.all(x[mine] > 0):
+        load = np.where(mine, x, 1.0)
+        yield np.column_stack([np.log(load), np.min(x[mine]) / load])
+        levels = np.unique(x[mine])
+        if 3 <= len(levels) <= min(_MOST_LEVELS, mine.sum() // 2):
+            yield (x[:, None] == levels[None, :]).astype(float)
+    elif against == SPEED:
+        yield np.log(np.maximum(np.where(mine, x, 1.0), np.max(x[mine]) / 1e3))[:, None]
+    elif against == STROKE:
+        yield x[:, None].astype(float)
+    else:
+        low, high = np.min(x[mine]), np.max(x[mine])
+        degree = min(_OF_CURVE if of_curve else _OF_PLACE, len(np.unique(x[mine])) - 1)
+        yield np.polynomial.legendre.legvander(np.where(mine, 2 * (x - low) / (high - low) - 1, 0.0), degree)
+
+
+def _tested(system: System, readings: Readings, columns: np.ndarray) -> tuple[float, float] | None:
+    """Probability of a departure as large by chance, and its size; None where it cannot be asked about."""
+    from scipy.special import fdtrc
+
+    whole = np.zeros((len(system.residuals), columns.shape[1]))
+    whole[readings.rows] = columns / (readings.unit * readings.scatter)[:, None]
+    whole /= np.maximum(np.linalg.norm(whole, axis=0), 1e-300)
+    u, s, _ = np.linalg.svd(whole - system.followed @ (system.followed.T @ whole), full_matrices=False)
+    u = u[:, s > _FOLLOWED]
+    along, k, part = u.T @ system.residuals, u.shape[1], u[readings.rows]
+    freedom = readings.freedom - float(np.sum(part**2))  # the parameters carry some of a departure to other tables
+    if k == 0 or freedom < _LEAST_FREEDOM:
+        return None
+    rest = system.residuals[readings.rows] - part @ along
+    variance = (float(np.sum(rest**2)) + readings.extra) / freedom
+    chance = float(fdtrc(k, freedom, float(along @ along) / k / max(variance, 1e-300)))
+    if len(rest) >= _MANY:
+        covariance = (part * rest[:, None] ** 2).T @ part * (len(rest) / max(len(rest) - k, 1))
+        robust = float(along @ np.linalg.lstsq(covariance, along, rcond=None)[0])
+        chance = max(chance, float(fdtrc(k, freedom, robust / k)))
+    moved = part @ along * readings.unit * readings.scatter
+    return chance, float(np.sqrt(np.mean(moved**2) / np.mean(readings.reading**2)))
+
+
+def _ends(readings: Readings, x: np.ndarray, mine: np.ndarray) -> Sequence[float]:
+    """Where the lowest and the highest third were taken, and how much more is read there than the model says."""
+    low, high = np.quantile(x[mine], (1 / 3, 2 / 3))
+    thirds = [mine & (x <= low), mine & (x >= high)]
+    return [float(np.mean(x[third])) for third in thirds] + [readings.excess(third) for third in thirds]

@@ -1,0 +1,203 @@
+"""Residuals of least squares, reading by reading and table by table, with what parameters and mountings can follow."""
+
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass, replace
+from typing import Any
+
+import numpy as np
+
+from bowdenfit.kinds.inside_runs import ORDER, STROKE, InsideRuns
+from bowdenfit.kinds.places import Places
+from bowdenfit.kinds.term import Term
+from bowdenfit.model import Model
+
+_LEAST_FREEDOM = 0.5  # degrees of freedom below which the scatter of readings is not known
+_SINGULAR = 1e-8
+_LEAST_SCATTER = 1e-5  # in units of what is expected: readings that agree better were not measured
+
+
+@dataclass(frozen=True)
+class Readings:
+    """Readings that scatter alike.
+
+    Args:
+        table: Name of the readings.
+        inside: Whether they are readings inside runs.
+        rows: Which of all residuals they are.
+        residuals: Standardized.
+        jacobian: Of the residuals.
+        of_runs: Columns that the effects of mountings follow.
+        unit: What a residual of 1 is in units of the reading.
+        reading: What was read, of which a departure is a share; a loss as a log ratio.
+        lever: How much of a reading a relative change of friction moves.
+        used: Which of them are readings, not bounds.
+        group: Contact or the like that each belongs to; empty where all are of one kind.
+        at: Where they were taken, by axis label.
+        count: How many independent ones there are.
+        extra: Sum of squares inside what was taken together.
+        freedom: Degrees of freedom that are left.
+        scatter: Standard deviation of the residuals; what they are divided by in `System`.
+    """
+
+    table: str
+    inside: bool
+    rows: slice
+    residuals: np.ndarray
+    jacobian: np.ndarray
+    of_runs: np.ndarray
+    unit: np.ndarray
+    reading: np.ndarray
+    lever: np.ndarray
+    used: np.ndarray
+    group: tuple[str, ...]
+    at: Mapping[str, np.ndarray]
+    count: float
+    extra: float = 0.0
+    freedom: float = 0.0
+    scatter: float = 1.0
+
+    def excess(self, some: np.ndarray) -> float:
+        """How much more some of them read than the model says, over what is read [1]."""
+        return float(np.sum((self.unit * self.residuals)[some]) / np.sum(np.abs(self.reading[some])))
+
+
+@dataclass(frozen=True)
+class System:
+    """All residuals, divided by the scatter of their table.
+
+    Args:
+        residuals: Less what the parameters and the mountings can follow.
+        followed: Orthonormal columns of what they can.
+        readings: Those that can be tested.
+    """
+
+    residuals: np.ndarray
+    followed: np.ndarray
+    readings: tuple[Readings, ...]
+
+
+def readings_to_test(model: Model, found: Mapping[str, Any]) -> System:
+    """Every residual of least squares in its place.
+
+    Args:
+        model: The model.
+        found: The minimum: residuals and expected readings by term, Jacobian, values.
+    """
+    values = {p.name: p.fixed or 0.0 for p in model.space.fixed}
+    values |= dict(zip((p.name for p in model.space.free), found["values"], strict=True))
+    blocks, start, position = list[Readings](), 0, 0
+    for term in model.terms:
+        size = len(found["residuals"][term.name])
+        of_term = found["residuals"][term.name], found["jacobian"][position : position + size]
+        position += size
+        for block in _blocks(term, model.places.get(term.name), *of_term, found["readings"][term.name], values):
+            stop = start + len(block.residuals)
+            blocks.append(replace(block, rows=slice(start, stop)))
+            start = stop
+    return _weighed(blocks)
+
+
+def _weighed(blocks: list[Readings]) -> System:
+    """Weighed by the scatter that the parameters leave, which needs the parameters' share of each residual first."""
+    residuals, followed = _projected(blocks)
+    for i, block in enumerate(blocks):
+        freedom = block.count - float(np.sum(followed[block.rows] ** 2))
+        left = float(np.sum(residuals[block.rows] ** 2)) + block.extra
+        if freedom > _LEAST_FREEDOM and left > 0:
+            blocks[i] = replace(block, scatter=float(np.sqrt(left / freedom)), extra=block.extra * freedom / left)
+    residuals, followed = _projected(blocks)
+    freedoms = [block.count - float(np.sum(followed[block.rows] ** 2)) for block in blocks]
+    tested = (
+        replace(block, freedom=freedom)
+        for block, freedom in zip(blocks, freedoms, strict=True)
+        if freedom > _LEAST_FREEDOM and block.scatter > _LEAST_SCATTER and block.at and np.any(block.reading)
+    )
+    return System(residuals, followed, tuple(tested))
+
+
+def _projected(blocks: list[Readings]) -> tuple[np.ndarray, np.ndarray]:
+    """Residuals less what can be followed, and orthonormal columns of that."""
+    residuals = np.concatenate([block.residuals / block.scatter for block in blocks])
+    n_runs = sum(block.of_runs.shape[1] for block in blocks)
+    columns = np.zeros((len(residuals), blocks[0].jacobian.shape[1] + n_runs))
+    at = blocks[0].jacobian.shape[1]
+    for block in blocks:
+        columns[block.rows, : block.jacobian.shape[1]] = block.jacobian / block.scatter
+        columns[block.rows, at : at + block.of_runs.shape[1]] = block.of_runs
+        at += block.of_runs.shape[1]
+    size = np.linalg.norm(columns, axis=0)
+    u, s, _ = np.linalg.svd(columns[:, size > 0] / size[size > 0], full_matrices=False)
+    followed = u[:, s > _SINGULAR]
+    return residuals - followed @ (followed.T @ residuals), followed
+
+
+def _blocks(
+    term: Term,
+    places: Places | None,
+    residuals: np.ndarray,
+    jacobian: np.ndarray,
+    expected: np.ndarray,
+    values: Mapping[str, float],
+) -> Iterator[Readings]:
+    """Readings of a term that scatter alike: the first are told apart, further ones only where they are inside runs."""
+    first, *others = term.residual_blocks
+    yield _of_labels(term, places, residuals[: first[0]], jacobian[: first[0]], expected)
+    start = first[0]
+    for count, independent in others:
+        rows = slice(start, start + count)
+        inside = getattr(term, "inside", None)
+        if inside is not None:
+            yield _inside(term, inside, residuals[rows], jacobian[rows], values)
+        else:
+            yield _untold(term, residuals[rows], jacobian[rows], independent)
+        start = rows.stop
+
+
+def _untold(term: Term, residuals: np.ndarray, jacobian: np.ndarray, count: float) -> Readings:
+    """Residuals that nothing is known of but their scatter."""
+    n = len(residuals)
+    nothing, none = np.zeros(n), np.zeros(n, dtype=bool)
+    return Readings(
+        term.name, False, slice(0), residuals, jacobian, np.zeros((n, 0)), nothing, nothing, nothing, none, ("",) * n, {}, count
+    )  # fmt: skip
+
+
+def _of_labels(
+    term: Term, places: Places | None, residuals: np.ndarray, jacobian: np.ndarray, expected: np.ndarray
+) -> Readings:
+    """The readings that results name, or whole runs."""
+    n = len(residuals)
+    untold = _untold(term, residuals, jacobian, float(np.count_nonzero(residuals)))
+    observed = term.observed()
+    if places is None or len(observed) < n or len(expected) != len(observed):
+        return untold
+    read, said = observed[:n], np.asarray(expected)[:n]
+    if term.unit == "1":
+        read, said = -np.log(read), -np.log(said)
+    used = np.isfinite(read) & (np.abs(residuals) > _SINGULAR)
+    unit = np.abs(np.divide(read - said, residuals, out=np.full(n, np.nan), where=used))
+    unit = np.where(unit > 0, unit, np.nanmedian(unit[unit > 0]) if np.any(unit > 0) else 1.0)
+    sign = np.sign(np.nansum((read - said) * residuals))
+    reading = np.where(used, read, 0.0)
+    numbers = {label: x[:n] for label, x in places.numbers.items()}
+    back = {STROKE: places.back[:n].astype(float)}
+    return replace(
+        untold, unit=sign * unit, reading=reading, lever=np.ones(n), used=used, group=places.group[:n],
+        at=numbers | back | {ORDER: np.arange(float(n))}, count=float(used.sum()),
+    )  # fmt: skip
+
+
+def _inside(
+    term: Any, inside: InsideRuns, residuals: np.ndarray, jacobian: np.ndarray, values: Mapping[str, float]
+) -> Readings:
+    """Readings inside runs, one by one: the residual of their cell, and how far they lie from it."""
+    noise, root = float(values[term.reading_noise]), np.sqrt(inside.weight)
+    share = root / np.sqrt(np.maximum(term.data["weight"][inside.cell], 1e-300))
+    runs = inside.run[:, None] == np.unique(inside.run)[None, :]
+    mean = np.bincount(inside.run, inside.weight * inside.log_ratio) / np.bincount(inside.run, inside.weight)
+    n = len(root)
+    return Readings(
+        term.name, True, slice(0), share * residuals[inside.cell] + root * inside.apart / noise,
+        share[:, None] * jacobian[inside.cell], runs * root[:, None], noise / root, inside.log_ratio,
+        np.abs(mean[inside.run]), np.ones(n, dtype=bool), ("",) * n, inside.at, inside.count, inside.within / noise**2,
+    )  # fmt: skip

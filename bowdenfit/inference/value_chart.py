@@ -1,0 +1,92 @@
+"""Proposals in the values of the parameters instead of z.
+
+Readings are nearly linear in friction coefficients and in the coefficients of curves, so that ridges of the posterior that
+are bent in z are straight in values, and a step along one stays on it. Noise scales stay in z, where a funnel is less narrow.
+"""
+
+from dataclasses import dataclass
+from functools import cached_property, lru_cache
+
+import jax
+import jax.numpy as jnp
+import numpy as np
+
+from bowdenfit.inference.compilation import compile_program
+from bowdenfit.inference.proposals import Proposal
+from bowdenfit.parameters.space import ParameterSpace
+
+NODES = np.linspace(-6.0, 6.0, 241)
+_WIDTH = float(NODES[1] - NODES[0])
+_BENT = 1e-6  # relative change of slope below which a value is linear in z, and charting it does nothing
+
+
+@dataclass(frozen=True)
+class Chart:
+    """A one-to-one map from z to other coordinates: parameter by parameter, linear between nodes and beyond the last.
+
+    Any such map leaves the sampler's target what it is, because its slopes are known exactly; this one follows the priors.
+
+    Args:
+        size: Number of parameters.
+        which: Positions of those that are mapped; the others stay as they are.
+        values: Coordinate at `NODES` of each of those, (node, parameter), rising.
+    """
+
+    size: int
+    which: np.ndarray
+    values: np.ndarray
+
+    @cached_property
+    def rises(self) -> np.ndarray:
+        """From one node to the next."""
+        return np.diff(self.values, axis=0)
+
+    @cached_property
+    def log_slopes(self) -> np.ndarray:
+        """Log of the coordinate per z between nodes."""
+        return np.log(self.rises / _WIDTH)
+
+    def from_z(self, z: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """Coordinates of z (last axis: parameters), and log of the volume of a unit of z there."""
+        along, found = (z[..., self.which] - NODES[0]) / _WIDTH, z.copy()
+        node = np.clip(along, 0, len(NODES) - 2).astype(int)
+        place = node * len(self.which) + np.arange(len(self.which))
+        found[..., self.which] = self.values.take(place) + (along - node) * self.rises.take(place)
+        return found, self.log_slopes.take(place).sum(axis=-1)
+
+    def to_z(self, found: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """Z of coordinates, and log of the volume of a unit of z there."""
+        z, volume = found.copy(), np.zeros(found.shape[:-1])
+        for column, parameter in enumerate(self.which):
+            at, values, rises = found[..., parameter], self.values[:, column], self.rises[:, column]
+            node = values[1:-1].searchsorted(at, side="right")
+            z[..., parameter] = NODES[0] + _WIDTH * (node + (at - values[node]) / rises[node])
+            volume += self.log_slopes[node, column]
+        return z, volume
+
+
+@lru_cache(maxsize=8)
+def chart_values(space: ParameterSpace) -> Chart:
+    """The chart of the values of free parameters, noise scales and values that are linear in z excepted."""
+    grid = np.repeat(NODES[:, None], space.size, axis=1)
+    shape = jax.ShapeDtypeStruct(grid.shape, jnp.float64)
+    values = np.asarray(compile_program(jax.vmap(space.vector), shape, run_once=True)(grid))
+    slopes = np.diff(values, axis=0)
+    rising = np.all(np.isfinite(values), axis=0) & np.all(slopes > 0, axis=0)
+    bent = np.ptp(slopes, axis=0) > _BENT * np.max(np.abs(slopes), axis=0)
+    which = np.flatnonzero(rising & bent & np.array([p.role != "noise" for p in space.free], dtype=bool))
+    return Chart(space.size, which, values[:, which])
+
+
+def in_values(proposal: Proposal, chart: Chart) -> Proposal:
+    """The same proposal, made in the coordinates of a chart."""
+
+    def propose(
+        moving: np.ndarray, resting: np.ndarray, random: np.random.RandomState
+    ) -> tuple[np.ndarray, np.ndarray]:
+        present, volume = chart.from_z(moving)
+        places, factors = proposal(present, chart.from_z(resting)[0], random)
+        z, new_volume = chart.to_z(places)
+        return z, factors + volume - new_volume
+
+    return propose

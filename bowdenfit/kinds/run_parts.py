@@ -1,0 +1,97 @@
+"""Parts of runs that can be left out one by one: the readings of one load, or each by itself, the mounting staying the same.
+
+What a run's mounting did is integrated out of the run's likelihood in closed form, with any of its readings as well as with
+all of them; the likelihood of a part, given the rest of its run, is the quotient of the two.
+"""
+
+from dataclasses import dataclass, replace
+from typing import Any, Literal
+
+import jax
+import numpy as np
+
+from bowdenfit.errors import UsageError
+from bowdenfit.kinds.runs import RunsTerm, run_sums, with_cells
+from bowdenfit.kinds.sliding_rows import SlidingRows
+from bowdenfit.kinds.term import Term
+from bowdenfit.types import Labels
+
+LeaveOut = Literal["run", "load", "reading"]
+_MOST_LOADS = 8  # of a stroke of a run, into which its readings are parted
+_MOST_PARTS = 400
+
+
+@dataclass(frozen=True)
+class RunParts:
+    """Parts of the runs of a term.
+
+    Args:
+        labels: Each in words.
+        said: Of each, what is the same wherever it is the same event: count of readings, mean log ratio, mean load [N].
+        run: Run of each.
+        data: Arrays of the term without each part, stacked with the parts first.
+    """
+
+    labels: tuple[str, ...]
+    said: np.ndarray
+    run: Labels
+    data: dict[str, Any]
+
+
+def run_parts(term: Term, unit: LeaveOut) -> RunParts | None:
+    """The parts of a term's runs; None where whole runs, or readings as they are, are all that can be left out.
+
+    Args:
+        term: A term of the model.
+        unit: What a part is.
+
+    Raises:
+        UsageError: There are too many parts.
+    """
+    if unit == "run" or not isinstance(term, RunsTerm) or term.rows is None:
+        return None
+    part, names = _parts(term, term.rows, unit)
+    counts, runs = np.bincount(part), np.unique(term.rows.run, return_inverse=True)[1]
+    of_part = np.zeros(len(counts), dtype=int)
+    of_part[part] = runs
+    if np.bincount(of_part).min() < 2:
+        return None  # a run in one part can only be left out whole
+    if len(counts) > _MOST_PARTS:
+        raise UsageError(
+            f"{term.name} has {len(counts):,} parts, and at most {_MOST_PARTS} can be left out one by one; use --leave-out "
+            f"{'load' if unit == 'reading' else 'run'}."
+        )
+    each = len(term.data["mean"]) // len(term.labels)
+    left = [with_cells(run_sums(term.cable, _chosen(term.rows, part != i)), len(term.labels), each) for i in range(len(counts))]
+    ratio, load = (np.bincount(part, values) / counts for values in (term.rows.log_ratio, term.rows.input_force))
+    stacked = jax.tree.map(lambda *arrays: np.stack(arrays), *left)
+    return RunParts(names, np.column_stack([counts, ratio, load]), of_part, stacked)
+
+
+def _chosen(rows: SlidingRows, kept: np.ndarray) -> SlidingRows:
+    """Some of the readings."""
+    arrays = {name: value[kept] for name, value in vars(rows).items() if name != "angles"}
+    return replace(rows, **arrays, angles={name: value[kept] for name, value in rows.angles.items()})
+
+
+def _parts(term: RunsTerm, rows: SlidingRows, unit: LeaveOut) -> tuple[Labels, tuple[str, ...]]:
+    """The part of each reading, and each part in words."""
+    run = np.unique(rows.run, return_inverse=True)[1]
+    level = np.arange(len(run)) if unit == "reading" else _load_levels(rows, run)
+    keys, part = np.unique(np.column_stack([run, rows.stroke > 0, level]), axis=0, return_inverse=True)
+    part = part.ravel()
+    load = np.bincount(part, rows.input_force) / np.bincount(part)
+    strokes = ("return", "pull")
+    names = [f"{term.labels[r]}, {strokes[s]} at {f:.4g} N" for (r, s, _), f in zip(keys, load, strict=True)]
+    return part, tuple(names)
+
+
+def _load_levels(rows: SlidingRows, run: Labels) -> Labels:
+    """The load of each reading as one of a few levels of its run and stroke, equally many readings in each."""
+    level = np.zeros(len(run), dtype=int)
+    group = run * 2 + (rows.stroke > 0)
+    for which in np.unique(group):
+        mine = np.flatnonzero(group == which)
+        order = mine[np.argsort(rows.input_force[mine], kind="stable")]
+        level[order] = np.arange(len(mine)) * min(_MOST_LOADS, len(mine)) // len(mine)
+    return level

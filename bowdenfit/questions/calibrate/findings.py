@@ -1,0 +1,91 @@
+"""From replications to what they say together."""
+
+from collections import Counter
+from collections.abc import Mapping, Sequence
+
+import numpy as np
+
+from bowdenfit.questions.calibrate.answer import INTERVALS, LEVEL, Calibration, Checked, Coverage, Quantity
+from bowdenfit.questions.calibrate.power import power_of
+from bowdenfit.questions.calibrate.replication import Replication
+from bowdenfit.questions.calibrate.uniformity import UniformRanks, holm
+
+
+def findings(
+    replications: Sequence[Replication],
+    quantities: Mapping[str, Quantity],
+    *,
+    name: str = "",
+    assumed: tuple[str, ...] = (),
+    truths: tuple[str, ...] = (),
+    seed: int = 0,
+) -> Calibration:
+    """What replications say.
+
+    Args:
+        replications: Any number, in any order.
+        quantities: What is known of each quantity; others are shown by name.
+        name: Name of the cable.
+        assumed: What was assumed in the fits.
+        truths: True values that did not come from the priors, in words.
+        seed: Seed of the replications.
+    """
+    replications = sorted(replications, key=lambda r: r.number)
+    good = [r for r in replications if not r.reasons]
+    known = {q: quantities.get(q, Quantity(q)) for q in (good[0].ranked if good else ())}
+    way = "coverage" if truths else "ranks and coverage"
+    judged_by = {q: way if each.is_answer or not truths else "" for q, each in known.items()}
+    n_judged = sum(map(bool, judged_by.values()))
+    ranks = [np.array([r.ranked[q].rank for r in good]) for q in known]
+    p_values = [UniformRanks(len(good)).p_value(r) for r in ranks]
+    checked = tuple(
+        _check_quantity(q, known[q].symbol, r, (p, c), n_judged, judged_by[q], good)
+        for q, r, p, c in zip(known, ranks, p_values, holm(p_values), strict=True)
+    )
+    redrawn: Counter[str] = Counter()
+    for each in replications:
+        redrawn.update(each.redrawn)
+    unconverged = {r.number: r.reasons[0] for r in replications if r.reasons}
+    seconds = float(np.median([r.seconds for r in replications])) if replications else float("nan")
+    engines = Counter(r.engine for r in good if r.engine)
+    bands = {claimed: _band(len(good), claimed, n_judged) for claimed in INTERVALS} if checked else {}
+    power = power_of(len(good), LEVEL / n_judged, bands, not truths) if checked else ()
+    done = len(replications), checked, unconverged, dict(redrawn), seconds
+    return Calibration(name, assumed, seed, *done, truths, dict(engines.most_common()), power)
+
+
+def _check_quantity(
+    name: str,
+    symbol: str,
+    ranks: np.ndarray,
+    p: tuple[float, float],
+    n_judged: int,
+    judged_by: str,
+    good: Sequence[Replication],
+) -> Checked:
+    found = [r.ranked[name] for r in good]
+    truth, mean, sd = (np.array([getattr(each, what) for each in found]) for what in ("truth", "mean", "sd"))
+    known = (sd > 0) & np.isfinite(truth)  # an optimum at the same end in every draw has no spread
+    deviation = (mean - truth)[known] / sd[known]
+    n = max(len(deviation), 1)
+    bias, error = (float(deviation.mean()), float(deviation.std() / np.sqrt(n))) if known.any() else (np.nan, np.nan)
+    # The prior of z is the standard normal; that of the optimum is what was drawn.
+    prior = float(np.var(truth)) if name.startswith("optimal_") else 1.0
+    of_prior = prior > 0 and judged_by == Checked.judged_by
+    shrinkage = 1 - float(np.mean(sd**2)) / prior if of_prior else float("nan")
+    coverage = tuple(_coverage(ranks, probability, n_judged) for probability in INTERVALS)
+    return Checked(name, symbol, tuple(ranks.tolist()), *p, coverage, bias, error, shrinkage, judged_by)
+
+
+def _coverage(ranks: np.ndarray, probability: float, n_judged: int) -> Coverage:
+    held = np.abs(ranks - 0.5) < probability / 2
+    return Coverage(probability, float(held.mean()), *_band(len(ranks), probability, n_judged))
+
+
+def _band(n: int, probability: float, n_judged: int) -> tuple[float, float]:
+    """Rates between which chance keeps the intervals of all quantities that are judged."""
+    from scipy import stats
+
+    tail = LEVEL / (2 * len(INTERVALS) * n_judged)
+    low, high = (float(stats.binom.ppf(t, n, probability)) / n for t in (tail, 1 - tail))
+    return low, high

@@ -1,0 +1,120 @@
+"""True values that are stated instead of drawn from the priors: a file of values and ranges.
+
+    mu1 = 0.1
+    tau = [0.002, 0.3]
+
+A number is the true value of every replication. Of two numbers each replication draws its own: so that every doubling is as
+likely as the next where the parameter can be any positive number (coefficients, noise scales, drag), else uniformly. Both
+are in the units in which results are shown. What is not named is drawn from its prior.
+
+A calibration with truths from the priors cannot see a bad prior; one with stated truths can.
+"""
+
+import math
+import tomllib
+from collections.abc import Mapping
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import jax.numpy as jnp
+import numpy as np
+
+from bowdenfit.errors import UsageError, nearest
+from bowdenfit.parameters.space import Parameter, ParameterSpace
+from bowdenfit.words import shown
+
+
+@dataclass(frozen=True)
+class StatedTruth:
+    """Where the true values of a parameter come from.
+
+    Args:
+        parameter: Which.
+        low, high: The range [shown unit]; the same for one value.
+        by_factors: Whether every doubling within the range is as likely as the next.
+    """
+
+    parameter: Parameter
+    low: float
+    high: float
+    by_factors: bool
+
+    @property
+    def text(self) -> str:
+        """As people read it."""
+        unit = "" if self.parameter.unit == "1" else f" {self.parameter.unit}"
+        if self.low == self.high:
+            return f"{self.parameter.name} {self.low:g}{unit}"
+        way = "log-uniform" if self.by_factors else "uniform"
+        return f"{self.parameter.name} {way} from {self.low:g} to {self.high:g}{unit}"
+
+    def z(self, generator: np.random.Generator) -> float:
+        """A true value, where the parameter's prior is a standard normal."""
+        share = generator.uniform()
+        value = self.low + share * (self.high - self.low)
+        if self.by_factors:
+            value = self.low * (self.high / self.low) ** share
+        return float(self.parameter.prior.unconstrain(jnp.asarray(value / self.parameter.shown_scale)))
+
+
+def read_truths(path: Path) -> dict[str, Any]:
+    """Values and ranges by name, as a TOML file has them.
+
+    Raises:
+        UsageError: There is no such file, or it is none.
+    """
+    try:
+        page = tomllib.loads(path.read_text(encoding="utf-8"))
+    except OSError as error:
+        raise UsageError(f"the truths of --truth cannot be read from {path} ({error.strerror}); name a file.") from None
+    except (tomllib.TOMLDecodeError, UnicodeDecodeError) as error:
+        raise UsageError(f"{path} is no TOML file ({error}); write lines such as tau = [0.002, 0.3].") from None
+    if not page:
+        raise UsageError(f"{path} states no true value; write lines such as mu = 0.1, or leave --truth out.")
+    return page
+
+
+def stated_truths(page: Mapping[str, Any], space: ParameterSpace, file: str) -> tuple[StatedTruth, ...]:
+    """What a file says of the parameters of a model.
+
+    Args:
+        page: Its values and ranges by name.
+        space: The parameters.
+        file: Its name.
+
+    Raises:
+        UsageError: A name is no free parameter, or what is said of it can be no true value.
+    """
+    known = {p.name: p for p in space.parameters}
+    for name in page:
+        if name not in known:
+            raise UsageError(f"{file}: {shown(name)} is no parameter of this cable{nearest(name, list(known))}")
+        if known[name].fixed is not None:
+            raise UsageError(f"{file}: {name} is fixed in cable.toml, so there is no truth to look for; leave it out.")
+    return tuple(_stated(known[name], value, f"{file}, {name}") for name, value in page.items())
+
+
+def _stated(parameter: Parameter, value: Any, place: str) -> StatedTruth:
+    numbers = value if isinstance(value, list) else [value, value]
+    if len(numbers) != 2 or not all(_is_number(number) for number in numbers):
+        raise UsageError(f"{place}: {shown(value)} is neither a number nor a range; write 0.1 or [0.05, 0.2].")
+    low, high = (float(number) for number in numbers)
+    if isinstance(value, list) and not low < high:
+        raise UsageError(f"{place}: the range [{low:g}, {high:g}] is upside down or empty; write its lower end first.")
+    ends = (float(parameter.prior.constrain(jnp.asarray(z))) * parameter.shown_scale for z in (-jnp.inf, jnp.inf))
+    least, most = ends
+    if low < least or high > most:
+        outside = low if low < least else high
+        raise UsageError(
+            f"{place}: {outside:g} is outside what the parameter can be, {least:g} to {most:g}"
+            f"{'' if parameter.unit == '1' else f' {parameter.unit}'}; truths are stated in that unit."
+        )
+    by_factors = least == 0 and most == math.inf and low < high
+    if by_factors and low == 0:
+        raise UsageError(f"{place}: a range of factors cannot start at 0; write the smallest value that matters.")
+    return StatedTruth(parameter, low, high, by_factors)
+
+
+def _is_number(value: object) -> bool:
+    return isinstance(value, int | float) and not isinstance(value, bool) and math.isfinite(value)

@@ -1,0 +1,218 @@
+"""Replications: a known truth, tables simulated with it, a fit, and the rank of the truth among the draws."""
+
+import time
+from collections.abc import Callable, Iterator, Sequence
+from dataclasses import dataclass, field
+from functools import cached_property
+from typing import Any
+
+import jax
+import jax.numpy as jnp
+import numpy as np
+
+from bowdenfit.dataset import Dataset
+from bowdenfit.errors import DatasetError, UsageError
+from bowdenfit.inference.batch_stages import BatchFit
+from bowdenfit.inference.compilation import compile_program
+from bowdenfit.inference.draws import for_each_draw
+from bowdenfit.inference.log_density import LogDensity
+from bowdenfit.kinds.drawn_readings import Readings, drawn_readings, drawn_tables, slipped
+from bowdenfit.kinds.measurements import Measurements
+from bowdenfit.model import Model, build_model
+from bowdenfit.questions.calibrate.acceptable_tables import refusal
+from bowdenfit.questions.calibrate.refit import Laboratory, with_parameters_of
+from bowdenfit.questions.calibrate.replication import RankedTruth, Replication, rank_truth
+from bowdenfit.questions.calibrate.truths import StatedTruth
+from bowdenfit.results.optimum import optimum_of
+from bowdenfit.results.record import OPTIMAL_EFFICIENCY, OPTIMAL_LENGTH
+
+TOGETHER = 64  # replications that are fitted together: what is lost when a calibration is interrupted
+MOST_DRAWN = 5000  # tables, before a replication is given up
+
+
+@dataclass(frozen=True)
+class Plan:
+    """What is replicated.
+
+    Args:
+        stated: The data set whose description and design are replicated; its readings give way to simulated ones.
+        assumed: The data set with the description that is fitted; the same for a calibration proper.
+        seed: Seed; replication i is the same whatever else is run.
+        truths: True values that do not come from the priors.
+    """
+
+    stated: Dataset
+    assumed: Dataset
+    seed: int
+    truths: tuple[StatedTruth, ...] = ()
+
+
+@dataclass(frozen=True)
+class Simulated:
+    """Tables that are waiting to be fitted.
+
+    Args:
+        number: Of the replication.
+        z: The truth, where priors are standard normals.
+        posterior: Of the tables.
+        redrawn: Why tables were drawn again, with how many were.
+        seed: Of the fit.
+        tie: Share of the draws equal to the truth that count as below it.
+    """
+
+    number: int
+    z: np.ndarray
+    posterior: LogDensity
+    redrawn: dict[str, int]
+    seed: int
+    tie: float
+
+
+@dataclass(frozen=True)
+class Workbench:
+    """Runs replications of one plan in this process.
+
+    Args:
+        plan: What is replicated.
+        laboratory: What fits; may be shared.
+        disturb: What is done to simulated tables before they are fitted, for calibrations that must fail.
+        refusal: Why simulated tables are not to be had from a bench, in a word; empty if they may be.
+    """
+
+    plan: Plan
+    laboratory: Laboratory = field(default_factory=Laboratory)
+    disturb: Callable[[Dataset], Dataset] = lambda dataset: dataset
+    refusal: Callable[[Dataset, Dataset], str] = refusal
+
+    @cached_property
+    def stated(self) -> Model:
+        """The model that readings are simulated with."""
+        return build_model(self.plan.stated)
+
+    @cached_property
+    def assumed(self) -> Model:
+        """The model that is fitted."""
+        return self.stated if self.plan.assumed is self.plan.stated else build_model(self.plan.assumed)
+
+    @cached_property
+    def _readings(self) -> Callable[..., Any]:
+        model, tables = self.stated, self.plan.stated.measurements
+
+        def readings(z: jax.Array, words: jax.Array) -> Any:
+            values = model.space.constrain(z)
+            return drawn_readings(model.cable, tables, values, jax.random.wrap_key_data(words))
+
+        words = jax.ShapeDtypeStruct((2,), jnp.uint32)
+        return compile_program(readings, jax.ShapeDtypeStruct((model.space.size,), jnp.float64), words)
+
+    @cached_property
+    def _optimum_of_truth(self) -> Callable[..., Any]:
+        return for_each_draw(optimum_of(self.stated), self.stated.space.size)
+
+    @cached_property
+    def _optimum(self) -> Callable[..., Any]:
+        if self.assumed is self.stated:
+            return self._optimum_of_truth
+        return for_each_draw(optimum_of(self.assumed), self.assumed.space.size)
+
+    def replications(self, numbers: Sequence[int]) -> Iterator[Replication]:
+        """Replications by their numbers, as they are done.
+
+        Raises:
+            UsageError: Hardly any tables drawn from the prior look like ones from a bench.
+        """
+        for start in range(0, len(numbers), TOGETHER):
+            with jax.enable_x64(True):
+                done = self._together(numbers[start : start + TOGETHER])
+            yield from done
+
+    def _together(self, numbers: Sequence[int]) -> list[Replication]:
+        begin = time.perf_counter()
+        waiting = [self._simulated(number) for number in numbers]
+        fits = self.laboratory.fits([each.posterior for each in waiting], [each.seed for each in waiting])
+        ranked = [self._ranked(each, fit) if len(fit.z) else {} for each, fit in zip(waiting, fits, strict=True)]
+        seconds = (time.perf_counter() - begin) / len(numbers)
+        return [
+            Replication(each.number, each.redrawn, fit.reasons, found, seconds, fit.steps, fit.engine)
+            for each, fit, found in zip(waiting, fits, ranked, strict=True)
+        ]
+
+    def _simulated(self, number: int) -> Simulated:
+        generator = np.random.default_rng([self.plan.seed, number])
+        z, dataset, redrawn = self._tables(generator)
+        assumed = Dataset(self.plan.assumed.description, dataset.measurements, {})
+        posterior = LogDensity(with_parameters_of(self.assumed, self.disturb(assumed)))
+        return Simulated(number, z, posterior, redrawn, int(generator.integers(2**31)), generator.uniform())
+
+    def _truth(self, generator: np.random.Generator) -> np.ndarray:
+        """Where the priors are standard normals: drawn from them, but for what is stated."""
+        z = generator.standard_normal(self.stated.space.size)
+        for stated in self.plan.truths:
+            z[self.stated.space.index[stated.parameter.name]] = stated.z(generator)
+        return z
+
+    def _tables(self, generator: np.random.Generator) -> tuple[np.ndarray, Dataset, dict[str, int]]:
+        """Truth and tables: drawn together until the tables, by themselves, could come from a bench."""
+        redrawn: dict[str, int] = {}
+        for _ in range(MOST_DRAWN):
+            z = self._truth(generator)
+            words = generator.integers(2**32, size=2, dtype=np.uint32)
+            tables, why = self._acceptable(self._readings(z, words))
+            if not why:
+                return z, Dataset(self.plan.stated.description, Measurements(tables), {}), redrawn
+            redrawn[why] = redrawn.get(why, 0) + 1
+        most = max(redrawn, key=lambda why: redrawn[why])
+        cause = "a prior far wider than what a cable can be: narrow it under [friction] or [prior] in cable.toml"
+        if self.plan.truths:
+            cause = "a true value that no cable on this bench can have: state others in the file of --truth"
+        raise UsageError(
+            f"none of {MOST_DRAWN} simulated data sets looks like one from a bench, mostly because {most}; the usual cause is "
+            f"{cause}."
+        )
+
+    def _acceptable(self, drawn: Readings) -> tuple[tuple[Any, ...], str]:
+        """Tables with what was drawn, and why no bench would hand them in: empty if one might."""
+        if slipped(drawn):
+            return (), "held readings would have slipped"
+        stated, tables = self.plan.stated, list[Any]()
+        try:
+            for table in drawn_tables(stated.description, stated.measurements, drawn):
+                why = self.refusal(stated, Dataset(stated.description, Measurements((table,)), {}))
+                if why:
+                    return (), why
+                tables.append(table)
+        except DatasetError:
+            return (), "a recording has no strokes"
+        return tuple(tables), ""
+
+    def _ranked(self, each: Simulated, fit: BatchFit) -> dict[str, RankedTruth]:
+        return self._ranked_parameters(each.z, fit.z) | self._ranked_optimum(each.z, fit.z, each.tie)
+
+    def _ranked_parameters(self, z_true: np.ndarray, z: np.ndarray) -> dict[str, RankedTruth]:
+        """Parameters that both descriptions have and that are fitted."""
+        stated, assumed = self.stated.space, self.assumed.space
+        truth = dict(zip((p.name for p in stated.free), z_true, strict=True))
+        if assumed != stated:
+            values = stated.constrain(jnp.asarray(z_true))
+            truth = {
+                p.name: float(p.prior.unconstrain(jnp.asarray(values[p.name])))
+                for p in assumed.free
+                if p.name in values
+            }
+        return {
+            name: rank_truth(float(value), z[:, assumed.index[name]])
+            for name, value in truth.items()
+            if name in assumed.index
+        }
+
+    def _ranked_optimum(self, z_true: np.ndarray, z: np.ndarray, tie: float) -> dict[str, RankedTruth]:
+        """Optimal length and the efficiency there, for a cable with a route.
+
+        An optimum at an end of the range has probability of its own there; a truth at the same end takes a place at random
+        within it, which keeps its rank uniform.
+        """
+        if self.assumed.description.route is None:
+            return {}
+        truth, draws = self._optimum_of_truth(z_true[None]), self._optimum(z)
+        names = (OPTIMAL_LENGTH, OPTIMAL_EFFICIENCY)
+        return {name: rank_truth(float(t[0]), d, tie) for name, t, d in zip(names, truth, draws, strict=True)}

@@ -1,0 +1,141 @@
+"""What the model does not describe, in sentences with a remedy: readings that depend on where, when or how they were taken."""
+
+
+from bowdenfit.cable.registry import CURVES
+from bowdenfit.inference.departure import FALSE_ALARM, Departure
+from bowdenfit.kinds import readings_called
+from bowdenfit.kinds.inside_runs import ORDER, SPEED, STROKE
+from bowdenfit.kinds.places import RUN
+from bowdenfit.kinds.term import LOAD
+from bowdenfit.questions.check.answer import Checks, checks_of
+from bowdenfit.results.record import Record, once
+from bowdenfit.words import listed
+
+_FEW = 3  # departures that are said
+_INTERVAL = 0.9
+
+
+@once
+def say_what_is_not_described(fit: Record) -> tuple[str, ...]:
+    """Sentences about readings that the model does not describe, the clearest first; none where all is chance."""
+    clear = [each for each in fit.least_squares.departures if each.worth_saying]
+    told: dict[tuple[str, str], Departure] = {}
+    for each in clear:  # the same place may have been asked about in two ways, and inside runs as well as between them
+        told.setdefault((each.table, each.group or each.against), each)
+    found = checks_of(fit)
+    return (*(_sentence(fit, each) for each in list(told.values())[:_FEW]), *(_scatter(found) if found else ()))
+
+
+def _sentence(fit: Record, found: Departure) -> str:
+    """'The model does not describe ...: the loss is 12 % larger ... What to do.'"""
+    readings = readings_called(found.table)
+    what = _called(found.group) if found.group else readings.words
+    read = "the loss" if readings.are_efficiencies else "what was read"
+    low, high = (_much(each) for each in (found.at_low, found.at_high))
+    where = _ends(found)
+    return (
+        f"The model does not describe {what}: {where[0]} {read} is {low} than the model says, and {where[1]} {high}; chance "
+        f"does as much in {_odds(found.chance)}. {_remedy(fit, found)}"
+    )
+
+
+def _called(column: str) -> str:
+    return column.replace("_", " ")
+
+
+def _much(excess: float) -> str:
+    """'12 % larger'"""
+    return f"{100 * abs(excess):.2g} % {'larger' if excess >= 0 else 'smaller'}"
+
+
+def _odds(chance: float) -> str:
+    """'one healthy fit of 5,000'"""
+    if chance < 1e-6:
+        return "less than one healthy fit of a million"
+    return f"one healthy fit of {float(f'{1 / chance:.1g}'):,.0f}"
+
+
+def _ends(found: Departure) -> tuple[str, str]:
+    """Where the lowest and the highest third were taken."""
+    if found.against == STROKE:
+        return ("on the return", "on the pull") if found.inside else ("on the way there", "on the way back")
+    if found.against in (ORDER, RUN):
+        return "in the first third of the readings", "in the last third"
+    name, _, unit = found.against.rstrip(")").partition(" (")
+    low, high = (f"{float(f'{value:.3g}'):g}{f' {unit}' if unit else ''}" for value in (found.low, found.high))
+    return f"around a {name.lower()} of {low}", f"around {high}"
+
+
+def _remedy(fit: Record, found: Departure) -> str:
+    """What to do about it."""
+    model, losses = fit.dataset.description.friction_model, readings_called(found.table).are_efficiencies
+    if found.group:
+        return _other_curve(fit, found.group)
+    if found.against == LOAD and losses:
+        zero = "the zero of the load cells (tare them with the rope slack, or have their offsets fitted)"
+        return _other_friction(model, ("drag", "load-dependent"), zero)
+    if found.against == SPEED and losses:
+        return _other_friction(model, ("rate-dependent",), "the delay between the channels")
+    if found.against == STROKE:
+        return (
+            "Pulling and returning do not share one friction: look at the zero and the gain of both load cells first, then at "
+            "what differs between the strokes (speed, bend, lay of the rope); fit each stroke by itself if nothing does."
+        )
+    if found.against in (ORDER, RUN):
+        return (
+            "Something drifted while it was measured: temperature, wear, or the zero of a load cell. Tare before each run, "
+            "take loads and bends in random order, and leave out the readings from before it settled."
+        )
+    return "Look at those readings first; if they are right, this model is not that of the cable there."
+
+
+def _other_friction(model: str, options: tuple[str, ...], otherwise: str) -> str:
+    """The friction options that are not in the model yet."""
+    missing = [option for option in options if option not in model]
+    if not missing:
+        return f"The friction model has {model} already, so look at {otherwise}."
+    asked = " or ".join(f"--friction {option}" for option in missing)
+    return f"Fit again with {asked} (bowdenfit compare tells which), and look at {otherwise}."
+
+
+def _other_curve(fit: Record, column: str) -> str:
+    """The curve families that the angles of a column do fit."""
+    from bowdenfit.questions.check.other_curves import follows  # what loads JAX is loaded where it is needed
+
+    contacts = fit.dataset.description.contact
+    number, contact = next((i, c) for i, c in enumerate(contacts, 1) if c.wrap_angle.column == column)
+    fitting = [name for name in CURVES if name != contact.wrap_angle.curve and follows(fit.dataset, number, name)]
+    if fitting:
+        asked = " or ".join(f"--set contact.{number}.wrap_angle.curve={name}" for name in fitting)
+        return f"A {contact.wrap_angle.curve} curve does not follow these angles; fit again with {asked}."
+    others = listed([name for name in CURVES if name != contact.wrap_angle.curve])
+    return (
+        f"Neither a {contact.wrap_angle.curve} curve nor any other family ({others}) follows these angles; narrow "
+        "the range under [route] to where one does, or measure the angle with each run."
+    )
+
+
+def _scatter(found: Checks) -> tuple[str, ...]:
+    """Readings that lie outside what the fit says of them more often, or farther, than chance does."""
+    from scipy.stats import binom
+
+    sentences = []
+    for table in found.tables:
+        outside = table.measured - table.in_interval
+        if binom.sf(outside - 1, table.measured, 1 - _INTERVAL) * len(found.tables) < FALSE_ALARM:
+            sentences.append(
+                f"The model does not describe {readings_called(table.table).words}: {outside} of {table.measured} lie outside "
+                "their 90 % intervals. The usual causes are a unit or a column that is not what its heading says, labels of "
+                "runs that belong to several mountings, and noise that was stated too small."
+            )
+    among = len(found.readings)
+    far = [r for r in found.outliers if r.chance * among < FALSE_ALARM]
+    if far:
+        names = listed([readings_called(r.table).one.format(r.label) for r in far[:_FEW]])
+        more = f" and {len(far) - _FEW} more" if len(far) > _FEW else ""
+        sentences.append(
+            f"The model does not describe {names}{more}: so far out that chance does it in less than one healthy fit of "
+            f"{1 / FALSE_ALARM:.0f}. Look at how it was measured and written down; if it stays, fit with --noise student, or "
+            "leave it out and say so."
+        )
+    return tuple(sentences)

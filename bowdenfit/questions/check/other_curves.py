@@ -1,0 +1,34 @@
+"""Whether curves of another family follow the angles of a contact."""
+
+import jax
+import numpy as np
+
+from bowdenfit.dataset import Dataset
+from bowdenfit.inference.departure import FALSE_ALARM
+from bowdenfit.inference.least_squares import least_squares
+from bowdenfit.inference.log_density import LogDensity
+from bowdenfit.inference.objective import make_objective
+from bowdenfit.kinds.angles.table import AngleTable
+from bowdenfit.kinds.measurements import Measurements
+from bowdenfit.model import build_model
+
+
+def follows(dataset: Dataset, number: int, family: str) -> bool:
+    """Whether it does.
+
+    Args:
+        dataset: The data set.
+        number: Number of the contact, from 1.
+        family: The other family.
+    """
+    description = dataset.description
+    contacts = list(description.contact)
+    angle = contacts[number - 1].wrap_angle
+    contacts[number - 1] = contacts[number - 1].model_copy(update={"wrap_angle": angle.model_copy(update={"curve": family})})
+    changed = description.model_copy(update={"contact": tuple(contacts)})
+    table = dataset.measurements.table(AngleTable)
+    with jax.enable_x64(True):
+        posterior = LogDensity(build_model(Dataset(changed, Measurements((table,) if table else (), ()), {})))
+        found = least_squares(posterior, make_objective(posterior), np.zeros(posterior.model.space.size), intervals=False)
+    mine = [each for each in found.departures if each.group == angle.column]
+    return bool(mine) and all(each.chance >= FALSE_ALARM for each in mine)

@@ -1,0 +1,87 @@
+"""What priors do to coefficients, design answers and the widths of their intervals, in sentences."""
+
+from math import isfinite
+
+from bowdenfit.inference.prior_sensitivity import Sensitivity, Width
+from bowdenfit.questions.check.answer import Checks
+from bowdenfit.words import decimals, listed
+
+_ANSWERS = {"optimal_length": "the best length", "optimal_efficiency": "the efficiency there"}
+
+
+def priors_text(found: Checks) -> str:
+    """What priors do; empty without sensitivities."""
+    every, said = found.sensitivities, [_contradictions(found)]
+    felt = [s for s in every if s.diagnosis in {"prior decides", "both count"}]
+    if felt:
+        said.append(f"The prior counts for {listed([_felt(s) for s in felt])}{_with_wider_prior(felt)}.")
+    said += _widths(found)
+    if every and not any(said):
+        answers = " and the design answer" if any(s.quantity in _ANSWERS for s in every) else ""
+        said.append(f"Priors hardly count for the coefficients{answers}, nor for the widths of their intervals.")
+    return " ".join(part for part in said if part)
+
+
+def _contradictions(found: Checks) -> str:
+    """Parameters that lie far out by their priors, or where a prior that counts is at odds with the readings."""
+    conflicts = found.conflicts
+    sds = {s.parameter: s.prior_sds for s in conflicts} | {f.parameter: f.prior_sds for f in found.far_out}
+    if not sds:
+        return ""
+    far = max(abs(value) for value in sds.values())
+    return (
+        f"Prior and readings contradict each other about {listed(list(sds))}: what was found lies {far:.1f} standard "
+        f"deviations of the prior from its middle{_with_wider_prior(conflicts)}. Check the prior, its unit first."
+    )
+
+
+def _widths(found: Checks) -> list[str]:
+    """Priors that widths follow, the strongest first, and those of which the draws cannot tell."""
+    held: dict[str, list[tuple[str, Width]]] = {}
+    for s in found.sensitivities:
+        for width in s.followed:
+            held.setdefault(width.parameter, []).append((_answer(s.quantity), width))
+    strongest = sorted(held, key=lambda name: -max(width.size for _, width in held[name]))
+    said = [_follows(name, held[name], found) for name in strongest[:1]]
+    if strongest[1:]:
+        said.append(f"Widths also follow the prior{'s' if len(strongest) > 2 else ''} of {listed(strongest[1:])}.")
+    untold = list(dict.fromkeys(name for s in found.sensitivities for name in s.untold))
+    if untold:
+        said.append(f"The draws cannot tell how widths follow the prior of {listed(untold)} (k above 0.7).")
+    return said
+
+
+def _follows(parameter: str, held: list[tuple[str, Width]], found: Checks) -> str:
+    """'The prior of tau sets widths: the 90 % interval of mu1 would be 1.4 times as wide with its scale doubled and ...'"""
+    name, width = max(held, key=lambda each: each[1].size)
+    others = [other for other, _ in held if other != name]
+    more = f"; less so {listed(others)}" if others else ""
+    why = ""
+    if parameter in found.told_by:
+        readings, coefficients = found.told_by[parameter]
+        why = f", because {readings} readings have {coefficients} coefficients to tell as well"
+    known = [(what, ratio) for what, ratio in (("doubled", width.doubled), ("halved", width.halved)) if isfinite(ratio)]
+    changes = listed([f"{ratio:.2f} times as wide with its scale {what}" for what, ratio in known])
+    return f"The prior of {parameter} sets widths{why}: the 90 % interval of {name} would be {changes}{more}."
+
+
+def _answer(quantity: str) -> str:
+    return _ANSWERS.get(quantity, quantity)
+
+
+def _felt(s: Sensitivity) -> str:
+    name = _answer(s.quantity)
+    return name if s.parameter == s.quantity else f"{name} (that of {s.parameter})"
+
+
+def _with_wider_prior(found: list[Sensitivity]) -> str:
+    """How far the quantity that moves most would move with a wider prior."""
+    known = [s for s in found if isfinite(s.wider) and s.sd]
+    if not known:
+        return ""
+    s = max(known, key=lambda s: abs(s.wider - s.median) / s.sd)
+    digits = decimals(s.sd) + 1
+    return (
+        f"; were the prior of {s.parameter} twice as wide, {_answer(s.quantity)} would be "
+        f"{s.wider:.{digits}f} instead of {s.median:.{digits}f}"
+    )

@@ -1,0 +1,28 @@
+"""Which answers of a fit are kept in its folder: what verbs are asked most, where that needs no further physics."""
+
+from typing import Any
+
+import numpy as np
+
+from bowdenfit.questions.identify.judgment import identifiability
+from bowdenfit.questions.predict.lengths import predict_at_lengths
+from bowdenfit.questions.summary.verdict import verdict
+from bowdenfit.results.plain import stored
+from bowdenfit.results.record import Record
+
+
+def answers_of(fit: Record) -> dict[str, Any]:
+    """Plain data by question; what a fit cannot answer is not among them.
+
+    Args:
+        fit: The fit.
+    """
+    answers: dict[str, Any] = {"troubles": list(verdict(fit).troubles)}
+    if fit.posterior is not None:
+        answers["identify"] = stored(vars(identifiability(fit)))
+        if (route := fit.dataset.description.route) is not None:
+            answers["length"] = stored(fit.optimal_length())
+            if route.choices:
+                rows = predict_at_lengths(fit, np.asarray(route.choices), None, "pull")
+                answers["predict"] = [[length, stored(row)] for length, row in zip(route.choices, rows, strict=True)]
+    return answers

@@ -1,0 +1,84 @@
+"""Which predictions lie outside what was measured, in words, and where a rope would have to push."""
+
+from collections.abc import Callable
+from dataclasses import dataclass
+
+import numpy as np
+
+from bowdenfit.kinds import each_table
+from bowdenfit.questions.bends.answer import elastic_answers
+from bowdenfit.results.record import Record
+
+_ROUNDING = 1e-6  # of an end of a range, by which a number may miss it
+_SURELY, _HARDLY = 0.995, 0.005  # shares of the draws
+Span = tuple[float, float] | None
+
+
+@dataclass(frozen=True)
+class Measured:
+    """What a cable was measured at, from the lowest to the highest; None where it was not.
+
+    Args:
+        lengths: Route values of wrap angles and of friction.
+        loads: Forces that friction acted on [N].
+        unit: Unit of the route.
+    """
+
+    lengths: Span
+    loads: Span
+    unit: str
+
+    def notes(self, length: float | None, input_force: float | None) -> list[str]:
+        """What lies outside, in words.
+
+        Args:
+            length: Route value; None without a route.
+            input_force: Force that was asked for [N]; None where the fit's own counts.
+        """
+        said = [_note(length, self.lengths, "lengths", self.unit)]
+        if input_force is not None:
+            said.append(_note(input_force, self.loads, "loads", "N") if self.loads else "no table says at which loads")
+        return [note for note in said if note]
+
+
+def measured(fit: Record) -> Measured:
+    """What the tables of a fit were measured at."""
+    measurements, route = fit.dataset.measurements, fit.dataset.description.route
+    tables = list(each_table(measurements))
+    lengths = [np.ravel(getattr(kind.conditions(table) if kind.conditions else table, "route", ())) for kind, table in tables]
+    loads = [np.abs(np.ravel(kind.forces(table))) for kind, table in tables]
+    return Measured(_span(lengths), _span(loads), route.unit if route else "")
+
+
+def bends_note(fit: Record) -> Callable[[float], str]:
+    """Function of a wrap angle [rad] that says that nothing was measured there; empty where something was."""
+    span = _span([np.rad2deg(elastic_answers(fit).measured_bends)])
+    return lambda angle: _note(float(np.rad2deg(angle)), span, "wrap angles", "deg")
+
+
+def pulled(force: np.ndarray, input_force: float, word: str = "slack") -> tuple[np.ndarray, list[str]]:
+    """Forces of a rope, which pulls or is slack but never pushes, and for each column what is said of it.
+
+    Args:
+        force: Forces by draws (rows), negative where nothing is left [N].
+        input_force: What they are left of [N].
+        word: What a rope is that does not pull.
+    """
+    share = np.mean(force <= _ROUNDING * input_force, axis=0)
+    words = [word if s > _SURELY else f"{word} in {s:.0%} of the draws" if s > _HARDLY else "" for s in share]
+    return np.maximum(force, 0.0), words
+
+
+def _span(parts: list[np.ndarray]) -> Span:
+    every = np.concatenate([np.asarray(part, dtype=float) for part in parts]) if parts else np.zeros(0)
+    known = every[np.isfinite(every)]
+    return (float(known.min()), float(known.max())) if len(known) else None
+
+
+def _note(value: float | None, span: Span, what: str, unit: str) -> str:
+    if value is None or span is None:
+        return ""
+    slack = _ROUNDING * max(abs(span[0]), abs(span[1]))
+    if span[0] - slack <= value <= span[1] + slack:
+        return ""
+    return f"outside the {what} measured, {span[0]:.4g} to {span[1]:.4g} {unit}"

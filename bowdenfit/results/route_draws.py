@@ -1,0 +1,122 @@
+"""What every draw implies along the route, in one program: curves, and efficiencies at the lengths that can be bought."""
+
+from concurrent.futures import Executor
+from dataclasses import dataclass
+from typing import Any
+
+import jax
+import jax.numpy as jnp
+import numpy as np
+from jax import Array
+from jaxtyping import Float
+
+from bowdenfit.cable.load_cells import RUN_SCATTER
+from bowdenfit.cable.noise import noise_law
+from bowdenfit.description import Description, Route
+from bowdenfit.inference.draws import OfDraws, curves_of, for_each_draw
+from bowdenfit.inference.interval import Interval
+from bowdenfit.model import Model
+from bowdenfit.results.choices import at_edge, best_window, rank_choices
+from bowdenfit.results.length import OptimalLength
+from bowdenfit.results.optimum import GRID_POINTS, route_grid
+
+
+@dataclass(frozen=True)
+class RouteDraws:
+    """Of every draw (rows).
+
+    Args:
+        grid: Route values of the curves.
+        curves: The efficiency [1] and wrap angles [deg] on the grid, by name.
+        choices: Efficiency at the choices.
+        mean, mounted: Output force [N] there at the reference force, without a mounting's effect and in a new one.
+    """
+
+    grid: np.ndarray
+    curves: dict[str, np.ndarray]
+    choices: np.ndarray
+    mean: np.ndarray
+    mounted: np.ndarray
+
+
+def compile_along_route(model: Model, beside: Executor | None = None) -> OfDraws:
+    """Curves and efficiencies of a cable with a route, of draws of z with the effect of a new mounting on the exponent.
+
+    Args:
+        model: The model.
+        beside: See `compile_program`.
+    """
+    route, grid = model.description.route, route_grid(model)
+    assert route is not None  # callers ask only where there is a route
+    at, force = np.asarray(route.choices, dtype=float), model.cable.friction.conditions.reference_force
+    curves = curves_of(model, np.concatenate([grid, at]))
+
+    def pulled(values: dict[str, Array], effect: Array) -> Array:
+        return model.cable.output_force_at(values, jnp.asarray(at), jnp.asarray(float(force)), jnp.ones(()), effect)
+
+    def implied(z_and_mounting: Float[Array, " free_and_one"]) -> dict[str, Any]:
+        values = model.space.constrain(z_and_mounting[:-1])
+        effects = {"mean": jnp.zeros(()), "mounted": z_and_mounting[-1]}
+        of_choices = {name: pulled(values, effect) for name, effect in effects.items()} if len(at) else {}
+        return {"curves": curves(z_and_mounting[:-1]), **of_choices}
+
+    with jax.enable_x64(True):
+        return for_each_draw(implied, model.space.size + 1, beside=beside)
+
+
+def route_draws(model: Model, program: OfDraws, z: np.ndarray, mounting: np.ndarray) -> RouteDraws:
+    """What draws imply along the route.
+
+    Args:
+        model: The model.
+        program: Of `compile_along_route`.
+        z: Draws, one a row.
+        mounting: Effect of a new mounting on the friction exponent of each.
+    """
+    with jax.enable_x64(True):
+        found = program(np.column_stack([z, mounting]))
+    none = np.zeros((len(z), 0))
+    return RouteDraws(
+        route_grid(model),
+        {name: draws[:, :GRID_POINTS] for name, draws in found["curves"].items()},
+        found["curves"]["efficiency"][:, GRID_POINTS:],
+        found.get("mean", none),
+        found.get("mounted", none),
+    )
+
+
+def new_mounting(description: Description, values: dict[str, np.ndarray], n: int, seed: int) -> np.ndarray:
+    """Effect of one new mounting on the friction exponent [1], for every draw.
+
+    Args:
+        description: How readings scatter.
+        values: Draws by parameter.
+        n: Their number.
+        seed: Of the fit.
+    """
+    scatter = values.get(RUN_SCATTER, np.zeros(1)).ravel()
+    return scatter * noise_law(description).draw_with(np.random.default_rng([seed, 3]), n)
+
+
+def best_length(
+    route: Route, lengths: np.ndarray, efficiencies: np.ndarray, along: RouteDraws, force: float | None
+) -> OptimalLength:
+    """The design answer.
+
+    Args:
+        route: What can be chosen.
+        lengths: Optimum of every draw.
+        efficiencies: Efficiency there.
+        along: The same draws along the route.
+        force: Input force at which efficiencies hold [N]; None where they are the same at any.
+    """
+    return OptimalLength(
+        route.variable,
+        route.unit,
+        Interval.of(lengths),
+        Interval.of(efficiencies),
+        float(at_edge(lengths, route.range).mean()),
+        best_window(along.grid, along.curves["efficiency"], efficiencies),
+        rank_choices(np.asarray(route.choices), along.choices) if route.choices else (),
+        force,
+    )

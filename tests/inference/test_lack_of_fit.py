@@ -1,0 +1,183 @@
+"""Whether a model describes its readings: silent on healthy benches, and clear where something depends on what it should not.
+
+The benches are those of `hand_bench`, which shares no code with the likelihood.
+"""
+
+import hand_bench
+import jax
+import numpy as np
+import pytest
+
+import bowdenfit as bf
+from bowdenfit.dataset import load_dataset
+from bowdenfit.inference.departure import FALSE_ALARM
+from bowdenfit.inference.least_squares import least_squares
+from bowdenfit.inference.log_density import LogDensity
+from bowdenfit.inference.objective import make_objective
+from bowdenfit.kinds.inside_runs import ORDER, STROKE
+from bowdenfit.kinds.term import LOAD
+from bowdenfit.model import build_model
+
+LOADS = (20, 40, 60, 80, 100, 120)
+CURVE = """
+schema = 1
+name = "bench"
+[route]
+variable = "cable_length"
+unit = "mm"
+range = [430, 550]
+[[contact]]
+name = "sheath"
+friction = "mu"
+wrap_angle = { curve = "CURVE", column = "sheath_angle" }
+[tables]
+angles = { file = "angles.csv", detection_limit = { value = 5, unit = "deg" } }
+forces = { file = "forces.csv" }
+"""
+ROUTES = {
+    "gaussian": lambda x: 60 * np.exp(-((x - 0.1) ** 2) / 0.5),
+    "parabola": lambda x: 60 * (1 - 0.8 * (x - 0.1) ** 2),
+    "logistic": lambda x: 60 / (1 + np.exp(-3 * (x - 0.2))),
+    "line": lambda x: 50 + 30 * x,
+}
+
+
+def forces(folder, seed, *, places=(180.0,) * 3, loads=LOADS, noise=0.4, asymmetry=0.0, drift=0.0, **bench):
+    """Three mountings of one bend, and what is wrong with them."""
+    generator = np.random.default_rng(seed)
+    loss = 0.12 * np.deg2rad(np.array(places))
+    given = {"repeats": 5, "scatter": 0.02, "noise": (0.0, 0.0)} | bench
+    rows = hand_bench.pull(generator, places, loss, loads, **given)
+    wrong = 1 - asymmetry / 2 * rows.stroke + drift * (np.linspace(0, 1, len(rows.stroke)) - 0.5)
+    ratio = np.log(rows.force_in / rows.force_out) * wrong
+    out = rows.force_in * np.exp(-ratio)
+    read = (force + noise * generator.standard_normal(len(out)) for force in (rows.force_in, out))
+    force_in, force_out = read
+    return hand_bench.write(folder, hand_bench.Readings(rows.label, rows.place, rows.stroke, force_in, force_out))
+
+
+def route(folder, seed, shape, curve, n=25):
+    """Angles along a route, and a mounting at three lengths."""
+    generator, lengths = np.random.default_rng(seed), np.linspace(430, 550, n)
+    angles = ROUTES[shape]((lengths - 490) / 60) + generator.standard_normal(n)
+    places = np.array([440.0, 490.0, 540.0])
+    loss = 0.15 * np.deg2rad(ROUTES[shape]((places - 490) / 60))
+    rows = hand_bench.pull(generator, places, loss, (40, 80), repeats=3, noise=(0.3, 0.3), scatter=0.01)
+    hand_bench.write(folder, rows, CURVE.replace("CURVE", curve), "cable_length_mm")
+    cells = [f"{at:g},{angle:.2f}" if angle >= 5 else f"{at:g},<5" for at, angle in zip(lengths, angles, strict=True)]
+    (folder / "angles.csv").write_text("\n".join(["cable_length_mm,sheath_angle_deg", *cells]) + "\n")
+    return folder
+
+
+class Judge:
+    """Departures of one data set after the other, with one program for all of one shape."""
+
+    def __init__(self):
+        self.objectives = {}
+
+    def __call__(self, folder, friction=None):
+        with jax.enable_x64(True):
+            data = load_dataset(folder, [f'friction_model="{friction}"'] if friction else [])
+            posterior = LogDensity(build_model(data))
+            shape = str(jax.tree.map(np.shape, posterior.data)) + str(posterior.model.space)
+            if shape not in self.objectives:
+                self.objectives[shape] = make_objective(posterior)
+            start = np.zeros(posterior.model.space.size)
+            return least_squares(posterior, self.objectives[shape], start, intervals=False).departures
+
+
+@pytest.fixture(scope="module")
+def judge():
+    return Judge()
+
+
+HEALTHY = {
+    "three mountings": {},
+    "one mounting": {"places": (180.0,)},
+    "twenty mountings": {"places": (180.0,) * 20, "repeats": 1},
+    "forces of a newton": {"loads": (0.5, 1, 2, 3), "noise": 0.02},
+    "forces of 10 kN": {"loads": (5e3, 1e4, 2e4), "noise": 40.0},
+    "three bends": {"places": (90.0, 180.0, 360.0)},
+}
+
+
+def alarms(judge, make, tmp_path, count, friction=None):
+    """How many of so many benches are said not to be described."""
+    said = [any(d.worth_saying for d in judge(make(tmp_path, seed), friction)) for seed in range(count)]
+    return int(np.sum(said))
+
+
+@pytest.mark.parametrize("bench", HEALTHY)
+def test_healthy_benches_raise_no_alarm(tmp_path, judge, bench):
+    """Three in a thousand may: of 30 benches, more than one does in 4 of 1000 runs of this test with other seeds."""
+    assert alarms(judge, lambda path, seed: forces(path, seed, **HEALTHY[bench]), tmp_path, 30) <= 1
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("bench", [*HEALTHY, "drag", "gaussian", "logistic", "line"])
+def test_at_most_one_healthy_bench_in_a_hundred_raises_an_alarm(tmp_path, judge, bench):
+    """At 0.003 an alarm, more than five of 500 by chance in 4 of 1000 runs of this test with other seeds."""
+    if bench in ROUTES:
+        count = alarms(judge, lambda path, seed: route(path, seed, bench, bench), tmp_path, 500)
+    elif bench == "drag":
+        count = alarms(judge, lambda path, seed: forces(path, seed, drag=3.5), tmp_path, 500, "drag")
+    else:
+        count = alarms(judge, lambda path, seed: forces(path, seed, **HEALTHY[bench]), tmp_path, 500)
+    assert count <= 5
+
+
+def test_chances_of_healthy_benches_are_uniform(tmp_path, judge):
+    """The smallest corrected chance is below 0.2 in at most a fifth of healthy benches, and not never."""
+    smallest = [min(d.chance for d in judge(forces(tmp_path, seed))) for seed in range(60)]
+    assert 3 <= np.sum(np.array(smallest) < 0.2) <= 20
+
+
+FAULTS = {
+    "a drag of a twentieth of the middle load": ({"drag": 3.5}, LOAD),
+    "a fifth more friction on the return": ({"asymmetry": 0.2}, STROKE),
+    "a twentieth more friction on the return": ({"asymmetry": 0.05}, STROKE),
+    "friction that rises by a fifth while it is measured": ({"drift": 0.2}, ORDER),
+}
+
+
+@pytest.mark.parametrize("fault", FAULTS)
+def test_faults_inside_runs_are_named(tmp_path, judge, fault):
+    wrong, against = FAULTS[fault]
+    for seed in range(3):
+        clear = [d for d in judge(forces(tmp_path, seed, **wrong)) if d.worth_saying]
+        assert against in {d.against for d in clear}
+        assert all(d.inside for d in clear if d.against == against)
+
+
+def test_a_model_with_the_drag_describes_the_bench_that_has_one(tmp_path, judge):
+    for seed in range(3):
+        assert not any(d.worth_saying for d in judge(forces(tmp_path, seed, drag=3.5), "drag"))
+
+
+@pytest.mark.parametrize(("shape", "curve"), [("parabola", "gaussian"), ("gaussian", "line"), ("logistic", "line")])
+def test_a_route_that_its_curve_cannot_follow_is_named(tmp_path, judge, shape, curve):
+    for seed in range(3):
+        clear = [d for d in judge(route(tmp_path, seed, shape, curve)) if d.worth_saying]
+        assert clear and clear[0].group == "sheath_angle"
+
+
+def test_the_verdict_says_what_to_do(tmp_path):
+    fit = bf.fit(forces(tmp_path, 1, drag=3.5), mcmc=False)
+    reasons = " ".join(fit.verdict().reasons)
+    assert not fit.verdict().trusted
+    assert "around a load of" in reasons and "--friction drag" in reasons and "the loss is" in reasons
+    assert bf.fit(forces(tmp_path, 1, drag=3.5), friction="drag", mcmc=False).verdict().trusted
+
+
+def test_the_verdict_names_the_curve_that_would_fit(tmp_path):
+    reasons = " ".join(bf.fit(route(tmp_path, 1, "gaussian", "line"), mcmc=False).verdict().reasons)
+    assert "--set contact.1.wrap_angle.curve=gaussian" in reasons
+    reasons = " ".join(bf.fit(route(tmp_path, 2, "parabola", "line"), mcmc=False).verdict().reasons)
+    assert ("sheath angle" in reasons and "A line curve does not follow" in reasons) or "Neither a line curve" in reasons
+
+
+def test_chances_are_corrected_for_how_many_were_asked_about(tmp_path, judge):
+    assert FALSE_ALARM < 0.01
+    found = judge(forces(tmp_path, 3))
+    assert len(found) > 3 and all(0 <= d.chance <= 1 for d in found)
+    assert [d.chance for d in found] == sorted(d.chance for d in found)

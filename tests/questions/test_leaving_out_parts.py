@@ -1,0 +1,92 @@
+"""Comparisons of fits with few mountings: parts of a run left out, the effect of its mounting integrated out."""
+
+from dataclasses import replace
+
+import hand_bench
+import jax
+import jax.numpy as jnp
+import numpy as np
+import pytest
+
+import bowdenfit as bf
+from bowdenfit.dataset import load_dataset
+from bowdenfit.errors import UsageError
+from bowdenfit.inference.leave_one_out import ReadingsToLeaveOut
+from bowdenfit.inference.log_density import LogDensity
+from bowdenfit.kinds.run_parts import run_parts
+from bowdenfit.kinds.runs import run_sums
+from bowdenfit.model import build_model
+from bowdenfit.questions.compare.words import comparison_text
+
+LOADS = (20, 40, 60, 80, 100, 120)
+
+
+def bench(folder, runs=1, drag=0.0, seed=1):
+    rows = hand_bench.pull(
+        np.random.default_rng(seed), [180.0] * runs, [0.12 * np.pi] * runs, LOADS,
+        repeats=5, noise=(0.4, 0.4), drag=drag, scatter=0.02,
+    )  # fmt: skip
+    return hand_bench.write(folder, rows)
+
+
+@pytest.mark.parametrize("friction", ["capstan", "drag"])
+@pytest.mark.parametrize("unit", ["load", "reading"])
+def test_leaving_out_a_part_is_the_likelihood_of_the_other_readings(tmp_path, friction, unit):
+    """Against the term of a table without those readings, at several places of the posterior."""
+    with jax.enable_x64(True):
+        posterior = LogDensity(build_model(load_dataset(bench(tmp_path, runs=3), [f'friction_model="{friction}"'])))
+        (term,) = posterior.model.terms
+        parts = run_parts(term, unit)
+        readings = ReadingsToLeaveOut(posterior, parts={term.name: parts})
+        z = 0.5 * np.random.default_rng(2).standard_normal((readings.batch, posterior.model.space.size))
+        assert len(parts.labels) == (3 * 2 * 8 if unit == "load" else 180)
+        i = len(parts.labels) // 2
+        kept = _without(term.rows, i, unit)
+        others = replace(term, data=run_sums(term.cable, kept), rows=kept)
+        found = np.asarray(readings.without(i)(z, posterior.data))[:5]
+        for density, each in zip(found, z, strict=False):
+            values = posterior.model.space.constrain(jnp.asarray(each))
+            exact = jnp.sum(others.log_likelihood(values, others.data)) - 0.5 * each @ each
+            assert density == pytest.approx(float(exact), abs=1e-8)
+        assert parts.said[i, 0] == len(term.rows.run) - len(kept.run)
+
+
+def _without(rows, i, unit):
+    """Readings without part i, found by what parts are called: in the order of run, stroke and load."""
+    run = np.unique(rows.run, return_inverse=True)[1]
+    groups = []
+    for r in np.unique(run):
+        for stroke in (-1, 1):
+            mine = np.flatnonzero((run == r) & (rows.stroke == stroke))
+            mine = mine[np.argsort(rows.input_force[mine], kind="stable")]
+            groups += np.array_split(mine, 8) if unit == "load" else [np.array([k]) for k in np.sort(mine)]
+    kept = ~np.isin(np.arange(len(run)), groups[i])
+    arrays = {name: value[kept] for name, value in vars(rows).items() if name != "angles"}
+    return replace(rows, **arrays, angles={name: value[kept] for name, value in rows.angles.items()})
+
+
+@pytest.fixture(scope="module")
+def one_run(tmp_path_factory):
+    folder = bench(tmp_path_factory.mktemp("one run"), drag=6.0)
+    return {name: bf.fit(folder, friction=name, seed=1) for name in ("capstan", "drag")}
+
+
+def test_with_one_run_its_loads_are_left_out_and_the_right_model_is_preferred(one_run):
+    found = bf.compare(one_run)
+    assert found.best == "drag" and found.verdict("capstan") == "clear"
+    assert found.left_out == "load" and len(found.readings) == 16
+    text = " ".join(comparison_text(found).split())
+    assert "there is one run" in text and "The data prefer drag over capstan" in text
+    assert "inf" not in text.replace("inform", "")
+
+
+def test_a_single_run_left_out_whole_is_refused(one_run):
+    with pytest.raises(UsageError, match="nothing predicts it once it is left out"):
+        bf.compare(one_run, leave_out="run")
+
+
+def test_too_many_readings_are_refused_with_what_to_do_instead(tmp_path):
+    with jax.enable_x64(True):
+        (term,) = build_model(load_dataset(bench(tmp_path, runs=10))).terms
+        with pytest.raises(UsageError, match="--leave-out load"):
+            run_parts(term, "reading")

@@ -1,0 +1,73 @@
+"""What the summary says is wrong, the verdict says too."""
+
+from dataclasses import replace
+
+import jax
+import numpy as np
+import pytest
+from hand_bench import pull, write
+
+import bowdenfit as bf
+from bowdenfit.dataset import Dataset, load_dataset
+from bowdenfit.kinds.forces.table import ForceTable
+from bowdenfit.kinds.measurements import Measurements
+from bowdenfit.questions.summary.verdict import IMPOSSIBLE, NOT_CONVERGED, NOT_DESCRIBED, NOT_IDENTIFIABLE
+from bowdenfit.questions.summary.words import summary_text
+
+HALF_TURN = """
+schema = 1
+name = "bench"
+[[contact]]
+name = "sheath"
+friction = "mu"
+wrap_angle = { value = 180, unit = "deg" }
+[tables]
+forces = { file = "forces.csv" }
+[sampler]
+n_walkers = 32
+max_steps = 1500
+target_ess = 100
+target_r_hat = 1.05
+"""
+
+
+def _bench(folder, runs: int, seed: int = 0, scatter: float = 0.01) -> Dataset:
+    rows = pull(
+        np.random.default_rng(seed), [180.0] * runs, [0.3] * runs, (20.0, 40.0, 60.0), strokes=(1,), repeats=5,
+        noise=(0.3, 0.3), scatter=scatter,
+    )  # fmt: skip
+    return load_dataset(write(folder, rows, HALF_TURN))
+
+
+def _swapped(data: Dataset) -> Dataset:
+    """As readings come that no table's check has seen: input and output exchanged."""
+    (table,) = data.measurements.tables
+    assert isinstance(table, ForceTable)
+    return replace(
+        data,
+        measurements=Measurements((replace(table, input_force=table.output_force, output_force=table.input_force),)),
+    )
+
+
+def _told(fit) -> str:
+    with jax.enable_x64(True):
+        return " ".join(summary_text(fit).split())
+
+
+@pytest.mark.parametrize("mcmc", [True, False])
+@pytest.mark.parametrize("runs", [1, 5])
+def test_efficiencies_above_1_are_no_fit_to_trust(tmp_path, runs, mcmc):
+    fit = bf.fit(_swapped(_bench(tmp_path, runs)), seed=1, mcmc=mcmc)
+    assert IMPOSSIBLE in fit.verdict().troubles
+    said = _told(fit)
+    assert "IMPOSSIBLE READINGS" in said and "swapped" in said and "run 1 13" in said
+    if mcmc and "determine no coefficient by itself" in said:
+        assert NOT_IDENTIFIABLE in fit.verdict().troubles
+    if mcmc and runs == 5:
+        assert "hold 0 of 5" in said and NOT_DESCRIBED in fit.verdict().troubles
+
+
+@pytest.mark.parametrize("runs", [1, 2, 5])
+def test_a_healthy_bench_is_trusted(tmp_path, runs):
+    fit = bf.fit(_bench(tmp_path, runs, seed=runs), seed=1)
+    assert set(fit.verdict().troubles) <= {NOT_CONVERGED}, fit.verdict().reasons  # the chain here is short

@@ -1,0 +1,263 @@
+"""What is asked most of a finished fit is read back: quickly, exactly as it would be worked out, and of that fit alone."""
+
+import json
+import shutil
+import subprocess
+import sys
+
+import numpy as np
+import pytest
+
+import bowdenfit as bf
+from bowdenfit.questions.figures import FIGURES, figures_of, kept_figures
+from bowdenfit.questions.length.verb import VERB as LENGTH
+from bowdenfit.questions.predict.verb import VERB as PREDICT
+from bowdenfit.results.folder import ANSWERS, FIGURE_DATA
+from bowdenfit.results.kept import keep, kept
+from bowdenfit.results.plain import stored
+
+QUICK = ("sampler.n_walkers=128", "sampler.target_ess=200", "sampler.target_r_hat=1.05", "sampler.max_steps=4000")
+HEAVY = {
+    "jax",
+    "scipy",
+    "pandas",
+    "xarray",
+    "arviz_base",
+    "arviz_stats",
+    "matplotlib",
+    "pydantic",
+    "pint",
+    "h5py",
+    "h5netcdf",
+}
+REFUSING = """
+import sys
+
+refused = set(sys.argv[1].split(","))
+
+class Refuse:
+    def find_spec(self, name, path=None, target=None):
+        if name.partition(".")[0] in refused:
+            raise SystemExit(f"{name} was imported")
+
+sys.meta_path.insert(0, Refuse())
+from bowdenfit.cli import main
+sys.argv[0:2] = ["bowdenfit"]
+main()
+"""
+
+
+@pytest.fixture(scope="module")
+def results(on_body, tmp_path_factory):
+    """A quick, converged fit with everything in its folder."""
+    folder = tmp_path_factory.mktemp("kept") / "fit"
+    bf.fit(on_body, output=folder, seed=11, settings=QUICK)
+    return folder
+
+
+@pytest.fixture(scope="module")
+def bare(results, tmp_path_factory):
+    """The same folder, as if nothing had been kept."""
+    copy = shutil.copytree(results, tmp_path_factory.mktemp("bare") / "fit")
+    (copy / ANSWERS).unlink()
+    (copy / FIGURE_DATA).unlink()
+    return copy
+
+
+def without(heavy, *arguments):
+    """The command line in a process of its own, in which some libraries cannot be imported."""
+    command = [sys.executable, "-c", REFUSING, ",".join(sorted(heavy)), *map(str, arguments)]
+    return subprocess.run(command, capture_output=True, text=True, check=False)
+
+
+@pytest.mark.parametrize(
+    "arguments",
+    [
+        ("summary", "RESULTS"),
+        ("summary", "RESULTS", "--json"),
+        ("length", "RESULTS"),
+        ("length", "RESULTS", "--json"),
+        ("predict", "RESULTS"),
+        ("predict", "RESULTS", "450", "470", "--format", "json"),
+        ("identify", "RESULTS"),
+    ],
+    ids=" ".join,
+)
+def test_what_needs_no_new_physics_loads_nothing_heavy(results, arguments):
+    done = without(HEAVY, *(results if part == "RESULTS" else part for part in arguments))
+    assert (done.returncode, done.stderr) == (0, "")
+    assert done.stdout
+
+
+def test_help_loads_no_arrays_and_reading_tables_neither_jax_nor_pint(on_body):
+    assert without(HEAVY | {"numpy"}, "--help").returncode == 0
+    done = without(HEAVY - {"pydantic"}, "check", on_body)
+    assert (done.returncode, done.stderr) == (0, "")
+
+
+def test_a_figure_is_drawn_again_without_a_model(results, tmp_path):
+    done = without(HEAVY - {"matplotlib"}, "plot", results, "--figure", "efficiency", "-o", tmp_path)
+    assert (done.returncode, done.stderr) == (0, "")
+    assert sorted(path.name for path in tmp_path.iterdir()) == ["efficiency.png", "efficiency.svg"]
+    for path in tmp_path.iterdir():
+        assert path.read_bytes() == (results / "figures" / path.name).read_bytes()
+
+
+@pytest.mark.parametrize(
+    "arguments", [("predict", "RESULTS", "455.25"), ("identify", "RESULTS", "--json")], ids=" ".join
+)
+def test_new_physics_needs_jax(results, arguments):
+    """So the tests above can fail."""
+    done = without({"jax"}, *(results if part == "RESULTS" else part for part in arguments))
+    assert done.returncode == 1
+    assert "was imported" in done.stderr
+
+
+@pytest.mark.parametrize(
+    "arguments",
+    [
+        ("length",),
+        ("length", "--json"),
+        ("predict",),
+        ("predict", "--format", "json"),
+        ("identify",),
+    ],
+    ids=" ".join,
+)
+def test_what_is_read_back_is_what_would_be_worked_out(results, bare, run, arguments):
+    verb, *options = arguments
+    again = run(verb, results, *options)
+    assert again[0] == 0
+    assert again == run(verb, bare, *options)
+
+
+def test_some_of_the_lengths_that_can_be_bought_are_predicted_as_they_are_alone(results, bare, run):
+    once, again = (
+        json.loads(run("predict", folder, "470", "440", "--format", "json")[1]) for folder in (results, bare)
+    )
+    for one, other in zip(once, again, strict=True):
+        assert list(one) == list(other)
+        assert one.pop("note") == other.pop("note") == ""
+        np.testing.assert_allclose(list(one.values()), list(other.values()), rtol=1e-13)
+
+
+@pytest.mark.parametrize(
+    "other",
+    [
+        {"lengths": (455.25,)},
+        {"lengths": (450.0, 455.25)},
+        {"stroke": "return"},
+        {"input_force": (100.0, "N")},
+        {"quantity": "output-force"},
+        {"wrap_angles": [(90.0, "deg")]},
+        {"preload": (20.0, "N")},
+        {"friction_limit": (5.0, "N")},
+    ],
+    ids=str,
+)
+def test_another_question_is_not_answered_by_what_was_kept(results, other):
+    asked = {"lengths": (), "input_force": None, "stroke": "pull", "quantity": None, "wrap_angles": ()}
+    asked |= {"preload": None, "friction_limit": None}
+    answers = kept(results)
+    assert PREDICT.kept(answers, asked) is not None
+    assert PREDICT.kept(answers, asked | other) is None
+
+
+def _edit(path, old, new):
+    text = path.read_text()
+    assert old in text
+    path.write_text(text.replace(old, new))
+
+
+def _spoil_draws(folder):
+    page = bytearray((folder / "posterior.nc").read_bytes())
+    page[len(page) // 2] ^= 1
+    (folder / "posterior.nc").write_bytes(page)
+
+
+@pytest.mark.parametrize(
+    "change",
+    [
+        lambda f: _edit(f / "fit.json", '"converged": true', '"converged": false'),
+        _spoil_draws,
+        lambda f: (f / "posterior.nc").unlink(),
+        lambda f: _edit(f / ANSWERS, '"variable": "cable_length"', '"variable": "cable_length "'),
+        lambda f: _edit(f / ANSWERS, '"schema": 1', '"schema": 0'),
+        lambda f: _edit(f / ANSWERS, '"version": "', '"version": "0.0'),
+        lambda f: (f / ANSWERS).write_text("{}"),
+        lambda f: (f / ANSWERS).write_text("["),
+        lambda f: (f / ANSWERS).write_text("[]"),
+        lambda f: (f / ANSWERS).write_bytes(b"\xff"),
+    ],
+    ids=["verdict", "draws", "no draws", "answer", "schema", "version", "empty", "cut off", "list", "no text"],
+)
+def test_nothing_is_read_back_of_a_folder_that_was_changed(results, tmp_path, change):
+    copy = shutil.copytree(results, tmp_path / "copy")
+    assert kept(copy)
+    change(copy)
+    assert kept(copy) == {}
+
+
+@pytest.mark.parametrize("verb", ["length", "predict", "identify"])
+def test_an_answer_that_was_kept_in_another_shape_is_worked_out(results, tmp_path, run, verb):
+    copy = shutil.copytree(results, tmp_path / "copy")
+    other = kept(copy) | {"length": {"unit": "mm"}, "predict": [430.0], "identify": {"groups": {}}}
+    keep(copy, other, (copy / "fit.json").read_text())
+    assert kept(copy) == other
+    assert run(verb, copy) == run(verb, results)
+
+
+def test_an_answer_of_missing_draws_is_refused(results, tmp_path, run):
+    copy = shutil.copytree(results, tmp_path / "copy")
+    (copy / "posterior.nc").unlink()
+    code, out, err = run("length", copy)
+    assert (code, out) == (2, "")
+    assert "posterior.nc is missing" in err
+
+
+def test_a_changed_fit_is_answered_anew(results, tmp_path, run):
+    copy = shutil.copytree(results, tmp_path / "copy")
+    _edit(copy / "fit.json", '"converged": true,\n  "reasons": []', '"converged": false,\n  "reasons": ["changed"]')
+    code, _, err = run("length", copy)
+    assert code == 0
+    assert err.startswith("Warning: this fit is not converged")
+
+
+def test_a_fit_that_is_not_to_be_trusted_says_so_beside_what_is_read_back(on_body, tmp_path, run):
+    few = ("sampler.n_walkers=32", "sampler.max_steps=200")
+    bf.fit(on_body, output=tmp_path / "fit", seed=1, settings=few, figures=False)
+    assert LENGTH.kept is not None and kept(tmp_path / "fit")["troubles"]
+    code, out, err = run("length", tmp_path / "fit")
+    (tmp_path / "fit" / ANSWERS).unlink()
+    assert (code, out, err) == run("length", tmp_path / "fit")
+    assert err.startswith("Warning: this fit is not converged")
+
+
+def test_figures_show_what_they_would_show_if_it_were_worked_out(results):
+    worked_out, again = dict(figures_of(bf.load(results))), kept_figures(results)
+    assert list(again) == list(worked_out)
+    for name, data in worked_out.items():
+        assert type(again[name]) is type(data), name
+        assert stored(again[name]) == stored(data), name
+
+
+def test_figures_that_were_changed_are_not_drawn_again(results, tmp_path):
+    copy = shutil.copytree(results, tmp_path / "copy")
+    page = bytearray((copy / FIGURE_DATA).read_bytes())
+    page[len(page) // 2] ^= 1
+    (copy / FIGURE_DATA).write_bytes(page)
+    assert kept_figures(copy) == {}
+    assert kept(copy)
+
+
+@pytest.mark.parametrize(
+    ("name", "says"),
+    [("efficency", "did you mean 'efficiency'"), ("stretch", "nothing to show in the figure 'stretch'")],
+)
+def test_a_figure_that_does_not_exist_is_refused_in_a_sentence(results, refuse, tmp_path, name, says):
+    assert says in refuse("plot", results, "--figure", name, "-o", tmp_path / "figures")
+
+
+def test_figures_have_names_that_plot_takes(results, run, tmp_path):
+    assert run("plot", results, "-o", tmp_path, "--figure", "pairs", "--figure", "wrap_angles")[0] == 0
+    assert {path.stem for path in tmp_path.iterdir()} == {"pairs", "wrap_angles"} <= set(FIGURES)

@@ -1,0 +1,103 @@
+"""The process that works beside a fit: answers and errors come back, and it never outlives the fit."""
+
+import os
+import signal
+import subprocess
+import sys
+import time
+from pathlib import Path
+
+import pytest
+
+from bowdenfit.errors import BowdenfitError
+from bowdenfit.run.helpers import InAnotherProcess, InThisProcess
+
+# A copy is made only of a process in which nothing runs, so each of these is one of its own.
+START = """
+import os, sys, time
+from bowdenfit.run.helpers import InAnotherProcess
+
+def nothing():
+    pass
+
+def two():
+    yield os.getpid()
+    time.sleep(SECONDS)
+    yield 2
+
+helper = InAnotherProcess(True, nothing, False)
+first, second = helper.begin(two, answers=2)
+print(first.result(), flush=True)
+"""
+
+
+def program(seconds, end):
+    return [sys.executable, "-c", START.replace("SECONDS", str(seconds)) + end]
+
+
+def has_ended(pid):
+    deadline = time.monotonic() + 20
+    while time.monotonic() < deadline:
+        try:
+            state = Path(f"/proc/{pid}/stat").read_text(encoding="ascii").rpartition(")")[2].split()[0]
+            if state == "Z":
+                return True
+        except OSError:
+            return True
+        time.sleep(0.02)
+    return False
+
+
+needs_linux = pytest.mark.skipif(sys.platform != "linux", reason="processes are copied on Linux alone")
+
+
+@needs_linux
+def test_answers_come_one_by_one_and_the_process_ends_with_its_work():
+    done = subprocess.run(
+        program(0, "print(second.result(), helper.submit(abs, -3).result()); helper.end()"),
+        capture_output=True, text=True, check=True, timeout=60,
+    )  # fmt: skip
+    pid, answers = done.stdout.splitlines()
+    assert answers == "2 3"
+    assert has_ended(pid)
+
+
+@needs_linux
+@pytest.mark.parametrize("sent", [signal.SIGKILL, signal.SIGTERM])
+def test_a_killed_fit_leaves_no_process_behind_not_even_in_the_middle_of_a_job(sent):
+    with subprocess.Popen(program(600, "second.result()"), stdout=subprocess.PIPE, text=True) as process:
+        pid = int(process.stdout.readline())
+        assert pid != process.pid
+        process.send_signal(sent)
+    ended = has_ended(pid)
+    if not ended:
+        os.kill(pid, signal.SIGKILL)
+    assert ended
+
+
+@needs_linux
+def test_a_process_that_is_ended_from_outside_is_a_sentence():
+    end = "import signal; os.kill(helper.process.pid, signal.SIGKILL)\ntry: second.result()\nexcept Exception as e: print(e)"
+    done = subprocess.run(program(600, end), capture_output=True, text=True, check=True, timeout=60)
+    assert "memory ran out" in done.stdout
+
+
+def fails():
+    yield 1
+    raise BowdenfitError("what was seen")
+
+
+def no_settings():
+    """Nothing to set."""
+
+
+@pytest.mark.parametrize("make", [InThisProcess, lambda: InAnotherProcess(False, no_settings, False)])
+def test_an_error_arrives_where_the_answer_is_asked_for(make):
+    helper = make()
+    first, second = helper.begin(fails, answers=2)
+    assert first.result() == 1
+    with pytest.raises(BowdenfitError, match="what was seen"):
+        second.result()
+    if isinstance(helper, InAnotherProcess):
+        helper.end()
+    helper.thread.shutdown()

@@ -1,0 +1,15 @@
+"""Whether what a figure shows comes back from the file in which it is kept."""
+
+from bowdenfit.questions.figures import data_types
+from bowdenfit.results.arrays import read_arrays, write_arrays
+from bowdenfit.results.plain import stored
+
+
+def assert_kept(data, path):
+    """Every figure's data come back from `path` as they were."""
+    write_arrays(path, data)
+    again = read_arrays(path, data_types(data))
+    assert list(again) == list(data)
+    for name, one in data.items():
+        assert type(again[name]) is type(one), name
+        assert stored(again[name]) == stored(one), name

@@ -1,25 +1,25 @@
-"""How long a fit takes and how much memory it needs, beside the same job written plainly with emcee and with NumPyro.
+"""How long a fit takes and how much memory it needs, beside another checkout and beside the same job written plainly.
 
-    python scripts/benchmark_fit.py [--repeats N]
+    python scripts/benchmark_fit.py [--repeats N] [--against TREE] [--record]
 
 Run it with the Python of the environment that bowdenfit and its tests use, on a machine that does nothing else: it takes
-several minutes, measures everything in one go, and prints three tables. Every number is the median of N fresh
-processes (default 3).
+several minutes, measures everything in one go, and prints one table. Every number is the median of N fresh processes
+(default 3). `--record` puts the table at the head of docs/benchmarks.md, with the machine, the date and the commit.
 
-1. Whole processes, of the on-body data and, where it says so, of the haptic loop: wall time from start to exit, imports,
-   compilation, figures and files included, and the peak of the resident memory of the process and those it starts.
-   "Cache empty" has no program kept by JAX's compilation cache, as in a first fit; "cache filled" is every later one. One
-   fit that is not measured comes first, so that Python's byte code and matplotlib's list of fonts exist. What reads a
-   finished fit is asked of the first.
-2. Stage times of these fits, as fit.json keeps them. "Other" is the rest of the wall time: starting, importing, reading,
-   writing, and waiting for the figures.
-3. Time to 1000 effective draws (bulk, the worst of all 11 parameters) of the joint posterior of the on-body data, by the
-   programs in scripts/baselines, which draw and write nothing. "To 1000" is from the start of the process to the first
-   look at the draws that finds as many, with imports and compilation; how many there were then is in the column beside
-   it, because samplers overshoot, and bowdenfit most: it samples on until R-hat, the tails, l* and eta* are settled too,
-   while the plain programs stop at 1000. "Draws/s" is effective draws for each second of sampling with everything
-   compiled, burn-in or warm-up included. Ratios are to bowdenfit with the cache empty; above 1 means that bowdenfit is
-   quicker. Means of the friction coefficients must agree, or a warning is printed.
+Whole processes: wall time from start to exit, imports, compilation, figures and files included, and the peak of the
+resident memory of the process and those it starts, shared pages counted in each. No program is kept from before ("cold"),
+but for "cache filled". With `--against`, another checkout does the same in turns, and each pair gives a ratio; the lowest
+and the highest of them stand beside their median. Commands on a finished fit read the one that their own checkout wrote.
+
+To 1000 effective draws (bulk, the worst of all 11 parameters) of the joint posterior of the on-body data, by the programs
+in scripts/baselines, which draw and write nothing: from the start of the process to the first look at the draws that finds
+as many. bowdenfit samples on until R-hat, the tails, l* and eta* are settled too, while the plain programs stop at 1000.
+Their pairs are with bowdenfit's own run of the same turn, so that a ratio below 1 means that bowdenfit is quicker. Means of
+the friction coefficients must agree, or a warning is printed. "cold fit beside" compares the whole command, with figures
+and files, to a plain program that only draws.
+
+Below the table: stages of the cold fits as fit.json keeps them; how many programs one fit compiles, and how many times it
+works out each answer, which should be once (scripts/baselines/counted.py, in one process).
 
 The exit code is 0 whenever everything could be measured, whether or not the targets are met.
 """
@@ -28,6 +28,7 @@ import argparse
 import json
 import os
 import platform
+import re
 import subprocess
 import sys
 import tempfile
@@ -46,11 +47,44 @@ DATASET = "datasets/on-body-exoskeleton"
 LOOP = "datasets/synthetic-haptic-loop"  # stretch, preload and loop in one posterior
 BASELINES = Path("scripts") / "baselines"
 COEFFICIENTS = ("mu1", "mu2", "mu3")
-TARGETS = {"fit": 12.0, "fit, haptic loop": 15.0, "fit --no-mcmc": 5.0, "--help": 0.3, "check": 1.5}  # seconds
-READING = {  # what is asked of a finished fit, and its target; the last needs new physics
-    "summary": 0.5, "length": 0.5, "predict": 0.5, "identify": 0.5, "plot --figure efficiency": 0.5, "predict 455": 1.0,
-}  # fmt: skip
-MEMORY_TARGET = 1024.0  # MiB
+BENCH, RECORDINGS = "datasets/synthetic-bench", "datasets/synthetic-recordings"
+FITS: dict[str, tuple[str, ...]] = {  # arguments of a cold fit, by its name in the table
+    "fit": (DATASET,),
+    "fit --no-mcmc": (DATASET, "--no-mcmc"),
+    "fit, haptic loop": (LOOP,),
+    "fit, recordings": (RECORDINGS,),
+    "fit, bench": (BENCH,),
+}
+READS: dict[str, tuple[str, ...]] = {  # FIT stands for a finished fit of the on-body data
+    "summary": ("summary", "FIT"),
+    "length": ("length", "FIT"),
+    "predict": ("predict", "FIT"),
+    "predict 455": ("predict", "FIT", "455"),  # new physics
+    "identify": ("identify", "FIT"),
+    "plot one": ("plot", "FIT", "--figure", "efficiency"),
+    "check": ("check", DATASET),
+    "--help": ("--help",),
+}
+PLAIN = {"blackjax": "plain_blackjax.py", "emcee and NumPy": "plain_emcee.py", "NumPyro": "plain_numpyro.py"}
+TARGETS = {  # ratios
+    "fit": 0.45,
+    "fit --no-mcmc": 0.55,
+    "fit, haptic loop": 0.5,
+    "fit, recordings": 0.5,
+    "fit, bench": 0.5,
+    "cold fit beside blackjax": 0.75,
+    "to 1000, beside emcee and NumPy": 0.6,
+}
+SECONDS = {
+    "summary": 0.5,
+    "length": 0.5,
+    "predict": 0.5,
+    "predict 455": 1.0,
+    "identify": 0.5,
+    "plot one": 0.5,
+}  # targets
+RECORD = ROOT / "docs" / "benchmarks.md"
+HEAD = "# Benchmarks\n\nWritten by `scripts/benchmark_fit.py --record`; its head says what each number is. The newest first.\n"
 NOT_TRUSTED = 3  # exit code of a fit that has not converged
 AGREEMENT = 0.2  # standard deviations between means
 
@@ -79,23 +113,25 @@ class Sampler:
 
     to_target: float
     ess: float
-    draws_per_second: float
     mean: np.ndarray
     sd: np.ndarray
 
 
-def measured(arguments: Sequence[str], environment: dict[str, str], results: Path | None = None) -> Run:
+def measured(
+    arguments: Sequence[str], environment: dict[str, str], results: Path | None = None, tree: Path = ROOT
+) -> Run:
     """Run Python in a fresh process and measure it.
 
     Args:
         arguments: Arguments of Python.
         environment: Changes to the environment.
         results: Results folder that the process writes.
+        tree: The checkout that it starts in.
     """
     with tempfile.TemporaryFile() as output, tempfile.TemporaryFile() as errors:
         started = time.monotonic()
         process = subprocess.Popen(
-            [sys.executable, *arguments], cwd=ROOT, env={**os.environ, **environment}, stdout=output, stderr=errors
+            [sys.executable, *arguments], cwd=tree, env={**os.environ, **environment}, stdout=output, stderr=errors
         )
         watch = MemoryWatch(process.pid)
         _, status, usage = os.wait4(process.pid, 0)
@@ -161,38 +197,111 @@ def byte_code(folder: Path) -> dict[str, str]:
     return {"PYTHONDONTWRITEBYTECODE": "", "PYTHONPYCACHEPREFIX": str(folder / "byte_code")}
 
 
+@dataclass(frozen=True)
+class Row:
+    """A line of the table: what was run, and in the same turns what it is compared with."""
+
+    name: str
+    runs: list[Run]
+    against: list[Run]
+
+    @property
+    def ratios(self) -> list[float]:
+        """Of wall times, pair by pair."""
+        return [a.seconds / b.seconds for a, b in zip(self.runs, self.against, strict=True)] if self.against else []
+
+    def cells(self) -> list[str]:
+        """Wall time and memory, those of the other, ratio with its spread, target."""
+        sides = [side for runs in (self.runs, self.against) for side in _side(runs)]
+        ratios, target = self.ratios, f"{TARGETS.get(self.name, '-')}"
+        said = [f"{x:.2f}" for x in (np.median(ratios), min(ratios), max(ratios))] if ratios else ["-"] * 3
+        return [self.name, *sides, *said, f"{SECONDS[self.name]} s" if self.name in SECONDS else target]
+
+
+COLUMNS = ["", "wall [s]", "peak [MiB]", "other [s]", "peak [MiB]", "ratio", "lowest", "highest", "target"]
+
+
+def _side(runs: list[Run]) -> list[str]:
+    if not runs:
+        return ["-", "-"]
+    memory = float(np.median([run.memory for run in runs]))
+    return [f"{np.median([run.seconds for run in runs]):.2f}", f"{memory:.0f}" if memory else "-"]
+
+
+@dataclass(frozen=True)
 class Bench:
-    """Runs of bowdenfit in one temporary folder, each by its name in the tables."""
+    """Runs of bowdenfit of this checkout, and of another, in one temporary folder."""
 
-    def __init__(self, folder: Path, repeats: int) -> None:
-        self.folder, self.repeats = folder, repeats
-        self.runs: dict[str, Run] = {}
-        self.command("first", ["fit", DATASET, "--no-mcmc", "--seed", "1"], "unmeasured", fits=True)
+    folder: Path
+    repeats: int
+    other: Path | None
 
-    def command(self, name: str, arguments: Sequence[str], cache: str, fits: bool = False) -> Run:
+    @property
+    def trees(self) -> list[Path]:
+        """The checkouts."""
+        return [ROOT, *([] if self.other is None else [self.other])]
+
+    def command(self, tree: Path, arguments: Sequence[str], cache: str, results: Path | None = None) -> Run:
         """Run one bowdenfit command with the compilation cache `cache`."""
-        results = self.folder / name if fits else None
-        output = ["--output", str(results), "--force"] if fits else []
+        output = ["--output", str(results), "--force"] if results is not None else []
         # matplotlib's list of fonts is no compiled program, so it stays where the cache is emptied.
         environment = {"XDG_CACHE_HOME": str(self.folder / cache), "MPLCONFIGDIR": str(self.folder / "matplotlib")}
-        return measured(["-m", "bowdenfit.cli", *arguments, *output], environment, results)
+        environment |= {"PYTHONPATH": str(tree)}
+        return measured(["-m", "bowdenfit.cli", *arguments, *output], environment, results, tree)
 
-    def fits(self, name: str, *options: str, dataset: str = DATASET) -> None:
-        """Fit with the cache empty and again with it filled."""
-        both: dict[str, list[Run]] = {"empty": [], "filled": []}
+    def rows(self) -> Iterator[Row]:
+        """All commands, cold or not, in turns."""
+        for tree in self.trees:
+            self.command(tree, ["fit", DATASET, "--seed", "1"], "unmeasured", self.finished(tree))
+        for name, arguments in FITS.items():
+            yield self.row(name, ["fit", *arguments, "--seed", "1"], cold=True)
+        yield self.row("fit, cache filled", ["fit", DATASET, "--seed", "1"], writes=True)
+        for name, arguments in READS.items():
+            yield self.row(name, arguments)
+
+    def row(self, name: str, arguments: Sequence[str], cold: bool = False, writes: bool = False) -> Row:
+        """One command."""
+        sides: list[list[Run]] = [[] for _ in self.trees]
         for i in range(self.repeats):
-            for state, runs in both.items():
-                say(f"{name}, cache {state}, {i + 1} of {self.repeats}")
-                label = f"{name} {i}".replace(",", "").replace(" ", "_")
-                arguments = ["fit", dataset, "--seed", "1", *options]
-                runs.append(self.command(f"{label}_{state}", arguments, f"{label}_cache", fits=True))
-        for state, runs in both.items():
-            self.runs[f"{name}, cache {state}"] = typical(runs)
+            say(f"{name}, {i + 1} of {self.repeats}")
+            for number, (tree, runs) in enumerate(zip(self.trees, sides, strict=True)):
+                given = [str(self.finished(tree)) if part == "FIT" else part for part in arguments]
+                at = self.folder / f"{name}_{number}_{i}".replace(",", "").replace(" ", "_")
+                cache = f"{at.name}_cache" if cold else "unmeasured"
+                runs.append(self.command(tree, given, cache, at if cold or writes else None))
+        return Row(name, sides[0], sides[1] if len(sides) > 1 else [])
 
-    def quick(self, name: str, *arguments: str) -> None:
-        """A command that compiles nothing."""
-        say(name)
-        self.runs[name] = typical([self.command(name, arguments, "unmeasured") for _ in range(self.repeats)])
+    def finished(self, tree: Path) -> Path:
+        """The fit that commands on a finished fit read."""
+        return self.folder / f"finished_{self.trees.index(tree)}"
+
+
+def samplers(folder: Path, repeats: int) -> dict[str, list[Sampler]]:
+    """Time to 1000 effective draws of bowdenfit and of the plain programs, in turns."""
+    found: dict[str, list[Sampler]] = {}
+    for seed in range(1, repeats + 1):
+        for name, script in {"bowdenfit": "with_bowdenfit.py", **PLAIN}.items():
+            say(f"{name} to 1000, {seed} of {repeats}")
+            environment = {"PYTHONPATH": search_path(), "XDG_CACHE_HOME": str(folder / f"cache_{name}_{seed}")}
+            run = measured([str(BASELINES / script), str(seed)], environment)
+            page = json.loads(run.output)
+            sampler = Sampler(page["ready_at"] - run.started, page["ess"], np.array(page["mean"]), np.array(page["sd"]))
+            found.setdefault(name, []).append(sampler)
+    return found
+
+
+def beside_plain(found: dict[str, list[Sampler]], fits: Row) -> Iterator[Row]:
+    """Bowdenfit beside the plain programs: to 1000 effective draws, and a whole cold fit."""
+    runs = {name: [Run(0.0, s.to_target, 0.0, "") for s in each] for name, each in found.items()}
+    for name in PLAIN:
+        yield Row(f"to 1000, beside {name}", runs["bowdenfit"], runs[name])
+    for name in PLAIN:
+        yield Row(f"cold fit beside {name}", fits.runs, runs[name])
+
+
+def batch_rows() -> Iterator[Row]:
+    """Many cables in one program: cost of 1000 cables, of 200 replications of `calibrate`; measured by a script of its own."""
+    yield from ()
 
 
 def typical(runs: Sequence[Run]) -> Run:
@@ -200,73 +309,39 @@ def typical(runs: Sequence[Run]) -> Run:
     return sorted(runs, key=lambda run: run.seconds)[len(runs) // 2]
 
 
-def sampled(name: str, script: str, environments: Sequence[dict[str, str]]) -> Sampler:
-    """Median of runs of one of the compared programs, each with its own seed and environment."""
-    pages = []
-    for seed, environment in enumerate(environments, start=1):
-        say(f"{name}, {seed} of {len(environments)}")
-        run = measured([str(BASELINES / script), str(seed)], {"PYTHONPATH": search_path(), **environment})
-        page = json.loads(run.output)
-        pages.append(page | {"to_target": page["ready_at"] - run.started})
-    medians = [float(np.median([page[key] for page in pages])) for key in ("to_target", "ess", "draws_per_second")]
-    return Sampler(*medians, *(np.mean([page[key] for page in pages], axis=0) for key in ("mean", "sd")))
-
-
 def search_path() -> str:
     """Where a script finds bowdenfit, installed or not."""
     return os.pathsep.join(filter(None, (str(ROOT), os.environ.get("PYTHONPATH"))))
 
 
-def compared(folder: Path, repeats: int) -> dict[str, Sampler]:
-    """Bowdenfit, with the cache empty and filled, and the plain programs."""
-    caches = [{"XDG_CACHE_HOME": str(folder / f"cache_{i}")} for i in range(repeats)]
-    return {
-        "bowdenfit, cache empty": sampled("bowdenfit, cache empty", "with_bowdenfit.py", caches),
-        "bowdenfit, cache filled": sampled("bowdenfit, cache filled", "with_bowdenfit.py", caches),
-        "emcee and NumPy": sampled("emcee and NumPy", "plain_emcee.py", [{}] * repeats),
-        "NumPyro NUTS": sampled("NumPyro NUTS", "plain_numpyro.py", [{}] * repeats),
-    }
-
-
-def process_table(runs: dict[str, Run]) -> list[list[str]]:
-    """Wall times and memory beside their targets."""
-    rows = [["process", "wall [s]", "target [s]", "peak [MiB]", "target [MiB]"]]
-    for name, run in runs.items():
-        target = (TARGETS | READING)[name.rsplit(", cache", 1)[0]]
-        rows.append([name, f"{run.seconds:.2f}", f"{target:g}", f"{run.memory:.0f}", f"{MEMORY_TARGET:.0f}"])
-    return rows
-
-
-def stage_table(runs: dict[str, Run]) -> list[list[str]]:
-    """Seconds of each stage, one column a fit."""
-    fits = {name: run for name, run in runs.items() if run.results is not None}
+def stage_rows(rows: Sequence[Row]) -> list[list[str]]:
+    """Seconds of each stage of the cold fits, one column a fit."""
+    fits = {row.name: typical(row.runs) for row in rows if row.name in FITS}
     stages = list(dict.fromkeys(stage for run in fits.values() for stage in run.stages))
-    rows = [["stage [s]", *fits]]
+    shown = [["stage [s]", *fits]]
     for stage in stages:
-        rows.append([stage, *(f"{run.stages[stage]:.2f}" if stage in run.stages else "-" for run in fits.values())])
-    rows.append(["other", *(f"{run.seconds - sum(run.stages.values()):.2f}" for run in fits.values())])
-    return rows
+        shown.append([stage, *(f"{run.stages[stage]:.2f}" if stage in run.stages else "-" for run in fits.values())])
+    return shown
 
 
-def sampler_table(samplers: dict[str, Sampler]) -> list[list[str]]:
-    """Time and rate of effective draws, and their ratios to the first."""
-    first = next(iter(samplers.values()))
-    rows = [["program", "to 1000 [s]", "draws then", "ratio", "draws/s", "ratio", *COEFFICIENTS]]
-    for name, s in samplers.items():
-        time_ratio, rate_ratio = s.to_target / first.to_target, first.draws_per_second / s.draws_per_second
-        numbers = [f"{s.to_target:.1f}", f"{s.ess:.0f}", f"{time_ratio:.2f}", f"{s.draws_per_second:.0f}"]
-        rows.append([name, *numbers, f"{rate_ratio:.2f}", *(f"{x:.4f}" for x in s.mean)])
-    return rows
+def counts() -> Iterator[str]:
+    """How many programs each fit compiles, and the answers that it works out, with how many times."""
+    for name in (DATASET, LOOP):
+        say(f"counting, {name}")
+        run = measured([str(BASELINES / "counted.py"), name], {"PYTHONPATH": search_path()})
+        page = json.loads(run.output)
+        answers = ", ".join(f"{asked.split('.', 2)[-1]} {times}" for asked, times in page["answers"].items())
+        yield f"{name}: {page['programs']} programs compiled; answers worked out: {answers}."
 
 
-def disagreements(samplers: dict[str, Sampler]) -> Iterator[str]:
+def disagreements(found: dict[str, list[Sampler]]) -> Iterator[str]:
     """Means that differ, which would make this a comparison of unequal things."""
-    first, *others = samplers
-    for other in others:
-        apart = np.abs(samplers[other].mean - samplers[first].mean) / samplers[first].sd
-        for name, distance in zip(COEFFICIENTS, apart, strict=True):
+    first = found["bowdenfit"]
+    for other in PLAIN:
+        ours, theirs = (np.mean([s.mean for s in each], axis=0) for each in (first, found[other]))
+        for name, distance in zip(COEFFICIENTS, np.abs(theirs - ours) / first[0].sd, strict=True):
             if not distance < AGREEMENT:
-                yield f"Warning: the means of {name} in {first!r} and {other!r} are {distance:.2f} sd apart."
+                yield f"Warning: the means of {name} by bowdenfit and by {other} are {distance:.2f} sd apart."
 
 
 def show(rows: list[list[str]]) -> None:
@@ -288,31 +363,61 @@ def say(what: str) -> None:
 def machine() -> str:
     """The line that says where these numbers are from."""
     cores = len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count()
-    libraries = ", ".join(f"{name} {version(name)}" for name in ("jax", "emcee", "numpyro", "numpy"))
-    return f"Python {platform.python_version()}, {libraries}; {cores} cores; {date.today().isoformat()}."
+    try:
+        models = re.findall(r"model name\s*: (.*)", Path("/proc/cpuinfo").read_text(encoding="utf-8"))
+    except OSError:
+        models = []
+    libraries = ", ".join(f"{name} {version(name)}" for name in ("jax", "emcee", "blackjax", "numpyro", "numpy"))
+    commit = f"commit {_commit(ROOT)}"
+    return (
+        f"{models[0] if models else platform.machine()}, {cores} cores; Python {platform.python_version()}, {libraries}; "
+        f"{date.today().isoformat()}; {commit}."
+    )
+
+
+def _commit(tree: Path) -> str:
+    """What a checkout is at; "+" where it has been changed since."""
+    asked = ["git", "-C", str(tree), "describe", "--always", "--dirty=+", "--exclude", "*"]
+    done = subprocess.run(asked, capture_output=True, text=True, check=False)
+    return done.stdout.strip() or "unknown"
+
+
+def markdown(rows: list[list[str]]) -> str:
+    """A table."""
+    head, *lines = (f"| {' | '.join(row)} |" for row in rows)
+    return "\n".join([head, "|" + " --- |" * len(rows[0]), *lines])
+
+
+def record(sections: Sequence[str]) -> None:
+    """Put what was measured at the head of the record."""
+    before = RECORD.read_text(encoding="utf-8").removeprefix(HEAD) if RECORD.exists() else ""
+    RECORD.parent.mkdir(exist_ok=True)
+    RECORD.write_text(HEAD + "\n" + "\n\n".join(sections) + "\n" + before, encoding="utf-8")
 
 
 def main() -> None:
-    parser = argparse.ArgumentParser(description="Time fits; the head of this file says how to read the tables.")
+    parser = argparse.ArgumentParser(description="Time fits; the head of this file says how to read the table.")
     parser.add_argument("--repeats", type=int, default=3, metavar="N", help="fresh processes a number [default: 3]")
-    repeats = max(parser.parse_args().repeats, 1)
+    parser.add_argument(
+        "--against", type=Path, metavar="TREE", help="another checkout, whose runs are paired with ours"
+    )
+    parser.add_argument("--record", action="store_true", help="keep the table in docs/benchmarks.md")
+    asked = parser.parse_args()
+    repeats, other = max(asked.repeats, 1), asked.against and asked.against.resolve()
     with tempfile.TemporaryDirectory() as folder:
         os.environ.update(byte_code(Path(folder)))
-        bench = Bench(Path(folder), repeats)
-        bench.fits("fit")
-        bench.fits("fit --no-mcmc", "--no-mcmc")
-        bench.fits("fit, haptic loop", dataset=LOOP)
-        bench.quick("--help", "--help")
-        bench.quick("check", "check", DATASET)
-        for name in READING:
-            verb, *rest = name.split()
-            bench.quick(name, verb, str(bench.runs["fit, cache empty"].results), *rest)
-        samplers = compared(Path(folder), repeats)
-        for rows in (process_table(bench.runs), stage_table(bench.runs), sampler_table(samplers)):
-            show(rows)
-    for warning in disagreements(samplers):
-        print(warning)
-    print(machine())
+        rows = list(Bench(Path(folder), repeats, other).rows())
+        found = samplers(Path(folder), repeats)
+        rows += [*beside_plain(found, rows[0]), *batch_rows()]
+        stages = stage_rows(rows)
+    table, remarks = [COLUMNS, *(row.cells() for row in rows)], [*counts(), *disagreements(found)]
+    show(table)
+    show(stages)
+    against = f" Other: commit {_commit(other)}." if other else ""
+    print("\n".join([*remarks, machine() + against]))
+    if asked.record:
+        title = f"## {date.today().isoformat()}, {_commit(ROOT)}"
+        record([title, machine() + against, markdown(table), markdown(stages), *remarks])
 
 
 if __name__ == "__main__":

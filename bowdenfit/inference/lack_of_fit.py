@@ -13,6 +13,7 @@ References:
 from collections.abc import Iterator, Sequence
 from dataclasses import replace
 
+import jax
 import jax.numpy as jnp
 import numpy as np
 
@@ -60,7 +61,8 @@ def _weighed_by_scatter(basin: Basin, model: Model, scale: np.ndarray) -> Soluti
             if name in index and count:
                 at = index[name]
                 value = np.clip(scale[start], *_BELIEVED) * found["values"][at]
-                pin[at] = np.clip(float(model.space.free[at].prior.unconstrain(jnp.asarray(value))), -_FARTHEST, _FARTHEST)
+                unconstrain = jax.jit(model.space.free[at].prior.unconstrain)  # one program instead of one for each operation
+                pin[at] = np.clip(float(unconstrain(jnp.asarray(value))), -_FARTHEST, _FARTHEST)
             start += count
     again = problem.solve(found["z"], basin.at_end, pin)
     return again if again["succeeded"] and np.all(np.isfinite(again["jacobian"])) else found

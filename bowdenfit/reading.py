@@ -20,8 +20,8 @@ class Reading(TypedDict, total=False):
             or time=1000Hz; may be repeated.
         noise: How readings scatter: normally, or as a Student-t, with which a few bad readings or mountings hardly pull
             the fit.
-        friction: How friction depends on load and speed: capstan, or drag (a hidden tension D, which costs
-            D (1 - exp(-Lambda)) of the force at any load), load-dependent and rate-dependent joined by +.
+        friction: How friction depends on load, stroke and speed: capstan, or drag (a hidden tension D, which costs
+            D (1 - exp(-Lambda)) of the force at any load), load-dependent, stroke-dependent and rate-dependent joined by +.
         geometry: How wrap angles follow the length: one curve over the whole range, or regions with dropped angles as
             the on-body paper has them.
         undetected: How angles too small to detect enter.

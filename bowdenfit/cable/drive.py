@@ -7,6 +7,7 @@ positive, and as it is of a loop, whose force passes through zero.
 
 from collections.abc import Mapping
 from dataclasses import dataclass
+from functools import partial
 
 import jax
 import jax.numpy as jnp
@@ -70,7 +71,8 @@ class Rope:
             restart: The same where it must be set anew, because the input before was not known; NaN elsewhere.
         """
         x, band = self.scaled(input_force), self.band(mounting)
-        y, slope = play_operator(x - band, x + band, start, restart=restart)
+        (pulling, returning), slopes = jax.jvp(partial(self.friction.shifts, self.values), (band,), (jnp.ones_like(band),))
+        y, slope = play_operator(x - pulling, x + returning, start, (-slopes[0], slopes[1]), restart)
         return jnp.maximum(self.friction.force(self.values, y), self.least_force), slope
 
     def shown(self, cells: LoadCells, output_force: Recorded, slope: Recorded) -> tuple[Recorded, Recorded]:

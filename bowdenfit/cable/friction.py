@@ -15,11 +15,12 @@ from jaxtyping import Float
 from bowdenfit.cable.conditions import Conditions
 from bowdenfit.description import PriorDefaults
 from bowdenfit.errors import DescriptionError, nearest
-from bowdenfit.parameters.priors import HalfCauchy, HalfNormal, LogNormal, Uniform
+from bowdenfit.parameters.priors import HalfCauchy, HalfNormal, LogNormal, Normal, Uniform
 from bowdenfit.parameters.space import Parameter, Role
 from bowdenfit.physics.friction import force_from_scale, force_scale, force_scale_slope, rate_factor
 
 DRAG, LOAD_EXPONENT = "drag", "load_exponent"
+STROKE_DIFFERENCE = "stroke_difference"
 STRIBECK, STRIBECK_SPEED, VISCOUS = "stribeck", "stribeck_speed", "viscous"
 _SHOWN_SPEED = {"mm/s": ("mm/s", 1.0), "rad/s": ("r/min", 30 / np.pi), "": ("mm/s", 1.0)}
 
@@ -33,6 +34,7 @@ class FrictionOption(ABC):
 
     of_load = False
     of_rate = False
+    of_stroke = False
 
     @abstractmethod
     def parameters(self, conditions: Conditions, defaults: PriorDefaults) -> list[Parameter]:
@@ -49,6 +51,11 @@ class FrictionOption(ABC):
 
     def drag(self, values: Mapping[str, Array]) -> Array:
         """What it adds to the drag D of that scale [N]."""
+        del values
+        return jnp.zeros(())
+
+    def stroke_difference(self, values: Mapping[str, Array]) -> Array:
+        """By how much more friction there is pulling than returning, over the mean of both [1]."""
         del values
         return jnp.zeros(())
 
@@ -138,10 +145,28 @@ class RateDependent(FrictionOption):
 
 
 
+class StrokeDependent(FrictionOption):
+    """Friction that is not the same both ways, mu (1 + d/2) pulling and mu (1 - d/2) returning: a laid rope, wear."""
+
+    of_stroke = True
+
+    def parameters(self, conditions: Conditions, defaults: PriorDefaults) -> list[Parameter]:
+        """The difference d."""
+        conditions.needs_loads("stroke-dependent")
+        meaning = "stroke difference: by how much more friction there is pulling than returning, over the mean of both"
+        prior = Normal(0.0, defaults.stroke_difference)
+        return [Parameter(STROKE_DIFFERENCE, "$d$", meaning, "friction_model", prior)]
+
+    def stroke_difference(self, values: Mapping[str, Array]) -> Array:
+        """D"""
+        return values[STROKE_DIFFERENCE]
+
+
 FRICTION_OPTIONS: dict[str, FrictionOption] = {
     "drag": Drag(),
     "load-dependent": LoadDependent(),
     "rate-dependent": RateDependent(),
+    "stroke-dependent": StrokeDependent(),
 }
 
 
@@ -184,6 +209,11 @@ class FrictionModel:
         """Whether friction depends on speed."""
         return any(option.of_rate for option in self._options)
 
+    @property
+    def depends_on_stroke(self) -> bool:
+        """Whether friction is not the same pulling and returning."""
+        return any(option.of_stroke for option in self._options)
+
     def parameters(self, defaults: PriorDefaults) -> list[Parameter]:
         """Parameters of all options."""
         return [p for option in self._options for p in option.parameters(self.conditions, defaults)]
@@ -210,11 +240,20 @@ class FrictionModel:
         """Derivative of g by the force [1/N]."""
         return force_scale_slope(force, *self._scale(values))
 
+    def shifts(self, values: Mapping[str, Array], exponent: Float[Array, "*batch"]) -> tuple[Array, Array]:
+        """Exponent while pulling and while returning [1], of one that is the mean of both."""
+        if not self.depends_on_stroke:
+            return exponent, exponent
+        half = sum((option.stroke_difference(values) for option in self._options), jnp.zeros(())) / 2
+        return exponent * (1 + half), exponent * (1 - half)
+
     def output_force(
         self, values: Mapping[str, Array], input_force: Array, exponent: Array, stroke: Array
     ) -> Float[Array, "..."]:
         """Force at the load side [N] while the rope slides, stroke +1 toward the motor and -1 back."""
-        return self.force(values, self.scaled(values, input_force) - stroke * exponent)
+        pulling, returning = self.shifts(values, exponent)
+        shift = jnp.where(stroke > 0, pulling, returning) if self.depends_on_stroke else exponent
+        return self.force(values, self.scaled(values, input_force) - stroke * shift)
 
     def rate(self, values: Mapping[str, Array], speed: Float[Array, "*batch"]) -> Float[Array, "*batch"]:
         """Factor on the friction exponent at a speed [1], 1 at the reference speed, which stands in where none is known.

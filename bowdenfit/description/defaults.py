@@ -116,6 +116,7 @@ class PriorDefaults(Frozen):
     drag_share: Positive = 0.05
     wobble_degrees: Positive = 30.0
     stribeck: Positive = 0.3
+    stroke_difference: Positive = 0.3
     viscous_at_highest_speed: Positive = 0.5
     stribeck_speed_log_sd: Positive = 1.0
     stiffness_log_sd: Positive = 1.5

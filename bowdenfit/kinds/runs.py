@@ -97,7 +97,7 @@ class RunsTerm:
         """Log ratio that the load cells show, and its derivatives by the friction exponent and by the log of the load."""
         friction, stroke, cells = self.cable.friction, data["stroke"], LoadCells.of(values)
         from_delay = cells.late(data["drift"])
-        if not (friction.depends_on_load or OUTPUT_OFFSET in values):
+        if not (friction.depends_on_load or friction.depends_on_stroke or OUTPUT_OFFSET in values):
             return exponent + stroke * cells.gain_error + from_delay, jnp.ones_like(exponent), jnp.zeros_like(exponent)
 
         least = friction.conditions.least_force

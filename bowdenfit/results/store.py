@@ -23,7 +23,7 @@ from bowdenfit.results.netcdf import EXPECTED, Coordinates, Groups, read_groups,
 from bowdenfit.results.plain import rebuilt, stored
 from bowdenfit.results.record import OPTIMAL_EFFICIENCY, OPTIMAL_LENGTH, Draws, Provenance, Record
 
-SCHEMA = 4
+SCHEMA = 5
 LOG_POSTERIOR = "lp"
 # What fit.json keeps of the draws; the draws themselves are in posterior.nc.
 COUNTS = ("n_ensembles", "steps", "acceptance", "sampler", "trajectories", "agreement", "diagnostics")

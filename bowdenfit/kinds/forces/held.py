@@ -69,7 +69,8 @@ class HeldForcesTerm:
         difference, from_cells = self._difference(values, data)
         from_angles = self.cable.exponent_variance(values, angles, variance)
         sd = jnp.sqrt(values[RUN_SCATTER] ** 2 + from_angles + from_cells)
-        beyond = jnp.abs(difference)  # the band is symmetric
+        pulling, returning = self.cable.friction.shifts(values, exponent)
+        beyond = jnp.abs(difference - (pulling - returning) / 2)  # about its middle the band is symmetric
         law = noise_law(self.cable.description)
         upper, lower = law.log_cdf((exponent - beyond) / sd), law.log_cdf((-exponent - beyond) / sd)
         # A band of no width at all holds no reading; the floor keeps its logarithm finite.

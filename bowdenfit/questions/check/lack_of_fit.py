@@ -76,11 +76,8 @@ def _remedy(fit: Record, found: Departure) -> str:
         return _other_friction(model, ("drag", "load-dependent"), zero)
     if found.against == SPEED and losses:
         return _other_friction(model, ("rate-dependent",), "the delay between the channels")
-    if found.against == STROKE:
-        return (
-            "Pulling and returning do not share one friction: look at the zero and the gain of both load cells first, then at "
-            "what differs between the strokes (speed, bend, lay of the rope); fit each stroke by itself if nothing does."
-        )
+    if found.against == STROKE and losses:
+        return _other_friction(model, ("stroke-dependent",), "the zero and the gain of both load cells")
     if found.against in (ORDER, RUN):
         return (
             "Something drifted while it was measured: temperature, wear, or the zero of a load cell. Tare before each run, "

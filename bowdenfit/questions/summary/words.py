@@ -197,6 +197,10 @@ def _friction_model(fit: Record) -> str:
         )
         lost = lost_force(fit)
         lines += [lost.sentence()] if lost is not None else []
+    if friction.depends_on_stroke:
+        lines.append(
+            "Coefficients are the mean of pulling and returning; efficiencies and the best length are those of pulling."
+        )
     if friction.depends_on_rate:
         unit, scale = SHOWN_SPEED[conditions.velocity_unit]
         speed = f"{scale * conditions.reference_speed:.3g} {unit}"

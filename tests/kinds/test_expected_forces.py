@@ -94,7 +94,8 @@ def test_a_hung_weight_has_no_noise_in_the_likelihood_nor_in_what_is_simulated(t
     _, as_cells = _term(write(tmp_path / "cells", rows))
     assert best(as_cells) < 0.9 * sd  # shared between two cells, of which only one is noisy
     assert "none" in next(p.meaning for p in model.space.parameters if p.name == "sigma_F")
-    accept("check", tmp_path / "weight")
+    assert "of hung weights without noise" in accept("check", tmp_path / "weight")
+    assert "of hung weights" not in accept("check", tmp_path / "cells")
 
 
 def test_a_ratio_of_noises_needs_that_of_both_cells(tmp_path, accept, refuse):

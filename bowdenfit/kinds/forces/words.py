@@ -17,7 +17,6 @@ def count(table: ForceTable) -> str:
 
 def describe(table: ForceTable, description: Description) -> list[str]:
     """How many readings of each stroke, and how large."""
-    del description
     files = table.origin.files[0] if len(table.origin.files) == 1 else f"{len(table.origin.files)} files"
     counts = ", ".join(
         f"{(table.stroke == stroke).sum()} {name}"
@@ -25,7 +24,8 @@ def describe(table: ForceTable, description: Description) -> list[str]:
         if (table.stroke == stroke).any()
     )
     low, high = table.input_force.min(), table.input_force.max()
-    return [f"{files}: {count(table)} ({counts}), input {low:.4g} to {high:.4g} N"]
+    weights = ", of hung weights without noise" if description.sensors.noise_ratio == 0 else ""
+    return [f"{files}: {count(table)} ({counts}), input {low:.4g} to {high:.4g} N{weights}"]
 
 
 def implausible(real: ForceTable, made: ForceTable) -> str:

@@ -104,7 +104,7 @@ def _by_weights(programs: BatchPrograms, weighted: Weighted | None) -> BatchFit:
         return BatchFit(np.zeros((0, len(programs.names))), "laplace", float("inf"), {}, (_UNKNOWN,))
     diagnostics = weighted.diagnose(programs.names)
     reasons = weighted.shortfalls(diagnostics, settings.sampler.target_ess)
-    kept = resample(np.exp(weighted.log_weights), settings.n_kept, np.random.default_rng([settings.n_kept]))
+    kept = resample(np.exp(weighted.log_weights), settings.n_kept, 0.5)
     return BatchFit(weighted.z[kept], "laplace", weighted.pareto_k, diagnostics, reasons)
 
 

@@ -59,7 +59,17 @@ class Weighted:
     def diagnose(self, names: tuple[str, ...]) -> dict[str, Diagnostics]:
         """Diagnostics by parameter; weighted draws have no R-hat and no drift (section 3.2.3 for the errors)."""
         weights = np.exp(self.log_weights)
-        return {name: _diagnose(self.z[:, i], weights) for i, name in enumerate(names)}
+        squares, apart = weights**2, (self.z - weights @ self.z) ** 2
+        error, ends = squares @ apart, np.quantile(self.z[resample(weights, BLOCK, 0.5)], _TAILS, axis=0)
+        tails = [p * (1 - p) / (squares @ ((self.z <= at) - p) ** 2) for p, at in zip(_TAILS, ends, strict=True)]
+        bulk = (weights @ apart) / np.maximum(error, np.finfo(float).tiny)
+        unknown = float("nan")
+        return {
+            name: Diagnostics(
+                unknown, float(bulk[i]), float(min(t[i] for t in tails)), float(np.sqrt(error[i])), unknown
+            )
+            for i, name in enumerate(names)
+        }
 
     def shortfalls(self, diagnostics: Mapping[str, Diagnostics], target_ess: int) -> tuple[str, ...]:
         """What keeps the draws from being trusted, in words; empty if nothing does."""
@@ -119,7 +129,7 @@ def _moved(mixture: Mixture, generator: np.random.Generator) -> Generator[np.nda
         if effective_draws(pool.log_weights) > _GOOD * len(pool.z):
             break
         log_weights = evened(pool.log_weights, _EFFECTIVE * z.shape[2])
-        near = pool.z[resample(np.exp(log_weights), BLOCK, generator)]
+        near = pool.z[resample(np.exp(log_weights), BLOCK, generator.uniform())]
         mixture = mixture.moved_to(near, effective_draws(log_weights))
     return Mixture.of(mixtures)
 
@@ -146,24 +156,7 @@ def evened(log_weights: np.ndarray, wanted: float) -> np.ndarray:
         return np.log(weights / weights.sum())
 
 
-def resample(weights: np.ndarray, count: int, generator: np.random.Generator) -> np.ndarray:
-    """Systematic: every draw as often as its weight says, to less than one."""
-    places = (np.arange(count) + generator.uniform()) / count
+def resample(weights: np.ndarray, count: int, begin: float) -> np.ndarray:
+    """Systematic, from a place between 0 and 1: every draw as often as its weight says, to less than one."""
+    places = (np.arange(count) + begin) / count
     return np.minimum(np.searchsorted(np.cumsum(weights), places), len(weights) - 1)
-
-
-def _diagnose(values: np.ndarray, weights: np.ndarray) -> Diagnostics:
-    mean = float(weights @ values)
-    variance, error = weights @ (values - mean) ** 2, np.sum(weights**2 * (values - mean) ** 2)
-    order = np.argsort(values)
-    values, weights = values[order], weights[order]
-    tail = min(_effective_below(weights, probability) for probability in _TAILS)
-    bulk = float(variance / error) if error > 0 else float(len(values))
-    return Diagnostics(float("nan"), bulk, tail, float(np.sqrt(error)), float("nan"))
-
-
-def _effective_below(weights: np.ndarray, probability: float) -> float:
-    """Effective draws for the probability of being below a quantile, of draws in order."""
-    below = np.cumsum(weights) <= probability
-    error = np.sum(weights**2 * (below - probability) ** 2)
-    return float(probability * (1 - probability) / error)

@@ -6,6 +6,7 @@ import jax
 import numpy as np
 import pytest
 
+import bowdenfit as bf
 from bowdenfit.dataset import load_dataset
 from bowdenfit.description import SamplerSettings
 from bowdenfit.inference.batch import fit_batch
@@ -18,6 +19,7 @@ ON_BODY, YARN = "on-body-exoskeleton", "yarn-on-cylinder"
 QUICK = BatchSettings(
     SamplerSettings(n_ensembles=2, n_walkers=64, max_steps=600, target_ess=300, target_r_hat=1.05), nuts=False
 )
+ACCURATE = BatchSettings(n_kept=4096)
 
 
 @pytest.fixture(scope="module", params=[ON_BODY, YARN])
@@ -60,3 +62,21 @@ def test_a_data_set_that_cannot_be_computed_says_so_and_hurts_no_other(programs)
     assert fits[1].reasons[0].startswith("the model cannot be computed")
     for i in (0, 2):
         np.testing.assert_array_equal(fits[i].z, alone[i].z)
+
+
+@pytest.mark.parametrize(
+    "name",
+    [
+        pytest.param(d.parent.name, marks=[] if d.parent.name == YARN else pytest.mark.slow)
+        for d in sorted(DATA.glob("*/cable.toml"))
+    ],
+)
+def test_a_batch_agrees_with_a_single_fit(name):
+    """Means to 0.1 sd and sds to 10 % of every parameter: four Monte Carlo errors of 1000 effective draws each, about."""
+    single = bf.fit(DATA / name, seed=1).posterior.z
+    posterior = LogDensity(build_model(load_dataset(DATA / name)))
+    (fit,) = fit_batch(posterior, [posterior.data], [1], ACCURATE)
+    assert fit.reasons == ()
+    mean, sd = single.mean(axis=(0, 1)), single.std(axis=(0, 1))
+    np.testing.assert_array_less(np.abs(fit.z.mean(axis=0) - mean) / sd, 0.1)
+    np.testing.assert_array_less(np.abs(fit.z.std(axis=0) / sd - 1), 0.1)

@@ -1,0 +1,85 @@
+"""Time batches of simple cables, 1 to 1000 of them: three coefficients, six runs each, in one process.
+
+    python scripts/benchmark_batch.py [--numbers 1 10 100 1000]
+
+Each line: how many cables, seconds in all and of those compiling, CPU seconds and milliseconds a cable without compiling,
+which engine drew for how many of them, how many may not be trusted; and, as a ratio, the seconds that as many single fits by
+the ensembles of `calibrate` take, reckoned from one of them after its programs were compiled.
+"""
+
+import argparse
+import time
+from collections import Counter
+
+import jax
+import numpy as np
+
+from bowdenfit.inference.batch import fit_batch
+from bowdenfit.inference.batch_programs import BatchPrograms, BatchSettings
+from bowdenfit.inference.log_density import LogDensity
+from bowdenfit.kinds.design import Design
+from bowdenfit.kinds.settings import parse_description
+from bowdenfit.model import build_model
+from bowdenfit.questions.calibrate.refit import Laboratory
+from bowdenfit.questions.simulate.simulation import empty_tables, simulate, true_values
+
+CONTACTS = ("sheath", "clamp", "edge")
+ANGLES = ((200, 30, 20), (150, 80, 20), (90, 30, 60), (240, 60, 90), (60, 90, 30), (120, 20, 80))  # deg, of each run
+FORCES, STROKES = (20.0, 50.0, 80.0), (1, -1)
+NUMBERS = (1, 10, 100, 1000)
+
+
+def cables(number: int) -> list[LogDensity]:
+    """Posteriors of cables whose coefficients are drawn from their priors."""
+    description = parse_description(
+        {
+            "name": "simple cable",
+            "contact": [{"name": n, "friction": f"mu_{n}", "wrap_angle": {"column": f"{n}_angle"}} for n in CONTACTS],
+            "tables": {"forces": {"file": "forces.csv"}},
+        }
+    )
+    own = {
+        f"{name}_angle": tuple(np.deg2rad(column))
+        for name, column in zip(CONTACTS, zip(*ANGLES, strict=True), strict=True)
+    }
+    design = Design(runs=(0.0,) * len(ANGLES), input_forces=FORCES, strokes=STROKES, own_angles=own)
+    tables = empty_tables(description, design)
+    found = []
+    for seed in range(number):
+        of_truth, of_readings = jax.random.split(jax.random.key(seed))
+        values = true_values(description, tables, {"tau": 0.01, "sigma_F": 0.4}, of_truth)
+        found.append(LogDensity(build_model(simulate(description, design, values, of_readings))))
+    return found
+
+
+def main() -> None:
+    parser = argparse.ArgumentParser(description="Time batches of simple cables; the head of this file says how.")
+    parser.add_argument("--numbers", type=int, nargs="+", default=NUMBERS, metavar="N", help="how many cables")
+    numbers = parser.parse_args().numbers
+    with jax.enable_x64(True):
+        posteriors = cables(min(max(numbers), 50))
+        laboratory = Laboratory()
+        laboratory.chain(posteriors[0], 0)
+        begin = time.perf_counter()
+        laboratory.chain(posteriors[1 % len(posteriors)], 0)
+        single = time.perf_counter() - begin
+        print("cables  seconds  compiling    CPU  ms a cable  single fits / batch  engines")
+        for number in numbers:
+            programs = BatchPrograms(posteriors[0], BatchSettings())
+            begin = time.perf_counter()
+            _ = programs.gradients, programs.densities, programs.ensembles
+            compiled = time.perf_counter()
+            cpu, data = time.process_time(), [posteriors[i % len(posteriors)].data for i in range(number)]
+            fits = fit_batch(posteriors[0], data, range(number), programs=programs)
+            seconds, used = time.perf_counter() - compiled, time.process_time() - cpu
+            engines = ", ".join(f"{count} {name}" for name, count in Counter(fit.engine for fit in fits).items())
+            failed = sum(bool(fit.reasons) for fit in fits)
+            print(
+                f"{number:6d} {seconds + compiled - begin:8.1f} {compiled - begin:10.1f} {used:6.1f} "
+                f"{1000 * seconds / number:11.1f} {single * number / seconds:20.1f}  {engines}; {failed} not to be trusted",
+                flush=True,
+            )
+
+
+if __name__ == "__main__":
+    main()

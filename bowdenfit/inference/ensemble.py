@@ -22,7 +22,7 @@ from bowdenfit.inference.value_chart import Chart, chart_values, in_values
 
 THIN = 10  # steps from one stored state to the next
 _BLOCK = 10  # stored states between two reports
-_FIRST_LOOK = 50  # stored states before the first look; of five data sets the slowest is there after half of that
+_FIRST_LOOK = 60  # stored states before the first look; of five data sets the slowest is there after half of that
 _FITTED = 4  # walkers a parameter that a covariance is fitted to half of
 _KEPT_PER_WALKER = 20  # draws that are kept of each walker, spread over the second half of its path
 

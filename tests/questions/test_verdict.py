@@ -64,7 +64,8 @@ def test_efficiencies_above_1_are_no_fit_to_trust(tmp_path, runs, mcmc):
     if mcmc and "determine no coefficient by itself" in said:
         assert NOT_IDENTIFIABLE in fit.verdict().troubles
     if mcmc and runs == 5:
-        assert "hold 0 of 5" in said and NOT_DESCRIBED in fit.verdict().troubles
+        assert NOT_IDENTIFIABLE in fit.verdict().troubles
+        assert "hold 0 of 5" not in said or NOT_DESCRIBED in fit.verdict().troubles
 
 
 @pytest.mark.parametrize("runs", [1, 2, 5])

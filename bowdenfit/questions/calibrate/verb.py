@@ -62,34 +62,47 @@ def calibrate(
     Raises:
         BowdenfitError: What is wrong, in a sentence; a data set that cannot be replicated is refused.
     """
-    from bowdenfit.errors import UsageError
-
     refuse_unknown(calibrate, reading)
-    folder = Path(output) if output is not None else None
-    if resume and folder is None:
-        raise UsageError("--resume needs the results folder of a calibration; name it with --output.")
-    stated, assumed = _stated_and_assumed(dataset, reading, assume)
-    seed = _seed(folder, seed, resume)
+    folder = _folder(output, resume)
+    plan = _plan(_stated_and_assumed(dataset, reading, assume), _seed(folder, seed, resume), truth)
     import jax
 
-    from bowdenfit.model import build_model
     from bowdenfit.questions.calibrate.findings import findings
     from bowdenfit.questions.calibrate.quantities import quantities_of
     from bowdenfit.questions.calibrate.store import open_replications
-    from bowdenfit.questions.calibrate.truths import read_truths, stated_truths
-    from bowdenfit.questions.calibrate.workbench import Plan
 
-    page = {} if truth is None else read_truths(Path(truth))
     with jax.enable_x64(True):
-        quantities = quantities_of(Plan(stated, assumed, seed))
-        plan = Plan(stated, assumed, seed, stated_truths(page, build_model(stated).space, str(truth)))
-    done = {} if folder is None else open_replications(folder, _fingerprint(plan, assume, page), resume, force)
+        quantities = quantities_of(plan)
+    done = {} if folder is None else open_replications(folder, _fingerprint(plan, assume), resume, force)
     _replicate(plan, done, replications, workers, folder, progress)
-    name, truths = stated.description.name, tuple(each.text for each in plan.truths)
-    found = findings(tuple(done.values()), quantities, name=name, assumed=tuple(assume), truths=truths, seed=seed)
+    how = {"assumed": tuple(assume), "truths": tuple(each.text for each in plan.truths)}
+    found = findings(tuple(done.values()), quantities, name=plan.stated.description.name, seed=plan.seed, **how)
     if folder is not None:
         _write(found, folder)
     return found
+
+
+def _folder(output: str | Path | None, resume: bool) -> Path | None:
+    from bowdenfit.errors import UsageError
+
+    if resume and output is None:
+        raise UsageError("--resume needs the results folder of a calibration; name it with --output.")
+    return Path(output) if output is not None else None
+
+
+def _plan(sets: "tuple[Dataset, Dataset]", seed: int, truth: str | Path | None) -> "Plan":
+    """What is replicated, with the truths of a file."""
+    import jax
+
+    from bowdenfit.model import build_model
+    from bowdenfit.questions.calibrate.truths import read_truths, stated_truths
+    from bowdenfit.questions.calibrate.workbench import Plan
+
+    if truth is None:
+        return Plan(*sets, seed)
+    page = read_truths(Path(truth))
+    with jax.enable_x64(True):
+        return Plan(*sets, seed, stated_truths(page, build_model(sets[0]).space, str(truth)))
 
 
 def _stated_and_assumed(
@@ -143,14 +156,14 @@ def _seed(folder: Path | None, seed: int | None, resume: bool) -> int:
     return seed_of(folder)
 
 
-def _fingerprint(plan: "Plan", assumptions: Sequence[str], truths: dict[str, Any]) -> dict[str, Any]:
+def _fingerprint(plan: "Plan", assumptions: Sequence[str]) -> dict[str, Any]:
     """What must not change between an interrupted calibration and its continuation."""
     page = {
         "description": plan.stated.description.to_json(),
         "sha256": plan.stated.sha256,
         "seed": plan.seed,
         "assumed": list(assumptions),
-        "truths": truths,
+        "truths": {each.parameter.name: [each.low, each.high] for each in plan.truths},
     }
     return dict(json.loads(json.dumps(page)))
 

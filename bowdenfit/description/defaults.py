@@ -111,7 +111,9 @@ class PriorDefaults(Frozen):
     curve_end_over_median: Positive = 3.0
     angle_noise_degrees: Positive = 3.0
     run_scatter: Positive = 0.025
-    noise_share: Positive = 0.01
+    force_noise_share: Positive = 0.02
+    stretch_noise_share: Positive = 0.005
+    preload_noise_share: Positive = 0.05
     offset_share: Positive = 0.025
     drag_share: Positive = 0.05
     wobble_degrees: Positive = 30.0

@@ -36,7 +36,7 @@ def force_noise(at: Circumstances, meaning: str = "standard deviation of a force
 
 def noise_of_forces(at: Circumstances, name: str, symbol: str, meaning: str) -> Parameter:
     """How forces scatter, in proportion to the loads."""
-    load, part = at.cable.friction.conditions.load, at.defaults.noise_share
+    load, part = at.cable.friction.conditions.load, at.defaults.force_noise_share
     return Parameter(name, symbol, meaning, "noise", HalfCauchy(part * load.value), "N", scaled_by=load.share(part))
 
 

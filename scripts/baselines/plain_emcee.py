@@ -27,8 +27,8 @@ def log_prior(mu: np.ndarray, curves: np.ndarray, sigma: np.ndarray, tau: np.nda
     total = -0.5 * (((np.log(mu) - center) / width) ** 2).sum(axis=1) - np.log(mu).sum(axis=1)
     total -= 0.5 * (((curves[..., 0] - levels) / onbody.LEVEL_SD) ** 2).sum(axis=1)
     total -= 0.5 * ((curves[..., 1] / onbody.SLOPE_SD) ** 2).sum(axis=1)
-    total -= 0.5 * ((curves[..., 2] / onbody.CURVATURE_SD) ** 2).sum(axis=1)
-    return total - 0.5 * (sigma / onbody.ANGLE_NOISE) ** 2 - 0.5 * (tau / onbody.SCATTER) ** 2
+    total -= (0.5 * np.log(curves[..., 2]) + np.log1p(curves[..., 2])).sum(axis=1)
+    return total - np.log1p((sigma / onbody.ANGLE_NOISE) ** 2) - np.log1p((tau / onbody.SCATTER) ** 2)
 
 
 def log_likelihood(mu: np.ndarray, curves: np.ndarray, sigma: np.ndarray, tau: np.ndarray) -> np.ndarray:

@@ -24,13 +24,13 @@ numpyro.enable_x64()
 def model() -> None:
     """Priors and likelihood of 11 parameters."""
     mu = numpyro.sample("mu", dist.LogNormal(*onbody.FRICTION).expand([3]).to_event(1))
-    sigma = numpyro.sample("sigma_theta", dist.HalfNormal(onbody.ANGLE_NOISE))
-    tau = numpyro.sample("tau", dist.HalfNormal(onbody.SCATTER))
+    sigma = numpyro.sample("sigma_theta", dist.HalfCauchy(onbody.ANGLE_NOISE))
+    tau = numpyro.sample("tau", dist.HalfCauchy(onbody.SCATTER))
     angles = []
     for k, curve in enumerate(DATA["curves"]):
         a = numpyro.sample(f"a{k}", dist.Normal(curve["level"], onbody.LEVEL_SD))
         b = numpyro.sample(f"b{k}", dist.Normal(0.0, onbody.SLOPE_SD))
-        c = numpyro.sample(f"c{k}", dist.HalfNormal(onbody.CURVATURE_SD))
+        c = numpyro.deterministic(f"c{k}", numpyro.sample(f"root{k}", dist.HalfCauchy(1.0)) ** 2)
         z, hidden = curve["z"], curve["z_undetected"]
         numpyro.sample(f"angle{k}", dist.Normal(jnp.exp(a + b * z - c * z**2), sigma), obs=curve["angle"])
         undetected = log_ndtr((onbody.LIMIT - jnp.exp(a + b * hidden - c * hidden**2)) / sigma)

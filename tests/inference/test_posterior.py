@@ -28,6 +28,14 @@ STATED = {
     "optimal_length": (469.7, 4.5),
     "optimal_efficiency": (0.789, 0.008),
 }
+# The same with the default priors, by bowdenfit's NUTS and by its ensembles, 4000 and 6000 effective draws.
+BY_DEFAULT = {
+    "mu1": (0.0856, 0.0138),
+    "mu2": (0.1087, 0.0288),
+    "mu3": (0.2144, 0.0275),
+    "optimal_length": (469.4, 5.16),
+    "optimal_efficiency": (0.790, 0.0105),
+}
 # The priors that this was worked out with, once the defaults.
 FIRST_PRIORS = [
     "prior.tau.prior.half_normal.sd=0.02",
@@ -145,6 +153,15 @@ def test_the_joint_posterior_has_the_stated_moments(drawn, request):
         assert abs(np.mean(draws[name]) - mean) < 0.1 * sd + digit, name
         assert abs(np.std(draws[name]) - sd) < 0.1 * sd + digit, name
     np.testing.assert_allclose(np.quantile(draws["optimal_length"], (0.05, 0.95)), (462.1, 476.5), atol=0.6)
+
+
+def test_the_default_priors_give_the_stated_moments(on_body):
+    """As above; 1000 effective draws know a mean to 0.03 sd and the sd of a heavy tail to 7 %, so 0.15 sd and 25 %."""
+    found = bf.fit(on_body, seed=1)
+    drawn = found.posterior.values | found.posterior.optimum
+    for name, (mean, sd) in BY_DEFAULT.items():
+        assert abs(np.mean(drawn[name]) - mean) < 0.15 * sd, name
+        assert abs(np.std(drawn[name]) / sd - 1) < 0.25, name
 
 
 def test_the_comparison_fails_when_the_snooker_move_is_put_in(bench, by_nuts):

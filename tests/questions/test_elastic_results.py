@@ -12,13 +12,13 @@ from scipy import stats
 
 import bowdenfit as bf
 from bowdenfit import predict
-from bowdenfit.dataset import Dataset
 from bowdenfit.inference.least_squares import least_squares, maximum_posterior
 from bowdenfit.inference.log_density import LogDensity
 from bowdenfit.inference.objective import make_objective
 from bowdenfit.kinds import KINDS
 from bowdenfit.kinds.loop.table import LoopTable
 from bowdenfit.model import build_model
+from bowdenfit.questions.calibrate.refit import with_parameters_of
 from bowdenfit.questions.figures import figures_of
 from bowdenfit.questions.simulate.simulation import empty_tables, simulate, true_values
 from bowdenfit.questions.simulate.tables import read_bench
@@ -210,12 +210,12 @@ def plan():
 
 @pytest.fixture(scope="module")
 def solved(plan):
-    """Least squares of simulated data sets of one shape, compiled once."""
-    tables = empty_tables(plan.description, plan.design)
-    objective = make_objective(LogDensity(build_model(Dataset(plan.description, tables, {}))))
+    """Least squares of simulated data sets of one shape and the priors of one of them, compiled once."""
+    model = build_model(simulated(plan, 0))
+    objective = make_objective(LogDensity(model))
 
     def solve(dataset):
-        posterior = LogDensity(build_model(dataset))
+        posterior = LogDensity(with_parameters_of(model, dataset))
         return least_squares(posterior, objective, maximum_posterior(posterior, objective).z)
 
     return solve

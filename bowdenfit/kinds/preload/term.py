@@ -47,7 +47,7 @@ def _preload(cable: Cable, values: Mapping[str, Array], data: Mapping[str, Any])
 
 def _parameters(_: PreloadTable, at: Circumstances) -> list[Parameter]:
     """The preload, and how readings scatter."""
-    part, by = at.defaults.noise_share, preload_scale(at)
+    part, by = at.defaults.preload_noise_share, preload_scale(at)
     noise = Parameter(
         PRELOAD_NOISE, r"$\sigma_P$", at.noise.meaning("standard deviation of a preload reading"), "noise",
         HalfCauchy(part * by.value), "N", scaled_by=by.share(part),

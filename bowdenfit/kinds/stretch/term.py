@@ -59,7 +59,7 @@ def _stretch(cable: Cable, values: Mapping[str, Array], data: Mapping[str, Any])
 
 def _parameters(table: StretchTable, at: Circumstances) -> list[Parameter]:
     """The rope, what the reading calls zero, how readings scatter, and the friction of stretching if it is not a contact's."""
-    zero, noise, prior = at.defaults.stretch_zero_share, at.defaults.noise_share, at.defaults.friction
+    zero, noise, prior = at.defaults.stretch_zero_share, at.defaults.stretch_noise_share, at.defaults.friction
     usual = at.defaults.stretch_mm_without_data
     largest = Scale(float(np.max(np.abs(table.stretch))) or usual, "largest stretch", "mm")
     spread = Scale(float(np.ptp(table.stretch)) or usual, "range of stretch", "mm")

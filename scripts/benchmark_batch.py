@@ -3,8 +3,8 @@
     python scripts/benchmark_batch.py [--numbers 1 10 100 1000]
 
 Each line: how many cables, seconds in all and of those compiling, CPU seconds and milliseconds a cable without compiling,
-which engine drew for how many of them, how many may not be trusted; and, as a ratio, the seconds that as many single fits by
-the ensembles of `calibrate` take, reckoned from one of them after its programs were compiled.
+which engine drew for how many of them, how many may not be trusted; and, as a ratio, the seconds that emcee's ensembles take
+for as many single posteriors, reckoned from one of them with its programs compiled.
 """
 
 import argparse
@@ -14,19 +14,24 @@ from collections import Counter
 import jax
 import numpy as np
 
+from bowdenfit.description import SamplerSettings
 from bowdenfit.inference.batch import fit_batch
 from bowdenfit.inference.batch_programs import BatchPrograms, BatchSettings
+from bowdenfit.inference.chain import Sampling
+from bowdenfit.inference.ensemble import sample
+from bowdenfit.inference.least_squares import maximum_posterior
 from bowdenfit.inference.log_density import LogDensity
+from bowdenfit.inference.objective import make_objective
 from bowdenfit.kinds.design import Design
 from bowdenfit.kinds.settings import parse_description
 from bowdenfit.model import build_model
-from bowdenfit.questions.calibrate.refit import Laboratory
 from bowdenfit.questions.simulate.simulation import empty_tables, simulate, true_values
 
 CONTACTS = ("sheath", "clamp", "edge")
 ANGLES = ((200, 30, 20), (150, 80, 20), (90, 30, 60), (240, 60, 90), (60, 90, 30), (120, 20, 80))  # deg, of each run
 FORCES, STROKES = (20.0, 50.0, 80.0), (1, -1)
 NUMBERS = (1, 10, 100, 1000)
+TARGETS = BatchSettings().sampler
 
 
 def cables(number: int) -> list[LogDensity]:
@@ -52,17 +57,24 @@ def cables(number: int) -> list[LogDensity]:
     return found
 
 
+def seconds_alone(posterior: LogDensity) -> float:
+    """What emcee's ensembles take for one cable to the targets of a batch, once compiled."""
+    settings = SamplerSettings(n_walkers=64, target_ess=TARGETS.target_ess, target_r_hat=TARGETS.target_r_hat)
+    objective = make_objective(posterior)
+    program = posterior.batched_log_density(settings.n_ensembles * settings.n_walkers // 2)
+    for _ in range(2):
+        begin = time.perf_counter()
+        sample(Sampling(posterior, maximum_posterior(posterior, objective), settings, 1), program)
+    return time.perf_counter() - begin
+
+
 def main() -> None:
     parser = argparse.ArgumentParser(description="Time batches of simple cables; the head of this file says how.")
     parser.add_argument("--numbers", type=int, nargs="+", default=NUMBERS, metavar="N", help="how many cables")
     numbers = parser.parse_args().numbers
     with jax.enable_x64(True):
         posteriors = cables(min(max(numbers), 50))
-        laboratory = Laboratory()
-        laboratory.chain(posteriors[0], 0)
-        begin = time.perf_counter()
-        laboratory.chain(posteriors[1 % len(posteriors)], 0)
-        single = time.perf_counter() - begin
+        single = seconds_alone(posteriors[0])
         print("cables  seconds  compiling    CPU  ms a cable  single fits / batch  engines")
         for number in numbers:
             programs = BatchPrograms(posteriors[0], BatchSettings())

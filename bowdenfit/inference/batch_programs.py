@@ -32,7 +32,7 @@ class BatchSettings:
 
     sampler: SamplerSettings = field(
         default_factory=lambda: SamplerSettings(
-            n_ensembles=2, n_walkers=64, max_steps=6000, target_ess=1000, target_r_hat=1.02
+            n_ensembles=2, n_walkers=64, max_steps=6000, target_ess=400, target_r_hat=1.03
         )
     )
     n_kept: int = 2048

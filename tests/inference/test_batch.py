@@ -15,11 +15,12 @@ from bowdenfit.inference.log_density import LogDensity
 from bowdenfit.model import build_model
 
 DATA = Path(__file__).parents[2] / "datasets"
+DATA_SETS = sorted(path.parent.name for path in DATA.glob("*/cable.toml"))
 ON_BODY, YARN = "on-body-exoskeleton", "yarn-on-cylinder"
 QUICK = BatchSettings(
     SamplerSettings(n_ensembles=2, n_walkers=64, max_steps=600, target_ess=300, target_r_hat=1.05), nuts=False
 )
-ACCURATE = BatchSettings(n_kept=4096)
+ACCURATE = BatchSettings(SamplerSettings(n_ensembles=2, n_walkers=64, target_ess=1000, target_r_hat=1.02), n_kept=4096)
 
 
 @pytest.fixture(scope="module", params=[ON_BODY, YARN])
@@ -64,13 +65,7 @@ def test_a_data_set_that_cannot_be_computed_says_so_and_hurts_no_other(programs)
         np.testing.assert_array_equal(fits[i].z, alone[i].z)
 
 
-@pytest.mark.parametrize(
-    "name",
-    [
-        pytest.param(d.parent.name, marks=[] if d.parent.name == YARN else pytest.mark.slow)
-        for d in sorted(DATA.glob("*/cable.toml"))
-    ],
-)
+@pytest.mark.parametrize("name", [YARN, *(pytest.param(n, marks=pytest.mark.slow) for n in DATA_SETS if n != YARN)])
 def test_a_batch_agrees_with_a_single_fit(name):
     """Means to 0.1 sd and sds to 10 % of every parameter: four Monte Carlo errors of 1000 effective draws each, about."""
     single = bf.fit(DATA / name, seed=1).posterior.z

@@ -3,6 +3,9 @@
 The benches are those of `hand_bench`, which shares no code with the likelihood.
 """
 
+from dataclasses import replace
+
+import elastic_cables
 import hand_bench
 import jax
 import numpy as np
@@ -15,25 +18,13 @@ from bowdenfit.inference.least_squares import least_squares
 from bowdenfit.inference.log_density import LogDensity
 from bowdenfit.inference.objective import make_objective
 from bowdenfit.kinds.inside_runs import ORDER, STROKE
+from bowdenfit.kinds.stretch.table import StretchTable
 from bowdenfit.kinds.term import LOAD
 from bowdenfit.model import build_model
 
 LOADS = (20, 40, 60, 80, 100, 120)
-CURVE = """
-schema = 1
-name = "bench"
-[route]
-variable = "cable_length"
-unit = "mm"
-range = [430, 550]
-[[contact]]
-name = "sheath"
-friction = "mu"
-wrap_angle = { curve = "CURVE", column = "sheath_angle" }
-[tables]
-angles = { file = "angles.csv", detection_limit = { value = 5, unit = "deg" } }
-forces = { file = "forces.csv" }
-"""
+LIMIT = "detection_limit = { value = 5, unit = \"deg\" } }"
+ROUTE = hand_bench.LENGTHS.replace("[440, 540]", "[430, 550]").replace('"angles.csv" }', f'"angles.csv", {LIMIT}')
 ROUTES = {
     "gaussian": lambda x: 60 * np.exp(-((x - 0.1) ** 2) / 0.5),
     "parabola": lambda x: 60 * (1 - 0.8 * (x - 0.1) ** 2),
@@ -63,7 +54,7 @@ def route(folder, seed, shape, curve, n=25):
     places = np.array([440.0, 490.0, 540.0])
     loss = 0.15 * np.deg2rad(ROUTES[shape]((places - 490) / 60))
     rows = hand_bench.pull(generator, places, loss, (40, 80), repeats=3, noise=(0.3, 0.3), scatter=0.01)
-    hand_bench.write(folder, rows, CURVE.replace("CURVE", curve), "cable_length_mm")
+    hand_bench.write(folder, rows, ROUTE.replace("gaussian", curve), "cable_length_mm")
     cells = [f"{at:g},{angle:.2f}" if angle >= 5 else f"{at:g},<5" for at, angle in zip(lengths, angles, strict=True)]
     (folder / "angles.csv").write_text("\n".join(["cable_length_mm,sheath_angle_deg", *cells]) + "\n")
     return folder
@@ -76,8 +67,10 @@ class Judge:
         self.objectives = {}
 
     def __call__(self, folder, friction=None):
+        return self.of(load_dataset(folder, [f'friction_model="{friction}"'] if friction else []))
+
+    def of(self, data):
         with jax.enable_x64(True):
-            data = load_dataset(folder, [f'friction_model="{friction}"'] if friction else [])
             posterior = LogDensity(build_model(data))
             shape = str(jax.tree.map(np.shape, posterior.data)) + str(posterior.model.space)
             if shape not in self.objectives:
@@ -147,6 +140,24 @@ def test_faults_inside_runs_are_named(tmp_path, judge, fault):
         clear = [d for d in judge(forces(tmp_path, seed, **wrong)) if d.worth_saying]
         assert against in {d.against for d in clear}
         assert all(d.inside for d in clear if d.against == against)
+
+
+@pytest.mark.parametrize(
+    ("planted", "against"),
+    [
+        (lambda table: 1 - 0.1 * table.unloading, STROKE),
+        (lambda table: 1 + 0.15 * np.sin(table.load / 15), LOAD),
+        (lambda table: 1 + 0.1 * np.linspace(-1, 1, len(table.load)), ORDER),
+    ],
+)
+def test_stretch_that_the_rope_does_not_have_is_named(judge, planted, against):
+    data = elastic_cables.bench(elastic_cables.elastic_cable(), elastic_cables.TRUTH, seed=3)[0]
+    table = data.measurements.table(StretchTable)
+    wrong = replace(table, stretch=table.stretch * planted(table))
+    measurements = data.measurements.with_tables(wrong)
+    assert not [d for d in judge.of(data) if d.worth_saying]
+    clear = [d for d in judge.of(replace(data, measurements=measurements)) if d.worth_saying and d.table == "stretch"]
+    assert against in {d.against for d in clear}
 
 
 def test_a_model_with_the_drag_describes_the_bench_that_has_one(tmp_path, judge):

@@ -5,7 +5,7 @@ from dataclasses import replace
 import jax.numpy as jnp
 import numpy as np
 import pytest
-from hand_bench import BENDS, pull, write
+from hand_bench import BENDS, LENGTHS, pull, write
 
 from bowdenfit.dataset import load_dataset
 from bowdenfit.inference.log_density import LogDensity
@@ -13,21 +13,6 @@ from bowdenfit.kinds.forces.table import ForceTable
 from bowdenfit.kinds.places import route_values
 from bowdenfit.model import build_model
 
-LENGTHS = """
-schema = 1
-name = "bench"
-[route]
-variable = "cable_length"
-unit = "mm"
-range = [440, 540]
-[[contact]]
-name = "sheath"
-friction = "mu"
-wrap_angle = { curve = "gaussian", column = "sheath_angle" }
-[tables]
-angles = { file = "angles.csv" }
-forces = { file = "forces.csv" }
-"""
 ALONG = {"lengths": (LENGTHS, "cable_length_mm"), "bends": (BENDS, "wrap_angle_deg")}
 
 

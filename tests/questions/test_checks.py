@@ -16,21 +16,19 @@ import bowdenfit as bf
 from bowdenfit.inference.compilation import compile_program
 from bowdenfit.inference.diagnostics import Diagnostics
 from bowdenfit.inference.log_density import LogDensity as Density
-from bowdenfit.inference.predictive_checks import LeftOut, place_at_random, predict_without_each, uniformity
+from bowdenfit.inference.predictive_checks import place_at_random, predict_without_each, uniformity
 from bowdenfit.inference.prior_sensitivity import SENSITIVE, far_out, sensitivities
 from bowdenfit.kinds import KINDS
 from bowdenfit.kinds.angles.table import AngleTable
-from bowdenfit.kinds.places import Places
 from bowdenfit.kinds.stretch.table import StretchTable
 from bowdenfit.kinds.stretch.words import warnings_of as stretch_warnings
 from bowdenfit.model import build_model
 from bowdenfit.parameters.priors import HalfCauchy, HalfNormal, LogNormal, Normal, TruncatedNormal, Uniform
 from bowdenfit.parameters.space import Parameter
 from bowdenfit.questions.check import checks_figure, prior_figure
-from bowdenfit.questions.check.answer import Checks, checks_of, trends_of
+from bowdenfit.questions.check.answer import checks_of
 from bowdenfit.questions.check.checks_figure import CheckedTable, checked_tables
 from bowdenfit.questions.check.prior_predictive import prior_predictive
-from bowdenfit.questions.check.table_checks import TableChecks
 from bowdenfit.questions.check.words import checks_text
 from bowdenfit.results.record import Draws, Provenance, Record
 
@@ -196,36 +194,6 @@ def test_a_width_of_which_the_draws_cannot_tell_is_no_number_and_no_all_clear():
 def test_a_parameter_beyond_three_sds_of_its_prior_is_named_but_not_at_an_end_that_the_prior_allows(prior, z, said):
     drawn = {"x": z + 0.1 * np.random.default_rng(0).standard_normal((4, 100))}
     assert bool(far_out(drawn, {"x": parameter("x", prior)})) == said
-
-
-def stretch_table(z, load, back):
-    """Readings of stretch with these deviations."""
-    n = len(z)
-    zero, one = np.zeros(n), np.ones(n)
-    predicted = LeftOut(zero, one, -1.64 * one, zero, 1.64 * one, one / 2, one / 2, one, 0.1 * one)
-    places = Places({"Load (N)": load}, ("",) * n, back, np.ones(n, dtype=bool))
-    labels = tuple(f"row {i}" for i in range(n))
-    return TableChecks("stretch", "mm", labels, z, np.zeros(n, dtype=bool), predicted, places, one / 2, None)
-
-
-@pytest.mark.parametrize(
-    ("planted", "words"),
-    [
-        (lambda load, back: 0.02 * load, ("those of stretch grow with the load",)),
-        (lambda load, back: 0.001 * (load - 50) ** 2, ("those of stretch are higher at both ends of the load",)),
-        (lambda load, back: -1.5 * back, ("those of stretch are lower on the way back",)),
-        (lambda load, back: 0.0 * load, ()),
-    ],
-)
-def test_deviations_that_depend_on_load_or_stroke_are_named(planted, words):
-    """Noise alone gives a trend in 1 of 100 tables; the planted ones are 4 sds and more; the seed is fixed."""
-    load, back = np.tile(np.linspace(0, 100, 40), 2), np.repeat([False, True], 40)
-    z = np.random.default_rng(2).standard_normal(80) + planted(load, back)
-    tables = (stretch_table(z, load, back),)
-    trends = trends_of(tables)
-    text = checks_text(Checks(tables, trends, ()))
-    assert all(each in " ".join(text.split()) for each in words)
-    assert len(trends) == len(words)
 
 
 QUICK = ("sampler.n_walkers=128", "sampler.target_ess=200", "sampler.target_r_hat=1.05", "sampler.max_steps=3000")
@@ -447,5 +415,5 @@ def test_healthy_cables_are_left_in_peace(measured):
     for seed in range(20):
         found = checked(measured(100 + seed), seed)
         fault = any(t.uniformity is not None and not t.uniformity.holds for t in found.tables)
-        alarms.append((bool(found.outliers), fault, bool(found.trends), bool(found.conflicts)))
+        alarms.append((bool(found.outliers), fault, bool(found.conflicts)))
     assert (np.sum(alarms, axis=0) <= 2).all(), alarms

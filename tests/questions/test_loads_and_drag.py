@@ -4,7 +4,7 @@ import json
 
 import numpy as np
 import pytest
-from hand_bench import BENDS, pull, write
+from hand_bench import BENDS, LENGTHS, pull, write
 
 import bowdenfit as bf
 from bowdenfit.questions.length.efficiency_figure import data, draw
@@ -102,24 +102,9 @@ def test_what_was_measured_says_what_lies_outside():
 
 
 def test_the_figure_of_the_efficiency_says_at_which_force_its_curve_holds(tmp_path):
-    description = """
-    schema = 1
-    name = "bench"
-    [route]
-    variable = "cable_length"
-    unit = "mm"
-    range = [440, 540]
-    [[contact]]
-    name = "sheath"
-    friction = "mu"
-    wrap_angle = { curve = "line", column = "sheath_angle" }
-    [tables]
-    angles = { file = "angles.csv" }
-    forces = { file = "forces.csv" }
-    """
     lengths = (440.0, 480.0, 520.0, 540.0)
     rows = pull(np.random.default_rng(6), lengths, [0.5, 0.4, 0.3, 0.25], LOADS, noise=(0.05, 0.05), drag=HIDDEN)
-    write(tmp_path, rows, description, "cable_length_mm")
+    write(tmp_path, rows, LENGTHS.replace("gaussian", "line"), "cable_length_mm")
     angles = "\n".join(f"{at},{180 - (at - 440) * 0.9}" for at in range(440, 541, 10))
     (tmp_path / "angles.csv").write_text(f"cable_length_mm,sheath_angle_deg\n{angles}\n")
     for friction, says in (("drag", "curve at 14 N"), ("capstan", "")):

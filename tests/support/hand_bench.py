@@ -78,6 +78,22 @@ wrap_angle = { column = "wrap_angle", nominal = { value = 180, unit = "deg" } }
 forces = { file = "forces.csv" }
 """
 
+LENGTHS = """
+schema = 1
+name = "bench"
+[route]
+variable = "cable_length"
+unit = "mm"
+range = [440, 540]
+[[contact]]
+name = "sheath"
+friction = "mu"
+wrap_angle = { curve = "gaussian", column = "sheath_angle" }
+[tables]
+angles = { file = "angles.csv" }
+forces = { file = "forces.csv" }
+"""
+
 
 def write(
     folder: Path, rows: Readings, description: str = BENDS, place: str = "wrap_angle_deg", more: str = ""

@@ -1,4 +1,4 @@
-"""Checks of a fit against its own readings: outliers, readings that decide by themselves, trends, and weight of the priors."""
+"""Checks of a fit against its own readings: outliers, readings that decide by themselves, and weight of the priors."""
 
 from dataclasses import dataclass, field
 from functools import cached_property
@@ -8,35 +8,16 @@ import numpy as np
 
 from bowdenfit.inference.predictive_checks import place_at_random, predict_without_each, uniformity
 from bowdenfit.inference.prior_sensitivity import FarOut, Sensitivity, far_out, sensitivities
-from bowdenfit.kinds.places import STROKE, places_of
+from bowdenfit.kinds.places import places_of
 from bowdenfit.kinds.term import Term
 from bowdenfit.parameters.space import Parameter
 from bowdenfit.questions.check.table_checks import FALSE_ALARM, CheckedReading, TableChecks
 from bowdenfit.results.record import Draws, Record, once
 
-_LEAST_READINGS = 8  # of a table, below which neither its distribution nor a trend can be judged
+_LEAST_READINGS = 8  # of a table, below which its distribution cannot be judged
 _FEW_LEFT = 4  # readings beyond the coefficients, up to which their scatter is hardly known
 _DRAWS = 5000  # that sensitivity to the priors is worked out from
 _STREAM = 5  # of the fit's random numbers
-
-
-@dataclass(frozen=True)
-class Trend:
-    """A way in which the deviations of a table depend on where its readings were taken.
-
-    Args:
-        table: Name of the readings.
-        group: Contact or the like that they belong to; empty where all are of one kind.
-        against: Axis label of what they depend on.
-        shape: What they do, such as "grow" or "are higher at both ends".
-        chance: Probability of as much by chance.
-    """
-
-    table: str
-    group: str
-    against: str
-    shape: str
-    chance: float
 
 
 @dataclass(frozen=True)
@@ -45,20 +26,18 @@ class Checks:
 
     Args:
         tables: By table; held forces, which only bound the friction, are not among them.
-        trends: Deviations that depend on where readings were taken, beyond what chance does.
         sensitivities: Of friction coefficients and design answers to priors and readings.
         far_out: Parameters that the readings put where their priors hardly allow them.
         told_by: Noise scales that few readings tell: how many readings, and how many coefficients they have to tell too.
     """
 
     tables: tuple[TableChecks, ...]
-    trends: tuple[Trend, ...]
     sensitivities: tuple[Sensitivity, ...]
     far_out: tuple[FarOut, ...] = ()
     told_by: dict[str, tuple[int, int]] = field(default_factory=dict)
 
     false_alarm: ClassVar = FALSE_ALARM
-    JSON: ClassVar = ("false_alarm", "tables", "readings", "trends", "sensitivities", "far_out")
+    JSON: ClassVar = ("false_alarm", "tables", "readings", "sensitivities", "far_out")
 
     @cached_property
     def readings(self) -> tuple[CheckedReading, ...]:
@@ -93,7 +72,7 @@ def checks_of(fit: Record) -> Checks | None:
     parameters = {p.name: p for p in fit.model.space.free}
     z = {name: fit.posterior.z[..., i] for name, i in fit.model.space.index.items()}
     found = _sensitivities(fit, fit.posterior, parameters)
-    return Checks(tables, trends_of(tables), found, far_out(z, parameters), _told_by_few(fit))
+    return Checks(tables, found, far_out(z, parameters), _told_by_few(fit))
 
 
 def _told_by_few(fit: Record) -> dict[str, tuple[int, int]]:
@@ -130,45 +109,6 @@ def readings_of(term: Term) -> tuple[np.ndarray, np.ndarray]:
     if bounds:
         at_most[len(at_most) - bounds :] = True
     return reading, at_most
-
-
-def trends_of(tables: tuple[TableChecks, ...]) -> tuple[Trend, ...]:
-    """Dependences of the deviations on where readings were taken, beyond what chance makes in one healthy fit of a hundred.
-
-    Args:
-        tables: Readings beside their predictions.
-    """
-    looked_at = [
-        trend for table in tables for group in dict.fromkeys(table.places.group) for trend in _looked(table, group)
-    ]
-    return tuple(trend for trend in looked_at if trend.chance * len(looked_at) < FALSE_ALARM)
-
-
-def _looked(table: TableChecks, group: str) -> list[Trend]:
-    """Rank correlation of deviations with each place, with the distance from its middle, and with the stroke."""
-    used = ~table.at_most & np.array([g == group for g in table.places.group])
-    if used.sum() < _LEAST_READINGS:
-        return []
-    z, back, found = table.z_score[used], table.places.back[used].astype(float), []
-    for against, numbers in table.places.numbers.items():
-        x = numbers[used]
-        off_middle = np.abs(x - (x.min() + x.max()) / 2)
-        found.append(_trend(table, group, against, x, z, ("grow", "fall")))
-        found.append(
-            _trend(table, group, against, off_middle, z, ("are higher at both ends", "are lower at both ends"))
-        )
-    if 3 <= back.sum() <= len(back) - 3:
-        found.append(_trend(table, group, STROKE, back, z, ("are higher on the way back", "are lower on the way back")))
-    return [trend for trend in found if np.isfinite(trend.chance)]
-
-
-def _trend(table: TableChecks, group: str, against: str, x: np.ndarray, z: np.ndarray, words: tuple[str, str]) -> Trend:
-    from scipy.stats import spearmanr
-
-    if np.ptp(x) == 0:
-        return Trend(table.table, group, against, "", float("nan"))
-    correlation, chance = spearmanr(x, z)
-    return Trend(table.table, group, against, words[int(correlation < 0)], float(chance))
 
 
 def _sensitivities(fit: Record, posterior: Draws, parameters: dict[str, Parameter]) -> tuple[Sensitivity, ...]:

@@ -23,7 +23,7 @@ def checks_text(found: Checks | None) -> str:
     """
     if found is None or not found.readings:
         return ""
-    sentences = [_scatter(found), _outliers(found), _trends(found), _decisive(found), _outside(found), priors_text(found)]
+    sentences = [_scatter(found), _outliers(found), _decisive(found), _outside(found), priors_text(found)]
     return "\n".join([_HEADING, *(filled(sentence) for sentence in sentences if sentence)])
 
 
@@ -70,23 +70,6 @@ def _with_unit(reading: CheckedReading, value: float) -> str:
         return f"{100 * value:.{decimals(100 * reading.sd)}f} %"
     unit = "" if reading.unit == "1" else f" {reading.unit}"
     return f"{value:.{decimals(reading.sd)}f}{unit}"
-
-
-def _trends(found: Checks) -> str:
-    parts = []
-    for t in found.trends:
-        what = t.group or readings_called(t.table).words
-        along = "" if t.against == "Stroke" else f" with the {t.against.split(' (')[0].lower()}"
-        parts.append(f"those of {what} {t.shape}{along if t.shape in {'grow', 'fall'} else _over(along)}")
-    if not parts:
-        return ""
-    return (
-        f"Deviations from the model are not all chance: {listed(parts)}. The model lacks something that matters there."
-    )
-
-
-def _over(along: str) -> str:
-    return along.replace(" with the ", " of the ", 1)
 
 
 def _decisive(found: Checks) -> str:

@@ -45,6 +45,7 @@ def summarize(fit: Record) -> dict[str, Any]:
             "converged": fit.least_squares.converged,
         },
         "agreement": agreement_page(fit),
+        "departures": fit.least_squares.departures,
         "measured": _measured_efficiencies(fit),
         "friction_model": fit.dataset.description.friction_model,
         "confounded": confounded_pairs(fit),

@@ -7,7 +7,6 @@ from conftest import ROOT
 
 from bowdenfit.dataset import Dataset
 from bowdenfit.errors import UsageError
-from bowdenfit.inference.batch_programs import BatchSettings
 from bowdenfit.model import build_model
 from bowdenfit.questions.calibrate import power
 from bowdenfit.questions.calibrate.answer import Quantity
@@ -148,7 +147,7 @@ def with_truth(laboratory: Laboratory, **friction: object) -> dict[str, str]:
 
 def test_stated_truths_show_a_prior_that_is_wrong():
     """Of a prior that is sure of 0.12; a weak one would be rejected by chance for one seed in a hundred."""
-    laboratory = Laboratory(BatchSettings(n_draws=1024, n_kept=1024))
+    laboratory = Laboratory()
     assert "estimated too low and intervals too narrow" in with_truth(laboratory, **SURE)["mu_edge"]
     assert "mu_edge" not in with_truth(laboratory, **WEAK)
 

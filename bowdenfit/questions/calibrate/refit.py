@@ -6,11 +6,14 @@ from dataclasses import dataclass, field, replace
 import jax
 
 from bowdenfit.dataset import Dataset
+from bowdenfit.description import SamplerSettings
 from bowdenfit.inference.batch import fit_batch
 from bowdenfit.inference.batch_programs import BatchPrograms, BatchSettings
 from bowdenfit.inference.batch_stages import BatchFit
 from bowdenfit.inference.log_density import LogDensity
 from bowdenfit.model import Model, build_model
+
+RANKS = SamplerSettings(n_ensembles=2, n_walkers=64, max_steps=6000, target_ess=400, target_r_hat=1.03)
 
 
 @dataclass(frozen=True)
@@ -22,7 +25,7 @@ class Laboratory:
         programs: What has been compiled, by cable and shape of the data.
     """
 
-    settings: BatchSettings = field(default_factory=BatchSettings)
+    settings: BatchSettings = field(default_factory=lambda: BatchSettings(RANKS))
     programs: dict[str, BatchPrograms] = field(default_factory=dict)
 
     def fits(self, posteriors: Sequence[LogDensity], seeds: Sequence[int]) -> list[BatchFit]:

@@ -131,12 +131,12 @@ def _replicate(
 ) -> None:
     """Do what is not done yet, and keep each as it ends."""
     from bowdenfit.inference.batch_programs import BatchSettings
-    from bowdenfit.questions.calibrate.refit import Laboratory
+    from bowdenfit.questions.calibrate.refit import RANKS, Laboratory
     from bowdenfit.questions.calibrate.store import keep
     from bowdenfit.questions.calibrate.workbench import Workbench
 
     missing = [number for number in range(replications) if number not in done]
-    bench = Workbench(plan, Laboratory(BatchSettings(threads=workers or 0)))
+    bench = Workbench(plan, Laboratory(BatchSettings(RANKS, threads=workers or 0)))
     for each in bench.replications(missing):
         done[each.number] = each
         if folder is not None:

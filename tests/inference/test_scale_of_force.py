@@ -44,7 +44,10 @@ CASES = {
     "load-dependent forces": (
         "synthetic-bench", ("friction_model=load-dependent+drag", "reference_force={value=<54>, unit='N'}"),
     ),
-    "offsets": ("synthetic-recordings", ("tables.recordings.prepare.tare=fitted", "sensors.gain_error_sd=0.01")),
+    "offsets": (
+        "synthetic-recordings",
+        ("tables.recordings.prepare.tare=fitted", "sensors={input_gain_error_sd=0.01, output_gain_error_sd=0.01}"),
+    ),
     "offsets as stated": (
         "synthetic-bench", ("friction_model=drag", "sensors.offset_sd={value=<0.2>, unit='N'}"),
     ),

@@ -52,16 +52,16 @@ def _widths(found: Checks) -> list[str]:
 
 
 def _follows(parameter: str, held: list[tuple[str, Width]], found: Checks) -> str:
-    """'The prior of tau sets widths: the 90 % interval of mu1 would be 1.4 times as wide with its scale doubled and ...'"""
+    """'The prior of tau sets widths: the 90 % interval of mu1 would be 1.4 times as wide with twice its scale and ...'"""
     name, width = max(held, key=lambda each: each[1].size)
     others = [other for other, _ in held if other != name]
     more = f"; less so {listed(others)}" if others else ""
     why = ""
     if parameter in found.told_by:
         readings, coefficients = found.told_by[parameter]
-        why = f", because {readings} readings have {coefficients} coefficients to tell as well"
-    known = [(what, ratio) for what, ratio in (("doubled", width.doubled), ("halved", width.halved)) if isfinite(ratio)]
-    changes = listed([f"{ratio:.2f} times as wide with its scale {what}" for what, ratio in known])
+        why = f", because {readings} readings tell {coefficients} coefficients too"
+    ratios = (("twice its scale", width.doubled), ("half of it", width.halved))
+    changes = listed([f"{ratio:.2f} times as wide with {what}" for what, ratio in ratios if isfinite(ratio)])
     return f"The prior of {parameter} sets widths{why}: the 90 % interval of {name} would be {changes}{more}."
 
 

@@ -1,11 +1,15 @@
 r"""Do the tables of a cable agree with each other?
 
-For each table: how far it moves the parameters from where all the others (and the priors) put them, against how far it
-may. If all is right, the move :math:`\delta` that a table makes has covariance :math:`V = H_{-t}^{-1} - H^{-1}`, with H the
-Gauss-Newton information of everything and :math:`H_{-t}` that without the table; so :math:`\delta^\top V^+ \delta` is
+For each table: how far it moves the parameters from where all the others put them, against how far it may. If all is right,
+the move :math:`\delta` that a table makes has covariance :math:`V = H_{-t}^{-1} - H^{-1}`, with H the Gauss-Newton
+information of everything and :math:`H_{-t}` that without the table; so :math:`\delta^\top V^+ \delta` is
 chi-squared with as many degrees of freedom as V has directions, or F where few readings tell how much they scatter. A table
 of many readings is weighed by its scatter about the best that it alone allows: the scatter about a fit that it contradicts
 would hide the contradiction. Of few readings that scatter is too uncertain; theirs about the fit of all has to do.
+
+A prior is no measurement, and contradicts nobody here: only directions count in which the other tables say much more than the
+priors, whose information keeps the problem linear where nobody says anything. A parameter far out by its prior is said to be
+so in its own words (`bowdenfit.inference.prior_sensitivity.far_out`).
 
 References:
     Hausman, Specification tests in econometrics, Econometrica 46 (1978), 1251.
@@ -24,6 +28,7 @@ from bowdenfit.parameters.space import Parameter
 WORTH_SAYING = 3.0  # sds; a table that is right says more than this three times in a thousand fits
 _MANY = 8  # degrees of freedom from which a table's own scatter is known well enough
 _LEAST_SCATTER = 1e-4  # readings that agree better than that, in units of their noise's prior, were not measured
+_LITTLE = 0.1  # share of the priors in what all others say of a direction, up to which it is the tables that say it
 _LEAST_MOVE = 1e-6  # share of a parameter's variance below which a table says nothing of it
 
 
@@ -103,7 +108,7 @@ def _disagreement(
     parameters: Sequence[Parameter],
     best: np.ndarray,
 ) -> Disagreement | None:
-    """What a move says; None where the table says nothing that anything else says something of."""
+    """What a move says; None where the table says nothing that any other table says something of."""
     from scipy.special import chdtrc, fdtrc, ndtri
 
     rest = np.linalg.inv(of_rest)
@@ -111,9 +116,10 @@ def _disagreement(
     # In units of what the rest leaves open, directions that the table says nothing of have no variance.
     root = np.linalg.cholesky(of_rest)
     shares, directions = np.linalg.eigh(np.eye(len(move)) - root.T @ covariance @ root)
-    told = shares > _LEAST_MOVE
+    of_priors = np.sum(np.linalg.solve(root.T, directions) ** 2, axis=0)
+    told = (shares > _LEAST_MOVE) & (of_priors < _LITTLE)
     along = directions[:, told].T @ (root.T @ move)
-    moved = np.flatnonzero(allowed > _LEAST_MOVE * np.diag(rest))
+    moved = np.flatnonzero((allowed > _LEAST_MOVE * np.diag(rest)) & (np.diag(rest) < _LITTLE))
     if not told.any() or not len(moved):
         return None
     total, n = float(np.sum(along**2 / shares[told])), int(told.sum())

@@ -41,7 +41,8 @@ def run(
     start, estimated = helper.begin(classical, density, answers=2)
     helper.prepare_to_draw()
     settings = data.description.sampler
-    load_beside(*(LIBRARIES[name] for name in samplers(settings.method)), "arviz_stats.ecdf_utils")
+    # Not blackjax, whose modules import each other in circles: two threads would see half of one.
+    load_beside(*(LIBRARIES[name] for name in samplers(settings.method) if name == "emcee"), "arviz_stats.ecdf_utils")
     compiling = ThreadPoolExecutor(1)
     with watch.stage("compile the posterior"):
         programs = sampling_programs(density, seed, compiling)

@@ -3,6 +3,7 @@
 import numpy as np
 
 from bowdenfit.description import Description
+from bowdenfit.kinds.forces.following import check_following
 from bowdenfit.kinds.forces.gained import check_gains
 from bowdenfit.kinds.forces.mountings import ForceSettings
 from bowdenfit.kinds.forces.table import ForceTable, read_forces
@@ -20,8 +21,9 @@ def _typical_speeds(table: ForceTable) -> list[float]:
 
 
 def _check(table: ForceTable, description: Description, measurements: Measurements) -> None:
-    """Every row has its wrap angles, and none gains force."""
+    """Every row has its wrap angles, the output follows the input, and no row gains force."""
     check_rows(table, description, measurements)
+    check_following(table)
     check_gains(table, description)
 
 

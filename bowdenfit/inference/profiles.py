@@ -212,15 +212,21 @@ def interval(
 
 
 def _limit(above: Callable[[float], float], center: float, step: float) -> float:
-    """Where a function that is negative at the center first becomes positive, going by growing steps."""
+    """Where a function that is negative at the center first becomes positive, going by growing steps.
+
+    Where it is not a number short of there, the interval is the wider one.
+    """
     from scipy.optimize import brentq
+
+    def known(z: float) -> float:
+        return float(np.nan_to_num(above(z), nan=-1.0))
 
     inside, end = center, np.copysign(FARTHEST, step)
     for _ in range(_MOST_STEPS):
         outside = float(np.clip(inside + step, -FARTHEST, FARTHEST))
         reached = above(outside)
         if reached >= 0:
-            return float(brentq(above, inside, outside, xtol=_PRECISION * abs(step))) if reached > 0 else outside
+            return float(brentq(known, inside, outside, xtol=_PRECISION * abs(step))) if reached > 0 else outside
         if np.isnan(reached):
             step /= 4
         else:

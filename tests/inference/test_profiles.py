@@ -152,6 +152,12 @@ def test_an_interval_is_open_where_the_model_cannot_be_computed():
     assert np.isfinite(low) and high == np.inf
 
 
+def test_where_the_model_cannot_be_computed_short_of_the_limit_the_interval_is_the_wider_one():
+    low, high = interval(lambda z: float("nan") if 1.6 < z < 1.7 else z**2, 0.0, 1.0, 1.0, 1e9)
+    assert -low == pytest.approx(stats.norm.ppf(0.95), abs=1e-3)
+    assert stats.norm.ppf(0.95) < high <= 1.71
+
+
 def test_an_interval_that_reaches_zero_is_cut_off_there():
     angle = np.deg2rad(np.linspace(20.0, 160.0, 8))[:, None]
     loss = 0.006 * angle[:, 0] + 0.02 * np.array([1, -1, 1, 1, -1, -1, 1, -1])

@@ -181,8 +181,11 @@ def test_the_verdict_says_what_to_do(tmp_path):
 
 
 def test_the_verdict_names_the_curve_that_would_fit(tmp_path):
-    reasons = " ".join(bf.fit(route(tmp_path, 1, "gaussian", "line"), mcmc=False).verdict().reasons)
-    assert "--set contact.1.wrap_angle.curve=gaussian" in reasons
+    folder = route(tmp_path, 1, "gaussian", "line")
+    reasons = " ".join(bf.fit(folder, mcmc=False).verdict().reasons)
+    remedy = "contact.0.wrap_angle.curve=gaussian"
+    assert f"--set {remedy}" in reasons
+    assert bf.fit(folder, settings=[remedy], mcmc=False).verdict().trusted
     reasons = " ".join(bf.fit(route(tmp_path, 2, "parabola", "line"), mcmc=False).verdict().reasons)
     assert ("sheath angle" in reasons and "A line curve does not follow" in reasons) or "Neither a line curve" in reasons
 

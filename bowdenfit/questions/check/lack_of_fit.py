@@ -100,7 +100,7 @@ def _other_curve(fit: Record, column: str) -> str:
     from bowdenfit.questions.check.other_curves import follows  # what loads JAX is loaded where it is needed
 
     contacts = fit.dataset.description.contact
-    number, contact = next((i, c) for i, c in enumerate(contacts, 1) if c.wrap_angle.column == column)
+    number, contact = next((i, c) for i, c in enumerate(contacts) if c.wrap_angle.column == column)
     fitting = [name for name in CURVES if name != contact.wrap_angle.curve and follows(fit.dataset, number, name)]
     if fitting:
         asked = " or ".join(f"--set contact.{number}.wrap_angle.curve={name}" for name in fitting)

@@ -18,13 +18,13 @@ def follows(dataset: Dataset, number: int, family: str) -> bool:
 
     Args:
         dataset: The data set.
-        number: Number of the contact, from 1.
+        number: Number of the contact, from 0.
         family: The other family.
     """
     description = dataset.description
     contacts = list(description.contact)
-    angle = contacts[number - 1].wrap_angle
-    contacts[number - 1] = contacts[number - 1].model_copy(update={"wrap_angle": angle.model_copy(update={"curve": family})})
+    angle = contacts[number].wrap_angle
+    contacts[number] = contacts[number].model_copy(update={"wrap_angle": angle.model_copy(update={"curve": family})})
     changed = description.model_copy(update={"contact": tuple(contacts)})
     table = dataset.measurements.table(AngleTable)
     with jax.enable_x64(True):

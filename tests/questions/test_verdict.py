@@ -72,3 +72,21 @@ def test_efficiencies_above_1_are_no_fit_to_trust(tmp_path, runs, mcmc):
 def test_a_healthy_bench_is_trusted(tmp_path, runs):
     fit = bf.fit(_bench(tmp_path, runs, seed=runs), seed=1)
     assert set(fit.verdict().troubles) <= {NOT_CONVERGED}, fit.verdict().reasons  # the chain here is short
+
+
+def _bends_of(folder, degrees: float, shown: float, settings=()):
+    """Three mountings at a bend that is written down as another."""
+    loss = 0.12 * np.deg2rad(degrees)
+    rows = pull(np.random.default_rng(0), [shown] * 3, [loss] * 3, (20.0, 40.0), repeats=4, noise=(0.2, 0.2))
+    return bf.fit(write(folder, rows), mcmc=False, settings=settings)
+
+
+@pytest.mark.parametrize(("degrees", "shown"), [(180.0, np.pi), (30.0, np.rad2deg(30.0))])
+def test_friction_that_no_sheath_has_is_no_fit_to_trust(tmp_path, degrees, shown):
+    """Radians headed deg, and degrees headed rad where they are few."""
+    found = _bends_of(tmp_path, degrees, shown).verdict()
+    assert list(found.troubles) == [IMPOSSIBLE]
+    assert "the unit of the wrap angles" in found.reasons[0] and "lognormal" in found.reasons[0]
+    stated = "friction.mu.prior.lognormal={median=1.0, log_sd=3.0}"
+    assert _bends_of(tmp_path, degrees, shown, [stated]).verdict().trusted
+    assert _bends_of(tmp_path, degrees, degrees).verdict().trusted

@@ -1,14 +1,16 @@
-"""Efficiencies that no rope can have, in a sentence for the verdict."""
+"""Efficiencies that no rope can have, and friction that no sheath has, in sentences for the verdict."""
 
 import numpy as np
 
 from bowdenfit.kinds import readings_called
 from bowdenfit.kinds.plausibility import GAIN_ERROR
 from bowdenfit.kinds.term import Term
+from bowdenfit.parameters.priors import LogNormal
 from bowdenfit.results.record import Record
 
 _SDS = 4.5  # of noise above what is possible, which one healthy reading of 300,000 exceeds
 _NAMED = 3
+_PRIOR_SDS = 3.0  # of the default prior of friction, beyond which a mistake is likelier than such a rope
 
 
 def impossible_efficiencies(fit: Record) -> str:
@@ -31,6 +33,32 @@ def impossible_efficiencies(fit: Record) -> str:
         f"No rope passes on more force than goes in, but these readings say so beyond their noise: {', '.join(found[:_NAMED])}"
         f"{more}. The usual causes are swapped columns or channels, pull and return exchanged, a unit, or a channel that is no "
         "force: look at these with `bowdenfit check`."
+    )
+
+
+def implausible_friction(fit: Record) -> str:
+    """Coefficients beyond what ropes in sheaths have, in a sentence; empty where there are none.
+
+    A coefficient of which something is stated is believed. What is too large counts by its estimate, what is too small by the
+    upper end of its 90 % interval, because a contact may rub too little to be seen.
+    """
+    found, low, high = [], 0.0, np.inf
+    for p in fit.model.space.free:
+        if p.role != "friction" or p.name in fit.dataset.description.friction or not isinstance(p.prior, LogNormal):
+            continue
+        low, high = (float(p.prior.median * np.exp(s * _PRIOR_SDS * p.prior.log_sd)) for s in (-1, 1))
+        if fit.posterior is None:
+            value, upper = fit.least_squares.estimates[p.name].value, fit.least_squares.estimates[p.name].upper
+        else:
+            value, upper = fit.parameter(p.name).median, fit.parameter(p.name).q95
+        if value > high or upper < low:
+            found.append(f"{p.name} = {value:.2g}")
+    if not found:
+        return ""
+    return (
+        f"Ropes in sheaths have coefficients of {low:.1g} to {high:.1g}, and these readings say {', '.join(found)}. The "
+        "usual causes are the unit of the wrap angles (rad for deg), a contact that was left out, and a slipped decimal point "
+        'in a reading; if it is right, say so: [friction.NAME] prior = { lognormal = { median = ..., log_sd = ... } }.'
     )
 
 

@@ -2,7 +2,7 @@
 
 from dataclasses import dataclass
 
-from bowdenfit.questions.check.impossible import impossible_efficiencies
+from bowdenfit.questions.check.impossible import implausible_friction, impossible_efficiencies
 from bowdenfit.questions.check.lack_of_fit import say_what_is_not_described
 from bowdenfit.questions.identify.contradiction import contradiction
 from bowdenfit.questions.identify.judgment import say_what_is_not_determined
@@ -41,7 +41,7 @@ def verdict(fit: Record) -> Verdict:
         NOT_CONVERGED: () if fit.converged else fit.reasons or ("the fit did not converge",),
         NOT_IDENTIFIABLE: _sentences(say_what_is_not_determined(fit)),
         CONTRADICTORY: _sentences(contradiction(fit)),
-        IMPOSSIBLE: _sentences(impossible_efficiencies(fit)),
+        IMPOSSIBLE: _sentences(impossible_efficiencies(fit)) + _sentences(implausible_friction(fit)),
         NOT_DESCRIBED: say_what_is_not_described(fit),
     }
     return Verdict({kind: sentences for kind, sentences in troubles.items() if sentences})

@@ -1,5 +1,6 @@
 """Settings of every test: 64-bit floats, strict promotion of types, and shapes checked at run time."""
 
+import os
 import sys
 from pathlib import Path
 
@@ -17,6 +18,18 @@ jax.config.update("jax_enable_x64", True)
 jax.config.update("jax_numpy_dtype_promotion", "standard")
 
 ROOT = Path(__file__).parent.parent
+
+
+MOST_MEMORY = 3 * 2**30  # bytes of a process, beyond which it drops what it has compiled
+
+
+@pytest.fixture(scope="module", autouse=True)
+def bounded_memory():
+    """Programs of earlier files go where a process has grown large: JAX would keep them all, several GiB by the end."""
+    yield
+    pages = Path("/proc/self/statm")  # Linux; elsewhere nothing is dropped
+    if pages.exists() and int(pages.read_text().split()[1]) * os.sysconf("SC_PAGE_SIZE") > MOST_MEMORY:
+        jax.clear_caches()
 
 
 @pytest.fixture(scope="session")

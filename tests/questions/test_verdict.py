@@ -1,5 +1,6 @@
 """What the summary says is wrong, the verdict says too."""
 
+import shutil
 from dataclasses import replace
 
 import jax
@@ -90,3 +91,16 @@ def test_friction_that_no_sheath_has_is_no_fit_to_trust(tmp_path, degrees, shown
     stated = "friction.mu.prior.lognormal={median=1.0, log_sd=3.0}"
     assert _bends_of(tmp_path, degrees, shown, [stated]).verdict().trusted
     assert _bends_of(tmp_path, degrees, degrees).verdict().trusted
+
+
+def test_a_reading_far_out_is_a_trouble_unless_the_noise_may_have_such(on_body, tmp_path):
+    """An angle of 28 deg written as 82: with normal noise the verdict names it, with Student noise it hardly counts."""
+    slipped = tmp_path / "slipped"
+    shutil.copytree(on_body, slipped)
+    angles = (slipped / "angles.csv").read_text()
+    (slipped / "angles.csv").write_text(angles.replace("480,17,28", "480,17,82"))
+    assert "480,17,82" in (slipped / "angles.csv").read_text()
+    normal, student = (bf.fit(slipped, noise=noise, seed=1) for noise in ("normal", "student"))
+    assert "free_sheath_angle at 480 mm: so far out" in " ".join(normal.verdict().reasons)
+    assert student.verdict().trusted
+    assert student.parameter("mu3").q05 > normal.parameter("mu3").q05 + 0.02

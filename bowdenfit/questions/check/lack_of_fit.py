@@ -23,7 +23,8 @@ def say_what_is_not_described(fit: Record) -> tuple[str, ...]:
     for each in clear:  # the same place may have been asked about in two ways, and inside runs as well as between them
         told.setdefault((each.table, each.group or each.against), each)
     found = checks_of(fit)
-    return (*(_sentence(fit, each) for each in list(told.values())[:_FEW]), *(_scatter(found) if found else ()))
+    sentences = tuple(_sentence(fit, each) for each in list(told.values())[:_FEW])
+    return sentences + (_scatter(found, fit.dataset.description.noise) if found else ())
 
 
 def _sentence(fit: Record, found: Departure) -> str:
@@ -112,8 +113,11 @@ def _other_curve(fit: Record, column: str) -> str:
     )
 
 
-def _scatter(found: Checks) -> tuple[str, ...]:
-    """Readings that lie outside what the fit says of them more often, or farther, than chance does."""
+def _scatter(found: Checks, noise: str) -> tuple[str, ...]:
+    """Readings that lie outside what the fit says of them more often, or farther, than chance does.
+
+    With Student noise a few readings may lie anywhere, which is what it is for.
+    """
     from scipy.stats import binom
 
     sentences = []
@@ -127,7 +131,7 @@ def _scatter(found: Checks) -> tuple[str, ...]:
             )
     among = len(found.readings)
     far = [r for r in found.outliers if r.chance * among < FALSE_ALARM]
-    if far:
+    if far and noise == "normal":
         names = listed([readings_called(r.table).one.format(r.label) for r in far[:_FEW]])
         more = f" and {len(far) - _FEW} more" if len(far) > _FEW else ""
         sentences.append(

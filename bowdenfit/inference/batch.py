@@ -1,7 +1,8 @@
 """Many data sets of one shape, fitted in one program: each by the least engine whose own checks it passes.
 
 First importance sampling from a mixture about the maxima of the posterior, where the Pareto k of the weights and the
-effective number of draws decide; then ensembles of walkers, started from those draws, in rounds until they agree; then NUTS.
+effective number of draws decide, given up where the first draws are worth little; then ensembles of walkers, started from
+those draws, in rounds until they agree; then NUTS.
 What comes of a data set depends on its own data and seed alone, not on what else is fitted.
 """
 
@@ -19,7 +20,7 @@ from bowdenfit.inference.batch_stages import BatchFit, Case, by_nuts, look, walk
 from bowdenfit.inference.log_density import LogDensity
 
 _GROUP = 256  # data sets from the start to the end, before the next; bounds memory
-_FIRST_LOOK = 2  # rounds before the first look
+_FIRST_LOOK = 3  # rounds before the first look
 
 
 def fit_batch(

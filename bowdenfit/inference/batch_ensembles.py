@@ -1,11 +1,7 @@
-"""Ensembles of walkers of many posteriors in one program: the moves of `ensemble`, some steps at a time.
+"""Ensembles of walkers of many posteriors in one program, some steps at a time.
 
-What a posterior's walkers do depends on its own seed, data and starts alone.
-
-References:
-    Goodman and Weare 2010, "Ensemble samplers with affine invariance" (Communications in Applied Mathematics and
-    Computational Science 5); ter Braak 2006, "A Markov chain Monte Carlo version of the genetic algorithm differential
-    evolution" (Statistics and Computing 16); Nelson, Ford and Payne 2014 (Astrophysical Journal Supplement 210), for both.
+What a posterior's walkers do depends on its own seed, data and starts alone. Which move is made at which step is drawn once for
+all of them, so that no other need be computed.
 """
 
 from collections.abc import Callable
@@ -16,14 +12,13 @@ import jax.numpy as jnp
 import numpy as np
 from jax import Array
 
+from bowdenfit.inference.batch_moves import Moves, batch_moves, numbers_of_move
 from bowdenfit.inference.compilation import compile_program
 from bowdenfit.inference.log_density import LogDensity
+from bowdenfit.inference.value_chart import chart_values
 
 STORED, THIN = 20, 10  # states of a round that are stored, and steps from one to the next
 STEPS = STORED * THIN
-_STRETCH, _JUMP = 0.3, 0.1  # shares of the moves; the rest is differential evolution
-_SCALE = 2.0  # of the stretch move
-_JITTER = 1e-5  # of the length of a difference
 _STREAM = 1
 
 
@@ -36,59 +31,61 @@ def make_round(posterior: LogDensity, n_ensembles: int, n_walkers: int, data: An
         n_walkers: Of each ensemble; a power of two.
         data: Data of as many cables as a round takes, along a new first axis.
     """
-    size, cables = posterior.model.space.size, len(jax.tree.leaves(data)[0])
-    half, first_gamma = n_walkers // 2, 2.38 / np.sqrt(2 * size)
+    space, cables = posterior.model.space, len(jax.tree.leaves(data)[0])
+    of_cable = walker_round(posterior.log_density, batch_moves(chart_values(space)))
+    seeds, number = jax.ShapeDtypeStruct((cables,), jnp.uint32), jax.ShapeDtypeStruct((), jnp.uint32)
+    shapes = [jax.ShapeDtypeStruct((cables, n_ensembles, n_walkers, *more), jnp.float64) for more in ((space.size,), ())]
+    return compile_program(jax.vmap(of_cable, (0, None, 0, 0, 0)), seeds, number, *shapes, data)
 
-    def of_cable(seed: Array, number: Array, z: Array, log_density: Array, data: Any) -> Any:
-        density = jax.vmap(jax.vmap(lambda one: posterior.log_density(one, data)))
+
+def walker_round(log_density: Callable[[Array, Any], Array], moves: Moves) -> Callable[..., Any]:
+    """A round of one cable, of seed, number of the round, z, log densities there and data: stored z, last log densities.
+
+    Args:
+        log_density: Of one z and data.
+        moves: What the walkers do.
+    """
+    proposals = [jax.vmap(move) for move, _ in moves]
+    ends = jnp.asarray(np.cumsum([share for _, share in moves])[:-1])
+
+    def of_cable(seed: Array, number: Array, z: Array, values: Array, data: Any) -> Any:
+        n_ensembles, n_walkers = values.shape
+        density = jax.vmap(jax.vmap(lambda one: log_density(one, data)))
 
         def move_half(carried: Any, turn: Any) -> Any:
-            (z, values), (which, bits, kind) = carried, turn
+            (z, values), (which, kind, uniform) = carried, turn
             moving, resting = z[which], z[1 - which]
-            gamma = jnp.where(kind < _STRETCH + _JUMP, 1.0, first_gamma)
-            proposed, log_factor = _propose(moving, resting, bits, kind < _STRETCH, gamma)
+            proposed, factors = jax.lax.switch(kind, proposals, uniform[..., 1:], moving, resting)
             new = density(proposed)
-            better = log_factor + new - values[which] > jnp.log(_uniform(bits[..., 2]))
+            better = factors + new - values[which] > jnp.log(uniform[..., 0])
             z = z.at[which].set(jnp.where(better[..., None], proposed, moving))
             return (z, values.at[which].set(jnp.where(better, new, values[which]))), None
 
-        def step(carried: Any, key: Array) -> Any:
-            of_order, of_walkers = jax.random.split(key)
-            order, kind = _halves(of_order, n_ensembles, n_walkers)
+        def step(carried: Any, chosen: Any) -> Any:
+            kind, bits, uniform = chosen
+            order = _order(bits, n_walkers)
             z, values, walker = (_shuffle(part, order) for part in carried)
-            bits = jax.random.bits(of_walkers, (2, n_ensembles, half, 3), jnp.uint32)
-            turns = jnp.arange(2), bits, jnp.stack([kind, kind])
-            (z, values), _ = jax.lax.scan(move_half, (_by_half(z, half), _by_half(values, half)), turns)
+            turns = jnp.arange(2), jnp.stack([kind, kind]), uniform
+            (z, values), _ = jax.lax.scan(move_half, (_by_half(z), _by_half(values)), turns)
             return (_whole(z), _whole(values), walker), None
 
-        def stored(carried: Any, keys: Array) -> Any:
-            (z, values, walker), _ = jax.lax.scan(step, carried, keys)
+        def stored(carried: Any, chosen: Any) -> Any:
+            keys, kinds = chosen
+            bits = jax.random.bits(keys[0], (THIN, 2, n_ensembles, 1), jnp.uint32)
+            count = 1 + numbers_of_move(z.shape[2])
+            uniform = _uniform(jax.random.bits(keys[1], (THIN, 2, n_ensembles, n_walkers // 2, count), jnp.uint32))
+            (*places, walker), _ = jax.lax.scan(step, carried, (kinds, bits, uniform))
             own = jnp.argsort(walker, axis=1)  # every walker in its own row again
-            z, values = _shuffle(z, own), _shuffle(values, own)
-            return (z, values, jnp.sort(walker, axis=1)), z
+            found, values = (_shuffle(part, own) for part in places)
+            return (found, values, jnp.sort(walker, axis=1)), found
 
-        key = jax.random.fold_in(jax.random.fold_in(jax.random.key(seed), _STREAM), number)
-        keys = jax.random.split(key, (STORED, THIN))
+        own, of_all = (jax.random.fold_in(jax.random.fold_in(jax.random.key(s), _STREAM), number) for s in (seed, 0))
+        kinds = jnp.searchsorted(ends, _uniform(jax.random.bits(of_all, (STORED, THIN), jnp.uint32)), side="right")
         walkers = jnp.tile(jnp.arange(n_walkers), (n_ensembles, 1))
-        (_, values, _), path = jax.lax.scan(stored, (z, log_density, walkers), keys)
+        (_, values, _), path = jax.lax.scan(stored, (z, values, walkers), (jax.random.split(own, (STORED, 2)), kinds))
         return path, values
 
-    whole = jax.ShapeDtypeStruct((cables,), jnp.uint32)
-    shapes = [jax.ShapeDtypeStruct((cables, n_ensembles, n_walkers, *more), jnp.float64) for more in ((size,), ())]
-    return compile_program(jax.vmap(of_cable), whole, whole, *shapes, data)
-
-
-def _propose(moving: Array, resting: Array, bits: Array, stretches: Array, gamma: Array) -> tuple[Array, Array]:
-    """Proposals by stretching toward one resting walker, or along the difference of two; log factors of acceptance."""
-    half, size = moving.shape[-2:]
-    one = bits[..., 0] % half
-    other = (one + 1 + (bits[..., 0] >> 8) % (half - 1)) % half
-    near, far = (jnp.take_along_axis(resting, i.astype(jnp.int32)[..., None], axis=-2) for i in (one, other))
-    uniform = _uniform(bits[..., 1])
-    factor = ((_SCALE - 1) * uniform + 1) ** 2 / _SCALE
-    stretched = near + factor[..., None] * (moving - near)
-    evolved = moving + (gamma * (1 + _JITTER * (2 * uniform - 1)))[..., None] * (near - far)
-    return jnp.where(stretches, stretched, evolved), jnp.where(stretches, (size - 1) * jnp.log(factor), 0.0)
+    return of_cable
 
 
 def _uniform(bits: Array) -> Array:
@@ -96,19 +93,18 @@ def _uniform(bits: Array) -> Array:
     return (bits + 0.5) / 2.0**32
 
 
-def _halves(key: Array, n_ensembles: int, n_walkers: int) -> tuple[Array, Array]:
-    """An order of the walkers of every ensemble at random, whose halves move one after the other, and what move."""
-    bits = jax.random.bits(key, (2, n_ensembles + 1), jnp.uint32)
-    odd, shift = 2 * bits[0, :-1, None] + 1, bits[1, :-1, None]
-    return (odd * jnp.arange(n_walkers, dtype=jnp.uint32) + shift) % n_walkers, _uniform(bits[0, -1])
+def _order(bits: Array, n_walkers: int) -> Array:
+    """An order of the walkers of every ensemble at random, whose halves move one after the other."""
+    return ((2 * bits[0] + 1) * jnp.arange(n_walkers, dtype=jnp.uint32) + bits[1]) % n_walkers
 
 
 def _shuffle(part: Array, order: Array) -> Array:
     return jax.vmap(lambda walkers, of: walkers[of])(part, order.astype(jnp.int32))
 
 
-def _by_half(part: Array, half: int) -> Array:
+def _by_half(part: Array) -> Array:
     """(half, ensemble, walker, ...) of (ensemble, walker, ...)."""
+    half = part.shape[1] // 2
     return jnp.stack([part[:, :half], part[:, half:]])
 
 

@@ -1,12 +1,10 @@
-"""Mixtures of Student-t's to draw from, moved to where weighted draws say that the mass is.
+"""Mixtures of Student-t's to draw from.
 
 References:
-    Cappe, Douc, Guillin, Marin and Robert 2008, "Adaptive importance sampling in general mixture classes" (Statistics and
-    Computing 18), for the steps; Owen and Zhou 2000, "Safe and effective importance sampling" (Journal of the American
-    Statistical Association 95), for the draws from the prior, which bound the weights.
+    Owen and Zhou 2000, "Safe and effective importance sampling" (Journal of the American Statistical Association 95), for the
+    draws from the prior, which bound the weights.
 """
 
-from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cached_property
 from math import lgamma
@@ -15,8 +13,6 @@ import numpy as np
 
 _FREEDOM = 5  # of the Student-t's
 _PRIOR_SHARE = 0.05  # of the draws that the prior has
-_LEAST_SHARE = 0.01  # that a part keeps
-_STEPS = 3  # of expectation and maximization
 
 
 @dataclass(frozen=True)
@@ -32,14 +28,6 @@ class Mixture:
     center: np.ndarray
     root: np.ndarray
     share: np.ndarray
-
-    @classmethod
-    def of(cls, mixtures: Sequence["Mixture"]) -> "Mixture":
-        """All parts of several, in equal shares."""
-        center, root, share = (
-            np.concatenate([getattr(m, name) for m in mixtures]) for name in ("center", "root", "share")
-        )
-        return cls(center, root, share / len(mixtures))
 
     @cached_property
     def _inverse(self) -> np.ndarray:
@@ -58,50 +46,18 @@ class Mixture:
 
     def log_density(self, z: np.ndarray) -> np.ndarray:
         """Of every row."""
-        of_parts, _ = self._parts(z)
+        of_parts = self._parts(z)
         of_prior = np.log(_PRIOR_SHARE) - 0.5 * (np.einsum("ni,ni->n", z, z) + z.shape[1] * np.log(2 * np.pi))
         top = of_parts.max(axis=1)
         within = np.log(np.sum(np.exp(of_parts - top[:, None]), axis=1)) + top
         return np.logaddexp(within + np.log1p(-_PRIOR_SHARE), of_prior)
 
-    def _parts(self, z: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        """Log of share times density of every part, and squared distance from its center, (row, part)."""
+    def _parts(self, z: np.ndarray) -> np.ndarray:
+        """Log of share times density of every part, (row, part)."""
         count, size = self.center.shape
         flat = self._inverse.reshape(-1, size)
         apart = (z @ flat.T - np.einsum("kij,kj->ki", self._inverse, self.center).ravel()).reshape(len(z), count, size)
         squares = np.einsum("nki,nki->nk", apart, apart)
         constant = lgamma((_FREEDOM + size) / 2) - lgamma(_FREEDOM / 2) - size / 2 * np.log(_FREEDOM * np.pi)
         of_part = np.log(self.share) + constant - np.linalg.slogdet(self.root)[1]
-        return of_part - (_FREEDOM + size) / 2 * np.log1p(squares / _FREEDOM), squares
-
-    def moved_to(self, z: np.ndarray, effective: float) -> "Mixture":
-        """The mixture nearer to draws, by a few steps of expectation and maximization; parts that hardly have any go.
-
-        Args:
-            z: Draws of equal weight, one a row.
-            effective: How many independent ones they are worth; each part keeps to what it was by as many as it has
-                parameters.
-        """
-        found = self
-        for _ in range(_STEPS):
-            found = found._nearer(z, effective)
-        return found
-
-    def _nearer(self, z: np.ndarray, effective: float) -> "Mixture":
-        size = z.shape[1]
-        logs, squares = self._parts(z)
-        belongs = np.exp(logs - logs.max(axis=1, keepdims=True))
-        belongs /= belongs.sum(axis=1, keepdims=True)
-        share, pull, own = belongs.mean(axis=0), belongs * (_FREEDOM + size) / (_FREEDOM + squares), size + 2.0
-        kept = np.flatnonzero(share * effective > own)
-        if not len(kept):
-            return self
-        center, root = [], []
-        for k in kept:
-            middle = pull[:, k] @ z / pull[:, k].sum()
-            apart, has = z - middle, share[k] * effective
-            scale = (apart * pull[:, k, None]).T @ apart / (share[k] * len(z))
-            center.append(middle)
-            root.append(np.linalg.cholesky((has * scale + own * self.root[k] @ self.root[k].T) / (has + own)))
-        shares = np.maximum(share[kept] / share[kept].sum(), _LEAST_SHARE)
-        return Mixture(np.array(center), np.array(root), shares / shares.sum())
+        return of_part - (_FREEDOM + size) / 2 * np.log1p(squares / _FREEDOM)

@@ -16,6 +16,7 @@ from bowdenfit.inference.compilation import compile_program
 from bowdenfit.inference.log_density import LogDensity
 from bowdenfit.inference.objective import noise_scales
 
+FITTED = 4  # walkers a parameter, at the least
 CHUNK = 16  # data sets that a program takes at once; always as many, so that rounding is the same
 
 
@@ -24,7 +25,8 @@ class BatchSettings:
     """How carefully a batch is fitted.
 
     Args:
-        sampler: Ensembles, their walkers (a power of two), most steps, and targets; those of NUTS where it is needed.
+        sampler: Ensembles, their walkers at the least (a power of two), most steps, and targets; those of NUTS where it is
+            needed.
         n_kept: Draws of equal weight that are made of weighted ones.
         nuts: Whether NUTS takes what the ensembles leave.
         threads: How many chunks at once; as many as there are cores if omitted.
@@ -80,8 +82,15 @@ class BatchPrograms:
     @cached_property
     def ensembles(self) -> Callable[..., Any]:
         """A round of all walkers."""
-        sampler = self.settings.sampler
-        return make_round(self.posterior, sampler.n_ensembles, sampler.n_walkers, self._data)
+        return make_round(self.posterior, self.settings.sampler.n_ensembles, self.n_walkers, self._data)
+
+    @property
+    def n_walkers(self) -> int:
+        """Of each ensemble: enough for a covariance to be fitted to half of them, doubled until they are."""
+        walkers = self.settings.sampler.n_walkers
+        while walkers < FITTED * self.posterior.model.space.size:
+            walkers *= 2
+        return walkers
 
     @cached_property
     def nuts(self) -> Callable[..., Any]:

@@ -5,7 +5,6 @@ from typing import Any
 
 import numpy as np
 
-from bowdenfit.description import SamplerSettings
 from bowdenfit.inference.batch_diagnostics import diagnose_few_draws
 from bowdenfit.inference.batch_ensembles import STEPS, STORED
 from bowdenfit.inference.batch_laplace import mixtures
@@ -99,7 +98,7 @@ def weigh(programs: BatchPrograms, parts: list[tuple[int, Any, int]]) -> list[Ca
 def _by_weights(programs: BatchPrograms, weighted: Weighted | None) -> BatchFit:
     """What weighted draws say, as draws of equal weight."""
     settings = programs.settings
-    least = _SPREAD * settings.sampler.n_ensembles * settings.sampler.n_walkers
+    least = _SPREAD * programs.n_walkers * settings.sampler.n_ensembles
     if weighted is None or np.isfinite(weighted.log_density).sum() < least:
         return BatchFit(np.zeros((0, len(programs.names))), "laplace", float("inf"), {}, (_UNKNOWN,))
     diagnostics = weighted.diagnose(programs.names)
@@ -109,12 +108,12 @@ def _by_weights(programs: BatchPrograms, weighted: Weighted | None) -> BatchFit:
 
 
 def walk(programs: BatchPrograms, cases: list[Case]) -> list[Case]:
-    """A round of the walkers of a chunk of data sets."""
-    begun = [case if case.rounds else _on_the_way(programs.settings.sampler, case) for case in cases]
+    """A round of the walkers of a chunk of data sets, which have gone as many."""
+    begun = [case if case.rounds else _on_the_way(programs, case) for case in cases]
     padded = [*begun, *[begun[-1]] * (CHUNK - len(begun))]
-    seeds, rounds = (np.array([getattr(c, name) for c in padded], dtype=np.uint32) for name in ("seed", "rounds"))
+    seeds, number = np.array([case.seed for case in padded], dtype=np.uint32), np.uint32(begun[0].rounds)
     z, log_density = (np.stack([case.walkers[i] for case in padded]) for i in (0, 1))
-    answer = programs.ensembles(seeds, rounds, z, log_density, stack([case.data for case in padded]))
+    answer = programs.ensembles(seeds, number, z, log_density, stack([case.data for case in padded]))
     path, log_density = (np.asarray(part) for part in answer)
     return [_further(case, path[i], log_density[i]) for i, case in enumerate(begun)]
 
@@ -126,16 +125,21 @@ def _further(case: Case, path: np.ndarray, log_density: np.ndarray) -> Case:
     return replace(case, rounds=rounds, walkers=(path[-1], log_density), path=late)
 
 
-def _on_the_way(sampler: SamplerSettings, case: Case) -> Case:
-    """Walkers at different ones of the weighted draws; of few effective draws the weights are made more even."""
+def _on_the_way(programs: BatchPrograms, case: Case) -> Case:
+    """Walkers at different ones of the weighted draws."""
     assert case.weighted is not None  # nothing walks where nothing can be computed
-    wanted, generator = sampler.n_ensembles * sampler.n_walkers, np.random.default_rng([case.seed, 2])
-    log_weights = evened(case.weighted.log_weights, _SPREAD * wanted)
+    shape, generator = (programs.settings.sampler.n_ensembles, programs.n_walkers), np.random.default_rng([case.seed, 2])
+    log_weights = _evened(programs, case.weighted)
     # The largest of weights times exponential numbers are a sample without replacement.
-    chosen = np.argsort(log_weights + generator.gumbel(size=len(log_weights)))[-wanted:]
-    chosen, shape = generator.permutation(chosen), (sampler.n_ensembles, sampler.n_walkers)
+    chosen = np.argsort(log_weights + generator.gumbel(size=len(log_weights)))[-shape[0] * shape[1] :]
+    chosen = generator.permutation(chosen)
     log_density = case.weighted.log_density[chosen].reshape(shape)
     return replace(case, walkers=(case.weighted.z[chosen].reshape(*shape, -1), log_density))
+
+
+def _evened(programs: BatchPrograms, weighted: Weighted) -> np.ndarray:
+    """Log weights, more even where draws are worth too few to start walkers from."""
+    return evened(weighted.log_weights, _SPREAD * programs.settings.sampler.n_ensembles * programs.n_walkers)
 
 
 def look(programs: BatchPrograms, cases: list[Case]) -> list[Case]:
@@ -161,7 +165,7 @@ def by_nuts(programs: BatchPrograms, case: Case) -> BatchFit:
     from bowdenfit.inference.nuts import sample
 
     assert case.weighted is not None  # nor is there anything to start from
-    weights, rows = np.exp(case.weighted.log_weights), case.weighted.z
+    weights, rows = np.exp(_evened(programs, case.weighted)), case.weighted.z
     start = MaximumPosterior(weights @ rows, np.cov(rows.T, aweights=weights).reshape(rows.shape[1], -1))
     posterior = replace(programs.posterior, given=case.data)
     asked = Sampling(posterior, start, programs.settings.sampler, case.seed, diagnose=diagnose_few_draws)

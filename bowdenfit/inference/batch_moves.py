@@ -1,0 +1,124 @@
+"""How walkers of a batch are moved: the proposals of `proposals` and the charts of `value_chart`, in JAX.
+
+A move takes numbers drawn uniformly between 0 and 1, `numbers_of_move` for each walker, and the two halves of one ensemble,
+the one that moves and the one that rests, (walker, parameter). It gives places for the moving half, and the log of what the
+ratio of densities there is to be multiplied by. That numbers come from outside keeps random generators, slow to compile, out.
+
+References:
+    Goodman and Weare 2010, "Ensemble samplers with affine invariance" (Communications in Applied Mathematics and
+    Computational Science 5); ter Braak 2006, "A Markov chain Monte Carlo version of the genetic algorithm differential
+    evolution" (Statistics and Computing 16); Nelson, Ford and Payne 2014 (Astrophysical Journal Supplement 210), for both.
+"""
+
+from collections.abc import Callable, Sequence
+from functools import partial
+
+import jax
+import jax.numpy as jnp
+import numpy as np
+from jax import Array
+
+from bowdenfit.inference.value_chart import NODES, Chart
+
+Move = Callable[[Array, Array, Array], tuple[Array, Array]]
+Moves = Sequence[tuple[Move, float]]
+
+_WIDEST_STRETCH = 2.0
+_GAMMA_SPREAD = 1e-5
+_FREEDOM = 5  # degrees of freedom of the t distribution; odd
+_JITTER = 1e-10  # of each variance; keeps the covariance of walkers on a narrow ridge positive
+_WIDTH = float(NODES[1] - NODES[0])
+
+
+def batch_moves(chart: Chart) -> Moves:
+    """What the walkers do, and how often: as in `ensemble.default_moves`."""
+    return [
+        (stretch, 0.1),
+        (differential_evolution, 0.15),
+        (in_values(differential_evolution, chart), 0.2),
+        (partial(differential_evolution, gamma=1.0), 0.05),
+        (independent, 0.2),
+        (in_values(independent, chart), 0.3),
+    ]
+
+
+def numbers_of_move(size: int) -> int:
+    """How many uniform numbers a walker of so many parameters needs for any move."""
+    return size + _FREEDOM
+
+
+def stretch(uniform: Array, moving: Array, resting: Array) -> tuple[Array, Array]:
+    """Places on the line through a resting walker."""
+    factor = ((_WIDEST_STRETCH - 1) * uniform[:, 0] + 1) ** 2 / _WIDEST_STRETCH
+    anchor = resting[_whole_number(uniform[:, 1], len(resting))]
+    return anchor - (anchor - moving) * factor[:, None], (moving.shape[1] - 1) * jnp.log(factor)
+
+
+def differential_evolution(
+    uniform: Array, moving: Array, resting: Array, gamma: float | None = None
+) -> tuple[Array, Array]:
+    """Places shifted by the difference of two resting walkers, times 2.38 / sqrt(2 parameters) or gamma."""
+    (n, size), count = moving.shape, len(resting)
+    first = _whole_number(uniform[:, 0], count)
+    second = (first + 1 + _whole_number(uniform[:, 1], count - 1)) % count  # any but the first
+    gamma = 2.38 / (2 * size) ** 0.5 if gamma is None else gamma
+    spread = gamma * (1 + _GAMMA_SPREAD * (2 * uniform[:, 2:3] - 1))
+    return moving + spread * (resting[second] - resting[first]), jnp.zeros(n)
+
+
+def independent(uniform: Array, moving: Array, resting: Array) -> tuple[Array, Array]:
+    """Places drawn from a t distribution fitted to the resting half."""
+    size = moving.shape[1]
+    normal = 2**0.5 * jax.lax.erf_inv(2 * uniform - 1)
+    drawn = normal[:, :size] * jnp.sqrt(_FREEDOM / jnp.sum(normal[:, size:] ** 2, axis=1, keepdims=True))
+    mean = resting.mean(axis=0)
+    covariance = (resting - mean).T @ (resting - mean) / (len(resting) - 1)
+    root = jnp.linalg.cholesky(covariance * (1 + _JITTER * jnp.eye(size)), symmetrize_input=False)
+    present = jax.scipy.linalg.solve_triangular(root, (moving - mean).T, lower=True).T
+    return mean + drawn @ root.T, _log_t(present) - _log_t(drawn)
+
+
+def _whole_number(uniform: Array, count: int) -> Array:
+    """From 0 to one less than a count."""
+    return (uniform * count).astype(int)
+
+
+def _log_t(standardized: Array) -> Array:
+    """Log density of the standard t distribution, up to a constant."""
+    return -(_FREEDOM + standardized.shape[-1]) / 2 * jnp.log1p(jnp.sum(standardized**2, axis=-1) / _FREEDOM)
+
+
+def in_values(move: Move, chart: Chart) -> Move:
+    """The same move, made in the coordinates of a chart."""
+    if not len(chart.which):
+        return move
+
+    def moved(uniform: Array, moving: Array, resting: Array) -> tuple[Array, Array]:
+        present, volume = _from_z(chart, moving)
+        places, factors = move(uniform, present, _from_z(chart, resting)[0])
+        z, new_volume = _to_z(chart, places)
+        return z, factors + volume - new_volume
+
+    return moved
+
+
+def _from_z(chart: Chart, z: Array) -> tuple[Array, Array]:
+    """`Chart.from_z`."""
+    along = (z[:, chart.which] - NODES[0]) / _WIDTH
+    node = jnp.clip(along, 0, len(NODES) - 2).astype(int)
+    found = _taken(chart.values, node) + (along - node) * _taken(chart.rises, node)
+    return z.at[:, chart.which].set(found), _taken(chart.log_slopes, node).sum(axis=1)
+
+
+def _to_z(chart: Chart, found: Array) -> tuple[Array, Array]:
+    """`Chart.to_z`."""
+    at, inner = found[:, chart.which], jnp.asarray(chart.values[1:-1])
+    search = jax.vmap(partial(jnp.searchsorted, side="right"), in_axes=1, out_axes=1)
+    node = search(inner, at)
+    along = node + (at - _taken(chart.values, node)) / _taken(chart.rises, node)
+    return found.at[:, chart.which].set(NODES[0] + _WIDTH * along), _taken(chart.log_slopes, node).sum(axis=1)
+
+
+def _taken(table: np.ndarray, node: Array) -> Array:
+    """Of each column of a table the rows of its nodes."""
+    return jnp.take(jnp.asarray(table), node * table.shape[1] + jnp.arange(table.shape[1]), mode="clip")

@@ -11,7 +11,8 @@ twenty, hung weights or cells, and what goes wrong on benches. In each
 - the right model is fitted to `--intervals` sessions by the batch engine, with the priors of the first of them: 90 % intervals
   must hold the truth as often as chance allows, at 99 % for all of them together.
 
-Prints a table, writes it into a file between two marks (`--write fits/README.md`), and ends with 1 if anything is wrong.
+Prints a table, writes its rows into a file between two marks (`--write fits/README.md`; those of other laboratories stay), and
+ends with 1 if anything is wrong.
 """
 
 import argparse
@@ -103,16 +104,17 @@ def investigate(name: str, asked: argparse.Namespace) -> Row:
     return row
 
 
-def write(path: Path, rows: list[Row], asked: argparse.Namespace) -> None:
-    """Put the table between its marks in a file of text."""
-    commit = subprocess.run(
-        ["git", "-C", str(ROOT), "rev-parse", "--short", "HEAD"], capture_output=True, text=True
-    ).stdout
-    lines = ["| " + " | ".join(cells) + " |" for cells in (HEADS, ("---",) * len(HEADS), *(row.cells for row in rows))]
-    day = datetime.datetime.now(datetime.UTC).date()
-    made = f"{day}, commit {commit.strip()}; {asked.verdicts} sessions for verdicts, {asked.intervals} for intervals."
+def write(path: Path, row: Row) -> None:
+    """Put a row into the table between its marks in a file of text, in place of an earlier one of the laboratory."""
+    commit = subprocess.run(["git", "-C", str(ROOT), "rev-parse", "--short", "HEAD"], capture_output=True, text=True).stdout
+    made = f"{datetime.datetime.now(datetime.UTC).date()}, {commit.strip()}"
     before, _, rest = path.read_text().partition(START)
-    path.write_text(before + "\n".join([START, "", *lines, "", made, "", END]) + rest.partition(END)[2])
+    old, _, after = rest.partition(END)
+    rows = {line.split(" | ")[0]: line for line in old.splitlines() if line.startswith("| ") and "---" not in line}
+    rows[f"| {row.name}"] = "| " + " | ".join((*row.cells, made)) + " |"
+    order = [f"| {name}" for name in LABORATORIES]
+    heads = ["| " + " | ".join((*HEADS, "made")) + " |", "| " + " | ".join(["---"] * (len(HEADS) + 1)) + " |"]
+    path.write_text(before + "\n".join([START, "", *heads, *(rows[k] for k in order if k in rows), "", END]) + after)
 
 
 def main() -> None:
@@ -131,9 +133,9 @@ def main() -> None:
     for name in asked.laboratories or LABORATORIES:
         rows.append(investigate(name, asked))
         print(" | ".join(rows[-1].cells), flush=True)
+        if asked.write:
+            write(asked.write, rows[-1])
     print("\n" + table(HEADS, [row.cells for row in rows]))
-    if asked.write:
-        write(asked.write, rows, asked)
     sys.exit(1 if any(row.wrong for row in rows) else 0)
 
 

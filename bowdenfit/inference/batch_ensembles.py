@@ -71,21 +71,26 @@ def walker_round(log_density: Callable[[Array, Any], Array], moves: Moves) -> Ca
 
         def stored(carried: Any, chosen: Any) -> Any:
             keys, kinds = chosen
-            bits = jax.random.bits(keys[0], (THIN, 2, n_ensembles, 1), jnp.uint32)
+            bits = _bits(keys[0], (THIN, 2, n_ensembles, 1))
             count = 1 + numbers_of_move(z.shape[2])
-            uniform = _uniform(jax.random.bits(keys[1], (THIN, 2, n_ensembles, n_walkers // 2, count), jnp.uint32))
+            uniform = _uniform(_bits(keys[1], (THIN, 2, n_ensembles, n_walkers // 2, count)))
             (*places, walker), _ = jax.lax.scan(step, carried, (kinds, bits, uniform))
             own = jnp.argsort(walker, axis=1)  # every walker in its own row again
             found, values = (_shuffle(part, own) for part in places)
             return (found, values, jnp.sort(walker, axis=1)), found
 
         own, of_all = (jax.random.fold_in(jax.random.fold_in(jax.random.key(s), _STREAM), number) for s in (seed, 0))
-        kinds = jnp.searchsorted(ends, _uniform(jax.random.bits(of_all, (STORED, THIN), jnp.uint32)), side="right")
+        kinds = jnp.searchsorted(ends, _uniform(_bits(of_all, (STORED, THIN))), side="right")
         walkers = jnp.tile(jnp.arange(n_walkers), (n_ensembles, 1))
         (_, values, _), path = jax.lax.scan(stored, (z, values, walkers), (jax.random.split(own, (STORED, 2)), kinds))
         return path, values
 
     return of_cable
+
+
+def _bits(key: Array, shape: tuple[int, ...]) -> Array:
+    """Random; along one axis first, because XLA takes ten seconds to compile them along five."""
+    return jax.random.bits(key, (int(np.prod(shape)),), jnp.uint32).reshape(shape)
 
 
 def _uniform(bits: Array) -> Array:

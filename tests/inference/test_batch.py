@@ -67,7 +67,11 @@ def test_a_data_set_that_cannot_be_computed_says_so_and_hurts_no_other(programs)
 
 @pytest.mark.parametrize("name", [YARN, *(pytest.param(n, marks=pytest.mark.slow) for n in DATA_SETS if n != YARN)])
 def test_a_batch_agrees_with_a_single_fit(name):
-    """Means to 0.1 sd and sds to 10 % of every parameter: four Monte Carlo errors of 1000 effective draws each, about."""
+    """Means to 0.1 sd and sds to 10 % of every parameter, at one seed.
+
+    Where both have 1000 effective draws, the difference of means has an error of 0.045 sd and that of sds one of 3 % of a
+    normal posterior, more of one with wide tails: bounds that catch a wrong posterior and not small bias.
+    """
     single = bf.fit(DATA / name, seed=1).posterior.z
     posterior = LogDensity(build_model(load_dataset(DATA / name)))
     (fit,) = fit_batch(posterior, [posterior.data], [1], ACCURATE)

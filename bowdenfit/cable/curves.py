@@ -193,5 +193,6 @@ class LogisticCurve(Curve):
 
 
 def _median(detected: Vector, defaults: PriorDefaults) -> float:
-    """The median detected angle [rad], or a usual one where none was detected."""
+    """The median detected angle [rad], or a usual one where none above 0 was detected."""
+    detected = detected[detected > 0]
     return float(np.median(detected)) if len(detected) else defaults.curve_level_degrees_without_data * _DEGREE

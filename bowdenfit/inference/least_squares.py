@@ -21,7 +21,7 @@ from bowdenfit.inference.log_density import LogDensity
 from bowdenfit.inference.objective import LOWER_END, Objective, Problem, Solution, may_end, sum_of_squares
 from bowdenfit.inference.other_minima import PINS, fitting_as_well, range_of_minima
 from bowdenfit.inference.profiles import Basin, limits
-from bowdenfit.parameters.priors import Uniform
+from bowdenfit.parameters.priors import LogNormal, Uniform
 from bowdenfit.parameters.space import Parameter
 
 UNDETERMINED = "the measurements do not determine it"
@@ -208,7 +208,8 @@ def _estimates(
         if basin.at_end[i]:
             remark = _at_bound(value, limit, found["z"][i] > 0)
             estimates[p.name] = Estimate(np.nan, np.nan, False, remark, *limit, at_bound=True)
-        elif not determined[i]:
+        elif not determined[i] or (p.role == "elastic" and isinstance(p.prior, LogNormal) and sd > value):
+            # A positive quantity that may as well be 0 or twice as large is none that was measured.
             estimates[p.name] = Estimate(np.nan, np.nan, False, UNDETERMINED)
         elif (ends := range_of_minima(value, sd, others)) is not None:
             remark = f"values from {ends[0]:.3g} to {ends[1]:.3g} fit about as well"

@@ -58,7 +58,9 @@ class Readings:
 
     def excess(self, some: np.ndarray) -> float:
         """How much more some of them read than the model says, over what is read [1]."""
-        return float(np.sum((self.unit * self.residuals)[some]) / np.sum(np.abs(self.reading[some])))
+        read = np.abs(self.reading[some])
+        total = np.sum(read) or len(read) * np.mean(np.abs(self.reading))  # where nothing is read there, of all of them
+        return float(np.sum((self.unit * self.residuals)[some]) / total)
 
 
 @dataclass(frozen=True)

@@ -3,7 +3,8 @@ r"""Forces as a run's readings together say they are, so that the weight of a re
 A weight made of the very readings that it weighs rises with the output's noise, as the efficiency does, and the mean of a run
 comes out too high by about 1.5 (sd/F)^2, however many rows it has. So the readings of each run, stroke and bend are projected
 on a line: :math:`F_\text{out} = k F_\text{in}` by total least squares (Deming 1943, with the ratio of the two cells' noises),
-bent by what is left over where that is far beyond noise, as hidden tension and load dependence do. The distance to the line
+bent by what is left over where that is far beyond noise, as hidden tension and load dependence do, and off the origin where
+the cells may have offsets. The distance to the line
 and the place along it have independent errors. What noise itself adds to a log ratio, to second order,
 
 .. math:: E[\log(F_\text{in}/F_\text{out})] - \log(k^{-1}) = \tfrac{\sigma^2}{2} (F_\text{out}^{-2} - \rho^2 F_\text{in}^{-2}),
@@ -17,6 +18,7 @@ import numpy as np
 
 from bowdenfit.types import Labels, Vector
 
+_FEWEST_TO_SHIFT = 3  # readings of a group, from which a line that need not go through the origin is told
 _FEWEST_TO_BEND = 6  # readings of a group, from which a bend is looked for
 _FAR_BEYOND = 10.0  # F of the bend, which chance exceeds in a group of a thousand
 _FAR_OFF = 0.2  # of a log ratio from the line, from which few readings are taken as they are
@@ -39,7 +41,12 @@ class ExpectedForces:
 
 
 def expected_forces(
-    input_force: Vector, output_force: Vector, group: Labels, noise_ratio: float, noise: float | None
+    input_force: Vector,
+    output_force: Vector,
+    group: Labels,
+    noise_ratio: float,
+    noise: float | None,
+    offsets: bool = False,
 ) -> ExpectedForces:
     """The forces that readings together say there were.
 
@@ -48,6 +55,7 @@ def expected_forces(
         group: Number of each reading's run, stroke and bend together.
         noise_ratio: rho, noise of the input over that of the output; 0 where a weight hangs there.
         noise: Standard deviation of an output's reading as stated [N]; None where distances tell it.
+        offsets: Whether the cells may show a force where there is none, so that the line need not go through the origin.
     """
     slope = _slopes(input_force, output_force, group, noise_ratio)[group]
     across = 1 + noise_ratio**2 * slope**2
@@ -56,7 +64,10 @@ def expected_forces(
     along = input_force + noise_ratio**2 * slope * distance / across
     few = np.zeros(len(distance), dtype=bool)
     for mine in np.split(np.argsort(group, kind="stable"), np.cumsum(np.bincount(group))[:-1]):
-        if len(mine) >= _FEWEST_TO_BEND:
+        if offsets and len(mine) >= _FEWEST_TO_SHIFT:
+            bend[mine], more = _shift(along[mine], distance[mine])
+            freedom -= more
+        elif len(mine) >= _FEWEST_TO_BEND:
             bend[mine], more = _bend(along[mine], distance[mine])
             freedom -= more
         elif np.any(np.abs(np.log(output_force[mine] / (slope * input_force)[mine])) > _FAR_OFF):
@@ -83,7 +94,20 @@ def _slopes(input_force: Vector, output_force: Vector, group: Labels, noise_rati
         np.bincount(group, product) for product in (input_force**2, input_force * output_force, output_force**2)
     )
     difference = of_input - noise_ratio**2 * of_output
-    return np.asarray(2 * of_both / (difference + np.sqrt(difference**2 + 4 * noise_ratio**2 * of_both**2)))
+    root = np.sqrt(difference**2 + 4 * noise_ratio**2 * of_both**2)
+    # One of two forms of the same root, whichever does not cancel; forces that no table has may be 0 or negative.
+    steep = (root - difference) / np.where(of_both == 0, 1.0, 2 * noise_ratio**2 * of_both) if noise_ratio else root
+    flat = 2 * of_both / np.where(difference < 0, 1.0, np.maximum(difference + root, 1e-300))
+    return np.asarray(np.where(difference < 0, steep, flat))
+
+
+def _shift(along: Vector, distance: Vector) -> tuple[Vector, int]:
+    """What is left over as a straight line along the line, and its further coefficients."""
+    spread = np.ptp(along)
+    if spread <= 1e-9 * np.max(along):
+        return np.zeros(len(along)), 0
+    columns = np.vander((along - along.mean()) / spread, 2)
+    return columns @ np.linalg.lstsq(columns, distance, rcond=None)[0], 1
 
 
 def _bend(along: Vector, distance: Vector) -> tuple[Vector, int]:

@@ -147,7 +147,7 @@ def test_faults_inside_runs_are_named(tmp_path, judge, fault):
     [
         (lambda table: 1 - 0.1 * table.unloading, STROKE),
         (lambda table: 1 + 0.15 * np.sin(table.load / 15), LOAD),
-        (lambda table: 1 + 0.1 * np.linspace(-1, 1, len(table.load)), ORDER),
+        (lambda table: 1 + 0.2 * np.linspace(-1, 1, len(table.load)) ** 2, ORDER),
     ],
 )
 def test_stretch_that_the_rope_does_not_have_is_named(judge, planted, against):

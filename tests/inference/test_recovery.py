@@ -34,6 +34,8 @@ PRIORS = {
     "squeezed_angle_b": _normal(-1.2, 0.3),
     "second_angle_a": _normal(-0.4, 0.3),
     "second_angle_b": _normal(0.3, 0.3),
+    **{f"{angle}_c": {"prior": {"half_normal": {"sd": 0.5}}} for angle in ("free_angle", "squeezed_angle", "second_angle")},
+    "tau": {"prior": {"half_normal": {"sd": 0.02}}},  # truths that a bench could show; the defaults have long tails
     "sigma_theta": {"prior": {"half_normal": {"sd": 1.5}}},
     "sigma_F": {"prior": {"half_normal": {"sd": 0.3}}},
 }
@@ -44,7 +46,7 @@ def recoverable(n_contacts: int) -> Description:
     """A cable whose priors do not look at its data; of three contacts, one whose angles below 10 deg go undetected."""
     plain = cable(n_contacts)
     names = [c.wrap_angle.column for c in plain.curved]
-    prior = {name: setting for name, setting in PRIORS.items() if name.startswith("sigma") or name[:-2] in names}
+    prior = {name: setting for name, setting in PRIORS.items() if name.startswith(("sigma", "tau")) or name[:-2] in names}
     angles = {"file": "a.csv"} | ({"detection_limit": {"value": 10, "unit": "deg"}} if n_contacts == 3 else {})
     friction = dict.fromkeys(plain.coefficients, FRICTION)
     return cable(n_contacts, {"angles": angles, "forces": {"file": "f.csv"}}, prior=prior, friction=friction)

@@ -41,7 +41,7 @@ def on_body_model(on_body) -> Model:
 @pytest.mark.parametrize("geometry", ["continuous", "published"])
 def test_the_optimum_is_that_of_a_fine_grid(on_body, geometry):
     model = build_model(load_dataset(on_body, [f'geometry="{geometry}"']))
-    z = _draws(model, 60, 1)
+    z = _draws(model, 120, 1)
     length, efficiency = for_each_draw(optimum_of(model), model.space.size)(z)
     brute_length, brute_efficiency = _by_brute_force(model, z)
     if geometry == "continuous":

@@ -59,7 +59,7 @@ def sliding_rows(
     group = np.unique(keys, axis=0, return_inverse=True)[1].ravel()
     sensors = description.sensors
     stated = None if sensors.force_noise is None else sensors.force_noise.to("force")
-    expected = expected_forces(force_in, force_out, group, sensors.noise_ratio, stated)
+    expected = expected_forces(force_in, force_out, group, sensors.noise_ratio, stated, description.fits_offsets)
     return SlidingRows(
         expected.input_force,
         expected.output_force,

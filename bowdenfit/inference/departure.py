@@ -36,3 +36,20 @@ class Departure:
     def worth_saying(self) -> bool:
         """Whether chance does not make it, and it matters."""
         return self.chance < FALSE_ALARM and self.size > WORTH_SAYING
+
+
+@dataclass(frozen=True)
+class FarReading:
+    """A reading that lies farther from the fit than chance puts one of all.
+
+    Args:
+        table: Name of the readings.
+        label: Which one.
+        chance: Probability of one as far out among all readings of a healthy fit.
+        sds: How far, in standard deviations of the others.
+    """
+
+    table: str
+    label: str
+    chance: float
+    sds: float

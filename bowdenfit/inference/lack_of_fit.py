@@ -17,7 +17,7 @@ import jax
 import jax.numpy as jnp
 import numpy as np
 
-from bowdenfit.inference.departure import Departure
+from bowdenfit.inference.departure import FALSE_ALARM, Departure, FarReading
 from bowdenfit.inference.objective import Solution
 from bowdenfit.inference.profiles import Basin
 from bowdenfit.inference.testable_readings import Readings, System, readings_to_test
@@ -29,13 +29,14 @@ _MANY = 30  # readings from which their own scatter weighs them
 _MOST_LEVELS = 24  # loads that are each asked about
 _OF_CURVE, _OF_PLACE = 4, 2  # degree of the polynomials by which curves, and other readings, may depart
 _LEAST_FREEDOM = 2.0
+_LEAST_TO_STAND_OUT = 5.0  # degrees of freedom from which one reading can be told from the scatter of the others
 _BELIEVED = (1e-3, 1e3)  # scatter in units of what a prior expects
 _FARTHEST = 6.0  # z of a noise scale
 _FOLLOWED = 1e-3  # share of a column that is left where the parameters can follow it
 
 
-def departures(basin: Basin, scale: np.ndarray) -> tuple[Departure, ...]:
-    """Every departure that was asked about, the least likely by chance first.
+def departures(basin: Basin, scale: np.ndarray) -> tuple[tuple[Departure, ...], tuple[FarReading, ...]]:
+    """Every departure that was asked about, the least likely by chance first; and single readings that are far out.
 
     Args:
         basin: The minimum of least squares.
@@ -45,7 +46,28 @@ def departures(basin: Basin, scale: np.ndarray) -> tuple[Departure, ...]:
     system = readings_to_test(model, _weighed_by_scatter(basin, model, scale))
     asked = [each for readings in system.readings for each in _departures_of(system, readings)]
     corrected = (replace(each, chance=min(each.chance * len(asked), 1.0)) for each in asked)
-    return tuple(sorted(corrected, key=lambda each: (each.chance, -each.size)))
+    found = tuple(sorted(corrected, key=lambda each: (each.chance, -each.size)))
+    return found, _far_readings(system)
+
+
+def _far_readings(system: System) -> tuple[FarReading, ...]:
+    """By externally studentized residuals, which a reading itself does not enlarge (Draper and Smith, chapter 8).
+
+    Not of readings inside runs, whose noise may well grow with the load.
+    """
+    from scipy.special import stdtr
+
+    whole = [r for r in system.readings if not r.inside and r.freedom >= _LEAST_TO_STAND_OUT]
+    found, among = [], sum(int(np.sum(readings.used)) for readings in whole)
+    for readings in whole:
+        residuals, freedom = system.residuals[readings.rows], readings.freedom
+        left = np.maximum(1 - np.sum(system.followed[readings.rows] ** 2, axis=1), 0.0)
+        share = residuals**2 / (np.maximum(left, _FOLLOWED) * np.sum(residuals**2))  # of all scatter, the reading's own
+        t = np.sqrt((freedom - 1) * share / np.maximum(1 - share, 1e-12))
+        chance = np.where(readings.used & (left > _FOLLOWED), 2 * stdtr(freedom - 1, -t) * among, 1.0)
+        far = np.flatnonzero(chance < FALSE_ALARM)
+        found += [FarReading(readings.table, readings.labels[i], float(chance[i]), float(t[i])) for i in far]
+    return tuple(sorted(found, key=lambda each: each.chance))
 
 
 def _weighed_by_scatter(basin: Basin, model: Model, scale: np.ndarray) -> Solution:

@@ -13,7 +13,7 @@ from typing import ClassVar
 import numpy as np
 
 from bowdenfit.errors import ConvergenceError
-from bowdenfit.inference.departure import Departure
+from bowdenfit.inference.departure import Departure, FarReading
 from bowdenfit.inference.disagreement import Disagreement, disagreements
 from bowdenfit.inference.lack_of_fit import departures
 from bowdenfit.inference.linearized import linearize, scatter_about
@@ -77,6 +77,7 @@ class LeastSquares:
         message: What it said.
         disagreements: How well each table agrees with everything else; empty of one table alone.
         departures: How residuals depend on where the readings were taken, the least likely by chance first.
+        far_readings: Single readings farther out than chance puts one, the farthest first.
     """
 
     estimates: dict[str, Estimate]
@@ -89,6 +90,7 @@ class LeastSquares:
     message: str
     disagreements: tuple[Disagreement, ...] = ()
     departures: tuple[Departure, ...] = ()
+    far_readings: tuple[FarReading, ...] = ()
 
 
 @dataclass(frozen=True)
@@ -153,7 +155,7 @@ def least_squares(
         bool(found["succeeded"]),
         "" if found["succeeded"] else "the solver stopped before it met its tolerance",
         disagreements(terms, space.free, found),
-        departures(basin, scale),
+        *departures(basin, scale),
     )
 
 

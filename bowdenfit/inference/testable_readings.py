@@ -33,6 +33,7 @@ class Readings:
         used: Which of them are readings, not bounds.
         group: Contact or the like that each belongs to; empty where all are of one kind.
         at: Where they were taken, by axis label.
+        labels: Each in words; empty of readings inside runs.
         count: How many independent ones there are.
         extra: Sum of squares inside what was taken together.
         freedom: Degrees of freedom that are left.
@@ -52,6 +53,7 @@ class Readings:
     group: tuple[str, ...]
     at: Mapping[str, np.ndarray]
     count: float
+    labels: tuple[str, ...] = ()
     extra: float = 0.0
     freedom: float = 0.0
     scatter: float = 1.0
@@ -185,7 +187,7 @@ def _of_labels(
     back = {STROKE: places.back[:n].astype(float)}
     return replace(
         untold, unit=sign * unit, reading=reading, lever=np.ones(n), used=used, group=places.group[:n],
-        at=numbers | back | {ORDER: np.arange(float(n))}, count=float(used.sum()),
+        at=numbers | back | {ORDER: np.arange(float(n))}, count=float(used.sum()), labels=tuple(term.labels[:n]),
     )  # fmt: skip
 
 
@@ -201,5 +203,6 @@ def _inside(
     return Readings(
         term.name, True, slice(0), share * residuals[inside.cell] + root * inside.apart / noise,
         share[:, None] * jacobian[inside.cell], runs * root[:, None], noise / root, inside.log_ratio,
-        np.abs(mean[inside.run]), np.ones(n, dtype=bool), ("",) * n, inside.at, inside.count, inside.within / noise**2,
+        np.abs(mean[inside.run]), np.ones(n, dtype=bool), ("",) * n, inside.at, inside.count,
+        extra=inside.within / noise**2,
     )  # fmt: skip

@@ -195,3 +195,18 @@ def test_chances_are_corrected_for_how_many_were_asked_about(tmp_path, judge):
     found = judge(forces(tmp_path, 3))
     assert len(found) > 3 and all(0 <= d.chance <= 1 for d in found)
     assert [d.chance for d in found] == sorted(d.chance for d in found)
+
+
+def test_a_slipped_angle_stands_out_of_least_squares_and_healthy_ones_do_not(tmp_path):
+    """Three healthy routes have one in 9 of 1000 runs of this test with other seeds."""
+    healthy = [bf.fit(route(tmp_path, seed, "gaussian", "gaussian"), mcmc=False).least_squares for seed in range(3)]
+    assert sum(bool(each.far_readings) for each in healthy) == 0
+    folder = route(tmp_path, 5, "gaussian", "gaussian")
+    rows = (folder / "angles.csv").read_text().splitlines()
+    length, angle = rows[9].split(",")
+    rows[9] = f"{length},{float(angle) / 2:.2f}"
+    (folder / "angles.csv").write_text("\n".join(rows) + "\n")
+    slipped = bf.fit(folder, mcmc=False)
+    assert [each.label for each in slipped.least_squares.far_readings] == [f"sheath_angle at {length} mm"]
+    assert f"sheath_angle at {length} mm: so far out" in " ".join(slipped.verdict().reasons)
+    assert bf.fit(folder, mcmc=False, noise="student").verdict().trusted

@@ -1,6 +1,8 @@
 """What the model does not describe, in sentences with a remedy: readings that depend on where, when or how they were taken."""
 
 
+from collections.abc import Sequence
+
 from bowdenfit.cable.registry import CURVES
 from bowdenfit.inference.departure import FALSE_ALARM, Departure
 from bowdenfit.kinds import readings_called
@@ -24,7 +26,25 @@ def say_what_is_not_described(fit: Record) -> tuple[str, ...]:
         told.setdefault((each.table, each.group or each.against), each)
     found = checks_of(fit)
     sentences = tuple(_sentence(fit, each) for each in list(told.values())[:_FEW])
-    return sentences + (_scatter(found, fit.dataset.description.noise) if found else ())
+    noise = fit.dataset.description.noise
+    return sentences + _far_out(fit, noise) + (_scatter(found, noise) if found else ())
+
+
+def _far_out(fit: Record, noise: str) -> tuple[str, ...]:
+    """Readings far out of least squares, where nothing was sampled; draws judge them better."""
+    far = fit.least_squares.far_readings
+    if not far or fit.posterior is not None or noise == "student":
+        return ()
+    return (_far_sentence([readings_called(each.table).one.format(each.label) for each in far]),)
+
+
+def _far_sentence(names: Sequence[str]) -> str:
+    more = f" and {len(names) - _FEW} more" if len(names) > _FEW else ""
+    return (
+        f"The model does not describe {listed(names[:_FEW])}{more}: so far out that chance does it in less than one healthy "
+        f"fit of {1 / FALSE_ALARM:.0f}. Look at how it was measured and written down; if it stays, fit with --noise student, "
+        "or leave it out and say so."
+    )
 
 
 def _sentence(fit: Record, found: Departure) -> str:
@@ -132,11 +152,5 @@ def _scatter(found: Checks, noise: str) -> tuple[str, ...]:
     among = len(found.readings)
     far = [r for r in found.outliers if r.chance * among < FALSE_ALARM]
     if far and noise == "normal":
-        names = listed([readings_called(r.table).one.format(r.label) for r in far[:_FEW]])
-        more = f" and {len(far) - _FEW} more" if len(far) > _FEW else ""
-        sentences.append(
-            f"The model does not describe {names}{more}: so far out that chance does it in less than one healthy fit of "
-            f"{1 / FALSE_ALARM:.0f}. Look at how it was measured and written down; if it stays, fit with --noise student, or "
-            "leave it out and say so."
-        )
+        sentences.append(_far_sentence([readings_called(r.table).one.format(r.label) for r in far]))
     return tuple(sentences)

@@ -54,7 +54,7 @@ def run_parts(term: Term, unit: LeaveOut) -> RunParts | None:
     counts, runs = np.bincount(part), np.unique(term.rows.run, return_inverse=True)[1]
     of_part = np.zeros(len(counts), dtype=int)
     of_part[part] = runs
-    if np.bincount(of_part).min() < 2:
+    if np.min(np.bincount(of_part)) < 2:
         return None  # a run in one part can only be left out whole
     if len(counts) > _MOST_PARTS:
         raise UsageError(

@@ -72,7 +72,7 @@ def pulled(force: np.ndarray, input_force: float, word: str = "slack") -> tuple[
 def _span(parts: list[np.ndarray]) -> Span:
     every = np.concatenate([np.asarray(part, dtype=float) for part in parts]) if parts else np.zeros(0)
     known = every[np.isfinite(every)]
-    return (float(known.min()), float(known.max())) if len(known) else None
+    return (float(np.min(known)), float(np.max(known))) if len(known) else None
 
 
 def _note(value: float | None, span: Span, what: str, unit: str) -> str:

@@ -27,25 +27,18 @@ The exit code is 0 whenever everything could be measured, whether or not the tar
 import argparse
 import json
 import os
-import platform
-import re
-import subprocess
-import sys
 import tempfile
-import threading
-import time
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from datetime import date
-from importlib.metadata import version
 from pathlib import Path
 
 import numpy as np
+from benchmark_tables import Table, commit, machine, say, show
+from processes import BASELINES, ROOT, Run, byte_code, measured, search_path, typical
 
-ROOT = Path(__file__).resolve().parents[1]
 DATASET = "datasets/on-body-exoskeleton"
 LOOP = "datasets/synthetic-haptic-loop"  # stretch, preload and loop in one posterior
-BASELINES = Path("scripts") / "baselines"
 COEFFICIENTS = ("mu1", "mu2", "mu3")
 BENCH, RECORDINGS = "datasets/synthetic-bench", "datasets/synthetic-recordings"
 FITS: dict[str, tuple[str, ...]] = {  # arguments of a cold fit, by its name in the table
@@ -85,26 +78,8 @@ SECONDS = {
 }  # targets
 RECORD = ROOT / "docs" / "benchmarks.md"
 HEAD = "# Benchmarks\n\nWritten by `scripts/benchmark_fit.py --record`; its head says what each number is. The newest first.\n"
-NOT_TRUSTED = 3  # exit code of a fit that has not converged
 AGREEMENT = 0.2  # standard deviations between means
-
-
-@dataclass(frozen=True)
-class Run:
-    """One process: when it started on the shared clock, its wall time [s], peak memory [MiB] and standard output."""
-
-    started: float
-    seconds: float
-    memory: float
-    output: str
-    results: Path | None = None
-
-    @property
-    def stages(self) -> dict[str, float]:
-        """Seconds of each stage of a fit."""
-        assert self.results is not None  # asked of fits only
-        page = json.loads((self.results / "fit.json").read_text(encoding="utf-8"))
-        return page["provenance"]["stage_times"]
+LIBRARIES = ("jax", "emcee", "blackjax", "numpyro", "numpy")
 
 
 @dataclass(frozen=True)
@@ -115,86 +90,6 @@ class Sampler:
     ess: float
     mean: np.ndarray
     sd: np.ndarray
-
-
-def measured(
-    arguments: Sequence[str], environment: dict[str, str], results: Path | None = None, tree: Path = ROOT
-) -> Run:
-    """Run Python in a fresh process and measure it.
-
-    Args:
-        arguments: Arguments of Python.
-        environment: Changes to the environment.
-        results: Results folder that the process writes.
-        tree: The checkout that it starts in.
-    """
-    with tempfile.TemporaryFile() as output, tempfile.TemporaryFile() as errors:
-        started = time.monotonic()
-        process = subprocess.Popen(
-            [sys.executable, *arguments], cwd=tree, env={**os.environ, **environment}, stdout=output, stderr=errors
-        )
-        watch = MemoryWatch(process.pid)
-        _, status, usage = os.wait4(process.pid, 0)
-        seconds = time.monotonic() - started
-        process.returncode = os.waitstatus_to_exitcode(status)
-        kernel = usage.ru_maxrss / (1024**2 if sys.platform == "darwin" else 1024)
-        memory = max(watch.stop(), kernel)
-        written = [_read(file) for file in (output, errors)]
-    if process.returncode == NOT_TRUSTED and results is not None:
-        print("Warning: a fit did not converge; its times mean little.", file=sys.stderr)
-    elif process.returncode:
-        sys.exit(f"{' '.join(arguments)} ended with exit code {process.returncode}:\n{written[1]}")
-    return Run(started, seconds, memory, written[0], results)
-
-
-def _read(file) -> str:
-    file.seek(0)
-    return file.read().decode()
-
-
-class MemoryWatch:
-    """Largest sum of the resident memory of a process and all those it starts, looked at every 20 ms (Linux only)."""
-
-    def __init__(self, pid: int) -> None:
-        self.peak, self.ended = 0.0, threading.Event()
-        self.thread = threading.Thread(target=self._watch, args=(pid,), daemon=True)
-        self.thread.start()
-
-    def stop(self) -> float:
-        """The peak [MiB]; 0 where the system has no /proc."""
-        self.ended.set()
-        self.thread.join()
-        return self.peak
-
-    def _watch(self, pid: int) -> None:
-        while not self.ended.wait(0.02):
-            self.peak = max(self.peak, sum(resident(p) for p in family(pid)))
-
-
-def resident(pid: int) -> float:
-    """Resident memory of a process [MiB]; 0 if it is gone."""
-    try:
-        pages = int(Path(f"/proc/{pid}/statm").read_text(encoding="ascii").split()[1])
-    except (OSError, IndexError):
-        return 0.0
-    return pages * os.sysconf("SC_PAGE_SIZE") / 1024**2
-
-
-def family(pid: int) -> Iterator[int]:
-    """A process and all its descendants."""
-    yield pid
-    try:
-        tasks = list(Path(f"/proc/{pid}/task").iterdir())
-        children = [int(child) for task in tasks for child in (task / "children").read_text(encoding="ascii").split()]
-    except OSError:
-        return
-    for child in children:
-        yield from family(child)
-
-
-def byte_code(folder: Path) -> dict[str, str]:
-    """Settings that let Python keep byte code, which some machines forbid; without it every start compiles the libraries."""
-    return {"PYTHONDONTWRITEBYTECODE": "", "PYTHONPYCACHEPREFIX": str(folder / "byte_code")}
 
 
 @dataclass(frozen=True)
@@ -304,17 +199,7 @@ def batch_rows() -> Iterator[Row]:
     yield from ()
 
 
-def typical(runs: Sequence[Run]) -> Run:
-    """The run of median wall time."""
-    return sorted(runs, key=lambda run: run.seconds)[len(runs) // 2]
-
-
-def search_path() -> str:
-    """Where a script finds bowdenfit, installed or not."""
-    return os.pathsep.join(filter(None, (str(ROOT), os.environ.get("PYTHONPATH"))))
-
-
-def stage_rows(rows: Sequence[Row]) -> list[list[str]]:
+def stage_rows(rows: Sequence[Row]) -> Table:
     """Seconds of each stage of the cold fits, one column a fit."""
     fits = {row.name: typical(row.runs) for row in rows if row.name in FITS}
     stages = list(dict.fromkeys(stage for run in fits.values() for stage in run.stages))
@@ -344,45 +229,7 @@ def disagreements(found: dict[str, list[Sampler]]) -> Iterator[str]:
                 yield f"Warning: the means of {name} by bowdenfit and by {other} are {distance:.2f} sd apart."
 
 
-def show(rows: list[list[str]]) -> None:
-    """Print an aligned table and an empty line."""
-    widths = [max(len(cell) for cell in column) for column in zip(*rows, strict=True)]
-    for i, (head, *cells) in enumerate(rows):
-        line = "  ".join([head.ljust(widths[0]), *(c.rjust(w) for c, w in zip(cells, widths[1:], strict=True))])
-        print(line.rstrip())
-        if i == 0:
-            print("-" * len(line))
-    print(flush=True)
-
-
-def say(what: str) -> None:
-    """What is being measured, for those who wait."""
-    print(f"measuring: {what}", file=sys.stderr, flush=True)
-
-
-def machine() -> str:
-    """The line that says where these numbers are from."""
-    cores = len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count()
-    try:
-        models = re.findall(r"model name\s*: (.*)", Path("/proc/cpuinfo").read_text(encoding="utf-8"))
-    except OSError:
-        models = []
-    libraries = ", ".join(f"{name} {version(name)}" for name in ("jax", "emcee", "blackjax", "numpyro", "numpy"))
-    commit = f"commit {_commit(ROOT)}"
-    return (
-        f"{models[0] if models else platform.machine()}, {cores} cores; Python {platform.python_version()}, {libraries}; "
-        f"{date.today().isoformat()}; {commit}."
-    )
-
-
-def _commit(tree: Path) -> str:
-    """What a checkout is at; "+" where it has been changed since."""
-    asked = ["git", "-C", str(tree), "describe", "--always", "--dirty=+", "--exclude", "*"]
-    done = subprocess.run(asked, capture_output=True, text=True, check=False)
-    return done.stdout.strip() or "unknown"
-
-
-def markdown(rows: list[list[str]]) -> str:
+def markdown(rows: Table) -> str:
     """A table."""
     head, *lines = (f"| {' | '.join(row)} |" for row in rows)
     return "\n".join([head, "|" + " --- |" * len(rows[0]), *lines])
@@ -413,11 +260,11 @@ def main() -> None:
     table, remarks = [COLUMNS, *(row.cells() for row in rows)], [*counts(), *disagreements(found)]
     show(table)
     show(stages)
-    against = f" Other: commit {_commit(other)}." if other else ""
-    print("\n".join([*remarks, machine() + against]))
+    against = f" Other: commit {commit(other)}." if other else ""
+    print("\n".join([*remarks, machine(*LIBRARIES) + against]))
     if asked.record:
-        title = f"## {date.today().isoformat()}, {_commit(ROOT)}"
-        record([title, machine() + against, markdown(table), markdown(stages), *remarks])
+        title = f"## {date.today().isoformat()}, {commit(ROOT)}"
+        record([title, machine(*LIBRARIES) + against, markdown(table), markdown(stages), *remarks])
 
 
 if __name__ == "__main__":

@@ -6,7 +6,7 @@ import jax
 import jax.numpy as jnp
 import numpy as np
 import pytest
-from test_proposals import CHART, DEGREES_OF_FREEDOM, DIMENSIONS, ROOT, below_quantiles, draw_t, p_value
+from test_proposals import CHART, DEGREES_OF_FREEDOM, DIMENSIONS, ROOT, below_quantiles, draw_t, moves_alone, p_value
 
 from bowdenfit.inference import proposals, value_chart
 from bowdenfit.inference.batch_ensembles import walker_round
@@ -22,15 +22,7 @@ from bowdenfit.inference.compilation import compile_program
 from bowdenfit.inference.ensemble import default_moves
 
 ENSEMBLES, WALKERS, INVERSE = 16, 64, np.linalg.inv(ROOT)
-MOVES = {
-    "stretch": stretch,
-    "differential evolution": differential_evolution,
-    "gamma 1": partial(differential_evolution, gamma=1.0),
-    "independent": independent,
-    "stretch in values": in_values(stretch, CHART),
-    "differential evolution in values": in_values(differential_evolution, CHART),
-    "independent in values": in_values(independent, CHART),
-}
+MOVES = moves_alone(stretch, differential_evolution, independent, in_values)
 
 
 def log_t(x, _):

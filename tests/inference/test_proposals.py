@@ -93,15 +93,21 @@ def test_the_default_moves_find_the_target_from_starts_far_outside():
 
 # Each move --------------------------------------------------------------------------------------------------------
 
-ALONE = {
-    "stretch": stretch,
-    "differential evolution": differential_evolution,
-    "gamma 1": partial(differential_evolution, gamma=1.0),
-    "independent": independent,
-    "stretch in values": in_values(stretch, CHART),
-    "differential evolution in values": in_values(differential_evolution, CHART),
-    "independent in values": in_values(independent, CHART),
-}
+
+def moves_alone(stretch, differential_evolution, independent, in_values):
+    """Every move of a sampler by its name, of the functions that make them."""
+    return {
+        "stretch": stretch,
+        "differential evolution": differential_evolution,
+        "gamma 1": partial(differential_evolution, gamma=1.0),
+        "independent": independent,
+        "stretch in values": in_values(stretch, CHART),
+        "differential evolution in values": in_values(differential_evolution, CHART),
+        "independent in values": in_values(independent, CHART),
+    }
+
+
+ALONE = moves_alone(stretch, differential_evolution, independent, in_values)
 
 
 @pytest.mark.parametrize("name", ALONE)

@@ -1,4 +1,4 @@
-"""The second sampler: known targets, its checkpoint, its diagnostics, and agreement with the first on the data sets."""
+"""The second sampler: known targets, its checkpoint and its diagnostics."""
 
 import json
 from dataclasses import replace
@@ -16,7 +16,6 @@ from bowdenfit.inference import nuts
 from bowdenfit.inference.chain import Sampling
 from bowdenfit.inference.diagnostics import Trajectories, energy_mixing, trajectory_shortfalls
 from bowdenfit.inference.least_squares import MaximumPosterior
-from bowdenfit.inference.samplers import FALSE_ALARM, Drawn, SamplerAgreement, compare_samplers, recommendation
 from bowdenfit.parameters.priors import Normal
 from bowdenfit.parameters.space import Parameter
 from bowdenfit.questions.summary.words import summary_text
@@ -160,91 +159,6 @@ def test_energy_mixing_is_that_of_the_worst_chain():
     assert np.isnan(energy_mixing(np.ones((2, 10))))
 
 
-# Do two samplers agree? ------------------------------------------------------------------------------------------
-
-
-def compared(draws: dict[str, np.ndarray], others: dict[str, np.ndarray]) -> SamplerAgreement:
-    """Of chains that are an ensemble each."""
-    n = [len(next(iter(both.values()))) for both in (draws, others)]
-    return compare_samplers(Drawn("emcee", draws, n[0]), Drawn("nuts", others, n[1]))
-
-
-def autocorrelated(generator, chains: int = 8, draws: int = 400, quantities: int = 12) -> dict[str, np.ndarray]:
-    """Stationary chains of standard normals that forget half of themselves from draw to draw."""
-    noise = generator.standard_normal((quantities, chains, draws + 50))
-    for i in range(1, draws + 50):
-        noise[..., i] = 0.5 * noise[..., i - 1] + np.sqrt(0.75) * noise[..., i]
-    return {f"q{i}": noise[i, :, 50:] for i in range(quantities)}
-
-
-def test_samplers_of_the_same_density_are_seldom_said_to_disagree():
-    """40 pairs at a false alarm of 1 in 1000 each, by Bonferroni: chance fails this once in 25 seeds at the most,
-    and for this seed it was seen not to; a limit of 3 errors in place of 4.2 fails it.
-    """
-    generator = np.random.default_rng(1)
-    for _ in range(40):
-        found = compared(autocorrelated(generator), autocorrelated(generator))
-        assert all(d.errors <= found.limit for d in found.differences)
-        assert "agree within Monte Carlo error" in found.sentence()
-
-
-@pytest.mark.parametrize(
-    ("disturb", "summary"),
-    [(lambda x: x + 0.4, "mean"), (lambda x: 0.7 * x, "sd"), (lambda x: np.where(x < -1, x - 1, x), "5 % quantile")],
-)
-def test_a_sampler_that_is_wrong_is_caught(disturb, summary):
-    """Shifted, narrowed, or with a longer tail; what is off by that much is beyond chance by far."""
-    generator = np.random.default_rng(2)
-    right, wrong = autocorrelated(generator), autocorrelated(generator)
-    wrong["q3"] = disturb(wrong["q3"])
-    found = compared(right, wrong)
-    assert not found.agree
-    assert {d.quantity for d in found.beyond_chance} == {"q3"}
-    assert summary in {d.summary for d in found.beyond_chance}
-    (reason,) = found.reasons()
-    assert reason.startswith("emcee and NUTS disagree on the")
-
-
-def test_a_difference_beyond_chance_that_changes_nothing_is_no_disagreement():
-    generator = np.random.default_rng(3)
-    right, other = (autocorrelated(generator, draws=20_000, quantities=1) for _ in range(2))
-    found = compared(right, {"q0": other["q0"] + 0.05})
-    assert max(d.errors for d in found.differences) > found.limit
-    assert found.agree
-
-
-def test_walkers_that_depend_on_each_other_get_larger_errors():
-    """Four ensembles whose 64 walkers share half their variance: the errors of the mean are 5.7 times those of
-    independent walkers. The scale is known to about 15 % from 12 quantities.
-    """
-    generator = np.random.default_rng(4)
-    common = np.repeat(generator.standard_normal((12, 4, 10)), 64, axis=1)
-    draws = {f"q{i}": np.sqrt(0.5) * (c + generator.standard_normal((256, 10))) for i, c in enumerate(common)}
-    assert Drawn("emcee", draws, 4).error_scale() > 3
-    free = {name: generator.standard_normal((256, 10)) for name in draws}
-    assert Drawn("emcee", free, 4).error_scale() < 1.3
-
-
-def test_the_limit_is_bonferroni_s():
-    draws = autocorrelated(np.random.default_rng(1))
-    found = compared(draws, draws)
-    assert 2 * stats.norm.sf(found.limit) * len(found.differences) == pytest.approx(FALSE_ALARM)
-    assert all(d.errors == 0 for d in found.differences)
-
-
-def test_a_quantity_that_cannot_vary_agrees_with_itself_and_with_nothing_else():
-    constant = np.full((4, 100), 430.0)
-    assert compared({"l": constant}, {"l": constant}).agree
-    assert not compared({"l": constant}, {"l": constant + 1}).agree
-
-
-def test_nuts_is_recommended_for_many_parameters_and_where_emcee_fails():
-    assert recommendation("emcee", 25, False) == ""
-    assert "26 free parameters" in recommendation("emcee", 26, False)
-    assert "--sampler nuts" in recommendation("emcee", 3, True)
-    assert recommendation("nuts", 40, True) == ""
-
-
 # Fits -------------------------------------------------------------------------------------------------------------
 
 
@@ -253,13 +167,6 @@ def saved(tmp_path_factory):
     """A quick fit by NUTS with its folder."""
     folder = tmp_path_factory.mktemp("results") / "fit"
     return bf.fit(YARN, output=folder, sampler="nuts", seed=3, settings=QUICK, figures=False), folder
-
-
-@pytest.fixture(scope="module")
-def by_both(on_body):
-    """Half as many walkers and looser targets than by default, for speed."""
-    settings = ("sampler.n_walkers=128", "sampler.target_ess=500", "sampler.target_r_hat=1.02")
-    return bf.fit(on_body, sampler="both", seed=1, settings=settings)
 
 
 @pytest.mark.parametrize("at", [200, 600])
@@ -317,52 +224,3 @@ def test_the_summary_says_how_trajectories_went(saved):
 def test_an_unknown_sampler_is_a_sentence():
     with pytest.raises(bf.UsageError, match="no sampler 'gibbs'; choose one of emcee, nuts, both"):
         bf.fit(YARN, sampler="gibbs")
-
-
-def test_a_fit_by_both_samplers_says_that_they_agree(by_both):
-    """On the on-body data, whose posterior is a funnel; the first sampler's draws are the result."""
-    posterior = by_both.posterior
-    assert posterior.sampler == "emcee"
-    assert posterior.agreement.agree
-    assert {d.quantity for d in posterior.agreement.differences} >= {
-        "mu1",
-        "tau",
-        "optimal_length",
-        "optimal_efficiency",
-    }
-    assert "emcee and NUTS agree within Monte Carlo error" in " ".join(summary_text(by_both).split())
-    assert by_both.summary()["samplers"]["agree"]
-    assert by_both.converged
-
-
-def test_what_both_samplers_said_is_read_back(by_both, tmp_path):
-    by_both.save(tmp_path / "fit")
-    again = bf.load(tmp_path / "fit")
-    assert again.posterior.agreement == by_both.posterior.agreement
-    assert again.summary()["samplers"] == by_both.summary()["samplers"]
-
-
-def test_samplers_that_disagree_are_a_reason_not_to_trust(monkeypatch):
-    """The second sampler is made to sample a density shifted by half a unit of z."""
-    sample = nuts.sample
-    monkeypatch.setattr(nuts, "sample", lambda *a, **k: (lambda c: replace(c, z=c.z + 0.5))(sample(*a, **k)))
-    found = bf.fit(YARN, sampler="both", seed=1, settings=("sampler.n_walkers=64", "sampler.target_ess=500"))
-    assert not found.converged
-    assert any(reason.startswith("emcee and NUTS disagree on the") for reason in found.reasons)
-    assert "NOT CONVERGED" in summary_text(found)
-
-
-DATA_SETS = sorted(path.parent.name for path in DATA.glob("*/cable.toml"))
-
-
-@pytest.mark.parametrize(
-    "name", [pytest.param(n, marks=[] if n == "yarn-on-cylinder" else pytest.mark.slow) for n in DATA_SETS]
-)
-def test_emcee_and_nuts_agree_on_every_data_set(name):
-    """Mean, sd, 5 % and 95 % quantile of every parameter, l* and eta*; chance fails this once in a thousand seeds.
-
-    The small on-body data are also fitted by both above, in every run of the tests.
-    """
-    found = bf.fit(DATA / name, sampler="both", seed=1)
-    assert found.posterior.agreement.agree, found.posterior.agreement.sentence()
-    assert found.converged, found.reasons

@@ -6,13 +6,11 @@ import jax
 import jax.numpy as jnp
 import numpy as np
 import pytest
-from cables import cable, measured
+from cables import cable
+from densities import draws, over_rows
 from scipy import integrate, stats
 
-import bowdenfit as bf
 from bowdenfit.dataset import Dataset, load_dataset, read_dataset
-from bowdenfit.inference.compilation import compile_program
-from bowdenfit.inference.log_density import LogDensity
 from bowdenfit.kinds.efficiencies.table import EfficiencyTable
 from bowdenfit.kinds.forces.table import ForceTable
 from bowdenfit.kinds.forces.term import HeldForcesTerm, sliding_rows
@@ -200,22 +198,20 @@ def test_a_held_reading_has_a_finite_likelihood_and_gradient_however_absurd_the_
     assert np.all(np.isfinite(_of_term(model, term, "residuals", VALUES | values)))
 
 
+def test_held_readings_alone_bound_the_coefficient_from_below_and_leave_the_rest_to_the_prior():
+    """Friction is at least what holds the load; above that, twice as much friction is as likely as ten times."""
+    at = [float(_held(VALUES | {"mu": mu})[1]) for mu in (0.02, 0.05, 0.2, 0.5, 1.0)]
+    assert at[0] < at[1] < at[2] - 1.0
+    assert at[2] == pytest.approx(0.0, abs=1e-6)
+    assert at[3] == pytest.approx(at[4], abs=1e-9)
+
+
 # Angles -----------------------------------------------------------------------------------------------------------
 
 
 @pytest.fixture(scope="module")
 def on_body_model(on_body) -> Model:
     return build_model(load_dataset(on_body))
-
-
-def _over_rows(function, z: np.ndarray, data):
-    """A function of one z, for every row of many; compiled in haste, because it runs once."""
-    program = compile_program(jax.vmap(function, in_axes=(0, None)), z, data, run_once=True)
-    return jax.tree.map(np.asarray, program(z, data))
-
-
-def _draws(model: Model, n: int, seed: int, scale: float = 1.0) -> np.ndarray:
-    return scale * np.random.default_rng(seed).standard_normal((n, model.space.size))
 
 
 def test_undetected_angles_have_the_probability_of_lying_below_the_limit(on_body_model):
@@ -226,7 +222,7 @@ def test_undetected_angles_have_the_probability_of_lying_below_the_limit(on_body
         values = model.space.constrain(z)
         return term.expected(values, data), term.log_likelihood(values, data), values["sigma_theta"]
 
-    expected, found, sigma = _over_rows(at, _draws(model, 50, 1), term.data)
+    expected, found, sigma = over_rows(at, draws(model, 50, 1), term.data)
     n, theta, sigma = len(term.data["angle"]), np.deg2rad(expected), sigma[:, None]
     np.testing.assert_allclose(
         found[:, n:], stats.norm.logcdf((np.deg2rad(10.0) - theta[:, n:]) / sigma), rtol=1e-9, atol=1e-15
@@ -241,90 +237,6 @@ def test_undetected_angles_enter_as_the_description_says(on_body, how, detected,
     assert len(term.data["limit"]) == undetected
     assert np.count_nonzero(term.data["angle"] == 0) == (5 if how == "zero" else 0)
     assert len(term.labels) == detected + undetected
-
-
-# Residuals and likelihood are one model ---------------------------------------------------------------------------
-
-
-def _models() -> dict[str, Model]:
-    censored = {
-        "angles": {"file": "a.csv", "detection_limit": {"value": 12, "unit": "deg"}},
-        "forces": {"file": "f.csv"},
-    }
-    with_efficiencies, _ = measured(cable(3, ("angles", "efficiencies")), 1)
-    with_forces, _ = measured(cable(5, tables=censored), 2)
-    sensors = {"input_gain_error_sd": 0, "output_gain_error_sd": 0.01}
-    with_gain, _ = measured(cable(3, ("angles", "efficiencies", "forces"), sensors=sensors), 3)
-    without_forces = {"angles": censored["angles"], "efficiencies": {"file": "e.csv"}}
-    robust, _ = measured(cable(2, without_forces, noise="student"), 2)
-    return {
-        "efficiencies": build_model(with_efficiencies),
-        "forces and undetected angles": build_model(with_forces),
-        "everything with gain error": build_model(with_gain),
-        "Student noise": build_model(robust),
-    }
-
-
-@pytest.fixture(scope="module")
-def models() -> dict[str, Model]:
-    return _models()
-
-
-MODELS = pytest.mark.parametrize(
-    "name", ["efficiencies", "forces and undetected angles", "everything with gain error", "Student noise"]
-)
-
-
-@MODELS
-def test_half_the_squared_residuals_are_minus_the_log_likelihood_up_to_a_constant_at_given_noise(models, name):
-    model = models[name]
-    posterior = LogDensity(model)
-    noise = np.array([p.role == "noise" for p in model.space.free])
-    z = _draws(model, 20, 5)
-    z[:, noise] = z[0, noise]
-
-    def both(z, data):
-        likelihoods, residuals = posterior.log_likelihoods(z, data), posterior.residuals(z, data)
-        return jax.tree.map(jnp.sum, likelihoods), jax.tree.map(lambda r: jnp.sum(r**2) / 2, residuals)
-
-    likelihood, squares = _over_rows(both, z, posterior.data)
-    for term in model.terms:
-        total = likelihood[term.name] + squares[term.name]
-        scale = 1 + np.abs(squares[term.name]).max()
-        np.testing.assert_allclose(total, total[0], rtol=0, atol=1e-12 * scale)
-
-
-@MODELS
-def test_gradients_agree_with_finite_differences_also_far_out(models, name):
-    """Along random directions, at draws of the prior and where every |z| is 4; and nothing is NaN or infinite."""
-    posterior = LogDensity(models[name])
-    size, generator = posterior.model.space.size, np.random.default_rng(6)
-    z = np.concatenate([generator.standard_normal((30, size)), 4.0 * generator.choice([-1.0, 1.0], (30, size))])
-    direction = generator.standard_normal(z.shape)
-    direction /= np.linalg.norm(direction, axis=1, keepdims=True)
-    h, shifts = 1e-4, np.array([-2, -1, 0, 1, 2])  # five-point rule: error h^4
-    shifted = (z + h * shifts[:, None, None] * direction).reshape(-1, size)
-    value, slope = _over_rows(jax.value_and_grad(posterior.log_density), shifted, posterior.data)
-    value, slope = value.reshape(len(shifts), -1), slope.reshape(len(shifts), *z.shape)
-    assert np.all(np.isfinite(value))
-    assert np.all(np.isfinite(slope))
-    at, along = value[2], np.sum(slope[2] * direction, axis=1)
-    difference = (8 * (value[3] - value[1]) - (value[4] - value[0])) / (12 * h)
-    rounding = 1e-15 * np.abs(at) / h
-    assert np.all(np.abs(difference - along) <= 1e-6 * np.abs(along) + 100 * rounding + 1e-8)
-
-
-@MODELS
-def test_residuals_and_their_derivatives_are_finite_far_out(models, name):
-    posterior = LogDensity(models[name])
-    generator = np.random.default_rng(7)
-    z = 6.0 * generator.choice([-1.0, 1.0], (60, posterior.model.space.size))
-    z = np.concatenate([z, np.zeros((1, posterior.model.space.size))])
-    jacobian, residuals = _over_rows(
-        jax.jacfwd(lambda z, data: (posterior.residuals(z, data),) * 2, has_aux=True), z, posterior.data
-    )
-    for found in (residuals, jacobian):
-        assert all(np.all(np.isfinite(x)) for x in found.values())
 
 
 # Rows outside the curves ------------------------------------------------------------------------------------------
@@ -366,41 +278,3 @@ def test_a_row_s_own_angle_comes_before_the_curve_with_its_stated_error_or_none(
     np.testing.assert_array_equal(data["is_own"][:, :2], [[False, True], [False] * 2, [False] * 2, [True, True]])
     np.testing.assert_allclose(data["known_variance"][:, 1], [0.02**2, 0, 0, 0.03**2])
     np.testing.assert_array_equal(data["noisy"][3, :2], [True, False])  # without a stated error: the angle table's
-
-
-# Draws of the prior -----------------------------------------------------------------------------------------------
-
-
-@pytest.mark.parametrize("which", ["on-body", "bench"])
-def test_ten_thousand_draws_of_the_prior_give_finite_densities_and_plausible_efficiencies(which, on_body, bench):
-    """Finite always; plausible along most of the range.
-
-    The slope of a log angle is wide open a priori (sd 6 over half the range), so that at the ends of the range nearly
-    half of all draws have so much wrap that nothing passes; in the middle one in ten has, and at the best length hardly any.
-    """
-    dataset = load_dataset(on_body) if which == "on-body" else bf.simulate(bench, seed=1)
-    posterior = LogDensity(build_model(dataset))
-    model = posterior.model
-    low, high = model.description.route.range
-    at = jnp.linspace(low, high, 21)
-
-    def of(z, data):
-        return posterior.log_density(z, data), jnp.exp(-model.cable.exponent_at(model.space.constrain(z), at))
-
-    drawn = _draws(model, 10_000, 8)
-    density, efficiency = _over_rows(of, np.concatenate([np.zeros((1, model.space.size)), drawn]), posterior.data)
-    assert np.all(np.isfinite(density))
-    assert np.all((efficiency >= 0) & (efficiency < 1))
-    assert np.all((efficiency[0] > 0.3) & (efficiency[0] < 0.95))  # z = 0, the medians of all priors
-    drawn = efficiency[1:]
-    assert np.mean(drawn.max(axis=1) > 0.05) > 0.96
-    assert np.mean(drawn[:, 10] > 0.05) > 0.9  # in the middle of the range
-    assert np.mean(drawn[:, [0, -1]] > 0.05) > 0.5  # at its ends
-
-
-def test_held_readings_alone_bound_the_coefficient_from_below_and_leave_the_rest_to_the_prior():
-    """Friction is at least what holds the load; above that, twice as much friction is as likely as ten times."""
-    at = [float(_held(VALUES | {"mu": mu})[1]) for mu in (0.02, 0.05, 0.2, 0.5, 1.0)]
-    assert at[0] < at[1] < at[2] - 1.0
-    assert at[2] == pytest.approx(0.0, abs=1e-6)
-    assert at[3] == pytest.approx(at[4], abs=1e-9)

@@ -2,7 +2,7 @@
 
 import math
 import textwrap
-from collections.abc import Collection, Sequence
+from collections.abc import Collection, Iterable, Sequence
 from html import escape
 
 _LONGEST = 40  # characters of a quoted value
@@ -22,6 +22,13 @@ def quoted(names: tuple[str, ...], most: int = 12) -> str:
     """Names in quotes with commas between them."""
     more = f" and {len(names) - most} more" if len(names) > most else ""
     return ", ".join(shown(name) for name in names[:most]) + more
+
+
+def few(names: Iterable[str], most: int = 3) -> str:
+    """Names with commas between them and a last "and"; of many the first, and how many more there are."""
+    every = list(names)
+    rest = [f"{len(every) - most} more"] if len(every) > most else []
+    return listed([*every[:most], *rest])
 
 
 def listed(parts: Sequence[str]) -> str:

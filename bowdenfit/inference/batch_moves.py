@@ -18,38 +18,28 @@ import jax.numpy as jnp
 import numpy as np
 from jax import Array
 
+from bowdenfit.inference.proposals import FREEDOM, GAMMA_SPREAD, JITTER, WIDEST_STRETCH, shares_of_moves
 from bowdenfit.inference.value_chart import NODES, Chart
 
 Move = Callable[[Array, Array, Array], tuple[Array, Array]]
 Moves = Sequence[tuple[Move, float]]
 
-_WIDEST_STRETCH = 2.0
-_GAMMA_SPREAD = 1e-5
-_FREEDOM = 5  # degrees of freedom of the t distribution; odd
-_JITTER = 1e-10  # of each variance; keeps the covariance of walkers on a narrow ridge positive
 _WIDTH = float(NODES[1] - NODES[0])
 
 
 def batch_moves(chart: Chart) -> Moves:
     """What the walkers do, and how often: as in `ensemble.default_moves`."""
-    return [
-        (stretch, 0.1),
-        (differential_evolution, 0.15),
-        (in_values(differential_evolution, chart), 0.2),
-        (partial(differential_evolution, gamma=1.0), 0.05),
-        (independent, 0.2),
-        (in_values(independent, chart), 0.3),
-    ]
+    return shares_of_moves(stretch, differential_evolution, independent, partial(in_values, chart=chart))
 
 
 def numbers_of_move(size: int) -> int:
     """How many uniform numbers a walker of so many parameters needs for any move."""
-    return size + _FREEDOM
+    return size + FREEDOM
 
 
 def stretch(uniform: Array, moving: Array, resting: Array) -> tuple[Array, Array]:
     """Places on the line through a resting walker."""
-    factor = ((_WIDEST_STRETCH - 1) * uniform[:, 0] + 1) ** 2 / _WIDEST_STRETCH
+    factor = ((WIDEST_STRETCH - 1) * uniform[:, 0] + 1) ** 2 / WIDEST_STRETCH
     anchor = resting[_whole_number(uniform[:, 1], len(resting))]
     return anchor - (anchor - moving) * factor[:, None], (moving.shape[1] - 1) * jnp.log(factor)
 
@@ -62,7 +52,7 @@ def differential_evolution(
     first = _whole_number(uniform[:, 0], count)
     second = (first + 1 + _whole_number(uniform[:, 1], count - 1)) % count  # any but the first
     gamma = 2.38 / (2 * size) ** 0.5 if gamma is None else gamma
-    spread = gamma * (1 + _GAMMA_SPREAD * (2 * uniform[:, 2:3] - 1))
+    spread = gamma * (1 + GAMMA_SPREAD * (2 * uniform[:, 2:3] - 1))
     return moving + spread * (resting[second] - resting[first]), jnp.zeros(n)
 
 
@@ -70,10 +60,10 @@ def independent(uniform: Array, moving: Array, resting: Array) -> tuple[Array, A
     """Places drawn from a t distribution fitted to the resting half."""
     size = moving.shape[1]
     normal = 2**0.5 * jax.lax.erf_inv(2 * uniform - 1)
-    drawn = normal[:, :size] * jnp.sqrt(_FREEDOM / jnp.sum(normal[:, size:] ** 2, axis=1, keepdims=True))
+    drawn = normal[:, :size] * jnp.sqrt(FREEDOM / jnp.sum(normal[:, size:] ** 2, axis=1, keepdims=True))
     mean = resting.mean(axis=0)
     covariance = (resting - mean).T @ (resting - mean) / (len(resting) - 1)
-    root = jnp.linalg.cholesky(covariance * (1 + _JITTER * jnp.eye(size)), symmetrize_input=False)
+    root = jnp.linalg.cholesky(covariance * (1 + JITTER * jnp.eye(size)), symmetrize_input=False)
     present = jax.scipy.linalg.solve_triangular(root, (moving - mean).T, lower=True).T
     return mean + drawn @ root.T, _log_t(present) - _log_t(drawn)
 
@@ -85,7 +75,7 @@ def _whole_number(uniform: Array, count: int) -> Array:
 
 def _log_t(standardized: Array) -> Array:
     """Log density of the standard t distribution, up to a constant."""
-    return -(_FREEDOM + standardized.shape[-1]) / 2 * jnp.log1p(jnp.sum(standardized**2, axis=-1) / _FREEDOM)
+    return -(FREEDOM + standardized.shape[-1]) / 2 * jnp.log1p(jnp.sum(standardized**2, axis=-1) / FREEDOM)
 
 
 def in_values(move: Move, chart: Chart) -> Move:

@@ -17,7 +17,7 @@ import numpy as np
 from bowdenfit.description import SamplerSettings
 from bowdenfit.inference.chain import Chain, Progress, Sampling, stuck_walkers, worst
 from bowdenfit.inference.least_squares import MaximumPosterior
-from bowdenfit.inference.proposals import Proposal, differential_evolution, independent, stretch
+from bowdenfit.inference.proposals import Proposal, differential_evolution, independent, shares_of_moves, stretch
 from bowdenfit.inference.value_chart import Chart, chart_values, in_values
 
 THIN = 10  # steps from one stored state to the next
@@ -65,24 +65,14 @@ class SideBySide(emcee.moves.RedBlueMove):
 
 
 def default_moves(chart: Chart, n_walkers: int) -> Moves:
-    """What the walkers do, by measurement on every data set here.
-
-    Draws from a fitted t distribution find the bulk, and mix best where the posterior is about normal; differential evolution
-    does along bent ridges, stretch moves do in narrow ends; gamma 1 jumps between modes. Half of all is done in values.
+    """What the walkers do; see `shares_of_moves`.
 
     Args:
         chart: Values of the parameters over z.
         n_walkers: Walkers of an ensemble; a few cannot tell the shape of a t distribution.
     """
     fitted = independent if n_walkers >= _FITTED * chart.size else differential_evolution
-    return [
-        (stretch, 0.1),
-        (differential_evolution, 0.15),
-        (in_values(differential_evolution, chart), 0.2),
-        (partial(differential_evolution, gamma=1.0), 0.05),
-        (fitted, 0.2),
-        (in_values(fitted, chart), 0.3),
-    ]
+    return shares_of_moves(stretch, differential_evolution, fitted, partial(in_values, chart=chart))
 
 
 def starting_points(start: MaximumPosterior, settings: SamplerSettings, generator: np.random.Generator) -> np.ndarray:

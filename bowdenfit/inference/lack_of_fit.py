@@ -10,12 +10,14 @@ References:
     White, A heteroskedasticity-consistent covariance matrix estimator, Econometrica 48 (1980), 817.
 """
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import replace
+from functools import cache
 
 import jax
 import jax.numpy as jnp
 import numpy as np
+from jax import Array
 
 from bowdenfit.inference.departure import FALSE_ALARM, Departure, FarReading
 from bowdenfit.inference.objective import Solution
@@ -83,11 +85,18 @@ def _weighed_by_scatter(basin: Basin, model: Model, scale: np.ndarray) -> Soluti
             if name in index and count:
                 at = index[name]
                 value = np.clip(scale[start], *_BELIEVED) * found["values"][at]
-                unconstrain = jax.jit(model.space.free[at].prior.unconstrain)  # one program instead of one for each operation
-                pin[at] = np.clip(float(unconstrain(jnp.asarray(value))), -_FARTHEST, _FARTHEST)
+                prior = model.space.free[at].prior
+                z = _unconstrained(type(prior))(vars(prior), jnp.asarray(value))
+                pin[at] = np.clip(float(z), -_FARTHEST, _FARTHEST)
             start += count
     again = problem.solve(found["z"], basin.at_end, pin)
     return again if again["succeeded"] and np.all(np.isfinite(again["jacobian"])) else found
+
+
+@cache
+def _unconstrained(kind: type) -> Callable[..., Array]:
+    """Compiled: z of a value, for all priors of a kind."""
+    return jax.jit(lambda prior, value: kind(**prior).unconstrain(value))
 
 
 def _departures_of(system: System, readings: Readings) -> Iterator[Departure]:

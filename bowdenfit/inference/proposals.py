@@ -5,15 +5,38 @@ for the moving half, and the log of what the ratio of densities there is to be m
 """
 
 from collections.abc import Callable
+from functools import partial
+from typing import Any
 
 import numpy as np
 
 Proposal = Callable[[np.ndarray, np.ndarray, np.random.RandomState], tuple[np.ndarray, np.ndarray]]
 
-_WIDEST_STRETCH = 2.0
-_GAMMA_SPREAD = 1e-5
-_FREEDOM = 5.0  # degrees of freedom of the t distribution: tails wider than a posterior's in z, and still a good fit
-_JITTER = 1e-10  # of each variance; keeps the covariance of walkers on a narrow ridge positive
+WIDEST_STRETCH = 2.0
+GAMMA_SPREAD = 1e-5
+FREEDOM = 5  # degrees of freedom of the t distribution: tails wider than a posterior's in z, and still a good fit; odd
+JITTER = 1e-10  # of each variance; keeps the covariance of walkers on a narrow ridge positive
+
+
+def shares_of_moves(stretch: Any, differential_evolution: Any, fitted: Any, in_values: Callable[[Any], Any]) -> list[Any]:
+    """The moves of an ensemble and how often each is made, by measurement on every data set here.
+
+    Draws from a fitted t distribution find the bulk, and mix best where the posterior is about normal; differential evolution
+    does along bent ridges, stretch moves do in narrow ends; gamma 1 jumps between modes. Half of all is done in values.
+
+    Args:
+        stretch, differential_evolution: Moves, in NumPy or in JAX.
+        fitted: What draws from a distribution fitted to the resting walkers.
+        in_values: Makes of a move the same in the values of the parameters.
+    """
+    return [
+        (stretch, 0.1),
+        (differential_evolution, 0.15),
+        (in_values(differential_evolution), 0.2),
+        (partial(differential_evolution, gamma=1.0), 0.05),
+        (fitted, 0.2),
+        (in_values(fitted), 0.3),
+    ]
 
 
 def stretch(moving: np.ndarray, resting: np.ndarray, random: np.random.RandomState) -> tuple[np.ndarray, np.ndarray]:
@@ -23,7 +46,7 @@ def stretch(moving: np.ndarray, resting: np.ndarray, random: np.random.RandomSta
         Goodman and Weare 2010, "Ensemble samplers with affine invariance" (CAMCoS 5), equation 7.
     """
     ensembles, n, size = moving.shape
-    factor = ((_WIDEST_STRETCH - 1) * random.rand(ensembles, n) + 1) ** 2 / _WIDEST_STRETCH
+    factor = ((WIDEST_STRETCH - 1) * random.rand(ensembles, n) + 1) ** 2 / WIDEST_STRETCH
     anchor = resting[_rows(resting), random.randint(resting.shape[1], size=(ensembles, n))]
     return anchor - (anchor - moving) * factor[..., None], (size - 1) * np.log(factor)
 
@@ -46,7 +69,7 @@ def differential_evolution(
     first = random.randint(count, size=(ensembles, n))
     second = (first + random.randint(1, count, size=(ensembles, n))) % count  # any but the first
     gamma = 2.38 / np.sqrt(2 * size) if gamma is None else gamma
-    spread = gamma * (1 + _GAMMA_SPREAD * random.randn(ensembles, n, 1))
+    spread = gamma * (1 + GAMMA_SPREAD * random.randn(ensembles, n, 1))
     difference = resting[_rows(resting), second] - resting[_rows(resting), first]
     return moving + spread * difference, np.zeros((ensembles, n))
 
@@ -60,8 +83,8 @@ def independent(moving: np.ndarray, resting: np.ndarray, random: np.random.Rando
     mean = resting.mean(axis=1, keepdims=True)
     deviations = resting - mean
     covariance = np.matmul(deviations.transpose(0, 2, 1), deviations) / (resting.shape[1] - 1)
-    root = np.linalg.cholesky(covariance * (1 + _JITTER * np.eye(size)))
-    mixing = np.sqrt(_FREEDOM / random.chisquare(_FREEDOM, size=(ensembles, n, 1)))
+    root = np.linalg.cholesky(covariance * (1 + JITTER * np.eye(size)))
+    mixing = np.sqrt(FREEDOM / random.chisquare(FREEDOM, size=(ensembles, n, 1)))
     drawn = random.standard_normal((ensembles, n, size)) * mixing
     present = np.matmul(moving - mean, np.linalg.inv(root).transpose(0, 2, 1))
     places = mean + np.matmul(drawn, root.transpose(0, 2, 1))
@@ -70,7 +93,7 @@ def independent(moving: np.ndarray, resting: np.ndarray, random: np.random.Rando
 
 def _log_t(standardized: np.ndarray) -> np.ndarray:
     """Log density of the standard t distribution, up to a constant."""
-    return -(_FREEDOM + standardized.shape[-1]) / 2 * np.log1p(np.sum(standardized**2, axis=-1) / _FREEDOM)
+    return -(FREEDOM + standardized.shape[-1]) / 2 * np.log1p(np.sum(standardized**2, axis=-1) / FREEDOM)
 
 
 def _rows(resting: np.ndarray) -> np.ndarray:

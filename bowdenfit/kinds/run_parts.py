@@ -38,6 +38,11 @@ class RunParts:
     data: dict[str, Any]
 
 
+def has_rows(term: Term) -> bool:
+    """Whether a term is one of runs whose readings are known one by one."""
+    return isinstance(term, RunsTerm) and term.rows is not None
+
+
 def run_parts(term: Term, unit: LeaveOut) -> RunParts | None:
     """The parts of a term's runs; None where whole runs, or readings as they are, are all that can be left out.
 

@@ -9,7 +9,7 @@ import numpy as np
 from bowdenfit.description import Route, Table
 from bowdenfit.kinds.rows import OwnAngles
 from bowdenfit.types import Labels, Vector
-from bowdenfit.words import listed
+from bowdenfit.words import few, listed
 
 SAME_BEND = float(np.deg2rad(1.99))  # wrap angles that follow one another more closely are one bend, read twice
 _SDS = 4.0  # standard deviations of stated ones within which that holds too
@@ -44,8 +44,8 @@ def mountings(labels: Sequence[str], route: Vector, own: OwnAngles, limits: Rout
         for k, (values, step) in enumerate(zip((route, *own.angle.T), steps, strict=True)):
             place[mine, k] = _apart(values[mine], float(np.max(step[mine])))
     keys = [(label, *where) for label, where in zip(labels, place.tolist(), strict=True)]
-    distinct = list(dict.fromkeys(keys))
-    run = np.array([distinct.index(key) for key in keys])
+    distinct = {key: i for i, key in enumerate(dict.fromkeys(keys))}
+    run = np.array([distinct[key] for key in keys])
     places = Counter(key[0] for key in distinct)
     names = [
         label if places[label] == 1 else f"{label} ({_where(run == i, route, own, limits)})"
@@ -59,11 +59,10 @@ def numbered_anew(labels: Sequence[str], n_mountings: int, file: str, route: Rou
     distinct = list(dict.fromkeys(labels))
     if n_mountings == len(distinct):
         return ""
-    what, more = "length" if route else "bend", f" and {len(distinct) - _NAMED} more" if len(distinct) > _NAMED else ""
-    named = (", ".join(distinct[:_NAMED]) + more) if more else listed(distinct)
+    what = "length" if route else "bend"
     return (
-        f"{file}: the {len(distinct)} labels of its runs ({named}) come back at another {what}, which is taken as another "
-        f"mounting of the cable each time: {n_mountings} mountings in all. If the cable stayed mounted while its {what} "
+        f"{file}: the {len(distinct)} labels of its runs ({few(distinct, _NAMED)}) come back at another {what}, which is "
+        f"taken as another mounting of the cable each time: {n_mountings} mountings in all. If the cable stayed mounted while its {what} "
         f'changed, write run = "across {what}s" beside the file in cable.toml.'
     )
 

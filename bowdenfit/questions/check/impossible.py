@@ -7,9 +7,9 @@ from bowdenfit.kinds.plausibility import GAIN_ERROR
 from bowdenfit.kinds.term import Term
 from bowdenfit.parameters.priors import LogNormal
 from bowdenfit.results.record import Record
+from bowdenfit.words import few
 
 _SDS = 4.5  # of noise above what is possible, which one healthy reading of 300,000 exceeds
-_NAMED = 3
 _PRIOR_SDS = 3.0  # of the default prior of friction, beyond which a mistake is likelier than such a rope
 
 
@@ -21,17 +21,14 @@ def impossible_efficiencies(fit: Record) -> str:
         if not called.are_efficiencies:
             continue
         measured, predicted = term.observed(), _predicted(fit, term)
-        above = np.log(
-            measured / np.maximum(predicted, 1.0)
-        )  # offsets and gains of the load cells may show more than 1
+        above = np.log(measured / np.maximum(predicted, 1.0))  # offsets and gains of the cells may show more than 1
         beyond = np.flatnonzero(above > GAIN_ERROR + _SDS * _noise(fit, term))
         found += [f"{called.one.format(term.labels[i])} {measured[i]:.1%}" for i in beyond]
     if not found:
         return ""
-    more = f" and {len(found) - _NAMED} more" if len(found) > _NAMED else ""
     return (
-        f"No rope passes on more force than goes in, but these readings say so beyond their noise: {', '.join(found[:_NAMED])}"
-        f"{more}. The usual causes are swapped columns or channels, pull and return exchanged, a unit, or a channel that is no "
+        f"No rope passes on more force than goes in, but these readings say so beyond their noise: {few(found)}. "
+        "The usual causes are swapped columns or channels, pull and return exchanged, a unit, or a channel that is no "
         "force: look at these with `bowdenfit check`."
     )
 

@@ -11,7 +11,7 @@ from bowdenfit.kinds.places import RUN
 from bowdenfit.kinds.term import LOAD
 from bowdenfit.questions.check.answer import Checks, checks_of
 from bowdenfit.results.record import Record, once
-from bowdenfit.words import listed
+from bowdenfit.words import few, listed
 
 _FEW = 3  # departures that are said
 _INTERVAL = 0.9
@@ -39,9 +39,8 @@ def _far_out(fit: Record, noise: str) -> tuple[str, ...]:
 
 
 def _far_sentence(names: Sequence[str]) -> str:
-    more = f" and {len(names) - _FEW} more" if len(names) > _FEW else ""
     return (
-        f"The model does not describe {listed(names[:_FEW])}{more}: so far out that chance does it in less than one healthy "
+        f"The model does not describe {few(names, _FEW)}: so far out that chance does it in less than one healthy "
         f"fit of {1 / FALSE_ALARM:.0f}. Look at how it was measured and written down; if it stays, fit with --noise student, "
         "or leave it out and say so."
     )

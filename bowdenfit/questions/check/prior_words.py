@@ -1,7 +1,7 @@
 """What the priors alone hold possible, in words: which readings lie outside, and what the usual cause is."""
 
 from bowdenfit.questions.check.prior_predictive import PriorPredictive, PriorTable
-from bowdenfit.words import filled, listed
+from bowdenfit.words import few, filled
 
 WORTH_WARNING = (
     0.2  # share of a table's readings outside the central 99 %: that many are in at most 1 of 20 good data sets
@@ -42,8 +42,7 @@ def _sentence(table: PriorTable) -> str:
 
 def _which(table: PriorTable, outside: list[int]) -> str:
     """The first few, with what was read and what the priors allow."""
-    told = [f"{table.labels[i]}{_values(table, i)}" for i in outside[:_FEW]]
-    return listed([*told, *([f"{len(outside) - _FEW} more"] if len(outside) > _FEW else [])])
+    return few((f"{table.labels[i]}{_values(table, i)}" for i in outside), _FEW)
 
 
 def _values(table: PriorTable, i: int) -> str:

@@ -1,13 +1,12 @@
 """What the checks of a fit say, in a few sentences: scatter, outliers, readings that decide by themselves, priors."""
 
-from collections.abc import Iterable
 from math import isfinite
 
 from bowdenfit.kinds import readings_called
 from bowdenfit.questions.check.answer import Checks
 from bowdenfit.questions.check.sensitivity_words import priors_text
 from bowdenfit.questions.check.table_checks import CheckedReading
-from bowdenfit.words import decimals, filled, listed
+from bowdenfit.words import decimals, few, filled, listed
 
 _FEW = 3  # readings of a kind that are named; of more, the rest is counted
 _FEW_CHANCE = "ten"  # where readings hang together, as two do of which each predicts the other
@@ -78,19 +77,13 @@ def _decisive(found: Checks) -> str:
     if not decisive:
         return ""
     return (
-        f"The fit leans on {_few(_name(r) for r in decisive)} (k above 0.7): without {_one(len(decisive))} it would be "
+        f"The fit leans on {few(_name(r) for r in decisive)} (k above 0.7): without {_one(len(decisive))} it would be "
         "markedly different, so measure there again first if in doubt."
     )
 
 
 def _one(n: int) -> str:
     return "it" if n == 1 else "one of them"
-
-
-def _few(names: Iterable[str]) -> str:
-    every = list(names)
-    rest = [f"{len(every) - _FEW} more"] if len(every) > _FEW else []
-    return listed([*every[:_FEW], *rest])
 
 
 def _outside(found: Checks) -> str:

@@ -14,7 +14,7 @@ from bowdenfit.inference.interval import Interval
 from bowdenfit.inference.leave_one_out import ReadingsToLeaveOut, leave_one_out
 from bowdenfit.inference.log_density import LogDensity as Density
 from bowdenfit.kinds import readings_called
-from bowdenfit.kinds.run_parts import LeaveOut, RunParts, run_parts
+from bowdenfit.kinds.run_parts import LeaveOut, RunParts, has_rows, run_parts
 from bowdenfit.kinds.terms import measured_kinds, term_kind
 from bowdenfit.questions.compare.common_readings import CommonReadings, Omitted, common_readings
 from bowdenfit.questions.recorded.rate import RateEffect, rate_effect
@@ -157,9 +157,7 @@ def compare(
     if len(fits) < 2:
         raise UsageError("a comparison needs at least two fits; name their results folders.")
     drawn = {name: _draws_of(name, fit) for name, fit in fits.items()}
-    few = _few_runs(fits) if leave_out is None else 0
-    unit: LeaveOut = leave_out or ("load" if few else "run")
-    parts = {name: _parts(fit, unit) for name, fit in fits.items()}
+    unit, few, parts = _parts_to_leave_out(fits, leave_out)
     common = _common(fits, parts)
     predictions = {
         name: _leave_out_each(name, fit, drawn[name], common, parts[name], report) for name, fit in fits.items()
@@ -185,19 +183,21 @@ def compare(
     )
 
 
+def _parts_to_leave_out(
+    fits: Mapping[str, Record], leave_out: LeaveOut | None
+) -> tuple[LeaveOut, int, dict[str, dict[str, RunParts]]]:
+    """What is left out of runs at a time; how few runs there are, if that decided it; the parts by fit and table."""
+    runs = [len(t.labels) for fit in fits.values() for t in fit.model.terms if has_rows(t)]
+    few = min(runs, default=_FEW_RUNS) if leave_out is None else 0
+    unit: LeaveOut = leave_out or ("load" if few < _FEW_RUNS else "run")
+    parts = {name: _parts(fit, unit) for name, fit in fits.items()}
+    return (unit, few if unit == "load" else 0, parts) if leave_out or any(parts.values()) else ("run", 0, parts)
+
+
 def _parts(fit: Record, unit: LeaveOut) -> dict[str, RunParts]:
     """Parts of the runs of every table that has some."""
     found = {term.name: run_parts(term, unit) for term in fit.model.terms}
     return {name: parts for name, parts in found.items() if parts is not None}
-
-
-def _few_runs(fits: Mapping[str, Record]) -> int:
-    """Number of runs of the table with fewest, where they are too few to be left out whole and can be parted; else 0."""
-    for fit in fits.values():
-        for term in fit.model.terms:
-            if len(term.labels) < _FEW_RUNS and run_parts(term, "load") is not None:
-                return len(term.labels)
-    return 0
 
 
 def _draws_of(name: str, fit: Record) -> Draws:

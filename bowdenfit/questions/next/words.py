@@ -2,7 +2,7 @@
 
 from bowdenfit.kinds.terms import candidate_kinds
 from bowdenfit.questions.next.answer import NextMeasurement, Ranked
-from bowdenfit.words import decimals, filled, listed, table
+from bowdenfit.words import decimals, few, filled, table
 
 _MOST_NAMED = 3  # candidates as good as the best that are named in the sentence
 
@@ -59,9 +59,8 @@ def _advice(found: NextMeasurement) -> list[str]:
     ]
     alike = [r for r in found.ranked if r.as_good and r is not best]
     if alike:
-        named = [r.words[0].upper() + r.words[1:] if i == 0 else r.words for i, r in enumerate(alike[:_MOST_NAMED])]
-        named += [f"{len(alike) - _MOST_NAMED} more"] if len(alike) > _MOST_NAMED else []
-        lines.append(f"{listed(named)} would do as well, within the error of this estimate.")
+        named = [r.words[0].upper() + r.words[1:] if i == 0 else r.words for i, r in enumerate(alike)]
+        lines.append(f"{few(named, _MOST_NAMED)} would do as well, within the error of this estimate.")
     return lines
 
 

@@ -15,8 +15,8 @@ import jax
 import numpy as np
 
 from bowdenfit.description import SamplerSettings
-from bowdenfit.inference.batch import fit_batch
-from bowdenfit.inference.batch_programs import BatchPrograms, BatchSettings
+from bowdenfit.inference.batch.fitting import fit_batch
+from bowdenfit.inference.batch.programs import BatchPrograms, BatchSettings
 from bowdenfit.inference.chain import Sampling
 from bowdenfit.inference.ensemble import sample
 from bowdenfit.inference.least_squares import maximum_posterior

@@ -9,8 +9,8 @@ import pytest
 import bowdenfit as bf
 from bowdenfit.dataset import load_dataset
 from bowdenfit.description import SamplerSettings
-from bowdenfit.inference.batch import fit_batch
-from bowdenfit.inference.batch_programs import BatchPrograms, BatchSettings
+from bowdenfit.inference.batch.fitting import fit_batch
+from bowdenfit.inference.batch.programs import BatchPrograms, BatchSettings
 from bowdenfit.inference.log_density import LogDensity
 from bowdenfit.model import build_model
 

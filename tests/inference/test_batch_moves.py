@@ -9,8 +9,8 @@ import pytest
 from test_proposals import CHART, DEGREES_OF_FREEDOM, DIMENSIONS, ROOT, below_quantiles, draw_t, moves_alone, p_value
 
 from bowdenfit.inference import proposals, value_chart
-from bowdenfit.inference.batch_ensembles import walker_round
-from bowdenfit.inference.batch_moves import (
+from bowdenfit.inference.batch.ensembles import walker_round
+from bowdenfit.inference.batch.moves import (
     batch_moves,
     differential_evolution,
     in_values,

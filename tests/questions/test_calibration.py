@@ -15,7 +15,7 @@ from spoiling import copied
 from bowdenfit.dataset import Dataset, load_dataset
 from bowdenfit.description import Description, SamplerSettings
 from bowdenfit.errors import DatasetError, StoreError
-from bowdenfit.inference.batch_programs import BatchSettings
+from bowdenfit.inference.batch.programs import BatchSettings
 from bowdenfit.inference.compilation import compile_program
 from bowdenfit.kinds import KINDS
 from bowdenfit.kinds.angles.table import AngleTable

@@ -9,8 +9,8 @@ from scipy import stats
 
 from bowdenfit.dataset import Dataset
 from bowdenfit.description import Description, SamplerSettings
-from bowdenfit.inference.batch_diagnostics import diagnose_few_draws
-from bowdenfit.inference.batch_programs import BatchSettings
+from bowdenfit.inference.batch.diagnostics import diagnose_few_draws
+from bowdenfit.inference.batch.programs import BatchSettings
 from bowdenfit.inference.chain import Sampling
 from bowdenfit.inference.ensemble import sample
 from bowdenfit.inference.least_squares import LeastSquares, least_squares, maximum_posterior

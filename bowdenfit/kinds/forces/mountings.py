@@ -62,8 +62,8 @@ def numbered_anew(labels: Sequence[str], n_mountings: int, file: str, route: Rou
     what = "length" if route else "bend"
     return (
         f"{file}: the {len(distinct)} labels of its runs ({few(distinct, _NAMED)}) come back at another {what}, which is "
-        f"taken as another mounting of the cable each time: {n_mountings} mountings in all. If the cable stayed mounted while its {what} "
-        f'changed, write run = "across {what}s" beside the file in cable.toml.'
+        f"taken as another mounting of the cable each time: {n_mountings} mountings in all. If the cable stayed mounted while "
+        f'its {what} changed, write run = "across {what}s" beside the file in cable.toml.'
     )
 
 

@@ -7,9 +7,9 @@ import jax
 
 from bowdenfit.dataset import Dataset
 from bowdenfit.description import SamplerSettings
-from bowdenfit.inference.batch import fit_batch
-from bowdenfit.inference.batch_programs import BatchPrograms, BatchSettings
-from bowdenfit.inference.batch_stages import BatchFit
+from bowdenfit.inference.batch.fitting import fit_batch
+from bowdenfit.inference.batch.programs import BatchPrograms, BatchSettings
+from bowdenfit.inference.batch.stages import BatchFit
 from bowdenfit.inference.log_density import LogDensity
 from bowdenfit.model import Model, build_model
 

@@ -130,7 +130,7 @@ def _replicate(
     progress: Report | None,
 ) -> None:
     """Do what is not done yet, and keep each as it ends."""
-    from bowdenfit.inference.batch_programs import BatchSettings
+    from bowdenfit.inference.batch.programs import BatchSettings
     from bowdenfit.questions.calibrate.refit import RANKS, Laboratory
     from bowdenfit.questions.calibrate.store import keep
     from bowdenfit.questions.calibrate.workbench import Workbench

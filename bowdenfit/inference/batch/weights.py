@@ -13,7 +13,7 @@ from functools import cached_property
 
 import numpy as np
 
-from bowdenfit.inference.batch_mixture import Mixture
+from bowdenfit.inference.batch.mixture import Mixture
 from bowdenfit.inference.diagnostics import Diagnostics
 from bowdenfit.inference.psis import reliable_k, smooth_weights
 

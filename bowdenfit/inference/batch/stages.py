@@ -5,11 +5,11 @@ from typing import Any
 
 import numpy as np
 
-from bowdenfit.inference.batch_diagnostics import diagnose_few_draws
-from bowdenfit.inference.batch_ensembles import STEPS, STORED
-from bowdenfit.inference.batch_laplace import mixtures
-from bowdenfit.inference.batch_programs import CHUNK, BatchPrograms, stack
-from bowdenfit.inference.batch_weights import BLOCK, Weighted, evened, resample, weighted_draws
+from bowdenfit.inference.batch.diagnostics import diagnose_few_draws
+from bowdenfit.inference.batch.ensembles import STEPS, STORED
+from bowdenfit.inference.batch.laplace import mixtures
+from bowdenfit.inference.batch.programs import CHUNK, BatchPrograms, stack
+from bowdenfit.inference.batch.weights import BLOCK, Weighted, evened, resample, weighted_draws
 from bowdenfit.inference.chain import Sampling, stuck_walkers
 from bowdenfit.inference.diagnostics import Diagnostics, shortfalls
 from bowdenfit.inference.least_squares import MaximumPosterior

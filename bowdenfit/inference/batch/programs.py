@@ -9,9 +9,9 @@ import jax
 import numpy as np
 
 from bowdenfit.description import SamplerSettings
-from bowdenfit.inference.batch_ensembles import make_round
-from bowdenfit.inference.batch_laplace import points_of_climb
-from bowdenfit.inference.batch_weights import BLOCK
+from bowdenfit.inference.batch.ensembles import make_round
+from bowdenfit.inference.batch.laplace import points_of_climb
+from bowdenfit.inference.batch.weights import BLOCK
 from bowdenfit.inference.compilation import compile_program
 from bowdenfit.inference.log_density import LogDensity
 from bowdenfit.inference.objective import noise_scales

@@ -14,9 +14,9 @@ from typing import Any
 
 import jax
 
-from bowdenfit.inference.batch_ensembles import STEPS
-from bowdenfit.inference.batch_programs import CHUNK, BatchPrograms, BatchSettings
-from bowdenfit.inference.batch_stages import BatchFit, Case, by_nuts, look, walk, weigh
+from bowdenfit.inference.batch.ensembles import STEPS
+from bowdenfit.inference.batch.programs import CHUNK, BatchPrograms, BatchSettings
+from bowdenfit.inference.batch.stages import BatchFit, Case, by_nuts, look, walk, weigh
 from bowdenfit.inference.log_density import LogDensity
 
 _GROUP = 256  # data sets from the start to the end, before the next; bounds memory

@@ -10,7 +10,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from bowdenfit.inference.batch_mixture import Mixture
+from bowdenfit.inference.batch.mixture import Mixture
 
 Gradients = Callable[[np.ndarray], tuple[np.ndarray, np.ndarray]]
 

@@ -12,7 +12,7 @@ import jax.numpy as jnp
 import numpy as np
 from jax import Array
 
-from bowdenfit.inference.batch_moves import Moves, batch_moves, numbers_of_move
+from bowdenfit.inference.batch.moves import Moves, batch_moves, numbers_of_move
 from bowdenfit.inference.compilation import compile_program
 from bowdenfit.inference.log_density import LogDensity
 from bowdenfit.inference.value_chart import chart_values

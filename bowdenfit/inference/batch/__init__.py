@@ -1,0 +1,1 @@
+"""Many data sets of one shape fitted in one program."""

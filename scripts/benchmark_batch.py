@@ -12,7 +12,6 @@ import time
 from collections import Counter
 
 import jax
-import numpy as np
 
 from bowdenfit.description import SamplerSettings
 from bowdenfit.inference.batch.fitting import fit_batch
@@ -22,14 +21,14 @@ from bowdenfit.inference.ensemble import sample
 from bowdenfit.inference.least_squares import maximum_posterior
 from bowdenfit.inference.log_density import LogDensity
 from bowdenfit.inference.objective import make_objective
-from bowdenfit.kinds.design import Design
+from bowdenfit.kinds.designs import design_of
 from bowdenfit.kinds.settings import parse_description
 from bowdenfit.model import build_model
 from bowdenfit.questions.simulate.simulation import empty_tables, simulate, true_values
 
 CONTACTS = ("sheath", "clamp", "edge")
 ANGLES = ((200, 30, 20), (150, 80, 20), (90, 30, 60), (240, 60, 90), (60, 90, 30), (120, 20, 80))  # deg, of each run
-FORCES, STROKES = (20.0, 50.0, 80.0), (1, -1)
+FORCES, STROKES = (20.0, 50.0, 80.0), ("pull", "return")
 NUMBERS = (1, 10, 100, 1000)
 TARGETS = BatchSettings().sampler
 
@@ -43,11 +42,8 @@ def cables(number: int) -> list[LogDensity]:
             "tables": {"forces": {"file": "forces.csv"}},
         }
     )
-    own = {
-        f"{name}_angle": tuple(np.deg2rad(column))
-        for name, column in zip(CONTACTS, zip(*ANGLES, strict=True), strict=True)
-    }
-    design = Design(runs=(0.0,) * len(ANGLES), input_forces=FORCES, strokes=STROKES, own_angles=own)
+    own = {f"{name}_angle": column for name, column in zip(CONTACTS, zip(*ANGLES, strict=True), strict=True)}
+    design = design_of(runs=(0.0,) * len(ANGLES), input_forces=FORCES, strokes=STROKES, own_angles=own)
     tables = empty_tables(description, design)
     found = []
     for seed in range(number):

@@ -19,7 +19,7 @@ import jax
 import numpy as np
 
 from bowdenfit.dataset import Dataset
-from bowdenfit.kinds.design import Design
+from bowdenfit.kinds.designs import design_of
 from bowdenfit.kinds.settings import parse_description
 from bowdenfit.questions.calibrate.findings import findings
 from bowdenfit.questions.calibrate.quantities import quantities_of
@@ -59,7 +59,9 @@ class Bench:
         tables = {"angles": limit, "forces": {"file": "forces.csv"}}
         raw = {"name": "bench", "route": ROUTE, "contact": contacts, "tables": tables}
         at = np.linspace(410.0, 590.0, self.mountings)
-        design = Design(angles=LENGTHS, runs=tuple(at), input_forces=tuple(self.load * np.array([0.4, 0.8, 1.2, 1.6])))
+        design = design_of(
+            angles=LENGTHS, runs=tuple(at), input_forces=tuple(self.load * np.array([0.4, 0.8, 1.2, 1.6]))
+        )
         description = parse_description(raw)
         return Dataset(description, empty_tables(description, design), {})
 

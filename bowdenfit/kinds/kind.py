@@ -116,7 +116,8 @@ class Kind(Generic[AnyTable]):
         implausible: Why no bench would hand in simulated readings in place of the measured ones, in a few words; empty if
             one might.
         page: Its table as the headings and rows of a file; None where it is written otherwise.
-        empty: A table of a design's shape with unremarkable readings, as of a file of some name; None where a design has none.
+        design: What it reads of [design] in a plan.
+        empty: A table of such a design with unremarkable readings, as of a file of some name; None where plans are otherwise.
         bends: Total wrap angles at which the rope itself was measured [rad]; None if it was not.
         conditions: Where and at which wrap angles friction was measured; None if it was not.
         forces: Forces that friction acted on [N].
@@ -141,7 +142,8 @@ class Kind(Generic[AnyTable]):
     count: Callable[[AnyTable], str] = lambda _: ""
     implausible: Callable[[AnyTable, AnyTable], str] = lambda *_: ""
     page: Callable[[AnyTable, Description], Page] | None = None
-    empty: Callable[[Design, Description, str], AnyTable] | None = None
+    design: type[Design] = Design
+    empty: Callable[[Any, Description, str], AnyTable] | None = None
     bends: Callable[[AnyTable], Vector] | None = None
     conditions: Callable[[AnyTable], ForceRows] | None = None
     forces: Callable[[AnyTable], Vector] = lambda _: np.zeros(0)

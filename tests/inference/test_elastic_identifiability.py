@@ -9,45 +9,53 @@ from bowdenfit.inference.least_squares import least_squares, maximum_posterior
 from bowdenfit.inference.log_density import LogDensity
 from bowdenfit.inference.objective import make_objective
 from bowdenfit.inference.other_minima import fitting_as_well, range_of_minima
-from bowdenfit.kinds.design import Design, ElasticDesign
+from bowdenfit.kinds.designs import design_of
 from bowdenfit.kinds.settings import parse_description
 from bowdenfit.model import build_model
 from bowdenfit.questions.bends.overview import products_with_preload
 from bowdenfit.questions.check.data_set_words import warnings_of
 from bowdenfit.questions.summary.words import summary_text
 
-ANGLES = tuple(np.deg2rad((0.0, 45.0, 90.0, 135.0, 180.0)))
+ANGLES = (0.0, 45.0, 90.0, 135.0, 180.0)
 LOADS = (1.0, 3.0, 6.0, 10.0, 15.0, 20.0, 30.0, 40.0, 60.0, 80.0, 100.0)
 TRUTH = {
     "mu": 0.07, "mu_stretch": 0.07, "stiffness": 35.0, "bedding_stretch": 0.4, "bedding_load": 15.0, "lengthening": 0.0061,
     "stretch_zero": 0.3, "preload": 10.0, "sigma_L": 0.02, "sigma_P": 0.3, "sigma_F": 0.3,
 }  # fmt: skip
-FREE = ElasticDesign(free_angles=ANGLES[1:], strokes=(1, -1) * 3)
+
+
+def stretched(loads, angles=ANGLES, *, unloading=False):
+    """A design that stretches the rope."""
+    return {"stretch": {"loads": tuple(loads), "wrap_angles": angles, "unloading": unloading}}
+
+
+FREE = {"loop": {"free_motion": ANGLES[1:], "strokes": ("pull", "return") * 3}}
 CASES = {
     # tables, what is measured, truth that differs, what cannot be told, what the check warns of
     "a single load": (
-        ("stretch",), ElasticDesign(loads=(30.0,), stretch_angles=ANGLES), {},
+        ("stretch",), stretched((30.0,)), {},
         ("stiffness", "bedding_stretch", "bedding_load"), "a single load, 30 N, so the stiffness of the rope is not identif",
     ),
     "one wrap angle": (
-        ("stretch",), ElasticDesign(loads=LOADS, stretch_angles=ANGLES[2:3], unloading=True), {},
+        ("stretch",), stretched(LOADS, ANGLES[2:3], unloading=True), {},
         ("lengthening", "stretch_zero"), "at one wrap angle, 90 deg",
     ),
     "loads far above the bedding load": (
-        ("stretch",), ElasticDesign(loads=tuple(np.linspace(150, 300, 9)), stretch_angles=ANGLES), {"bedding_load": 5.0},
+        ("stretch",), stretched(np.linspace(150, 300, 9)), {"bedding_load": 5.0},
         ("bedding_stretch", "bedding_load", "stretch_zero"), "no low loads, only 150 to 300 N",
     ),
     "loads far below the bedding load": (
-        ("stretch",), ElasticDesign(loads=tuple(np.linspace(0.1, 1.5, 9)), stretch_angles=ANGLES),
+        ("stretch",), stretched(np.linspace(0.1, 1.5, 9)),
         {"bedding_load": 60.0, "sigma_L": 0.002}, ("stiffness", "bedding_stretch", "bedding_load"), None,
     ),
     "preloads alone": (
-        ("preload",), ElasticDesign(preload_angles=tuple(np.deg2rad(np.linspace(60, 180, 8)))), {},
+        ("preload",), {"preload": {"wrap_angles": tuple(np.linspace(60, 180, 8))}}, {},
         ("mu", "stiffness", "bedding_stretch", "lengthening"), "without a table of stretch, preloads tell only",
     ),
     "free motion": (("loop",), FREE, {}, ("mu", "preload"), "tells only the product of friction and preload"),
     "a loop that is always slack": (
-        ("loop",), ElasticDesign(loop_angles=ANGLES[1:], input_forces=(40.0, 60.0, 80.0, 100.0), strokes=(1, -1)),
+        ("loop",), {"loop": {
+            "wrap_angles": ANGLES[1:], "input_forces": (40.0, 60.0, 80.0, 100.0), "strokes": ("pull", "return")}},
         {"preload": 1.0}, ("preload",), None,
     ),
 }  # fmt: skip
@@ -72,7 +80,7 @@ def estimates_of(tables, design, truth, seeds=SEEDS):
     """Least-squares estimates and true values [shown units] of several seeds, and the last data set."""
     objective, found = None, []
     for seed in seeds:
-        data, values = measured(cable_with(tables), seed, design=Design(elastic=design), **(TRUTH | truth))
+        data, values = measured(cable_with(tables), seed, design=design_of(**design), **(TRUTH | truth))
         posterior = LogDensity(build_model(data))
         objective = objective or make_objective(posterior)
         estimates = least_squares(posterior, objective, maximum_posterior(posterior, objective).z).estimates
@@ -101,15 +109,14 @@ def test_what_the_data_cannot_tell_is_not_identified_and_no_error_bar_is_too_sma
 
 
 def test_good_tables_leave_nothing_unidentified():
-    design = ElasticDesign(loads=LOADS, stretch_angles=ANGLES, unloading=True)
-    found, data = estimates_of(("stretch",), design, {}, seeds=(0,))
+    found, data = estimates_of(("stretch",), stretched(LOADS, unloading=True), {}, seeds=(0,))
     assert all(estimate.identified for estimates in found for estimate, _ in estimates.values())
     assert warnings_of(data) == []
 
 
 def test_the_summary_says_which_values_fit_as_well():
     tables, design, truth, *_ = CASES["a loop that is always slack"]
-    data, _ = measured(cable_with(tables), 0, design=Design(elastic=design), **(TRUTH | truth))
+    data, _ = measured(cable_with(tables), 0, design=design_of(**design), **(TRUTH | truth))
     text = " ".join(summary_text(bf.fit(data, mcmc=False, seed=1)).split())
     assert "preload is not identified by least squares: values from" in text
     assert "fit about as well" in text
@@ -118,7 +125,7 @@ def test_the_summary_says_which_values_fit_as_well():
 def test_free_motion_tells_the_product_of_friction_and_preload_and_says_so():
     sampler = {"n_walkers": 32, "target_ess": 100, "target_r_hat": 1.1, "max_steps": 400}
     prior = {"preload": {"prior": {"lognormal": {"median": 20.0, "log_sd": 1.0}}}}  # else it may as well be slack
-    data, _ = measured(cable_with(("loop",), sampler=sampler, prior=prior), 0, design=Design(elastic=FREE), **TRUTH)
+    data, _ = measured(cable_with(("loop",), sampler=sampler, prior=prior), 0, design=design_of(**FREE), **TRUTH)
     fit = bf.fit(data, seed=1)  # so short that the ratio below is 6 to 12, by the seed
     (sentence,) = products_with_preload(fit)
     assert sentence.startswith(
@@ -131,7 +138,7 @@ def test_free_motion_tells_the_product_of_friction_and_preload_and_says_so():
 
 def test_a_preload_whose_wrap_angle_is_given_but_not_used_is_warned_of():
     description = cable_with(("loop",), preload={"wrap_angle": {"value": 90, "unit": "deg"}})
-    data, _ = measured(description, 0, design=Design(elastic=FREE), **TRUTH)
+    data, _ = measured(description, 0, design=design_of(**FREE), **TRUTH)
     assert any('model = "stretch"' in said for said in warnings_of(data))
 
 

@@ -14,9 +14,9 @@ import jax
 import jax.numpy as jnp
 import numpy as np
 import pytest
-from cables import CONTACTS, DESIGN, cable
+from cables import CONTACTS, cable, other_design
 from cables import TRUTH as CABLE_TRUTH
-from elastic_cables import CONSTANT, ELASTIC, TRUTH, bench, elastic_cable, radians
+from elastic_cables import CONSTANT, ELASTIC, TRUTH, bench, changed, elastic_cable
 from laboratory import Laboratory, held, p_values, table
 from scipy import stats
 
@@ -25,7 +25,7 @@ from bowdenfit.description import Description, SamplerSettings
 from bowdenfit.inference.log_density import LogDensity
 from bowdenfit.kinds import KINDS
 from bowdenfit.kinds.angles.table import AngleTable
-from bowdenfit.kinds.design import Design
+from bowdenfit.kinds.designs import design_of
 from bowdenfit.kinds.measurements import Measurements
 from bowdenfit.kinds.settings import parse_description
 from bowdenfit.kinds.stretch.table import StretchTable
@@ -34,14 +34,15 @@ from bowdenfit.questions.simulate.simulation import empty_tables, simulate, true
 
 QUICK = SamplerSettings(n_ensembles=4, n_walkers=32, max_steps=1000, target_ess=500, target_r_hat=1.03)
 ROPE = ("stiffness", "bedding_stretch", "bedding_load", "lengthening", "stretch_zero", "sigma_L")
-SHORT = replace(
+SHORT = changed(
     ELASTIC,
-    loads=(1.0, 3.0, 6.0, 10.0, 20.0, 40.0, 70.0, 100.0),
-    stretch_angles=radians(0, 90, 180),
-    preload_angles=radians(0, 45, 60, 90, 120, 150, 180),
-    loop_angles=radians(60, 120, 180),
-    free_angles=radians(60, 120, 180),
-    input_forces=(5.0, 10.0, 20.0, 40.0, 60.0),
+    stretch={"loads": (1.0, 3.0, 6.0, 10.0, 20.0, 40.0, 70.0, 100.0), "wrap_angles": (0, 90, 180)},
+    preload={"wrap_angles": (0, 45, 60, 90, 120, 150, 180)},
+    loop={
+        "wrap_angles": (60, 120, 180),
+        "input_forces": (5.0, 10.0, 20.0, 40.0, 60.0),
+        "free_motion": (60, 120, 180),
+    },
 )
 
 
@@ -126,7 +127,7 @@ def test_over_twenty_loops_nine_in_ten_intervals_hold_the_truth(laboratory):
 
     That takes 12 hits or fewer of 20, so by chance one of the ten does in fewer than four of a thousand seeds.
     """
-    ranks = laboratory.ranks(plausible(), Design(elastic=SHORT), range(20))
+    ranks = laboratory.ranks(plausible(), design_of(**SHORT), range(20))
     p = p_values(ranks)
     assert set(p) == set(TRUTH) - {"mu_stretch"}
     assert all(value > 0.001 for value in p.values()), table(ranks)
@@ -141,7 +142,7 @@ def test_over_two_hundred_loops_ranks_are_uniform():
     Twenty tests with the binomial ones; the smallest p times their number is below 0.001 once in a thousand seeds.
     """
     laboratory = Laboratory(sampler=QUICK)
-    ranks = laboratory.ranks(plausible(), Design(elastic=SHORT), range(1000, 1200))
+    ranks = laboratory.ranks(plausible(), design_of(**SHORT), range(1000, 1200))
     p = list(p_values(ranks).values())
     p += [stats.kstest([each[name] for each in ranks], "uniform").pvalue for name in ranks[0]]
     assert min(p) * len(p) > 0.001, (table(ranks), p)
@@ -158,7 +159,7 @@ def test_the_same_test_rejects_a_model_without_the_unloading_branch(laboratory):
     """The negative control: friction that holds the stretch back while the load comes down, taken for noise."""
     wrong = Laboratory(all_on_the_way_up, QUICK)
     wrong.fits = laboratory.fits
-    p = p_values(wrong.ranks(plausible(), Design(elastic=SHORT), range(6)))
+    p = p_values(wrong.ranks(plausible(), design_of(**SHORT), range(6)))
     assert p["sigma_L"] < 0.001
     assert p["lengthening"] < 0.001
 
@@ -180,7 +181,7 @@ def test_stretch_and_loop_together_tell_friction_better_than_either_alone(labora
 
     The scatter that a standard error rests on is itself known to a tenth or so from so few rows.
     """
-    few = replace(ELASTIC, loop_angles=radians(45, 90), free_angles=radians(90), input_forces=(10.0, 40.0))
+    few = changed(ELASTIC, loop={"wrap_angles": (45, 90), "input_forces": (10.0, 40.0), "free_motion": (90,)})
     both = bench(told_by("stretch", "loop"), TRUTH, 3, design=few)[0].measurements
     sd = []
     for names in (("stretch", "loop"), ("stretch",), ("loop",)):
@@ -207,7 +208,7 @@ def stretched_on_body(on_body):
     def joined(friction: str | None) -> Dataset:
         description = parse_description(raw | ({"stretch": {"friction": friction}} if friction else {}))
         truth = {name: TRUTH[name] for name in ROPE} | ({friction: 0.085} if friction else {})
-        design = Design(angles=(450.0, 500.0), efficiencies=(470.0,), elastic=ELASTIC)
+        design = design_of(angles=(450.0, 500.0), efficiencies=(470.0,), **ELASTIC)
         values = true_values(description, empty_tables(description, design), truth, jax.random.key(1))
         rows = simulate(description, design, values, jax.random.key(2)).measurements.table(StretchTable)
         return Dataset(description, alone.measurements.with_tables(rows), {})
@@ -257,7 +258,7 @@ def mixture(tables: tuple[str, ...]) -> Dataset:
     """Such tables of one cable: of two contacts with curves if its angles are measured, else of a cable without."""
     contacts = {} if "angles" in tables else {"contact": [CONTACTS[2], CONTACTS[4]]}
     description = cable(2, tables, **contacts, preload={"model": "stretch"})
-    design = replace(DESIGN, elastic=SHORT)
+    design = other_design(**SHORT)
     empty = empty_tables(description, design)
     names = {p.name for p in build_model(Dataset(description, empty, {})).space.parameters}
     truth = {name: value for name, value in (TRUTH | CABLE_TRUTH).items() if name in names}

@@ -7,7 +7,7 @@ import jax
 import jax.numpy as jnp
 import numpy as np
 import pytest
-from cables import CONTACTS, DESIGN, TRUTH, cable, measured
+from cables import CONTACTS, TRUTH, cable, measured, other_design
 from scipy import optimize
 
 from bowdenfit.dataset import Dataset
@@ -62,7 +62,9 @@ def test_scipy_s_trust_region_with_a_jax_jacobian_finds_the_same_minimum():
         return jnp.concatenate(list(posterior.residuals(z, data).values()))
 
     start = np.zeros(len(free))
-    residuals, jacobian = (compile_program(f, start, posterior.data, run_once=True) for f in (stacked, jax.jacfwd(stacked)))
+    residuals, jacobian = (
+        compile_program(f, start, posterior.data, run_once=True) for f in (stacked, jax.jacfwd(stacked))
+    )
     theirs = optimize.least_squares(
         lambda part: np.asarray(residuals(part, posterior.data)),
         start,
@@ -170,7 +172,7 @@ def test_one_coefficient_at_two_constant_angles_is_identified():
 def test_a_gain_error_is_not_told_from_a_constant_angle_by_pulling_alone_but_is_by_both_strokes():
     sensors = {"sensors": {"input_gain_error_sd": 0, "output_gain_error_sd": 0.02}}
     description = cable(3, **sensors)
-    _, pulling = fitted(measured(description, seed=1, design=replace(DESIGN, strokes=(1,)))[0])
+    _, pulling = fitted(measured(description, seed=1, design=other_design(strokes=("pull",)))[0])
     _, both = fitted(measured(description, seed=1)[0])
     for name in ("mu_edge", "gain_error"):
         assert not pulling.estimates[name].identified
@@ -189,7 +191,9 @@ def test_a_coefficient_that_would_be_negative_is_not_given_a_number():
     weights = {"tau": 0.02, "sigma_theta": 5.0}  # so that efficiencies count enough for the angles not to give way
     prior = {name: {"prior": {"half_normal": {"sd": sd}}} for name, sd in weights.items()}
     dataset, _ = measured(cable(2, ("angles", "efficiencies"), prior=prior), seed=1, noise=False)
-    table = dataset.measurements.table(EfficiencyTable)  # all loss grows with the free angle, and falls with the squeezed one
+    table = dataset.measurements.table(
+        EfficiencyTable
+    )  # all loss grows with the free angle, and falls with the squeezed one
     loss = np.linspace(0.1, 0.9, len(table.route))
     changed = dataset.measurements.with_tables(replace(table, efficiency=np.exp(-loss)))
     _, found = fitted(replace(dataset, measurements=changed))

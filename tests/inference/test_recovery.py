@@ -14,7 +14,7 @@ from typing import Any
 
 import numpy as np
 import pytest
-from cables import CONTACTS, DESIGN, cable
+from cables import CONTACTS, DESIGN, cable, other_design
 from laboratory import Laboratory, held, p_values, table
 from scipy import stats
 
@@ -34,7 +34,10 @@ PRIORS = {
     "squeezed_angle_b": _normal(-1.2, 0.3),
     "second_angle_a": _normal(-0.4, 0.3),
     "second_angle_b": _normal(0.3, 0.3),
-    **{f"{angle}_c": {"prior": {"half_normal": {"sd": 0.5}}} for angle in ("free_angle", "squeezed_angle", "second_angle")},
+    **{
+        f"{angle}_c": {"prior": {"half_normal": {"sd": 0.5}}}
+        for angle in ("free_angle", "squeezed_angle", "second_angle")
+    },
     "tau": {"prior": {"half_normal": {"sd": 0.02}}},  # truths that a bench could show; the defaults have long tails
     "sigma_theta": {"prior": {"half_normal": {"sd": 1.5}}},
     "sigma_F": {"prior": {"half_normal": {"sd": 0.3}}},
@@ -46,7 +49,9 @@ def recoverable(n_contacts: int) -> Description:
     """A cable whose priors do not look at its data; of three contacts, one whose angles below 10 deg go undetected."""
     plain = cable(n_contacts)
     names = [c.wrap_angle.column for c in plain.curved]
-    prior = {name: setting for name, setting in PRIORS.items() if name.startswith(("sigma", "tau")) or name[:-2] in names}
+    prior = {
+        name: setting for name, setting in PRIORS.items() if name.startswith(("sigma", "tau")) or name[:-2] in names
+    }
     angles = {"file": "a.csv"} | ({"detection_limit": {"value": 10, "unit": "deg"}} if n_contacts == 3 else {})
     friction = dict.fromkeys(plain.coefficients, FRICTION)
     return cable(n_contacts, {"angles": angles, "forces": {"file": "f.csv"}}, prior=prior, friction=friction)
@@ -101,7 +106,7 @@ def test_the_same_test_rejects_a_likelihood_that_takes_the_samples_of_a_run_for_
     friction = dict.fromkeys(("mu_edge", "mu_clamp"), FRICTION)
     prior = {"sigma_F": PRIORS["sigma_F"]}
     description = cable(2, ("forces",), contact=measured_angles, friction=friction, prior=prior)
-    long_runs = replace(DESIGN, input_forces=tuple(np.linspace(40.0, 90.0, 40)), strokes=(1,))
+    long_runs = other_design(input_forces=tuple(np.linspace(40.0, 90.0, 40)), strokes=("pull",))
     laboratory = Laboratory(independent_samples, SamplerSettings(n_ensembles=4, n_walkers=32, max_steps=600))
     p = p_values(laboratory.ranks(description, long_runs, range(8)))
     assert p["mu_edge"] < 0.001

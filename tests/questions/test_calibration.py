@@ -7,7 +7,7 @@ import jax
 import jax.numpy as jnp
 import numpy as np
 import pytest
-from cables import CONTACTS, DESIGN, cable
+from cables import CONTACTS, DESIGN, cable, other_design
 from conftest import ROOT
 from scipy import stats
 from spoiling import copied
@@ -21,6 +21,7 @@ from bowdenfit.kinds import KINDS
 from bowdenfit.kinds.angles.table import AngleTable
 from bowdenfit.kinds.angles.term import detection_limit
 from bowdenfit.kinds.design import Design
+from bowdenfit.kinds.designs import design_of
 from bowdenfit.kinds.drawn_readings import drawn_readings
 from bowdenfit.kinds.forces.table import ForceTable
 from bowdenfit.kinds.forces.term import HeldForcesTerm
@@ -138,9 +139,11 @@ def test_recordings_drawn_without_noise_show_the_friction_exponent_that_they_wer
 def held_at(forces: tuple[float, ...]) -> Dataset:
     """Forces that were read while nothing slid, on a cable of one known angle."""
     description = cable(1, ("forces",), contact=[CONTACTS[2]])
-    table = empty_tables(description, Design(runs=(450.0,), input_forces=forces, strokes=(1,))).table(ForceTable)
+    table = empty_tables(description, design_of(runs=(450.0,), input_forces=forces, strokes=("pull",))).table(
+        ForceTable
+    )
     held = replace(table, stroke=np.zeros(len(forces), dtype=int), output_force=np.full(len(forces), forces[0]))
-    return Dataset(description, empty_tables(description, Design()).with_tables(held), {})
+    return Dataset(description, empty_tables(description, design_of()).with_tables(held), {})
 
 
 def test_held_readings_slip_as_often_as_their_likelihood_says():
@@ -366,7 +369,10 @@ def two_coefficients(**prior: object) -> Dataset:
     friction = dict.fromkeys(("mu_edge", "mu_clamp"), FRICTION)
     contacts = [CONTACTS[2], CONTACTS[4]]
     description = cable(2, ("forces",), contact=contacts, friction=friction, prior=SMALL_NOISE | prior)
-    return designed(description, replace(DESIGN, input_forces=tuple(np.linspace(40.0, 90.0, 40)), strokes=(1,)))
+    return designed(
+        description,
+        other_design(input_forces=tuple(np.linspace(40.0, 90.0, 40)), strokes=("pull",)),
+    )
 
 
 def test_a_small_calibration_of_the_right_likelihood_passes():
@@ -395,7 +401,7 @@ def angles_alone(undetected: str) -> Dataset:
     normal = {"free_angle_a": (-1.1, 0.2), "free_angle_b": (-1.2, 0.3)}
     prior = {name: {"prior": {"normal": {"mean": mean, "sd": sd}}} for name, (mean, sd) in normal.items()}
     prior |= {"sigma_theta": {"prior": {"lognormal": {"median": 2.0, "log_sd": 0.3}}}}
-    return designed(cable(1, {"angles": angles}, prior=prior), Design(angles=DESIGN.angles))
+    return designed(cable(1, {"angles": angles}, prior=prior), design_of(angles=DESIGN.angles))
 
 
 def test_a_small_calibration_catches_zeros_in_the_place_of_angles_too_small_to_detect():

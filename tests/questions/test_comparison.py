@@ -17,7 +17,7 @@ from bowdenfit.inference.leave_one_out import REFIT, LeavingOut, ReadingsToLeave
 from bowdenfit.inference.log_density import LogDensity
 from bowdenfit.inference.moment_matching import Affine, best_map, match_moments
 from bowdenfit.inference.psis import reliable_k
-from bowdenfit.kinds.design import Design
+from bowdenfit.kinds.designs import design_of
 from bowdenfit.kinds.efficiencies.table import EfficiencyTable
 from bowdenfit.model import build_model
 from bowdenfit.questions.compare.answer import Comparison
@@ -34,7 +34,7 @@ NO_RUN_EFFECT = {"tau": {"fixed": 0.0}}
 def outlier():
     """Eight efficiencies of one contact, the last far from the others: two parameters, so that integrals are exact."""
     description = cable(1, ("efficiencies",), contact=[EDGE])
-    dataset, _ = measured(description, 3, design=Design(efficiencies=tuple(np.linspace(400.0, 600.0, 8))))
+    dataset, _ = measured(description, 3, design=design_of(efficiencies=tuple(np.linspace(400.0, 600.0, 8))))
     efficiency = dataset.measurements.table(EfficiencyTable).efficiency.copy()
     efficiency[-1] *= 0.93
     table = replace(dataset.measurements.table(EfficiencyTable), efficiency=efficiency)
@@ -237,7 +237,7 @@ def test_one_reading_that_makes_most_of_a_difference_is_named():
 def mountings():
     """Twelve mountings of one cable, which differ by 3 %."""
     description = cable(1, ("forces",), contact=[EDGE])
-    design = Design(runs=tuple(np.linspace(400.0, 600.0, 12)), input_forces=(20.0, 40.0, 60.0, 80.0))
+    design = design_of(runs=tuple(np.linspace(400.0, 600.0, 12)), input_forces=(20.0, 40.0, 60.0, 80.0))
     return measured(description, 6, design=design, tau=0.03)[0]
 
 

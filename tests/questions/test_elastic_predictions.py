@@ -8,7 +8,7 @@ from typing import Any
 import jax
 import numpy as np
 import pytest
-from elastic_cables import CONSTANT, ELASTIC, TRUTH, bench, elastic_cable, radians
+from elastic_cables import CONSTANT, ELASTIC, TRUTH, bench, changed, elastic_cable
 from scipy.integrate import quad
 from scipy.optimize import brentq
 
@@ -23,7 +23,9 @@ BENDS = np.deg2rad([0.0, 30.0, 75.0, 120.0, 180.0, 270.0])
 MU, DEGREE = TRUTH["mu"], np.deg2rad(1.0)
 ROPE = (TRUTH["stiffness"], TRUTH["bedding_stretch"], TRUTH["bedding_load"])
 LINEAR = {"bedding_stretch": {"fixed": 0.0}}
-FEW = replace(ELASTIC, loads=(1.0, 5.0, 20.0, 50.0), stretch_angles=radians(0, 180), input_forces=(10.0, 60.0))
+FEW = changed(
+    ELASTIC, stretch={"loads": (1.0, 5.0, 20.0, 50.0), "wrap_angles": (0, 180)}, loop={"input_forces": (10.0, 60.0)}
+)
 
 
 def known(description: Description, spread: float = 0.0, n: int = 1, **truth: float) -> Fit:

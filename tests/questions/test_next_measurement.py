@@ -7,7 +7,7 @@ from typing import Any
 import jax.numpy as jnp
 import numpy as np
 import pytest
-from cables import DESIGN, cable, measured
+from cables import DESIGN, cable, measured, other_design
 from elastic_cables import ELASTIC, elastic_cable
 from elastic_cables import TRUTH as ELASTIC_TRUTH
 from laboratory import Laboratory
@@ -22,6 +22,7 @@ from bowdenfit.inference.log_density import LogDensity as Density
 from bowdenfit.kinds.angles.table import AngleTable
 from bowdenfit.kinds.candidate import Candidate
 from bowdenfit.kinds.design import Design
+from bowdenfit.kinds.designs import design_of
 from bowdenfit.kinds.efficiencies.table import EfficiencyTable
 from bowdenfit.kinds.next_run import typical_run
 from bowdenfit.kinds.rows import OwnAngles, RowOrigin
@@ -235,7 +236,7 @@ def test_a_run_of_both_strokes_tells_the_exponent_free_of_the_gain_error():
     """Noise is made negligible: the gain error is all in the difference of the strokes, and in the mean of a pull alone."""
     without, both = (_runs(*_quiet(), tau=1e-9, gain_error=g)[0] for g in (1e-9, 0.03))
     np.testing.assert_allclose(both - without, [0.0, 0.03], atol=1e-5)
-    (pulled,) = _runs(*_quiet(replace(DESIGN, strokes=(1,))), tau=1e-9, gain_error=0.03)
+    (pulled,) = _runs(*_quiet(other_design(strokes=("pull",))), tau=1e-9, gain_error=0.03)
     np.testing.assert_allclose(pulled, [without[0] + 0.03], atol=1e-5)
 
 
@@ -255,7 +256,7 @@ def test_a_run_where_friction_depends_on_the_load_also_tells_how_it_changes_with
 
 
 def test_long_runs_are_joined_into_few_readings_that_count_for_more():
-    design = replace(DESIGN, input_forces=tuple(np.linspace(20.0, 90.0, 100)))
+    design = other_design(input_forces=tuple(np.linspace(20.0, 90.0, 100)))
     run = typical_run(empty_tables(cable(1), design))
     assert len(run.input_force) == 24
     assert run.worth.sum() == 200
@@ -285,9 +286,7 @@ def test_by_default_candidates_are_what_the_tables_can_hold(fit):
 def test_a_cable_without_a_route_is_measured_again_at_its_wrap_angles():
     clamp = {"name": "housing", "friction": "mu", "wrap_angle": {"column": "clamp_angle"}}
     description = cable(1, ("forces",), contact=[clamp], route=None)
-    design = Design(
-        runs=(0.0,) * 3, input_forces=(20.0, 60.0), own_angles={"clamp_angle": tuple(np.deg2rad((30.0, 90.0, 180.0)))}
-    )
+    design = design_of(runs=(0.0,) * 3, input_forces=(20.0, 60.0), own_angles={"clamp_angle": (30.0, 90.0, 180.0)})
     dataset = Dataset(description, empty_tables(description, design), {})
     fit = pretended(dataset, {"mu": 0.1, "tau": 0.01, "sigma_F": 0.5}, n=3200)
     assert [name_of(c) for c in default_candidates(fit)] == ["force@30deg", "force@90deg", "force@180deg"]
@@ -299,7 +298,7 @@ def test_a_cable_without_a_route_is_measured_again_at_its_wrap_angles():
 
 def test_elastic_cables_have_stretch_preload_and_loop_readings():
     description = elastic_cable()
-    dataset = Dataset(description, empty_tables(description, Design(elastic=ELASTIC)), {})
+    dataset = Dataset(description, empty_tables(description, design_of(**ELASTIC)), {})
     fit = pretended(dataset, ELASTIC_TRUTH, n=3200)  # in shown units, which here are the internal ones
     names = [name_of(c) for c in default_candidates(fit)]
     assert {name.partition("@")[0] for name in names} == {"stretch", "preload", "loop"}
@@ -527,7 +526,7 @@ def test_refits_with_the_readings_added_narrow_the_best_length_as_expected():
     The refits are by the package's own sampler, whose draws give a variance to 5 % or so; the best candidate, which is so by
     far, must be that of the refits too.
     """
-    design = Design(angles=(420.0, 470.0, 500.0, 540.0, 590.0), efficiencies=(440.0, 500.0, 560.0))
+    design = design_of(angles=(420.0, 470.0, 500.0, 540.0, 590.0), efficiencies=(440.0, 500.0, 560.0))
     dataset, _ = measured(cable(2, ("angles", "efficiencies")), 3, design=design)
     laboratory, density = Laboratory(), Density(build_model(dataset))
     z = laboratory.draws(density, 1)

@@ -12,7 +12,7 @@ from bowdenfit.cli import bowdenfit as command
 from bowdenfit.errors import UsageError
 from bowdenfit.inference.comparison import Difference, Prediction, differences
 from bowdenfit.inference.interval import Interval
-from bowdenfit.kinds.design import Design
+from bowdenfit.kinds.designs import design_of
 from bowdenfit.kinds.forces.table import ForceTable
 from bowdenfit.questions.check.data_set_words import check_text
 from bowdenfit.questions.identify.confounding import confounded_pairs
@@ -213,8 +213,10 @@ def test_leave_one_out_of_a_normal_mean_is_what_leaving_one_out_gives():
 def pulls_only():
     """One constant angle, pulling strokes alone, and load cells that may differ in gain."""
     contact = {"name": "edge", "friction": "mu_edge", "wrap_angle": {"value": 45, "unit": "deg"}}
-    description = cable(1, ("forces",), contact=[contact], sensors={"input_gain_error_sd": 0, "output_gain_error_sd": 0.05})
-    design = Design(runs=(400.0,) * 8, input_forces=(20.0, 40.0, 60.0), strokes=(1,))
+    description = cable(
+        1, ("forces",), contact=[contact], sensors={"input_gain_error_sd": 0, "output_gain_error_sd": 0.05}
+    )
+    design = design_of(runs=(400.0,) * 8, input_forces=(20.0, 40.0, 60.0), strokes=("pull",))
     dataset, values = measured(description, 4, design=design)
     return bf.fit(dataset, seed=2), values
 

@@ -8,6 +8,7 @@ import numpy as np
 from bowdenfit.dataset import Dataset
 from bowdenfit.description import Description
 from bowdenfit.kinds.design import Design
+from bowdenfit.kinds.designs import design_of
 from bowdenfit.kinds.settings import parse_description
 from bowdenfit.model import build_model
 from bowdenfit.questions.simulate.simulation import empty_tables, simulate, true_values
@@ -34,13 +35,18 @@ TRUTH = {
 }  # fmt: skip
 LENGTHS = tuple(np.linspace(400.0, 600.0, 11))
 RUN_LENGTHS = (400.0, 430.0, 460.0, 490.0, 520.0, 550.0, 580.0, 600.0)
-DESIGN = Design(
+DESIGN = design_of(
     angles=LENGTHS,
     efficiencies=(410.0, 450.0, 490.0, 530.0, 570.0),
     runs=RUN_LENGTHS,
     input_forces=(20.0, 40.0, 60.0, 80.0),
-    own_angles={"clamp_angle": tuple(np.deg2rad((10.0, 60.0, 25.0, 80.0, 5.0, 45.0, 70.0, 20.0)))},
+    own_angles={"clamp_angle": (10.0, 60.0, 25.0, 80.0, 5.0, 45.0, 70.0, 20.0)},
 )
+
+
+def other_design(**measured_otherwise: Any) -> Design:
+    """The usual design, but for what is said."""
+    return design_of(**dict(DESIGN) | measured_otherwise)
 
 
 def cable(n_contacts: int, tables: tuple[str, ...] | dict[str, Any] = ("angles", "forces"), **more: Any) -> Description:

@@ -3,11 +3,10 @@
 from typing import Any
 
 import jax
-import numpy as np
 
 from bowdenfit.dataset import Dataset
 from bowdenfit.description import Description
-from bowdenfit.kinds.design import Design, ElasticDesign
+from bowdenfit.kinds.designs import design_of
 from bowdenfit.kinds.settings import parse_description
 from bowdenfit.model import build_model
 from bowdenfit.questions.simulate.simulation import empty_tables, simulate, true_values
@@ -27,21 +26,26 @@ TRUTH = {
 }  # fmt: skip
 
 
-def radians(*degrees: float) -> tuple[float, ...]:
-    """Angles [rad] of angles [deg]."""
-    return tuple(float(a) for a in np.deg2rad(degrees))
+Parts = dict[str, dict[str, Any]]
+ELASTIC: Parts = {
+    "stretch": {
+        "loads": (1.0, 3.0, 6.0, 10.0, 15.0, 20.0, 30.0, 40.0, 60.0, 80.0, 100.0),
+        "wrap_angles": (0, 45, 90, 135, 180),
+        "unloading": True,
+    },
+    "preload": {"wrap_angles": (0, 15, 30, 60, 90, 120, 150, 180)},
+    "loop": {
+        "wrap_angles": (45, 90, 135, 180),
+        "input_forces": (5.0, 10.0, 15.0, 20.0, 30.0, 40.0, 60.0),
+        "strokes": ("pull", "return"),
+        "free_motion": (45, 90, 135, 180),
+    },
+}
 
 
-ELASTIC = ElasticDesign(
-    loads=(1.0, 3.0, 6.0, 10.0, 15.0, 20.0, 30.0, 40.0, 60.0, 80.0, 100.0),
-    stretch_angles=radians(0, 45, 90, 135, 180),
-    unloading=True,
-    preload_angles=radians(0, 15, 30, 60, 90, 120, 150, 180),
-    loop_angles=radians(45, 90, 135, 180),
-    input_forces=(5.0, 10.0, 15.0, 20.0, 30.0, 40.0, 60.0),
-    strokes=(1, -1),
-    free_angles=radians(45, 90, 135, 180),
-)
+def changed(design: Parts, **parts: dict[str, Any]) -> Parts:
+    """A design with some of its parts measured otherwise."""
+    return {name: part | parts.get(name, {}) for name, part in design.items()}
 
 
 def elastic_cable(
@@ -67,7 +71,7 @@ def bench(
     Of the stated ones only those count that the cable has and that are not fixed.
     """
     of_truth, of_readings = jax.random.split(jax.random.key(seed))
-    measured = Design(elastic=design)
+    measured = design_of(**design)
     empty = empty_tables(description, measured)
     free = {p.name for p in build_model(Dataset(description, empty, {})).space.free}
     wanted = {name: value for name, value in truth.items() if name in free}

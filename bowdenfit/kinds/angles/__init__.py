@@ -1,6 +1,7 @@
 """Wrap angles of curved contacts along the route."""
 
 from bowdenfit.kinds.angles.table import (
+    AngleDesign,
     AngleSettings,
     AngleTable,
     contradiction,
@@ -26,5 +27,6 @@ ANGLES = Kind(
     warnings=warnings_of,
     implausible=implausible,
     page=page,
+    design=AngleDesign,
     empty=empty,
 )

@@ -6,7 +6,7 @@ from typing import Literal
 import numpy as np
 
 from bowdenfit.cable.registry import CURVES
-from bowdenfit.description import Description, QuantityValue, Table
+from bowdenfit.description import Description, Finite, QuantityValue, Table
 from bowdenfit.files.cells import Cell
 from bowdenfit.files.columns import Column, Quantity, find_columns, require
 from bowdenfit.files.csv_table import read_csv
@@ -165,7 +165,13 @@ def page(table: AngleTable, description: Description) -> Page:
     return [*(route_heading(description) or [""]), *(f"{name}_deg" for name in table.names)], rows
 
 
-def empty(design: Design, description: Description, file: str) -> AngleTable:
+class AngleDesign(Design):
+    """[design]: route values at which wrap angles are read."""
+
+    angles: tuple[Finite, ...] = ()
+
+
+def empty(design: AngleDesign, description: Description, file: str) -> AngleTable:
     """A table of a design's shape with unremarkable readings."""
     columns = tuple(c.wrap_angle.column or "" for c in description.curved)
     shape = (len(design.angles), len(columns))

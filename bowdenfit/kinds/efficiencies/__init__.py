@@ -1,6 +1,14 @@
 """Transmission efficiencies."""
 
-from bowdenfit.kinds.efficiencies.table import EfficiencyTable, describe, empty, implausible, page, read_efficiencies
+from bowdenfit.kinds.efficiencies.table import (
+    EfficiencyDesign,
+    EfficiencyTable,
+    describe,
+    empty,
+    implausible,
+    page,
+    read_efficiencies,
+)
 from bowdenfit.kinds.kind import Kind, itself
 from bowdenfit.kinds.readings import efficiencies
 from bowdenfit.kinds.wrap_angles import check_rows
@@ -14,6 +22,7 @@ EFFICIENCIES = Kind(
     describe=describe,
     implausible=implausible,
     page=page,
+    design=EfficiencyDesign,
     empty=empty,
     count=lambda table: f"{len(table.efficiency)} efficiencies",
     conditions=itself,

@@ -4,7 +4,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from bowdenfit.description import Description
+from bowdenfit.description import Description, Finite
 from bowdenfit.files.cells import Cell
 from bowdenfit.files.columns import Column, Quantity, find_columns, require
 from bowdenfit.files.csv_table import read_csv
@@ -126,7 +126,13 @@ def page(table: EfficiencyTable, description: Description) -> Page:
     return [*route_heading(description), "efficiency"], rows
 
 
-def empty(design: Design, description: Description, file: str) -> EfficiencyTable:
+class EfficiencyDesign(Design):
+    """[design]: route values at which an efficiency is measured."""
+
+    efficiencies: tuple[Finite, ...] = ()
+
+
+def empty(design: EfficiencyDesign, description: Description, file: str) -> EfficiencyTable:
     """A table of a design's shape with unremarkable readings."""
     n = len(design.efficiencies)
     own, origin = OwnAngles.none(description.angle_columns, n), RowOrigin.below_heading(file, n)

@@ -7,7 +7,7 @@ from bowdenfit.kinds.forces.following import check_following
 from bowdenfit.kinds.forces.gained import check_gains
 from bowdenfit.kinds.forces.mountings import ForceSettings
 from bowdenfit.kinds.forces.table import ForceTable, read_forces
-from bowdenfit.kinds.forces.words import count, describe, empty, implausible, page
+from bowdenfit.kinds.forces.words import ForceDesign, count, describe, empty, implausible, page
 from bowdenfit.kinds.kind import Kind, itself
 from bowdenfit.kinds.measurements import Measurements
 from bowdenfit.kinds.readings import Readings, efficiencies
@@ -40,6 +40,7 @@ FORCES = Kind(
     describe=describe,
     implausible=implausible,
     page=page,
+    design=ForceDesign,
     empty=empty,
     count=count,
     conditions=itself,

@@ -1,9 +1,11 @@
 """Tables of forces in words and in rows: what was read, what is plausible, and how a file says it."""
 
 import numpy as np
+from pydantic import Field, model_validator
 
-from bowdenfit.description import Description
-from bowdenfit.kinds.design import Design
+from bowdenfit.description import Description, Finite
+from bowdenfit.errors import nearest
+from bowdenfit.kinds.design import Design, Stroke, radians, signs
 from bowdenfit.kinds.forces.table import ForceTable
 from bowdenfit.kinds.pages import STROKE_NAMES, Page, route_cells, route_heading
 from bowdenfit.kinds.plausibility import SCATTER, beyond, parts
@@ -58,18 +60,49 @@ def page(table: ForceTable, description: Description) -> Page:
     return [*route_heading(description), "run", "stroke", "input_force_N", "output_force_N"], rows
 
 
-def empty(design: Design, description: Description, file: str) -> ForceTable:
+class ForceDesign(Design):
+    """[design]: route value of each run, and the input forces [N] of every stroke of a run.
+
+    Args:
+        runs: Route values; any number for each run of a cable without a route.
+        input_forces: Input forces [N].
+        strokes: Strokes, in order.
+        own_angles: Wrap angle of each run [deg], by column of a contact without a curve.
+    """
+
+    runs: tuple[Finite, ...] = ()
+    input_forces: tuple[Finite, ...] = ()
+    strokes: tuple[Stroke, ...] = ("pull", "return")
+    own_angles: dict[str, tuple[Finite, ...]] = Field(default_factory=dict)
+
+    @model_validator(mode="after")
+    def _every_run_has_forces_and_angles(self) -> "ForceDesign":
+        if self.runs and not self.input_forces:
+            raise ValueError("runs need input_forces, such as [20, 40, 60] (in N)")
+        for column, angles in self.own_angles.items():
+            if len(angles) != len(self.runs):
+                raise ValueError(
+                    f"own_angles.{column} has {len(angles)} angles for {len(self.runs)} runs; write one each"
+                )
+        return self
+
+    def contradiction(self, description: Description) -> str:
+        """Wrap angles of a column that no contact has."""
+        known = description.angle_columns
+        unknown = next((name for name in self.own_angles if name not in known), None)
+        return f"own_angles.{unknown}: no contact has that column{nearest(unknown, known or ['none'])}" if unknown else ""
+
+
+def empty(design: ForceDesign, description: Description, file: str) -> ForceTable:
     """A table of a design's shape with unremarkable readings."""
-    per_run = len(design.strokes) * len(design.input_forces)
-    run = np.repeat(np.arange(len(design.runs)), per_run)
-    stroke = np.tile(np.repeat(design.strokes, len(design.input_forces)), len(design.runs))
-    force = np.tile(design.input_forces, len(design.runs) * len(design.strokes))
-    names = description.angle_columns
+    n_runs, n_forces, names = len(design.runs), len(design.input_forces), description.angle_columns
+    run = np.repeat(np.arange(n_runs), len(design.strokes) * n_forces)
+    stroke = np.tile(np.repeat(signs(design.strokes), n_forces), n_runs)
+    force = np.tile(design.input_forces, n_runs * len(design.strokes))
     own = OwnAngles.none(names, len(run))
-    for k, name in enumerate(names):
-        if design.own_angles and name in design.own_angles:
-            own.angle[:, k] = np.asarray(design.own_angles[name])[run]
+    for name in set(design.own_angles).intersection(names):
+        own.angle[:, names.index(name)] = radians(design.own_angles[name])[run]
     route = np.asarray(design.runs, dtype=float)[run]
-    labels = tuple(str(i + 1) for i in range(len(design.runs)))
+    labels = tuple(str(i + 1) for i in range(n_runs))
     origin, velocity = RowOrigin.below_heading(file, len(run)), np.full(len(run), np.nan)
     return ForceTable(route, force, 0.8 * force, run, labels, stroke.astype(int), own, origin, velocity)

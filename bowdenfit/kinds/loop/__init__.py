@@ -4,7 +4,7 @@ import numpy as np
 
 from bowdenfit.kinds.kind import Kind, itself
 from bowdenfit.kinds.loop.table import LoopTable, read_loop
-from bowdenfit.kinds.loop.words import contradiction, describe, empty, implausible, page, warnings_of
+from bowdenfit.kinds.loop.words import LoopDesign, contradiction, describe, empty, implausible, page, warnings_of
 from bowdenfit.kinds.readings import Readings
 from bowdenfit.kinds.wrap_angles import check_rows
 
@@ -19,6 +19,7 @@ LOOP = Kind(
     warnings=warnings_of,
     implausible=implausible,
     page=page,
+    design=LoopDesign,
     empty=empty,
     count=lambda table: f"{len(table.stroke)} readings of a loop",
     bends=lambda table: np.nansum(table.own.angle, axis=1),

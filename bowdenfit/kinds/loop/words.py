@@ -1,10 +1,12 @@
 """Tables of a loop in words and in rows: what was read, what it cannot tell, what is plausible, how a file says it."""
 
 import numpy as np
+from pydantic import model_validator
 
-from bowdenfit.description import Description, Table
+from bowdenfit.description import Description, Finite, Table
 from bowdenfit.description.elastic import PRELOAD
-from bowdenfit.kinds.design import Design
+from bowdenfit.description.values import Frozen
+from bowdenfit.kinds.design import Design, Stroke, radians, signs
 from bowdenfit.kinds.loop.table import LoopTable
 from bowdenfit.kinds.measurements import Measurements
 from bowdenfit.kinds.pages import STROKE_NAMES, Page, in_words
@@ -80,11 +82,32 @@ def page(table: LoopTable, description: Description) -> Page:
     return [*(f"{name}_deg" for name in names), "stroke", f"input_{what}", f"output_{what}"], rows
 
 
-def empty(design: Design, description: Description, file: str) -> LoopTable:
+class _Rows(Frozen):
+    """[design.loop]: wrap angles [deg] and input forces [N] under load, wrap angles of free motion [deg], and strokes."""
+
+    wrap_angles: tuple[Finite, ...] = ()
+    input_forces: tuple[Finite, ...] = ()
+    strokes: tuple[Stroke, ...] = ("pull",)
+    free_motion: tuple[Finite, ...] = ()
+
+    @model_validator(mode="after")
+    def _loads_are_given(self) -> "_Rows":
+        if self.wrap_angles and not self.input_forces:
+            raise ValueError("wrap_angles need input_forces, such as [5, 10, 20] (in N)")
+        return self
+
+
+class LoopDesign(Design):
+    """[design]: how the loop is moved."""
+
+    loop: _Rows = _Rows()
+
+
+def empty(design: LoopDesign, description: Description, file: str) -> LoopTable:
     """A table of a design's shape with unremarkable readings."""
-    elastic = design.elastic
-    loaded = [(a, f, s) for a in elastic.loop_angles for s in elastic.strokes for f in elastic.input_forces]
-    free = [(a, np.nan, s) for a in elastic.free_angles for s in elastic.strokes]
+    loop, strokes = design.loop, signs(design.loop.strokes)
+    loaded = [(a, f, s) for a in radians(loop.wrap_angles) for s in strokes for f in loop.input_forces]
+    free = [(a, np.nan, s) for a in radians(loop.free_motion) for s in strokes]
     rows = np.array([*loaded, *free], dtype=float).reshape(-1, 3)
     names, n = description.angle_columns, len(rows)
     own = OwnAngles.none(names, n)

@@ -2,7 +2,7 @@
 
 from bowdenfit.kinds.kind import Kind
 from bowdenfit.kinds.preload.table import PreloadTable, PreloadTableSettings, read_preload
-from bowdenfit.kinds.preload.words import describe, empty, implausible, page, warnings_of
+from bowdenfit.kinds.preload.words import PreloadDesign, describe, empty, implausible, page, warnings_of
 from bowdenfit.kinds.readings import Readings
 
 PRELOAD = Kind(
@@ -15,6 +15,7 @@ PRELOAD = Kind(
     warnings=warnings_of,
     implausible=implausible,
     page=page,
+    design=PreloadDesign,
     empty=empty,
     count=lambda table: f"{len(table.preload)} preloads",
     bends=lambda table: table.wrap_angle,

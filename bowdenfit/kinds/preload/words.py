@@ -2,8 +2,9 @@
 
 import numpy as np
 
-from bowdenfit.description import Description
-from bowdenfit.kinds.design import Design
+from bowdenfit.description import Description, Finite
+from bowdenfit.description.values import Frozen
+from bowdenfit.kinds.design import Design, radians
 from bowdenfit.kinds.measurements import Measurements
 from bowdenfit.kinds.pages import Page, in_words
 from bowdenfit.kinds.plausibility import within_factor
@@ -62,8 +63,20 @@ def page(table: PreloadTable, description: Description) -> Page:
     return ["wrap_angle_deg", "preload_N"], [[f"{angle:.6g}", f"{preload:.3f}"] for angle, preload in columns]
 
 
-def empty(design: Design, description: Description, file: str) -> PreloadTable:
+class _Rows(Frozen):
+    """[design.preload]: wrap angles [deg]."""
+
+    wrap_angles: tuple[Finite, ...]
+
+
+class PreloadDesign(Design):
+    """[design]: where the preload is read."""
+
+    preload: _Rows = _Rows(wrap_angles=())
+
+
+def empty(design: PreloadDesign, description: Description, file: str) -> PreloadTable:
     """A table of a design's shape with unremarkable readings."""
     del description
-    angles = np.asarray(design.elastic.preload_angles, dtype=float)
+    angles = radians(design.preload.wrap_angles)
     return PreloadTable(angles, np.full(len(angles), 20.0), RowOrigin.below_heading(file, len(angles)))

@@ -3,7 +3,7 @@
 from bowdenfit.kinds.kind import Kind
 from bowdenfit.kinds.readings import Readings
 from bowdenfit.kinds.stretch.table import StretchTable, read_stretch
-from bowdenfit.kinds.stretch.words import describe, empty, implausible, page, warnings_of
+from bowdenfit.kinds.stretch.words import StretchDesign, describe, empty, implausible, page, warnings_of
 
 STRETCH = Kind(
     name="stretch",
@@ -14,6 +14,7 @@ STRETCH = Kind(
     warnings=warnings_of,
     implausible=implausible,
     page=page,
+    design=StretchDesign,
     empty=empty,
     count=lambda table: f"{len(table.load)} readings of stretch",
     bends=lambda table: table.wrap_angle,

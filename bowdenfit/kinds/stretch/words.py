@@ -4,8 +4,9 @@ from itertools import product
 
 import numpy as np
 
-from bowdenfit.description import Description
-from bowdenfit.kinds.design import Design
+from bowdenfit.description import Description, Finite
+from bowdenfit.description.values import Frozen
+from bowdenfit.kinds.design import Design, radians
 from bowdenfit.kinds.measurements import Measurements
 from bowdenfit.kinds.pages import Page, in_words
 from bowdenfit.kinds.plausibility import parts, within_factor
@@ -111,14 +112,25 @@ def page(table: StretchTable, description: Description) -> Page:
     return ["wrap_angle_deg", "branch", "load_N", "stretch_mm"], rows
 
 
-def empty(design: Design, description: Description, file: str) -> StretchTable:
+class _Rows(Frozen):
+    """[design.stretch]: loads of every loading [N], wrap angles [deg], and whether the way down is read too."""
+
+    loads: tuple[Finite, ...]
+    wrap_angles: tuple[Finite, ...]
+    unloading: bool = False
+
+
+class StretchDesign(Design):
+    """[design]: how the rope is stretched."""
+
+    stretch: _Rows = _Rows(loads=(), wrap_angles=())
+
+
+def empty(design: StretchDesign, description: Description, file: str) -> StretchTable:
     """A table of a design's shape with unremarkable readings."""
     del description
-    loads, angles = (
-        np.asarray(design.elastic.loads, dtype=float),
-        np.asarray(design.elastic.stretch_angles, dtype=float),
-    )
-    cycle = np.concatenate([loads, loads[-2::-1]]) if design.elastic.unloading else loads
+    loads, angles = np.array(sorted(design.stretch.loads), dtype=float), radians(design.stretch.wrap_angles)
+    cycle = np.concatenate([loads, loads[-2::-1]]) if design.stretch.unloading else loads
     down = np.arange(len(cycle)) >= len(loads)
     n = len(angles)
     load, wrap_angle = np.tile(cycle, n), np.repeat(angles, len(cycle))

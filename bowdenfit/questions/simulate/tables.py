@@ -14,7 +14,8 @@ from bowdenfit.dataset import DESCRIPTION_FILE, Dataset
 from bowdenfit.description import Description
 from bowdenfit.errors import DescriptionError
 from bowdenfit.kinds import each_table
-from bowdenfit.kinds.design import Design, read_design
+from bowdenfit.kinds.design import Design
+from bowdenfit.kinds.designs import read_design
 from bowdenfit.kinds.measurements import Measurements
 from bowdenfit.kinds.settings import parse_description
 from bowdenfit.questions.simulate.simulation import empty_tables, simulate, true_values
@@ -72,7 +73,8 @@ def read_bench(path: Path) -> BenchPlan:
         )
     truth = truth_of(raw, path.name)
     cable = {name: value for name, value in raw.items() if name not in {"design", "truth"}}
-    return BenchPlan(text, parse_description(cable, path.name), read_design(raw["design"], path.name), truth)
+    description = parse_description(cable, path.name)
+    return BenchPlan(text, description, read_design(raw["design"], description, path.name), truth)
 
 
 def make(bench: BenchPlan, key: jax.Array, noise: bool) -> tuple[Dataset, dict[str, float]]:

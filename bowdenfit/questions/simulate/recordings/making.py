@@ -13,8 +13,8 @@ from bowdenfit.cable.cable import ANGLE_NOISE, Cable
 from bowdenfit.cable.load_cells import FORCE_NOISE, GAIN_ERROR, INPUT_OFFSET, OUTPUT_OFFSET, RUN_SCATTER
 from bowdenfit.dataset import Dataset
 from bowdenfit.kinds.angles.table import AngleSettings, AngleTable
-from bowdenfit.kinds.design import Design
 from bowdenfit.kinds.measurements import Measurements
+from bowdenfit.kinds.planned_recordings import design_without_recordings
 from bowdenfit.model import build_model
 from bowdenfit.questions.simulate.bench import SimulatedRecording, simulate_recording
 from bowdenfit.questions.simulate.recordings.plan import RecordingsPlan
@@ -60,8 +60,7 @@ def make_recordings(plan: RecordingsPlan, seed: int, noise: bool = True) -> Made
     of_truth, of_readings = jax.random.split(jax.random.key(seed))
     of_noise, of_runs, of_angles, *of_each = np.random.default_rng(seed).spawn(3 + len(plan.recordings))
     lengths = np.array([r.length for r in plan.recordings])
-    route = plan.description.route
-    design = Design(angles=plan.angles, efficiencies=(route.middle if route else 0.0,))  # where all curves hold
+    design = design_without_recordings(plan.description, plan.angles)
     tables, given = empty_tables(plan.description, design), dict(plan.truth)
     force_noise = given.pop(FORCE_NOISE, abs(of_noise.standard_normal()) * _CELL_NOISE)
     values = true_values(plan.description, tables, given, of_truth)

@@ -12,11 +12,9 @@ from bowdenfit.description import Description, QuantityValue
 from bowdenfit.description.file import explain
 from bowdenfit.description.values import Frozen
 from bowdenfit.errors import DatasetError, DescriptionError, nearest
-from bowdenfit.kinds.settings import parse_description
+from bowdenfit.kinds.planned_recordings import description_without_recordings
 from bowdenfit.questions.simulate.recordings.planned import Page, PlannedRecording, planned_recordings
 from bowdenfit.questions.simulate.tables import plan_page, truth_of
-
-_FITTED_FRICTION = ("friction_model", "reference_force", "reference_velocity")
 
 
 class _Plan(Frozen):
@@ -73,7 +71,7 @@ def parse_recordings_plan(raw: Mapping[str, Any], text: str, file: str = "bench.
         raise DescriptionError(
             f'{file} has no [recordings]: say what to record, such as lengths = [440, 470], speeds = ["20 r/min"].'
         )
-    truth, description = truth_of(raw, file), _description(raw, file)
+    truth, description = truth_of(raw, file), description_without_recordings(raw, file)
     try:
         page = _Plan.model_validate({"recordings": raw["recordings"]}).recordings
     except ValidationError as error:
@@ -90,31 +88,6 @@ def parse_recordings_plan(raw: Mapping[str, Any], text: str, file: str = "bench.
         )
     angles = page.angles if description.curved else ()
     return RecordingsPlan(text, description, truth, angles, measured, recordings, page.decimals)
-
-
-def _description(raw: Mapping[str, Any], file: str) -> Description:
-    """The cable without what needs its recordings, whose files do not exist yet: a table of efficiencies stands in for
-    them, and [recordings.friction] for a model of friction.
-    """
-    tables = raw.get("tables", {})
-    if "recording" in raw:
-        raise DescriptionError(f"{file}: a plan has no [[recording]]; these are made from [recordings].")
-    for name in tables:
-        if name not in {"angles", "recordings"}:
-            raise DescriptionError(
-                f"{file}, tables.{name}: a plan of recordings makes angles and recordings only; leave it out, or plan it "
-                "with [design] in a file of its own."
-            )
-    kept = {k: v for k, v in raw.items() if k not in {"truth", "recordings", "tables", *_FITTED_FRICTION}}
-    angles = {"angles": tables["angles"]} if "angles" in tables else {}
-    description = parse_description({**kept, "tables": {**angles, "efficiencies": {"file": "none.csv"}}}, file)
-    for contact in description.contact:
-        if contact.wrap_angle.constant is None and contact.wrap_angle.curve is None:
-            raise DescriptionError(
-                f"{file}, contact {contact.name!r}: recordings are simulated from a constant wrap angle or a curve; "
-                "this contact has only a column."
-            )
-    return description
 
 
 def _with_reference_force(page: Page, raw: Mapping[str, Any], file: str) -> Page:

@@ -1,0 +1,52 @@
+"""A whole design: what every kind reads of [design], in one."""
+
+from collections.abc import Mapping
+from functools import lru_cache
+from typing import Any
+
+from pydantic import BaseModel, ValidationError, create_model
+
+from bowdenfit.description import Description
+from bowdenfit.description.file import explain
+from bowdenfit.description.values import Frozen
+from bowdenfit.errors import DescriptionError
+from bowdenfit.kinds import KINDS
+from bowdenfit.kinds.design import Design
+
+
+def read_design(page: Mapping[str, Any], description: Description, file: str) -> Design:
+    """The design of a plan.
+
+    Args:
+        page: [design] as read.
+        description: The cable.
+        file: Its file, for errors.
+
+    Raises:
+        DescriptionError: A key or a value is wrong, or this cable cannot have what is asked for.
+    """
+    design = _parsed(page, file)
+    for kind in KINDS.values():
+        if said := kind.design.contradiction(design, description):
+            raise DescriptionError(f"{file}, design.{said}")
+    return design
+
+
+def design_of(**measured: Any) -> Design:
+    """A design of any cable, from keywords; what a cable does not have of it is not measured."""
+    return _parsed(measured, "the design")
+
+
+def _parsed(page: Mapping[str, Any], file: str) -> Design:
+    model = _page(tuple(kind.design for kind in KINDS.values() if kind.design is not Design))
+    try:
+        return model.model_validate({"design": dict(page)}).design  # type: ignore[attr-defined]
+    except ValidationError as error:
+        raise DescriptionError(explain(error, model, file, "write it, such as loads = [10, 20, 40]")) from None
+
+
+@lru_cache
+def _page(parts: tuple[type[Design], ...]) -> type[BaseModel]:
+    """What is read of a plan."""
+    whole = create_model("WholeDesign", __base__=parts, __module__=__name__)
+    return create_model("DesignPage", __base__=Frozen, __module__=__name__, design=(whole, ...))

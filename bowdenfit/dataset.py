@@ -15,6 +15,7 @@ from bowdenfit.kinds.measurements import Measurements
 from bowdenfit.kinds.settings import load_description, parse_description
 from bowdenfit.kinds.single_file import kind_of
 from bowdenfit.units import ColumnSource
+from bowdenfit.words import printable
 
 DESCRIPTION_FILE = "cable.toml"
 
@@ -82,7 +83,7 @@ def single_file_dataset(
     kind = kind or kind_of(path, bool(channels))
     angle = {"value": wrap_angle[0], "unit": wrap_angle[1]}
     raw = {
-        "name": path.stem,
+        "name": printable(path.stem).strip()[:80] or "cable",
         "source": path.name,
         "contact": [{"name": "cable", "friction": "mu", "wrap_angle": angle}],
         "tables": {kind: {"files": path.name}},

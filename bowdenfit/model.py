@@ -6,7 +6,6 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 
 from bowdenfit.cable.cable import Cable, constant_angle_name
-from bowdenfit.cable.laws import symbol_of
 from bowdenfit.cable.load_cells import RUN_SCATTER
 from bowdenfit.dataset import Dataset
 from bowdenfit.description import (
@@ -29,6 +28,7 @@ from bowdenfit.kinds.term import Term
 from bowdenfit.kinds.terms import measured_kinds, parameters_asked_for
 from bowdenfit.parameters.priors import HalfCauchy, HalfNormal, LogNormal, Normal, Prior, TruncatedNormal, Uniform
 from bowdenfit.parameters.space import Parameter, ParameterSpace
+from bowdenfit.parameters.symbols import symbol_of
 
 
 @dataclass(frozen=True)
@@ -93,17 +93,10 @@ def _space(cable: Cable, measurements: Measurements) -> ParameterSpace:
 
 def _friction(description: Description, name: str, prior: LogNormalPrior) -> Parameter:
     contacts = " and ".join(c.name for c in description.contact if c.friction == name)
-    stem = name.rstrip("0123456789").rstrip("_")
-    subscript = name[len(stem) :].strip("_")
-    symbol = (
-        rf"$\mu_{{{subscript}}}$"
-        if stem == "mu" and subscript
-        else r"$\mu$"
-        if name == "mu"
-        else rf"$\mu_\mathrm{{{name}}}$"
-    )
+    subscript = name.removeprefix("mu").strip("_ ") if name.startswith("mu") else name
+    symbol = symbol_of(r"\mu", subscript) if subscript else r"$\mu$"
     return Parameter(
-        name, symbol.replace("_", " ") if " " in name else symbol, f"friction coefficient, {contacts}", "friction",
+        name, symbol, f"friction coefficient, {contacts}", "friction",
         LogNormal(prior.median, prior.log_sd),
     )  # fmt: skip
 

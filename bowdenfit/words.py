@@ -18,6 +18,11 @@ def shown(value: object) -> str:
     return text if len(text) <= _LONGEST else f"{text[: _LONGEST - 15]}...{text[-12:]}"
 
 
+def printable(text: str) -> str:
+    """Text in which nothing steers a terminal: whatever is neither visible nor the end of a line is written out."""
+    return "".join(x if x in "\n\t" or x == " " or x.isprintable() or x == "\u00a0" else ascii(x)[1:-1] for x in text)
+
+
 def quoted(names: tuple[str, ...], most: int = 12) -> str:
     """Names in quotes with commas between them."""
     more = f" and {len(names) - most} more" if len(names) > most else ""

@@ -17,6 +17,7 @@ from jaxtyping import Float
 from bowdenfit.description import PriorDefaults
 from bowdenfit.parameters.priors import HalfNormal
 from bowdenfit.parameters.space import Parameter
+from bowdenfit.parameters.symbols import symbol_of
 
 
 @dataclass(frozen=True)
@@ -89,8 +90,3 @@ class Wobble(ContactLaw):
 def parameter_of(what: str, contact: str) -> str:
     """Name of a parameter that one contact has, such as "wobble_free_sheath"."""
     return f"{what}_" + "_".join(contact.lower().split())
-
-
-def symbol_of(letter: str, contact: str) -> str:
-    """Its symbol, in matplotlib's math notation."""
-    return rf"${letter}_\mathrm{{{contact.replace(' ', chr(92) + ' ')}}}$"

@@ -11,6 +11,7 @@ from bowdenfit.cli.progress import INTERRUPTED
 from bowdenfit.cli.starting import completion, init
 from bowdenfit.errors import BowdenfitError
 from bowdenfit.verbs import VERBS
+from bowdenfit.words import printable
 
 _MADE = 50_000  # objects made before Python looks for garbage: most stay, and each look goes through all of them
 
@@ -36,7 +37,7 @@ def main() -> None:
         error.show()
         sys.exit(error.exit_code)
     except BowdenfitError as error:
-        click.echo(f"Error: {error}", err=True)
+        click.echo(printable(f"Error: {error}"), err=True)
         sys.exit(error.exit_code)
     except (click.Abort, KeyboardInterrupt):
         click.echo("Interrupted.", err=True)
@@ -47,11 +48,11 @@ def main() -> None:
     except Exception as error:
         if os.environ.get("BOWDENFIT_DEBUG"):
             raise
-        click.echo(
+        text = (
             f"Error: something went wrong inside bowdenfit ({type(error).__name__}: {error}). This is our fault: please "
-            "report it with what BOWDENFIT_DEBUG=1 prints when you run the command again.",
-            err=True,
+            "report it with what BOWDENFIT_DEBUG=1 prints when you run the command again."
         )
+        click.echo(printable(text), err=True)
         sys.exit(1)
 
 

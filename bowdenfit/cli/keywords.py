@@ -111,7 +111,9 @@ def keywords_of(function: Callable[..., Any]) -> tuple[Keyword, ...]:
         if parameter.kind is inspect.Parameter.VAR_KEYWORD:
             (record,) = get_args(parameter.annotation)
             hints, about = get_type_hints(record, include_extras=True), _words(record)
-            shared = [_keyword(key, hint, () if "Sequence" in str(hint) else None, about) for key, hint in hints.items()]
+            shared = [
+                _keyword(key, hint, () if "Sequence" in str(hint) else None, about) for key, hint in hints.items()
+            ]
         elif get_origin(parameter.annotation) is Annotated:
             default = None if parameter.default is inspect.Parameter.empty else parameter.default
             own.append(_keyword(name, parameter.annotation, default, words))

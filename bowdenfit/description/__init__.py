@@ -18,6 +18,7 @@ from bowdenfit.description.values import (
     HalfNormalPrior,
     LogNormalPrior,
     Measured,
+    Name,
     NonNegative,
     NormalPrior,
     ParameterSetting,
@@ -69,6 +70,7 @@ __all__ = [
 SCHEMA = 1
 Geometry = Literal["continuous", "published"]
 Noise = Literal["normal", "student"]
+_TAKEN = ("chain", "draw", "optimal_length", "optimal_efficiency")  # of what stands beside the coefficients in a file of draws
 AnySettings = TypeVar("AnySettings")
 
 
@@ -76,7 +78,7 @@ class Description(Frozen):
     """Everything said about a cable and its measurements, defaults filled in."""
 
     schema_: Annotated[int, Field(alias="schema", ge=1, le=SCHEMA)] = SCHEMA
-    name: str
+    name: Name
     source: str = ""
     license: str = ""
     geometry: Geometry = "continuous"
@@ -114,6 +116,9 @@ class Description(Frozen):
     @model_validator(mode="after")
     def _consistent(self) -> "Description":
         used = [c.friction for c in self.contact]
+        taken = [name for name in used if name in _TAKEN]
+        if taken:
+            raise ValueError(f"a friction coefficient cannot be called {taken[0]!r}, which results hold already; rename it")
         for name in self.friction:
             if name not in used:
                 raise ValueError(f"[friction.{name}] belongs to no contact{nearest(name, used)}")

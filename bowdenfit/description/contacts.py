@@ -2,13 +2,13 @@
 
 from pydantic import model_validator
 
-from bowdenfit.description.values import Finite, Frozen, NonNegative, Positive, QuantityValue
+from bowdenfit.description.values import Finite, Frozen, Name, NonNegative, Positive, QuantityValue
 
 
 class Route(Frozen):
     """What the design question varies: a column of the tables, and where the angle curves hold."""
 
-    variable: str = "cable_length"
+    variable: Name = "cable_length"
     unit: str = "mm"
     range: tuple[Finite, Finite]
     choices: tuple[Finite, ...] = ()
@@ -42,7 +42,7 @@ class WrapAngle(Frozen):
     """Where a contact's wrap angle comes from: a curve through the angle table, each row, or a constant."""
 
     curve: str | None = None
-    column: str | None = None
+    column: Name | None = None
     published_range: tuple[Finite, Finite] | None = None
     nominal: QuantityValue | None = None
     value: NonNegative | None = None
@@ -76,8 +76,8 @@ class WrapAngle(Frozen):
 class Contact(Frozen):
     """One place where rope rubs."""
 
-    name: str
-    friction: str
+    name: Name
+    friction: Name
     law: str = "capstan"
     wrap_angle: WrapAngle
 

@@ -11,6 +11,7 @@ from bowdenfit.description import SCHEMA, Description, ParameterSetting, Quantit
 from bowdenfit.description.elastic import check_elastic
 from bowdenfit.errors import DatasetError, DescriptionError, nearest
 from bowdenfit.units import route_conversion_factor
+from bowdenfit.words import shown
 
 Stated = tuple[str, QuantityValue | None, str]
 """Where a quantity stands, the quantity, and what it must measure."""
@@ -137,7 +138,7 @@ def _set(raw: dict[str, Any], override: str) -> None:
     for depth, part in enumerate(parents):
         node = (
             node[int(part)]
-            if isinstance(node, list) and part.isdigit() and int(part) < len(node)
+            if isinstance(node, list) and part.isdecimal() and int(part) < len(node)
             else (node.setdefault(part, {}) if isinstance(node, dict) else None)
         )
         if not isinstance(node, dict | list):
@@ -172,8 +173,8 @@ def explain(
     message = first["msg"].removeprefix("Value error, ")
     if where == ["schema"]:
         message = f"schema {first['input']} is newer than this program, which reads up to {SCHEMA}; update bowdenfit"
-    shown = f" (found {first['input']!r})" if not isinstance(first["input"], dict | list) and where else ""
-    sentence = f"{place}: {message[:1].lower() + message[1:]}{shown}"
+    found = f" (found {shown(first['input'])})" if not isinstance(first["input"], dict | list) and where else ""
+    sentence = f"{place}: {message[:1].lower() + message[1:]}{found}"
     return sentence if sentence.endswith((".", "?")) else f"{sentence}."
 
 
@@ -181,9 +182,9 @@ def _written_as(error: Mapping[str, Any], where: Sequence[str]) -> str:
     """How to write what must be a table of keys."""
     found = error["input"]
     if error.get("ctx", {}).get("class_name") == QuantityValue.__name__:
-        return f"a number needs its unit (found {found!r}); write it as {_with_unit(found, where)}."
+        return f"a number needs its unit (found {shown(found)}); write it as {_with_unit(found, where)}."
     how = f"under [{where[0]}]" if len(where) == 1 else "between braces, { key = ... }"
-    return f"this holds keys of its own (found {found!r}); write them {how}."
+    return f"this holds keys of its own (found {shown(found)}); write them {how}."
 
 
 def _with_unit(value: Any, where: Sequence[str]) -> str:

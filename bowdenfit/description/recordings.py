@@ -4,7 +4,7 @@ from typing import Literal
 
 from pydantic import Field, model_validator
 
-from bowdenfit.description.values import Finite, Frozen, QuantityValue
+from bowdenfit.description.values import Finite, Frozen, Name, QuantityValue
 from bowdenfit.units import ColumnSource, conversion_factor
 
 
@@ -68,8 +68,8 @@ class RecordingFile(Frozen):
     """
 
     file: str
-    name: str | None = None
-    run: str | None = None
+    name: Name | None = None
+    run: Name | None = None
     at: Finite | None = None
     wrap_angles: dict[str, QuantityValue] = Field(default_factory=dict)
     velocity: QuantityValue | None = None

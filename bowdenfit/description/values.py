@@ -1,14 +1,31 @@
 """Values of a description: quantities with units, priors, and what may be said of one parameter."""
 
+import unicodedata
 from typing import Annotated
 
-from pydantic import BaseModel, ConfigDict, Field, model_validator
+from pydantic import AfterValidator, BaseModel, ConfigDict, Field, model_validator
 
 from bowdenfit.units import conversion_factor
+
+_LONGEST_NAME = 80
+
+
+def _nameable(name: str) -> str:
+    """A name that can be printed and told apart."""
+    if not name.strip():
+        raise ValueError("the name is empty; write one that tells it from the others")
+    if len(name) > _LONGEST_NAME:
+        raise ValueError(f"the name has {len(name)} characters; at most {_LONGEST_NAME} fit into tables and figures")
+    hidden = [letter for letter in name if unicodedata.category(letter) in {"Cc", "Cf", "Cs", "Zl", "Zp"}]
+    if hidden:
+        raise ValueError(f"the name holds a character that cannot be printed, {hidden[0]!a}; leave it out")
+    return name.strip()
+
 
 Positive = Annotated[float, Field(gt=0, allow_inf_nan=False)]
 NonNegative = Annotated[float, Field(ge=0, allow_inf_nan=False)]
 Finite = Annotated[float, Field(allow_inf_nan=False)]
+Name = Annotated[str, AfterValidator(_nameable)]
 
 
 class Frozen(BaseModel):

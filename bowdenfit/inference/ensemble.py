@@ -24,7 +24,7 @@ THIN = 10  # steps from one stored state to the next
 _BLOCK = 10  # stored states between two reports
 _FIRST_LOOK = 60  # stored states before the first look; of five data sets the slowest is there after half of that
 _FITTED = 4  # walkers a parameter that a covariance is fitted to half of
-_KEPT_PER_WALKER = 20  # draws that are kept of each walker, spread over the second half of its path
+_KEPT_PER_WALKER = 20  # draws at least that are kept of each walker, spread over the second half of its path
 
 Moves = Sequence[tuple[Proposal, float]]
 
@@ -139,7 +139,8 @@ def _in_halves(program: Callable[..., Any], data: Any, half: int) -> Callable[[n
 def _summarized(asked: Sampling, backend: emcee.backends.Backend) -> Chain:
     """Draws from the second half of every walker's path, with their diagnostics."""
     stored = int(backend.iteration)
-    kept = np.unique(np.linspace(stored // 2, stored - 1, _KEPT_PER_WALKER).round().astype(int))
+    wanted = max(_KEPT_PER_WALKER, 2 * asked.settings.target_ess // backend.shape[0])
+    kept = np.unique(np.linspace(stored // 2, stored - 1, wanted).round().astype(int))
     # In this order in memory, as in a loaded fit: sums must agree to the last bit.
     z = np.ascontiguousarray(np.asarray(backend.get_chain()[kept]).transpose(1, 0, 2))
     acceptance = float(np.mean(backend.accepted)) / stored

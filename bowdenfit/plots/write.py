@@ -32,9 +32,28 @@ def write(figure: Figure, path: Path) -> Path:
     """
     ending = path.suffix.removeprefix(".")
     temporary = path.with_name(f".{path.name}.part")
+    options: dict[str, Any] = {"format": ending, "dpi": DOTS_PER_INCH, **OPTIONS.get(ending, {})}
     try:
-        figure.savefig(temporary, format=ending, dpi=DOTS_PER_INCH, **OPTIONS.get(ending, {}))
+        try:
+            figure.savefig(temporary, **options)
+        except ValueError:  # a name that someone chose has dollar signs in it, and no formula between them
+            _show_as_written(figure)
+            figure.savefig(temporary, **options)
         os.replace(temporary, path)  # noqa: PTH105
     finally:
         temporary.unlink(missing_ok=True)
     return path
+
+
+def _show_as_written(figure: Figure) -> None:
+    """Texts that are no formulas in spite of their dollar signs are shown as they are."""
+    from matplotlib.mathtext import MathTextParser
+    from matplotlib.text import Text
+
+    parser = MathTextParser("path")
+    for text in figure.findobj(Text):
+        assert isinstance(text, Text)
+        try:
+            parser.parse(text.get_text())
+        except ValueError:
+            text.set_parse_math(False)

@@ -3,6 +3,7 @@
 from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, TypeAlias
+from urllib.parse import unquote
 
 import numpy as np
 
@@ -40,7 +41,8 @@ def write_groups(
             group = file.create_group(name)
             for variable, values in variables.items():
                 attached = variable_attributes.get(variable, {}) if name in ("posterior", "prior") else {}
-                _write(group, variable, np.asarray(values), labels.get(variable.removeprefix(EXPECTED)), attached)
+                of_readings = labels.get(variable.removeprefix(EXPECTED))
+                _write(group, _key(variable), np.asarray(values), of_readings, attached)
 
 
 def _write(
@@ -65,6 +67,12 @@ def _write(
     variable.attrs.update({**attributes, **({"dtype": "bool"} if flags else {})})
 
 
+def _key(name: str) -> str:
+    """A name as the file can hold it: "/" would be a group of its own there, "." this one, and spaces at its end be lost."""
+    encoded = name.replace("%", "%25").replace("/", "%2F")
+    return encoded.replace(".", "%2E") if not encoded.strip(".") else encoded
+
+
 def _text() -> Any:
     import h5py
 
@@ -81,7 +89,9 @@ def read_groups(path: Path) -> Groups:
     with h5py.File(path) as file:
         return {
             group: {
-                name: _array(file[group][name]) for name in _members(file[group]) if not _is_label(file[group][name])
+                unquote(key): _array(file[group][key])
+                for key in _members(file[group])
+                if not _is_label(file[group][key])
             }
             for group in _members(file)
             if isinstance(file[group], h5py.Group)

@@ -1,8 +1,10 @@
 """The results folder of a fit: whether it may be written, the checkpoint, and all files once the fit is done."""
 
 import secrets
+from concurrent.futures import Future
 from dataclasses import replace
 from pathlib import Path
+from textwrap import shorten
 from typing import TYPE_CHECKING, Any, get_args
 
 from bowdenfit.dataset import Dataset
@@ -12,13 +14,25 @@ from bowdenfit.kinds.settings import parse_description
 from bowdenfit.results.folder import CHAIN, clear, read_checkpoint, refuse_to_overwrite, start_checkpoint
 from bowdenfit.run.helpers import Assistant
 from bowdenfit.verb import LARGEST_SEED
+from bowdenfit.words import few, printable
 
 if TYPE_CHECKING:
     from bowdenfit.front_desk import Fit
 
 
-def write_results(found: "Fit", folder: Path, figures: bool, helper: Assistant) -> None:
-    """All files of the results folder, as far as possible at the same time; fit.json comes last of the fit's own."""
+def write_results(found: "Fit", folder: Path, figures: bool, helper: Assistant) -> tuple[str, ...]:
+    """All files of the results folder, as far as possible at the same time; fit.json comes last of the fit's own.
+
+    Args:
+        found: The fit.
+        folder: Its results folder.
+        figures: Whether to draw them.
+        helper: Who draws them.
+
+    Returns:
+        What is missing, in sentences; a fit whose figures cannot be drawn is kept all the same.
+    """
+    from bowdenfit.questions.figures import FIGURES as FIGURE_NAMES
     from bowdenfit.questions.figures import draw_figure, figures_of
     from bowdenfit.questions.kept import answers_of
     from bowdenfit.questions.summary.words import summary_text
@@ -27,15 +41,35 @@ def write_results(found: "Fit", folder: Path, figures: bool, helper: Assistant) 
 
     if found.posterior is None:
         clear(folder)
-    place, shown = folder / FIGURES, figures_of(found) if figures else ()
-    data, drawn = {}, []
-    for name, one in shown:
-        data[name] = one
-        drawn.append(helper.submit(draw_figure, name, one, place))  # while the next is worked out
+    data, drawn, failed = dict[str, Any](), dict[str, Future[Any]](), dict[str, Exception]()
+    for name in FIGURE_NAMES if figures else ():
+        try:
+            data |= dict(figures_of(found, [name]))
+            if name in data:
+                drawn[name] = helper.submit(draw_figure, name, data[name], folder / FIGURES)  # meanwhile, the next
+        except Exception as error:  # whatever is wrong with a figure, the fit is to be kept
+            failed[name] = error
     save(found, found.summary(), folder, True, answers_of(found), data)
-    write_text(folder / SUMMARY_TEXT, summary_text(found))
-    for figure in drawn:
-        figure.result()
+    write_text(folder / SUMMARY_TEXT, printable(summary_text(found)))
+    for name, figure in drawn.items():
+        try:
+            figure.result()
+        except Exception as error:
+            failed[name] = error
+    return _without_figures(folder, failed)
+
+
+def _without_figures(folder: Path, failed: dict[str, Exception]) -> tuple[str, ...]:
+    """That some figures are missing, in a sentence."""
+    if not failed:
+        return ()
+    names, error = list(failed), next(iter(failed.values()))
+    why = " ".join(str(error).split()) or type(error).__name__
+    some = f"its figures {few(names)}" if len(names) > 1 else f"its figure {names[0]}"
+    return (
+        f"{folder} holds the whole fit, but {some} could not be drawn ({shorten(why, 200)}); draw them later with "
+        f"bowdenfit plot {folder}.",
+    )
 
 
 def with_sampler(data: Dataset, method: str | None) -> Dataset:

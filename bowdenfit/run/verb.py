@@ -4,6 +4,7 @@ from collections.abc import Callable
 from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any, Literal, Unpack
+from warnings import warn
 
 from bowdenfit.questions.summary.verb import reply
 from bowdenfit.reading import Reading, read, refuse_unknown
@@ -31,6 +32,7 @@ def fit(
     in_background: bool = False,
     remember_compilations: bool = False,
     progress: "Callable[[Progress], None] | None" = None,
+    report: Callable[[str], None] = warn,
     **reading: Unpack[Reading],
 ) -> "Fit":
     """Fit a data set: least squares, then the posterior, then the design answer. Nothing is written unless `output` says where.
@@ -49,6 +51,7 @@ def fit(
             start with `if __name__ == "__main__"`.
         remember_compilations: Whether JAX may keep compiled programs in the user's cache folder; a setting of the process.
         progress: Called while sampling.
+        report: Called with a sentence where the fit is whole but its figures could not be drawn; a warning if omitted.
         reading: Keywords of `bowdenfit.read`.
 
     Raises:
@@ -72,7 +75,8 @@ def fit(
             begin = partial(start_checkpointing, folder, data, seed, resume)
             found = run(data, begin, mcmc, seed, resume, progress, helper)
             if folder is not None:
-                write_results(found, folder, figures, helper)
+                for sentence in write_results(found, folder, figures, helper):
+                    report(sentence)
     return found
 
 

@@ -38,6 +38,7 @@ def check(dataset: "str | Path | Dataset", **reading: Unpack[Reading]) -> "Datas
         or data.measurements.table(Recordings) is not None
         or description.prior
         or any(setting.prior for setting in description.friction.values())
+        or any(not name.startswith("mu") for name in description.coefficients)  # another parameter may be called that
     ):
         import jax
 

@@ -1,0 +1,108 @@
+"""Names that people choose: whatever is in them works in tables, files and figures, or `check` refuses it."""
+
+import shutil
+
+import numpy as np
+import pytest
+from matplotlib.mathtext import MathTextParser
+
+import bowdenfit as bf
+from bowdenfit.parameters.symbols import symbol_of, upright
+from bowdenfit.results.netcdf import read_groups, write_groups
+from bowdenfit.words import printable
+
+QUICK = ("sampler.n_walkers=32", "sampler.max_steps=200", "sampler.target_ess=100")
+ODD = [
+    "a/b",
+    ".",
+    "..",
+    "mu%",
+    "a#b",
+    "{x",
+    "}",
+    "mu_",
+    "_",
+    "a^b_c",
+    "$x_$",
+    "\\frac",
+    "a b",
+    "50% & more",
+    "%2F",
+    'µ "~`',
+]
+
+
+def called(on_body, place, name):
+    """The data set, its first coefficient called something else."""
+    folder = shutil.copytree(on_body, place / "cable")
+    text = (folder / "cable.toml").read_text()
+    quoted = name.replace("\\", "\\\\").replace('"', '\\"').replace("\x1b", "\\u001b").replace("\n", "\\n")
+    assert 'friction = "mu1"' in text
+    (folder / "cable.toml").write_text(
+        text.replace('"mu1"', f'"{quoted}"').replace("[friction.mu1]", f'[friction."{quoted}"]')
+    )
+    return folder
+
+
+def test_every_printable_letter_can_be_set_in_a_subscript():
+    parser = MathTextParser("path")
+    letters = [chr(i) for i in (*range(0x20, 0x250), 0x3BC, 0x2116, 0x4E2D, 0x1F600) if chr(i).isprintable()]
+    for letter in letters:
+        parser.parse(symbol_of(r"\mu", f"x{letter}y"))
+        parser.parse(f"${upright(letter)}$")
+
+
+def test_an_underscore_in_a_coefficient_s_name_is_a_space_and_no_subscript():
+    assert symbol_of(r"\mu", "sheath_edge") == r"$\mu_{\mathrm{sheath\ edge}}$"
+
+
+def test_odd_names_come_back_from_the_file_of_draws(tmp_path):
+    groups = {"posterior": {name: np.full((2, 3), float(i)) for i, name in enumerate(ODD)}}
+    write_groups(tmp_path / "posterior.nc", groups, {}, {}, {})
+    found = read_groups(tmp_path / "posterior.nc")["posterior"]
+    assert list(found) == ODD
+    assert all(np.all(found[name] == i) for i, name in enumerate(ODD))
+
+
+@pytest.mark.parametrize("name", ["a/b", "$x_$"])
+def test_a_fit_with_an_odd_name_is_written_drawn_and_read_again(on_body, tmp_path, name):
+    fit = bf.fit(called(on_body, tmp_path, name), output=tmp_path / "fit", seed=3, settings=QUICK)
+    again = bf.load(tmp_path / "fit")
+    np.testing.assert_array_equal(again.posterior.values[name], fit.posterior.values[name])
+    assert (tmp_path / "fit" / "figures" / "coefficients.png").exists()
+
+
+@pytest.mark.parametrize(
+    ("name", "says"),
+    [
+        ("", "the name is empty"),
+        ("  ", "the name is empty"),
+        ("\x1b[31mred", "cannot be printed, '\\\\x1b'"),
+        ("a\nb", "cannot be printed"),
+        ("x" * 81, "has 81 characters"),
+        ("chain", "cannot be called 'chain'"),
+        ("optimal_length", "cannot be called 'optimal_length'"),
+        ("tau", "both called 'tau'"),
+    ],
+)
+def test_names_that_cannot_be_are_refused_by_check(on_body, tmp_path, name, says):
+    with pytest.raises(bf.DescriptionError, match=says):
+        bf.check(called(on_body, tmp_path, name))
+
+
+def test_a_fit_whose_figures_cannot_be_drawn_is_kept_and_drawn_later(on_body, tmp_path, monkeypatch):
+    from bowdenfit.questions.figures import FIGURES
+
+    drawn, said = FIGURES["wrap_angles"].draw, []
+    monkeypatch.setattr(FIGURES["wrap_angles"], "draw", lambda _: 1 / 0)
+    bf.fit(on_body, output=tmp_path / "fit", seed=3, mcmc=False, report=said.append)
+    (sentence,) = said
+    assert "holds the whole fit, but its figure wrap_angles could not be drawn (division by zero)" in sentence
+    assert bf.load(tmp_path / "fit").converged
+    assert (tmp_path / "fit" / "summary.txt").exists()
+    monkeypatch.setattr(FIGURES["wrap_angles"], "draw", drawn)
+    assert bf.plot(tmp_path / "fit", figures=["wrap_angles"])
+
+
+def test_nothing_that_is_printed_steers_a_terminal():
+    assert printable("a\x1b[31m\u202eb\tµ ± 1\u00a0N\n") == "a\\x1b[31m\\u202eb\tµ ± 1\u00a0N\n"

@@ -11,6 +11,7 @@ from bowdenfit.description.file import override
 from bowdenfit.errors import DescriptionError
 from bowdenfit.kinds import KINDS, each_table
 from bowdenfit.kinds.kind import Source
+from bowdenfit.kinds.measured_groups import measured_groups
 from bowdenfit.kinds.measurements import Measurements
 from bowdenfit.kinds.settings import load_description, parse_description
 from bowdenfit.kinds.single_file import kind_of
@@ -119,6 +120,7 @@ def read_dataset(
     if channels and not any(kind.takes_channels for kind, _ in each_table(measurements)):
         raise DescriptionError("--channel names channels of recordings, but the data set has none.")
     check_names(description)
+    measured_groups(description, measurements)
     for kind, table in each_table(measurements):
         kind.check(table, description, measurements)
     return Dataset(description, measurements, checksums)

@@ -6,6 +6,7 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 
 from bowdenfit.cable.cable import Cable, constant_angle_name
+from bowdenfit.cable.groups import split_coefficient
 from bowdenfit.cable.load_cells import RUN_SCATTER
 from bowdenfit.dataset import Dataset
 from bowdenfit.description import (
@@ -68,7 +69,7 @@ def _space(cable: Cable, measurements: Measurements) -> ParameterSpace:
     description, defaults = cable.description, PriorDefaults()
     asked = parameters_asked_for(cable, measurements)
     parameters = [
-        *(_friction(description, name, defaults.friction) for name in description.coefficients),
+        *(_friction(description, name, defaults.friction) for name in cable.coefficients),
         *(p for p in asked if p.role == "curve"),
         *_uncertain_constants(description),
         *cable.law_parameters(defaults),
@@ -76,11 +77,18 @@ def _space(cable: Cable, measurements: Measurements) -> ParameterSpace:
         *(p for p in asked if p.role != "curve"),
     ]
     known = [p.name for p in parameters]
+    for name in description.friction:
+        if name not in known and name not in description.coefficients:
+            raise DescriptionError(f"cable.toml, friction.{name}: no such coefficient{nearest(name, cable.coefficients)}")
     for name in description.prior:
-        if name not in known or name in description.coefficients:
+        if name not in known or name in cable.coefficients:
             hint = f"; friction coefficients belong under [friction.{name}]." if name in known else nearest(name, known)
             raise DescriptionError(f"cable.toml, prior.{name}: no such parameter{hint}")
-    settings = {**description.friction, **description.prior}
+    of_groups = {name: split_coefficient(name, description.coefficients)[0] for name in cable.coefficients}
+    settings: dict[str, ParameterSetting] = {
+        name: description.friction[stem] for name, stem in of_groups.items() if stem in description.friction
+    }
+    settings |= {**description.friction, **description.prior}
     space = ParameterSpace(tuple(_set(p, settings[p.name]) if p.name in settings else p for p in parameters))
     for fixed in (p.fixed for p in space.fixed if p.name == RUN_SCATTER):
         if fixed is not None and fixed < 0:
@@ -92,11 +100,13 @@ def _space(cable: Cable, measurements: Measurements) -> ParameterSpace:
 
 
 def _friction(description: Description, name: str, prior: LogNormalPrior) -> Parameter:
-    contacts = " and ".join(c.name for c in description.contact if c.friction == name)
-    subscript = name.removeprefix("mu").strip("_ ") if name.startswith("mu") else name
+    whole, group = split_coefficient(name, description.coefficients)
+    contacts = " and ".join(c.name for c in description.contact if c.friction == whole)
+    subscript = whole.removeprefix("mu").strip("_ ") if whole.startswith("mu") else whole
+    subscript = ", ".join(part for part in (subscript, group) if part)
     symbol = symbol_of(r"\mu", subscript) if subscript else r"$\mu$"
     return Parameter(
-        name, symbol, f"friction coefficient, {contacts}", "friction",
+        name, symbol, f"friction coefficient, {contacts}{f', {group}' if group else ''}", "friction",
         LogNormal(prior.median, prior.log_sd),
     )  # fmt: skip
 

@@ -1,17 +1,18 @@
 """The cable itself: its contacts in series, their wrap angles, and the friction exponent at any length."""
 
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from functools import cached_property
 
 import jax.numpy as jnp
 from jax import Array
-from jaxtyping import Float
+from jaxtyping import Float, Int
 
 from bowdenfit.cable.conditions import Conditions
 from bowdenfit.cable.curves import Curve
 from bowdenfit.cable.elasticity import STRETCH_FRICTION, Elasticity
 from bowdenfit.cable.friction import FrictionModel, friction_options
+from bowdenfit.cable.groups import coefficient_of
 from bowdenfit.cable.laws import Capstan, ContactLaw, parameter_of
 from bowdenfit.cable.registry import CONTACT_LAWS, CURVES, check_names, class_at
 from bowdenfit.description import Contact, Description, PriorDefaults
@@ -54,9 +55,26 @@ class Cable:
         return Elasticity(self.description, laws[0] if laws else Capstan("", STRETCH_FRICTION))
 
     @cached_property
+    def laws_by_group(self) -> tuple[tuple[ContactLaw, ...], ...]:
+        """The law of each contact in each group of readings; where all groups share their coefficients, one for all."""
+        return tuple(
+            tuple(
+                class_at(CONTACT_LAWS[c.law])(c.name, coefficient_of(c.friction, group) if group and c.by_group else c.friction)
+                for c in self.description.contact
+            )
+            for group in self.friction.groups or ("",)
+        )
+
+    @property
     def laws(self) -> tuple[ContactLaw, ...]:
-        """The law of each contact."""
-        return tuple(class_at(CONTACT_LAWS[c.law])(c.name, c.friction) for c in self.description.contact)
+        """The law of each contact, in the group that predictions are for, the first."""
+        return self.laws_by_group[0]
+
+    @property
+    def coefficients(self) -> tuple[str, ...]:
+        """Names of all friction coefficients, each once, in order of the contacts."""
+        by_contact = zip(*self.laws_by_group, strict=True)
+        return tuple(dict.fromkeys(law.friction for laws in by_contact for law in laws))
 
     def law_parameters(self, defaults: PriorDefaults) -> list[Parameter]:
         """Parameters that contact laws have of their own."""
@@ -83,23 +101,39 @@ class Cable:
         return jnp.broadcast_to(values[name] if name in values else source.constant.to("angle"), route.shape)
 
     def friction_exponent(
-        self, values: Mapping[str, Array], wrap_angles: Float[Array, "rows contacts"]
+        self,
+        values: Mapping[str, Array],
+        wrap_angles: Float[Array, "rows contacts"],
+        group: Int[Array, " rows"] | None = None,
     ) -> Float[Array, " rows"]:
-        """Friction exponent [1] at given wrap angles [rad]."""
-        terms = [law.exponent(values, wrap_angles[..., k]) for k, law in enumerate(self.laws)]
-        return jnp.sum(jnp.stack(terms), axis=0)
+        """Friction exponent [1] at given wrap angles [rad], in the groups of given numbers or the one of predictions."""
+
+        def total(laws: tuple[ContactLaw, ...]) -> Array:
+            return jnp.sum(jnp.stack([law.exponent(values, wrap_angles[..., k]) for k, law in enumerate(laws)]), axis=0)
+
+        return self._of_groups(total, group)
+
+    def _of_groups(self, of_laws: Callable[[tuple[ContactLaw, ...]], Array], group: Int[Array, " rows"] | None) -> Array:
+        """What the laws of each row's group give."""
+        if group is None or not self.friction.groups:
+            return of_laws(self.laws)
+        each = jnp.stack([of_laws(laws) for laws in self.laws_by_group], axis=-1)
+        return jnp.take_along_axis(each, group[..., None], axis=-1)[..., 0]
 
     def exponent_variance(
         self,
         values: Mapping[str, Array],
         wrap_angles: Float[Array, "rows contacts"],
         angle_variance: Float[Array, "rows contacts"],
+        group: Int[Array, " rows"] | None = None,
     ) -> Float[Array, " rows"]:
-        """Variance of the friction exponent from independent errors of the wrap angles [rad^2]."""
-        terms = [
-            law.slope(values, wrap_angles[..., k]) ** 2 * angle_variance[..., k] for k, law in enumerate(self.laws)
-        ]
-        return jnp.sum(jnp.stack(terms), axis=0)
+        """Variance of the friction exponent from independent errors of the wrap angles [rad^2], by groups as it is."""
+
+        def total(laws: tuple[ContactLaw, ...]) -> Array:
+            slopes = [law.slope(values, wrap_angles[..., k]) for k, law in enumerate(laws)]
+            return jnp.sum(jnp.stack([slope**2 * angle_variance[..., k] for k, slope in enumerate(slopes)]), axis=0)
+
+        return self._of_groups(total, group)
 
     def efficiency_at(self, values: Mapping[str, Array], route: Float[Array, " rows"]) -> Float[Array, " rows"]:
         """Efficiency while pulling with the reference force at the reference speed [1] at values of the route variable."""

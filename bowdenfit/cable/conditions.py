@@ -24,6 +24,7 @@ class Conditions:
         velocity_unit: "mm/s" or "rad/s"; empty without velocities.
         shows_loads: Whether any table shows the forces, and not their ratio alone.
         median_load: Median of all loads measured at [N]; None where no table shows any.
+        groups: Groups of its readings; empty without any.
     """
 
     reference_force: float
@@ -32,6 +33,7 @@ class Conditions:
     velocity_unit: str
     shows_loads: bool = True
     median_load: float | None = None
+    groups: tuple[str, ...] = ()
 
     @property
     def load(self) -> Scale:
@@ -59,7 +61,12 @@ class Conditions:
 
 
 def make_conditions(
-    description: Description, forces: Vector, tensions: Vector, speeds: Vector, velocity_unit: str
+    description: Description,
+    forces: Vector,
+    tensions: Vector,
+    speeds: Vector,
+    velocity_unit: str,
+    groups: tuple[str, ...] = (),
 ) -> Conditions:
     """Reference force and speed as stated, or from the middle of the measurements.
 
@@ -69,6 +76,7 @@ def make_conditions(
         tensions: Tensions of the rope that tables without these show, wherever they are positive [N].
         speeds: Speeds while the rope slides [mm/s or rad/s].
         velocity_unit: Which of the two; empty without velocities.
+        groups: Groups of readings.
     """
     stated = description.reference_force
     force = stated.to("force") if stated else _rounded(np.exp(np.mean(np.log(forces)))) if len(forces) else 1.0
@@ -78,7 +86,7 @@ def make_conditions(
     ends = (float(speeds.min()), float(speeds.max())) if len(speeds) else (float("nan"), float("nan"))
     loads = forces if len(forces) else tensions
     typical = float(np.median(loads)) if len(loads) else None
-    return Conditions(float(force), float(speed), ends, velocity_unit, len(forces) > 0, typical)
+    return Conditions(float(force), float(speed), ends, velocity_unit, len(forces) > 0, typical, groups)
 
 
 def _rounded(value: float) -> float:

@@ -13,7 +13,7 @@ from jax import Array
 from jaxtyping import Float
 
 from bowdenfit.cable.conditions import Conditions
-from bowdenfit.description import PriorDefaults
+from bowdenfit.description import BY_GROUP, PriorDefaults
 from bowdenfit.errors import DescriptionError, nearest
 from bowdenfit.parameters.priors import HalfCauchy, HalfNormal, LogNormal, Normal, Uniform
 from bowdenfit.parameters.space import Parameter, Role
@@ -35,6 +35,7 @@ class FrictionOption(ABC):
     of_load = False
     of_rate = False
     of_stroke = False
+    of_group = False
 
     @abstractmethod
     def parameters(self, conditions: Conditions, defaults: PriorDefaults) -> list[Parameter]:
@@ -162,11 +163,23 @@ class StrokeDependent(FrictionOption):
         return values[STROKE_DIFFERENCE]
 
 
+class ByGroup(FrictionOption):
+    """Each group of readings has coefficients of its own, but of contacts with by_group = false."""
+
+    of_group = True
+
+    def parameters(self, conditions: Conditions, defaults: PriorDefaults) -> list[Parameter]:
+        """None: there are more coefficients."""
+        del conditions, defaults
+        return []
+
+
 FRICTION_OPTIONS: dict[str, FrictionOption] = {
     "drag": Drag(),
     "load-dependent": LoadDependent(),
     "rate-dependent": RateDependent(),
     "stroke-dependent": StrokeDependent(),
+    BY_GROUP: ByGroup(),
 }
 
 
@@ -213,6 +226,11 @@ class FrictionModel:
     def depends_on_stroke(self) -> bool:
         """Whether friction is not the same pulling and returning."""
         return any(option.of_stroke for option in self._options)
+
+    @property
+    def groups(self) -> tuple[str, ...]:
+        """Groups of readings that have coefficients of their own; empty where all share them."""
+        return self.conditions.groups if any(option.of_group for option in self._options) else ()
 
     def parameters(self, defaults: PriorDefaults) -> list[Parameter]:
         """Parameters of all options."""

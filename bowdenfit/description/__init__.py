@@ -31,6 +31,7 @@ from bowdenfit.errors import nearest
 from bowdenfit.words import listed
 
 __all__ = [
+    "BY_GROUP",
     "SCHEMA",
     "CableSettings",
     "Contact",
@@ -68,6 +69,7 @@ __all__ = [
 ]
 
 SCHEMA = 1
+BY_GROUP = "by-group"
 Geometry = Literal["continuous", "published"]
 Noise = Literal["normal", "student"]
 _TAKEN = ("chain", "draw", "optimal_length", "optimal_efficiency")  # of what stands beside the coefficients in a file of draws
@@ -83,6 +85,7 @@ class Description(Frozen):
     license: str = ""
     geometry: Geometry = "continuous"
     friction_model: str = "capstan"
+    group: str | None = None
     noise: Noise = "normal"
     student_degrees_of_freedom: Annotated[int, Field(ge=2, le=100, multiple_of=2)] = 4
     reference_force: QuantityValue | None = None
@@ -100,6 +103,12 @@ class Description(Frozen):
     sampler: SamplerSettings = SamplerSettings()
 
     model_config = ConfigDict(frozen=True, extra="forbid", populate_by_name=True)
+
+    @field_validator("friction_model")
+    @classmethod
+    def _hyphens(cls, model: str) -> str:
+        """Options are written with hyphens; "by group" is understood."""
+        return "+".join(part.strip().replace(" ", "-") for part in model.split("+"))
 
     @field_validator("contact")
     @classmethod
@@ -120,8 +129,11 @@ class Description(Frozen):
         if taken:
             raise ValueError(f"a friction coefficient cannot be called {taken[0]!r}, which results hold already; rename it")
         for name in self.friction:
-            if name not in used:
+            if name not in used and name.partition("[")[0] not in used:
                 raise ValueError(f"[friction.{name}] belongs to no contact{nearest(name, used)}")
+        for name in used:
+            if len({c.by_group for c in self.contact if c.friction == name}) > 1:
+                raise ValueError(f"by_group is not the same in all contacts of {name!r}; write it in each, or use two names")
         curved = [c for c in self.contact if c.wrap_angle.curve]
         if curved and self.route is None:
             raise ValueError(
@@ -144,6 +156,13 @@ class Description(Frozen):
             raise ValueError(
                 'student_degrees_of_freedom belongs to noise = "student"; write that beside it, or leave it out'
             )
+        if self.by_group and self.stretch.friction is not None:
+            raise ValueError(
+                "stretch.friction is a coefficient that groups have one each of, and the stretch is of no group; leave it out, "
+                "for a coefficient of its own"
+            )
+        if self.group is not None and not self.by_group:
+            raise ValueError('group names the one that predictions are for, which belongs to friction_model = "by-group"')
         if self.cable.kind == "loop" and self.friction_model != "capstan":
             raise ValueError(
                 'the equations of a loop hold for friction_model = "capstan" only; leave it out, or fit one rope alone'
@@ -154,6 +173,11 @@ class Description(Frozen):
     def fits_offsets(self) -> bool:
         """Whether the load cells' offsets are parameters."""
         return self.sensors.offset_sd is not None or any(said.fits_offsets for said in self.tables.stated.values())
+
+    @property
+    def by_group(self) -> bool:
+        """Whether each group of readings has friction coefficients of its own."""
+        return BY_GROUP in self.friction_model.split("+")
 
     @property
     def noise_in_words(self) -> str:

@@ -1,6 +1,6 @@
 """What a description says of the route and of the contacts along it."""
 
-from pydantic import model_validator
+from pydantic import field_validator, model_validator
 
 from bowdenfit.description.values import Finite, Frozen, Name, NonNegative, Positive, QuantityValue
 
@@ -74,12 +74,23 @@ class WrapAngle(Frozen):
 
 
 class Contact(Frozen):
-    """One place where rope rubs."""
+    """One place where rope rubs; whether its coefficient may be another in each group of readings, if groups are asked for."""
 
     name: Name
     friction: Name
     law: str = "capstan"
+    by_group: bool = True
     wrap_angle: WrapAngle
+
+    @field_validator("friction")
+    @classmethod
+    def _is_a_name(cls, friction: str) -> str:
+        if friction.replace("-", " ").strip().lower() == "by group":
+            raise ValueError(
+                'this is the name of the coefficient, such as "mu"; for one in each group write friction_model = "by-group" at '
+                "the top of the file, or --friction by-group"
+            )
+        return friction
 
     @property
     def special_law(self) -> str:

@@ -125,6 +125,7 @@ class Kind(Generic[AnyTable]):
         speeds: Speeds of sliding [mm/s or rad/s].
         typical_speeds: Of its recordings or runs, in the same unit.
         velocity_unit: Which of the two; empty without velocities.
+        groups: Group of each row; empty without groups.
         takes_channels: Whether channels can be named on the command line.
     """
 
@@ -151,6 +152,7 @@ class Kind(Generic[AnyTable]):
     speeds: Callable[[AnyTable], Vector] = lambda _: np.zeros(0)
     typical_speeds: Callable[[AnyTable], list[float]] = lambda _: []
     velocity_unit: Callable[[AnyTable], str] = lambda _: ""
+    groups: Callable[[AnyTable], tuple[str, ...]] = lambda _: ()
     takes_channels: bool = False
 
     def file_name(self, settings: Any) -> str:

@@ -7,6 +7,7 @@ from bowdenfit.cable.conditions import make_conditions
 from bowdenfit.description import Description
 from bowdenfit.errors import DescriptionError
 from bowdenfit.kinds import each_table
+from bowdenfit.kinds.measured_groups import measured_groups
 from bowdenfit.kinds.measurements import Measurements
 
 
@@ -18,7 +19,8 @@ def measured_cable(description: Description, measurements: Measurements) -> Cabl
     """
     unit = _velocity_unit(measurements)
     forces, tensions = (_positive(measurements, name) for name in ("forces", "tensions"))
-    conditions = make_conditions(description, forces, tensions, _speeds(measurements), unit)
+    groups = measured_groups(description, measurements)
+    conditions = make_conditions(description, forces, tensions, _speeds(measurements), unit, groups)
     return make_cable(description, _own_angles(description, measurements), conditions)
 
 

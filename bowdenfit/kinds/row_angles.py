@@ -31,6 +31,7 @@ class RowAngles:
             "is_own": self.is_own,
             "known_variance": self.known_sd**2,
             "noisy": self.has_angle_noise,
+            "group": np.zeros(len(self.route), dtype=int),  # a kind whose rows are of groups puts theirs in its place
         }
 
 

@@ -117,12 +117,14 @@ class RunsTerm:
         self, values: Mapping[str, Array], data: Mapping[str, Any], weights: Mapping[str, Array]
     ) -> "_Deviations":
         angles, variance = resolve_angles(self.cable, values, data)
-        exponent = self.cable.friction_exponent(values, angles) * self.cable.friction.rate(values, data["velocity"])
+        friction = self.cable.friction_exponent(values, angles, data["group"])
+        exponent = friction * self.cable.friction.rate(values, data["velocity"])
         shown, slope, by_load = self._shown(values, data, exponent)
         deviation = data["mean"] - shown
         total = self._per_run(data, slope**2)
         mounting = self._per_run(data, slope * deviation) / total
-        from_angles = self._per_run(data, slope**2 * self.cable.exponent_variance(weights, angles, variance)) / total
+        angle_variance = self.cable.exponent_variance(weights, angles, variance, data["group"])
+        from_angles = self._per_run(data, slope**2 * angle_variance) / total
         sd = jnp.sqrt(weights[RUN_SCATTER] ** 2 + from_angles + weights[self.reading_noise] ** 2 / total)
         plain = self._per_run(data, deviation) / data["run_weight"]
         inside = data["load_squares"] * by_load**2 - 2 * data["load_products"] * by_load

@@ -7,7 +7,7 @@ import numpy as np
 
 from bowdenfit.types import Labels, Vector
 
-ROW_ARRAYS = ("route", "own", "is_own", "known_variance", "noisy")
+ROW_ARRAYS = ("route", "own", "is_own", "known_variance", "noisy", "group")
 
 
 @dataclass(frozen=True)

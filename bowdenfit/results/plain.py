@@ -1,7 +1,7 @@
 """Any answer as plain data for JSON, and stored data back as what they were: one pair for every dataclass."""
 
 from collections.abc import Callable, Iterable, Iterator, Mapping
-from dataclasses import fields, is_dataclass
+from dataclasses import MISSING, fields, is_dataclass
 from types import NoneType, UnionType
 from typing import Any, get_args, get_origin, get_type_hints
 
@@ -85,7 +85,8 @@ def rebuilt(kind: Any, value: Any) -> Any:
         return tuple(rebuilt(part, item) for part, item in zip(each, value, strict=True))
     if isinstance(kind, type) and is_dataclass(kind):
         hints = get_type_hints(kind)
-        return kind(**{f.name: rebuilt(hints[f.name], value[f.name]) for f in fields(kind)})
+        since = {f.name for f in fields(kind) if f.name not in value and f.default is not MISSING}  # that it was stored
+        return kind(**{f.name: rebuilt(hints[f.name], value[f.name]) for f in fields(kind) if f.name not in since})
     if np.ndarray in (kind, origin, getattr(kind, "array_type", None)):
         return _array(kind, value)
     return _number(value) if kind is float else value

@@ -209,7 +209,7 @@ def test_capstan_adds_nothing_and_options_add_up():
     [
         ("drga", ["'drga'", "did you mean 'drag'?"]),
         ("capstan+load_dependent", ["'load_dependent'", "did you mean 'load-dependent'?"]),
-        ("xyz", ["'xyz'", "known here: capstan, drag, load-dependent, rate-dependent, stroke-dependent."]),
+        ("xyz", ["'xyz'", "known here: capstan, drag, load-dependent, rate-dependent, stroke-dependent, by-group."]),
         ("drag+", ["''", "known here"]),
         ("drag+rate-dependent+drag", ["'drag+rate-dependent+drag'", "'drag' twice"]),
     ],

@@ -115,7 +115,8 @@ def _rows(seed: int, n: int, values, strokes=(1, -1), angles=(2.5,), m: float = 
     own = np.array([[angles[(i // 2) % len(angles)]] for i in range(n)])
     drift = stroke * generator.uniform(0.0, 1.5, n) if "delay_error" in values else np.zeros(n)
     arrays = {"route": np.zeros(n), "own": own, "is_own": np.ones((n, 1), dtype=bool),
-              "known_variance": np.zeros((n, 1)), "noisy": np.zeros((n, 1), dtype=bool)}  # fmt: skip
+              "known_variance": np.zeros((n, 1)), "noisy": np.zeros((n, 1), dtype=bool),
+              "group": np.zeros(n, dtype=int)}  # fmt: skip
     rows = SlidingRows(
         force_in, force_in, np.zeros(n), stroke, np.zeros(n, dtype=int), velocity, drift, np.ones(n), arrays
     )

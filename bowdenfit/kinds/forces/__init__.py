@@ -48,4 +48,5 @@ FORCES = Kind(
     speeds=lambda table: np.abs(table.velocity),
     typical_speeds=_typical_speeds,
     velocity_unit=lambda table: table.velocity_unit,
+    groups=lambda table: table.group,
 )

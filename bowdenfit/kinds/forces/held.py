@@ -65,9 +65,9 @@ class HeldForcesTerm:
     def log_likelihood(self, values: Mapping[str, Array], data: Mapping[str, Any]) -> Float[Array, " rows"]:
         """Log likelihood of each row."""
         angles, variance = resolve_angles(self.cable, values, data)
-        exponent = self.cable.friction_exponent(values, angles)
+        exponent = self.cable.friction_exponent(values, angles, data["group"])
         difference, from_cells = self._difference(values, data)
-        from_angles = self.cable.exponent_variance(values, angles, variance)
+        from_angles = self.cable.exponent_variance(values, angles, variance, data["group"])
         sd = jnp.sqrt(values[RUN_SCATTER] ** 2 + from_angles + from_cells)
         pulling, returning = self.cable.friction.shifts(values, exponent)
         beyond = jnp.abs(difference - (pulling - returning) / 2)  # about its middle the band is symmetric
@@ -83,7 +83,7 @@ class HeldForcesTerm:
     def expected(self, values: Mapping[str, Array], data: Mapping[str, Any]) -> Float[Array, " rows"]:
         """Largest ratio of input to output force that friction can hold at the row's input force [1]."""
         angles, _ = resolve_angles(self.cable, values, data)
-        exponent = self.cable.friction_exponent(values, angles)
+        exponent = self.cable.friction_exponent(values, angles, data["group"])
         return data["input_force"] / self._output_force(values, data, exponent)
 
     def _output_force(
@@ -99,7 +99,7 @@ class HeldForcesTerm:
         """A ratio of input to output force anywhere in the band, with noise [1]."""
         band, noise = jax.random.split(key)
         angles, _ = resolve_angles(self.cable, values, data)
-        limit = self.cable.friction_exponent(values, angles)
+        limit = self.cable.friction_exponent(values, angles, data["group"])
         _, from_cells = self._difference(values, data)
         inside = limit * jax.random.uniform(band, limit.shape, minval=-1.0, maxval=1.0)
         sd = jnp.sqrt(values[RUN_SCATTER] ** 2 + from_cells)

@@ -18,19 +18,26 @@ _NAMED = 4  # labels that a remark names
 
 
 class ForceSettings(Table):
-    """The table of forces; whether one label of a run stands for one mounting wherever it was measured.
+    """The table of forces; which of its rows were read in one mounting of the cable, and what its groups are called.
 
-    A label that comes back at another length or bend is another mounting by default: runs are usually numbered anew there.
+    A label of a run that comes back at another length or bend or in another group is another mounting by default: runs are
+    usually numbered anew there. With "each row" every reading had a mounting of its own, as trials have for which the cable
+    was laid anew each time. Groups are called by words, because a number may be a quantity, unless it is said that they are
+    called by numbers.
     """
 
-    run: Literal["at one length", "across lengths", "across bends"] = "at one length"
+    run: Literal["at one length", "across lengths", "across bends", "across groups", "each row"] = "at one length"
+    groups: Literal["called by words", "called by numbers"] = "called by words"
 
 
-def mountings(labels: Sequence[str], route: Vector, own: OwnAngles, limits: Route | None) -> tuple[Labels, list[str]]:
-    """The mounting of each row, and the name of each: a label at one length and one bend.
+def mountings(
+    labels: Sequence[str], group: Sequence[str], route: Vector, own: OwnAngles, limits: Route | None
+) -> tuple[Labels, list[str]]:
+    """The mounting of each row, and the name of each: a label at one length and one bend, in one group.
 
     Args:
         labels: What the table calls the run of each row.
+        group: Group of each row; empty without groups.
         route: Route variable; NaN where the cable has no route.
         own: Wrap angles measured with the row.
         limits: The route; None without.
@@ -43,27 +50,44 @@ def mountings(labels: Sequence[str], route: Vector, own: OwnAngles, limits: Rout
         mine = named == label
         for k, (values, step) in enumerate(zip((route, *own.angle.T), steps, strict=True)):
             place[mine, k] = _apart(values[mine], float(np.max(step[mine])))
-    keys = [(label, *where) for label, where in zip(labels, place.tolist(), strict=True)]
+    groups = group or [""] * len(labels)
+    keys = [(label, which, *where) for label, which, where in zip(labels, groups, place.tolist(), strict=True)]
     distinct = {key: i for i, key in enumerate(dict.fromkeys(keys))}
     run = np.array([distinct[key] for key in keys])
-    places = Counter(key[0] for key in distinct)
-    names = [
-        label if places[label] == 1 else f"{label} ({_where(run == i, route, own, limits)})"
-        for i, (label, *_) in enumerate(distinct)
-    ]
+    places = Counter(key[:2] for key in distinct)
+    in_groups = Counter(label for label, _ in places)
+    names = []
+    for i, (label, which, *_) in enumerate(distinct):
+        told = [which] if in_groups[label] > 1 else []
+        told += [_where(run == i, route, own, limits)] if places[label, which] > 1 else []
+        names.append(f"{label} ({', '.join(told)})" if told else label)
     return run, names
 
 
-def numbered_anew(labels: Sequence[str], n_mountings: int, file: str, route: Route | None) -> str:
-    """What is said of labels that come back elsewhere; empty where none does."""
+def numbered_anew(labels: Sequence[str], group: Sequence[str], n_mountings: int, file: str, route: Route | None) -> str:
+    """What is said of labels that come back elsewhere or in another group; empty where none does."""
     distinct = list(dict.fromkeys(labels))
     if n_mountings == len(distinct):
         return ""
     what = "length" if route else "bend"
+    where = f"at another {what}"
+    if group and (in_groups := len(set(zip(labels, group, strict=True)))) > len(distinct):
+        where = f"{where} or in another group" if n_mountings > in_groups else "in another group"
+        what = what if n_mountings > in_groups else "group"
     return (
-        f"{file}: the {len(distinct)} labels of its runs ({few(distinct, _NAMED)}) come back at another {what}, which is "
+        f"{file}: the {len(distinct)} labels of its runs ({few(distinct, _NAMED)}) come back {where}, which is "
         f"taken as another mounting of the cable each time: {n_mountings} mountings in all. If the cable stayed mounted while "
         f'its {what} changed, write run = "across {what}s" beside the file in cable.toml.'
+    )
+
+
+def each_row_apart(n_rows: int, file: str) -> str:
+    """What it means that every row is a run of its own."""
+    return (
+        f"{file}: each of its {n_rows} rows is taken as a mounting of its own, as cable.toml says. So {n_rows} rows tell a "
+        "coefficient as surely as that many mountings do, and the scatter from mounting to mounting cannot be told from the "
+        "noise of the load cells unless that is stated. Where the cable in fact stayed mounted over several rows these share "
+        "what its mounting did, and intervals come out too narrow: give those rows one run."
     )
 
 

@@ -10,7 +10,8 @@ from bowdenfit.errors import DatasetError
 from bowdenfit.files.cells import Cell
 from bowdenfit.files.columns import Column, Quantity, find_columns, require
 from bowdenfit.files.csv_table import read_csv
-from bowdenfit.kinds.forces.mountings import mountings, numbered_anew
+from bowdenfit.kinds.forces.mountings import each_row_apart, mountings, numbered_anew
+from bowdenfit.kinds.groups import GROUP, NO_GROUP, read_groups
 from bowdenfit.kinds.kind import Found, Source
 from bowdenfit.kinds.rows import (
     OwnAngles,
@@ -42,6 +43,7 @@ class ForceTable:
         origin: Where each row was read.
         velocity: Velocity of the rope [mm/s] or of the motor [rad/s]; NaN where it is not known.
         velocity_unit: Which of the two; empty without velocities.
+        group: Group of each row, such as "new rope"; empty without groups.
     """
 
     route: Vector
@@ -54,6 +56,7 @@ class ForceTable:
     origin: RowOrigin
     velocity: Vector
     velocity_unit: str = ""
+    group: tuple[str, ...] = ()
 
 
 def read_forces(source: Source) -> Found[ForceTable]:
@@ -97,9 +100,17 @@ def read_forces(source: Source) -> Found[ForceTable]:
         ),
         np.concatenate([t.velocity for t in tables]),
         _one_velocity_unit(tables),
+        _groups(tables),
     )
     remarks = dict.fromkeys(remark for _, said in parts for remark in said)
     return Found(merged, {source.name_of(path): path for path in paths}, tuple(remarks))
+
+
+def _groups(tables: Sequence[ForceTable]) -> tuple[str, ...]:
+    """Group of each row of all files; empty where none has groups."""
+    if not any(t.group for t in tables):
+        return ()
+    return tuple(name for t in tables for name in (t.group or (NO_GROUP,) * len(t.run)))
 
 
 def _one_velocity_unit(tables: Sequence[ForceTable]) -> str:
@@ -115,34 +126,26 @@ def _one_velocity_unit(tables: Sequence[ForceTable]) -> str:
 def _read_force_file(path: Path, source: Source) -> tuple[ForceTable, list[str]]:
     table, route, contacts = read_csv(path), source.description.route, source.description.angle_columns
     forces = (Quantity("input_force", "force"), Quantity("output_force", "force"))
-    others = (Quantity("run", "text"), Quantity("stroke", "text"), Quantity("velocity", "speed"))
+    others = (Quantity("run", "text"), Quantity("stroke", "text"), Quantity("velocity", "speed"), GROUP)
     found = find_columns(table, (*forces, *others, *shared_columns(route, contacts)), source.columns, _UNUSED)
     columns = [require(table, found, q.name, f"{q.name}_N") for q in forces]
     input_force, output_force = (np.array([_force(cell, c) for cell in c.cells]) for c in columns)
     own = read_own_angles(table, found, contacts)
     route_values = read_route(table, found, route)
-    remarks = []
+    groups = source.settings.groups == "called by numbers", source.description.by_group
+    group, remarks = read_groups(found, table.file, *groups)
     if "stroke" not in found:
         remarks.append(f"{table.file} has no stroke column: every row is taken as pulling (rope sliding to the motor).")
-    if "run" not in found:
-        remarks.append(
-            f"{table.file} has no run column: all rows at one {route.variable if route else 'wrap angle'} are taken "
-            "as one run (one mounting of the cable)."
-        )
-    run, run_names = _runs(found.get("run"), route_values, own)
-    if "run" in found and source.settings.run == "at one length":
-        labels = [run_names[i] for i in run]
-        run, distinct = mountings(labels, route_values, own, route)
-        run_names = tuple(distinct)
-        remarks += [said for said in [numbered_anew(labels, len(distinct), table.file, route)] if said]
     strokes, origin = read_strokes(found, len(table.rows)), provenance_of(table)
+    run, run_names, said = _mounted(found.get("run"), source, route_values, own, origin, group)
+    remarks += said
     if held := int(np.sum(strokes == 0)):
         remarks.append(
             f"{table.file}: {held} readings are held. A held reading says only that friction is at least as large as it takes "
             "to hold it; a coefficient that rests on such readings alone has a lower bound, and above it nothing but its prior."
         )
     velocity, unit = _velocities(found.get("velocity"), len(table.rows))
-    parts = (route_values, input_force, output_force, run, run_names, strokes, own, origin, velocity, unit)
+    parts = (route_values, input_force, output_force, run, run_names, strokes, own, origin, velocity, unit, group)
     return ForceTable(*parts), remarks
 
 
@@ -154,14 +157,30 @@ def _velocities(column: Column | None, n_rows: int) -> tuple[Vector, str]:
     return values, INTERNAL_UNITS[speed_dimension(column.unit or "")]
 
 
-def _runs(column: Column | None, route: Vector, own: OwnAngles) -> tuple[Labels, tuple[str, ...]]:
-    if column is not None:
-        keys = [cell.text.strip() or "(no run)" for cell in column.cells]
-    else:
+def _mounted(
+    column: Column | None, source: Source, route: Vector, own: OwnAngles, origin: RowOrigin, group: tuple[str, ...]
+) -> tuple[Labels, tuple[str, ...], list[str]]:
+    """Run of each row, the name of each run, and what had to be assumed."""
+    limits, how, file = source.description.route, source.settings.run, origin.files[0]
+    if how == "each row":
+        return np.arange(len(route)), tuple(f"row {row}" for row in origin.row), [each_row_apart(len(route), file)]
+    if column is None:
         rows = np.column_stack([route, own.angle])
         keys = [", ".join(f"{value:g}" for value in row if np.isfinite(value)) or "all" for row in rows]
-    names = tuple(dict.fromkeys(keys))
-    return np.array([names.index(key) for key in keys]), names
+        keys = [f"{name}, {key}" for name, key in zip(group, keys, strict=True)] if group else keys
+        names = tuple(dict.fromkeys(keys))
+        return np.array([names.index(key) for key in keys]), names, [
+            f"{file} has no run column: all rows at one {limits.variable if limits else 'wrap angle'}"
+            f"{' and of one group' if group else ''} are taken as one run (one mounting of the cable); where each row had a "
+            'mounting of its own, write run = "each row" beside the file in cable.toml.'
+        ]  # fmt: skip
+    labels = [cell.text.strip() or "(no run)" for cell in column.cells]
+    if how != "at one length":
+        names = tuple(dict.fromkeys(labels))
+        return np.array([names.index(label) for label in labels]), names, []
+    run, distinct = mountings(labels, group, route, own, limits)
+    said = numbered_anew(labels, group, len(distinct), file, limits)
+    return run, tuple(distinct), [said] if said else []
 
 
 def _force(cell: Cell, column: Column) -> float:

@@ -13,9 +13,10 @@ from bowdenfit.cable.load_cells import FORCE_NOISE, RUN_SCATTER, LoadCells
 from bowdenfit.description import Description
 from bowdenfit.kinds.angles.table import AngleTable
 from bowdenfit.kinds.bench import Remeasurement, Truth
-from bowdenfit.kinds.expected_forces import expected_forces
+from bowdenfit.kinds.expected_forces import ExpectedForces, expected_forces
 from bowdenfit.kinds.forces.held import HeldForcesTerm
 from bowdenfit.kinds.forces.table import ForceTable
+from bowdenfit.kinds.groups import group_numbers
 from bowdenfit.kinds.next_run import FORCE_RUN
 from bowdenfit.kinds.row_angles import row_angles
 from bowdenfit.kinds.runs import RunsTerm, run_sums
@@ -23,11 +24,12 @@ from bowdenfit.kinds.shared_parameters import force_noise, offsets, run_scatter
 from bowdenfit.kinds.sliding_rows import ROW_ARRAYS, SlidingRows
 from bowdenfit.kinds.term import Circumstances, TermKind
 from bowdenfit.parameters.space import Parameter
+from bowdenfit.types import Labels
 
 
 def force_terms(cable: Cable, table: ForceTable, angles: AngleTable | None) -> tuple[RunsTerm | HeldForcesTerm, ...]:
     """The terms of a force table: sliding rows by run, held rows one by one."""
-    rows = row_angles(cable.description, table, angles).data
+    rows = row_angles(cable.description, table, angles).data | {"group": _group(cable, table)}
     terms: list[RunsTerm | HeldForcesTerm] = []
     sliding, held = np.flatnonzero(table.stroke != 0), np.flatnonzero(table.stroke == 0)
     if len(sliding):
@@ -43,6 +45,11 @@ def force_terms(cable: Cable, table: ForceTable, angles: AngleTable | None) -> t
     return tuple(terms)
 
 
+def _group(cable: Cable, table: ForceTable) -> Labels:
+    """Number of each row's group."""
+    return group_numbers(cable.friction.groups, table.group, len(table.run))
+
+
 def sliding_rows(
     description: Description, table: ForceTable, rows: Mapping[str, np.ndarray], used: np.ndarray
 ) -> SlidingRows:
@@ -56,10 +63,7 @@ def sliding_rows(
     """
     stroke, force_in, force_out = table.stroke[used], table.input_force[used], table.output_force[used]
     keys = np.column_stack([table.run[used], stroke, *(rows[name][used] for name in ROW_ARRAYS)])
-    group = np.unique(keys, axis=0, return_inverse=True)[1].ravel()
-    sensors = description.sensors
-    stated = None if sensors.force_noise is None else sensors.force_noise.to("force")
-    expected = expected_forces(force_in, force_out, group, sensors.noise_ratio, stated, description.fits_offsets)
+    expected = _expected(description, table, used, keys)
     return SlidingRows(
         expected.input_force,
         expected.output_force,
@@ -71,6 +75,34 @@ def sliding_rows(
         np.ones(len(used)),
         {name: rows[name][used] for name in ROW_ARRAYS},
     )
+
+
+def _expected(description: Description, table: ForceTable, used: np.ndarray, keys: np.ndarray) -> ExpectedForces:
+    """What readings together say of their forces: those of a run, and those that are alone in theirs with each other.
+
+    How the latter scatter is not the noise of the load cells, because each had a mounting of its own.
+
+    Args:
+        description: What was said about the cable.
+        table: The table.
+        used: Numbers of its rows.
+        keys: Of each the run, then what else is the same for readings that are looked at together.
+    """
+    sensors, runs = description.sensors, table.run[used]
+    alone = np.bincount(runs)[runs] == 1
+    named = np.unique(np.array(table.group)[used], return_inverse=True)[1] if table.group else np.zeros(len(used), dtype=int)
+    keys = np.column_stack([np.where(alone, -1 - named, runs), keys[:, 1:]])
+    stated = None if sensors.force_noise is None else sensors.force_noise.to("force")
+    found = ExpectedForces(*(np.zeros(len(used)) for _ in range(3)))
+    for mine, noise in ((~alone, stated), (alone, stated or 0.0)):
+        if not mine.any():
+            continue
+        together = np.unique(keys[mine], axis=0, return_inverse=True)[1].ravel()
+        forces = table.input_force[used][mine], table.output_force[used][mine]
+        part = expected_forces(*forces, together, sensors.noise_ratio, noise, description.fits_offsets)
+        for name, values in vars(part).items():
+            getattr(found, name)[mine] = values
+    return found
 
 
 def _run_label(cable: Cable, table: ForceTable, run: int) -> str:
@@ -97,7 +129,8 @@ def _draw(table: ForceTable, truth: Truth) -> dict[str, Array]:
     of_angles = jax.random.normal(jax.random.fold_in(key, 3), (runs, bends.shape[1]))
     bends = bends + scale * jnp.sqrt(variance) * of_angles[run]
     mounting = scale * values[RUN_SCATTER] * truth.scatter(of_run, (runs,))
-    exponent = cable.friction_exponent(values, bends) * cable.friction.rate(values, jnp.asarray(table.velocity))
+    friction = cable.friction_exponent(values, bends, jnp.asarray(_group(cable, table)))
+    exponent = friction * cable.friction.rate(values, jnp.asarray(table.velocity))
     stroke, force = jnp.asarray(table.stroke, dtype=float), jnp.asarray(table.input_force)
     output = cable.friction.output_force(values, force, exponent + mounting[run], stroke)
     cells, noise, slides = LoadCells.of(values), scale * values[FORCE_NOISE], table.stroke != 0

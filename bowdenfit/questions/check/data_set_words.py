@@ -5,8 +5,10 @@ import numpy as np
 from bowdenfit.dataset import Dataset
 from bowdenfit.description import Contact, Description, FrictionSetting
 from bowdenfit.kinds import each_table
+from bowdenfit.kinds.measured_groups import measured_groups
 from bowdenfit.kinds.measurements import Measurements
 from bowdenfit.kinds.stretch.table import StretchTable
+from bowdenfit.words import listed
 
 
 def check_text(dataset: Dataset) -> str:
@@ -25,7 +27,8 @@ def check_text(dataset: Dataset) -> str:
         for c in description.contact
     ]
     lines += ["", "Friction coefficients:"]
-    lines += [f"  {name}: {_setting(description.friction.get(name))}" for name in description.coefficients]
+    settings = {name: _setting(description.friction.get(name)) for name in description.coefficients}
+    lines += [f"  {name}: {setting}{_each(dataset, name)}" for name, setting in settings.items()]
     lines += ["", "Measurements:"]
     sections: list[str] = []
     for kind, table in each_table(measurements):
@@ -41,6 +44,14 @@ def check_text(dataset: Dataset) -> str:
     lines += ["", *(f"Warning: {warning}" for warning in warnings_of(dataset))]
     lines.append("Everything could be read." + (" Nothing is wrong." if not warnings_of(dataset) else ""))
     return "\n".join(lines) + "\n"
+
+
+def _each(dataset: Dataset, coefficient: str) -> str:
+    """Of which groups there is one each; empty where all readings share it."""
+    contacts = [c for c in dataset.description.contact if c.friction == coefficient]
+    if not (dataset.description.by_group and contacts[0].by_group):
+        return ""
+    return f"; one for each of the groups {listed(measured_groups(dataset.description, dataset.measurements))}"
 
 
 def warnings_of(dataset: Dataset) -> list[str]:

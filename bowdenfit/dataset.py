@@ -13,6 +13,7 @@ from bowdenfit.kinds import KINDS, each_table
 from bowdenfit.kinds.kind import Source
 from bowdenfit.kinds.measured_groups import measured_groups
 from bowdenfit.kinds.measurements import Measurements
+from bowdenfit.kinds.named_columns import with_columns
 from bowdenfit.kinds.settings import load_description, parse_description
 from bowdenfit.kinds.single_file import kind_of
 from bowdenfit.units import ColumnSource
@@ -37,7 +38,10 @@ class Dataset:
 
 
 def load_dataset(
-    path: Path, overrides: Sequence[str] = (), channels: Mapping[str, ColumnSource] | None = None
+    path: Path,
+    overrides: Sequence[str] = (),
+    channels: Mapping[str, ColumnSource] | None = None,
+    columns: Mapping[str, ColumnSource] | None = None,
 ) -> Dataset:
     """Read a folder with `cable.toml` and tables, or the `cable.toml` itself.
 
@@ -45,6 +49,7 @@ def load_dataset(
         path: Folder, or description file.
         overrides: Settings that replace those of the description, such as `friction.mu1.fixed=0.1`.
         channels: Channels of recordings named on the command line.
+        columns: Columns of tables named there.
 
     Raises:
         DescriptionError: The description is missing or wrong.
@@ -58,7 +63,7 @@ def load_dataset(
     if path.suffix.lower() not in {".toml", ""} and not path.exists():
         raise DescriptionError(f"{path} does not exist; check the spelling and the folder.")
     file = path if path.suffix == ".toml" else path / DESCRIPTION_FILE
-    description = load_description(file, overrides)
+    description = load_description(file, overrides, columns)
     return read_dataset(description, file.parent, {file.name: _sha256(file)}, channels)
 
 
@@ -67,6 +72,7 @@ def single_file_dataset(
     wrap_angle: tuple[float, str],
     overrides: Sequence[str] = (),
     channels: Mapping[str, ColumnSource] | None = None,
+    columns: Mapping[str, ColumnSource] | None = None,
     kind: str = "",
 ) -> Dataset:
     """A data set from one table or recording of a cable with one contact at one known wrap angle.
@@ -76,12 +82,13 @@ def single_file_dataset(
         wrap_angle: The angle and its unit.
         overrides: Settings, as for a description.
         channels: Channels of a recording named on the command line.
+        columns: Columns of a table named there.
         kind: "forces", "efficiencies" or "recordings"; by the file if omitted.
 
     Raises:
         DescriptionError, DatasetError: The angle, a setting or the file is wrong.
     """
-    kind = kind or kind_of(path, bool(channels))
+    kind = kind or kind_of(path, bool(channels), bool(columns))
     angle = {"value": wrap_angle[0], "unit": wrap_angle[1]}
     raw = {
         "name": printable(path.stem).strip()[:80] or "cable",
@@ -89,7 +96,8 @@ def single_file_dataset(
         "contact": [{"name": "cable", "friction": "mu", "wrap_angle": angle}],
         "tables": {kind: {"files": path.name}},
     }
-    return read_dataset(parse_description(override(raw, overrides), "--wrap-angle"), path.parent, {}, channels)
+    described = with_columns(override(raw, overrides), columns or {})
+    return read_dataset(parse_description(described, "--wrap-angle"), path.parent, {}, channels)
 
 
 def read_dataset(
@@ -118,7 +126,9 @@ def read_dataset(
         measurements = Measurements((*measurements.tables, found.table), (*measurements.remarks, *found.remarks))
         checksums |= {name: _sha256(path) for name, path in found.files.items()}
     if channels and not any(kind.takes_channels for kind, _ in each_table(measurements)):
-        raise DescriptionError("--channel names channels of recordings, but the data set has none.")
+        raise DescriptionError(
+            "--channel names channels of recordings, but the data set has none; a column of a table is named by --column."
+        )
     check_names(description)
     measured_groups(description, measurements)
     for kind, table in each_table(measurements):

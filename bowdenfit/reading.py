@@ -18,6 +18,9 @@ class Reading(TypedDict, total=False):
         settings: Change a setting of cable.toml, such as friction.mu1.fixed=0.1; may be repeated.
         channels: Which channel of a recording is input_force, output_force, velocity or time, such as input_force=ai0:lbf
             or time=1000Hz; may be repeated.
+        columns: Which column of a table is input_force, output_force, stroke or another quantity, such as
+            input_force='Force input (N)'; a unit that the heading lacks follows a colon, as in input_force=F1:N; may be
+            repeated.
         noise: How readings scatter: normally, or as a Student-t, with which a few bad readings or mountings hardly pull
             the fit.
         friction: How friction depends on load, stroke and speed: capstan, or drag (a hidden tension D, which costs
@@ -31,6 +34,7 @@ class Reading(TypedDict, total=False):
 
     settings: Annotated[Sequence[str], Option(("--set",), metavar="KEY=VALUE")]
     channels: Annotated[Sequence[str], Option(("--channel",), metavar="QUANTITY=CHANNEL:UNIT")]
+    columns: Annotated[Sequence[str], Option(("--column",), metavar="QUANTITY=COLUMN:UNIT")]
     noise: Annotated[Literal["normal", "student"] | None, Option(default="as in cable.toml, else normal")]
     friction: Annotated[str | None, Option(metavar="MODEL", default="as in cable.toml, else capstan")]
     geometry: Annotated[Literal["continuous", "published"] | None, Option(default="as in cable.toml, else continuous")]
@@ -60,6 +64,7 @@ def read(dataset: "str | Path | Dataset", **reading: Unpack[Reading]) -> "Datase
         UsageError: There is no such keyword.
     """
     from bowdenfit.dataset import Dataset, load_dataset, single_file_dataset
+    from bowdenfit.files.naming import parse_sources
     from bowdenfit.recordings.forces import parse_channels
 
     refuse_unknown(read, reading)
@@ -68,10 +73,11 @@ def read(dataset: "str | Path | Dataset", **reading: Unpack[Reading]) -> "Datase
     stated = {key: reading.get(name) for name, key in _SETTINGS.items()}
     changes = [*reading.get("settings", ()), *(f'{key}="{value}"' for key, value in stated.items() if value is not None)]
     sources = parse_channels(reading.get("channels", ()))
+    columns = parse_sources(reading.get("columns", ()), "--column")
     wrap_angle = reading.get("wrap_angle")
     if wrap_angle is not None:
-        return single_file_dataset(Path(dataset), wrap_angle, changes, sources)
-    return load_dataset(Path(dataset), changes, sources)
+        return single_file_dataset(Path(dataset), wrap_angle, changes, sources, columns)
+    return load_dataset(Path(dataset), changes, sources, columns)
 
 
 def refuse_unknown(verb: Callable[..., Any], reading: Reading) -> None:

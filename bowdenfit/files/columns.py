@@ -1,35 +1,20 @@
-"""From column headings to named quantities: `input_force_N`, `input_force [N]` and `Input force (N)` are one column."""
+"""From columns of a table to named quantities with their units: `input_force_N`, `Force input (N)` and `F_in [N]` are one."""
 
 import difflib
 import math
-import re
-from collections.abc import Mapping
+from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass
 
 from bowdenfit.errors import DatasetError
 from bowdenfit.files.cells import Cell
 from bowdenfit.files.csv_table import RawTable
 from bowdenfit.files.headings import split_brackets
-from bowdenfit.units import ColumnSource, conversion_factor, is_unit, route_conversion_factor, speed_dimension
-from bowdenfit.words import quoted, shown
-
-_LONGEST_HEADING = 200
-
-
-@dataclass(frozen=True)
-class Quantity:
-    """A column that a table may have.
-
-    Args:
-        name: Canonical name.
-        dimension: Kind of quantity (`units.INTERNAL_UNITS`), "route" for the route variable, "speed" for the velocity of
-            the rope or of the motor, "text" for labels.
-        to: Unit to convert to; the internal one if omitted.
-    """
-
-    name: str
-    dimension: str
-    to: str | None = None
+from bowdenfit.files.matching import Candidate, candidates, meanings, plain_name
+from bowdenfit.files.matching import Quantity as Quantity  # readers of tables take both from here
+from bowdenfit.files.naming import naming
+from bowdenfit.files.spellings import spelled
+from bowdenfit.units import ColumnSource, conversion_factor, route_conversion_factor, speed_dimension
+from bowdenfit.words import listed, quoted, shown
 
 
 @dataclass(frozen=True)
@@ -79,34 +64,52 @@ def find_columns(
         DatasetError: A heading fits two quantities or two headings fit one; a unit is missing, unknown or of the
             wrong dimension; a named column is not there, or is named for what the table cannot have.
     """
-    sources = {
-        name: ColumnSource(name=_one_space(source.name), unit=source.unit) for name, source in (sources or {}).items()
-    }
+    sources = {name: _as_in_header(table, source) for name, source in (sources or {}).items()}
     _check_sources(table, [*(quantity.name for quantity in wanted), *unused], sources)
-    found: dict[str, Column] = {}
     taken = {source.name for source in sources.values()}
-    for heading in table.header:
-        if heading in taken or not heading:
-            continue
-        readings = [reading for reading in meanings(heading, wanted) if reading[0].name not in sources]
-        if len(readings) > 1:
-            names = " and ".join(quantity.name for quantity, _ in readings)
-            raise DatasetError(
-                f"{table.file}: the column {shown(heading)} can be read as {names}; rename it, or say which under columns "
-                f'in cable.toml: columns = {{ {readings[0][0].name} = {{ name = "{heading}", unit = ... }} }}.'
-            )
-        for quantity, unit in readings:
-            if quantity.name in found:
-                raise DatasetError(
-                    f"{table.file}: the columns {shown(found[quantity.name].heading)} and {shown(heading)} both look like "
-                    f"{quantity.name}; rename one, or say which under columns in cable.toml: "
-                    f'columns = {{ {quantity.name} = {{ name = "{heading}" }} }}.'
-                )
-            found[quantity.name] = _column(table, heading, quantity, unit)
+    headings = [("" if text in taken else text, unit) for text, unit in zip(table.header, table.units, strict=True)]
+    _check_single_meaning(table, headings, wanted, sources)
+    found: dict[str, Column] = {}
+    can_be = candidates(headings, wanted, tuple(sources))
     for quantity in wanted:
+        columns = can_be[quantity.name]
+        if len(columns) > 1:
+            raise _several(table, quantity.name, columns)
         if quantity.name in sources:
             found[quantity.name] = _named_column(table, quantity, sources[quantity.name])
+        elif columns:
+            found[quantity.name] = _column(table, table.header[columns[0].position], quantity, columns[0].unit)
     return found
+
+
+def _as_in_header(table: RawTable, source: ColumnSource) -> ColumnSource:
+    """A source as `read_csv` keeps headings: one space for any run of spaces; a heading may have a colon itself."""
+    name = " ".join(source.name.split())
+    whole = f"{name}:{source.unit}"
+    return ColumnSource(name=whole) if whole in table.header else ColumnSource(name=name, unit=source.unit)
+
+
+def _check_single_meaning(
+    table: RawTable, headings: Sequence[tuple[str, str]], wanted: tuple[Quantity, ...], sources: Mapping[str, ColumnSource]
+) -> None:
+    for heading, _ in headings:
+        names = [quantity.name for quantity, _ in meanings(heading, wanted) if quantity.name not in sources]
+        if len(names) > 1:
+            raise DatasetError(
+                f"{table.file}: the column {shown(heading)} can be read as {' and '.join(names)}; rename it, or say which: "
+                f"{naming(names[0], heading)}, or in cable.toml "
+                f'columns = {{ {names[0]} = {{ name = "{heading}", unit = ... }} }}.'
+            )
+
+
+def _several(table: RawTable, quantity: str, columns: Sequence[Candidate]) -> DatasetError:
+    names = [table.header[each.position] for each in columns]
+    both = "both" if len(names) == 2 else "all"
+    return DatasetError(
+        f"{table.file}: the columns {listed([shown(name) for name in names])} {both} look like {quantity}; say which, "
+        f'{naming(quantity, names[0])}, or in cable.toml columns = {{ {quantity} = {{ name = "{names[0]}" }} }}; or rename '
+        "the others."
+    )
 
 
 def require(table: RawTable, found: Mapping[str, Column], name: str, example: str) -> Column:
@@ -117,49 +120,31 @@ def require(table: RawTable, found: Mapping[str, Column], name: str, example: st
     """
     if name in found:
         return found[name]
+    _, _, unit = example.removeprefix(name).partition("_")
+    option = naming(name, "NAME", unit.replace("_", "*"))
     raise DatasetError(
-        f"{table.file} has no column {name}{_nearest(name, table.header)}; it has {quoted(table.header)}. "
-        f"Name the column {example}, or map it in cable.toml: columns = {{ {name} = {{ name = ..., unit = ... }} }}."
+        f"{table.file} has no column {name}{_nearest(name, table.header)}; it has {quoted(table.header)}. Name the column "
+        f"{example}, or say which it is: {option} (in cable.toml columns = {{ {name} = {{ name = ..., unit = ... }} }})."
     )
 
 
-def _nearest(name: str, header: tuple[str, ...]) -> str:
-    near = difflib.get_close_matches(name, [_plain(h) for h in header], n=1, cutoff=0.7)
-    match = next((h for h in header if near and _plain(h) == near[0]), None)
-    return f" (is it {shown(match)}?)" if match else ""
-
-
-def _plain(heading: str) -> str:
-    """Heading in lower case with underscores for anything between words."""
-    return re.sub(r"[\W_]+", "_", heading.lower()).strip("_")
-
-
-def _one_space(heading: str) -> str:
-    """Heading as `read_csv` keeps it, with one space for any run of spaces and line breaks."""
-    return " ".join(heading.split())
-
-
-def meanings(heading: str, wanted: tuple[Quantity, ...]) -> list[tuple[Quantity, str | None]]:
-    """Every quantity that the heading can mean, with the unit written in it; exact names win over name and unit."""
-    if len(heading) > _LONGEST_HEADING:
+def taken_in_pairs(table: RawTable, found: Mapping[str, Column], stated: Collection[str]) -> list[str]:
+    """What is said of headings that tell the ends of the cable only together, such as T1 and T2."""
+    ends = {name: found[name].heading for name in ("input_force", "output_force") if name in found}
+    says = [spelled(heading) for name, heading in ends.items() if name not in stated]
+    if len(ends) < 2 or not any(each and each.pair for each in says):
         return []
-    name, unit = split_brackets(heading)
-    exact = [(q, unit or _suffix(name, q.name)) for q in wanted if _plain(name) == _plain(q.name)]
-    whole = [(q, None) for q in wanted if _plain(heading) == _plain(q.name)]
-    named = exact or whole or [(q, behind) for q in wanted if (behind := _suffix(heading, q.name)) is not None]
-    return [(q, unit) for q, unit in named if not (q.dimension == "text" and unit and is_unit(unit))]
+    (one, at_input), (other, at_output) = ends.items()
+    return [
+        f"{table.file}: {shown(at_input)} is taken as {one} and {shown(at_output)} as {other}; if it is the other way round, "
+        f"say so: {naming(one, at_output)} {naming(other, at_input)}."
+    ]
 
 
-def _suffix(heading: str, name: str) -> str | None:
-    """Unit behind the name in `input_force_N` or "Input force N", case kept; None where it is no unit."""
-    words = re.split(r"[\s_\-]+", heading.strip())
-    units = ["_".join(words[i:]) for i in range(1, len(words)) if _plain("_".join(words[:i])) == _plain(name)]
-    if not units:
-        return None
-    candidate = units[-1].replace("_per_", "/").replace("_", "*")
-    if candidate.lower() in {"pct", "percent"}:
-        return "%"
-    return candidate if is_unit(candidate) else None
+def _nearest(name: str, header: tuple[str, ...]) -> str:
+    near = difflib.get_close_matches(name, [plain_name(h) for h in header], n=1, cutoff=0.7)
+    match = next((h for h in header if near and plain_name(h) == near[0]), None)
+    return f" (is it {shown(match)}?)" if match else ""
 
 
 def _column(table: RawTable, heading: str, quantity: Quantity, unit: str | None) -> Column:
@@ -167,10 +152,11 @@ def _column(table: RawTable, heading: str, quantity: Quantity, unit: str | None)
     if quantity.dimension in {"text", "ratio"} and unit is None:
         return Column(heading, cells, 1.0, None)
     if unit is None:
+        usual = quantity.to or _usual(quantity.dimension)
         raise DatasetError(
-            f"{table.file}: the column {shown(heading)} does not say its unit; rename it to "
-            f"{quantity.name}_{quantity.to or _usual(quantity.dimension)} (or the unit it is in), or give the unit in "
-            f'cable.toml: columns = {{ {quantity.name} = {{ name = "{heading}", unit = ... }} }}.'
+            f"{table.file}: the column {shown(heading)} does not say its unit; rename it to {quantity.name}_{usual} (or the "
+            f"unit it is in), or give the unit, such as {naming(quantity.name, heading, usual.replace('_', '*'))}, in "
+            f'cable.toml columns = {{ {quantity.name} = {{ name = "{heading}", unit = ... }} }}.'
         )
     try:
         if quantity.dimension == "speed":
@@ -198,16 +184,16 @@ def _check_sources(table: RawTable, known: list[str], sources: Mapping[str, Colu
             near = difflib.get_close_matches(name, known, n=1, cutoff=0.5)
             hint = f"did you mean {near[0]}?" if near else f"it can have {', '.join(known)}."
             raise DatasetError(
-                f"cable.toml names a column for {shown(name)}, which {table.file} cannot have under columns; {hint}"
+                f"a column is named for {shown(name)}, which {table.file} cannot have under columns; {hint}"
             )
         if source.name not in table.header:
             raise DatasetError(
-                f"{table.file} has no column {shown(source.name)}, which cable.toml names for {name}; "
+                f"{table.file} has no column {shown(source.name)}, which --column or cable.toml names for {name}; "
                 f"its columns are {quoted(table.header)}."
             )
         if source.name in serves:
             raise DatasetError(
-                f"cable.toml names the column {shown(source.name)} of {table.file} for both {serves[source.name]} and "
+                f"the column {shown(source.name)} of {table.file} is named for both {serves[source.name]} and "
                 f"{name}; correct one of them."
             )
         serves[source.name] = name

@@ -23,6 +23,7 @@ class RawTable:
     header: tuple[str, ...]
     header_row: int
     rows: tuple[tuple[Cell, ...], ...]
+    units: tuple[str, ...]
 
 
 def read_csv(path: Path) -> RawTable:
@@ -63,7 +64,8 @@ def read_csv(path: Path) -> RawTable:
             f"{name} has a header row but no measurements; add the rows, or remove the table from cable.toml."
         )
     decimals = Decimals.of((cell for row in rows[1:] for cell in row.cells), separator != ",")
-    return RawTable(name, header, rows[0].row, tuple(_cells(name, header, row, decimals) for row in rows[1:]))
+    return RawTable(name, header, rows[0].row, tuple(_cells(name, header, row, decimals) for row in rows[1:]),
+        ("",) * len(header))
 
 
 def _fitness(lines: Sequence[Line], separator: str) -> tuple[bool, int]:

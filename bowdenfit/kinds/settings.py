@@ -12,19 +12,24 @@ from bowdenfit.description.file import check_quantities, read_toml, validate
 from bowdenfit.errors import DescriptionError
 from bowdenfit.kinds import KINDS
 from bowdenfit.kinds.kind import Kind
+from bowdenfit.kinds.named_columns import with_columns
+from bowdenfit.units import ColumnSource
 
 
-def load_description(path: Path, overrides: Sequence[str] = ()) -> Description:
+def load_description(
+    path: Path, overrides: Sequence[str] = (), columns: Mapping[str, ColumnSource] | None = None
+) -> Description:
     """Read `cable.toml`.
 
     Args:
         path: The file.
         overrides: Settings from the command line, such as `friction.mu1.fixed=0.1`.
+        columns: Columns of tables named on the command line.
 
     Raises:
         DescriptionError: The file is missing or no TOML, a key is unknown, or a value is impossible.
     """
-    return parse_description(read_toml(path, overrides), path.name)
+    return parse_description(with_columns(read_toml(path, overrides), columns or {}), path.name)
 
 
 def parse_description(raw: Mapping[str, Any], file: str = "cable.toml") -> Description:

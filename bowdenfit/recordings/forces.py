@@ -10,7 +10,8 @@ import numpy as np
 from bowdenfit.description.pulleys import Pulleys
 from bowdenfit.errors import DatasetError, nearest
 from bowdenfit.files.channels import Channel, ChannelFile
-from bowdenfit.files.columns import Quantity, meanings
+from bowdenfit.files.matching import Quantity, candidates, meanings
+from bowdenfit.files.naming import parse_sources
 from bowdenfit.recordings.recording import RawRecording
 from bowdenfit.units import INTERNAL_UNITS, ColumnSource, conversion_factor, speed_dimension
 from bowdenfit.words import quoted, shown
@@ -21,6 +22,7 @@ WANTED = (
     Quantity("velocity", "speed"),
     Quantity("time", "time"),
 )
+_FORCES = WANTED[:2]
 TORQUES = (Quantity("input_torque", "torque"), Quantity("output_torque", "torque"))  # of a loop's pulleys
 _RATE = re.compile(r"(?P<rate>[+-]?(?:[0-9]+\.?[0-9]*|\.[0-9]+)(?:e[+-]?[0-9]+)?)\s*(?P<unit>k?Hz)", re.IGNORECASE)
 _FIELD = re.compile(r"\{([A-Za-z_]\w*)(?::([^}]*))?\}")
@@ -160,7 +162,9 @@ def _find(file: ChannelFile, quantity: Quantity, sources: Mapping[str, ColumnSou
         if quantity.name == "time" and _RATE.fullmatch(source.name.strip()):
             return None
         return _named(file, quantity.name, source.name)
-    matches = [c for c in file.channels if _says(c, quantity)]
+    headings = [(_PATH.split(c.name)[-1] or c.name, c.unit) for c in file.channels]
+    spelled = {each.position for each in candidates(headings, _FORCES, tuple(sources)).get(quantity.name, ())}
+    matches = [c for i, c in enumerate(file.channels) if i in spelled or _says(c, quantity)]
     if len(matches) > 1 and quantity.name == "time":
         return None  # each channel has the clock beside it
     if len(matches) > 1:
@@ -284,26 +288,7 @@ def parse_channels(texts: Sequence[str]) -> dict[str, ColumnSource]:
     Raises:
         DatasetError: A text is not of that form, or names a quantity that recordings do not have.
     """
-    known = [q.name for q in (*WANTED, *TORQUES)]
-    sources: dict[str, ColumnSource] = {}
-    for text in texts:
-        quantity, equals, rest = text.partition("=")
-        name, _, unit = rest.rpartition(":") if ":" in rest else (rest, "", "")
-        if not equals or not quantity.strip() or not name.strip():
-            raise DatasetError(
-                f"--channel {shown(text)} is not of the form QUANTITY=CHANNEL:UNIT, such as input_force=ai0:N."
-            )
-        if quantity.strip() not in known:
-            raise DatasetError(
-                f"--channel {shown(text)}: no quantity is called {shown(quantity.strip())}{nearest(quantity.strip(), known)}"
-            )
-        if quantity.strip() in sources:
-            raise DatasetError(
-                f"--channel names {quantity.strip()} twice, as {shown(sources[quantity.strip()].name)} and {shown(rest)}; "
-                "keep one of them."
-            )
-        sources[quantity.strip()] = ColumnSource(name=name.strip(), unit=unit.strip() or None)
-    return sources
+    return parse_sources(texts, "--channel", [quantity.name for quantity in (*WANTED, *TORQUES)])
 
 
 def pattern_fields(pattern: str) -> tuple[tuple[str, str], ...]:

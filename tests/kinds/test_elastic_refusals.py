@@ -65,7 +65,7 @@ TABLES = [
     (L, "input_force_N", "input_force", ["'input_force'", "does not say its unit", "input_force_N"]),
     (L, "input_force_N", "input_force_N_m", ["'input_force_N_m'", "does not measure a force"]),
     (L, "input_force_N", "input_torque_N", ["'input_torque_N'", "does not measure a torque"]),
-    (L, "input_force_N", "motor_N", ["no column input_force", "input_torque_N_m", "columns ="]),
+    (L, "input_force_N", "cell_7_N", ["no column input_force", "input_torque_N_m", "columns ="]),
     (L, "preload_N", "input_torque_N_m", ["both input_force and input_torque", "leave one"]),
 ]
 

@@ -38,7 +38,7 @@ TABLES = [
     ("efficiencies.csv", "440,77", "440,-77", ["row 3", "not possible"]),
     ("efficiencies.csv", "440,77", "440,177", ["row 3", "above 1"]),
     ("efficiencies.csv", "efficiency_percent", "efficiency", ["row 3", "above 1", "efficiency_percent"]),
-    ("efficiencies.csv", "efficiency_percent", "eta", ["no column efficiency", "columns ="]),
+    ("efficiencies.csv", "efficiency_percent", "score", ["no column efficiency", "columns ="]),
     ("efficiencies.csv", "efficiency_percent", "cable_length_mm", ["cable_length_mm", "twice"]),
     ("efficiencies.csv", "cable_length_mm", "cable_length", ["cable_length", "unit"]),
     ("efficiencies.csv", "cable_length_mm", "cable_length_N", ["cable_length", "N"]),

@@ -8,7 +8,7 @@ import numpy as np
 
 from bowdenfit.errors import DatasetError
 from bowdenfit.files.cells import Cell
-from bowdenfit.files.columns import Column, Quantity, find_columns, require
+from bowdenfit.files.columns import Column, Quantity, find_columns, require, taken_in_pairs
 from bowdenfit.files.csv_table import read_csv
 from bowdenfit.kinds.forces.mountings import each_row_apart, mountings, numbered_anew
 from bowdenfit.kinds.groups import GROUP, NO_GROUP, read_groups
@@ -134,6 +134,7 @@ def _read_force_file(path: Path, source: Source) -> tuple[ForceTable, list[str]]
     route_values = read_route(table, found, route)
     groups = source.settings.groups == "called by numbers", source.description.by_group
     group, remarks = read_groups(found, table.file, *groups)
+    remarks += taken_in_pairs(table, found, source.columns)
     if "stroke" not in found:
         remarks.append(f"{table.file} has no stroke column: every row is taken as pulling (rope sliding to the motor).")
     strokes, origin = read_strokes(found, len(table.rows)), provenance_of(table)

@@ -7,8 +7,9 @@ import numpy as np
 
 from bowdenfit.description.pulleys import Pulleys
 from bowdenfit.errors import DatasetError
-from bowdenfit.files.columns import Column, Quantity, find_columns, meanings, require
+from bowdenfit.files.columns import Column, Quantity, find_columns, require
 from bowdenfit.files.csv_table import RawTable, read_csv
+from bowdenfit.files.matching import meanings
 from bowdenfit.kinds.kind import Found, Source
 from bowdenfit.kinds.rows import (
     OwnAngles,

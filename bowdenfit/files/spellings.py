@@ -1,0 +1,157 @@
+"""How laboratories write what a column holds: words in five languages, symbols, and pairs that say it only together."""
+
+import re
+import unicodedata
+from collections.abc import Iterable
+from dataclasses import dataclass
+
+from bowdenfit.units import dimension_of, is_unit
+
+_WORDS = {
+    "input": "input in inlet eingang ein einlauf entree entrada ingresso entrata motor antrieb actuator actuation actuating "
+    "actuated aktor aktuator drive driving driver moteur actionneur actionnement motriz actuador accionamiento motore "
+    "attuatore proximal proximale prossimale prox upstream",
+    "output": "output out outlet ausgang aus auslauf sortie salida uscita distal distale dist downstream abtrieb effector tip",
+    "load": "load last charge carga carico",  # at the output, but only beside the other end
+    "pull": "pull pulling pulled zug traction tiro tirer",  # at the input, likewise
+    "force": "force forces f kraft zugkraft seilkraft seilspannung fuerza forza t tension tensione spannung",
+    "side": "side end seite ende cote extremite bout lado extremo lato estremita",
+    "": "the of at on de du d la le l les el del della di al dell der die das des am an auf im sensor sensors cell loadcell "
+    "zelle messzelle kraftsensor capteur celula cella cable rope seil tendon wire kabel cavo corde bowden measured reading "
+    "readings value wert messwert mesuree medida gemessen mean average mittelwert moyenne media",
+}
+_ROLES = {word: role for role, words in _WORDS.items() for word in words.split()}
+_WEIGHTS = {"kg", "g", "lb"}  # refused with a hint where they are converted
+_NAMES = {
+    "stroke": "direction|richtung|hub|hubrichtung|bewegungsrichtung|stroke direction|sens|sens de deplacement|sentido|"
+    "direccion|carrera|direzione|corsa",
+    "velocity": "speed|geschwindigkeit|seilgeschwindigkeit|drehzahl|motordrehzahl|vitesse|velocidad|velocita|cable speed|"
+    "rope speed|motor speed|motor velocity|cable velocity",
+    "run": "run no|run nr|run number|run id|mounting|mounting no|mounting number|montage|montaje|montaggio",
+    "wrap_angle": "wrapping angle|angle of wrap|total wrap angle|umschlingungswinkel|umschlingung|angle d enroulement|"
+    "angle d embrassement|angulo de abrazamiento|angulo de abrazo|angolo di avvolgimento",
+    "efficiency": "wirkungsgrad|ubertragungswirkungsgrad|rendement|rendimiento|eficiencia|rendimento|efficienza|eta|eff|"
+    "transmission efficiency|force efficiency|efficiency of transmission",
+}
+_QUANTITIES = {name: quantity for quantity, names in _NAMES.items() for name in names.split("|")}
+_LIKELY = {  # what only the user can say
+    "wrap_angle": "wrap|bend|bend angle|bending angle|total bend angle|contact angle|angle|theta|phi|winkel|biegewinkel|"
+    "umlenkwinkel|angle de contact|angulo|angulo de contacto|angulo de curvatura|angolo|nominal angle|nominal wrap",
+}
+_GUESSES = {name: quantity for quantity, names in _LIKELY.items() for name in names.split("|")}
+_DIMENSIONS = {"velocity": ("velocity", "angular_velocity"), "wrap_angle": ("angle",), "efficiency": ("ratio",)}
+_SYMBOL = re.compile(r"([ft])(in|out|ein|aus|input|output|motor|mot|act|load|prox|dist|ent|sal|i|o)")
+_ENDS = {"mot": "motor", "act": "actuator", "ent": "entrada", "sal": "salida", "i": "in", "o": "out"}
+_COMPOUND = re.compile(r"(?P<end>\w{3,}?)s?(?P<of>kraft|spannung|seite|seitig)")
+_BRACKETED = re.compile(r"[\[(](?P<unit>[^\[\]()]+)[\])]")
+_PREPOSITION = re.compile(r"^(?P<name>.*\S)\s+(?:in|en)\s+(?P<unit>\S+)$", re.IGNORECASE)
+_NUMBERED = re.compile(r"[tf]_?(?P<number>[12])|tension ?(?P<of>[12])")
+
+
+@dataclass(frozen=True)
+class Spelling:
+    """What a heading says in other words than the name of its quantity.
+
+    Args:
+        quantity: Name of the quantity.
+        unit: Unit that stands in the heading; None without one.
+        pair: What must say the other end for this to say its own: "number" for the other one of T1 and T2, "load" for
+            anything else; "said" where only the user can say so; empty where the heading says it alone.
+    """
+
+    quantity: str
+    unit: str | None
+    pair: str = ""
+
+
+def spelled(heading: str, unit: str = "") -> Spelling | None:
+    """The quantity that a heading means, if its words are those of one; None where a word is not known.
+
+    Args:
+        heading: As written, with or without its unit.
+        unit: Unit that the file gives elsewhere, as in a row below the headings.
+    """
+    for name, written in _divided(heading, unit):
+        plain = " ".join(_words(name))
+        if quantity := _QUANTITIES.get(plain) or _GUESSES.get(plain):
+            fits = not written or dimension_of(written) in _DIMENSIONS.get(quantity, ())
+            return Spelling(quantity, written or None, "" if plain in _QUANTITIES else "said") if fits else None
+        numbered = _NUMBERED.fullmatch(_folded(name))
+        if numbered:
+            end = "input" if "1" in (numbered["number"], numbered["of"]) else "output"
+            return Spelling(f"{end}_force", written or None, "number") if _may_be_force(written) else None
+        found = _end_of(plain.split(), written)
+        if found and _may_be_force(written):
+            return Spelling(f"{found[0]}_force", written or None, found[1])
+    return None
+
+
+def _divided(heading: str, unit: str) -> Iterable[tuple[str, str]]:
+    """Name and unit of a heading, in every way that it may be divided, the likeliest first; the unit is one that is known."""
+    bracketed = next((each for each in _BRACKETED.finditer(heading) if is_unit(each["unit"].strip())), None)
+    if bracketed:
+        yield heading.replace(bracketed[0], " "), bracketed["unit"].strip()
+        return
+    plain = heading.replace("(", " ").replace(")", " ").replace("[", " ").replace("]", " ")
+    said = _PREPOSITION.match(plain)
+    if said and is_unit(said["unit"]):  # "Kraft in N" is no force at an input
+        yield said["name"], said["unit"]
+        return
+    yield plain, unit if unit and is_unit(unit) else ""
+    parts = re.split(r"[\s_\-]+", plain.strip())
+    if len(parts) > 1 and _known(parts[:-1]) and is_unit(parts[-1]):
+        yield " ".join(parts[:-1]), parts[-1]
+
+
+def _known(parts: list[str]) -> bool:
+    """Whether the words before a unit say a quantity, so that not every last word is looked up among all units."""
+    name = " ".join(parts)
+    plain = _words(name)
+    said = " ".join(plain) in _QUANTITIES | _GUESSES
+    return said or bool(_NUMBERED.fullmatch(_folded(name))) or _end_of(plain, "N") is not None
+
+
+def _end_of(words: Iterable[str], unit: str) -> tuple[str, str] | None:
+    """Which end of the cable the words of a force name, and what pair they need; None if they name none."""
+    roles = {_ROLES.get(word) for word in _split(words)}
+    if None in roles or not ("force" in roles or unit):
+        return None
+    at = roles & {"input", "output"}
+    if at:
+        return (str(*at), "") if len(at) == 1 else None
+    if len(roles & {"load", "pull"}) != 1:
+        return None
+    if "load" in roles:
+        return "output", "" if "side" in roles else "load"
+    return "input", "load"
+
+
+def _may_be_force(unit: str) -> bool:
+    return not unit or unit in _WEIGHTS or dimension_of(unit) == "force"
+
+
+def _folded(text: str) -> str:
+    """In lower case, without accents, one space or underscore between words."""
+    letters = unicodedata.normalize("NFKD", text.replace("θ", "theta").replace("η", "eta").replace("ß", "ss"))
+    plain = "".join(letter for letter in letters if not unicodedata.combining(letter))
+    return " ".join(re.sub(r"[^\w]+", " ", plain.lower()).split())
+
+
+def _words(name: str) -> list[str]:
+    """Words of a heading: "InputForce" has two, and "Load cell" says no load."""
+    apart = re.sub(r"(?<=[a-z])(?=[A-Z][a-z])", " ", name)
+    plain = _folded(apart).replace("_", " ").replace("load cell", "cell")
+    return re.sub(r"\b([ft]) ([io])\b", r"\1\2", plain).split()
+
+
+def _split(words: Iterable[str]) -> Iterable[str]:
+    """Words with symbols such as Fin, and German compounds such as Eingangskraft, taken apart."""
+    for word in words:
+        symbol, compound = _SYMBOL.fullmatch(word), _COMPOUND.fullmatch(word)
+        if symbol:
+            yield from (symbol[1], _ENDS.get(symbol[2], symbol[2]))
+        elif compound and word not in _ROLES:
+            yield from _split([compound["end"]])
+            yield {"seitig": "seite"}.get(compound["of"], compound["of"])
+        else:
+            yield word

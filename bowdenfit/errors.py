@@ -1,7 +1,11 @@
 """Every way bowdenfit can refuse: sentences with a remedy, never a bare traceback."""
 
 import difflib
+import errno
 from collections.abc import Sequence
+from pathlib import Path
+
+_FULL = {errno.ENOSPC, errno.EFBIG, errno.EIO, *({errno.EDQUOT} if hasattr(errno, "EDQUOT") else ())}
 
 
 class BowdenfitError(Exception):
@@ -34,10 +38,29 @@ class StoreError(BowdenfitError):
     exit_code = 2
 
 
+class DiskError(StoreError):
+    """There is no room for what is to be written, though the request was good."""
+
+    exit_code = 1
+
+
 class ConvergenceError(BowdenfitError):
     """A solver or sampler stopped without an answer that can be used at all."""
 
     exit_code = 3
+
+
+def disk_error(path: Path, error: OSError) -> StoreError:
+    """Why a file or folder cannot be written, with a remedy: there is no room, or it may not be written at all.
+
+    Args:
+        path: The file or folder.
+        error: What the system says.
+    """
+    why = error.strerror or type(error).__name__
+    if error.errno in _FULL:
+        return DiskError(f"{path} cannot be written ({why}); make room on that disk, or name another folder.")
+    return StoreError(f"{path} cannot be written ({why}); name another folder with --output.")
 
 
 def nearest(name: str, known: Sequence[str]) -> str:

@@ -10,6 +10,7 @@ from typing import Any, TypeAlias
 
 import click
 
+from bowdenfit.errors import DiskError
 from bowdenfit.verb import Watch
 
 INTERRUPTED = 130
@@ -52,11 +53,18 @@ def watch_verb(folder: Path, watch: Watch) -> Iterator[Report]:
                 show(*progress)
 
             yield report
-    except KeyboardInterrupt:
+    except DiskError as error:
+        if not (folder / watch.kept).exists():
+            raise
+        said = f"What was done so far is kept in {folder}: with room, run the same command with --resume."
+        raise DiskError(f"{error} {said}") from None
+    except BaseException as error:  # where an interrupt is wanted, whatever came of it is that interrupt
+        if not (asked.is_set() or isinstance(error, KeyboardInterrupt)):
+            raise
         if (folder / watch.kept).exists():
             click.echo(f"\nInterrupted; {watch.remark} {folder}: run the same command with --resume.", err=True)
             raise click.exceptions.Exit(INTERRUPTED) from None
-        raise
+        raise KeyboardInterrupt from None
     finally:
         sys.unraisablehook = printed
 

@@ -61,7 +61,7 @@ class Sampling:
         settings: Ensembles or chains, maximum of steps and targets.
         seed: Seed of everything random here.
         quantities: Derived quantities of many z; they must converge too.
-        checkpoint: HDF5 file that every stored state is written to.
+        checkpoint: File that every stored state is written to; see `bowdenfit.inference.checkpoint`.
         resume: Go on from the states in `checkpoint`.
         report: Called after every block.
         diagnose: What diagnoses all quantities; `diagnose_all`, or something that has another process do it.

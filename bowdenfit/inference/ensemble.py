@@ -8,6 +8,7 @@ and every ensemble agrees on the wrong answer.
 from collections.abc import Callable, Sequence
 from dataclasses import replace
 from functools import partial
+from pathlib import Path
 from typing import Any
 
 import emcee
@@ -16,6 +17,7 @@ import numpy as np
 
 from bowdenfit.description import SamplerSettings
 from bowdenfit.inference.chain import Chain, Progress, Sampling, stuck_walkers, worst
+from bowdenfit.inference.checkpoint import append, records
 from bowdenfit.inference.least_squares import MaximumPosterior
 from bowdenfit.inference.proposals import Proposal, differential_evolution, independent, shares_of_moves, stretch
 from bowdenfit.inference.value_chart import Chart, chart_values, in_values
@@ -98,7 +100,8 @@ def sample(asked: Sampling, program: Callable[..., Any], moves: Moves | None = N
     """
     settings, start, seed = asked.settings, asked.start, asked.seed
     points = starting_points(start, settings, np.random.default_rng([seed, 0])).reshape(-1, len(start.z))
-    backend, log_density = _backend(asked, points.shape), _in_halves(program, asked.posterior.data, len(points) // 2)
+    backend = Checkpointed(points.shape, asked.checkpoint, asked.resume)
+    log_density = _in_halves(program, asked.posterior.data, len(points) // 2)
     moves = moves or default_moves(chart_values(asked.posterior.model.space), settings.n_walkers)
     moved = [(SideBySide(proposal, settings.n_ensembles), weight) for proposal, weight in moves]
     sampler = emcee.EnsembleSampler(*points.shape, log_density, vectorize=True, backend=backend, moves=moved)
@@ -107,7 +110,10 @@ def sample(asked: Sampling, program: Callable[..., Any], moves: Moves | None = N
     generator = np.random.RandomState(np.random.MT19937(np.random.SeedSequence([seed, 1])))
     state = None if backend.iteration else emcee.State(points, random_state=generator.get_state())
     limit = max(settings.max_steps // THIN, 2)
-    target = min(max(_FIRST_LOOK, int(backend.iteration)), limit)
+    target = _FIRST_LOOK
+    while target < int(backend.iteration):  # the looks of a sampling that nothing interrupted
+        target = _next_look(target)
+    target = min(target, limit)
     seen: tuple[float | None, float | None] = (None, None)
     while True:
         while (missing := target - int(backend.iteration)) > 0:
@@ -119,15 +125,50 @@ def sample(asked: Sampling, program: Callable[..., Any], moves: Moves | None = N
         asked.report(Progress(chain.steps, settings.max_steps, *seen))
         if not chain.reasons or target >= limit:
             return chain
-        target = min(target + target // 3, limit)
+        target = min(_next_look(target), limit)
 
 
-def _backend(asked: Sampling, shape: tuple[int, ...]) -> emcee.backends.Backend:
-    path = asked.checkpoint
-    backend = emcee.backends.Backend() if path is None else emcee.backends.HDFBackend(str(path))
-    if path is None or not (asked.resume and path.exists() and backend.initialized):
-        backend.reset(*shape)
-    return backend
+def _next_look(stored: int) -> int:
+    """Stored states at the look after one at so many."""
+    return stored + stored // 3
+
+
+class Checkpointed(emcee.backends.Backend):
+    """States in memory, and one after the other in a checkpoint.
+
+    Args:
+        shape: Walkers and parameters.
+        checkpoint: Where; nowhere if None.
+        resume: Go on from the states there.
+    """
+
+    def __init__(self, shape: tuple[int, ...], checkpoint: Path | None, resume: bool) -> None:
+        super().__init__()
+        self.reset(*shape)
+        self.checkpoint: Path | None = None
+        before = records(checkpoint) if checkpoint is not None and resume else []
+        self.grow(len(before), None)
+        for record in before:
+            keys = record["random_key"], *(int(i) for i in record["random_place"]), float(record["random_normal"])
+            state = emcee.State(record["z"], log_prob=record["log_density"], random_state=("MT19937", *keys))
+            self.save_step(state, record["accepted"])
+        self.checkpoint = checkpoint
+
+    def grow(self, ngrow: int, blobs: None) -> None:
+        """Make room for more states, twice as much each time, since all that are there must move."""
+        if ngrow > len(self.chain) - self.iteration:
+            super().grow(max(ngrow, self.iteration), blobs)
+
+    def save_step(self, state: emcee.State, accepted: np.ndarray) -> None:
+        """Keep a state; how many proposals were accepted since the last is added up."""
+        super().save_step(state, accepted)
+        if self.checkpoint is not None:
+            _, key, place, has_normal, normal = state.random_state
+            append(
+                self.checkpoint,
+                {"z": state.coords, "log_density": state.log_prob, "accepted": np.asarray(accepted), "random_key": key,
+                 "random_place": np.asarray([place, has_normal]), "random_normal": np.asarray(normal)},
+            )  # fmt: skip
 
 
 def _in_halves(program: Callable[..., Any], data: Any, half: int) -> Callable[[np.ndarray], np.ndarray]:

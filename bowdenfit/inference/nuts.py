@@ -15,7 +15,6 @@ References:
 from collections.abc import Callable, Sequence
 from dataclasses import replace
 from itertools import accumulate
-from pathlib import Path
 from typing import Any, TypeAlias
 
 import jax
@@ -27,6 +26,7 @@ from jax import Array
 
 from bowdenfit.description import SamplerSettings
 from bowdenfit.inference.chain import Chain, Progress, Sampling, stuck_walkers, worst
+from bowdenfit.inference.checkpoint import append, records
 from bowdenfit.inference.compilation import compile_program
 from bowdenfit.inference.diagnostics import Trajectories, energy_mixing, trajectory_shortfalls
 from bowdenfit.inference.least_squares import MaximumPosterior
@@ -115,9 +115,12 @@ def sample(asked: Sampling, program: Callable[..., Any]) -> Chain:
     """
     posterior, settings, seed = asked.posterior, asked.settings, asked.seed
     points = starting_points(posterior, asked.start, settings, np.random.default_rng([seed, _STREAM]))
-    blocks = _stored(asked.checkpoint) if asked.checkpoint is not None and asked.resume else []
+    blocks = records(asked.checkpoint) if asked.checkpoint is not None and asked.resume else []
     limit = WARM_UP + max(settings.max_steps // BLOCK, 1)
-    target = min(max(WARM_UP + _FIRST_LOOK, len(blocks)), limit)
+    target = WARM_UP + _FIRST_LOOK
+    while target < len(blocks):  # the looks of a sampling that nothing interrupted
+        target = _next_look(target)
+    target = min(target, limit)
     seen: tuple[float | None, float | None] = (None, None)
     while True:
         while len(blocks) < target:
@@ -126,14 +129,19 @@ def sample(asked: Sampling, program: Callable[..., Any]) -> Chain:
             done = program(*numbers, z, tuning, np.bool_(len(blocks) < WARM_UP), mass, posterior.data)
             blocks.append(jax.tree.map(np.asarray, done))
             if asked.checkpoint is not None:
-                _store(asked.checkpoint, blocks)
+                append(asked.checkpoint, blocks[-1])
             asked.report(Progress(len(blocks) * BLOCK, limit * BLOCK, *seen, "nuts"))
         chain, could_improve = _summarized(asked, blocks)
         seen = worst(chain)
         asked.report(Progress(len(blocks) * BLOCK, limit * BLOCK, *seen, "nuts"))
         if not could_improve or target >= limit:
             return chain
-        target = min(target + (target - WARM_UP + 2) // 3, limit)
+        target = min(_next_look(target), limit)
+
+
+def _next_look(blocks: int) -> int:
+    """Blocks at the look after one at so many."""
+    return blocks + (blocks - WARM_UP + 2) // 3
 
 
 def _before(
@@ -188,30 +196,3 @@ def _summarized(asked: Sampling, blocks: Sequence[Block]) -> tuple[Chain, bool]:
     chain = asked.chain_of(z, chains, steps=steps, **went)
     reasons = (*chain.reasons, *stuck_walkers(z[:, z.shape[1] // 2 :], "chains"))
     return replace(chain, reasons=(*reasons, *trajectory_shortfalls(trajectories))), bool(reasons)
-
-
-def _store(path: Path, blocks: Sequence[Block]) -> None:
-    """Add the last block to the checkpoint; the count that makes it valid is written last."""
-    import h5py
-
-    with h5py.File(path, "a") as file:
-        group, number = file.require_group("nuts"), len(blocks) - 1
-        for name, values in blocks[-1].items():
-            if name not in group:
-                group.create_dataset(name, (0, *values.shape), values.dtype, maxshape=(None, *values.shape))
-            group[name].resize(number + 1, axis=0)
-            group[name][number] = values
-        file.flush()
-        group.attrs["blocks"] = number + 1
-
-
-def _stored(path: Path) -> list[Block]:
-    """The blocks of a checkpoint."""
-    import h5py
-
-    with h5py.File(path, "r") as file:
-        if "nuts" not in file:
-            return []
-        group = file["nuts"]
-        whole = {name: np.asarray(values) for name, values in group.items()}
-        return [{name: values[i] for name, values in whole.items()} for i in range(int(group.attrs.get("blocks", 0)))]

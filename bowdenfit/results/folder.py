@@ -1,9 +1,8 @@
 """The results folder as files: their names, writing them whole, and not overwriting what is there.
 
-`fit.json` is written last, so a folder that has it is complete. A folder with `chain.h5` alone is an interrupted fit.
+`fit.json` is written last, so a folder that has it is complete. A folder with `chain.checkpoint` alone is an interrupted fit.
 """
 
-import json
 import os
 import shutil
 from collections.abc import Iterator, Mapping
@@ -11,12 +10,18 @@ from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
 
-from bowdenfit.errors import StoreError
+from bowdenfit.errors import StoreError, disk_error
+
+try:
+    import fcntl
+except ImportError:  # not on Windows, where folders cannot be locked
+    fcntl = None  # type: ignore[assignment]
 
 FIT, SUMMARY, SUMMARY_TEXT = "fit.json", "summary.json", "summary.txt"
-POSTERIOR, CHAIN, FIGURES = "posterior.nc", "chain.h5", "figures"
+POSTERIOR, CHAIN, FIGURES = "posterior.nc", "chain.checkpoint", "figures"
 ANSWERS, FIGURE_DATA = "answers.json", "figures.npz"
 REPLICATIONS = "replications.jsonl"  # of a calibration
+_WRITTEN = (FIT, ANSWERS, SUMMARY, SUMMARY_TEXT, FIGURE_DATA, POSTERIOR, CHAIN)
 
 
 @contextmanager
@@ -44,8 +49,7 @@ def folder_to_write(folder: Path) -> Iterator[Path]:
         folder.mkdir(parents=True, exist_ok=True)
         yield folder
     except OSError as error:
-        why = error.strerror or type(error).__name__
-        raise StoreError(f"{folder} cannot be written ({why}); name another with --output.") from None
+        raise disk_error(folder, error) from None
 
 
 def write_text(path: Path, text: str) -> None:
@@ -65,23 +69,65 @@ def refuse_to_overwrite(folder: Path, force: bool) -> None:
         StoreError: The folder holds something already.
     """
     if (folder / FIT).exists():
-        if force:
-            return
-        raise StoreError(
-            f"{folder} holds a finished fit already; add --force to replace it, or name another with --output."
-        )
-    if (folder / CHAIN).exists():
-        if force:
-            return
-        raise StoreError(f"{folder} holds an interrupted fit; go on with --resume, or start over with --force.")
-    if folder.exists() and (not folder.is_dir() or any(path.suffix != ".md" for path in folder.iterdir())):
+        there = "holds a finished fit already; add --force to replace it, or name another with --output."
+    elif (folder / CHAIN).exists():
+        there = "holds an interrupted fit; go on with --resume, or start over with --force."
+    elif not folder.exists():
+        return
+    elif not folder.is_dir() or any(not _is_ours(path) for path in folder.iterdir()):
         raise StoreError(f"{folder} exists and is no results folder; name another with --output.")
+    elif any(path.suffix != ".md" for path in folder.iterdir()):
+        there = "holds what is left of a fit that was ended; add --force to replace it, or name another with --output."
+    else:
+        return
+    if not force:
+        raise StoreError(f"{folder} {there}")
+
+
+def _is_ours(path: Path) -> bool:
+    """Whether a fit writes what lies in a results folder, or people write it there (*.md)."""
+    name = path.name.removeprefix(".").removesuffix(".partial")
+    return path.suffix == ".md" or name in {*_WRITTEN, FIGURES}
+
+
+@contextmanager
+def reserved(folder: Path) -> Iterator[None]:
+    """A results folder that no other process fits into meanwhile; the reservation ends with this process at the latest.
+
+    Args:
+        folder: The folder, made if missing.
+
+    Raises:
+        StoreError: Another process does, or the folder cannot be made.
+    """
+    new = not folder.exists()
+    with folder_to_write(folder):
+        held = os.open(folder, os.O_RDONLY) if fcntl is not None else None
+    try:
+        if held is not None:
+            _lock(held, folder)
+        yield
+    finally:
+        if held is not None:
+            os.close(held)
+        if new and not any(folder.iterdir()):
+            folder.rmdir()
+
+
+def _lock(held: int, folder: Path) -> None:
+    try:
+        fcntl.flock(held, fcntl.LOCK_EX | fcntl.LOCK_NB)
+    except BlockingIOError:
+        raise StoreError(
+            f"another fit is being written into {folder}; wait for it, or name another folder with --output."
+        ) from None
 
 
 def clear(folder: Path) -> None:
     """Remove what an earlier fit wrote, and nothing else; the mark of a finished fit goes first."""
-    for name in (FIT, ANSWERS, SUMMARY, SUMMARY_TEXT, FIGURE_DATA, POSTERIOR, CHAIN):
+    for name in _WRITTEN:
         (folder / name).unlink(missing_ok=True)
+        (folder / f".{name}.partial").unlink(missing_ok=True)
     if (folder / FIGURES).is_dir():
         shutil.rmtree(folder / FIGURES)
 
@@ -92,14 +138,10 @@ def start_checkpoint(path: Path, fingerprint: Mapping[str, Any]) -> None:
     Raises:
         StoreError: The folder cannot be written.
     """
-    import h5py
+    from bowdenfit.inference.checkpoint import heading
 
-    try:
-        path.parent.mkdir(parents=True, exist_ok=True)
-        with h5py.File(path, "w") as file:
-            file.attrs["fingerprint"] = json.dumps(fingerprint)
-    except OSError as error:
-        raise StoreError(f"{path.parent} cannot be written ({error}); name another folder with --output.") from None
+    with folder_to_write(path.parent), replace_when_whole(path) as temporary:
+        temporary.write_bytes(heading(fingerprint))
 
 
 def read_checkpoint(folder: Path) -> dict[str, Any]:
@@ -108,13 +150,12 @@ def read_checkpoint(folder: Path) -> dict[str, Any]:
     Raises:
         StoreError: There is no checkpoint, or it is damaged.
     """
-    import h5py
+    from bowdenfit.inference.checkpoint import fingerprint_of
 
     path = folder / CHAIN
     if not path.exists():
-        raise StoreError(f"{folder} holds no checkpoint (chain.h5) to resume from; fit without --resume.")
+        raise StoreError(f"{folder} holds no checkpoint ({CHAIN}) to resume from; fit without --resume.")
     try:
-        with h5py.File(path, "r") as file:
-            return dict(json.loads(str(file.attrs["fingerprint"])))
-    except (OSError, KeyError, json.JSONDecodeError):
+        return fingerprint_of(path)
+    except (OSError, ValueError):
         raise StoreError(f"{path} is damaged and cannot be resumed; start over with --force.") from None

@@ -1,5 +1,6 @@
 """posterior.nc: draws as ArviZ reads them, from plain data and back; loads no model."""
 
+import io
 from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, TypeAlias
@@ -35,7 +36,8 @@ def write_groups(
     """
     import h5netcdf
 
-    with replace_when_whole(path) as temporary, h5netcdf.File(temporary, "w") as file:
+    in_memory = io.BytesIO()  # HDF5 does not survive a disk that is full
+    with h5netcdf.File(in_memory, "w") as file:
         file.attrs.update(attributes)
         for name, variables in groups.items():
             group = file.create_group(name)
@@ -43,6 +45,8 @@ def write_groups(
                 attached = variable_attributes.get(variable, {}) if name in ("posterior", "prior") else {}
                 of_readings = labels.get(variable.removeprefix(EXPECTED))
                 _write(group, _key(variable), np.asarray(values), of_readings, attached)
+    with replace_when_whole(path) as temporary:
+        temporary.write_bytes(in_memory.getbuffer())
 
 
 def _write(

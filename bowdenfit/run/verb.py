@@ -57,16 +57,22 @@ def fit(
     Raises:
         BowdenfitError: What is wrong, in a sentence; nothing is written then.
     """
+    from contextlib import ExitStack
+
+    from bowdenfit.results.folder import reserved
     from bowdenfit.run.helpers import assistant
     from bowdenfit.run.storing import choose_seed, start_checkpointing, with_sampler, write_results
 
     refuse_unknown(fit, reading)
     folder = Path(output) if output is not None else None
     data = with_sampler(read(dataset, **reading), sampler)
-    seed = choose_seed(folder, data, mcmc, seed, resume, force)
     drawing = figures and folder is not None
     settings = _remember_compilations if remember_compilations else _no_settings
-    with assistant(in_background and (mcmc or drawing), settings, drawing) as helper:
+    with ExitStack() as held:
+        if folder is not None and (not folder.exists() or folder.is_dir()):
+            held.enter_context(reserved(folder))
+        seed = choose_seed(folder, data, mcmc, seed, resume, force)
+        helper = held.enter_context(assistant(in_background and (mcmc or drawing), settings, drawing))
         import jax
 
         from bowdenfit.run.fitting import run

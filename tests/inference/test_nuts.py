@@ -14,6 +14,7 @@ import bowdenfit as bf
 from bowdenfit.description import SamplerSettings
 from bowdenfit.inference import nuts
 from bowdenfit.inference.chain import Sampling
+from bowdenfit.inference.checkpoint import heading
 from bowdenfit.inference.diagnostics import Trajectories, energy_mixing, trajectory_shortfalls
 from bowdenfit.inference.least_squares import MaximumPosterior
 from bowdenfit.parameters.priors import Normal
@@ -183,7 +184,8 @@ def test_resumed_chains_equal_those_that_were_never_interrupted(normal, tmp_path
         start = MaximumPosterior(np.zeros(3), np.eye(3))
         return nuts.sample(Sampling(normal.target, start, settings, 1, **options), normal.program)
 
-    path = tmp_path / "chain.h5"
+    path = tmp_path / "chain.checkpoint"
+    path.write_bytes(heading({}))
     with pytest.raises(Stop):
         run(checkpoint=path, report=stop)
     np.testing.assert_array_equal(run(checkpoint=path, resume=True).z, run().z)

@@ -4,11 +4,11 @@ import dataclasses
 import json
 import shutil
 
-import h5py
 import numpy as np
 import pytest
 
 import bowdenfit as bf
+from bowdenfit.inference.checkpoint import fingerprint_of, heading
 from bowdenfit.results.folder import replace_when_whole
 
 QUICK = (
@@ -125,7 +125,7 @@ def test_force_replaces_a_fit_and_nothing_else(saved, on_body, tmp_path):
     fit = bf.fit(on_body, output=copy, mcmc=False, seed=9, figures=False, force=True, settings=QUICK)
     assert bf.load(copy).provenance.seed == fit.provenance.seed == 9
     assert not (copy / "posterior.nc").exists()
-    assert not (copy / "chain.h5").exists()
+    assert not (copy / "chain.checkpoint").exists()
     assert (copy / "notes.txt").read_text() == "mine"
 
 
@@ -154,7 +154,7 @@ def interrupted(on_body, folder, at, **options):
 def test_an_interrupted_fit_leaves_its_checkpoint_and_nothing_half_written(on_body, tmp_path):
     folder = tmp_path / "fit"
     interrupted(on_body, folder, 200)
-    assert [p.name for p in folder.iterdir()] == ["chain.h5"]
+    assert [p.name for p in folder.iterdir()] == ["chain.checkpoint"]
     with pytest.raises(bf.StoreError, match="--resume"):
         bf.fit(on_body, output=folder, settings=QUICK)
     with pytest.raises(bf.StoreError, match="--resume"):
@@ -174,11 +174,11 @@ def test_a_checkpoint_from_before_a_setting_existed_is_resumed(saved, on_body, t
     """Settings that have come since stand at their defaults."""
     fit, folder = saved
     copy = shutil.copytree(folder, tmp_path / "copy")
-    with h5py.File(copy / "chain.h5", "a") as file:
-        page = json.loads(file.attrs["fingerprint"])
-        for key in ("method", "n_chains", "target_acceptance"):
-            del page["description"]["sampler"][key]
-        file.attrs["fingerprint"] = json.dumps(page)
+    page, path = fingerprint_of(copy / "chain.checkpoint"), copy / "chain.checkpoint"
+    now = heading(page)
+    for key in ("method", "n_chains", "target_acceptance"):
+        del page["description"]["sampler"][key]
+    path.write_bytes(heading(page) + path.read_bytes().removeprefix(now))
     again = bf.fit(on_body, output=copy, settings=QUICK, figures=False, resume=True)
     np.testing.assert_array_equal(again.posterior.z, fit.posterior.z)
 
@@ -216,7 +216,7 @@ def test_resume_needs_a_checkpoint(on_body, tmp_path):
 
 
 def test_a_damaged_checkpoint_is_a_sentence(on_body, tmp_path):
-    (tmp_path / "chain.h5").write_bytes(b"not HDF5")
+    (tmp_path / "chain.checkpoint").write_bytes(b"something else")
     with pytest.raises(bf.StoreError, match="damaged"):
         bf.fit(on_body, output=tmp_path, resume=True)
 
@@ -256,7 +256,6 @@ def test_a_write_that_fails_leaves_the_old_file(tmp_path):
 
 def test_the_checkpoint_carries_what_it_was_started_for(saved):
     fit, folder = saved
-    with h5py.File(folder / "chain.h5") as file:
-        page = json.loads(file.attrs["fingerprint"])
+    page = fingerprint_of(folder / "chain.checkpoint")
     assert page["seed"] == 3
     assert page["sha256"] == fit.dataset.sha256

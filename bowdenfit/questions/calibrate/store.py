@@ -8,7 +8,7 @@ from typing import Any
 
 from bowdenfit.errors import StoreError
 from bowdenfit.questions.calibrate.replication import Replication
-from bowdenfit.results.folder import FIGURES, REPLICATIONS, SUMMARY_TEXT
+from bowdenfit.results.folder import FIGURES, REPLICATIONS, SUMMARY_TEXT, folder_to_write, write_text
 from bowdenfit.results.plain import rebuilt, stored
 
 CALIBRATION = "calibration.json"
@@ -38,11 +38,8 @@ def open_replications(
     if folder.exists() and not path.exists() and any(folder.iterdir()):
         raise StoreError(f"{folder} exists and holds no calibration; name another with --output.")
     _clear(folder)
-    try:
-        folder.mkdir(parents=True, exist_ok=True)
-        path.write_text(json.dumps(dict(fingerprint)) + "\n", encoding="utf-8")
-    except OSError as error:
-        raise StoreError(f"{folder} cannot be written ({error}); name another folder with --output.") from None
+    with folder_to_write(folder):
+        write_text(path, json.dumps(dict(fingerprint)) + "\n")
     return {}
 
 
@@ -60,7 +57,10 @@ def seed_of(folder: Path) -> int:
     Raises:
         StoreError: There is none.
     """
-    return int(_lines(folder / REPLICATIONS)[0]["seed"])
+    try:
+        return int(_lines(folder / REPLICATIONS)[0]["seed"])
+    except (KeyError, TypeError, ValueError):
+        raise _damaged(folder / REPLICATIONS) from None
 
 
 def _read_replications(path: Path, fingerprint: Mapping[str, Any]) -> dict[int, Replication]:
@@ -72,8 +72,12 @@ def _read_replications(path: Path, fingerprint: Mapping[str, Any]) -> dict[int, 
             "--force."
         )
     # A line that was being written when the program was stopped is made again.
-    path.write_text("".join(json.dumps(line) + "\n" for line in (before, *pages)), encoding="utf-8")
-    found = [rebuilt(Replication, page) for page in pages]
+    with folder_to_write(path.parent):
+        write_text(path, "".join(json.dumps(line) + "\n" for line in (before, *pages)))
+    try:
+        found = [rebuilt(Replication, page) for page in pages]
+    except (KeyError, TypeError, ValueError):
+        raise _damaged(path) from None
     return {each.number: each for each in found}
 
 
@@ -81,16 +85,20 @@ def _lines(path: Path) -> list[dict[str, Any]]:
     """The whole lines of a file of replications, the fingerprint first."""
     if not path.exists():
         raise StoreError(f"{path.parent} holds no calibration to resume; leave --resume out.")
-    text = path.read_text(encoding="utf-8")
+    text = path.read_text(encoding="utf-8", errors="replace")
     whole = text[: text.rfind("\n") + 1].splitlines()
     try:
         lines = [json.loads(line) for line in whole]
-        return [lines[0], *({"engine": "", **page, "redrawn": page["redrawn"]} for page in lines[1:])]
-    except (json.JSONDecodeError, IndexError, KeyError, TypeError):
-        raise StoreError(f"{path} is damaged and cannot be resumed; start over with --force.") from None
+        return [dict(lines[0]), *({"engine": "", **page, "redrawn": page["redrawn"]} for page in lines[1:])]
+    except (ValueError, IndexError, KeyError, TypeError, RecursionError):
+        raise _damaged(path) from None
+
+
+def _damaged(path: Path) -> StoreError:
+    return StoreError(f"{path} is damaged and cannot be resumed; start over with --force.")
 
 
 def keep(folder: Path, replication: Replication) -> None:
     """Add a finished replication."""
-    with (folder / REPLICATIONS).open("a", encoding="utf-8") as file:
+    with folder_to_write(folder), (folder / REPLICATIONS).open("a", encoding="utf-8") as file:
         file.write(json.dumps(stored(replication)) + "\n")

@@ -1,0 +1,103 @@
+"""The sampler's checkpoint: what it was started for, then one record after the other, each whole or not there.
+
+A file that only grows, written by plain means: where the disk is full or the process is ended in the middle of a record, the
+records before it stand, and sampling goes on after them. (HDF5 keeps its books all over the file, and a write that fails
+leaves them unreadable.)
+"""
+
+import io
+import json
+import struct
+from collections.abc import Iterator, Mapping
+from pathlib import Path
+from typing import Any, BinaryIO
+from zlib import crc32
+
+import numpy as np
+
+from bowdenfit.errors import StoreError, disk_error
+
+_MARK = b"bowdenfit checkpoint 1\n"
+_HEAD = struct.Struct("<QI")  # length and checksum of a record
+Record = dict[str, np.ndarray]
+
+
+def heading(fingerprint: Mapping[str, Any]) -> bytes:
+    """How a checkpoint begins.
+
+    Args:
+        fingerprint: What it is started for, as plain data.
+    """
+    return _MARK + json.dumps(fingerprint).encode() + b"\n"
+
+
+def fingerprint_of(path: Path) -> dict[str, Any]:
+    """What a checkpoint was started for.
+
+    Raises:
+        ValueError: It is no checkpoint.
+        OSError: It cannot be read.
+    """
+    with path.open("rb") as file:
+        return _fingerprint(file)
+
+
+def records(path: Path) -> list[Record]:
+    """Records in their order; what stands behind the last whole one is cut off.
+
+    Args:
+        path: The checkpoint.
+
+    Raises:
+        StoreError: It cannot be read.
+    """
+    try:
+        with path.open("r+b") as file:
+            _fingerprint(file)
+            found, end = list[Record](), file.tell()
+            for record in _whole(file):
+                found.append(record)
+                end = file.tell()
+            file.truncate(end)
+    except ValueError:
+        raise StoreError(f"{path} is damaged and cannot be resumed; start over with --force.") from None
+    except OSError as error:
+        raise disk_error(path, error) from None
+    return found
+
+
+def append(path: Path, record: Mapping[str, np.ndarray]) -> None:
+    """Add a record.
+
+    Args:
+        path: The checkpoint, begun by `heading`.
+        record: Named arrays.
+
+    Raises:
+        StoreError: There is no room for it.
+    """
+    written = io.BytesIO()
+    save: Any = np.savez  # its stub takes arrays for its own keywords
+    save(written, **record)
+    content = written.getvalue()
+    try:
+        with path.open("ab") as file:
+            file.write(_HEAD.pack(len(content), crc32(content)) + content)
+    except OSError as error:
+        raise disk_error(path, error) from None
+
+
+def _fingerprint(file: BinaryIO) -> dict[str, Any]:
+    if file.readline() != _MARK:
+        raise ValueError("no checkpoint")
+    return dict(json.loads(file.readline()))
+
+
+def _whole(file: BinaryIO) -> Iterator[Record]:
+    while len(head := file.read(_HEAD.size)) == _HEAD.size:
+        length, checksum = _HEAD.unpack(head)
+        content = file.read(length)
+        if len(content) < length or crc32(content) != checksum:
+            return
+        with np.load(io.BytesIO(content)) as arrays:
+            yield dict(arrays)

@@ -1,0 +1,90 @@
+"""The results folder while a fit is written: one at a time, on a disk that may be full, ended at any moment."""
+
+import os
+import subprocess
+import sys
+
+import numpy as np
+import pytest
+
+import bowdenfit as bf
+from bowdenfit.errors import DiskError
+from bowdenfit.inference.checkpoint import append, fingerprint_of, heading, records
+from bowdenfit.results.folder import folder_to_write, reserved
+
+QUICK = ("sampler.n_walkers=32", "sampler.max_steps=200", "sampler.target_ess=100")
+
+
+@pytest.fixture
+def checkpoint(tmp_path):
+    path = tmp_path / "chain.checkpoint"
+    path.write_bytes(heading({"seed": 3}))
+    for i in range(4):
+        append(path, {"z": np.full((5, 2), float(i)), "place": np.asarray(i)})
+    return path
+
+
+def test_a_checkpoint_gives_its_records_back(checkpoint):
+    assert fingerprint_of(checkpoint) == {"seed": 3}
+    assert [int(r["place"]) for r in records(checkpoint)] == [0, 1, 2, 3]
+
+
+def test_a_checkpoint_cut_anywhere_keeps_every_whole_record(checkpoint):
+    whole, start = checkpoint.read_bytes(), len(heading({"seed": 3}))
+    each = (len(whole) - start) // 4
+    for length in range(start, len(whole), 97):
+        checkpoint.write_bytes(whole[:length])
+        assert len(records(checkpoint)) == (length - start) // each
+        append(checkpoint, {"z": np.zeros((5, 2)), "place": np.asarray(9)})
+        assert int(records(checkpoint)[-1]["place"]) == 9
+
+
+def test_a_flipped_bit_ends_a_checkpoint_before_its_record(checkpoint):
+    content = bytearray(checkpoint.read_bytes())
+    content[-30] ^= 1
+    checkpoint.write_bytes(content)
+    assert [int(r["place"]) for r in records(checkpoint)] == [0, 1, 2]
+
+
+@pytest.mark.parametrize("limit", [20_000, 400_000])
+def test_a_fit_that_may_not_write_more_keeps_what_it_sampled_and_is_resumed(on_body, tmp_path, limit):
+    """A limit of the file's size stands for a full disk."""
+    fit = ["-m", "bowdenfit.cli", "fit", str(on_body), "-o", str(tmp_path / "fit"), "--seed", "3", "--no-figures"]
+    command = [sys.executable, *fit, *(f"--set={setting}" for setting in QUICK)]
+    limit_size = "r.setrlimit(r.RLIMIT_FSIZE, (int(sys.argv[1]),) * 2)"
+    limited = f"import os, resource as r, sys; {limit_size}; os.execv(sys.argv[2], sys.argv[2:])"
+
+    def run(*before, after=()):
+        return subprocess.run([*before, *command, *after], capture_output=True, text=True, check=False, timeout=120)
+
+    full = run(sys.executable, "-c", limited, str(limit))
+    assert full.returncode == 1, full.stderr
+    assert "File too large" in full.stderr
+    assert "--resume" in full.stderr
+    assert len(full.stderr.splitlines()) == 1
+    resumed = run(after=["--resume"])
+    assert resumed.returncode in {0, 3}, resumed.stderr
+    whole = bf.fit(on_body, seed=3, settings=QUICK)
+    np.testing.assert_array_equal(bf.load(tmp_path / "fit").posterior.z, whole.posterior.z)
+
+
+def test_a_disk_without_room_is_no_mistake_of_the_user(tmp_path):
+    with pytest.raises(DiskError, match="No space left on device") as full, folder_to_write(tmp_path / "fit"):
+        raise OSError(28, os.strerror(28))
+    assert full.value.exit_code == 1
+
+
+def test_two_fits_into_one_folder_are_told_apart_at_the_start(on_body, tmp_path):
+    with reserved(tmp_path / "fit"), pytest.raises(bf.StoreError, match="another fit is being written"):
+        bf.fit(on_body, output=tmp_path / "fit", mcmc=False, figures=False)
+    assert not (tmp_path / "fit").exists()
+    bf.fit(on_body, output=tmp_path / "fit", mcmc=False, figures=False)
+
+
+def test_what_is_left_of_an_ended_fit_is_replaced_with_force(on_body, tmp_path):
+    (tmp_path / "fit" / "figures").mkdir(parents=True)
+    (tmp_path / "fit" / ".posterior.nc.partial").write_text("half")
+    with pytest.raises(bf.StoreError, match="what is left of a fit"):
+        bf.fit(on_body, output=tmp_path / "fit", mcmc=False, figures=False)
+    bf.fit(on_body, output=tmp_path / "fit", mcmc=False, figures=False, force=True)
+    assert not (tmp_path / "fit" / ".posterior.nc.partial").exists()

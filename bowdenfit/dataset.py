@@ -9,6 +9,7 @@ from bowdenfit.cable.registry import check_names
 from bowdenfit.description import Description
 from bowdenfit.description.file import override
 from bowdenfit.errors import DescriptionError
+from bowdenfit.files.row_account import RowAccount
 from bowdenfit.kinds import KINDS, each_table
 from bowdenfit.kinds.kind import Source
 from bowdenfit.kinds.measured_groups import measured_groups
@@ -30,11 +31,13 @@ class Dataset:
         description: What was said about the cable.
         measurements: What was measured on it.
         sha256: Checksum of every file that was read, by file name.
+        accounts: Where the rows of each of its tables and recordings went; empty where it was not read from files.
     """
 
     description: Description
     measurements: Measurements
     sha256: dict[str, str]
+    accounts: tuple[RowAccount, ...] = ()
 
 
 def load_dataset(
@@ -117,13 +120,15 @@ def read_dataset(
     Raises:
         DatasetError: A table is missing or wrong, or does not fit the description.
     """
-    measurements, checksums = Measurements(), dict(sha256)
+    measurements, checksums, accounts = Measurements(), dict(sha256), tuple[RowAccount, ...]()
     for kind in KINDS.values():
         settings = description.tables.stated.get(kind.name)
         if settings is None:
             continue
         found = kind.read(Source(kind.name, settings, description, folder, channels or {}))
-        measurements = Measurements((*measurements.tables, found.table), (*measurements.remarks, *found.remarks))
+        remarks = (*(said for each in found.accounts for said in each.remarks), *found.remarks)
+        measurements = Measurements((*measurements.tables, found.table), (*measurements.remarks, *remarks))
+        accounts += found.accounts
         checksums |= {name: _sha256(path) for name, path in found.files.items()}
     if channels and not any(kind.takes_channels for kind, _ in each_table(measurements)):
         raise DescriptionError(
@@ -133,7 +138,7 @@ def read_dataset(
     measured_groups(description, measurements)
     for kind, table in each_table(measurements):
         kind.check(table, description, measurements)
-    return Dataset(description, measurements, checksums)
+    return Dataset(description, measurements, checksums, accounts)
 
 
 def _sha256(path: Path) -> str:

@@ -1,36 +1,50 @@
-"""Tables in CSV files: one row of headings, and rows of cells that still know where they stood."""
+"""Tables in CSV files: headings, and rows of cells that still know where they stood; every row is accounted for."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from itertools import dropwhile, islice
 from pathlib import Path
 
 from bowdenfit.errors import DatasetError
 from bowdenfit.files.cells import Cell, Decimals, is_plain_number
 from bowdenfit.files.contents import UNKNOWN, recognize
 from bowdenfit.files.csv_rows import SEPARATORS, CsvRecord, declared_separator, records, too_many_cells
+from bowdenfit.files.row_account import BLANK, COMMENT, RowAccount, account_of
+from bowdenfit.files.table_parts import TableParts, parts_of
+from bowdenfit.files.table_rows import is_measured, numbers_less_words
 from bowdenfit.files.text_file import Line, comment_mark, first_bytes, first_lines, is_blank
 from bowdenfit.words import shown
 
-_FIRST_ROWS = 20
+_FIRST_ROWS = 200
+_SEPARATOR, _CONTINUED = "the separator", "the rest of a cell that runs over several rows"
 
 
 @dataclass(frozen=True)
 class RawTable:
-    """Header and rows of one file, all cells as text."""
+    """Header and rows of one file, all cells as text.
+
+    Args:
+        file: Its name.
+        header: What stands over each column.
+        header_row: The row of the headings, of which the last stands over the units or the data.
+        rows: Rows of readings.
+        units: The unit that stands below each heading; empty without one.
+        account: Where the rows of the file went.
+    """
 
     file: str
     header: tuple[str, ...]
     header_row: int
     rows: tuple[tuple[Cell, ...], ...]
     units: tuple[str, ...]
+    account: RowAccount
 
 
 def read_csv(path: Path) -> RawTable:
     """Read one table.
 
-    Understands comma, semicolon, tab and bar between columns; decimal comma; UTF-8, UTF-16 and Windows encodings; comment
-    lines starting with #; Excel's `sep=;` line, trailing empty columns, blank lines and quoted cells.
+    Understands comma, semicolon, tab, bar and blanks between columns; decimal comma; UTF-8, UTF-16 and Windows encodings;
+    comment lines starting with #; Excel's `sep=;` line, trailing empty columns, blank lines and quoted cells; lines over the
+    headings, a row of units below them, remarks between the rows and beside them, statistics and other text below.
 
     Args:
         path: The file.
@@ -43,53 +57,58 @@ def read_csv(path: Path) -> RawTable:
     content = recognize(path, data[:1024])
     if content is not UNKNOWN:
         raise DatasetError(f"{name} is {content.what}, not a CSV file; save the table as CSV and name that file.")
-    _, lines = first_lines(data, name, whole=True)
-    declared, lines = declared_separator(lines, name)
-    lines = list(
-        dropwhile(lambda line: is_blank(line.text), (line for line in lines if comment_mark(line.text) != "#"))
-    )  # % may be a heading
-    separator = declared or max(SEPARATORS[:-1], key=lambda each: _fitness(lines, each))
-    rows = [row for row in records(lines, separator, len(lines)) if not row.blank]
+    _, every = first_lines(data, name, whole=True)
+    declared, lines = declared_separator(every, name)
+    lines = [line for line in lines if comment_mark(line.text) != "#"]  # % may be a heading
+    separator = declared or max(SEPARATORS, key=lambda each: _fitness(lines, each))
+    rows = list(records(lines, separator, len(lines)))
     for row in rows:
         if not row.closed:
             raise DatasetError(
                 f"{name}, row {row.row}: a quotation mark opens there that is never closed, or a cell is too long; close or "
                 "delete it."
             )
-    if not rows:
+    if all(row.blank for row in rows):
         raise DatasetError(f"{name} is empty; it needs one header row and the measurements below it.")
-    header = _header(rows[0], name)
-    if len(rows) == 1:
+    return _table(name, every, rows, separator)
+
+
+def _table(name: str, lines: Sequence[Line], rows: Sequence[CsvRecord], separator: str) -> RawTable:
+    parts = parts_of(rows, name)
+    header = _header(parts, name)
+    if not parts.body:
         raise DatasetError(
             f"{name} has a header row but no measurements; add the rows, or remove the table from cable.toml."
         )
-    decimals = Decimals.of((cell for row in rows[1:] for cell in row.cells), separator != ",")
-    return RawTable(name, header, rows[0].row, tuple(_cells(name, header, row, decimals) for row in rows[1:]),
-        ("",) * len(header))
+    decimals = Decimals.of((cell for row in parts.body for cell in row.cells), separator != ",")
+    units = (*parts.units, *[""] * len(header))[: len(header)]
+    cells = tuple(_cells(name, header, row, decimals) for row in parts.body)
+    return RawTable(name, header, parts.headings[0].row, cells, units, _account(name, lines, rows, parts, len(header)))
 
 
-def _fitness(lines: Sequence[Line], separator: str) -> tuple[bool, int]:
-    """How well a separator splits the first rows: into equally many cells, and into most."""
-    rows = list(islice((row for row in records(lines, separator, len(lines)) if not row.blank), _FIRST_ROWS))
+def _fitness(lines: Sequence[Line], separator: str) -> tuple[int, bool, int]:
+    """How well a separator splits the first rows: into most numbers and fewest words, equally many cells, and most of them."""
+    rows = [row for row in records(lines[:_FIRST_ROWS], separator, _FIRST_ROWS) if not row.blank]
     widths = [len(row.cells) for row in rows] or [0]
-    return widths[0] > 1 and len(set(widths)) == 1 and all(row.closed for row in rows), widths[0]
+    alike = widths[0] > 1 and len(set(widths)) == 1 and all(row.closed for row in rows)
+    return numbers_less_words(rows), alike, widths[0]
 
 
-def _header(row: CsvRecord, file: str) -> tuple[str, ...]:
+def _header(parts: TableParts, file: str) -> tuple[str, ...]:
     """The headings, without the empty ones behind the last."""
-    header = tuple(" ".join(cell.split()) for cell in row.cells)
+    header, row = parts.names, parts.headings[0].row
     while not header[-1]:
         header = header[:-1]
     if all(is_plain_number(column) for column in header if column):
         raise DatasetError(
-            f"{file}, row {row.row}: this is the header row, but it holds numbers only ({shown(header[0])}, ...); write the "
+            f"{file}, row {row}: this is the header row, but it holds numbers only ({shown(header[0])}, ...); write the "
             "names of the columns, with their units, above them."
         )
     seen: dict[str, int] = {}
     for position, column in enumerate(header, start=1):
         if column and column.lower() in seen:
             raise DatasetError(
-                f"{file}, row {row.row}: the column {shown(column)} appears twice (columns {seen[column.lower()]} and "
+                f"{file}, row {row}: the column {shown(column)} appears twice (columns {seen[column.lower()]} and "
                 f"{position}); rename or delete one of them."
             )
         seen[column.lower()] = position
@@ -97,9 +116,37 @@ def _header(row: CsvRecord, file: str) -> tuple[str, ...]:
 
 
 def _cells(file: str, header: tuple[str, ...], row: CsvRecord, decimals: Decimals) -> tuple[Cell, ...]:
-    too_many_cells(file, row.row, row.cells, len(header))
+    if any(map(is_measured, _behind(row, len(header)))):
+        too_many_cells(file, row.row, row.cells, len(header))
     padded = row.cells + [""] * (len(header) - len(row.cells))
     return tuple(
         Cell(file, row.row, column or f"(column {i + 1}, without heading)", text, decimals)
         for i, (column, text) in enumerate(zip(header, padded, strict=False))
     )
+
+
+def _behind(row: CsvRecord, width: int) -> list[str]:
+    """What stands in cells behind the last column."""
+    return [cell.strip() for cell in row.cells[width:] if cell.strip()]
+
+
+def _account(
+    name: str, lines: Sequence[Line], rows: Sequence[CsvRecord], parts: TableParts, width: int
+) -> RowAccount:
+    starts = {row.row: row for row in rows}
+    reasons: dict[int, tuple[str, str]] = {}
+    for line in lines:
+        row = starts.get(line.row)
+        if line.text.strip().strip('"').lower().startswith("sep="):
+            reasons[line.row] = _SEPARATOR, ""
+        elif comment_mark(line.text) == "#":
+            reasons[line.row] = COMMENT, ""
+        elif row is None:
+            reasons[line.row] = (BLANK, "") if is_blank(line.text) else (_CONTINUED, "")
+        elif row.blank:
+            reasons[line.row] = BLANK, ""
+        elif row.row in parts.left_out:
+            reasons[row.row] = parts.left_out[row.row], " ".join(filter(None, map(str.strip, row.cells)))
+    beside = [(row.row, " ".join(text)) for row in parts.body if (text := _behind(row, width))]
+    over = [row.row for row in parts.headings]
+    return account_of(name, len(lines), over, reasons, (*parts.beside, *beside))

@@ -10,6 +10,7 @@ import numpy as np
 from bowdenfit.description import Description, Table, TableSettings
 from bowdenfit.description.file import Stated
 from bowdenfit.errors import DatasetError
+from bowdenfit.files.row_account import RowAccount
 from bowdenfit.kinds.design import Design
 from bowdenfit.kinds.measurements import Measurements
 from bowdenfit.kinds.pages import Page
@@ -88,11 +89,13 @@ class Found(Generic[AnyTable]):
         table: The table.
         files: The files it was read from, by name.
         remarks: What had to be assumed, in sentences.
+        accounts: Where the rows of each file went.
     """
 
     table: AnyTable
     files: Mapping[str, Path]
     remarks: tuple[str, ...] = ()
+    accounts: tuple[RowAccount, ...] = ()
 
 
 @dataclass(frozen=True)

@@ -88,6 +88,7 @@ def read_angles(source: Source) -> Found[AngleTable]:
     return Found(
         AngleTable(rounded(lengths.numbers()), tuple(contacts), pairs[..., 0].T, pairs[..., 1].T, provenance_of(table)),
         {path.name: path},
+        accounts=(table.account,),
     )
 
 

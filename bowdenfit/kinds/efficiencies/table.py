@@ -63,7 +63,7 @@ def read_efficiencies(source: Source) -> Found[EfficiencyTable]:
         read_own_angles(table, found, contacts),
         provenance_of(table),
     )
-    return Found(rows, {path.name: path})
+    return Found(rows, {path.name: path}, accounts=(table.account,))
 
 
 def _ratio(cell: Cell, column: Column) -> float:

@@ -10,6 +10,7 @@ from bowdenfit.errors import DatasetError
 from bowdenfit.files.cells import Cell
 from bowdenfit.files.columns import Column, Quantity, find_columns, require, taken_in_pairs
 from bowdenfit.files.csv_table import read_csv
+from bowdenfit.files.row_account import RowAccount
 from bowdenfit.kinds.forces.mountings import each_row_apart, mountings, numbered_anew
 from bowdenfit.kinds.groups import GROUP, NO_GROUP, read_groups
 from bowdenfit.kinds.kind import Found, Source
@@ -76,10 +77,10 @@ def read_forces(source: Source) -> Found[ForceTable]:
     parts = [_read_force_file(path, source) for path in paths]
     names: list[str] = []
     runs = []
-    for path, (part, _) in zip(paths, parts, strict=True):
+    for path, (part, *_) in zip(paths, parts, strict=True):
         runs.append(part.run + len(names))
         names += [f"{path.stem}:{name}" if len(paths) > 1 else name for name in part.run_names]
-    tables = [part for part, _ in parts]
+    tables = [part for part, *_ in parts]
     own = OwnAngles(
         tuple(contacts),
         np.concatenate([t.own.angle for t in tables]),
@@ -102,8 +103,9 @@ def read_forces(source: Source) -> Found[ForceTable]:
         _one_velocity_unit(tables),
         _groups(tables),
     )
-    remarks = dict.fromkeys(remark for _, said in parts for remark in said)
-    return Found(merged, {source.name_of(path): path for path in paths}, tuple(remarks))
+    remarks = dict.fromkeys(remark for _, said, _ in parts for remark in said)
+    accounts = tuple(account for *_, account in parts)
+    return Found(merged, {source.name_of(path): path for path in paths}, tuple(remarks), accounts)
 
 
 def _groups(tables: Sequence[ForceTable]) -> tuple[str, ...]:
@@ -123,7 +125,7 @@ def _one_velocity_unit(tables: Sequence[ForceTable]) -> str:
     return next(iter(units), "")
 
 
-def _read_force_file(path: Path, source: Source) -> tuple[ForceTable, list[str]]:
+def _read_force_file(path: Path, source: Source) -> tuple[ForceTable, list[str], RowAccount]:
     table, route, contacts = read_csv(path), source.description.route, source.description.angle_columns
     forces = (Quantity("input_force", "force"), Quantity("output_force", "force"))
     others = (Quantity("run", "text"), Quantity("stroke", "text"), Quantity("velocity", "speed"), GROUP)
@@ -147,7 +149,7 @@ def _read_force_file(path: Path, source: Source) -> tuple[ForceTable, list[str]]
         )
     velocity, unit = _velocities(found.get("velocity"), len(table.rows))
     parts = (route_values, input_force, output_force, run, run_names, strokes, own, origin, velocity, unit, group)
-    return ForceTable(*parts), remarks
+    return ForceTable(*parts), remarks, table.account
 
 
 def _velocities(column: Column | None, n_rows: int) -> tuple[Vector, str]:

@@ -96,7 +96,7 @@ def read_loop(source: Source) -> Found[LoopTable]:
         remarks.append(
             f"{table.file} has the column {shown(angles[0])}, which no contact in cable.toml reads; it is left out of account."
         )
-    return Found(made, {path.name: path}, tuple(remarks))
+    return Found(made, {path.name: path}, tuple(remarks), (table.account,))
 
 
 def _end(table: RawTable, found: Mapping[str, Column], end: str, pulleys: Pulleys) -> Vector:

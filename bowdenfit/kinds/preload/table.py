@@ -58,4 +58,4 @@ def read_preload(source: Source) -> Found[PreloadTable]:
         np.array([read_tension(cell, preloads, "a preload") for cell in preloads.cells]),
         provenance_of(table),
     )
-    return Found(rows, {path.name: path})
+    return Found(rows, {path.name: path}, accounts=(table.account,))

@@ -76,7 +76,8 @@ def read_stretch(source: Source) -> Found[StretchTable]:
     peak = np.array([load[cycle == c].max() for c in cycle])
     made = StretchTable(load, wrap_angle, np.asarray(stretch), unloading, peak, cycle, names, provenance_of(table))
     _check_rising(stretches, made)
-    return Found(made, {path.name: path}, tuple(_branch_remarks(table, made, "branch" in found)))
+    remarks = tuple(_branch_remarks(table, made, "branch" in found))
+    return Found(made, {path.name: path}, remarks, (table.account,))
 
 
 def _branch_remarks(table: RawTable, made: StretchTable, stated: bool) -> list[str]:

@@ -24,7 +24,7 @@ def read(source):
     table = read_csv(path)
     found = find_columns(table, (Quantity("input_force", "force"), Quantity("loss", "force")), source.settings.columns)
     force, loss = (require(table, found, name, f"{name}_N").numbers() for name in ("input_force", "loss"))
-    return Found(LossTable(np.array(force), np.array(loss)), {path.name: path})
+    return Found(LossTable(np.array(force), np.array(loss)), {path.name: path}, accounts=(table.account,))
 
 
 def describe(table, description):

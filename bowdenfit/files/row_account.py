@@ -1,0 +1,104 @@
+"""Where the rows of a file went: every one is read, holds headings, or is left out for a reason."""
+
+from collections.abc import Iterable, Mapping
+from dataclasses import dataclass
+
+from bowdenfit.words import few, shown
+
+BLANK, COMMENT = "blank", "a comment"
+_USUAL = (BLANK, COMMENT)  # reasons that nobody needs to hear of where nothing else is left out
+_RANGES, _TEXTS = 4, 3  # that are named
+
+
+@dataclass(frozen=True)
+class LeftOut:
+    """Rows that are not read, for one reason.
+
+    Args:
+        why: The reason, behind the words "not used, ".
+        ranges: First and last of the rows that stand together.
+        texts: What the first of them say.
+    """
+
+    why: str
+    ranges: tuple[tuple[int, int], ...]
+    texts: tuple[str, ...] = ()
+
+    @property
+    def count(self) -> int:
+        """How many rows they are."""
+        return sum(last - first + 1 for first, last in self.ranges)
+
+    @property
+    def words(self) -> str:
+        """Which rows, why, and what the first of them say."""
+        many = self.count > 1
+        where = few([f"{first} to {last}" if last > first else f"{first}" for first, last in self.ranges], _RANGES)
+        says = f" ({', '.join(shown(text) for text in self.texts)}{', ...' if self.count > len(self.texts) else ''})"
+        return f"row{'s' if many else ''} {where}: {self.why}{says if self.texts else ''}"
+
+
+@dataclass(frozen=True)
+class RowAccount:
+    """Where the rows of a file went; `read`, `headings` and `left_out` together are all of them.
+
+    Args:
+        file: Its name.
+        rows: Number of its rows.
+        read: How many hold readings.
+        headings: The rows that hold headings and their units.
+        left_out: All others.
+        beside: Row and text of remarks in rows that are read, beside the table.
+    """
+
+    file: str
+    rows: int
+    read: int
+    headings: tuple[int, ...] = ()
+    left_out: tuple[LeftOut, ...] = ()
+    beside: tuple[tuple[int, str], ...] = ()
+
+    @property
+    def accounted(self) -> int:
+        """How many rows are accounted for."""
+        return self.read + len(self.headings) + sum(each.count for each in self.left_out)
+
+    @property
+    def remarks(self) -> list[str]:
+        """What is said of rows whose loss may matter, in sentences."""
+        said = [f"{self.file}, {each.words}; not used." for each in self.left_out if each.why not in _USUAL]
+        return said + [f"{self.file}, {self.beside_in_words}."] * bool(self.beside)
+
+    @property
+    def beside_in_words(self) -> str:
+        """What stands beside the table."""
+        texts = few([f"{shown(text)} in row {row}" for row, text in self.beside], _TEXTS)
+        return f"beside the table: {texts}; not used"
+
+
+def account_of(
+    file: str, rows: int, headings: Iterable[int], reasons: Mapping[int, tuple[str, str]], beside: Iterable[tuple[int, str]]
+) -> RowAccount:
+    """The account of a file of which some rows are not read.
+
+    Args:
+        file: Its name.
+        rows: Number of its rows.
+        headings: The rows that hold headings and their units.
+        reasons: Why a row is not read, and what it says; by its number.
+        beside: Row and text of remarks beside the table.
+    """
+    ranges: dict[str, list[tuple[int, int]]] = {}
+    texts: dict[str, list[str]] = {}
+    for row in sorted(reasons):
+        why, text = reasons[row]
+        of_reason, said = ranges.setdefault(why, []), texts.setdefault(why, [])
+        if of_reason and of_reason[-1][1] == row - 1:
+            of_reason[-1] = (of_reason[-1][0], row)
+        else:
+            of_reason.append((row, row))
+        if text and len(said) < _TEXTS:
+            said.append(text)
+    left_out = tuple(LeftOut(why, tuple(ranges[why]), tuple(texts[why])) for why in ranges)
+    over = tuple(headings)
+    return RowAccount(file, rows, rows - len(over) - len(reasons), over, left_out, tuple(beside))

@@ -10,6 +10,7 @@ from bowdenfit.description import Description
 from bowdenfit.description.file import override
 from bowdenfit.errors import DescriptionError
 from bowdenfit.files.row_account import RowAccount
+from bowdenfit.inputs import refuse_special
 from bowdenfit.kinds import KINDS, each_table
 from bowdenfit.kinds.kind import Source
 from bowdenfit.kinds.measured_groups import measured_groups
@@ -142,5 +143,6 @@ def read_dataset(
 
 
 def _sha256(path: Path) -> str:
+    refuse_special(path)
     with path.open("rb") as file:
         return hashlib.file_digest(file, "sha256").hexdigest()

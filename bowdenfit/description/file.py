@@ -10,6 +10,7 @@ from pydantic import BaseModel, ValidationError
 from bowdenfit.description import SCHEMA, Description, ParameterSetting, QuantityValue, Route
 from bowdenfit.description.elastic import check_elastic
 from bowdenfit.errors import DatasetError, DescriptionError, nearest
+from bowdenfit.inputs import read_toml_file
 from bowdenfit.units import route_conversion_factor
 from bowdenfit.words import shown
 
@@ -27,17 +28,8 @@ def read_toml(path: Path, overrides: Sequence[str] = ()) -> dict[str, Any]:
     Raises:
         DescriptionError: The file is missing or no TOML, or a setting leads nowhere.
     """
-    try:
-        raw = tomllib.loads(path.read_text(encoding="utf-8-sig"))
-    except FileNotFoundError:
-        raise DescriptionError(
-            f"{path} does not exist; name a folder that holds a cable.toml, or write one with `bowdenfit init FOLDER`."
-        ) from None
-    except (tomllib.TOMLDecodeError, UnicodeDecodeError) as error:
-        raise DescriptionError(f"{path.name} is not valid TOML: {error}.") from None
-    except OSError as error:
-        raise DescriptionError(f"{path} cannot be read ({error.strerror}).") from None
-    return override(raw, overrides)
+    remedy = "name a folder that holds a cable.toml, or write one with `bowdenfit init FOLDER`"
+    return override(read_toml_file(path, remedy)[1], overrides)
 
 
 def override(raw: dict[str, Any], overrides: Sequence[str]) -> dict[str, Any]:
@@ -131,7 +123,7 @@ def _set(raw: dict[str, Any], override: str) -> None:
         raise DescriptionError(f"--set {override!r} is not of the form key=value, such as friction.mu1.fixed=0.1.")
     try:
         value = tomllib.loads(f"value = {text.strip()}")["value"]
-    except tomllib.TOMLDecodeError:
+    except (ValueError, RecursionError):  # a name without quotes, mostly
         value = text.strip()
     node: Any = raw
     *parents, last = key.strip().split(".")

@@ -9,6 +9,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from bowdenfit.errors import DatasetError
+from bowdenfit.inputs import refuse_special
 
 _BYTE_ORDER_MARKS = ((b"\xff\xfe", "utf-16-le"), (b"\xfe\xff", "utf-16-be"), (b"\xef\xbb\xbf", "utf-8"))
 _COMMENT = re.compile(r"\s*\"?\s*(?P<mark>#(?!n/a|div/0!|value!|num!|ref!|na\b)|%)", re.IGNORECASE)
@@ -72,6 +73,7 @@ def first_bytes(path: Path, most: int = -1) -> bytes:
             f"{path.name} is a folder, not a recording or a table; give one of the files in it "
             "(only a ROS 2 bag is a folder, and it holds a metadata.yaml)."
         )
+    refuse_special(path)
     try:
         with path.open("rb") as file:
             data = file.read(most)

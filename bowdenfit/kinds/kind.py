@@ -11,6 +11,7 @@ from bowdenfit.description import Description, Table, TableSettings
 from bowdenfit.description.file import Stated
 from bowdenfit.errors import DatasetError
 from bowdenfit.files.row_account import RowAccount
+from bowdenfit.inputs import matching
 from bowdenfit.kinds.design import Design
 from bowdenfit.kinds.measurements import Measurements
 from bowdenfit.kinds.pages import Page
@@ -51,7 +52,7 @@ class Source:
         named = [name for part in stated if part for name in ([part] if isinstance(part, str) else part)]
         paths: list[Path] = []
         for name in named:
-            matches = sorted(self.folder.glob(name)) if any(c in name for c in "*?[") else [self.folder / name]
+            matches = matching(self.folder, name) if any(c in name for c in "*?[") else [self.folder / name]
             if not matches:
                 raise DatasetError(
                     f"no file in {self.folder} matches {name!r}, which cable.toml names for the table {self.kind}."

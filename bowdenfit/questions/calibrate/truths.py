@@ -11,7 +11,6 @@ A calibration with truths from the priors cannot see a bad prior; one with state
 """
 
 import math
-import tomllib
 from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
@@ -20,7 +19,8 @@ from typing import Any
 import jax.numpy as jnp
 import numpy as np
 
-from bowdenfit.errors import UsageError, nearest
+from bowdenfit.errors import DescriptionError, UsageError, nearest
+from bowdenfit.inputs import read_toml_file
 from bowdenfit.parameters.space import Parameter, ParameterSpace
 from bowdenfit.words import shown
 
@@ -65,11 +65,9 @@ def read_truths(path: Path) -> dict[str, Any]:
         UsageError: There is no such file, or it is none.
     """
     try:
-        page = tomllib.loads(path.read_text(encoding="utf-8"))
-    except OSError as error:
-        raise UsageError(f"the truths of --truth cannot be read from {path} ({error.strerror}); name a file.") from None
-    except (tomllib.TOMLDecodeError, UnicodeDecodeError) as error:
-        raise UsageError(f"{path} is no TOML file ({error}); write lines such as tau = [0.002, 0.3].") from None
+        _, page = read_toml_file(path)
+    except DescriptionError as error:
+        raise UsageError(f"--truth: {error} Write lines such as tau = [0.002, 0.3].") from None
     if not page:
         raise UsageError(f"{path} states no true value; write lines such as mu = 0.1, or leave --truth out.")
     return page

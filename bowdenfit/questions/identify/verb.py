@@ -1,11 +1,12 @@
 """What measurements determine: of a fit, of tables before sampling, or of a plan before anything is measured."""
 
-import tomllib
 from collections.abc import Mapping
 from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any, Unpack
 
+from bowdenfit.errors import DescriptionError
+from bowdenfit.inputs import read_toml_file
 from bowdenfit.questions.writing import files_of, write_answer
 from bowdenfit.reading import Reading, read, refuse_unknown
 from bowdenfit.verb import Argument, Option, Output, Reply, Verb
@@ -68,8 +69,8 @@ def _is_plan(path: Path) -> bool:
     if path.suffix != ".toml" or not path.is_file():
         return False
     try:
-        return "design" in tomllib.loads(path.read_text(encoding="utf-8-sig"))
-    except (OSError, UnicodeDecodeError, tomllib.TOMLDecodeError):
+        return "design" in read_toml_file(path)[1]
+    except DescriptionError:
         return False  # the reader says what is wrong
 
 

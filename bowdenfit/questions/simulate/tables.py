@@ -2,7 +2,6 @@
 
 import json
 import re
-import tomllib
 from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
@@ -13,6 +12,7 @@ import jax
 from bowdenfit.dataset import DESCRIPTION_FILE, Dataset
 from bowdenfit.description import Description
 from bowdenfit.errors import DescriptionError
+from bowdenfit.inputs import read_toml_file
 from bowdenfit.kinds import each_table
 from bowdenfit.kinds.design import Design
 from bowdenfit.kinds.designs import read_design
@@ -41,13 +41,7 @@ def plan_page(path: Path) -> tuple[str, dict[str, Any]]:
     Raises:
         DescriptionError: The file is missing or no TOML.
     """
-    try:
-        text = path.read_text(encoding="utf-8-sig")
-        return text, tomllib.loads(text)
-    except OSError as error:
-        raise DescriptionError(f"{path} cannot be read ({error.strerror}); name a bench.toml.") from None
-    except (tomllib.TOMLDecodeError, UnicodeDecodeError) as error:
-        raise DescriptionError(f"{path.name} is not valid TOML: {error}.") from None
+    return read_toml_file(path, "name a bench.toml")
 
 
 def truth_of(raw: Mapping[str, Any], file: str) -> Mapping[str, float]:

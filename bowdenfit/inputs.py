@@ -1,0 +1,100 @@
+"""What may be opened at all: regular files of a size that fits what they are, found by patterns that end."""
+
+import os
+import stat
+import tomllib
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+from bowdenfit.errors import BowdenfitError, DatasetError, DescriptionError
+
+_LARGEST_TOML = 4_000_000  # bytes; a description has some thousand
+_DEEPEST = 12  # keys below keys; a description has four
+_SPECIAL = {
+    stat.S_ISFIFO: "a named pipe",
+    stat.S_ISCHR: "a device",
+    stat.S_ISBLK: "a device",
+    stat.S_ISSOCK: "a socket",
+}
+
+
+def refuse_special(path: Path, error: Callable[[str], BowdenfitError] = DatasetError) -> None:
+    """Refuse what is neither a file nor a folder, before it is opened: a pipe waits for ever, a device never ends.
+
+    Args:
+        path: To be opened; links are followed.
+        error: What is raised.
+
+    Raises:
+        BowdenfitError: Of that type.
+    """
+    try:
+        mode = path.stat().st_mode
+    except (OSError, ValueError):
+        return  # whoever opens it says that it is missing
+    for is_so, what in _SPECIAL.items():
+        if is_so(mode):
+            raise error(f"{path.name} is {what}, not a file; copy what it gives into a file, and name that.")
+
+
+def read_toml_file(path: Path, remedy: str = "") -> tuple[str, dict[str, Any]]:
+    """Text and plain data of a TOML file.
+
+    Args:
+        path: The file.
+        remedy: What to do where there is none.
+
+    Raises:
+        DescriptionError: It is missing, cannot be read, or is no TOML that a person would write.
+    """
+    refuse_special(path, DescriptionError)
+    try:
+        if path.stat().st_size > _LARGEST_TOML:
+            raise DescriptionError(f"{path.name} is larger than 4 MB; a TOML file that describes a cable has a few kB.")
+        text = path.read_text(encoding="utf-8-sig")
+        page = tomllib.loads(text)
+    except FileNotFoundError:
+        raise DescriptionError(f"{path} does not exist; {remedy or 'check the spelling and the folder'}.") from None
+    except OSError as error:
+        raise DescriptionError(f"{path} cannot be read ({error.strerror or os.strerror(error.errno or 0)}).") from None
+    except RecursionError:
+        raise DescriptionError(f"{path.name} is nested too deeply; a description has at most {_DEEPEST} levels.") from None
+    except ValueError as error:  # no UTF-8, no TOML, a number of thousands of digits, an impossible path
+        raise DescriptionError(f"{path.name} is not valid TOML: {' '.join(str(error).split())[:200]}.") from None
+    if _is_deeper(page, _DEEPEST):
+        raise DescriptionError(f"{path.name} is nested too deeply; a description has at most {_DEEPEST} levels.")
+    return text, page
+
+
+def _is_deeper(page: dict[str, Any], levels: int) -> bool:
+    """Whether keys lie below more than so many others."""
+    layer: list[Any] = [page]
+    for _ in range(levels):
+        inside = [part for x in layer for part in (x.values() if isinstance(x, dict) else x)]
+        layer = [part for part in inside if isinstance(part, dict | list)]
+        if not layer:
+            return False
+    return True
+
+
+def matching(folder: Path, pattern: str) -> list[Path]:
+    """Files that a pattern names, in sorted order.
+
+    Args:
+        folder: Where the pattern starts.
+        pattern: With *, ? and [...]; ** for folders at any depth once.
+
+    Raises:
+        DescriptionError: The pattern starts elsewhere, or would take too long.
+    """
+    if pattern.startswith(("/", "~", "\\")) or "\0" in pattern or ":" in pattern[:3]:
+        raise DescriptionError(
+            f"cable.toml: the pattern {pattern!r} does not start in the folder of cable.toml; write it as seen from there, "
+            'such as "recordings/*.csv".'
+        )
+    if pattern.count("**") > 1 or pattern.count("*") > 12:
+        raise DescriptionError(
+            f'cable.toml: the pattern {pattern[:60]!r} has too many stars; name the files, or write "recordings/*.csv".'
+        )
+    return sorted(folder.glob(pattern))

@@ -1,0 +1,108 @@
+"""What may be opened: regular files of a size that fits; patterns end; TOML that nobody would write is a sentence."""
+
+import os
+import shutil
+import socket
+import time
+
+import pytest
+
+import bowdenfit as bf
+
+
+@pytest.fixture
+def cable(on_body, tmp_path):
+    return shutil.copytree(on_body, tmp_path / "cable")
+
+
+def replace_in(path, old, new):
+    text = path.read_text()
+    assert old in text
+    path.write_text(text.replace(old, new))
+
+
+def pipe(path):
+    os.mkfifo(path)
+
+
+def endless(path):
+    path.symlink_to("/dev/zero")
+
+
+def listening(path):
+    with socket.socket(socket.AF_UNIX) as one:
+        one.bind(str(path))
+
+
+@pytest.mark.parametrize(("make", "what"), [(pipe, "a named pipe"), (endless, "a device"), (listening, "a socket")])
+@pytest.mark.parametrize("name", ["angles.csv", "efficiencies.csv", "cable.toml"])
+def test_what_is_no_file_is_refused_before_it_is_opened(cable, monkeypatch, name, make, what):
+    (cable / name).unlink()
+    monkeypatch.chdir(cable)  # names of sockets are short
+    make((cable / name).relative_to(cable))
+    with pytest.raises(bf.BowdenfitError, match=f"{name} is {what}, not a file"):
+        bf.check(cable)
+
+
+@pytest.mark.parametrize("ending", [".csv", ".mat", ".xlsx", ".h5", ".mf4"])
+def test_a_recording_that_is_a_pipe_is_refused(tmp_path, ending):
+    os.mkfifo(tmp_path / f"run{ending}")
+    with pytest.raises(bf.DatasetError, match="is a named pipe, not a file"):
+        bf.read(tmp_path / f"run{ending}", wrap_angle=(180, "deg"))
+
+
+@pytest.mark.parametrize(
+    ("text", "says"),
+    [
+        ("x = " + "[" * 5000 + "]" * 5000, "nested too deeply"),
+        (".".join(["a"] * 20_000) + " = 1", "nested too deeply"),
+        ("a = {" + "b = {" * 400 + "}" * 401, "nested too deeply"),
+        ("x = " + "9" * 5000, "is not valid TOML"),
+        ("x = 1\n" * 3, "is not valid TOML"),
+        ("#" * 5_000_000, "larger than 4 MB"),
+        ('x = "\x00"', "is not valid TOML"),
+    ],
+    ids=["list", "dots", "tables", "digits", "twice", "large", "nul"],
+)
+def test_toml_that_nobody_would_write_is_a_sentence(cable, text, says):
+    (cable / "cable.toml").write_text(text)
+    with pytest.raises(bf.DescriptionError, match=says) as refused:
+        bf.check(cable)
+    assert len(str(refused.value)) < 400
+
+
+def test_a_description_that_is_no_utf_8_is_a_sentence(cable):
+    (cable / "cable.toml").write_bytes(b'name = "\xff\xfe"')
+    with pytest.raises(bf.DescriptionError, match="not valid TOML"):
+        bf.check(cable)
+
+
+@pytest.mark.parametrize(
+    ("pattern", "says"),
+    [("/etc/*", "does not start in the folder"), ("a*\\u0000", "does not start in the folder"),
+     ("**/**/**/*.csv", "too many stars"), ("*a" * 30, "too many stars"), ("nothing*.csv", "no file in")],
+)  # fmt: skip
+def test_patterns_end(cable, pattern, says):
+    replace_in(cable / "cable.toml", '"efficiencies.csv"', f'"{pattern}"')
+    start = time.monotonic()
+    with pytest.raises(bf.BowdenfitError, match=says):
+        bf.check(cable)
+    assert time.monotonic() - start < 5
+
+
+@pytest.mark.parametrize(
+    "setting",
+    [
+        "contact.².friction=mu",
+        "contact.9.friction=mu",
+        "x=" + "9" * 5000,
+        "x=" + "[" * 3000,
+        "=",
+        "tables=",
+        "a.b.c.d=1",
+    ],
+)
+def test_settings_that_lead_nowhere_are_sentences(on_body, setting):
+    with pytest.raises(bf.DescriptionError) as refused:
+        bf.check(on_body, settings=[setting])
+    assert len(str(refused.value)) < 600

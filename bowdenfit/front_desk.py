@@ -6,6 +6,7 @@ from typing import Any
 
 from bowdenfit.questions.bends.answer import Elastic, elastic_answers
 from bowdenfit.questions.check.answer import Checks, checks_of
+from bowdenfit.questions.groups.answer import Groups, groups_of
 from bowdenfit.questions.identify.answer import Identifiability
 from bowdenfit.questions.identify.judgment import identifiability
 from bowdenfit.questions.kept import answers_of
@@ -51,6 +52,11 @@ class Fit(Record):
     def checks(self) -> Checks | None:
         """Every reading against its prediction from all the others, and what the priors do; None without draws."""
         return checks_of(self)
+
+    @property
+    def groups(self) -> Groups | None:
+        """Groups of readings that have coefficients of their own, with their contrasts; None without such, or without draws."""
+        return groups_of(self)
 
     def summary(self) -> dict[str, Any]:
         """Everything on one page, for programs (the contents of summary.json)."""

@@ -24,7 +24,7 @@ from bowdenfit.inference.objective import Solution
 from bowdenfit.inference.profiles import Basin
 from bowdenfit.inference.testable_readings import Readings, System, readings_to_test
 from bowdenfit.kinds.inside_runs import SPEED, STROKE
-from bowdenfit.kinds.term import LOAD
+from bowdenfit.kinds.term import GROUP, LOAD
 from bowdenfit.model import Model
 
 _MANY = 30  # readings from which their own scatter weighs them
@@ -124,6 +124,8 @@ def _columns(against: str, x: np.ndarray, mine: np.ndarray, of_curve: bool) -> I
         yield np.log(np.maximum(np.where(mine, x, 1.0), np.max(x[mine]) / 1e3))[:, None]
     elif against == STROKE:
         yield x[:, None].astype(float)
+    elif against == GROUP:
+        yield (x[:, None] == np.unique(x[mine])[None, :]).astype(float)
     else:
         low, high = np.min(x[mine]), np.max(x[mine])
         degree = min(_OF_CURVE if of_curve else _OF_PLACE, len(np.unique(x[mine])) - 1)

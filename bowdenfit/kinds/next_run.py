@@ -168,7 +168,7 @@ class _Rows:
 FORCE_RUN = CandidateKind(
     name="force",
     noun="force run",
-    words=lambda _: "a force run",
+    words=lambda cable: f"a force run{f' of the group {cable.friction.groups[0]}' if cable.friction.groups else ''}",
     example="force@470",
     order=1,
     needs=(RUN_SCATTER,),

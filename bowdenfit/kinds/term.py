@@ -104,7 +104,7 @@ class Circumstances:
         return noise_law(self.cable.description)
 
 
-LOAD, WRAP_ANGLE = "Load (N)", "Wrap angle (deg)"  # labels of places
+LOAD, WRAP_ANGLE, GROUP = "Load (N)", "Wrap angle (deg)", "Group"  # labels of places
 
 
 def what_was_read(term: Term, description: Description) -> np.ndarray:

@@ -7,7 +7,7 @@ from bowdenfit.kinds.forces.following import check_following
 from bowdenfit.kinds.forces.gained import check_gains
 from bowdenfit.kinds.forces.mountings import ForceSettings
 from bowdenfit.kinds.forces.table import ForceTable, read_forces
-from bowdenfit.kinds.forces.words import ForceDesign, count, describe, empty, implausible, page
+from bowdenfit.kinds.forces.words import ForceDesign, count, describe, empty, implausible, page, warnings
 from bowdenfit.kinds.kind import Kind, itself
 from bowdenfit.kinds.measurements import Measurements
 from bowdenfit.kinds.readings import Readings, efficiencies
@@ -38,6 +38,7 @@ FORCES = Kind(
     read=read_forces,
     check=_check,
     describe=describe,
+    warnings=warnings,
     implausible=implausible,
     page=page,
     design=ForceDesign,

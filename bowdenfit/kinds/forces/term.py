@@ -22,9 +22,11 @@ from bowdenfit.kinds.row_angles import row_angles
 from bowdenfit.kinds.runs import RunsTerm, run_sums
 from bowdenfit.kinds.shared_parameters import force_noise, offsets, run_scatter
 from bowdenfit.kinds.sliding_rows import ROW_ARRAYS, SlidingRows
-from bowdenfit.kinds.term import Circumstances, TermKind
+from bowdenfit.kinds.term import GROUP, LOAD, Circumstances, Term, TermKind
 from bowdenfit.parameters.space import Parameter
 from bowdenfit.types import Labels
+
+_ONE_LOAD = 1.05  # highest over lowest load of a run that counts as made at one
 
 
 def force_terms(cable: Cable, table: ForceTable, angles: AngleTable | None) -> tuple[RunsTerm | HeldForcesTerm, ...]:
@@ -159,6 +161,24 @@ def _drawn_table(_: Description, table: ForceTable, drawn: Mapping[str, np.ndarr
     return replace(table, input_force=drawn["input_force"], output_force=drawn["output_force"])
 
 
+def _where(table: ForceTable, term: Term) -> Mapping[str, np.ndarray]:
+    """Load of each run, where each was made at one and not all at the same; number of its group, from 1."""
+    if not isinstance(term, RunsTerm) or term.rows is None:
+        return {}
+    runs, run = np.unique(term.rows.run, return_inverse=True)
+    load, found = term.rows.input_force, dict[str, np.ndarray]()
+    low, high = np.full(len(runs), np.inf), np.zeros(len(runs))
+    np.minimum.at(low, run, load)
+    np.maximum.at(high, run, load)
+    if np.all(high <= _ONE_LOAD * low) and high.max() > _ONE_LOAD**2 * low.min():
+        found[LOAD] = (low + high) / 2
+    if table.group:
+        names = term.cable.friction.conditions.groups
+        of_run = [table.group[int(np.argmax((table.run == number) & (table.stroke != 0)))] for number in runs]
+        found[GROUP] = np.array([1.0 + names.index(name) for name in of_run])
+    return found
+
+
 FORCES = TermKind(
     "forces",
     force_terms,
@@ -166,4 +186,5 @@ FORCES = TermKind(
     Remeasurement(_draw, _drawn_table),
     FORCE_RUN,
     tells_mountings=True,
+    where=_where,
 )

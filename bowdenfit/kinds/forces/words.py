@@ -1,5 +1,7 @@
 """Tables of forces in words and in rows: what was read, what is plausible, and how a file says it."""
 
+from collections import Counter
+
 import numpy as np
 from pydantic import Field, model_validator
 
@@ -7,9 +9,11 @@ from bowdenfit.description import Description, Finite
 from bowdenfit.errors import nearest
 from bowdenfit.kinds.design import Design, Stroke, radians, signs
 from bowdenfit.kinds.forces.table import ForceTable
+from bowdenfit.kinds.measurements import Measurements
 from bowdenfit.kinds.pages import STROKE_NAMES, Page, route_cells, route_heading
 from bowdenfit.kinds.plausibility import SCATTER, beyond, parts
 from bowdenfit.kinds.rows import OwnAngles, RowOrigin
+from bowdenfit.words import listed
 
 
 def count(table: ForceTable) -> str:
@@ -28,6 +32,22 @@ def describe(table: ForceTable, description: Description) -> list[str]:
     low, high = table.input_force.min(), table.input_force.max()
     weights = ", of hung weights without noise" if description.sensors.noise_ratio == 0 else ""
     return [f"{files}: {count(table)} ({counts}), input {low:.4g} to {high:.4g} N{weights}"]
+
+
+def warnings(table: ForceTable, description: Description, measurements: Measurements) -> list[str]:
+    """Groups of which there is one mounting, which its coefficient cannot be told from."""
+    del measurements
+    if not description.by_group:
+        return []
+    mounted = Counter(name for name, _ in set(zip(table.group, table.run.tolist(), strict=True)))
+    once = [name for name in dict.fromkeys(table.group) if mounted[name] == 1]
+    if not once:
+        return []
+    return [
+        f"{listed(once)}: measured in one mounting of the cable{' each' if len(once) > 1 else ''}, so what that mounting did "
+        "cannot be told from what the group does, and intervals rest on the scatter of other mountings, or on its prior; mount "
+        "the cable anew a few times in each group."
+    ]
 
 
 def implausible(real: ForceTable, made: ForceTable) -> str:

@@ -4,11 +4,12 @@
 from collections.abc import Sequence
 
 from bowdenfit.cable.registry import CURVES
+from bowdenfit.description import BY_GROUP
 from bowdenfit.inference.departure import FALSE_ALARM, Departure
 from bowdenfit.kinds import readings_called
 from bowdenfit.kinds.inside_runs import ORDER, SPEED, STROKE
 from bowdenfit.kinds.places import RUN
-from bowdenfit.kinds.term import LOAD
+from bowdenfit.kinds.term import GROUP, LOAD
 from bowdenfit.questions.check.answer import Checks, checks_of
 from bowdenfit.results.record import Record, once
 from bowdenfit.words import few, listed
@@ -52,7 +53,7 @@ def _sentence(fit: Record, found: Departure) -> str:
     what = _called(found.group) if found.group else readings.words
     read = "the loss" if readings.are_efficiencies else "what was read"
     low, high = (_much(each) for each in (found.at_low, found.at_high))
-    where = _ends(found)
+    where = _ends(found, fit.model.cable.friction.conditions.groups)
     return (
         f"The model does not describe {what}: {where[0]} {read} is {low} than the model says, and {where[1]} {high}; chance "
         f"does as much in {_odds(found.chance)}. {_remedy(fit, found)}"
@@ -75,8 +76,11 @@ def _odds(chance: float) -> str:
     return f"one healthy fit of {float(f'{1 / chance:.1g}'):,.0f}"
 
 
-def _ends(found: Departure) -> tuple[str, str]:
+def _ends(found: Departure, groups: Sequence[str]) -> tuple[str, str]:
     """Where the lowest and the highest third were taken."""
+    if found.against == GROUP:
+        low, high = (groups[round(number) - 1] for number in (found.low, found.high))
+        return f"in the group {low}", f"in the group {high}"
     if found.against == STROKE:
         return ("on the return", "on the pull") if found.inside else ("on the way there", "on the way back")
     if found.against in (ORDER, RUN):
@@ -98,6 +102,8 @@ def _remedy(fit: Record, found: Departure) -> str:
         return _other_friction(model, ("rate-dependent",), "the delay between the channels")
     if found.against == STROKE and losses:
         return _other_friction(model, ("stroke-dependent",), "the zero and the gain of both load cells")
+    if found.against == GROUP:
+        return _other_friction(model, (BY_GROUP,), "what else is not the same in these groups")
     if found.against in (ORDER, RUN):
         return (
             "Something drifted while it was measured: temperature, wear, or the zero of a load cell. Tare before each run, "

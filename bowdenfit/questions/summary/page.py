@@ -12,6 +12,7 @@ from bowdenfit.kinds.recordings.accounts import preparation_pages
 from bowdenfit.kinds.term import Term
 from bowdenfit.questions.bends.overview import elastic_overview
 from bowdenfit.questions.check.answer import checks_of
+from bowdenfit.questions.groups.answer import groups_of
 from bowdenfit.questions.identify.confounding import confounded_pairs
 from bowdenfit.questions.identify.contradiction import agreement_page
 from bowdenfit.questions.recorded.lost_force import lost_force
@@ -56,6 +57,8 @@ def summarize(fit: Record) -> dict[str, Any]:
         page["recordings"] = preparation_pages(recordings)
     if elastic := elastic_overview(fit):
         page["elastic"] = elastic
+    if groups := groups_of(fit):
+        page["groups"] = groups
     if checks := checks_of(fit):
         page["checks"] = checks
     if (lost := lost_force(fit)) is not None:

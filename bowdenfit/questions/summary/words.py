@@ -10,6 +10,7 @@ from bowdenfit.kinds.terms import term_kind
 from bowdenfit.questions.bends.words import elastic_text
 from bowdenfit.questions.check.answer import checks_of
 from bowdenfit.questions.check.words import checks_text
+from bowdenfit.questions.groups.words import groups_text
 from bowdenfit.questions.identify.answer import say_what_is_determined
 from bowdenfit.questions.identify.confounding import confounded_pairs
 from bowdenfit.questions.identify.judgment import identifiability
@@ -42,6 +43,7 @@ def summary_text(fit: Record) -> str:
         _title(fit),
         _verdict(fit, page),
         parameters_text(fit),
+        groups_text(fit),
         _known(fit),
         _rests_on_prior(page),
         _curves(fit, page),

@@ -1,0 +1,1 @@
+"""Do groups of readings differ in friction?"""

@@ -1,0 +1,108 @@
+"""Contrasts between groups of readings: by how much the friction of a new rope differs from that of an old one."""
+
+from collections.abc import Iterator
+from dataclasses import dataclass, replace
+from itertools import combinations
+from typing import ClassVar
+
+import numpy as np
+
+from bowdenfit.cable.groups import coefficient_of
+from bowdenfit.inference.interval import Interval
+from bowdenfit.results.record import Record, once
+from bowdenfit.words import decimals
+
+_ALL_PAIRS = 4  # groups, of which each is compared with each; of more, all with the first
+_SURE = 0.999  # beyond which draws are too few to say more
+
+
+@dataclass(frozen=True)
+class Contrast:
+    """Friction coefficient of one group less that of another.
+
+    Args:
+        coefficient: Which coefficient.
+        group, less: The groups.
+        difference: Of the draws, a new mounting of the cable not in it: what the groups do on average.
+        probability: That it has the sign of its median, whichever that is: 0.5 where nothing is known of it.
+    """
+
+    coefficient: str
+    group: str
+    less: str
+    difference: Interval
+    probability: float
+
+    JSON: ClassVar = (..., ("in_words", "sentence"))
+
+    def sentence(self) -> str:
+        """'new less old: -0.140, 90 % interval -0.160 to -0.120, different (lower) with probability 0.99'"""
+        known, way = self.difference, "lower" if self.difference.median < 0 else "higher"
+        value, low, high = (f"{v:.{decimals(known.sd)}f}" for v in (known.median, known.q05, known.q95))
+        sure = f"above {_SURE}" if self.probability > _SURE else f"{self.probability:.3g}"
+        return (
+            f"{self.group} less {self.less}: {value}, 90 % interval {low} to {high}, different ({way}) with probability {sure}"
+        )
+
+    def __str__(self) -> str:
+        return self.sentence()
+
+
+@dataclass(frozen=True)
+class Groups:
+    """The groups of readings that have coefficients of their own.
+
+    Args:
+        names: In order.
+        predicted: The one that predictions are for.
+        contrasts: Between them.
+    """
+
+    names: tuple[str, ...]
+    predicted: str
+    contrasts: tuple[Contrast, ...]
+
+    def contrast(self, group: str, less: str, coefficient: str = "") -> Contrast:
+        """One of them, either way round.
+
+        Args:
+            group: A group.
+            less: The group that is taken off.
+            coefficient: Which coefficient; the first if omitted.
+
+        Raises:
+            KeyError: There is none of these groups.
+        """
+        mine = [c for c in self.contrasts if coefficient in ("", c.coefficient) and {c.group, c.less} == {group, less}]
+        if not mine:
+            raise KeyError(f"there is no contrast of {group!r} and {less!r}; groups are {', '.join(self.names)}.")
+        found, known = mine[0], mine[0].difference
+        if found.group == group:
+            return found
+        other_way = Interval(-known.mean, known.sd, -known.median, -known.q95, -known.q05)
+        return replace(found, group=group, less=less, difference=other_way)
+
+
+@once
+def groups_of(fit: Record) -> Groups | None:
+    """The groups of a fit and their contrasts; None where all readings share their coefficients, or without draws."""
+    names = fit.model.cable.friction.groups
+    if not names or fit.posterior is None:
+        return None
+    return Groups(names, names[0], tuple(_contrasts(fit, names)))
+
+
+def _contrasts(fit: Record, names: tuple[str, ...]) -> Iterator[Contrast]:
+    pairs = list(combinations(names, 2)) if len(names) <= _ALL_PAIRS else [(names[0], name) for name in names[1:]]
+    contacts = fit.dataset.description.contact
+    for coefficient in dict.fromkeys(c.friction for c in contacts if c.by_group):
+        for group, less in pairs:
+            draws = np.ravel(_draws(fit, coefficient_of(coefficient, group)) - _draws(fit, coefficient_of(coefficient, less)))
+            below = float(np.mean(draws < 0))
+            yield Contrast(coefficient, group, less, Interval.of(draws), max(below, 1 - below))
+
+
+def _draws(fit: Record, name: str) -> np.ndarray | float:
+    """Draws of a coefficient, or what it is fixed at."""
+    values = fit.draws().values
+    return values[name] if name in values else next(p.fixed or 0.0 for p in fit.model.space.fixed if p.name == name)

@@ -141,7 +141,7 @@ def _set(default: Parameter, setting: ParameterSetting) -> Parameter:
         return replace(parameter, fixed=setting.fixed / scale, prior_words="")
     if setting.measured is not None:
         value, sd = setting.measured.value, setting.measured.sd
-        words = f"measured {value:g} +- {sd:g}" + ("" if parameter.unit == "1" else f" {parameter.unit}")
+        words = f"measured {value:g} ± {sd:g}" + ("" if parameter.unit == "1" else f" {parameter.unit}")
         return replace(parameter, prior=TruncatedNormal(value / scale, sd / scale), fixed=None, prior_words=words)
     assert setting.prior is not None  # a setting has exactly one of the three
     _check_support(parameter, setting.prior)

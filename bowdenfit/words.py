@@ -1,12 +1,15 @@
 """Plain text as people read it: quoted values, lists in words, digits worth showing, filled paragraphs, aligned columns."""
 
 import math
+import re
 import textwrap
 from collections.abc import Collection, Iterable, Sequence
 from html import escape
 
 _LONGEST = 40  # characters of a quoted value
-WIDTH = 110
+WIDTH = 78  # of a line; a terminal has 80 columns, and some count bytes
+_KEPT = re.compile(r"(?<=\d) (?=(?:mm|N|deg|ms|points)\b|[%±])|(?<=±) (?=\d)")  # blanks at which no line ends
+_PLAIN = str.maketrans({"±": "+-", "µ": "u", "μ": "mu", "Λ": "Lambda", "²": "^2", "–": "-", "−": "-", "…": "..."})
 
 
 def shown(value: object) -> str:
@@ -48,10 +51,33 @@ def decimals(scale: float) -> int:
     return min(max(1 - math.floor(math.log10(scale)), 0), 8)
 
 
+def counted(n: int, noun: str, several: str = "") -> str:
+    """'1 run', '3 runs'."""
+    return f"{n} {noun}" if n == 1 else f"{n} {several or noun + 's'}"
+
+
+def percent(share: float, digits: int = 1, sign: str = "") -> str:
+    """A share in percent, such as '67.5 %'."""
+    return f"{100 * share:{sign}.{digits}f} %"
+
+
+def give_or_take(value: float, sd: float) -> str:
+    """A value with its standard deviation, such as '0.112 ± 0.013'."""
+    digits = decimals(sd)
+    return f"{value:.{digits}f} ± {sd:.{digits}f}"
+
+
+def in_ascii(text: str) -> str:
+    """The same for a terminal that has no more than ASCII."""
+    return text.translate(_PLAIN).encode("ascii", "replace").decode("ascii")
+
+
 def filled(text: str, indent: str = "") -> str:
-    """A paragraph in lines of at most `WIDTH` characters."""
+    """A paragraph in lines of at most `WIDTH` characters; no number loses its unit to the next line."""
     hanging = indent + ("  " if text.startswith("- ") else "")
-    return textwrap.fill(text, WIDTH, initial_indent=indent, subsequent_indent=hanging)
+    kept = _KEPT.sub("\N{NO-BREAK SPACE}", text)
+    lines = textwrap.wrap(kept, WIDTH, initial_indent=indent, subsequent_indent=hanging, break_on_hyphens=False)
+    return "\n".join(lines).replace("\N{NO-BREAK SPACE}", " ")
 
 
 def table(heads: Sequence[str], rows: Sequence[Sequence[str]], left: Collection[str] = ("prior", "unit")) -> str:

@@ -9,9 +9,9 @@ import click
 from bowdenfit.cli.commands import command
 from bowdenfit.cli.progress import INTERRUPTED
 from bowdenfit.cli.starting import completion, init
+from bowdenfit.cli.terminal import say
 from bowdenfit.errors import BowdenfitError
 from bowdenfit.verbs import VERBS
-from bowdenfit.words import printable
 
 _MADE = 50_000  # objects made before Python looks for garbage: most stay, and each look goes through all of them
 
@@ -37,7 +37,7 @@ def main() -> None:
         error.show()
         sys.exit(error.exit_code)
     except BowdenfitError as error:
-        click.echo(printable(f"Error: {error}"), err=True)
+        say(f"Error: {error}", err=True)
         sys.exit(error.exit_code)
     except (click.Abort, KeyboardInterrupt):
         click.echo("Interrupted.", err=True)
@@ -52,7 +52,7 @@ def main() -> None:
             f"Error: something went wrong inside bowdenfit ({type(error).__name__}: {error}). This is our fault: please "
             "report it with what BOWDENFIT_DEBUG=1 prints when you run the command again."
         )
-        click.echo(printable(text), err=True)
+        say(text, err=True)
         sys.exit(1)
 
 

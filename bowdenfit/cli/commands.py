@@ -11,8 +11,8 @@ import click
 
 from bowdenfit.cli.keywords import Keyword, keywords_of
 from bowdenfit.cli.progress import watch_verb
+from bowdenfit.cli.terminal import say
 from bowdenfit.verb import Argument, Reply, Verb
-from bowdenfit.words import printable
 
 if TYPE_CHECKING:
     from bowdenfit.front_desk import Fit
@@ -45,9 +45,9 @@ def _run(verb: Verb, keywords: tuple[Keyword, ...], given: dict[str, Any], as_js
     reply = _kept(verb, asked)
     if reply is None or (as_json and reply.page is None):
         reply = _answer(verb, keywords, given, asked)
-    click.echo(printable(_page(reply) if as_json else reply.text), nl=False)
+    say(_page(reply) if as_json else reply.text, nl=False)
     for note in reply.notes:
-        click.echo(printable(note), err=True)
+        say(note, err=True)
     return reply.exit_code
 
 
@@ -75,7 +75,7 @@ def _answer(verb: Verb, keywords: tuple[Keyword, ...], given: dict[str, Any], as
         asked["output"] = Path(verb.results) / _name_of(Path(asked["dataset"]))
     behind = dict(verb.behind)
     if "report" in inspect.signature(verb.function).parameters:
-        behind["report"] = lambda sentence: click.echo(printable(sentence), err=True)
+        behind["report"] = lambda sentence: say(sentence, err=True)
     if verb.watch is None:
         answer = verb.function(**asked, **behind)
     else:

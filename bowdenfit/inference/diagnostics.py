@@ -7,6 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from bowdenfit.types import ChainDraws
+from bowdenfit.words import percent
 
 MAXIMUM_DRIFT = 0.08  # a Monte Carlo error of 3 % at 1000 effective draws, two and a half times over
 MOST_FINE_DIVERGED = 0.001  # share of the trajectories of fine steps, without which a corner is out of reach
@@ -93,7 +94,7 @@ def shortfalls(diagnostics: Mapping[str, Diagnostics], target_r_hat: float, targ
         if not d.r_hat < target_r_hat:
             reasons.append(f"R-hat of {name} is {d.r_hat:.3f} and should be below {target_r_hat:g}")
         if not d.drift < MAXIMUM_DRIFT:
-            reasons.append(f"{name} still drifts along the chain, by {d.drift:.0%} of its spread")
+            reasons.append(f"{name} still drifts along the chain, by {percent(d.drift, 0)} of its spread")
         low = min(d.ess_bulk, d.ess_tail)
         if not low >= target_ess:
             which = "bulk" if d.ess_bulk <= d.ess_tail else "tail"

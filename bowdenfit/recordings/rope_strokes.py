@@ -11,6 +11,7 @@ from bowdenfit.recordings.preparation.play import Hysteresis, play, white_noise
 from bowdenfit.recordings.preparation.robust import robust_minimum
 from bowdenfit.recordings.recording import PULL, RETURN, SWITCH, Blocks
 from bowdenfit.types import Flags, Labels, Matrix, Vector
+from bowdenfit.words import percent
 
 _FIT_BLOCKS = 1000  # more than these say no more about the loop
 _GAIN_SD = 0.02  # how far two load cells may disagree before the loop is believed to be off center
@@ -162,8 +163,8 @@ def _remarks(name: str, found: set[int], loop: Hysteresis) -> tuple[str, ...]:
         )
     if abs(loop.center) > 2.5 * _GAIN_SD and len(found) == 2:
         remarks.append(
-            f"{name}: the hysteresis loop is off center by {loop.center:+.1%} of the force; the usual cause is a load cell "
-            "with a wrong calibration or tare: give [sensors] input_gain_error_sd and output_gain_error_sd, or an offset_sd, "
-            "or tare the recording."
+            f"{name}: the hysteresis loop is off center by {percent(loop.center, 1, '+')} of the force; the usual cause is "
+            "a load cell with a wrong calibration or tare: give [sensors] input_gain_error_sd and output_gain_error_sd, or an "
+            "offset_sd, or tare the recording."
         )
     return tuple(remarks)

@@ -17,11 +17,12 @@ try:
 except ImportError:  # not on Windows, where folders cannot be locked
     fcntl = None  # type: ignore[assignment]
 
-FIT, SUMMARY, SUMMARY_TEXT = "fit.json", "summary.json", "summary.txt"
+FIT, SUMMARY = "fit.json", "summary.json"
+SUMMARY_TEXT, DETAILS_TEXT = "summary.txt", "details.txt"  # one page, and everything
 POSTERIOR, CHAIN, FIGURES = "posterior.nc", "chain.checkpoint", "figures"
 ANSWERS, FIGURE_DATA = "answers.json", "figures.npz"
 REPLICATIONS = "replications.jsonl"  # of a calibration
-_WRITTEN = (FIT, ANSWERS, SUMMARY, SUMMARY_TEXT, FIGURE_DATA, POSTERIOR, CHAIN)
+_WRITTEN = (FIT, ANSWERS, SUMMARY, SUMMARY_TEXT, DETAILS_TEXT, FIGURE_DATA, POSTERIOR, CHAIN)
 
 
 @contextmanager

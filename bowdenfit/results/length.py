@@ -8,7 +8,9 @@ import numpy as np
 
 from bowdenfit.inference.interval import Interval
 from bowdenfit.results.choices import Choice, Window
-from bowdenfit.words import html_table
+from bowdenfit.words import decimals, filled, html_table, percent, table
+
+_WORTH_SAYING = 0.005  # probability of an optimum at an end of the range
 
 
 @dataclass(frozen=True)
@@ -49,55 +51,80 @@ class OptimalLength:
         """The choice with the least expected regret."""
         return min(self.choices, key=lambda c: c.expected_regret, default=None)
 
-    def __str__(self) -> str:
-        return "\n".join(self.lines())
+    @property
+    def what(self) -> str:
+        """The route variable in words."""
+        return self.variable.replace("_", " ")
 
-    def lines(self) -> list[str]:
-        """The answer in sentences and a small table."""
-        at = "" if self.at_input_force is None else f" at an input force of {self.at_input_force:.3g} N"
-        what, unit, length, eta = self.variable.replace("_", " "), self.unit, self.length, self.efficiency
-        lines = [
-            f"Best {what}: {length.median:.1f} {unit} (90 % interval {length.q05:.1f} to {length.q95:.1f} {unit}), "
-            f"efficiency there {eta.median:.1%} ({eta.q05:.1%} to {eta.q95:.1%}){at}."
+    @property
+    def action(self) -> str:
+        """What to do, or what is best, in one clause: the choice that costs least, or the best length where none is named."""
+        choice, length = self.best_choice, self.length
+        value = f"{choice.length:g}" if choice else f"{length.median:.{decimals(length.q95 - length.q05)}f}"
+        is_cut = self.variable == "cable_length"
+        return f"{'cut the cable to' if is_cut else f'the best {self.what} is'} {value} {self.unit}"
+
+    def __str__(self) -> str:
+        return "\n".join([self.headline, *(filled(sentence) for sentence in self.sentences()), *self._table()])
+
+    @property
+    def headline(self) -> str:
+        """The answer as a sentence."""
+        return f"{self.action[0].upper()}{self.action[1:]}."
+
+    def sentences(self) -> list[str]:
+        """How sure it is, and what would do as well."""
+        at = "" if self.at_input_force is None else f", at an input force of {self.at_input_force:.3g} N"
+        length, eta = self.length, self.efficiency.times(100)
+        digits, of_force = decimals(length.q95 - length.q05), decimals(eta.q95 - eta.q05)
+        said = [
+            f"The best {self.what} is {length.median:.{digits}f} {self.unit} (90 % interval {length.q05:.{digits}f} to "
+            f"{length.q95:.{digits}f} {self.unit}); {eta.median:.{of_force}f} % of the force arrives there "
+            f"({eta.q05:.{of_force}f} to {eta.q95:.{of_force}f} %){at}."
         ]
-        if self.at_edge > 0.005:
-            lines.append(
-                f"In {self.at_edge:.0%} of the draws the optimum lies at an end of the range: a better {what} may lie "
-                "outside what was measured."
+        if self.at_edge > _WORTH_SAYING:
+            said.append(
+                f"With {percent(self.at_edge, 0)} probability the best lies at an end of the range: a better {self.what} may "
+                "lie outside what was measured."
             )
+        return [*said, self.good_enough if self.is_settled else self._not_settled]
+
+    @property
+    def is_settled(self) -> bool:
+        """Whether some length is good enough for sure."""
+        return bool(np.isfinite(self.window.start))
+
+    @property
+    def good_enough(self) -> str:
+        """Which lengths will do."""
         window = self.window
-        if np.isfinite(window.start):
-            lines.append(
-                f"Any {what} from {window.start:.0f} to {window.stop:.0f} {unit} is within {window.within:.0%} of the "
-                f"best with at least {window.probability:.0%} probability."
-            )
-        else:
-            lines.append(
-                f"No single {what} is within {window.within:.0%} of the best with {window.probability:.0%} probability; "
-                "more measurements are needed."
-            )
-        if self.choices:
-            lines += [
-                "",
-                f"{what.capitalize() + ' (' + unit + ')':>20}  {'P(best)':>8}  {'expected loss of efficiency':>28}",
-            ]
-            lines += [
-                f"{c.length:>20g}  {c.probability_best:>8.1%}  {100 * c.expected_regret:>21.2f} points"
-                for c in self.choices
-            ]
-        return lines
+        digits = decimals(window.stop - window.start)
+        return (
+            f"Any {self.what} from {window.start:.{digits}f} to {window.stop:.{digits}f} {self.unit} is good enough: within "
+            f"{percent(window.within, 0)} of the best with at least {percent(window.probability, 0)} probability."
+        )
+
+    @property
+    def _not_settled(self) -> str:
+        window = self.window
+        return (
+            f"No single {self.what} is within {percent(window.within, 0)} of the best with "
+            f"{percent(window.probability, 0)} probability; more measurements are needed."
+        )
+
+    def _table(self) -> list[str]:
+        return ["", table(self._heads, self._rows)] if self.choices else []
+
+    @property
+    def _heads(self) -> tuple[str, str, str]:
+        return f"{self.what.capitalize()} ({self.unit})", "probability of being best", "expected loss of efficiency"
+
+    @property
+    def _rows(self) -> list[tuple[str, str, str]]:
+        return [
+            (f"{c.length:g}", percent(c.probability_best), f"{100 * c.expected_regret:.2f} points") for c in self.choices
+        ]
 
     def _repr_html_(self) -> str:
-        shown = [line for line in self.lines() if line and "P(best)" not in line]
-        sentences = shown[: len(shown) - len(self.choices)]
-        text = "".join(f"<p>{escape(line)}</p>" for line in sentences)
-        heads = (
-            f"{self.variable.replace('_', ' ').capitalize()} ({self.unit})",
-            "P(best)",
-            "Expected loss of efficiency",
-        )
-        rows = [
-            (f"{c.length:g}", f"{c.probability_best:.1%}", f"{100 * c.expected_regret:.2f} points")
-            for c in self.choices
-        ]
-        return text + (html_table(heads, rows) if rows else "")
+        text = "".join(f"<p>{escape(line)}</p>" for line in [self.headline, *self.sentences()])
+        return text + (html_table(self._heads, self._rows) if self.choices else "")

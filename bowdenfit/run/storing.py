@@ -35,8 +35,9 @@ def write_results(found: "Fit", folder: Path, figures: bool, helper: Assistant) 
     from bowdenfit.questions.figures import FIGURES as FIGURE_NAMES
     from bowdenfit.questions.figures import draw_figure, figures_of
     from bowdenfit.questions.kept import answers_of
-    from bowdenfit.questions.summary.words import summary_text
-    from bowdenfit.results.folder import FIGURES, SUMMARY_TEXT, write_text
+    from bowdenfit.questions.summary.brief_words import summary_text
+    from bowdenfit.questions.summary.words import full_text
+    from bowdenfit.results.folder import DETAILS_TEXT, FIGURES, SUMMARY_TEXT, write_text
     from bowdenfit.results.store import save
 
     if found.posterior is None:
@@ -51,6 +52,7 @@ def write_results(found: "Fit", folder: Path, figures: bool, helper: Assistant) 
             failed[name] = error
     save(found, found.summary(), folder, True, answers_of(found), data)
     write_text(folder / SUMMARY_TEXT, printable(summary_text(found)))
+    write_text(folder / DETAILS_TEXT, printable(full_text(found)))
     for name, figure in drawn.items():
         try:
             figure.result()

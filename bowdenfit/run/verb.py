@@ -101,7 +101,7 @@ def _no_settings() -> None:
 
 
 def _reply(found: "Fit", asked: dict[str, Any]) -> Reply:
-    said = reply(found)
+    said = reply(found, {})
     exit_code = 0 if found.verdict().trusted else NOT_TRUSTED
     return Reply(said.text, said.page, (f"Wrote {asked['output']}.",), exit_code)
 

@@ -149,8 +149,8 @@ def test_summary_and_check_name_the_law(tmp_path, run):
     assert run("check", folder)[1].count("sheath: mu, wobble law, wrap angle measured in every row") == 1
     code, out, _ = run("fit", folder, "--no-mcmc", "--no-figures", "-o", tmp_path / "results")
     assert code == 0
-    assert "the wobble law in the contact 'sheath'" in " ".join((tmp_path / "results/summary.txt").read_text().split())
-    assert [line for line in out.splitlines() if line.startswith("wobble_sheath") and line.endswith("deg")]
+    assert "the wobble law in the contact 'sheath'" in " ".join((tmp_path / "results/details.txt").read_text().split())
+    assert [line for line in out.splitlines() if line.startswith("wobble_sheath") and " deg " in line]
 
 
 def test_figures_show_the_parameter_of_a_law(fitted):
@@ -167,7 +167,7 @@ def test_identifiability_and_the_next_measurement_know_the_parameter_of_a_law(fi
     ("setting", "text"),
     [
         ({"fixed": 20.0}, "fixed"),
-        ({"measured": {"value": 30.0, "sd": 4.0}}, "measured 30 +- 4 deg"),
+        ({"measured": {"value": 30.0, "sd": 4.0}}, "measured 30 ± 4 deg"),
         ({"prior": {"uniform": {"low": 0.0, "high": 90.0}}}, "Uniform(0, 90) deg"),
     ],
 )

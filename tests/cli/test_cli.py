@@ -92,12 +92,15 @@ def test_summary_prints_what_the_fit_wrote(run, results):
     assert out == (results / "summary.txt").read_text()
     code, out, _ = run("summary", results, "--json")
     assert json.loads(out) == bf.load(results).summary()
+    code, out, _ = run("summary", results, "--full")
+    assert (code, out) == (0, (results / "details.txt").read_text())
+    assert "Verdict: converged" in out
 
 
 def test_length_gives_the_design_answer(run, results):
     code, out, _ = run("length", results)
     assert code == 0
-    assert re.search(r"Best cable length: 4[67]\d\.\d mm \(90 % interval", out)
+    assert re.match(r"Cut the cable to 470 mm\.\nThe best cable length is 4[67]\d mm \(90 % interval", out)
     code, out, _ = run("length", results, "--json")
     page = json.loads(out)
     assert page["unit"] == "mm"
@@ -179,8 +182,8 @@ def test_a_fit_that_has_not_converged_exits_with_3_and_says_why(run, on_body, tm
     ]
     code, out, err = run("fit", on_body, "--output", tmp_path / "fit", "--seed", 1, "--no-figures", *few)
     assert code == 3
-    assert "NOT CONVERGED" in out
-    assert "should be at least 1000" in out
+    assert "DO NOT USE THESE NUMBERS: the computation has not settled" in " ".join(out.split())
+    assert "should be at least 1000" in run("summary", tmp_path / "fit", "--full")[1]
     assert (tmp_path / "fit" / "fit.json").exists()
     assert run("length", tmp_path / "fit")[2].startswith("Warning")
 
@@ -285,9 +288,8 @@ def test_a_whole_fit_in_a_process_of_its_own_and_an_interrupt(on_body, tmp_path)
     found = subprocess.run(resumed, cwd=ROOT, env=environment, capture_output=True, text=True, check=False, timeout=300)
     assert found.returncode == 0, found.stderr
     names = {p.name for p in (tmp_path / "fit").iterdir()}
-    known = {"fit.json", "summary.json", "summary.txt", "answers.json", "figures.npz", "posterior.nc", "figures"}
-    known.add("chain.checkpoint")
-    assert names == known
+    known = {"fit.json", "summary.json", "summary.txt", "details.txt", "answers.json", "figures.npz"}
+    assert names == known | {"posterior.nc", "chain.checkpoint", "figures"}
     assert len(list((tmp_path / "fit" / "figures").iterdir())) == 14
 
 

@@ -9,12 +9,14 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from one_page import faults
 from scipy import stats
 
 import bowdenfit
 from bowdenfit.dataset import Dataset
 from bowdenfit.front_desk import Fit
 from bowdenfit.kinds.forces.table import ForceTable
+from bowdenfit.questions.summary.brief_words import summary_text
 
 FOLDER = Path(__file__).parents[2] / "datasets" / "yarn-on-cylinder"
 NOMINAL = np.repeat([45, 90, 135, 180, 225, 270, 315], 3)
@@ -41,6 +43,12 @@ def trials() -> dict[str, np.ndarray]:
 def fit() -> Fit:
     """The data set fitted with a short chain."""
     return bowdenfit.fit(FOLDER, seed=1, settings=SHORT_CHAIN)
+
+
+def test_the_summary_is_one_page_that_names_the_trial_far_off(fit):
+    page = summary_text(fit)
+    assert faults(page) == []
+    assert "Next: look at how run 225 deg trial 1 was measured" in page
 
 
 def through_origin(x: np.ndarray, y: np.ndarray) -> tuple[float, float, float]:

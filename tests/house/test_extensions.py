@@ -83,7 +83,7 @@ def test_a_new_kind_of_table_is_a_folder_and_two_lines(data_set, monkeypatch, tm
     found = bf.fit(folder, output=tmp_path / "fit", seed=1, settings=QUICK)
     interval = found.parameter("mu")
     assert abs(interval.mean - MU) < 4 * interval.sd
-    assert "15 lost forces" in (tmp_path / "fit" / "summary.txt").read_text()
+    assert "15 lost forces" in (tmp_path / "fit" / "details.txt").read_text()
     assert {"checks.png", "coefficients.png", "pairs.png"} <= {
         path.name for path in (tmp_path / "fit" / "figures").iterdir()
     }

@@ -14,7 +14,7 @@ from bowdenfit.kinds.settings import parse_description
 from bowdenfit.model import build_model
 from bowdenfit.questions.bends.overview import products_with_preload
 from bowdenfit.questions.check.data_set_words import warnings_of
-from bowdenfit.questions.summary.words import summary_text
+from bowdenfit.questions.summary.words import full_text
 
 ANGLES = (0.0, 45.0, 90.0, 135.0, 180.0)
 LOADS = (1.0, 3.0, 6.0, 10.0, 15.0, 20.0, 30.0, 40.0, 60.0, 80.0, 100.0)
@@ -117,7 +117,7 @@ def test_good_tables_leave_nothing_unidentified():
 def test_the_summary_says_which_values_fit_as_well():
     tables, design, truth, *_ = CASES["a loop that is always slack"]
     data, _ = measured(cable_with(tables), 0, design=design_of(**design), **(TRUTH | truth))
-    text = " ".join(summary_text(bf.fit(data, mcmc=False, seed=1)).split())
+    text = " ".join(full_text(bf.fit(data, mcmc=False, seed=1)).split())
     assert "preload is not identified by least squares: values from" in text
     assert "fit about as well" in text
 

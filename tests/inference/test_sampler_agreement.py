@@ -10,7 +10,7 @@ from scipy import stats
 import bowdenfit as bf
 from bowdenfit.inference import nuts
 from bowdenfit.inference.samplers import FALSE_ALARM, Drawn, SamplerAgreement, compare_samplers, recommendation
-from bowdenfit.questions.summary.words import summary_text
+from bowdenfit.questions.summary.words import full_text
 
 DATA = Path(__file__).parents[2] / "datasets"
 YARN = DATA / "yarn-on-cylinder"
@@ -116,7 +116,7 @@ def test_a_fit_by_both_samplers_says_that_they_agree(by_both):
         "optimal_length",
         "optimal_efficiency",
     }
-    assert "emcee and NUTS agree within Monte Carlo error" in " ".join(summary_text(by_both).split())
+    assert "emcee and NUTS agree within Monte Carlo error" in " ".join(full_text(by_both).split())
     assert by_both.summary()["samplers"]["agree"]
     assert by_both.converged
 
@@ -135,7 +135,7 @@ def test_samplers_that_disagree_are_a_reason_not_to_trust(monkeypatch):
     found = bf.fit(YARN, sampler="both", seed=1, settings=("sampler.n_walkers=64", "sampler.target_ess=500"))
     assert not found.converged
     assert any(reason.startswith("emcee and NUTS disagree on the") for reason in found.reasons)
-    assert "NOT CONVERGED" in summary_text(found)
+    assert "NOT CONVERGED" in full_text(found)
 
 
 DATA_SETS = sorted(path.parent.name for path in DATA.glob("*/cable.toml"))

@@ -135,7 +135,7 @@ def test_an_efficiency_above_1_within_its_error_is_read_and_one_beyond_it_is_ref
     )
     table = tmp_path / "efficiencies.csv"
     table.write_text("efficiency,efficiency_sd\n0.99,0.02\n1.03,0.02\n")
-    assert "103.0%" in accept("check", tmp_path)
+    assert "103.0 %" in accept("check", tmp_path)
     table.write_text("efficiency,efficiency_sd\n0.99,0.02\n1.13,0.02\n")
     assert "above 1" in refuse("check", tmp_path)
     table.write_text("efficiency_percent\n99\n103\n")

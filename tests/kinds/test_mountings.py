@@ -65,3 +65,16 @@ def test_wrap_angles_read_anew_in_every_row_do_not_part_a_run(tmp_path):
     table = load_dataset(write(tmp_path, rows)).measurements.table(ForceTable)
     assert isinstance(table, ForceTable) and len(table.run_names) == 2
     assert [float(name[3:-5]) for name in table.run_names] == pytest.approx([90, 180], abs=0.5)
+
+
+@pytest.mark.parametrize(("along", "label"), [("lengths", "440 mm"), ("bends", "88 deg")])
+def test_runs_without_names_are_called_by_their_place_in_a_unit(tmp_path, along, label):
+    folder = _folder(tmp_path, ["1", "2", "3"] * 6, along)
+    rows = [line.split(",") for line in (folder / "forces.csv").read_text().splitlines()]
+    keep = [i for i, head in enumerate(rows[0]) if head != "run"]
+    place = rows[0].index(ALONG[along][1])
+    for row in rows[1:]:
+        row[place] = str(float(row[place]) / (1 if along == "lengths" else 5))
+    (folder / "forces.csv").write_text("\n".join(",".join(row[i] for i in keep) for row in rows) + "\n")
+    labels = next(term.labels for term in build_model(load_dataset(folder)).terms if term.name == "run_efficiency")
+    assert labels[0] == label and len(labels) == 6

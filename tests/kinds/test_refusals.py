@@ -158,7 +158,7 @@ def test_decimal_commas_byte_order_marks_and_excel_are_no_bad_input(dataset, mon
         cli.main()
     out = capsys.readouterr().out
     assert stop.value.code == 0, out
-    assert "2 efficiencies, 77.0% to 78.5%" in out
+    assert "2 efficiencies, 77.0 % to 78.5 %" in out
 
 
 def read_forces(folder: Path, *files: str) -> Measurements:

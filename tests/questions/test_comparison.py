@@ -213,7 +213,7 @@ def test_the_sentence_says_what_is_preferred_and_what_that_rests_on():
     def words(*args):
         return " ".join(comparison_text(by_hand(*args)).split())
 
-    assert "The data prefer good over poor (elpd difference 12.1 +- 0.2)." in words([2.0, 2.1, 1.9, 2.0, 2.1, 2.0])
+    assert "The data prefer good over poor (elpd difference 12.1 ± 0.2)." in words([2.0, 2.1, 1.9, 2.0, 2.1, 2.0])
     assert "With 6 readings the standard errors tend to be too small." in words([2.0, 2.1, 1.9, 2.0, 2.1, 2.0])
     leaning = words([2.0, 0.2, 1.9, 2.5, 0.1, 0.3])
     assert "The data lean towards good over poor (elpd difference 7.0" in leaning

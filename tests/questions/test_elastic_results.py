@@ -8,6 +8,7 @@ from pathlib import Path
 import jax
 import numpy as np
 import pytest
+from one_page import faults
 from scipy import stats
 
 import bowdenfit as bf
@@ -22,7 +23,8 @@ from bowdenfit.questions.calibrate.refit import with_parameters_of
 from bowdenfit.questions.figures import figures_of
 from bowdenfit.questions.simulate.simulation import empty_tables, simulate, true_values
 from bowdenfit.questions.simulate.tables import read_bench
-from bowdenfit.questions.summary.words import summary_text
+from bowdenfit.questions.summary.brief_words import summary_text
+from bowdenfit.questions.summary.words import full_text
 from bowdenfit.results.optimum import optimum_of
 
 FOLDER = Path(__file__).parents[2] / "datasets" / "synthetic-haptic-loop"
@@ -41,6 +43,12 @@ def folder(tmp_path_factory):
 @pytest.fixture(scope="module")
 def fit(folder):
     return bf.load(folder)
+
+
+def test_the_summary_of_a_loop_is_one_page_that_says_which_preload_to_set(fit):
+    page = summary_text(fit)
+    assert faults(page) == []
+    assert "Preload it with 1" in page
 
 
 def test_the_plan_makes_the_data_set_that_is_there(tmp_path):
@@ -75,7 +83,7 @@ def test_a_saved_fit_gives_the_same_answers_again(fit, folder, tmp_path):
 
 
 def test_the_summary_says_what_each_wrap_angle_does(fit):
-    text = summary_text(fit)
+    text = full_text(fit)
     assert "Fitted to 105 readings of stretch, 8 preloads and 64 readings of a loop." in text
     assert "Stretch and preload, median (90 % interval)" in text
     assert "Over bends from 0 to 180 deg the cable stays taut from a preload of" in text
@@ -160,7 +168,7 @@ def test_the_preload_window_is_given_for_bends_and_a_limit(folder, run):
     )
     (row,) = json.loads(out)
     assert row["possible"] == 0
-    assert "with a probability of only 0%" in row["in_words"]
+    assert "with a probability of only 0 %" in row["in_words"]
 
 
 @pytest.mark.parametrize("quantity", ["preload", "slack-load", "position", "stiffness", "output-force"])
@@ -264,7 +272,7 @@ def test_the_report_says_which_table_disagrees_and_the_fit_goes_on(tmp_path):
             rows.append(f"{angle},pull,{0.02 * force:.5f},{0.02 * out + 0.004 * np.sin(17 * len(rows)):.5f}")
     (tmp_path / "loop.csv").write_text("\n".join(rows) + "\n")
     fit = bf.fit(tmp_path, mcmc=False)
-    text = " ".join(summary_text(fit).split())
+    text = " ".join(full_text(fit).split())
     assert "The table of loop disagrees with everything else by" in text
     assert "standard deviations: without it" in text
     worst = fit.summary()["agreement"][0]

@@ -40,7 +40,7 @@ def test_drag_is_said_as_the_hidden_tension_and_as_the_force_that_it_costs(drag)
     found = lost_force(drag[0])
     assert abs(found.hidden_tension.median - HIDDEN) < 4 * found.hidden_tension.sd < 0.8
     assert abs(found.lost.median - HIDDEN * 0.25) < 4 * found.lost.sd < 0.2
-    said = " ".join((drag[1] / "summary.txt").read_text().split())
+    said = " ".join((drag[1] / "details.txt").read_text().split())
     assert "of the force is lost at any load, as if 2." in said and "of tension did not show at the cells" in said
     page = json.loads((drag[1] / "summary.json").read_text())
     assert page["drag"]["lost_force_N"]["median"] == pytest.approx(found.lost.median)
@@ -60,7 +60,7 @@ def test_the_force_lost_is_what_a_bench_without_hidden_tension_would_deliver_mor
 def test_an_efficiency_that_depends_on_the_load_is_said_with_its_force(drag):
     rows = json.loads((drag[1] / "summary.json").read_text())["measured"]
     assert all(LOADS[0] < row["input_force_N"] <= 1.02 * LOADS[-1] for row in rows)
-    said = " ".join((drag[1] / "summary.txt").read_text().split())
+    said = " ".join((drag[1] / "details.txt").read_text().split())
     assert "at input" in said and "measured efficiencies hold at the force that stands beside them" in said
 
 
@@ -88,7 +88,7 @@ def test_predictions_outside_the_loads_measured_are_marked_in_text_and_json(drag
 def test_a_rope_pulls_or_is_slack():
     force, words = pulled(np.array([[1.0, -1.0, 3.0], [1.0, -2.0, -1.0]]), 10.0)
     np.testing.assert_array_equal(force, [[1.0, 0.0, 3.0], [1.0, 0.0, 0.0]])
-    assert words == ["", "slack", "slack in 50% of the draws"]
+    assert words == ["", "slack", "slack in 50 % of the draws"]
 
 
 def test_what_was_measured_says_what_lies_outside():

@@ -6,6 +6,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from cables import cable, measured
+from one_page import faults
 
 import bowdenfit as bf
 from bowdenfit.cli import bowdenfit as command
@@ -19,7 +20,8 @@ from bowdenfit.questions.identify.confounding import confounded_pairs
 from bowdenfit.questions.recorded import dependence_figure
 from bowdenfit.questions.recorded.rate import RateEffect, rate_effect
 from bowdenfit.questions.recorded.traces import traces
-from bowdenfit.questions.summary.words import summary_text
+from bowdenfit.questions.summary.brief_words import summary_text
+from bowdenfit.questions.summary.words import full_text
 from bowdenfit.recordings.recording import Recordings
 
 QUICK = ("sampler.n_walkers=128", "sampler.target_ess=200", "sampler.target_r_hat=1.05", "sampler.max_steps=2000")
@@ -46,6 +48,13 @@ def with_rate(recorded, tmp_path_factory):
 @pytest.fixture(scope="session")
 def truth(recorded):
     return json.loads((recorded / "truth.json").read_text())
+
+
+def test_the_summary_of_recordings_is_one_page(plain, with_rate):
+    assert faults(summary_text(plain[0])) == []
+    page = summary_text(with_rate[0])
+    assert faults(page) == []
+    assert "no dependence on speed" in " ".join(page.split())
 
 
 def test_the_coefficients_of_the_synthetic_recordings_lie_in_their_intervals(plain, truth):
@@ -79,7 +88,7 @@ def test_both_likelihoods_ask_for_the_same_coefficients(recorded, plain):
 def test_a_saved_fit_of_recordings_comes_back_bit_for_bit(plain):
     fit, folder = plain
     again = bf.load(folder)
-    assert summary_text(again) == summary_text(fit)
+    assert full_text(again) == full_text(fit)
     for before, after in zip(
         fit.dataset.measurements.table(Recordings).each, again.dataset.measurements.table(Recordings).each, strict=True
     ):
@@ -99,7 +108,7 @@ def test_no_sample_disappears_without_being_counted(plain):
 
 
 def test_the_summary_says_where_the_samples_went_and_how_much_mountings_differ(plain):
-    text = " ".join(summary_text(plain[0]).split())
+    text = " ".join(full_text(plain[0]).split())
     samples = sum(r.account.samples for r in plain[0].dataset.measurements.table(Recordings).each)
     assert f"{samples} samples of 7 recordings in 7 runs" in text
     assert "From one mounting of the cable to the next the efficiency scatters by" in text
@@ -134,7 +143,7 @@ def test_speed_is_answered_with_its_difference_and_interval(with_rate):
     assert abs(effect.difference.median) < 0.01  # the truth is 0, mountings differ by 1 %
     page = json.loads((folder / "summary.json").read_text())
     assert page["rate_effect"]["difference"]["median"] == pytest.approx(effect.difference.median)
-    assert "Efficiency at 470 mm at 60 r/min less that at 20 r/min" in " ".join(summary_text(fit).split())
+    assert "Efficiency at 470 mm at 60 r/min less that at 20 r/min" in " ".join(full_text(fit).split())
     (dependence,) = dependence_figure.data(fit)
     assert (dependence.what, dependence.label) == ("speed", "Speed (r/min)")
     assert len(dependence.points_x) == 4
@@ -229,7 +238,7 @@ def test_a_gain_error_and_a_constant_angle_are_said_to_be_confounded_with_what_i
     truth = values["mu_edge"] + pair.factor * values["gain_error"]
     assert pair.mean == pytest.approx(truth, abs=4 * pair.sd)  # fails by chance for one seed in 10^4
     assert pair.sd < 0.4 * pair.first_sd
-    text = " ".join(summary_text(fit).split())
+    text = " ".join(full_text(fit).split())
     assert "hardly tell mu_edge and gain_error apart" in text
     assert fit.summary()["confounded"][0]["combination"] == pair.combination
     assert not fit.least_squares.estimates["mu_edge"].identified

@@ -7,13 +7,15 @@ import jax
 import numpy as np
 import pytest
 from hand_bench import pull, write
+from one_page import faults
 
 import bowdenfit as bf
 from bowdenfit.dataset import Dataset, load_dataset
 from bowdenfit.kinds.forces.table import ForceTable
 from bowdenfit.kinds.measurements import Measurements
+from bowdenfit.questions.summary.brief_words import summary_text
 from bowdenfit.questions.summary.verdict import IMPOSSIBLE, NOT_CONVERGED, NOT_DESCRIBED, NOT_IDENTIFIABLE
-from bowdenfit.questions.summary.words import summary_text
+from bowdenfit.questions.summary.words import full_text
 
 HALF_TURN = """
 schema = 1
@@ -52,7 +54,7 @@ def _swapped(data: Dataset) -> Dataset:
 
 def _told(fit) -> str:
     with jax.enable_x64(True):
-        return " ".join(summary_text(fit).split())
+        return " ".join(full_text(fit).split())
 
 
 @pytest.mark.parametrize("mcmc", [True, False])
@@ -60,6 +62,9 @@ def _told(fit) -> str:
 def test_efficiencies_above_1_are_no_fit_to_trust(tmp_path, runs, mcmc):
     fit = bf.fit(_swapped(_bench(tmp_path, runs)), seed=1, mcmc=mcmc)
     assert IMPOSSIBLE in fit.verdict().troubles
+    with jax.enable_x64(True):
+        page = summary_text(fit)
+    assert faults(page) == [] and "DO NOT USE THESE NUMBERS" in page.splitlines()[0]
     said = _told(fit)
     assert "IMPOSSIBLE READINGS" in said and "swapped" in said and "run 1 13" in said
     if mcmc and "determine no coefficient by itself" in said:

@@ -15,7 +15,7 @@ from bowdenfit.kinds.forces.reading_noise import LogGains, beyond_noise, standin
 from bowdenfit.kinds.forces.table import ForceTable
 from bowdenfit.kinds.plausibility import GAIN_ERROR
 from bowdenfit.types import Flags, Labels, Vector
-from bowdenfit.words import shown
+from bowdenfit.words import percent, shown
 
 _ZERO_ERROR = 0.005  # of the largest force, that is allowed where nothing is stated
 _SDS = 3.0  # of stated errors of the load cells that are allowed
@@ -128,7 +128,7 @@ def _refuse(table: ForceTable, found: Gained) -> NoReturn:
     many = f"{int(np.sum(found.excess > 0))} of {len(found.rows)}"
     raise DatasetError(
         f"{table.origin.place(row)}: output_force {force_out:.4g} N at input_force {force_in:.4g} N, "
-        f"{force_out / force_in:.0%} while {how}; friction never lets {what} out than in, and noise hardly shows it. "
+        f"{percent(force_out / force_in, 0)} while {how}; friction never lets {what} out than in, and noise hardly shows it. "
         f"So it is in {many} rows: the usual cause is {_cause(found) if found.wide else _exception(table, found, row)}."
     )
 

@@ -168,8 +168,7 @@ def _mounted(
     if how == "each row":
         return np.arange(len(route)), tuple(f"row {row}" for row in origin.row), [each_row_apart(len(route), file)]
     if column is None:
-        rows = np.column_stack([route, own.angle])
-        keys = [", ".join(f"{value:g}" for value in row if np.isfinite(value)) or "all" for row in rows]
+        keys = _places(route, own, limits.unit if limits else "")
         keys = [f"{name}, {key}" for name, key in zip(group, keys, strict=True)] if group else keys
         names = tuple(dict.fromkeys(keys))
         return np.array([names.index(key) for key in keys]), names, [
@@ -184,6 +183,13 @@ def _mounted(
     run, distinct = mountings(labels, group, route, own, limits)
     said = numbered_anew(labels, group, len(distinct), file, limits)
     return run, tuple(distinct), [said] if said else []
+
+
+def _places(route: Vector, own: OwnAngles, unit: str) -> list[str]:
+    """Where each row was read, such as "440 mm" or "45 deg"."""
+    rows, units = np.column_stack([route, np.rad2deg(own.angle)]), [unit, *["deg"] * len(own.names)]
+    known = [[(value, unit) for value, unit in zip(row, units, strict=True) if np.isfinite(value)] for row in rows]
+    return [", ".join(f"{value:g} {unit}".rstrip() for value, unit in row) or "all" for row in known]
 
 
 def _force(cell: Cell, column: Column) -> float:

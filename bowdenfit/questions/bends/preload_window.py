@@ -5,6 +5,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from bowdenfit.inference.interval import Interval
+from bowdenfit.words import percent
 
 TAUT = 0.95  # probability with which the recommended preload keeps both sides taut
 
@@ -37,16 +38,29 @@ class PreloadAnswer:
     felt: Interval
     possible: float
 
+    @property
+    def advice(self) -> str:
+        """Which preload to set."""
+        low, high = (f"{angle:.4g}" for angle in self.bends)
+        return (
+            f"Preload it with {self.best:.3g} N{self._at}: that is felt least of those that keep the cable taut from {low} to "
+            f"{high} deg."
+        )
+
+    @property
+    def _at(self) -> str:
+        return "" if np.isnan(self.reference_angle) else f" at {self.reference_angle:.4g} deg"
+
     def sentence(self) -> str:
         """The answer in words."""
         low, high = (f"{angle:.4g}" for angle in self.bends)
-        at = "" if np.isnan(self.reference_angle) else f" at {self.reference_angle:.4g} deg"
+        at = self._at
         under = f" under up to {self.input_force:g} N" if self.input_force > 0 else ""
         lowest, felt, unit = self.lowest, self.felt, self.friction_unit
         parts = [
             f"Over bends from {low} to {high} deg{under} the cable stays taut from a preload of {lowest.median:.3g} N{at} on "
-            f"(90 % interval {lowest.q05:.3g} to {lowest.q95:.3g} N). Least friction is felt without slack, with {TAUT:.0%} "
-            f"probability, at {self.best:.3g} N: then free motion takes {felt.median:.3g} {unit} "
+            f"(90 % interval {lowest.q05:.3g} to {lowest.q95:.3g} N). Least friction is felt without slack, with "
+            f"{percent(TAUT, 0)} probability, at {self.best:.3g} N: then free motion takes {felt.median:.3g} {unit} "
             f"({felt.q05:.3g} to {felt.q95:.3g}) at the bend where it is most."
         ]
         if self.highest is not None:
@@ -55,5 +69,5 @@ class PreloadAnswer:
                 f"{self.highest.median:.3g} N{at} ({self.highest.q05:.3g} to {self.highest.q95:.3g} N)."
             )
             if self.possible < TAUT:
-                parts.append(f"That leaves a preload that does both with a probability of only {self.possible:.0%}.")
+                parts.append(f"That leaves a preload that does both with a probability of only {percent(self.possible, 0)}.")
         return " ".join(parts)

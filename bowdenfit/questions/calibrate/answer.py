@@ -6,6 +6,7 @@ from typing import ClassVar
 import numpy as np
 
 from bowdenfit.questions.calibrate.power import Power
+from bowdenfit.words import percent
 
 LEVEL = 0.01  # at which a quantity is rejected, corrected for the number of quantities
 INTERVALS = (0.5, 0.9)
@@ -98,11 +99,11 @@ class Checked:
             faults.append(f"estimated too {'high' if self.bias > 0 else 'low'}")
         if any(each.rate < each.low for each in self.coverage):
             faults.append(
-                f"intervals too narrow ({widest.rate:.0%} of the {widest.probability:.0%} intervals hold the truth)"
+                f"intervals too narrow ({percent(widest.rate, 0)} of the {percent(widest.probability, 0)} ones hold the truth)"
             )
         elif any(each.rate > each.high for each in self.coverage):
             faults.append(
-                f"intervals too wide ({widest.rate:.0%} of the {widest.probability:.0%} intervals hold the truth)"
+                f"intervals too wide ({percent(widest.rate, 0)} of the {percent(widest.probability, 0)} ones hold the truth)"
             )
         return " and ".join(faults) or "ranks are not uniform"
 

@@ -1,7 +1,7 @@
 """What `bowdenfit calibrate` prints."""
 
 from bowdenfit.questions.calibrate.answer import FEWEST, LEVEL, MOST_UNCONVERGED, Calibration, Checked
-from bowdenfit.words import filled, listed, table
+from bowdenfit.words import filled, listed, percent, table
 
 _NAMED = 8  # unconverged replications that are named
 
@@ -31,7 +31,7 @@ def _what(found: Calibration) -> str:
 
 def _verdict(found: Calibration) -> list[str]:
     if not found.is_judged:
-        few = f"at least {FEWEST} replications must converge, and at most {MOST_UNCONVERGED:.0%} may fail to"
+        few = f"at least {FEWEST} replications must converge, and at most {percent(MOST_UNCONVERGED, 0)} may fail to"
         return [f"NOT JUDGED: {found.ranked} of {found.replications} replications converged; {few}."]
     whose = "intervals of the coefficients and of the optimum" if found.truths else "intervals"
     if found.is_calibrated:
@@ -46,7 +46,7 @@ def _verdict(found: Calibration) -> list[str]:
 
 def _power(found: Calibration) -> str:
     """What so many replications can see."""
-    seen = listed([f"too small by {p.too_small:.0%} with probability {p.caught:.2f}" for p in found.power])
+    seen = listed([f"too small by {percent(p.too_small, 0)} with probability {p.caught:.2f}" for p in found.power])
     return f"Power: of one quantity, a posterior standard deviation {seen} is caught by {found.ranked} replications."
 
 
@@ -54,10 +54,12 @@ def _table(found: Calibration) -> str:
     heads = ("quantity", "50 % held", "90 % held", "p of ranks", "corrected", "bias", "shrinkage", "")
     rows = [_row(q) for q in found.quantities]
     first = found.quantities[0].coverage
-    bands = listed([f"{c.low:.0%} and {c.high:.0%} of the {c.probability:.0%} intervals" for c in first])
+    bands = listed(
+        [f"{percent(c.low, 0)} and {percent(c.high, 0)} of the {percent(c.probability, 0)} intervals" for c in first]
+    )
     note = (
         f"Held: share of the intervals that hold the truth; by chance alone all {'judged ' if found.truths else ''}quantities "
-        f"lie between {bands} in {1 - LEVEL:.0%} of calibrations. "
+        f"lie between {bands} in {percent(1 - LEVEL, 0)} of calibrations. "
     )
     if found.truths:
         note += (
@@ -79,9 +81,9 @@ def _row(q: Checked) -> tuple[str, ...]:
     half, wide = q.coverage
     by_ranks = q.judged_by == Checked.judged_by
     return (
-        q.name if q.judged_by else f"({q.name})", f"{half.rate:.1%}", f"{wide.rate:.1%}",
+        q.name if q.judged_by else f"({q.name})", percent(half.rate), percent(wide.rate),
         *((f"{q.p_value:.3f}", f"{q.corrected:.3f}") if by_ranks else ("", "")),
-        f"{q.bias:+.2f} +- {q.bias_error:.2f}", f"{q.shrinkage:.2f}" if by_ranks else "",
+        f"{q.bias:+.2f} ± {q.bias_error:.2f}", f"{q.shrinkage:.2f}" if by_ranks else "",
         "" if q.is_calibrated else "wrong",
     )  # fmt: skip
 

@@ -97,7 +97,7 @@ def _conditions(measurements: Measurements) -> int:
 def _angle_source(contact: Contact, description: Description) -> str:
     source = contact.wrap_angle
     if source.constant is not None:
-        sd = f" +- {source.sd:g}" if source.sd else ""
+        sd = f" ± {source.sd:g}" if source.sd else ""
         return f"constant wrap angle {source.value:g}{sd} {source.unit}"
     if source.curve:
         where = (
@@ -116,5 +116,5 @@ def _setting(setting: FrictionSetting | None) -> str:
     if setting.fixed is not None:
         return f"fixed at {setting.fixed:g}"
     if setting.measured is not None:
-        return f"measured separately, {setting.measured.value:g} +- {setting.measured.sd:g}"
+        return f"measured separately, {setting.measured.value:g} ± {setting.measured.sd:g}"
     return f"free, prior {setting.prior.model_dump(exclude_none=True)}" if setting.prior else "free"

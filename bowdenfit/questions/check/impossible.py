@@ -7,7 +7,7 @@ from bowdenfit.kinds.plausibility import GAIN_ERROR
 from bowdenfit.kinds.term import Term
 from bowdenfit.parameters.priors import LogNormal
 from bowdenfit.results.record import Record
-from bowdenfit.words import few
+from bowdenfit.words import few, percent
 
 _SDS = 4.5  # of noise above what is possible, which one healthy reading of 300,000 exceeds
 _PRIOR_SDS = 3.0  # of the default prior of friction, beyond which a mistake is likelier than such a rope
@@ -23,7 +23,7 @@ def impossible_efficiencies(fit: Record) -> str:
         measured, predicted = term.observed(), _predicted(fit, term)
         above = np.log(measured / np.maximum(predicted, 1.0))  # offsets and gains of the cells may show more than 1
         beyond = np.flatnonzero(above > GAIN_ERROR + _SDS * _noise(fit, term))
-        found += [f"{called.one.format(term.labels[i])} {measured[i]:.1%}" for i in beyond]
+        found += [f"{called.one.format(term.labels[i])} {percent(measured[i])}" for i in beyond]
     if not found:
         return ""
     return (

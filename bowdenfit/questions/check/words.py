@@ -55,15 +55,15 @@ def _outliers(found: Checks) -> str:
 
 def _sentence(reading: CheckedReading) -> str:
     """'efficiency at 550 mm: measured 67.8 %, expected 68.1 % without it (90 % interval ..., z = -0.2, k = 0.6)'"""
-    expected, low, high = (_with_unit(reading, getattr(reading, key)) for key in ("expected", "q05", "q95"))
-    measured = f"{'at most' if reading.is_bound else 'measured'} {_with_unit(reading, reading.reading)}"
+    expected, low, high = (with_unit(reading, getattr(reading, key)) for key in ("expected", "q05", "q95"))
+    measured = f"{'at most' if reading.is_bound else 'measured'} {with_unit(reading, reading.reading)}"
     z = f", z = {reading.z:+.1f}" if isfinite(reading.z) else ""
     k = f"= {reading.pareto_k:.2f}" if isfinite(reading.pareto_k) else "far above 1"
     interval = f"90 % interval {low} to {high}{z}, k {k}"
     return f"{_name(reading)}: {measured}, expected {expected} without it ({interval})"
 
 
-def _with_unit(reading: CheckedReading, value: float) -> str:
+def with_unit(reading: CheckedReading, value: float) -> str:
     """A value of a reading's kind with its unit."""
     if readings_called(reading.table).are_efficiencies:
         return f"{100 * value:.{decimals(100 * reading.sd)}f} %"

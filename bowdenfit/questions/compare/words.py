@@ -68,7 +68,7 @@ def _leaning(found: Comparison, name: str) -> str:
 
 def _difference(found: Comparison, name: str) -> str:
     d = found.differences[name]
-    error = "standard error unknown, with one reading" if np.isnan(d.standard_error) else f"+- {d.standard_error:.1f}"
+    error = "standard error unknown, with one reading" if np.isnan(d.standard_error) else f"± {d.standard_error:.1f}"
     return f"elpd difference {_elpd(d.elpd)} {error}"
 
 
@@ -156,7 +156,7 @@ def _parameters(found: Comparison) -> str:
         if len(found.optimal_length) == len(names)
         else []
     )
-    return "What changes, mean +- sd\n" + table(("parameter", *names), rows)
+    return "What changes, mean ± sd\n" + table(("parameter", *names), rows)
 
 
 def _head(name: str, unit: str) -> str:
@@ -167,7 +167,7 @@ def _shown(interval: Interval | None, unit: str = "") -> str:
     if interval is None:
         return "-"
     digits = decimals(interval.sd)
-    return f"{interval.mean:.{digits}f} +- {interval.sd:.{digits}f}" + (f" {unit}" if unit else "")
+    return f"{interval.mean:.{digits}f} ± {interval.sd:.{digits}f}" + (f" {unit}" if unit else "")
 
 
 def _speed(found: Comparison) -> list[str]:

@@ -88,4 +88,4 @@ def how_well(known: Known | Combination) -> str:
     """How well a quantity is known: in percent where it is clear of zero, else in its unit."""
     if abs(known.value) > 2 * known.sd:
         return f"to {100 * known.sd / abs(known.value):.2g} %"
-    return f"to +- {known.sd:.{decimals(known.sd)}f}"
+    return f"to ± {known.sd:.{decimals(known.sd)}f}"

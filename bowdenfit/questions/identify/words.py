@@ -2,7 +2,7 @@
 
 from bowdenfit.inference.identifiability import OWN, RESTS_ON_PRIOR, Combination, Knowledge, Known
 from bowdenfit.questions.identify.answer import CURVES, Identifiability
-from bowdenfit.words import decimals, filled, table
+from bowdenfit.words import decimals, filled, percent, table
 
 _HARD = 1000.0  # condition number beyond which parameters are hardly told apart
 
@@ -38,14 +38,14 @@ def _parameters(name: str, group: Knowledge) -> str:
 
 def _numbers(p: Known) -> tuple[str, str, str]:
     digits = decimals(p.sd)
-    return f"{p.value:.{digits}f}", f"+- {p.sd:.{digits}f}", f"+- {p.prior_sd:.{digits}f}"
+    return f"{p.value:.{digits}f}", f"± {p.sd:.{digits}f}", f"± {p.prior_sd:.{digits}f}"
 
 
 def _informed(share: float) -> str:
     """Who speaks: measurements or prior."""
     if share < OWN:
-        return f"measurements ({1 - share:.0%})"
-    return f"prior ({share:.0%})" if share > RESTS_ON_PRIOR else f"both (prior {share:.0%})"
+        return f"measurements ({percent(1 - share, 0)})"
+    return f"prior ({percent(share, 0)})" if share > RESTS_ON_PRIOR else f"both (prior {percent(share, 0)})"
 
 
 def _alike(p: Known) -> str:
@@ -63,4 +63,4 @@ def _directions(group: Knowledge) -> str:
 
 def _sum(d: Combination) -> tuple[str, str]:
     digits = decimals(d.sd)
-    return f"{d.value:.{digits}f}", f"+- {d.sd:.{digits}f}"
+    return f"{d.value:.{digits}f}", f"± {d.sd:.{digits}f}"

@@ -2,7 +2,7 @@
 
 from bowdenfit.kinds.terms import candidate_kinds
 from bowdenfit.questions.next.answer import NextMeasurement, Ranked
-from bowdenfit.words import decimals, few, filled, table
+from bowdenfit.words import decimals, few, filled, percent, table
 
 _MOST_NAMED = 3  # candidates as good as the best that are named in the sentence
 
@@ -96,8 +96,8 @@ def _table(found: NextMeasurement, shown: tuple[Ranked, ...]) -> str:
     unit = f" ({found.answer.unit})" if found.answer.unit else ""
     digits = _digits(found)
     heads = ["candidate", f"sd afterwards{unit}", "variance taken away", "error"]
-    rows = [[r.name, f"{r.sd:.{digits}f}", f"{r.share:.1%}", f"{r.error:.1%}"] for r in shown]
+    rows = [[r.name, f"{r.sd:.{digits}f}", percent(r.share), percent(r.error)] for r in shown]
     if any(r.cost is not None for r in shown):
         heads += ["cost", "taken away per cost"]
-        rows = [[*row, f"{r.cost:g}", f"{r.worth:.2%}"] for row, r in zip(rows, shown, strict=True)]
+        rows = [[*row, f"{r.cost:g}", percent(r.worth, 2)] for row, r in zip(rows, shown, strict=True)]
     return table(heads, rows)

@@ -8,6 +8,7 @@ import numpy as np
 from bowdenfit.kinds import each_table
 from bowdenfit.questions.bends.answer import elastic_answers
 from bowdenfit.results.record import Record
+from bowdenfit.words import percent
 
 _ROUNDING = 1e-6  # of an end of a range, by which a number may miss it
 _SURELY, _HARDLY = 0.995, 0.005  # shares of the draws
@@ -65,7 +66,7 @@ def pulled(force: np.ndarray, input_force: float, word: str = "slack") -> tuple[
         word: What a rope is that does not pull.
     """
     share = np.mean(force <= _ROUNDING * input_force, axis=0)
-    words = [word if s > _SURELY else f"{word} in {s:.0%} of the draws" if s > _HARDLY else "" for s in share]
+    words = [word if s > _SURELY else f"{word} in {percent(s, 0)} of the draws" if s > _HARDLY else "" for s in share]
     return np.maximum(force, 0.0), words
 
 

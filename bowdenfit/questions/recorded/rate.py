@@ -9,7 +9,7 @@ import numpy as np
 from bowdenfit.inference.interval import Interval
 from bowdenfit.kinds import each_table
 from bowdenfit.recordings.recording import Recordings
-from bowdenfit.results.record import Record
+from bowdenfit.results.record import Record, once
 
 _SURE = 0.99  # probability from which a dependence on speed is called one
 SHOWN_SPEED = {"rad/s": ("r/min", 30 / np.pi), "mm/s": ("mm/s", 1.0), "": ("", 1.0)}
@@ -52,6 +52,7 @@ class RateEffect:
         )
 
 
+@once
 def rate_effect(fit: Record) -> RateEffect | None:
     """The effect of speed; None where the fit has none or no draws."""
     friction = fit.model.cable.friction

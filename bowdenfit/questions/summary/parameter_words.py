@@ -9,7 +9,7 @@ from bowdenfit.results.record import Record
 from bowdenfit.words import decimals, filled, listed, table
 
 _HEADS = (
-    "parameter", "median", "90 % interval", "mean +- sd", "least squares +- s.e.", "90 % profile interval", "prior", "unit",
+    "parameter", "median", "90 % interval", "mean ± sd", "least squares ± s.e.", "90 % profile interval", "prior", "unit",
 )  # fmt: skip
 _ALWAYS = (0, 4, 6)  # columns that are shown even where they are empty
 _WIDE = 2.5  # standard errors to each side beyond which an interval needs a word; of many readings it is 1.6
@@ -76,14 +76,14 @@ def _moments(known: Interval) -> tuple[str, str, str]:
     median, low, high, mean, sd = (
         f"{value:.{decimals(known.sd)}f}" for value in (known.median, known.q05, known.q95, known.mean, known.sd)
     )
-    return median, f"{low} to {high}", f"{mean} +- {sd}"
+    return median, f"{low} to {high}", f"{mean} ± {sd}"
 
 
 def _with_error(estimate: Estimate) -> str:
     if not estimate.identified:
         return _without_value(estimate)
     digits = _digits(estimate, abs(estimate.value) / 1000)
-    return f"{estimate.value:.{digits}f} +- {estimate.standard_error:.{digits}f}"
+    return f"{estimate.value:.{digits}f} ± {estimate.standard_error:.{digits}f}"
 
 
 def _with_interval(estimate: Estimate) -> str:

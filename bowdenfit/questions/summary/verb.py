@@ -1,7 +1,7 @@
 """The summary of a fit, and its figures."""
 
 import json
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
@@ -11,35 +11,40 @@ if TYPE_CHECKING:
     from bowdenfit.results.record import Record
 
 
-def summary(results: Annotated[Path, Argument("RESULTS")]) -> "tuple[str, str] | Record":
+def summary(
+    results: Annotated[Path, Argument("RESULTS")], *, full: Annotated[bool, Option()] = False
+) -> "tuple[str, str] | Record":
     """The summary of a finished fit, for people and as JSON; or the fit, where they were not written.
 
     Args:
         results: Its folder.
+        full: Everything that the fit says, instead of one page.
 
     Raises:
         StoreError: The folder is missing, unfinished or damaged.
     """
-    from bowdenfit.results.folder import FIT, SUMMARY, SUMMARY_TEXT
+    from bowdenfit.results.folder import DETAILS_TEXT, FIT, SUMMARY, SUMMARY_TEXT
 
     folder = Path(results)
-    if all((folder / name).exists() for name in (FIT, SUMMARY, SUMMARY_TEXT)):
-        text, page = ((folder / name).read_text(encoding="utf-8") for name in (SUMMARY_TEXT, SUMMARY))
+    if all((folder / name).exists() for name in (FIT, SUMMARY, SUMMARY_TEXT, DETAILS_TEXT)):
+        shown = DETAILS_TEXT if full else SUMMARY_TEXT
+        text, page = ((folder / name).read_text(encoding="utf-8") for name in (shown, SUMMARY))
         return text, page
     from bowdenfit.results.store import load
 
     return load(folder)
 
 
-def reply(found: "tuple[str, str] | Record", _: object = None) -> Reply:
+def reply(found: "tuple[str, str] | Record", asked: Mapping[str, Any]) -> Reply:
     """What is printed of a fit."""
     if isinstance(found, tuple):
         text, page = found
         return Reply(text, lambda: json.loads(page))
+    from bowdenfit.questions.summary.brief_words import summary_text
     from bowdenfit.questions.summary.page import summarize
-    from bowdenfit.questions.summary.words import summary_text
+    from bowdenfit.questions.summary.words import full_text
 
-    return Reply(summary_text(found), lambda: summarize(found))
+    return Reply(full_text(found) if asked.get("full") else summary_text(found), lambda: summarize(found))
 
 
 def plot(
@@ -99,7 +104,7 @@ SUMMARY_VERB = Verb(
     summary,
     reply,
     "Print the summary of a fit.",
-    "Print the summary of a finished fit.",
+    "Print the summary of a finished fit on one page: the answer, whether to trust it, and what to do next.",
     json="Print summary.json instead of the summary for people.",
 )
 PLOT_VERB = Verb(

@@ -1,4 +1,4 @@
-"""The printed summary (`summary.txt`): verdict, coefficients, measured beside predicted, the design answer."""
+"""The whole summary (`details.txt`): verdict, coefficients, measured beside predicted, the design answer."""
 
 from typing import Any
 
@@ -30,14 +30,14 @@ from bowdenfit.questions.summary.verdict import (
 )
 from bowdenfit.recordings.recording import Recordings
 from bowdenfit.results.record import Record
-from bowdenfit.words import filled, listed, table
+from bowdenfit.words import filled, listed, percent, table
 
 _UNLIMITED = 2000.0  # an angle in degrees or a length in mm beyond which a curve coefficient is no longer a finding
 _RESTS_ON_PRIOR = 0.2  # contraction below which a parameter is said to rest on its prior alone
 
 
-def summary_text(fit: Record) -> str:
-    """The summary of a fit for people."""
+def full_text(fit: Record) -> str:
+    """Everything that a fit says, for people."""
     page = summarize(fit)
     blocks = [
         _title(fit),
@@ -224,16 +224,16 @@ def _measured(fit: Record, page: dict[str, Any]) -> str:
     heads += ["measured/predicted - 1"]
     rows = []
     for row in page["measured"]:
-        interval = [f"{row['q05']:.2%} to {row['q95']:.2%}"] if drawn else []
+        interval = [f"{percent(row['q05'], 2)} to {percent(row['q95'], 2)}"] if drawn else []
         what = "run " if readings_called(row["table"]).are_runs else ""
         rows.append(
             [
                 what + row["label"],
                 *([f"{row['input_force_N']:.3g} N"] if of_load else []),
-                f"{row['measured']:.2%}",
-                f"{row['predicted']:.2%}",
+                percent(row['measured'], 2),
+                percent(row['predicted'], 2),
                 *interval,
-                f"{row['relative_error']:+.2%}",
+                percent(row['relative_error'], 2, "+"),
             ]
         )
     return "Efficiency, measured and predicted\n" + table(heads, rows)
@@ -242,10 +242,7 @@ def _measured(fit: Record, page: dict[str, Any]) -> str:
 def _answer(fit: Record) -> str:
     if fit.posterior is None or fit.dataset.description.route is None:
         return ""
-    sentences = [
-        part for line in fit.optimal_length().lines() for part in ([filled(line)] if "  " not in line else [line])
-    ]
-    return "\n".join(sentences)
+    return str(fit.optimal_length())
 
 
 def _origin(page: dict[str, Any]) -> str:

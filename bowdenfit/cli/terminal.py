@@ -1,0 +1,37 @@
+"""What is said in a terminal: in its own letters, or in ASCII where it has no others."""
+
+import os
+import sys
+
+import click
+
+from bowdenfit.words import in_ascii, printable
+
+
+def say(text: str, err: bool = False, nl: bool = True) -> None:
+    """Print to standard output, or to standard error.
+
+    Args:
+        text: What is said.
+        err: Whether it goes to standard error.
+        nl: Whether the line ends after it.
+    """
+    stream = sys.stderr if err else sys.stdout
+    said = printable(text)
+    click.echo(said if shows(said, getattr(stream, "encoding", None)) else in_ascii(said), nl=nl, err=err)
+
+
+def shows(text: str, encoding: str | None) -> bool:
+    """Whether a terminal of an encoding can show a text; one of the locale C says that it has no more than ASCII.
+
+    Args:
+        text: What is to be shown.
+        encoding: What the stream is written in.
+    """
+    if os.environ.get("LC_ALL") in {"C", "POSIX"}:
+        return text.isascii()
+    try:
+        text.encode(encoding or "ascii")
+    except (UnicodeEncodeError, LookupError):
+        return False
+    return True

@@ -1,0 +1,75 @@
+"""The summary as it is printed (`summary.txt`): one page with the answer, whether to trust it, what to do next, and numbers."""
+
+import textwrap
+
+from bowdenfit.kinds import readings_called
+from bowdenfit.questions.check.table_checks import CheckedReading
+from bowdenfit.questions.check.words import with_unit
+from bowdenfit.questions.summary.answer import answer, checked_readings, quantities, readings_off
+from bowdenfit.questions.summary.trust_words import next_step, reasons, trust, warning
+from bowdenfit.questions.summary.verdict import verdict
+from bowdenfit.results.record import Record
+from bowdenfit.words import WIDTH, filled, table
+
+LINES = 25
+_LONGEST_NAME, _LONGEST_READING = 44, 36  # characters
+_MOST_QUANTITIES, _MOST_OFF = 8, 3  # rows
+_MORE = "Everything else: bowdenfit summary --full"
+
+
+def summary_text(fit: Record) -> str:
+    """One page for people: at most `LINES` lines, as a terminal of 80 columns shows them."""
+    below = [line for block in (_quantities(fit), _off(fit), [_MORE]) for line in (["", *block] if block else [])]
+    above, room = _said(fit), LINES - len(below)
+    if len(above) > room:
+        above = [*above[: room - 1], "[...]"]
+    return "\n".join([*above, *below]) + "\n"
+
+
+def _said(fit: Record) -> list[str]:
+    """The answer, whether to trust it, and what to do next, each from a line of its own on."""
+    found, name = verdict(fit), textwrap.shorten(fit.name, _LONGEST_NAME, placeholder="...")
+    first, *others = answer(fit)
+    first = first[0].lower() + first[1:]
+    if found.trusted:
+        sentences = [f"{name}: {first}", *others, *trust(fit), next_step(fit)]
+    else:
+        sentences = [f"{name}: {warning(found)}", *reasons(found), f"What they would say: {first}"]
+    return [line for sentence in sentences if sentence for line in filled(sentence).splitlines()]
+
+
+def _quantities(fit: Record) -> list[str]:
+    """The coefficients in a table."""
+    found = quantities(fit)
+    shown = found[:_MOST_QUANTITIES]
+    if not shown:
+        return []
+    wide = max(len(q.interval) for q in shown)
+    rows = [(q.name, q.value, f"{q.interval:>{wide}} {q.unit}".rstrip()) for q in shown]
+    lines = table(("", "value", f"{'90 % interval':>{wide}}"), rows, left=(f"{'90 % interval':>{wide}}",)).splitlines()
+    start = max(map(len, lines)) + 2
+    meanings = [textwrap.shorten(q.what, WIDTH - start, placeholder=" ...") for q in shown]
+    lines[2:] = [f"{line:<{start}}{meaning}".rstrip() for line, meaning in zip(lines[2:], meanings, strict=True)]
+    more = len(found) - len(shown)
+    return [*lines, *([f"and {more} more"] if more > 0 else [])]
+
+
+def _off(fit: Record) -> list[str]:
+    """Readings that are off, beside what was expected of them; how many there are where none is."""
+    off, every = readings_off(fit), checked_readings(fit)
+    if not off:
+        return [filled(f"None of {len(every)} readings is off.")] if len(every) > 1 else []
+    rows = [_row(reading) for reading in off[:_MOST_OFF]]
+    heads = (f"Off: {len(off)} of {len(every)} readings", "measured", "expected", "90 % interval")
+    more = len(off) - len(rows)
+    return [*table(heads, rows).splitlines(), *([f"and {more} more"] if more > 0 else [])]
+
+
+def _row(reading: CheckedReading) -> tuple[str, str, str, str]:
+    name = readings_called(reading.table).one.format(reading.label)
+    measured, expected, low, high = (
+        with_unit(reading, value) for value in (reading.reading, reading.expected, reading.q05, reading.q95)
+    )
+    bound = "at most " if reading.is_bound else ""
+    interval = f"{low.rsplit(' ', 1)[0]} to {high}"
+    return textwrap.shorten(name, _LONGEST_READING, placeholder="..."), f"{bound}{measured}", expected, interval

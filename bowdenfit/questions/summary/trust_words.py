@@ -1,0 +1,95 @@
+"""Whether a fit may be trusted and why not, and what to do next, in sentences without terms of statistics."""
+
+from bowdenfit.kinds import readings_called
+from bowdenfit.questions.check.answer import checks_of
+from bowdenfit.questions.check.table_checks import CheckedReading
+from bowdenfit.questions.identify.confounding import confounded_pairs
+from bowdenfit.questions.identify.judgment import identifiability
+from bowdenfit.questions.summary.answer import readings_off
+from bowdenfit.questions.summary.verdict import (
+    CONTRADICTORY,
+    IMPOSSIBLE,
+    NOT_CONVERGED,
+    NOT_DESCRIBED,
+    NOT_IDENTIFIABLE,
+    Verdict,
+)
+from bowdenfit.results.record import Record
+from bowdenfit.words import listed
+
+_WRONG = {
+    NOT_CONVERGED: "the computation has not settled",
+    CONTRADICTORY: "the measurements contradict each other",
+    IMPOSSIBLE: "some of the readings cannot be",
+    NOT_DESCRIBED: "the model does not describe these readings",
+    NOT_IDENTIFIABLE: "the measurements do not tell every coefficient",
+}
+
+
+def warning(found: Verdict) -> str:
+    """The first line of a fit that is not to be trusted; empty of one that is."""
+    kinds = [words for kind, words in _WRONG.items() if kind in found.troubles]
+    return f"DO NOT USE THESE NUMBERS: {listed(kinds)}." if kinds else ""
+
+
+def reasons(found: Verdict) -> list[str]:
+    """Why not, without what only says how the computation went."""
+    said = [sentence for kind in _WRONG if kind != NOT_CONVERGED for sentence in found.troubles.get(kind, ())]
+    if NOT_CONVERGED in found.troubles:
+        said.append(
+            "The numbers still move, and may be far off. Let it go on with the same command "
+            "and --resume; if that does not end it, state what you know of the coefficients in cable.toml."
+        )
+    return said
+
+
+def trust(fit: Record) -> list[str]:
+    """What speaks for a fit that may be trusted, and what to keep in mind."""
+    if fit.posterior is None:
+        best = ", without a best length" if fit.dataset.description.route is not None else ""
+        return [
+            f"Nothing speaks against these numbers, but they are least squares alone{best}; fit again without --no-mcmc for "
+            "the full answer."
+        ]
+    said = ["You can trust this: the computation has settled, and the readings agree with the model and with each other."]
+    return said + [sentence for sentence in (_resting(fit), _alike(fit), _prior_against(fit)) if sentence]
+
+
+def next_step(fit: Record) -> str:
+    """What to do next with a fit that may be trusted; empty where there is nothing."""
+    found, off = checks_of(fit), readings_off(fit)
+    if found is None:
+        return ""
+    if off:
+        return f"Next: look at how {_named(off[0])} was measured and written down: it is far off (see below)."
+    again = f"; in doubt, measure {_named(found.decisive[0])} again, on which the answer leans most" if found.decisive else ""
+    if fit.dataset.description.route is not None and fit.optimal_length().is_settled:
+        return f"Next: nothing needs to be measured{again}. bowdenfit next says what would narrow it."
+    return f"Next: bowdenfit next says which measurement would tell most{again}."
+
+
+def _named(reading: CheckedReading) -> str:
+    return readings_called(reading.table).one.format(reading.label)
+
+
+def _resting(fit: Record) -> str:
+    """Coefficients of friction that no measurement tells, because they were stated."""
+    friction = identifiability(fit).groups.get("friction")
+    names = friction.resting if friction is not None else []
+    return f"Hardly measured, mostly as assumed beforehand: {listed(names)}." if names else ""
+
+
+def _alike(fit: Record) -> str:
+    """The two parameters that are told apart least."""
+    pairs = confounded_pairs(fit)
+    if not pairs:
+        return ""
+    pair = pairs[0]
+    return f"{pair.first} and {pair.second} are hardly told apart; {pair.combination} is known much better than each."
+
+
+def _prior_against(fit: Record) -> str:
+    """Parameters about which readings and prior contradict each other."""
+    found = checks_of(fit)
+    names = dict.fromkeys([s.parameter for s in found.conflicts] + [f.parameter for f in found.far_out]) if found else {}
+    return f"The readings contradict what was assumed of {listed(list(names))} beforehand; check its unit." if names else ""

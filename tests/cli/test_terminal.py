@@ -1,0 +1,35 @@
+"""What is printed is readable where it is printed: in UTF-8 where the terminal has it, in ASCII where not."""
+
+import io
+
+import pytest
+
+from bowdenfit.cli import terminal
+from bowdenfit.words import WIDTH, filled, in_ascii
+
+
+@pytest.mark.parametrize(
+    ("encoding", "printed"),
+    [("utf-8", "0.2 ± 0.1, 5 µm"), ("ascii", "0.2 +- 0.1, 5 um"), ("cp1252", "0.2 ± 0.1, 5 µm"), ("?", "0.2 +- 0.1, 5 um")],
+)
+def test_a_terminal_is_given_the_letters_that_it_has(encoding, printed, monkeypatch):
+    monkeypatch.delenv("LC_ALL", raising=False)
+    text = "0.2 ± 0.1, 5 µm"
+    assert (text if terminal.shows(text, encoding) else in_ascii(text)) == printed
+
+
+def test_the_locale_c_is_taken_at_its_word(monkeypatch):
+    monkeypatch.setenv("LC_ALL", "C")
+    stream = io.StringIO()
+    monkeypatch.setattr("sys.stdout", stream)
+    terminal.say("1 ± 2")
+    assert stream.getvalue() == "1 +- 2\n"
+
+
+@pytest.mark.parametrize("start", range(60, 80))
+def test_no_number_loses_its_unit_or_its_error_to_the_next_line(start):
+    text = "a" * start + " 0.25 ± 0.03 N and 95 % of it, with --friction rate-dependent"
+    lines = filled(text).splitlines()
+    assert all(len(line) <= max(WIDTH, start) for line in lines)
+    assert not any(line.startswith(("±", "%", "N ")) or line.endswith("±") for line in lines)
+    assert " ".join(" ".join(lines).split()) in (text, text[:WIDTH] + " " + text[WIDTH:])

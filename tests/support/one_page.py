@@ -1,0 +1,24 @@
+"""What keeps a page from being read by an engineer in a terminal: too wide, too long, no answer at its top, jargon."""
+
+import re
+
+JARGON = (
+    r"\belpd\b", r"\bk\b", r"\bz\b", r"\bdraws?\b", r"\bwalkers?\b", r"\bensembles?\b", r"\bcondition number\b",
+    r"\blog rad\b", r"\w*(Normal|Cauchy)\(", r"\bcensored\b", r"\bposterior\b", r"\bR-hat\b", r"\beffective sample\b",
+    r"\bs\.e\.", r"\b1 \w+s were\b", r"\b1 (runs|readings|recordings)\b", r"\+-", r"\d%",
+)  # fmt: skip
+ANSWER = re.compile(r"cut the cable to \d|coefficients? of friction:? |best .* is \d|DO NOT USE", re.IGNORECASE)
+
+
+def faults(page: str, lines: int = 25) -> list[str]:
+    """What is wrong with a printed page, a sentence each.
+
+    Args:
+        page: The page.
+        lines: How many there may be.
+    """
+    rows = page.splitlines()
+    found = [f"wider than 80: {row}" for row in rows if len(row.encode()) > 80]
+    found += [f"{len(rows)} lines"] if len(rows) > lines else []
+    found += ["no answer in three lines"] if not ANSWER.search(" ".join(rows[:3])) else []
+    return found + [f"jargon: {word[0]!r}" for pattern in JARGON if (word := re.search(pattern, page, re.IGNORECASE))]

@@ -5,6 +5,7 @@ import json
 import numpy as np
 import pytest
 from hand_bench import BENDS, pull
+from one_page import faults
 
 import bowdenfit as bf
 
@@ -41,7 +42,9 @@ def test_a_contrast_is_said_in_summary_json_and_notebook(fitted):
     contrast = fit.groups.contrast("new", "old")
     assert contrast.difference.median == pytest.approx(np.median(draws)) == pytest.approx(-0.04, abs=0.015)
     assert contrast.probability == pytest.approx(np.mean(draws < 0))
-    said = (fitted / "by-group" / "summary.txt").read_text()
+    page = (fitted / "by-group" / "summary.txt").read_text()
+    said = " ".join(page.split())
+    assert faults(page) == []
     assert f"new less old: {contrast.difference.median:.4f}, 90 % interval" in said and "different (lower) with prob" in said
     (page,) = json.loads((fitted / "by-group" / "summary.json").read_text())["groups"]["contrasts"]
     assert page["difference"]["q95"] == contrast.difference.q95 and page["in_words"] == str(contrast)

@@ -9,13 +9,14 @@ from bowdenfit.parameters.space import Parameter
 from bowdenfit.questions.bends.overview import elastic_overview
 from bowdenfit.questions.check.answer import checks_of
 from bowdenfit.questions.check.table_checks import CheckedReading
+from bowdenfit.questions.groups.answer import groups_of
 from bowdenfit.questions.recorded.lost_force import lost_force
 from bowdenfit.questions.recorded.rate import rate_effect
 from bowdenfit.results.record import Record
 from bowdenfit.words import decimals, few
 
 _ROLES = ("friction", "friction_model", "angle", "elastic")
-_FEW = 3  # coefficients that the answer names
+_FEW = 3  # coefficients and contrasts that the answer names
 _COEFFICIENT = "friction coefficient"
 _QUANTILE = 1.645  # standard errors to each end of a 90 % interval
 
@@ -127,5 +128,7 @@ def _preload(fit: Record) -> list[str]:
 
 
 def _of_options(fit: Record) -> list[str]:
-    """What was found of drag and speed, where the fit asked for them."""
-    return [found.sentence() for found in (lost_force(fit), rate_effect(fit)) if found is not None]
+    """What was found of drag, of speed and of groups, where the fit asked for them."""
+    groups = groups_of(fit)
+    contrasts = [f"Friction {c.coefficient}, {c.sentence()}." for c in (groups.contrasts if groups else ())[:_FEW]]
+    return [found.sentence() for found in (lost_force(fit), rate_effect(fit)) if found is not None] + contrasts

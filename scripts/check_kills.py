@@ -1,0 +1,141 @@
+"""Does a fit that is ended at any moment lose anything? Signals at random times, and what comes of going on.
+
+    python scripts/check_kills.py [--kills N] [--seed S]
+
+Each time a small fit by emcee or NUTS, or a calibration, is started in a process of its own and ended by SIGINT, SIGTERM or
+SIGKILL after a random part of the time that it takes. Then the same command is given again, with --resume where a checkpoint is
+said to be kept or is there, with --force where anything else is left. It must end as usual, with the same draws (or
+replications) as one that nothing ended; no process of the first may be left; and one that was asked to end must have ended with
+130 and a sentence, or have finished.
+
+Prints each kill, and ends with 1 if a promise was broken.
+"""
+
+import argparse
+import json
+import os
+import random
+import signal
+import subprocess
+import sys
+import tempfile
+import time
+from dataclasses import dataclass
+from pathlib import Path
+
+ROOT = Path(__file__).resolve().parent.parent
+SMALL = ("sampler.n_walkers=32", "sampler.max_steps=600", "sampler.target_ess=100")
+SIGNALS = (signal.SIGINT, signal.SIGTERM, signal.SIGKILL)
+# A shell that runs this in the background makes its children deaf to interrupts; this one hears again.
+HEAR = "import os, signal, sys; signal.signal(signal.SIGINT, signal.SIG_DFL); os.execv(sys.argv[1], sys.argv[1:])"
+
+
+@dataclass(frozen=True)
+class Job:
+    """Something long that may be ended.
+
+    Args:
+        name: What it is.
+        words: Of its command, before the results folder.
+        kept: File that lets it go on.
+        done: File that is there once it has finished.
+    """
+
+    name: str
+    words: tuple[str, ...]
+    kept: str
+    done: str
+
+    def command(self, folder: Path, *more: str) -> list[str]:
+        """Its command."""
+        return [sys.executable, "-m", "bowdenfit.cli", *self.words, "-o", str(folder), "--seed", "3", *more]
+
+    def result(self, folder: Path) -> object:
+        """What it found, to be compared."""
+        if self.done == "fit.json":
+            import bowdenfit as bf
+
+            return bf.load(folder).posterior.z.tobytes()
+        lines = [json.loads(line) for line in (folder / self.kept).read_text().splitlines()[1:]]
+        return sorted((line["number"], json.dumps(line["ranked"])) for line in lines)
+
+
+SET = tuple(f"--set={setting}" for setting in SMALL)
+YARN = str(ROOT / "datasets" / "yarn-on-cylinder")
+JOBS = (
+    Job("emcee", ("fit", YARN, *SET), "chain.checkpoint", "fit.json"),
+    Job("nuts", ("fit", YARN, "--sampler", "nuts", *SET), "chain.checkpoint", "fit.json"),
+    Job("calibrate", ("calibrate", YARN, "--replications", "6"), "replications.jsonl", "calibration.json"),
+)
+
+
+def main() -> None:
+    """Command line."""
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("--kills", type=int, default=60)
+    parser.add_argument("--seed", type=int, default=1)
+    asked = parser.parse_args()
+    chance, broken = random.Random(asked.seed), 0
+    with tempfile.TemporaryDirectory() as place:
+        whole = {job.name: run_whole(job, Path(place) / job.name) for job in JOBS}
+        for number in range(asked.kills):
+            job, sent = JOBS[number % len(JOBS)], SIGNALS[number // len(JOBS) % len(SIGNALS)]
+            seconds, result = whole[job.name]
+            at = chance.uniform(0, 1.05 * seconds)
+            said, wrong = kill_once(job, sent, at, result, Path(place) / f"{number}")
+            broken += bool(wrong)
+            said += f"; WRONG: {wrong}" if wrong else ""
+            print(f"{number:3d} {job.name:9s} {sent.name} at {at:5.2f} s: {said}", flush=True)
+    print(f"{broken} of {asked.kills} went wrong")
+    sys.exit(broken > 0)
+
+
+def run_whole(job: Job, folder: Path) -> tuple[float, object]:
+    """Seconds that a job takes, and what it finds."""
+    start = time.monotonic()
+    subprocess.run(job.command(folder), check=False, capture_output=True)
+    return time.monotonic() - start, job.result(folder)
+
+
+def kill_once(job: Job, sent: signal.Signals, at: float, result: object, folder: Path) -> tuple[str, str]:
+    """What a job said that was ended, and which promise was broken."""
+    command = [sys.executable, "-c", HEAR, *job.command(folder)]
+    pipes = {"stdout": subprocess.PIPE, "stderr": subprocess.PIPE, "text": True}
+    with subprocess.Popen(command, **pipes, start_new_session=True) as process:
+        try:
+            process.wait(at)
+        except subprocess.TimeoutExpired:
+            process.send_signal(sent)
+        try:
+            _, err = process.communicate(timeout=30)
+        except subprocess.TimeoutExpired:
+            os.killpg(process.pid, signal.SIGKILL)
+            return "", "its output stayed open for 30 s"
+    said = f"{process.returncode} {' '.join(err.split())[-90:]!r}"
+    finished = (folder / job.done).exists()
+    if sent != signal.SIGKILL and not finished and process.returncode not in {130, -sent}:
+        return said, f"exit code {process.returncode}"
+    if is_running(process.pid):
+        return said, "a process is left"
+    if "--resume" in err and not (folder / job.kept).exists():
+        return said, "--resume is promised, and nothing is kept"
+    more = ["--resume"] if (folder / job.kept).exists() else ["--force"]
+    again = subprocess.run(job.command(folder, *more), capture_output=True, text=True, check=False, timeout=300)
+    if again.returncode not in {0, 3}:
+        return said, f"{more[0]} ended with {again.returncode}: {again.stderr[-200:]}"
+    return f"{said}, then {more[0]}", "" if job.result(folder) == result else "another result than without the kill"
+
+
+def is_running(session: int) -> bool:
+    """Whether a process of a session is left, after a moment to end."""
+    for _ in range(20):
+        try:
+            os.killpg(session, 0)
+        except ProcessLookupError:
+            return False
+        time.sleep(0.1)
+    return True
+
+
+if __name__ == "__main__":
+    main()

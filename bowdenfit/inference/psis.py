@@ -32,7 +32,7 @@ def smooth_weights(log_ratio: np.ndarray, share: float = 1.0) -> tuple[np.ndarra
     ratios = np.where(usable, log_ratio, np.max(log_ratio[usable], initial=0.0) - _NO_WEIGHT)
     if not np.ptp(ratios) > _FLAT:
         return equal, 0.0
-    with np.errstate(divide="ignore", invalid="ignore"):
+    with np.errstate(divide="ignore", invalid="ignore", over="ignore"):  # what overflows is not finite, and is looked at below
         # ArviZ's function takes what is left out, the log likelihood, and turns its sign itself.
         log_weights, k = array_stats.psislw(-ratios, r_eff=share, axis=0)
     if not (np.isfinite(k) and np.all(np.isfinite(log_weights))):

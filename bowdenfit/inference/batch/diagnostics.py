@@ -17,3 +17,12 @@ def diagnose_few_draws(draws: Mapping[str, np.ndarray], n_ensembles: int) -> dic
     found = diagnose_all(draws, n_ensembles)
     by_chance = {name: 2.5 / np.sqrt(max(min(d.ess_bulk, d.ess_tail), 1.0)) for name, d in found.items()}
     return {name: replace(d, drift=float(d.drift / by_chance[name]) / 2 * MAXIMUM_DRIFT) for name, d in found.items()}
+
+
+def remembered(diagnostics: Mapping[str, Diagnostics], least: int) -> tuple[str, ...]:
+    """Where too few effective draws were made for walkers to have forgotten where they started, in words."""
+    return tuple(
+        f"bulk effective sample size of {name} is {d.ess_bulk:.0f} and should be at least {least}"
+        for name, d in diagnostics.items()
+        if not d.ess_bulk >= least
+    )

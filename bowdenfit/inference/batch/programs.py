@@ -17,7 +17,7 @@ from bowdenfit.inference.log_density import LogDensity
 from bowdenfit.inference.objective import noise_scales
 
 FITTED = 4  # walkers a parameter, at the least
-CHUNK = 16  # data sets that a program takes at once; always as many, so that rounding is the same
+CHUNK = 8  # data sets that a program takes at once; always as many, so that rounding is the same
 
 
 @dataclass(frozen=True)

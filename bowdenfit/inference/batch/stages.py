@@ -5,7 +5,7 @@ from typing import Any
 
 import numpy as np
 
-from bowdenfit.inference.batch.diagnostics import diagnose_few_draws
+from bowdenfit.inference.batch.diagnostics import diagnose_few_draws, remembered
 from bowdenfit.inference.batch.ensembles import STEPS, STORED
 from bowdenfit.inference.batch.laplace import mixtures
 from bowdenfit.inference.batch.programs import CHUNK, BatchPrograms, stack
@@ -154,8 +154,8 @@ def _by_ensembles(programs: BatchPrograms, case: Case) -> BatchFit:
     z = second[kept].transpose(1, 2, 0, 3).reshape(-1, len(kept), len(programs.names))
     draws = {name: z[..., i] for i, name in enumerate(programs.names)}
     diagnostics = diagnose_few_draws(draws, sampler.n_ensembles)
-    target = max(sampler.target_ess, FORGETS * len(z))
-    reasons = (*shortfalls(diagnostics, sampler.target_r_hat, target), *stuck_walkers(z))
+    short = shortfalls(diagnostics, sampler.target_r_hat, sampler.target_ess)
+    reasons = (*short, *remembered(diagnostics, FORGETS * len(z)), *stuck_walkers(z))
     steps = case.rounds * STEPS
     return BatchFit(z.reshape(-1, z.shape[-1]), "ensembles", case.fit.pareto_k, diagnostics, reasons, steps)
 

@@ -124,6 +124,8 @@ class Calibration:
         truths: True values that did not come from the priors, in words.
         engines: What fitted how many replications.
         power: What so many replications can see of one quantity.
+        faults_with_all: What would be wrong with which quantity if replications whose draws could not be trusted were ranked
+            too, by the draws there are.
     """
 
     name: str
@@ -137,6 +139,7 @@ class Calibration:
     truths: tuple[str, ...] = ()
     engines: dict[str, int] = field(default_factory=dict)
     power: tuple[Power, ...] = ()
+    faults_with_all: dict[str, str] = field(default_factory=dict)
 
     level: ClassVar = LEVEL
     JSON: ClassVar = (..., "is_calibrated", "ranked", "level")

@@ -36,12 +36,9 @@ def findings(
     way = "coverage" if truths else "ranks and coverage"
     judged_by = {q: way if each.is_answer or not truths else "" for q, each in known.items()}
     n_judged = sum(map(bool, judged_by.values()))
-    ranks = [np.array([r.ranked[q].rank for r in good]) for q in known]
-    p_values = [UniformRanks(len(good)).p_value(r) for r in ranks]
-    checked = tuple(
-        _check_quantity(q, known[q].symbol, r, (p, c), n_judged, judged_by[q], good)
-        for q, r, p, c in zip(known, ranks, p_values, holm(p_values), strict=True)
-    )
+    checked = _check_all(known, judged_by, good)
+    drawn = [r for r in replications if r.ranked]
+    with_all = checked if len(drawn) == len(good) else _check_all(known, judged_by, drawn)
     redrawn: Counter[str] = Counter()
     for each in replications:
         redrawn.update(each.redrawn)
@@ -51,7 +48,21 @@ def findings(
     bands = {claimed: _band(len(good), claimed, n_judged) for claimed in INTERVALS} if checked else {}
     power = power_of(len(good), LEVEL / n_judged, bands, not truths) if checked else ()
     done = len(replications), checked, unconverged, dict(redrawn), seconds
-    return Calibration(name, assumed, seed, *done, truths, dict(engines.most_common()), power)
+    wrong_with_all = {q.name: q.fault for q in with_all if not q.is_calibrated}
+    return Calibration(name, assumed, seed, *done, truths, dict(engines.most_common()), power, wrong_with_all)
+
+
+def _check_all(
+    known: Mapping[str, Quantity], judged_by: Mapping[str, str], ranked: Sequence[Replication]
+) -> tuple[Checked, ...]:
+    """Every quantity over the same replications."""
+    n_judged = sum(map(bool, judged_by.values()))
+    ranks = [np.array([r.ranked[q].rank for r in ranked]) for q in known]
+    p_values = [UniformRanks(len(ranked)).p_value(r) for r in ranks]
+    return tuple(
+        _check_quantity(q, known[q].symbol, r, (p, c), n_judged, judged_by[q], ranked)
+        for q, r, p, c in zip(known, ranks, p_values, holm(p_values), strict=True)
+    )
 
 
 def _check_quantity(

@@ -3,6 +3,7 @@
 import json
 import secrets
 from collections.abc import Callable, Sequence
+from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any, Unpack
 
@@ -130,13 +131,12 @@ def _replicate(
     progress: Report | None,
 ) -> None:
     """Do what is not done yet, and keep each as it ends."""
-    from bowdenfit.inference.batch.programs import BatchSettings
     from bowdenfit.questions.calibrate.refit import RANKS, Laboratory
     from bowdenfit.questions.calibrate.store import keep
     from bowdenfit.questions.calibrate.workbench import Workbench
 
     missing = [number for number in range(replications) if number not in done]
-    bench = Workbench(plan, Laboratory(BatchSettings(RANKS, threads=workers or 0)))
+    bench = Workbench(plan, Laboratory(replace(RANKS, threads=workers or 0)))
     for each in bench.replications(missing):
         done[each.number] = each
         if folder is not None:

@@ -26,7 +26,7 @@ from bowdenfit.questions.calibrate.truths import StatedTruth
 from bowdenfit.results.optimum import optimum_of
 from bowdenfit.results.record import OPTIMAL_EFFICIENCY, OPTIMAL_LENGTH
 
-TOGETHER = 64  # replications that are fitted together: what is lost when a calibration is interrupted
+TOGETHER = 128  # replications that are fitted together: what is lost when a calibration is interrupted
 MOST_DRAWN = 5000  # tables, before a replication is given up
 
 

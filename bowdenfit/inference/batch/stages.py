@@ -128,7 +128,10 @@ def _further(case: Case, path: np.ndarray, log_density: np.ndarray) -> Case:
 def _on_the_way(programs: BatchPrograms, case: Case) -> Case:
     """Walkers at different ones of the weighted draws."""
     assert case.weighted is not None  # nothing walks where nothing can be computed
-    shape, generator = (programs.settings.sampler.n_ensembles, programs.n_walkers), np.random.default_rng([case.seed, 2])
+    shape, generator = (
+        (programs.settings.sampler.n_ensembles, programs.n_walkers),
+        np.random.default_rng([case.seed, 2]),
+    )
     log_weights = _evened(programs, case.weighted)
     # The largest of weights times exponential numbers are a sample without replacement.
     chosen = np.argsort(log_weights + generator.gumbel(size=len(log_weights)))[-shape[0] * shape[1] :]

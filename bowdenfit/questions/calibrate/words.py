@@ -93,7 +93,8 @@ def _with_all(found: Calibration) -> str:
     if found.faults_with_all == found.faults:
         return "Ranked by the draws there are, they would change nothing."
     wrong = [f"{name} ({fault})" for name, fault in found.faults_with_all.items()]
-    return f"Ranked with them, by the draws there are, {f'wrong would be {listed(wrong)}' if wrong else 'nothing would be wrong'}."
+    says = f"wrong would be {listed(wrong)}" if wrong else "nothing would be wrong"
+    return f"Ranked with them, by the draws there are, {says}."
 
 
 def _accounts(found: Calibration) -> list[str]:
@@ -121,8 +122,8 @@ def _accounts(found: Calibration) -> list[str]:
         named = ", ".join(str(n) for n in numbers[:_NAMED]) + (" ..." if len(numbers) > _NAMED else "")
         first = found.unconverged[numbers[0]]
         lines.append(
-            f"{len(numbers)} replications did not converge and are not ranked (numbers {named}), such as {numbers[0]}: {first}. "
-            "Whether draws converge follows from the readings, whatever the truth is, so that leaving some out leaves ranks "
-            f"uniform. {_with_all(found)}"
+            f"{len(numbers)} replications did not converge and are not ranked (numbers {named}), such as {numbers[0]}: "
+            f"{first}. Whether draws converge follows from the readings, whatever the truth is, so that leaving some "
+            f"out leaves ranks uniform. {_with_all(found)}"
         )
     return lines

@@ -1,9 +1,11 @@
 """A data set: the description and the tables of one folder, read together and checked against each other."""
 
+import glob
 import hashlib
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
+from typing import Any
 
 from bowdenfit.cable.registry import check_names
 from bowdenfit.description import Description
@@ -12,12 +14,12 @@ from bowdenfit.errors import DescriptionError
 from bowdenfit.files.row_account import RowAccount
 from bowdenfit.inputs import refuse_special
 from bowdenfit.kinds import KINDS, each_table
+from bowdenfit.kinds.fit_commands import WRAP_ANGLE, has_own_angles, only_kind
 from bowdenfit.kinds.kind import Source
 from bowdenfit.kinds.measured_groups import measured_groups
 from bowdenfit.kinds.measurements import Measurements
 from bowdenfit.kinds.named_columns import with_columns
 from bowdenfit.kinds.settings import load_description, parse_description
-from bowdenfit.kinds.single_file import kind_of
 from bowdenfit.units import ColumnSource
 from bowdenfit.words import printable
 
@@ -59,11 +61,6 @@ def load_dataset(
         DescriptionError: The description is missing or wrong.
         DatasetError: A table is missing or wrong, or does not fit the description.
     """
-    if path.suffix.lower() not in {".toml", ""} and path.is_file():
-        raise DescriptionError(
-            f"{path.name} is a table without a description; say the angle it was measured at, such as "
-            f"--wrap-angle 180deg, or write a cable.toml beside it with `bowdenfit init`."
-        )
     if path.suffix.lower() not in {".toml", ""} and not path.exists():
         raise DescriptionError(f"{path} does not exist; check the spelling and the folder.")
     file = path if path.suffix == ".toml" else path / DESCRIPTION_FILE
@@ -71,34 +68,47 @@ def load_dataset(
     return read_dataset(description, file.parent, {file.name: _sha256(file)}, channels)
 
 
+def is_lone_file(path: Path) -> bool:
+    """Whether a data set is one file without a description."""
+    return path.suffix.lower() not in {".toml", ""} and path.is_file()
+
+
 def single_file_dataset(
     path: Path,
-    wrap_angle: tuple[float, str],
+    wrap_angle: tuple[float, str] | None,
     overrides: Sequence[str] = (),
     channels: Mapping[str, ColumnSource] | None = None,
     columns: Mapping[str, ColumnSource] | None = None,
     kind: str = "",
 ) -> Dataset:
-    """A data set from one table or recording of a cable with one contact at one known wrap angle.
+    """A data set from one table or recording of a cable with one contact.
 
     Args:
         path: Table of forces or of efficiencies, or a recording.
-        wrap_angle: The angle and its unit.
+        wrap_angle: The angle and its unit; None where each row of a table has its own.
         overrides: Settings, as for a description.
         channels: Channels of a recording named on the command line.
         columns: Columns of a table named there.
-        kind: "forces", "efficiencies" or "recordings"; by the file if omitted.
+        kind: Name of the kind of measurement; by the file if omitted.
 
     Raises:
         DescriptionError, DatasetError: The angle, a setting or the file is wrong.
     """
-    kind = kind or kind_of(path, bool(channels), bool(columns))
-    angle = {"value": wrap_angle[0], "unit": wrap_angle[1]}
+    kind = kind or only_kind(path, bool(channels), tuple(columns or ()))
+    if has_own_angles(path, kind, tuple(columns or ()), wrap_angle is not None):
+        angle: dict[str, Any] = {"column": WRAP_ANGLE.name}
+    elif wrap_angle is None:
+        raise DescriptionError(
+            f"{path.name} is a file without a description; say the angle that the cable was wrapped by, such as --wrap-angle "
+            "180deg, or write a cable.toml beside it with `bowdenfit init`; `bowdenfit check` prints the whole command."
+        )
+    else:
+        angle = {"value": wrap_angle[0], "unit": wrap_angle[1]}
     raw = {
         "name": printable(path.stem).strip()[:80] or "cable",
         "source": path.name,
         "contact": [{"name": "cable", "friction": "mu", "wrap_angle": angle}],
-        "tables": {kind: {"files": path.name}},
+        "tables": {kind: {"files": glob.escape(path.name)}},
     }
     described = with_columns(override(raw, overrides), columns or {})
     return read_dataset(parse_description(described, "--wrap-angle"), path.parent, {}, channels)

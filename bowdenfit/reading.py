@@ -56,14 +56,14 @@ def read(dataset: "str | Path | Dataset", **reading: Unpack[Reading]) -> "Datase
     """Read and check a data set, without fitting anything.
 
     Args:
-        dataset: Folder with a cable.toml, the file itself, or one table if `wrap_angle` is given.
-        reading: See `Reading`; `wrap_angle` is a number and its unit.
+        dataset: Folder with a cable.toml, the file itself, or one table or recording.
+        reading: See `Reading`; `wrap_angle` is a number and its unit, needed where the rows of a lone file have none.
 
     Raises:
         DescriptionError, DatasetError: What is wrong, in a sentence.
         UsageError: There is no such keyword.
     """
-    from bowdenfit.dataset import Dataset, load_dataset, single_file_dataset
+    from bowdenfit.dataset import Dataset, is_lone_file, load_dataset, single_file_dataset
     from bowdenfit.files.naming import parse_sources
     from bowdenfit.recordings.forces import parse_channels
 
@@ -75,7 +75,7 @@ def read(dataset: "str | Path | Dataset", **reading: Unpack[Reading]) -> "Datase
     sources = parse_channels(reading.get("channels", ()))
     columns = parse_sources(reading.get("columns", ()), "--column")
     wrap_angle = reading.get("wrap_angle")
-    if wrap_angle is not None:
+    if wrap_angle is not None or is_lone_file(Path(dataset)):
         return single_file_dataset(Path(dataset), wrap_angle, changes, sources, columns)
     return load_dataset(Path(dataset), changes, sources, columns)
 

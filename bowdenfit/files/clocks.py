@@ -16,6 +16,7 @@ from bowdenfit.units import conversion_factor
 _TIME_WORDS = {"time", "timestamp", "datetime", "elapsed", "zeit", "uhrzeit", "zeitstempel", "temps", "tiempo", "tempo"}
 _LABVIEW = "x_value"
 _SECONDS = {"sek", "sek.", "sec.", "seg", "secs"}
+_TENSION = re.compile(r"T_?\d")  # a clock only where it rises
 _EPOCH_UNITS = (
     (1e17, 1e-9),
     (1e14, 1e-6),
@@ -66,9 +67,10 @@ def is_clock(channel: Channel) -> bool:
     a unit of time must also never run backwards.
     """
     factor = _time_factor(channel.unit)
-    if names_time(channel.name):
+    rises = len(channel.values) > 1 and bool(np.all(np.diff(channel.values) >= 0))
+    if names_time(channel.name) and (rises or not _TENSION.fullmatch(channel.name)):
         return not channel.unit or factor is not None
-    return factor is not None and len(channel.values) > 1 and bool(np.all(np.diff(channel.values) >= 0))
+    return factor is not None and rises
 
 
 def names_time(heading: str) -> bool:

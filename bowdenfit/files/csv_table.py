@@ -14,7 +14,7 @@ from bowdenfit.files.table_rows import is_measured, numbers_less_words
 from bowdenfit.files.text_file import Line, comment_mark, first_bytes, first_lines, is_blank
 from bowdenfit.words import shown
 
-_FIRST_ROWS = 200
+_FIRST_ROWS, _FIRST_BYTES = 200, 1 << 18
 _SEPARATOR, _CONTINUED = "the separator", "the rest of a cell that runs over several rows"
 
 
@@ -39,7 +39,7 @@ class RawTable:
     account: RowAccount
 
 
-def read_csv(path: Path) -> RawTable:
+def read_csv(path: Path, most: int | None = None) -> RawTable:
     """Read one table.
 
     Understands comma, semicolon, tab, bar and blanks between columns; decimal comma; UTF-8, UTF-16 and Windows encodings;
@@ -48,16 +48,19 @@ def read_csv(path: Path) -> RawTable:
 
     Args:
         path: The file.
+        most: Number of its first rows that are enough; all if omitted.
 
     Raises:
         DatasetError: The file is missing, is no text, is empty, has no header or duplicate columns, or a row is longer
             than the header.
     """
-    name, data = path.name, first_bytes(path)
+    name, data = path.name, first_bytes(path, -1 if most is None else _FIRST_BYTES)
     content = recognize(path, data[:1024])
     if content is not UNKNOWN:
         raise DatasetError(f"{name} is {content.what}, not a CSV file; save the table as CSV and name that file.")
-    _, every = first_lines(data, name, whole=True)
+    _, every = first_lines(data, name, whole=most is None, most=most)
+    if most is not None and len(every) > 1 and not every[-1].ended:
+        every = every[:-1]
     declared, lines = declared_separator(every, name)
     lines = [line for line in lines if comment_mark(line.text) != "#"]  # % may be a heading
     separator = declared or max(SEPARATORS, key=lambda each: _fitness(lines, each))

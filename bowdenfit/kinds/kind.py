@@ -113,6 +113,7 @@ class Kind(Generic[AnyTable]):
             where there is no such table.
         quantities: Quantities in the settings, which must have the right dimensions.
         describe: What was understood of a table, for `check`, line by line.
+        alone: What a file is that holds such a table alone, in words with an article.
         heading: Over these lines, where they are a section of their own.
         warnings: What a table will not be able to tell, as far as counting shows.
         check: Refuses a table that does not fit the description or the other tables.
@@ -138,6 +139,7 @@ class Kind(Generic[AnyTable]):
     readings: tuple[Readings, ...]
     read: Callable[[Source], Found[AnyTable]]
     describe: Callable[[AnyTable, Description], list[str]]
+    alone: Callable[[AnyTable], str] = lambda _: "a table"
     settings: type[TableSettings] = Table
     contradiction: Callable[[Any, Description], str] = lambda *_: ""
     quantities: Callable[[Any, Description], list[Stated]] = lambda *_: []

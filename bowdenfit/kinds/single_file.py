@@ -1,29 +1,162 @@
-"""Which kind of table a file is that no description names."""
+"""What a file is that no description names: a table of readings or a recording, why, and whether it could be either."""
 
-from contextlib import nullcontext
-from itertools import islice
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass
+from itertools import pairwise
 from pathlib import Path
 
-from bowdenfit.files.csv_table import read_csv
-from bowdenfit.files.matching import Quantity, meanings
+import numpy as np
 
-_LONG = 200  # rows beyond which a table of forces is a recording
+from bowdenfit.errors import DatasetError
+from bowdenfit.files.cells import number_of
+from bowdenfit.files.clocks import is_date, names_time
+from bowdenfit.files.contents import TEXT
+from bowdenfit.files.csv_table import RawTable, read_csv
+from bowdenfit.files.headings import heading_of
+from bowdenfit.files.matching import Quantity, candidates
+from bowdenfit.files.sheets import stated_rate
+from bowdenfit.files.spellings import spelled
+from bowdenfit.files.text_file import first_bytes, first_lines
+from bowdenfit.units import conversion_factor
+from bowdenfit.words import shown
+
+HEAD = 400  # rows by which it is decided
+_FEW, _LONG = 50, 200  # rows of a table with a slow clock, and rows beyond which one without may be a recording
+_SLOW = 1.0  # seconds between rows beyond which a person may have written them
+_UNEVEN = 3.0  # largest step of a clock over its smallest
+_SMOOTH = 0.02  # mean square of the steps of a force over twice its variance: white noise has 1
+FORCES = (Quantity("input_force", "force"), Quantity("output_force", "force"))
+COLUMNS = (
+    *FORCES,
+    *(Quantity(name, "text") for name in ("run", "stroke", "group")),
+    Quantity("efficiency", "ratio"),
+    Quantity("velocity", "speed"),
+    Quantity("wrap_angle", "angle"),
+    Quantity("wrap_angle_sd", "angle"),
+    Quantity("efficiency_sd", "ratio"),
+)
+"""What a table without a description may have."""
 
 
-def kind_of(path: Path, has_channels: bool, has_columns: bool = False) -> str:
-    """Which kind of table a file without a description is.
+@dataclass(frozen=True)
+class FileKind:
+    """What a file without a description is.
 
-    A CSV file is a recording if it is long, or if its rows have a time and neither a run nor a stroke.
+    Args:
+        kind: Name of the kind of measurement that it holds.
+        why: Why it is taken for that, as a clause behind "because".
+        other: The kind that it could be as well; empty where there is no doubt.
     """
-    if has_channels or (path.suffix.lower() not in {".csv", ".txt", ".tsv"} and not has_columns):
-        return "recordings"
-    with path.open("rb") if path.is_file() else nullcontext() as file:
-        lines = sum(1 for _ in islice(file, _LONG + 1)) if file is not None else 0
-    if lines > _LONG and not has_columns:
-        return "recordings"
-    header = read_csv(path).header
-    if any("efficiency" in heading.lower() for heading in header):
-        return "efficiencies"
-    wanted = (Quantity("time", "time"), Quantity("run", "text"), Quantity("stroke", "text"))
-    found = {quantity.name for heading in header for quantity, _ in meanings(heading, wanted)}
-    return "recordings" if found == {"time"} else "forces"
+
+    kind: str
+    why: str
+    other: str = ""
+
+
+def file_kind(path: Path, has_channels: bool = False, named: Sequence[str] = ()) -> FileKind:
+    """What kind of measurement a file without a description holds.
+
+    A time column makes a recording, unless a column of runs, strokes or groups says that its rows are readings of their own;
+    its number of rows does not.
+
+    Args:
+        path: The file.
+        has_channels: Whether the user names channels, as recordings have.
+        named: Quantities whose columns the user names, as tables have.
+
+    Raises:
+        DatasetError: The file is missing or empty, or no text although its ending says so.
+    """
+    if named:
+        return FileKind("efficiencies" if "efficiency" in named else "forces", "its columns are named with --column")
+    if has_channels:
+        return FileKind("recordings", "its channels are named with --channel")
+    if path.suffix.lower() not in TEXT:
+        return FileKind("recordings", f"files with the ending {path.suffix or '(none)'} are those of acquisition programs")
+    try:
+        table = read_csv(path, HEAD)
+    except DatasetError as error:
+        return _without_headings(path, error)
+    return _by_columns(path, table)
+
+
+def _without_headings(path: Path, error: DatasetError) -> FileKind:
+    """A file whose first rows are no table; a short one is refused for what is wrong with them.
+
+    Raises:
+        DatasetError: It is short, or no text.
+    """
+    _, lines = first_lines(first_bytes(path, 1 << 18), path.name, whole=False, most=_LONG + 1)
+    if len(lines) <= _LONG:
+        raise error
+    return FileKind("recordings", "it is long, and its first rows are no headings over columns of readings")
+
+
+def _by_columns(path: Path, table: RawTable) -> FileKind:
+    clock = next((i for i, heading in enumerate(table.header) if _is_time(heading, table.units[i])), None)
+    found = {name for name, columns in candidates(_headings(table), COLUMNS).items() if columns}
+    forces = {quantity.name for quantity in FORCES}
+    kind = "efficiencies" if "efficiency" in found and not forces <= found else "forces"
+    rows_alone = next((name for name in ("run", "stroke", "group") if name in found), "")
+    if clock is not None:
+        return _with_clock(table, clock, kind, rows_alone)
+    _, above = first_lines(first_bytes(path, 1 << 15), path.name, whole=False, most=table.header_row - 1)
+    rate = stated_rate([line.text for line in above])
+    if rate is not None:
+        return FileKind("recordings", f"the line {shown(rate[1])} states its sampling rate")
+    if rows_alone or kind == "efficiencies" or len(table.rows) <= _LONG or not _is_smooth(table):
+        return FileKind(kind, "it has no column of time")
+    why = "it has no column of time, but many rows in which the force changes little from one to the next"
+    return FileKind(kind, why, "recordings")
+
+
+def _with_clock(table: RawTable, clock: int, kind: str, rows_alone: str) -> FileKind:
+    heading = shown(table.header[clock])
+    if rows_alone or kind == "efficiencies":
+        return FileKind(kind, f"its column {rows_alone or 'of efficiencies'} says that each row is a reading of its own")
+    steps = _steps(table, clock)
+    has_dates = not steps and any(is_date(row[clock].text.strip()) for row in table.rows[:_FEW])
+    even = bool(steps) and min(steps) > 0 and max(steps) < _UNEVEN * min(steps)
+    many = len(table.rows) >= _FEW
+    if (steps and (float(np.median(steps)) < _SLOW or (even and many))) or (has_dates and many):
+        return FileKind("recordings", f"it has a column of time, {heading}")
+    few = f"{len(table.rows)} rows" if not steps else f"{len(table.rows)} rows, {float(np.median(steps)):.3g} s apart"
+    return FileKind("recordings", f"it has a column of time, {heading}, but only {few}", kind)
+
+
+def _headings(table: RawTable) -> list[tuple[str, str]]:
+    return list(zip(table.header, table.units, strict=True))
+
+
+def _is_time(heading: str, unit: str) -> bool:
+    """Whether a heading means time; that of a tension, such as T1, does not."""
+    other = spelled(heading, unit)
+    return names_time(heading) and not (other and (other.unit or other.pair))
+
+
+def _steps(table: RawTable, column: int) -> list[float]:
+    """Seconds from each of the first rows to the next; empty where these are no numbers."""
+    values = [number_of(row[column].text.strip(), "." if "," not in row[column].text else ",") for row in table.rows]
+    known = [value for value in values if value is not None and math.isfinite(value)]
+    unit = heading_of(table.header[column], table.units[column]).unit
+    try:
+        factor = conversion_factor(unit, "time") if unit else 1.0
+    except DatasetError:
+        factor = 1.0
+    return [factor * (after - before) for before, after in pairwise(known)] if len(known) > len(values) / 2 else []
+
+
+def _is_smooth(table: RawTable) -> bool:
+    """Whether the first force changes from row to row as one that is sampled does, through many values."""
+    for i, (heading, unit) in enumerate(_headings(table)):
+        other = spelled(heading, unit)
+        if heading_of(heading, unit).unit not in {"N", "kN", "lbf"} and not (other and "force" in other.quantity):
+            continue
+        cells = [number_of(row[i].text.strip(), "." if "," not in row[i].text else ",") for row in table.rows]
+        values = np.array([math.nan if value is None else value for value in cells])
+        values = values[np.isfinite(values)]
+        spread = float(np.var(values)) if len(values) > _LONG else 0.0
+        many = len(set(values.tolist())) > len(values) / 4
+        return spread > 0 and many and float(np.mean(np.diff(values) ** 2)) < 2 * _SMOOTH * spread
+    return False

@@ -297,7 +297,7 @@ def test_check_of_a_file_alone_lists_channels_and_what_it_is_as_a_recording(reco
     assert "440mm_20rpm 1200" in words
     csv = str(recorded.parent / "yarn-on-cylinder" / "forces.csv")
     words = " ".join(CliRunner().invoke(command, ["check", csv]).output.split())
-    assert "As a recording it cannot be used yet" in words
+    assert "a table of 21 readings at 1 load" in words
 
 
 def test_recordings_forces_efficiencies_and_angles_are_fitted_together(recorded, on_body, tmp_path):

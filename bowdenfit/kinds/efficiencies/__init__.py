@@ -20,6 +20,7 @@ EFFICIENCIES = Kind(
     read=read_efficiencies,
     check=check_rows,
     describe=describe,
+    alone=lambda table: f"a table of {len(table.efficiency)} efficiencies",
     implausible=implausible,
     page=page,
     design=EfficiencyDesign,

@@ -5,6 +5,7 @@ import numpy as np
 from bowdenfit.description import Description
 from bowdenfit.kinds.forces.following import check_following
 from bowdenfit.kinds.forces.gained import check_gains
+from bowdenfit.kinds.forces.loads import alone
 from bowdenfit.kinds.forces.mountings import ForceSettings
 from bowdenfit.kinds.forces.table import ForceTable, read_forces
 from bowdenfit.kinds.forces.words import ForceDesign, count, describe, empty, implausible, page, warnings
@@ -39,6 +40,7 @@ FORCES = Kind(
     check=_check,
     describe=describe,
     warnings=warnings,
+    alone=alone,
     implausible=implausible,
     page=page,
     design=ForceDesign,

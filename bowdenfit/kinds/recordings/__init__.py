@@ -7,7 +7,7 @@ from bowdenfit.kinds.readings import Readings, efficiencies
 from bowdenfit.kinds.recordings.angles import check_angles, recorded_angles
 from bowdenfit.kinds.recordings.settings import RecordingsTable, contradiction, quantities_of
 from bowdenfit.kinds.recordings.table import read_recordings
-from bowdenfit.kinds.recordings.words import count, implausible, recordings_text
+from bowdenfit.kinds.recordings.words import alone, count, implausible, recordings_text
 from bowdenfit.recordings.recording import Recordings
 from bowdenfit.types import Vector
 
@@ -37,6 +37,7 @@ RECORDINGS = Kind(
     quantities=quantities_of,
     check=check_angles,
     describe=lambda recordings, _: recordings_text(recordings),
+    alone=alone,
     heading="Recordings",
     implausible=implausible,
     count=count,

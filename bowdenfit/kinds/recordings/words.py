@@ -87,6 +87,12 @@ def _by_hand(pages: list[dict[str, Any]]) -> list[str]:
     return [f"Phases set by hand in cable.toml: {listed(names)}."] if names else []
 
 
+def alone(recordings: Recordings) -> str:
+    """How long a lone recording is."""
+    length = sum(float(np.ptp(r.blocks.time)) for r in recordings.each if len(r.blocks.time))
+    return f"a recording of {length:.3g} s"
+
+
 def count(recordings: Recordings) -> str:
     """How many samples of how many recordings, in how many runs."""
     blocks = sum(int(r.strokes.used_sliding.sum()) for r in recordings.each)

@@ -3,34 +3,38 @@
 import numpy as np
 
 from bowdenfit.files.channels import Channel, ChannelFile
+from bowdenfit.kinds.fit_commands import FitCommand
+from bowdenfit.kinds.recordings import RECORDINGS
 from bowdenfit.kinds.recordings.words import recordings_text
+from bowdenfit.questions.check.file_words import command_words
 from bowdenfit.recordings.recording import Recordings
 from bowdenfit.words import filled, table
 
 _HEADS = ("channel", "unit", "samples", "rate", "length", "lowest", "highest", "clock")
 
 
-def channels_text(file: ChannelFile, recordings: Recordings | None = None, why_not: str = "") -> str:
+def channels_text(
+    file: ChannelFile, why: str, command: FitCommand, recordings: Recordings | None = None, why_not: str = ""
+) -> str:
     """The channels of a file, one a line, and what the file is as a recording.
 
     Args:
         file: What was read.
+        why: Why it is taken for a recording, as a clause.
+        command: What fits it.
         recordings: The file as a recording, where its channels say which is which.
         why_not: What keeps it from being one, in a sentence.
     """
-    title = f"{file.path.name}: {file.kind}, {len(file.channels)} channel{'s' if len(file.channels) != 1 else ''}"
+    what = RECORDINGS.alone(recordings) if recordings is not None else "a recording"
+    n = len(file.channels)
+    title = f"{file.path.name}: {what}, because {why} ({file.kind}, {n} channel{'s' if n != 1 else ''})."
     rows = [_row(channel) for channel in file.channels]
     keep = [i for i, _ in enumerate(_HEADS) if i in (0, 1, 2, 5, 6) or any(row[i] for row in rows)]
     listing = table(
         [_HEADS[i] for i in keep], [[row[i] for i in keep] for row in rows], left=("channel", "unit", "clock")
     )
     notes = [filled(f"Note: {remark}") for remark in file.remarks]
-    how = filled(
-        "To fit it as a recording of one cable with one contact: bowdenfit fit "
-        f"{file.path.name} --wrap-angle 180deg --channel input_force=NAME:N --channel output_force=NAME:N. Names that say it "
-        "themselves, such as input_force_N, need no --channel; several recordings go into a cable.toml (bowdenfit init)."
-    )
-    lines = [title, "", listing, *(["", *notes] if notes else [])]
+    lines = [filled(title), "", listing, *(["", *notes] if notes else [])]
     if recordings is not None:
         lines += ["", *recordings_text(recordings)]
         lines += [
@@ -38,7 +42,8 @@ def channels_text(file: ChannelFile, recordings: Recordings | None = None, why_n
         ]
     elif why_not:
         lines += ["", filled(f"As a recording it cannot be used yet: {why_not}")]
-    return "\n".join([*lines, "", how]) + "\n"
+    several = "Several recordings of one cable go into a cable.toml (bowdenfit init)."
+    return "\n".join([*lines, "", *command_words([command]), several]) + "\n"
 
 
 def _row(channel: Channel) -> tuple[str, ...]:

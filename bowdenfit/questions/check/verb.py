@@ -1,6 +1,5 @@
 """Reading a data set and saying what was understood of it, and looking at its priors, before anything is fitted."""
 
-from collections.abc import Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Unpack
 
@@ -9,9 +8,7 @@ from bowdenfit.verb import Argument, Option, Reply, Verb
 
 if TYPE_CHECKING:
     from bowdenfit.dataset import Dataset
-    from bowdenfit.files.channels import ChannelFile
     from bowdenfit.questions.check.prior_predictive import PriorPredictive
-    from bowdenfit.recordings.recording import Recordings
 
 FIGURE = "prior_predictive"
 
@@ -49,33 +46,6 @@ def check(dataset: "str | Path | Dataset", **reading: Unpack[Reading]) -> "Datas
     return data
 
 
-def channels_of(path: str | Path, channels: Sequence[str] = ()) -> "tuple[ChannelFile, Recordings | None, str]":
-    """The channels of a recording's file, and the recording that they make.
-
-    Args:
-        path: A file.
-        channels: Which channel is what, such as "input_force=ai0:lbf".
-
-    Returns:
-        The channels; the recording, prepared and cut into strokes, None where it cannot be; and why not, in a sentence.
-
-    Raises:
-        DatasetError: The file cannot be read.
-    """
-    from bowdenfit.dataset import single_file_dataset
-    from bowdenfit.errors import DatasetError
-    from bowdenfit.files import read_channels
-    from bowdenfit.recordings.forces import parse_channels
-    from bowdenfit.recordings.recording import Recordings
-
-    file = read_channels(Path(path))
-    try:
-        data = single_file_dataset(Path(path), (0.0, "deg"), (), parse_channels(channels), kind="recordings")
-    except DatasetError as error:
-        return file, None, str(error)
-    return file, data.measurements.table(Recordings), ""
-
-
 def show_priors(dataset: "Dataset", folder: str | Path, seed: int = 0) -> "PriorPredictive":
     """Draw what the priors alone hold possible beside what was measured, PNG and SVG; fit nothing.
 
@@ -110,7 +80,7 @@ def describe(
     prior_predictive: Annotated[Path | None, Option(metavar="FOLDER")] = None,
     **reading: Unpack[Reading],
 ) -> Reply:
-    """What was understood of a data set; of a file alone, its channels.
+    """What was understood of a data set; of a file alone, what it is and the command that fits it.
 
     Args:
         dataset: Folder, description or file.
@@ -121,9 +91,9 @@ def describe(
     from bowdenfit.questions.check.data_set_words import check_text
 
     if dataset.is_file() and dataset.suffix.lower() != ".toml" and not reading.get("wrap_angle"):
-        from bowdenfit.questions.check.channels_words import channels_text
+        from bowdenfit.questions.check.lone_file import lone_file_text
 
-        return Reply(channels_text(*channels_of(dataset, reading.get("channels", ()))))
+        return Reply(lone_file_text(dataset, reading.get("channels", ()), reading.get("columns", ())))
     found = check(dataset, **reading)
     text = check_text(found)
     if prior_predictive is not None:
@@ -141,8 +111,8 @@ VERB = Verb(
     "Say what was understood of a data set and what is wrong.",
     """Read everything in DATASET, say what was understood and what is wrong; fit nothing.
 
-    DATASET is a folder with cable.toml and tables, or one table or recording with --wrap-angle. Of a file alone, its
-    channels are listed: name, unit, sampling rate, length and range, and what it is as a recording.
+    DATASET is a folder with cable.toml and tables, or one table or recording with --wrap-angle. Of a file alone it is said
+    whether it is a table or a recording and why, what its columns or channels and its rows are, and the command that fits it.
     """,
     name="check",
     json="",

@@ -1,0 +1,102 @@
+"""What `bowdenfit check FILE` says of a table alone: what it is and why, its columns and rows, and the command that fits it."""
+
+from collections.abc import Mapping, Sequence
+
+from bowdenfit.dataset import Dataset
+from bowdenfit.files.csv_table import RawTable
+from bowdenfit.files.headings import heading_of
+from bowdenfit.files.matching import candidates
+from bowdenfit.files.row_account import RowAccount
+from bowdenfit.kinds import each_table
+from bowdenfit.kinds.fit_commands import FitCommand, columns_of
+from bowdenfit.kinds.single_file import COLUMNS, FileKind
+from bowdenfit.words import filled, listed, table
+
+_LEFT = ("column", "unit", "read as")
+
+
+def table_text(
+    raw: RawTable,
+    found: FileKind,
+    commands: Sequence[FitCommand],
+    data: Dataset | None,
+    why_not: str,
+    named: Mapping[str, str],
+) -> str:
+    """What a table is, and how to fit it.
+
+    Args:
+        raw: The file as read.
+        found: What it is taken for.
+        commands: What fits it; two where it could be either.
+        data: The data set that it makes; None if it makes none yet.
+        why_not: What keeps it from that, in a sentence.
+        named: Quantities whose columns the user has named, by heading.
+    """
+    title = f"{raw.file}: {_what(raw, data)}, because {found.why}."
+    if found.other:
+        title = f"{raw.file}: a table of readings or a recording; {found.why}."
+    lines = [filled(title), "", _columns(raw, named)]
+    if data is not None:
+        lines += ["", *first_and_last(data)]
+    lines += ["", *account_words(raw.account)]
+    if data is not None:
+        lines += [filled(f"Note: {remark}") for remark in data.measurements.remarks if remark not in raw.account.remarks]
+    if why_not:
+        lines += ["", filled(f"As it stands it cannot be fitted: {why_not}")]
+    return "\n".join([*lines, "", *command_words(commands)]) + "\n"
+
+
+def command_words(commands: Sequence[FitCommand]) -> list[str]:
+    """The command on a line of its own, so that it can be pasted, and what it takes for granted."""
+    lines = []
+    for what, command in zip(("a table", "a recording") if len(commands) > 1 else ("",), commands, strict=True):
+        lines += [f"To fit it as {what}:" if what else "To fit it:", f"  {command.text}"]
+        granted = listed([f"that {each}" for each in command.provided])
+        lines += [filled(f"This takes for granted {granted}; change what is not so.")] if granted else []
+    return lines
+
+
+def account_words(account: RowAccount) -> list[str]:
+    """How many rows were read, and every row that was not, with the reason."""
+    headings = [f"row{'s' if len(account.headings) > 1 else ''} {', '.join(map(str, account.headings))}"]
+    head = f", headings in {headings[0]}" if account.headings else ""
+    lines = [f"Of {account.rows} rows {account.read} hold readings{head}."]
+    lines += [filled(f"Not used: {each.words}.") for each in account.left_out]
+    return [*lines, *([filled(f"Not used: {account.beside_in_words.removesuffix('; not used')}.")] if account.beside else [])]
+
+
+def first_and_last(data: Dataset) -> list[str]:
+    """The first and the last row of each table as understood."""
+    lines = []
+    for kind, found in each_table(data.measurements):
+        if kind.page is None:
+            continue
+        heads, rows = kind.page(found, data.description)
+        for which, i in (("First", 0), ("Last", -1)):
+            cells = ", ".join(f"{head} {cell}" for head, cell in zip(heads, rows[i], strict=True) if cell)
+            lines.append(filled(f"{which} row, {found.origin.place(i)}: {cells}."))
+    return lines
+
+
+def _what(raw: RawTable, data: Dataset | None) -> str:
+    for kind, found in each_table(data.measurements) if data else ():
+        return kind.alone(found)
+    return f"a table of {len(raw.rows)} rows"
+
+
+def _columns(raw: RawTable, named: Mapping[str, str]) -> str:
+    """Every column: its unit, what it is read as, and its range."""
+    can_be = candidates(list(zip(raw.header, raw.units, strict=True)), COLUMNS, tuple(named.values()))
+    read_as = dict(named)
+    for quantity, columns in can_be.items():
+        for each in columns:
+            read_as[raw.header[each.position]] = quantity if len(columns) == 1 else f"{quantity}?"
+    numbers = {each.name: each for each in columns_of(raw)}
+    rows = []
+    for heading, below in zip(raw.header, raw.units, strict=True):
+        if heading:
+            column = numbers.get(heading)
+            spread = [f"{column.low:.5g}", f"{column.high:.5g}"] if column else ["", ""]
+            rows.append([heading, heading_of(heading, below).unit or "-", read_as.get(heading, "-"), *spread])
+    return table(["column", "unit", "read as", "lowest", "highest"], rows, left=_LEFT)

@@ -1,0 +1,162 @@
+"""A file without a description: a table or a recording, why, and the one command that fits it as it stands."""
+
+import shlex
+
+import numpy as np
+import pytest
+
+import bowdenfit as bf
+from bowdenfit.kinds.forces.loads import levels
+from bowdenfit.kinds.forces.table import ForceTable
+from bowdenfit.kinds.single_file import file_kind
+from bowdenfit.recordings.recording import Recordings
+
+GENERATOR = np.random.default_rng(3)
+LOADS = np.repeat([10.0, 20.0, 40.0, 60.0, 80.0, 100.0], 10)
+
+
+def write(folder, headings, columns, name="file.csv"):
+    texts = [[f"{cell:.5g}" if isinstance(cell, float) else str(cell) for cell in column] for column in columns]
+    rows = (",".join(row) for row in zip(*texts, strict=True))
+    (folder / name).write_text("\n".join([",".join(headings), *rows]) + "\n", encoding="utf-8")
+    return folder / name
+
+
+def trials(n=60, exponent=0.3):
+    """Readings of trials in a shuffled order of loads, with the noise of a hand-held scale."""
+    load = GENERATOR.permutation(np.resize(LOADS, n)) * (1 + 0.002 * GENERATOR.normal(size=n))
+    return load * np.exp(exponent) + 0.05 * GENERATOR.normal(size=n), load
+
+
+def recorded(seconds=12.0, rate=50.0, exponent=0.3):
+    """Time and forces of a pull and a return, again and again."""
+    time = np.arange(0, seconds, 1 / rate)
+    force = 60 + 40 * np.sin(2 * np.pi * time / 4)
+    output = np.empty_like(force)
+    state = force[0] * np.exp(-exponent)
+    for i, each in enumerate(force):
+        state = min(max(state, each * np.exp(-exponent)), each * np.exp(exponent))
+        output[i] = state
+    return time, force + 0.1 * GENERATOR.normal(size=len(time)), output + 0.1 * GENERATOR.normal(size=len(time))
+
+
+def command(text):
+    """What `check` says to paste, as words."""
+    lines = [line.strip() for line in text.splitlines() if line.strip().startswith("bowdenfit fit ")]
+    return [shlex.split(line)[1:] for line in lines]
+
+
+def test_sixty_trials_are_a_table_at_six_loads_and_the_command_fits_them(run, tmp_path):
+    path = write(tmp_path, ("Trial", "Force input (N)", "Force output (N)"), (range(1, 61), *trials()))
+    code, out, _ = run("check", path)
+    assert code == 0
+    assert out.startswith("file.csv: a table of 60 readings at 6 loads, because it has no column of time.")
+    (words,) = command(out)
+    code, out, _ = run(*words, "--no-mcmc", "--no-figures", "--seed", 1, "--output", tmp_path / "fit")
+    assert code in (0, 3)
+    assert bf.load(tmp_path / "fit").least_squares.estimates["mu"].value == pytest.approx(0.3 / np.pi, rel=0.02)
+
+
+def test_more_than_two_hundred_rows_do_not_make_a_recording(tmp_path):
+    path = write(tmp_path, ("No.", "Fin (N)", "Fout (N)"), (range(500), *trials(500)))
+    assert file_kind(path).kind == "forces" and not file_kind(path).other
+    assert len(bf.read(path, wrap_angle=(180, "deg")).measurements.table(ForceTable).run) == 500
+
+
+def test_an_index_is_no_clock(tmp_path):
+    time, force, output = recorded()
+    path = write(tmp_path, ("Index", "Fin (N)", "Fout (N)"), (range(len(time)), force, output))
+    found = file_kind(path)
+    assert (found.kind, found.other) == ("forces", "recordings")
+    with pytest.raises(bf.DatasetError, match=r"could be a table of readings or a recording.*--channel time=1000Hz"):
+        bf.read(path, wrap_angle=(180, "deg"))
+
+
+def test_a_time_column_makes_a_recording(run, tmp_path):
+    path = write(tmp_path, ("Zeit [s]", "Kraft Motor [N]", "Kraft Last [N]"), recorded())
+    _, out, _ = run("check", path)
+    assert out.startswith("file.csv: a recording of 11.9 s, because it has a column of time, 'Zeit [s]'")
+    (words,) = command(out)
+    assert bf.read(path, wrap_angle=(180, "deg")).measurements.table(Recordings) is not None
+    assert run("check", *words[1:])[0] == 0
+
+
+def test_tensions_called_t1_and_t2_are_no_clocks(tmp_path):
+    path = write(tmp_path, ("T1 (N)", "T2 (N)"), trials())
+    assert file_kind(path).kind == "forces"
+    time, force, output = recorded()
+    path = write(tmp_path, ("t", "T1", "T2"), (time, force, output))
+    (table,) = bf.read(path, wrap_angle=(180, "deg"), channels=["input_force=T1:N", "output_force=T2:N"]).measurements.tables
+    assert table.each[0].account.samples == len(time)
+
+
+@pytest.mark.parametrize(("step", "n"), [(30.0, 12), (5.0, 20)])
+def test_few_rows_with_a_slow_clock_could_be_either_and_each_command_works(run, tmp_path, step, n):
+    path = write(tmp_path, ("time (s)", "F_in (N)", "F_out (N)"), (step * np.arange(n), *trials(n)))
+    _, out, _ = run("check", path)
+    said = f"a table of readings or a recording; it has a column of time, 'time (s)', but only {n} rows"
+    assert said in " ".join(out.split())
+    of_table, of_recording = command(out)
+    assert "--column" in of_table and "--channel" in of_recording
+    assert run("check", *of_table[1:])[0] == 0
+    code, _, err = run("fit", path, "--wrap-angle", "180deg")
+    assert code == 2
+    assert shlex.join(of_table[1:3]) in err.replace("'", "") or "bowdenfit fit" in err
+
+
+def test_a_time_column_beside_runs_or_strokes_leaves_readings(tmp_path):
+    path = write(tmp_path, ("time (s)", "run", "F_in (N)", "F_out (N)"), (0.1 * np.arange(60), range(60), *trials()))
+    found = file_kind(path)
+    assert (found.kind, found.other) == ("forces", "")
+    assert "run" in found.why
+
+
+def test_a_stated_rate_makes_a_recording(tmp_path):
+    time, force, output = recorded()
+    path = write(tmp_path, ("F_in (N)", "F_out (N)"), (force, output))
+    path.write_text("Sampling rate: 50 Hz\n" + path.read_text())
+    assert file_kind(path).kind == "recordings"
+
+
+def test_rows_have_the_wrap_angles_of_their_column_and_no_other(tmp_path, run):
+    angles = np.repeat([90.0, 180.0], 30)
+    _, load = trials()
+    force = load * np.exp(0.1 * np.deg2rad(angles))
+    path = write(tmp_path, ("F_in (N)", "F_out (N)", "Wrap angle (deg)"), (force, load, angles))
+    _, out, _ = run("check", path)
+    assert command(out) == [["fit", str(path)]]
+    fit = bf.fit(path, mcmc=False, seed=1)
+    assert fit.least_squares.estimates["mu"].value == pytest.approx(0.1, rel=1e-3)
+    with pytest.raises(bf.DatasetError, match="'Wrap angle \\(deg\\)', and --wrap-angle states one angle"):
+        bf.read(path, wrap_angle=(180, "deg"))
+
+
+def test_a_column_that_may_be_the_wrap_angle_is_proposed_and_not_taken(tmp_path, run):
+    path = write(tmp_path, ("F_in (N)", "F_out (N)", "Angle (deg)"), (*trials(), np.repeat([90.0, 180.0], 30)))
+    _, out, _ = run("check", path)
+    assert command(out) == [["fit", str(path), "--column", "wrap_angle=Angle (deg)"]]
+    with pytest.raises(bf.DescriptionError, match="--wrap-angle 180deg"):
+        bf.read(path)
+
+
+def test_forces_that_no_heading_tells_apart_are_proposed_by_their_size(tmp_path, run):
+    force, load = trials()
+    path = write(tmp_path, ("Force 1 (N)", "Force 2 (N)"), (load, force))
+    _, out, _ = run("check", path)
+    (words,) = command(out)
+    assert words[-4:] == ["--column", "input_force=Force 2 (N)", "--column", "output_force=Force 1 (N)"]
+    assert run("check", *words[1:])[0] == 0
+
+
+@pytest.mark.parametrize(
+    ("forces", "count"),
+    [
+        ([10.0, 10.0, 20.0, 20.0], 2),
+        ([50.0, 50.1, 49.9, 50.2], 1),
+        ([10.1, 9.9, 10.0, 99.0, 101.0, 100.0, 1000.0, 1010.0, 990.0], 3),
+        (np.linspace(10, 100, 40).tolist(), None),
+        ([12.0], 1),
+    ],
+)
+def test_loads_are_counted_where_readings_fall_together(forces, count):
+    assert levels(np.array(forces)) == count

@@ -15,7 +15,7 @@ if TYPE_CHECKING:
 
 Groups: TypeAlias = dict[str, dict[str, np.ndarray]]
 Coordinates: TypeAlias = Mapping[str, tuple[str, ...]]
-EXPECTED = "expected_"
+EXPECTED, DERIVED = "expected_", "derived"  # the group of what follows from parameters, and may be infinite
 
 
 def write_groups(
@@ -29,7 +29,7 @@ def write_groups(
 
     Args:
         path: The file.
-        groups: Arrays by group and name; draws have walkers first, then the draws of each, then readings.
+        groups: Arrays by group and name; draws have chains first, then the draws of each, then readings.
         labels: Labels of the readings, by table.
         attributes: Attributes of the file.
         variable_attributes: Unit, symbol and meaning by variable.
@@ -42,7 +42,7 @@ def write_groups(
         for name, variables in groups.items():
             group = file.create_group(name)
             for variable, values in variables.items():
-                attached = variable_attributes.get(variable, {}) if name in ("posterior", "prior") else {}
+                attached = variable_attributes.get(variable, {}) if name in ("posterior", "prior", DERIVED) else {}
                 of_readings = labels.get(variable.removeprefix(EXPECTED))
                 _write(group, _key(variable), np.asarray(values), of_readings, attached)
     with replace_when_whole(path) as temporary:
@@ -52,10 +52,7 @@ def write_groups(
 def _write(
     group: Any, name: str, values: np.ndarray, labels: Sequence[str] | None, attributes: Mapping[str, str]
 ) -> None:
-    """A variable with its dimensions, as xarray would write it, which takes a third of a second to load.
-
-    Each walker is a chain, because flattening walkers into few chains would inflate effective sample sizes.
-    """
+    """A variable with its dimensions, as xarray would write it, which takes a third of a second to load."""
     of_readings = [] if labels is None else [f"{name.removeprefix(EXPECTED)}_reading"]
     drawn = values.ndim - len(of_readings)
     dimensions = [*("chain", "draw")[:drawn], *(f"{name}_dim_{i}" for i in range(drawn - 2)), *of_readings]

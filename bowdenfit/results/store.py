@@ -19,12 +19,13 @@ from bowdenfit.kinds.settings import parse_description
 from bowdenfit.results.arrays import write_arrays
 from bowdenfit.results.folder import CHAIN, FIGURE_DATA, FIT, POSTERIOR, SUMMARY, folder_to_write, write_text
 from bowdenfit.results.kept import keep
-from bowdenfit.results.netcdf import EXPECTED, Coordinates, Groups, read_groups, write_groups
+from bowdenfit.results.netcdf import DERIVED, EXPECTED, Coordinates, Groups, read_groups, write_groups
 from bowdenfit.results.plain import rebuilt, stored
 from bowdenfit.results.record import OPTIMAL_EFFICIENCY, OPTIMAL_LENGTH, Draws, Provenance, Record
 
 SCHEMA = 5
-LOG_POSTERIOR = "lp"
+LOG_POSTERIOR, WALKER = "lp", "walker"
+_NOT_DRAWN = ("prior", "observed_data")  # groups of posterior.nc without chains
 # What fit.json keeps of the draws; the draws themselves are in posterior.nc.
 COUNTS = ("n_ensembles", "steps", "acceptance", "sampler", "trajectories", "agreement", "diagnostics")
 
@@ -145,10 +146,12 @@ def posterior_page(fit: Record) -> tuple[Groups, Coordinates, dict[str, str], di
     of_trajectories = posterior.trajectories.statistics if posterior.trajectories else {}
     log_prior = -0.5 * np.sum(posterior.z**2 + np.log(2 * np.pi), axis=-1)
     log_likelihood = [np.sum(part, axis=-1) for part in posterior.log_likelihood.values()]
-    groups = {
-        "posterior": posterior.values | posterior.optimum,
+    derived = derived_units(fit.model)
+    groups: Groups = {
+        "posterior": {n: draws for n, draws in posterior.values.items() if n not in derived} | posterior.optimum,
+        DERIVED: {n: draws for n, draws in posterior.values.items() if n in derived},
         "unconstrained_posterior": {p.name: posterior.z[..., i] for i, p in enumerate(space.free)},
-        "sample_stats": {LOG_POSTERIOR: sum(log_likelihood, log_prior)} | of_trajectories,
+        "sample_stats": {LOG_POSTERIOR: sum(log_likelihood, log_prior)} | _walkers(posterior) | of_trajectories,
         "log_likelihood": posterior.log_likelihood,
         "posterior_predictive": posterior.replicated,
         "predictions": {f"{EXPECTED}{name}": value for name, value in posterior.expected.items()},
@@ -156,8 +159,41 @@ def posterior_page(fit: Record) -> tuple[Groups, Coordinates, dict[str, str], di
         "observed_data": {term.name: term.observed() for term in fit.model.terms},
     }
     labels = {term.name: term.labels for term in fit.model.terms}
+    groups = {name: variables for name, variables in groups.items() if variables or name != DERIVED}
     attributes = {"provenance": json.dumps(asdict(fit.provenance)), "name": fit.name}
+    for name in groups.keys() - _NOT_DRAWN:
+        groups[name] = {variable: _as_chains(draws, posterior.n_ensembles) for variable, draws in groups[name].items()}
     return groups, labels, attributes, _variable_attributes(fit)
+
+
+def _walkers(posterior: Draws) -> dict[str, np.ndarray]:
+    """Of every draw, the walker of its ensemble that took it; nothing of ensembles of one."""
+    rows, draws = posterior.z.shape[:2]
+    if rows == posterior.n_ensembles:
+        return {}
+    walkers = np.arange(rows, dtype=np.int32) % (rows // posterior.n_ensembles)
+    return {WALKER: np.repeat(walkers, draws).reshape(rows, draws)}
+
+
+def _as_chains(draws: np.ndarray, chains: int) -> np.ndarray:
+    """Draws of walkers (ordered by ensemble) as those of one chain an ensemble: the path of one walker after the other.
+
+    So autocorrelations stay those of the paths, and others count effective draws as we do; a step of all walkers after the
+    other would pass them off as independent. A chain for each walker is too short for the usual R-hat.
+    """
+    return draws.reshape(chains, -1, *draws.shape[2:])
+
+
+def _as_walkers(groups: Groups) -> Groups:
+    """The other way round."""
+    walker = groups["sample_stats"].pop(WALKER, np.zeros(1))
+    each = int(np.max(walker)) + 1
+    return {
+        group: variables
+        if group in _NOT_DRAWN
+        else {n: draws.reshape(len(draws) * each, -1, *draws.shape[2:]) for n, draws in variables.items()}
+        for group, variables in groups.items()
+    }
 
 
 def _variable_attributes(fit: Record) -> dict[str, dict[str, str]]:
@@ -174,8 +210,8 @@ def _variable_attributes(fit: Record) -> dict[str, dict[str, str]]:
 def _posterior(path: Path, page: Mapping[str, Any]) -> Draws:
     if not path.exists():
         raise StoreError(f"{path} is missing; fit again, or restore the folder from a copy.")
-    groups = read_groups(path)
-    values, z = groups["posterior"], groups["unconstrained_posterior"]
+    groups = _as_walkers(read_groups(path))
+    values, z = dict(sorted((groups["posterior"] | groups.get(DERIVED, {})).items())), groups["unconstrained_posterior"]
     optimum = {name: values.pop(name) for name in (OPTIMAL_LENGTH, OPTIMAL_EFFICIENCY) if name in values}
     hints = get_type_hints(Draws)
     counts = {name: rebuilt(hints[name], page[name]) for name in COUNTS}

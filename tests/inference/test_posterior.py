@@ -6,6 +6,7 @@ import jax
 import jax.numpy as jnp
 import numpy as np
 import pytest
+from arviz_stats.base import array_stats
 from numpyro.infer import MCMC, NUTS
 from snooker import snooker_mixture
 
@@ -19,6 +20,7 @@ from bowdenfit.inference.log_density import LogDensity
 from bowdenfit.inference.objective import make_objective
 from bowdenfit.model import build_model
 from bowdenfit.results.optimum import optimum_of
+from bowdenfit.results.store import posterior_page
 
 # model.md, section 8: mean, standard deviation; efficiencies only, continuous geometry. Two NUTS implementations agree.
 STATED = {
@@ -155,13 +157,34 @@ def test_the_joint_posterior_has_the_stated_moments(drawn, request):
     np.testing.assert_allclose(np.quantile(draws["optimal_length"], (0.05, 0.95)), (462.1, 476.5), atol=0.6)
 
 
-def test_the_default_priors_give_the_stated_moments(on_body):
+@pytest.fixture(scope="module")
+def by_default(on_body) -> bf.Fit:
+    """As a user fits."""
+    return bf.fit(on_body, seed=1)
+
+
+def test_the_default_priors_give_the_stated_moments(by_default):
     """As above; 1000 effective draws know a mean to 0.03 sd and the sd of a heavy tail to 7 %, so 0.15 sd and 25 %."""
-    found = bf.fit(on_body, seed=1)
-    drawn = found.posterior.values | found.posterior.optimum
+    drawn = by_default.posterior.values | by_default.posterior.optimum
     for name, (mean, sd) in BY_DEFAULT.items():
         assert abs(np.mean(drawn[name]) - mean) < 0.15 * sd, name
         assert abs(np.std(drawn[name]) / sd - 1) < 0.25, name
+
+
+def test_others_find_the_draws_in_the_file_converged_and_count_effective_ones_as_we_do(by_default):
+    """By split R-hat and ESS of the chains in posterior.nc, which is what `az.summary` prints; ours know each walker's path."""
+    groups, *_ = posterior_page(by_default)
+    axes = {"chain_axis": 0, "draw_axis": 1}
+    per_chain = len(by_default.posterior.z) // by_default.posterior.n_ensembles
+    for name, known in by_default.posterior.diagnostics.items():
+        draws = groups["posterior"][name]
+        assert draws.shape[0] == by_default.posterior.n_ensembles == 4
+        assert array_stats.rhat(draws, method="rank", **axes) < 1.01, name
+        assert 0.6 < array_stats.ess(draws, method="bulk", **axes) / known.ess_bulk < 1.1, name
+        # What the file must not hold: all walkers step by step look independent, and a chain for each is no chain.
+        by_steps = draws.reshape(4, per_chain, -1).transpose(0, 2, 1).reshape(4, -1)
+        assert array_stats.ess(by_steps, method="bulk", **axes) > 1.5 * known.ess_bulk, name
+        assert array_stats.rhat(draws.reshape(4 * per_chain, -1), method="rank", **axes) > 1.05, name
 
 
 def test_the_comparison_fails_when_the_snooker_move_is_put_in(bench, by_nuts):

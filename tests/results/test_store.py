@@ -93,6 +93,8 @@ def test_the_posterior_file_opens_in_arviz(saved):
         )
         assert tree["posterior"]["optimal_length"].attrs["units"] == "mm"
         assert tree["posterior"]["mu1"].dims == ("chain", "draw")
+        assert tree["posterior"].sizes["chain"] == fit.posterior.n_ensembles
+        assert "free_sheath_angle_A" in tree["derived"] and "free_sheath_angle_A" not in tree["posterior"]
         assert set(tree["log_likelihood"].data_vars) == set(tree["observed_data"].data_vars)
         assert json.loads(tree.attrs["provenance"])["seed"] == fit.provenance.seed
 

@@ -73,6 +73,9 @@ class Judge:
         with jax.enable_x64(True):
             posterior = LogDensity(build_model(data))
             shape = str(jax.tree.map(np.shape, posterior.data)) + str(posterior.model.space)
+            if len(self.objectives) > 100:  # the system lets a process map so many programs only
+                self.objectives.clear()
+                jax.clear_caches()
             if shape not in self.objectives:
                 self.objectives[shape] = make_objective(posterior)
             start = np.zeros(posterior.model.space.size)

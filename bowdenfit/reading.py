@@ -30,6 +30,7 @@ class Reading(TypedDict, total=False):
             the on-body paper has them.
         undetected: How angles too small to detect enter.
         wrap_angle: Wrap angle of a single table without cable.toml, such as 180deg.
+        reading_limit: So many times the memory and time that are usual for a binary file of its size may be taken to read it.
     """
 
     settings: Annotated[Sequence[str], Option(("--set",), metavar="KEY=VALUE")]
@@ -42,6 +43,7 @@ class Reading(TypedDict, total=False):
         Literal["censored", "zero", "dropped"] | None, Option(default="as in cable.toml, else censored")
     ]
     wrap_angle: Annotated[Quantity | None, Option(metavar="ANGLE", example="180deg")]
+    reading_limit: Annotated[int | None, Option(metavar="TIMES", least=1, most=1000, default="1")]
 
 
 _SETTINGS = {  # keywords that stand for a setting of cable.toml
@@ -64,6 +66,7 @@ def read(dataset: "str | Path | Dataset", **reading: Unpack[Reading]) -> "Datase
         UsageError: There is no such keyword.
     """
     from bowdenfit.dataset import Dataset, is_lone_file, load_dataset, single_file_dataset
+    from bowdenfit.files.apart import limits_times
     from bowdenfit.files.naming import parse_sources
     from bowdenfit.recordings.forces import parse_channels
 
@@ -75,9 +78,10 @@ def read(dataset: "str | Path | Dataset", **reading: Unpack[Reading]) -> "Datase
     sources = parse_channels(reading.get("channels", ()))
     columns = parse_sources(reading.get("columns", ()), "--column")
     wrap_angle = reading.get("wrap_angle")
-    if wrap_angle is not None or is_lone_file(Path(dataset)):
-        return single_file_dataset(Path(dataset), wrap_angle, changes, sources, columns)
-    return load_dataset(Path(dataset), changes, sources, columns)
+    with limits_times(reading.get("reading_limit") or 1):
+        if wrap_angle is not None or is_lone_file(Path(dataset)):
+            return single_file_dataset(Path(dataset), wrap_angle, changes, sources, columns)
+        return load_dataset(Path(dataset), changes, sources, columns)
 
 
 def refuse_unknown(verb: Callable[..., Any], reading: Reading) -> None:

@@ -27,7 +27,8 @@ def read_channels(path: Path) -> ChannelFile:
     """Read all numeric channels of a recording, whatever program wrote it.
 
     The ending chooses the reader; the first bytes are looked at first, so that a file with the wrong ending is refused
-    with what it really is. Libraries are imported only for the kind of file at hand.
+    with what it really is. Libraries are imported only for the kind of file at hand, and those that read binary files in a
+    process of their own, with limits of memory and time.
 
     Args:
         path: A file, or the folder of a ROS 2 bag.
@@ -36,6 +37,16 @@ def read_channels(path: Path) -> ChannelFile:
         DatasetError: The file is missing, empty, unreadable, damaged, too large, not what its ending says, or of no
             kind that can be read; or its library is not installed.
     """
+    ending = ".bag" if _is_ros2_folder(path) else _checked_ending(path)
+    if str(FORMATS[ending]).startswith(f"{__name__}.") and ending not in TEXT:
+        from bowdenfit.files.apart import read_apart
+
+        return read_apart(path)
+    return read_here(path)
+
+
+def read_here(path: Path) -> ChannelFile:
+    """The same, in this process."""
     reader = FORMATS[".bag" if _is_ros2_folder(path) else _checked_ending(path)]
     result: ChannelFile = import_module(reader).read(path) if isinstance(reader, str) else reader(path)
     return result

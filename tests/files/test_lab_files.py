@@ -17,7 +17,7 @@ from rosbags.rosbag2 import Writer as Bag2Writer
 from rosbags.typesys import Stores, get_typestore
 
 from bowdenfit.errors import DatasetError
-from bowdenfit.files import outcome, read_channels
+from bowdenfit.files import outcome, read_channels, read_here
 from bowdenfit.files.channels import Channel, ChannelFile
 
 RATE = 1000.0
@@ -35,9 +35,9 @@ def names(file: ChannelFile) -> list[str]:
     return [each.name for each in file.channels]
 
 
-def refusal(path: Path) -> str:
+def refusal(path: Path, read: Callable[[Path], object] = read_channels) -> str:
     with pytest.raises(DatasetError) as caught:
-        read_channels(path)
+        read(path)
     return str(caught.value)
 
 
@@ -422,7 +422,7 @@ def test_a_missing_library_is_named(
 ) -> None:
     (tmp_path / name).write_bytes(start)
     monkeypatch.setitem(sys.modules, module, None)
-    assert "pip install 'bowdenfit[lab]'" in refusal(tmp_path / name)
+    assert "pip install 'bowdenfit[lab]'" in refusal(tmp_path / name, read_here)
 
 
 @pytest.mark.parametrize("name", ["plain.mat", "packed.mat", "modern.mat", "a.h5", "a.bag", "a.tdms"])
@@ -431,19 +431,19 @@ def test_a_file_too_large_for_the_memory_is_refused_before_it_is_read(
 ) -> None:
     {**WRITERS, "a.tdms": write_tdms}[name](tmp_path / name)
     monkeypatch.setattr(outcome, "LARGEST_BYTES", 2000)
-    assert "decimate it" in refusal(tmp_path / name)
+    assert "decimate it" in refusal(tmp_path / name, read_here)
 
 
 def test_a_packed_structure_is_measured_before_it_is_unpacked(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     scipy.io.savemat(tmp_path / "a.mat", {"rec": {"F": np.zeros(10**5)}}, do_compression=True)
     assert (tmp_path / "a.mat").stat().st_size < 10**4
     monkeypatch.setattr(outcome, "LARGEST_BYTES", 4 * 10**5)
-    assert "decimate it" in refusal(tmp_path / "a.mat")
+    assert "decimate it" in refusal(tmp_path / "a.mat", read_here)
 
 
 def test_an_mdf_file_too_large_is_refused(mf4: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(outcome, "LARGEST_BYTES", 2000)
-    assert "decimate it" in refusal(mf4)
+    assert "decimate it" in refusal(mf4, read_here)
 
 
 CMBL = """<Document><DataSet><DataSetName>Latest</DataSetName>

@@ -91,9 +91,11 @@ def describe(
     from bowdenfit.questions.check.data_set_words import check_text
 
     if dataset.is_file() and dataset.suffix.lower() != ".toml" and not reading.get("wrap_angle"):
+        from bowdenfit.files.apart import limits_times
         from bowdenfit.questions.check.lone_file import lone_file_text
 
-        return Reply(lone_file_text(dataset, reading.get("channels", ()), reading.get("columns", ())))
+        with limits_times(reading.get("reading_limit") or 1):
+            return Reply(lone_file_text(dataset, reading.get("channels", ()), reading.get("columns", ())))
     found = check(dataset, **reading)
     text = check_text(found)
     if prior_predictive is not None:

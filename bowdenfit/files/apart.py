@@ -1,0 +1,218 @@
+"""Binary files are read in a process of their own, with so much memory and time as fits their size.
+
+The libraries that read them believe what a file says of itself: a file of 200 bytes may declare an array of gigabytes, or
+blocks that point at themselves. Here such a file costs a sentence. What the libraries print stays there too.
+"""
+
+import atexit
+import json
+import os
+import pickle
+import select
+import struct
+import subprocess
+import sys
+import time
+from collections.abc import Iterator
+from contextlib import contextmanager, suppress
+from contextvars import ContextVar
+from dataclasses import dataclass, replace
+from pathlib import Path
+from typing import IO, Any
+
+from bowdenfit.errors import DatasetError
+from bowdenfit.files.channels import ChannelFile
+
+_MEMORY, _MEMORY_PER_BYTE = 1 << 29, 40  # bytes; what libraries need by themselves, and what they unpack
+_SECONDS, _SECONDS_PER_BYTE = 8.0, 4e-6  # of CPU
+_WALL = 8  # times the seconds of CPU, for machines that do much besides
+_IDLE = 20.0  # seconds after which a reader with nothing to do ends
+_LENGTH = struct.Struct("<Q")
+LIMITS: ContextVar[float] = ContextVar("LIMITS", default=1.0)
+
+
+@contextmanager
+def limits_times(factor: float) -> Iterator[None]:
+    """Meanwhile, files may take so many times the memory and time that is usual for their size."""
+    before = LIMITS.set(factor)
+    try:
+        yield
+    finally:
+        LIMITS.reset(before)
+
+
+@dataclass(frozen=True)
+class Limits:
+    """What reading a file may take.
+
+    Args:
+        memory: Bytes beside what the reader has already.
+        seconds: Of CPU.
+    """
+
+    memory: int
+    seconds: float
+
+    @classmethod
+    def of(cls, path: Path) -> "Limits":
+        """By the size of the file, or of all in a folder, and `LIMITS`."""
+        files = path.rglob("*") if path.is_dir() else [path]
+        size, factor = sum(file.stat().st_size for file in files if file.is_file()), LIMITS.get()
+        return cls(int(factor * (_MEMORY + _MEMORY_PER_BYTE * size)), factor * (_SECONDS + _SECONDS_PER_BYTE * size))
+
+
+def read_apart(path: Path) -> ChannelFile:
+    """Read a file in the other process.
+
+    Args:
+        path: A file whose reader is found by its ending.
+
+    Raises:
+        DatasetError: What the reader says of the file, or that it took more memory or time than fits its size.
+    """
+    limits = Limits.of(path)
+    ended, content = _ask(path, limits)
+    if content is None:
+        raise DatasetError(_broken(path, limits, ended))
+    found = pickle.loads(content)  # noqa: S301  (of our own process)
+    if isinstance(found, ChannelFile):
+        return replace(found, path=path)
+    raise DatasetError(_too_much(path, limits, "memory") if found is None else found)
+
+
+def _ask(path: Path, limits: Limits) -> tuple[int | None, bytes | None]:
+    """How the reader ended, None if it did not, and its answer, None if there is none."""
+    request = json.dumps([str(path.resolve()), limits.memory, limits.seconds]).encode() + b"\n"
+    for _ in range(2):  # one that had nothing to do may just have ended
+        reader = _reader()
+        assert reader.stdin is not None and reader.stdout is not None  # both are pipes
+        try:
+            reader.stdin.write(request)
+            reader.stdin.flush()
+            content = _answer(reader.stdout, time.monotonic() + _WALL * limits.seconds)
+        except BrokenPipeError:
+            content = b""
+        if content:
+            return None, content
+        if (ended := _end(reader)) != 0 or content is None:
+            return ended, None
+    return 0, None
+
+
+_readers: list["subprocess.Popen[bytes]"] = []
+
+
+def _reader() -> "subprocess.Popen[bytes]":
+    """The process that reads, started if there is none."""
+    if _readers and _readers[0].poll() is not None:
+        _end(_readers[0])
+    if not _readers:
+        command = [sys.executable, "-c", "from bowdenfit.files.apart import serve; serve()"]
+        pipes: dict[str, Any] = dict.fromkeys(("stdin", "stdout"), subprocess.PIPE) | {"stderr": subprocess.DEVNULL}
+        place = str(Path(__file__).resolve().parents[2])
+        paths = os.pathsep.join(filter(None, [place, os.environ.get("PYTHONPATH", "")]))
+        environment = {**os.environ, "PYTHONPATH": paths}
+        _readers.append(subprocess.Popen(command, **pipes, env=environment))  # noqa: S603  (our own)
+    return _readers[0]
+
+
+@atexit.register
+def _end_all() -> None:
+    for reader in [*_readers]:
+        _end(reader)
+
+
+def _end(reader: "subprocess.Popen[bytes]") -> int:
+    """End a reader; its exit code, or the signal that it was ended by."""
+    _readers.remove(reader)
+    reader.kill()
+    for stream in (reader.stdin, reader.stdout):
+        assert stream is not None  # both are pipes
+        with suppress(BrokenPipeError):
+            stream.close()
+    return reader.wait()
+
+
+def _answer(stream: IO[bytes], until: float) -> bytes | None:
+    """What comes; empty if the other end is closed before it is whole, None if it takes too long."""
+    content, length, number = bytearray(), _LENGTH.size, stream.fileno()
+    while len(content) < length:
+        ready, _, _ = select.select([number], [], [], max(until - time.monotonic(), 0.0))
+        if not ready:
+            return None
+        piece = os.read(number, 1 << 20)
+        if not piece:
+            return b""
+        content += piece
+        if length == _LENGTH.size and len(content) >= length:
+            length += _LENGTH.unpack_from(content)[0]
+    return bytes(content[_LENGTH.size :])
+
+
+def _broken(path: Path, limits: Limits, ended: int | None) -> str:
+    import signal
+
+    if ended in {-signal.SIGXCPU, -signal.SIGKILL}:
+        return _too_much(path, limits, "time")
+    return (
+        f"{path.name} cannot be read: the library that reads such files crashed on it; copy the file again from the "
+        "acquisition computer, or export the recording as CSV."
+    )
+
+
+def _too_much(path: Path, limits: Limits, what: str) -> str:
+    most = f"{limits.memory / 2**20:.0f} MiB of memory" if what == "memory" else f"{limits.seconds:.0f} s"
+    return (
+        f"{path.name} takes more than {most} to read, far more than fits its size: it is damaged, or made to do so. Copy it "
+        "again from the acquisition computer; if it is as it should be, allow more with --reading-limit 4."
+    )
+
+
+def serve() -> None:
+    """Read one file after the other, as asked on standard input, until that ends or nothing is asked for a while."""
+    import signal
+
+    signal.signal(signal.SIGINT, signal.SIG_IGN)  # for the process that asks to handle
+    answers = os.fdopen(os.dup(1), "wb")
+    os.dup2(2, 1)  # what libraries print
+    while select.select([0], [], [], _IDLE)[0] and (line := sys.stdin.buffer.readline()):
+        path, memory, seconds = json.loads(line)
+        _limit(memory, seconds)
+        content = pickle.dumps(_read(Path(path)), protocol=5)
+        answers.write(_LENGTH.pack(len(content)) + content)
+        answers.flush()
+    os._exit(0)
+
+
+def _read(path: Path) -> ChannelFile | str | None:
+    """The file, why it cannot be read, or None if memory ran out."""
+    from bowdenfit.files import read_here
+
+    try:
+        return read_here(path)
+    except MemoryError:
+        return None
+    except DatasetError as error:
+        return None if isinstance(error.__cause__, MemoryError) else str(error)
+
+
+def _limit(memory: int, seconds: float) -> None:
+    """Let this process take so much more than it has."""
+    try:
+        import resource
+    except ImportError:  # Windows
+        return
+    used = resource.getrusage(resource.RUSAGE_SELF)
+    most = int(used.ru_utime + used.ru_stime + seconds) + 1
+    for kind, value in ((resource.RLIMIT_CPU, most), (resource.RLIMIT_DATA, _data() + memory)):
+        hard = resource.getrlimit(kind)[1]
+        resource.setrlimit(kind, (value if hard == resource.RLIM_INFINITY else min(value, hard), hard))
+
+
+def _data() -> int:
+    """Bytes of data that this process has."""
+    try:
+        with Path("/proc/self/status").open() as status:
+            return next(int(line.split()[1]) for line in status if line.startswith("VmData:")) * 1024
+    except (OSError, StopIteration):
+        return 1 << 28

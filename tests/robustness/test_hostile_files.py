@@ -1,0 +1,144 @@
+"""Small files that ask for much: each ends within bounds, in a sentence that names it."""
+
+import os
+import struct
+import time
+import zipfile
+
+import numpy as np
+import pytest
+import scipy.io
+
+import bowdenfit as bf
+from bowdenfit.files import read_channels
+from bowdenfit.files.apart import Limits, limits_times
+
+MATLAB = b"MATLAB 5.0 MAT-file".ljust(124) + struct.pack("<H2s", 0x0100, b"IM")
+
+
+def element(kind: int, content: bytes) -> bytes:
+    """A data element of a .mat file, padded to 8 bytes."""
+    return struct.pack("<II", kind, len(content)) + content + b"\0" * (-len(content) % 8)
+
+
+def matrix(of: int, rows: int, name: bytes, *parts: bytes) -> bytes:
+    """An array of a class, such as 2 of structures and 1 of cells."""
+    head = element(6, struct.pack("<II", of, 0)) + element(5, struct.pack("<ii", rows, 1)) + element(1, name)
+    return element(14, head + b"".join(parts))
+
+
+def structures(path):
+    """A column of 400 million structures in some 200 bytes."""
+    fields = struct.pack("<HHi", 5, 4, 8) + element(1, b"a".ljust(8, b"\0"))
+    path.write_bytes(MATLAB + matrix(2, 400_000_000, b"x", fields))
+
+
+def nested_cells(path):
+    """Cells in cells in cells."""
+    inner = matrix(6, 1, b"", element(9, struct.pack("<d", 1.0)))
+    for _ in range(20_000):
+        inner = matrix(1, 1, b"", inner)
+    path.write_bytes(MATLAB + matrix(1, 1, b"x", inner))
+
+
+def sheet(path, rows):
+    """A workbook whose only sheet has these rows."""
+    content = "<worksheet xmlns='http://schemas.openxmlformats.org/spreadsheetml/2006/main'><sheetData>"
+    kinds = "application/vnd.openxmlformats-officedocument.spreadsheetml"
+    office = "http://schemas.openxmlformats.org/officeDocument/2006/relationships"
+    links = "http://schemas.openxmlformats.org/package/2006/relationships"
+    with zipfile.ZipFile(path, "w", zipfile.ZIP_DEFLATED) as book:
+        book.writestr(
+            "[Content_Types].xml",
+            "<Types xmlns='http://schemas.openxmlformats.org/package/2006/content-types'>"
+            f"<Override PartName='/xl/workbook.xml' ContentType='{kinds}.sheet.main+xml'/>"
+            f"<Override PartName='/xl/worksheets/sheet1.xml' ContentType='{kinds}.worksheet+xml'/></Types>",
+        )
+        book.writestr(
+            "_rels/.rels",
+            f"<Relationships xmlns='{links}'><Relationship Id='r1' Type='{office}/officeDocument' Target='xl/workbook.xml'/>"
+            "</Relationships>",
+        )
+        book.writestr(
+            "xl/workbook.xml",
+            f"<workbook xmlns='http://schemas.openxmlformats.org/spreadsheetml/2006/main' xmlns:r='{office}'>"
+            "<sheets><sheet name='a' sheetId='1' r:id='r1'/></sheets></workbook>",
+        )
+        book.writestr(
+            "xl/_rels/workbook.xml.rels",
+            f"<Relationships xmlns='{links}'><Relationship Id='r1' Type='{office}/worksheet' Target='worksheets/sheet1.xml'/>"
+            "</Relationships>",
+        )
+        with book.open("xl/worksheets/sheet1.xml", "w") as stream:
+            stream.write(content.encode())
+            for row in rows:
+                stream.write(row)
+            stream.write(b"</sheetData></worksheet>")
+
+
+def far_row(path):
+    """A workbook whose second row is the hundred-thousand-millionth."""
+    sheet(path, [b"<row r='1'><c r='A1'><v>1</v></c></row>", b"<row r='99999999999'><c r='A99999999999'><v>2</v></c></row>"])
+
+
+def bomb(path):
+    """A workbook of some megabytes that unpacks to gigabytes."""
+    cell = b"<c><v>1</v></c>" * 16_000
+    sheet(path, (b"<row>" + cell + b"</row>" for _ in range(1500)))
+
+
+def looped_blocks(path):
+    """An MDF file whose list of data groups links to itself."""
+    mark = struct.pack("<8s8s8s4xH2x28xHH", b"MDF     ", b"4.10    ", b"bowden  ", 410, 0, 0)
+    header = struct.pack("<4s4xQQ", b"##HD", 104, 6) + struct.pack("<6Q", 168, 0, 0, 0, 0, 0) + b"\0" * 32
+    group = struct.pack("<4s4xQQ", b"##DG", 64, 4) + struct.pack("<4Q", 168, 0, 0, 0) + b"\0" * 8
+    path.write_bytes(mark.ljust(64, b"\0") + header + group)
+
+
+HOSTILE = {
+    "structures.mat": structures, "cells.mat": nested_cells, "far.xlsx": far_row, "bomb.xlsx": bomb, "loop.mf4": looped_blocks,
+}  # fmt: skip
+
+
+@pytest.mark.parametrize("name", HOSTILE)
+def test_small_files_that_ask_for_much_are_refused_in_time(tmp_path, name):
+    path = tmp_path / name
+    HOSTILE[name](path)
+    start = time.monotonic()
+    with limits_times(0.3), pytest.raises(bf.DatasetError, match=name) as refused:  # 2.4 s of CPU
+        read_channels(path)
+    assert time.monotonic() - start < 60
+    assert len(str(refused.value)) < 500
+
+
+def test_a_refused_file_leaves_the_next_one_readable(tmp_path):
+    structures(tmp_path / "bad.mat")
+    scipy.io.savemat(tmp_path / "good.mat", {"F": np.arange(5.0), "t": np.arange(5.0)})
+    with pytest.raises(bf.DatasetError):
+        read_channels(tmp_path / "bad.mat")
+    assert [channel.name for channel in read_channels(tmp_path / "good.mat").channels]
+
+
+def test_limits_grow_with_the_file_and_with_what_is_asked(tmp_path):
+    (tmp_path / "a.mat").write_bytes(b"x" * 1000)
+    (tmp_path / "b.mat").write_bytes(b"x" * 1_000_000)
+    small, large = Limits.of(tmp_path / "a.mat"), Limits.of(tmp_path / "b.mat")
+    assert large.memory > small.memory and large.seconds > small.seconds
+    with limits_times(4):
+        assert Limits.of(tmp_path / "a.mat").seconds == pytest.approx(4 * small.seconds)
+
+
+def test_a_file_under_too_small_a_limit_names_the_option(tmp_path):
+    structures(tmp_path / "bad.mat")
+    with limits_times(0.1), pytest.raises(bf.DatasetError, match="--reading-limit 4"):
+        read_channels(tmp_path / "bad.mat")
+
+
+def test_readers_that_have_nothing_to_do_hold_no_output_of_ours(tmp_path):
+    scipy.io.savemat(tmp_path / "good.mat", {"F": np.arange(5.0)})
+    ours, theirs = os.pipe()
+    os.set_inheritable(theirs, False)
+    read_channels(tmp_path / "good.mat")
+    os.close(theirs)
+    assert os.read(ours, 1) == b""
+    os.close(ours)

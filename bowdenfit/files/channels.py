@@ -6,6 +6,7 @@ from pathlib import Path
 
 import numpy as np
 
+from bowdenfit.files.row_account import RowAccount
 from bowdenfit.types import Vector
 
 
@@ -46,12 +47,14 @@ class ChannelFile:
         kind: What it is, for people: "CSV", "MATLAB", "TDMS", "MDF4", "ROS bag", "Parquet", "HDF5", "Excel workbook".
         channels: Its numeric channels, in the order of the file.
         remarks: What was left out or assumed, in sentences.
+        account: Where its rows went; None where it has none.
     """
 
     path: Path
     kind: str
     channels: tuple[Channel, ...]
     remarks: tuple[str, ...] = ()
+    account: RowAccount | None = None
 
 
 def with_unique_names(channels: Sequence[Channel]) -> tuple[Channel, ...]:

@@ -4,6 +4,7 @@ import csv
 import io
 import warnings
 from collections.abc import Iterator, Sequence
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -12,6 +13,7 @@ import numpy as np
 from bowdenfit.errors import DatasetError
 from bowdenfit.files.cells import MISSING
 from bowdenfit.files.channels import ChannelFile
+from bowdenfit.files.csv_account import account
 from bowdenfit.files.csv_rows import cells_of
 from bowdenfit.files.csv_start import Sheet, start_of
 from bowdenfit.files.layout import is_summary
@@ -66,12 +68,14 @@ def read(path: Path) -> ChannelFile:
         raise DatasetError(f"{path.name} breaks off before its first whole row of numbers; copy or export it again.")
     split = last[0].start if last else stop
     long = _long(path, sheet, split) if split > sheet.start else {}
-    columns, remarks = columns_of(_rows(path, sheet, sheet.start if long is None else split, stop, long))
-    channels, left_out = channels_of(sheet.layout, columns)
+    quick = (sheet.start, 0) if not long else (split, sum(map(len, next(iter(long.values())))))
+    found = columns_of(_rows(path, sheet, sheet.start if long is None else split, stop, long))
+    channels, left_out = channels_of(sheet.layout, found.values)
     timed, clock = with_rate(channels, sheet.metadata)
     row = rows_before(path, stop) + 1 if cut else 0
     broken = [f"The file breaks off in row {row}; that row was left out."] if cut else []
-    return channel_file(path, "CSV", timed, UnreadNames(), (*left_out, *broken, *remarks, *clock))
+    whole = channel_file(path, "CSV", timed, UnreadNames(), (*left_out, *broken, *found.remarks, *clock))
+    return replace(whole, account=account(path, sheet, found, quick, stop))
 
 
 def _long(path: Path, sheet: Sheet, stop: int) -> dict[int, list[np.ndarray]] | None:

@@ -8,7 +8,8 @@ from bowdenfit.errors import DatasetError
 from bowdenfit.files.csv_rows import SEPARATORS, CsvRecord, cells_of, declared_separator, records, too_many_cells
 from bowdenfit.files.headings import Heading, heading_of
 from bowdenfit.files.layout import Layout, layout_of
-from bowdenfit.files.text_file import Line, comment_mark, first_lines
+from bowdenfit.files.row_account import ABOVE, BLANK, COMMENT
+from bowdenfit.files.text_file import Line, comment_mark, first_lines, is_blank
 
 _FIRST_LINES = 300
 _HEADING_LINES = 12
@@ -27,6 +28,8 @@ class Sheet:
         start: Where the data start [bytes].
         layout: Headings and kinds of the columns.
         metadata: The lines above the data.
+        headings: Rows of the headings and their units.
+        above: Why the other rows above the data are not read, and what they say, by their numbers.
     """
 
     encoding: str
@@ -35,6 +38,8 @@ class Sheet:
     start: int
     layout: Layout
     metadata: tuple[str, ...]
+    headings: tuple[int, ...]
+    above: dict[int, tuple[str, str]]
 
 
 def start_of(path: Path, data: bytes) -> Sheet:
@@ -46,6 +51,7 @@ def start_of(path: Path, data: bytes) -> Sheet:
     encoding, lines = first_lines(data, path.name, whole=False, most=_FIRST_LINES)
     if len(lines) > 1 and not lines[-1].ended:
         lines = lines[:-1]
+    every = lines
     declared, lines = declared_separator(lines, path.name)
     texts = [line for line in lines if not comment_mark(line.text)]
     rows = {s: list(records(texts, s, _HEADING_LINES)) for s in _separators(texts, declared)}
@@ -61,7 +67,15 @@ def start_of(path: Path, data: bytes) -> Sheet:
     below = rows[separator][layout.start :]
     above = [line for line in lines if line.start < below[0].start]
     layout = _fitting(path, layout, below, separator, above)
-    return Sheet(encoding, separator, decimal, below[0].start, layout, tuple(line.text for line in above))
+    over = tuple(rows[separator][i].row for i in layout.over)
+    others = {line.row: _why_above(line) for line in every if line.start < below[0].start and line.row not in over}
+    return Sheet(encoding, separator, decimal, below[0].start, layout, tuple(line.text for line in above), over, others)
+
+
+def _why_above(line: Line) -> tuple[str, str]:
+    if is_blank(line.text):
+        return BLANK, ""
+    return (COMMENT, "") if comment_mark(line.text) else (ABOVE, " ".join(line.text.split()))
 
 
 def _separators(lines: Sequence[Line], declared: str | None) -> list[str]:
@@ -84,7 +98,7 @@ def _fitting(path: Path, layout: Layout, below: Sequence[CsvRecord], separator: 
         return _from_comment(layout, separator, above)
     for row in () if layout.fits else below:
         too_many_cells(path.name, row.row, row.cells, layout.room)
-    return layout if layout.named else _from_comment(layout, separator, above)
+    return layout.inside if layout.named else _from_comment(layout, separator, above)
 
 
 def _from_comment(layout: Layout, separator: str, above: Sequence[Line]) -> Layout:

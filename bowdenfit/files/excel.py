@@ -98,6 +98,6 @@ def _read_sheet(place: str, cells: Iterable[_Cells]) -> tuple[tuple[Channel, ...
         return (), []
     start = layout.start
     rows = SheetRows(place, layout, chain(first[start:], iterator), lambda position: start + position + 1)
-    columns, remarks = columns_of(rows)
-    channels, left_out = channels_of(layout, columns)
-    return channels, [*left_out, *remarks]
+    found = columns_of(rows)
+    channels, left_out = channels_of(layout, found.values)
+    return channels, [*left_out, *found.remarks]

@@ -2,7 +2,7 @@
 
 import re
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from itertools import pairwise
 
 import numpy as np
@@ -32,6 +32,7 @@ class Layout:
         named: Whether there is a row of headings.
         score: How much speaks for this reading of the sheet: the number of cells that are numbers.
         given: Number of cells in the row of headings.
+        over: Positions of the rows of headings and units.
     """
 
     start: int
@@ -40,6 +41,7 @@ class Layout:
     named: bool
     score: int
     given: int = 0
+    over: tuple[int, ...] = ()
 
     @property
     def room(self) -> int:
@@ -49,7 +51,13 @@ class Layout:
     @property
     def fits(self) -> bool:
         """Whether no column stands outside the headings, as happens where decimal commas are taken for separators."""
-        return not self.named or all(kind == "blank" for kind in self.kinds[self.room :])
+        return not self.named or all(kind in ("blank", "text") for kind in self.kinds[self.room :])
+
+    @property
+    def inside(self) -> "Layout":
+        """The layout without columns outside the headings, in which only remarks stand."""
+        room = self.room if self.named and self.fits else len(self.kinds)
+        return replace(self, headings=self.headings[:room], kinds=self.kinds[:room])
 
     def name(self, column: int) -> str:
         """What a column is called, by its place where it has no heading."""
@@ -71,10 +79,11 @@ def layout_of(rows: Rows, decimal: str) -> Layout | None:
     start, stop, score = _longest_run(kinds, [is_summary(row) for row in rows])
     if score <= 0:
         return None
+    start = _below_headings(rows, kinds, start)
     width = max(len(row) for row in rows[start:stop])
-    header, units = _header_rows(rows, start)
+    header, units, over = _header_rows(rows, start, stop)
     if not header and _is_numeric_heading(rows[start:stop], kinds[start:stop], decimal):
-        header, start = [rows[start]], start + 1
+        header, over, start = [rows[start]], [start], start + 1
     columns = tuple(_kind_of_column(kinds[start:stop], i) for i in range(width))
     rising = [_rises(rows[start:stop], i, decimal) for i in range(width)]
     if not header:
@@ -88,6 +97,7 @@ def layout_of(rows: Rows, decimal: str) -> Layout | None:
         True,
         score,
         max(map(len, header)),
+        tuple(over),
     )
 
 
@@ -112,6 +122,26 @@ def _longest_run(kinds: Sequence[Sequence[Kind]], summaries: Sequence[bool]) -> 
     return best
 
 
+def _below_headings(rows: Rows, kinds: Sequence[Sequence[Kind]], start: int) -> int:
+    """Where the data start that agree from `start` on: right below the headings, where only data with bad cells stand between.
+
+    A bad cell, a remark or the headings once more near the top would else make a heading of the row that has it.
+    """
+    numeric = [i for i, kind in enumerate(kinds[start]) if kind in ("number", "date")]
+    first = start
+    for i in range(start - 1, -1, -1):
+        filled = [cell for cell in rows[i] if cell.strip()]
+        if not filled or (first < start and is_units_row(rows[i])):
+            continue
+        if any(k < len(kinds[i]) and kinds[i][k] in ("number", "date") for k in numeric):
+            if first == start and without_label(rows[i]) != list(rows[i]):
+                return start
+            first = i
+        elif len(filled) >= max(len(numeric), 2) and list(rows[i]) not in [list(row) for row in rows[:i]]:
+            return first
+    return start
+
+
 def _last_filled(kinds: Sequence[Sequence[Kind]], start: int, stop: int) -> Sequence[Kind]:
     return next((kinds[i] for i in range(stop - 1, start - 1, -1) if set(kinds[i]) - {"blank"}), [])
 
@@ -120,14 +150,15 @@ def _agree(above: Sequence[Kind], below: Sequence[Kind]) -> bool:
     return all(a == b or "blank" in (a, b) for a, b in zip(above, below, strict=False))
 
 
-def _header_rows(rows: Rows, start: int) -> tuple[list[Sequence[str]], list[str]]:
-    """The rows of headings right over the data, from above, and the units below them."""
+def _header_rows(rows: Rows, start: int, stop: int) -> tuple[list[Sequence[str]], list[str], list[int]]:
+    """The rows of headings right over the data, from above, the units below them, and the positions of all."""
     above = [i for i in range(start) if any(cell.strip() for cell in rows[i])]
-    width = _filled_width(rows[start])
+    width = sorted(map(_filled_width, rows[start:stop]))[(stop - start) // 2]
     units: list[str] = []
+    places: list[int] = []
     if len(above) > 1 and is_units_row(rows[above[-1]]) and _is_over_units(rows[above[-2]], width):
         units = [cell.strip() for cell in rows[above[-1]]]
-        above = above[:-1]
+        places, above = above[-1:], above[:-1]
     header: list[Sequence[str]] = []
     below: list[int] = []
     for i in reversed(above):
@@ -137,7 +168,8 @@ def _header_rows(rows: Rows, start: int) -> tuple[list[Sequence[str]], list[str]
             break
         below = [i]
         header = [rows[i], *header]
-    return header, units
+        places = [i, *places]
+    return header, units, places
 
 
 def _is_heading(row: Sequence[str], width: int) -> bool:

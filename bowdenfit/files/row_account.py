@@ -5,7 +5,8 @@ from dataclasses import dataclass
 
 from bowdenfit.words import few, shown
 
-BLANK, COMMENT = "blank", "a comment"
+BLANK, COMMENT, ABOVE, BELOW = "blank", "a comment", "above the headings", "below the table"
+BETWEEN, AGAIN = "a remark between the rows", "the headings again"
 _USUAL = (BLANK, COMMENT)  # reasons that nobody needs to hear of where nothing else is left out
 _RANGES, _TEXTS = 4, 3  # that are named
 
@@ -67,13 +68,13 @@ class RowAccount:
     def remarks(self) -> list[str]:
         """What is said of rows whose loss may matter, in sentences."""
         said = [f"{self.file}, {each.words}; not used." for each in self.left_out if each.why not in _USUAL]
-        return said + [f"{self.file}, {self.beside_in_words}."] * bool(self.beside)
+        return said + [f"{self.file}, {self.beside_in_words}; not used."] * bool(self.beside)
 
     @property
     def beside_in_words(self) -> str:
         """What stands beside the table."""
         texts = few([f"{shown(text)} in row {row}" for row, text in self.beside], _TEXTS)
-        return f"beside the table: {texts}; not used"
+        return f"beside the table: {texts}"
 
 
 def account_of(

@@ -3,7 +3,7 @@
 import math
 import re
 from array import array
-from collections.abc import Callable, Iterable, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from datetime import timedelta
 from typing import Any
@@ -13,13 +13,15 @@ import numpy as np
 from bowdenfit.files.cells import Cell, kind_of, number_of
 from bowdenfit.files.clocks import seconds_of_dates
 from bowdenfit.files.csv_rows import too_many_cells
+from bowdenfit.files.headings import heading_of
 from bowdenfit.files.layout import Layout, is_summary
+from bowdenfit.files.row_account import AGAIN, BELOW, BETWEEN, BLANK, COMMENT
 from bowdenfit.types import Vector
-from bowdenfit.words import shown
+from bowdenfit.words import few, shown
 
 _MOST_SUMMARY_ROWS = 40
 _MOST_ROWS_AFTER_BLANK = 10
-_DATA, _BLANK, _EMPTY, _COMMENT, _SUMMARY, _WORDS, _MIXED = b"d ,#swm"
+_DATA, _BLANK, _EMPTY, _COMMENT, _SUMMARY, _WORDS, _MIXED, _REMARK = b"d ,#swmr"
 _BLOCK_OF_WORDS = re.compile(rb"(?<=[^ ])(?: +[wm#]+)+$")
 _LAST_FEW = re.compile(rb"([^ ]+) +([^ ]{1,%d})" % _MOST_ROWS_AFTER_BLANK)
 
@@ -64,23 +66,44 @@ class _Cells:
     letters: bytearray
 
 
-def columns_of(sheet: SheetRows) -> tuple[list[Vector | None], list[str]]:
-    """The numbers of each column, None for a column of text, and remarks on rows left out below the data.
+@dataclass(frozen=True)
+class SheetColumns:
+    """What a sheet holds.
+
+    Args:
+        values: The numbers of each column; None for a column of text.
+        remarks: What was left out, in sentences.
+        left_out: Why a row is not read, and what it says, by its number.
+        beside: Row and text of remarks beside the columns.
+    """
+
+    values: list[Vector | None]
+    remarks: list[str]
+    left_out: dict[int, tuple[str, str]]
+    beside: list[tuple[int, str]]
+
+
+def columns_of(sheet: SheetRows) -> SheetColumns:
+    """The numbers of each column, and what was left out below the data, between the rows and beside them.
 
     Raises:
         DatasetError: Text stands among the numbers of a column.
     """
     kinds, cells = sheet.layout.kinds, _read(sheet)
     stop = _data_end(bytes(cells.letters))
+    left_out, beside = _left_out(sheet, cells, stop), []
     for position, column, text in cells.words:
         if position >= stop:
             break
+        row = sheet.number(position)
+        if row in left_out:
+            continue
         if column == len(kinds):
-            too_many_cells(sheet.place, sheet.number(position), text, len(kinds))
+            beside.append((row, _remark_beside(sheet, row, text)))
         elif kinds[column] == "number" or (sheet.of_text and kinds[column] == "blank"):
-            raise Cell(sheet.place, sheet.number(position), sheet.layout.name(column), text).no_sample(sheet.decimal)
-    space = [_COMMENT, _BLANK] if sheet.of_text else [_COMMENT]
-    kept = ~np.isin(np.array(cells.letters[:stop]), space)
+            raise Cell(sheet.place, row, sheet.layout.name(column), text).no_sample(sheet.decimal)
+    dropped = [_COMMENT, _BLANK, _REMARK] if sheet.of_text else [_COMMENT, _REMARK]
+    kept = ~np.isin(np.array(cells.letters[:stop]), dropped)
     columns: list[Vector | None] = [None] * len(kinds)
     before = sheet.before or {}
     for i, values in (cells.numbers | cells.dates).items():
@@ -91,7 +114,49 @@ def columns_of(sheet: SheetRows) -> tuple[list[Vector | None], list[str]]:
         else:
             whole[~np.isfinite(whole)] = np.nan
             columns[i] = whole
-    return columns, _remarks(sheet, cells.letters, stop)
+    return SheetColumns(columns, _remarks(sheet, cells.letters, left_out, beside, stop), left_out, beside)
+
+
+def _left_out(sheet: SheetRows, cells: _Cells, stop: int) -> dict[int, tuple[str, str]]:
+    """Why rows are not read, by their numbers; remarks between the rows are marked as such in the letters."""
+    of_row: dict[int, list[tuple[int, str]]] = {}
+    for position, column, text in cells.words:
+        if column < len(sheet.layout.kinds):
+            of_row.setdefault(position, []).append((column, text_of(text)))
+    left_out: dict[int, tuple[str, str]] = {}
+    for position, letter in enumerate(cells.letters):
+        says = " ".join(text for _, text in of_row.get(position, ()))
+        if letter == _COMMENT:
+            left_out[sheet.number(position)] = COMMENT, ""
+        elif letter == _BLANK or (letter == _EMPTY and position >= stop):
+            left_out[sheet.number(position)] = BLANK, ""
+        elif position >= stop:
+            left_out[sheet.number(position)] = BELOW, says
+        elif letter == _WORDS and (why := _why_words(sheet, of_row.get(position, []))):
+            left_out[sheet.number(position)] = why, says
+            cells.letters[position] = _REMARK
+    return left_out
+
+
+def _why_words(sheet: SheetRows, words: Sequence[tuple[int, str]]) -> str:
+    """Why a row without numbers is no bad sample: it has one remark alone, or the headings again; empty where it is one."""
+    if len(words) == 1 and len(sheet.layout.kinds) > 1:
+        return BETWEEN
+    again = all(heading_of(text).name == sheet.layout.headings[column].name for column, text in words)
+    return AGAIN if words and again else ""
+
+
+def _remark_beside(sheet: SheetRows, row: int, cells: Sequence[str]) -> str:
+    """The words behind the last column.
+
+    Raises:
+        DatasetError: Numbers stand there.
+    """
+    width = len(sheet.layout.kinds)
+    behind = [cell.strip() for cell in cells[width:] if cell.strip()]
+    if any(kind_of(cell, sheet.decimal) != "text" for cell in behind):
+        too_many_cells(sheet.place, row, cells, width)
+    return " ".join(behind)
 
 
 def text_of(cell: object) -> str:
@@ -110,9 +175,10 @@ def _read(sheet: SheetRows) -> _Cells:
     numbers = {i: array("d") for i, kind in enumerate(kinds) if kind in ("number", "blank")}
     cells = _Cells(numbers, {i: [] for i, kind in enumerate(kinds) if kind == "date"}, [], bytearray())
     for position, row in enumerate(sheet.rows):
-        known, filled = len(cells.words), row or ()
+        filled = row or ()
         if sheet.of_text and len(filled) > len(kinds) and any(map(str.strip, filled[len(kinds) :])):
             cells.words.append((position, len(kinds), filled))
+        known = len(cells.words)
         for i, column in cells.numbers.items():
             cell = filled[i] if i < len(filled) else None
             column.append(cell if type(cell) in (float, int) else _number(cells, position, i, cell, sheet.decimal))
@@ -159,7 +225,13 @@ def _data_end(letters: bytes) -> int:
     return last.end(1) if last and last.end(1) > 2 * len(last[2]) + 2 else len(data)
 
 
-def _remarks(sheet: SheetRows, letters: bytearray, stop: int) -> list[str]:
+def _remarks(
+    sheet: SheetRows,
+    letters: bytearray,
+    left_out: Mapping[int, tuple[str, str]],
+    beside: Sequence[tuple[int, str]],
+    stop: int,
+) -> list[str]:
     comments = letters[:stop].count(_COMMENT)
     said = [f"{comments} comment lines between the rows of data were left out."] if comments else []
     below = [i for i in range(stop, len(letters)) if letters[i] not in b" ,#"]
@@ -167,4 +239,7 @@ def _remarks(sheet: SheetRows, letters: bytearray, stop: int) -> list[str]:
         top, bottom = sheet.number(below[0]), sheet.number(below[-1])
         where = f"Row {top} was" if top == bottom else f"Rows {top} to {bottom} were"
         said.append(f"{where} left out: they stand below the data, as statistics do.")
-    return said
+    between = [f"row {row} ({shown(text)})" for row, (why, text) in left_out.items() if why in (BETWEEN, AGAIN)]
+    said += [f"Left out because no numbers stand there: {few(between)}."] if between else []
+    texts = [f"{shown(text)} in row {row}" for row, text in beside]
+    return said + ([f"Remarks beside the columns were left out: {few(texts)}."] if texts else [])

@@ -9,13 +9,13 @@ from bowdenfit.errors import DatasetError
 from bowdenfit.files.cells import BLANK
 from bowdenfit.files.csv_rows import CsvRecord
 from bowdenfit.files.layout import is_summary
+from bowdenfit.files.row_account import AGAIN, BELOW, BETWEEN
 from bowdenfit.files.table_rows import is_measured, is_units, is_words, words_and_numbers
 from bowdenfit.words import shown
 
 _MOST_STATISTICS = 8  # rows of statistics that may stand below text columns
 _FEWEST_ALIKE, _SHARE_ALIKE = 2, 0.2  # rows below words, and of those above, from which they may belong to the table
-_BELOW, _STATISTICS = "below the table", "statistics below the table"
-_BETWEEN, _AGAIN, _INSIDE = "a remark between the rows", "the headings again", "statistics between the rows"
+_STATISTICS, _INSIDE = "statistics below the table", "statistics between the rows"
 
 
 def readings(rows: Sequence[CsvRecord], header: CsvRecord, file: str) -> tuple[list[CsvRecord], dict[int, str]]:
@@ -33,7 +33,7 @@ def readings(rows: Sequence[CsvRecord], header: CsvRecord, file: str) -> tuple[l
     for i, row in enumerate(rows):
         if row.blank:
             continue
-        why = _inside(row, header, numeric) if i < end else (_STATISTICS if is_summary(row.cells) else _BELOW)
+        why = _inside(row, header, numeric) if i < end else (_STATISTICS if is_summary(row.cells) else BELOW)
         if why:
             left_out[row.row] = why
         else:
@@ -99,8 +99,8 @@ def _inside(row: CsvRecord, header: CsvRecord, numeric: set[int]) -> str:
     """Why a row among the readings is none; empty where it is one."""
     words, numbers = words_and_numbers(row)
     if not numbers and (row.cells == header.cells or is_units(row)):
-        return _AGAIN
+        return AGAIN
     if not numbers and words == 1 and len(numeric) > 1:
-        return _BETWEEN
+        return BETWEEN
     at_number = [cell for i, cell in enumerate(row.cells) if i in numeric]
     return _INSIDE if is_summary(at_number) else ""

@@ -9,12 +9,12 @@ from dataclasses import dataclass, field, replace
 from bowdenfit.errors import DatasetError
 from bowdenfit.files.csv_rows import CsvRecord
 from bowdenfit.files.headings import without_brackets
+from bowdenfit.files.row_account import ABOVE
 from bowdenfit.files.table_body import readings
 from bowdenfit.files.table_rows import is_measured, is_units, is_words, words_and_numbers
 from bowdenfit.words import shown
 
 _NEAR_TOP = 60  # rows in which headings are looked for
-_ABOVE = "above the headings"
 
 
 @dataclass(frozen=True)
@@ -83,7 +83,7 @@ def _parts(rows: Sequence[CsvRecord], file: str) -> TableParts:
     if at and _is_over(filled[at - 1], names):
         names = _joined(filled[at - 1].cells, names)
         over.insert(0, filled[at - 1])
-    reasons = {row.row: _ABOVE for row in filled[:at] if row not in over}
+    reasons = {row.row: ABOVE for row in filled[:at] if row not in over}
     _check_above(filled[:at], sum(map(bool, names)), filled[at], file)
     body, left_out = readings([row for row in rows if row.row > over[-1].row], filled[at], file)
     return TableParts(tuple(over), filled[at], tuple(names), tuple(units), tuple(body), reasons | left_out)

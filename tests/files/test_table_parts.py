@@ -3,6 +3,7 @@
 import pytest
 
 from bowdenfit.errors import DatasetError
+from bowdenfit.files import read_channels
 from bowdenfit.files.csv_table import read_csv
 
 ROWS = ["20.5;15.25", "40.25;30.5", "61.0;45.25", "80.5;61.0"]
@@ -138,3 +139,44 @@ def test_separators_of_thousands_are_read_where_they_leave_no_doubt(tmp_path, ce
 def test_a_table_typed_with_blanks_between_its_columns_is_read(tmp_path):
     table = read(tmp_path, ["F_in_N  F_out_N", "20.5    15.25", "40.25   30.5"])
     assert table.header == ("F_in_N", "F_out_N") and numbers(table) == CLEAN[:2]
+
+
+RECORDED = [f"{i / 10:.1f};{50 + i:.1f};{40 + 0.8 * i:.1f}" for i in range(30)]
+CLOCKED = "Time (s);F_in (N);F_out (N)"
+AROUND = {
+    "a remark beside": ([CLOCKED, RECORDED[0] + ";start;of;the;pull", *RECORDED[1:]], []),
+    "a remark between": ([CLOCKED, *RECORDED[:20], "--- pause ---", *RECORDED[20:]], ["a remark between the rows"]),
+    "the headings again": ([CLOCKED, *RECORDED[:10], CLOCKED, *RECORDED[10:]], ["the headings again"]),
+    "metadata": (["Operator;W", "Range;500;500", "", CLOCKED, *RECORDED], ["above the headings", "blank"]),
+    "a footer": ([CLOCKED, *RECORDED, "", "Operator: W", "Radius (mm);25"], ["blank", "below the table"]),
+    "blank rows": ([CLOCKED, *RECORDED[:10], "", *RECORDED[10:]], ["blank"]),
+}
+
+
+@pytest.mark.parametrize("case", AROUND)
+def test_a_recording_is_read_whatever_stands_around_it_and_every_row_is_accounted_for(tmp_path, case):
+    lines, left_out = AROUND[case]
+    (tmp_path / "run.csv").write_text("\n".join(lines) + "\n", encoding="utf-8")
+    file = read_channels(tmp_path / "run.csv")
+    found = [(channel.name, channel.unit, len(channel.values)) for channel in file.channels]
+    assert found == [("Time", "s", 30), ("F_in", "N", 30), ("F_out", "N", 30)]
+    assert file.account.rows == file.account.accounted == len(lines)
+    assert [each.why for each in file.account.left_out] == left_out
+
+
+def test_long_recordings_with_blank_rows_are_accounted_for(tmp_path):
+    lines = [CLOCKED, *(f"{i / 100:.2f};{50 + i % 7}.5;40.25" for i in range(9000))]
+    lines.insert(4000, "")
+    (tmp_path / "run.csv").write_text("\n".join(lines), encoding="utf-8")
+    account = read_channels(tmp_path / "run.csv").account
+    assert (account.rows, account.accounted, account.read) == (9002, 9002, 9000)
+    assert account.left_out[0].ranges == ((4001, 4001),)
+
+
+@pytest.mark.parametrize(("row", "value"), [(2, "0.0;abc;48"), (3, "0.1;abc;48"), (12, "1.0;6o.0;48"), (25, "2.3;7x;-")])
+def test_a_bad_cell_near_the_top_of_a_recording_is_named_and_never_becomes_a_heading(tmp_path, row, value):
+    lines = [CLOCKED, *RECORDED]
+    lines[row - 1] = value
+    (tmp_path / "run.csv").write_text("\n".join(lines) + "\n", encoding="utf-8")
+    with pytest.raises(DatasetError, match=f"row {row}, column 'F_in': '{value.split(';')[1]}' is not a number"):
+        read_channels(tmp_path / "run.csv")

@@ -9,6 +9,7 @@ import numpy as np
 from bowdenfit.description import Description, Preparation, QuantityValue, RecordingFile
 from bowdenfit.errors import DatasetError, DescriptionError, nearest
 from bowdenfit.files import read_channels
+from bowdenfit.files.row_account import RowAccount
 from bowdenfit.kinds.kind import Found, Source
 from bowdenfit.kinds.recordings.angles import check_placed
 from bowdenfit.kinds.recordings.names import said_by_name
@@ -47,7 +48,8 @@ def read_recordings(source: Source) -> Found[Recordings]:
     recordings = Recordings(description.angle_columns, each, unit, delay_sd, loop)
     check_placed(recordings, description)
     remarks = [remark for r in each for remark in (*r.account.remarks, *r.strokes.remarks)]
-    return Found(recordings, {entry.file: path for path, entry in entries}, tuple(remarks))
+    accounts = dict.fromkeys(f.account for f in files if f.account is not None)  # a file may hold several recordings
+    return Found(recordings, {entry.file: path for path, entry in entries}, tuple(remarks), tuple(accounts))
 
 
 @dataclass(frozen=True)
@@ -59,6 +61,7 @@ class _File:
     settings: Preparation
     delay_sd: float
     velocity_unit: str
+    account: RowAccount | None
 
 
 def _prepared(files: Sequence[_File]) -> tuple[list[tuple[Blocks, Account]], float]:
@@ -128,11 +131,12 @@ def _to_read(description: Description, path: Path, entry: RecordingFile, channel
     assert table is not None  # the caller asked
     page, sources = entry.prepare or table.prepare, {**_known(table.channels), **_known(entry.channels), **channels}
     pulleys = description.cable.pulleys if description.cable.kind == "loop" else None
-    raw, unit = to_recording(rows_where(read_channels(path), entry.where), _name(path, entry), sources, pulleys)
+    file = read_channels(path)
+    raw, unit = to_recording(rows_where(file, entry.where), _name(path, entry), sources, pulleys)
     stated = page.delay.sd_to("time") if isinstance(page.delay, QuantityValue) else None
     if entry.velocity is not None and not unit:
         unit = INTERNAL_UNITS[speed_dimension(entry.velocity.unit)]
-    return _File(raw, entry, page, stated or 0.0, unit)
+    return _File(raw, entry, page, stated or 0.0, unit, file.account)
 
 
 def _recording(description: Description, file: _File, blocks: Blocks, account: Account) -> Recording:

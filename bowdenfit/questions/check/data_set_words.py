@@ -8,6 +8,7 @@ from bowdenfit.kinds import each_table
 from bowdenfit.kinds.measured_groups import measured_groups
 from bowdenfit.kinds.measurements import Measurements
 from bowdenfit.kinds.stretch.table import StretchTable
+from bowdenfit.questions.check.row_words import row_words
 from bowdenfit.words import listed
 
 
@@ -41,6 +42,7 @@ def check_text(dataset: Dataset) -> str:
         lines.append(f"  note: {description.cable.sharp_bend}")
     lines += sections
     lines += [f"  note: {remark}" for remark in measurements.remarks]
+    lines += ["", "Rows of the files:", *(f"  {line}" for words in row_words(dataset) for line in words.splitlines())]
     lines += ["", *(f"Warning: {warning}" for warning in warnings_of(dataset))]
     lines.append("Everything could be read." + (" Nothing is wrong." if not warnings_of(dataset) else ""))
     return "\n".join(lines) + "\n"

@@ -6,10 +6,10 @@ from bowdenfit.dataset import Dataset
 from bowdenfit.files.csv_table import RawTable
 from bowdenfit.files.headings import heading_of
 from bowdenfit.files.matching import candidates
-from bowdenfit.files.row_account import RowAccount
 from bowdenfit.kinds import each_table
 from bowdenfit.kinds.fit_commands import FitCommand, columns_of
 from bowdenfit.kinds.single_file import COLUMNS, FileKind
+from bowdenfit.questions.check.row_words import account_words, first_and_last
 from bowdenfit.words import filled, listed, table
 
 _LEFT = ("column", "unit", "read as")
@@ -54,28 +54,6 @@ def command_words(commands: Sequence[FitCommand]) -> list[str]:
         lines += [f"To fit it as {what}:" if what else "To fit it:", f"  {command.text}"]
         granted = listed([f"that {each}" for each in command.provided])
         lines += [filled(f"This takes for granted {granted}; change what is not so.")] if granted else []
-    return lines
-
-
-def account_words(account: RowAccount) -> list[str]:
-    """How many rows were read, and every row that was not, with the reason."""
-    headings = [f"row{'s' if len(account.headings) > 1 else ''} {', '.join(map(str, account.headings))}"]
-    head = f", headings in {headings[0]}" if account.headings else ""
-    lines = [f"Of {account.rows} rows {account.read} hold readings{head}."]
-    lines += [filled(f"Not used: {each.words}.") for each in account.left_out]
-    return [*lines, *([filled(f"Not used: {account.beside_in_words.removesuffix('; not used')}.")] if account.beside else [])]
-
-
-def first_and_last(data: Dataset) -> list[str]:
-    """The first and the last row of each table as understood."""
-    lines = []
-    for kind, found in each_table(data.measurements):
-        if kind.page is None:
-            continue
-        heads, rows = kind.page(found, data.description)
-        for which, i in (("First", 0), ("Last", -1)):
-            cells = ", ".join(f"{head} {cell}" for head, cell in zip(heads, rows[i], strict=True) if cell)
-            lines.append(filled(f"{which} row, {found.origin.place(i)}: {cells}."))
     return lines
 
 

@@ -1,0 +1,39 @@
+"""Which rows of the files were read, which not and why, and how the first and the last one were understood."""
+
+from bowdenfit.dataset import Dataset
+from bowdenfit.files.row_account import RowAccount
+from bowdenfit.kinds import each_table
+from bowdenfit.words import filled
+
+
+def row_words(dataset: Dataset) -> list[str]:
+    """Of every file of a data set."""
+    accounts = [line for account in dataset.accounts for line in account_words(account, account.file)]
+    return [*first_and_last(dataset), *accounts]
+
+
+def account_words(account: RowAccount, file: str = "") -> list[str]:
+    """How many rows were read, and every row that was not, with the reason; what stands beside them too.
+
+    Args:
+        account: Of a file.
+        file: Its name, where several are spoken of.
+    """
+    over = f", headings in row{'s' if len(account.headings) > 1 else ''} {', '.join(map(str, account.headings))}"
+    before = f"{file}: of" if file else "Of"
+    lines = [f"{before} {account.rows} rows {account.read} hold readings{over if account.headings else ''}."]
+    unused = [each.words for each in account.left_out] + [account.beside_in_words] * bool(account.beside)
+    return [*lines, *(filled(f"Not used: {words}.", "  " if file else "") for words in unused)]
+
+
+def first_and_last(data: Dataset) -> list[str]:
+    """The first and the last row of each table as understood."""
+    lines = []
+    for kind, found in each_table(data.measurements):
+        if kind.page is None:
+            continue
+        heads, rows = kind.page(found, data.description)
+        for which, i in (("First", 0), ("Last", -1)):
+            cells = ", ".join(f"{head} {cell}" for head, cell in zip(heads, rows[i], strict=True) if cell)
+            lines.append(filled(f"{which} row, {found.origin.place(i)}: {cells}."))
+    return lines

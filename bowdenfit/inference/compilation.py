@@ -24,12 +24,18 @@ def compile_program(
         beside: Compiles it while this thread goes on; the first call waits for that.
     """
     lowered = jax.jit(function).lower(*shapes)
-    chosen = (_RUN_ONCE if run_once else _OPTIONS) if jax.default_backend() == "cpu" else {}
-    options = {name: value for name, value in chosen.items() if _known(name, value)}
+    options = (_RUN_ONCE if run_once else _OPTIONS) if jax.default_backend() == "cpu" else {}
     if beside is None:
-        return lowered.compile(compiler_options=options)
-    compiled = beside.submit(lowered.compile, compiler_options=options)
+        return _compiled(lowered, options)
+    compiled = beside.submit(_compiled, lowered, options)
     return lambda *arguments: compiled.result()(*arguments)
+
+
+def _compiled(lowered: Any, options: dict[str, Any]) -> Callable[..., Any]:
+    try:
+        return lowered.compile(compiler_options=options)
+    except jax.errors.JaxRuntimeError:  # perhaps of an option that this XLA does not have
+        return lowered.compile(compiler_options={name: value for name, value in options.items() if _known(name, value)})
 
 
 @cache

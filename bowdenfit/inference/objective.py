@@ -43,10 +43,8 @@ def make_objective(posterior: LogDensity) -> Objective:
     def objective(
         start: np.ndarray, pinned: np.ndarray, pin: np.ndarray, weight: np.ndarray, data: Any, quick: bool = False
     ) -> Solution:
-        on_device = jax.device_put(data)
-
         def everything(z: np.ndarray) -> Solution:
-            return program(np.where(pinned, pin, z), weight, on_device)
+            return program(np.where(pinned, pin, z), weight, data)
 
         def evaluate(z: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
             found = everything(z)
@@ -101,13 +99,18 @@ class Problem:
         """Which free parameters are noise scales."""
         return noise_scales(self.posterior)
 
+    @cached_property
+    def data(self) -> Any:
+        """The posterior's data where the compiled program wants them; putting them there costs as much as some evaluations."""
+        return jax.device_put(self.posterior.data)
+
     def solve(
         self, start: np.ndarray, pinned: np.ndarray | bool = False, pin: np.ndarray | None = None, quick: bool = False
     ) -> Solution:
         """The minimum with further parameters pinned; without priors z weighs so little that it only breaks ties."""
         weight = np.where(self.noise, 0.0, 1.0 if self.with_priors else _TIE)
         at = np.zeros(len(start)) if pin is None else pin
-        return self.objective(start, self.noise | pinned, at, weight, self.posterior.data, quick)
+        return self.objective(start, self.noise | pinned, at, weight, self.data, quick)
 
 
 def sum_of_squares(found: Solution) -> float:

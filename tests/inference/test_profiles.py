@@ -15,7 +15,7 @@ from bowdenfit.inference.compilation import compile_program
 from bowdenfit.inference.least_squares import LeastSquares, least_squares, maximum_posterior
 from bowdenfit.inference.log_density import LogDensity
 from bowdenfit.inference.objective import Objective, make_objective
-from bowdenfit.inference.profiles import freedom_of, interval, profile
+from bowdenfit.inference.profiles import _crossing, freedom_of, interval, profile
 from bowdenfit.inference.solver import minimize, orthogonal
 from bowdenfit.model import build_model
 
@@ -254,3 +254,12 @@ def test_a_coefficient_at_the_upper_limit_of_its_prior_has_a_lower_limit_and_say
     assert "runs to its upper end, 0.12" in estimate.remark
     assert estimate.upper == pytest.approx(0.12, rel=1e-6)
     assert 0.01 < estimate.lower < 0.12
+
+
+def test_a_limit_is_found_to_its_tolerance_between_any_two_points_and_on_plateaus():
+    rng = np.random.default_rng(1)
+    for power in (0.3, 0.5, 1.0, 2.0, 5.0):
+        for at in rng.uniform(0.01, 0.99, 40):
+            found = _crossing(lambda x, p=power, r=at: np.copysign(abs(abs(x) - r) ** p, abs(x) - r), 0.0, -1.0, 1e-3)
+            assert found == pytest.approx(-at, abs=1e-3)
+            assert _crossing(lambda x, r=at: 1e150 if x > r else -1.0, 0.0, 1.0, 1e-3) == pytest.approx(at, abs=1e-3)

@@ -13,6 +13,7 @@ from bowdenfit.words import shown
 if TYPE_CHECKING:
     import pint
 
+LARGEST = 1e15  # of anything measured, in internal units; beyond it sums of squares leave the range of numbers
 INTERNAL_UNITS = {
     "force": "N",
     "length": "mm",

@@ -1,7 +1,6 @@
 """From columns of a table to named quantities with their units: `input_force_N`, `Force input (N)` and `F_in [N]` are one."""
 
 import difflib
-import math
 from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass
 
@@ -13,7 +12,7 @@ from bowdenfit.files.matching import Candidate, candidates, meanings, plain_name
 from bowdenfit.files.matching import Quantity as Quantity  # readers of tables take both from here
 from bowdenfit.files.naming import naming
 from bowdenfit.files.spellings import spelled
-from bowdenfit.units import ColumnSource, conversion_factor, route_conversion_factor, speed_dimension
+from bowdenfit.units import LARGEST, ColumnSource, conversion_factor, route_conversion_factor, speed_dimension
 from bowdenfit.words import listed, quoted, shown
 
 
@@ -33,8 +32,10 @@ class Column:
             DatasetError: The cell is blank, is text, or is not finite.
         """
         value = cell.number() * self.factor
-        if not math.isfinite(value):
-            raise cell.refuse(f"{cell.shown} is too large for a number; correct the value or the unit.")
+        if not abs(value) <= LARGEST:
+            raise cell.refuse(f"{cell.shown} is too large for a measurement; correct the value or the unit.")
+        if 0 < abs(value) < 1 / LARGEST**6:
+            raise cell.refuse(f"{cell.shown} is closer to 0 than any measurement; correct the value, or write 0.")
         return value
 
     def numbers(self) -> list[float]:

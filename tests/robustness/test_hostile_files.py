@@ -78,7 +78,10 @@ def sheet(path, rows):
 
 def far_row(path):
     """A workbook whose second row is the hundred-thousand-millionth."""
-    sheet(path, [b"<row r='1'><c r='A1'><v>1</v></c></row>", b"<row r='99999999999'><c r='A99999999999'><v>2</v></c></row>"])
+    sheet(
+        path,
+        [b"<row r='1'><c r='A1'><v>1</v></c></row>", b"<row r='99999999999'><c r='A99999999999'><v>2</v></c></row>"],
+    )
 
 
 def bomb(path):

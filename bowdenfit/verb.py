@@ -10,6 +10,7 @@ from pathlib import Path
 from typing import Any, Literal, TypeAlias
 
 Quantity: TypeAlias = tuple[float, str]  # a number and its unit
+Length: TypeAlias = float | Quantity  # a number of the route's unit, or with its own
 LARGEST_SEED = 2**31 - 1
 
 
@@ -57,6 +58,7 @@ class Reply:
     Args:
         text: For people.
         page: Gives the answer for programs, asked only for `--json`.
+        csv: Gives it as CSV, asked only for `--csv`.
         notes: Lines beside the answer, on standard error.
         exit_code: 0, or 3 for an answer that must not be trusted.
     """
@@ -65,6 +67,7 @@ class Reply:
     page: Callable[[], Any] | None = None
     notes: tuple[str, ...] = ()
     exit_code: int = 0
+    csv: Callable[[], str] | None = None
 
 
 @dataclass(frozen=True)
@@ -95,7 +98,7 @@ class Verb:
         text: In the verb's own help.
         name: On the command line; the function's if omitted.
         json: What `--json` prints, in words; empty without that option.
-        formats: What `--format` takes in place of `--json`: that of the text, and "json".
+        csv: What `--csv` prints, in words; empty without that option.
         results: Folder in which results go unless `output` names another.
         watch: How it is interrupted; None if it is quick.
         behind: Keywords that the command line adds.
@@ -110,7 +113,7 @@ class Verb:
     text: str
     name: str = ""
     json: str = "Print as JSON."
-    formats: tuple[str, ...] = ()
+    csv: str = ""
     results: str = ""
     watch: Watch | None = None
     behind: Mapping[str, Any] = field(default_factory=dict)

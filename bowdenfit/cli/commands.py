@@ -12,6 +12,7 @@ import click
 from bowdenfit.cli.keywords import Keyword, keywords_of
 from bowdenfit.cli.progress import watch_verb
 from bowdenfit.cli.terminal import say
+from bowdenfit.errors import UsageError
 from bowdenfit.verb import Argument, Reply, Verb
 
 if TYPE_CHECKING:
@@ -26,26 +27,26 @@ def command(verb: Verb) -> click.Command:
     """
     keywords = keywords_of(verb.function)
     parameters = [keyword.parameter() for keyword in keywords]
-    if verb.formats:
-        shape = click.Choice(verb.formats)
-        parameters.append(click.Option(["--format", "form"], type=shape, default=verb.formats[0], show_default=True))
-    elif verb.json:
-        parameters.append(click.Option(["--json", "as_json"], is_flag=True, help=verb.json))
+    for form, words in (("csv", verb.csv), ("json", verb.json)):
+        if words:
+            parameters.append(click.Option([f"--{form}", f"as_{form}"], is_flag=True, help=words))
 
-    def run(as_json: bool = False, form: str = "", **given: Any) -> int:
-        return _run(verb, keywords, given, as_json or form == "json")
+    def run(as_json: bool = False, as_csv: bool = False, **given: Any) -> int:
+        if as_json and as_csv:
+            raise UsageError("--json and --csv are two forms of the same answer; name one of them.")
+        return _run(verb, keywords, given, "json" if as_json else "csv" if as_csv else "")
 
     name = verb.name or verb.function.__name__
     return click.Command(name, callback=run, params=parameters, help=inspect.cleandoc(verb.text), short_help=verb.short)
 
 
-def _run(verb: Verb, keywords: tuple[Keyword, ...], given: dict[str, Any], as_json: bool) -> int:
-    """Ask, and print the reply."""
+def _run(verb: Verb, keywords: tuple[Keyword, ...], given: dict[str, Any], form: str) -> int:
+    """Ask, and print the reply for people, or as "json" or "csv"."""
     asked = {keyword.name: keyword.value(given[keyword.name]) for keyword in keywords}
     reply = _kept(verb, asked)
-    if reply is None or (as_json and reply.page is None):
+    if reply is None or (form == "json" and reply.page is None):
         reply = _answer(verb, keywords, given, asked)
-    say(_page(reply) if as_json else reply.text, nl=False)
+    say(_page(reply) if form == "json" else reply.csv() if form == "csv" and reply.csv else reply.text, nl=False)
     for note in reply.notes:
         say(note, err=True)
     return reply.exit_code

@@ -1,6 +1,7 @@
 """The keywords of a function as options and arguments of the command line."""
 
 import inspect
+import re
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -10,7 +11,9 @@ from typing import Annotated, Any, Literal, Union, get_args, get_origin, get_typ
 import click
 
 from bowdenfit.errors import UsageError
-from bowdenfit.verb import Argument, Option, Quantity
+from bowdenfit.verb import Argument, Length, Option, Quantity
+
+_LENGTH = re.compile(r"(?P<value>[+-]?(?:\d+\.?\d*|\.\d+)(?:[eE][+-]?\d+)?)\s*(?P<unit>[^\W\d][^\s]*)?(?=\s|$)")
 
 
 @dataclass(frozen=True)
@@ -34,7 +37,7 @@ class Keyword:
     def parameter(self) -> click.Parameter:
         """The argument or option of click."""
         if isinstance(self.mark, Argument):
-            kind = float if self._is(Sequence[float]) else click.Path(path_type=Path)
+            kind = str if self._is(Sequence[Length]) else click.Path(path_type=Path)
             many, metavar = (-1, f"[{self.mark.name}]...") if self.mark.many else (1, self.mark.name)
             return click.Argument([self.name], type=kind, nargs=many, metavar=metavar)
         shown = self.default is not None and self.default != () and not self._is(bool)
@@ -59,8 +62,10 @@ class Keyword:
         Raises:
             UsageError: It cannot be read.
         """
-        if isinstance(self.mark, Argument) or given is None:
+        if given is None:
             return given
+        if isinstance(self.mark, Argument):
+            return read_lengths(given, self.mark.name) if self._is(Sequence[Length]) else given
         one = self._reader(self.mark)
         if one is None:
             return given
@@ -160,6 +165,27 @@ def read_quantity(text: str, option: str, example: str) -> Quantity:
     if not unit:
         raise UsageError(f"{option} {text!r} is not a number with its unit; write it as {example}.")
     return value, unit
+
+
+def read_lengths(given: Sequence[str], name: str) -> list[Length]:
+    """Numbers, each with its unit where one stands behind it, as in 455 455mm 18 in.
+
+    Args:
+        given: As written, a unit perhaps by itself.
+        name: Of the argument.
+
+    Raises:
+        UsageError: Something is no number.
+    """
+    found, text = list[Length](), " ".join(given)
+    while text := text.strip():
+        match = _LENGTH.match(text)
+        if match is None:
+            raise UsageError(f"{name} {text.split()[0]!r} is no number; write lengths as 455, 455mm or 18 in.")
+        value, unit = float(match["value"]), match["unit"]
+        found.append((value, unit) if unit else value)
+        text = text[match.end() :]
+    return found
 
 
 def read_named_number(text: str, option: str, example: str) -> tuple[str, float]:

@@ -108,7 +108,7 @@ def test_length_gives_the_design_answer(run, results):
 
 
 def test_predict_marks_lengths_outside_the_range(run, results):
-    code, out, _ = run("predict", results, "470", "600")
+    code, out, _ = run("predict", results, "470", "600", "--csv")
     assert code == 0
     heads, inside, outside = (line.split(",") for line in out.splitlines())
     assert heads[0] == "cable_length_mm"
@@ -119,9 +119,30 @@ def test_predict_marks_lengths_outside_the_range(run, results):
     )
 
 
+def test_predictions_are_a_page_with_units_for_people(run, results):
+    code, out, _ = run("predict", results, "470", "600")
+    assert code == 0 and all(len(line) <= 80 for line in out.splitlines())
+    first, table, notes = out.split("\n\n")
+    heads, _, inside, outside = table.splitlines()
+    assert re.match(r"Efficiency: highest 7\d\.\d % at 470 mm, lowest \d\d(\.\d)? % at 600 mm\.", first)
+    assert heads.split("  ")[0] == "cable length (mm)" and inside.startswith("470 ") and outside.startswith("600 ")
+    assert "600 mm: outside the lengths measured, 430 to 550 mm" in " ".join(notes.split())
+    assert re.match(r"Efficiency at 470 mm: 7\d\.\d % \(90 % interval ", run("predict", results, "470")[1])
+
+
+def test_lengths_are_read_with_their_units(run, results):
+    by_unit = json.loads(run("predict", results, "455mm", "18", "in", "0.47", "m", "470", "1.8e1in", "--json")[1])
+    assert [row["cable_length_mm"] for row in by_unit] == pytest.approx([455, 457.2, 470, 470, 457.2])
+    for wrong, words in ((["lots"], "is no number"), (["470", "foo"], "is not known"), (["470N"], "cannot be converted")):
+        code, _, err = run("predict", results, *wrong)
+        assert code == 2 and words in err
+    code, _, err = run("predict", results, "470", "--csv", "--json")
+    assert code == 2 and "name one of them" in err
+
+
 def test_predicted_forces_scale_with_the_input_and_turn_with_the_stroke(run, results):
     def forces(*options):
-        return json.loads(run("predict", results, "470", "--format", "json", "--input-force", *options)[1])[0]
+        return json.loads(run("predict", results, "470", "--json", "--input-force", *options)[1])[0]
 
     pull, pull_in_pounds, back = forces("100N"), forces("22.480894lbf"), forces("100 N", "--stroke", "return")
     assert pull["output_force_N"] < 100 < back["output_force_N"]

@@ -129,7 +129,7 @@ def table(printed: str) -> list[dict[str, str]]:
 
 def test_efficiency_is_predicted_at_wrap_angles_with_its_own_and_another_preload(fit, folder, run):
     code, out, _ = run("predict", folder, "--wrap-angle", "90deg", "--wrap-angle", "3.14159265rad", "--input-force", "20N",
-                       "--quantity", "efficiency")  # fmt: skip
+                       "--quantity", "efficiency", "--csv")  # fmt: skip
     assert code == 0
     rows = table(out)
     assert [float(row["wrap_angle_deg"]) for row in rows] == pytest.approx([90, 180])
@@ -139,13 +139,13 @@ def test_efficiency_is_predicted_at_wrap_angles_with_its_own_and_another_preload
     expected = np.median(np.minimum(20 - 2 * preload * exponent, 20 * np.exp(-exponent))) / 20
     assert float(rows[0]["efficiency"]) == pytest.approx(expected, rel=1e-5)
     code, out, _ = run("predict", folder, "--wrap-angle", "90deg", "--input-force", "20N", "--quantity", "efficiency",
-                       "--preload", "30N")  # fmt: skip
+                       "--preload", "30N", "--csv")  # fmt: skip
     stiffer = np.median(20 - 60 * exponent) / 20  # at 90 deg, where preload is meant
     assert float(table(out)[0]["efficiency"]) == pytest.approx(stiffer, rel=1e-5)
 
 
 def test_what_is_felt_is_twice_preload_times_exponent_times_the_radius(fit, folder, run):
-    code, out, _ = run("predict", folder, "--quantity", "friction", "--wrap-angle", "90deg")
+    code, out, _ = run("predict", folder, "--quantity", "friction", "--wrap-angle", "90deg", "--csv")
     assert code == 0
     felt = 2 * fit.posterior.values["preload"] * fit.posterior.values["mu"] * np.pi / 2 * 20
     (row,) = table(out)
@@ -155,7 +155,7 @@ def test_what_is_felt_is_twice_preload_times_exponent_times_the_radius(fit, fold
 
 def test_the_preload_window_is_given_for_bends_and_a_limit(folder, run):
     code, out, _ = run(
-        "predict", folder, "--quantity", "preload-window", "--friction-limit", "0.3N*m", "--format", "json"
+        "predict", folder, "--quantity", "preload-window", "--friction-limit", "0.3N*m", "--json"
     )
     assert code == 0
     (row,) = json.loads(out)
@@ -164,7 +164,7 @@ def test_the_preload_window_is_given_for_bends_and_a_limit(folder, run):
     assert row["possible"] == 1
     assert "must not exceed" in row["in_words"]
     code, out, _ = run(
-        "predict", folder, "--quantity", "preload-window", "--friction-limit", "0.1N*m", "--format", "json"
+        "predict", folder, "--quantity", "preload-window", "--friction-limit", "0.1N*m", "--json"
     )
     (row,) = json.loads(out)
     assert row["possible"] == 0
@@ -173,7 +173,9 @@ def test_the_preload_window_is_given_for_bends_and_a_limit(folder, run):
 
 @pytest.mark.parametrize("quantity", ["preload", "slack-load", "position", "stiffness", "output-force"])
 def test_every_other_quantity_is_a_table_with_intervals(folder, run, quantity):
-    code, out, _ = run("predict", folder, "--quantity", quantity, "--input-force", "20N")
+    page = run("predict", folder, "--quantity", quantity, "--input-force", "20N")[1]
+    assert max(map(len, page.splitlines())) <= 80 and "highest" in page.splitlines()[0]
+    code, out, _ = run("predict", folder, "--quantity", quantity, "--input-force", "20N", "--csv")
     assert code == 0
     rows = table(out)
     assert len(rows) == 10  # every wrap angle that anything was measured at

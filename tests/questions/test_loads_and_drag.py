@@ -66,8 +66,8 @@ def test_an_efficiency_that_depends_on_the_load_is_said_with_its_force(drag):
 
 def test_predictions_outside_the_loads_measured_are_marked_in_text_and_json(drag, accept):
     def notes(*asked):
-        rows = json.loads(accept("predict", drag[1], *asked, "--format", "json"))
-        text = accept("predict", drag[1], *asked)
+        rows = json.loads(accept("predict", drag[1], *asked, "--json"))
+        text = " ".join(accept("predict", drag[1], *asked).split())
         assert all(row["note"] in text for row in rows)
         return rows
 

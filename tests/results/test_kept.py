@@ -78,7 +78,7 @@ def without(heavy, *arguments):
         ("length", "RESULTS"),
         ("length", "RESULTS", "--json"),
         ("predict", "RESULTS"),
-        ("predict", "RESULTS", "450", "470", "--format", "json"),
+        ("predict", "RESULTS", "450", "470", "--json"),
         ("identify", "RESULTS"),
     ],
     ids=" ".join,
@@ -119,7 +119,8 @@ def test_new_physics_needs_jax(results, arguments):
         ("length",),
         ("length", "--json"),
         ("predict",),
-        ("predict", "--format", "json"),
+        ("predict", "--json"),
+        ("predict", "--csv"),
         ("identify",),
     ],
     ids=" ".join,
@@ -133,7 +134,7 @@ def test_what_is_read_back_is_what_would_be_worked_out(results, bare, run, argum
 
 def test_some_of_the_lengths_that_can_be_bought_are_predicted_as_they_are_alone(results, bare, run):
     once, again = (
-        json.loads(run("predict", folder, "470", "440", "--format", "json")[1]) for folder in (results, bare)
+        json.loads(run("predict", folder, "470", "440", "--json")[1]) for folder in (results, bare)
     )
     for one, other in zip(once, again, strict=True):
         assert list(one) == list(other)

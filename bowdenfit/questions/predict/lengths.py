@@ -1,16 +1,19 @@
 """Predictions as rows of a table, for the command line and for other programs."""
 
+from collections.abc import Sequence
 from typing import Any
 
 import jax
 import numpy as np
 
+from bowdenfit.description import Route
 from bowdenfit.errors import DatasetError, UsageError
 from bowdenfit.inference.draws import output_force_at
 from bowdenfit.inference.interval import Interval
 from bowdenfit.questions.predict.outside import measured, pulled
 from bowdenfit.results.record import Record
-from bowdenfit.units import conversion_factor
+from bowdenfit.units import conversion_factor, route_conversion_factor
+from bowdenfit.verb import Length
 
 _STROKES = {"pull": 1, "return": -1}
 
@@ -63,6 +66,28 @@ def predict_at_lengths(
         row["note"] = "; ".join(note for note in notes if note)
         rows.append(row)
     return rows
+
+
+def in_unit_of(route: Route | None, lengths: Sequence[Length] | None) -> list[float]:
+    """Route values in the unit of the route.
+
+    Args:
+        route: The route; None without one.
+        lengths: Numbers, or numbers with their units.
+
+    Raises:
+        UsageError: A unit is unknown, or measures something else, or there is no route.
+    """
+    found = []
+    for length in lengths or ():
+        value, unit = length if isinstance(length, tuple) else (float(length), "")
+        try:
+            found.append(value * route_conversion_factor(unit, route.unit) if unit and route else value)
+        except DatasetError as error:
+            raise UsageError(f"LENGTHS, {value:g} {unit}: {error}.") from None
+        if unit and route is None:
+            raise UsageError(f"LENGTHS, {value:g} {unit}: this cable has no route, so there are no lengths to predict at.")
+    return found
 
 
 def _forces(fit: Record, lengths: np.ndarray, force: float, sign: int) -> tuple[np.ndarray, np.ndarray]:

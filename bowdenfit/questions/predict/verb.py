@@ -3,7 +3,8 @@
 from collections.abc import Mapping, Sequence
 from typing import TYPE_CHECKING, Annotated, Any, Literal
 
-from bowdenfit.verb import Argument, Option, Quantity, Reply, Stroke, Verb
+from bowdenfit.questions.predict.words import predictions_csv, predictions_text
+from bowdenfit.verb import Argument, Length, Option, Quantity, Reply, Stroke, Verb
 
 if TYPE_CHECKING:
     from bowdenfit.results.record import Record
@@ -16,7 +17,7 @@ AT_LENGTHS = ("efficiency", "output-force")  # all others are asked at wrap angl
 
 def predict(
     found: Annotated["Record", Argument("RESULTS", results=True)],
-    lengths: Annotated[Sequence[float] | None, Argument("LENGTHS", many=True)] = None,
+    lengths: Annotated[Sequence[Length] | None, Argument("LENGTHS", many=True)] = None,
     input_force: Annotated[Quantity | None, Option(metavar="FORCE", example="100N")] = None,
     stroke: Annotated[Stroke, Option()] = "pull",
     *,
@@ -29,7 +30,8 @@ def predict(
 
     Args:
         found: The fit.
-        lengths: Route values; the description's choices if omitted.
+        lengths: Route values, in the unit of the route or with another, such as 455, 455mm or 18 in; the description's choices
+            if omitted.
         input_force: Force at the motor side, such as 100N.
         stroke: Direction of sliding.
         quantity: What to predict.
@@ -44,7 +46,7 @@ def predict(
     import numpy as np
 
     from bowdenfit.errors import UsageError
-    from bowdenfit.questions.predict.lengths import predict_at_lengths
+    from bowdenfit.questions.predict.lengths import in_unit_of, predict_at_lengths
 
     route = found.dataset.description.route
     if quantity is None:
@@ -67,19 +69,12 @@ def predict(
         )
     if not lengths and route is not None and not route.choices:
         raise UsageError("the description has no choices; name the lengths to predict at.")
-    wanted = np.asarray(lengths or (route.choices if route else [0.0]), dtype=float)
+    wanted = np.asarray(in_unit_of(route, lengths) or (route.choices if route else [0.0]), dtype=float)
     return predict_at_lengths(found, wanted, input_force, stroke)
 
 
-def _table(rows: list[dict[str, Any]]) -> str:
-    """Rows as CSV."""
-    return "\n".join([",".join(rows[0]), *(",".join(_cell(value) for value in row.values()) for row in rows)]) + "\n"
-
-
-def _cell(value: object) -> str:
-    if isinstance(value, float):
-        return f"{value:.6g}"
-    return f'"{value}"' if isinstance(value, str) else str(value).lower()
+def _reply(rows: list[dict[str, Any]], _: object = None) -> Reply:
+    return Reply(predictions_text(rows), lambda: rows, csv=lambda: predictions_csv(rows))
 
 
 def _kept(answers: Mapping[str, Any], asked: Mapping[str, Any]) -> Reply | None:
@@ -90,13 +85,13 @@ def _kept(answers: Mapping[str, Any], asked: Mapping[str, Any]) -> Reply | None:
     if other or (asked["quantity"], asked["stroke"]) not in {(None, "pull"), (AT_LENGTHS[0], "pull")} or not lengths:
         return None
     if (rows := [known[length] for length in lengths if length in known]) and len(rows) == len(lengths):
-        return Reply(_table(rows), lambda: rows)
+        return _reply(rows)
     return None
 
 
 VERB = Verb(
     predict,
-    lambda rows, _: Reply(_table(rows), lambda: rows),
+    _reply,
     "Predict efficiency, forces, preload, position or stiffness.",
     """Predict the efficiency, or the output force for an input force, at LENGTHS (default: the lengths that can be bought)
     or at wrap angles; or what stretch and preload do at wrap angles.
@@ -111,10 +106,12 @@ VERB = Verb(
     stiffness       seen at the load side, motor locked
     preload-window  lowest preload without slack over these bends, highest for --friction-limit, and the best
 
-    The interval q05 to q95 is that of the cable's mean; mounting_q05 to mounting_q95 also holds the scatter from one
-    mounting of the cable to the next. A note marks what lies outside the lengths, wrap angles and loads measured, and where
-    nothing of the force is left: a rope pulls or is slack, at 0 N.
+    LENGTHS are in the unit of the route, or have their own: 455, 455mm, 18 in.
+
+    The 90 % interval is that of the cable's mean (q05 to q95 with --csv and --json); that of any one mounting also holds
+    the scatter from one mounting of the cable to the next. A note marks what lies outside the
+    lengths, wrap angles and loads measured, and where nothing of the force is left: a rope pulls or is slack, at 0 N.
     """,
-    formats=("csv", "json"),
+    csv="Print as CSV, with mean, sd and quantiles.",
     kept=_kept,
 )

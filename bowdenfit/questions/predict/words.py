@@ -1,0 +1,140 @@
+"""What `bowdenfit predict` prints: sentences and a table with units for people, or the rows as they are as CSV."""
+
+from collections.abc import Iterator, Mapping, Sequence
+from typing import Any
+
+from bowdenfit.words import WIDTH, decimals, few, filled, percent, table
+
+Row = Mapping[str, Any]
+_UNITS = {"N_m_per_rad": "N*m/rad", "N_per_mm": "N/mm", "N_mm": "N*mm", "N": "N", "mm": "mm", "deg": "deg"}
+_MOUNTING, _PROBABILITY = "mounting", "_probability"
+
+
+def predictions_text(rows: Sequence[Row]) -> str:
+    """Predictions for people: the answer in a sentence, of several places in a table, and what lies outside.
+
+    Args:
+        rows: One a place.
+    """
+    if "in_words" in rows[0]:
+        return filled(rows[0]["in_words"]) + "\n"
+    several = len(rows) > 1
+    blocks = [filled(_extremes(rows)) if several else "\n".join(filled(line) for line in _one(rows[0]))]
+    blocks += list(_tables(rows)) if several else []
+    blocks += ["\n".join(filled(note) for note in _notes(rows))]
+    return "\n\n".join(block for block in blocks if block) + "\n"
+
+
+def predictions_csv(rows: Sequence[Row]) -> str:
+    """Predictions as CSV, with a heading.
+
+    Args:
+        rows: One a place.
+    """
+    return "\n".join([",".join(rows[0]), *(",".join(_cell(value) for value in row.values()) for row in rows)]) + "\n"
+
+
+def _cell(value: object) -> str:
+    if isinstance(value, float):
+        return f"{value:.6g}"
+    return f'"{value}"' if isinstance(value, str) else str(value).lower()
+
+
+def _quantities(row: Row) -> list[str]:
+    """Names of what is predicted: the first has its mean under that name, the others after their own."""
+    names = list(row)
+    return [names[names.index("mean") - 1], *(name for name in names if f"{name}_mean" in row)]
+
+
+def _place(row: Row) -> str | None:
+    """Name of where it is predicted; None where a cable has just one place."""
+    first = next(iter(row))
+    return first if first != _quantities(row)[0] else None
+
+
+def _unit(name: str) -> tuple[str, str]:
+    """A column's name in words, and its unit; efficiencies are shown in percent."""
+    if name == "efficiency":
+        return name, "%"
+    unit = next((unit for unit in _UNITS if name.endswith(f"_{unit}")), None)
+    if unit is not None:
+        return name.removesuffix(f"_{unit}").replace("_", " "), _UNITS[unit]
+    words, _, unit = name.rpartition("_")
+    return words.replace("_", " "), unit
+
+
+def _at(row: Row) -> str:
+    """'470 mm'"""
+    name = _place(row)
+    return f"{row[name]:.6g} {_unit(name)[1]}" if name is not None else "the nominal wrap angles"
+
+
+def _known(row: Row, name: str, of: str = "") -> tuple[str, str]:
+    """Median and interval of a quantity, to the digits that the interval has; or of it in one mounting."""
+    before = "" if name == _quantities(row)[0] else f"{name}_"
+    scale = 100.0 if _unit(name)[1] == "%" else 1.0
+    value, low, high = (scale * row[key] for key in (name, f"{of or before}q05", f"{of or before}q95"))
+    if not high > low:
+        return f"{value:.4g}", f"{low:.4g} to {high:.4g}"
+    digits = decimals(high - low)
+    return f"{value:.{digits}f}", f"{low:.{digits}f} to {high:.{digits}f}"
+
+
+def _one(row: Row) -> list[str]:
+    """The predictions of one place in sentences."""
+    lines = []
+    for name in _quantities(row):
+        (words, unit), (value, interval) = _unit(name), _known(row, name)
+        lines.append(f"{words[0].upper()}{words[1:]} at {_at(row)}: {value} {unit} (90 % interval {interval} {unit}).")
+    if f"{_MOUNTING}_q05" in row:
+        name = _quantities(row)[0]
+        lines.append(f"Any one mounting of the cable: {_known(row, name, f'{_MOUNTING}_')[1]} {_unit(name)[1]}.")
+    lines += [f"Probability that it is slack: {percent(row[name], 0)}." for name in row if name.endswith(_PROBABILITY)]
+    return lines
+
+
+def _extremes(rows: Sequence[Row]) -> str:
+    """Where the first quantity is highest and where lowest."""
+    name = _quantities(rows[0])[0]
+    words, unit = _unit(name)
+    high, low = (choose(rows, key=lambda row: row[name]) for choose in (max, min))
+    said = f"{words[0].upper()}{words[1:]}: highest {_known(high, name)[0]} {unit} at {_at(high)}"
+    return f"{said}, lowest {_known(low, name)[0]} {unit} at {_at(low)}. 90 % intervals are in brackets."
+
+
+def _tables(rows: Sequence[Row]) -> Iterator[str]:
+    """All places, in as many tables one below the other as their columns need."""
+    name = next(iter(rows[0]))  # of several places it is there
+    words, unit = _unit(name)
+    first, columns = [f"{words} ({unit})", *(f"{row[name]:.6g}" for row in rows)], list(_columns(rows))
+    while columns:
+        shown, width = [first], max(map(len, first))
+        while columns and (len(shown) == 1 or width + 2 + max(map(len, columns[0])) <= WIDTH):
+            width += 2 + max(map(len, columns[0]))
+            shown.append(columns.pop(0))
+        heads, *cells = zip(*shown, strict=True)
+        yield table(heads, cells)
+
+
+def _columns(rows: Sequence[Row]) -> Iterator[list[str]]:
+    """Columns with their headings."""
+    for name in _quantities(rows[0]):
+        words, unit = _unit(name)
+        known = [_known(row, name) for row in rows]
+        yield [f"{words} ({unit})", *(f"{value} ({interval})" for value, interval in known)]
+    if f"{_MOUNTING}_q05" in rows[0]:
+        name = _quantities(rows[0])[0]
+        yield ["in any one mounting", *(_known(row, name, f"{_MOUNTING}_")[1] for row in rows)]
+    for name in rows[0]:
+        if name.endswith(_PROBABILITY):
+            yield [f"{name.removesuffix(_PROBABILITY)}, probability", *(percent(row[name], 0) for row in rows)]
+
+
+def _notes(rows: Sequence[Row]) -> list[str]:
+    """What holds of all, and what lies outside where."""
+    of_load = rows[0].get("at_input_force_N")
+    said = [] if of_load is None else [f"At an input force of {of_load:.3g} N, because friction depends on the load."]
+    for note in dict.fromkeys(row["note"] for row in rows if row["note"]):
+        where = [_at(row) for row in rows if row["note"] == note]
+        said.append(f"{'Everywhere' if len(where) == len(rows) > 1 else few(where, 4)}: {note}.")
+    return said

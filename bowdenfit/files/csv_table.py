@@ -89,12 +89,15 @@ def _table(name: str, lines: Sequence[Line], rows: Sequence[CsvRecord], separato
     return RawTable(name, header, parts.headings[0].row, cells, units, _account(name, lines, rows, parts, len(header)))
 
 
-def _fitness(lines: Sequence[Line], separator: str) -> tuple[int, bool, int]:
-    """How well a separator splits the first rows: into most numbers and fewest words, equally many cells, and most of them."""
+def _fitness(lines: Sequence[Line], separator: str) -> tuple[int, bool, bool, int]:
+    """How well a separator splits the first rows: into most numbers and fewest words, equally many cells, and most of them.
+
+    Blanks, which stand in headings too, separate columns only where nothing else does.
+    """
     rows = [row for row in records(lines[:_FIRST_ROWS], separator, _FIRST_ROWS) if not row.blank]
     widths = [len(row.cells) for row in rows] or [0]
     alike = widths[0] > 1 and len(set(widths)) == 1 and all(row.closed for row in rows)
-    return numbers_less_words(rows), alike, widths[0]
+    return numbers_less_words(rows), separator != " ", alike, widths[0]
 
 
 def _header(parts: TableParts, file: str) -> tuple[str, ...]:

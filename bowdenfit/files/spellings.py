@@ -130,11 +130,16 @@ def _may_be_force(unit: str) -> bool:
     return not unit or unit in _WEIGHTS or dimension_of(unit) == "force"
 
 
+def without_accents(text: str) -> str:
+    """Letters without what stands above or below them."""
+    letters = unicodedata.normalize("NFKD", text.replace("ß", "ss"))
+    return "".join(letter for letter in letters if not unicodedata.combining(letter))
+
+
 def _folded(text: str) -> str:
     """In lower case, without accents, one space or underscore between words."""
-    letters = unicodedata.normalize("NFKD", text.replace("θ", "theta").replace("η", "eta").replace("ß", "ss"))
-    plain = "".join(letter for letter in letters if not unicodedata.combining(letter))
-    return " ".join(re.sub(r"[^\w]+", " ", plain.lower()).split())
+    plain = without_accents(text.replace("θ", "theta").replace("η", "eta")).lower()
+    return " ".join(re.sub(r"[^\w]+", " ", plain).split())
 
 
 def _words(name: str) -> list[str]:

@@ -8,14 +8,13 @@ from pathlib import Path
 import numpy as np
 
 from bowdenfit.errors import DatasetError
-from bowdenfit.files.cells import number_of
 from bowdenfit.files.clocks import names_time
 from bowdenfit.files.csv_table import RawTable, read_csv
 from bowdenfit.files.headings import heading_of
 from bowdenfit.files.matching import Quantity, candidates
 from bowdenfit.files.naming import naming
 from bowdenfit.files.spellings import spelled
-from bowdenfit.kinds.single_file import FORCES, HEAD, FileKind, file_kind
+from bowdenfit.kinds.single_file import FORCES, HEAD, FileKind, file_kind, numbers_in
 from bowdenfit.units import dimension_of, is_unit
 from bowdenfit.words import shown
 
@@ -150,9 +149,8 @@ def columns_of(table: RawTable) -> list[HeadedColumn]:
     """The columns of numbers of a table but for clocks."""
     found = []
     for i, (heading, unit) in enumerate(zip(table.header, table.units, strict=True)):
-        cells = [number_of(row[i].text.strip(), "," if "," in row[i].text else ".") for row in table.rows]
-        known = [float(cell) for cell in cells if cell is not None and np.isfinite(cell)]
-        if heading and len(known) > len(cells) / 2 and not (names_time(heading) and not spelled(heading, unit)):
+        known = [value for value in numbers_in(table, i) if np.isfinite(value)]
+        if heading and len(known) > len(table.rows) / 2 and not (names_time(heading) and not spelled(heading, unit)):
             found.append(HeadedColumn(heading, unit, float(np.mean(known)), min(known), max(known)))
     return found
 

@@ -12,16 +12,20 @@ from bowdenfit.errors import DatasetError
 from bowdenfit.files.cells import Cell
 from bowdenfit.files.columns import Column, Quantity, require
 from bowdenfit.files.csv_table import RawTable
+from bowdenfit.files.spellings import without_accents
 from bowdenfit.types import Labels, Matrix, Vector
 from bowdenfit.words import shown
 
 LARGEST_ANGLE = float(np.deg2rad(2000.0)) * (1 + 1e-12)
 _ALIKE = 0.75  # likeness from which an unknown heading is taken for a misspelled one
-_STROKES = {
-    **dict.fromkeys(("pull", "pulling", "+1", "1", "+1.0", "1.0"), 1),
-    **dict.fromkeys(("return", "returning", "release", "-1", "-1.0"), -1),
-    **dict.fromkeys(("hold", "0", "0.0"), 0),
+_STROKE_WORDS = {
+    1: "pull pulling pulled +1 1 +1.0 1.0 loading ziehen zug hub belasten belastung tirer traction charge tirar traccion carga "
+    "tirare trazione carico",
+    -1: "return returning release releasing -1 -1.0 unloading zuruck zurueck ruckhub rueckhub nachlassen entlasten entlastung "
+    "retour relacher decharge retorno vuelta soltar descarga ritorno rilascio scarico",
+    0: "hold held holding 0 0.0 halten gehalten maintien tenir mantener tenere",
 }
+_STROKES = {word: stroke for stroke, words in _STROKE_WORDS.items() for word in words.split()}
 
 
 @dataclass(frozen=True)
@@ -129,7 +133,7 @@ def read_strokes(
         return np.ones(n_rows, dtype=int)
     strokes = []
     for cell in found["stroke"].cells:
-        text = cell.text.strip().lower().replace("\u2212", "-").replace(",", ".")
+        text = without_accents(cell.text.strip().lower().replace("\u2212", "-").replace(",", "."))
         if text not in _STROKES:
             raise cell.refuse(f"{cell.shown} is no stroke; write pull (+1) or return (-1){held}.")
         strokes.append(_STROKES[text])

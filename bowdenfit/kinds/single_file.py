@@ -9,7 +9,6 @@ from pathlib import Path
 import numpy as np
 
 from bowdenfit.errors import DatasetError
-from bowdenfit.files.cells import number_of
 from bowdenfit.files.clocks import is_date, names_time
 from bowdenfit.files.contents import TEXT
 from bowdenfit.files.csv_table import RawTable, read_csv
@@ -18,7 +17,7 @@ from bowdenfit.files.matching import Quantity, candidates
 from bowdenfit.files.sheets import stated_rate
 from bowdenfit.files.spellings import spelled
 from bowdenfit.files.text_file import first_bytes, first_lines
-from bowdenfit.units import conversion_factor
+from bowdenfit.units import conversion_factor, dimension_of, is_unit
 from bowdenfit.words import shown
 
 HEAD = 400  # rows by which it is decided
@@ -94,7 +93,7 @@ def _without_headings(path: Path, error: DatasetError) -> FileKind:
 
 
 def _by_columns(path: Path, table: RawTable) -> FileKind:
-    clock = next((i for i, heading in enumerate(table.header) if _is_time(heading, table.units[i])), None)
+    clock = next((i for i, _ in enumerate(table.header) if _is_time(table, i)), None)
     found = {name for name, columns in candidates(_headings(table), COLUMNS).items() if columns}
     forces = {quantity.name for quantity in FORCES}
     kind = "efficiencies" if "efficiency" in found and not forces <= found else "forces"
@@ -129,16 +128,34 @@ def _headings(table: RawTable) -> list[tuple[str, str]]:
     return list(zip(table.header, table.units, strict=True))
 
 
-def _is_time(heading: str, unit: str) -> bool:
-    """Whether a heading means time; that of a tension, such as T1, does not."""
+def _is_time(table: RawTable, column: int) -> bool:
+    """Whether a column is one of time, by its heading or by a unit of time over numbers that rise; T1 is a tension."""
+    heading, unit = table.header[column], table.units[column]
     other = spelled(heading, unit)
-    return names_time(heading) and not (other and (other.unit or other.pair))
+    if names_time(heading):
+        return not (other and (other.unit or other.pair))
+    written = heading_of(heading, unit).unit
+    if not written or not is_unit(written) or dimension_of(written) != "time":
+        return False
+    steps = _steps(table, column)
+    return bool(steps) and min(steps) > 0
+
+
+def numbers_in(table: RawTable, column: int) -> list[float]:
+    """The numbers of a column, as they stand there; NaN where a cell holds none."""
+    found = []
+    for row in table.rows:
+        try:
+            found.append(row[column].number())
+        except DatasetError:
+            found.append(math.nan)
+    return found
 
 
 def _steps(table: RawTable, column: int) -> list[float]:
     """Seconds from each of the first rows to the next; empty where these are no numbers."""
-    values = [number_of(row[column].text.strip(), "." if "," not in row[column].text else ",") for row in table.rows]
-    known = [value for value in values if value is not None and math.isfinite(value)]
+    values = numbers_in(table, column)
+    known = [value for value in values if math.isfinite(value)]
     unit = heading_of(table.header[column], table.units[column]).unit
     try:
         factor = conversion_factor(unit, "time") if unit else 1.0
@@ -153,8 +170,7 @@ def _is_smooth(table: RawTable) -> bool:
         other = spelled(heading, unit)
         if heading_of(heading, unit).unit not in {"N", "kN", "lbf"} and not (other and "force" in other.quantity):
             continue
-        cells = [number_of(row[i].text.strip(), "." if "," not in row[i].text else ",") for row in table.rows]
-        values = np.array([math.nan if value is None else value for value in cells])
+        values = np.array(numbers_in(table, i))
         values = values[np.isfinite(values)]
         spread = float(np.var(values)) if len(values) > _LONG else 0.0
         many = len(set(values.tolist())) > len(values) / 4

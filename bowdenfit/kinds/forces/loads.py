@@ -7,6 +7,7 @@ from bowdenfit.types import Vector
 
 _MOST = 25  # loads that are counted
 _APART = 3.0  # smallest gap between loads over the largest within one
+_SAME = 0.002  # relative difference of readings that is none
 _ONE = 0.03  # relative width of readings that are at one load
 
 
@@ -29,9 +30,7 @@ def levels(forces: Vector) -> int | None:
         return 1
     gaps = np.sort(np.diff(logs))[::-1]
     most = min(_MOST, (len(forces) + 1) // 2)
-    if np.count_nonzero(gaps) < most and len(gaps) > np.count_nonzero(gaps):
-        return int(np.count_nonzero(gaps)) + 1
-    ratios = gaps[: most - 1] / np.maximum(gaps[1:most], 1e-12) if most > 1 else np.zeros(0)
+    ratios = gaps[: most - 1] / np.maximum(gaps[1:most], _SAME) if most > 1 else np.zeros(0)
     if not len(ratios) or ratios.max() < _APART:
         return None
     return int(np.argmax(ratios)) + 2

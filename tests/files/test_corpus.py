@@ -1,0 +1,88 @@
+"""Small files as laboratories write them: each is understood as it must be, and the command that `check` prints fits it."""
+
+import shlex
+import tomllib
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+import bowdenfit as bf
+from bowdenfit.files import read_channels
+from bowdenfit.files.contents import TEXT
+from bowdenfit.files.csv_table import read_csv
+from bowdenfit.kinds.efficiencies.table import EfficiencyTable
+from bowdenfit.kinds.forces.table import ForceTable
+
+CORPUS = Path(__file__).parent / "corpus"
+UNDERSTOOD = tomllib.loads((CORPUS / "understood.toml").read_text(encoding="utf-8"))
+FITTED = ("excel_german.csv", "t1_t2_wrap.csv", "tendon_strokes.csv", "wirkungsgrad.csv")
+ANY_DIGITS = 2e-4  # relative; what a file does not print
+
+
+def test_the_corpus_has_forty_files_and_every_one_is_described():
+    files = {path.name for path in CORPUS.iterdir()} - {"understood.toml"}
+    assert files == set(UNDERSTOOD)
+    assert len(files) >= 40
+
+
+@pytest.mark.parametrize("name", UNDERSTOOD)
+def test_a_file_is_said_to_be_what_it_is_and_its_command_reads_it(run, monkeypatch, name):
+    monkeypatch.chdir(CORPUS)
+    truth = UNDERSTOOD[name]
+    code, out, _ = run("check", name)
+    said = " ".join(out.split())
+    assert code == 0
+    assert said.startswith(f"{name}: {truth.get('says', 'a ' + truth['kind'])}"), said
+    (table,) = bf.read(Path(name), **command_of(out)[1]).measurements.tables
+    if isinstance(table, EfficiencyTable):
+        assert [table.efficiency[0], table.efficiency[-1]] == pytest.approx([*truth["first"], *truth["last"]], rel=ANY_DIGITS)
+    elif isinstance(table, ForceTable):
+        ends = [[table.input_force[i], table.output_force[i]] for i in (0, -1)]
+        np.testing.assert_allclose(ends, [truth["first"], truth["last"]], rtol=ANY_DIGITS)
+        assert len(table.run) == truth["readings"]
+    else:
+        assert table.each[0].account.samples == truth["readings"]
+        assert table.each[0].strokes.exponent == pytest.approx(np.pi * truth["mu"], rel=0.05)
+
+
+@pytest.mark.parametrize("name", UNDERSTOOD)
+def test_every_row_of_a_file_is_read_or_named_with_its_reason(name):
+    truth, path = UNDERSTOOD[name], CORPUS / name
+    account = read_channels(path).account if truth["kind"] == "recording" else read_csv(path).account
+    text = path.read_bytes()
+    lines = text.decode("utf-16").splitlines() if text.startswith(b"\xff\xfe") else text.splitlines()
+    assert account.rows == len(lines) == account.accounted
+    assert account.read == truth["readings"]
+    assert len(account.beside) == truth.get("beside", 0)
+    if "headings" in truth:
+        assert list(account.headings) == truth["headings"]
+        assert {each.why: each.count for each in account.left_out} == truth["unused"]
+
+
+@pytest.mark.parametrize("name", [n if n in FITTED else pytest.param(n, marks=pytest.mark.slow) for n in UNDERSTOOD])
+def test_the_command_that_check_prints_fits_a_file(run, monkeypatch, tmp_path, name):
+    monkeypatch.chdir(CORPUS)
+    words, _ = command_of(run("check", name)[1])
+    code, _, err = run(*words, "--no-mcmc", "--no-figures", "--seed", 1, "--output", tmp_path / "fit")
+    assert code in (0, 3), err
+    found = bf.load(tmp_path / "fit").least_squares.estimates["mu"]
+    assert found.value == pytest.approx(UNDERSTOOD[name]["mu"], rel=0.03)
+
+
+def command_of(text):
+    """The one command that `check` prints, as words, and as keywords for notebooks."""
+    (line,) = [line.strip() for line in text.splitlines() if line.strip().startswith("bowdenfit fit ")]
+    words = shlex.split(line)[1:]
+    named = {}
+    for option, value in zip(words[2::2], words[3::2], strict=True):
+        named.setdefault(option, []).append(value)
+    keywords = {"--column": "columns", "--channel": "channels", "--wrap-angle": "wrap_angle"}
+    given = {keywords[option]: values for option, values in named.items()}
+    if "wrap_angle" in given:
+        given["wrap_angle"] = (float(given["wrap_angle"][0].removesuffix("deg")), "deg")
+    return words, given
+
+
+def test_endings_of_text_are_those_of_the_corpus():
+    assert {Path(name).suffix for name in UNDERSTOOD} <= set(TEXT)

@@ -18,6 +18,7 @@ MOST = 8  # recordings in a figure
 ALIKE = 4.0  # ranges share an axis if all of them together are so many times the shortest at most
 CHARACTER = 0.064  # in, width of one in a title
 LEGEND_MARK = 4.0  # pt
+LONG = 60.0  # ratio of the ends of a logarithmic axis from which it has numbers at powers of ten only
 MARK_GRID = (160, 60)  # across and up a panel, marks of a kind that it can show
 
 
@@ -97,6 +98,23 @@ def enlarge_marks(figure: Figure) -> None:
     for handle in figure.legends[0].legend_handles:
         if isinstance(handle, Line2D) and handle.get_linestyle() == "None":
             handle.set_markersize(max(handle.get_markersize(), LEGEND_MARK))
+
+
+def make_logarithmic(axes: Axes, which: str, ratio: float) -> None:
+    """A logarithmic axis with plain numbers, at 1, 2 and 5 or of a long one at powers of ten.
+
+    Args:
+        axes: Panel; its limits may come later.
+        which: "x" or "y".
+        ratio: Of its largest to its smallest value.
+    """
+    from matplotlib.ticker import FuncFormatter, LogLocator, NullFormatter
+
+    axes.set(**{f"{which}scale": "log"})
+    axis = axes.xaxis if which == "x" else axes.yaxis
+    axis.set_major_locator(LogLocator(subs=(1.0, 2.0, 5.0) if ratio < LONG else (1.0,), numticks=6))
+    axis.set_major_formatter(FuncFormatter(lambda value, _: f"{value:,.6g}"))
+    axis.set_minor_formatter(NullFormatter())
 
 
 def draw_marks(

@@ -26,7 +26,13 @@ from bowdenfit.questions.recorded import (
     recordings_figure,
     sample_efficiency_figure,
 )
-from bowdenfit.questions.summary import coefficients_figure, pairs_figure, residuals_figure, traces_figure
+from bowdenfit.questions.summary import (
+    coefficients_figure,
+    forces_figure,
+    pairs_figure,
+    residuals_figure,
+    traces_figure,
+)
 from bowdenfit.results.arrays import read_arrays
 from bowdenfit.results.folder import FIGURE_DATA
 from bowdenfit.results.kept import kept
@@ -39,6 +45,7 @@ _FILES = (  # first those whose data are there, so that drawing begins at once
     pairs_figure,
     traces_figure,
     residuals_figure,
+    forces_figure,
     wrap_angles_figure,
     efficiency_figure,
     stretch_figure,

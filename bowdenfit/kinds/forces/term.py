@@ -24,7 +24,7 @@ from bowdenfit.kinds.shared_parameters import force_noise, offsets, run_scatter
 from bowdenfit.kinds.sliding_rows import ROW_ARRAYS, SlidingRows
 from bowdenfit.kinds.term import GROUP, LOAD, Circumstances, Term, TermKind
 from bowdenfit.parameters.space import Parameter
-from bowdenfit.types import Labels
+from bowdenfit.types import Labels, Vector
 
 _ONE_LOAD = 1.05  # highest over lowest load of a run that counts as made at one
 
@@ -82,8 +82,6 @@ def sliding_rows(
 def _expected(description: Description, table: ForceTable, used: np.ndarray, keys: np.ndarray) -> ExpectedForces:
     """What readings together say of their forces: those of a run, and those that are alone in theirs with each other.
 
-    How the latter scatter is not the noise of the load cells, because each had a mounting of its own.
-
     Args:
         description: What was said about the cable.
         table: The table.
@@ -102,9 +100,21 @@ def _expected(description: Description, table: ForceTable, used: np.ndarray, key
         together = np.unique(keys[mine], axis=0, return_inverse=True)[1].ravel()
         forces = table.input_force[used][mine], table.output_force[used][mine]
         part = expected_forces(*forces, together, sensors.noise_ratio, noise, description.fits_offsets)
+        if noise and alone[mine].any():
+            part = _less_mountings(part, *forces, sensors.noise_ratio, noise)
         for name, values in vars(part).items():
             getattr(found, name)[mine] = values
     return found
+
+
+def _less_mountings(
+    expected: ExpectedForces, input_force: Vector, output_force: Vector, noise_ratio: float, noise: float
+) -> ExpectedForces:
+    """The same where each reading had a mounting of its own, which moves the forces themselves: noise moves them by less."""
+    moved_in, moved_out = expected.input_force - input_force, expected.output_force - output_force
+    squares = np.mean(moved_out**2 * (1 + (noise_ratio * output_force / input_force) ** 2))
+    share = min(1.0, noise**2 / squares) if squares > 0 else 1.0
+    return ExpectedForces(input_force + share * moved_in, output_force + share * moved_out, expected.log_ratio_error)
 
 
 def _run_label(cable: Cable, table: ForceTable, run: int) -> str:

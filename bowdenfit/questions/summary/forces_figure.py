@@ -1,0 +1,201 @@
+"""Output against input force with the law that was fitted, what readings are off it, and the apparent friction by the load."""
+
+from __future__ import annotations
+
+import textwrap
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from bowdenfit.plots.bands import draw_quantiles, middle, name_band
+from bowdenfit.plots.layout import BOTTOM, RIGHT, empty_page, legend_above, place_labels
+from bowdenfit.plots.panels import make_logarithmic
+from bowdenfit.plots.style import (
+    BLACK,
+    GRAY,
+    GREEN,
+    LEAST_SQUARES,
+    LIGHT,
+    SERIES_COLORS,
+    SERIES_MARKERS,
+    SMALL,
+    VERMILLION,
+    WIDE,
+    in_paper_style,
+)
+from bowdenfit.questions.summary.forces_shown import STROKES, Forces, ForcesHere, forces_shown
+
+if TYPE_CHECKING:
+    from bowdenfit.plots.layout import Axes, Figure
+    from bowdenfit.results.record import Record
+
+MAIN, STRIP, GAP, ACROSS, LEFT = 2.3, 0.85, 0.12, 0.88, 0.78  # in
+LABEL = 0.56  # in, from the axes to their names: numbers of many digits stand between
+VERDICT_ROW, LETTERS = 0.14, 125  # in, and letters in a row
+MARK, SMALL_MARK, MANY = 3.4, 2.0, 300  # pt, pt, and readings from which marks are small
+RETURN_DASHES = (0, (4, 1.6))
+ROOM = 1.15
+CAPSTAN, CAPSTAN_DOTS = "Capstan equation", (0, (1, 1.2))
+ALIKE = 1e-3  # of a coefficient, within which it is the same
+FROM_ZERO = 0.6  # lowest over highest coefficient below which the axis begins at 0
+_OUTER = (0.02, 0.98)  # quantiles of the readings between which the axis of the coefficient is made
+
+
+def data(fit: Record) -> Forces | None:
+    """What is shown; None without a table of forces."""
+    return forces_shown(fit)
+
+
+@in_paper_style
+def draw(forces: Forces) -> Figure:
+    """Output against input with a strip of residuals below; beside them the apparent coefficient against the load."""
+    said = textwrap.wrap(_verdict(forces), LETTERS, max_lines=2, placeholder=" ...")
+    top = 0.06 + VERDICT_ROW * len(said)
+    height = BOTTOM + STRIP + GAP + MAIN + top
+    figure = empty_page(WIDE, height)
+    width = (WIDE - LEFT - RIGHT - ACROSS) / 2
+    box = {"bottom": BOTTOM / height, "top": 1 - top / height}
+    ratios = {"height_ratios": [MAIN, STRIP], "hspace": 2 * GAP / (MAIN + STRIP)}
+    left = figure.add_gridspec(2, 1, left=LEFT / WIDE, right=(LEFT + width) / WIDE, **box, **ratios)
+    right = figure.add_gridspec(1, 1, left=1 - (RIGHT + width) / WIDE, right=1 - RIGHT / WIDE, **box)
+    main = figure.add_subplot(left[0])
+    strip, beside = figure.add_subplot(left[1], sharex=main), figure.add_subplot(right[0])
+    if forces.logarithmic:
+        for axes, name, value in ((main, "x", "input_force"), (main, "y", "output_force"), (beside, "x", "input_force")):
+            read = np.concatenate([getattr(here, value) for here in forces.places])
+            make_logarithmic(axes, name, float(read.max() / read.min()))
+    _main(main, forces)
+    _strip(strip, forces)
+    _apparent(beside, forces)
+    for axes in (main, strip, beside):
+        place_labels(figure, axes)
+        axes.yaxis.set_label_coords(-LABEL / width, 0.5)
+    main.set_title("\n".join(said), loc="left", color=GREEN if forces.trusted else VERMILLION, fontsize=SMALL, x=-LABEL / width)
+    legend_above(figure, [main, strip, beside], columns=4)
+    return figure
+
+
+def _verdict(forces: Forces) -> str:
+    """The verdict in a sentence."""
+    if forces.trusted:
+        return f"The readings follow the fitted law ({forces.model})."
+    return f"Not trusted. {forces.verdict.partition(';')[0].rstrip('.')}."
+
+
+def _colored(forces: Forces) -> list[tuple[ForcesHere, str, str]]:
+    """The places with lines of their own, with color and marker."""
+    shown = [here for here in forces.places if here.shown]
+    return [(here, SERIES_COLORS[i % 8], SERIES_MARKERS[i % 8]) for i, here in enumerate(shown)]
+
+
+def _marks(axes: Axes, forces: Forces, value: str, name: bool = False) -> None:
+    """Readings of all places: filled while pulling, open while returning, crosses where held, gray without a line."""
+    size = MARK if sum(len(here.stroke) for here in forces.places) < MANY else SMALL_MARK
+    low, high = axes.get_ylim() if value == "apparent" else (-np.inf, np.inf)
+    looks = {id(here): (color, marker) for here, color, marker in _colored(forces)}
+    for here in forces.places:
+        color, marker = looks.get(id(here), (GRAY, "."))
+        y = np.clip(getattr(here, value), low, high)
+        for stroke, mark, fill in ((1, marker, color), (-1, marker, "white"), (0, "x", color)):
+            mine = (here.stroke == stroke) & np.isfinite(y)
+            if mine.any():
+                axes.plot(
+                    here.input_force[mine], y[mine], mark, color=color, markerfacecolor=fill, markersize=size,
+                    markeredgewidth=0.7, zorder=3, clip_on=value != "apparent",
+                )  # fmt: skip
+        if name and here.shown and here.label:
+            axes.plot([], [], marker=marker, color=color, markersize=MARK, label=here.label)
+
+
+def _main(axes: Axes, forces: Forces) -> None:
+    """Output against input."""
+    every = np.concatenate([here.stroke for here in forces.places])
+    for here, color, _ in _colored(forces):
+        for i, stroke in enumerate(STROKES):
+            if np.any(here.stroke == stroke) or not np.any(here.stroke):
+                line = "-" if stroke > 0 else RETURN_DASHES
+                draw_quantiles(axes, here.load, here.law[:, i], color, linestyle=line, linewidth=1.0)
+    load = forces.places[0].load
+    axes.plot(load, load, color=GRAY, linewidth=0.6, label="No friction")
+    law = forces.places[0].law
+    what = LEAST_SQUARES if len(law) == 1 else "Law"
+    for stroke, words, line, fill in ((1, "pulling", "-", GRAY), (-1, "returning", RETURN_DASHES, "white")):
+        if np.any(every == stroke):
+            axes.plot(
+                [], [], linestyle=line, marker="o", color=GRAY, markerfacecolor=fill, markersize=MARK, label=f"{what}, {words}"
+            )
+    if np.any(every == 0):
+        axes.plot([], [], "x", color=GRAY, markersize=MARK, label="Held")
+    name_band(axes, law)
+    _marks(axes, forces, "output_force", name=True)
+    if not all(here.shown for here in forces.places):
+        axes.plot([], [], ".", color=GRAY, label="Elsewhere")
+    if forces.count:
+        shown = sum(len(here.stroke) for here in forces.places)
+        axes.plot([], [], " ", label=f"{shown:,} of {forces.count:,} readings shown")
+    axes.set_xlim(load[0] if forces.logarithmic else 0.0, load[-1])
+    out = np.concatenate([here.output_force for here in forces.places])
+    axes.set_ylim((0.7 * out.min(), 1.4 * out.max()) if forces.logarithmic else (0.0, 1.08 * max(out.max(), load[-1])))
+    axes.set_ylabel("Output force (N)")
+    axes.tick_params(labelbottom=False)
+
+
+def _strip(axes: Axes, forces: Forces) -> None:
+    """What readings are off the law."""
+    off = np.concatenate([here.off for here in forces.places])
+    limit = ROOM * float(np.nanmax(np.abs(off), initial=0.0)) or 1.0
+    if len(forces.spread):
+        spread = np.minimum(forces.spread, 10 * limit)
+        axes.fill_between(
+            forces.spread_load, -spread, spread, color=LIGHT, linewidth=0, zorder=0.4, label="9 of 10 readings"
+        )
+    axes.axhline(0.0, color=GRAY, linewidth=0.8, zorder=0.9)
+    _marks(axes, forces, "off")
+    axes.set_ylim(-limit, limit)
+    axes.set(xlabel="Input force (N)", ylabel="Residual (%)")
+    axes.locator_params(axis="y", nbins=5)
+
+
+def _apparent(axes: Axes, forces: Forces) -> None:
+    """Apparent coefficient against the load, beside what the capstan equation says: a horizontal line."""
+    load = forces.places[0].load
+    axes.set_xlim(load[0] if forces.logarithmic else 0.0, load[-1])
+    axes.set_ylim(*_coefficient_limits(forces))
+    colored, bent = _colored(forces), False
+    for here, color in [(colored[0][0], BLACK)] if _all_alike(forces) else [(here, color) for here, color, _ in colored]:
+        for i, stroke in enumerate(STROKES):
+            if np.any(here.stroke == stroke):
+                line = "-" if stroke > 0 else RETURN_DASHES
+                draw_quantiles(axes, here.load, here.apparent_law[:, i], color, linestyle=line, linewidth=1.0)
+        if np.isfinite(here.capstan) and not _is_level(here):
+            axes.axhline(here.capstan, color=color, linestyle=CAPSTAN_DOTS, linewidth=1.1)
+            bent = True
+    axes.plot([], [], color=GRAY, linestyle=CAPSTAN_DOTS if bent else "-", linewidth=1.1, label=CAPSTAN)
+    _marks(axes, forces, "apparent")
+    axes.locator_params(axis="y", nbins=6)
+    axes.set(xlabel="Input force (N)", ylabel="Apparent friction coefficient")
+
+
+def _all_alike(forces: Forces) -> bool:
+    """Whether several places have one coefficient, so that their lines are one."""
+    lines = np.array([middle(here.apparent_law) for here in forces.places if here.shown])
+    return bool(len(lines) > 1 and np.ptp(lines) < ALIKE * np.max(np.abs(lines)))
+
+
+def _is_level(here: ForcesHere) -> bool:
+    """Whether the law is the capstan equation's: the same coefficient at all loads."""
+    line = middle(here.apparent_law)
+    return bool(np.ptp(line) < ALIKE * np.max(np.abs(line)))
+
+
+def _coefficient_limits(forces: Forces) -> tuple[float, float]:
+    """From the readings but for a few far ones, and from the laws; far ones are drawn on the edge."""
+    readings = np.concatenate([here.apparent for here in forces.places])
+    readings = readings[np.isfinite(readings)]
+    if not len(readings):
+        return 0.0, 1.0
+    lines = [value for here in forces.places if here.shown for value in (here.capstan, *middle(here.apparent_law)[0])]
+    outer = np.quantile(readings, _OUTER)
+    low, high = min(*outer, np.nanmedian(lines)), max(*outer, np.nanmedian(lines))
+    room = 0.15 * (high - low) or 0.1 * abs(high)
+    return (low - room if low > FROM_ZERO * high else min(0.0, low - room)), high + room

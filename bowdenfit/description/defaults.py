@@ -127,3 +127,7 @@ class PriorDefaults(Frozen):
     lengthening_mm_per_radian_without_data: Positive = 1.0
     stretch_zero_share: Positive = 2.0
     preload_log_sd: Positive = 1.0
+    end_stiffness_log_sd: Positive = 2.0
+    displacement_zero_ranges: Positive = 2.0
+    displacement_noise_share: Positive = 0.002
+    motor_offset_share: Positive = 0.05

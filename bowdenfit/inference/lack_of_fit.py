@@ -153,7 +153,8 @@ def _tested(system: System, readings: Readings, columns: np.ndarray) -> tuple[fl
         robust = float(along @ np.linalg.lstsq(covariance, along, rcond=None)[0])
         chance = max(chance, float(fdtrc(k, freedom, robust / k)))
     moved = part @ along * readings.unit * readings.scatter
-    return chance, float(np.sqrt(np.mean(moved**2) / np.mean(readings.reading**2)))
+    of = readings.reading if readings.effect is None else readings.effect
+    return chance, float(np.sqrt(np.mean(moved**2) / max(np.mean(of**2), 1e-300)))
 
 
 def _ends(readings: Readings, x: np.ndarray, mine: np.ndarray) -> Sequence[float]:

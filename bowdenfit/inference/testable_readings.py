@@ -29,6 +29,7 @@ class Readings:
         of_runs: Columns that the effects of mountings follow.
         unit: What a residual of 1 is in units of the reading.
         reading: What was read, of which a departure is a share; a loss as a log ratio.
+        effect: What friction makes of that, where it is a part of what is read; a departure is as large as its share of this.
         lever: How much of a reading a relative change of friction moves.
         used: Which of them are readings, not bounds.
         group: Contact or the like that each belongs to; empty where all are of one kind.
@@ -57,6 +58,7 @@ class Readings:
     extra: float = 0.0
     freedom: float = 0.0
     scatter: float = 1.0
+    effect: np.ndarray | None = None
 
     def excess(self, some: np.ndarray) -> float:
         """How much more some of them read than the model says, over what is read [1]."""
@@ -145,7 +147,9 @@ def _blocks(
 ) -> Iterator[Readings]:
     """Readings of a term that scatter alike: the first are told apart, further ones only where they are inside runs."""
     first, *others = term.residual_blocks
-    yield _of_labels(term, places, residuals[: first[0]], jacobian[: first[0]], expected)
+    of_labels = _of_labels(term, places, residuals[: first[0]], jacobian[: first[0]], expected)
+    effect = getattr(term, "friction_effect", None)
+    yield of_labels if effect is None else replace(of_labels, effect=np.asarray(effect(values)))
     start = first[0]
     for count, independent in others:
         rows = slice(start, start + count)

@@ -4,6 +4,7 @@ from collections.abc import Iterator
 from typing import Any
 
 from bowdenfit.kinds.angles import ANGLES
+from bowdenfit.kinds.displacement import DISPLACEMENT
 from bowdenfit.kinds.efficiencies import EFFICIENCIES
 from bowdenfit.kinds.forces import FORCES
 from bowdenfit.kinds.kind import Kind
@@ -15,7 +16,7 @@ from bowdenfit.kinds.recordings import RECORDINGS
 from bowdenfit.kinds.stretch import STRETCH
 
 KINDS: dict[str, Kind[Any]] = {
-    kind.name: kind for kind in (ANGLES, EFFICIENCIES, FORCES, RECORDINGS, STRETCH, PRELOAD, LOOP)
+    kind.name: kind for kind in (ANGLES, EFFICIENCIES, FORCES, RECORDINGS, STRETCH, PRELOAD, LOOP, DISPLACEMENT)
 }
 """Every kind by its name, in the order in which tables are read, fitted and spoken of."""
 

@@ -25,6 +25,7 @@ from bowdenfit.cable.load_cells import (
 from bowdenfit.kinds import each_table, kind_of
 from bowdenfit.kinds.angles.term import ANGLES
 from bowdenfit.kinds.candidate import CandidateKind
+from bowdenfit.kinds.displacement.term import DISPLACEMENT
 from bowdenfit.kinds.efficiencies.term import EFFICIENCIES
 from bowdenfit.kinds.forces.term import FORCES
 from bowdenfit.kinds.loop.term import LOOP, LOOP_MOUNTING
@@ -37,7 +38,7 @@ from bowdenfit.kinds.term import Circumstances, TermKind
 from bowdenfit.parameters.space import Parameter
 
 TERMS: dict[str, TermKind] = {
-    kind.name: kind for kind in (ANGLES, EFFICIENCIES, FORCES, RECORDINGS, STRETCH, PRELOAD, LOOP)
+    kind.name: kind for kind in (ANGLES, EFFICIENCIES, FORCES, RECORDINGS, STRETCH, PRELOAD, LOOP, DISPLACEMENT)
 }
 """What each kind adds to the likelihood."""
 

@@ -1,0 +1,32 @@
+"""Force at the motor against its displacement: one load cell and one position, with a spring or a stop at the far end."""
+
+import numpy as np
+
+from bowdenfit.kinds.displacement.table import DisplacementSettings, DisplacementTable, contradiction, read_displacement
+from bowdenfit.kinds.displacement.words import DisplacementDesign, count, describe, empty, implausible, page, warnings_of
+from bowdenfit.kinds.kind import Kind, itself
+from bowdenfit.kinds.readings import Readings
+from bowdenfit.kinds.wrap_angles import check_rows
+
+DISPLACEMENT = Kind(
+    name="displacement",
+    table=DisplacementTable,
+    readings=(
+        Readings("motor_force", "displacement", "force at the motor", "force at the motor in {}", "Force at the motor (N)"),
+    ),
+    read=read_displacement,
+    settings=DisplacementSettings,
+    contradiction=contradiction,
+    quantities=lambda said, _: [("tables, displacement, stop", said.stop, "length")],
+    check=check_rows,
+    describe=describe,
+    warnings=warnings_of,
+    implausible=implausible,
+    page=page,
+    design=DisplacementDesign,
+    empty=empty,
+    count=count,
+    bends=lambda table: np.nansum(table.own.angle, axis=1),
+    conditions=itself,
+    forces=lambda table: table.force[table.used],
+)

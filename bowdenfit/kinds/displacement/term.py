@@ -1,0 +1,251 @@
+"""Force at the motor against displacement in the likelihood: the far end, the rope, and the mounting of each run."""
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
+from typing import Any
+
+import jax
+import jax.numpy as jnp
+import numpy as np
+from jax import Array
+from jaxtyping import Float
+
+from bowdenfit.cable.cable import Cable
+from bowdenfit.cable.elasticity import BEDDING_LOAD, BEDDING_STRETCH, STIFFNESS
+from bowdenfit.cable.load_cells import FORCE_NOISE, RUN_SCATTER, LoadCells
+from bowdenfit.cable.noise import noise_law, scatter
+from bowdenfit.description import Description
+from bowdenfit.kinds.angles.table import AngleTable
+from bowdenfit.kinds.bench import Remeasurement, Truth
+from bowdenfit.kinds.displacement.arrays import arrays_of, order_of, readings, zero_names
+from bowdenfit.kinds.displacement.parameters import DISPLACEMENT_NOISE, END_SPRING, ROPE_STIFFNESS, parameters
+from bowdenfit.kinds.displacement.table import DisplacementSettings, DisplacementTable
+from bowdenfit.kinds.resolve_angles import resolve_angles
+from bowdenfit.kinds.term import WRAP_ANGLE, TermKind
+from bowdenfit.physics.tendon import RopeStretch, Tendon, Turn
+from bowdenfit.types import Vector
+
+MOTOR_FORCE, AT, SINCE_TURN = "motor_force", "Displacement (mm)", "Distance from the turn (mm)"
+LEAST_EXPONENT = 1e-9  # below which friction would push, with whatever the mounting does to it
+
+Values = Mapping[str, Array]
+Data = Mapping[str, Any]
+
+
+@dataclass(frozen=True)
+class DisplacementTerm:
+    r"""Likelihood of the force at the motor against displacement, reading by reading.
+
+    .. math:: F_{ij} = f(x_{ij}, \Lambda_i + m_i) + e_{ij}, \quad m_i \sim \text{Normal}(0, \tau), \quad
+              e_{ij} \sim \text{Normal}(0, \sqrt{\sigma_F^2 + s_{ij}^2})
+
+    with f of `bowdenfit.physics.tendon` and s what the displacement's noise makes of the force, half of the difference that it
+    makes on both sides, which is finite where the force falls steeply after a turn. What a run's mounting and errors of its
+    wrap angles do to the friction exponent is taken to first order and integrated out. The likelihood is said reading by
+    reading, each given those before it in its run; the residuals are those in the run and those of runs, as of `RunsTerm`.
+
+    Args:
+        cable: The cable.
+        data: Arrays over readings in order of their runs, over runs, and over turns of the motor by depth.
+        labels: Each reading in words.
+        zeros: Parameters of the displacement without force, one a run.
+        stop: Whether the far end pulls against a stop.
+        reading_noise: Noise scale of the second block of residuals, that of runs.
+    """
+
+    cable: Cable
+    data: dict[str, Any]
+    labels: tuple[str, ...]
+    zeros: tuple[str, ...]
+    stop: bool
+    name: str = MOTOR_FORCE
+    unit: str = "N"
+    noise: str = FORCE_NOISE
+    reading_noise: str = RUN_SCATTER
+
+    @property
+    def residual_blocks(self) -> tuple[tuple[int, int], ...]:
+        """Readings scatter alike in their runs; runs scatter by their mountings."""
+        rows, runs = len(self.labels), len(self.zeros)
+        return ((rows, rows - runs), (runs, runs))
+
+    def exponents(self, values: Values, data: Data) -> tuple[Float[Array, " runs"], Float[Array, " runs"]]:
+        """Friction exponent of each run, and its variance from errors of the wrap angles."""
+        angles, variance = resolve_angles(self.cable, values, data["angles"])
+        exponent = self.cable.friction_exponent(values, angles)
+        return exponent, self.cable.exponent_variance(values, angles, variance)
+
+    def shown(self, values: Values, data: Data, exponent: Float[Array, " runs"], beside: Array | float = 0.0) -> Array:
+        """Force that the motor's load cell shows at each reading [N].
+
+        Args:
+            values: Values of the parameters.
+            data: Arrays as of the term; readings may be others of the same runs.
+            exponent: Friction exponent of each run [1].
+            beside: Displacement beside that of the readings [mm].
+        """
+        exponent = jnp.maximum(exponent, LEAST_EXPONENT)
+        zero = jnp.stack([values[name] for name in self.zeros])
+        compliance = 0.0 if self.stop else 1 / values[END_SPRING]
+        rope = _rope(values)
+
+        def tendon(run: Array) -> Tendon:
+            return Tendon(exponent[run], compliance, rope)
+
+        first, *later = data["turns"]
+        travel = first["at"] - zero[first["run"]]
+        known = Turn(travel, *tendon(first["run"]).sliding(travel, first["stroke"]))
+        for turns in later:
+            travel = turns["at"] - zero[turns["run"]]
+            force, mean = tendon(turns["run"]).since(_taken(known, turns["after"]), travel, turns["stroke"])
+            parts = ((known.travel, travel), (known.force, force), (known.mean, mean))
+            known = Turn(*(jnp.concatenate(part) for part in parts))
+        travel, at = data["displacement"] + beside - zero[data["run"]], tendon(data["run"])
+        sliding = at.sliding(travel, data["stroke"])[0]
+        since = at.since(_taken(known, data["after"]), travel, data["stroke"])[0]
+        return LoadCells.of(values).shown_input(jnp.where(data["slides"], sliding, since))
+
+    def _readings(self, values: Values, data: Data, weights: Values) -> "_Readings":
+        exponent, angle_variance = self.exponents(values, data)
+        mean, slope = jax.jvp(lambda at: self.shown(values, data, at), (exponent,), (jnp.ones_like(exponent),))
+        if weights is not values:
+            exponent, angle_variance = self.exponents(weights, data)
+            slope = jax.jvp(lambda at: self.shown(weights, data, at), (exponent,), (jnp.ones_like(exponent),))[1]
+        variance = weights[FORCE_NOISE] ** 2
+        if DISPLACEMENT_NOISE in weights:
+            more, less = (self.shown(weights, data, exponent, s * weights[DISPLACEMENT_NOISE]) for s in (1.0, -1.0))
+            variance = variance + ((more - less) / 2) ** 2
+        of_runs = weights[RUN_SCATTER] ** 2 + angle_variance
+        return _Readings(mean, data["force"] - mean, slope, jnp.broadcast_to(variance, mean.shape), of_runs, data["run"])
+
+    def _one_by_one(self, values: Values, data: Data) -> tuple[Float[Array, " rows"], Float[Array, " rows"]]:
+        """Mean and standard deviation of each reading by those before it in its run."""
+        found = self._readings(values, data, values)
+        told = _before(found.slope**2 / found.variance, data["start"])
+        said = _before(found.slope * found.deviation / found.variance, data["start"])
+        of_run = found.of_runs[data["run"]]
+        left = of_run / (1 + of_run * told)
+        return found.mean + found.slope * left * said, jnp.sqrt(found.variance + found.slope**2 * left)
+
+    def expected(self, values: Values, data: Data) -> Float[Array, " rows"]:
+        """Expected forces in the mounting of each run, as its readings together show it [N]."""
+        found = self._readings(values, data, values)
+        return found.mean + found.slope * found.mounting[0][data["run"]]
+
+    def log_likelihood(self, values: Values, data: Data) -> Float[Array, " rows"]:
+        """Log likelihood of each reading, given those before it in its run."""
+        return noise_law(self.cable.description).log_density(data["force"], *self._one_by_one(values, data))
+
+    def residuals(self, values: Values, data: Data) -> Float[Array, " rows_and_runs"]:
+        """Standardized residuals of readings in their run, and of runs; weights follow the parameters, undifferentiated."""
+        law, weights = noise_law(self.cable.description), jax.lax.stop_gradient(dict(values))
+        found = self._readings(values, data, weights)
+        mounting, variance = found.mounting
+        slope, sd = (jax.lax.stop_gradient(each) for each in (found.slope, jnp.sqrt(found.variance)))
+        inside = (found.deviation - slope * mounting[data["run"]]) / sd
+        return jnp.concatenate([law.residual(inside), mounting / jax.lax.stop_gradient(jnp.sqrt(found.of_runs + variance))])
+
+    def simulate(self, values: Values, data: Data, key: Array) -> Float[Array, " rows"]:
+        """Forces as the bench would give them, each after the readings before it [N]."""
+        mean, sd = self._one_by_one(values, data)
+        return mean + sd * scatter(key, mean.shape, self.cable.description)
+
+    def friction_effect(self, values: Mapping[str, float]) -> np.ndarray:
+        """What friction makes of each force [N], to first order."""
+        at = {name: jnp.asarray(value) for name, value in values.items()}
+        found = self._readings(at, self.data, at)
+        return np.asarray(found.slope * self.exponents(at, self.data)[0][self.data["run"]])
+
+    def observed(self) -> np.ndarray:
+        """Measured forces [N]."""
+        return self.data["force"]
+
+
+@jax.tree_util.register_dataclass
+@dataclass(frozen=True)
+class _Readings:
+    """Of readings: mean without mountings, deviation, change of the mean with the exponent, variance; variance of runs."""
+
+    mean: Array
+    deviation: Array
+    slope: Array
+    variance: Array
+    of_runs: Array
+    run: Array
+
+    @property
+    def mounting(self) -> tuple[Array, Array]:
+        """What the readings of each run say of its mounting by themselves [1], and its variance."""
+        none = jnp.zeros_like(self.of_runs)
+        told = jnp.maximum(none.at[self.run].add(self.slope**2 / self.variance), 1e-300)
+        return none.at[self.run].add(self.slope * self.deviation / self.variance) / told, 1 / told
+
+
+def _rope(values: Values) -> RopeStretch:
+    """As a table of stretch has it, or linear."""
+    if ROPE_STIFFNESS in values:
+        return RopeStretch(values[ROPE_STIFFNESS])
+    return RopeStretch(values[STIFFNESS], (values[BEDDING_STRETCH], values[BEDDING_LOAD]))
+
+
+def _taken(turns: Turn, which: Array) -> Turn:
+    return Turn(turns.travel[which], turns.force[which], turns.mean[which])
+
+
+def _before(terms: Float[Array, " rows"], start: Array) -> Float[Array, " rows"]:
+    """Sum over the readings of the same run before each; `start` is the first of its run."""
+    total = jnp.cumsum(terms) - terms
+    return total - total[start]
+
+
+def displacement_term(cable: Cable, table: DisplacementTable, angles: AngleTable | None) -> DisplacementTerm:
+    """The term of a table of force against displacement."""
+    rows, data = order_of(table), arrays_of(cable, table, angles)
+    settings = cable.description.table(DisplacementSettings)
+    stop = settings is not None and settings.end == "stop"
+    data |= {"force": table.force[rows], **readings(table, rows)}
+    return DisplacementTerm(cable, data, tuple(table.origin.place(int(i)) for i in rows), zero_names(table), stop)
+
+
+def _draw(table: DisplacementTable, truth: Truth) -> dict[str, Array]:
+    """Forces with noise in the cell and in the displacement; all readings of a run share its mounting and angles."""
+    of_run, of_force, of_x = jax.random.split(jax.random.fold_in(truth.key, 7), 3)
+    term, values, scale = displacement_term(truth.cable, table, truth.angles), truth.values, truth.scale
+    data = jax.tree.map(jnp.asarray, term.data)
+    exponent, angle_variance = term.exponents(values, data)
+    mounting = jnp.sqrt(values[RUN_SCATTER] ** 2 + angle_variance) * truth.scatter(of_run, exponent.shape)
+    shape = (len(term.labels),)
+    beside = scale * values.get(DISPLACEMENT_NOISE, 0.0) * jax.random.normal(of_x, shape)
+    force = term.shown(values, data, exponent + scale * mounting, beside)
+    return {"force": force + scale * values[FORCE_NOISE] * truth.scatter(of_force, shape)}
+
+
+def _drawn_table(_: Description, table: DisplacementTable, drawn: Mapping[str, np.ndarray]) -> DisplacementTable:
+    force: Vector = table.force.copy()
+    force[order_of(table)] = drawn["force"]
+    return replace(table, force=force)
+
+
+def _where(table: DisplacementTable, term: Any) -> Mapping[str, np.ndarray]:
+    """Displacement, how far the motor has moved since its turn, and wrap angle of each reading."""
+    del term
+    rows = order_of(table)
+    angles = np.rad2deg(np.nansum(table.own.angle[rows], axis=1))
+    turns, after = table.motion.turns.at, table.motion.after[rows]
+    moved = np.where(table.motion.slides[rows], np.ptp(table.displacement), np.abs(table.displacement[rows] - turns[after]))
+    return {AT: table.displacement[rows], SINCE_TURN: moved, WRAP_ANGLE: angles}
+
+
+def _terms(cable: Cable, table: DisplacementTable, angles: AngleTable | None) -> Sequence[DisplacementTerm]:
+    return (displacement_term(cable, table, angles),)
+
+
+DISPLACEMENT = TermKind(
+    "displacement",
+    _terms,
+    parameters,
+    Remeasurement(_draw, _drawn_table),
+    tells_mountings=True,
+    where=_where,
+    back=lambda table: table.motion.stroke[order_of(table)] < 0,
+)

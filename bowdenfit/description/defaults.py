@@ -128,6 +128,7 @@ class PriorDefaults(Frozen):
     stretch_zero_share: Positive = 2.0
     preload_log_sd: Positive = 1.0
     end_stiffness_log_sd: Positive = 2.0
+    rope_give: Positive = 0.5
     displacement_zero_ranges: Positive = 2.0
-    displacement_noise_share: Positive = 0.002
+    displacement_noise_share: Positive = 0.0005
     motor_offset_share: Positive = 0.05

@@ -10,7 +10,7 @@ from endings import HARMLESS, NOT_TRUSTED, REFUSED, WRONG, answers, end_of
 import bowdenfit as bf
 
 DATASETS = Path(__file__).parents[2] / "datasets"
-ON_BODY, BENCH, LOOP, RECORDINGS, YARN = sorted(path.name for path in DATASETS.iterdir() if path.is_dir())
+ON_BODY, BENCH, CATHETER, LOOP, RECORDINGS, YARN = sorted(path.name for path in DATASETS.iterdir() if path.is_dir())
 MISTAKES = {
     (3, RECORDINGS): REFUSED,  # input and output exchanged
     (4, YARN): NOT_TRUSTED,  # input_force_lbf for N

@@ -65,6 +65,10 @@ CASES = {
         "synthetic-recordings", ("friction_model=drag", "tables.recordings.likelihood=whole"),
     ),
     "recordings of a loop": ("", ()),
+    "force against displacement": ("synthetic-catheter", ()),
+    "force against displacement up to a stop": (
+        "synthetic-catheter", ("tables.displacement.end=stop", "sensors.offset_sd={value=<0.2>, unit='N'}"),
+    ),
 }  # fmt: skip
 
 

@@ -2,8 +2,17 @@
 
 import numpy as np
 
-from bowdenfit.kinds.displacement.table import DisplacementSettings, DisplacementTable, contradiction, read_displacement
-from bowdenfit.kinds.displacement.words import DisplacementDesign, count, describe, empty, implausible, page, warnings_of
+from bowdenfit.kinds.displacement.reader import read_displacement
+from bowdenfit.kinds.displacement.table import DisplacementSettings, DisplacementTable, contradiction
+from bowdenfit.kinds.displacement.words import (
+    DisplacementDesign,
+    count,
+    describe,
+    empty,
+    implausible,
+    page,
+    warnings_of,
+)
 from bowdenfit.kinds.kind import Kind, itself
 from bowdenfit.kinds.readings import Readings
 from bowdenfit.kinds.wrap_angles import check_rows
@@ -12,7 +21,9 @@ DISPLACEMENT = Kind(
     name="displacement",
     table=DisplacementTable,
     readings=(
-        Readings("motor_force", "displacement", "force at the motor", "force at the motor in {}", "Force at the motor (N)"),
+        Readings(
+            "motor_force", "displacement", "force at the motor", "force at the motor in {}", "Force at the motor (N)"
+        ),
     ),
     read=read_displacement,
     settings=DisplacementSettings,

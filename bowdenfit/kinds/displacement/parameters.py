@@ -8,11 +8,11 @@ from bowdenfit.kinds.displacement.table import DisplacementSettings, Displacemen
 from bowdenfit.kinds.shared_parameters import force_noise, offsets, rope, run_scatter
 from bowdenfit.kinds.stretch.table import StretchTable
 from bowdenfit.kinds.term import Circumstances
-from bowdenfit.parameters.priors import HalfNormal, LogNormal, Normal
+from bowdenfit.parameters.priors import HalfCauchy, LogNormal, Normal
 from bowdenfit.parameters.scale import Scale
 from bowdenfit.parameters.space import Parameter
 
-END_SPRING, ROPE_STIFFNESS, DISPLACEMENT_NOISE = "end_spring", "rope_stiffness", "sigma_x"
+END_SPRING, ROPE_STIFFNESS, ROPE_GIVE, DISPLACEMENT_NOISE = "end_spring", "rope_stiffness", "rope_give", "sigma_x"
 
 
 def _level(table: DisplacementTable) -> Scale:
@@ -38,31 +38,43 @@ def _zeros(table: DisplacementTable, at: Circumstances) -> list[Parameter]:
 
 def parameters(table: DisplacementTable, at: Circumstances) -> list[Parameter]:
     """Spring, rope and zero; how readings and mountings scatter; the zero of the cell where that is fitted."""
-    by, wide, settings = _level(table), at.defaults.end_stiffness_log_sd, at.description.table(DisplacementSettings)
-    stiffness = LogNormal(by.value, wide)
-    spring = Parameter(
-        END_SPRING, r"$K$", "stiffness of the spring at the far end", "elastic", stiffness, "N/mm", scaled_by=str(by)
-    )
-    alone = at.measurements.table(StretchTable) is None
-    linear = Parameter(
-        ROPE_STIFFNESS, r"$k_\mathrm{rope}$", "stiffness of rope and sheath together", "elastic", stiffness, "N/mm",
-        scaled_by=str(by),
-    )  # fmt: skip
     range_x = Scale(float(np.ptp(table.displacement)) or 1.0, "range of displacements", "mm")
     part = at.defaults.displacement_noise_share
     jitter = Parameter(
         DISPLACEMENT_NOISE, r"$\sigma_x$", at.noise.meaning("standard deviation of a displacement"), "noise",
-        HalfNormal(part * range_x.value), "mm", scaled_by=range_x.share(part),
+        HalfCauchy(part * range_x.value), "mm", scaled_by=range_x.share(part),
     )  # fmt: skip
     return [
-        *([] if settings is not None and settings.end == "stop" else [spring]),
-        *([linear] if alone else rope(at)),
+        *_stiffness(table, at),
         *_zeros(table, at),
         run_scatter(at),
         force_noise(at, at.noise.meaning("standard deviation of a force reading")),
         *([] if table.sliding else [jitter]),
         _offset(table, at),
     ]
+
+
+def _stiffness(table: DisplacementTable, at: Circumstances) -> list[Parameter]:
+    """Spring and rope; of a rope that nothing is said of how it gives beside the spring, which may be next to nothing."""
+    by, settings = _level(table), at.description.table(DisplacementSettings)
+    prior, rests = LogNormal(by.value, at.defaults.end_stiffness_log_sd), str(by)
+    spring = Parameter(
+        END_SPRING, r"$K$", "stiffness of the spring at the far end", "elastic", prior, "N/mm", scaled_by=rests
+    )
+    linear = Parameter(
+        ROPE_STIFFNESS, r"$k_\mathrm{rope}$", "stiffness of rope and sheath together", "elastic", prior, "N/mm",
+        scaled_by=rests,
+    )  # fmt: skip
+    give = Parameter(
+        ROPE_GIVE, r"$K/k_\mathrm{rope}$", "give of rope and sheath over that of the spring at the far end", "elastic",
+        HalfCauchy(at.defaults.rope_give),
+    )  # fmt: skip
+    at_stop = settings is not None and settings.end == "stop"
+    if at.measurements.table(StretchTable) is not None:
+        return [*rope(at), *([] if at_stop else [spring])]
+    if at_stop:
+        return [linear]
+    return [spring, linear if ROPE_STIFFNESS in at.description.prior else give]
 
 
 def _offset(table: DisplacementTable, at: Circumstances) -> Parameter:

@@ -18,7 +18,13 @@ from bowdenfit.description import Description
 from bowdenfit.kinds.angles.table import AngleTable
 from bowdenfit.kinds.bench import Remeasurement, Truth
 from bowdenfit.kinds.displacement.arrays import arrays_of, order_of, readings, zero_names
-from bowdenfit.kinds.displacement.parameters import DISPLACEMENT_NOISE, END_SPRING, ROPE_STIFFNESS, parameters
+from bowdenfit.kinds.displacement.parameters import (
+    DISPLACEMENT_NOISE,
+    END_SPRING,
+    ROPE_GIVE,
+    ROPE_STIFFNESS,
+    parameters,
+)
 from bowdenfit.kinds.displacement.table import DisplacementSettings, DisplacementTable
 from bowdenfit.kinds.resolve_angles import resolve_angles
 from bowdenfit.kinds.term import WRAP_ANGLE, TermKind
@@ -26,6 +32,7 @@ from bowdenfit.physics.tendon import RopeStretch, Tendon, Turn
 from bowdenfit.types import Vector
 
 MOTOR_FORCE, AT, SINCE_TURN = "motor_force", "Displacement (mm)", "Distance from the turn (mm)"
+_LEAST_GIVE = 1e-9  # of the spring's, below which a rope is as good as one that does not give
 LEAST_EXPONENT = 1e-9  # below which friction would push, with whatever the mounting does to it
 
 Values = Mapping[str, Array]
@@ -183,6 +190,8 @@ class _Readings:
 
 def _rope(values: Values) -> RopeStretch:
     """As a table of stretch has it, or linear."""
+    if ROPE_GIVE in values:
+        return RopeStretch(values[END_SPRING] / jnp.maximum(values[ROPE_GIVE], _LEAST_GIVE))
     if ROPE_STIFFNESS in values:
         return RopeStretch(values[ROPE_STIFFNESS])
     return RopeStretch(values[STIFFNESS], (values[BEDDING_STRETCH], values[BEDDING_LOAD]))

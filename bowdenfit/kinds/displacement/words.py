@@ -5,13 +5,13 @@ from dataclasses import replace
 from typing import Annotated
 
 import numpy as np
-
 from pydantic import Field
 
 from bowdenfit.description import Description, Finite
 from bowdenfit.description.values import Frozen
 from bowdenfit.kinds.design import Design, radians
-from bowdenfit.kinds.displacement.table import DisplacementSettings, DisplacementTable, early
+from bowdenfit.kinds.displacement.chosen import early
+from bowdenfit.kinds.displacement.table import DisplacementSettings, DisplacementTable
 from bowdenfit.kinds.displacement.turns import in_order
 from bowdenfit.kinds.measurements import Measurements
 from bowdenfit.kinds.pages import Page, in_words, route_cells, route_heading

@@ -132,7 +132,8 @@ def _as_wide_as_prior(fit: Record, name: str) -> bool:
 def _undetermined(fit: Record, name: str) -> bool:
     """Whether least squares without priors leaves a coefficient open altogether."""
     estimates = fit.least_squares.estimates
-    if any(estimates[p.name].remark == UNDETERMINED for p in fit.model.space.free if p.role == "sensor"):
+    stated = (p for p in fit.model.space.free if p.role == "sensor" and not p.scaled_by)
+    if any(estimates[p.name].remark == UNDETERMINED for p in stated):
         return False
     return estimates[name].remark == UNDETERMINED
 

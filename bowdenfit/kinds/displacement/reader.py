@@ -1,0 +1,153 @@
+"""Reading force against displacement: columns, runs and strokes, and whether a rope with a spring or a stop has such forces."""
+
+from collections.abc import Mapping
+
+import numpy as np
+
+from bowdenfit.errors import DatasetError
+from bowdenfit.files.columns import Column, Quantity, find_columns, require
+from bowdenfit.files.csv_table import RawTable, read_csv
+from bowdenfit.kinds.displacement.chosen import chosen
+from bowdenfit.kinds.displacement.table import DisplacementTable
+from bowdenfit.kinds.displacement.turns import in_order, sliding
+from bowdenfit.kinds.kind import Found, Source
+from bowdenfit.kinds.rows import (
+    OwnAngles,
+    check_spelling,
+    provenance_of,
+    read_own_angles,
+    read_route,
+    read_strokes,
+    shared_columns,
+)
+from bowdenfit.types import Labels, Vector
+from bowdenfit.words import listed
+
+_UNUSED = ("time", "velocity")  # columns that such a table may have and that nothing reads
+_NAMES = {"force": ("force", "input_force"), "displacement": ("displacement", "position")}
+_NEGATIVE = 0.05  # of the largest force, that noise about 0 may be below it
+_FOLLOWS = 0.5  # correlation of the force with the displacement while the motor pulls, below which it does not follow
+_GAINS = 1.1  # return over pull, that noise does not make of a cable without friction
+_FEWEST = 4  # readings from which that can be said
+
+
+def read_displacement(source: Source) -> Found[DisplacementTable]:
+    """Read a table of the force at the motor against its displacement.
+
+    Args:
+        source: Where it is.
+
+    Raises:
+        DatasetError: See `read_csv` and `find_columns`; or a force is negative, there is a second force, the force does not
+            follow the displacement, the return takes more force than the pull, or a stop is never reached.
+    """
+    path, route, contacts = source.file, source.description.route, source.description.angle_columns
+    settings, table = source.settings, read_csv(path)
+    ends = [Quantity(name, what) for names, what in zip(_NAMES.values(), ("force", "length"), strict=True) for name in names]
+    others = (Quantity("run", "text"), Quantity("stroke", "text"))
+    wanted = (*ends, Quantity("output_force", "force"), *others, *shared_columns(route, contacts))
+    found = find_columns(table, wanted, source.columns, _UNUSED)
+    check_spelling(table, found, others)
+    force_column, x_column = (_one_of(table, found, name, unit) for name, unit in (("force", "N"), ("displacement", "mm")))
+    if "output_force" in found:
+        raise DatasetError(
+            f"{table.file} has forces at both ends; name it under tables.forces, which tells friction without any spring, or "
+            "leave one of the two columns out."
+        )
+    force, displacement = _forces(force_column), np.array(x_column.numbers())
+    stroke = _strokes(found, len(force))
+    how = settings.rows or ("sliding" if stroke is not None else "in order")
+    if how == "sliding" and stroke is None:
+        raise DatasetError(
+            f"{table.file} has no stroke column, so nobody knows which way the rope slides in a row; add one (pull or return), "
+            'or write rows = "in order" for readings in the order in which they were taken.'
+        )
+    own, at = read_own_angles(table, found, contacts), read_route(table, found, route)
+    run, names = _runs(found.get("run"), at, own)
+    motion = sliding(stroke, displacement, run) if how == "sliding" and stroke is not None else in_order(displacement, run)
+    every, origin = np.ones(len(force), dtype=bool), provenance_of(table)
+    rows = DisplacementTable(at, force, displacement, motion, run, names, every, own, origin, how == "sliding")
+    rows, remarks = chosen(rows, settings, "stroke" in found)
+    _check_force(rows)
+    return Found(rows, {path.name: path}, tuple(remarks), (table.account,))
+
+
+def _one_of(table: RawTable, found: Mapping[str, Column], name: str, unit: str) -> Column:
+    """A column by either of its names."""
+    named = [each for each in _NAMES[name] if each in found]
+    if len(named) > 1:
+        raise DatasetError(f"{table.file} has the columns {listed(named)}, which are both read as {name}; leave one out.")
+    return require(table, found, named[0] if named else name, f"{name}_{unit}")
+
+
+def _forces(column: Column) -> Vector:
+    """Forces, which are tensions; noise about no force may be a little below 0."""
+    values = np.array(column.numbers())
+    low = int(np.argmin(values))
+    if values[low] < -_NEGATIVE * max(values.max(), 0.0):
+        raise column.cells[low].refuse(
+            f"{column.cells[low].shown} is negative, and a rope cannot be pushed; the usual causes are the sign convention of "
+            "the load cell and its zero: write tension as positive, and take off what the cell shows of a slack rope."
+        )
+    return values
+
+
+def _strokes(found: Mapping[str, Column], n: int) -> Labels | None:
+    if "stroke" not in found:
+        return None
+    strokes = read_strokes(found, n, held="")
+    if not strokes.all():
+        raise found["stroke"].cells[int(np.flatnonzero(strokes == 0)[0])].refuse(
+            "a held reading lies anywhere between pull and return; write pull or return, or leave the row out."
+        )
+    return strokes
+
+
+def _runs(column: Column | None, route: Vector, own: OwnAngles) -> tuple[Labels, tuple[str, ...]]:
+    """One run is what the column calls so, at one route value and one set of wrap angles."""
+    said = [cell.text.strip() or "(no run)" for cell in column.cells] if column is not None else [""] * len(route)
+    where = [
+        ", ".join([f"{at:.5g}"] * bool(np.isfinite(at)) + [f"{angle:.5g} deg" for angle in angles if np.isfinite(angle)])
+        for at, angles in zip(route, np.rad2deg(own.angle), strict=True)
+    ]
+    places: dict[str, set[str]] = {}
+    for label, place in zip(said, where, strict=True):
+        places.setdefault(label, set()).add(place)
+    keys = [
+        f"{label} ({place})" if label and len(places[label]) > 1 else label or place or "all"
+        for label, place in zip(said, where, strict=True)
+    ]
+    names = tuple(dict.fromkeys(keys))
+    return np.array([names.index(key) for key in keys]), names
+
+
+def _check_force(table: DisplacementTable) -> None:
+    """The force follows the displacement, and the pull takes more of it than the return."""
+    file, x, force, pulls = table.origin.files[0], table.displacement, table.force, table.pulls
+    these = pulls if pulls.sum() >= _FEWEST else table.used
+    if these.sum() >= _FEWEST and np.ptp(x[these]) > 0:
+        alike = float(np.corrcoef(x[these], force[these])[0, 1]) if np.ptp(force[these]) > 0 else 0.0
+        if alike < -_FOLLOWS:
+            raise DatasetError(
+                f"{file}: the force falls while the displacement grows (correlation {alike:.2f}); the usual cause is a "
+                "displacement counted the other way: write it as growing while the motor pulls."
+            )
+        if alike < _FOLLOWS:
+            raise DatasetError(
+                f"{file}: the force does not follow the displacement (correlation {alike:.2f}); the usual causes are a dead "
+                "load cell, a wrong column, and a stop or spring that is never reached: plot force against displacement."
+            )
+    low, high = table.shared
+    if high > low:
+        pull, back = (_mean_between(low, high, x[rows], force[rows]) for rows in (pulls, table.used & ~pulls))
+        if back > _GAINS * pull:
+            raise DatasetError(
+                f"{file}: at the same displacement the return takes more force ({back:.4g} N) than the pull ({pull:.4g} N); "
+                "the usual causes are strokes, or the rows of the table, the wrong way round."
+            )
+
+
+def _mean_between(low: float, high: float, x: Vector, force: Vector) -> float:
+    """Mean force between two displacements [N]."""
+    order = np.argsort(x, kind="stable")
+    return float(np.mean(np.interp(np.linspace(low, high, 9), x[order], force[order])))

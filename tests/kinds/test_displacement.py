@@ -1,0 +1,148 @@
+"""Tables of one force and a position: what is read, what is refused and said, which turns each reading comes after."""
+
+import numpy as np
+import pytest
+from catheters import TRUTH, bench
+from spoiling import copied, spoil
+
+import bowdenfit as bf
+from bowdenfit.kinds.displacement.table import DisplacementTable
+from bowdenfit.kinds.displacement.turns import in_order
+from bowdenfit.questions.check.data_set_words import check_text
+
+NAMES = ("cable.toml", "displacement.csv")
+TOML, CSV = NAMES
+SLIDING = """wrap_angle_deg,stroke,displacement_mm,force_N
+180,pull,4,1.9
+180,pull,8,4.1
+180,pull,12,6.2
+180,return,12,3.1
+180,return,8,2.0
+"""
+STOP = ('end = "spring"', 'end = "stop", stop = { value = 12, unit = "mm" }')
+
+
+@pytest.fixture
+def catheter(on_body, tmp_path):
+    """A copy of the synthetic catheter to spoil."""
+    return copied(on_body.parent / "synthetic-catheter", NAMES, tmp_path / "cable")
+
+
+def test_the_synthetic_catheter_is_what_its_simulator_makes(on_body):
+    folder = on_body.parent / "synthetic-catheter"
+    assert (folder / CSV).read_text() == bench(2026)
+    assert all(f'"{name}": {value}' in (folder / "truth.json").read_text() for name, value in TRUTH.items())
+
+
+def test_every_row_is_a_reading_or_said_to_be_unused(catheter):
+    data = bf.read(catheter)
+    table = data.measurements.table(DisplacementTable)
+    assert len(table.used) == data.accounts[0].read == 147
+    text = check_text(data)
+    assert f"{table.used.sum()} forces against displacement in 3 runs" in text
+    assert f"{147 - table.used.sum()} of 147 rows are not used" in text
+    assert 120 < table.used.sum() < 147
+    assert "turns of the motor" in text
+    assert "a spring whose stiffness is fitted" in text
+
+
+SPOILED = [
+    (CSV, "force_N", "force", ["'force'", "does not say its unit"]),
+    (CSV, "displacement_mm", "displacement_N", ["'displacement_N'", "does not measure a length"]),
+    (CSV, "displacement_mm", "angle_of_motor", ["no column displacement", "displacement_mm"]),
+    (CSV, "180,2.", "180,x2.", ["row 2", "plain number"]),
+    (CSV, "wrap_angle_deg", "wrap_deg", ["wrap_angle", "sheath"]),
+    (TOML, 'end = "spring"', 'end = "wall"', ["tables.displacement.end", "spring"]),
+    (TOML, 'end = "spring"', 'stop = { value = 3, unit = "mm" }', ["where a stop is", 'end = "stop"']),
+    (TOML, 'end = "spring"', 'end = "stop", stop = { value = 3, unit = "N" }', ["does not measure a length"]),
+    (TOML, 'end = "spring"', 'end = "stop", stop = { value = 30, unit = "mm" }', ["30 mm", "never reached", "pull on"]),
+    (TOML, 'end = "spring"', 'rows = "sliding"', ["no stroke column", 'rows = "in order"']),
+    (TOML, "[tables]", '[cable]\nkind = "loop"\n[tables]', ["a loop has two", "one rope alone"]),
+    (TOML, "[[contact]]", 'friction_model = "drag"\n[[contact]]', ["capstan", "leave it out"]),
+]
+
+
+@pytest.mark.parametrize(("name", "old", "new", "said"), SPOILED)
+def test_bad_input_is_refused_with_a_remedy(catheter, refuse, name, old, new, said):
+    path = catheter / name
+    text = path.read_text()
+    assert old in text
+    path.write_text(text.replace(old, new, 1))
+    sentence = refuse("check", catheter)
+    assert all(part in sentence for part in said), sentence
+
+
+def with_columns(catheter, change):
+    """The table with its numbers changed."""
+    lines = (catheter / CSV).read_text().splitlines()
+    rows = change(np.array([line.split(",") for line in lines[1:]], dtype=float))
+    (catheter / CSV).write_text("\n".join([lines[0], *(",".join(f"{x:.4f}" for x in row) for row in rows)]) + "\n")
+
+
+CHANGES = {
+    "a dead cell": (lambda rows: np.column_stack([rows[:, :2], 0.3 + 0 * rows[:, 2]]), ["does not follow", "dead"]),
+    "a displacement counted the other way": (lambda rows: rows * [1, -1, 1], ["falls while the displacement grows"]),
+    "a force with the other sign": (lambda rows: rows * [1, 1, -1], ["negative", "sign convention"]),
+    "rows the wrong way round": (
+        lambda rows: np.concatenate([np.column_stack([p[:33, :2], p[32::-1, 2]]) for p in np.split(rows, 3)]),
+        ["the return takes more force", "wrong way round"],
+    ),
+    "a stop that is never reached": (
+        lambda rows: np.column_stack([rows[:, :2], 0.1 + 0.01 * np.sin(7 * np.arange(len(rows)))]),
+        ["never reached"],
+    ),
+}
+
+
+@pytest.mark.parametrize("what", CHANGES)
+def test_forces_that_no_rope_with_a_spring_has_are_refused(catheter, refuse, what):
+    change, said = CHANGES[what]
+    with_columns(catheter, change)
+    sentence = refuse("check", catheter)
+    assert all(part in sentence for part in said), sentence
+
+
+def test_a_second_force_is_refused_and_two_names_of_one_column_too(catheter, refuse):
+    (catheter / CSV).write_text("wrap_angle_deg,displacement_mm,force_N,output_force_N\n180,1,2,1\n180,2,4,3\n")
+    assert "tables.forces" in refuse("check", catheter)
+    (catheter / CSV).write_text("wrap_angle_deg,displacement_mm,position_mm,force_N\n180,1,1,2\n180,2,2,4\n")
+    assert "both read as displacement" in refuse("check", catheter)
+
+
+def test_rows_with_strokes_are_taken_while_all_of_the_rope_slides(catheter, refuse):
+    (catheter / CSV).write_text(SLIDING)
+    data = bf.read(catheter)
+    table = data.measurements.table(DisplacementTable)
+    assert table.sliding and table.used.all() and table.motion.slides.all()
+    text = check_text(data)
+    assert 'rows = "in order"' in text
+    assert "only to a factor of two" in text
+    spoil(catheter / CSV, "pull,8", "hold,8")
+    assert "held reading" in refuse("check", catheter)
+
+
+def test_a_free_spring_without_a_closed_loop_is_warned_of(catheter):
+    with_columns(catheter, lambda rows: np.concatenate([part[:17] for part in np.split(rows, 3)]))
+    assert "friction cannot be told from the stiffness" in check_text(bf.read(catheter))
+
+
+def test_rows_before_a_stop_are_counted_and_left_out(catheter):
+    spoil(catheter / TOML, *STOP)
+    data = bf.read(catheter)
+    table = data.measurements.table(DisplacementTable)
+    before = int(np.sum(table.displacement <= 12))
+    assert not np.any(table.used & (table.displacement <= 12))
+    assert "rows lie before the stop" in check_text(data) and before > 10
+
+
+def test_turns_are_remembered_and_forgotten_once_they_are_passed():
+    at = np.array([0, 10, 20, 30, 20, 10, 15, 20, 25, 22, 25, 29, 31, 30, 0, -5], dtype=float)
+    motion = in_order(at, np.zeros(len(at), dtype=int))
+    assert motion.turns.at.tolist() == [0, 30, 10, 25, 22, 31]
+    came_after = motion.turns.at[motion.after].tolist()
+    #                     pull, back from 30, pull from 10, back from 25, pull from 22, from 10 again, from 0, back from 31
+    assert came_after == [0, 0, 0, 0, 30, 30, 10, 10, 10, 25, 10, 10, 0, 31, 0, 0]
+    assert motion.slides.tolist() == [False] * 14 + [True] * 2
+    assert motion.first.sum() == 4
+    jitter = in_order(np.array([0, 10, 20.05, 20, 20.06, 30, 20], dtype=float), np.zeros(7, dtype=int))
+    assert jitter.turns.at.tolist() == [0, 30]

@@ -10,7 +10,7 @@ from bowdenfit.files.contents import UNKNOWN, recognize
 from bowdenfit.files.csv_rows import SEPARATORS, CsvRecord, declared_separator, records, too_many_cells
 from bowdenfit.files.row_account import BLANK, COMMENT, RowAccount, account_of
 from bowdenfit.files.table_parts import TableParts, parts_of
-from bowdenfit.files.table_rows import is_measured, numbers_less_words
+from bowdenfit.files.table_rows import is_measured, numbers_found
 from bowdenfit.files.text_file import Line, comment_mark, first_bytes, first_lines, is_blank
 from bowdenfit.words import shown
 
@@ -97,7 +97,7 @@ def _fitness(lines: Sequence[Line], separator: str) -> tuple[int, bool, bool, in
     rows = [row for row in records(lines[:_FIRST_ROWS], separator, _FIRST_ROWS) if not row.blank]
     widths = [len(row.cells) for row in rows] or [0]
     alike = widths[0] > 1 and len(set(widths)) == 1 and all(row.closed for row in rows)
-    return numbers_less_words(rows), separator != " ", alike, widths[0]
+    return numbers_found(rows, separator), separator != " ", alike, widths[0]
 
 
 def _header(parts: TableParts, file: str) -> tuple[str, ...]:

@@ -239,6 +239,8 @@ def _remarks(
         top, bottom = sheet.number(below[0]), sheet.number(below[-1])
         where = f"Row {top} was" if top == bottom else f"Rows {top} to {bottom} were"
         said.append(f"{where} left out: they stand below the data, as statistics do.")
+    if sheet.of_text:
+        return said  # the account of the file names the rest
     between = [f"row {row} ({shown(text)})" for row, (why, text) in left_out.items() if why in (BETWEEN, AGAIN)]
     said += [f"Left out because no numbers stand there: {few(between)}."] if between else []
     texts = [f"{shown(text)} in row {row}" for row, text in beside]

@@ -12,8 +12,8 @@ _WORDS = {
     "actuated aktor aktuator drive driving driver moteur actionneur actionnement motriz actuador accionamiento motore "
     "attuatore proximal proximale prossimale prox upstream",
     "output": "output out outlet ausgang aus auslauf sortie salida uscita distal distale dist downstream abtrieb effector tip",
-    "load": "load last charge carga carico",  # at the output, but only beside the other end
-    "pull": "pull pulling pulled zug traction tiro tirer",  # at the input, likewise
+    "load": "load last charge carga carico weight gewicht poids peso",  # at the output, but only beside the other end
+    "pull": "pull pulling pulled zug traction tiro tirer effort applied",  # at the input, likewise
     "force": "force forces f kraft zugkraft seilkraft seilspannung fuerza forza t tension tensione spannung",
     "side": "side end seite ende cote extremite bout lado extremo lato estremita",
     "": "the of at on de du d la le l les el del della di al dell der die das des am an auf im sensor sensors cell loadcell "
@@ -36,7 +36,8 @@ _NAMES = {
 _QUANTITIES = {name: quantity for quantity, names in _NAMES.items() for name in names.split("|")}
 _LIKELY = {  # what only the user can say
     "wrap_angle": "wrap|bend|bend angle|bending angle|total bend angle|contact angle|angle|theta|phi|winkel|biegewinkel|"
-    "umlenkwinkel|angle de contact|angulo|angulo de contacto|angulo de curvatura|angolo|nominal angle|nominal wrap",
+    "umlenkwinkel|angle de contact|angulo|angulo de contacto|angulo de curvatura|angolo|nominal angle|nominal wrap|"
+    "measured angle|measured wrap|nominal wrap angle|measured wrap angle",
 }
 _GUESSES = {name: quantity for quantity, names in _LIKELY.items() for name in names.split("|")}
 _DIMENSIONS = {"velocity": ("velocity", "angular_velocity"), "wrap_angle": ("angle",), "efficiency": ("ratio",)}

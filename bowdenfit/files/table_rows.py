@@ -1,24 +1,30 @@
 """What stands in the rows of a table: numbers, words, or units."""
 
+import re
 from collections.abc import Sequence
 
 from bowdenfit.files.cells import BLANK, is_plain_number
 from bowdenfit.files.csv_rows import CsvRecord
 from bowdenfit.files.headings import is_units_row
 
+_TOGETHER = re.compile(r"\d\s*[,;|\t ]\s*[-+]?\d")
 
 def is_measured(text: str) -> bool:
     """Whether a cell holds what a table measures: a number, a percentage, or a limit such as <10."""
     return is_plain_number(text.strip().rstrip("%").lstrip("<≤="))
 
 
-def numbers_less_words(rows: Sequence[CsvRecord]) -> int:
-    """How many cells of the rows that hold numbers do so, less those that hold words: the most for the right separator."""
+def numbers_found(rows: Sequence[CsvRecord], separator: str) -> int:
+    """How many cells hold numbers, less those in which two numbers stand together: the most for the right separator.
+
+    Blanks, which separate words too, count for less by every word between them.
+    """
     total = 0
     for row in rows:
         filled = [cell for cell in row.cells if cell.strip()]
         numbers = sum(map(is_measured, filled))
-        total += 2 * numbers - len(filled) if numbers else 0
+        wrong = filled if separator == " " else list(filter(_TOGETHER.search, filled))
+        total += numbers - sum(not is_measured(cell) for cell in wrong) * (1 if separator == " " else 2)
     return total
 
 

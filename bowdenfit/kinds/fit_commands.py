@@ -1,5 +1,6 @@
 """The one command that fits a file without a description, with the options that name what its headings do not say."""
 
+import re
 import shlex
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -16,10 +17,11 @@ from bowdenfit.files.naming import naming
 from bowdenfit.files.spellings import spelled
 from bowdenfit.kinds.single_file import FORCES, HEAD, FileKind, file_kind, numbers_in
 from bowdenfit.units import dimension_of, is_unit
-from bowdenfit.words import shown
+from bowdenfit.words import listed, shown
 
 WRAP_ANGLE = Quantity("wrap_angle", "angle")
 _ANY_ANGLE = "--wrap-angle 180deg"
+_SPREAD = re.compile(r"(?:^|[\W_])(?:sd|std|stdev|sem|unc|uncertainty|error|err|noise|dev|deviation)(?:$|[\W_])", re.IGNORECASE)
 
 
 @dataclass(frozen=True)
@@ -175,7 +177,7 @@ def name_ends(columns: Sequence[HeadedColumn], option: str, always: bool) -> tup
         provided += [f"{shown(ends[name].name)} is the {name}" for name in missing]
     elif missing:
         ends |= {name: HeadedColumn("NAME", "N") for name in missing}
-        provided += [f"NAME is the column of the {name}" for name in missing]
+        provided += [f"NAME is the {option.removeprefix('--')} of the {name}" for name in missing]
     elif len(sure) < len(FORCES):
         provided += [f"{shown(ends[name].name)} is the {name}" for name in ends if name not in sure]
     options = []
@@ -190,8 +192,9 @@ def name_ends(columns: Sequence[HeadedColumn], option: str, always: bool) -> tup
 
 def _forces_among(columns: Sequence[HeadedColumn]) -> list[HeadedColumn]:
     """The columns that can be forces: those in units of force, or where there are none those without any unit."""
-    of_force = [each for each in columns if (unit := _unit(each)) and is_unit(unit) and dimension_of(unit) == "force"]
-    return of_force or [each for each in columns if not _unit(each)]
+    measured = [each for each in columns if not _SPREAD.search(each.name)]
+    of_force = [each for each in measured if (unit := _unit(each)) and is_unit(unit) and dimension_of(unit) == "force"]
+    return of_force or [each for each in measured if not _unit(each)]
 
 
 def _unit(column: HeadedColumn) -> str:
@@ -214,8 +217,10 @@ def _wrap_angle(headings: Sequence[tuple[str, str]]) -> tuple[list[str], list[st
         for heading, unit in headings
         if (other := spelled(heading, unit)) and other.quantity == "wrap_angle" and other.unit
     ]
-    if len(likely) == 1:
-        return [naming("wrap_angle", likely[0])], [f"{shown(likely[0])} is the wrap angle"]
+    if likely:
+        best = next((heading for heading in likely if "measured" in heading.lower()), likely[0])
+        rather = "" if len(likely) == 1 else f" rather than {listed([shown(each) for each in likely if each != best])}"
+        return [naming("wrap_angle", best)], [f"{shown(best)} is the wrap angle{rather}"]
     return [_ANY_ANGLE], ["180 deg is the wrap angle of the bench"]
 
 

@@ -135,7 +135,9 @@ def read_strokes(
     for cell in found["stroke"].cells:
         text = without_accents(cell.text.strip().lower().replace("\u2212", "-").replace(",", "."))
         if text not in _STROKES:
-            raise cell.refuse(f"{cell.shown} is no stroke; write pull (+1) or return (-1){held}.")
+            raise cell.refuse(
+                f"{cell.shown} is no stroke; write pull (+1) or return (-1){held}; rename a column that tells something else."
+            )
         strokes.append(_STROKES[text])
     return np.array(strokes)
 

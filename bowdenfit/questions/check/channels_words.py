@@ -7,9 +7,11 @@ from bowdenfit.kinds.fit_commands import FitCommand
 from bowdenfit.kinds.recordings import RECORDINGS
 from bowdenfit.kinds.recordings.words import recordings_text
 from bowdenfit.questions.check.file_words import command_words
+from bowdenfit.questions.check.row_words import account_words
 from bowdenfit.recordings.recording import Recordings
 from bowdenfit.words import filled, table
 
+_NAMED = 8  # channels whose first and last sample are said
 _HEADS = ("channel", "unit", "samples", "rate", "length", "lowest", "highest", "clock")
 
 
@@ -34,7 +36,7 @@ def channels_text(
         [_HEADS[i] for i in keep], [[row[i] for i in keep] for row in rows], left=("channel", "unit", "clock")
     )
     notes = [filled(f"Note: {remark}") for remark in file.remarks]
-    lines = [filled(title), "", listing, *(["", *notes] if notes else [])]
+    lines = [filled(title), "", listing, "", *_ends(file), *(account_words(file.account) if file.account else []), *notes]
     if recordings is not None:
         lines += ["", *recordings_text(recordings)]
         lines += [
@@ -44,6 +46,16 @@ def channels_text(
         lines += ["", filled(f"As a recording it cannot be used yet: {why_not}")]
     several = "Several recordings of one cable go into a cable.toml (bowdenfit init)."
     return "\n".join([*lines, "", *command_words([command]), several]) + "\n"
+
+
+def _ends(file: ChannelFile) -> list[str]:
+    """The first and the last sample of every channel."""
+    said = []
+    for which, i in (("First", 0), ("Last", -1)):
+        values = [f"{channel.name} {channel.values[i]:.5g}" for channel in file.channels[:_NAMED]]
+        more = [f"{len(file.channels) - _NAMED} more"] if len(file.channels) > _NAMED else []
+        said.append(filled(f"{which} sample{'s' if more else ''}: {', '.join([*values, *more])}."))
+    return said
 
 
 def _row(channel: Channel) -> tuple[str, ...]:

@@ -87,7 +87,7 @@ class OptimalLength:
                 f"With {percent(self.at_edge, 0)} probability the best lies at an end of the range: a better {self.what} may "
                 "lie outside what was measured."
             )
-        return [*said, self.good_enough if self.is_settled else self._not_settled]
+        return [*said, self.good_enough if self.is_settled else self.not_settled]
 
     @property
     def is_settled(self) -> bool:
@@ -105,7 +105,8 @@ class OptimalLength:
         )
 
     @property
-    def _not_settled(self) -> str:
+    def not_settled(self) -> str:
+        """That none will do yet."""
         window = self.window
         return (
             f"No single {self.what} is within {percent(window.within, 0)} of the best with "

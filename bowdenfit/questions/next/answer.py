@@ -108,6 +108,8 @@ class NextMeasurement:
         route_label: Axis label of the route; empty without one.
         route_range: Where the curves hold.
         converged: Whether the fit may be trusted.
+        loads: Lowest and highest input force of a run like those made so far [N]; None where there is none.
+        stop: Whether nothing needs to be measured, in a sentence.
     """
 
     answer: Answer
@@ -117,8 +119,12 @@ class NextMeasurement:
     route_label: str
     route_range: tuple[float, float]
     converged: bool
+    loads: tuple[float, float] | None = None
+    stop: str = ""
 
-    JSON: ClassVar = ("answer", ("best", "best_name"), ("candidates", "ranked"), "repeats", "plan", "converged")
+    JSON: ClassVar = (
+        "answer", ("best", "best_name"), ("candidates", "ranked"), "repeats", "plan", "converged", "loads?", "stop",
+    )  # fmt: skip
 
     @property
     def best(self) -> Ranked | None:

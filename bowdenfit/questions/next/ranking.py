@@ -7,13 +7,14 @@ import numpy as np
 
 from bowdenfit.errors import UsageError, nearest
 from bowdenfit.kinds.candidate import Candidate
+from bowdenfit.kinds.next_run import typical_run
 from bowdenfit.questions.next.answer import LEAST_SHARE, WITHIN, NextMeasurement, Ranked, Repeats, Step, is_noticeable
 from bowdenfit.questions.next.candidate_names import parsed_candidates
 from bowdenfit.questions.next.candidates import default_candidates, name_of, words_of
 from bowdenfit.questions.next.simulated_readings import simulated_readings
 from bowdenfit.questions.next.target import Answer, answer_of
 from bowdenfit.questions.next.variance_reduction import Explained, error_of_difference, explained_share, mean_and_spread
-from bowdenfit.results.record import Record
+from bowdenfit.results.record import OPTIMAL_EFFICIENCY, OPTIMAL_LENGTH, Record
 
 REPEATS = (1, 2, 4, 8, 16, 32)
 STEPS, MOST_IN_PLAN = 3, 24  # measurements in a plan, and candidates that it chooses from
@@ -45,11 +46,27 @@ def next_measurement(
     ranked = _ranked(fit, answer, chosen, found, costs)
     route = fit.dataset.description.route
     shown = (route.label, route.range) if route else ("", (0.0, 0.0))
+    loads, stop = _loads(fit), _stop(fit, answer)
     if not ranked[0].is_noticeable:
-        return NextMeasurement(answer, ranked, None, (), *shown, fit.converged)
+        return NextMeasurement(answer, ranked, None, (), *shown, fit.converged, loads, stop)
     repeats = _repeats(fit, answer, ranked[0].candidate)
     plan = _plan(answer, ranked, dict(zip(chosen, readings, strict=True)))
-    return NextMeasurement(answer, ranked, repeats, plan, *shown, fit.converged)
+    return NextMeasurement(answer, ranked, repeats, plan, *shown, fit.converged, loads, stop)
+
+
+def _loads(fit: Record) -> tuple[float, float] | None:
+    """Lowest and highest input force of the runs made so far, of which a next one would be like."""
+    run = typical_run(fit.dataset.measurements)
+    return (float(run.input_force.min()), float(run.input_force.max())) if run is not None else None
+
+
+def _stop(fit: Record, answer: Answer) -> str:
+    """Whether more needs to be measured at all."""
+    if answer.name in (OPTIMAL_LENGTH.replace("_", "-"), OPTIMAL_EFFICIENCY.replace("_", "-")):
+        best = fit.optimal_length()
+        return f"You may stop: {best.good_enough[0].lower()}{best.good_enough[1:]}" if best.is_settled else best.not_settled
+    unit = f" {answer.unit}" if answer.unit else ""
+    return f"You may stop if it is enough to know {answer.words} to ± {answer.sd:.2g}{unit}."
 
 
 def _readings(fit: Record, chosen: Sequence[Candidate], repeats: int) -> list[np.ndarray]:

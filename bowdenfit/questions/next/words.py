@@ -8,22 +8,22 @@ _MOST_NAMED = 3  # candidates as good as the best that are named in the sentence
 
 
 def next_measurement_text(found: NextMeasurement, top: int) -> str:
-    """What to measure next, in sentences and a table of the best candidates.
+    """What to measure next and when to stop, in sentences and a table of the best candidates.
 
     Args:
         found: The ranking.
         top: How many candidates the table shows.
     """
-    sentences = [*_advice(found), *_planned(found), *_repeated(found)]
+    sentences = [*_advice(found), found.stop, *_planned(found), *_repeated(found)]
     shown = found.ranked[:top]
     more = len(found.ranked) - len(shown)
     lines = [
-        "\n".join(filled(line) for line in sentences),
+        "\n".join(filled(line) for line in sentences if line),
         _table(found, shown)
         + (f"\n... and {more} more, ranked lower; --top {len(found.ranked)} shows all." if more > 0 else ""),
         filled(
-            "Each number is an average over what the reading may turn out to be, given what is known now. The error is that "
-            "of the simulation, not of the measurement."
+            "± is one standard deviation, on average over what the reading may turn out to be; two that differ in the last "
+            "digit are as good as each other."
         ),
     ]
     return "\n\n".join(lines) + "\n"
@@ -32,7 +32,7 @@ def next_measurement_text(found: NextMeasurement, top: int) -> str:
 def _sd(found: NextMeasurement, sd: float) -> str:
     """A standard deviation with the answer's unit."""
     unit = f" {found.answer.unit}" if found.answer.unit else ""
-    return f"{sd:.{_digits(found)}f}{unit}"
+    return f"± {sd:.{_digits(found)}f}{unit}"
 
 
 def _digits(found: NextMeasurement) -> int:
@@ -42,26 +42,36 @@ def _digits(found: NextMeasurement) -> int:
 
 
 def _advice(found: NextMeasurement) -> list[str]:
-    """What to measure, and what would do as well."""
+    """What to measure, at which load, and what would do as well."""
     best, answer = found.best, found.answer
     if best is None:
         first = found.ranked[0]
         return [
-            f"None of these measurements would narrow {answer.words} noticeably: its standard deviation is "
-            f"{_sd(found, answer.sd)}, and {_sd(found, first.sd)} after the best of them, {first.words}.",
+            f"None of these measurements would narrow {answer.words} noticeably: it is known to {_sd(found, answer.sd)}, and "
+            f"to {_sd(found, first.sd)} after the best of them, {first.words}.",
             "One more reading of a kind that there are many of already adds little; name another kind with --candidate, or "
             "ask for another answer with --for.",
         ]
     per_cost = " for its cost" if best.cost is not None else ""
     lines = [
-        f"Measure {best.words} next{per_cost}: on average this would cut the standard deviation of {answer.words} from "
-        f"{_sd(found, answer.sd)} to {_sd(found, best.sd)}."
+        f"Measure {best.words} next{per_cost}{_how(found, best)}. Then {answer.words} would be known to "
+        f"{_sd(found, best.sd)}, now to {_sd(found, answer.sd)}."
     ]
     alike = [r for r in found.ranked if r.as_good and r is not best]
     if alike:
         named = [r.words[0].upper() + r.words[1:] if i == 0 else r.words for i, r in enumerate(alike)]
-        lines.append(f"{few(named, _MOST_NAMED)} would do as well, within the error of this estimate.")
+        lines.append(f"{few(named, _MOST_NAMED)} would do as well.")
     return lines
+
+
+def _how(found: NextMeasurement, best: Ranked) -> str:
+    """That the cable is to be mounted anew, and at which loads, where neither is said already."""
+    if not candidate_kinds()[best.candidate.kind].mounted_anew:
+        return ""
+    if found.loads is None:
+        return ", mounted anew"
+    low, high = (f"{load:.3g}" for load in found.loads)
+    return f", mounted anew, at {low} N" if low == high else f", mounted anew, at {low} to {high} N as so far"
 
 
 def _planned(found: NextMeasurement) -> list[str]:
@@ -70,34 +80,29 @@ def _planned(found: NextMeasurement) -> list[str]:
         f"{step.words}{' again' if step.name in [s.name for s in found.plan[:i]] else ''} ({_sd(found, step.sd)})"
         for i, step in enumerate(found.plan)
     ][1:]
-    if not after:
-        return []
-    return [f"What would be worth most after it, with the standard deviation then: {', then '.join(after)}."]
+    return [f"After it, {', then '.join(after)}."] if after else []
 
 
 def _repeated(found: NextMeasurement) -> list[str]:
-    """How often the best candidate would have to be measured to halve the standard deviation."""
+    """How often the best candidate would have to be measured to halve the uncertainty."""
     best, repeats = found.best, found.repeats
     if best is None or repeats is None:
         return []
     half, most = repeats.to_halve(found.answer.sd), repeats.times[-1]
-    anew = ", mounted anew each time," if candidate_kinds()[best.candidate.kind].mounted_anew else ""
     if half == 1:
         return []
     if half is not None:
-        return [f"Measuring nothing but this{anew} would take about {half} times to halve the standard deviation."]
-    return [
-        f"Measuring nothing but this would not halve it: after {most} times{anew} it would still be "
-        f"{_sd(found, repeats.sd[-1])}."
-    ]
+        return [f"Nothing but this would take about {half} times to halve the uncertainty."]
+    still = _sd(found, repeats.sd[-1])
+    return [f"Nothing but this would not halve the uncertainty: after {most} times it would still be {still}."]
 
 
 def _table(found: NextMeasurement, shown: tuple[Ranked, ...]) -> str:
     unit = f" ({found.answer.unit})" if found.answer.unit else ""
     digits = _digits(found)
-    heads = ["candidate", f"sd afterwards{unit}", "variance taken away", "error"]
-    rows = [[r.name, f"{r.sd:.{digits}f}", percent(r.share), percent(r.error)] for r in shown]
+    heads = ["measurement", f"then known to{unit}", "uncertainty less by"]
+    rows = [[r.name, f"± {r.sd:.{digits}f}", percent(1 - r.sd / found.answer.sd)] for r in shown]
     if any(r.cost is not None for r in shown):
-        heads += ["cost", "taken away per cost"]
+        heads += ["cost", "variance less by, per cost"]
         rows = [[*row, f"{r.cost:g}", percent(r.worth, 2)] for row, r in zip(rows, shown, strict=True)]
     return table(heads, rows)

@@ -1,6 +1,7 @@
 """The keywords of a function as options and arguments of the command line."""
 
 import inspect
+import math
 import re
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
@@ -13,7 +14,10 @@ import click
 from bowdenfit.errors import UsageError
 from bowdenfit.verb import Argument, Length, Option, Quantity
 
-_LENGTH = re.compile(r"(?P<value>[+-]?(?:\d+\.?\d*|\.\d+)(?:[eE][+-]?\d+)?)\s*(?P<unit>[^\W\d][^\s]*)?(?=\s|$)")
+_NUMBER = r"(?P<value>[+-]?(?:\d+\.?\d*|\.\d+)(?:[eE][+-]?\d+)?)"
+_LENGTH = re.compile(_NUMBER + r"\s*(?P<unit>[^\W\d][^\s]*)?(?=\s|$)")
+_QUANTITY = re.compile(_NUMBER + r"\s*(?P<unit>(?!\.|[eE]\d)\D.*)", re.ASCII)
+
 
 
 @dataclass(frozen=True)
@@ -157,12 +161,9 @@ def read_quantity(text: str, option: str, example: str) -> Quantity:
     Raises:
         UsageError: It is something else.
     """
-    digits = len(text) - len(text.lstrip("+-.0123456789"))
-    try:
-        value, unit = float(text[:digits]), text[digits:].strip()
-    except ValueError:
-        value, unit = 0.0, ""
-    if not unit:
+    match = _QUANTITY.fullmatch(text.strip())
+    value, unit = (float(match["value"]), match["unit"]) if match else (0.0, "")
+    if not unit or not math.isfinite(value):
         raise UsageError(f"{option} {text!r} is not a number with its unit; write it as {example}.")
     return value, unit
 

@@ -25,7 +25,7 @@ def keep(folder: Path, answers: Mapping[str, Any], fit_page: str) -> None:
         answers: Plain data, by question.
         fit_page: Text that fit.json will be.
     """
-    of = {FIT: crc32(fit_page.encode()), **{name: _checksum(folder / name) for name in (POSTERIOR, FIGURE_DATA)}}
+    of = {FIT: crc32(fit_page.encode()), **{name: checksum(folder / name) for name in (POSTERIOR, FIGURE_DATA)}}
     page = {"schema": SCHEMA, "version": _version(), "of": of, "answers": answers}
     write_text(folder / ANSWERS, json.dumps({"crc32": _own(page), **page}, allow_nan=False) + "\n")
 
@@ -40,7 +40,7 @@ def kept(folder: Path, *beside: str) -> dict[str, Any]:
     try:
         page = json.loads((folder / ANSWERS).read_text(encoding="utf-8"))
         as_written = page.pop("crc32") == _own(page) and (page["schema"], page["version"]) == (SCHEMA, _version())
-        same = as_written and all(_checksum(folder / name) == page["of"][name] for name in (FIT, POSTERIOR, *beside))
+        same = as_written and all(checksum(folder / name) == page["of"][name] for name in (FIT, POSTERIOR, *beside))
         return dict(page["answers"]) if same else {}
     except (OSError, ValueError, KeyError, TypeError, AttributeError):
         return {}
@@ -50,7 +50,7 @@ def _own(page: Mapping[str, Any]) -> int:
     return crc32(json.dumps(page).encode())
 
 
-def _checksum(path: Path) -> int | None:
+def checksum(path: Path) -> int | None:
     """Of a file; None where there is none."""
     if not path.exists():
         return None

@@ -10,7 +10,7 @@ from typing import Any, get_type_hints
 import numpy as np
 
 from bowdenfit.dataset import Dataset
-from bowdenfit.errors import StoreError
+from bowdenfit.errors import DescriptionError, StoreError
 from bowdenfit.inference.draws import derived_units
 from bowdenfit.inference.least_squares import LeastSquares
 from bowdenfit.kinds import KINDS, each_table
@@ -18,7 +18,7 @@ from bowdenfit.kinds.measurements import Measurements
 from bowdenfit.kinds.settings import parse_description
 from bowdenfit.results.arrays import write_arrays
 from bowdenfit.results.folder import CHAIN, FIGURE_DATA, FIT, POSTERIOR, SUMMARY, folder_to_write, write_text
-from bowdenfit.results.kept import keep
+from bowdenfit.results.kept import checksum, keep
 from bowdenfit.results.netcdf import DERIVED, EXPECTED, Coordinates, Groups, read_groups, write_groups
 from bowdenfit.results.plain import rebuilt, stored
 from bowdenfit.results.record import OPTIMAL_EFFICIENCY, OPTIMAL_LENGTH, Draws, Provenance, Record
@@ -60,7 +60,8 @@ def save(
             write_groups(folder / POSTERIOR, *posterior_page(fit))
         write_text(folder / SUMMARY, json.dumps(summary, indent=1) + "\n")
         measurements = json.dumps(_measurements_page(fit.dataset.measurements))  # long, and read by no person
-        page = f'{json.dumps(_fit_page(fit), indent=1)[:-2]},\n "measurements": {measurements}\n}}\n'
+        known = {"posterior_crc32": checksum(folder / POSTERIOR)}
+        page = f'{json.dumps(_fit_page(fit) | known, indent=1)[:-2]},\n "measurements": {measurements}\n}}\n'
         (folder / FIGURE_DATA).unlink(missing_ok=True)
         if figures:
             write_arrays(folder / FIGURE_DATA, figures)
@@ -78,14 +79,17 @@ def load(folder: Path) -> Record:
     try:
         dataset = Dataset(parse_description(page["description"]), _measurements(page["measurements"]), page["sha256"])
         squares = rebuilt(LeastSquares, page["least_squares"])
+        as_written = page.get("posterior_crc32") in {None, checksum(folder / POSTERIOR)}
+        if page["posterior"] and (folder / POSTERIOR).exists() and not as_written:
+            raise StoreError(f"{folder / POSTERIOR} is not as it was written; fit again, or restore the folder from a copy.")
         posterior = _posterior(folder / POSTERIOR, page["posterior"]) if page["posterior"] else None
-        verdict = page["verdict"]
+        verdict = page["verdict"]["converged"], tuple(page["verdict"]["reasons"])
         provenance = rebuilt(Provenance, page["provenance"])
-    except (KeyError, TypeError, ValueError, OSError) as error:
+    except (LookupError, TypeError, ValueError, AttributeError, OSError, DescriptionError) as error:
         raise StoreError(
             f"{folder} is damaged ({type(error).__name__}: {error}); fit again, or restore the folder from a copy."
         ) from error
-    return Record(dataset, squares, posterior, verdict["converged"], tuple(verdict["reasons"]), provenance)
+    return Record(dataset, squares, posterior, *verdict, provenance)
 
 
 def _read_page(folder: Path) -> dict[str, Any]:
@@ -98,9 +102,11 @@ def _read_page(folder: Path) -> dict[str, Any]:
             ) from None
         what = "is no results folder (it has no fit.json)" if folder.is_dir() else "does not exist"
         raise StoreError(f"{folder} {what}; name a folder that `bowdenfit fit` wrote, such as fits/NAME.") from None
-    except (json.JSONDecodeError, UnicodeDecodeError):
+    except (ValueError, RecursionError):  # no JSON, no UTF-8, a number of thousands of digits
         raise StoreError(f"{folder / FIT} is damaged; fit again, or restore the folder from a copy.") from None
-    schema = page.get("schema", SCHEMA)
+    schema = page.get("schema", SCHEMA) if isinstance(page, dict) else None
+    if not isinstance(schema, int):
+        raise StoreError(f"{folder / FIT} is damaged; fit again, or restore the folder from a copy.")
     if schema > SCHEMA:
         raise StoreError(f"{folder} was written by a newer bowdenfit (schema {schema}); update bowdenfit.")
     if schema < SCHEMA:

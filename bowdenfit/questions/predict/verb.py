@@ -67,6 +67,8 @@ def predict(
         raise UsageError(
             "--quantity efficiency at lengths is that at the fit's own reference force; leave --input-force out."
         )
+    if odd := [length for length in lengths or () if not np.isfinite(length)]:
+        raise UsageError(f"{odd[0]} is no length; name the lengths to predict at as numbers.")
     if not lengths and route is not None and not route.choices:
         raise UsageError("the description has no choices; name the lengths to predict at.")
     wanted = np.asarray(in_unit_of(route, lengths) or (route.choices if route else [0.0]), dtype=float)

@@ -1,0 +1,90 @@
+"""Results folders that somebody edited or damaged, and requests with impossible numbers: sentences, exit code 2."""
+
+import json
+import os
+import shutil
+import subprocess
+import sys
+
+import pytest
+
+import bowdenfit as bf
+from bowdenfit.cli.keywords import read_quantity
+
+QUICK = ("sampler.n_walkers=32", "sampler.max_steps=200", "sampler.target_ess=100")
+
+
+@pytest.fixture(scope="module")
+def finished(on_body, tmp_path_factory):
+    folder = tmp_path_factory.mktemp("edited") / "fit"
+    bf.fit(on_body, output=folder, seed=3, settings=QUICK, figures=False)
+    return folder
+
+
+def other(page, key, value):
+    return json.dumps({**page, key: value})
+
+
+@pytest.mark.parametrize(
+    "edit",
+    [
+        lambda page: "",
+        lambda page: "null",
+        lambda page: "[1, 2]",
+        lambda page: "[" * 100_000,
+        lambda page: '{"schema": ' + "9" * 5000 + "}",
+        lambda page: other(page, "schema", "x"),
+        lambda page: other(page, "description", {}),
+        lambda page: other(page, "description", None),
+        lambda page: other(page, "measurements", [1]),
+        lambda page: other(page, "least_squares", {"estimates": 3}),
+        lambda page: other(page, "posterior", {"n_ensembles": "many"}),
+        lambda page: other(page, "verdict", []),
+        lambda page: other(page, "provenance", 5),
+        lambda page: other(page, "sha256", None)[:-40],
+    ],
+)
+def test_an_edited_fit_is_a_sentence(finished, tmp_path, edit):
+    folder = shutil.copytree(finished, tmp_path / "fit")
+    (folder / "fit.json").write_text(edit(json.loads((folder / "fit.json").read_text())))
+    with pytest.raises(bf.StoreError) as refused:
+        bf.load(folder)
+    assert "damaged" in str(refused.value) or "another" in str(refused.value)
+    assert len(str(refused.value)) < 600
+
+
+def test_draws_of_another_fit_are_refused(finished, on_body, tmp_path):
+    folder = shutil.copytree(finished, tmp_path / "fit")
+    bf.fit(on_body, output=tmp_path / "other", seed=4, settings=QUICK, figures=False)
+    shutil.copy(tmp_path / "other" / "posterior.nc", folder)
+    with pytest.raises(bf.StoreError, match=r"posterior\.nc is not as it was written"):
+        bf.load(folder)
+
+
+@pytest.mark.parametrize("length", [float("nan"), float("inf")])
+def test_what_is_no_length_is_refused(finished, length):
+    with pytest.raises(bf.UsageError, match="is no length"):
+        bf.predict(bf.load(finished), [length])
+
+
+@pytest.mark.parametrize(
+    ("text", "value"),
+    [("1e3N", (1000.0, "N")), ("180deg", (180.0, "deg")), ("-.5 mm", (-0.5, "mm")), ("2.5E-1 in", (0.25, "in"))],
+)
+def test_numbers_with_units_are_read_as_people_write_them(text, value):
+    assert read_quantity(text, "--input-force", "100N") == value
+
+
+@pytest.mark.parametrize("text", ["N", "1e3", "nanN", "1e999N", "1..2N", "- 5N", "٣N", ""])
+def test_what_is_no_number_with_a_unit_is_refused(text):
+    with pytest.raises(bf.UsageError, match="write it as 100N"):
+        read_quantity(text, "--input-force", "100N")
+
+
+@pytest.mark.parametrize("closed", ["1", "2"])
+def test_a_closed_output_is_no_failure(on_body, closed):
+    command = f'exec "{sys.executable}" -m bowdenfit.cli check "{on_body}" {closed}>&-'
+    done = subprocess.run(
+        ["sh", "-c", command], env={**os.environ}, capture_output=True, text=True, check=False, timeout=60
+    )
+    assert done.returncode == 0, done.stderr

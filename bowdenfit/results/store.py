@@ -141,7 +141,7 @@ def _posterior_page(posterior: Draws) -> dict[str, Any]:
 
 
 def _measurements(page: Mapping[str, Any]) -> Measurements:
-    tables = (rebuilt(kind.table | None, page[name]) for name, kind in KINDS.items())
+    tables = (rebuilt(kind.table | None, page.get(name)) for name, kind in KINDS.items())
     return Measurements(tuple(table for table in tables if table is not None), tuple(page["remarks"]))
 
 

@@ -261,3 +261,13 @@ def test_the_checkpoint_carries_what_it_was_started_for(saved):
     page = fingerprint_of(folder / "chain.checkpoint")
     assert page["seed"] == 3
     assert page["sha256"] == fit.dataset.sha256
+
+
+def test_a_fit_from_before_a_kind_of_table_existed_is_read(saved, tmp_path):
+    fit, folder = saved
+    copy = shutil.copytree(folder, tmp_path / "copy")
+    page = json.loads((copy / "fit.json").read_text())
+    absent = next(name for name, table in page["measurements"].items() if table is None)
+    del page["measurements"][absent]
+    (copy / "fit.json").write_text(json.dumps(page))
+    np.testing.assert_array_equal(bf.load(copy).posterior.z, fit.posterior.z)

@@ -19,7 +19,8 @@ from bowdenfit.files.csv_start import Sheet, start_of
 from bowdenfit.files.layout import is_summary
 from bowdenfit.files.libraries import load
 from bowdenfit.files.outcome import UnreadNames, channel_file, refuse_larger, refuse_too_large
-from bowdenfit.files.sheet_columns import SheetRows, columns_of
+from bowdenfit.files.sheet_cells import SheetRows
+from bowdenfit.files.sheet_columns import columns_of
 from bowdenfit.files.sheets import channels_of, with_rate
 from bowdenfit.files.text_file import (
     Line,

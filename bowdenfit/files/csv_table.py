@@ -73,10 +73,21 @@ def read_csv(path: Path, most: int | None = None) -> RawTable:
             )
     if all(row.blank for row in rows):
         raise DatasetError(f"{name} is empty; it needs one header row and the measurements below it.")
-    return _table(name, every, rows, separator)
+    return raw_table(name, every, rows, separator)
 
 
-def _table(name: str, lines: Sequence[Line], rows: Sequence[CsvRecord], separator: str) -> RawTable:
+def raw_table(name: str, lines: Sequence[Line], rows: Sequence[CsvRecord], separator: str) -> RawTable:
+    """The table that the rows of a file make.
+
+    Args:
+        name: Of the file.
+        lines: All its lines.
+        rows: The cells of those that are no comments.
+        separator: What stands between columns.
+
+    Raises:
+        DatasetError: See `read_csv`.
+    """
     parts = parts_of(rows, name)
     header = _header(parts, name)
     if not parts.body:

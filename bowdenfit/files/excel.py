@@ -12,7 +12,9 @@ from bowdenfit.files.channels import Channel, ChannelFile
 from bowdenfit.files.layout import layout_of
 from bowdenfit.files.libraries import load
 from bowdenfit.files.outcome import refuse_damage, refuse_larger
-from bowdenfit.files.sheet_columns import SheetRows, columns_of, text_of
+from bowdenfit.files.row_account import ABOVE, BLANK, RowAccount, account_of
+from bowdenfit.files.sheet_cells import SheetRows, text_of
+from bowdenfit.files.sheet_columns import columns_of
 from bowdenfit.files.sheets import channels_of
 from bowdenfit.words import shown
 
@@ -42,9 +44,11 @@ def read(path: Path) -> ChannelFile:
     channels: dict[str, tuple[Channel, ...]] = {}
     remarks: list[str] = []
     errors: list[DatasetError] = []
-    for title, rows in _sheets(openpyxl, path):
+    accounts: list[RowAccount] = []
+    for title, rows in sheets_of(openpyxl, path):
         try:
-            channels[title], said = _read_sheet(f"{path.name}, sheet {shown(title)}", rows)
+            channels[title], said, account = _read_sheet(f"{path.name}, sheet {shown(title)}", path.name, rows)
+            accounts += [account] if account else []
             remarks += [f"Sheet {shown(title)}: {remark[0].lower()}{remark[1:]}" for remark in said]
         except DatasetError as error:
             errors.append(error)
@@ -52,7 +56,8 @@ def read(path: Path) -> ChannelFile:
     if not found:
         raise errors[0] if errors else _without_numbers(path)
     remarks += [f"A sheet was left out: {error}" for error in errors]
-    return ChannelFile(path, "Excel workbook", tuple(_named(found)), tuple(remarks))
+    account = accounts[0] if len(accounts) == 1 else None  # rows of several sheets have the same numbers
+    return ChannelFile(path, "Excel workbook", tuple(_named(found)), tuple(remarks), account)
 
 
 def _named(sheets: dict[str, tuple[Channel, ...]]) -> Iterator[Channel]:
@@ -71,7 +76,7 @@ def _without_numbers(path: Path) -> DatasetError:
     )
 
 
-def _sheets(openpyxl: Any, path: Path) -> Iterator[tuple[str, Iterator[_Cells]]]:
+def sheets_of(openpyxl: Any, path: Path) -> Iterator[tuple[str, Iterator[_Cells]]]:
     """Title and rows of each sheet; what the library cannot read becomes one sentence."""
     with warnings.catch_warnings():
         warnings.simplefilter("ignore", UserWarning)  # on styles and validations, which do not matter here
@@ -90,14 +95,17 @@ def _rows(path: Path, sheet: Any) -> Iterator[_Cells]:
         yield from sheet.iter_rows(values_only=True)
 
 
-def _read_sheet(place: str, cells: Iterable[_Cells]) -> tuple[tuple[Channel, ...], list[str]]:
+def _read_sheet(place: str, file: str, cells: Iterable[_Cells]) -> tuple[tuple[Channel, ...], list[str], RowAccount | None]:
     iterator = iter(cells)
     first = list(islice(iterator, _FIRST_ROWS))
     layout = layout_of([[text_of(cell) for cell in row] for row in first], ".")
     if layout is None:
-        return (), []
+        return (), [], None
     start = layout.start
     rows = SheetRows(place, layout, chain(first[start:], iterator), lambda position: start + position + 1)
     found = columns_of(rows)
     channels, left_out = channels_of(layout, found.values)
-    return channels, [*left_out, *found.remarks]
+    above = {i + 1: (ABOVE if any(first[i]) else BLANK, "") for i in range(start) if i not in layout.over}
+    over = [i + 1 for i in layout.over]
+    account = account_of(file, start + found.rows, over, above | found.left_out, found.beside)
+    return channels, [*left_out, *found.remarks], account

@@ -1,69 +1,35 @@
 """The columns of a sheet out of its rows of cells: numbers, dates, and what stands below the data."""
 
-import math
 import re
-from array import array
-from collections.abc import Callable, Iterable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-from datetime import timedelta
-from typing import Any
 
 import numpy as np
 
-from bowdenfit.files.cells import Cell, kind_of, number_of
+from bowdenfit.files.cells import Cell, kind_of
 from bowdenfit.files.clocks import seconds_of_dates
 from bowdenfit.files.csv_rows import too_many_cells
 from bowdenfit.files.headings import heading_of
-from bowdenfit.files.layout import Layout, is_summary
 from bowdenfit.files.row_account import AGAIN, BELOW, BETWEEN, BLANK, COMMENT
+from bowdenfit.files.sheet_cells import (
+    EMPTY,
+    REMARK,
+    REMARKED,
+    SPACE,
+    SUMMARY,
+    WORDS,
+    SheetCells,
+    SheetRows,
+    cells_of_sheet,
+    text_of,
+)
 from bowdenfit.types import Vector
 from bowdenfit.words import few, shown
 
 _MOST_SUMMARY_ROWS = 40
 _MOST_ROWS_AFTER_BLANK = 10
-_DATA, _BLANK, _EMPTY, _COMMENT, _SUMMARY, _WORDS, _MIXED, _REMARK = b"d ,#swmr"
 _BLOCK_OF_WORDS = re.compile(rb"(?<=[^ ])(?: +[wm#]+)+$")
 _LAST_FEW = re.compile(rb"([^ ]+) +([^ ]{1,%d})" % _MOST_ROWS_AFTER_BLANK)
-
-
-@dataclass(frozen=True)
-class SheetRows:
-    """The rows of a sheet from the first of data on.
-
-    Args:
-        place: File and sheet, for errors.
-        layout: Headings and kinds of the columns.
-        rows: Their cells, text or as the library gives them; None for a comment.
-        number: The number in the file of the row at a position, from 0.
-        decimal: Decimal mark of numbers that are text.
-        of_text: Whether they are lines of text, of which blank ones are only space and none may have too many cells.
-        before: Numbers or dates of each column that have been read from the rows before, in pieces; taken out.
-    """
-
-    place: str
-    layout: Layout
-    rows: Iterable[Sequence[Any] | None]
-    number: Callable[[int], int]
-    decimal: str = "."
-    of_text: bool = False
-    before: dict[int, list[np.ndarray]] | None = None
-
-
-@dataclass(frozen=True)
-class _Cells:
-    """What has been read of a sheet.
-
-    Args:
-        numbers: The numbers of each column.
-        dates: The texts of each column of dates.
-        words: Position, column and text of each cell that is not as it should be; the cells of a row that has too many.
-        letters: What each row holds.
-    """
-
-    numbers: dict[int, array]
-    dates: dict[int, list[str]]
-    words: list[tuple[int, int, Any]]
-    letters: bytearray
 
 
 @dataclass(frozen=True)
@@ -75,12 +41,14 @@ class SheetColumns:
         remarks: What was left out, in sentences.
         left_out: Why a row is not read, and what it says, by its number.
         beside: Row and text of remarks beside the columns.
+        rows: How many rows there are from the first of data on.
     """
 
     values: list[Vector | None]
     remarks: list[str]
     left_out: dict[int, tuple[str, str]]
     beside: list[tuple[int, str]]
+    rows: int
 
 
 def columns_of(sheet: SheetRows) -> SheetColumns:
@@ -89,7 +57,7 @@ def columns_of(sheet: SheetRows) -> SheetColumns:
     Raises:
         DatasetError: Text stands among the numbers of a column.
     """
-    kinds, cells = sheet.layout.kinds, _read(sheet)
+    kinds, cells = sheet.layout.kinds, cells_of_sheet(sheet)
     stop = _data_end(bytes(cells.letters))
     left_out, beside = _left_out(sheet, cells, stop), []
     for position, column, text in cells.words:
@@ -102,7 +70,7 @@ def columns_of(sheet: SheetRows) -> SheetColumns:
             beside.append((row, _remark_beside(sheet, row, text)))
         elif kinds[column] == "number" or (sheet.of_text and kinds[column] == "blank"):
             raise Cell(sheet.place, row, sheet.layout.name(column), text).no_sample(sheet.decimal)
-    dropped = [_COMMENT, _BLANK, _REMARK] if sheet.of_text else [_COMMENT, _REMARK]
+    dropped = [REMARKED, SPACE, REMARK] if sheet.of_text else [REMARKED, REMARK]
     kept = ~np.isin(np.array(cells.letters[:stop]), dropped)
     columns: list[Vector | None] = [None] * len(kinds)
     before = sheet.before or {}
@@ -114,10 +82,10 @@ def columns_of(sheet: SheetRows) -> SheetColumns:
         else:
             whole[~np.isfinite(whole)] = np.nan
             columns[i] = whole
-    return SheetColumns(columns, _remarks(sheet, cells.letters, left_out, beside, stop), left_out, beside)
+    return SheetColumns(columns, _remarks(sheet, cells.letters, left_out, beside, stop), left_out, beside, len(cells.letters))
 
 
-def _left_out(sheet: SheetRows, cells: _Cells, stop: int) -> dict[int, tuple[str, str]]:
+def _left_out(sheet: SheetRows, cells: SheetCells, stop: int) -> dict[int, tuple[str, str]]:
     """Why rows are not read, by their numbers; remarks between the rows are marked as such in the letters."""
     of_row: dict[int, list[tuple[int, str]]] = {}
     for position, column, text in cells.words:
@@ -126,15 +94,15 @@ def _left_out(sheet: SheetRows, cells: _Cells, stop: int) -> dict[int, tuple[str
     left_out: dict[int, tuple[str, str]] = {}
     for position, letter in enumerate(cells.letters):
         says = " ".join(text for _, text in of_row.get(position, ()))
-        if letter == _COMMENT:
+        if letter == REMARKED:
             left_out[sheet.number(position)] = COMMENT, ""
-        elif letter == _BLANK or (letter == _EMPTY and position >= stop):
+        elif letter == SPACE or (letter == EMPTY and position >= stop):
             left_out[sheet.number(position)] = BLANK, ""
         elif position >= stop:
             left_out[sheet.number(position)] = BELOW, says
-        elif letter == _WORDS and (why := _why_words(sheet, of_row.get(position, []))):
+        elif letter == WORDS and (why := _why_words(sheet, of_row.get(position, []))):
             left_out[sheet.number(position)] = why, says
-            cells.letters[position] = _REMARK
+            cells.letters[position] = REMARK
     return left_out
 
 
@@ -159,66 +127,13 @@ def _remark_beside(sheet: SheetRows, row: int, cells: Sequence[str]) -> str:
     return " ".join(behind)
 
 
-def text_of(cell: object) -> str:
-    """A cell as text: dates as ISO dates, true and false as words."""
-    if isinstance(cell, str):
-        return cell
-    if isinstance(cell, timedelta):
-        return repr(cell.total_seconds())
-    if cell is None:
-        return ""
-    return repr(cell) if isinstance(cell, bool | int | float) else str(cell)
-
-
-def _read(sheet: SheetRows) -> _Cells:
-    kinds = sheet.layout.kinds
-    numbers = {i: array("d") for i, kind in enumerate(kinds) if kind in ("number", "blank")}
-    cells = _Cells(numbers, {i: [] for i, kind in enumerate(kinds) if kind == "date"}, [], bytearray())
-    for position, row in enumerate(sheet.rows):
-        filled = row or ()
-        if sheet.of_text and len(filled) > len(kinds) and any(map(str.strip, filled[len(kinds) :])):
-            cells.words.append((position, len(kinds), filled))
-        known = len(cells.words)
-        for i, column in cells.numbers.items():
-            cell = filled[i] if i < len(filled) else None
-            column.append(cell if type(cell) in (float, int) else _number(cells, position, i, cell, sheet.decimal))
-        for i, texts in cells.dates.items():
-            texts.append(text_of(filled[i]) if i < len(filled) else "")
-            if kind_of(texts[-1], sheet.decimal) == "text":
-                cells.words.append((position, i, texts[-1]))
-        cells.letters.append(_letter(row, sheet, len(cells.words) > known))
-    return cells
-
-
-def _number(cells: _Cells, row: int, column: int, cell: object, decimal: str) -> float:
-    value = number_of(text_of(cell), decimal)
-    if value is None:
-        cells.words.append((row, column, text_of(cell)))
-    return math.nan if value is None else value
-
-
-def _letter(row: Sequence[Any] | None, sheet: SheetRows, worded: bool) -> int:
-    """What a row holds; statistics bear a label in a column that holds no words in the data."""
-    if row is None:
-        return _COMMENT
-    if all(cell is None or cell == "" for cell in row):
-        return _EMPTY if sheet.of_text and row else _BLANK
-    if not worded:
-        return _DATA
-    texts, kinds = [text_of(cell) for cell in row], sheet.layout.kinds
-    if is_summary([text for i, text in enumerate(texts) if i >= len(kinds) or kinds[i] != "text"]):
-        return _SUMMARY
-    found = {kind_of(text, sheet.decimal) for text in texts}
-    return _MIXED if len(kinds) == 1 or found & {"number", "date"} else _WORDS
-
-
 def _data_end(letters: bytes) -> int:
     """Position of the row behind the data, by a letter for each row.
 
     Below the data stand statistics, words alone, a block in whose every row are words, or a few last rows after a blank.
     """
     filled = letters.rstrip(b" ,#")
-    label = filled.find(_SUMMARY, max(0, len(filled) - _MOST_SUMMARY_ROWS))
+    label = filled.find(SUMMARY, max(0, len(filled) - _MOST_SUMMARY_ROWS))
     data = (filled if label < 0 else filled[:label]).rstrip(b" ,#w")
     data = _BLOCK_OF_WORDS.sub(b"", data)
     last = _LAST_FEW.fullmatch(data)
@@ -232,7 +147,7 @@ def _remarks(
     beside: Sequence[tuple[int, str]],
     stop: int,
 ) -> list[str]:
-    comments = letters[:stop].count(_COMMENT)
+    comments = letters[:stop].count(REMARKED)
     said = [f"{comments} comment lines between the rows of data were left out."] if comments else []
     below = [i for i in range(stop, len(letters)) if letters[i] not in b" ,#"]
     if below:

@@ -10,11 +10,12 @@ import numpy as np
 
 from bowdenfit.errors import DatasetError
 from bowdenfit.files.clocks import names_time
-from bowdenfit.files.csv_table import RawTable, read_csv
+from bowdenfit.files.csv_table import RawTable
 from bowdenfit.files.headings import heading_of
 from bowdenfit.files.matching import Quantity, candidates
 from bowdenfit.files.naming import naming
 from bowdenfit.files.spellings import spelled
+from bowdenfit.files.tables import read_table
 from bowdenfit.kinds.single_file import FORCES, HEAD, FileKind, file_kind, numbers_in
 from bowdenfit.units import dimension_of, is_unit
 from bowdenfit.words import listed, shown
@@ -119,7 +120,7 @@ def only_kind(path: Path, has_channels: bool, named: Sequence[str]) -> str:
     """
     found = file_kind(path, has_channels, named)
     if found.other:
-        raise refuse_either(path, read_csv(path, HEAD), found)
+        raise refuse_either(path, read_table(path, HEAD), found)
     return found.kind
 
 
@@ -137,7 +138,7 @@ def has_own_angles(path: Path, kind: str, named: Sequence[str], stated: bool) ->
     """
     if kind == "recordings":
         return False
-    table = read_csv(path, HEAD)
+    table = read_table(path, HEAD)
     columns = candidates(list(zip(table.header, table.units, strict=True)), (WRAP_ANGLE,))[WRAP_ANGLE.name]
     if not columns and WRAP_ANGLE.name not in named:
         return False

@@ -11,11 +11,12 @@ import numpy as np
 from bowdenfit.errors import DatasetError
 from bowdenfit.files.clocks import is_date, names_time
 from bowdenfit.files.contents import TEXT
-from bowdenfit.files.csv_table import RawTable, read_csv
+from bowdenfit.files.csv_table import RawTable
 from bowdenfit.files.headings import heading_of
 from bowdenfit.files.matching import Quantity, candidates
 from bowdenfit.files.sheets import stated_rate
 from bowdenfit.files.spellings import spelled
+from bowdenfit.files.tables import WORKBOOKS, read_table
 from bowdenfit.files.text_file import first_bytes, first_lines
 from bowdenfit.units import conversion_factor, dimension_of, is_unit
 from bowdenfit.words import shown
@@ -71,10 +72,10 @@ def file_kind(path: Path, has_channels: bool = False, named: Sequence[str] = ())
         return FileKind("efficiencies" if "efficiency" in named else "forces", "its columns are named with --column")
     if has_channels:
         return FileKind("recordings", "its channels are named with --channel")
-    if path.suffix.lower() not in TEXT:
+    if path.suffix.lower() not in (*TEXT, *WORKBOOKS):
         return FileKind("recordings", f"files with the ending {path.suffix or '(none)'} are those of acquisition programs")
     try:
-        table = read_csv(path, HEAD)
+        table = read_table(path, HEAD)
     except DatasetError as error:
         return _without_headings(path, error)
     return _by_columns(path, table)
@@ -86,6 +87,8 @@ def _without_headings(path: Path, error: DatasetError) -> FileKind:
     Raises:
         DatasetError: It is short, or no text.
     """
+    if path.suffix.lower() in WORKBOOKS:
+        return FileKind("recordings", "none of its sheets is a table of readings")
     _, lines = first_lines(first_bytes(path, 1 << 18), path.name, whole=False, most=_LONG + 1)
     if len(lines) <= _LONG:
         raise error
@@ -100,14 +103,18 @@ def _by_columns(path: Path, table: RawTable) -> FileKind:
     rows_alone = next((name for name in ("run", "stroke", "group") if name in found), "")
     if clock is not None:
         return _with_clock(table, clock, kind, rows_alone)
-    _, above = first_lines(first_bytes(path, 1 << 15), path.name, whole=False, most=table.header_row - 1)
-    rate = stated_rate([line.text for line in above])
+    rate = None if path.suffix.lower() in WORKBOOKS else stated_rate(_lines_above(path, table))
     if rate is not None:
         return FileKind("recordings", f"the line {shown(rate[1])} states its sampling rate")
     if rows_alone or kind == "efficiencies" or len(table.rows) <= _LONG or not _is_smooth(table):
         return FileKind(kind, "it has no column of time")
     why = "it has no column of time, but many rows in which the force changes little from one to the next"
     return FileKind(kind, why, "recordings")
+
+
+def _lines_above(path: Path, table: RawTable) -> list[str]:
+    _, above = first_lines(first_bytes(path, 1 << 15), path.name, whole=False, most=table.header_row - 1)
+    return [line.text for line in above]
 
 
 def _with_clock(table: RawTable, clock: int, kind: str, rows_alone: str) -> FileKind:
@@ -132,12 +139,12 @@ def _is_time(table: RawTable, column: int) -> bool:
     """Whether a column is one of time, by its heading or by a unit of time over numbers that rise; T1 is a tension."""
     heading, unit = table.header[column], table.units[column]
     other = spelled(heading, unit)
+    steps = _steps(table, column)
     if names_time(heading):
-        return not (other and (other.unit or other.pair))
+        return not (other and (other.unit or other.pair)) and (len(steps) < 2 or float(np.median(steps)) > 0)
     written = heading_of(heading, unit).unit
     if not written or not is_unit(written) or dimension_of(written) != "time":
         return False
-    steps = _steps(table, column)
     return bool(steps) and min(steps) > 0
 
 

@@ -5,12 +5,12 @@ import tomllib
 from pathlib import Path
 
 import numpy as np
+import openpyxl
 import pytest
 
 import bowdenfit as bf
 from bowdenfit.files import read_channels
-from bowdenfit.files.contents import TEXT
-from bowdenfit.files.csv_table import read_csv
+from bowdenfit.files.tables import read_table
 from bowdenfit.kinds.efficiencies.table import EfficiencyTable
 from bowdenfit.kinds.forces.table import ForceTable
 
@@ -49,10 +49,8 @@ def test_a_file_is_said_to_be_what_it_is_and_its_command_reads_it(run, monkeypat
 @pytest.mark.parametrize("name", UNDERSTOOD)
 def test_every_row_of_a_file_is_read_or_named_with_its_reason(name):
     truth, path = UNDERSTOOD[name], CORPUS / name
-    account = read_channels(path).account if truth["kind"] == "recording" else read_csv(path).account
-    text = path.read_bytes()
-    lines = text.decode("utf-16").splitlines() if text.startswith(b"\xff\xfe") else text.splitlines()
-    assert account.rows == len(lines) == account.accounted
+    account = read_channels(path).account if truth["kind"] == "recording" else read_table(path).account
+    assert account.rows == account.accounted == rows_of(path)
     assert account.read == truth["readings"]
     assert len(account.beside) == truth.get("beside", 0)
     if "headings" in truth:
@@ -70,6 +68,14 @@ def test_the_command_that_check_prints_fits_a_file(run, monkeypatch, tmp_path, n
     assert found.value == pytest.approx(UNDERSTOOD[name]["mu"], rel=0.03)
 
 
+def rows_of(path):
+    """How many rows a file has."""
+    if path.suffix == ".xlsx":
+        return max(sheet.max_row for sheet in openpyxl.load_workbook(path))
+    text = path.read_bytes()
+    return len(text.decode("utf-16").splitlines() if text.startswith(b"\xff\xfe") else text.splitlines())
+
+
 def command_of(text):
     """The one command that `check` prints, as words, and as keywords for notebooks."""
     (line,) = [line.strip() for line in text.splitlines() if line.strip().startswith("bowdenfit fit ")]
@@ -82,7 +88,3 @@ def command_of(text):
     if "wrap_angle" in given:
         given["wrap_angle"] = (float(given["wrap_angle"][0].removesuffix("deg")), "deg")
     return words, given
-
-
-def test_endings_of_text_are_those_of_the_corpus():
-    assert {Path(name).suffix for name in UNDERSTOOD} <= set(TEXT)

@@ -9,7 +9,7 @@ from bowdenfit.cable.registry import CURVES
 from bowdenfit.description import Description, Finite, QuantityValue, Table
 from bowdenfit.files.cells import Cell
 from bowdenfit.files.columns import Column, Quantity, find_columns, require
-from bowdenfit.files.csv_table import read_csv
+from bowdenfit.files.tables import read_table
 from bowdenfit.kinds.design import Design
 from bowdenfit.kinds.kind import Found, Source
 from bowdenfit.kinds.measurements import Measurements
@@ -72,13 +72,13 @@ def read_angles(source: Source) -> Found[AngleTable]:
         source: Where it is.
 
     Raises:
-        DatasetError: See `read_csv` and `find_columns`; or a cell is not an angle between 0 and 2000 degrees.
+        DatasetError: See `read_table` and `find_columns`; or a cell is not an angle between 0 and 2000 degrees.
     """
     path, route, stated = source.file, source.description.route, source.settings.detection_limit
     assert route is not None  # a description has angles only with a route
     contacts = [c.wrap_angle.column for c in source.description.curved if c.wrap_angle.column]
     detection_limit = stated.to("angle") if stated else None
-    table = read_csv(path)
+    table = read_table(path)
     wanted = (route_column(route), *(Quantity(c, "angle") for c in contacts))
     found = find_columns(table, wanted, source.columns)
     lengths = require(table, found, route.variable, f"{route.variable}_{route.unit}")

@@ -7,7 +7,7 @@ import numpy as np
 from bowdenfit.description import Description, Finite
 from bowdenfit.files.cells import Cell
 from bowdenfit.files.columns import Column, Quantity, find_columns, require
-from bowdenfit.files.csv_table import read_csv
+from bowdenfit.files.tables import read_table
 from bowdenfit.kinds.design import Design
 from bowdenfit.kinds.kind import Found, Source
 from bowdenfit.kinds.pages import Page, route_cells, route_heading
@@ -45,10 +45,10 @@ def read_efficiencies(source: Source) -> Found[EfficiencyTable]:
         source: Where it is.
 
     Raises:
-        DatasetError: See `read_csv` and `find_columns`; or an efficiency is not positive, or above 1 beyond its error.
+        DatasetError: See `read_table` and `find_columns`; or an efficiency is not positive, or above 1 beyond its error.
     """
     path, route, contacts = source.file, source.description.route, source.description.angle_columns
-    table = read_csv(path)
+    table = read_table(path)
     names = (Quantity("efficiency", "ratio"), Quantity("efficiency_sd", "ratio"))
     found = find_columns(table, (*names, *shared_columns(route, contacts)), source.columns)
     column = require(table, found, "efficiency", "efficiency (0 to 1) or efficiency_percent")

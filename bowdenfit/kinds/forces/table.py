@@ -9,8 +9,8 @@ import numpy as np
 from bowdenfit.errors import DatasetError
 from bowdenfit.files.cells import Cell
 from bowdenfit.files.columns import Column, Quantity, find_columns, require, taken_in_pairs
-from bowdenfit.files.csv_table import read_csv
 from bowdenfit.files.row_account import RowAccount
+from bowdenfit.files.tables import read_table
 from bowdenfit.kinds.forces.mountings import each_row_apart, mountings, numbered_anew
 from bowdenfit.kinds.groups import GROUP, NO_GROUP, read_groups
 from bowdenfit.kinds.kind import Found, Source
@@ -71,7 +71,7 @@ def read_forces(source: Source) -> Found[ForceTable]:
         source: Where they are.
 
     Raises:
-        DatasetError: See `read_csv` and `find_columns`; or a force is not positive, or a stroke is unknown.
+        DatasetError: See `read_table` and `find_columns`; or a force is not positive, or a stroke is unknown.
     """
     paths, contacts = source.files, source.description.angle_columns
     parts = [_read_force_file(path, source) for path in paths]
@@ -126,7 +126,7 @@ def _one_velocity_unit(tables: Sequence[ForceTable]) -> str:
 
 
 def _read_force_file(path: Path, source: Source) -> tuple[ForceTable, list[str], RowAccount]:
-    table, route, contacts = read_csv(path), source.description.route, source.description.angle_columns
+    table, route, contacts = read_table(path), source.description.route, source.description.angle_columns
     forces = (Quantity("input_force", "force"), Quantity("output_force", "force"))
     others = (Quantity("run", "text"), Quantity("stroke", "text"), Quantity("velocity", "speed"), GROUP)
     found = find_columns(table, (*forces, *others, *shared_columns(route, contacts)), source.columns, _UNUSED)

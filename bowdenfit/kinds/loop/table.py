@@ -8,8 +8,9 @@ import numpy as np
 from bowdenfit.description.pulleys import Pulleys
 from bowdenfit.errors import DatasetError
 from bowdenfit.files.columns import Column, Quantity, find_columns, require
-from bowdenfit.files.csv_table import RawTable, read_csv
+from bowdenfit.files.csv_table import RawTable
 from bowdenfit.files.matching import meanings
+from bowdenfit.files.tables import read_table
 from bowdenfit.kinds.kind import Found, Source
 from bowdenfit.kinds.rows import (
     OwnAngles,
@@ -58,11 +59,11 @@ def read_loop(source: Source) -> Found[LoopTable]:
         source: Where it is.
 
     Raises:
-        DatasetError: See `read_csv` and `find_columns`; or a preload is negative, a torque has no radius, or the output is
+        DatasetError: See `read_table` and `find_columns`; or a preload is negative, a torque has no radius, or the output is
             larger than the input while moving forward.
     """
     path, route, contacts = source.file, source.description.route, source.description.angle_columns
-    table, pulleys = read_csv(path), source.description.cable.pulleys
+    table, pulleys = read_table(path), source.description.cable.pulleys
     ends = [Quantity(f"{end}_{what}", what) for end in ("input", "output") for what in ("force", "torque")]
     others = (Quantity("stroke", "text"), Quantity("preload", "force"))
     found = find_columns(table, (*ends, *others, *shared_columns(route, contacts)), source.columns, _UNUSED)

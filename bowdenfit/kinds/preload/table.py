@@ -6,7 +6,7 @@ import numpy as np
 
 from bowdenfit.description import Table
 from bowdenfit.files.columns import Quantity, find_columns, require
-from bowdenfit.files.csv_table import read_csv
+from bowdenfit.files.tables import read_table
 from bowdenfit.kinds.kind import Found, Source
 from bowdenfit.kinds.rows import RowOrigin, provenance_of, read_angle, read_tension
 from bowdenfit.types import Vector
@@ -45,10 +45,10 @@ def read_preload(source: Source) -> Found[PreloadTable]:
         source: Where it is.
 
     Raises:
-        DatasetError: See `read_csv` and `find_columns`; or a preload is negative.
+        DatasetError: See `read_table` and `find_columns`; or a preload is negative.
     """
     path = source.file
-    table = read_csv(path)
+    table = read_table(path)
     wanted = (Quantity("preload", "force"), Quantity("wrap_angle", "angle"))
     found = find_columns(table, wanted, source.columns, _UNUSED)
     angles = require(table, found, "wrap_angle", "wrap_angle_deg")

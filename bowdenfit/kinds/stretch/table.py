@@ -7,7 +7,8 @@ from itertools import product
 import numpy as np
 
 from bowdenfit.files.columns import Column, Quantity, find_columns, require
-from bowdenfit.files.csv_table import RawTable, read_csv
+from bowdenfit.files.csv_table import RawTable
+from bowdenfit.files.tables import read_table
 from bowdenfit.kinds.kind import Found, Source
 from bowdenfit.kinds.rows import RowOrigin, check_spelling, provenance_of, read_angle, read_tension
 from bowdenfit.types import Flags, Labels, Vector
@@ -56,10 +57,10 @@ def read_stretch(source: Source) -> Found[StretchTable]:
         source: Where it is.
 
     Raises:
-        DatasetError: See `read_csv` and `find_columns`; or a load is negative, or stretch falls with load.
+        DatasetError: See `read_table` and `find_columns`; or a load is negative, or stretch falls with load.
     """
     path = source.file
-    table = read_csv(path)
+    table = read_table(path)
     wanted = (Quantity("load", "force"), Quantity("wrap_angle", "angle"), Quantity("stretch", "length"))
     optional = (Quantity("branch", "text"), Quantity("cycle", "text"))
     found = find_columns(table, (*wanted, *optional), source.columns, _UNUSED)

@@ -8,8 +8,8 @@ from bowdenfit.errors import BowdenfitError, DatasetError
 from bowdenfit.files import read_channels
 from bowdenfit.files.channels import ChannelFile
 from bowdenfit.files.clocks import is_clock
-from bowdenfit.files.csv_table import read_csv
 from bowdenfit.files.naming import naming, parse_sources
+from bowdenfit.files.tables import read_table
 from bowdenfit.kinds import KINDS
 from bowdenfit.kinds.fit_commands import (
     FitCommand,
@@ -44,7 +44,7 @@ def lone_file_text(path: Path, channels: Sequence[str] = (), columns: Sequence[s
     found = file_kind(path, bool(channels), tuple(named))
     if KINDS[found.kind].takes_channels and not found.other:
         return _recording_text(path, found, channels)
-    raw = read_csv(path)
+    raw = read_table(path)
     headings = {source.name: quantity.rpartition(".")[2] for quantity, source in named.items()}
     if found.other:
         return table_text(raw, found, either(path, raw, found), None, "", headings)

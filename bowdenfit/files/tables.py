@@ -1,0 +1,24 @@
+"""Tables of readings in whatever file they are kept."""
+
+from pathlib import Path
+
+from bowdenfit.files.csv_table import RawTable, read_csv
+
+WORKBOOKS = (".xlsx", ".xlsm")
+
+
+def read_table(path: Path, most: int | None = None) -> RawTable:
+    """Read one table from a CSV file or an Excel workbook.
+
+    Args:
+        path: The file.
+        most: Number of its first rows that are enough; all if omitted.
+
+    Raises:
+        DatasetError: See `read_csv` and `read_workbook`.
+    """
+    if path.suffix.lower() not in WORKBOOKS:
+        return read_csv(path, most)
+    from bowdenfit.files.workbook_table import read_workbook
+
+    return read_workbook(path, most)

@@ -79,6 +79,12 @@ class LoopStrokes:
         "out."
     )
 
+    @staticmethod
+    def contact(loop: Hysteresis, velocity: Vector) -> Labels:
+        """Contact of each block, as the operator has it."""
+        del velocity
+        return loop.state
+
     def usable(self, blocks: Blocks) -> Flags:
         """Blocks inside the range of the load cells."""
         return ~blocks.saturated

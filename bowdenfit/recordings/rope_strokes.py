@@ -7,6 +7,7 @@ import numpy as np
 
 from bowdenfit.description import Phase
 from bowdenfit.errors import DatasetError
+from bowdenfit.recordings.one_way import refuse_dead, sliding_one_way
 from bowdenfit.recordings.preparation.play import Hysteresis, play, white_noise
 from bowdenfit.recordings.preparation.robust import robust_minimum
 from bowdenfit.recordings.recording import PULL, RETURN, SWITCH, Blocks
@@ -59,6 +60,7 @@ class RopeStrokes:
     """The steps of `strokes.find_strokes` that a single rope takes in its own way."""
 
     follow = staticmethod(fit_loop)
+    contact = staticmethod(sliding_one_way)
     unusable: ClassVar = (
         "have both forces above their noise and inside the range of the load cells; the usual cause is a sign, a unit or a "
         "tare that is wrong: see bowdenfit check."
@@ -73,6 +75,7 @@ class RopeStrokes:
         """Refuse a recording whose channels are the wrong way round, or that holds nothing but the return."""
         if by_hand:
             return
+        refuse_dead(loop.force_in, loop.force_out, file, name, loop)
         swap = (
             "if they are swapped, map them the other way round, such as --channel input_force=OUTPUT_CHANNEL --channel "
             "output_force=INPUT_CHANNEL"
@@ -159,7 +162,8 @@ def _remarks(name: str, found: set[int], loop: Hysteresis) -> tuple[str, ...]:
     elif len(found) == 1:
         which = "pulling" if PULL in found else "returning"
         remarks.append(
-            f"{name} is {which} throughout: a gain error of the load cells cannot be told from friction by it."
+            f"{name} is {which} throughout and has no loop: a gain error, or a zero that is wrong, cannot be told from "
+            "friction by it, and where it slides is known by the motor's motion or by both forces changing together."
         )
     if abs(loop.center) > 2.5 * _GAIN_SD and len(found) == 2:
         remarks.append(

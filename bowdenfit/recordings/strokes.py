@@ -10,6 +10,7 @@ import numpy as np
 from bowdenfit.description import Description, Phase
 from bowdenfit.errors import DatasetError
 from bowdenfit.recordings.loop_strokes import LoopStrokes
+from bowdenfit.recordings.one_way import refuse_dead
 from bowdenfit.recordings.preparation.noise import autocorrelation
 from bowdenfit.recordings.recording import PULL, RETURN, SWITCH, Blocks, Strokes
 from bowdenfit.recordings.rope_strokes import RopeStrokes
@@ -43,12 +44,14 @@ def find_strokes(
     _check_length(blocks, file, name, by_hand)
     usable = cable.usable(blocks)
     if usable.sum() < _FEWEST:
+        refuse_dead(blocks.input_force, blocks.output_force, file, name)
         raise DatasetError(f"{file}: only {int(usable.sum())} blocks of the recording {name!r} {cable.unusable}")
     loop = cable.follow(blocks.input_force[usable], blocks.output_force[usable])
-    velocity = _toward_motor(blocks.velocity[usable], loop.state)
+    contact = cable.contact(loop, blocks.velocity[usable])
+    velocity = _toward_motor(blocks.velocity[usable], contact)
     cable.refuse(loop, velocity, file, name, by_hand)
     state, moving = np.zeros(len(usable), dtype=int), np.ones(len(usable), dtype=bool)
-    state[usable], moving[usable] = loop.state, _moving_steadily(velocity, loop.state)
+    state[usable], moving[usable] = contact, _moving_steadily(velocity, contact)
     used = _inside_sliding(state) & usable & moving
     if by_hand:
         used &= ~np.any([_inside(blocks.time, span) for span in by_hand], axis=0)

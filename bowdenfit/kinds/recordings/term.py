@@ -90,10 +90,10 @@ def _needs_blocks(recordings: Recordings, parts: "list[_Part]") -> None:
     for run in recordings.runs:
         mine = [r for r in recordings.each if r.run == run]
         if not any(len(p.used) for r, p in zip(recordings.each, parts, strict=True) if r.run == run):
+            under_tension = np.concatenate([positive(r) for r in mine]).mean() > _MOSTLY
+            why = _NO_SLIDING if under_tension else _NO_TENSION
             raise DatasetError(
-                f"{mine[0].file}: nothing of the run {run!r} can be used, because while the rope slides no block has both "
-                "forces above 0 inside the cells' ranges; the usual causes are a wrong tare, swapped or inverted channels, "
-                "or a pull that hardly moved: look at it with `bowdenfit check FILE`, or leave the recording out."
+                f"{mine[0].file}: nothing of the run {run!r} can be used, because {why}; or leave the recording out."
             )
 
 
@@ -103,6 +103,18 @@ def _needs_reversal(recording: Recording) -> None:
             f"{recording.file}: the recording {recording.name!r} has no reversal, and the play operator has nothing to show "
             'without one; record a pull and a return, or set likelihood = "runs" for the recordings.'
         )
+
+
+_MOSTLY = 0.9  # share of the blocks that are readings of a rope under tension, from which tension is not what is missing
+_NO_TENSION = (
+    "while the rope slides no block has both forces above 0 inside the cells' ranges; the usual causes are a wrong tare, "
+    "swapped or inverted channels, or a pull that hardly moved: look at it with `bowdenfit check FILE`"
+)
+_NO_SLIDING = (
+    "nothing shows that the rope slides: the forces neither make a loop nor rise together at both ends, and no velocity says "
+    "that the motor moves. Record through a reversal, map the velocity, or say where it slides under its [[recording]], "
+    'strokes = [{ start = ..., end = ..., stroke = "pull" }]'
+)
 
 
 @dataclass(frozen=True)

@@ -55,8 +55,9 @@ def correlation_time(values: Vector) -> float:
     References:
         Sokal, Monte Carlo methods in statistical mechanics (1997), section 3: the window is five times the time itself.
     """
-    n, correlation = len(values), autocorrelation(values)
-    if n < 4 or correlation is None:
+    n = len(values)
+    correlation = autocorrelation(values) if n >= 4 else None
+    if correlation is None:
         return 1.0
     times = 2 * np.cumsum(correlation[: n // 2]) - 1
     wide_enough = np.arange(len(times)) >= 5 * times

@@ -61,10 +61,11 @@ def test_draws_of_another_fit_are_refused(finished, on_body, tmp_path):
         bf.load(folder)
 
 
-@pytest.mark.parametrize("length", [float("nan"), float("inf")])
+@pytest.mark.parametrize("length", [float("nan"), float("inf"), (float("nan"), "mm")])
 def test_what_is_no_length_is_refused(finished, length):
     with pytest.raises(bf.UsageError, match="is no length"):
         bf.predict(bf.load(finished), [length])
+    assert len(bf.predict(bf.load(finished), [(455, "mm"), 460])) == 2
 
 
 @pytest.mark.parametrize(

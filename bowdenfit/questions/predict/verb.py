@@ -67,7 +67,8 @@ def predict(
         raise UsageError(
             "--quantity efficiency at lengths is that at the fit's own reference force; leave --input-force out."
         )
-    if odd := [length for length in lengths or () if not np.isfinite(length)]:
+    numbers = [length[0] if isinstance(length, tuple) else length for length in lengths or ()]
+    if odd := [number for number in numbers if not np.isfinite(number)]:
         raise UsageError(f"{odd[0]} is no length; name the lengths to predict at as numbers.")
     if not lengths and route is not None and not route.choices:
         raise UsageError("the description has no choices; name the lengths to predict at.")

@@ -15,7 +15,7 @@ from typing import Any
 import jax
 
 from bowdenfit.inference.batch.ensembles import STEPS
-from bowdenfit.inference.batch.programs import CHUNK, BatchPrograms, BatchSettings
+from bowdenfit.inference.batch.programs import CHUNK, WALKING, BatchPrograms, BatchSettings
 from bowdenfit.inference.batch.stages import BatchFit, Case, by_nuts, look, walk, weigh
 from bowdenfit.inference.log_density import LogDensity
 
@@ -52,14 +52,16 @@ def _fit_group(
 ) -> list[BatchFit]:
     """Fits of as many data sets as memory is given to at once."""
 
-    def in_chunks(function: Callable[[BatchPrograms, list[Any]], list[Case]], parts: Sequence[Any]) -> list[Case]:
+    def in_chunks(
+        function: Callable[[BatchPrograms, list[Any]], list[Case]], parts: Sequence[Any], count: int = CHUNK
+    ) -> list[Case]:
         """What a function gives of all parts, chunk by chunk."""
 
         def in_64_bits(chunk: list[Any]) -> list[Case]:
             with jax.enable_x64(True):  # the setting is each thread's own
                 return function(programs, chunk)
 
-        chunks = [list(parts[i : i + CHUNK]) for i in range(0, len(parts), CHUNK)]
+        chunks = [list(parts[i : i + count]) for i in range(0, len(parts), count)]
         return [case for cases in pool.map(in_64_bits, chunks) for case in cases]
 
     _ = programs.gradients, programs.densities, programs.noise, programs.names
@@ -69,7 +71,7 @@ def _fit_group(
     while walking := [case for case in done.values() if len(case.fit.z) and case.fit.reasons and case.rounds < limit]:
         _ = programs.ensembles
         for _ in range(walking[0].rounds, target):
-            walking = in_chunks(walk, walking)
+            walking = in_chunks(walk, walking, WALKING)
         done |= {case.number: case for case in in_chunks(look, walking)}
         target = min(target + max(target // 3, 1), limit)
     for case in done.values():

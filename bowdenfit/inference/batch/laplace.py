@@ -16,10 +16,10 @@ Gradients = Callable[[np.ndarray], tuple[np.ndarray, np.ndarray]]
 
 STARTS = 4  # places that each density is climbed from: the prior medians, and draws of the prior
 _ASIDE = (-2.0, 1.5, 3.0)  # standard deviations from its maximum at which each noise scale is held
-_MOST_STEPS, _DIFFERENCE = 60, 1e-5
+_MOST_STEPS, _DIFFERENCE = 30, 1e-5
 _FLAT = 0.2  # least curvature that is believed; the prior's is 1
 _LONGEST = 3.0  # step, in standard deviations of the prior
-_TOP = 1e-9  # gain that a step promises at which the top is reached
+_TOP = 1e-4  # gain that a step promises at which the top is near enough to draw about it
 _STUCK = 1e8  # damping at which no step gains anything
 _LEAST_SHARE = 0.02  # of each part in the draws
 
@@ -58,7 +58,7 @@ def climb(gradients: Gradients, z: np.ndarray, free: np.ndarray) -> Tops:
         active &= (np.sum(slope * free * step, axis=-1) > _TOP) & (damping < _STUCK)
         if not active.any():
             break
-        step *= np.minimum(1.0, _LONGEST / np.maximum(np.abs(step).max(axis=-1, keepdims=True), _TOP))
+        step *= _LONGEST / np.maximum(np.abs(step).max(axis=-1, keepdims=True), _LONGEST)
         trial = _around(gradients, z + step)
         better = active & (trial[0] > value)
         z, value = np.where(better[..., None], z + step, z), np.where(better, trial[0], value)

@@ -1,4 +1,4 @@
-"""How walkers of a batch are moved: the proposals of `proposals` and the charts of `value_chart`, in JAX.
+"""How walkers of a batch are moved: the proposals of `proposals`, in JAX.
 
 A move takes numbers drawn uniformly between 0 and 1, `numbers_of_move` for each walker, and the two halves of one ensemble,
 the one that moves and the one that rests, (walker, parameter). It gives places for the moving half, and the log of what the
@@ -15,21 +15,12 @@ from functools import partial
 
 import jax
 import jax.numpy as jnp
-import numpy as np
 from jax import Array
 
-from bowdenfit.inference.proposals import FREEDOM, GAMMA_SPREAD, JITTER, WIDEST_STRETCH, shares_of_moves
-from bowdenfit.inference.value_chart import NODES, Chart
+from bowdenfit.inference.proposals import FREEDOM, GAMMA_SPREAD, JITTER, WIDEST_STRETCH
 
 Move = Callable[[Array, Array, Array], tuple[Array, Array]]
 Moves = Sequence[tuple[Move, float]]
-
-_WIDTH = float(NODES[1] - NODES[0])
-
-
-def batch_moves(chart: Chart) -> Moves:
-    """What the walkers do, and how often: as in `ensemble.default_moves`."""
-    return shares_of_moves(stretch, differential_evolution, independent, partial(in_values, chart=chart))
 
 
 def numbers_of_move(size: int) -> int:
@@ -78,37 +69,9 @@ def _log_t(standardized: Array) -> Array:
     return -(FREEDOM + standardized.shape[-1]) / 2 * jnp.log1p(jnp.sum(standardized**2, axis=-1) / FREEDOM)
 
 
-def in_values(move: Move, chart: Chart) -> Move:
-    """The same move, made in the coordinates of a chart."""
-    if not len(chart.which):
-        return move
-
-    def moved(uniform: Array, moving: Array, resting: Array) -> tuple[Array, Array]:
-        present, volume = _from_z(chart, moving)
-        places, factors = move(uniform, present, _from_z(chart, resting)[0])
-        z, new_volume = _to_z(chart, places)
-        return z, factors + volume - new_volume
-
-    return moved
-
-
-def _from_z(chart: Chart, z: Array) -> tuple[Array, Array]:
-    """`Chart.from_z`."""
-    along = (z[:, chart.which] - NODES[0]) / _WIDTH
-    node = jnp.clip(along, 0, len(NODES) - 2).astype(int)
-    found = _taken(chart.values, node) + (along - node) * _taken(chart.rises, node)
-    return z.at[:, chart.which].set(found), _taken(chart.log_slopes, node).sum(axis=1)
-
-
-def _to_z(chart: Chart, found: Array) -> tuple[Array, Array]:
-    """`Chart.to_z`."""
-    at, inner = found[:, chart.which], jnp.asarray(chart.values[1:-1])
-    search = jax.vmap(partial(jnp.searchsorted, side="right"), in_axes=1, out_axes=1)
-    node = search(inner, at)
-    along = node + (at - _taken(chart.values, node)) / _taken(chart.rises, node)
-    return found.at[:, chart.which].set(NODES[0] + _WIDTH * along), _taken(chart.log_slopes, node).sum(axis=1)
-
-
-def _taken(table: np.ndarray, node: Array) -> Array:
-    """Of each column of a table the rows of its nodes."""
-    return jnp.take(jnp.asarray(table), node * table.shape[1] + jnp.arange(table.shape[1]), mode="clip")
+MOVES: Moves = (
+    (stretch, 0.1),
+    (differential_evolution, 0.35),
+    (partial(differential_evolution, gamma=1.0), 0.05),
+    (independent, 0.5),
+)

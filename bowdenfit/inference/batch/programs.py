@@ -10,14 +10,19 @@ import numpy as np
 
 from bowdenfit.description import SamplerSettings
 from bowdenfit.inference.batch.ensembles import make_round
+from bowdenfit.inference.batch.conditional import Conditional
+from bowdenfit.inference.batch.frames import batch_frames
 from bowdenfit.inference.batch.laplace import points_of_climb
 from bowdenfit.inference.batch.weights import BLOCK
 from bowdenfit.inference.compilation import compile_program
 from bowdenfit.inference.log_density import LogDensity
 from bowdenfit.inference.objective import noise_scales
+from bowdenfit.inference.value_chart import chart_values
 
 FITTED = 4  # walkers a parameter, at the least
-CHUNK = 8  # data sets that a program takes at once; always as many, so that rounding is the same
+# Data sets that a program takes at once, always as many, so that rounding is the same: to weigh, and to walk, where the last few
+# may go on for long.
+CHUNK, WALKING = 16, 4
 
 
 @dataclass(frozen=True)
@@ -59,14 +64,10 @@ class BatchPrograms:
     posterior: LogDensity
     settings: BatchSettings
 
-    @cached_property
-    def _data(self) -> Any:
-        return stack([self.posterior.data] * CHUNK)
-
     def _of_points(self, function: Callable[..., Any], count: int) -> Callable[..., Any]:
         """Compiled: what a function of z and data gives at so many points of each data set."""
         shape = jax.ShapeDtypeStruct((CHUNK, count, self.posterior.model.space.size), np.dtype(float))
-        return compile_program(jax.vmap(jax.vmap(function, (0, None))), shape, self._data)
+        return compile_program(jax.vmap(jax.vmap(function, (0, None))), shape, stack([self.posterior.data], CHUNK))
 
     @cached_property
     def gradients(self) -> Callable[..., Any]:
@@ -82,7 +83,9 @@ class BatchPrograms:
     @cached_property
     def ensembles(self) -> Callable[..., Any]:
         """A round of all walkers."""
-        return make_round(self.posterior, self.settings.sampler.n_ensembles, self.n_walkers, self._data)
+        frames = batch_frames(chart_values(self.posterior.model.space), Conditional(self.posterior))
+        data = stack([self.posterior.data], WALKING)
+        return make_round(self.posterior, frames, self.settings.sampler.n_ensembles, self.n_walkers, data)
 
     @property
     def n_walkers(self) -> int:
@@ -110,7 +113,7 @@ class BatchPrograms:
         return tuple(p.name for p in self.posterior.model.space.free)
 
 
-def stack(trees: Sequence[Any]) -> Any:
-    """Data of several data sets, along a new first axis, and the last again up to a whole chunk."""
-    padded = [*trees, *[trees[-1]] * (CHUNK - len(trees))]
+def stack(trees: Sequence[Any], count: int) -> Any:
+    """Data of several data sets, along a new first axis, and the last again up to a count."""
+    padded = [*trees, *[trees[-1]] * (count - len(trees))]
     return jax.tree.map(lambda *leaves: np.stack(leaves), *padded)

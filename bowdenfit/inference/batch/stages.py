@@ -8,7 +8,7 @@ import numpy as np
 from bowdenfit.inference.batch.diagnostics import diagnose_few_draws, remembered
 from bowdenfit.inference.batch.ensembles import STEPS, STORED
 from bowdenfit.inference.batch.laplace import mixtures
-from bowdenfit.inference.batch.programs import CHUNK, BatchPrograms, stack
+from bowdenfit.inference.batch.programs import CHUNK, WALKING, BatchPrograms, stack
 from bowdenfit.inference.batch.weights import BLOCK, Weighted, evened, resample, weighted_draws
 from bowdenfit.inference.chain import Sampling, stuck_walkers
 from bowdenfit.inference.diagnostics import Diagnostics, shortfalls
@@ -71,7 +71,7 @@ class Case:
 
 def weigh(programs: BatchPrograms, parts: list[tuple[int, Any, int]]) -> list[Case]:
     """Weighted draws of a chunk of data sets."""
-    seeds, data = np.array([seed for *_, seed in parts]), stack([data for _, data, _ in parts])
+    seeds, data = np.array([seed for *_, seed in parts]), stack([data for _, data, _ in parts], CHUNK)
     padded = np.concatenate([seeds, np.repeat(seeds[-1:], CHUNK - len(seeds))])
     begun = mixtures(lambda z: programs.gradients(z, data), programs.noise, padded)
     drawing = {
@@ -110,10 +110,10 @@ def _by_weights(programs: BatchPrograms, weighted: Weighted | None) -> BatchFit:
 def walk(programs: BatchPrograms, cases: list[Case]) -> list[Case]:
     """A round of the walkers of a chunk of data sets, which have gone as many."""
     begun = [case if case.rounds else _on_the_way(programs, case) for case in cases]
-    padded = [*begun, *[begun[-1]] * (CHUNK - len(begun))]
+    padded = [*begun, *[begun[-1]] * (WALKING - len(begun))]
     seeds, number = np.array([case.seed for case in padded], dtype=np.uint32), np.uint32(begun[0].rounds)
     z, log_density = (np.stack([case.walkers[i] for case in padded]) for i in (0, 1))
-    answer = programs.ensembles(seeds, number, z, log_density, stack([case.data for case in padded]))
+    answer = programs.ensembles(seeds, number, z, log_density, stack([case.data for case in padded], WALKING))
     path, log_density = (np.asarray(part) for part in answer)
     return [_further(case, path[i], log_density[i]) for i, case in enumerate(begun)]
 

@@ -9,8 +9,8 @@ import jax
 import numpy as np
 
 from bowdenfit.description import SamplerSettings
-from bowdenfit.inference.batch.ensembles import make_round
 from bowdenfit.inference.batch.conditional import Conditional
+from bowdenfit.inference.batch.ensembles import make_round
 from bowdenfit.inference.batch.frames import batch_frames
 from bowdenfit.inference.batch.laplace import points_of_climb
 from bowdenfit.inference.batch.weights import BLOCK
@@ -20,8 +20,8 @@ from bowdenfit.inference.objective import noise_scales
 from bowdenfit.inference.value_chart import chart_values
 
 FITTED = 4  # walkers a parameter, at the least
-# Data sets that a program takes at once, always as many, so that rounding is the same: to weigh, and to walk, where the last few
-# may go on for long.
+# Data sets that a program takes at once, always as many, so that rounding is the same: to weigh, and to walk, where the last
+# few may go on for long.
 CHUNK, WALKING = 16, 4
 
 

@@ -3,8 +3,10 @@
 from pathlib import Path
 
 import jax
+import jax.numpy as jnp
 import numpy as np
 import pytest
+from rows import of_rows
 
 import bowdenfit as bf
 from bowdenfit.dataset import load_dataset
@@ -13,14 +15,22 @@ from bowdenfit.inference.batch.fitting import fit_batch
 from bowdenfit.inference.batch.programs import BatchPrograms, BatchSettings
 from bowdenfit.inference.log_density import LogDensity
 from bowdenfit.model import build_model
+from bowdenfit.questions.calibrate.refit import RANKS
 
 DATA = Path(__file__).parents[2] / "datasets"
 DATA_SETS = sorted(path.parent.name for path in DATA.glob("*/cable.toml"))
+RIDGE = np.deg2rad([(200.0, 30.0, 20.0), (60.0, 90.0, 30.0), (90.0, 30.0, 60.0)])  # angles of rows and contacts
 ON_BODY, YARN = "on-body-exoskeleton", "yarn-on-cylinder"
 QUICK = BatchSettings(
-    SamplerSettings(n_ensembles=2, n_walkers=64, max_steps=600, target_ess=300, target_r_hat=1.05), nuts=False
+    SamplerSettings(n_ensembles=2, n_walkers=64, max_steps=600, target_ess=300, target_r_hat=1.05),
+    target_sd_error=np.inf,
+    nuts=False,
 )
-ACCURATE = BatchSettings(SamplerSettings(n_ensembles=2, n_walkers=64, target_ess=1000, target_r_hat=1.02), n_kept=4096)
+ACCURATE = BatchSettings(
+    SamplerSettings(n_ensembles=2, n_walkers=64, max_steps=20_000, target_ess=1000, target_r_hat=1.02),
+    n_kept=4096,
+    nuts=False,
+)
 
 
 @pytest.fixture(scope="module", params=[ON_BODY, YARN])
@@ -65,14 +75,48 @@ def test_a_data_set_that_cannot_be_computed_says_so_and_hurts_no_other(programs)
         np.testing.assert_array_equal(fits[i].z, alone[i].z)
 
 
+def test_small_scatters_are_drawn_as_often_as_quadrature_says():
+    """Three rows for three coefficients: the smaller the scatter between mountings, the narrower their ridge, without end.
+
+    Shares of draws below four quantiles, of sixteen seeds: one of them is 4.5 errors off by chance once in a thousand sets of
+    seeds. That small ones are found often enough for an error of 0.002 is what the coordinates of the ridge are for: it is
+    0.0010 with them and 0.0026 without.
+    """
+    posterior = LogDensity(build_model(of_rows(RIDGE @ np.array([0.1, 0.15, 0.12]), RIDGE)))
+    levels = np.array([0.02, 0.05, 0.5, 0.95])
+    fits = fit_batch(posterior, [posterior.data] * 16, range(16), RANKS)
+    shares = np.array([[np.mean(fit.z[:, -1] < at) for at in quantiles_of_scatter(posterior, levels)] for fit in fits])
+    errors = shares.std(axis=0, ddof=1) / np.sqrt(len(fits))
+    assert not any(fit.reasons for fit in fits)
+    assert errors[0] < 0.002
+    np.testing.assert_array_less(np.abs(shares.mean(axis=0) - levels), 4.5 * errors)
+
+
+def quantiles_of_scatter(posterior: LogDensity, levels: np.ndarray) -> np.ndarray:
+    """Of tau in z, with the coefficients integrated out over the errors of the rows: at each tau the readings less errors drawn
+    at random say what the coefficients are, and their prior density there is averaged.
+    """
+    mu, tau = (posterior.model.space.free[i].prior for i in (0, -1))
+    grid, errors = np.linspace(-5, 5, 401), np.random.default_rng(0).standard_normal((20_000, 3))
+    loss, density = RIDGE @ np.array([0.1, 0.15, 0.12]), []
+    for scatter in np.asarray(tau.constrain(jnp.asarray(grid))):
+        found = (loss + scatter * errors) @ np.linalg.inv(RIDGE).T
+        positive = np.where(found > 0, found, 1.0)
+        z = np.log(positive / mu.median) / mu.log_sd
+        density.append(np.mean(np.all(found > 0, axis=1) * np.exp(-0.5 * np.sum(z**2, axis=1)) / positive.prod(axis=1)))
+    below = np.cumsum(np.array(density) * np.exp(-(grid**2) / 2))
+    return np.interp(levels, below / below[-1], grid)
+
+
 @pytest.mark.parametrize("name", [YARN, *(pytest.param(n, marks=pytest.mark.slow) for n in DATA_SETS if n != YARN)])
 def test_a_batch_agrees_with_a_single_fit(name):
     """Means to 0.1 sd and sds to 10 % of every parameter, at one seed.
 
-    Where both have 1000 effective draws, the difference of means has an error of 0.045 sd and that of sds one of 3 % of a
-    normal posterior, more of one with wide tails: bounds that catch a wrong posterior and not small bias.
+    On-body sds need many draws, because a coefficient's tails are so long in z (kurtosis 28): the batch knows them to 3.3 %,
+    six thousand effective draws of a single fit to 3.4 %, so that chance takes the worst one beyond 10 % once in thirty seeds.
     """
-    single = bf.fit(DATA / name, seed=1).posterior.z
+    longer = ["sampler.target_ess=6000", "sampler.max_steps=12000"] if name == ON_BODY else []
+    single = bf.fit(DATA / name, seed=1, settings=longer).posterior.z
     posterior = LogDensity(build_model(load_dataset(DATA / name)))
     (fit,) = fit_batch(posterior, [posterior.data], [1], ACCURATE)
     assert fit.reasons == ()

@@ -37,7 +37,7 @@ class Laboratory:
 
     def __init__(self, disturb: Callable[[Dataset], Dataset] = lambda dataset: dataset, sampler=SAMPLER):
         self.disturb, self.sampler, self.programs = disturb, sampler, {}
-        self.fits, self.benches = Fits(BatchSettings(sampler)), {}
+        self.fits, self.benches = Fits(BatchSettings(sampler, target_sd_error=np.inf)), {}
 
     def least_squares(self, dataset: Dataset) -> LeastSquares:
         """Classical estimates, as a fit without MCMC gives them."""

@@ -29,3 +29,23 @@ def remembered(diagnostics: Mapping[str, Diagnostics], least: int) -> tuple[str,
         for name, d in diagnostics.items()
         if not d.ess_bulk >= least
     )
+
+
+def sd_errors(draws: Mapping[str, np.ndarray]) -> dict[str, float]:
+    """Monte Carlo error of each standard deviation as a share of it; draws are (walker, draw)."""
+    from arviz_stats.base import array_stats
+
+    return {
+        name: float(array_stats.mcse(each, method="sd", chain_axis=0, draw_axis=1) / np.std(each))
+        for name, each in draws.items()
+        if np.ptp(each) > 0
+    }
+
+
+def uncertain_sds(errors: Mapping[str, float], most: float) -> tuple[str, ...]:
+    """Which standard deviations are not known well enough, in words."""
+    return tuple(
+        f"the standard deviation of {name} is known to {error:.1%} and should be to {most:.1%}"
+        for name, error in errors.items()
+        if not error <= most
+    )

@@ -32,6 +32,8 @@ class BatchSettings:
     Args:
         sampler: Ensembles, their walkers at the least (a power of two), most steps, and targets; those of NUTS where it is
             needed.
+        target_sd_error: Largest Monte Carlo error of a standard deviation, as a share of it; a tenth is hardly ever exceeded.
+            Long tails need many more draws for it than for a mean or a rank.
         n_kept: Draws of equal weight that are made of weighted ones.
         nuts: Whether NUTS takes what the ensembles leave.
         threads: How many chunks at once; as many as there are cores if omitted.
@@ -39,9 +41,10 @@ class BatchSettings:
 
     sampler: SamplerSettings = field(
         default_factory=lambda: SamplerSettings(
-            n_ensembles=2, n_walkers=64, max_steps=6000, target_ess=400, target_r_hat=1.03
+            n_ensembles=2, n_walkers=64, max_steps=20_000, target_ess=400, target_r_hat=1.03
         )
     )
+    target_sd_error: float = 0.033
     n_kept: int = 2048
     nuts: bool = True
     threads: int = 0

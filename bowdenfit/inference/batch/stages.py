@@ -5,7 +5,7 @@ from typing import Any
 
 import numpy as np
 
-from bowdenfit.inference.batch.diagnostics import diagnose_few_draws, remembered
+from bowdenfit.inference.batch.diagnostics import diagnose_few_draws, remembered, sd_errors, uncertain_sds
 from bowdenfit.inference.batch.ensembles import STEPS, STORED
 from bowdenfit.inference.batch.laplace import mixtures
 from bowdenfit.inference.batch.programs import CHUNK, WALKING, BatchPrograms, stack
@@ -14,7 +14,7 @@ from bowdenfit.inference.chain import Sampling, stuck_walkers
 from bowdenfit.inference.diagnostics import Diagnostics, shortfalls
 from bowdenfit.inference.least_squares import MaximumPosterior
 
-_KEPT_PER_WALKER = 20
+_KEPT_PER_WALKER, _KEPT_PER_WALKER_FOR_SDS = 20, 100
 FORGETS = 3  # effective draws that each walker makes by itself, so that where it started is forgotten
 _SPREAD = 2  # effective draws for every walker that the starts of ensembles are drawn from, at the least
 _UNKNOWN = (
@@ -103,6 +103,7 @@ def _by_weights(programs: BatchPrograms, weighted: Weighted | None) -> BatchFit:
         return BatchFit(np.zeros((0, len(programs.names))), "laplace", float("inf"), {}, (_UNKNOWN,))
     diagnostics = weighted.diagnose(programs.names)
     reasons = weighted.shortfalls(diagnostics, settings.sampler.target_ess)
+    reasons += uncertain_sds(weighted.sd_errors(programs.names), settings.target_sd_error)
     kept = resample(np.exp(weighted.log_weights), settings.n_kept, 0.5)
     return BatchFit(weighted.z[kept], "laplace", weighted.pareto_k, diagnostics, reasons)
 
@@ -153,12 +154,16 @@ def look(programs: BatchPrograms, cases: list[Case]) -> list[Case]:
 def _by_ensembles(programs: BatchPrograms, case: Case) -> BatchFit:
     sampler, stored = programs.settings.sampler, case.rounds * STORED
     second = case.path[-(stored // 2) :]
-    kept = np.unique(np.linspace(0, len(second) - 1, _KEPT_PER_WALKER).round().astype(int))
+    strict = bool(np.isfinite(programs.settings.target_sd_error))
+    per_walker = _KEPT_PER_WALKER_FOR_SDS if strict else _KEPT_PER_WALKER
+    kept = np.unique(np.linspace(0, len(second) - 1, per_walker).round().astype(int))
     z = second[kept].transpose(1, 2, 0, 3).reshape(-1, len(kept), len(programs.names))
     draws = {name: z[..., i] for i, name in enumerate(programs.names)}
     diagnostics = diagnose_few_draws(draws, sampler.n_ensembles)
     short = shortfalls(diagnostics, sampler.target_r_hat, sampler.target_ess)
     reasons = (*short, *remembered(diagnostics, FORGETS * len(z)), *stuck_walkers(z))
+    if strict and not reasons:
+        reasons = uncertain_sds(sd_errors(draws), programs.settings.target_sd_error)
     steps = case.rounds * STEPS
     return BatchFit(z.reshape(-1, z.shape[-1]), "ensembles", case.fit.pareto_k, diagnostics, reasons, steps)
 
@@ -173,5 +178,7 @@ def by_nuts(programs: BatchPrograms, case: Case) -> BatchFit:
     posterior = replace(programs.posterior, given=case.data)
     asked = Sampling(posterior, start, programs.settings.sampler, case.seed, diagnose=diagnose_few_draws)
     chain = sample(asked, programs.nuts)
+    draws = {name: chain.z[..., i] for i, name in enumerate(programs.names)}
+    reasons = chain.reasons or uncertain_sds(sd_errors(draws), programs.settings.target_sd_error)
     z = chain.z.reshape(-1, chain.z.shape[-1])
-    return BatchFit(z, "nuts", case.fit.pareto_k, chain.diagnostics, chain.reasons, chain.steps)
+    return BatchFit(z, "nuts", case.fit.pareto_k, chain.diagnostics, reasons, chain.steps)

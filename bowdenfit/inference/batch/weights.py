@@ -66,6 +66,14 @@ class Weighted:
             for i, name in enumerate(names)
         }
 
+    def sd_errors(self, names: tuple[str, ...]) -> dict[str, float]:
+        """Monte Carlo error of each standard deviation as a share of it (section 3.2.3, of the square deviations)."""
+        weights = np.exp(self.log_weights)
+        squares = (self.z - weights @ self.z) ** 2
+        variance = weights @ squares
+        errors = np.sqrt(weights**2 @ (squares - variance) ** 2) / (2 * np.maximum(variance, np.finfo(float).tiny))
+        return dict(zip(names, errors.tolist(), strict=True))
+
     def shortfalls(self, diagnostics: Mapping[str, Diagnostics], target_ess: int) -> tuple[str, ...]:
         """What keeps the draws from being trusted, in words; empty if nothing does."""
         most, reasons = reliable_k(len(self.z)), []

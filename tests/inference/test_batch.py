@@ -78,8 +78,8 @@ def test_a_data_set_that_cannot_be_computed_says_so_and_hurts_no_other(programs)
 def test_small_scatters_are_drawn_as_often_as_quadrature_says():
     """Three rows for three coefficients: the smaller the scatter between mountings, the narrower their ridge, without end.
 
-    Shares of draws below four quantiles, of sixteen seeds: one of them is 4.5 errors off by chance once in a thousand sets of
-    seeds. That small ones are found often enough for an error of 0.002 is what the coordinates of the ridge are for: it is
+    Shares of draws below four quantiles, of sixteen seeds: one of them is 4.5 errors off by chance once in five hundred sets
+    of seeds. That small ones are found often enough for an error of 0.002 is what the coordinates of the ridge are for: it is
     0.0010 with them and 0.0026 without.
     """
     posterior = LogDensity(build_model(of_rows(RIDGE @ np.array([0.1, 0.15, 0.12]), RIDGE)))

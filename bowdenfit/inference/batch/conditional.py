@@ -46,11 +46,16 @@ class Conditional:
         terms, data = self.posterior.model.terms, self.posterior.data
         others = self.posterior.model.space.constrain(jnp.zeros(self.posterior.model.space.size))
         own = {p.name: others[p.name] for p in self._coefficients}
-        return [
-            i
-            for i, term in enumerate(terms)
-            if _depends(lambda own, i=i, term=term: term.residuals(others | own, data[i]), own)
-        ]
+
+        def depends(term: Any, data: Any) -> bool:
+            return _depends(lambda coefficients: term.residuals(others | coefficients, data), own)
+
+        return [i for i, each in enumerate(zip(terms, data, strict=True)) if depends(*each)]
+
+    @property
+    def is_told(self) -> bool:
+        """Whether readings say anything of coefficients."""
+        return len(self.which) > 0 and len(self._rubbing) > 0
 
     def to_w(self, z: Array, data: Any) -> Array:
         """W of one z."""

@@ -42,7 +42,7 @@ def batch_frames(chart: Chart, conditional: Conditional) -> Frames:
     friction coefficient, half of all is done in values as in a single fit.
     """
     values = in_values(chart) if len(chart.which) else IN_Z
-    if not len(conditional.which):
+    if not conditional.is_told:
         return (IN_Z, 0.5), (values, 0.5)
     return (IN_Z, 0.25), (values, 0.25), (in_ridge(conditional), 0.5)
 

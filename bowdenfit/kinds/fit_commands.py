@@ -1,12 +1,9 @@
 """The one command that fits a file without a description, with the options that name what its headings do not say."""
 
-import re
 import shlex
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
-
-import numpy as np
 
 from bowdenfit.errors import DatasetError
 from bowdenfit.files.clocks import names_time
@@ -16,30 +13,13 @@ from bowdenfit.files.matching import Quantity, candidates
 from bowdenfit.files.naming import naming
 from bowdenfit.files.spellings import spelled
 from bowdenfit.files.tables import read_table
-from bowdenfit.kinds.single_file import FORCES, HEAD, FileKind, file_kind, numbers_in
-from bowdenfit.units import dimension_of, is_unit
+from bowdenfit.kinds.single_file import HEAD, FileKind, file_kind
+from bowdenfit.kinds.stated_angle import stated_angle
+from bowdenfit.kinds.unnamed_ends import HeadedColumn, columns_of, name_ends
+from bowdenfit.units import ColumnSource
 from bowdenfit.words import listed, shown
 
 WRAP_ANGLE = Quantity("wrap_angle", "angle")
-_ANY_ANGLE = "--wrap-angle 180deg"
-_SPREAD = re.compile(r"(?:^|[\W_])(?:sd|std|stdev|sem|unc|uncertainty|error|err|noise|dev|deviation)(?:$|[\W_])", re.IGNORECASE)
-
-
-@dataclass(frozen=True)
-class HeadedColumn:
-    """A column or channel of numbers as far as naming it goes.
-
-    Args:
-        name: What it is called.
-        unit: Unit that the file gives; empty without one.
-        mean, low, high: Of its values.
-    """
-
-    name: str
-    unit: str
-    mean: float = 0.0
-    low: float = 0.0
-    high: float = 0.0
 
 
 @dataclass(frozen=True)
@@ -55,27 +35,28 @@ class FitCommand:
     provided: tuple[str, ...] = ()
 
 
-def table_command(path: Path, table: RawTable, kind: str, stated: Sequence[str] = (), always: bool = False) -> FitCommand:
+def table_command(
+    path: Path, table: RawTable, kind: str, stated: Mapping[str, ColumnSource], always: bool = False
+) -> FitCommand:
     """The command that fits a table.
 
     Args:
         path: Its file.
         table: What was read of it.
         kind: Name of the kind of measurement.
-        stated: Options that the user has given already.
+        stated: What the user has named already, by quantity.
         always: Whether columns are named that say themselves what they are.
     """
     headings = list(zip(table.header, table.units, strict=True))
-    options, provided = list(stated), list[str]()
-    if kind == "forces" and not stated:
-        named, provided = name_ends(columns_of(table), "--column", always)
-        options += named
-    angle, of_angle = _wrap_angle(headings)
-    return _command(path, [*angle, *options], [*of_angle, *provided])
+    options, provided = list[str](), list[str]()
+    if kind == "forces":
+        options, provided = name_ends(columns_of(table), "--column", stated, always)
+    angle, of_angle = ([], []) if WRAP_ANGLE.name in stated else _wrap_angle(headings, path)
+    return _command(path, [*angle, *_named(stated, "--column"), *options], [*of_angle, *provided])
 
 
 def recording_command(
-    path: Path, columns: Sequence[HeadedColumn], has_clock: bool, stated: Sequence[str] = (), always: bool = False
+    path: Path, columns: Sequence[HeadedColumn], has_clock: bool, stated: Mapping[str, ColumnSource], always: bool = False
 ) -> FitCommand:
     """The command that fits a recording.
 
@@ -83,16 +64,15 @@ def recording_command(
         path: Its file.
         columns: Its channels, without clocks.
         has_clock: Whether the file gives the time of its samples.
-        stated: Options that the user has given already.
+        stated: What the user has named already, by quantity.
         always: Whether channels are named that say themselves what they are.
     """
-    options, provided = list(stated), list[str]()
-    if not stated:
-        options, provided = name_ends(columns, "--channel", always)
-    if not has_clock and not any(option.startswith("--channel time=") for option in stated):
+    options, provided = name_ends(columns, "--channel", stated, always)
+    if not has_clock and "time" not in stated:
         options.append("--channel time=1000Hz")
         provided.append("1000 Hz is its sampling rate")
-    return _command(path, [_ANY_ANGLE, *options], ["180 deg is the wrap angle of the bench", *provided])
+    angle, of_angle = _one_angle(path)
+    return _command(path, [*angle, *_named(stated, "--channel"), *options], [*of_angle, *provided])
 
 
 def either(path: Path, table: RawTable, found: FileKind) -> list[FitCommand]:
@@ -100,7 +80,7 @@ def either(path: Path, table: RawTable, found: FileKind) -> list[FitCommand]:
     kind = found.kind if found.other == "recordings" else found.other
     clocks = [i for i, heading in enumerate(table.header) if names_time(heading)]
     channels = [HeadedColumn(*_split(each.name, each.unit), each.mean) for each in columns_of(table)]
-    return [table_command(path, table, kind, (), True), recording_command(path, channels, bool(clocks), (), True)]
+    return [table_command(path, table, kind, {}, True), recording_command(path, channels, bool(clocks), {}, True)]
 
 
 def refuse_either(path: Path, table: RawTable, found: FileKind) -> DatasetError:
@@ -148,68 +128,13 @@ def has_own_angles(path: Path, kind: str, named: Sequence[str], stated: bool) ->
     return True
 
 
-def columns_of(table: RawTable) -> list[HeadedColumn]:
-    """The columns of numbers of a table but for clocks."""
-    found = []
-    for i, (heading, unit) in enumerate(zip(table.header, table.units, strict=True)):
-        known = [value for value in numbers_in(table, i) if np.isfinite(value)]
-        if heading and len(known) > len(table.rows) / 2 and not (names_time(heading) and not spelled(heading, unit)):
-            found.append(HeadedColumn(heading, unit, float(np.mean(known)), min(known), max(known)))
-    return found
-
-
-def name_ends(columns: Sequence[HeadedColumn], option: str, always: bool) -> tuple[list[str], list[str]]:
-    """Options that name the forces at both ends, and what they take for granted.
-
-    Args:
-        columns: Columns or channels of numbers.
-        option: "--column" or "--channel".
-        always: Whether forces are named that say themselves what they are.
-    """
-    can_be = candidates([(each.name, each.unit) for each in columns], FORCES)
-    ends = {name: columns[found[0].position] for name, found in can_be.items() if found}
-    sure = {name for name, found in can_be.items() if len(found) == 1}
-    provided = []
-    missing = [quantity.name for quantity in FORCES if quantity.name not in ends]
-    rest = _forces_among([each for each in columns if each not in ends.values()])
-    if missing and len(rest) == len(missing):
-        rest = sorted(rest, key=lambda each: -each.mean)  # a pulled cable loses force
-        ends |= dict(zip(missing, rest, strict=True))
-        provided += [f"{shown(ends[name].name)} is the {name}" for name in missing]
-    elif missing:
-        ends |= {name: HeadedColumn("NAME", "N") for name in missing}
-        provided += [f"NAME is the {option.removeprefix('--')} of the {name}" for name in missing]
-    elif len(sure) < len(FORCES):
-        provided += [f"{shown(ends[name].name)} is the {name}" for name in ends if name not in sure]
-    options = []
-    for name in (quantity.name for quantity in FORCES):
-        unit = "" if _unit(ends[name]) else "N"
-        if always or unit or name not in sure:
-            options.append(naming(name, ends[name].name, unit, option))
-    if any(not _unit(each) for each in ends.values()):
-        provided.append("the forces are in newtons, as the file does not say")
-    return options, provided
-
-
-def _forces_among(columns: Sequence[HeadedColumn]) -> list[HeadedColumn]:
-    """The columns that can be forces: those in units of force, or where there are none those without any unit."""
-    measured = [each for each in columns if not _SPREAD.search(each.name)]
-    of_force = [each for each in measured if (unit := _unit(each)) and is_unit(unit) and dimension_of(unit) == "force"]
-    return of_force or [each for each in measured if not _unit(each)]
-
-
-def _unit(column: HeadedColumn) -> str:
-    other = spelled(column.name, column.unit)
-    return (other.unit if other else "") or heading_of(column.name, column.unit).unit
-
-
 def _split(heading: str, unit: str) -> tuple[str, str]:
     """Name and unit as a recording has them."""
     both = heading_of(heading, unit)
     return both.name, both.unit
 
 
-def _wrap_angle(headings: Sequence[tuple[str, str]]) -> tuple[list[str], list[str]]:
+def _wrap_angle(headings: Sequence[tuple[str, str]], path: Path) -> tuple[list[str], list[str]]:
     """What gives the wrap angle of a table: a column of its own, one that may be, or the user."""
     if candidates(headings, (WRAP_ANGLE,))["wrap_angle"]:
         return [], []
@@ -222,7 +147,20 @@ def _wrap_angle(headings: Sequence[tuple[str, str]]) -> tuple[list[str], list[st
         best = next((heading for heading in likely if "measured" in heading.lower()), likely[0])
         rather = "" if len(likely) == 1 else f" rather than {listed([shown(each) for each in likely if each != best])}"
         return [naming("wrap_angle", best)], [f"{shown(best)} is the wrap angle{rather}"]
-    return [_ANY_ANGLE], ["180 deg is the wrap angle of the bench"]
+    return _one_angle(path)
+
+
+def _named(stated: Mapping[str, ColumnSource], option: str) -> list[str]:
+    return [naming(quantity, source.name, source.unit or "", option) for quantity, source in stated.items()]
+
+
+def _one_angle(path: Path) -> tuple[list[str], list[str]]:
+    """The wrap angle that a file states, or any."""
+    stated = stated_angle(path)
+    if stated is None:
+        return ["--wrap-angle 180deg"], ["180 deg is the wrap angle of the bench"]
+    angle, where = stated
+    return [f"--wrap-angle {angle}"], [f"{angle} is the wrap angle, as {where} says"]
 
 
 def _command(path: Path, options: Sequence[str], provided: Sequence[str]) -> FitCommand:

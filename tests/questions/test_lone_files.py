@@ -160,3 +160,42 @@ def test_forces_that_no_heading_tells_apart_are_proposed_by_their_size(tmp_path,
 )
 def test_loads_are_counted_where_readings_fall_together(forces, count):
     assert levels(np.array(forces)) == count
+
+
+def test_what_the_user_has_named_is_kept_and_the_other_end_found(tmp_path, run):
+    force, load = trials()
+    path = write(tmp_path, ("Cell A (N)", "Cell B (N)", "Cell C (N)"), (load, force, 2 * force))
+    _, out, _ = run("check", path, "--column", "input_force=Cell B (N)")
+    (words,) = command(out)
+    assert words[4:6] == ["--column", "input_force=Cell B (N)"] and words[6] == "--column"
+    path = write(tmp_path, ("Cell A (N)", "Cell B (N)"), (load, force), "two.csv")
+    _, out, _ = run("check", path, "--column", "input_force=Cell B (N)")
+    (words,) = command(out)
+    assert words[4:] == ["--column", "input_force=Cell B (N)", "--column", "output_force=Cell A (N)"]
+
+
+@pytest.mark.parametrize(
+    ("line", "angle"),
+    [
+        ("Wrap angle: 90 deg", "90deg"),
+        ("Umschlingungswinkel [°]: 270", "270deg"),
+        ("angle d'enroulement = 1,57 rad", "1.57rad"),
+        ("Ángulo de abrazamiento;120;°", "120deg"),
+        ("Radius: 25 mm, 90 readings", "180deg"),
+        ("Wrap angle: 90 deg, then wrap angle: 180 deg", "180deg"),
+    ],
+)
+def test_a_wrap_angle_that_stands_in_the_file_is_proposed(tmp_path, run, line, angle):
+    path = write(tmp_path, ("F_in (N)", "F_out (N)"), trials())
+    path.write_text(f"# {line}\n" + path.read_text(), encoding="utf-8")
+    _, out, _ = run("check", path)
+    assert command(out)[0][2:] == ["--wrap-angle", angle]
+    with pytest.raises(bf.DescriptionError, match="say the angle"):
+        bf.read(path)
+
+
+def test_a_wrap_angle_in_the_name_of_a_file_is_proposed(tmp_path, run):
+    path = write(tmp_path, ("F_in (N)", "F_out (N)"), trials(), "cable 3, 135 deg.csv")
+    _, out, _ = run("check", path)
+    assert command(out) == [["fit", str(path), "--wrap-angle", "135deg"]]
+    assert "as its name says" in " ".join(out.split())

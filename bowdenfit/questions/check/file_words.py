@@ -7,8 +7,9 @@ from bowdenfit.files.csv_table import RawTable
 from bowdenfit.files.headings import heading_of
 from bowdenfit.files.matching import candidates
 from bowdenfit.kinds import each_table
-from bowdenfit.kinds.fit_commands import FitCommand, columns_of
+from bowdenfit.kinds.fit_commands import FitCommand
 from bowdenfit.kinds.single_file import COLUMNS, FileKind
+from bowdenfit.kinds.unnamed_ends import columns_of
 from bowdenfit.questions.check.row_words import account_words, first_and_last
 from bowdenfit.words import filled, listed, table
 

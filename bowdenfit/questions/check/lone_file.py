@@ -8,18 +8,18 @@ from bowdenfit.errors import BowdenfitError, DatasetError
 from bowdenfit.files import read_channels
 from bowdenfit.files.channels import ChannelFile
 from bowdenfit.files.clocks import is_clock
-from bowdenfit.files.naming import naming, parse_sources
+from bowdenfit.files.naming import parse_sources
 from bowdenfit.files.tables import read_table
 from bowdenfit.kinds import KINDS
 from bowdenfit.kinds.fit_commands import (
     FitCommand,
-    HeadedColumn,
     either,
     has_own_angles,
     recording_command,
     table_command,
 )
 from bowdenfit.kinds.single_file import FileKind, file_kind
+from bowdenfit.kinds.unnamed_ends import HeadedColumn
 from bowdenfit.questions.check.channels_words import channels_text
 from bowdenfit.questions.check.file_words import table_text
 from bowdenfit.recordings.forces import parse_channels
@@ -48,8 +48,7 @@ def lone_file_text(path: Path, channels: Sequence[str] = (), columns: Sequence[s
     headings = {source.name: quantity.rpartition(".")[2] for quantity, source in named.items()}
     if found.other:
         return table_text(raw, found, either(path, raw, found), None, "", headings)
-    options = [naming(quantity, each.name, each.unit or "") for quantity, each in named.items()]
-    command = table_command(path, raw, found.kind, options)
+    command = table_command(path, raw, found.kind, named)
     data, why_not = _as_data_set(path, found, named)
     return table_text(raw, found, [command], data, why_not, headings)
 
@@ -70,9 +69,8 @@ def _recording_text(path: Path, found: FileKind, channels: Sequence[str]) -> str
 
 def _command(path: Path, file: ChannelFile, channels: Sequence[str]) -> FitCommand:
     signals = [each for each in file.channels if not is_clock(each)]
-    stated = [naming(quantity, each.name, each.unit or "", "--channel") for quantity, each in parse_channels(channels).items()]
     headed = [HeadedColumn(each.name, each.unit, float(each.values[each.values == each.values].mean())) for each in signals]
-    return recording_command(path, headed, any(each.time is not None for each in signals), stated)
+    return recording_command(path, headed, any(each.time is not None for each in signals), parse_channels(channels))
 
 
 def channels_of(path: str | Path, channels: Sequence[str] = ()) -> tuple[ChannelFile, Recordings | None, str]:

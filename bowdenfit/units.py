@@ -3,9 +3,9 @@
 import math
 import re
 from functools import cache
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Annotated
 
-from pydantic import BaseModel, ConfigDict
+from pydantic import BaseModel, ConfigDict, Field, model_validator
 
 from bowdenfit.errors import DatasetError
 from bowdenfit.words import shown
@@ -69,6 +69,27 @@ class ColumnSource(BaseModel):
 
     name: str
     unit: str | None = None
+
+
+class ChannelSource(ColumnSource):
+    """The same of a channel, which may hold counts or volts: a quantity is gain x (what the file says - offset), in the unit.
+
+    The gain is what one count is worth, the offset what the file says of no load, in counts; without a gain, in the unit.
+    """
+
+    gain: Annotated[float, Field(allow_inf_nan=False)] = 1.0
+    offset: Annotated[float, Field(allow_inf_nan=False)] = 0.0
+
+    @model_validator(mode="after")
+    def _gain_has_a_unit(self) -> "ChannelSource":
+        if self.gain == 0:
+            raise ValueError("a gain of 0 makes nothing of every reading; write what one count is worth")
+        if self.gain != 1 and self.unit is None:
+            raise ValueError(
+                f"gain = {self.gain:g} says what one count of {self.name} is worth, but not in which unit; write unit = \"N\" "
+                "(or the unit it is in) beside it"
+            )
+        return self
 
 
 @cache

@@ -5,7 +5,7 @@ from typing import Literal
 from pydantic import Field, model_validator
 
 from bowdenfit.description.values import Finite, Frozen, Name, QuantityValue
-from bowdenfit.units import ColumnSource, conversion_factor
+from bowdenfit.units import ChannelSource, conversion_factor
 
 
 class ForceLimits(Frozen):
@@ -73,7 +73,7 @@ class RecordingFile(Frozen):
     at: Finite | None = None
     wrap_angles: dict[str, QuantityValue] = Field(default_factory=dict)
     velocity: QuantityValue | None = None
-    channels: dict[str, ColumnSource] = Field(default_factory=dict)
+    channels: dict[str, ChannelSource] = Field(default_factory=dict)
     where: dict[str, Finite] = Field(default_factory=dict)
     prepare: Preparation | None = None
     strokes: tuple[Phase, ...] = ()

@@ -1,7 +1,7 @@
 """From the channels of a file to a recording: which channel is which force, in which unit, and on which clock."""
 
 import re
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
 from pathlib import Path
 
@@ -13,7 +13,7 @@ from bowdenfit.files.channels import Channel, ChannelFile
 from bowdenfit.files.matching import Quantity, candidates, meanings
 from bowdenfit.files.naming import parse_sources
 from bowdenfit.recordings.recording import RawRecording
-from bowdenfit.units import INTERNAL_UNITS, ColumnSource, conversion_factor, speed_dimension
+from bowdenfit.units import INTERNAL_UNITS, ChannelSource, ColumnSource, conversion_factor, speed_dimension
 from bowdenfit.words import quoted, shown
 
 WANTED = (
@@ -214,9 +214,51 @@ def _converted(
     """Values of a channel in the internal unit."""
     sign, unit = _unit(file, channel, quantity, source)
     try:
-        return channel.values * (sign * conversion_factor(unit, dimension))
+        return _of_counts(channel, source) * (sign * conversion_factor(unit, dimension))
     except DatasetError as error:
         raise DatasetError(f"{file.path.name}, channel {shown(channel.name)}: {error}.") from None
+
+
+def _of_counts(channel: Channel, source: ColumnSource | None) -> np.ndarray:
+    """What a channel says, by the gain and the offset that the user gives it."""
+    if not isinstance(source, ChannelSource):
+        return channel.values
+    return source.gain * (channel.values - source.offset)
+
+
+def steady_value(
+    file: ChannelFile, quantity: Quantity, source: ColumnSource | None, convert: Callable[[str], float]
+) -> tuple[float, float, float] | None:
+    """The middle value of a channel, and the range of nearly all of its values; None where the file has no such channel.
+
+    Args:
+        file: What was read.
+        quantity: A wrap angle or the route variable.
+        source: The channel that the user names.
+        convert: Factor from a unit.
+
+    Raises:
+        DatasetError: The channel has no unit, one of another kind, or no number.
+    """
+    channel = _find(file, quantity, {quantity.name: source} if source else {})
+    if channel is None:
+        return None
+    written = next((unit for _, unit in meanings(channel.name, (quantity,)) if unit), "")
+    unit = (source.unit if source else None) or channel.unit or written
+    if not unit:
+        raise DatasetError(
+            f"{file.path.name}: the channel {shown(channel.name)} does not say its unit; write it beside the name of the "
+            f'channel, {quantity.name} = {{ name = "{channel.name}", unit = ... }}.'
+        )
+    try:
+        values = _of_counts(channel, source) * convert(unit)
+    except DatasetError as error:
+        raise DatasetError(f"{file.path.name}, channel {shown(channel.name)}: {error}.") from None
+    finite = values[np.isfinite(values)]
+    if not len(finite):
+        raise DatasetError(f"{file.path.name}: the channel {shown(channel.name)} has no number in it; name another.")
+    low, middle, high = np.quantile(finite, (0.02, 0.5, 0.98))
+    return float(middle), float(low), float(high)
 
 
 def _unit(file: ChannelFile, channel: Channel, quantity: str, source: ColumnSource | None) -> tuple[float, str]:

@@ -6,7 +6,7 @@ from pydantic import Field
 
 from bowdenfit.description import Description, Preparation, QuantityValue, TableSettings
 from bowdenfit.description.file import Stated
-from bowdenfit.units import ColumnSource, speed_dimension
+from bowdenfit.units import ChannelSource, speed_dimension
 
 
 class RecordingsTable(TableSettings):
@@ -17,7 +17,7 @@ class RecordingsTable(TableSettings):
 
     files: str | tuple[str, ...] | None = None
     pattern: str | None = None
-    channels: dict[str, ColumnSource] = Field(default_factory=dict)
+    channels: dict[str, ChannelSource] = Field(default_factory=dict)
     likelihood: Literal["runs", "whole"] = "runs"
     prepare: Preparation = Preparation()
 

@@ -13,6 +13,7 @@ from bowdenfit.files.row_account import RowAccount
 from bowdenfit.kinds.kind import Found, Source
 from bowdenfit.kinds.recordings.angles import check_placed
 from bowdenfit.kinds.recordings.names import said_by_name
+from bowdenfit.kinds.recordings.placing import place_names, placed_by_channels
 from bowdenfit.kinds.recordings.settings import RecordingsTable
 from bowdenfit.recordings.forces import TORQUES, WANTED, rows_where, to_recording
 from bowdenfit.recordings.preparation import NO_DELAY_OF_LOOPS, average_recording, inspect_recording
@@ -129,10 +130,13 @@ def _name(path: Path, entry: RecordingFile) -> str:
 def _to_read(description: Description, path: Path, entry: RecordingFile, channels: Mapping[str, ColumnSource]) -> _File:
     table = description.table(RecordingsTable)
     assert table is not None  # the caller asked
-    page, sources = entry.prepare or table.prepare, {**_known(table.channels), **_known(entry.channels), **channels}
+    page = entry.prepare or table.prepare
+    sources = _known(table.channels, description) | _known(entry.channels, description) | dict(channels)
     pulleys = description.cable.pulleys if description.cable.kind == "loop" else None
     file = read_channels(path)
-    raw, unit = to_recording(rows_where(file, entry.where), _name(path, entry), sources, pulleys)
+    rows = rows_where(file, entry.where)
+    raw, unit = to_recording(rows, _name(path, entry), sources, pulleys)
+    entry = placed_by_channels(description, rows, entry, sources)
     stated = page.delay.sd_to("time") if isinstance(page.delay, QuantityValue) else None
     if entry.velocity is not None and not unit:
         unit = INTERNAL_UNITS[speed_dimension(entry.velocity.unit)]
@@ -150,15 +154,15 @@ def _recording(description: Description, file: _File, blocks: Blocks, account: A
     return Recording(raw.name, raw.file, entry.run or raw.name, route, angle, sd, blocks, strokes, account)
 
 
-def _known(channels: Mapping[str, ColumnSource]) -> Mapping[str, ColumnSource]:
+def _known(channels: Mapping[str, ColumnSource], description: Description) -> dict[str, ColumnSource]:
     """Channels of the description, if they are of quantities that a recording has."""
-    known = [quantity.name for quantity in (*WANTED, *TORQUES)]
+    known = [*(quantity.name for quantity in (*WANTED, *TORQUES)), *place_names(description)]
     for name in channels:
         if name not in known:
             raise DescriptionError(
                 f"cable.toml, channels of recordings: no quantity is called {name!r}{nearest(name, known)}"
             )
-    return channels
+    return dict(channels)
 
 
 def _own_angles(description: Description, entry: RecordingFile) -> tuple[np.ndarray, np.ndarray]:

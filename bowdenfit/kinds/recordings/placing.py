@@ -1,0 +1,96 @@
+"""Recordings whose files say themselves at which wrap angle or length they were made, in a channel that stays the same."""
+
+from collections.abc import Mapping
+
+import numpy as np
+
+from bowdenfit.description import Description, QuantityValue, RecordingFile, Route
+from bowdenfit.errors import DatasetError
+from bowdenfit.files.channels import ChannelFile
+from bowdenfit.files.matching import Quantity
+from bowdenfit.recordings.forces import steady_value
+from bowdenfit.units import ColumnSource, conversion_factor, route_conversion_factor
+
+_SAME_BEND = float(np.deg2rad(2.0))  # by which a wrap angle may change during a recording
+_SAME_LENGTH = 0.005  # of the range of the route, by which a length may
+
+
+def place_names(description: Description) -> tuple[str, ...]:
+    """Quantities that say where a recording was made."""
+    return (*description.angle_columns, *([description.route.variable] if description.route else []))
+
+
+def placed_by_channels(
+    description: Description, file: ChannelFile, entry: RecordingFile, sources: Mapping[str, ColumnSource]
+) -> RecordingFile:
+    """A recording's entry with the wrap angles and the length that its channels say, where it does not say them itself.
+
+    A channel is looked for by its name where a contact has no curve, and is that which the user names in any case.
+
+    Args:
+        description: The cable.
+        file: The rows of the recording.
+        entry: What is said of it.
+        sources: Channels that the user names.
+
+    Raises:
+        DatasetError: A channel changes during the recording, or is named beside a value.
+    """
+    angles, at = dict(entry.wrap_angles), entry.at
+    for contact in description.contact:
+        column = contact.wrap_angle.column
+        if column is None or (column not in sources and (contact.wrap_angle.curve or column in angles)):
+            continue
+        if column in angles:
+            raise _twice(entry, column)
+        angle = _angle(file, column, sources.get(column))
+        if angle is not None:
+            angles[column] = QuantityValue(value=angle, unit="rad")
+    route = description.route
+    if route is not None and (route.variable in sources or at is None):
+        found = _length(file, route, sources.get(route.variable))
+        if found is not None and at is not None:
+            raise _twice(entry, route.variable)
+        at = found if found is not None else at
+    return entry.model_copy(update={"wrap_angles": angles, "at": at})
+
+
+def _angle(file: ChannelFile, column: str, source: ColumnSource | None) -> float | None:
+    """A wrap angle [rad]."""
+    found = steady_value(file, Quantity(column, "angle"), source, lambda unit: conversion_factor(unit, "angle"))
+    if found is None:
+        return None
+    value, low, high = found
+    if high - low > _SAME_BEND:
+        raise _changes(file, column, float(np.rad2deg(low)), float(np.rad2deg(high)), "deg")
+    if value < 0:
+        raise DatasetError(
+            f"{file.path.name}: {column} is {np.rad2deg(value):.4g} deg; wrap angles add up without sign, so turn that of the "
+            "channel round with a negative gain."
+        )
+    return value
+
+
+def _length(file: ChannelFile, route: Route, source: ColumnSource | None) -> float | None:
+    """A value of the route variable, in its unit."""
+    quantity = Quantity(route.variable, "route", route.unit)
+    found = steady_value(file, quantity, source, lambda unit: route_conversion_factor(unit, route.unit))
+    if found is None:
+        return None
+    value, low, high = found
+    if high - low > _SAME_LENGTH * abs(route.range[1] - route.range[0]):
+        raise _changes(file, route.variable, low, high, route.unit)
+    return float(f"{value:.12g}")
+
+
+def _changes(file: ChannelFile, name: str, low: float, high: float, unit: str) -> DatasetError:
+    return DatasetError(
+        f"{file.path.name}: {name} changes from {low:.4g} to {high:.4g} {unit} during the recording, which is of one bend; "
+        "choose its rows by where = { ... } in a [[recording]] for each, or state the value there and rename the channel."
+    )
+
+
+def _twice(entry: RecordingFile, name: str) -> DatasetError:
+    return DatasetError(
+        f"{entry.file}: {name} is stated in its [[recording]], and a channel is named for it too; keep one of the two."
+    )

@@ -94,6 +94,19 @@ def table(heads: Sequence[str], rows: Sequence[Sequence[str]], left: Collection[
     return "\n".join([lines[0], "-" * len(lines[0]), *lines[1:]])
 
 
+def narrow_table(heads: Sequence[str], rows: Sequence[Sequence[str]], left: Collection[str] = ("prior", "unit")) -> str:
+    """A table of at most `WIDTH` characters: columns that find no place stand below, beside the first again."""
+    widths = [max(len(row[i]) for row in [heads, *rows]) for i in range(len(heads))]
+    blocks, rest = list[str](), list(range(1, len(heads)))
+    while rest or not blocks:
+        shown, width = [0], widths[0]
+        while rest and (len(shown) == 1 or width + 2 + widths[rest[0]] <= WIDTH):
+            width += 2 + widths[rest[0]]
+            shown.append(rest.pop(0))
+        blocks.append(table([heads[i] for i in shown], [[row[i] for i in shown] for row in rows], left))
+    return "\n\n".join(blocks)
+
+
 def html_table(heads: Sequence[str], rows: Sequence[Sequence[str]]) -> str:
     """A table for notebooks."""
     head = "".join(f"<th>{escape(cell)}</th>" for cell in heads)

@@ -213,10 +213,10 @@ def test_the_sentence_says_what_is_preferred_and_what_that_rests_on():
     def words(*args):
         return " ".join(comparison_text(by_hand(*args)).split())
 
-    assert "The data prefer good over poor (elpd difference 12.1 ± 0.2)." in words([2.0, 2.1, 1.9, 2.0, 2.1, 2.0])
+    assert "The data prefer good over poor (score less by 12.1 ± 0.2)." in words([2.0, 2.1, 1.9, 2.0, 2.1, 2.0])
     assert "With 6 readings the standard errors tend to be too small." in words([2.0, 2.1, 1.9, 2.0, 2.1, 2.0])
     leaning = words([2.0, 0.2, 1.9, 2.5, 0.1, 0.3])
-    assert "The data lean towards good over poor (elpd difference 7.0" in leaning
+    assert "The data lean towards good over poor (score less by 7.0" in leaning
     assert "tends to be too small: not proof." in leaning
     alone = words([9.0, 0.2, -0.1, 0.2, 0.1, 0.3])
     assert "The data cannot tell good from poor" in alone
@@ -265,7 +265,7 @@ def test_run_effects_that_are_there_are_preferred_to_none(by_run_effect):
     assert sum(found.weights.values()) == pytest.approx(1.0)
     text = " ".join(comparison_text(found).split())
     assert "capstan, no run effect" in text
-    assert "(elpd difference" in text
+    assert "(score less by" in text
     assert "A run of forces counts as one reading" in text
     assert "12 of run efficiency" in text
 

@@ -19,6 +19,7 @@ from bowdenfit.types import Matrix, Vector
 
 _FEWEST = 3  # detected angles that a plausible table has of each curve
 _NUMBERS = {2: "two", 3: "three"}
+_UNDETECTED = {"censored": "known to be less", "zero": "taken as 0", "dropped": "left out"}
 
 
 class AngleSettings(Table):
@@ -110,7 +111,7 @@ def _angle_or_limit(cell: Cell, column: Column, detection_limit: float | None) -
 def describe(table: AngleTable, description: Description) -> list[str]:
     """What was detected in each column, and what lies outside the range of the curves."""
     settings = description.table(AngleSettings)
-    how = settings.undetected if settings else "censored"
+    how = _UNDETECTED[settings.undetected if settings else "censored"]
     lines = []
     for name in table.names:
         angle, limit = table.column(name)
@@ -125,8 +126,8 @@ def describe(table: AngleTable, description: Description) -> list[str]:
     if description.route:
         outside = (table.route < description.route.range[0]) | (table.route > description.route.range[1])
         if outside.any():
-            rows = "1 row lies" if outside.sum() == 1 else f"{outside.sum()} rows lie"
-            lines.append(f"{rows} outside the range of the curves, and serves measurements made there.")
+            rows, are = ("1 row lies", "is") if outside.sum() == 1 else (f"{outside.sum()} rows lie", "are")
+            lines.append(f"{rows} outside the range of the curves, and {are} used for what was measured there.")
     return lines
 
 

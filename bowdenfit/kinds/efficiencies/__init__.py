@@ -12,6 +12,7 @@ from bowdenfit.kinds.efficiencies.table import (
 from bowdenfit.kinds.kind import Kind, itself
 from bowdenfit.kinds.readings import efficiencies
 from bowdenfit.kinds.wrap_angles import check_rows
+from bowdenfit.words import counted
 
 EFFICIENCIES = Kind(
     name="efficiencies",
@@ -20,11 +21,11 @@ EFFICIENCIES = Kind(
     read=read_efficiencies,
     check=check_rows,
     describe=describe,
-    alone=lambda table: f"a table of {len(table.efficiency)} efficiencies",
+    alone=lambda table: f"a table of {counted(len(table.efficiency), 'efficiency', 'efficiencies')}",
     implausible=implausible,
     page=page,
     design=EfficiencyDesign,
     empty=empty,
-    count=lambda table: f"{len(table.efficiency)} efficiencies",
+    count=lambda table: counted(len(table.efficiency), "efficiency", "efficiencies"),
     conditions=itself,
 )

@@ -14,7 +14,7 @@ from bowdenfit.kinds.pages import Page, route_cells, route_heading
 from bowdenfit.kinds.plausibility import GAIN_ERROR, beyond
 from bowdenfit.kinds.rows import OwnAngles, RowOrigin, provenance_of, read_own_angles, read_route, shared_columns
 from bowdenfit.types import Vector
-from bowdenfit.words import percent
+from bowdenfit.words import counted, percent
 
 _SDS = 4.5  # stated standard deviations above 1, which one healthy row of 300,000 exceeds
 
@@ -111,7 +111,8 @@ def describe(table: EfficiencyTable, description: Description) -> list[str]:
     """How many there are, and how large."""
     del description
     low, high = table.efficiency.min(), table.efficiency.max()
-    return [f"{table.origin.files[0]}: {len(table.efficiency)} efficiencies, {percent(low)} to {percent(high)}"]
+    n = counted(len(table.efficiency), "efficiency", "efficiencies")
+    return [f"{table.origin.files[0]}: {n}, {percent(low)} to {percent(high)}"]
 
 
 def implausible(real: EfficiencyTable, made: EfficiencyTable) -> str:

@@ -13,12 +13,12 @@ from bowdenfit.kinds.measurements import Measurements
 from bowdenfit.kinds.pages import STROKE_NAMES, Page, route_cells, route_heading
 from bowdenfit.kinds.plausibility import SCATTER, beyond, parts
 from bowdenfit.kinds.rows import OwnAngles, RowOrigin
-from bowdenfit.words import listed
+from bowdenfit.words import counted, listed
 
 
 def count(table: ForceTable) -> str:
     """How many readings, in how many runs."""
-    return f"{len(table.run)} force readings in {len(table.run_names)} runs"
+    return f"{counted(len(table.run), 'force reading')} in {counted(len(table.run_names), 'run')}"
 
 
 def describe(table: ForceTable, description: Description) -> list[str]:

@@ -7,6 +7,7 @@ from bowdenfit.kinds.loop.table import LoopTable, read_loop
 from bowdenfit.kinds.loop.words import LoopDesign, contradiction, describe, empty, implausible, page, warnings_of
 from bowdenfit.kinds.readings import Readings
 from bowdenfit.kinds.wrap_angles import check_rows
+from bowdenfit.words import counted
 
 LOOP = Kind(
     name="loop",
@@ -21,7 +22,7 @@ LOOP = Kind(
     page=page,
     design=LoopDesign,
     empty=empty,
-    count=lambda table: f"{len(table.stroke)} readings of a loop",
+    count=lambda table: f"{counted(len(table.stroke), 'reading')} of a loop",
     bends=lambda table: np.nansum(table.own.angle, axis=1),
     conditions=itself,
     forces=lambda table: table.input_force * table.stroke,

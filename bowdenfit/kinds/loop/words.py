@@ -14,6 +14,7 @@ from bowdenfit.kinds.plausibility import HIGHEST, LOWEST
 from bowdenfit.kinds.preload.table import PreloadTable
 from bowdenfit.kinds.rows import OwnAngles, RowOrigin
 from bowdenfit.kinds.stretch.table import StretchTable
+from bowdenfit.words import counted
 
 _FREE = 0.25  # output over input force below which a loop moves all but freely
 
@@ -31,7 +32,7 @@ def describe(rows: LoopTable, description: Description) -> list[str]:
     measured = int(np.isfinite(rows.preload).sum())
     own = f"; {measured} rows have their own measured preload" if measured else ""
     return [
-        f"{rows.origin.files[0]}: {len(rows.stroke)} readings of a loop ({forward} moving forward, "
+        f"{rows.origin.files[0]}: {counted(len(rows.stroke), 'reading')} of a loop ({forward} moving forward, "
         f"{len(rows.stroke) - forward} back), input {in_words(rows.input_force, 'N')}; its preload {how}{own}"
     ]
 

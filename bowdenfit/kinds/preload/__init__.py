@@ -4,6 +4,7 @@ from bowdenfit.kinds.kind import Kind
 from bowdenfit.kinds.preload.table import PreloadTable, PreloadTableSettings, read_preload
 from bowdenfit.kinds.preload.words import PreloadDesign, describe, empty, implausible, page, warnings_of
 from bowdenfit.kinds.readings import Readings
+from bowdenfit.words import counted
 
 PRELOAD = Kind(
     name="preload",
@@ -17,7 +18,7 @@ PRELOAD = Kind(
     page=page,
     design=PreloadDesign,
     empty=empty,
-    count=lambda table: f"{len(table.preload)} preloads",
+    count=lambda table: counted(len(table.preload), "preload"),
     bends=lambda table: table.wrap_angle,
     tensions=lambda table: table.preload,
 )

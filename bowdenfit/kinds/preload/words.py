@@ -12,6 +12,7 @@ from bowdenfit.kinds.preload.table import PreloadTable
 from bowdenfit.kinds.rows import RowOrigin
 from bowdenfit.kinds.stretch.table import StretchTable
 from bowdenfit.kinds.stretch.words import one_angle_warning
+from bowdenfit.words import counted
 
 _FEWEST_TAUT = 3  # readings above 0 that a plausible table has
 
@@ -22,7 +23,8 @@ def describe(rows: PreloadTable, description: Description) -> list[str]:
     slack = int(np.sum(rows.preload == 0))
     none = f" ({slack} of them 0, which says at most 0)" if slack else ""
     angles = in_words(np.rad2deg(rows.wrap_angle), "deg")
-    return [f"{rows.origin.files[0]}: {len(rows.preload)} preloads{none}, {in_words(rows.preload, 'N')}, at {angles}"]
+    n = counted(len(rows.preload), "preload")
+    return [f"{rows.origin.files[0]}: {n}{none}, {in_words(rows.preload, 'N')}, at {angles}"]
 
 
 def warnings_of(rows: PreloadTable, description: Description, measurements: Measurements) -> list[str]:

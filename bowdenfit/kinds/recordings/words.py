@@ -7,7 +7,7 @@ import numpy as np
 from bowdenfit.kinds.plausibility import FACTOR, SCATTER, beyond
 from bowdenfit.kinds.recordings.accounts import preparation_pages
 from bowdenfit.recordings.recording import PULL, RETURN, Recordings
-from bowdenfit.words import filled, listed, table
+from bowdenfit.words import counted, filled, listed, table
 
 _FEWEST_BLOCKS = 10  # of each stroke of a plausible recording
 _SAMPLES = ("recording", "samples", "used", "left out", "block")
@@ -97,7 +97,8 @@ def count(recordings: Recordings) -> str:
     """How many samples of how many recordings, in how many runs."""
     blocks = sum(int(r.strokes.used_sliding.sum()) for r in recordings.each)
     samples, runs = sum(r.account.samples for r in recordings.each), len(recordings.runs)
-    return f"{samples} samples of {len(recordings.each)} recordings in {runs} runs ({blocks} sliding blocks)"
+    of = f"{counted(len(recordings.each), 'recording')} in {counted(runs, 'run')}"
+    return f"{counted(samples, 'sample')} of {of} ({counted(blocks, 'sliding block')})"
 
 
 def implausible(real: Recordings, made: Recordings) -> str:

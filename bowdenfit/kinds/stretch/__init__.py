@@ -4,6 +4,7 @@ from bowdenfit.kinds.kind import Kind
 from bowdenfit.kinds.readings import Readings
 from bowdenfit.kinds.stretch.table import StretchTable, read_stretch
 from bowdenfit.kinds.stretch.words import StretchDesign, describe, empty, implausible, page, warnings_of
+from bowdenfit.words import counted
 
 STRETCH = Kind(
     name="stretch",
@@ -16,7 +17,7 @@ STRETCH = Kind(
     page=page,
     design=StretchDesign,
     empty=empty,
-    count=lambda table: f"{len(table.load)} readings of stretch",
+    count=lambda table: f"{counted(len(table.load), 'reading')} of stretch",
     bends=lambda table: table.wrap_angle,
     tensions=lambda table: table.load,
 )

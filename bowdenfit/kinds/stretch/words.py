@@ -13,6 +13,7 @@ from bowdenfit.kinds.plausibility import parts, within_factor
 from bowdenfit.kinds.preload.table import PreloadTable
 from bowdenfit.kinds.rows import RowOrigin
 from bowdenfit.kinds.stretch.table import StretchTable
+from bowdenfit.words import counted
 
 _LOW = 1 / 3  # share of the highest load above which a lowest load is not low
 _STIFFNESSES = (0.1, 1e5)  # N/mm; a meter of thin cord and of crane rope
@@ -25,7 +26,7 @@ def describe(rows: StretchTable, description: Description) -> list[str]:
     angles = np.rad2deg(np.unique(rows.wrap_angle))
     own = description.stretch.friction or "a friction coefficient of its own, mu_stretch"
     return [
-        f"{rows.origin.files[0]}: {len(rows.load)} readings of stretch{down}, loads {in_words(rows.load, 'N')}, at "
+        f"{rows.origin.files[0]}: {counted(len(rows.load), 'reading')} of stretch{down}, loads {in_words(rows.load, 'N')}, at "
         f"{len(angles)} wrap angle{'s' if len(angles) > 1 else ''}, {in_words(angles, 'deg')}; friction: {own}"
     ]
 

@@ -9,8 +9,8 @@ _NAMED = 8  # unconverged replications that are named
 def calibration_text(found: Calibration) -> str:
     """A calibration for people: the verdict, a table of all quantities, and what was left out."""
     blocks = [
-        filled(_what(found)),
         "\n".join(filled(line) for line in _verdict(found)),
+        filled(_what(found)),
         _table(found) if found.quantities else "",
         "\n".join(filled(line) for line in _accounts(found)),
     ]
@@ -47,11 +47,11 @@ def _verdict(found: Calibration) -> list[str]:
 def _power(found: Calibration) -> str:
     """What so many replications can see."""
     seen = listed([f"too small by {percent(p.too_small, 0)} with probability {p.caught:.2f}" for p in found.power])
-    return f"Power: of one quantity, a posterior standard deviation {seen} is caught by {found.ranked} replications."
+    return f"Of one quantity, intervals {seen} are caught by {found.ranked} replications."
 
 
 def _table(found: Calibration) -> str:
-    heads = ("quantity", "50 % held", "90 % held", "p of ranks", "corrected", "bias", "shrinkage", "")
+    heads = ("quantity", "50 % held", "90 % held", "bias", "")
     rows = [_row(q) for q in found.quantities]
     first = found.quantities[0].coverage
     bands = listed(
@@ -63,28 +63,19 @@ def _table(found: Calibration) -> str:
     )
     if found.truths:
         note += (
-            "Ranks of truths that do not come from the priors need not be uniform, and are not judged; nor are noise scales "
-            "and the like, in brackets, whose intervals may lean on their priors. "
+            "Noise scales and the like, in brackets, are not judged: their intervals may lean on what was assumed beforehand. "
         )
     else:
-        note += (
-            "p of ranks: chance of ranks this far from uniform; corrected for the number of quantities, below "
-            f"{LEVEL:g} counts as wrong. "
-        )
-    note += "Bias: posterior mean less truth, in posterior standard deviations."
-    if not found.truths:
-        note += " Shrinkage: 0 where the data say nothing beyond the prior, 1 where they say all."
+        note += "Whether truths lie evenly within what the fits say is judged too. "
+    note += "Bias: estimate less truth, in standard deviations of the estimate."
     return table(heads, rows) + "\n\n" + filled(note)
 
 
 def _row(q: Checked) -> tuple[str, ...]:
     half, wide = q.coverage
-    by_ranks = q.judged_by == Checked.judged_by
     return (
         q.name if q.judged_by else f"({q.name})", percent(half.rate), percent(wide.rate),
-        *((f"{q.p_value:.3f}", f"{q.corrected:.3f}") if by_ranks else ("", "")),
-        f"{q.bias:+.2f} ± {q.bias_error:.2f}", f"{q.shrinkage:.2f}" if by_ranks else "",
-        "" if q.is_calibrated else "wrong",
+        f"{q.bias:+.2f} ± {q.bias_error:.2f}", "" if q.is_calibrated else "wrong",
     )  # fmt: skip
 
 

@@ -9,13 +9,15 @@ from bowdenfit.kinds.measured_groups import measured_groups
 from bowdenfit.kinds.measurements import Measurements
 from bowdenfit.kinds.stretch.table import StretchTable
 from bowdenfit.questions.check.row_words import row_words
-from bowdenfit.words import listed
+from bowdenfit.words import counted, listed
 
 
 def check_text(dataset: Dataset) -> str:
     """What was understood of a data set."""
     description, measurements = dataset.description, dataset.measurements
-    lines = [description.name, "=" * len(description.name)]
+    warnings = [f"Warning: {warning}" for warning in warnings_of(dataset)]
+    found = f"{counted(len(warnings), 'warning')}, at the end." if warnings else "Nothing is wrong."
+    lines = [description.name, "=" * len(description.name), f"Everything could be read. {found}", ""]
     if description.route:
         route = description.route
         choices = f"; {len(route.choices)} lengths can be bought" if route.choices else ""
@@ -43,8 +45,7 @@ def check_text(dataset: Dataset) -> str:
     lines += sections
     lines += [f"  note: {remark}" for remark in measurements.remarks]
     lines += ["", "Rows of the files:", *(f"  {line}" for words in row_words(dataset) for line in words.splitlines())]
-    lines += ["", *(f"Warning: {warning}" for warning in warnings_of(dataset))]
-    lines.append("Everything could be read." + (" Nothing is wrong." if not warnings_of(dataset) else ""))
+    lines += ["", *warnings] if warnings else []
     return "\n".join(lines) + "\n"
 
 

@@ -7,16 +7,16 @@ import numpy as np
 from bowdenfit.inference.comparison import SMALL
 from bowdenfit.inference.interval import Interval
 from bowdenfit.questions.compare.answer import Comparison
-from bowdenfit.words import decimals, filled, listed, table
+from bowdenfit.words import counted, filled, give_or_take, listed, narrow_table
 
 _DOMINATES = 0.5  # share of a difference from which one reading is named
 _FEW = 20  # readings treated one by one that are named
-_SHORT = {"importance sampling": "-", "moment matching": "draws moved", "refit": "fitted again", "rough": "rough"}
+_SHORT = {"importance sampling": "-", "moment matching": "moved", "refit": "fitted again", "rough": "rough"}
 
 
 def comparison_text(found: Comparison) -> str:
     """A comparison for people: which fit predicts best, what changes between them, and what speed does."""
-    heads = ("fit", "model", "elpd less than the best", "standard error", "weight")
+    heads = ("fit", "model", "score less by", "±", "weight")
     rows = [
         (
             name,
@@ -28,8 +28,8 @@ def comparison_text(found: Comparison) -> str:
         for name, d in found.differences.items()
     ]
     blocks = [
-        "How well each predicts a reading left out\n" + table(heads, rows, left=("model",)),
         "\n".join(filled(line) for line in _verdict(found)),
+        "How well each predicts a reading left out\n" + narrow_table(heads, rows, left=("model",)),
         "\n".join(filled(line) for line in _basis(found)),
         _treated(found),
         _parameters(found),
@@ -68,8 +68,8 @@ def _leaning(found: Comparison, name: str) -> str:
 
 def _difference(found: Comparison, name: str) -> str:
     d = found.differences[name]
-    error = "standard error unknown, with one reading" if np.isnan(d.standard_error) else f"± {d.standard_error:.1f}"
-    return f"elpd difference {_elpd(d.elpd)} {error}"
+    error = ", its standard error unknown, with one reading" if np.isnan(d.standard_error) else f" ± {d.standard_error:.1f}"
+    return f"score less by {_elpd(d.elpd)}{error}"
 
 
 def _elpd(value: float) -> str:
@@ -97,8 +97,9 @@ def _basis(found: Comparison) -> list[str]:
     what = listed([f"{n} {parts}of {name.replace('_', ' ')}" for name, n in counts.items()])
     n = len(found.readings)
     lines = [
-        f"Compared by leave-one-out on {n} reading{'s' if n > 1 else ''}: {what}. The elpd is the sum of the log densities "
-        "with which the others predict each; the weights make the mixture of the models that predicts best (stacking)."
+        f"Compared on {counted(n, 'reading')}, each left out and predicted by the others: {what}. The score says how "
+        "probable the readings were: 2.3 less is ten times less probable (in the JSON it is elpd, of leave-one-out). The "
+        "weights make the mixture of the models that predicts best."
     ]
     if found.left_out != "run":
         what = "the readings at one load" if found.left_out == "load" else "one reading"
@@ -131,19 +132,19 @@ def _treated(found: Comparison) -> str:
         return ""
     rough = sum(how.count("rough") for how in ways.values())
     lines = [
-        "Readings that would move the posterior (Pareto k above 0.7) were left out by moving the draws to where they would "
-        "be without the reading (moment matching) or, where that was not enough, by fitting again without it."
+        "Readings on which a fit leans were left out by moving the fit to where it would be without them or, where that was "
+        "not enough, by fitting again."
     ]
     if rough:
         lines.append(
-            f"For {rough} reading{'s' if rough > 1 else ''} the fit without it did not converge: take the differences as "
+            f"For {counted(rough, 'reading')} the fit without it did not converge: take the differences as "
             "rough."
         )
     if len(which) > _FEW:
         lines.append(f"That concerns {len(which)} of {len(found.readings)} readings.")
         return "\n".join(filled(line) for line in lines)
     rows = [(_named(found.readings[i]), *(_SHORT[ways[name][i]] for name in names)) for i in which]
-    return "\n".join([*(filled(line) for line in lines), table(("reading", *names), rows)])
+    return "\n".join([*(filled(line) for line in lines), narrow_table(("reading", *names), rows)])
 
 
 def _parameters(found: Comparison) -> str:
@@ -156,7 +157,7 @@ def _parameters(found: Comparison) -> str:
         if len(found.optimal_length) == len(names)
         else []
     )
-    return "What changes, mean ± sd\n" + table(("parameter", *names), rows)
+    return "What changes, mean ± sd\n" + narrow_table(("parameter", *names), rows)
 
 
 def _head(name: str, unit: str) -> str:
@@ -166,8 +167,7 @@ def _head(name: str, unit: str) -> str:
 def _shown(interval: Interval | None, unit: str = "") -> str:
     if interval is None:
         return "-"
-    digits = decimals(interval.sd)
-    return f"{interval.mean:.{digits}f} ± {interval.sd:.{digits}f}" + (f" {unit}" if unit else "")
+    return give_or_take(interval.mean, interval.sd) + (f" {unit}" if unit else "")
 
 
 def _speed(found: Comparison) -> list[str]:

@@ -16,7 +16,7 @@ from bowdenfit.questions.identify.answer import GROUPS, Identifiability, how_wel
 from bowdenfit.results.record import Record, once
 from bowdenfit.words import listed
 
-DRAWS = "the draws of the posterior"
+DRAWS = "what the fit found"
 
 
 @once

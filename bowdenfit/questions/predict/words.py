@@ -3,7 +3,7 @@
 from collections.abc import Iterator, Mapping, Sequence
 from typing import Any
 
-from bowdenfit.words import WIDTH, decimals, few, filled, percent, table
+from bowdenfit.words import decimals, few, filled, narrow_table, percent
 
 Row = Mapping[str, Any]
 _UNITS = {"N_m_per_rad": "N*m/rad", "N_per_mm": "N/mm", "N_mm": "N*mm", "N": "N", "mm": "mm", "deg": "deg"}
@@ -20,7 +20,7 @@ def predictions_text(rows: Sequence[Row]) -> str:
         return filled(rows[0]["in_words"]) + "\n"
     several = len(rows) > 1
     blocks = [filled(_extremes(rows)) if several else "\n".join(filled(line) for line in _one(rows[0]))]
-    blocks += list(_tables(rows)) if several else []
+    blocks += [_table(rows)] if several else []
     blocks += ["\n".join(filled(note) for note in _notes(rows))]
     return "\n\n".join(block for block in blocks if block) + "\n"
 
@@ -102,18 +102,12 @@ def _extremes(rows: Sequence[Row]) -> str:
     return f"{said}, lowest {_known(low, name)[0]} {unit} at {_at(low)}. 90 % intervals are in brackets."
 
 
-def _tables(rows: Sequence[Row]) -> Iterator[str]:
-    """All places, in as many tables one below the other as their columns need."""
+def _table(rows: Sequence[Row]) -> str:
+    """All places."""
     name = next(iter(rows[0]))  # of several places it is there
     words, unit = _unit(name)
-    first, columns = [f"{words} ({unit})", *(f"{row[name]:.6g}" for row in rows)], list(_columns(rows))
-    while columns:
-        shown, width = [first], max(map(len, first))
-        while columns and (len(shown) == 1 or width + 2 + max(map(len, columns[0])) <= WIDTH):
-            width += 2 + max(map(len, columns[0]))
-            shown.append(columns.pop(0))
-        heads, *cells = zip(*shown, strict=True)
-        yield table(heads, cells)
+    heads, *cells = zip([f"{words} ({unit})", *(f"{row[name]:.6g}" for row in rows)], *_columns(rows), strict=True)
+    return narrow_table(heads, cells)
 
 
 def _columns(rows: Sequence[Row]) -> Iterator[list[str]]:

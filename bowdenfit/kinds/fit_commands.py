@@ -2,7 +2,7 @@
 
 import shlex
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 
 from bowdenfit.errors import DatasetError
@@ -29,10 +29,12 @@ class FitCommand:
     Args:
         text: The command, as it can be pasted.
         provided: What it takes for granted, each as a clause.
+        names_more: Whether it names columns that the user has not.
     """
 
     text: str
     provided: tuple[str, ...] = ()
+    names_more: bool = False
 
 
 def table_command(
@@ -52,7 +54,8 @@ def table_command(
     if kind == "forces":
         options, provided = name_ends(columns_of(table), "--column", stated, always)
     angle, of_angle = ([], []) if WRAP_ANGLE.name in stated else _wrap_angle(headings, path)
-    return _command(path, [*angle, *_named(stated, "--column"), *options], [*of_angle, *provided])
+    found = _command(path, [*angle, *_named(stated, "--column"), *options], [*of_angle, *provided])
+    return replace(found, names_more=bool(options) and not any(option.endswith("=NAME") for option in options))
 
 
 def recording_command(

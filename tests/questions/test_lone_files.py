@@ -165,9 +165,8 @@ def test_loads_are_counted_where_readings_fall_together(forces, count):
 def test_what_the_user_has_named_is_kept_and_the_other_end_found(tmp_path, run):
     force, load = trials()
     path = write(tmp_path, ("Cell A (N)", "Cell B (N)", "Cell C (N)"), (load, force, 2 * force))
-    _, out, _ = run("check", path, "--column", "input_force=Cell B (N)")
-    (words,) = command(out)
-    assert words[4:6] == ["--column", "input_force=Cell B (N)"] and words[6] == "--column"
+    code, _, err = run("check", path, "--column", "input_force=Cell B (N)")
+    assert code == 2 and "no column output_force" in err
     path = write(tmp_path, ("Cell A (N)", "Cell B (N)"), (load, force), "two.csv")
     _, out, _ = run("check", path, "--column", "input_force=Cell B (N)")
     (words,) = command(out)
@@ -199,3 +198,23 @@ def test_a_wrap_angle_in_the_name_of_a_file_is_proposed(tmp_path, run):
     _, out, _ = run("check", path)
     assert command(out) == [["fit", str(path), "--wrap-angle", "135deg"]]
     assert "as its name says" in " ".join(out.split())
+
+
+@pytest.mark.parametrize(
+    ("options", "says"),
+    [
+        (["--column", "force=F_in (N)"], "did you mean input_force"),
+        (["--column", "input_force=F_in"], "no column 'F_in'"),
+        (["--column", "input_force=F_in (N):mm"], "does not measure a force"),
+        (["--friction", "nonsense"], "nonsense"),
+        (["--set", "a.b=1"], "unknown key 'a'"),
+    ],
+)
+def test_what_the_user_asks_of_a_lone_file_and_cannot_be_is_refused(tmp_path, refuse, options, says):
+    assert says in refuse("check", write(tmp_path, ("F_in (N)", "F_out (N)"), trials()), *options)
+
+
+def test_the_command_keeps_what_the_user_has_set(tmp_path, run):
+    path = write(tmp_path, ("F_in (N)", "F_out (N)"), trials())
+    _, out, _ = run("check", path, "--noise", "student", "--set", "friction.mu.fixed=0.1")
+    assert command(out)[0][4:] == ["--set", "friction.mu.fixed=0.1", "--noise", "student"]

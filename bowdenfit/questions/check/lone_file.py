@@ -1,7 +1,10 @@
 """Looking at a file without a description: what it is, how it is understood, and the command that fits it."""
 
-from collections.abc import Sequence
+import shlex
+from collections.abc import Callable, Sequence
+from dataclasses import replace
 from pathlib import Path
+from typing import cast
 
 from bowdenfit.dataset import Dataset, single_file_dataset
 from bowdenfit.errors import BowdenfitError, DatasetError
@@ -22,25 +25,26 @@ from bowdenfit.kinds.single_file import FileKind, file_kind
 from bowdenfit.kinds.unnamed_ends import HeadedColumn
 from bowdenfit.questions.check.channels_words import channels_text
 from bowdenfit.questions.check.file_words import table_text
+from bowdenfit.reading import Reading
 from bowdenfit.recordings.forces import parse_channels
 from bowdenfit.recordings.recording import Recordings
-from bowdenfit.units import ColumnSource
 
+_CHOICES = ("noise", "friction", "geometry", "undetected")
 _ANY_ANGLE = (180.0, "deg")  # what the command says as well
 
 
-def lone_file_text(path: Path, channels: Sequence[str] = (), columns: Sequence[str] = ()) -> str:
+def lone_file_text(path: Path, reading: Reading, check: Callable[..., Dataset]) -> str:
     """What a file alone is, and the command that fits it.
 
     Args:
         path: The file.
-        channels: Which channel of a recording is what, such as "input_force=ai0:lbf".
-        columns: Which column of a table is what.
+        reading: Keywords of `bowdenfit.read`; which column of a table or channel of a recording is what among them.
+        check: Reads a data set with such keywords and refuses a model that cannot be.
 
     Raises:
-        DatasetError: The file cannot be read.
+        BowdenfitError: The file cannot be read, or not with these keywords.
     """
-    named = parse_sources(columns, "--column")
+    channels, named = reading.get("channels", ()), parse_sources(reading.get("columns", ()), "--column")
     found = file_kind(path, bool(channels), tuple(named))
     if KINDS[found.kind].takes_channels and not found.other:
         return _recording_text(path, found, channels)
@@ -49,17 +53,33 @@ def lone_file_text(path: Path, channels: Sequence[str] = (), columns: Sequence[s
     if found.other:
         return table_text(raw, found, either(path, raw, found), None, "", headings)
     command = table_command(path, raw, found.kind, named)
-    data, why_not = _as_data_set(path, found, named)
-    return table_text(raw, found, [command], data, why_not, headings)
+    own = has_own_angles(path, found.kind, tuple(named), stated=False)
+    asked = any(reading.values()) and not command.names_more
+    data, why_not = _as_data_set(path, cast(Reading, {**reading, "wrap_angle": None if own else _ANY_ANGLE}), check, asked)
+    return table_text(raw, found, [_with_settings(command, reading)], data, why_not, headings)
 
 
-def _as_data_set(path: Path, found: FileKind, named: dict[str, ColumnSource]) -> tuple[Dataset | None, str]:
-    """The data set that a table makes at any wrap angle, or why it makes none."""
+def _as_data_set(
+    path: Path, reading: Reading, check: Callable[..., Dataset], asked: bool
+) -> tuple[Dataset | None, str]:
+    """The data set that a table makes at any wrap angle, or why it makes none as it stands.
+
+    Raises:
+        BowdenfitError: It makes none, and the user has asked for something that the command would not mend.
+    """
     try:
-        own = has_own_angles(path, found.kind, tuple(named), stated=False)
-        return single_file_dataset(path, None if own else _ANY_ANGLE, (), {}, named, found.kind), ""
+        return check(path, **reading), ""
     except BowdenfitError as error:
+        if asked:
+            raise
         return None, str(error)
+
+
+def _with_settings(command: FitCommand, reading: Reading) -> FitCommand:
+    """The command with what the user has set besides columns."""
+    stated = [f"--set {shlex.quote(setting)}" for setting in reading.get("settings", ())]
+    stated += [f"--{name} {value}" for name in _CHOICES if (value := reading.get(name))]
+    return replace(command, text=" ".join([command.text, *stated]))
 
 
 def _recording_text(path: Path, found: FileKind, channels: Sequence[str]) -> str:

@@ -95,7 +95,7 @@ def describe(
         from bowdenfit.questions.check.lone_file import lone_file_text
 
         with limits_times(reading.get("reading_limit") or 1):
-            return Reply(lone_file_text(dataset, reading.get("channels", ()), reading.get("columns", ())))
+            return Reply(lone_file_text(dataset, reading, check))
     found = check(dataset, **reading)
     text = check_text(found)
     if prior_predictive is not None:

@@ -13,6 +13,7 @@ from bowdenfit.plots.write import FORMATS, write_all
 from bowdenfit.questions.bends import (
     bending_loss_figure,
     loops_figure,
+    motor_force_figure,
     preload_figure,
     preload_window_figure,
     stretch_figure,
@@ -48,6 +49,7 @@ _FILES = (  # first those whose data are there, so that drawing begins at once
     forces_figure,
     wrap_angles_figure,
     efficiency_figure,
+    motor_force_figure,
     stretch_figure,
     preload_figure,
     bending_loss_figure,

@@ -34,18 +34,20 @@ def readings(table: DisplacementTable, rows: np.ndarray) -> dict[str, Any]:
     }
 
 
-def arrays_of(cable: Cable, table: DisplacementTable, angles: AngleTable | None) -> dict[str, Any]:
-    """Turns by depth, each with the place of the one before among those of lower depth; and the wrap angles of every run."""
-    turns, place = table.motion.turns, places_of(table.motion.turns)
-    levels = []
-    for depth in range(int(turns.depth.max()) + 1):
-        these = np.flatnonzero(turns.depth == depth)
-        at = {"at": turns.at, "stroke": turns.stroke.astype(float), "after": place[turns.after], "run": turns.run}
-        levels.append({name: values[these] for name, values in at.items()})
+def turns_by_depth(turns: Turns) -> tuple[dict[str, np.ndarray], ...]:
+    """Turns by depth, each with the place of the one before it among those of lower depth."""
+    place = places_of(turns)
+    at = {"at": turns.at, "stroke": turns.stroke.astype(float), "after": place[turns.after], "run": turns.run}
+    return tuple(
+        {name: values[turns.depth == depth] for name, values in at.items()} for depth in range(int(turns.depth.max()) + 1)
+    )
+
+
+def angles_of_runs(cable: Cable, table: DisplacementTable, angles: AngleTable | None) -> dict[str, np.ndarray]:
+    """Wrap angles of every run, which are those of its first row."""
     first = np.array([np.flatnonzero(table.run == run)[0] for run in range(len(table.run_names))])
     own = OwnAngles(table.own.names, table.own.angle[first], table.own.sd[first])
-    of_runs = replace(table, route=table.route[first], own=own)
-    return {"turns": tuple(levels), "angles": row_angles(cable.description, of_runs, angles).data}
+    return row_angles(cable.description, replace(table, route=table.route[first], own=own), angles).data
 
 
 def places_of(turns: Turns) -> np.ndarray:

@@ -17,7 +17,7 @@ from bowdenfit.cable.noise import noise_law, scatter
 from bowdenfit.description import Description
 from bowdenfit.kinds.angles.table import AngleTable
 from bowdenfit.kinds.bench import Remeasurement, Truth
-from bowdenfit.kinds.displacement.arrays import arrays_of, order_of, readings, zero_names
+from bowdenfit.kinds.displacement.arrays import angles_of_runs, order_of, readings, turns_by_depth, zero_names
 from bowdenfit.kinds.displacement.parameters import (
     DISPLACEMENT_NOISE,
     END_SPRING,
@@ -157,6 +157,12 @@ class DisplacementTerm:
         mean, sd = self._one_by_one(values, data)
         return mean + sd * scatter(key, mean.shape, self.cable.description)
 
+    def mounted(self, values: Values, data: Data) -> Float[Array, " runs"]:
+        """Friction exponent of each run with what its readings say of its mounting."""
+        found = self._readings(values, data, values)
+        mounting, variance = found.mounting
+        return self.exponents(values, data)[0] + mounting * found.of_runs / (found.of_runs + variance)
+
     def friction_effect(self, values: Mapping[str, float]) -> np.ndarray:
         """What friction makes of each force [N], to first order."""
         at = {name: jnp.asarray(value) for name, value in values.items()}
@@ -209,9 +215,10 @@ def _before(terms: Float[Array, " rows"], start: Array) -> Float[Array, " rows"]
 
 def displacement_term(cable: Cable, table: DisplacementTable, angles: AngleTable | None) -> DisplacementTerm:
     """The term of a table of force against displacement."""
-    rows, data = order_of(table), arrays_of(cable, table, angles)
+    rows = order_of(table)
     settings = cable.description.table(DisplacementSettings)
     stop = settings is not None and settings.end == "stop"
+    data = {"turns": turns_by_depth(table.motion.turns), "angles": angles_of_runs(cable, table, angles)}
     data |= {"force": table.force[rows], **readings(table, rows)}
     return DisplacementTerm(cable, data, tuple(table.origin.place(int(i)) for i in rows), zero_names(table), stop)
 

@@ -1,0 +1,143 @@
+"""Force at the motor against its displacement, a panel for each run, with the fitted loop through every turn of the motor."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from itertools import pairwise
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from bowdenfit.plots.bands import draw_quantiles, evenly, name_band, say_of_how_many
+from bowdenfit.plots.layout import legend_above
+from bowdenfit.plots.panels import alike, enlarge_marks, label_outer, recording_panels, set_limits, span
+from bowdenfit.plots.style import BLUE, GRAY, LEAST_SQUARES, MEDIAN, VERMILLION, in_paper_style
+
+if TYPE_CHECKING:
+    from bowdenfit.kinds.displacement.table import DisplacementTable
+    from bowdenfit.plots.layout import Axes, Figure
+    from bowdenfit.results.record import Record
+
+MOST, MOST_COLUMNS = 6, 3
+_POINTS = 150  # of the loop of a run, at least
+# stroke, name, marker, size [pt], color
+_STROKES = ((1, "Read while pulling", "o", 3.2, BLUE), (-1, "Read on the return", "s", 3.0, VERMILLION))
+
+
+@dataclass(frozen=True)
+class MotorForce:
+    """Force at the motor of one run.
+
+    Args:
+        label: Name of the run.
+        displacement: Along the fitted path, in the order in which the motor took it [mm].
+        force: Quantiles of the force there [N].
+        stroke: +1 pulling, -1 return, there.
+        points_displacement, points_force, points_stroke: Readings [mm, N].
+        points_used: Whether each is used.
+    """
+
+    label: str
+    displacement: np.ndarray
+    force: np.ndarray
+    stroke: np.ndarray
+    points_displacement: np.ndarray
+    points_force: np.ndarray
+    points_stroke: np.ndarray
+    points_used: np.ndarray
+
+
+def data(fit: Record) -> tuple[MotorForce, ...] | None:
+    """The loop of each run; None where no force was measured against displacement."""
+    from bowdenfit.kinds.displacement.arrays import readings, turns_by_depth
+    from bowdenfit.kinds.displacement.table import DisplacementTable
+    from bowdenfit.kinds.displacement.term import DisplacementTerm
+    from bowdenfit.questions.bends.curves import Values, of_draws, quantiles
+
+    table = fit.dataset.measurements.table(DisplacementTable)
+    term = next((t for t in fit.model.terms if isinstance(t, DisplacementTerm)), None)
+    if table is None or term is None:
+        return None
+    path = _path(table)
+    every = np.arange(len(path.run))
+    along = {"turns": turns_by_depth(path.motion.turns), "angles": term.data["angles"], **readings(path, every)}
+
+    def curves(values: Values) -> dict[str, Any]:
+        return {"force": term.shown(values, along, term.mounted(values, term.data))}
+
+    drawn, found = of_draws(fit, curves)["force"], []
+    for run, name in enumerate(table.run_names):
+        here, rows = path.run == run, table.run == run
+        label = "" if len(table.run_names) == 1 else name
+        points = table.displacement[rows], table.force[rows], table.motion.stroke[rows], table.used[rows]
+        curve = path.displacement[here], quantiles(drawn[:, here]), path.motion.stroke[here]
+        found.append(MotorForce(label, *curve, *points))
+    return tuple(found)
+
+
+def _path(table: DisplacementTable) -> DisplacementTable:
+    """The way that the motor took in each run, in steps finer than its readings."""
+    from bowdenfit.kinds.displacement.turns import in_order, sliding
+
+    x, run, stroke = [], [], []
+    for number in range(len(table.run_names)):
+        at = table.displacement[table.run == number]
+        if table.sliding:
+            line = np.linspace(at.min(), at.max(), _POINTS)
+            x.append(np.concatenate([line, line]))
+            stroke.append(np.repeat([1, -1], _POINTS))
+        else:
+            steps = max(1, -(-_POINTS // max(len(at) - 1, 1)))
+            x.append(np.interp(np.arange(steps * (len(at) - 1) + 1) / steps, np.arange(len(at)), at))
+        run.append(np.full(len(x[-1]), number))
+    displacement, of_run = np.concatenate(x), np.concatenate(run)
+    motion = sliding(np.concatenate(stroke), displacement, of_run) if table.sliding else in_order(displacement, of_run)
+    return replace(table, displacement=displacement, run=of_run, motion=motion)
+
+
+@in_paper_style
+def draw(runs: tuple[MotorForce, ...]) -> Figure:
+    """Force at the motor [N] against displacement [mm], a panel for each of at most six runs."""
+    shown = evenly(runs, MOST)
+    across = [span([run.displacement], room=0.03) for run in shown]
+    up = [span([run.force, run.points_force]) for run in shown]
+    share_x, share_y = alike(across), alike(up)
+    figure, flat, columns = recording_panels([run.label for run in shown], MOST_COLUMNS, None, share_x, share_y)
+    set_limits(flat, across, "x", share_x)
+    set_limits(flat, up, "y", share_y)
+    for axes, run in zip(flat, shown, strict=True):
+        _loop(axes, run)
+        _readings(axes, run)
+    label_outer(flat, columns, "Displacement at the motor (mm)", "Force at the motor (N)")
+    say_of_how_many(flat[-1], len(shown), len(runs), "runs")
+    legend_above(figure, flat, columns={1: 2, 2: 3}.get(columns, 4))
+    enlarge_marks(figure)
+    return figure
+
+
+def _loop(axes: Axes, run: MotorForce) -> None:
+    """The fitted force stroke by stroke, each from the end of the one before."""
+    name = (MEDIAN if len(run.force) > 1 else LEAST_SQUARES).lower()
+    ends = [0, *(np.flatnonzero(np.diff(run.stroke)) + 1).tolist(), len(run.stroke)]
+    said = set[int]()
+    for start, stop in pairwise(ends):
+        joined = start > 0 and abs(run.displacement[start] - run.displacement[start - 1]) < 0.5 * np.ptp(run.displacement)
+        way, part = int(run.stroke[start]), slice(start - joined, stop)
+        label = {} if way in said else {"label": f"{'Pull' if way > 0 else 'Return'}, {name}"}
+        draw_quantiles(axes, run.displacement[part], run.force[:, part], BLUE if way > 0 else VERMILLION, **label)
+        said.add(way)
+    name_band(axes, run.force)
+    axes.axhline(0.0, color=GRAY, linewidth=0.6, zorder=0.5)
+
+
+def _readings(axes: Axes, run: MotorForce) -> None:
+    """Readings by stroke; those that are not used are open."""
+    for stroke, name, marker, size, color in _STROKES:
+        for used, words in ((True, name), (False, "Not used")):
+            here = (run.points_stroke == stroke) & (run.points_used.astype(bool) == used)
+            if here.any():
+                axes.plot(
+                    run.points_displacement[here], run.points_force[here], marker, color=color, markersize=size,
+                    markerfacecolor=color if used else "white", markeredgewidth=0.5,
+                    markeredgecolor="white" if used else color, zorder=3, label=words,
+                )  # fmt: skip

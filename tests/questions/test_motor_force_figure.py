@@ -1,0 +1,40 @@
+"""The figure of force against displacement shows the fitted loop through its readings, each stroke from the end of the last."""
+
+import jax
+import matplotlib.pyplot as plt
+import numpy as np
+import pytest
+
+import bowdenfit as bf
+from bowdenfit.questions.bends.motor_force_figure import data, draw
+
+
+@pytest.fixture(scope="module")
+def shown(on_body):
+    """What the figure of the synthetic catheter shows, by least squares."""
+    fit = bf.fit(on_body.parent / "synthetic-catheter", mcmc=False)
+    with jax.enable_x64(True):
+        return data(fit)
+
+
+def test_the_loop_of_every_run_goes_through_its_readings(shown):
+    assert [run.label for run in shown] == ["180 deg", "360 deg", "540 deg"]
+    for run in shown:
+        for way in (1, -1):
+            here = (run.points_stroke == way) & run.points_used
+            at, force = run.displacement[run.stroke == way], run.force[0][run.stroke == way]
+            nearest = np.abs(at[:, None] - run.points_displacement[here]).argmin(axis=0)
+            assert np.median(np.abs(force[nearest] - run.points_force[here])) < 0.1
+
+
+def test_it_is_drawn_with_a_panel_a_run_and_unused_readings_open(shown):
+    figure = draw(shown)
+    assert [axes.get_title() for axes in figure.axes[:3]] == ["180 deg", "360 deg", "540 deg"]
+    assert "Not used" in {line.get_label() for line in figure.axes[0].lines}
+    plt.close(figure)
+
+
+def test_other_fits_have_no_such_figure(on_body):
+    fit = bf.fit(on_body, mcmc=False)
+    with jax.enable_x64(True):
+        assert data(fit) is None

@@ -189,7 +189,7 @@ def _pinned_elsewhere(problem: Problem, start: np.ndarray) -> list[Solution]:
     parameters = problem.posterior.model.space.free
     roles = ["friction", "elastic"] if any(p.role == "elastic" for p in parameters) else []
     each = [np.arange(len(start)) == i for i, p in enumerate(parameters) if p.role in roles]
-    return [problem.solve(start, this, np.where(this, z, 0.0)) for this, z in product(each, PINS)]
+    return [problem.solve(start, this, np.where(this, z, 0.0), quick=True) for this, z in product(each, PINS)]
 
 
 def _estimates(

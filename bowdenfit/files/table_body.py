@@ -14,7 +14,7 @@ from bowdenfit.files.table_rows import is_measured, is_units, is_words, words_an
 from bowdenfit.words import shown
 
 _MOST_STATISTICS = 8  # rows of statistics that may stand below text columns
-_FEWEST_ALIKE, _SHARE_ALIKE = 2, 0.2  # rows below words, and of those above, from which they may belong to the table
+_FEWEST_ALIKE, _SHARE_ALIKE = 2, 0.05  # rows below words, and of those above, from which they may belong to the table
 _STATISTICS, _INSIDE = "statistics below the table", "statistics between the rows"
 
 
@@ -51,8 +51,10 @@ def _other_table(rows: Sequence[CsvRecord], header: CsvRecord, file: str) -> int
     for i, row in enumerate(rows):
         if seen and rows[i - 1].blank and is_words(row) and row.cells != header.cells:
             numeric = _numeric_columns(rows[:i])
-            above, below = (sum(_agrees(each, numeric) for each in part) for part in (rows[:i], rows[i + 1 :]))
-            if below >= max(_FEWEST_ALIKE, _SHARE_ALIKE * above):
+            filled = sorted(_filled(each, numeric) for each in rows[:i] if _agrees(each, numeric))
+            usual = filled[len(filled) // 2] if filled else 1
+            below = sum(_agrees(each, numeric) and _filled(each, numeric) >= usual for each in rows[i + 1 :])
+            if below >= max(_FEWEST_ALIKE, _SHARE_ALIKE * len(filled)):
                 raise DatasetError(
                     f"{file}, row {row.row}: words stand there ({shown(' '.join(row.cells))}) behind a blank row, and {below} "
                     "rows of numbers in the same columns below them; if these belong to the table, delete the words or begin "
@@ -78,6 +80,11 @@ def _agrees(row: CsvRecord, numeric: set[int]) -> bool:
     """Whether a row has numbers where the table has them, and no words there."""
     cells = [row.cells[i] for i in numeric if i < len(row.cells) and row.cells[i].strip().lower() not in BLANK]
     return bool(cells) and 2 * len(cells) >= len(numeric) and all(map(is_measured, cells))
+
+
+def _filled(row: CsvRecord, numeric: set[int]) -> int:
+    """How many of the columns of numbers have one in a row."""
+    return sum(i < len(row.cells) and is_measured(row.cells[i]) for i in numeric)
 
 
 def _misfits(row: CsvRecord, numeric: set[int]) -> bool:

@@ -18,6 +18,7 @@ from bowdenfit.files.sheets import stated_rate
 from bowdenfit.files.spellings import spelled
 from bowdenfit.files.tables import WORKBOOKS, read_table
 from bowdenfit.files.text_file import first_bytes, first_lines
+from bowdenfit.kinds.forces.loads import levels
 from bowdenfit.units import conversion_factor, dimension_of, is_unit
 from bowdenfit.words import shown
 
@@ -106,7 +107,7 @@ def _by_columns(path: Path, table: RawTable) -> FileKind:
     rate = None if path.suffix.lower() in WORKBOOKS else stated_rate(_lines_above(path, table))
     if rate is not None:
         return FileKind("recordings", f"the line {shown(rate[1])} states its sampling rate")
-    if rows_alone or kind == "efficiencies" or len(table.rows) <= _LONG or not _is_smooth(table):
+    if kind == "efficiencies" or len(table.rows) <= _LONG or not _is_smooth(table):
         return FileKind(kind, "it has no column of time")
     why = "it has no column of time, but many rows in which the force changes little from one to the next"
     return FileKind(kind, why, "recordings")
@@ -118,13 +119,15 @@ def _lines_above(path: Path, table: RawTable) -> list[str]:
 
 
 def _with_clock(table: RawTable, clock: int, kind: str, rows_alone: str) -> FileKind:
-    heading = shown(table.header[clock])
-    if rows_alone or kind == "efficiencies":
+    heading, steps, many = shown(table.header[clock]), _steps(table, clock), len(table.rows) >= _FEW
+    if (rows_alone or kind == "efficiencies") and not (many and steps and float(np.median(steps)) < _SLOW):
         return FileKind(kind, f"its column {rows_alone or 'of efficiencies'} says that each row is a reading of its own")
-    steps = _steps(table, clock)
+    if rows_alone or kind == "efficiencies":
+        beside = rows_alone or "of efficiencies"
+        why = f"it has a column of time, {heading}, whose steps are those of a sampled force, but also a column {beside}"
+        return FileKind("recordings", why, kind)
     has_dates = not steps and any(is_date(row[clock].text.strip()) for row in table.rows[:_FEW])
     even = bool(steps) and min(steps) > 0 and max(steps) < _UNEVEN * min(steps)
-    many = len(table.rows) >= _FEW
     if (steps and (float(np.median(steps)) < _SLOW or (even and many))) or (has_dates and many):
         return FileKind("recordings", f"it has a column of time, {heading}")
     few = f"{len(table.rows)} rows" if not steps else f"{len(table.rows)} rows, {float(np.median(steps)):.3g} s apart"
@@ -180,6 +183,6 @@ def _is_smooth(table: RawTable) -> bool:
         values = np.array(numbers_in(table, i))
         values = values[np.isfinite(values)]
         spread = float(np.var(values)) if len(values) > _LONG else 0.0
-        many = len(set(values.tolist())) > len(values) / 4
-        return spread > 0 and many and float(np.mean(np.diff(values) ** 2)) < 2 * _SMOOTH * spread
+        spreads = len(set(values.tolist())) > len(values) / 4 and (values.min() <= 0 or levels(values) is None)
+        return spread > 0 and spreads and float(np.mean(np.diff(values) ** 2)) < 2 * _SMOOTH * spread
     return False

@@ -113,6 +113,14 @@ def test_words_with_many_rows_of_the_table_below_them_are_refused_rather_than_th
         read(tmp_path, [*TABLE[:3], "", "day 2;new oil", *TABLE[3:]])
 
 
+def test_a_smaller_table_below_with_headings_of_its_own_is_left_out_and_one_as_wide_is_refused(tmp_path):
+    rows = [f"{i};{row};0.{i}" for i, row in enumerate(ROWS * 5)]
+    lines = [f"trial;{HEADER};mu", *rows, "", "Load;mean mu", *(f"{load};0.12" for load in range(8))]
+    assert len(read(tmp_path, lines).rows) == 20
+    with pytest.raises(DatasetError, match="row 23: words stand there"):
+        read(tmp_path, [*lines[:22], "day 2;new oil", *rows[:2]])
+
+
 def test_groups_called_as_statistics_are_stay_readings(tmp_path):
     rows = [f"{level};{row}" for level, row in zip(("min", "min", "max", "max"), ROWS, strict=True)]
     assert len(read(tmp_path, [f"level;{HEADER}", *rows[:2], "", *rows[2:]]).rows) == 4

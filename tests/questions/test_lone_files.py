@@ -105,10 +105,29 @@ def test_few_rows_with_a_slow_clock_could_be_either_and_each_command_works(run, 
 
 
 def test_a_time_column_beside_runs_or_strokes_leaves_readings(tmp_path):
-    path = write(tmp_path, ("time (s)", "run", "F_in (N)", "F_out (N)"), (0.1 * np.arange(60), range(60), *trials()))
+    path = write(tmp_path, ("time (s)", "run", "F_in (N)", "F_out (N)"), (20.0 * np.arange(60), range(60), *trials()))
     found = file_kind(path)
     assert (found.kind, found.other) == ("forces", "")
     assert "run" in found.why
+
+
+@pytest.mark.parametrize("beside", ["direction", "run", "Efficiency (%)"])
+def test_samples_of_a_fast_clock_are_not_taken_for_readings_whatever_stands_beside_them(tmp_path, beside):
+    time, force, output = recorded()
+    columns = ("time (s)", beside, "Cell A (N)", "Cell B (N)"), (time, 50.0 + 0 * time, force, output)
+    assert file_kind(write(tmp_path, *columns)).kind == "recordings"
+    with pytest.raises(bf.DatasetError, match="could be a table of readings or a recording"):
+        bf.read(write(tmp_path, *columns), wrap_angle=(180, "deg"))
+
+
+def test_samples_without_a_clock_are_not_readings_because_they_have_a_direction_and_sorted_readings_are(tmp_path):
+    _, force, output = recorded()
+    path = write(tmp_path, ("direction", "F_in (N)", "F_out (N)"), (["pull"] * len(force), force, output))
+    assert file_kind(path).other == "recordings"
+    force, load = trials(300)
+    order = np.argsort(load)
+    found = file_kind(write(tmp_path, ("F_in (N)", "F_out (N)"), (force[order], load[order])))
+    assert (found.kind, found.other) == ("forces", "")
 
 
 def test_a_stated_rate_makes_a_recording(tmp_path):

@@ -38,6 +38,13 @@ COLUMNS = (
     Quantity("efficiency_sd", "ratio"),
 )
 """What a table without a description may have."""
+_ONE_FORCE = (Quantity("force", "force"), *FORCES)
+_POSITION = (Quantity("displacement", "length"), Quantity("position", "length"))
+
+
+def columns_of_kind(kind: str) -> tuple[Quantity, ...]:
+    """What a table of a kind may have, without a description."""
+    return (*COLUMNS, _ONE_FORCE[0], *_POSITION) if kind == "displacement" else COLUMNS
 
 
 @dataclass(frozen=True)
@@ -70,7 +77,8 @@ def file_kind(path: Path, has_channels: bool = False, named: Sequence[str] = ())
         DatasetError: The file is missing or empty, or no text although its ending says so.
     """
     if named:
-        return FileKind("efficiencies" if "efficiency" in named else "forces", "its columns are named with --column")
+        kind = "efficiencies" if "efficiency" in named else "displacement" if "displacement" in named else "forces"
+        return FileKind(kind, "its columns are named with --column")
     if has_channels:
         return FileKind("recordings", "its channels are named with --channel")
     if path.suffix.lower() not in (*TEXT, *WORKBOOKS):
@@ -102,6 +110,8 @@ def _by_columns(path: Path, table: RawTable) -> FileKind:
     forces = {quantity.name for quantity in FORCES}
     kind = "efficiencies" if "efficiency" in found and not forces <= found else "forces"
     rows_alone = next((name for name in ("run", "stroke", "group") if name in found), "")
+    if _has_one_force_and_a_position(table):
+        return FileKind("displacement", "it has one force and a displacement")
     if clock is not None:
         return _with_clock(table, clock, kind, rows_alone)
     rate = None if path.suffix.lower() in WORKBOOKS else stated_rate(_lines_above(path, table))
@@ -116,6 +126,16 @@ def _by_columns(path: Path, table: RawTable) -> FileKind:
 def _lines_above(path: Path, table: RawTable) -> list[str]:
     _, above = first_lines(first_bytes(path, 1 << 15), path.name, whole=False, most=table.header_row - 1)
     return [line.text for line in above]
+
+
+def _has_one_force_and_a_position(table: RawTable) -> bool:
+    """Whether a table has a single column of forces, at the motor if it says where, and one of displacements."""
+    headings = _headings(table)
+    found = {name: len(columns) for name, columns in candidates(headings, (*_ONE_FORCE, *_POSITION)).items()}
+    units = [heading_of(heading, unit).unit for heading, unit in headings]
+    forces = sum(unit is not None and is_unit(unit) and dimension_of(unit) == "force" for unit in units)
+    at_motor = found["force"] + found["input_force"] == 1 and not found["output_force"]
+    return at_motor and forces <= 1 and found["displacement"] + found["position"] == 1
 
 
 def _with_clock(table: RawTable, clock: int, kind: str, rows_alone: str) -> FileKind:

@@ -237,3 +237,19 @@ def test_the_command_keeps_what_the_user_has_set(tmp_path, run):
     path = write(tmp_path, ("F_in (N)", "F_out (N)"), trials())
     _, out, _ = run("check", path, "--noise", "student", "--set", "friction.mu.fixed=0.1")
     assert command(out)[0][4:] == ["--set", "friction.mu.fixed=0.1", "--noise", "student"]
+
+
+def test_one_force_and_a_position_are_a_table_of_their_own_with_or_without_a_clock(tmp_path, run):
+    x = np.concatenate([np.linspace(1.0, 20.0, 20), np.linspace(19.0, 1.0, 19)])
+    force = np.where(np.arange(len(x)) < 20, 0.8 * x, 0.4 * x)
+    for head, clock in (("", ""), ("time_s,", "{:.1f},")):
+        path = tmp_path / "tip.csv"
+        rows = [f"{clock.format(0.1 * i)}{a:.2f},{b:.3f}" for i, (a, b) in enumerate(zip(x, force, strict=True))]
+        path.write_text("\n".join([f"{head}Displacement [mm],Motor force (N)", *rows]) + "\n")
+        code, out, _ = run("check", path)
+        text = " ".join(out.split())
+        assert code == 0
+        assert "it has one force and a displacement" in text
+        assert "taken for a spring whose stiffness is fitted" in text and "bowdenfit fit" in text
+    path.write_text(path.read_text().replace("Motor force (N)", "Motor force (N)").replace("time_s", "output_force_N"))
+    assert "one force and a displacement" not in run("check", path)[1]

@@ -37,6 +37,7 @@ DISPLACEMENT = Kind(
     design=DisplacementDesign,
     empty=empty,
     count=count,
+    alone=lambda table: f"a table of {len(table.force)} forces against displacement",
     bends=lambda table: np.nansum(table.own.angle, axis=1),
     conditions=itself,
     forces=lambda table: table.force[table.used],

@@ -45,6 +45,11 @@ def chosen(table: DisplacementTable, settings: Any, has_strokes: bool) -> tuple[
             f"{ignored} {int(unknown.sum())} of {len(x)} rows, at the start of each run, are not used, because there the force "
             "depends on how the rope lay before, which nobody knows."
         )
+    if "end" not in settings.model_fields_set:
+        remarks.append(
+            f"{file}: the far end is taken for a spring whose stiffness is fitted; if the rope pulls against a stop, write "
+            'end = "stop" beside the file in cable.toml, or --set tables.displacement.end=stop.'
+        )
     if settings.stop is not None:
         at = settings.stop.to("length")
         if not np.any(x > at):

@@ -5,10 +5,10 @@ from collections.abc import Mapping, Sequence
 from bowdenfit.dataset import Dataset
 from bowdenfit.files.csv_table import RawTable
 from bowdenfit.files.headings import heading_of
-from bowdenfit.files.matching import candidates
+from bowdenfit.files.matching import Quantity, candidates
 from bowdenfit.kinds import each_table
 from bowdenfit.kinds.fit_commands import FitCommand
-from bowdenfit.kinds.single_file import COLUMNS, FileKind
+from bowdenfit.kinds.single_file import FileKind, columns_of_kind
 from bowdenfit.kinds.unnamed_ends import columns_of
 from bowdenfit.questions.check.row_words import account_words, first_and_last
 from bowdenfit.words import filled, listed, table
@@ -37,7 +37,7 @@ def table_text(
     title = f"{raw.file}: {_what(raw, data)}, because {found.why}."
     if found.other:
         title = f"{raw.file}: a table of readings or a recording; {found.why}."
-    lines = [filled(title), "", _columns(raw, named)]
+    lines = [filled(title), "", _columns(raw, columns_of_kind(found.kind), named)]
     if data is not None:
         lines += ["", *first_and_last(data)]
     lines += ["", *account_words(raw.account)]
@@ -64,9 +64,9 @@ def _what(raw: RawTable, data: Dataset | None) -> str:
     return f"a table of {len(raw.rows)} rows"
 
 
-def _columns(raw: RawTable, named: Mapping[str, str]) -> str:
+def _columns(raw: RawTable, wanted: tuple[Quantity, ...], named: Mapping[str, str]) -> str:
     """Every column: its unit, what it is read as, and its range."""
-    can_be = candidates(list(zip(raw.header, raw.units, strict=True)), COLUMNS, tuple(named.values()))
+    can_be = candidates(list(zip(raw.header, raw.units, strict=True)), wanted, tuple(named.values()))
     read_as = dict(named)
     for quantity, columns in can_be.items():
         for each in columns:

@@ -6,10 +6,11 @@ posterior at the noise scales' prior medians.
 """
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from itertools import product
 from typing import ClassVar
 
+import jax.numpy as jnp
 import numpy as np
 
 from bowdenfit.errors import ConvergenceError
@@ -21,11 +22,12 @@ from bowdenfit.inference.log_density import LogDensity
 from bowdenfit.inference.objective import LOWER_END, Objective, Problem, Solution, may_end, sum_of_squares
 from bowdenfit.inference.other_minima import PINS, fitting_as_well, range_of_minima
 from bowdenfit.inference.profiles import Basin, limits
-from bowdenfit.parameters.priors import LogNormal, Uniform
+from bowdenfit.parameters.priors import HalfCauchy, LogNormal, Uniform
 from bowdenfit.parameters.space import Parameter
 
 UNDETERMINED = "the measurements do not determine it"
 _SUSPECT = -2.0  # below this z an estimate may be on its way to the lower end, above its negative to the upper
+_FARTHEST = 6.0  # z of a noise scale
 _UNKNOWN = (float("nan"), float("nan"))
 _FAR = 50.0  # standard error in units of the prior's sd beyond which data say nothing of a parameter
 
@@ -124,7 +126,8 @@ def least_squares(
 ) -> LeastSquares:
     """Least squares without priors, from the maximum of the posterior.
 
-    The weights of the tables against each other are the prior medians of the noise scales; the standard errors use the
+    The weights of the tables against each other are the prior medians of the noise scales, or what single readings of a run
+    each tell of these; the standard errors use the
     scatter that is left (sandwich form), table by table; a force table scatters between its runs and within them.
 
     Args:
@@ -133,7 +136,7 @@ def least_squares(
         start: z to start from.
         intervals: Whether to compute the profile intervals, which take some twenty solves a parameter.
     """
-    basin = _minimum(Problem(posterior, objective), start)
+    basin = _weighed(_minimum(Problem(posterior, objective), start))
     found, space, terms = basin.found, posterior.model.space, posterior.model.terms
     active = np.flatnonzero(~basin.problem.noise & ~basin.at_end)
     about = linearize(found["jacobian"][:, active])
@@ -176,6 +179,28 @@ def _minimum(problem: Problem, start: np.ndarray) -> Basin:
         if sum_of_squares(trial) <= sum_of_squares(found) * (1 + 1e-7) + 1e-14:
             at_end, pin, found = at_end | this, trial_pin, trial
     return Basin(problem, found, at_end)
+
+
+def _weighed(basin: Basin) -> Basin:
+    """The minimum with the noise scales that single readings of a run each tell; the same where there are no such runs.
+
+    Their prior medians say how much more readings scatter at low loads than at high ones, which nothing else corrects.
+    """
+    problem, space = basin.problem, basin.problem.posterior.model.space
+    values = dict(zip((p.name for p in space.free), basin.found["values"], strict=True))
+    values |= {p.name: np.asarray(p.fixed) for p in space.fixed}
+    told: dict[str, float] = {}
+    for term in problem.posterior.model.terms:
+        if hasattr(term, "scatter_of_single_readings"):
+            told |= term.scatter_of_single_readings(values)
+    weighed = [name for name in told if name in space.index and isinstance(space.free[space.index[name]].prior, HalfCauchy)]
+    if not weighed or len(weighed) < len(told):
+        return basin
+    noise_z = np.zeros(space.size)
+    for name in weighed:
+        at = space.index[name]
+        noise_z[at] = np.clip(float(space.free[at].prior.unconstrain(jnp.asarray(told[name]))), -_FARTHEST, _FARTHEST)
+    return _minimum(replace(problem, noise_z=noise_z), basin.found["z"])
 
 
 def _suspect(parameters: tuple[Parameter, ...], z: np.ndarray) -> np.ndarray:

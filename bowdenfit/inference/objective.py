@@ -88,11 +88,13 @@ class Problem:
         posterior: The posterior.
         objective: What `make_objective` compiled for data of its shape.
         with_priors: Whether the priors count as measurements of the parameters.
+        noise_z: z of the noise scales, where they do not stay at their prior medians.
     """
 
     posterior: LogDensity
     objective: Objective
     with_priors: bool = False
+    noise_z: np.ndarray | float = 0.0
 
     @cached_property
     def noise(self) -> np.ndarray:
@@ -109,7 +111,8 @@ class Problem:
     ) -> Solution:
         """The minimum with further parameters pinned; without priors z weighs so little that it only breaks ties."""
         weight = np.where(self.noise, 0.0, 1.0 if self.with_priors else _TIE)
-        at = np.zeros(len(start)) if pin is None else pin
+        pin = np.zeros(len(start)) if pin is None else pin
+        at = np.where(self.noise & (pin == 0), self.noise_z, pin)
         return self.objective(start, self.noise | pinned, at, weight, self.data, quick)
 
 

@@ -75,7 +75,7 @@ def run_parts(term: Term, unit: LeaveOut) -> RunParts | None:
 
 def _chosen(rows: SlidingRows, kept: np.ndarray) -> SlidingRows:
     """Some of the readings."""
-    arrays = {name: value[kept] for name, value in vars(rows).items() if name != "angles"}
+    arrays = {name: value[kept] for name, value in vars(rows).items() if isinstance(value, np.ndarray)}
     return replace(rows, **arrays, angles={name: value[kept] for name, value in rows.angles.items()})
 
 

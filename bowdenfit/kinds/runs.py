@@ -23,6 +23,8 @@ from bowdenfit.types import Labels, Vector
 _WEIGHTS = ("weight", "load_squares", "load_products")
 _OF_RUNS = ("n", "run_weight", "run_mean", "scatter", "log_weights")
 _LOAD_BINS, _SPEED_BINS, _DELAY_BINS = 24, 24, 8  # of each stroke of a run, where load, speed or a delay matters
+_FEWEST = 6  # runs of a single reading, from which their scatter is parted
+_LEAST_SHARE = 1e-3  # of the variance of a mounting, that of the noise of a reading in the middle of the loads
 _ALIKE = 0.05  # speeds that differ by less than this fraction are one
 
 
@@ -120,6 +122,8 @@ class RunsTerm:
         friction = self.cable.friction_exponent(values, angles, data["group"])
         exponent = friction * self.cable.friction.rate(values, data["velocity"])
         shown, slope, by_load = self._shown(values, data, exponent)
+        if weights is not values:  # else a drag that makes mountings count for less would seem to fit better
+            slope = jax.lax.stop_gradient(slope)
         deviation = data["mean"] - shown
         total = self._per_run(data, slope**2)
         mounting = self._per_run(data, slope * deviation) / total
@@ -136,6 +140,22 @@ class RunsTerm:
     def _per_run(self, data: Mapping[str, Any], cells: Float[Array, " cells"]) -> Float[Array, " runs"]:
         """Weighted sum over the cells of each run."""
         return jnp.sum((data["weight"] * cells).reshape(len(self.labels), -1), axis=1)
+
+    def scatter_of_single_readings(self, values: Mapping[str, Array]) -> dict[str, float]:
+        """What makes runs of a single reading scatter: mountings at all loads alike, load cells more at low loads [1, N].
+
+        By maximum likelihood about given values; empty where runs have more readings, of which the noise is told, or are few.
+        """
+        if np.any(self.data["n"] > 1) or len(self.labels) < _FEWEST or self.cable.description.noise != "normal":
+            return {}
+        found = jax.jit(lambda v, data: self._deviations(v, data, v))(dict(values), self.data)
+        squares, per_noise = np.asarray(found.mounting) ** 2, 1 / np.asarray(found.total)
+        shares = np.concatenate([[0.0], np.geomspace(_LEAST_SHARE, 1 / _LEAST_SHARE, 49)]) / np.median(per_noise)
+        variance = 1 + shares[:, None] * per_noise
+        tau_squared = np.mean(squares / variance, axis=1)
+        best = int(np.argmax(-len(squares) * np.log(np.maximum(tau_squared, 1e-300)) - np.sum(np.log(variance), axis=1)))
+        tau = float(np.sqrt(tau_squared[best]))
+        return {RUN_SCATTER: tau, self.reading_noise: tau * float(np.sqrt(max(shares[best], _LEAST_SHARE * shares[1])))}
 
     def log_likelihood(self, values: Mapping[str, Array], data: Mapping[str, Any]) -> Float[Array, " runs"]:
         """Log likelihood of each run, all samples together."""

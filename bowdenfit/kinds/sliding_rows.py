@@ -23,6 +23,8 @@ class SlidingRows:
         drift: s d(log F_out)/dt, by which a delay of the output channel shifts the log ratio [1/s]; 0 without a clock.
         worth: How many independent readings each counts for [1].
         angles: `ROW_ARRAYS` of every row.
+        tells: How much one reading as each tells of its log ratio at unit noise of the output cell [N^2]; by the forces if
+            omitted.
     """
 
     input_force: Vector
@@ -34,6 +36,7 @@ class SlidingRows:
     drift: Vector
     worth: Vector
     angles: Mapping[str, np.ndarray]
+    tells: Vector | None = None
 
     def weight(self, noise_ratio: float) -> Vector:
         """Information on the log ratio at unit noise of the output cell [N^2].
@@ -41,4 +44,6 @@ class SlidingRows:
         Args:
             noise_ratio: Noise of the input cell over that of the output cell [1].
         """
+        if self.tells is not None:
+            return self.worth * self.tells
         return np.asarray(self.worth / (noise_ratio**2 / self.input_force**2 + 1 / self.output_force**2))

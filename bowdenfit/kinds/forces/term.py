@@ -65,7 +65,7 @@ def sliding_rows(
     """
     stroke, force_in, force_out = table.stroke[used], table.input_force[used], table.output_force[used]
     keys = np.column_stack([table.run[used], stroke, *(rows[name][used] for name in ROW_ARRAYS)])
-    expected = _expected(description, table, used, keys)
+    expected, weight = _expected(description, table, used, keys)
     return SlidingRows(
         expected.input_force,
         expected.output_force,
@@ -76,11 +76,17 @@ def sliding_rows(
         np.zeros(len(used)),
         np.ones(len(used)),
         {name: rows[name][used] for name in ROW_ARRAYS},
+        weight,
     )
 
 
-def _expected(description: Description, table: ForceTable, used: np.ndarray, keys: np.ndarray) -> ExpectedForces:
-    """What readings together say of their forces: those of a run, and those that are alone in theirs with each other.
+def _expected(
+    description: Description, table: ForceTable, used: np.ndarray, keys: np.ndarray
+) -> tuple[ExpectedForces, Vector]:
+    """What the readings of a run together say of their forces, and how much each tells of its log ratio [N^2].
+
+    A reading that is alone in its run is taken as it is, because a mounting of its own moves the forces themselves; but it is
+    weighed by what all such readings say, so that one whose output noise makes larger does not count for more.
 
     Args:
         description: What was said about the cable.
@@ -93,28 +99,19 @@ def _expected(description: Description, table: ForceTable, used: np.ndarray, key
     named = np.unique(np.array(table.group)[used], return_inverse=True)[1] if table.group else np.zeros(len(used), dtype=int)
     keys = np.column_stack([np.where(alone, -1 - named, runs), keys[:, 1:]])
     stated = None if sensors.force_noise is None else sensors.force_noise.to("force")
-    found = ExpectedForces(*(np.zeros(len(used)) for _ in range(3)))
+    found = ExpectedForces(table.input_force[used].copy(), table.output_force[used].copy(), np.zeros(len(used)))
+    weight = np.zeros(len(used))
     for mine, noise in ((~alone, stated), (alone, stated or 0.0)):
         if not mine.any():
             continue
         together = np.unique(keys[mine], axis=0, return_inverse=True)[1].ravel()
         forces = table.input_force[used][mine], table.output_force[used][mine]
         part = expected_forces(*forces, together, sensors.noise_ratio, noise, description.fits_offsets)
-        if noise and alone[mine].any():
-            part = _less_mountings(part, *forces, sensors.noise_ratio, noise)
+        weight[mine] = 1 / (sensors.noise_ratio**2 / part.input_force**2 + 1 / part.output_force**2)
         for name, values in vars(part).items():
-            getattr(found, name)[mine] = values
-    return found
-
-
-def _less_mountings(
-    expected: ExpectedForces, input_force: Vector, output_force: Vector, noise_ratio: float, noise: float
-) -> ExpectedForces:
-    """The same where each reading had a mounting of its own, which moves the forces themselves: noise moves them by less."""
-    moved_in, moved_out = expected.input_force - input_force, expected.output_force - output_force
-    squares = np.mean(moved_out**2 * (1 + (noise_ratio * output_force / input_force) ** 2))
-    share = min(1.0, noise**2 / squares) if squares > 0 else 1.0
-    return ExpectedForces(input_force + share * moved_in, output_force + share * moved_out, expected.log_ratio_error)
+            if not alone[mine].any() or name == "log_ratio_error":
+                getattr(found, name)[mine] = values
+    return found, weight
 
 
 def _run_label(cable: Cable, table: ForceTable, run: int) -> str:

@@ -62,6 +62,8 @@ class OptimalLength:
         choice, length = self.best_choice, self.length
         value = f"{choice.length:g}" if choice else f"{length.median:.{decimals(length.q95 - length.q05)}f}"
         is_cut = self.variable == "cable_length"
+        if not self.is_settled:
+            return f"measure more{' before you cut' if is_cut else ''}; the best guess is {value} {self.unit}"
         return f"{'cut the cable to' if is_cut else f'the best {self.what} is'} {value} {self.unit}"
 
     def __str__(self) -> str:

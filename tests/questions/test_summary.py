@@ -58,6 +58,16 @@ def test_least_squares_alone_say_so_on_one_page():
         assert "least squares alone" in page
 
 
+def test_a_length_that_is_not_settled_is_not_said_to_be_cut_to(fit):
+    best = fit.optimal_length()
+    unsure = replace(best, window=replace(best.window, start=float("nan"), stop=float("nan")))
+    assert str(unsure).startswith("Measure more before you cut; the best guess is 470 mm.\n")
+    assert "more measurements are needed" in " ".join(str(unsure).split())
+    assert str(best).startswith("Cut the cable to 470 mm.\n")
+    angle = replace(best, variable="knee_angle", unit="deg")
+    assert str(angle).startswith("The best knee angle is 470 deg.\n")
+
+
 def test_the_page_of_a_fit_that_has_not_settled_begins_with_that(fit):
     page = summary_text(replace(fit, converged=False, reasons=("R-hat of mu1 is 1.2 and should be below 1.01",)))
     assert faults(page) == []

@@ -13,14 +13,18 @@ from bowdenfit.words import WIDTH, filled, table
 
 LINES = 25
 _LONGEST_NAME, _LONGEST_READING = 44, 36  # characters
-_MOST_QUANTITIES, _MOST_OFF = 8, 3  # rows
+_LEAST_QUANTITIES, _MOST_QUANTITIES, _MOST_OFF = 4, 8, 3  # rows
+_BESIDE = 7  # lines that are neither sentences nor rows: headings, what is left out, blank lines, the last one
 _MORE = "Everything else: bowdenfit summary --full"
 
 
 def summary_text(fit: Record) -> str:
     """One page for people: at most `LINES` lines, as a terminal of 80 columns shows them."""
-    below = [line for block in (_quantities(fit), _off(fit), [_MORE]) for line in (["", *block] if block else [])]
-    above, room = _said(fit), LINES - len(below)
+    above, off = _said(fit), _off(fit)
+    rows = LINES - len(above) - len(off) - _BESIDE
+    shown = _quantities(fit, min(max(rows, _LEAST_QUANTITIES), _MOST_QUANTITIES))
+    below = [line for block in (shown, off, [_MORE]) for line in (["", *block] if block else [])]
+    room = LINES - len(below)
     if len(above) > room:
         above = [*above[: room - 1], "[...]"]
     return "\n".join([*above, *below]) + "\n"
@@ -38,20 +42,27 @@ def _said(fit: Record) -> list[str]:
     return [line for sentence in sentences if sentence for line in filled(sentence).splitlines()]
 
 
-def _quantities(fit: Record) -> list[str]:
-    """The coefficients in a table."""
+def _quantities(fit: Record, most: int) -> list[str]:
+    """The coefficients in a table of so many rows at most."""
     found = quantities(fit)
-    shown = found[:_MOST_QUANTITIES]
+    shown = found[:most]
     if not shown:
         return []
     wide = max(len(q.interval) for q in shown)
     rows = [(q.name, q.value, f"{q.interval:>{wide}} {q.unit}".rstrip()) for q in shown]
     lines = table(("", "value", f"{'90 % interval':>{wide}}"), rows, left=(f"{'90 % interval':>{wide}}",)).splitlines()
     start = max(map(len, lines)) + 2
-    meanings = [textwrap.shorten(q.what, WIDTH - start, placeholder=" ...") for q in shown]
+    meanings = [_meaning(q.what, WIDTH - start) for q in shown]
     lines[2:] = [f"{line:<{start}}{meaning}".rstrip() for line, meaning in zip(lines[2:], meanings, strict=True)]
     more = len(found) - len(shown)
     return [*lines, *([f"and {more} more"] if more > 0 else [])]
+
+
+def _meaning(what: str, room: int) -> str:
+    """What a coefficient is; the names of those that are no friction say it themselves where there is no room."""
+    if len(what) > room and not what.startswith("friction"):
+        return ""
+    return textwrap.shorten(what, room, placeholder=" ...")
 
 
 def _off(fit: Record) -> list[str]:

@@ -72,8 +72,8 @@ def recording_command(
     """
     options, provided = name_ends(columns, "--channel", stated, always)
     if not has_clock and "time" not in stated:
-        options.append("--channel time=1000Hz")
-        provided.append("1000 Hz is its sampling rate")
+        options.append("--channel time=RATE")
+        provided.append("RATE is its sampling rate, such as 1000Hz, which the file does not say")
     angle, of_angle = _one_angle(path)
     return _command(path, [*angle, *_named(stated, "--channel"), *options], [*of_angle, *provided])
 

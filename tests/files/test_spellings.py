@@ -5,6 +5,7 @@ import pytest
 
 import bowdenfit as bf
 from bowdenfit.errors import DatasetError, DescriptionError
+from bowdenfit.files import spellings
 from bowdenfit.files.spellings import spelled
 from bowdenfit.kinds.forces.table import ForceTable
 
@@ -173,3 +174,22 @@ def test_of_several_tables_the_one_must_be_named(on_body):
 def test_a_column_that_cannot_be_is_refused_in_a_sentence(tmp_path, text, says):
     with pytest.raises(DatasetError, match=says):
         forces(write(tmp_path, ("F_in (N)", "F_out (N)")), columns=[text])
+
+
+def test_no_word_says_two_things():
+    words = [word for said in spellings._WORDS.values() for word in said.split()]
+    names = [name for said in spellings._NAMES.values() for name in said.split("|")]
+    assert len(words) == len(set(words))
+    assert len(names) == len(set(names))
+    assert not {*names} & {*spellings._GUESSES}
+
+
+def test_strokes_are_read_in_five_languages_and_other_words_are_refused(tmp_path):
+    words = ("Ziehen", "zurück", "tirer", "relâcher", "soltar", "rilascio", "loading", "return")
+    columns = [40.0] * 8, [30, 50, 30, 50, 50, 50, 30, 50], words
+    path = write(tmp_path, ("Kraft ein (N)", "Kraft aus (N)", "Richtung"), *columns)
+    table = bf.read(path, wrap_angle=(180, "deg")).measurements.table(ForceTable)
+    assert table.stroke.tolist() == [1, -1, 1, -1, -1, -1, 1, -1]
+    path = write(tmp_path, ("F_in (N)", "F_out (N)", "direction"), FORCE_IN, FORCE_OUT, ["left"] * 4)
+    with pytest.raises(DatasetError, match=r"'left' is no stroke; .* rename a column that tells something else"):
+        forces(path)

@@ -2,7 +2,7 @@
 
 import numpy as np
 import pytest
-from catheters import TRUTH, bench
+from catheters import TRUTH, Catheter, bench, cycles
 from spoiling import copied, spoil
 
 import bowdenfit as bf
@@ -133,6 +133,53 @@ def test_rows_before_a_stop_are_counted_and_left_out(catheter):
     before = int(np.sum(table.displacement <= 12))
     assert not np.any(table.used & (table.displacement <= 12))
     assert "rows lie before the stop" in check_text(data) and before > 10
+
+
+PLAN = """name = "planned"
+[[contact]]
+name = "sheath"
+friction = "mu"
+wrap_angle = { column = "wrap_angle" }
+[tables]
+displacement = { file = "tip.csv" }
+[design.displacement]
+displacements = [2, 5, 8, 11, 14, 17, 20]
+wrap_angles = [180, 360]
+[truth]
+mu = 0.1
+end_spring = 0.5
+rope_give = 0.1
+tau = 0
+sigma_F = 0.01
+sigma_x = 0
+input_offset = 0
+displacement_zero_1 = 1
+displacement_zero_2 = 1
+"""
+
+
+def test_a_plan_is_simulated_row_by_row_as_friction_at_every_place_has_it(tmp_path, accept):
+    (tmp_path / "bench.toml").write_text(PLAN)
+    accept("simulate", tmp_path / "bench.toml", "-o", tmp_path / "out", "--seed", 1)
+    text = check_text(bf.read(tmp_path / "out"))
+    assert "in 2 runs" in text
+    rows = np.loadtxt(tmp_path / "out" / "tip.csv", delimiter=",", skiprows=1, usecols=(0, 2, 3))
+    for bend in (180, 360):
+        x, force = rows[rows[:, 0] == bend, 1:].T
+        known = Catheter(0.1 * np.deg2rad(bend), 0.5, 5.0, 1.0).pulled(x)
+        np.testing.assert_allclose(force[7:], known[7:], atol=0.06)  # the first stroke is from a slack rope
+
+
+def test_of_a_long_table_some_rows_are_used_and_all_turns(catheter):
+    motion = cycles(2.0, 24.0, 1000, 2)
+    force = Catheter(0.5, 0.6, 9.0).pulled(motion[::50])
+    rows = zip(motion, np.interp(np.arange(len(motion)), np.arange(0, len(motion), 50), force), strict=True)
+    lines = ["wrap_angle_deg,displacement_mm,force_N", *(f"180,{x},{f}" for x, f in rows)]
+    (catheter / CSV).write_text("\n".join(lines) + "\n")
+    data = bf.read(catheter)
+    table = data.measurements.table(DisplacementTable)
+    assert 300 < table.used.sum() <= 600 and len(table.motion.turns.at) == 4
+    assert "is used" in check_text(data)
 
 
 def test_turns_are_remembered_and_forgotten_once_they_are_passed():

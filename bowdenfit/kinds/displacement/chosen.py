@@ -16,6 +16,7 @@ from bowdenfit.kinds.displacement.table import DisplacementTable
 from bowdenfit.types import Flags
 
 _LEAST_SHARE = 0.01  # of the largest force, which a rope's may be taken for none
+_MOST = 600  # rows that are used, of longer tables
 _PLACES = 9  # displacements at which pull and return are compared
 
 
@@ -60,6 +61,14 @@ def chosen(table: DisplacementTable, settings: Any, has_strokes: bool) -> tuple[
         before = used & (x <= at)
         used &= ~before
         remarks.append(f"{file}: {int(before.sum())} rows lie before the stop, and are not used.")
+    n = int(used.sum())
+    if n > _MOST:
+        step = -(-n // _MOST)
+        used[np.flatnonzero(used)[np.arange(n) % step != 0]] = False
+        remarks.append(
+            f"{file}: of the {n} rows that are left one in {step} is used, {int(used.sum())} in all; those between them say "
+            "hardly more, and the turns of the motor are those of all rows."
+        )
     return replace(table, used=used), remarks
 
 

@@ -1,7 +1,7 @@
 """Force at the motor against displacement in the likelihood: the far end, the rope, and the mounting of each run."""
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from typing import Any
 
 import jax
@@ -14,7 +14,6 @@ from bowdenfit.cable.cable import Cable
 from bowdenfit.cable.elasticity import BEDDING_LOAD, BEDDING_STRETCH, STIFFNESS
 from bowdenfit.cable.load_cells import FORCE_NOISE, RUN_SCATTER, LoadCells
 from bowdenfit.cable.noise import noise_law, scatter
-from bowdenfit.description import Description
 from bowdenfit.kinds.angles.table import AngleTable
 from bowdenfit.kinds.bench import Remeasurement, Truth
 from bowdenfit.kinds.displacement.arrays import angles_of_runs, order_of, readings, turns_by_depth, zero_names
@@ -29,7 +28,6 @@ from bowdenfit.kinds.displacement.table import DisplacementSettings, Displacemen
 from bowdenfit.kinds.resolve_angles import resolve_angles
 from bowdenfit.kinds.term import WRAP_ANGLE, TermKind
 from bowdenfit.physics.tendon import RopeStretch, Tendon, Turn
-from bowdenfit.types import Vector
 
 MOTOR_FORCE, AT, SINCE_TURN = "motor_force", "Displacement (mm)", "Distance from the turn (mm)"
 _LEAST_GIVE = 1e-9  # of the spring's, below which a rope is as good as one that does not give
@@ -224,22 +222,16 @@ def displacement_term(cable: Cable, table: DisplacementTable, angles: AngleTable
 
 
 def _draw(table: DisplacementTable, truth: Truth) -> dict[str, Array]:
-    """Forces with noise in the cell and in the displacement; all readings of a run share its mounting and angles."""
+    """Forces of every row with noise in the cell and in the displacement; those of a run share its mounting and angles."""
     of_run, of_force, of_x = jax.random.split(jax.random.fold_in(truth.key, 7), 3)
     term, values, scale = displacement_term(truth.cable, table, truth.angles), truth.values, truth.scale
-    data = jax.tree.map(jnp.asarray, term.data)
+    data = jax.tree.map(jnp.asarray, term.data | readings(table, np.arange(len(table.run))))
     exponent, angle_variance = term.exponents(values, data)
     mounting = jnp.sqrt(values[RUN_SCATTER] ** 2 + angle_variance) * truth.scatter(of_run, exponent.shape)
-    shape = (len(term.labels),)
+    shape = table.force.shape
     beside = scale * values.get(DISPLACEMENT_NOISE, 0.0) * jax.random.normal(of_x, shape)
     force = term.shown(values, data, exponent + scale * mounting, beside)
     return {"force": force + scale * values[FORCE_NOISE] * truth.scatter(of_force, shape)}
-
-
-def _drawn_table(_: Description, table: DisplacementTable, drawn: Mapping[str, np.ndarray]) -> DisplacementTable:
-    force: Vector = table.force.copy()
-    force[order_of(table)] = drawn["force"]
-    return replace(table, force=force)
 
 
 def _where(table: DisplacementTable, term: Any) -> Mapping[str, np.ndarray]:
@@ -260,7 +252,7 @@ DISPLACEMENT = TermKind(
     "displacement",
     _terms,
     parameters,
-    Remeasurement(_draw, _drawn_table),
+    Remeasurement(_draw),
     tells_mountings=True,
     where=_where,
     back=lambda table: table.motion.stroke[order_of(table)] < 0,

@@ -14,6 +14,7 @@ from bowdenfit.kinds.rows import OwnAngles, RowOrigin
 
 UNKNOWN_SCATTER = "the fit does not know how such readings scatter, because it has no table of them"
 GRID, MOST_ANGLES, MOST_LOADS = 11, 9, 5  # lengths without choices; wrap angles and loads of default candidates
+STROKE_WORDS = {1: "pulling", -1: "returning"}
 Simulate = Callable[[Mapping[str, Array], Any, Array], Array]
 
 
@@ -25,13 +26,16 @@ class Candidate:
         kind: Name of its `CandidateKind`.
         route: Value of the route variable; NaN without one.
         angles: Wrap angles [rad]: of the contacts measured row by row, in the order of their columns, or the total one.
-        load: Load of the rope, or input force of a loop [N]; NaN where the kind has none.
+        load: Load of the rope, or input force of a loop or of all readings of a run [N]; NaN where the kind has none, or of
+            a run with the loads of those made so far.
+        stroke: Of all readings of a run, +1 pulling and -1 returning; 0 as in those made so far.
     """
 
     kind: str
     route: float = float("nan")
     angles: tuple[float, ...] = ()
     load: float = float("nan")
+    stroke: int = 0
 
     def __eq__(self, other: object) -> bool:
         return isinstance(other, Candidate) and self._key == other._key
@@ -43,7 +47,7 @@ class Candidate:
     def _key(self) -> tuple[object, ...]:
         """What makes two the same; NaN equals nothing, None does."""
         route, load = (None if np.isnan(value) else value for value in (self.route, self.load))
-        return self.kind, route, self.angles, load
+        return self.kind, route, self.angles, load, self.stroke
 
 
 @dataclass(frozen=True)
@@ -137,6 +141,9 @@ class CandidateKind:
         tells_curves: Whether it is of the wrap angles themselves, so that no measured angle can stand in.
         angles: Which wrap angles name it where there is no route: none, those measured row by row, or the total one.
         loaded: Whether it is made under a load.
+        designs: Loads [N] and strokes at which all its readings could be taken, where a candidate leaves them open; NaN and
+            0 as in those made so far.
+        usual: Loads and strokes of those made so far, in words.
         mounted_anew: Whether each means mounting the cable anew.
     """
 
@@ -155,6 +162,8 @@ class CandidateKind:
     tells_curves: bool = False
     angles: Literal["none", "columns", "total"] = "columns"
     loaded: bool = False
+    designs: Callable[[Situation], list[tuple[float, int]]] = lambda _: []
+    usual: Callable[[Situation], str] = lambda _: ""
     mounted_anew: bool = False
 
     @property
@@ -186,9 +195,9 @@ def one_reading_each(term: Any) -> Simulation:
     return Simulation(term.simulate, term.data, [(row,) for row in range(len(term.labels))])
 
 
-def some_loads(loads: np.ndarray) -> list[float]:
+def some_loads(loads: np.ndarray, most: int = MOST_LOADS) -> list[float]:
     """Some of the loads measured at, to two digits: as they were meant, without the noise of their reading."""
-    return _some(np.array([float(f"{load:.2g}") for load in loads if load > 0]), MOST_LOADS)
+    return _some(np.array([float(f"{load:.2g}") for load in loads if load > 0]), most)
 
 
 def some_bends(angles: np.ndarray) -> list[float]:

@@ -1,7 +1,7 @@
 """A force run that could be made next: what its readings say once the effect of its mounting is in them."""
 
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 import jax
@@ -12,7 +12,15 @@ from jax import Array
 from bowdenfit.cable.cable import Cable
 from bowdenfit.cable.load_cells import BLOCK_NOISE, FORCE_NOISE, RUN_SCATTER, LoadCells
 from bowdenfit.cable.noise import scatter
-from bowdenfit.kinds.candidate import UNKNOWN_SCATTER, Candidate, CandidateKind, Simulation, Situation
+from bowdenfit.kinds.candidate import (
+    STROKE_WORDS,
+    UNKNOWN_SCATTER,
+    Candidate,
+    CandidateKind,
+    Simulation,
+    Situation,
+    some_loads,
+)
 from bowdenfit.kinds.forces.table import ForceTable
 from bowdenfit.kinds.measurements import Measurements
 from bowdenfit.kinds.recordings.angles import recorded_angles
@@ -24,6 +32,7 @@ from bowdenfit.recordings.recording import Recordings
 from bowdenfit.types import Vector
 
 _MOST = 12  # forces of each stroke; more readings of a run are joined, and count for more
+_LOADS = 3  # at which all readings of a run could be taken
 _SPREAD = 1.05  # ratio of the largest to the smallest force or speed from which on their effect is looked for
 
 
@@ -88,6 +97,18 @@ def _joined(force: Vector, stroke: Any, velocity: Vector, worth: Vector, noise: 
     return RunDesign(np.array(means[0]), np.array(ways), np.array(means[1]), np.array(total), noise)
 
 
+def chosen_run(design: RunDesign, load: float, stroke: int) -> RunDesign:
+    """As many readings as a run has, all at one load and of one stroke.
+
+    Args:
+        design: The run.
+        load: Input force [N]; NaN to keep those of the run.
+        stroke: +1 or -1; 0 to keep those of the run.
+    """
+    force = design.input_force if np.isnan(load) else np.full(len(design.input_force), load)
+    return replace(design, input_force=force, stroke=np.full(len(force), float(stroke)) if stroke else design.stroke)
+
+
 def run_readings(
     cable: Cable, design: RunDesign
 ) -> tuple[Callable[[Mapping[str, Array], Mapping[str, Any], Array], Array], int]:
@@ -148,13 +169,50 @@ def _offered(at: Situation) -> list[Candidate]:
     return at.along_cable("force", own)
 
 
+def _designs(at: Situation) -> list[tuple[float, int]]:
+    """The lowest, a middle and the highest load of the runs made so far, and each of their strokes and both."""
+    run = typical_run(at.measurements)
+    if run is None:
+        return []
+    loads = some_loads(run.input_force, _LOADS)
+    strokes = [0, *sorted({int(stroke) for stroke in run.stroke}, reverse=True)]
+    return [(load, stroke) for load in loads for stroke in (strokes if len(strokes) > 2 else (0,))]
+
+
+def _usual(at: Situation) -> str:
+    """'24 readings at 20 to 60 N, pulling and returning'"""
+    run = typical_run(at.measurements)
+    assert run is not None
+    low, high = run.input_force.min(), run.input_force.max()
+    loads = f"{low:.3g} to {high:.3g} N" if high > _SPREAD * low else f"{np.mean(run.input_force):.3g} N"
+    ways = " and ".join(STROKE_WORDS[way] for way in (1, -1) if np.any(run.stroke == way))
+    count = round(float(np.sum(run.worth)))
+    return f"{count:,} {'reading' if count == 1 else 'readings'} at {loads}, {ways}"
+
+
 def _simulation(at: Situation, wanted: Sequence[Candidate]) -> Simulation:
-    design = typical_run(at.measurements)
-    assert design is not None  # else there are no candidates
-    route, own, _ = at.rows(wanted)
-    simulate, width = run_readings(at.cable, design)
-    columns = [tuple(range(n * width, (n + 1) * width)) for n in range(len(wanted))]
-    return Simulation(simulate, row_angles(at.cable.description, _Rows(route, own), at.angles).data, columns)
+    typical = typical_run(at.measurements)
+    assert typical is not None
+    groups: dict[tuple[str, int], list[int]] = {}
+    for i, candidate in enumerate(wanted):
+        groups.setdefault((f"{candidate.load:g}", candidate.stroke), []).append(i)
+    parts: list[tuple[Callable[..., Array], Any]] = []
+    columns: list[tuple[int, ...]] = [()] * len(wanted)
+    start = 0
+    for members in groups.values():
+        mine = [wanted[i] for i in members]
+        route, own, _ = at.rows(mine)
+        simulate, width = run_readings(at.cable, chosen_run(typical, mine[0].load, mine[0].stroke))
+        parts.append((simulate, row_angles(at.cable.description, _Rows(route, own), at.angles).data))
+        for i in members:
+            columns[i] = tuple(range(start, start + width))
+            start += width
+
+    def readings(values: Mapping[str, Array], data: Sequence[Any], key: Array) -> Array:
+        keys = jax.random.split(key, len(parts)) if len(parts) > 1 else [key]
+        return jnp.concatenate([part[0](values, own, k) for part, own, k in zip(parts, data, keys, strict=True)])
+
+    return Simulation(readings, [data for _, data in parts], columns)
 
 
 @dataclass(frozen=True)
@@ -169,7 +227,7 @@ FORCE_RUN = CandidateKind(
     name="force",
     noun="force run",
     words=lambda cable: f"a force run{f' of the group {cable.friction.groups[0]}' if cable.friction.groups else ''}",
-    example="force@470",
+    example="force@470 or force@470,20N,pull",
     order=1,
     needs=(RUN_SCATTER,),
     possible=lambda at: typical_run(at.measurements) is not None,
@@ -177,5 +235,7 @@ FORCE_RUN = CandidateKind(
     offered=_offered,
     simulation=_simulation,
     along_route=True,
+    designs=_designs,
+    usual=_usual,
     mounted_anew=True,
 )

@@ -97,6 +97,21 @@ class Step:
 
 
 @dataclass(frozen=True)
+class Within:
+    """At which load and of which stroke the readings of the best candidate tell most.
+
+    Args:
+        usual: What the candidate was taken to be, in words: the loads and strokes of the runs made so far.
+        ranked: The same with all its readings at one load and of one stroke, best first, with that as usual among them.
+    """
+
+    usual: str
+    ranked: tuple[Ranked, ...]
+
+    JSON: ClassVar = ("usual", ("candidates", "ranked"))
+
+
+@dataclass(frozen=True)
 class NextMeasurement:
     """Candidates from the most to the least worth measuring.
 
@@ -110,6 +125,7 @@ class NextMeasurement:
         converged: Whether the fit may be trusted.
         loads: Lowest and highest input force of a run like those made so far [N]; None where there is none.
         stop: Whether nothing needs to be measured, in a sentence.
+        within: At which load and stroke the best is best made; None where it says so itself, or is not made under any.
     """
 
     answer: Answer
@@ -121,9 +137,11 @@ class NextMeasurement:
     converged: bool
     loads: tuple[float, float] | None = None
     stop: str = ""
+    within: Within | None = None
 
     JSON: ClassVar = (
-        "answer", ("best", "best_name"), ("candidates", "ranked"), "repeats", "plan", "converged", "loads?", "stop",
+        "answer", ("best", "best_name"), ("candidates", "ranked"), ("load_and_stroke", "within"), "repeats", "plan",
+        "converged", "loads?", "stop",
     )  # fmt: skip
 
     @property

@@ -13,6 +13,7 @@ from bowdenfit.questions.next.candidates import route_words, situation_of, why_n
 from bowdenfit.results.record import Record
 from bowdenfit.units import conversion_factor, dimension_of, route_conversion_factor
 
+_STROKES = {"pull": 1, "return": -1}
 _NUMBER = re.compile(r"\s*([+-]?[\d.]+(?:[eE][+-]?\d+)?)\s*(.*?)\s*")
 
 
@@ -44,15 +45,19 @@ def _with_part(fit: Record, kind: CandidateKind, candidate: Candidate, text: str
     """The candidate with one more number of its place."""
     found = _NUMBER.fullmatch(part)
     route = fit.dataset.description.route
+    has_designs = bool(kind.designs(situation_of(fit.model, fit.dataset.measurements)))
+    if part in _STROKES and has_designs:
+        return replace(candidate, stroke=_STROKES[part])
     try:
         value, unit = float(found[1]) if found else float("nan"), found[2] if found else ""
         if np.isnan(value):
-            raise ValueError(f"{part!r} is no number with its unit")
+            strokes = f", nor a stroke, {' or '.join(_STROKES)}" if has_designs else ""
+            raise ValueError(f"{part!r} is no number with its unit{strokes}")
         along = route is not None and kind.along_route and np.isnan(candidate.route)
         kind_of_unit = dimension_of(unit) if unit else ""
         if along and route is not None and (not unit or kind_of_unit == dimension_of(route.unit)):
             return replace(candidate, route=value * (route_conversion_factor(unit, route.unit) if unit else 1.0))
-        if kind_of_unit == "force" and kind.loaded:
+        if kind_of_unit == "force" and (kind.loaded or has_designs):
             return replace(candidate, load=value * conversion_factor(unit, "force"))
         if kind_of_unit == "angle" and kind.angles != "none":
             return replace(candidate, angles=(*candidate.angles, value * conversion_factor(unit, "angle")))
@@ -78,7 +83,7 @@ def _check_complete(fit: Record, kind: CandidateKind, candidate: Candidate, text
                 f"--candidate {text!r}: this cable's wrap angles are constant, so there is no place to name; write "
                 f"{kind.name} alone."
             )
-    if not missing and kind.loaded and not candidate.load > 0:
+    if not missing and (kind.loaded or not np.isnan(candidate.load)) and not candidate.load > 0:
         missing = "a load greater than zero"
     if not missing and any(not angle >= 0 for angle in candidate.angles):
         missing = "wrap angles without a sign"

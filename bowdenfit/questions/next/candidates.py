@@ -3,7 +3,7 @@
 import numpy as np
 
 from bowdenfit.errors import UsageError
-from bowdenfit.kinds.candidate import Candidate, Situation
+from bowdenfit.kinds.candidate import STROKE_WORDS, Candidate, Situation
 from bowdenfit.kinds.measurements import Measurements
 from bowdenfit.kinds.terms import candidate_kinds
 from bowdenfit.model import Model
@@ -68,7 +68,8 @@ def words_of(fit: Record, candidate: Candidate) -> str:
     if candidate.angles:
         angles = " and ".join(f"{angle:.4g}" for angle in np.rad2deg(candidate.angles))
         what += f" at {angles} deg"
-    return what + (f" under {candidate.load:.3g} N" if np.isfinite(candidate.load) else "")
+    what += f" under {candidate.load:.3g} N" if np.isfinite(candidate.load) else ""
+    return what + (f" while {STROKE_WORDS[candidate.stroke]}" if candidate.stroke else "")
 
 
 def name_of(candidate: Candidate) -> str:
@@ -76,4 +77,5 @@ def name_of(candidate: Candidate) -> str:
     parts = [f"{candidate.route:.12g}"] if np.isfinite(candidate.route) else []
     parts += [f"{angle:.6g}deg" for angle in np.rad2deg(candidate.angles)]
     parts += [f"{candidate.load:.6g}N"] if np.isfinite(candidate.load) else []
+    parts += [{1: "pull", -1: "return"}[candidate.stroke]] if candidate.stroke else []
     return candidate.kind + ("@" + ",".join(parts) if parts else "")

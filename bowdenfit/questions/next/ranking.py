@@ -1,6 +1,7 @@
 """What to measure next: candidates ranked by how far each would narrow an answer, on average."""
 
 from collections.abc import Mapping, Sequence
+from dataclasses import replace
 
 import jax
 import numpy as np
@@ -8,9 +9,19 @@ import numpy as np
 from bowdenfit.errors import UsageError, nearest
 from bowdenfit.kinds.candidate import Candidate
 from bowdenfit.kinds.next_run import typical_run
-from bowdenfit.questions.next.answer import LEAST_SHARE, WITHIN, NextMeasurement, Ranked, Repeats, Step, is_noticeable
+from bowdenfit.kinds.terms import candidate_kinds
+from bowdenfit.questions.next.answer import (
+    LEAST_SHARE,
+    WITHIN,
+    NextMeasurement,
+    Ranked,
+    Repeats,
+    Step,
+    Within,
+    is_noticeable,
+)
 from bowdenfit.questions.next.candidate_names import parsed_candidates
-from bowdenfit.questions.next.candidates import default_candidates, name_of, words_of
+from bowdenfit.questions.next.candidates import default_candidates, name_of, situation_of, words_of
 from bowdenfit.questions.next.simulated_readings import simulated_readings
 from bowdenfit.questions.next.target import Answer, answer_of
 from bowdenfit.questions.next.variance_reduction import Explained, error_of_difference, explained_share, mean_and_spread
@@ -51,7 +62,8 @@ def next_measurement(
         return NextMeasurement(answer, ranked, None, (), *shown, fit.converged, loads, stop)
     repeats = _repeats(fit, answer, ranked[0].candidate)
     plan = _plan(answer, ranked, dict(zip(chosen, readings, strict=True)))
-    return NextMeasurement(answer, ranked, repeats, plan, *shown, fit.converged, loads, stop)
+    within = _within(fit, answer, ranked[0].candidate)
+    return NextMeasurement(answer, ranked, repeats, plan, *shown, fit.converged, loads, stop, within)
 
 
 def _loads(fit: Record) -> tuple[float, float] | None:
@@ -102,6 +114,16 @@ def _ranked(
             )
         )  # fmt: skip
     return tuple(ranked)
+
+
+def _within(fit: Record, answer: Answer, best: Candidate) -> Within | None:
+    """The best candidate with its readings at other loads or of one stroke; None where it names these, or has none."""
+    kind, at = candidate_kinds()[best.kind], situation_of(fit.model, fit.dataset.measurements)
+    if np.isfinite(best.load) or best.stroke or not (designs := kind.designs(at)):
+        return None
+    chosen = [best, *(replace(best, load=load, stroke=stroke) for load, stroke in designs)]
+    found = [explained_share(reading[:, 0], answer.draws) for reading in _readings(fit, chosen, 1)]
+    return Within(kind.usual(at), _ranked(fit, answer, chosen, found, None))
 
 
 def _repeats(fit: Record, answer: Answer, candidate: Candidate) -> Repeats:

@@ -1,5 +1,8 @@
 """What `bowdenfit next` prints."""
 
+import math
+
+from bowdenfit.kinds.candidate import STROKE_WORDS
 from bowdenfit.kinds.terms import candidate_kinds
 from bowdenfit.questions.next.answer import NextMeasurement, Ranked
 from bowdenfit.words import decimals, few, filled, percent, table
@@ -14,7 +17,7 @@ def next_measurement_text(found: NextMeasurement, top: int) -> str:
         found: The ranking.
         top: How many candidates the table shows.
     """
-    sentences = [*_advice(found), found.stop, *_planned(found), *_repeated(found)]
+    sentences = [*_advice(found), *_load_and_stroke(found), found.stop, *_planned(found), *_repeated(found)]
     shown = found.ranked[:top]
     more = len(found.ranked) - len(shown)
     lines = [
@@ -68,10 +71,38 @@ def _how(found: NextMeasurement, best: Ranked) -> str:
     """That the cable is to be mounted anew, and at which loads, where neither is said already."""
     if not candidate_kinds()[best.candidate.kind].mounted_anew:
         return ""
-    if found.loads is None:
+    if found.loads is None or math.isfinite(best.candidate.load):
         return ", mounted anew"
     low, high = (f"{load:.3g}" for load in found.loads)
     return f", mounted anew, at {low} N" if low == high else f", mounted anew, at {low} to {high} N as so far"
+
+
+def _load_and_stroke(found: NextMeasurement) -> list[str]:
+    """At which load and of which stroke its readings tell most, against the same number of them as usual."""
+    within = found.within
+    if within is None:
+        return []
+    usual = next(r for r in within.ranked if r.name == found.ranked[0].name)
+    best, worst = within.ranked[0], within.ranked[-1]
+    said = f"That is a run as those made so far: {within.usual}."
+    if worst.as_good or (usual.as_good and len({r.as_good for r in within.ranked}) == 1):
+        return [f"{said} Which load and stroke they are taken at makes no difference beyond the error of this estimate."]
+    if usual.as_good:
+        return [
+            f"{said} No other load or stroke does better beyond the error of this estimate; as many {_where(worst)} would "
+            f"leave {_sd(found, worst.sd)}."
+        ]
+    return [
+        f"{said} As many readings {_where(best)} do most: they leave {_sd(found, best.sd)}, those as usual "
+        f"{_sd(found, usual.sd)}, and {_where(worst)} {_sd(found, worst.sd)}; name it with --candidate {best.name}."
+    ]
+
+
+def _where(ranked: Ranked) -> str:
+    """'at 64 N while pulling'"""
+    load, stroke = ranked.candidate.load, ranked.candidate.stroke
+    way = f"while {STROKE_WORDS[stroke]}" if stroke else "of both strokes"
+    return f"all at {load:.3g} N {way}"
 
 
 def _planned(found: NextMeasurement) -> list[str]:

@@ -1,0 +1,42 @@
+"""At which load and of which stroke the readings of the next run are worth most."""
+
+import numpy as np
+import pytest
+from hand_bench import pull, write
+
+import bowdenfit as bf
+from bowdenfit.errors import UsageError
+from bowdenfit.questions.next.candidate_names import parsed_candidates
+from bowdenfit.questions.next.candidates import name_of, words_of
+from bowdenfit.questions.next.ranking import next_measurement
+from bowdenfit.questions.next.words import next_measurement_text
+
+
+@pytest.fixture(scope="module")
+def fit(tmp_path_factory):
+    """A rope with a hidden tension, which is told by what comes out at low loads."""
+    rows = pull(np.random.default_rng(1), [180.0] * 4, [0.4] * 4, (4, 16, 64), drag=2.0, noise=(0.05, 0.05), scatter=0.02)
+    return bf.fit(write(tmp_path_factory.mktemp("drag"), rows), friction="drag", seed=1)
+
+
+def test_a_hidden_tension_is_told_by_the_lowest_load(fit):
+    within = next_measurement(fit, "drag").within
+    assert within.usual.startswith("6 readings at") and within.usual.endswith("64 N, pulling and returning")
+    share = {(round(np.nan_to_num(r.candidate.load)), r.candidate.stroke): r.share for r in within.ranked}
+    assert set(share) == {(0, 0), *((load, stroke) for load in (4, 16, 64) for stroke in (0, 1, -1))}
+    assert share[64, 0] < share[4, 0] and share[64, 0] < share[0, 0]
+
+
+def test_the_advice_says_which_load_and_stroke(fit):
+    said = " ".join(next_measurement_text(next_measurement(fit, "drag"), 5).split())
+    assert "That is a run as those made so far: 6 readings at" in said and "pulling and returning" in said and "64 N" in said
+    assert bf.next_measurement(fit, "drag", ["force@180deg,4N,pull"]).within is None
+
+
+def test_a_run_is_read_as_it_is_named(fit):
+    (candidate,) = parsed_candidates(fit, ["force@180deg,20N,return"])
+    assert (candidate.load, candidate.stroke) == (20.0, -1)
+    assert name_of(candidate) == "force@180deg,20N,return"
+    assert words_of(fit, candidate).endswith("under 20 N while returning")
+    with pytest.raises(UsageError, match="pull or return"):
+        parsed_candidates(fit, ["force@180deg,pul"])

@@ -20,6 +20,7 @@ from bowdenfit.questions.identify.confounding import confounded_pairs
 from bowdenfit.questions.recorded import dependence_figure
 from bowdenfit.questions.recorded.rate import RateEffect, rate_effect
 from bowdenfit.questions.recorded.traces import traces
+from bowdenfit.questions.summary.answer import answer
 from bowdenfit.questions.summary.brief_words import summary_text
 from bowdenfit.questions.summary.words import full_text
 from bowdenfit.recordings.recording import Recordings
@@ -52,9 +53,8 @@ def truth(recorded):
 
 def test_the_summary_of_recordings_is_one_page(plain, with_rate):
     assert faults(summary_text(plain[0])) == []
-    page = summary_text(with_rate[0])
-    assert faults(page) == []
-    assert "no dependence on speed" in " ".join(page.split())
+    assert faults(summary_text(with_rate[0])) == []  # so short that it is not trusted, and begins with that
+    assert "no dependence on speed" in " ".join(answer(with_rate[0]))
 
 
 def test_the_coefficients_of_the_synthetic_recordings_lie_in_their_intervals(plain, truth):

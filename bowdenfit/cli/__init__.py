@@ -3,6 +3,7 @@
 import gc
 import os
 import sys
+import warnings
 from pathlib import Path
 
 import click
@@ -20,6 +21,8 @@ _MADE = 50_000  # objects made before Python looks for garbage: most stay, and e
 def start() -> None:
     """The program: `main`, and an end at once; to take apart what was loaded takes Python 0.3 s."""
     gc.set_threshold(_MADE)
+    if not (sys.warnoptions or os.environ.get("BOWDENFIT_DEBUG")):
+        warnings.simplefilter("ignore")  # of libraries, in words of their own; what matters is said in ours
     for name in ("stdout", "stderr"):
         if getattr(sys, name) is None:  # closed by whoever started this
             setattr(sys, name, Path(os.devnull).open("w", encoding="utf-8"))  # noqa: SIM115  (for as long as this runs)

@@ -13,7 +13,7 @@ import struct
 import subprocess
 import sys
 import time
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from contextlib import contextmanager, suppress
 from contextvars import ContextVar
 from dataclasses import dataclass, replace
@@ -107,7 +107,7 @@ def _reader() -> "subprocess.Popen[bytes]":
     if _readers and _readers[0].poll() is not None:
         _end(_readers[0])
     if not _readers:
-        command = [sys.executable, "-c", "from bowdenfit.files.apart import serve; serve()"]
+        command = [sys.executable, "-c", "from bowdenfit.files import apart, read_here; apart.serve(read_here)"]
         pipes: dict[str, Any] = dict.fromkeys(("stdin", "stdout"), subprocess.PIPE) | {"stderr": subprocess.DEVNULL}
         place = str(Path(__file__).resolve().parents[2])
         paths = os.pathsep.join(filter(None, [place, os.environ.get("PYTHONPATH", "")]))
@@ -168,8 +168,12 @@ def _too_much(path: Path, limits: Limits, what: str) -> str:
     )
 
 
-def serve() -> None:
-    """Read one file after the other, as asked on standard input, until that ends or nothing is asked for a while."""
+def serve(reader: Callable[[Path], ChannelFile]) -> None:
+    """Read one file after the other, as asked on standard input, until that ends or nothing is asked for a while.
+
+    Args:
+        reader: Reads in this process.
+    """
     import signal
 
     signal.signal(signal.SIGINT, signal.SIG_IGN)  # for the process that asks to handle
@@ -178,18 +182,16 @@ def serve() -> None:
     while select.select([0], [], [], _IDLE)[0] and (line := sys.stdin.buffer.readline()):
         path, memory, seconds = json.loads(line)
         _limit(memory, seconds)
-        content = pickle.dumps(_read(Path(path)), protocol=5)
+        content = pickle.dumps(_read(reader, Path(path)), protocol=5)
         answers.write(_LENGTH.pack(len(content)) + content)
         answers.flush()
     os._exit(0)
 
 
-def _read(path: Path) -> ChannelFile | str | None:
+def _read(reader: Callable[[Path], ChannelFile], path: Path) -> ChannelFile | str | None:
     """The file, why it cannot be read, or None if memory ran out."""
-    from bowdenfit.files import read_here
-
     try:
-        return read_here(path)
+        return reader(path)
     except MemoryError:
         return None
     except DatasetError as error:

@@ -92,15 +92,18 @@ def _is_ours(path: Path) -> bool:
 
 
 @contextmanager
-def reserved(folder: Path) -> Iterator[None]:
+def reserved(folder: Path | None) -> Iterator[None]:
     """A results folder that no other process fits into meanwhile; the reservation ends with this process at the latest.
 
     Args:
-        folder: The folder, made if missing.
+        folder: The folder, made if missing; None for none, and nothing is reserved where a file lies in its place.
 
     Raises:
         StoreError: Another process does, or the folder cannot be made.
     """
+    if folder is None or (folder.exists() and not folder.is_dir()):
+        yield
+        return
     new = not folder.exists()
     with folder_to_write(folder):
         held = os.open(folder, os.O_RDONLY) if fcntl is not None else None

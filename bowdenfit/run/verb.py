@@ -1,6 +1,7 @@
 """Fitting a data set."""
 
 from collections.abc import Callable
+from contextlib import ExitStack
 from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any, Literal, Unpack
@@ -57,8 +58,6 @@ def fit(
     Raises:
         BowdenfitError: What is wrong, in a sentence; nothing is written then.
     """
-    from contextlib import ExitStack
-
     from bowdenfit.results.folder import reserved
     from bowdenfit.run.helpers import assistant
     from bowdenfit.run.storing import choose_seed, start_checkpointing, with_sampler, write_results
@@ -66,11 +65,9 @@ def fit(
     refuse_unknown(fit, reading)
     folder = Path(output) if output is not None else None
     data = with_sampler(read(dataset, **reading), sampler)
-    drawing = figures and folder is not None
-    settings = _remember_compilations if remember_compilations else _no_settings
+    drawing, settings = figures and folder is not None, _remember_compilations if remember_compilations else _no_settings
     with ExitStack() as held:
-        if folder is not None and (not folder.exists() or folder.is_dir()):
-            held.enter_context(reserved(folder))
+        held.enter_context(reserved(folder))
         seed = choose_seed(folder, data, mcmc, seed, resume, force)
         helper = held.enter_context(assistant(in_background and (mcmc or drawing), settings, drawing))
         import jax
@@ -80,9 +77,8 @@ def fit(
         with jax.enable_x64(True):
             begin = partial(start_checkpointing, folder, data, seed, resume)
             found = run(data, begin, mcmc, seed, resume, progress, helper)
-            if folder is not None:
-                for sentence in write_results(found, folder, figures, helper):
-                    report(sentence)
+            for sentence in write_results(found, folder, figures, helper) if folder is not None else ():
+                report(sentence)
     return found
 
 

@@ -55,7 +55,10 @@ def test_a_fit_that_may_not_write_more_keeps_what_it_sampled_and_is_resumed(on_b
     limited = f"import os, resource as r, sys; {limit_size}; os.execv(sys.argv[2], sys.argv[2:])"
 
     def run(*before, after=()):
-        return subprocess.run([*before, *command, *after], capture_output=True, text=True, check=False, timeout=120)
+        environment = os.environ | {"XDG_CACHE_HOME": str(tmp_path / "cache")}  # programs are cut off there too
+        return subprocess.run(
+            [*before, *command, *after], env=environment, capture_output=True, text=True, check=False, timeout=240
+        )
 
     full = run(sys.executable, "-c", limited, str(limit))
     assert full.returncode == 1, full.stderr

@@ -86,21 +86,18 @@ def walker_round(log_density: Callable[[Array, Any], Array], moves: Moves, frame
         def stored(carried: Any, chosen: Any) -> Any:
             (z, values), (keys, kinds, frame) = carried, chosen
             bits = _bits(keys[0], (THIN, 2, n_ensembles, 1))
-            count = 1 + numbers_of_move(z.shape[2])
-            uniform = _uniform(_bits(keys[1], (THIN, 2, n_ensembles, n_walkers // 2, count)))
+            uniform = _uniform(_bits(keys[1], (THIN, 2, n_ensembles, n_walkers // 2, 1 + numbers_of_move(z.shape[2]))))
             w = jax.lax.switch(frame, to_w, z.reshape(-1, z.shape[-1]), data).reshape(z.shape)
             begin = w, values + back(frame, w)[1], jnp.tile(jnp.arange(n_walkers), (n_ensembles, 1))
             (w, values, walker), _ = jax.lax.scan(partial(step, frame), begin, (kinds, bits, uniform))
-            own = jnp.argsort(walker, axis=1)  # every walker in its own row again
-            z, volume = back(frame, w)
+            own, (z, volume) = jnp.argsort(walker, axis=1), back(frame, w)  # every walker in its own row again
             z, values = (_shuffle(part, own) for part in (z, values - volume))
             return (z, values), z
 
         own, of_all = (jax.random.fold_in(jax.random.fold_in(jax.random.key(s), _STREAM), number) for s in (seed, 0))
         drawn = _uniform(_bits(of_all, (STORED, THIN + 1)))
-        kinds, frame = (
-            jnp.searchsorted(e, u, side="right") for e, u in zip(ends, (drawn[:, 1:], drawn[:, 0]), strict=True)
-        )
+        chosen = zip(ends, (drawn[:, 1:], drawn[:, 0]), strict=True)
+        kinds, frame = (jnp.searchsorted(end, number, side="right") for end, number in chosen)
         (_, values), path = jax.lax.scan(stored, (z, values), (jax.random.split(own, (STORED, 2)), kinds, frame))
         return path, values
 

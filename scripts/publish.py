@@ -2,8 +2,8 @@
 
     python scripts/publish.py
 
-Takes some minutes. Everything is fitted with seed 1, so that on the same machine and with the same versions nothing changes. Look
-at what changed before committing it: each number that did is a change of the program.
+Takes some minutes. Everything is fitted with seed 1, so that on the same machine and with the same versions nothing changes.
+Look at what changed before committing it: each number that did is a change of the program.
 """
 
 import re
@@ -19,7 +19,7 @@ FITS = {  # data set: its figure, further files
     FIRST: ("efficiency", ("summary.json", "fit.json")),
     "synthetic-recordings": ("recordings", ()),
     "synthetic-haptic-loop": ("bending_loss", ()),
-    "synthetic-catheter": ("displacement", ()),
+    "synthetic-catheter": ("motor_force", ()),
 }
 BLOCK = re.compile(r"(?<=It prints:\n\n```text\n).*?(?=```\n)", re.DOTALL)
 

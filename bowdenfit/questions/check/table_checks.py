@@ -9,6 +9,7 @@ from bowdenfit.inference.predictive_checks import LeftOut, Uniformity
 from bowdenfit.inference.psis import RELIABLE_K
 from bowdenfit.kinds.places import Places
 
+_LEAST_FREEDOM = 5  # of the tails of a prediction by few readings, where priors tell something of the scatter too
 FALSE_ALARM = 0.01  # chance that a healthy fit is said to have an outlier; the same for the other kinds of alarm
 
 
@@ -103,14 +104,17 @@ class TableChecks:
 
     @property
     def chance(self) -> np.ndarray:
-        """Probability of a deviation as large, of each reading; where the weights fail, as if predictions were normal.
+        """Probability of a deviation as large, of each reading; where the weights fail, as if predictions were Student-t.
 
-        Weights that lean on few draws leave much of the reading's own effect in its prediction, which is then too wide.
+        Weights that lean on few draws leave much of the reading's own effect in its prediction, which is then too wide. The
+        degrees of freedom are those of a scatter found from the other readings of the table, because a prediction by few
+        readings has longer tails than a normal one: without them a healthy reading at 3.8 sds of twenty is an outlier.
         """
-        from scipy.stats import norm
+        from scipy.special import stdtr
 
-        as_normal = 2 * norm.sf(np.abs(np.nan_to_num(self.z_score)))
-        return np.where(self.decisive, np.minimum(as_normal, self.predicted.tail), self.predicted.tail)
+        freedom = max(self.measured - 2, _LEAST_FREEDOM)
+        t = np.abs(np.nan_to_num(self.z_score)) * np.sqrt(freedom / (freedom - 2))  # z is in sds of the prediction
+        return np.where(self.decisive, np.minimum(2 * stdtr(freedom, -t), self.predicted.tail), self.predicted.tail)
 
     def readings(self, among: int) -> list[CheckedReading]:
         """One by one.

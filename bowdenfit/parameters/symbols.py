@@ -15,7 +15,7 @@ def upright(name: str) -> str:
 
 def symbol_of(letter: str, name: str) -> str:
     """A letter with a name for its subscript."""
-    return rf"${letter}_{{{upright(name)}}}$"
+    return rf"${letter}_{upright(name)}$"
 
 
 def _set(letter: str) -> str:

@@ -53,7 +53,7 @@ def test_every_printable_letter_can_be_set_in_a_subscript():
 
 
 def test_an_underscore_in_a_coefficient_s_name_is_a_space_and_no_subscript():
-    assert symbol_of(r"\mu", "sheath_edge") == r"$\mu_{\mathrm{sheath\ edge}}$"
+    assert symbol_of(r"\mu", "sheath_edge") == r"$\mu_\mathrm{sheath\ edge}$"
 
 
 def test_odd_names_come_back_from_the_file_of_draws(tmp_path):

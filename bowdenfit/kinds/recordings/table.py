@@ -1,5 +1,6 @@
 """The recordings of a data set: read, prepared, cut into strokes, and placed on the route."""
 
+from collections import Counter
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
@@ -111,7 +112,15 @@ def _entries(source: Source) -> list[tuple[Path, RecordingFile]]:
     for path in source.files:
         if path.resolve() not in named:
             entries.append((path, said_by_name(description, source.settings.pattern, path, source.name_of(path))))
-    return entries
+    runs = Counter(entry.run for _, entry in entries if not entry.name)
+    return [(path, _named(path, entry) if runs[entry.run] > 1 else entry) for path, entry in entries]
+
+
+def _named(path: Path, entry: RecordingFile) -> RecordingFile:
+    """One of several recordings of a run that have no names of their own."""
+    if entry.name or not entry.run:
+        return entry
+    return entry.model_copy(update={"name": f"{entry.run}, {path.stem}"})
 
 
 def _check_names(entries: list[tuple[Path, RecordingFile]]) -> None:

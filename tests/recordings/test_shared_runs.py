@@ -1,0 +1,20 @@
+"""Several recordings of one mounting of the cable."""
+
+import shutil
+from pathlib import Path
+
+import bowdenfit as bf
+from bowdenfit.recordings.recording import Recordings
+
+SOURCE = Path(__file__).resolve().parents[2] / "datasets" / "synthetic-recordings"
+
+
+def test_two_recordings_may_share_a_run_without_names(tmp_path):
+    folder = shutil.copytree(SOURCE, tmp_path / "cable")
+    description = folder / "cable.toml"
+    text = description.read_text()
+    assert '"470 mm, 60 r/min"' in text and '"470 mm, 40 r/min"' in text
+    description.write_text(text.replace('"470 mm, 60 r/min"', '"470 mm, 40 r/min"'))
+    recordings = bf.read(folder).measurements.table(Recordings)
+    shared = [each for each in recordings.each if each.run == "470 mm, 40 r/min"]
+    assert [each.name for each in shared] == ["470 mm, 40 r/min, 470mm_40rpm", "470 mm, 40 r/min, 470mm_60rpm"]

@@ -22,7 +22,7 @@ def _nameable(name: str) -> str:
     return name.strip()
 
 
-Positive = Annotated[float, Field(gt=0, ge=1e-90, le=LARGEST, allow_inf_nan=False)]
+Positive = Annotated[float, Field(gt=0, le=LARGEST, allow_inf_nan=False)]
 NonNegative = Annotated[float, Field(ge=0, le=LARGEST, allow_inf_nan=False)]
 Finite = Annotated[float, Field(ge=-LARGEST, le=LARGEST, allow_inf_nan=False)]
 Name = Annotated[str, AfterValidator(_nameable)]

@@ -221,7 +221,7 @@ def test_the_on_body_fit_has_no_outlier_and_says_so_of_550_mm(fit):
     text = said(fit)
     assert "No reading is an outlier." in text
     assert re.search(r"Outside the range of the curves: efficiency at 550 mm: measured 67.8 %, expected 6[78]\.", text)
-    assert len(checks_text(fit.checks).splitlines()) <= 12  # three of them of what priors do to widths
+    assert len(checks_text(fit.checks)) <= 12 * 100  # a quarter of it says what priors do to widths
 
 
 def test_every_reading_has_a_row_and_undetected_angles_are_bounds(fit):

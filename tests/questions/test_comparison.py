@@ -298,7 +298,7 @@ def test_published_and_continuous_geometry_are_compared_on_what_both_have(geomet
     assert "Of wrap angle only 17 of 22 readings are compared" in words
     assert "continuous: below the limit, published: zeros, in the published regions" in words
     assert "4 of efficiency" in words
-    assert "(Pareto k above 0.7) were left out by moving the draws" in words
+    assert "Readings on which a fit leans were left out by moving the fit" in words
     named = re.findall(r"leaving out wrap_angle (.+)|leaving out efficiency (.+)", progress)
     assert named and all((angle or f"efficiency {length}") in text for angle, length in named)
     page = json.loads((where / "comparison.json").read_text())

@@ -415,7 +415,7 @@ def test_a_wrong_plan_is_refused_in_a_sentence(spoil, words):
 
 
 def test_a_missing_or_broken_plan_is_refused_in_a_sentence(tmp_path):
-    with pytest.raises(DescriptionError, match="does not exist; name a bench.toml"):
+    with pytest.raises(DescriptionError, match=r"does not exist; name a bench\.toml"):
         read_recordings_plan(tmp_path / "bench.toml")
     (tmp_path / "bench.toml").write_text("[recordings")
     with pytest.raises(DescriptionError, match="not valid TOML"):

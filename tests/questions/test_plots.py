@@ -208,7 +208,7 @@ def test_only_figures_that_apply_are_drawn(fit, on_body):
     squares = bf.fit(on_body, mcmc=False)
     assert [name for name, _ in figures_of(squares)] == ["residuals", "wrap_angles", "efficiency"]
     without = bf.fit(on_body.parent / "yarn-on-cylinder", mcmc=False)
-    assert [name for name, _ in figures_of(without)] == ["residuals"]
+    assert [name for name, _ in figures_of(without)] == ["residuals", "forces"]
 
 
 def test_a_single_draw_of_each_walker_has_no_trace_but_all_else(fit):

@@ -13,21 +13,23 @@ import struct
 import subprocess
 import sys
 import time
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 from contextlib import contextmanager, suppress
 from contextvars import ContextVar
 from dataclasses import dataclass, replace
+from importlib import import_module
 from pathlib import Path
 from typing import IO, Any
 
 from bowdenfit.errors import DatasetError
 from bowdenfit.files.channels import ChannelFile
+from bowdenfit.inputs import refuse_special
 
 _MEMORY, _MEMORY_PER_BYTE = 1 << 29, 40  # bytes; what libraries need by themselves, and what they unpack
 _SECONDS, _SECONDS_PER_BYTE = 8.0, 4e-6  # of CPU
 _WALL = 8  # times the seconds of CPU, for machines that do much besides
 _IDLE = 20.0  # seconds after which a reader with nothing to do ends
-_LENGTH = struct.Struct("<Q")
+_LENGTH, _NO_MEMORY = struct.Struct("<Q"), "no memory"
 LIMITS: ContextVar[float] = ContextVar("LIMITS", default=1.0)
 
 
@@ -70,19 +72,37 @@ def read_apart(path: Path) -> ChannelFile:
     Raises:
         DatasetError: What the reader says of the file, or that it took more memory or time than fits its size.
     """
+    found: ChannelFile = call_apart(path, "bowdenfit.files:read_here")
+    return replace(found, path=path)
+
+
+def call_apart(path: Path, reader: str, *arguments: Any) -> Any:
+    """What a function makes of a file, in the other process.
+
+    Args:
+        path: The file.
+        reader: Module and name of the function.
+        arguments: Further ones, which JSON can carry.
+
+    Raises:
+        DatasetError: What the reader says of the file, or that it took more memory or time than fits its size.
+    """
+    refuse_special(path)
     limits = Limits.of(path)
-    ended, content = _ask(path, limits)
+    ended, content = _ask(path, limits, reader, arguments)
     if content is None:
         raise DatasetError(_broken(path, limits, ended))
-    found = pickle.loads(content)  # noqa: S301  (of our own process)
-    if isinstance(found, ChannelFile):
-        return replace(found, path=path)
-    raise DatasetError(_too_much(path, limits, "memory") if found is None else found)
+    refused, found = pickle.loads(content)  # noqa: S301  (of our own process)
+    if refused == _NO_MEMORY:
+        raise DatasetError(_too_much(path, limits, "memory"))
+    if refused:
+        raise DatasetError(refused)
+    return found
 
 
-def _ask(path: Path, limits: Limits) -> tuple[int | None, bytes | None]:
+def _ask(path: Path, limits: Limits, name: str, arguments: tuple[Any, ...]) -> tuple[int | None, bytes | None]:
     """How the reader ended, None if it did not, and its answer, None if there is none."""
-    request = json.dumps([str(path.resolve()), limits.memory, limits.seconds]).encode() + b"\n"
+    request = json.dumps([str(path.resolve()), limits.memory, limits.seconds, name, arguments]).encode() + b"\n"
     for _ in range(2):  # one that had nothing to do may just have ended
         reader = _reader()
         assert reader.stdin is not None and reader.stdout is not None  # both are pipes
@@ -107,7 +127,7 @@ def _reader() -> "subprocess.Popen[bytes]":
     if _readers and _readers[0].poll() is not None:
         _end(_readers[0])
     if not _readers:
-        command = [sys.executable, "-c", "from bowdenfit.files import apart, read_here; apart.serve(read_here)"]
+        command = [sys.executable, "-c", "from bowdenfit.files.apart import serve; serve()"]
         pipes: dict[str, Any] = dict.fromkeys(("stdin", "stdout"), subprocess.PIPE) | {"stderr": subprocess.DEVNULL}
         place = str(Path(__file__).resolve().parents[2])
         paths = os.pathsep.join(filter(None, [place, os.environ.get("PYTHONPATH", "")]))
@@ -168,34 +188,31 @@ def _too_much(path: Path, limits: Limits, what: str) -> str:
     )
 
 
-def serve(reader: Callable[[Path], ChannelFile]) -> None:
-    """Read one file after the other, as asked on standard input, until that ends or nothing is asked for a while.
-
-    Args:
-        reader: Reads in this process.
-    """
+def serve() -> None:
+    """Read one file after the other, as asked on standard input, until that ends or nothing is asked for a while."""
     import signal
 
     signal.signal(signal.SIGINT, signal.SIG_IGN)  # for the process that asks to handle
     answers = os.fdopen(os.dup(1), "wb")
     os.dup2(2, 1)  # what libraries print
     while select.select([0], [], [], _IDLE)[0] and (line := sys.stdin.buffer.readline()):
-        path, memory, seconds = json.loads(line)
+        path, memory, seconds, name, arguments = json.loads(line)
         _limit(memory, seconds)
-        content = pickle.dumps(_read(reader, Path(path)), protocol=5)
+        content = pickle.dumps(_read(name, Path(path), arguments), protocol=5)
         answers.write(_LENGTH.pack(len(content)) + content)
         answers.flush()
     os._exit(0)
 
 
-def _read(reader: Callable[[Path], ChannelFile], path: Path) -> ChannelFile | str | None:
-    """The file, why it cannot be read, or None if memory ran out."""
+def _read(name: str, path: Path, arguments: list[Any]) -> tuple[str, Any]:
+    """Why the file cannot be read, empty if it can; and what is made of it."""
+    module, _, function = name.partition(":")
     try:
-        return reader(path)
+        return "", getattr(import_module(module), function)(path, *arguments)
     except MemoryError:
-        return None
+        return _NO_MEMORY, None
     except DatasetError as error:
-        return None if isinstance(error.__cause__, MemoryError) else str(error)
+        return _NO_MEMORY if isinstance(error.__cause__, MemoryError) else str(error), None
 
 
 def _limit(memory: int, seconds: float) -> None:

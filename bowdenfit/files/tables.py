@@ -19,6 +19,7 @@ def read_table(path: Path, most: int | None = None) -> RawTable:
     """
     if path.suffix.lower() not in WORKBOOKS:
         return read_csv(path, most)
-    from bowdenfit.files.workbook_table import read_workbook
+    from bowdenfit.files.apart import call_apart
 
-    return read_workbook(path, most)
+    table: RawTable = call_apart(path, "bowdenfit.files.workbook_table:read_workbook", most)
+    return table

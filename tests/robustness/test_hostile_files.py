@@ -114,6 +114,15 @@ def test_small_files_that_ask_for_much_are_refused_in_time(tmp_path, name):
     assert len(str(refused.value)) < 500
 
 
+@pytest.mark.parametrize("name", ["far.xlsx"])
+def test_a_workbook_is_read_within_the_same_limits_where_it_is_a_table(tmp_path, name):
+    HOSTILE[name](tmp_path / name)
+    start = time.monotonic()
+    with limits_times(0.1), pytest.raises(bf.DatasetError, match=name):
+        bf.read(tmp_path / name, wrap_angle=(180, "deg"))
+    assert time.monotonic() - start < 60
+
+
 def test_a_refused_file_leaves_the_next_one_readable(tmp_path):
     structures(tmp_path / "bad.mat")
     scipy.io.savemat(tmp_path / "good.mat", {"F": np.arange(5.0), "t": np.arange(5.0)})

@@ -11,7 +11,7 @@ from bowdenfit.kinds.fit_commands import FitCommand
 from bowdenfit.kinds.single_file import FileKind, columns_of_kind
 from bowdenfit.kinds.unnamed_ends import columns_of
 from bowdenfit.questions.check.row_words import account_words, first_and_last
-from bowdenfit.words import filled, listed, table
+from bowdenfit.words import counted, filled, listed, table
 
 _LEFT = ("column", "unit", "read as")
 
@@ -61,7 +61,7 @@ def command_words(commands: Sequence[FitCommand]) -> list[str]:
 def _what(raw: RawTable, data: Dataset | None) -> str:
     for kind, found in each_table(data.measurements) if data else ():
         return kind.alone(found)
-    return f"a table of {len(raw.rows)} rows"
+    return f"a table of {counted(len(raw.rows), 'row')}"
 
 
 def _columns(raw: RawTable, wanted: tuple[Quantity, ...], named: Mapping[str, str]) -> str:

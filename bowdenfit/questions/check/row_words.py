@@ -21,7 +21,8 @@ def account_words(account: RowAccount, file: str = "") -> list[str]:
     """
     over = f", headings in row{'s' if len(account.headings) > 1 else ''} {', '.join(map(str, account.headings))}"
     before = f"{file}: of" if file else "Of"
-    lines = [f"{before} {account.rows} rows {account.read} hold readings{over if account.headings else ''}."]
+    held = "holds a reading" if account.read == 1 else "hold readings"
+    lines = [f"{before} {account.rows} rows {account.read} {held}{over if account.headings else ''}."]
     unused = [each.words for each in account.left_out] + [account.beside_in_words] * bool(account.beside)
     return [*lines, *(filled(f"Not used: {words}.", "  " if file else "") for words in unused)]
 

@@ -68,7 +68,7 @@ def read(dataset: "str | Path | Dataset", **reading: Unpack[Reading]) -> "Datase
     from bowdenfit.dataset import Dataset, is_lone_file, load_dataset, single_file_dataset
     from bowdenfit.files.apart import limits_times
     from bowdenfit.files.naming import parse_sources
-    from bowdenfit.recordings.forces import parse_channels
+    from bowdenfit.recordings.named_channels import parse_channels
 
     refuse_unknown(read, reading)
     if isinstance(dataset, Dataset):

@@ -6,7 +6,7 @@ from loop_benches import folder_of, recorded
 
 from bowdenfit.dataset import load_dataset
 from bowdenfit.errors import DatasetError
-from bowdenfit.recordings.forces import parse_channels
+from bowdenfit.recordings.named_channels import parse_channels
 from bowdenfit.recordings.recording import Recordings
 
 IN_RADIUS = 'input_pulley_radius = { value = 15, unit = "mm" }'

@@ -4,7 +4,7 @@ from pathlib import Path
 
 from bowdenfit.description import Description, QuantityValue, RecordingFile
 from bowdenfit.errors import DatasetError, DescriptionError, nearest
-from bowdenfit.recordings.forces import match_name, pattern_fields
+from bowdenfit.recordings.name_patterns import match_name, pattern_fields
 from bowdenfit.units import conversion_factor, speed_dimension
 
 

@@ -8,7 +8,7 @@ from bowdenfit.description import Description, QuantityValue, RecordingFile, Rou
 from bowdenfit.errors import DatasetError
 from bowdenfit.files.channels import ChannelFile
 from bowdenfit.files.matching import Quantity
-from bowdenfit.recordings.forces import steady_value
+from bowdenfit.recordings.named_channels import steady_value
 from bowdenfit.units import ColumnSource, conversion_factor, route_conversion_factor
 
 _SAME_BEND = float(np.deg2rad(2.0))  # by which a wrap angle may change during a recording

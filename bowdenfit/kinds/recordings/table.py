@@ -16,7 +16,8 @@ from bowdenfit.kinds.recordings.angles import check_placed
 from bowdenfit.kinds.recordings.names import said_by_name
 from bowdenfit.kinds.recordings.placing import place_names, placed_by_channels
 from bowdenfit.kinds.recordings.settings import RecordingsTable
-from bowdenfit.recordings.forces import TORQUES, WANTED, rows_where, to_recording
+from bowdenfit.recordings.forces import to_recording
+from bowdenfit.recordings.named_channels import TORQUES, WANTED, rows_where
 from bowdenfit.recordings.preparation import NO_DELAY_OF_LOOPS, average_recording, inspect_recording
 from bowdenfit.recordings.preparation.delay import COMMON_ERROR
 from bowdenfit.recordings.recording import Account, Blocks, RawRecording, Recording, Recordings

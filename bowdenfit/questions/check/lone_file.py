@@ -26,7 +26,7 @@ from bowdenfit.kinds.unnamed_ends import HeadedColumn
 from bowdenfit.questions.check.channels_words import channels_text
 from bowdenfit.questions.check.file_words import table_text
 from bowdenfit.reading import Reading
-from bowdenfit.recordings.forces import parse_channels
+from bowdenfit.recordings.named_channels import parse_channels
 from bowdenfit.recordings.recording import Recordings
 
 _CHOICES = ("noise", "friction", "geometry", "undetected")

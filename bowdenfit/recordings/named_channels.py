@@ -1,0 +1,179 @@
+"""The channels of a recording by what they are: named by the user or found by their names, in internal units."""
+
+import re
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import replace
+
+import numpy as np
+
+from bowdenfit.errors import DatasetError, nearest
+from bowdenfit.files.channels import Channel, ChannelFile
+from bowdenfit.files.matching import Quantity, candidates, meanings
+from bowdenfit.files.naming import parse_sources
+from bowdenfit.units import ChannelSource, ColumnSource, conversion_factor
+from bowdenfit.words import quoted, shown
+
+WANTED = (
+    Quantity("input_force", "force"),
+    Quantity("output_force", "force"),
+    Quantity("velocity", "speed"),
+    Quantity("time", "time"),
+)
+TORQUES = (Quantity("input_torque", "torque"), Quantity("output_torque", "torque"))  # of a loop's pulleys
+RATE = re.compile(r"(?P<rate>[+-]?(?:[0-9]+\.?[0-9]*|\.[0-9]+)(?:e[+-]?[0-9]+)?)\s*(?P<unit>k?Hz)", re.IGNORECASE)
+_PATH = re.compile(r"[/.]")
+
+
+def rows_where(file: ChannelFile, where: Mapping[str, float]) -> ChannelFile:
+    """The part of a file in which channels have the given values, as where recordings stand one below the other.
+
+    Args:
+        file: What was read.
+        where: Value by name of a channel, such as a number of the run.
+
+    Raises:
+        DatasetError: There is no such channel, or no row has these values.
+    """
+    for name, value in where.items():
+        chosen = _named(file, "where", name).values == value
+        if not chosen.any():
+            raise DatasetError(
+                f"{file.path.name}: no row has {value:g} in the channel {shown(name)}; see bowdenfit check."
+            )
+        channels = tuple(_rows(channel, chosen) for channel in file.channels)
+        file = replace(file, channels=channels)
+    return file
+
+
+def _rows(channel: Channel, chosen: np.ndarray) -> Channel:
+    """The chosen rows of a channel; one of another length is left as it is."""
+    if len(channel.values) != len(chosen):
+        return channel
+    time = None if channel.time is None else channel.time[chosen]
+    return replace(channel, values=channel.values[chosen], time=time)
+
+
+def find_channel(file: ChannelFile, quantity: Quantity, sources: Mapping[str, ColumnSource]) -> Channel | None:
+    """The channel of a quantity: the one the user names, or the only one whose name says so."""
+    source = sources.get(quantity.name)
+    if source is not None:
+        if quantity.name == "time" and RATE.fullmatch(source.name.strip()):
+            return None
+        return _named(file, quantity.name, source.name)
+    headings = [(_PATH.split(c.name)[-1] or c.name, c.unit) for c in file.channels]
+    spelled = {each.position for each in candidates(headings, WANTED[:2], tuple(sources)).get(quantity.name, ())}
+    matches = [c for i, c in enumerate(file.channels) if i in spelled or _says(c, quantity)]
+    if len(matches) > 1 and quantity.name == "time":
+        return None  # each channel has the clock beside it
+    if len(matches) > 1:
+        raise DatasetError(
+            f"{file.path.name}: the channels {quoted(tuple(c.name for c in matches))} can all be the {quantity.name}; say "
+            f"which: --channel {quantity.name}={matches[0].name}, or channels = {{ {quantity.name} = {{ name = "
+            f'"{matches[0].name}" }} }} in cable.toml.'
+        )
+    return matches[0] if matches else None
+
+
+def _says(channel: Channel, quantity: Quantity) -> bool:
+    """Whether the name of a channel, or the last part of its path, is that of the quantity."""
+    names = (channel.name, _PATH.split(channel.name)[-1])
+    return any(meanings(name, (quantity,)) for name in names if name)
+
+
+def _named(file: ChannelFile, quantity: str, name: str) -> Channel:
+    wanted = " ".join(name.split())
+    matches = [c for c in file.channels if c.name == wanted] or [
+        c for c in file.channels if wanted == c.name.rsplit("/", 1)[-1]
+    ]
+    if len(matches) == 1:
+        return matches[0]
+    if matches:
+        raise DatasetError(
+            f"{file.path.name} has several channels called {shown(wanted)}: {quoted(tuple(c.name for c in matches))}; give "
+            "the whole name."
+        )
+    raise DatasetError(
+        f"{file.path.name} has no channel {shown(wanted)}, which you name as {quantity}"
+        f"{nearest(wanted, [c.name for c in file.channels])}"
+    )
+
+
+def stated_unit(file: ChannelFile, channel: Channel, quantity: str, source: ColumnSource | None) -> tuple[float, str]:
+    """Sign and unit of a channel, as the user says, else the file, else the channel's name."""
+    named = [
+        unit for q in (*WANTED, *TORQUES) if q.name == quantity for _, unit in meanings(channel.name, (q,)) if unit
+    ]
+    # A heading such as input_torque_N_m was read as one in m, which only the name of the quantity can tell.
+    read = [*named, channel.unit] if quantity.endswith("torque") else [channel.unit, *named]
+    stated = next((unit for unit in (source.unit if source else None, *read) if unit), "")
+    if not stated:
+        units = {"velocity": "mm/s", "time": "s", "input_torque": "N*m", "output_torque": "N*m"}
+        example = units.get(quantity, "N")
+        raise DatasetError(
+            f"{file.path.name}: the channel {shown(channel.name)} does not say its unit; give it, such as --channel "
+            f"{quantity}={channel.name}:{example}."
+        )
+    text = stated.strip()
+    return (-1.0, text[1:]) if text.startswith(("-", "\u2212")) and len(text) > 1 else (1.0, text)
+
+
+def converted(
+    file: ChannelFile, channel: Channel, quantity: str, source: ColumnSource | None, dimension: str
+) -> np.ndarray:
+    """Values of a channel in the internal unit."""
+    sign, unit = stated_unit(file, channel, quantity, source)
+    try:
+        return _of_counts(channel, source) * (sign * conversion_factor(unit, dimension))
+    except DatasetError as error:
+        raise DatasetError(f"{file.path.name}, channel {shown(channel.name)}: {error}.") from None
+
+
+def _of_counts(channel: Channel, source: ColumnSource | None) -> np.ndarray:
+    """What a channel says, by the gain and the offset that the user gives it."""
+    if not isinstance(source, ChannelSource):
+        return channel.values
+    return source.gain * (channel.values - source.offset)
+
+
+def steady_value(
+    file: ChannelFile, quantity: Quantity, source: ColumnSource | None, convert: Callable[[str], float]
+) -> tuple[float, float, float] | None:
+    """The middle value of a channel, and the range of nearly all of its values; None where the file has no such channel.
+
+    Args:
+        file: What was read.
+        quantity: A wrap angle or the route variable.
+        source: The channel that the user names.
+        convert: Factor from a unit.
+
+    Raises:
+        DatasetError: The channel has no unit, one of another kind, or no number.
+    """
+    channel = find_channel(file, quantity, {quantity.name: source} if source else {})
+    if channel is None:
+        return None
+    written = next((unit for _, unit in meanings(channel.name, (quantity,)) if unit), "")
+    unit = (source.unit if source else None) or channel.unit or written
+    if not unit:
+        raise DatasetError(
+            f"{file.path.name}: the channel {shown(channel.name)} does not say its unit; write it beside the name of the "
+            f'channel, {quantity.name} = {{ name = "{channel.name}", unit = ... }}.'
+        )
+    try:
+        values = _of_counts(channel, source) * convert(unit)
+    except DatasetError as error:
+        raise DatasetError(f"{file.path.name}, channel {shown(channel.name)}: {error}.") from None
+    finite = values[np.isfinite(values)]
+    if not len(finite):
+        raise DatasetError(f"{file.path.name}: the channel {shown(channel.name)} has no number in it; name another.")
+    low, middle, high = np.quantile(finite, (0.02, 0.5, 0.98))
+    return float(middle), float(low), float(high)
+
+
+def parse_channels(texts: Sequence[str]) -> dict[str, ColumnSource]:
+    """Channels named on the command line, such as "input_force=ai0:lbf" or "time=1000Hz".
+
+    Raises:
+        DatasetError: A text is not of that form, or names a quantity that recordings do not have.
+    """
+    return parse_sources(texts, "--channel", [quantity.name for quantity in (*WANTED, *TORQUES)])

@@ -12,6 +12,7 @@ import select
 import struct
 import subprocess
 import sys
+import threading
 import time
 from collections.abc import Iterator
 from contextlib import contextmanager, suppress
@@ -89,7 +90,8 @@ def call_apart(path: Path, reader: str, *arguments: Any) -> Any:
     """
     refuse_special(path)
     limits = Limits.of(path)
-    ended, content = _ask(path, limits, reader, arguments)
+    with _asking:
+        ended, content = _ask(path, limits, reader, arguments)
     if content is None:
         raise DatasetError(_broken(path, limits, ended))
     refused, found = pickle.loads(content)  # noqa: S301  (of our own process)
@@ -119,7 +121,11 @@ def _ask(path: Path, limits: Limits, name: str, arguments: tuple[Any, ...]) -> t
     return 0, None
 
 
-_readers: list["subprocess.Popen[bytes]"] = []
+_readers: list["subprocess.Popen[bytes]"] = []  # one at most, of this process alone
+_asking = threading.Lock()
+if hasattr(os, "register_at_fork"):  # a copy of this process starts its own: answers to two would mix
+    os.register_at_fork(before=_asking.acquire, after_in_parent=_asking.release, after_in_child=_asking.release)
+    os.register_at_fork(after_in_child=_readers.clear)
 
 
 def _reader() -> "subprocess.Popen[bytes]":

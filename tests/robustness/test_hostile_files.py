@@ -2,8 +2,11 @@
 
 import os
 import struct
+import subprocess
+import sys
 import time
 import zipfile
+from concurrent.futures import ThreadPoolExecutor
 
 import numpy as np
 import pytest
@@ -129,6 +132,27 @@ def test_a_refused_file_leaves_the_next_one_readable(tmp_path):
     with pytest.raises(bf.DatasetError):
         read_channels(tmp_path / "bad.mat")
     assert [channel.name for channel in read_channels(tmp_path / "good.mat").channels]
+
+
+def test_files_read_at_the_same_time_and_in_a_copy_of_the_process_get_their_own_answers(tmp_path):
+    for i in range(6):
+        scipy.io.savemat(tmp_path / f"{i}.mat", {"F": np.full(50_000, float(i)), "t": np.arange(50_000.0)})
+
+    def found(i):
+        return float(np.median(read_channels(tmp_path / f"{i}.mat").channels[0].values))
+
+    with ThreadPoolExecutor(6) as threads:
+        assert list(threads.map(found, range(6))) == list(range(6))
+    program = (
+        "import os, sys; import numpy as np; from pathlib import Path; from bowdenfit.files import read_channels\n"
+        "of = lambda i: float(np.median(read_channels(Path(sys.argv[1]) / f'{i}.mat').channels[0].values))\n"
+        "of(0); child = os.fork(); mine = 1 if child else 2\n"
+        "same = all(of(mine) == mine for _ in range(20))\n"
+        "if not child: os._exit(not same)\n"
+        "sys.exit(not (same and os.waitpid(child, 0)[1] == 0))"
+    )
+    done = subprocess.run([sys.executable, "-c", program, str(tmp_path)], capture_output=True, check=False, timeout=60)
+    assert done.returncode == 0, done.stderr
 
 
 def test_limits_grow_with_the_file_and_with_what_is_asked(tmp_path):

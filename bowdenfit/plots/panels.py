@@ -76,6 +76,31 @@ def recording_panels(
     return figure, flat, columns
 
 
+def panels_with_limits(
+    names: Sequence[str],
+    across: Sequence[tuple[float, float]],
+    up: Sequence[tuple[float, float]],
+    most_columns: int,
+    height: float | None = None,
+    page: float = MEDIUM,
+) -> tuple[Figure, list[Axes], int]:
+    """The same, each axis with the limits of its own panel, or with those of all where they are alike.
+
+    Args:
+        names: Of the panels.
+        across: Limits of each x axis.
+        up: Limits of each y axis.
+        most_columns: Panels in a row.
+        height: Of a panel [in]; None for square ones.
+        page: Width of the page for a single column [in].
+    """
+    share_x, share_y = alike(across), alike(up)
+    figure, flat, columns = recording_panels(names, most_columns, height, share_x, share_y, page)
+    set_limits(flat, across, "x", share_x)
+    set_limits(flat, up, "y", share_y)
+    return figure, flat, columns
+
+
 def short(name: str, longest: int) -> str:
     """The end of a name, which tells recordings of one folder apart."""
     return name if len(name) <= longest else "\N{HORIZONTAL ELLIPSIS}" + name[1 - longest :]

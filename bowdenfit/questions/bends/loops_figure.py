@@ -9,7 +9,7 @@ import numpy as np
 
 from bowdenfit.plots.bands import draw_quantiles, evenly, middle, name_band, say_of_how_many
 from bowdenfit.plots.layout import legend_above
-from bowdenfit.plots.panels import alike, enlarge_marks, label_outer, recording_panels, set_limits, span
+from bowdenfit.plots.panels import enlarge_marks, label_outer, panels_with_limits, span
 from bowdenfit.plots.style import BLACK, BLUE, GRAY, LEAST_SQUARES, MEDIAN, PURPLE, VERMILLION, in_paper_style
 
 if TYPE_CHECKING:
@@ -107,11 +107,7 @@ def draw(loops: tuple[LoopCurve, ...]) -> Figure:
     shown = evenly(loops, MOST)
     across = [span([loop.input_force, loop.points_input], room=0.03) for loop in shown]
     up = [span([loop.forward, loop.back, loop.points_output]) for loop in shown]
-    share_x, share_y = alike(across), alike(up)
-    names = [loop.label for loop in shown]
-    figure, flat, columns = recording_panels(names, MOST_COLUMNS, None, share_x, share_y)
-    set_limits(flat, across, "x", share_x)
-    set_limits(flat, up, "y", share_y)
+    figure, flat, columns = panels_with_limits([loop.label for loop in shown], across, up, MOST_COLUMNS)
     for axes, loop in zip(flat, shown, strict=True):
         axes.locator_params(nbins=6, steps=[1, 2, 2.5, 5, 10])
         _curves(axes, loop)

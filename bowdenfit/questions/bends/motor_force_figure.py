@@ -10,7 +10,7 @@ import numpy as np
 
 from bowdenfit.plots.bands import draw_quantiles, evenly, name_band, say_of_how_many
 from bowdenfit.plots.layout import legend_above
-from bowdenfit.plots.panels import alike, enlarge_marks, label_outer, recording_panels, set_limits, span
+from bowdenfit.plots.panels import enlarge_marks, label_outer, panels_with_limits, span
 from bowdenfit.plots.style import BLUE, GRAY, LEAST_SQUARES, MEDIAN, VERMILLION, in_paper_style
 
 if TYPE_CHECKING:
@@ -101,10 +101,7 @@ def draw(runs: tuple[MotorForce, ...]) -> Figure:
     shown = evenly(runs, MOST)
     across = [span([run.displacement], room=0.03) for run in shown]
     up = [span([run.force, run.points_force]) for run in shown]
-    share_x, share_y = alike(across), alike(up)
-    figure, flat, columns = recording_panels([run.label for run in shown], MOST_COLUMNS, None, share_x, share_y)
-    set_limits(flat, across, "x", share_x)
-    set_limits(flat, up, "y", share_y)
+    figure, flat, columns = panels_with_limits([run.label for run in shown], across, up, MOST_COLUMNS)
     for axes, run in zip(flat, shown, strict=True):
         _loop(axes, run)
         _readings(axes, run)

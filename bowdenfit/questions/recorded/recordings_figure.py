@@ -10,7 +10,7 @@ import numpy as np
 
 from bowdenfit.plots.bands import evenly, say_of_how_many
 from bowdenfit.plots.layout import legend_above
-from bowdenfit.plots.panels import MOST, alike, draw_marks, extremes, label_outer, recording_panels, set_limits, span
+from bowdenfit.plots.panels import MOST, draw_marks, extremes, label_outer, panels_with_limits, span
 from bowdenfit.plots.style import (
     BLACK,
     BLUE,
@@ -95,10 +95,7 @@ def draw(recordings: tuple[OverTime, ...]) -> Figure:
     shown = [beginning(r) for r in whole]
     times = [span([r.time - _start(r), r.flagged_time - _start(r)], room=0.0) for r in shown]
     forces = [_force_limits(r) for r in shown]
-    share_x, share_y = alike(times), alike(forces)
-    figure, flat, columns = recording_panels([r.name for r in shown], 2, 1.5, share_x, share_y, WIDE)
-    set_limits(flat, times, "x", share_x)
-    set_limits(flat, forces, "y", share_y)
+    figure, flat, columns = panels_with_limits([r.name for r in shown], times, forces, 2, 1.5, WIDE)
     for axes, recording in zip(flat, shown, strict=True):
         _phases(axes, recording)
         _forces(axes, recording, POINTS // (2 * len(shown)))

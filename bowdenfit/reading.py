@@ -68,11 +68,13 @@ def read(dataset: "str | Path | Dataset", **reading: Unpack[Reading]) -> "Datase
     from bowdenfit.dataset import Dataset, is_lone_file, load_dataset, single_file_dataset
     from bowdenfit.files.apart import limits_times
     from bowdenfit.files.naming import parse_sources
+    from bowdenfit.inputs import refuse_special
     from bowdenfit.recordings.named_channels import parse_channels
 
     refuse_unknown(read, reading)
     if isinstance(dataset, Dataset):
         return dataset
+    refuse_special(Path(dataset))
     stated = {key: reading.get(name) for name, key in _SETTINGS.items()}
     changes = [*reading.get("settings", ()), *(f'{key}="{value}"' for key, value in stated.items() if value is not None)]
     sources = parse_channels(reading.get("channels", ()))

@@ -44,6 +44,13 @@ def test_what_is_no_file_is_refused_before_it_is_opened(cable, monkeypatch, name
         bf.check(cable)
 
 
+@pytest.mark.parametrize("name", ["bench.csv", "cable.toml"])
+def test_a_pipe_in_the_place_of_the_data_set_is_called_that(tmp_path, name):
+    os.mkfifo(tmp_path / name)
+    with pytest.raises(bf.BowdenfitError, match=f"{name} is a named pipe, not a file"):
+        bf.check(tmp_path / name)
+
+
 @pytest.mark.parametrize("ending", [".csv", ".mat", ".xlsx", ".h5", ".mf4"])
 def test_a_recording_that_is_a_pipe_is_refused(tmp_path, ending):
     os.mkfifo(tmp_path / f"run{ending}")

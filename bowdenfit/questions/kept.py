@@ -18,7 +18,7 @@ def answers_of(fit: Record) -> dict[str, Any]:
         fit: The fit.
     """
     answers: dict[str, Any] = {"troubles": list(verdict(fit).troubles)}
-    if fit.posterior is not None:
+    if fit.sampled is not None:
         answers["identify"] = stored(vars(identifiability(fit)))
         if (route := fit.dataset.description.route) is not None:
             answers["length"] = stored(fit.optimal_length())

@@ -94,7 +94,7 @@ class Record:
     Args:
         dataset: What was fitted.
         least_squares: Classical estimates.
-        posterior: Draws, or None where only least squares was asked for.
+        sampled: Draws, or None where only least squares was asked for.
         converged: Whether the sampler (or, without it, least squares) converged.
         reasons: Why not.
         provenance: Seed, versions, times.
@@ -103,7 +103,7 @@ class Record:
 
     dataset: Dataset
     least_squares: LeastSquares
-    posterior: Draws | None
+    sampled: Draws | None
     converged: bool
     reasons: tuple[str, ...]
     provenance: Provenance
@@ -187,17 +187,26 @@ class Record:
         force = friction.conditions.reference_force if friction.depends_on_load else None
         return best_length(route, lengths, efficiencies, self.along_route, force)
 
+    @property
+    def posterior(self) -> Draws:
+        """The draws; `sampled` is None where there are none.
+
+        Raises:
+            UsageError: There are none.
+        """
+        return self.draws()
+
     def draws(self) -> Draws:
         """The posterior.
 
         Raises:
             UsageError: There is none.
         """
-        if self.posterior is None:
+        if self.sampled is None:
             raise UsageError(
                 "this fit has no posterior, because it was made without MCMC; fit again without --no-mcmc for intervals."
             )
-        return self.posterior
+        return self.sampled
 
     def _needs_route(self) -> None:
         self.draws()

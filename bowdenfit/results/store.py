@@ -54,7 +54,7 @@ def save(
     if not force and (folder / FIT).exists():
         raise StoreError(f"{folder} holds a finished fit already; add --force (force=True) to replace it.")
     with folder_to_write(folder):
-        if fit.posterior is None:
+        if fit.sampled is None:
             (folder / POSTERIOR).unlink(missing_ok=True)
         else:
             write_groups(folder / POSTERIOR, *posterior_page(fit))
@@ -117,7 +117,7 @@ def _read_page(folder: Path) -> dict[str, Any]:
 
 
 def _fit_page(fit: Record) -> dict[str, Any]:
-    posterior = fit.posterior
+    posterior = fit.sampled
     return {
         "schema": SCHEMA,
         "description": fit.dataset.description.to_json(),
@@ -148,7 +148,6 @@ def _measurements(page: Mapping[str, Any]) -> Measurements:
 def posterior_page(fit: Record) -> tuple[Groups, Coordinates, dict[str, str], dict[str, dict[str, str]]]:
     """Contents of posterior.nc as plain data: groups of variables, the readings' labels, attributes of file and variables."""
     posterior, space = fit.posterior, fit.model.space
-    assert posterior is not None  # the caller asked
     of_trajectories = posterior.trajectories.statistics if posterior.trajectories else {}
     log_prior = -0.5 * np.sum(posterior.z**2 + np.log(2 * np.pi), axis=-1)
     log_likelihood = [np.sum(part, axis=-1) for part in posterior.log_likelihood.values()]

@@ -40,7 +40,7 @@ def write_results(found: "Fit", folder: Path, figures: bool, helper: Assistant) 
     from bowdenfit.results.folder import DETAILS_TEXT, FIGURES, SUMMARY_TEXT, write_text
     from bowdenfit.results.store import save
 
-    if found.posterior is None:
+    if found.sampled is None:
         clear(folder)
     data, drawn, failed = dict[str, Any](), dict[str, Future[Any]](), dict[str, Exception]()
     for name in FIGURE_NAMES if figures else ():

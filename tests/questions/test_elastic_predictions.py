@@ -39,7 +39,7 @@ def known(description: Description, spread: float = 0.0, n: int = 1, **truth: fl
     drawn = z + spread * np.random.default_rng(5).standard_normal((1, n, len(z)))
     shown = [p.shown_scale * np.asarray(p.prior.constrain(drawn[..., i])) for i, p in enumerate(fit.model.space.free)]
     named = {p.name: value for p, value in zip(fit.model.space.free, shown, strict=True)}
-    return replace(fit, posterior=Draws(drawn, named, {}, {}, {}, {}, {}, {}, 1, n, 0.3))
+    return replace(fit, sampled=Draws(drawn, named, {}, {}, {}, {}, {}, {}, 1, n, 0.3))
 
 
 def extension(tension: Any, stiffness: float, bedding_stretch: float, bedding_load: float) -> Any:

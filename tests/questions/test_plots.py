@@ -217,7 +217,7 @@ def test_a_single_draw_of_each_walker_has_no_trace_but_all_else(fit):
 
     draws = fit.posterior
     single = dataclasses.replace(draws, z=draws.z[:, :1], values=first(draws.values), optimum=first(draws.optimum))
-    single = dataclasses.replace(fit, posterior=single)
+    single = dataclasses.replace(fit, sampled=single)
     assert FIGURES["traces"].data(single) is None
     assert FIGURES["coefficients"].data(single) is not None
     assert FIGURES["pairs"].data(single) is not None
@@ -369,7 +369,7 @@ def fit_of_nine():
     optimum = {OPTIMAL_LENGTH: lengths, OPTIMAL_EFFICIENCY: np.full(lengths.shape, 0.79) + 1e-4 * lengths}
     route = SimpleNamespace(variable="cable_length", unit="mm", range=RANGE)
     return SimpleNamespace(
-        posterior=SimpleNamespace(values=draws, optimum=optimum), model=SimpleNamespace(space=SimpleNamespace(free=free)),
+        sampled=SimpleNamespace(values=draws, optimum=optimum), model=SimpleNamespace(space=SimpleNamespace(free=free)),
         dataset=SimpleNamespace(description=SimpleNamespace(route=route)),
     )  # fmt: skip
 

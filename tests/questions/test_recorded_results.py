@@ -189,7 +189,7 @@ def test_compare_refuses_fits_of_different_readings_one_fit_and_fits_without_dra
     with pytest.raises(UsageError, match="at least two"):
         bf.compare({"a": fit})
     with pytest.raises(UsageError, match="without --no-mcmc"):
-        bf.compare({"a": fit, "b": replace(fit, posterior=None)})
+        bf.compare({"a": fit, "b": replace(fit, sampled=None)})
 
 
 def test_the_better_model_is_seen_only_beyond_two_standard_errors():

@@ -13,7 +13,7 @@ _NORMAL_90 = 1.645
 def answers(fit: bf.Fit) -> dict[str, Interval]:
     """Coefficients and the best length with their 90 % intervals; of least squares those of a normal distribution."""
     names = [p.name for p in fit.model.space.free if p.role in _ROLES]
-    if fit.posterior is None:
+    if fit.sampled is None:
         found = {name: fit.least_squares.estimates[name] for name in names}
         return {name: _normal(each.value, each.standard_error) for name, each in found.items()}
     best = {"best length": fit.optimal_length().length} if fit.dataset.description.route else {}

@@ -52,7 +52,7 @@ class Elastic:
 
     def over(self, function: Callable[..., Any], *data: Any) -> Any:
         """A function of named values (and of data that are the same for all), for every draw, or for least squares alone."""
-        space, posterior = self.fit.model.space, self.fit.posterior
+        space, posterior = self.fit.model.space, self.fit.sampled
         z = self.fit.least_squares.z[None] if posterior is None else posterior.flat_z
         with jax.enable_x64(True):
             return for_each_draw(

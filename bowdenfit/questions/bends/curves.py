@@ -30,7 +30,7 @@ def of_draws(fit: Record, curves: Callable[[Values], dict[str, Any]]) -> dict[st
         fit: The fit.
         curves: Function of the values of one draw.
     """
-    space, posterior = fit.model.space, fit.posterior
+    space, posterior = fit.model.space, fit.sampled
     z = fit.least_squares.z[None]
     if posterior is not None:
         z = posterior.flat_z[np.linspace(0, len(posterior.flat_z) - 1, BATCH).astype(int)]

@@ -40,7 +40,7 @@ class ElasticOverview:
 @once
 def elastic_overview(fit: Record) -> ElasticOverview | None:
     """Answers at the wrap angles that were measured at; None without draws, or of a cable that has none."""
-    if fit.posterior is None or not has_elastic_answers(fit):
+    if fit.sampled is None or not has_elastic_answers(fit):
         return None
     answers, (arm, unit) = elastic_answers(fit), friction_arm(fit)
     bends, draws, window = answers.usual if has_bends(fit) else (np.zeros(0), {}, None)
@@ -68,7 +68,7 @@ def has_bends(fit: Record) -> bool:
 def products_with_preload(fit: Record) -> list[str]:
     """What to say of coefficients of friction of which only the product with the preload is known, as in free motion."""
     names = [p.name for p in fit.model.space.free]
-    if fit.posterior is None or PRELOAD not in names:
+    if fit.sampled is None or PRELOAD not in names:
         return []
     preload, sentences = fit.posterior.values[PRELOAD].ravel(), []
     for name in (n for n in fit.dataset.description.coefficients if n in names):

@@ -64,7 +64,7 @@ class Checks:
 @once
 def checks_of(fit: Record) -> Checks | None:
     """All checks of a fit; None without draws."""
-    if fit.posterior is None:
+    if fit.sampled is None:
         return None
     terms = [t for t in fit.model.terms if t.labels and t.residual_blocks[0][1] > 0]
     generator = np.random.default_rng([fit.provenance.seed, _STREAM])

@@ -44,7 +44,7 @@ def implausible_friction(fit: Record) -> str:
         if p.role != "friction" or p.name in fit.dataset.description.friction or not isinstance(p.prior, LogNormal):
             continue
         low, high = (float(p.prior.median * np.exp(s * _PRIOR_SDS * p.prior.log_sd)) for s in (-1, 1))
-        if fit.posterior is None:
+        if fit.sampled is None:
             value, upper = fit.least_squares.estimates[p.name].value, fit.least_squares.estimates[p.name].upper
         else:
             value, upper = fit.parameter(p.name).median, fit.parameter(p.name).q95
@@ -60,7 +60,7 @@ def implausible_friction(fit: Record) -> str:
 
 
 def _predicted(fit: Record, term: Term) -> np.ndarray:
-    if fit.posterior is None:
+    if fit.sampled is None:
         return fit.least_squares.readings[term.name]
     return np.asarray(np.median(fit.posterior.expected[term.name], axis=(0, 1)))
 
@@ -73,7 +73,7 @@ def _noise(fit: Record, term: Term) -> np.ndarray | float:
     fixed = {p.name: p.fixed for p in fit.model.space.fixed}
     if noise in fixed:
         value = float(fixed[noise] or 0.0)
-    elif fit.posterior is not None:
+    elif fit.sampled is not None:
         value = float(np.median(fit.posterior.values[noise]))
     else:
         cells = np.asarray(term.data["weight"])

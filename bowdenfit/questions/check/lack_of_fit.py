@@ -34,7 +34,7 @@ def say_what_is_not_described(fit: Record) -> tuple[str, ...]:
 def _far_out(fit: Record, noise: str) -> tuple[str, ...]:
     """Readings far out of least squares, where nothing was sampled; draws judge them better."""
     far = fit.least_squares.far_readings
-    if not far or fit.posterior is not None or noise == "student":
+    if not far or fit.sampled is not None or noise == "student":
         return ()
     return (_far_sentence([readings_called(each.table).one.format(each.label) for each in far]),)
 

@@ -201,7 +201,7 @@ def _parts(fit: Record, unit: LeaveOut) -> dict[str, RunParts]:
 
 
 def _draws_of(name: str, fit: Record) -> Draws:
-    if fit.posterior is None:
+    if fit.sampled is None:
         raise UsageError(f"{name} has no posterior, because it was made without MCMC; fit it again without --no-mcmc.")
     return fit.posterior
 
@@ -284,7 +284,7 @@ def _parameters(fits: Mapping[str, Record]) -> dict[str, ComparedParameter]:
     rows: dict[str, ComparedParameter] = {}
     for name, fit in fits.items():
         for p in fit.model.space.free:
-            if p.role in _SHOWN_ROLES and fit.posterior is not None:
+            if p.role in _SHOWN_ROLES and fit.sampled is not None:
                 row = rows.setdefault(p.name, ComparedParameter(p.symbol, p.unit, {}))
                 row.by_fit[name] = Interval.of(np.asarray(fit.posterior.values[p.name]))
     return rows

@@ -87,7 +87,7 @@ class Groups:
 def groups_of(fit: Record) -> Groups | None:
     """The groups of a fit and their contrasts; None where all readings share their coefficients, or without draws."""
     names = fit.model.cable.friction.groups
-    if not names or fit.posterior is None:
+    if not names or fit.sampled is None:
         return None
     return Groups(names, names[0], tuple(_contrasts(fit, names)))
 

@@ -55,7 +55,7 @@ class Confounded:
 
 def confounded_pairs(fit: Record) -> list[Confounded]:
     """Pairs of parameters whose draws lie along a line, the closest first; empty without draws."""
-    if fit.posterior is None:
+    if fit.sampled is None:
         return []
     names = [
         p.name for p in fit.model.space.free if p.role in _ROLES and not (p.role == "elastic" and _known(fit, p.name))
@@ -67,13 +67,11 @@ def confounded_pairs(fit: Record) -> list[Confounded]:
 
 def _known(fit: Record, name: str) -> bool:
     """Whether a parameter is known well by itself, so that what it is correlated with does not matter."""
-    assert fit.posterior is not None  # the caller checked
     draws = fit.posterior.values[name]
     return bool(np.std(draws) < _WELL * np.abs(np.median(draws)))
 
 
 def _pair(fit: Record, first: str, second: str) -> Confounded:
-    assert fit.posterior is not None  # the caller checked
     a, b = fit.posterior.values[first].ravel(), fit.posterior.values[second].ravel()
     covariance = np.cov(a, b)
     factor = -covariance[0, 1] / covariance[1, 1] if covariance[1, 1] > 0 else 0.0

@@ -107,7 +107,7 @@ def say_what_is_not_determined(fit: Record) -> str:
     that it rests on that. The same holds for what the data sheet of a load cell says.
     """
     names = [p.name for p in fit.model.space.free if p.role == "friction" and not _stated(fit, p.name)]
-    if fit.posterior is None:
+    if fit.sampled is None:
         return _in_words([name for name in names if _undetermined(fit, name)], None)
     friction = identifiability(fit).groups.get("friction")
     if friction is None:

@@ -18,7 +18,7 @@ def along_route(fit: Record) -> dict[str, Band]:
     """The efficiency [1] and every curved wrap angle [deg], by name; empty without a route."""
     if fit.dataset.description.route is None:
         return {}
-    if fit.posterior is not None:
+    if fit.sampled is not None:
         grid, draws = fit.curves()
         every = max(1, len(fit.posterior.flat_z) // _DRAWS)
         return {name: Band(grid, np.quantile(d[::every], BAND_QUANTILES, axis=0)) for name, d in draws.items()}

@@ -84,7 +84,7 @@ def data(fit: Record) -> AlongRoute | None:
     from bowdenfit.questions.length.curves import along_route
     from bowdenfit.results.record import OPTIMAL_LENGTH
 
-    route, posterior = fit.dataset.description.route, fit.posterior
+    route, posterior = fit.dataset.description.route, fit.sampled
     if route is None:
         return None
     friction = fit.model.cable.friction
@@ -109,7 +109,7 @@ def efficiency_points(fit: Record) -> tuple[EfficiencyPoints, ...]:
         if route is None or at is None:
             at = np.full(len(term.labels), np.nan)
         predicted = fit.least_squares.readings[term.name][None]
-        if fit.posterior is not None:
+        if fit.sampled is not None:
             predicted = np.quantile(fit.posterior.replicated[term.name], BAND_QUANTILES, axis=(0, 1))
         inside = (at >= route.range[0]) & (at <= route.range[1]) if route else np.ones(len(at), dtype=bool)
         points.append(EfficiencyPoints(called.are_runs, term.labels, at, term.observed(), predicted, inside))

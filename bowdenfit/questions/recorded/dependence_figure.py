@@ -152,7 +152,7 @@ def _curves(fit: Record, at: float, forces: np.ndarray | None, speeds: np.ndarra
     with jax.enable_x64(True):
         curves, reference = jax.jit(jax.vmap(efficiency))(jnp.asarray(some_draws(fit, CURVES)))
     constant = float(np.median(np.asarray(reference)))
-    if fit.posterior is None:
+    if fit.sampled is None:
         return np.asarray(curves)[:1], constant
     return np.quantile(np.asarray(curves), QUANTILES, axis=0), constant
 

@@ -40,7 +40,7 @@ def _angles(fit: Record, recordings: Recordings) -> np.ndarray:
     """Wrap angles of each recording in each contact [rad], by the middle of the draws where curves give them."""
     cable, space, angles = fit.model.cable, fit.model.space, fit.dataset.measurements.table(AngleTable)
     measured = row_angles(cable.description, recorded_angles(recordings), angles).data
-    z = fit.least_squares.z if fit.posterior is None else np.median(fit.posterior.flat_z, axis=0)
+    z = fit.least_squares.z if fit.sampled is None else np.median(fit.posterior.flat_z, axis=0)
     with jax.enable_x64(True):
         rows = {name: jnp.asarray(array) for name, array in measured.items()}
         return np.asarray(resolve_angles(cable, space.constrain(jnp.asarray(z)), rows)[0])

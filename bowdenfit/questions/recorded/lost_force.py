@@ -60,7 +60,7 @@ def lost_force(fit: Record) -> LostForce | None:
     output at no input.
     """
     friction = fit.model.cable.friction
-    if fit.posterior is None or DRAG not in friction.options:
+    if fit.sampled is None or DRAG not in friction.options:
         return None
     at, place = place_of(fit)
     route, best = fit.dataset.description.route, fit.posterior.optimum.get(OPTIMAL_LENGTH)

@@ -56,7 +56,7 @@ class RateEffect:
 def rate_effect(fit: Record) -> RateEffect | None:
     """The effect of speed; None where the fit has none or no draws."""
     friction = fit.model.cable.friction
-    if fit.posterior is None or not friction.depends_on_rate:
+    if fit.sampled is None or not friction.depends_on_rate:
         return None
     unit, scale = SHOWN_SPEED[friction.conditions.velocity_unit]
     slow, fast = _typical_speeds(fit)
@@ -95,5 +95,4 @@ def _differences(fit: Record, at: float, slow: float, fast: float) -> np.ndarray
         output = friction.output_force(values, force, shifts, jnp.ones(())) / force
         return output[1] - output[0]
 
-    assert fit.posterior is not None  # the caller checked
     return np.asarray(jax.jit(jax.vmap(difference))(jnp.asarray(fit.posterior.flat_z)))

@@ -86,7 +86,7 @@ def _runs(fit: Record) -> dict[str, tuple[np.ndarray, float, float]]:
     from bowdenfit.questions.recorded.traces import QUANTILES
     from bowdenfit.recordings.recording import Recordings
 
-    recordings, posterior = fit.dataset.measurements.table(Recordings), fit.posterior
+    recordings, posterior = fit.dataset.measurements.table(Recordings), fit.sampled
     assert recordings is not None  # the caller has traces of them
     term = next(t for t in fit.model.terms if t.name == RECORDED)
     observed = term.observed()

@@ -88,7 +88,7 @@ def traces(fit: Record) -> tuple[Trace, ...]:
 
 def some_draws(fit: Record, n: int = DRAWS) -> np.ndarray:
     """So many draws of the posterior, or as many times least squares."""
-    if fit.posterior is None:
+    if fit.sampled is None:
         return np.repeat(fit.least_squares.z[None], n, axis=0)
     flat = fit.posterior.flat_z
     return flat[np.linspace(0, len(flat) - 1, n).astype(int)]
@@ -97,7 +97,7 @@ def some_draws(fit: Record, n: int = DRAWS) -> np.ndarray:
 def _predicted(fit: Record, recordings: Recordings, follower: Follower) -> tuple[np.ndarray, np.ndarray]:
     """Quantiles of the output force with a new mounting, and of the friction exponent without."""
     z, n = some_draws(fit), len(recordings.each)
-    if fit.posterior is None:
+    if fit.sampled is None:
         force, exponent = follower(z, np.zeros((DRAWS, n)))
         return force[:1], exponent[:1]
     tau = fit.posterior.values[RUN_SCATTER].ravel() if RUN_SCATTER in fit.posterior.values else np.zeros(1)

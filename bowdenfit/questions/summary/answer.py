@@ -49,7 +49,7 @@ def quantities(fit: Record) -> list[Quantity]:
 
 def answer(fit: Record) -> list[str]:
     """The answer in sentences: the first says what to do, or what the coefficients are."""
-    if fit.posterior is not None and fit.dataset.description.route is not None:
+    if fit.sampled is not None and fit.dataset.description.route is not None:
         best = fit.optimal_length()
         return [best.headline, *best.sentences(), *_of_options(fit)]
     return [_coefficients(fit), *_preload(fit), *_of_options(fit)]
@@ -73,7 +73,7 @@ def _quantity(fit: Record, parameter: Parameter) -> Quantity | None:
     what = "scatter between mountings" if percent else _what(parameter)
     if parameter.fixed is not None:
         return Quantity(parameter.name, what, unit, f"{parameter.fixed * parameter.shown_scale:.4g}", "as stated")
-    if fit.posterior is not None:
+    if fit.sampled is not None:
         return Quantity(parameter.name, what, unit, *_drawn(fit.parameter(parameter.name).times(scale)))
     estimate = fit.least_squares.estimates.get(parameter.name)
     return Quantity(parameter.name, what, unit, *_estimated(estimate)) if estimate is not None else None

@@ -55,7 +55,7 @@ class Coefficient:
 
 def data(fit: Record) -> tuple[Coefficient, ...] | None:
     """The parameters that belong to friction, constant angles or sensors; None where none was sampled."""
-    drawn, estimates, found = fit.posterior, fit.least_squares.estimates, []
+    drawn, estimates, found = fit.sampled, fit.least_squares.estimates, []
     if drawn is None:
         return None
     for p in (p for role in ROLES for p in fit.model.space.free if p.role == role):

@@ -92,7 +92,7 @@ def forces_shown(fit: "Record") -> Forces | None:
     found = _of_draws(fit, table, rows, rows[first], load)
     places = [_here(table, rows, place == i, label, load, found, i, i in shown) for i, label in enumerate(labels)]
     judged = verdict(fit)
-    spread = _spread(fit, load, found) if fit.posterior is not None else np.zeros(0)
+    spread = _spread(fit, load, found) if fit.sampled is not None else np.zeros(0)
     count = len(table.run) if len(rows) < len(table.run) else 0
     said = next(iter(judged.reasons), "")
     model = fit.dataset.description.friction_model

@@ -66,7 +66,7 @@ def summarize(fit: Record) -> dict[str, Any]:
     effect = rate_effect(fit)
     if effect is not None:
         page["rate_effect"] = effect
-    if fit.posterior is not None:
+    if fit.sampled is not None:
         page["sampler"] = _sampler(fit, fit.posterior)
         if fit.posterior.agreement is not None:
             page["samplers"] = fit.posterior.agreement
@@ -102,7 +102,7 @@ def _parameter(fit: Record, name: str) -> dict[str, Any]:
         row["fixed"] = parameter.fixed * parameter.shown_scale
     if name in fit.least_squares.estimates:
         row["least_squares"] = fit.least_squares.estimates[name]
-    if fit.posterior is not None and name in fit.posterior.values:
+    if fit.sampled is not None and name in fit.posterior.values:
         draws, diagnostics = fit.posterior.values[name], fit.posterior.diagnostics[name]
         row |= vars(fit.parameter(name)) | {
             "ess_bulk": diagnostics.ess_bulk,
@@ -116,7 +116,6 @@ def _parameter(fit: Record, name: str) -> dict[str, Any]:
 
 def contraction(fit: Record, name: str) -> float:
     """How much narrower the posterior is than the prior, in z: 1 where data decide, 0 where the prior alone speaks."""
-    assert fit.posterior is not None  # callers ask only where there are draws
     return float(1 - np.var(fit.posterior.z[..., fit.model.space.index[name]]))
 
 
@@ -129,7 +128,7 @@ def curve_coefficients(fit: Record) -> dict[str, tuple[str, str]]:
 
 def _curve_coefficient(fit: Record, name: str) -> dict[str, Any]:
     row: dict[str, Any] = {"unit": curve_coefficients(fit)[name][0]}
-    if fit.posterior is not None:
+    if fit.sampled is not None:
         ordered = np.sort(fit.posterior.values[name], axis=None)  # some may be infinite, and are not to be interpolated
         q05, median, q95 = (ordered[round(q * (len(ordered) - 1))] for q in (0.05, 0.5, 0.95))
         row |= {"median": float(median), "q05": float(q05), "q95": float(q95)}
@@ -161,7 +160,7 @@ def _measured_efficiencies(fit: Record) -> list[dict[str, Any]]:
         observed, forces = term.observed(), _input_forces(fit, term)
         for i, label in enumerate(term.labels):
             row: dict[str, Any] = {"table": term.name, "label": label, "measured": float(observed[i])}
-            if fit.posterior is not None:
+            if fit.sampled is not None:
                 expected = Interval.of(fit.posterior.expected[term.name][..., i])
                 replicated = fit.posterior.replicated[term.name][..., i]
                 row |= {"predicted": expected.median, "q05": expected.q05, "q95": expected.q95}

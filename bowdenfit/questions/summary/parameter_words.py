@@ -54,7 +54,7 @@ def parameter_cells(parameter: Parameter, known: Interval | None, estimate: Esti
 
 def drawn_intervals(fit: Record) -> dict[str, Interval]:
     """Of every parameter that was sampled; empty without draws."""
-    return {p.name: fit.parameter(p.name) for p in fit.model.space.free} if fit.posterior is not None else {}
+    return {p.name: fit.parameter(p.name) for p in fit.model.space.free} if fit.sampled is not None else {}
 
 
 def _row(parameter: Parameter, known: Interval | None, estimate: Estimate | None, sampled: bool) -> tuple[str, ...]:

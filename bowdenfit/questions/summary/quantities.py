@@ -35,9 +35,9 @@ class SampledQuantity:
 
 def sampled_quantities(fit: Record, roles: tuple[str, ...] = ()) -> list[SampledQuantity]:
     """The sampled parameters, of the given roles in the given order, or all; none without draws."""
-    if fit.posterior is None:
+    if fit.sampled is None:
         return []
-    free, values = fit.model.space.free, fit.posterior.values
+    free, values = fit.model.space.free, fit.sampled.values
     wanted = [p for role in roles for p in free if p.role == role] if roles else free
     return [SampledQuantity(axis_label(p.symbol, p.unit), values[p.name], (support(values[p.name]), np.inf)) for p in wanted]
 
@@ -46,7 +46,7 @@ def optimum(fit: Record) -> list[SampledQuantity]:
     """The optimal length and the efficiency there [%], where there are such."""
     from bowdenfit.results.record import OPTIMAL_EFFICIENCY, OPTIMAL_LENGTH
 
-    route, posterior = fit.dataset.description.route, fit.posterior
+    route, posterior = fit.dataset.description.route, fit.sampled
     if route is None or posterior is None:
         return []
     length, efficiency = posterior.optimum[OPTIMAL_LENGTH], 100 * posterior.optimum[OPTIMAL_EFFICIENCY]

@@ -34,7 +34,7 @@ class Paths:
 def data(fit: Record) -> Paths | None:
     """What is shown; None where no walker has a path."""
     quantities = sampled_quantities(fit) + optimum(fit)[:1]
-    if fit.posterior is None or all(q.draws.shape[1] == 1 for q in quantities):
+    if fit.sampled is None or all(q.draws.shape[1] == 1 for q in quantities):
         return None
     return Paths(quantities, fit.posterior.n_ensembles)
 

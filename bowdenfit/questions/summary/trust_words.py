@@ -45,7 +45,7 @@ def reasons(found: Verdict) -> list[str]:
 
 def trust(fit: Record) -> list[str]:
     """What speaks for a fit that may be trusted, and what to keep in mind."""
-    if fit.posterior is None:
+    if fit.sampled is None:
         best = ", without a best length" if fit.dataset.description.route is not None else ""
         return [
             f"Nothing speaks against these numbers, but they are least squares alone{best}; fit again without --no-mcmc for "

@@ -79,7 +79,7 @@ def _title(fit: Record) -> str:
 
 def _verdict(fit: Record, page: dict[str, Any]) -> str:
     found = verdict(fit)
-    if fit.posterior is None:
+    if fit.sampled is None:
         state = "least squares only; no posterior, no design answer" if found.trusted else _untrusted(found)
     else:
         state = "converged" if found.trusted else _untrusted(found)
@@ -108,7 +108,7 @@ def _untrusted(found: Verdict) -> str:
 
 def _known(fit: Record) -> str:
     """Which coefficients the measurements determine, in a sentence."""
-    friction = identifiability(fit).groups.get("friction") if fit.posterior is not None else None
+    friction = identifiability(fit).groups.get("friction") if fit.sampled is not None else None
     return filled(say_what_is_determined(friction, measured=True)) if friction is not None else ""
 
 
@@ -126,7 +126,7 @@ def _rests_on_prior(page: dict[str, Any]) -> str:
 
 def _curves(fit: Record, page: dict[str, Any]) -> str:
     """Derived quantities of the curves, a table for each family."""
-    if fit.posterior is None:
+    if fit.sampled is None:
         return ""
     families: dict[type[Curve], list[str]] = {}
     for curve in fit.model.cable.curves.values():
@@ -218,7 +218,7 @@ def _friction_model(fit: Record) -> str:
 def _measured(fit: Record, page: dict[str, Any]) -> str:
     if not page["measured"]:
         return ""
-    drawn = fit.posterior is not None
+    drawn = fit.sampled is not None
     of_load = ["at input"] if any("input_force_N" in row for row in page["measured"]) else []
     heads = ["measured at", *of_load, "measured", "predicted", *(["90 % interval"] if drawn else [])]
     heads += ["measured/predicted - 1"]
@@ -240,7 +240,7 @@ def _measured(fit: Record, page: dict[str, Any]) -> str:
 
 
 def _answer(fit: Record) -> str:
-    if fit.posterior is None or fit.dataset.description.route is None:
+    if fit.sampled is None or fit.dataset.description.route is None:
         return ""
     return str(fit.optimal_length())
 

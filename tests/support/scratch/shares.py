@@ -36,7 +36,7 @@ VERB = Verb(shares, words, "Shares of the loss.", "Which contact takes what shar
 
 def data(fit):
     """What the figure shows."""
-    return shares(fit) if fit.posterior is not None else None
+    return shares(fit) if fit.sampled is not None else None
 
 
 def draw(answer):

@@ -6,10 +6,13 @@ quarter of the time of a figure. Tests see to it that nothing overlaps or leaves
 
 from __future__ import annotations
 
+import textwrap
 from collections.abc import Iterable, Sequence
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
-from bowdenfit.plots.style import WIDE
+import numpy as np
+
+from bowdenfit.plots.style import SMALL, TITLE_SIZE, WIDE
 
 if TYPE_CHECKING:
     from matplotlib.artist import Artist
@@ -20,6 +23,9 @@ LEFT, RIGHT, BOTTOM = 0.62, 0.18, 0.45  # margins
 LEGEND_ROW, LEGEND_ROOM = 0.155, 0.12
 TITLE = 0.22  # room for a title of one line
 LABEL_LEFT, LABEL_BELOW = 0.41, 0.25  # from the axes to its labels
+EDGE = 0.08  # from words to the edge of the page
+_MARK, _APART = 2.6, 2.0  # of a legend, in its font size: a mark with its gap, and from one column to the next
+_TITLE_ROWS, _TITLE_ROW = 2, 0.15
 
 
 def empty_page(width: float, height: float) -> Figure:
@@ -56,6 +62,12 @@ def panels(
     return figure, flat
 
 
+def axes_at(figure: Figure, left: float, bottom: float, width: float, height: float, **sharing: Any) -> Axes:
+    """A panel at a place in inches."""
+    page, total = figure.get_size_inches()
+    return figure.add_axes((left / page, bottom / total, width / page, height / total), **sharing)
+
+
 def place_labels(figure: Figure, axes: Axes) -> None:
     """Put the axis labels at a fixed distance, so that those of neighbors line up."""
     page, box = figure.get_size_inches(), axes.get_position()
@@ -70,15 +82,89 @@ def drop_unused(flat: list[Axes], used: int) -> list[Axes]:
     return flat[:used]
 
 
+def columns_within(page: float, most: int, least: float, gap: float) -> int:
+    """How many panels fit side by side.
+
+    Args:
+        page: Width of the figure.
+        most: Panels in a row where there is room.
+        least: Width of a panel that can still be read.
+        gap: Between panels.
+    """
+    return max(1, min(most, int((page - LEFT - RIGHT + gap) / (least + gap))))
+
+
+def text_width(words: str, size: float = SMALL, weight: str = "normal") -> float:
+    """Width of words on the page, of the longest line [in]."""
+    from matplotlib.font_manager import FontProperties
+    from matplotlib.textpath import text_to_path
+
+    font = FontProperties(family="sans-serif", size=size, weight=weight)
+
+    def width(line: str) -> float:
+        try:
+            return float(text_to_path.get_text_width_height_descent(line, font, line.count("$") > 1)[0])
+        except ValueError:  # dollar signs without a formula between them
+            return float(text_to_path.get_text_width_height_descent(line, font, False)[0])
+
+    return max(map(width, words.split("\n"))) / 72
+
+
+def wrapped(words: str, room: float, size: float = SMALL, weight: str = "normal", most: int | None = None) -> str:
+    """Words in lines that are no wider than the room, in so many lines at most; the end of what is longer is left out."""
+    if text_width(words, size, weight) <= room:
+        return words
+    letters = max(1, int(len(words) * room / text_width(words, size, weight)))
+    for n in range(letters + 3, 0, -1):
+        lines = textwrap.wrap(words, n, max_lines=most, placeholder=" \N{HORIZONTAL ELLIPSIS}")
+        if lines and text_width("\n".join(lines), size, weight) <= room:
+            return "\n".join(lines)
+    return words
+
+
 def legend_above(figure: Figure, axes: Iterable[Axes], columns: int) -> None:
-    """One legend for several panels, on room added at the top of the page, where it hides no data."""
+    """One legend for several panels, on room added at the top of the page, where it hides no data.
+
+    Args:
+        figure: The page.
+        axes: Panels whose entries are shown.
+        columns: Entries in a row, fewer where they have no room.
+    """
+    room = figure.get_size_inches()[0] - 2 * EDGE
     entries: dict[str, Artist] = {}
     for panel in axes:
         for handle, label in zip(*panel.get_legend_handles_labels(), strict=True):
-            entries.setdefault(label, handle)
-    columns = min(columns, len(entries))
-    _add_room(figure, LEGEND_ROOM + LEGEND_ROW * -(-len(entries) // columns))
-    figure.legend(list(entries.values()), list(entries), loc="upper center", ncols=columns, borderaxespad=0.3)
+            entries.setdefault(wrapped(label, room - _MARK * SMALL / 72), handle)
+    if not entries:
+        return
+    widths = [_MARK * SMALL / 72 + text_width(label) for label in entries]
+    columns = next(n for n in range(min(columns, len(entries)), 0, -1) if n == 1 or _legend_width(widths, n) <= room)
+    rows = max(sum(1 + label.count("\n") for label in part) for part in np.array_split(np.array(list(entries)), columns))
+    _add_room(figure, LEGEND_ROOM + LEGEND_ROW * rows)
+    figure.legend(
+        list(entries.values()), list(entries), loc="upper center", ncols=columns, borderaxespad=0.3,
+        bbox_to_anchor=(0.5, 1.0),
+    )  # fmt: skip
+
+
+def _legend_width(widths: Sequence[float], columns: int) -> float:
+    """Width of a legend whose entries stand in columns, one after the other."""
+    return sum(max(part) for part in np.array_split(np.array(widths), columns)) + _APART * SMALL / 72 * columns
+
+
+def title_above(figure: Figure, words: str) -> None:
+    """What the figure is of, on room added above everything else."""
+    width = figure.get_size_inches()[0]
+    said = wrapped(words, width - 2 * EDGE, TITLE_SIZE, "bold", _TITLE_ROWS)
+    room = EDGE + _TITLE_ROW * (1 + said.count("\n"))
+    _add_room(figure, room)
+    height = figure.get_size_inches()[1]
+    for legend in figure.legends:
+        legend.set_bbox_to_anchor((0.5, 1 - room / height), figure.transFigure)
+    figure.text(
+        EDGE / width, 1 - EDGE / height, said, ha="left", va="top", fontsize=TITLE_SIZE, fontweight="bold",
+        parse_math=False,
+    )  # fmt: skip
 
 
 def _add_room(figure: Figure, room: float) -> None:

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from bowdenfit.plots.layout import TITLE, drop_unused, panels
+from bowdenfit.plots.layout import LEFT, RIGHT, TITLE, columns_within, drop_unused, panels
 from bowdenfit.plots.style import MEDIUM, SMALL, WIDE
 
 if TYPE_CHECKING:
@@ -15,6 +15,7 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
 MOST = 8  # recordings in a figure
+LEAST_WIDTH = 1.2  # in, of a panel
 ALIKE = 4.0  # ranges share an axis if all of them together are so many times the shortest at most
 CHARACTER = 0.064  # in, width of one in a title
 LEGEND_MARK = 4.0  # pt
@@ -52,8 +53,9 @@ def set_limits(flat: list[Axes], spans: Sequence[tuple[float, float]], which: st
 
 
 def recording_panels(
-    names: Sequence[str], most_columns: int, height: float | None, share_x: bool, share_y: bool, page: float = MEDIUM
-) -> tuple[Figure, list[Axes], int]:
+    names: Sequence[str], most_columns: int, height: float | None, share_x: bool, share_y: bool, page: float = MEDIUM,
+    width: float | None = None,
+) -> tuple[Figure, list[Axes], int]:  # fmt: skip
     """A panel a recording under its name, in a grid without more columns than it needs.
 
     Args:
@@ -62,17 +64,18 @@ def recording_panels(
         height: Of a panel [in]; None for square ones.
         share_x, share_y: Whether all panels have the same axes.
         page: Width of the page for a single column [in].
+        width: Of the page, whatever is on it [in].
     """
-    rows = -(-len(names) // most_columns)
-    columns = -(-len(names) // rows)
-    page = page if columns == 1 else WIDE
     across, down = (0.16 if share_y else 0.42), TITLE + (0.08 if share_x else 0.2)
-    width = (page - 0.8 - across * (columns - 1)) / columns
-    heights = [width if height is None else height] * rows
+    rows = -(-len(names) // columns_within(width or WIDE, most_columns, LEAST_WIDTH, across))
+    columns = -(-len(names) // rows)
+    page = width or (page if columns == 1 else WIDE)
+    inner = (page - LEFT - RIGHT - across * (columns - 1)) / columns
+    heights = [inner if height is None else height] * rows
     figure, flat = panels(heights, columns, TITLE, (across, down), page, sharex=share_x, sharey=share_y)
     flat = drop_unused(flat, len(names))
     for axes, name in zip(flat, names, strict=True):
-        axes.set_title(short(name, int(width / CHARACTER)), fontsize=SMALL)
+        axes.set_title(short(name, int(inner / CHARACTER)), fontsize=SMALL)
     return figure, flat, columns
 
 
@@ -83,6 +86,7 @@ def panels_with_limits(
     most_columns: int,
     height: float | None = None,
     page: float = MEDIUM,
+    width: float | None = None,
 ) -> tuple[Figure, list[Axes], int]:
     """The same, each axis with the limits of its own panel, or with those of all where they are alike.
 
@@ -93,9 +97,10 @@ def panels_with_limits(
         most_columns: Panels in a row.
         height: Of a panel [in]; None for square ones.
         page: Width of the page for a single column [in].
+        width: Of the page, whatever is on it [in].
     """
     share_x, share_y = alike(across), alike(up)
-    figure, flat, columns = recording_panels(names, most_columns, height, share_x, share_y, page)
+    figure, flat, columns = recording_panels(names, most_columns, height, share_x, share_y, page, width)
     set_limits(flat, across, "x", share_x)
     set_limits(flat, up, "y", share_y)
     return figure, flat, columns

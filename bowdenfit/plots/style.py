@@ -22,6 +22,8 @@ SERIES_LINES = ("-", (0, (5, 1.5)), (0, (1, 1)), (0, (5, 1, 1, 1)))
 WIDE = 7.0  # in, both columns of a paper
 MEDIUM = 4.6  # in, figures of one panel
 SMALL = 7  # pt, ticks and legends
+TITLE_SIZE = 8  # pt
+LEAST = 6  # pt, of any words
 DOTS_PER_INCH = 160
 
 EFFICIENCY, WRAP_ANGLE = "Efficiency (%)", "Wrap angle (deg)"
@@ -55,6 +57,7 @@ SETTINGS: dict[Any, Any] = {
     "figure.facecolor": "white",
     "svg.fonttype": "none",
     "svg.hashsalt": "bowdenfit",
+    "pdf.fonttype": 42,  # letters as letters
 }
 
 

@@ -1,13 +1,15 @@
-"""All the figures of a fit, in their order: each is a file, and a line here.
+"""All the figures of a fit, in the order in which they are read: each is a file, and a line here.
 
-A figure file has `data`, what the figure shows of a fit as plain arrays, None where that has nothing of it, and `draw`, the
-figure of such data. Data load no matplotlib and drawing loads no JAX, so that another process can draw while this one goes on.
+A figure file has `HEADING`, `data`, what the figure shows of a fit as plain arrays, None where that has nothing of it, and of
+such data `draw`, the figure, as wide as it is told, and `caption`, what is drawn, in plain words. Data load no matplotlib and
+drawing loads no JAX, so that another process can draw while this one goes on.
 """
 
-from collections.abc import Collection, Iterable, Iterator, Sequence
+from collections.abc import Collection, Iterable, Iterator, Mapping, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, get_type_hints
 
+from bowdenfit.plots.layout import title_above
 from bowdenfit.plots.style import in_paper_style
 from bowdenfit.plots.write import FORMATS, write_all
 from bowdenfit.questions.bends import (
@@ -35,34 +37,38 @@ from bowdenfit.questions.summary import (
     traces_figure,
 )
 from bowdenfit.results.arrays import read_arrays
-from bowdenfit.results.folder import FIGURE_DATA
+from bowdenfit.results.folder import FIGURE_DATA, write_text
 from bowdenfit.results.kept import kept
+from bowdenfit.words import filled, printable
 
 if TYPE_CHECKING:
+    from bowdenfit.plots.layout import Figure
     from bowdenfit.results.record import Record
 
-_FILES = (  # first those whose data are there, so that drawing begins at once
-    coefficients_figure,
-    pairs_figure,
-    traces_figure,
-    residuals_figure,
+_FILES = (  # first what was measured beside the model, then what follows, then whether it can be relied on
     forces_figure,
-    wrap_angles_figure,
-    efficiency_figure,
     motor_force_figure,
     stretch_figure,
     preload_figure,
-    bending_loss_figure,
     loops_figure,
-    preload_window_figure,
-    checks_figure,
     recordings_figure,
+    wrap_angles_figure,
+    efficiency_figure,
+    residuals_figure,
     hysteresis_figure,
     sample_efficiency_figure,
-    autocorrelation_figure,
     dependence_figure,
+    bending_loss_figure,
+    preload_window_figure,
+    coefficients_figure,
+    pairs_figure,
+    traces_figure,
+    checks_figure,
+    autocorrelation_figure,
 )
 FIGURES = {file.__name__.rpartition(".")[2].removesuffix("_figure"): file for file in _FILES}
+AT_ONCE = ("coefficients", "pairs", "traces")  # whose data are there, so that drawing begins at once
+CAPTIONS = "captions.txt"
 
 
 def figures_of(fit: "Record", names: Collection[str] = ()) -> Iterator[tuple[str, Any]]:
@@ -97,14 +103,60 @@ def data_types(names: Iterable[str]) -> dict[str, Any]:
 
 
 @in_paper_style
-def draw_figure(name: str, data: Any, folder: Path, formats: Sequence[str] = FORMATS) -> list[Path]:
-    """Draw and write one figure; loads matplotlib, and no model.
+def figure_of(name: str, data: Any, cable: str = "", width: float | None = None) -> "Figure":
+    """A figure under its title; loads matplotlib, and no model.
+
+    Args:
+        name: Which of `FIGURES`.
+        data: What it shows.
+        cable: Name of the cable, for the title.
+        width: Of the page [in], on which words stay as large as they are; what suits the figure if omitted.
+    """
+    figure: Figure = FIGURES[name].draw(data, width)
+    title_above(figure, title_of(name, cable))
+    return figure
+
+
+def title_of(name: str, cable: str) -> str:
+    """Heading of a figure with the name of the cable."""
+    return f"{FIGURES[name].HEADING} \N{EN DASH} {cable}" if cable else FIGURES[name].HEADING
+
+
+def caption_of(name: str, data: Any) -> str:
+    """What a figure shows, in plain words: what is drawn, what the bands are, of how many."""
+    said: str = FIGURES[name].caption(data)
+    return said
+
+
+def draw_figure(
+    name: str, data: Any, folder: Path, formats: Sequence[str] = FORMATS, cable: str = "", width: float | None = None
+) -> list[Path]:
+    """Draw and write one figure.
 
     Args:
         name: Which of `FIGURES`.
         data: What it shows.
         folder: Where the files go; made if it is missing.
         formats: Endings; the figure is written in every one.
+        cable: See `figure_of`.
+        width: See `figure_of`.
     """
     folder.mkdir(parents=True, exist_ok=True)
-    return write_all(FIGURES[name].draw(data), folder, name, formats)
+    return write_all(figure_of(name, data, cable, width), folder, name, formats)
+
+
+def write_captions(shown: Mapping[str, Any], folder: Path, cable: str) -> Path:
+    """Write the captions of some figures, a paragraph each, beside those of the others in the folder.
+
+    Args:
+        shown: Data of the figures, by name.
+        folder: Where the figures are.
+        cable: Name of the cable.
+    """
+    path = folder / CAPTIONS
+    there = path.read_text(encoding="utf-8").split("\n\n") if path.exists() else []
+    said = {text.partition(":")[0]: text.strip() for text in there if text.strip()}
+    for name, data in shown.items():
+        said[name] = printable(filled(" ".join(f"{name}: {title_of(name, cable)}. {caption_of(name, data)}".split())))
+    write_text(path, "\n\n".join(said[name] for name in FIGURES if name in said) + "\n")
+    return path

@@ -32,8 +32,9 @@ def write_results(found: "Fit", folder: Path, figures: bool, helper: Assistant) 
     Returns:
         What is missing, in sentences; a fit whose figures cannot be drawn is kept all the same.
     """
+    from bowdenfit.plots.write import FORMATS
+    from bowdenfit.questions.figures import AT_ONCE, draw_figure, figures_of, write_captions
     from bowdenfit.questions.figures import FIGURES as FIGURE_NAMES
-    from bowdenfit.questions.figures import draw_figure, figures_of
     from bowdenfit.questions.kept import answers_of
     from bowdenfit.questions.summary.brief_words import summary_text
     from bowdenfit.questions.summary.words import full_text
@@ -43,11 +44,12 @@ def write_results(found: "Fit", folder: Path, figures: bool, helper: Assistant) 
     if found.sampled is None:
         clear(folder)
     data, drawn, failed = dict[str, Any](), dict[str, Future[Any]](), dict[str, Exception]()
-    for name in FIGURE_NAMES if figures else ():
+    for name in dict.fromkeys((*AT_ONCE, *FIGURE_NAMES)) if figures else ():
         try:
             data |= dict(figures_of(found, [name]))
             if name in data:
-                drawn[name] = helper.submit(draw_figure, name, data[name], folder / FIGURES)  # meanwhile, the next
+                of = name, data[name], folder / FIGURES, FORMATS, found.name
+                drawn[name] = helper.submit(draw_figure, *of)  # meanwhile, the next
         except Exception as error:  # whatever is wrong with a figure, the fit is to be kept
             failed[name] = error
     save(found, found.summary(), folder, True, answers_of(found), data)
@@ -58,6 +60,10 @@ def write_results(found: "Fit", folder: Path, figures: bool, helper: Assistant) 
             figure.result()
         except Exception as error:
             failed[name] = error
+    try:
+        write_captions({name: data[name] for name in data.keys() - failed}, folder / FIGURES, found.name)
+    except Exception as error:
+        failed["captions"] = error
     return _without_figures(folder, failed)
 
 

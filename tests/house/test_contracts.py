@@ -55,7 +55,7 @@ def test_every_figure_file_of_a_fit_is_listed():
     files = (ROOT / "bowdenfit" / "questions").glob("*/*_figure.py")
     of_fits = {path.stem.removesuffix("_figure") for path in files if "\ndef data(fit:" in path.read_text(encoding="utf-8")}
     assert of_fits == set(FIGURES)
-    assert all(callable(figure.draw) for figure in FIGURES.values())
+    assert all(callable(figure.draw) and callable(figure.caption) and figure.HEADING for figure in FIGURES.values())
 
 
 def test_importing_changes_no_global_setting():

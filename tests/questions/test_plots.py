@@ -106,7 +106,7 @@ def paper_data(length_draws=None):
         "coefficients": friction,
         "pairs": Pairs([positive(c) for c in (*friction, *noise)] + answer, "cable length"),
         "traces": Paths([positive(c) for c in (*friction, *noise, shape)] + answer[:1], ENSEMBLES),
-        "residuals": Residuals((points,), curves, LABEL),
+        "residuals": Residuals((points,)),
     }
 
 
@@ -122,12 +122,12 @@ def without_draws(data):
         return Band(band.route, band.quantiles[2:3])
 
     (points,), along = data["residuals"].points, data["efficiency"]
-    curves = tuple(dataclasses.replace(c, band=line(c.band)) for c in data["residuals"].curves)
+    curves = tuple(dataclasses.replace(c, band=line(c.band)) for c in data["wrap_angles"].curves)
     points = (dataclasses.replace(points, predicted=points.predicted[2:3]),)
     return {
         "wrap_angles": WrapAngles(curves, LABEL, RANGE),
         "efficiency": AlongRoute(LABEL, RANGE, line(along.efficiency), points),
-        "residuals": Residuals(points, curves, LABEL),
+        "residuals": Residuals(points),
     }
 
 
@@ -153,7 +153,7 @@ def with_five_contacts(data):
     friction = tuple(coefficient(f"mu{'4' * i}", rf"$\mu_{i}$", 0.1, 0.01) for i in range(4, 9))
     sampled = [positive(c) for c in friction]
     data = data | {"coefficients": friction + data["coefficients"]}
-    data = changed(changed(data, "wrap_angles", curves=curves), "residuals", curves=curves)
+    data = changed(data, "wrap_angles", curves=curves)
     pairs = sampled + data["pairs"].quantities
     data = changed(data, "pairs", quantities=pairs[: pairs_figure.MOST - 2] + pairs[-2:])
     return changed(data, "traces", quantities=sampled + data["traces"].quantities)
@@ -187,7 +187,7 @@ CASES = {
     "constant draws": lambda: with_constant_draws(paper_data()),
     "optimum at the edge": at_the_edge,
 }
-ALL = ["wrap_angles", "efficiency", "coefficients", "pairs", "traces", "residuals"]
+ALL = ["wrap_angles", "efficiency", "residuals", "coefficients", "pairs", "traces"]
 
 
 def drawn(name, data=None):
@@ -204,11 +204,11 @@ def fit(on_body):
 
 
 def test_only_figures_that_apply_are_drawn(fit, on_body):
-    assert [name for name, _ in figures_of(fit)] == [*ALL[2:], *ALL[:2], "checks"]
+    assert [name for name, _ in figures_of(fit)] == [*ALL, "checks"]
     squares = bf.fit(on_body, mcmc=False)
-    assert [name for name, _ in figures_of(squares)] == ["residuals", "wrap_angles", "efficiency"]
+    assert [name for name, _ in figures_of(squares)] == ["wrap_angles", "efficiency", "residuals"]
     without = bf.fit(on_body.parent / "yarn-on-cylinder", mcmc=False)
-    assert [name for name, _ in figures_of(without)] == ["residuals", "forces"]
+    assert [name for name, _ in figures_of(without)] == ["forces", "residuals"]
 
 
 def test_a_single_draw_of_each_walker_has_no_trace_but_all_else(fit):
@@ -243,7 +243,7 @@ def test_every_axis_says_what_it_shows_or_shares_one_that_does(case):
     for name in data.keys() - {"pairs", "traces"}:
         for axes in drawn(name, data).axes:
             assert any(other.get_xlabel() for other in axes.get_shared_x_axes().get_siblings(axes))
-            lists_rows = "Measured efficiency" in axes.get_xlabel()
+            lists_rows = name == "residuals"
             assert lists_rows or any(other.get_ylabel() for other in axes.get_shared_y_axes().get_siblings(axes))
 
 
@@ -255,7 +255,7 @@ def test_every_axis_says_what_it_shows_or_shares_one_that_does(case):
         ("coefficients", {r"$\mu_1$", r"$\mu_2$", r"$\mu_3$", "Density"}),
         ("pairs", {r"$\mu_1$", r"$\sigma_\theta$ (deg)", "Optimum (mm)", "Efficiency at\noptimum (%)"}),
         ("traces", {r"$\mu_1$", r"$\sigma_\theta$ (deg)", "Optimum (mm)", "Draw of each walker"}),
-        ("residuals", {"Cable length (mm)", "Residual (deg)"}),
+        ("residuals", {"Efficiency (%)", "Measured less predicted median\n(percentage points)"}),
     ],
 )
 def test_names_and_units_are_the_same_everywhere(name, labels):
@@ -394,15 +394,16 @@ def test_traces_tell_a_stray_ensemble():
 
 
 def test_residuals_are_measured_minus_predicted_in_points():
-    axes = drawn("residuals").axes[0]
-    np.testing.assert_allclose(line(axes, "Measured").get_xdata(), -0.2, atol=1e-12)
-    np.testing.assert_allclose(line(axes, "Outside the range").get_xydata(), [[-0.2, 3.0]])
+    figure = drawn("residuals")
+    axes, strip = figure.axes
+    np.testing.assert_allclose(line(axes, "Measured").get_xdata(), 100 * EFFICIENCIES[:3])
+    np.testing.assert_allclose(line(strip, "Measured").get_xdata(), -0.2, atol=1e-12)
+    np.testing.assert_allclose(line(strip, "Outside the range of the curves").get_xydata(), [[-0.2, 3.0]])
     assert [t.get_text() for t in axes.get_yticklabels()] == ["440 mm", "470 mm", "510 mm", "550 mm"]
 
 
 def test_angle_residuals_are_readings_minus_the_curve():
-    first, second = drawn("residuals").axes[1:]
-    for axes in (first, second):
+    for axes in drawn("wrap_angles").axes[1::2]:
         np.testing.assert_allclose(axes.get_lines()[0].get_ydata(), 0.5)
 
 
@@ -437,7 +438,7 @@ def test_ticks_are_round_and_within_the_axis(limits):
 def test_all_figures_are_written_in_both_formats_and_nothing_else(tmp_path):
     before = dict(mpl.rcParams)
     written = [path for name, data in paper_data().items() for path in draw_figure(name, data, tmp_path / "figures")]
-    assert [path.name for path in written] == [f"{name}.{ending}" for name in ALL for ending in ("png", "svg")]
+    assert [path.name for path in written] == [f"{name}.{ending}" for name in paper_data() for ending in ("png", "svg")]
     assert sorted(written) == sorted((tmp_path / "figures").iterdir())
     assert all(1_000 < path.stat().st_size < 500_000 for path in written)
     assert dict(mpl.rcParams) == before

@@ -261,4 +261,6 @@ def test_a_figure_that_does_not_exist_is_refused_in_a_sentence(results, refuse, 
 
 def test_figures_have_names_that_plot_takes(results, run, tmp_path):
     assert run("plot", results, "-o", tmp_path, "--figure", "pairs", "--figure", "wrap_angles")[0] == 0
-    assert {path.stem for path in tmp_path.iterdir()} == {"pairs", "wrap_angles"} <= set(FIGURES)
+    assert {path.stem for path in tmp_path.iterdir()} == {"pairs", "wrap_angles", "captions"} <= {*FIGURES, "captions"}
+    said = (tmp_path / "captions.txt").read_text(encoding="utf-8").split("\n\n")
+    assert [paragraph.partition(":")[0] for paragraph in said] == ["wrap_angles", "pairs"]

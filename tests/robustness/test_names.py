@@ -94,7 +94,7 @@ def test_a_fit_whose_figures_cannot_be_drawn_is_kept_and_drawn_later(on_body, tm
     from bowdenfit.questions.figures import FIGURES
 
     drawn, said = FIGURES["wrap_angles"].draw, []
-    monkeypatch.setattr(FIGURES["wrap_angles"], "draw", lambda _: 1 / 0)
+    monkeypatch.setattr(FIGURES["wrap_angles"], "draw", lambda *_: 1 / 0)
     bf.fit(on_body, output=tmp_path / "fit", seed=3, mcmc=False, report=said.append)
     (sentence,) = said
     assert "holds the whole fit, but its figure wrap_angles could not be drawn (division by zero)" in sentence

@@ -9,17 +9,20 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from bowdenfit.plots.bands import draw_quantiles, name_band
-from bowdenfit.plots.layout import LEGEND_ROW, TITLE, legend_above, panels
-from bowdenfit.plots.panels import span
+from bowdenfit.plots.captions import curve_words
+from bowdenfit.plots.layout import LEGEND_ROW, TITLE, columns_within, legend_above, panels
+from bowdenfit.plots.panels import label_outer, span
 from bowdenfit.plots.style import BLACK, EFFICIENCY, GRAY, MEDIUM, WIDE, WRAP_ANGLE, in_paper_style, mapped_color
 
 if TYPE_CHECKING:
     from bowdenfit.plots.layout import Axes, Figure
     from bowdenfit.results.record import Record
 
+HEADING = "Efficiency against the wrap angle"
 DASHES = (0, (4, 1.6))
 MARKERS = ("o", "s", "^", "D", "v", "P")
 MARKS = 4  # on each line
+LEAST_WIDTH = 2.2  # in, of a panel
 LINES_IN_A_ROW = 2  # of a panel's legend
 TIMES_COEFFICIENT, TIMES_PRELOAD = (0.5, 1.0, 2.0), (0.0, 0.5, 1.0, 2.0)  # times what was fitted
 # What a panel varies, and the color map its lines are from, so that neither panel's legend holds for the other.
@@ -115,20 +118,29 @@ def data(fit: Record) -> BendingLoss | None:
     )
 
 
+def caption(loss: BendingLoss) -> str:
+    """What is drawn, in plain words."""
+    return (
+        f"Efficiency, output over input force while moving forward, against the wrap angle, at {loss.input_force:.4g} N input "
+        f"force. Black: the cable as fitted. {curve_words(len(loss.fitted) > 1)} In color: the same cable with other friction "
+        "coefficients, and with other preloads. Dashed: the capstan equation alone, which has no preload."
+    )
+
+
 @in_paper_style
-def draw(loss: BendingLoss) -> Figure:
+def draw(loss: BendingLoss, width: float | None = None) -> Figure:
     """Efficiency [%] against the wrap angle [deg]: several friction coefficients, and several preloads."""
     sides = [(*COEFFICIENTS, loss.coefficients), (*PRELOADS, loss.preloads)]
     sides = [side for side in sides if side[2]] or [(*FITTED, ())]
     rows = max(-(-len(lines) // LINES_IN_A_ROW) for _, _, lines in sides)
-    page = WIDE if len(sides) > 1 else MEDIUM
-    figure, flat = panels([2.3], len(sides), TITLE + rows * LEGEND_ROW, (0.2, 0), page, sharey=True)
+    page, above = width or (WIDE if len(sides) > 1 else MEDIUM), TITLE + rows * LEGEND_ROW
+    columns = columns_within(page, len(sides), LEAST_WIDTH, 0.2)
+    figure, flat = panels([2.3] * (len(sides) // columns), columns, above, (0.2, above + 0.4), page, sharey=True)
     for axes, (what, colors, lines) in zip(flat, sides, strict=True):
         _lines(axes, loss, lines, colors)
         _fitted(axes, loss)
         axes.set_title(f"{what}, at {loss.input_force:.4g} N input force", pad=6 + 72 * rows * LEGEND_ROW)
-        axes.set_xlabel(WRAP_ANGLE)
-    flat[0].set_ylabel(EFFICIENCY)
+    label_outer(flat, columns, WRAP_ANGLE, EFFICIENCY)
     flat[0].set_ylim(*_limits(loss))
     legend_above(figure, flat, columns=4 if len(sides) > 1 else 2)
     return figure

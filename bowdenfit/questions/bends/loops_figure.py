@@ -8,14 +8,17 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from bowdenfit.plots.bands import draw_quantiles, evenly, middle, name_band, say_of_how_many
+from bowdenfit.plots.captions import curve_words, shown_words, strip_words
 from bowdenfit.plots.layout import legend_above
 from bowdenfit.plots.panels import enlarge_marks, label_outer, panels_with_limits, span
 from bowdenfit.plots.style import BLACK, BLUE, GRAY, LEAST_SQUARES, MEDIAN, PURPLE, VERMILLION, in_paper_style
+from bowdenfit.words import counted
 
 if TYPE_CHECKING:
     from bowdenfit.plots.layout import Axes, Figure
     from bowdenfit.results.record import Record
 
+HEADING = "Forces of the loop"
 MOST, MOST_COLUMNS = 6, 3
 WORD_ROOM = 0.075  # share of a panel's width that a word along the line takes
 # stroke, name, marker, size [pt], color
@@ -101,13 +104,23 @@ def _points(fit: Record, bends: np.ndarray) -> np.ndarray:
     return np.concatenate(parts, axis=1)
 
 
+def caption(loops: tuple[LoopCurve, ...]) -> str:
+    """What is drawn, in plain words."""
+    n, shown = sum(len(loop.points_input) for loop in loops), min(len(loops), MOST)
+    return (
+        f"Output against input force of the loop, moving forward and back, at {shown_words(shown, len(loops), 'wrap angle')}. "
+        f"{curve_words(len(loops[0].forward) > 1)} Dashed: a rope without preload. Purple: the input force beyond which the "
+        f"return side is slack. {strip_words('in N')} n = {counted(n, 'reading')}."
+    )
+
+
 @in_paper_style
-def draw(loops: tuple[LoopCurve, ...]) -> Figure:
+def draw(loops: tuple[LoopCurve, ...], width: float | None = None) -> Figure:
     """Output against input force [N], a panel for each of at most six wrap angles."""
     shown = evenly(loops, MOST)
     across = [span([loop.input_force, loop.points_input], room=0.03) for loop in shown]
     up = [span([loop.forward, loop.back, loop.points_output]) for loop in shown]
-    figure, flat, columns = panels_with_limits([loop.label for loop in shown], across, up, MOST_COLUMNS)
+    figure, flat, columns = panels_with_limits([loop.label for loop in shown], across, up, MOST_COLUMNS, width=width)
     for axes, loop in zip(flat, shown, strict=True):
         axes.locator_params(nbins=6, steps=[1, 2, 2.5, 5, 10])
         _curves(axes, loop)

@@ -9,15 +9,18 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from bowdenfit.plots.bands import draw_quantiles, evenly, name_band, say_of_how_many
+from bowdenfit.plots.captions import curve_words, shown_words, strip_words
 from bowdenfit.plots.layout import legend_above
 from bowdenfit.plots.panels import enlarge_marks, label_outer, panels_with_limits, span
 from bowdenfit.plots.style import BLUE, GRAY, LEAST_SQUARES, MEDIAN, VERMILLION, in_paper_style
+from bowdenfit.words import counted
 
 if TYPE_CHECKING:
     from bowdenfit.kinds.displacement.table import DisplacementTable
     from bowdenfit.plots.layout import Axes, Figure
     from bowdenfit.results.record import Record
 
+HEADING = "Force at the motor against displacement"
 MOST, MOST_COLUMNS = 6, 3
 _POINTS = 150  # of the loop of a run, at least
 # stroke, name, marker, size [pt], color
@@ -95,13 +98,23 @@ def _path(table: DisplacementTable) -> DisplacementTable:
     return replace(table, displacement=displacement, run=of_run, motion=motion)
 
 
+def caption(runs: tuple[MotorForce, ...]) -> str:
+    """What is drawn, in plain words."""
+    n, shown = sum(int(run.points_used.sum()) for run in runs), min(len(runs), MOST)
+    return (
+        f"Force at the motor against its displacement, {shown_words(shown, len(runs), 'run')}: what was read, and the "
+        f"fitted loop through every turn of the motor. {curve_words(len(runs[0].force) > 1)} {strip_words('in N')} "
+        f"n = {counted(n, 'reading')} in {counted(len(runs), 'run')}."
+    )
+
+
 @in_paper_style
-def draw(runs: tuple[MotorForce, ...]) -> Figure:
+def draw(runs: tuple[MotorForce, ...], width: float | None = None) -> Figure:
     """Force at the motor [N] against displacement [mm], a panel for each of at most six runs."""
     shown = evenly(runs, MOST)
     across = [span([run.displacement], room=0.03) for run in shown]
     up = [span([run.force, run.points_force]) for run in shown]
-    figure, flat, columns = panels_with_limits([run.label for run in shown], across, up, MOST_COLUMNS)
+    figure, flat, columns = panels_with_limits([run.label for run in shown], across, up, MOST_COLUMNS, width=width)
     for axes, run in zip(flat, shown, strict=True):
         _loop(axes, run)
         _readings(axes, run)

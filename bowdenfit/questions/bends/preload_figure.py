@@ -8,14 +8,17 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from bowdenfit.plots.bands import draw_quantiles, name_band
+from bowdenfit.plots.captions import curve_words, strip_words
 from bowdenfit.plots.layout import legend_above, panels
 from bowdenfit.plots.panels import span
 from bowdenfit.plots.style import BLACK, BLUE, LEAST_SQUARES, LIGHT, MEDIAN, MEDIUM, WRAP_ANGLE, in_paper_style, percent
+from bowdenfit.words import counted
 
 if TYPE_CHECKING:
     from bowdenfit.plots.layout import Axes, Figure
     from bowdenfit.results.record import Record
 
+HEADING = "Preload against the wrap angle"
 DARK = "#C4C4C4"
 PERHAPS, RATHER = 0.05, 0.5  # probabilities of being slack from which on a region is shaded lightly and darkly
 PLACES = 2001  # along the wrap angle, for the ends of the regions
@@ -73,11 +76,23 @@ def _largest_bend(fit: Record) -> float:
     return max([float(a.max()) for a in found], default=np.pi)
 
 
+def caption(curve: PreloadCurve) -> str:
+    """What is drawn, in plain words."""
+    n = len(curve.points_preload)
+    return " ".join(filter(None, (
+        "Tension of the rope between fixed ends, which bending changes because it lengthens the sheath.",
+        curve_words(len(curve.preload) > 1),
+        "Gray: where the rope is slack." if np.max(curve.slack) > 0 else "",
+        strip_words("in N") if n else "",
+        f"n = {counted(n, 'reading')}." if n else "Preload was read at no bend; the curve follows from the other tables.",
+    )))  # fmt: skip
+
+
 @in_paper_style
-def draw(curve: PreloadCurve) -> Figure:
+def draw(curve: PreloadCurve, width: float | None = None) -> Figure:
     """Preload [N] against the wrap angle [deg], and below it the slack [mm] where there is any."""
     ever_slack = bool(np.max(curve.slack) > 0)
-    figure, flat = panels([2.2, 0.9] if ever_slack else [2.6], 1, 0.02, (0, 0.16), MEDIUM, sharex=True)
+    figure, flat = panels([2.2, 0.9] if ever_slack else [2.6], 1, 0.02, (0, 0.16), width or MEDIUM, sharex=True)
     _preload(flat[0], curve)
     if ever_slack:
         draw_quantiles(flat[1], curve.wrap_angle, curve.slack, BLUE)

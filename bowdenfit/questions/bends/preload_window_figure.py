@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from bowdenfit.plots.bands import draw_quantiles, middle, name_band
+from bowdenfit.plots.captions import curve_words
 from bowdenfit.plots.layout import TITLE, legend_above, panels
 from bowdenfit.plots.panels import span
 from bowdenfit.plots.style import (
@@ -28,6 +29,7 @@ if TYPE_CHECKING:
     from bowdenfit.plots.layout import Axes, Figure
     from bowdenfit.results.record import Record
 
+HEADING = "Which preload is enough"
 COARSE, FINE = 25, 401  # preloads: friction against them is smooth, the probability of slack is not
 ENOUGH = 0.95  # probability of staying taut from which on a preload is within the window
 
@@ -92,10 +94,20 @@ def data(fit: Record) -> PreloadWindow | None:
     )
 
 
+def caption(window: PreloadWindow) -> str:
+    """What is drawn, in plain words."""
+    return (
+        "What a preload costs and what it buys. Above: the friction that is felt in free motion at the bend where it is "
+        f"largest. {curve_words(len(window.friction) > 1)} Below: the probability that both sides of the loop stay taut "
+        "over all bends. Green: preloads for which that is nearly sure; the vertical line is the lowest that keeps both "
+        "sides taut. Nothing here is measured directly; it follows from the fit."
+    )
+
+
 @in_paper_style
-def draw(window: PreloadWindow) -> Figure:
+def draw(window: PreloadWindow, width: float | None = None) -> Figure:
     """Friction felt in free motion, and the probability that both sides stay taut [%], against preload [N]."""
-    figure, (cost, gain) = panels([1.6, 1.3], 1, TITLE, (0, 0.16), MEDIUM, sharex=True)
+    figure, (cost, gain) = panels([1.6, 1.3], 1, TITLE, (0, 0.16), width or MEDIUM, sharex=True)
     cost.set_title(_title(window))
     draw_quantiles(cost, window.preload, window.friction, BLUE, label=_name(window))
     name_band(cost, window.friction, BLUE)

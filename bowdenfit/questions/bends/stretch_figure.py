@@ -9,14 +9,17 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from bowdenfit.plots.bands import draw_quantiles, evenly, name_band, say_of_how_many
+from bowdenfit.plots.captions import curve_words, shown_words, strip_words
 from bowdenfit.plots.layout import legend_above, panels
 from bowdenfit.plots.panels import span
 from bowdenfit.plots.style import BLACK, GRAY, LEAST_SQUARES, MEDIAN, MEDIUM, in_paper_style, mapped_color
+from bowdenfit.words import counted
 
 if TYPE_CHECKING:
     from bowdenfit.plots.layout import Axes, Figure
     from bowdenfit.results.record import Record
 
+HEADING = "Stretch against load"
 MOST, MOST_COLUMNS = 8, 4  # wrap angles in a panel, and columns of its legend
 DARKEST, LIGHTEST = 0.0, 0.86  # ends of the color map in use; what follows is too light on white
 DASHES = (0, (4, 1.6))
@@ -74,12 +77,25 @@ def data(fit: Record) -> tuple[StretchCurve, ...] | None:
     return tuple(found)
 
 
+def caption(stretch: tuple[StretchCurve, ...]) -> str:
+    """What is drawn, in plain words."""
+    n, shown = sum(len(curve.points_load) for curve in stretch), min(len(stretch), MOST)
+    down = any(np.any(curve.points_unloading) for curve in stretch)
+    return " ".join(filter(None, (
+        f"Stretch of the rope against its load, at {shown_words(shown, len(stretch), 'wrap angle')}, a color each.",
+        curve_words(len(stretch[0].loading) > 1),
+        "Open marks and dashed lines: read while the load came down." if down else "",
+        strip_words("in mm"),
+        f"n = {counted(n, 'reading')}.",
+    )))  # fmt: skip
+
+
 @in_paper_style
-def draw(stretch: tuple[StretchCurve, ...]) -> Figure:
+def draw(stretch: tuple[StretchCurve, ...], width: float | None = None) -> Figure:
     """Stretch [mm] against load [N], a color for each wrap angle."""
     every = sorted(stretch, key=lambda curve: curve.wrap_angle)
     shown = evenly(every, MOST)
-    figure, (axes,) = panels([2.9], 1, 0.02, (0, 0), MEDIUM)
+    figure, (axes,) = panels([2.9], 1, 0.02, (0, 0), width or MEDIUM)
     axes.axhline(0.0, color=BLACK, linewidth=0.6)
     rows = _explain(axes, shown)
     for i, curve in enumerate(shown):

@@ -7,15 +7,27 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from bowdenfit.plots.layout import TITLE, drop_unused, legend_above, panels
-from bowdenfit.plots.style import BLACK, BLUE, GRAY, LIGHT, SERIES_COLORS, SERIES_MARKERS, VERMILLION, in_paper_style
+from bowdenfit.plots.layout import TITLE, columns_within, drop_unused, legend_above, panels
+from bowdenfit.plots.style import (
+    BLACK,
+    BLUE,
+    GRAY,
+    LIGHT,
+    SERIES_COLORS,
+    SERIES_MARKERS,
+    VERMILLION,
+    WIDE,
+    in_paper_style,
+)
+from bowdenfit.words import counted
 
 if TYPE_CHECKING:
     from bowdenfit.plots.layout import Axes, Figure
     from bowdenfit.questions.check.answer import Checks, TableChecks
     from bowdenfit.results.record import Record
 
-ROW = 1.35  # in
+HEADING = "Every reading against its prediction from all others"
+ROW, LEAST_WIDTH = 1.35, 1.0  # in, of a panel
 MOST_NAMED = 3  # outliers of a panel that are named
 BACK = "Read on the way back"
 LEAST_LIMIT = 3.2  # standard deviations that the axis shows at least
@@ -91,14 +103,28 @@ def _checked(table: TableChecks, outlier: list[bool]) -> CheckedTable:
     )
 
 
+def caption(tables: tuple[CheckedTable, ...]) -> str:
+    """What is drawn, in plain words."""
+    n = sum(len(table.labels) for table in tables)
+    return (
+        f"Whether the scatter of the readings is as predicted, a row for each of {counted(len(tables), 'table')}. Left: "
+        "how often readings lie below a given place in their predictions, less how often they should; the line should "
+        "stay in the band, which has no less than the stated probability to hold all of it. Right: how far each reading "
+        "is off its prediction from all the others, in standard deviations, against where it was taken; there should be "
+        f"no trend. n = {counted(n, 'reading')}."
+    )
+
+
 @in_paper_style
-def draw(tables: tuple[CheckedTable, ...]) -> Figure:
+def draw(tables: tuple[CheckedTable, ...], width: float | None = None) -> Figure:
     """One row a table: distribution of the readings in their predictions, and deviations by where they were taken."""
-    columns = 1 + max(len(table.numbers) for table in tables)
-    figure, flat = panels([ROW] * len(tables), columns, TITLE, (0.62, 0.74))
+    page, most = width or WIDE, 1 + max(len(table.numbers) for table in tables)
+    columns = columns_within(page, most, LEAST_WIDTH, 0.62)
+    rows = [-(-(1 + len(table.numbers)) // columns) for table in tables]
+    figure, flat = panels([ROW] * sum(rows), columns, TITLE, (0.62, 0.74), page)
     used = []
-    for row, table in enumerate(tables):
-        here = flat[row * columns : (row + 1) * columns]
+    for i, table in enumerate(tables):
+        here = flat[sum(rows[:i]) * columns : sum(rows[: i + 1]) * columns]
         _distribution(here[0], table)
         used.append(here[0])
         for axes, (label, numbers) in zip(here[1:], table.numbers.items(), strict=False):

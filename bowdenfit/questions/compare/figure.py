@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from bowdenfit.plots.layout import TITLE, empty_page, legend_above, place_labels
+from bowdenfit.plots.layout import TITLE, axes_at, empty_page, legend_above, place_labels
 from bowdenfit.plots.panels import short
 from bowdenfit.plots.style import (
     BLACK,
@@ -49,8 +49,8 @@ def draw(found: Comparison) -> Figure:
     parts = [TITLE, height_of_fits, _GAP + TITLE, _MIDDLE, below_readings]
     parts += [TITLE + 0.1, *([height_of_fits, _BELOW + 0.1] * rows)] if rows else []
     figure = empty_page(WIDE, sum(parts))
-    _differences(_axes(figure, left, sum(parts[2:]), WIDE - left - _RIGHT, height_of_fits), found, names)
-    middle = _axes(figure, left, below_readings + sum(parts[5:]), WIDE - left - _RIGHT, _MIDDLE)
+    _differences(axes_at(figure, left, sum(parts[2:]), WIDE - left - _RIGHT, height_of_fits), found, names)
+    middle = axes_at(figure, left, below_readings + sum(parts[5:]), WIDE - left - _RIGHT, _MIDDLE)
     _by_reading(middle, found, names)
     flat = [_cell_axes(figure, left, parts, i, columns, height_of_fits) for i in range(len(cells))]
     for i, (axes, cell) in enumerate(zip(flat, cells, strict=True)):
@@ -73,18 +73,12 @@ def _plain(label: str) -> str:
     return label.replace("_", " ")
 
 
-def _axes(figure: Figure, left: float, bottom: float, width: float, height: float) -> Axes:
-    """A panel at a place in inches."""
-    page, total = figure.get_size_inches()
-    return figure.add_axes((left / page, bottom / total, width / page, height / total))
-
-
 def _cell_axes(figure: Figure, left: float, parts: list[float], i: int, columns: int, height: float) -> Axes:
     """The panel of a parameter."""
     width = (WIDE - left - _RIGHT - 0.22 * (columns - 1)) / columns
     row = i // columns
     bottom = sum(parts[6 + 2 * row + 1 :])
-    return _axes(figure, left + (i % columns) * (width + 0.22), bottom, width, height)
+    return axes_at(figure, left + (i % columns) * (width + 0.22), bottom, width, height)
 
 
 def _cells(found: Comparison) -> list[tuple[str, dict[str, Interval]]]:

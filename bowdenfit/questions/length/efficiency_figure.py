@@ -18,6 +18,7 @@ from bowdenfit.plots.style import (
     ORANGE,
     SMALL,
     VERMILLION,
+    WIDE,
     in_paper_style,
     percent,
     rounded_texts,
@@ -29,6 +30,7 @@ if TYPE_CHECKING:
     from bowdenfit.results.record import Record
 
 # marker, its size [pt] and label
+HEADING = "Efficiency along the route"
 READING, RUN = ("o", 4.5, "Measured"), ("D", 2.8, "Measured, mean of a run")
 MOST_NUMBERS, LEAST_NUMBER = 16, 0.5  # so many bars have numbers over them, if they are so many percent high
 LEAST_AT_EDGE = 0.005
@@ -116,11 +118,28 @@ def efficiency_points(fit: Record) -> tuple[EfficiencyPoints, ...]:
     return tuple(points)
 
 
+def caption(data: AlongRoute) -> str:
+    """What is drawn, in plain words."""
+    n, drawn = sum(len(points.labels) for points in data.points), not data.efficiency.is_line
+    best = data.optimum
+    return " ".join(filter(None, (
+        "Efficiency of the cable, output over input force, against the length.",
+        "Line: median; bands: the intervals that hold the efficiency of the cable with 50 % and 90 % probability."
+        if drawn else "Line: least squares.",
+        f"Dots: measured, n = {n}." if n else "No efficiency was measured along the route.",
+        f"The curve holds at {data.at_input_force:g} N input force." if data.at_input_force is not None else "",
+        "Below: where the best length lies"
+        + (", and with which probability each length on offer is the best." if best.choices else ".") if best else "",
+        f"Green: lengths that are within {percent(best.window.within)} of the best with {percent(best.window.probability)} "
+        "probability." if best and np.isfinite(best.window.start) else "",
+    )))  # fmt: skip
+
+
 @in_paper_style
-def draw(data: AlongRoute) -> Figure:
+def draw(data: AlongRoute, width: float | None = None) -> Figure:
     """Efficiency [%] against the route, the density of the optimal length, and each choice's chance to be the best."""
     below = 0 if data.optimum is None else 2 if data.optimum.choices else 1
-    figure, flat = panels([2.3] + [0.75] * below, 1, 0.08, (0.0, TITLE + 0.12), sharex=True)
+    figure, flat = panels([2.3] + [0.75] * below, 1, 0.08, (0.0, TITLE + 0.12), width or WIDE, sharex=True)
     shown = route_limits(data.route_range, *(points.route for points in data.points))
     _curve_and_points(flat[0], data)
     if data.optimum is not None:

@@ -8,15 +8,18 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from bowdenfit.plots.bands import Band, draw_band, route_limits, shade_outside
-from bowdenfit.plots.layout import TITLE, drop_unused, legend_above, panels
-from bowdenfit.plots.panels import label_outer
-from bowdenfit.plots.style import BLACK, MEDIUM, WIDE, WRAP_ANGLE, in_paper_style
+from bowdenfit.plots.captions import strip_words
+from bowdenfit.plots.layout import legend_above
+from bowdenfit.plots.strips import panels_with_strips
+from bowdenfit.plots.style import BLACK, WRAP_ANGLE, in_paper_style
+from bowdenfit.words import counted
 
 if TYPE_CHECKING:
     from bowdenfit.plots.layout import Axes, Figure
     from bowdenfit.results.record import Record
 
-MOST_COLUMNS = 3
+HEADING = "Wrap angle along the route"
+MOST_COLUMNS, HEIGHT = 3, 1.8  # panels in a row, and height of one [in]
 
 
 @dataclass(frozen=True)
@@ -83,27 +86,47 @@ def _angle_curve(fit: Record, column: str, band: Band) -> AngleCurve:
     )
 
 
+def caption(data: WrapAngles) -> str:
+    """What is drawn, in plain words."""
+    read = sum(len(c.route) for c in data.curves)
+    limits, unused = sum(len(c.undetected_route) for c in data.curves), sum(len(c.outside_route) for c in data.curves)
+    drawn = not data.curves[0].band.is_line
+    return " ".join(filter(None, (
+        f"Wrap angle of {counted(len(data.curves), 'contact')} along the route, with the curve through the readings.",
+        "Line: median; bands: the intervals that hold the curve with 50 % and 90 % probability."
+        if drawn else "Line: least squares.",
+        "Hatched: too small to be read, so anything between zero and the triangle." if limits else "",
+        "Squares: outside the range of the curve, which does not use them." if unused else "",
+        strip_words("in degrees"),
+        f"n = {counted(read, 'reading')}" + (f" and {counted(limits, 'upper limit')}." if limits else "."),
+    )))  # fmt: skip
+
+
 @in_paper_style
-def draw(data: WrapAngles) -> Figure:
+def draw(data: WrapAngles, width: float | None = None) -> Figure:
     """Wrap angle [deg] of each curved contact against the route, a panel each."""
-    columns = min(MOST_COLUMNS, len(data.curves))
-    rows = -(-len(data.curves) // columns)
-    page = WIDE if columns > 1 else MEDIUM
-    figure, flat = panels([1.8] * rows, columns, TITLE, (0.2, TITLE + 0.26), page, sharex=True, sharey=True)
-    flat = drop_unused(flat, len(data.curves))
     everywhere = [route for c in data.curves for route in (c.route, c.undetected_route, c.outside_route)]
     shown = route_limits(data.route_range, *everywhere)
-    for axes, curve in zip(flat, data.curves, strict=True):
+    names, top = [curve.contact for curve in data.curves], (0.0, _highest(data.curves))
+    made = panels_with_strips(names, [shown] * len(names), [top] * len(names), MOST_COLUMNS, HEIGHT, width)
+    for axes, strip, curve in zip(made.mains, made.strips, data.curves, strict=True):
         draw_band(axes, curve.band)
         _readings(axes, curve)
+        strip.plot(curve.route, _off(curve), "o", color=BLACK, markersize=3.6)
+        shade_outside(strip, data.route_range, shown)
         _undetected(axes, curve, data.route_range, _spacing(everywhere, shown))
         shade_outside(axes, data.route_range, shown)
-        axes.set_title(curve.contact)
-    flat[0].set_ylim(0, _highest(data.curves))
-    flat[0].locator_params(axis="y", nbins=7)
-    label_outer(flat, columns, data.route_label, WRAP_ANGLE)
-    legend_above(figure, flat, columns=4 if columns > 1 else 2)
-    return figure
+        axes.locator_params(axis="y", nbins=7)
+    made.finish_strips()
+    made.label(data.route_label, WRAP_ANGLE, "deg")
+    legend_above(made.figure, made.mains, columns=4 if made.columns > 1 else 2)
+    return made.figure
+
+
+def _off(curve: AngleCurve) -> np.ndarray:
+    """Readings less the curve that they follow [deg]."""
+    middle = curve.band.quantiles[len(curve.band.quantiles) // 2]
+    return np.asarray(curve.angle - np.interp(curve.route, curve.band.route, middle))
 
 
 def _readings(axes: Axes, curve: AngleCurve) -> None:

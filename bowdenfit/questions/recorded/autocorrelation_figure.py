@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from bowdenfit.plots.bands import evenly, say_of_how_many
+from bowdenfit.plots.captions import shown_words
 from bowdenfit.plots.layout import legend_above
 from bowdenfit.plots.panels import MOST, alike, label_outer, recording_panels, set_limits
 from bowdenfit.plots.style import BLUE, GRAY, in_paper_style
@@ -16,6 +17,7 @@ if TYPE_CHECKING:
     from bowdenfit.plots.layout import Axes, Figure
     from bowdenfit.results.record import Record
 
+HEADING = "Whether what is left over is noise"
 MOST_COLUMNS = 4
 LEAST_BLOCKS, MOST_LAGS = 8, 60
 NORMAL_95 = 1.96
@@ -62,13 +64,23 @@ def autocorrelation(deviation: np.ndarray) -> np.ndarray:
     return np.array(products) / products[0]
 
 
+def caption(recordings: tuple[Autocorrelation, ...]) -> str:
+    """What is drawn, in plain words."""
+    shown = min(len(recordings), MOST)
+    return (
+        f"How deviations from the fit hang together in {shown_words(shown, len(recordings), 'recording')}, by the time between "
+        "them. Of noise without memory 95 % lie in the gray band; a slow wave outside it is something that the model does not "
+        f"know. n = {sum(r.n_blocks for r in recordings)} blocks of samples."
+    )
+
+
 @in_paper_style
-def draw(recordings: tuple[Autocorrelation, ...]) -> Figure:
+def draw(recordings: tuple[Autocorrelation, ...], width: float | None = None) -> Figure:
     """Autocorrelation against the lag [s], a panel a recording, and the band that noise without memory would keep to."""
     shown = evenly(recordings, MOST)
     lags = [(float(-0.02 * r.lag.max()), float(1.02 * r.lag.max())) for r in shown]
     share_x = alike(lags)
-    figure, flat, columns = recording_panels([r.name for r in shown], MOST_COLUMNS, 1.2, share_x, share_y=True)
+    figure, flat, columns = recording_panels([r.name for r in shown], MOST_COLUMNS, 1.2, share_x, True, width=width)
     set_limits(flat, lags, "x", share_x)
     for axes, recording in zip(flat, shown, strict=True):
         _panel(axes, recording)

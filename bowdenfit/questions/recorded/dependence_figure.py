@@ -7,7 +7,8 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from bowdenfit.plots.layout import TITLE, drop_unused, legend_above, panels
+from bowdenfit.plots.captions import curve_words
+from bowdenfit.plots.layout import TITLE, columns_within, drop_unused, legend_above, panels
 from bowdenfit.plots.panels import short, span
 from bowdenfit.plots.style import (
     BLACK,
@@ -24,6 +25,7 @@ from bowdenfit.plots.style import (
     WIDE_INTERVAL,
     in_paper_style,
 )
+from bowdenfit.words import counted
 
 if TYPE_CHECKING:
     import jax
@@ -32,9 +34,10 @@ if TYPE_CHECKING:
     from bowdenfit.recordings.recording import Recording
     from bowdenfit.results.record import Record
 
+HEADING = "Efficiency by load and speed"
 GRID, BINS = 60, 12  # places of a curve, and points a run that are shown against the load
 CURVES = 4000  # draws of a curve
-MOST_COLUMNS = 2
+MOST_COLUMNS, LEAST_WIDTH = 2, 2.2  # panels in a row, and width of one [in]
 MOST_NAMES, LONGEST = 8, 34  # runs that have a mark each, and characters of their names
 WIDE_RANGE = 30.0  # highest over lowest x, beyond which the axis is logarithmic
 POINT_COLORS = (BLACK, *SERIES_COLORS[2:4], *SERIES_COLORS[5:8], BLACK, BLACK)  # not those of the curves
@@ -157,12 +160,21 @@ def _curves(fit: Record, at: float, forces: np.ndarray | None, speeds: np.ndarra
     return np.quantile(np.asarray(curves), QUANTILES, axis=0), constant
 
 
+def caption(dependences: tuple[Dependence, ...]) -> str:
+    """What is drawn, in plain words."""
+    words, n = " and ".join(one.what for one in dependences), max(len(set(one.points_label)) for one in dependences)
+    return (
+        f"Efficiency against {words}. {curve_words(len(dependences[0].quantiles) > 1)} Dashed: the capstan equation, by "
+        f"which it is the same everywhere. Marks: measured. n = {counted(n, 'run')}."
+    )
+
+
 @in_paper_style
-def draw(dependences: tuple[Dependence, ...]) -> Figure:
+def draw(dependences: tuple[Dependence, ...], width: float | None = None) -> Figure:
     """Efficiency [%] against load and speed, a panel each on one efficiency axis."""
-    columns = min(MOST_COLUMNS, len(dependences))
+    columns = columns_within(width or WIDE, min(MOST_COLUMNS, len(dependences)), LEAST_WIDTH, 0.2)
     rows = -(-len(dependences) // columns)
-    page = WIDE if columns > 1 else MEDIUM
+    page = width or (WIDE if columns > 1 else MEDIUM)
     figure, flat = panels([2.1] * rows, columns, TITLE, (0.2, TITLE + 0.45), page, sharey=True)
     flat = drop_unused(flat, len(dependences))
     runs = list(dict.fromkeys(label for d in dependences for label in d.points_label))

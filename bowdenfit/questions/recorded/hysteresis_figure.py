@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from bowdenfit.plots.bands import evenly, say_of_how_many
+from bowdenfit.plots.captions import shown_words
 from bowdenfit.plots.layout import legend_above
 from bowdenfit.plots.panels import MOST, alike, enlarge_marks, label_outer, recording_panels, set_limits, span
 from bowdenfit.plots.style import (
@@ -26,6 +27,7 @@ if TYPE_CHECKING:
     from bowdenfit.plots.layout import Axes, Figure
     from bowdenfit.results.record import Record
 
+HEADING = "Output against input force of the recordings"
 MOST_COLUMNS = 4
 WITHOUT_INTERVAL = 0.05  # uncertainty of an exponent whose digits are to be shown
 # stroke, name, marker, size [pt] and color
@@ -68,13 +70,24 @@ def data(fit: Record) -> tuple[LoopPanel, ...] | None:
     return tuple(found) or None
 
 
+def caption(recordings: tuple[LoopPanel, ...]) -> str:
+    """What is drawn, in plain words."""
+    shown = min(len(recordings), MOST)
+    return (
+        f"The loop that friction opens, {shown_words(shown, len(recordings), 'recording')}: output against input force, "
+        "dot by dot, between the two lines of the capstan equation. The words in each panel give the friction exponent "
+        "of this recording by itself and the one expected of the cable, with its 90 % interval. "
+        f"n = {sum(int(np.isfinite(r.input_force).sum()) for r in recordings)} blocks of samples."
+    )
+
+
 @in_paper_style
-def draw(recordings: tuple[LoopPanel, ...]) -> Figure:
+def draw(recordings: tuple[LoopPanel, ...], width: float | None = None) -> Figure:
     """Output against input force [N] on equal axes, a panel a recording."""
     shown = evenly(recordings, MOST)
     limits = [span([r.input_force, r.output_force]) for r in shown]
     shared = alike(limits)
-    figure, flat, columns = recording_panels([r.name for r in shown], MOST_COLUMNS, None, shared, shared)
+    figure, flat, columns = recording_panels([r.name for r in shown], MOST_COLUMNS, None, shared, shared, width=width)
     set_limits(flat, limits, "x", shared)
     set_limits(flat, limits, "y", shared)
     for axes, recording in zip(flat, shown, strict=True):

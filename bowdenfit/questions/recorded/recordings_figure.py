@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from bowdenfit.plots.bands import evenly, say_of_how_many
+from bowdenfit.plots.captions import shown_words
 from bowdenfit.plots.layout import legend_above
 from bowdenfit.plots.panels import MOST, draw_marks, extremes, label_outer, panels_with_limits, span
 from bowdenfit.plots.style import (
@@ -30,6 +31,7 @@ if TYPE_CHECKING:
     from bowdenfit.questions.recorded.traces import Trace
     from bowdenfit.results.record import Record
 
+HEADING = "Recordings over time"
 POINTS = 3200  # of each line, all panels together, which is what a page can show
 GAP_STEPS = 5
 MOST_CYCLES = 8  # of each recording over time
@@ -88,14 +90,30 @@ def _over_time(trace: Trace) -> OverTime:
     return OverTime(recording.name, trace.loop, *blocks, trace.predicted, trace.fitted, *left_out)
 
 
+def caption(recordings: tuple[OverTime, ...]) -> str:
+    """What is drawn, in plain words."""
+    shown = min(len(recordings), MOST)
+    band = (
+        "the band holds it with 90 % probability, a new mounting included" if len(recordings[0].predicted) > 1 else (
+            "the dashed line is the least-squares prediction"
+        )
+    )
+    return (
+        f"Both forces over time of {shown_words(shown, len(recordings), 'recording')}: black the measured output, gray the "
+        f"measured input, blue what the cable would give out at this input ({band}), red the fit with this recording's own "
+        "mounting. Shading: what the rope does. Marks: samples that were left out, by reason. "
+        f"n = {sum(len(r.time) for r in recordings)} blocks of samples."
+    )
+
+
 @in_paper_style
-def draw(recordings: tuple[OverTime, ...]) -> Figure:
+def draw(recordings: tuple[OverTime, ...], width: float | None = None) -> Figure:
     """Input and output force [N] over time, what the cable would give at this input, and the samples left out."""
     whole = evenly(recordings, MOST)
     shown = [beginning(r) for r in whole]
     times = [span([r.time - _start(r), r.flagged_time - _start(r)], room=0.0) for r in shown]
     forces = [_force_limits(r) for r in shown]
-    figure, flat, columns = panels_with_limits([r.name for r in shown], times, forces, 2, 1.5, WIDE)
+    figure, flat, columns = panels_with_limits([r.name for r in shown], times, forces, 2, 1.5, WIDE, width)
     for axes, recording in zip(flat, shown, strict=True):
         _phases(axes, recording)
         _forces(axes, recording, POINTS // (2 * len(shown)))

@@ -12,6 +12,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from bowdenfit.plots.bands import evenly, say_of_how_many
+from bowdenfit.plots.captions import shown_words
 from bowdenfit.plots.layout import legend_above
 from bowdenfit.plots.panels import MOST, alike, enlarge_marks, label_outer, recording_panels
 from bowdenfit.plots.style import (
@@ -30,6 +31,7 @@ if TYPE_CHECKING:
     from bowdenfit.plots.layout import Axes, Figure
     from bowdenfit.results.record import Record
 
+HEADING = "Efficiency sample by sample"
 MOST_COLUMNS = 4
 NORMAL_90 = 1.645  # standard errors to either end of a 90 % interval
 EDGE = 0.12  # of the panel's width, right of the samples
@@ -99,13 +101,24 @@ def _runs(fit: Record) -> dict[str, tuple[np.ndarray, float, float]]:
     return {run: (expected[:, i], float(observed[i]), float(sd[i])) for i, run in enumerate(recordings.runs)}
 
 
+def caption(recordings: tuple[Samples, ...]) -> str:
+    """What is drawn, in plain words."""
+    shown = min(len(recordings), MOST)
+    return (
+        f"Efficiency of every used block of samples in {shown_words(shown, len(recordings), 'recording')}. Line and gray "
+        "band: mean of its run, with the 90 % interval that its readings alone give; green: what is expected of the "
+        "cable. Runs differ by more than the gray band because no two mountings are alike. "
+        f"n = {sum(len(r.stroke) for r in recordings)} blocks."
+    )
+
+
 @in_paper_style
-def draw(recordings: tuple[Samples, ...]) -> Figure:
+def draw(recordings: tuple[Samples, ...], width: float | None = None) -> Figure:
     """Efficiency [%] of each used block against its number, a panel a recording on one efficiency axis."""
     shown = evenly(recordings, MOST)
     counts = [(0.0, float(len(r.stroke))) for r in shown]
     share_x = alike(counts)
-    figure, flat, columns = recording_panels([r.name for r in shown], MOST_COLUMNS, 1.6, share_x, share_y=True)
+    figure, flat, columns = recording_panels([r.name for r in shown], MOST_COLUMNS, 1.6, share_x, True, width=width)
     longest = max(count for _, count in counts)
     for axes, recording, (_, count) in zip(flat, shown, counts, strict=True):
         _samples(axes, recording)

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from bowdenfit.plots.densities import GRID_POINTS, density, limits, support
-from bowdenfit.plots.layout import TITLE, drop_unused, legend_above, panels
+from bowdenfit.plots.layout import TITLE, columns_within, drop_unused, legend_above, panels
 from bowdenfit.plots.style import (
     BLACK,
     BLUE,
@@ -23,13 +23,15 @@ from bowdenfit.plots.style import (
     in_paper_style,
     rounded_texts,
 )
+from bowdenfit.words import counted
 
 if TYPE_CHECKING:
     from bowdenfit.plots.layout import Axes, Figure
     from bowdenfit.results.record import Record
 
+HEADING = "Coefficients"
 ROLES = ("friction", "friction_model", "angle", "sensor")
-MOST_COLUMNS = 3
+MOST_COLUMNS, LEAST_WIDTH = 3, 1.4  # panels in a row, and width of one [in]
 
 
 @dataclass(frozen=True)
@@ -65,12 +67,23 @@ def data(fit: Record) -> tuple[Coefficient, ...] | None:
     return tuple(found) or None
 
 
+def caption(parameters: tuple[Coefficient, ...]) -> str:
+    """What is drawn, in plain words."""
+    return (
+        f"What the measurements say of {counted(len(parameters), 'coefficient')}. Shaded: how plausible each value is, "
+        "measurements and priors considered; dashed: by the prior alone; square with bar: the least-squares estimate with its "
+        "standard error. Above each panel stand the median and the interval that holds the value with 90 % probability. "
+        f"n = {parameters[0].draws.size} draws."
+    )
+
+
 @in_paper_style
-def draw(parameters: tuple[Coefficient, ...]) -> Figure:
+def draw(parameters: tuple[Coefficient, ...], width: float | None = None) -> Figure:
     """Posterior density of each coefficient against its prior, and the least-squares estimate with standard error."""
-    columns = min(MOST_COLUMNS, len(parameters))
+    columns = columns_within(width or WIDE, min(MOST_COLUMNS, len(parameters)), LEAST_WIDTH, 0.68)
     rows = -(-len(parameters) // columns)
-    figure, flat = panels([1.35] * rows, columns, TITLE + 0.14, (0.68, TITLE + 0.64), WIDE if columns > 1 else MEDIUM)
+    page = width or (WIDE if columns > 1 else MEDIUM)
+    figure, flat = panels([1.35] * rows, columns, TITLE + 0.14, (0.68, TITLE + 0.64), page)
     flat = drop_unused(flat, len(parameters))
     for axes, parameter in zip(flat, parameters, strict=True):
         _panel(axes, parameter)

@@ -2,13 +2,12 @@
 
 from __future__ import annotations
 
-import textwrap
 from typing import TYPE_CHECKING
 
 import numpy as np
 
 from bowdenfit.plots.bands import draw_quantiles, middle, name_band
-from bowdenfit.plots.layout import BOTTOM, RIGHT, empty_page, legend_above, place_labels
+from bowdenfit.plots.layout import BOTTOM, RIGHT, axes_at, empty_page, legend_above, place_labels, wrapped
 from bowdenfit.plots.panels import make_logarithmic
 from bowdenfit.plots.style import (
     BLACK,
@@ -24,14 +23,17 @@ from bowdenfit.plots.style import (
     in_paper_style,
 )
 from bowdenfit.questions.summary.forces_shown import STROKES, Forces, ForcesHere, forces_shown
+from bowdenfit.words import counted
 
 if TYPE_CHECKING:
     from bowdenfit.plots.layout import Axes, Figure
     from bowdenfit.results.record import Record
 
+HEADING = "Output against input force"
 MAIN, STRIP, GAP, ACROSS, LEFT = 2.3, 0.85, 0.12, 0.88, 0.78  # in
 LABEL = 0.56  # in, from the axes to their names: numbers of many digits stand between
-VERDICT_ROW, LETTERS = 0.14, 125  # in, and letters in a row
+VERDICT_ROW, VERDICT_ROWS = 0.14, 3  # in, and how many at most
+LEAST_WIDTH = 2.6  # in, of a panel with its labels
 MARK, SMALL_MARK, MANY = 3.4, 2.0, 300  # pt, pt, and readings from which marks are small
 RETURN_DASHES = (0, (4, 1.6))
 ROOM = 1.15
@@ -46,20 +48,26 @@ def data(fit: Record) -> Forces | None:
     return forces_shown(fit)
 
 
+def caption(forces: Forces) -> str:
+    """What is drawn, in plain words."""
+    n = forces.count or sum(len(here.stroke) for here in forces.places)
+    band = "lines: medians, with the intervals that hold them with 90 % probability" if len(forces.places[0].law) > 1 else (
+        "lines: least squares"
+    )
+    return (
+        f"Output against input force, a color for each bend; {band}. Below: how far each reading is off its line, in percent, "
+        "with the band in which nine of ten single readings should lie. Beside: the friction coefficient that each reading by "
+        "itself would have by the capstan equation; where that equation holds it is the same at all loads. "
+        f"n = {counted(n, 'reading')}."
+    )
+
+
 @in_paper_style
-def draw(forces: Forces) -> Figure:
+def draw(forces: Forces, width: float | None = None) -> Figure:
     """Output against input with a strip of residuals below; beside them the apparent coefficient against the load."""
-    said = textwrap.wrap(_verdict(forces), LETTERS, max_lines=2, placeholder=" ...")
-    top = 0.06 + VERDICT_ROW * len(said)
-    height = BOTTOM + STRIP + GAP + MAIN + top
-    figure = empty_page(WIDE, height)
-    width = (WIDE - LEFT - RIGHT - ACROSS) / 2
-    box = {"bottom": BOTTOM / height, "top": 1 - top / height}
-    ratios = {"height_ratios": [MAIN, STRIP], "hspace": 2 * GAP / (MAIN + STRIP)}
-    left = figure.add_gridspec(2, 1, left=LEFT / WIDE, right=(LEFT + width) / WIDE, **box, **ratios)
-    right = figure.add_gridspec(1, 1, left=1 - (RIGHT + width) / WIDE, right=1 - RIGHT / WIDE, **box)
-    main = figure.add_subplot(left[0])
-    strip, beside = figure.add_subplot(left[1], sharex=main), figure.add_subplot(right[0])
+    page = width or WIDE
+    said = wrapped(_verdict(forces), page - LEFT - RIGHT + LABEL, most=VERDICT_ROWS)
+    figure, (main, strip, beside) = _panels(page, 0.06 + VERDICT_ROW * (1 + said.count("\n")))
     if forces.logarithmic:
         for axes, name, value in ((main, "x", "input_force"), (main, "y", "output_force"), (beside, "x", "input_force")):
             read = np.concatenate([getattr(here, value) for here in forces.places])
@@ -67,12 +75,26 @@ def draw(forces: Forces) -> Figure:
     _main(main, forces)
     _strip(strip, forces)
     _apparent(beside, forces)
+    inner = page * main.get_position().width
     for axes in (main, strip, beside):
         place_labels(figure, axes)
-        axes.yaxis.set_label_coords(-LABEL / width, 0.5)
-    main.set_title("\n".join(said), loc="left", color=GREEN if forces.trusted else VERMILLION, fontsize=SMALL, x=-LABEL / width)
+        axes.yaxis.set_label_coords(-LABEL / inner, 0.5)
+    color = GREEN if forces.trusted else VERMILLION
+    main.set_title(said, loc="left", color=color, fontsize=SMALL, x=-LABEL / inner)
     legend_above(figure, [main, strip, beside], columns=4)
     return figure
+
+
+def _panels(page: float, top: float) -> tuple[Figure, list[Axes]]:
+    """Output with its strip, and the coefficient beside them, or below where the page is narrow."""
+    beside = page >= 2 * LEAST_WIDTH
+    inner = (page - LEFT - RIGHT - ACROSS) / 2 if beside else page - LEFT - RIGHT
+    lower = 0.0 if beside else MAIN + BOTTOM + 2 * GAP
+    figure = empty_page(page, top + MAIN + GAP + STRIP + BOTTOM + lower)
+    main = axes_at(figure, LEFT, lower + BOTTOM + STRIP + GAP, inner, MAIN)
+    strip = axes_at(figure, LEFT, lower + BOTTOM, inner, STRIP, sharex=main)
+    left, tall = (LEFT + inner + ACROSS, MAIN + GAP + STRIP) if beside else (LEFT, MAIN)
+    return figure, [main, strip, axes_at(figure, left, BOTTOM, inner, tall)]
 
 
 def _verdict(forces: Forces) -> str:

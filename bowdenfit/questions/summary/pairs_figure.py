@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from bowdenfit.plots.densities import BINS, bin_numbers, enclosed_share
+from bowdenfit.plots.layout import EDGE, wrapped
 from bowdenfit.plots.sheet import Panel, PanelSheet
 from bowdenfit.plots.style import BLUE, SMALL, WIDE, in_paper_style
 from bowdenfit.questions.summary.quantities import SampledQuantity, optimum, sampled_quantities
@@ -17,11 +18,12 @@ if TYPE_CHECKING:
     from bowdenfit.plots.layout import Figure
     from bowdenfit.results.record import Record
 
+HEADING = "Which unknowns hang together"
 MOST = 8
 SHARE = 0.996  # of the draws, within the axes
 ROLES = ("friction", "friction_model", "sensor", "noise", "angle")
 FILLS = {0.68: "#5E9FCB", 0.95: "#C3DCEE"}
-MARGIN, GAP, LARGEST = 0.62, 0.09, 1.45  # in
+MARGIN, GAP, LARGEST, SMALLEST = 0.62, 0.09, 1.45, 0.66  # in
 
 
 @dataclass(frozen=True)
@@ -43,18 +45,35 @@ def data(fit: Record) -> Pairs | None:
     return Pairs(quantities, best) if len(quantities) > 1 else None
 
 
+def caption(data: Pairs) -> str:
+    """What is drawn, in plain words."""
+    return (
+        "Every two unknowns against each other, and each alone on the diagonal. Dark and light: the smallest areas that "
+        "hold 68 % and 95 % of the draws; a long slanted area means that the measurements tell a combination of the two "
+        "better than either alone. Dashed: median and 90 % interval. "
+        f"n = {data.quantities[0].draws.size} draws."
+    )
+
+
 @in_paper_style
-def draw(data: Pairs) -> Figure:
+def draw(data: Pairs, width: float | None = None) -> Figure:
     """Joint and marginal posterior of coefficients, noise and optimum."""
-    quantities = data.quantities
-    size = min(LARGEST, (WIDE - MARGIN - GAP) / len(quantities))
+    quantities = _with_room(data, int(((width or WIDE) - MARGIN - GAP) / SMALLEST))
+    size = ((width or WIDE) - MARGIN - GAP) / len(quantities)
+    size = size if width else min(LARGEST, size)
     sheet = PanelSheet(MARGIN + GAP + size * len(quantities), MARGIN + 2 * GAP + size * len(quantities))
     panels = _panels(quantities, size)
     _marginals(sheet, quantities, panels)
     _regions(sheet, quantities, panels)
     _axes(sheet, quantities, panels)
-    _words(sheet, data.best, panels)
+    _words(sheet, data, panels, len(quantities))
     return sheet.finished()
+
+
+def _with_room(data: Pairs, most: int) -> list[SampledQuantity]:
+    """So many quantities at most, the optimum among them."""
+    every, last = data.quantities, 2 if data.best and most > 2 else 0
+    return every if len(every) <= most else every[: most - last] + every[len(every) - last :]
 
 
 def _panels(quantities: list[SampledQuantity], size: float) -> dict[tuple[int, int], Panel]:
@@ -118,9 +137,10 @@ def _axes(sheet: PanelSheet, quantities: list[SampledQuantity], panels: dict[tup
             sheet.text(0.16, middle, quantity.label, ha="center", va="center", rotation=90, fontsize=SMALL)
 
 
-def _words(sheet: PanelSheet, best: str, panels: dict[tuple[int, int], Panel]) -> None:
+def _words(sheet: PanelSheet, data: Pairs, panels: dict[tuple[int, int], Panel], shown: int) -> None:
     """The key, in the empty corner right of the first panel."""
     first = panels[0, 0]
+    room = sheet.figure.get_size_inches()[0] - first.left - first.width - 2.5 * GAP - EDGE
     x, y = first.left + first.width + 2.5 * GAP, first.bottom + first.height
     entries = [(FILLS[share], f"{100 * share:.0f} % of the draws") for share in FILLS]
     for i, (color, words) in enumerate(entries):
@@ -128,7 +148,10 @@ def _words(sheet: PanelSheet, best: str, panels: dict[tuple[int, int], Panel]) -
         sheet.areas([np.array([(x, top), (x + 0.2, top), (x + 0.2, top - 0.1), (x, top - 0.1)])], facecolor=color)
         sheet.text(x + 0.26, top - 0.05, words, va="center_baseline", fontsize=SMALL)
     lines = ["Dashed: median and 90 % interval"]
-    if best:
-        lines.append(f"Optimum: best {best}")
+    if data.best:
+        lines.append(f"Optimum: best {data.best}")
+    if shown < len(data.quantities):
+        lines.append(f"{shown} of {len(data.quantities)} unknowns shown")
+    lines = [line for words in lines for line in wrapped(words, room).split("\n")]
     for i, words in enumerate(lines, start=len(entries)):
         sheet.text(x, y - 0.17 * i - 0.05, words, va="center_baseline", fontsize=SMALL)

@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from bowdenfit.plots.layout import EDGE, wrapped
 from bowdenfit.plots.sheet import Panel, PanelSheet
 from bowdenfit.plots.style import SERIES_COLORS, SERIES_LINES, SMALL, WIDE, WIDE_INTERVAL, in_paper_style
 from bowdenfit.questions.summary.quantities import SampledQuantity, optimum, sampled_quantities
@@ -15,10 +16,12 @@ if TYPE_CHECKING:
     from bowdenfit.plots.layout import Figure
     from bowdenfit.results.record import Record
 
+HEADING = "Paths of the sampler"
 MOST_DRAWS = 40  # shown of each walker
 STRETCHES = 20  # that the path of a chain without other walkers is cut into
 SHARE = 0.98  # of the draws, within the axes
 GRID, MOST_NAMES = 48, 6
+NAME, KEY_ROW, LEAST_COLUMN = 0.9, 0.13, 2.6  # in, an entry of the legend, a row of it, and a column of panels
 LEFT, RIGHT, BOTTOM, TOP = 0.66, 0.08, 0.42, 0.5  # in, margins; LEFT of each of the two columns
 PANEL, ROW, MARGINAL = 0.68, 0.84, 0.5  # in, height of a panel, of a row, width of a marginal
 
@@ -39,30 +42,39 @@ def data(fit: Record) -> Paths | None:
     return Paths(quantities, fit.posterior.n_ensembles)
 
 
+def caption(data: Paths) -> str:
+    """What is drawn, in plain words."""
+    return (
+        "Whether the sampling can be relied on: the path of every sampled unknown through the draws, a color for each "
+        "independent start. They should lie on top of each other and go neither up nor down. Right of each panel: where "
+        f"each spent its time. n = {data.n_ensembles} independent starts, {data.quantities[0].draws.size} draws in all."
+    )
+
+
 @in_paper_style
-def draw(data: Paths) -> Figure:
+def draw(data: Paths, width: float | None = None) -> Figure:
     """Median and 90 % of the walkers of each ensemble against the draw, and the marginal of each ensemble.
 
     A chain that has no other walkers is summarized over stretches of its path.
     """
-    quantities = data.quantities
-    rows = -(-len(quantities) // 2)
-    sheet = PanelSheet(WIDE, TOP + BOTTOM + rows * ROW - (ROW - PANEL))
-    panels = [_panel(q, i // rows, rows - 1 - i % rows) for i, q in enumerate(quantities)]
+    quantities, page = data.quantities, width or WIDE
+    columns = 2 if page >= 2 * LEAST_COLUMN and len(quantities) > 1 else 1
+    rows = -(-len(quantities) // columns)
+    chains = len(quantities[0].draws) == data.n_ensembles
+    key = wrapped(_key(chains), page - 2 * EDGE)
+    sheet = PanelSheet(page, TOP + KEY_ROW * key.count("\n") + BOTTOM + rows * ROW - (ROW - PANEL))
+    panels = [_panel(q, page / columns, i // rows, rows - 1 - i % rows) for i, q in enumerate(quantities)]
     for number in range(data.n_ensembles):
         _ensemble(sheet, number, panels, quantities, data.n_ensembles)
-    chains = len(quantities[0].draws) == data.n_ensembles
     _axes(sheet, quantities, panels, rows, "Draw of each chain" if chains else "Draw of each walker")
-    _legend(sheet, data.n_ensembles, chains)
+    _legend(sheet, data.n_ensembles, chains, key)
     return sheet.finished()
 
 
-def _panel(quantity: SampledQuantity, column: int, row: int) -> Panel:
-    width = WIDE / 2 - LEFT - RIGHT - MARGINAL
-    draws = quantity.draws.shape[1]
-    return Panel(
-        LEFT + column * WIDE / 2, BOTTOM + row * ROW, width, PANEL, (1.0, float(draws)), quantity.limits(SHARE)
-    )
+def _panel(quantity: SampledQuantity, room: float, column: int, row: int) -> Panel:
+    """The panel in a column of so much room."""
+    inner, draws = room - LEFT - RIGHT - MARGINAL, quantity.draws.shape[1]
+    return Panel(LEFT + column * room, BOTTOM + row * ROW, inner, PANEL, (1.0, float(draws)), quantity.limits(SHARE))
 
 
 def _ensemble(sheet: PanelSheet, number: int, panels: list[Panel], quantities: list[SampledQuantity], n_ensembles: int) -> None:
@@ -114,23 +126,24 @@ def _axes(sheet: PanelSheet, quantities: list[SampledQuantity], panels: list[Pan
             sheet.text(middle, panel.bottom - 0.27, across, ha="center", va="center", fontsize=SMALL)
 
 
-def _legend(sheet: PanelSheet, n_ensembles: int, chains: bool) -> None:
+def _key(chains: bool) -> str:
+    """What lines and bands are."""
+    if chains:
+        return f"Line: median of each {STRETCHES}th of a chain; shaded: its {WIDE_INTERVAL}; right of each panel: density"
+    return f"Thick: median of an ensemble's walkers; thin: their {WIDE_INTERVAL}; right of each panel: density"
+
+
+def _legend(sheet: PanelSheet, n_ensembles: int, chains: bool, key: str) -> None:
     """One entry an ensemble (or chain), and what line and band are."""
     width, height = sheet.figure.get_size_inches()
-    shown = MOST_NAMES - 1 if chains and n_ensembles > MOST_NAMES else min(n_ensembles, MOST_NAMES)
-    more = n_ensembles - shown if chains else 0
+    most = min(MOST_NAMES, int((width - EDGE) / NAME))
+    shown = n_ensembles if n_ensembles <= most else most - 1
+    more, step = n_ensembles - shown, min(1.0, (width - EDGE) / most)
     for number in range(shown):
-        x, y = width / 2 + 1.0 * (number - (shown + bool(more)) / 2), height - 0.14
+        x, y = width / 2 + step * (number - (shown + bool(more)) / 2), height - 0.14
         color, line = SERIES_COLORS[number], SERIES_LINES[number % len(SERIES_LINES)]
         sheet.lines([np.array([(x, y), (x + 0.25, y)])], color=color, linestyle=line, linewidth=1.2)
-        name = "Chain" if chains else "Ensemble"
-        sheet.text(x + 0.3, y, f"{name} {number + 1}", va="center_baseline", fontsize=SMALL)
+        sheet.text(x + 0.3, y, f"{'Chain' if chains else 'Ensemble'} {number + 1}", va="center_baseline", fontsize=SMALL)
     if more:
-        x = width / 2 + shown - (shown + 1) / 2
-        sheet.text(x, height - 0.14, f"and {more} more", va="center_baseline", fontsize=SMALL)
-    words = f"Thick: median of an ensemble's walkers; thin: their {WIDE_INTERVAL}; right of each panel: density"
-    if chains:
-        words = (
-            f"Line: median of each {STRETCHES}th of a chain; shaded: its {WIDE_INTERVAL}; right of each panel: density"
-        )
-    sheet.text(width / 2, height - 0.32, words, ha="center", va="center_baseline", fontsize=SMALL)
+        sheet.text(width / 2 + step * (shown - 1) / 2, height - 0.14, f"and {more} more", va="center_baseline", fontsize=SMALL)
+    sheet.text(width / 2, height - 0.24, key, ha="center", va="top", fontsize=SMALL, linespacing=1.25)

@@ -5,10 +5,12 @@ from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
-from bowdenfit.verb import Argument, Option, Output, Reply, Verb
+from bowdenfit.verb import Argument, Option, Output, Quantity, Reply, Verb
 
 if TYPE_CHECKING:
     from bowdenfit.results.record import Record
+
+NARROWEST, WIDEST = 3.0, 20.0  # in, of a figure
 
 
 def summary(
@@ -52,52 +54,90 @@ def plot(
     output: Annotated[Output, Option(("-o",), default="RESULTS/figures")] = None,
     *,
     figures: Annotated[Sequence[str], Option(("--figure",), metavar="NAME")] = (),
+    width: Annotated[Quantity | None, Option(example="3.5in", metavar="LENGTH")] = None,
+    formats: Annotated[Sequence[str], Option(("--format",), metavar="ENDING", default="png and svg")] = (),
 ) -> list[Path]:
-    """Draw the figures of a fit into a folder, PNG and SVG.
+    """Draw the figures of a fit into a folder, and write what each shows, in words, to captions.txt beside them.
 
     Args:
         found: The fit, or its results folder.
         output: Folder for the figures.
         figures: Draw only this figure, such as efficiency; may be repeated.
+        width: Width of the page, such as 3.5in or 88mm for a column of a paper; words keep their size.
+        formats: Write this format: png, svg or pdf; may be repeated.
 
     Returns:
         The files written.
 
     Raises:
-        UsageError: Neither a folder for the figures nor one of results is named, or the fit has no such figure.
+        UsageError: Neither a folder for the figures nor one of results is named, or the fit has no such figure; or there is no
+            such format, or figures cannot be so wide.
         StoreError: The results folder is missing or damaged, or the other cannot be written.
     """
     from bowdenfit.errors import UsageError
-    from bowdenfit.questions.figures import draw_figure
+    from bowdenfit.questions.figures import draw_figure, write_captions
     from bowdenfit.results.folder import FIGURES, folder_to_write
 
     if isinstance(found, str | Path):
         output = output or Path(found) / FIGURES
     if output is None:
         raise UsageError("a fit by itself has no folder; name one for the figures.")
-    shown = _shown(found, figures)
+    endings, page = _formats(formats), _page_width(width)
+    shown, cable = _shown(found, figures)
     with folder_to_write(Path(output)) as place:
-        return [path for name, data in shown.items() for path in draw_figure(name, data, place)]
+        files = [path for name, data in shown.items() for path in draw_figure(name, data, place, endings, cable, page)]
+        return [*files, write_captions(shown, place, cable)]
 
 
-def _shown(found: "Record | str | Path", names: Sequence[str]) -> dict[str, Any]:
-    """Data of all figures of a fit, or of some; what it was drawn with before is not worked out again."""
+def _formats(named: Sequence[str]) -> Sequence[str]:
+    """Endings of the files; those of a fit where none is named."""
+    from bowdenfit.errors import UsageError, nearest
+    from bowdenfit.plots.write import EVERY_FORMAT, FORMATS
+
+    for name in named:
+        if name not in EVERY_FORMAT:
+            raise UsageError(f"there is no format {name!r} for figures{nearest(name, list(EVERY_FORMAT))}")
+    return tuple(dict.fromkeys(named)) or FORMATS
+
+
+def _page_width(width: Quantity | None) -> float | None:
+    """Width of the page [in]."""
+    from bowdenfit.errors import UsageError
+    from bowdenfit.units import conversion_factor
+
+    if width is None:
+        return None
+    value, unit = width
+    inches = value * conversion_factor(unit, "length") / conversion_factor("in", "length")
+    if not NARROWEST <= inches <= WIDEST:
+        raise UsageError(
+            f"figures cannot be {value:g} {unit} wide; say a width from {NARROWEST:g} in to {WIDEST:g} in, such as 3.5in for a "
+            "column of a paper."
+        )
+    return float(inches)
+
+
+def _shown(found: "Record | str | Path", names: Sequence[str]) -> tuple[dict[str, Any], str]:
+    """Data of all figures of a fit, or of some, and the cable; what it was drawn with before is not worked out again."""
     from bowdenfit.errors import UsageError, nearest
     from bowdenfit.questions.figures import FIGURES, figures_of, kept_figures
+    from bowdenfit.results.folder import FIT
 
     for name in names:
         if name not in FIGURES:
             raise UsageError(f"there is no figure {name!r}{nearest(name, list(FIGURES))}")
     shown = kept_figures(Path(found), names) if isinstance(found, str | Path) else {}
-    if not shown:
+    if shown and isinstance(found, str | Path):
+        cable = json.loads((Path(found) / FIT).read_text(encoding="utf-8"))["description"]["name"]
+    else:
         if isinstance(found, str | Path):
             from bowdenfit.results.store import load
 
             found = load(Path(found))
-        shown = dict(figures_of(found, names))
+        shown, cable = dict(figures_of(found, names)), found.name
     if missing := [name for name in names if name not in shown]:
         raise UsageError(f"this fit has nothing to show in the figure {missing[0]!r}; leave it out.")
-    return shown
+    return shown, cable
 
 
 SUMMARY_VERB = Verb(
@@ -111,6 +151,6 @@ PLOT_VERB = Verb(
     plot,
     lambda files, _: Reply("".join(f"{path}\n" for path in files)),
     "Draw the figures of a fit again.",
-    "Draw the figures of a finished fit again, as PNG and SVG.",
+    "Draw the figures of a finished fit again, for the page of a paper too: --width 3.5in --format pdf.",
     json="",
 )

@@ -34,16 +34,24 @@ def words(answer, _):
 VERB = Verb(shares, words, "Shares of the loss.", "Which contact takes what share of the loss?")
 
 
+HEADING = "Who takes what"
+
+
 def data(fit):
     """What the figure shows."""
     return shares(fit) if fit.sampled is not None else None
 
 
-def draw(answer):
+def caption(answer):
+    """What is drawn."""
+    return f"Share of the loss of {len(answer)} contacts."
+
+
+def draw(answer, width=None):
     """A bar a contact."""
     from bowdenfit.plots.layout import panels
 
-    figure, (axes,) = panels([1.5], 1, 0.1, (0, 0))
+    figure, (axes,) = panels([1.5], 1, 0.1, (0, 0), width or 4.6)
     axes.bar([each.contact for each in answer], [each.share.median for each in answer])
     axes.set_ylabel("Share of the loss")
     return figure

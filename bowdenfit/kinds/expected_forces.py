@@ -60,7 +60,7 @@ def expected_forces(
     slope = _slopes(input_force, output_force, group, noise_ratio)[group]
     across = 1 + noise_ratio**2 * slope**2
     distance = output_force - slope * input_force
-    bend, freedom = np.zeros(len(distance)), float(len(distance) - np.max(group) - 1)
+    bend, freedom = np.zeros(len(distance)), float(len(distance) - np.max(group, initial=-1) - 1)
     along = input_force + noise_ratio**2 * slope * distance / across
     few = np.zeros(len(distance), dtype=bool)
     for mine in np.split(np.argsort(group, kind="stable"), np.cumsum(np.bincount(group))[:-1]):

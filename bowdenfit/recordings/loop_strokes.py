@@ -59,7 +59,8 @@ def fit_force_loop(force_in: Vector, force_out: Vector, taut: bool = True, slack
     starts = sorted(_starts(x, y, scale), key=lambda p: robust_cost(model(p)[0]))[:2]
     best, cost = min((robust_minimum(model, start, *_LIMITS) for start in starts), key=lambda fit: fit[1])
     loss, exponent, center = (best * told * [scale, 1.0, scale]).tolist()
-    found = _deviation(force_in, force_out, loss, exponent, center)
+    deviation, followed, state = _deviation(force_in, force_out, loss, exponent, center)
+    found = deviation, followed, state, state
     return Hysteresis(force_in, force_out, exponent, center, loss, *found, cost / len(x))
 
 

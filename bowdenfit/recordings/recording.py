@@ -122,6 +122,7 @@ class Strokes:
     Args:
         stroke: +1 sliding toward the motor, -1 sliding back, 0 switching or held; of a pull-pull loop +1 moving forward,
             -1 moving back, 0 between.
+        contact: The same as the play operator has it, which stands where noise lifts a sliding rope off its limit.
         used_sliding: Whether the block is safely inside a sliding phase.
         exponent: Friction exponent of this recording by itself [1]; of a pull-pull loop NaN where it does not tell it.
         center: Mean log ratio of input to output force over both strokes [1]; what sensors add. Of a pull-pull loop the
@@ -136,6 +137,7 @@ class Strokes:
     """
 
     stroke: Labels
+    contact: Labels
     used_sliding: Flags
     exponent: float
     center: float

@@ -8,7 +8,7 @@ import numpy as np
 from bowdenfit.description import Phase
 from bowdenfit.errors import DatasetError
 from bowdenfit.recordings.one_way import refuse_dead, sliding_one_way
-from bowdenfit.recordings.preparation.play import Hysteresis, play, white_noise
+from bowdenfit.recordings.preparation.play import Hysteresis, contact_through_noise, play, white_noise
 from bowdenfit.recordings.preparation.robust import robust_minimum
 from bowdenfit.recordings.recording import PULL, RETURN, SWITCH, Blocks
 from bowdenfit.types import Flags, Labels, Matrix, Vector
@@ -52,7 +52,11 @@ def fit_loop(force_in: Vector, force_out: Vector) -> Hysteresis:
             break
     best, cost = min(fits, key=lambda fit: fit[1])
     exponent, middle, drag = float(best[0]), float(best[1]), level * float(best[2])
-    found = _follow(force_in, force_out, exponent, middle, drag)
+    x, shown = np.log(force_in + drag), np.log(force_out + drag) + middle
+    output, state = play(x, exponent, float(shown[0]))
+    of_input = white_noise(force_in) / (force_in + drag)
+    followed, sliding = contact_through_noise(x - exponent, x + exponent, output, state, of_input)
+    found = shown - followed, followed, state, sliding
     return Hysteresis(force_in, force_out, exponent, middle, drag, *found, cost / len(few_in))
 
 

@@ -47,23 +47,25 @@ def find_strokes(
         refuse_dead(blocks.input_force, blocks.output_force, file, name)
         raise DatasetError(f"{file}: only {int(usable.sum())} blocks of the recording {name!r} {cable.unusable}")
     loop = cable.follow(blocks.input_force[usable], blocks.output_force[usable])
-    contact = cable.contact(loop, blocks.velocity[usable])
-    velocity = _toward_motor(blocks.velocity[usable], contact)
+    sliding = cable.contact(loop, blocks.velocity[usable])
+    velocity = _toward_motor(blocks.velocity[usable], sliding)
     cable.refuse(loop, velocity, file, name, by_hand)
-    state, moving = np.zeros(len(usable), dtype=int), np.ones(len(usable), dtype=bool)
-    state[usable], moving[usable] = contact, _moving_steadily(velocity, contact)
+    state, contact = np.zeros((2, len(usable)), dtype=int)
+    state[usable], contact[usable] = sliding, loop.state
+    moving = np.ones(len(usable), dtype=bool)
+    moving[usable] = _moving_steadily(velocity, sliding)
     used = _inside_sliding(state) & usable & moving
     if by_hand:
         used &= ~np.any([_inside(blocks.time, span) for span in by_hand], axis=0)
     for span in by_hand:
         inside = _inside(blocks.time, span)
-        state[inside] = _SIGNS[span.stroke]
+        state[inside] = contact[inside] = _SIGNS[span.stroke]
         used[inside] = usable[inside] & (_SIGNS[span.stroke] != SWITCH)
     correlation = correlation_time(loop.deviation[used[usable]]) if used.any() else 1.0
     told = cable.told(loop, state[usable], set(state[used].tolist()), correlation, name)
     exponent, center, lost, remarks = told
     noise = float(1.4826 * np.median(np.abs(loop.deviation))) or 1e-12
-    return Strokes(state, used, exponent, center, lost, noise, correlation, bool(by_hand), remarks)
+    return Strokes(state, contact, used, exponent, center, lost, noise, correlation, bool(by_hand), remarks)
 
 
 def cable_of(description: Description) -> RopeStrokes | LoopStrokes:

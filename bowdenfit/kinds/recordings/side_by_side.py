@@ -71,9 +71,9 @@ class Thinned:
 
     def _worth(self, counted: np.ndarray, lost: np.ndarray) -> np.ndarray:
         """What each group is worth: the blocks that count, inside their phases, unless its input is not known."""
-        stroke = self.recording.strokes.stroke
-        each = worth_of(self.recording, np.arange(len(stroke))) * (counted & inside_phase(stroke))
-        return np.add.reduceat(each * standing_share(stroke), self.starts) * ~lost
+        contact = self.recording.strokes.contact
+        each = worth_of(self.recording, np.arange(len(contact))) * (counted & inside_phase(contact))
+        return np.add.reduceat(each * standing_share(contact), self.starts) * ~lost
 
     def _censored(self, saturated: np.ndarray, force_out: np.ndarray, lost: np.ndarray) -> dict[str, np.ndarray]:
         """Which end of the range the output lies beyond, and what that says.
@@ -93,7 +93,7 @@ class Thinned:
 
 def group_blocks(recording: Recording) -> Thinned:
     """The blocks of a recording, in groups where there are more than `MOST_BLOCKS`."""
-    return Thinned(recording, first_of_groups(recording.strokes.stroke, MOST_BLOCKS))
+    return Thinned(recording, first_of_groups(recording.strokes.contact, MOST_BLOCKS))
 
 
 def side_by_side(

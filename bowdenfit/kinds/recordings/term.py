@@ -5,7 +5,6 @@ it only up to what the mounting did to this run.
 """
 
 from collections.abc import Mapping
-from dataclasses import dataclass
 
 import numpy as np
 
@@ -30,6 +29,7 @@ from bowdenfit.kinds.recordings.events import EVENTS
 from bowdenfit.kinds.recordings.loops import LoopRecordingsTerm, loop_recordings_term
 from bowdenfit.kinds.recordings.settings import RecordingsTable
 from bowdenfit.kinds.recordings.simulation import drawn_recordings, recorded_again, refuse_saturated
+from bowdenfit.kinds.recordings.sliding import BlocksUsed, sliding_blocks
 from bowdenfit.kinds.recordings.whole import WholeRecordingsTerm, pad_recordings
 from bowdenfit.kinds.row_angles import row_angles
 from bowdenfit.kinds.runs import RunsTerm, run_sums
@@ -57,7 +57,7 @@ def recordings_term(
         censored = settings is not None and _censored(settings, recordings)
         return loop_recordings_term(cable, recordings, rows, labels, censored)
     if settings is None or settings.likelihood == "runs":
-        parts = [_sliding_blocks(r) for r in recordings.each]
+        parts = [sliding_blocks(r, cable.description) for r in recordings.each]
         _needs_blocks(recordings, parts)
         blocks = _rows(recordings, parts, rows)
         return RunsTerm(cable, run_sums(cable, blocks), labels, RECORDED, BLOCK_NOISE, rows=blocks)
@@ -85,7 +85,7 @@ def _label(cable: Cable, recordings: Recordings, run: str) -> str:
     return f"{run} ({where})" if where and where not in run else run
 
 
-def _needs_blocks(recordings: Recordings, parts: "list[_Part]") -> None:
+def _needs_blocks(recordings: Recordings, parts: list[BlocksUsed]) -> None:
     """Every run must have something that the likelihood can use."""
     for run in recordings.runs:
         mine = [r for r in recordings.each if r.run == run]
@@ -117,25 +117,7 @@ _NO_SLIDING = (
 )
 
 
-@dataclass(frozen=True)
-class _Part:
-    """Blocks of one recording that enter: indices, stroke, log ratio, worth."""
-
-    used: np.ndarray
-    stroke: np.ndarray
-    log_ratio: np.ndarray
-    worth: np.ndarray
-
-
-def _sliding_blocks(recording: Recording) -> _Part:
-    """Blocks in which the rope slides, with their log ratio."""
-    used = np.flatnonzero(recording.strokes.used_sliding & positive(recording))
-    stroke, blocks = recording.strokes.stroke[used], recording.blocks
-    ratio = stroke * np.log(blocks.input_force[used] / blocks.output_force[used])
-    return _Part(used, stroke, ratio, worth_of(recording, used))
-
-
-def _all_blocks(recording: Recording, noise_ratio: float) -> _Part:
+def _all_blocks(recording: Recording, noise_ratio: float) -> BlocksUsed:
     r"""Every block after the rope first slid, as the log ratio it would show had it gone on sliding.
 
     Between contacts the output stands still where the last stroke left it, :math:`y = y(\hat\Lambda) - s (\Lambda -
@@ -150,7 +132,9 @@ def _all_blocks(recording: Recording, noise_ratio: float) -> _Part:
     ratio = strokes.exponent - stroke * (y - followed)[kept]
     force_in, force_out = blocks.input_force[used], blocks.output_force[used]
     of_output_alone = np.where(state[kept] == 0, 1 + (noise_ratio * force_out / force_in) ** 2, 1.0)
-    return _Part(used, stroke, ratio, worth_of(recording, used) * of_output_alone * standing_share(state)[kept])
+    worth = worth_of(recording, used) * of_output_alone * standing_share(state)[kept]
+    tells = 1 / ((noise_ratio / force_in) ** 2 + 1 / force_out**2)
+    return BlocksUsed(used, stroke, force_in, force_out, ratio, worth, tells)
 
 
 def _followed_in_parts(
@@ -167,26 +151,26 @@ def _followed_in_parts(
     return followed, np.stack([state, last])
 
 
-def _rows(recordings: Recordings, parts: list[_Part], angles: Mapping[str, np.ndarray]) -> SlidingRows:
+def _rows(recordings: Recordings, parts: list[BlocksUsed], angles: Mapping[str, np.ndarray]) -> SlidingRows:
     """Blocks of all recordings as rows of runs."""
     of_recording = np.repeat(np.arange(len(parts)), [len(p.used) for p in parts])
     runs = recordings.runs
 
-    def gathered(name: str) -> np.ndarray:
-        pairs = zip(recordings.each, parts, strict=True)
-        return np.concatenate([getattr(r.blocks, name)[p.used] for r, p in pairs])
+    def joined(name: str) -> np.ndarray:
+        return np.concatenate([getattr(part, name) for part in parts])
 
-    run = np.array([runs.index(r.run) for r in recordings.each])[of_recording]
+    pairs = list(zip(recordings.each, parts, strict=True))
     return SlidingRows(
-        gathered("input_force"),
-        gathered("output_force"),
-        np.concatenate([p.log_ratio for p in parts]),
-        np.concatenate([p.stroke for p in parts]).astype(int),
-        run,
-        gathered("velocity"),
-        np.concatenate([p.stroke * drift_of(r)[p.used] for r, p in zip(recordings.each, parts, strict=True)]),
-        np.concatenate([p.worth for p in parts]),
+        joined("input_force"),
+        joined("output_force"),
+        joined("log_ratio"),
+        joined("stroke").astype(int),
+        np.array([runs.index(r.run) for r in recordings.each])[of_recording],
+        np.concatenate([r.blocks.velocity[p.used] for r, p in pairs]),
+        np.concatenate([p.stroke * drift_of(r)[p.used] for r, p in pairs]),
+        joined("worth"),
         {name: angles[name][of_recording] for name in ROW_ARRAYS},
+        joined("tells"),
     )
 
 

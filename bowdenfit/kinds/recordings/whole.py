@@ -87,6 +87,6 @@ def _blocks(recording: Recording, censored: bool, noise_ratio: float) -> dict[st
     """Blocks of one recording; while the rope stands still the input's noise is not in the output."""
     groups = group_blocks(recording)
     arrays = groups.arrays(Rope, positive(recording), censored)
-    standing = recording.strokes.stroke[groups.starts] == 0
+    standing = recording.strokes.contact[groups.starts] == 0
     variance = np.where(standing, 0.0, (noise_ratio / arrays["input_force"]) ** 2) + 1 / arrays["output_force"] ** 2
     return arrays | {"weight": arrays["worth"] / variance}

@@ -6,6 +6,8 @@ import numpy as np
 
 from bowdenfit.types import Labels, Vector
 
+_BEYOND_NOISE = 6.0  # of two blocks, one the highest of many: with fewer, blocks would still be chosen by their noise
+
 
 @dataclass(frozen=True)
 class Hysteresis:
@@ -18,9 +20,10 @@ class Hysteresis:
             input less output force [N].
         lost: Drag that makes the loop's width the same at all loads [N]; of a pull-pull loop the force lost while both
             sides are taut, 2 P Lambda [N].
-        deviation: Of log(F_out + drag) from the operator, block by block [1]; of a pull-pull loop of F_out [N].
-        followed: Output of the operator, in the same units.
+        deviation: Of log(F_out + drag) from `followed`, block by block [1]; of a pull-pull loop of F_out [N].
+        followed: Output of the operator, in the same units; of a single rope on its limit wherever it slides.
         state: Contact of each block; see `play_between`.
+        sliding: The same of a single rope through noise; see `contact_through_noise`.
         cost: Robust sum of squares of the deviations, in units of their noise, over twice their number.
     """
 
@@ -32,6 +35,7 @@ class Hysteresis:
     deviation: Vector
     followed: Vector
     state: Labels
+    sliding: Labels
     cost: float
 
 
@@ -71,6 +75,32 @@ def play_between(lower: Vector, upper: Vector, start: float) -> tuple[Vector, La
         output.append(y)
         state.append(contact)
     return np.array(output), np.array(state, dtype=int)
+
+
+def contact_through_noise(
+    lower: Vector, upper: Vector, output: Vector, state: Labels, noise: Vector
+) -> tuple[Vector, Labels]:
+    """What `play_between` gives, with contact also where noise alone makes a sliding rope seem to stand.
+
+    With noise on an input that rises, the operator touches its limit at new peaks alone. Blocks taken for sliding by that would
+    be chosen by their own noise: they scatter less than all (by a tenth where noise is as large as the change from block to
+    block), and their log ratio is too large. So between two contacts on one side the output counts as in contact throughout,
+    if nowhere in between the limit is farther from it than noise makes it: `_BEYOND_NOISE` standard deviations.
+
+    Args:
+        lower, upper: Limits.
+        output: The operator's output.
+        state: Its contact.
+        noise: Standard deviation of the limits.
+    """
+    output, state = output.copy(), state.copy()
+    touched = np.flatnonzero(state)
+    for before, after in zip(touched[:-1].tolist(), touched[1:].tolist(), strict=True):
+        side, between = state[before], slice(before + 1, after)
+        limit = lower[between] if side > 0 else upper[between]
+        if state[after] == side and np.all(side * (output[between] - limit) < _BEYOND_NOISE * noise[between]):
+            output[between], state[between] = limit, side
+    return output, state
 
 
 def white_noise(series: Vector) -> float:

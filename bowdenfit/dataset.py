@@ -10,7 +10,7 @@ from typing import Any
 from bowdenfit.cable.registry import check_names
 from bowdenfit.description import Description
 from bowdenfit.description.file import override
-from bowdenfit.errors import DescriptionError
+from bowdenfit.errors import DescriptionError, Faults
 from bowdenfit.files.row_account import RowAccount
 from bowdenfit.inputs import refuse_special
 from bowdenfit.kinds import KINDS, each_table
@@ -63,9 +63,9 @@ def load_dataset(
     """
     if path.suffix.lower() not in {".toml", ""} and not path.exists():
         raise DescriptionError(f"{path} does not exist; check the spelling and the folder.")
-    file = path if path.suffix == ".toml" else path / DESCRIPTION_FILE
-    description = load_description(file, overrides, columns)
-    return read_dataset(description, file.parent, {file.name: _sha256(file)}, channels)
+    file, faults = path if path.suffix == ".toml" else path / DESCRIPTION_FILE, Faults()
+    description = load_description(file, overrides, columns, faults)
+    return read_dataset(description, file.parent, {file.name: _sha256(file)}, channels, faults)
 
 
 def is_lone_file(path: Path) -> bool:
@@ -119,6 +119,7 @@ def read_dataset(
     folder: Path,
     sha256: dict[str, str],
     channels: Mapping[str, ColumnSource] | None = None,
+    faults: Faults | None = None,
 ) -> Dataset:
     """Read the tables that a description names.
 
@@ -127,28 +128,37 @@ def read_dataset(
         folder: Where its files are.
         sha256: Checksums of what has been read so far.
         channels: Channels of recordings named on the command line.
+        faults: What is wrong with the description.
 
     Raises:
-        DatasetError: A table is missing or wrong, or does not fit the description.
+        DatasetError: Tables are missing or wrong, or do not fit the description; says all that is wrong with each. Whether
+            they fit is looked at where all could be read.
     """
+    faults = faults or Faults()
     measurements, checksums, accounts = Measurements(), dict(sha256), tuple[RowAccount, ...]()
     for kind in KINDS.values():
         settings = description.tables.stated.get(kind.name)
         if settings is None:
             continue
-        found = kind.read(Source(kind.name, settings, description, folder, channels or {}))
-        remarks = (*(said for each in found.accounts for said in each.remarks), *found.remarks)
-        measurements = Measurements((*measurements.tables, found.table), (*measurements.remarks, *remarks))
-        accounts += found.accounts
-        checksums |= {name: _sha256(path) for name, path in found.files.items()}
+        with faults.noted():
+            found = kind.read(Source(kind.name, settings, description, folder, channels or {}))
+            remarks = (*(said for each in found.accounts for said in each.remarks), *found.remarks)
+            measurements = Measurements((*measurements.tables, found.table), (*measurements.remarks, *remarks))
+            accounts += found.accounts
+            checksums |= {name: _sha256(path) for name, path in found.files.items()}
+    faults.refuse()
     if channels and not any(kind.takes_channels for kind, _ in each_table(measurements)):
         raise DescriptionError(
             "--channel names channels of recordings, but the data set has none; a column of a table is named by --column."
         )
-    check_names(description)
-    measured_groups(description, measurements)
+    with faults.noted():
+        check_names(description)
+    with faults.noted():
+        measured_groups(description, measurements)
     for kind, table in each_table(measurements):
-        kind.check(table, description, measurements)
+        with faults.noted():
+            kind.check(table, description, measurements)
+    faults.refuse()
     return Dataset(description, measurements, checksums, accounts)
 
 

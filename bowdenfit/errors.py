@@ -2,16 +2,30 @@
 
 import difflib
 import errno
-from collections.abc import Sequence
+from collections.abc import Callable, Hashable, Iterable, Iterator, Sequence
+from contextlib import contextmanager
+from dataclasses import dataclass, field
 from pathlib import Path
+from typing import TypeVar
+
+Value = TypeVar("Value")
+Given = TypeVar("Given")
 
 _FULL = {errno.ENOSPC, errno.EFBIG, errno.EIO, *({errno.EDQUOT} if hasattr(errno, "EDQUOT") else ())}
 
 
 class BowdenfitError(Exception):
-    """Base of all errors a user can cause or meet; its text is complete sentences with a remedy."""
+    """Base of all errors a user can cause or meet; its text is complete sentences with a remedy.
+
+    Several that are said together are in `faults`; those of a table that say the same have the same `alike`, and their rows;
+    those of a description have the keys that lead to their `place`.
+    """
 
     exit_code = 1
+    faults: "tuple[BowdenfitError, ...]" = ()
+    alike: Hashable = None
+    row: int = 0
+    place: tuple[str | int, ...] = ()
 
 
 class DatasetError(BowdenfitError):
@@ -48,6 +62,78 @@ class ConvergenceError(BowdenfitError):
     """A solver or sampler stopped without an answer that can be used at all."""
 
     exit_code = 3
+
+
+_MOST_FAULTS, _MOST_ROWS = 20, 12  # that are named
+
+
+@dataclass
+class Faults:
+    """What is wrong so far: noted while reading goes on, and refused together, so that nobody corrects one at a time.
+
+    Args:
+        found: The faults.
+    """
+
+    found: list[BowdenfitError] = field(default_factory=list)
+
+    @contextmanager
+    def noted(self, place: tuple[str | int, ...] = ()) -> Iterator[None]:
+        """Whatever is refused inside is noted, of a place in a description, and what comes behind it is done."""
+        try:
+            yield
+        except (DatasetError, DescriptionError) as error:
+            for fault in error.faults or (error,):
+                fault.place = fault.place or place
+                self.found.append(fault)
+
+    def each(self, read: Callable[[Given], Value], given: Iterable[Given], otherwise: Value) -> list[Value]:
+        """All that is given, read one by one, with `otherwise` in place of what is refused."""
+        values = []
+        for one in given:
+            try:
+                values.append(read(one))
+            except (DatasetError, DescriptionError) as error:
+                self.found.append(error)
+                values.append(otherwise)
+        return values
+
+    def refuse(self) -> None:
+        """Raise all that was noted, if anything was.
+
+        Raises:
+            BowdenfitError: Of the type of the first fault.
+        """
+        if self.found:
+            raise together(self.found)
+
+
+def together(found: Sequence[BowdenfitError]) -> BowdenfitError:
+    """One error that says all faults, a sentence each; the same in several rows is said once, with the rows."""
+    every = tuple(fault for error in found for fault in error.faults or (error,))
+    kinds: dict[Hashable, list[BowdenfitError]] = {}
+    for fault in every:
+        kinds.setdefault(fault.alike or str(fault), []).append(fault)
+    said = [_with_rows(faults) for faults in kinds.values()]
+    if len(every) == 1:
+        return every[0]
+    more = [f"- and {len(said) - _MOST_FAULTS} more."] if len(said) > _MOST_FAULTS else []
+    lines = [f"{len(said)} things are wrong:", *(f"- {sentence}" for sentence in said[:_MOST_FAULTS]), *more]
+    error = type(every[0])("\n".join(lines) if len(said) > 1 else said[0])
+    error.faults = every
+    return error
+
+
+def _with_rows(faults: Sequence[BowdenfitError]) -> str:
+    """What the first of several that are alike says, and the rows of the others."""
+    others = sorted({fault.row for fault in faults} - {faults[0].row})
+    if not others:
+        return str(faults[0])
+    named = [str(row) for row in others[:_MOST_ROWS]]
+    if len(others) > _MOST_ROWS:
+        named.append(f"{len(others) - _MOST_ROWS} more")
+    rows = ", ".join(named[:-1]) + " and " + named[-1] if len(named) > 1 else named[0]
+    return f"{faults[0]} The same in row{'s' if len(others) > 1 else ''} {rows}."
 
 
 def disk_error(path: Path, error: OSError) -> StoreError:

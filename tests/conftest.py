@@ -60,17 +60,21 @@ def run(monkeypatch, capsys):
 
 @pytest.fixture
 def refuse(run, tmp_path):
-    """Run the command line on bad input, and return its one sentence; nothing may be written."""
+    """Run the command line on bad input, and return its sentences, one a fault; nothing may be written."""
 
-    def call(*arguments):
+    def call(*arguments, faults=1):
         before = sorted(tmp_path.rglob("*"))
         code, out, err = run(*arguments)
         assert code == 2, (out, err)
         assert out == ""
         assert err.startswith("Error: ")
-        assert err.count("\n") == 1
-        assert len(err) < 520
-        assert err.rstrip()[-1] in ".?"
+        lines = err.splitlines()
+        if faults > 1:
+            assert lines.pop(0) == f"Error: {faults} things are wrong:"
+            assert all(line.startswith("- ") for line in lines)
+        assert len(lines) == faults, err
+        assert all(len(line) < 520 for line in lines)
+        assert all(line[-1] in ".?" for line in lines)
         assert "inside bowdenfit" not in err
         assert sorted(tmp_path.rglob("*")) == before
         return err

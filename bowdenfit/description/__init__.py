@@ -1,5 +1,6 @@
 """The description of a cable, `cable.toml`, as frozen models; the only place where defaults are written."""
 
+from collections.abc import Iterator
 from typing import Annotated, Any, Literal, TypeVar
 
 from pydantic import ConfigDict, Field, field_validator, model_validator
@@ -124,50 +125,51 @@ class Description(Frozen):
 
     @model_validator(mode="after")
     def _consistent(self) -> "Description":
+        if said := [*self._of_names(), *self._of_the_whole()]:
+            raise ValueError("\n".join(said))  # a line each
+        return self
+
+    def _of_names(self) -> Iterator[str]:
+        """What names contradict."""
         used = [c.friction for c in self.contact]
-        taken = [name for name in used if name in _TAKEN]
-        if taken:
-            raise ValueError(f"a friction coefficient cannot be called {taken[0]!r}, which results hold already; rename it")
+        for name in self.coefficients:
+            if name in _TAKEN:
+                yield f"a friction coefficient cannot be called {name!r}, which results hold already; rename it"
+            if len({c.by_group for c in self.contact if c.friction == name}) > 1:
+                yield f"by_group is not the same in all contacts of {name!r}; write it in each, or use two names"
         for name in self.friction:
             if name not in used and name.partition("[")[0] not in used:
-                raise ValueError(f"[friction.{name}] belongs to no contact{nearest(name, used)}")
-        for name in used:
-            if len({c.by_group for c in self.contact if c.friction == name}) > 1:
-                raise ValueError(f"by_group is not the same in all contacts of {name!r}; write it in each, or use two names")
-        curved = [c for c in self.contact if c.wrap_angle.curve]
-        if curved and self.route is None:
-            raise ValueError(
-                f"the contact {curved[0].name!r} has a curve, so a [route] is needed: variable, unit, range"
-            )
-        if self.geometry == "published" and not curved:
-            raise ValueError('geometry = "published" needs contacts with a curve')
+                yield f"[friction.{name}] belongs to no contact{nearest(name, used)}"
         if self.stretch.friction is not None and self.stretch.friction not in used:
             hint = nearest(self.stretch.friction, used)
-            raise ValueError(f"stretch.friction {self.stretch.friction!r} belongs to no contact{hint}")
+            yield f"stretch.friction {self.stretch.friction!r} belongs to no contact{hint}"
+        if self.group is not None and not self.by_group:
+            yield 'group names the one that predictions are for, which belongs to friction_model = "by-group"'
+
+    def _of_the_whole(self) -> Iterator[str]:
+        """What settings contradict."""
+        curved = [c for c in self.contact if c.wrap_angle.curve]
+        if curved and self.route is None:
+            yield f"the contact {curved[0].name!r} has a curve, so a [route] is needed: variable, unit, range"
+        if self.geometry == "published" and not curved:
+            yield 'geometry = "published" needs contacts with a curve'
         laws = [c.special_law for c in self.contact if c.friction == self.stretch.friction]
         if len(laws) > 1 and any(laws):
-            raise ValueError(
+            yield (
                 f"stretch.friction {self.stretch.friction!r} acts in {len(laws)} contacts, and by the "
                 f"{next(filter(None, laws))} law their wrap angles together do not tell the friction of the rope; leave "
                 "stretch.friction out, for a coefficient of its own"
             )
         freedom = type(self).model_fields["student_degrees_of_freedom"].default
         if self.noise != "student" and self.student_degrees_of_freedom != freedom:
-            raise ValueError(
-                'student_degrees_of_freedom belongs to noise = "student"; write that beside it, or leave it out'
-            )
+            yield 'student_degrees_of_freedom belongs to noise = "student"; write that beside it, or leave it out'
         if self.by_group and self.stretch.friction is not None:
-            raise ValueError(
+            yield (
                 "stretch.friction is a coefficient that groups have one each of, and the stretch is of no group; leave it out, "
                 "for a coefficient of its own"
             )
-        if self.group is not None and not self.by_group:
-            raise ValueError('group names the one that predictions are for, which belongs to friction_model = "by-group"')
         if self.cable.kind == "loop" and self.friction_model != "capstan":
-            raise ValueError(
-                'the equations of a loop hold for friction_model = "capstan" only; leave it out, or fit one rope alone'
-            )
-        return self
+            yield 'the equations of a loop hold for friction_model = "capstan" only; leave it out, or fit one rope alone'
 
     @property
     def fits_offsets(self) -> bool:

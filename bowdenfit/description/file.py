@@ -5,21 +5,21 @@ from collections.abc import Iterable, Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
-from pydantic import BaseModel, ValidationError
+from pydantic import ValidationError
 
-from bowdenfit.description import SCHEMA, Description, ParameterSetting, QuantityValue, Route
+from bowdenfit.description import Description, ParameterSetting, QuantityValue, Route
 from bowdenfit.description.elastic import check_elastic
-from bowdenfit.errors import DatasetError, DescriptionError, nearest
+from bowdenfit.description.wrong_keys import wrong_keys
+from bowdenfit.errors import DatasetError, DescriptionError, Faults
 from bowdenfit.inputs import read_toml_file
 from bowdenfit.units import route_conversion_factor
-from bowdenfit.words import shown
 
 Stated = tuple[str, QuantityValue | None, str]
 """Where a quantity stands, the quantity, and what it must measure."""
 
 
-def read_toml(path: Path, overrides: Sequence[str] = ()) -> dict[str, Any]:
-    """Plain data of `cable.toml`.
+def read_toml(path: Path, overrides: Sequence[str] = ()) -> tuple[str, dict[str, Any]]:
+    """Text and plain data of `cable.toml`.
 
     Args:
         path: The file.
@@ -29,7 +29,8 @@ def read_toml(path: Path, overrides: Sequence[str] = ()) -> dict[str, Any]:
         DescriptionError: The file is missing or no TOML, or a setting leads nowhere.
     """
     remedy = "name a folder that holds a cable.toml, or write one with `bowdenfit init FOLDER`"
-    return override(read_toml_file(path, remedy)[1], overrides)
+    text, raw = read_toml_file(path, remedy)
+    return text, override(raw, overrides)
 
 
 def override(raw: dict[str, Any], overrides: Sequence[str]) -> dict[str, Any]:
@@ -52,15 +53,20 @@ def validate(raw: Mapping[str, Any], model: type[Description], file: str) -> Des
         file: Its file, for errors.
 
     Raises:
-        DescriptionError: A key is unknown, or a value is missing or impossible.
+        DescriptionError: Keys are unknown, or values are missing or impossible; says all of them.
     """
     try:
         description = model.model_validate(dict(raw))
     except ValidationError as error:
-        raise DescriptionError(explain(error, model, file)) from None
-    check_quantities(_quantities(description), file)
-    _check_route(description.route, file)
-    check_elastic(description.preload, description.prior, file)
+        raise wrong_keys(error, raw, model, file) from None
+    faults = Faults()
+    with faults.noted():
+        check_quantities(_quantities(description), file)
+    with faults.noted(place=("route",)):
+        _check_route(description.route, file)
+    with faults.noted(place=("prior",)):
+        check_elastic(description.preload, description.prior, file)
+    faults.refuse()
     return description
 
 
@@ -93,28 +99,28 @@ def check_quantities(quantities: Iterable[Stated], file: str) -> None:
     """Every quantity is in a unit of the right dimension, and possible.
 
     Raises:
-        DescriptionError: One is not.
+        DescriptionError: Some are not.
     """
+    faults = Faults()
     for where, quantity, dimension in quantities:
-        if quantity is None:
-            continue
-        try:
-            quantity.to(dimension)
-        except DatasetError as error:
-            raise DescriptionError(f"{file}, {where}: {error}.") from None
-        if dimension == "length" and not (quantity.value > 0 or (where == "cable, backlash" and quantity.value == 0)):
-            raise DescriptionError(
-                f"{file}, {where}: {quantity.value:g} {quantity.unit} is not positive; write its size, or leave the key out."
-            )
-        if where == "preload, value" and quantity.value < 0:
-            raise DescriptionError(
-                f"{file}, {where}: {quantity.value:g} {quantity.unit} is negative; a rope cannot be pushed, so write 0 for a "
-                "slack rope."
-            )
-        if dimension == "angle" and not 0 <= quantity.to("angle") <= 34.91:
-            raise DescriptionError(
-                f"{file}, {where}: {quantity.value:g} {quantity.unit} is not between 0 and 2000 deg."
-            )
+        with faults.noted(place=(where.partition(",")[0].split()[0],)):
+            if quantity is not None:
+                _check_quantity(f"{file}, {where}", where, quantity, dimension)
+    faults.refuse()
+
+
+def _check_quantity(place: str, where: str, quantity: QuantityValue, dimension: str) -> None:
+    written = f"{quantity.value:g} {quantity.unit}"
+    try:
+        quantity.to(dimension)
+    except DatasetError as error:
+        raise DescriptionError(f"{place}: {error}.") from None
+    if dimension == "length" and not (quantity.value > 0 or (where == "cable, backlash" and quantity.value == 0)):
+        raise DescriptionError(f"{place}: {written} is not positive; write its size, or leave the key out.")
+    if where == "preload, value" and quantity.value < 0:
+        raise DescriptionError(f"{place}: {written} is negative; a rope cannot be pushed, so write 0 for a slack rope.")
+    if dimension == "angle" and not 0 <= quantity.to("angle") <= 34.91:
+        raise DescriptionError(f"{place}: {written} is not between 0 and 2000 deg.")
 
 
 def _set(raw: dict[str, Any], override: str) -> None:
@@ -140,69 +146,3 @@ def _set(raw: dict[str, Any], override: str) -> None:
     if isinstance(node, list):
         raise DescriptionError(f"--set {override!r}: {key} is a list; name an entry by its number, from 0.")
     node[last] = value
-
-
-def explain(
-    error: ValidationError,
-    model: type[BaseModel],
-    file: str,
-    remedy: str = "`bowdenfit init` writes a template that has it",
-) -> str:
-    """The first thing that is wrong in a file, as a sentence; `remedy` is for a key that is missing."""
-    first = next((e for e in error.errors() if e["type"] == "extra_forbidden"), error.errors()[0])
-    where = [str(part) for part in first["loc"]]
-    place = f"{file}, {'.'.join(where)}" if where else file
-    if first["type"] == "extra_forbidden":
-        return f"{file}: unknown key {'.'.join(where)!r}{nearest(where[-1], _siblings(model, where[:-1]))}"
-    if first["type"] == "missing" and where[-1] == "unit" and isinstance(first["input"], dict):
-        return (
-            f"{place}: the unit is missing; write one, such as {_with_unit(first['input'].get('value'), where[:-1])}."
-        )
-    if first["type"] == "missing":
-        return f"{file}: the key {'.'.join(where)!r} is missing; {remedy}."
-    if first["type"] == "model_type":
-        return f"{place}: {_written_as(first, where)}"
-    message = first["msg"].removeprefix("Value error, ")
-    if where == ["schema"]:
-        message = f"schema {first['input']} is newer than this program, which reads up to {SCHEMA}; update bowdenfit"
-    found = f" (found {shown(first['input'])})" if not isinstance(first["input"], dict | list) and where else ""
-    sentence = f"{place}: {message[:1].lower() + message[1:]}{found}"
-    return sentence if sentence.endswith((".", "?")) else f"{sentence}."
-
-
-def _written_as(error: Mapping[str, Any], where: Sequence[str]) -> str:
-    """How to write what must be a table of keys."""
-    found = error["input"]
-    if error.get("ctx", {}).get("class_name") == QuantityValue.__name__:
-        return f"a number needs its unit (found {shown(found)}); write it as {_with_unit(found, where)}."
-    how = f"under [{where[0]}]" if len(where) == 1 else "between braces, { key = ... }"
-    return f"this holds keys of its own (found {shown(found)}); write them {how}."
-
-
-def _with_unit(value: Any, where: Sequence[str]) -> str:
-    """A number with a unit that fits its place, as TOML."""
-    number = value if isinstance(value, int | float) and not isinstance(value, bool) else 20
-    key = ".".join(where)
-    unit = "deg" if "angle" in key else "N" if "force" in key or key == "preload.value" else "mm"
-    return f'{{ value = {number}, unit = "{unit}" }}'
-
-
-def _siblings(model: Any, path: Sequence[str]) -> list[str]:
-    """Keys that are known at a place in the description."""
-    for part in path:
-        if isinstance(model, type) and issubclass(model, BaseModel) and part in model.model_fields:
-            model = _models_in(model.model_fields[part].annotation)
-    if not (isinstance(model, type) and issubclass(model, BaseModel)):
-        return []
-    return [field.alias or name for name, field in model.model_fields.items()]
-
-
-def _models_in(annotation: Any) -> Any:
-    """The first model inside an annotation such as `tuple[Contact, ...]` or `Route | None`."""
-    if isinstance(annotation, type) and issubclass(annotation, BaseModel):
-        return annotation
-    for argument in getattr(annotation, "__args__", ()):
-        found = _models_in(argument)
-        if found is not None:
-            return found
-    return None

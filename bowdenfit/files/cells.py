@@ -68,7 +68,9 @@ class Cell:
 
     def refuse(self, what: str) -> DatasetError:
         """An error that names this cell."""
-        return DatasetError(f"{self.file}, row {self.row}, column {shown(self.column)}: {what}")
+        error = DatasetError(f"{self.file}, row {self.row}, column {shown(self.column)}: {what}")
+        error.alike, error.row = (self.file, self.column, what.replace(self.shown, "")), self.row
+        return error
 
     @property
     def shown(self) -> str:

@@ -1,10 +1,12 @@
 """From columns of a table to named quantities with their units: `input_force_N`, `Force input (N)` and `F_in [N]` are one."""
 
 import difflib
-from collections.abc import Collection, Mapping, Sequence
+from collections.abc import Callable, Collection, Mapping, Sequence
 from dataclasses import dataclass
+from math import nan
+from typing import TypeVar
 
-from bowdenfit.errors import DatasetError
+from bowdenfit.errors import DatasetError, Faults
 from bowdenfit.files.cells import Cell
 from bowdenfit.files.csv_table import RawTable
 from bowdenfit.files.headings import split_brackets
@@ -15,15 +17,32 @@ from bowdenfit.files.spellings import spelled
 from bowdenfit.units import LARGEST, ColumnSource, conversion_factor, route_conversion_factor, speed_dimension
 from bowdenfit.words import listed, quoted, shown
 
+Value = TypeVar("Value")
+
 
 @dataclass(frozen=True)
 class Column:
-    """The cells of one quantity and the factor to its internal unit."""
+    """The cells of one quantity and the factor to its internal unit.
+
+    Args:
+        heading: What stands over it.
+        cells: From above.
+        factor: From its unit to the internal one.
+        unit: As written; None without one.
+        faults: Where cells that cannot be read are noted.
+        known: Whether it is a column of the table; otherwise what is wrong with that is noted already.
+    """
 
     heading: str
     cells: tuple[Cell, ...]
     factor: float
     unit: str | None
+    faults: Faults
+    known: bool = True
+
+    def each(self, read: Callable[[Cell], Value], otherwise: Value) -> list[Value]:
+        """Every cell as read, with `otherwise` in place of those that cannot be; these are noted."""
+        return self.faults.each(read, self.cells, otherwise) if self.known else [otherwise] * len(self.cells)
 
     def value(self, cell: Cell) -> float:
         """The number in one of the cells, in the internal unit.
@@ -39,12 +58,8 @@ class Column:
         return value
 
     def numbers(self) -> list[float]:
-        """All values in the internal unit; every cell must hold one.
-
-        Raises:
-            DatasetError: A cell is blank, is text, or is not finite.
-        """
-        return [self.value(cell) for cell in self.cells]
+        """All values in the internal unit; every cell must hold one, and those that hold none are noted."""
+        return self.each(self.value, nan)
 
 
 def find_columns(
@@ -53,20 +68,19 @@ def find_columns(
     sources: Mapping[str, ColumnSource] | None = None,
     unused: tuple[str, ...] = (),
 ) -> dict[str, Column]:
-    """The wanted quantities that the table has.
+    """The wanted quantities that the table has; what is wrong with a column is noted among the table's faults.
+
+    That is a heading that fits two quantities, or two headings that fit one; a unit that is missing, unknown or of the wrong
+    dimension; a named column that is not there, or is named for what the table cannot have.
 
     Args:
         table: The file.
         wanted: What to look for.
         sources: Columns the user has named explicitly; these are not searched for.
         unused: Names that the user may give a column although nothing reads it.
-
-    Raises:
-        DatasetError: A heading fits two quantities or two headings fit one; a unit is missing, unknown or of the
-            wrong dimension; a named column is not there, or is named for what the table cannot have.
     """
     sources = {name: _as_in_header(table, source) for name, source in (sources or {}).items()}
-    _check_sources(table, [*(quantity.name for quantity in wanted), *unused], sources)
+    wrong = _wrong_sources(table, [*(quantity.name for quantity in wanted), *unused], sources)
     taken = {source.name for source in sources.values()}
     headings = [("" if text in taken else text, unit) for text, unit in zip(table.header, table.units, strict=True)]
     _check_single_meaning(table, headings, wanted, sources)
@@ -74,13 +88,21 @@ def find_columns(
     can_be = candidates(headings, wanted, tuple(sources))
     for quantity in wanted:
         columns = can_be[quantity.name]
-        if len(columns) > 1:
-            raise _several(table, quantity.name, columns)
-        if quantity.name in sources:
-            found[quantity.name] = _named_column(table, quantity, sources[quantity.name])
-        elif columns:
-            found[quantity.name] = _column(table, table.header[columns[0].position], quantity, columns[0].unit)
+        if quantity.name in sources or columns:
+            found[quantity.name] = _unknown(table, quantity.name)
+        with table.faults.noted():
+            if len(columns) > 1:
+                raise _several(table, quantity.name, columns)
+            if quantity.name in sources and quantity.name not in wrong:
+                found[quantity.name] = _named_column(table, quantity, sources[quantity.name])
+            elif columns:
+                found[quantity.name] = _column(table, table.header[columns[0].position], quantity, columns[0].unit)
     return found
+
+
+def _unknown(table: RawTable, name: str) -> Column:
+    """What stands for a column that is wrong or missing while reading goes on."""
+    return Column(name, tuple(Cell(table.file, row[0].row, name, "") for row in table.rows), nan, None, table.faults, False)
 
 
 def _as_in_header(table: RawTable, source: ColumnSource) -> ColumnSource:
@@ -95,12 +117,13 @@ def _check_single_meaning(
 ) -> None:
     for heading, _ in headings:
         names = [quantity.name for quantity, _ in meanings(heading, wanted) if quantity.name not in sources]
-        if len(names) > 1:
-            raise DatasetError(
-                f"{table.file}: the column {shown(heading)} can be read as {' and '.join(names)}; rename it, or say which: "
-                f"{naming(names[0], heading)}, or in cable.toml "
-                f'columns = {{ {names[0]} = {{ name = "{heading}", unit = ... }} }}.'
-            )
+        with table.faults.noted():
+            if len(names) > 1:
+                raise DatasetError(
+                    f"{table.file}: the column {shown(heading)} can be read as {' and '.join(names)}; rename it, or say "
+                    f"which: {naming(names[0], heading)}, or in cable.toml "
+                    f'columns = {{ {names[0]} = {{ name = "{heading}", unit = ... }} }}.'
+                )
 
 
 def _several(table: RawTable, quantity: str, columns: Sequence[Candidate]) -> DatasetError:
@@ -114,16 +137,17 @@ def _several(table: RawTable, quantity: str, columns: Sequence[Candidate]) -> Da
 
 
 def require(table: RawTable, found: Mapping[str, Column], name: str, example: str) -> Column:
-    """The column called `name`.
-
-    Raises:
-        DatasetError: The table has no such column.
-    """
+    """The column called `name`; that there is none is noted among the table's faults."""
     if name in found:
         return found[name]
+    table.faults.found.append(_missing(table, name, example))
+    return _unknown(table, name)
+
+
+def _missing(table: RawTable, name: str, example: str) -> DatasetError:
     _, _, unit = example.removeprefix(name).partition("_")
     option = naming(name, "NAME", unit.replace("_", "*"))
-    raise DatasetError(
+    return DatasetError(
         f"{table.file} has no column {name}{_nearest(name, table.header)}; it has {quoted(table.header)}. Name the column "
         f"{example}, or say which it is: {option} (in cable.toml columns = {{ {name} = {{ name = ..., unit = ... }} }})."
     )
@@ -151,7 +175,7 @@ def _nearest(name: str, header: tuple[str, ...]) -> str:
 def _column(table: RawTable, heading: str, quantity: Quantity, unit: str | None) -> Column:
     cells = tuple(row[table.header.index(heading)] for row in table.rows)
     if quantity.dimension in {"text", "ratio"} and unit is None:
-        return Column(heading, cells, 1.0, None)
+        return Column(heading, cells, 1.0, None, table.faults)
     if unit is None:
         usual = quantity.to or _usual(quantity.dimension)
         raise DatasetError(
@@ -168,7 +192,7 @@ def _column(table: RawTable, heading: str, quantity: Quantity, unit: str | None)
             factor = 1.0 if quantity.dimension == "text" else conversion_factor(unit, quantity.dimension, quantity.to)
     except DatasetError as error:
         raise DatasetError(f"{table.file}, row {table.header_row}, column {shown(heading)}: {error}.") from None
-    return Column(heading, cells, factor, unit)
+    return Column(heading, cells, factor, unit, table.faults)
 
 
 def _usual(dimension: str) -> str:
@@ -177,27 +201,36 @@ def _usual(dimension: str) -> str:
     )
 
 
-def _check_sources(table: RawTable, known: list[str], sources: Mapping[str, ColumnSource]) -> None:
-    """Every column that cable.toml names is one of the file's, and serves one known quantity."""
+def _wrong_sources(table: RawTable, known: list[str], sources: Mapping[str, ColumnSource]) -> set[str]:
+    """Quantities whose column is none of the file's, serves another already, or cannot be; what is wrong is noted."""
     serves: dict[str, str] = {}
+    wrong = set(sources)
     for name, source in sources.items():
-        if name not in known:
-            near = difflib.get_close_matches(name, known, n=1, cutoff=0.5)
-            hint = f"did you mean {near[0]}?" if near else f"it can have {', '.join(known)}."
-            raise DatasetError(
-                f"a column is named for {shown(name)}, which {table.file} cannot have under columns; {hint}"
-            )
-        if source.name not in table.header:
-            raise DatasetError(
-                f"{table.file} has no column {shown(source.name)}, which --column or cable.toml names for {name}; "
-                f"its columns are {quoted(table.header)}."
-            )
-        if source.name in serves:
-            raise DatasetError(
-                f"the column {shown(source.name)} of {table.file} is named for both {serves[source.name]} and "
-                f"{name}; correct one of them."
-            )
-        serves[source.name] = name
+        with table.faults.noted():
+            _check_source(table, known, name, source, serves)
+            serves[source.name] = name
+            wrong.discard(name)
+    return wrong
+
+
+def _check_source(
+    table: RawTable, known: list[str], name: str, source: ColumnSource, serves: Mapping[str, str]
+) -> None:
+    """A column that cable.toml names is one of the file's, and serves one known quantity."""
+    if name not in known:
+        near = difflib.get_close_matches(name, known, n=1, cutoff=0.5)
+        hint = f"did you mean {near[0]}?" if near else f"it can have {', '.join(known)}."
+        raise DatasetError(f"a column is named for {shown(name)}, which {table.file} cannot have under columns; {hint}")
+    if source.name not in table.header:
+        raise DatasetError(
+            f"{table.file} has no column {shown(source.name)}, which --column or cable.toml names for {name}; "
+            f"its columns are {quoted(table.header)}."
+        )
+    if source.name in serves:
+        raise DatasetError(
+            f"the column {shown(source.name)} of {table.file} is named for both {serves[source.name]} and "
+            f"{name}; correct one of them."
+        )
 
 
 def _named_column(table: RawTable, quantity: Quantity, source: ColumnSource) -> Column:

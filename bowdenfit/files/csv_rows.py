@@ -96,8 +96,10 @@ def too_many_cells(file: str, row: int, cells: Sequence[str], width: int) -> Non
     """
     extra = [cell for cell in cells[width:] if cell.strip()]
     if extra:
-        raise DatasetError(
+        error = DatasetError(
             f"{file}, row {row}: {len(cells)} cells where the headings or the rows above have {width} (the first too many "
             f"is {shown(extra[0])}); the usual cause is a decimal comma in a file separated by commas (separate the columns "
             "with semicolons, or write decimal points), or a row that was written twice."
         )
+        error.alike, error.row = (file, "too many cells"), row
+        raise error

@@ -1,10 +1,10 @@
 """Tables in CSV files: headings, and rows of cells that still know where they stood; every row is accounted for."""
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from pathlib import Path
 
-from bowdenfit.errors import DatasetError
+from bowdenfit.errors import DatasetError, Faults
 from bowdenfit.files.cells import Cell, Decimals, is_plain_number
 from bowdenfit.files.contents import UNKNOWN, recognize
 from bowdenfit.files.csv_rows import SEPARATORS, CsvRecord, declared_separator, records, too_many_cells
@@ -28,7 +28,8 @@ class RawTable:
         header_row: The row of the headings, of which the last stands over the units or the data.
         rows: Rows of readings.
         units: The unit that stands below each heading; empty without one.
-        account: Where the rows of the file went.
+        lines: Where the rows of the file went.
+        faults: What is found wrong while it is read.
     """
 
     file: str
@@ -36,7 +37,18 @@ class RawTable:
     header_row: int
     rows: tuple[tuple[Cell, ...], ...]
     units: tuple[str, ...]
-    account: RowAccount
+    lines: RowAccount
+    faults: Faults = field(default_factory=Faults, compare=False)
+
+    @property
+    def account(self) -> RowAccount:
+        """Where the rows of the file went, for a reader that is through with it.
+
+        Raises:
+            DatasetError: All that is wrong with the file.
+        """
+        self.faults.refuse()
+        return self.lines
 
 
 def read_csv(path: Path, most: int | None = None) -> RawTable:
@@ -96,7 +108,10 @@ def raw_table(name: str, lines: Sequence[Line], rows: Sequence[CsvRecord], separ
         )
     decimals = Decimals.of((cell for row in parts.body for cell in row.cells), separator != ",")
     units = (*parts.units, *[""] * len(header))[: len(header)]
-    cells = tuple(_cells(name, header, row, decimals) for row in parts.body)
+    too_long = Faults()
+    nothing = tuple[Cell, ...]()
+    cells = tuple(too_long.each(lambda row: _cells(name, header, row, decimals), parts.body, nothing))
+    too_long.refuse()
     return RawTable(name, header, parts.headings[0].row, cells, units, _account(name, lines, rows, parts, len(header)))
 
 

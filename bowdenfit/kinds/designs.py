@@ -7,8 +7,8 @@ from typing import Any
 from pydantic import BaseModel, ValidationError, create_model
 
 from bowdenfit.description import Description
-from bowdenfit.description.file import explain
 from bowdenfit.description.values import Frozen
+from bowdenfit.description.wrong_keys import wrong_keys
 from bowdenfit.errors import DescriptionError
 from bowdenfit.kinds import KINDS
 from bowdenfit.kinds.design import Design
@@ -39,10 +39,11 @@ def design_of(**measured: Any) -> Design:
 
 def _parsed(page: Mapping[str, Any], file: str) -> Design:
     model = _page(tuple(kind.design for kind in KINDS.values() if kind.design is not Design))
+    raw = {"design": dict(page)}
     try:
-        return model.model_validate({"design": dict(page)}).design  # type: ignore[attr-defined]
+        return model.model_validate(raw).design  # type: ignore[attr-defined]
     except ValidationError as error:
-        raise DescriptionError(explain(error, model, file, "write it, such as loads = [10, 20, 40]")) from None
+        raise wrong_keys(error, raw, model, file, "write it, such as loads = [10, 20, 40]") from None
 
 
 @lru_cache

@@ -4,7 +4,7 @@ from collections.abc import Mapping, Sequence
 
 import numpy as np
 
-from bowdenfit.errors import DatasetError
+from bowdenfit.errors import DatasetError, together
 from bowdenfit.files.cells import Cell
 from bowdenfit.files.columns import Column, Quantity
 from bowdenfit.types import Labels
@@ -37,7 +37,7 @@ def read_groups(
             f'{file} has no column group, but friction_model has "by-group", which gives each group of readings its own '
             'friction coefficients; add the column, or map it in cable.toml: columns = { group = { name = "rope" } }.'
         )
-    if column is None:
+    if column is None or not column.known:
         return (), []
     names = tuple(" ".join(cell.text.split()) for cell in column.cells)
     distinct = list(dict.fromkeys(names))
@@ -46,12 +46,12 @@ def read_groups(
         raise DatasetError(f"{file}: {wrong}")
     if wrong:
         return (), [f"{file}: {wrong} It is not used."]
-    for cell, name in zip(column.cells, names, strict=True):
-        if asked and not name:
-            raise cell.refuse(
-                "the cell is blank, so this row is of no group; write the name of its group "
-                f"({few([shown(each) for each in distinct if each], _NAMED)}), or leave the row out."
-            )
+    why = (
+        "the cell is blank, so this row is of no group; write the name of its group "
+        f"({few([shown(each) for each in distinct if each], _NAMED)}), or leave the row out."
+    )
+    if blank := [cell.refuse(why) for cell, name in zip(column.cells, names, strict=True) if asked and not name]:
+        raise together(blank)
     names = tuple(name or NO_GROUP for name in names)
     if asked or len(distinct) == 1:
         return names, []

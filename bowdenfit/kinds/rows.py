@@ -3,6 +3,7 @@
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from difflib import get_close_matches
+from functools import partial
 from typing import Protocol
 
 import numpy as np
@@ -131,15 +132,16 @@ def read_strokes(
     """
     if "stroke" not in found:
         return np.ones(n_rows, dtype=int)
-    strokes = []
-    for cell in found["stroke"].cells:
-        text = without_accents(cell.text.strip().lower().replace("\u2212", "-").replace(",", "."))
-        if text not in _STROKES:
-            raise cell.refuse(
-                f"{cell.shown} is no stroke; write pull (+1) or return (-1){held}; rename a column that tells something else."
-            )
-        strokes.append(_STROKES[text])
-    return np.array(strokes)
+    return np.array(found["stroke"].each(lambda cell: _stroke(cell, held), 1))
+
+
+def _stroke(cell: Cell, held: str) -> int:
+    text = without_accents(cell.text.strip().lower().replace("\u2212", "-").replace(",", "."))
+    if text not in _STROKES:
+        raise cell.refuse(
+            f"{cell.shown} is no stroke; write pull (+1) or return (-1){held}; rename a column that tells something else."
+        )
+    return _STROKES[text]
 
 
 def shared_columns(route: Route | None, contacts: Sequence[str]) -> tuple[Quantity, ...]:
@@ -167,11 +169,13 @@ def read_own_angles(table: RawTable, found: Mapping[str, Column], contacts: Sequ
     for k, name in enumerate(contacts):
         for target, column in ((angle, found.get(name)), (sd, found.get(f"{name}_sd"))):
             if column is not None:
-                target[:, k] = [np.nan if cell.blank else _own_angle(cell, column) for cell in column.cells]
+                target[:, k] = column.each(partial(_own_angle, column), np.nan)
     return OwnAngles(tuple(contacts), angle, sd)
 
 
-def _own_angle(cell: Cell, column: Column) -> float:
+def _own_angle(column: Column, cell: Cell) -> float:
+    if cell.blank:
+        return np.nan
     if cell.limit() is not None:
         raise cell.refuse(
             f"{cell.shown} is no measured angle; leave the cell blank where the contact has a curve, or write the angle."
@@ -205,8 +209,9 @@ def check_spelling(table: RawTable, found: Mapping[str, Column], optional: Seque
     for heading in table.header:
         name = heading.lower().partition(" ")[0].partition("_")[0]
         near = get_close_matches(name, missing, n=1, cutoff=_ALIKE) if heading and heading not in read else []
-        if near:
-            raise DatasetError(
-                f"{table.file}, row {table.header_row}: the column {shown(heading)} is not known; did you mean {near[0]}? "
-                "Rename it, or delete it."
-            )
+        with table.faults.noted():
+            if near:
+                raise DatasetError(
+                    f"{table.file}, row {table.header_row}: the column {shown(heading)} is not known; did you mean {near[0]}? "
+                    "Rename it, or delete it."
+                )

@@ -3,7 +3,7 @@
 import numpy as np
 
 from bowdenfit.description import Contact, Description
-from bowdenfit.errors import DatasetError
+from bowdenfit.errors import DatasetError, Faults
 from bowdenfit.kinds.angles.table import AngleTable
 from bowdenfit.kinds.measurements import Measurements
 from bowdenfit.kinds.rows import Rows
@@ -15,9 +15,12 @@ def check_rows(table: Rows, description: Description, measurements: Measurements
     Raises:
         DatasetError: One cannot; says which, and what to do.
     """
+    faults, angles = Faults(), measurements.table(AngleTable)
     for contact in description.contact:
-        if contact.wrap_angle.constant is None:
-            _check_contact(description, measurements.table(AngleTable), contact, table)
+        with faults.noted():
+            if contact.wrap_angle.constant is None:
+                _check_contact(description, angles, contact, table)
+    faults.refuse()
 
 
 def _check_contact(description: Description, angles: AngleTable | None, contact: Contact, table: Rows) -> None:
@@ -30,21 +33,23 @@ def _check_contact(description: Description, angles: AngleTable | None, contact:
                 f"{table.origin.files[0]} has no column {column!r}, the wrap angle of the contact {contact.name!r}; "
                 f"add it (as {column}_deg), or give the contact a constant angle or a curve in cable.toml."
             )
-        if len(missing):
-            raise DatasetError(
-                f"{table.origin.place(int(missing[0]))}, column {column!r}: the cell is blank, but the contact "
-                f"{contact.name!r} has no curve that could stand in for it; fill in the measured angle."
-            )
+        why = f"the cell is blank, but the contact {contact.name!r} has no curve that could stand in for it; fill in the "
+        Faults([_in_row(table, i, column, why + "measured angle.") for i in map(int, missing)]).refuse()
         return
     route = description.route
     assert route is not None and angles is not None  # the description guarantees both
     outside = np.isnan(own) & ((table.route < route.range[0]) | (table.route > route.range[1]))
-    for i in np.flatnonzero(outside):
-        at = np.flatnonzero(angles.route == table.route[i])
-        if not len(at):
-            raise DatasetError(
-                f"{table.origin.place(int(i))}, column {route.variable!r}: {table.route[i]:g} {route.unit} lies outside "
-                f"the range {route.range[0]:g} to {route.range[1]:g} {route.unit} where the angle curves hold, and the "
-                f"angle table has no row there; measure the wrap angles at that {route.variable.replace('_', ' ')}, "
-                "or write them into this row."
-            )
+    why = (
+        f"lies outside the range {route.range[0]:g} to {route.range[1]:g} {route.unit} where the angle curves hold, and the "
+        f"angle table has no row there; measure the wrap angles at that {route.variable.replace('_', ' ')}, or write them "
+        "into this row."
+    )
+    rows = [int(i) for i in np.flatnonzero(outside) if not np.any(angles.route == table.route[i])]
+    Faults([_in_row(table, i, route.variable, why, f"{table.route[i]:g} {route.unit} ") for i in rows]).refuse()
+
+
+def _in_row(table: Rows, i: int, column: str, what: str, value: str = "") -> DatasetError:
+    """What is wrong with a column in a row of a table, behind the value that stands there."""
+    error = DatasetError(f"{table.origin.place(i)}, column {column!r}: {value}{what}")
+    error.alike, error.row = (table.origin.files[table.origin.file[i]], column, what), int(table.origin.row[i])
+    return error

@@ -77,6 +77,12 @@ def test_the_template_becomes_a_data_set_by_filling_in(run, tmp_path):
     folder = tmp_path / "cable"
     rows = [f"{length},{angle}" for length, angle in ((430, 12), (460, 25), (490, 44), (520, 80))]
     (folder / "angles.csv").write_text((folder / "angles.csv").read_text() + "\n".join(rows) + "\n")
+    described = (folder / "cable.toml").read_text()
+    filled = {"NAME OF THE CABLE": "glove", "WHO MEASURED IT, WHEN, ON WHICH BENCH": "we"}
+    numbers = {"SHORTEST": 430, "LONGEST": 520, "WRAP ANGLE": 45}
+    for left, right in (*((f'"{k}"', f'"{v}"') for k, v in filled.items()), *((f'"{k}"', str(v)) for k, v in numbers.items())):
+        described = described.replace(left, right)
+    (folder / "cable.toml").write_text(described)
     forces = [
         f"{length},{run_},pull,{50 + i},{40 + i}" for length, run_ in ((440, 1), (480, 2), (520, 3)) for i in range(3)
     ]

@@ -100,10 +100,13 @@ DESCRIPTIONS = [
 ]
 
 
+EVERYWHERE = ("rang = [430", 'curv = "gaussian"')  # two contacts have them
+
+
 @pytest.mark.parametrize(("old", "new", "names"), DESCRIPTIONS)
 def test_a_spoiled_description_is_refused_by_key(dataset, refuse, old, new, names):
     spoil(dataset / "cable.toml", old, new)
-    said = refuse("check", dataset)
+    said = refuse("check", dataset, faults=2 if new in EVERYWHERE else 1)
     for name in names:
         assert name in said, said
 

@@ -42,7 +42,8 @@ def read_all(tmp_path, source, seeds):
         except bf.BowdenfitError as error:
             refused += 1
             said = str(error)
-            is_sentence = error.exit_code == 2 and 10 < len(said) <= LONGEST and said.rstrip()[-1] in ".?)"
+            lines = said.splitlines()[1:] if error.faults and "\n" in said else said.splitlines()
+            is_sentence = error.exit_code == 2 and all(10 < len(one) <= LONGEST and one[-1] in ".?)" for one in lines)
             if not is_sentence:
                 raise AssertionError(f"{source.name}, seed {seed}, {name}: {said}") from None
         except Exception as error:

@@ -1,6 +1,7 @@
 """Wrap angles of the curved contacts against the route variable."""
 
 from dataclasses import dataclass
+from functools import partial
 from typing import Literal
 
 import numpy as np
@@ -84,7 +85,7 @@ def read_angles(source: Source) -> Found[AngleTable]:
     found = find_columns(table, wanted, source.columns)
     lengths = require(table, found, route.variable, f"{route.variable}_{route.unit}")
     columns = [require(table, found, name, f"{name}_deg") for name in contacts]
-    cells = [[_angle_or_limit(cell, c, detection_limit) for cell in c.cells] for c in columns]
+    cells = [c.each(partial(_angle_or_limit, c, detection_limit), (np.nan, np.nan)) for c in columns]
     pairs = np.array(cells, dtype=float).reshape(len(columns), len(table.rows), 2)
     return Found(
         AngleTable(rounded(lengths.numbers()), tuple(contacts), pairs[..., 0].T, pairs[..., 1].T, provenance_of(table)),
@@ -93,7 +94,7 @@ def read_angles(source: Source) -> Found[AngleTable]:
     )
 
 
-def _angle_or_limit(cell: Cell, column: Column, detection_limit: float | None) -> tuple[float, float]:
+def _angle_or_limit(column: Column, detection_limit: float | None, cell: Cell) -> tuple[float, float]:
     written = cell.limit()
     if written is None and not cell.blank:
         return read_angle(cell, column), np.nan

@@ -4,7 +4,7 @@ from collections.abc import Mapping
 
 import numpy as np
 
-from bowdenfit.errors import DatasetError
+from bowdenfit.errors import DatasetError, together
 from bowdenfit.files.columns import Column, Quantity, find_columns, require
 from bowdenfit.files.csv_table import RawTable, read_csv
 from bowdenfit.kinds.displacement.chosen import chosen
@@ -54,15 +54,18 @@ def read_displacement(source: Source) -> Found[DisplacementTable]:
             f"{table.file} has forces at both ends; name it under tables.forces, which tells friction without any spring, or "
             "leave one of the two columns out."
         )
-    force, displacement = _forces(force_column), np.array(x_column.numbers())
-    stroke = _strokes(found, len(force))
+    force, displacement = np.array(force_column.numbers()), np.array(x_column.numbers())
+    own, at = read_own_angles(table, found, contacts), read_route(table, found, route)
+    strokes = read_strokes(found, len(force), held="")
+    table.faults.refuse()
+    _check_tensions(force, force_column)
+    stroke = _check_moving(strokes, found)
     how = settings.rows or ("sliding" if stroke is not None else "in order")
     if how == "sliding" and stroke is None:
         raise DatasetError(
             f"{table.file} has no stroke column, so nobody knows which way the rope slides in a row; add one (pull or return), "
             'or write rows = "in order" for readings in the order in which they were taken.'
         )
-    own, at = read_own_angles(table, found, contacts), read_route(table, found, route)
     run, names = _runs(found.get("run"), at, own)
     motion = sliding(stroke, displacement, run) if how == "sliding" and stroke is not None else in_order(displacement, run)
     every, origin = np.ones(len(force), dtype=bool), provenance_of(table)
@@ -80,26 +83,23 @@ def _one_of(table: RawTable, found: Mapping[str, Column], name: str, unit: str) 
     return require(table, found, named[0] if named else name, f"{name}_{unit}")
 
 
-def _forces(column: Column) -> Vector:
-    """Forces, which are tensions; noise about no force may be a little below 0."""
-    values = np.array(column.numbers())
+def _check_tensions(values: Vector, column: Column) -> None:
+    """Forces are tensions; noise about no force may be a little below 0."""
     low = int(np.argmin(values))
     if values[low] < -_NEGATIVE * max(values.max(), 0.0):
         raise column.cells[low].refuse(
             f"{column.cells[low].shown} is negative, and a rope cannot be pushed; the usual causes are the sign convention of "
             "the load cell and its zero: write tension as positive, and take off what the cell shows of a slack rope."
         )
-    return values
 
 
-def _strokes(found: Mapping[str, Column], n: int) -> Labels | None:
+def _check_moving(strokes: Labels, found: Mapping[str, Column]) -> Labels | None:
+    """The strokes, of which none is held; None without a column."""
     if "stroke" not in found:
         return None
-    strokes = read_strokes(found, n, held="")
     if not strokes.all():
-        raise found["stroke"].cells[int(np.flatnonzero(strokes == 0)[0])].refuse(
-            "a held reading lies anywhere between pull and return; write pull or return, or leave the row out."
-        )
+        why = "a held reading lies anywhere between pull and return; write pull or return, or leave the row out."
+        raise together([found["stroke"].cells[i].refuse(why) for i in np.flatnonzero(strokes == 0)])
     return strokes
 
 

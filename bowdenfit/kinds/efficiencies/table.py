@@ -52,11 +52,12 @@ def read_efficiencies(source: Source) -> Found[EfficiencyTable]:
     names = (Quantity("efficiency", "ratio"), Quantity("efficiency_sd", "ratio"))
     found = find_columns(table, (*names, *shared_columns(route, contacts)), source.columns)
     column = require(table, found, "efficiency", "efficiency (0 to 1) or efficiency_percent")
-    spread = found.get("efficiency_sd")
-    pairs = zip(spread.cells, column.cells, strict=True) if spread else ()
-    sd = [0.0 if cell.blank else _efficiency_sd(cell, spread, beside, column) for cell, beside in pairs if spread]
-    sd = sd if spread else [0.0] * len(table.rows)
-    efficiency = [_efficiency(cell, column, error) for cell, error in zip(column.cells, sd, strict=True)]
+    sd, spread = [0.0] * len(table.rows), found.get("efficiency_sd")
+    if spread is not None:
+        beside = {cell.row: cell for cell in column.cells}
+        sd = spread.each(lambda cell: 0.0 if cell.blank else _efficiency_sd(cell, spread, beside[cell.row], column), 0.0)
+    errors = dict(zip((cell.row for cell in column.cells), sd, strict=True))
+    efficiency = column.each(lambda cell: _efficiency(cell, column, errors[cell.row]), np.nan)
     rows = EfficiencyTable(
         read_route(table, found, route),
         np.array(efficiency),

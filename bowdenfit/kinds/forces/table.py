@@ -2,11 +2,12 @@
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from functools import partial
 from pathlib import Path
 
 import numpy as np
 
-from bowdenfit.errors import DatasetError
+from bowdenfit.errors import DatasetError, Faults
 from bowdenfit.files.cells import Cell
 from bowdenfit.files.columns import Column, Quantity, find_columns, require, taken_in_pairs
 from bowdenfit.files.row_account import RowAccount
@@ -74,7 +75,9 @@ def read_forces(source: Source) -> Found[ForceTable]:
         DatasetError: See `read_table` and `find_columns`; or a force is not positive, or a stroke is unknown.
     """
     paths, contacts = source.files, source.description.angle_columns
-    parts = [_read_force_file(path, source) for path in paths]
+    faults = Faults()
+    parts = [part for part in faults.each(lambda path: _read_force_file(path, source), paths, None) if part is not None]
+    faults.refuse()
     names: list[str] = []
     runs = []
     for path, (part, *_) in zip(paths, parts, strict=True):
@@ -131,15 +134,19 @@ def _read_force_file(path: Path, source: Source) -> tuple[ForceTable, list[str],
     others = (Quantity("run", "text"), Quantity("stroke", "text"), Quantity("velocity", "speed"), GROUP)
     found = find_columns(table, (*forces, *others, *shared_columns(route, contacts)), source.columns, _UNUSED)
     columns = [require(table, found, q.name, f"{q.name}_N") for q in forces]
-    input_force, output_force = (np.array([_force(cell, c) for cell in c.cells]) for c in columns)
+    input_force, output_force = (np.array(c.each(partial(_force, c), np.nan)) for c in columns)
     own = read_own_angles(table, found, contacts)
     route_values = read_route(table, found, route)
     groups = source.settings.groups == "called by numbers", source.description.by_group
-    group, remarks = read_groups(found, table.file, *groups)
+    group, remarks = tuple[str, ...](), list[str]()
+    with table.faults.noted():
+        group, remarks = read_groups(found, table.file, *groups)
     remarks += taken_in_pairs(table, found, source.columns)
     if "stroke" not in found:
         remarks.append(f"{table.file} has no stroke column: every row is taken as pulling (rope sliding to the motor).")
     strokes, origin = read_strokes(found, len(table.rows)), provenance_of(table)
+    velocity, unit = _velocities(found.get("velocity"), len(table.rows))
+    table.faults.refuse()
     run, run_names, said = _mounted(found.get("run"), source, route_values, own, origin, group)
     remarks += said
     if held := int(np.sum(strokes == 0)):
@@ -147,7 +154,6 @@ def _read_force_file(path: Path, source: Source) -> tuple[ForceTable, list[str],
             f"{table.file}: {held} readings are held. A held reading says only that friction is at least as large as it takes "
             "to hold it; a coefficient that rests on such readings alone has a lower bound, and above it nothing but its prior."
         )
-    velocity, unit = _velocities(found.get("velocity"), len(table.rows))
     parts = (route_values, input_force, output_force, run, run_names, strokes, own, origin, velocity, unit, group)
     return ForceTable(*parts), remarks, table.account
 
@@ -156,8 +162,8 @@ def _velocities(column: Column | None, n_rows: int) -> tuple[Vector, str]:
     """Velocities, NaN where blank or without a column, and their internal unit."""
     if column is None:
         return np.full(n_rows, np.nan), ""
-    values = np.array([np.nan if cell.blank else column.value(cell) for cell in column.cells])
-    return values, INTERNAL_UNITS[speed_dimension(column.unit or "")]
+    values = np.array(column.each(lambda cell: np.nan if cell.blank else column.value(cell), np.nan))
+    return values, INTERNAL_UNITS[speed_dimension(column.unit or "mm/s")]
 
 
 def _mounted(
@@ -192,7 +198,7 @@ def _places(route: Vector, own: OwnAngles, unit: str) -> list[str]:
     return [", ".join(f"{value:g} {unit}".rstrip() for value, unit in row) or "all" for row in known]
 
 
-def _force(cell: Cell, column: Column) -> float:
+def _force(column: Column, cell: Cell) -> float:
     value = column.value(cell)
     if value <= 0:
         raise cell.refuse(

@@ -6,7 +6,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from bowdenfit.description.pulleys import Pulleys
-from bowdenfit.errors import DatasetError
+from bowdenfit.errors import DatasetError, together
 from bowdenfit.files.columns import Column, Quantity, find_columns, require
 from bowdenfit.files.csv_table import RawTable
 from bowdenfit.files.matching import meanings
@@ -68,24 +68,25 @@ def read_loop(source: Source) -> Found[LoopTable]:
     others = (Quantity("stroke", "text"), Quantity("preload", "force"))
     found = find_columns(table, (*ends, *others, *shared_columns(route, contacts)), source.columns, _UNUSED)
     check_spelling(table, found, others)
-    input_force, output_force = (_end(table, found, end, pulleys) for end in ("input", "output"))
+    nothing = np.full(len(table.rows), np.nan)
+    ends_read = table.faults.each(lambda end: _end(table, found, end, pulleys), ("input", "output"), nothing)
+    input_force, output_force = ends_read
     stroke = read_strokes(found, len(table.rows), held="")
+    preload = nothing
+    if (column := found.get("preload")) is not None:
+        preload = np.array(column.each(lambda c: np.nan if c.blank else read_tension(c, column, "a preload"), np.nan))
+    at, own = read_route(table, found, route), read_own_angles(table, found, contacts)
+    table.faults.refuse()
     if not stroke.all():
-        held = found["stroke"].cells[int(np.flatnonzero(stroke == 0)[0])]
-        raise held.refuse(
-            "a loop that is held still tells nothing but bounds; write pull (moving forward) or return, or leave the row out."
-        )
-    column = found.get("preload")
-    preload = np.full(len(table.rows), np.nan)
-    if column is not None:
-        preload = np.array([np.nan if c.blank else read_tension(c, column, "a preload") for c in column.cells])
+        why = "a loop that is held still tells nothing but bounds; write pull (moving forward) or return, or leave the row out."
+        raise together([found["stroke"].cells[i].refuse(why) for i in np.flatnonzero(stroke == 0)])
     made = LoopTable(
-        read_route(table, found, route),
+        at,
         input_force,
         output_force,
         stroke,
         preload,
-        read_own_angles(table, found, contacts),
+        own,
         provenance_of(table),
     )
     _check_loss(table, made)

@@ -54,8 +54,8 @@ def read_preload(source: Source) -> Found[PreloadTable]:
     angles = require(table, found, "wrap_angle", "wrap_angle_deg")
     preloads = require(table, found, "preload", "preload_N")
     rows = PreloadTable(
-        np.array([read_angle(cell, angles) for cell in angles.cells]),
-        np.array([read_tension(cell, preloads, "a preload") for cell in preloads.cells]),
+        np.array(angles.each(lambda cell: read_angle(cell, angles), np.nan)),
+        np.array(preloads.each(lambda cell: read_tension(cell, preloads, "a preload"), np.nan)),
         provenance_of(table),
     )
     return Found(rows, {path.name: path}, accounts=(table.account,))

@@ -8,7 +8,7 @@ from pathlib import Path
 import numpy as np
 
 from bowdenfit.description import Description, Preparation, QuantityValue, RecordingFile
-from bowdenfit.errors import DatasetError, DescriptionError, nearest
+from bowdenfit.errors import DatasetError, DescriptionError, Faults, nearest
 from bowdenfit.files import read_channels
 from bowdenfit.files.row_account import RowAccount
 from bowdenfit.kinds.kind import Found, Source
@@ -38,7 +38,10 @@ def read_recordings(source: Source) -> Found[Recordings]:
     description, channels = source.description, source.channels
     entries = _entries(source)
     _check_names(entries)
-    files = [_to_read(description, path, entry, channels) for path, entry in entries]
+    faults = Faults()
+    read = faults.each(lambda each: _to_read(description, *each, channels), entries, None)
+    faults.refuse()
+    files = [file for file in read if file is not None]
     units = {f.velocity_unit: f.raw.file for f in files if f.velocity_unit}
     if len(units) > 1:
         raise DatasetError(

@@ -6,6 +6,7 @@ from itertools import product
 
 import numpy as np
 
+from bowdenfit.files.cells import Cell
 from bowdenfit.files.columns import Column, Quantity, find_columns, require
 from bowdenfit.files.csv_table import RawTable
 from bowdenfit.files.tables import read_table
@@ -69,10 +70,11 @@ def read_stretch(source: Source) -> Found[StretchTable]:
         require(table, found, name, f"{name}_{unit}")
         for name, unit in (("load", "N"), ("wrap_angle", "deg"), ("stretch", "mm"))
     )
-    load = np.array([read_tension(cell, loads, "a load") for cell in loads.cells])
-    wrap_angle = np.array([read_angle(cell, angles) for cell in angles.cells])
+    load = np.array(loads.each(lambda cell: read_tension(cell, loads, "a load"), np.nan))
+    wrap_angle = np.array(angles.each(lambda cell: read_angle(cell, angles), np.nan))
     stretch = stretches.numbers()
     unloading = _branches(found.get("branch"), len(load))
+    table.faults.refuse()
     cycle, names = _cycles(found.get("cycle"), wrap_angle)
     peak = np.array([load[cycle == c].max() for c in cycle])
     made = StretchTable(load, wrap_angle, np.asarray(stretch), unloading, peak, cycle, names, provenance_of(table))
@@ -104,14 +106,15 @@ def _branch_remarks(table: RawTable, made: StretchTable, stated: bool) -> list[s
 def _branches(column: Column | None, n_rows: int) -> Flags:
     if column is None:
         return np.zeros(n_rows, dtype=bool)
-    branches = []
-    for cell in column.cells:
-        text = cell.text.strip().lower()
-        if text not in _BRANCHES:
-            seen = "the cell is blank" if cell.blank else f"{cell.shown} is no branch"
-            raise cell.refuse(f"{seen}; write load (while the load grows) or unload (while it falls).")
-        branches.append(_BRANCHES[text])
-    return np.array(branches, dtype=bool)
+    return np.array(column.each(_branch, False), dtype=bool)
+
+
+def _branch(cell: Cell) -> bool:
+    text = cell.text.strip().lower()
+    if text not in _BRANCHES:
+        seen = "the cell is blank" if cell.blank else f"{cell.shown} is no branch"
+        raise cell.refuse(f"{seen}; write load (while the load grows) or unload (while it falls).")
+    return _BRANCHES[text]
 
 
 def _cycles(column: Column | None, wrap_angle: Vector) -> tuple[Labels, tuple[str, ...]]:

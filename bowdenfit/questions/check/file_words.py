@@ -40,9 +40,9 @@ def table_text(
     lines = [filled(title), "", _columns(raw, columns_of_kind(found.kind), named)]
     if data is not None:
         lines += ["", *first_and_last(data)]
-    lines += ["", *account_words(raw.account)]
+    lines += ["", *account_words(raw.lines)]
     if data is not None:
-        lines += [filled(f"Note: {remark}") for remark in data.measurements.remarks if remark not in raw.account.remarks]
+        lines += [filled(f"Note: {remark}") for remark in data.measurements.remarks if remark not in raw.lines.remarks]
     if why_not:
         lines += ["", filled(f"As it stands it cannot be fitted: {why_not}")]
     return "\n".join([*lines, "", *command_words(commands)]) + "\n"

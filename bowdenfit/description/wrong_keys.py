@@ -1,0 +1,123 @@
+"""What is wrong with the keys of a description, each in a sentence, and no fault twice."""
+
+from collections.abc import Mapping, Sequence
+from difflib import get_close_matches
+from typing import Any
+
+from pydantic import BaseModel, ValidationError
+
+from bowdenfit.description import SCHEMA, QuantityValue
+from bowdenfit.errors import BowdenfitError, DescriptionError, nearest, together
+from bowdenfit.words import shown
+
+_INIT = "`bowdenfit init` writes a template that has it"
+_ALIKE = 0.5  # likeness from which an unknown key is taken for a misspelled one, as `nearest` has it
+
+
+def wrong_keys(
+    error: ValidationError, raw: Mapping[str, Any], model: type[BaseModel], file: str, remedy: str = _INIT
+) -> BowdenfitError:
+    """All that is wrong with the keys of a file.
+
+    Args:
+        error: What the model says.
+        raw: The plain data.
+        model: Of the file.
+        file: Its name.
+        remedy: What to do about a key that is missing.
+    """
+    found: list[BowdenfitError] = []
+    for cause in _causes(error, raw, model):
+        for message in cause["msg"].removeprefix("Value error, ").splitlines():
+            fault = DescriptionError(_sentence({**cause, "msg": message}, model, file, remedy))
+            fault.place = tuple(cause["loc"])
+            found.append(fault)
+    return together(found)
+
+
+def _causes(error: ValidationError, raw: Mapping[str, Any], model: type[BaseModel]) -> list[dict[str, Any]]:
+    """The errors without what others bring about: what is misspelled is not missing too, and a value has one fault."""
+    errors: list[dict[str, Any]] = [dict(each) for each in error.errors()]
+    meant = set()
+    for each in errors:
+        *parents, name = each["loc"] or ("",)
+        if each["type"] == "extra_forbidden":
+            near = get_close_matches(str(name), _siblings(model, [*map(str, parents)]), n=1, cutoff=_ALIKE)
+            meant |= {(*parents, key) for key in near}
+    kept: dict[Any, dict[str, Any]] = {}
+    for each in errors:
+        written = _written(each["loc"], raw)
+        lacking = each["type"] == "missing" and len(each["loc"]) == len(written) + 1
+        if not (lacking and tuple(each["loc"]) in meant):
+            kept.setdefault(tuple(each["loc"]) if lacking else written, each)
+    return [each for place, each in kept.items() if not any(place == other[: len(place)] for other in kept if place != other)]
+
+
+def _written(place: Sequence[str | int], raw: Any) -> tuple[str | int, ...]:
+    """As many of the keys that lead to an error as stand in the file; behind them are alternatives that a value may have."""
+    keys: list[str | int] = []
+    for key in place:
+        inside = isinstance(key, int) and key < len(raw) if isinstance(raw, list) else isinstance(raw, dict) and key in raw
+        if not inside:
+            break
+        keys.append(key)
+        raw = raw[key]
+    return tuple(keys)
+
+
+def _sentence(error: Mapping[str, Any], model: type[BaseModel], file: str, remedy: str) -> str:
+    """What is wrong with one key."""
+    where = [str(part) for part in error["loc"]]
+    place = f"{file}, {'.'.join(where)}" if where else file
+    if error["type"] == "extra_forbidden":
+        return f"{file}: unknown key {'.'.join(where)!r}{nearest(where[-1], _siblings(model, where[:-1]))}"
+    if error["type"] == "missing" and where[-1] == "unit" and isinstance(error["input"], dict):
+        return f"{place}: the unit is missing; write one, such as {_with_unit(error['input'].get('value'), where[:-1])}."
+    if error["type"] == "missing":
+        return f"{file}: the key {'.'.join(where)!r} is missing; {remedy}."
+    if error["type"] == "model_type":
+        return f"{place}: {_written_as(error, where)}"
+    message = error["msg"]
+    if where == ["schema"]:
+        message = f"schema {error['input']} is newer than this program, which reads up to {SCHEMA}; update bowdenfit"
+    found = f" (found {shown(error['input'])})" if not isinstance(error["input"], dict | list) and where else ""
+    sentence = f"{place}: {message[:1].lower() + message[1:]}{found}"
+    return sentence if sentence.endswith((".", "?")) else f"{sentence}."
+
+
+def _written_as(error: Mapping[str, Any], where: Sequence[str]) -> str:
+    """How to write what must be a table of keys."""
+    found = error["input"]
+    if error.get("ctx", {}).get("class_name") == QuantityValue.__name__:
+        return f"a number needs its unit (found {shown(found)}); write it as {_with_unit(found, where)}."
+    how = f"under [{where[0]}]" if len(where) == 1 else "between braces, { key = ... }"
+    return f"this holds keys of its own (found {shown(found)}); write them {how}."
+
+
+def _with_unit(value: Any, where: Sequence[str]) -> str:
+    """A number with a unit that fits its place, as TOML."""
+    number = value if isinstance(value, int | float) and not isinstance(value, bool) else 20
+    key = ".".join(where)
+    unit = "deg" if "angle" in key else "N" if "force" in key or key == "preload.value" else "mm"
+    return f'{{ value = {number}, unit = "{unit}" }}'
+
+
+def _siblings(model: Any, path: Sequence[str]) -> list[str]:
+    """Keys that are known at a place in the description."""
+    for part in path:
+        if isinstance(model, type) and issubclass(model, BaseModel) and part in model.model_fields:
+            model = _models_in(model.model_fields[part].annotation)
+    if not (isinstance(model, type) and issubclass(model, BaseModel)):
+        return []
+    return [field.alias or name for name, field in model.model_fields.items()]
+
+
+def _models_in(annotation: Any) -> Any:
+    """The first model inside an annotation such as `tuple[Contact, ...]` or `Route | None`."""
+    if isinstance(annotation, type) and issubclass(annotation, BaseModel):
+        return annotation
+    for argument in getattr(annotation, "__args__", ()):
+        found = _models_in(argument)
+        if found is not None:
+            return found
+    return None

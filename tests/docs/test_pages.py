@@ -1,0 +1,92 @@
+"""The documentation builds without a warning and without a network, its notebooks run, and its links lead somewhere."""
+
+import json
+import os
+import subprocess
+import sys
+from html.parser import HTMLParser
+from pathlib import Path
+from urllib.parse import unquote
+
+import pytest
+from conftest import ROOT
+
+MOST_TEXT = 2000  # characters of one output
+
+
+@pytest.fixture(scope="module")
+def built(tmp_path_factory) -> Path:
+    """The documentation as a reader has it."""
+    place = tmp_path_factory.mktemp("documentation") / "html"
+    nowhere = dict.fromkeys(("http_proxy", "https_proxy", "HTTP_PROXY", "HTTPS_PROXY"), "http://127.0.0.1:9")
+    variables = {**os.environ, **nowhere, "PYTHONPATH": str(ROOT), "JUPYTER_PLATFORM_DIRS": "1"}
+    variables.setdefault("JAX_COMPILATION_CACHE_DIR", str(place.parent / "compiled"))  # two notebooks make the same fit
+    variables.setdefault("JAX_PERSISTENT_CACHE_MIN_COMPILE_TIME_SECS", "0.1")
+    command = [sys.executable, "-m", "sphinx", "-W", "--keep-going", "-q", "-b", "html", ROOT / "docs", place]
+    done = subprocess.run(command, env=variables, capture_output=True, text=True, check=False)
+    assert done.returncode == 0, done.stderr
+    return place
+
+
+class Page(HTMLParser):
+    """What a page of the documentation refers to, and what can be referred to in it."""
+
+    def __init__(self, path: Path):
+        super().__init__()
+        self.links: list[str] = []
+        self.parts: list[str] = []
+        self.names: set[str] = set()
+        self.formulas = 0
+        self.feed(path.read_text(encoding="utf-8"))
+
+    def handle_starttag(self, tag, attrs):
+        """Note what matters of a tag."""
+        said = dict(attrs)
+        self.names |= {name for name in (said.get("id"), said.get("name")) if name}
+        if tag == "a" and said.get("href"):
+            self.links.append(said["href"])
+        elif tag != "a":
+            self.parts += [said[name] for name in ("src", "href") if said.get(name)]
+        self.formulas += tag == "math"
+
+
+@pytest.fixture(scope="module")
+def pages(built) -> dict[Path, Page]:
+    """Every page by its file."""
+    return {path: Page(path) for path in built.rglob("*.html")}
+
+
+def test_every_link_inside_the_documentation_leads_to_a_page_and_to_a_place_on_it(pages):
+    for path, page in pages.items():
+        for link in page.links:
+            target, _, place = unquote(link).partition("#")
+            if "://" in link:
+                continue
+            file = (path.parent / target).resolve() if target else path
+            assert file.exists(), f"{path.name}: {link}"
+            assert not place or file not in pages or place in pages[file].names, f"{path.name}: {link}"
+
+
+def test_no_page_needs_a_network(pages):
+    for path, page in pages.items():
+        for part in page.parts:
+            assert "//" not in part, f"{path.name} takes {part} from a network"
+            assert part.startswith(("data:", "#")) or (path.parent / part.partition("?")[0]).exists(), f"{path.name}: {part}"
+
+
+def test_formulas_are_shown_by_the_browser_itself(pages):
+    theory = next(page for path, page in pages.items() if path.name == "theory.html")
+    assert theory.formulas > 50
+
+
+def test_notebooks_say_something_in_every_output_and_never_too_much(built):
+    notebooks = sorted((built.parent / "jupyter_execute").rglob("*.ipynb"))
+    assert [path.stem for path in notebooks] == ["first-fit", "recordings-or-loops", "what-to-measure-next"]
+    for path in notebooks:
+        cells = json.loads(path.read_text(encoding="utf-8"))["cells"]
+        outputs = [output for cell in cells for output in cell.get("outputs", ())]
+        assert len(outputs) > 3, path.stem
+        for output in outputs:
+            assert output["output_type"] != "error", output
+            text = "".join(output.get("text", ()) or output.get("data", {}).get("text/plain", ()))
+            assert 0 < len(text) <= MOST_TEXT, (path.stem, text)

@@ -10,6 +10,7 @@ from bowdenfit.questions.bends.overview import elastic_overview
 from bowdenfit.questions.check.answer import checks_of
 from bowdenfit.questions.check.table_checks import CheckedReading
 from bowdenfit.questions.groups.answer import groups_of
+from bowdenfit.questions.loss.answer import loss_by_contact
 from bowdenfit.questions.recorded.lost_force import lost_force
 from bowdenfit.questions.recorded.rate import rate_effect
 from bowdenfit.results.record import Record
@@ -51,8 +52,8 @@ def answer(fit: Record) -> list[str]:
     """The answer in sentences: the first says what to do, or what the coefficients are."""
     if fit.sampled is not None and fit.dataset.description.route is not None:
         best = fit.optimal_length()
-        return [best.headline, *best.sentences(), *_of_options(fit)]
-    return [_coefficients(fit), *_preload(fit), *_of_options(fit)]
+        return [best.headline, *best.sentences(), *_loss(fit), *_of_options(fit)]
+    return [_coefficients(fit), *_preload(fit), *_loss(fit), *_of_options(fit)]
 
 
 def checked_readings(fit: Record) -> tuple[CheckedReading, ...]:
@@ -125,6 +126,12 @@ def _preload(fit: Record) -> list[str]:
     """Which preload to set, of a cable that has one."""
     found = elastic_overview(fit)
     return [found.preload_window.advice] if found is not None and found.preload_window is not None else []
+
+
+def _loss(fit: Record) -> list[str]:
+    """Which contact takes how much of the loss, of a cable that has several."""
+    found = loss_by_contact(fit)
+    return [found.sentence()] if found is not None else []
 
 
 def _of_options(fit: Record) -> list[str]:

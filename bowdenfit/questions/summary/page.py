@@ -15,6 +15,7 @@ from bowdenfit.questions.check.answer import checks_of
 from bowdenfit.questions.groups.answer import groups_of
 from bowdenfit.questions.identify.confounding import confounded_pairs
 from bowdenfit.questions.identify.contradiction import agreement_page
+from bowdenfit.questions.loss.answer import loss_by_contact
 from bowdenfit.questions.recorded.lost_force import lost_force
 from bowdenfit.questions.recorded.rate import rate_effect
 from bowdenfit.questions.summary.verdict import verdict
@@ -61,6 +62,8 @@ def summarize(fit: Record) -> dict[str, Any]:
         page["groups"] = groups
     if checks := checks_of(fit):
         page["checks"] = checks
+    if (loss := loss_by_contact(fit)) is not None:
+        page["loss"] = loss
     if (lost := lost_force(fit)) is not None:
         page["drag"] = lost
     effect = rate_effect(fit)

@@ -14,6 +14,7 @@ from bowdenfit.questions.groups.words import groups_text
 from bowdenfit.questions.identify.answer import say_what_is_determined
 from bowdenfit.questions.identify.confounding import confounded_pairs
 from bowdenfit.questions.identify.judgment import identifiability
+from bowdenfit.questions.loss.words import loss_text
 from bowdenfit.questions.recorded.lost_force import lost_force
 from bowdenfit.questions.recorded.rate import SHOWN_SPEED, rate_effect
 from bowdenfit.questions.summary.page import summarize
@@ -56,6 +57,7 @@ def full_text(fit: Record) -> str:
         checks_text(checks_of(fit)),
         _friction_model(fit),
         elastic_text(fit),
+        loss_text(fit),
         _answer(fit),
     ]
     blocks.append(_origin(page))

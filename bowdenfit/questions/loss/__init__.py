@@ -1,0 +1,1 @@
+"""Where a cable loses its force: the share of each contact."""

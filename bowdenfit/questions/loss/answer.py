@@ -1,0 +1,108 @@
+"""Which contact takes how much of what a cable loses: where to work on it."""
+
+import textwrap
+from dataclasses import dataclass
+from typing import ClassVar
+
+import jax
+import jax.numpy as jnp
+import numpy as np
+from jax import Array
+from jaxtyping import Float
+
+from bowdenfit.inference.interval import Interval
+from bowdenfit.questions.recorded.rate import place_of
+from bowdenfit.results.record import OPTIMAL_LENGTH, Record, once
+from bowdenfit.words import decimals, few, percent
+
+_LONGEST_NAME = 40  # characters of a contact's name in a sentence
+_FEW = 2  # contacts after the first that a sentence names
+
+
+@dataclass(frozen=True)
+class ContactShare:
+    """One contact.
+
+    Args:
+        contact: Its name.
+        share: Its part of the friction exponent [1].
+        probability_largest: Probability that no other contact takes more.
+    """
+
+    contact: str
+    share: Interval
+    probability_largest: float
+
+    @property
+    def name(self) -> str:
+        """The contact as a sentence names it."""
+        return textwrap.shorten(self.contact, _LONGEST_NAME, placeholder="...")
+
+
+@dataclass(frozen=True)
+class Loss:
+    """Shares of the contacts, the largest first.
+
+    Args:
+        place: Where on the route, in words; empty without a route.
+        contacts: Each contact's share.
+    """
+
+    place: str
+    contacts: tuple[ContactShare, ...]
+
+    JSON: ClassVar = (("at", "place"), "contacts", ("in_words", "sentence"))
+
+    def sentence(self) -> str:
+        """'72 % of the loss sits at the bracket edge (90 % interval 62 to 79 %), 15 % at the squeezed sheath, ...'"""
+        first, *others = self.contacts
+        low, high = (percent(of, 0) for of in (first.share.q05, first.share.q95))
+        rest = few([f"{percent(c.share.median, 0)} at {c.name!r}" for c in others], _FEW)
+        where = f"{self.place[0].upper()}{self.place[1:]}, " if self.place else ""
+        return (
+            f"{where}{percent(first.share.median, 0)} of the loss sits at {first.name!r} "
+            f"(90 % interval {low.removesuffix(' %')} to {high}), {rest}."
+        )
+
+
+@once
+def loss_by_contact(fit: Record) -> Loss | None:
+    r"""Share of each contact in the friction exponent, at the best length if there is one; None without draws or contacts.
+
+    .. math:: \frac{\mu_k \theta_k}{\sum_j \mu_j \theta_j}
+
+    The exponents of contacts in series add up (on-body paper, equation 7), so this is their share of the logarithm of the loss.
+    Contacts whose angle was measured in each run count at their nominal angle.
+
+    Args:
+        fit: The fit.
+    """
+    laws, route = fit.model.cable.laws, fit.dataset.description.route
+    if fit.sampled is None or len(laws) < 2:
+        return None
+    at, place = place_of(fit)
+    if route is not None and (lengths := fit.posterior.optimum.get(OPTIMAL_LENGTH)) is not None:
+        best = Interval.of(lengths)
+        at, place = best.median, f"at {best.median:.{decimals(best.q95 - best.q05)}f} {route.unit}"
+    shares = _shares(fit, at)
+    largest = np.argmax(shares, axis=1)
+    contacts = [
+        ContactShare(law.contact, Interval.of(shares[:, k]), float(np.mean(largest == k))) for k, law in enumerate(laws)
+    ]
+    return Loss(place, tuple(sorted(contacts, key=lambda c: -c.share.median)))
+
+
+def _shares(fit: Record, at: float) -> np.ndarray:
+    """Share of each contact (columns) in each draw (rows) at a value of the route variable."""
+    cable, z = fit.model.cable, fit.posterior.flat_z
+    drawn = {p.name: fit.posterior.values[p.name].ravel() / p.shown_scale for p in fit.model.space.free}
+    fixed = {p.name: np.full(len(z), p.fixed) for p in fit.model.space.fixed}
+
+    def exponents(values: dict[str, Array], route: Float[Array, " draws"]) -> Array:
+        angles = cable.wrap_angles(values, route)
+        return jnp.stack([law.exponent(values, angles[:, k]) for k, law in enumerate(cable.laws)], axis=-1)
+
+    with jax.enable_x64(True):
+        found = np.asarray(jax.jit(exponents)(drawn | fixed, np.full(len(z), at)))
+    total = np.sum(found, axis=1, keepdims=True)
+    return np.where(total > 0, found / np.where(total > 0, total, 1.0), 1 / len(cable.laws))

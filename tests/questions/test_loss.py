@@ -1,0 +1,54 @@
+"""Which contact takes how much of the loss."""
+
+import numpy as np
+import pytest
+
+import bowdenfit as bf
+from bowdenfit.questions.loss.answer import loss_by_contact
+from bowdenfit.questions.loss.words import loss_text
+
+QUICK = ("sampler.n_walkers=64", "sampler.target_ess=100", "sampler.target_r_hat=1.1", "sampler.max_steps=1000")
+
+
+@pytest.fixture(scope="module")
+def fit(on_body):
+    """A quick fit of the on-body data."""
+    return bf.fit(on_body, seed=5, settings=QUICK)
+
+
+def test_shares_are_coefficient_times_angle_over_their_sum_draw_by_draw(fit):
+    found = loss_by_contact(fit)
+    at = float(np.median(fit.posterior.optimum["optimal_length"]))
+    grid, curves = fit.curves()
+
+    def angle(column):
+        return np.deg2rad(np.array([np.interp(at, grid, row) for row in curves[column]]))
+
+    drawn = {name: fit.posterior.values[name].ravel() for name in ("mu1", "mu2", "mu3")}
+    lost = {
+        "free sheath": drawn["mu1"] * angle("free_sheath_angle"),
+        "squeezed sheath": drawn["mu2"] * angle("squeezed_sheath_angle"),
+        "bracket edge": drawn["mu3"] * np.pi / 4,
+    }
+    total = sum(lost.values())
+    for contact in found.contacts:
+        share = lost[contact.contact] / total
+        assert contact.share.median == pytest.approx(np.median(share), abs=1e-4)  # the grid is interpolated here
+        assert contact.share.q05 == pytest.approx(np.quantile(share, 0.05), abs=1e-4)
+    assert [c.contact for c in found.contacts] == ["bracket edge", "squeezed sheath", "free sheath"]
+    assert sum(c.share.mean for c in found.contacts) == pytest.approx(1)
+    assert sum(c.probability_largest for c in found.contacts) == pytest.approx(1)
+
+
+def test_the_answer_says_where_to_work_on_the_cable(fit):
+    assert "of the loss sits at 'bracket edge'" in str(fit.summary()["loss"]["in_words"])
+    assert loss_text(fit).startswith("Where the force is lost, at 4")
+
+
+def test_one_contact_has_no_shares(tmp_path):
+    table = tmp_path / "bench.csv"
+    table.write_text("wrap_angle_deg,input_force_N,output_force_N\n90,50,43\n180,50,36.5\n270,50,31.1\n90,80,68.7\n")
+    fit = bf.fit(table, seed=1, settings=QUICK)
+    assert loss_by_contact(fit) is None
+    assert loss_text(fit) == ""
+    assert "loss" not in fit.summary()

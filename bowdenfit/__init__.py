@@ -26,6 +26,7 @@ if TYPE_CHECKING:
     from bowdenfit.questions.identify.verb import identify
     from bowdenfit.questions.next.verb import next_measurement
     from bowdenfit.questions.predict.verb import predict
+    from bowdenfit.questions.report.verb import report
     from bowdenfit.questions.simulate.verb import simulate
     from bowdenfit.questions.summary.verb import plot
     from bowdenfit.reading import read
@@ -43,6 +44,7 @@ _WHERE = {
     "plot": "bowdenfit.questions.summary.verb",
     "predict": "bowdenfit.questions.predict.verb",
     "read": "bowdenfit.reading",
+    "report": "bowdenfit.questions.report.verb",
     "simulate": "bowdenfit.questions.simulate.verb",
     **dict.fromkeys(
         ("BowdenfitError", "ConvergenceError", "DatasetError", "DescriptionError", "StoreError", "UsageError"),
@@ -68,6 +70,7 @@ __all__ = [
     "plot",
     "predict",
     "read",
+    "report",
     "simulate",
 ]
 

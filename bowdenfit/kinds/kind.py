@@ -118,6 +118,7 @@ class Kind(Generic[AnyTable]):
         warnings: What a table will not be able to tell, as far as counting shows.
         check: Refuses a table that does not fit the description or the other tables.
         count: How many readings were fitted, in words; empty where its term counts them.
+        method: How its readings are described, in a sentence of a paper.
         implausible: Why no bench would hand in simulated readings in place of the measured ones, in a few words; empty if
             one might.
         page: Its table as the headings and rows of a file; None where it is written otherwise.
@@ -147,6 +148,7 @@ class Kind(Generic[AnyTable]):
     warnings: Callable[[AnyTable, Description, Measurements], list[str]] = lambda *_: []
     check: Callable[[AnyTable, Description, Measurements], None] = lambda *_: None
     count: Callable[[AnyTable], str] = lambda _: ""
+    method: str = ""
     implausible: Callable[[AnyTable, AnyTable], str] = lambda *_: ""
     page: Callable[[AnyTable, Description], Page] | None = None
     design: type[Design] = Design

@@ -19,10 +19,11 @@ except ImportError:  # not on Windows, where folders cannot be locked
 
 FIT, SUMMARY = "fit.json", "summary.json"
 SUMMARY_TEXT, DETAILS_TEXT = "summary.txt", "details.txt"  # one page, and everything
+REPORT = "report.html"
 POSTERIOR, CHAIN, FIGURES = "posterior.nc", "chain.checkpoint", "figures"
 ANSWERS, FIGURE_DATA = "answers.json", "figures.npz"
 REPLICATIONS = "replications.jsonl"  # of a calibration
-_WRITTEN = (FIT, ANSWERS, SUMMARY, SUMMARY_TEXT, DETAILS_TEXT, FIGURE_DATA, POSTERIOR, CHAIN)
+_WRITTEN = (FIT, ANSWERS, SUMMARY, SUMMARY_TEXT, DETAILS_TEXT, REPORT, FIGURE_DATA, POSTERIOR, CHAIN)
 
 
 @contextmanager

@@ -116,18 +116,20 @@ class OptimalLength:
         )
 
     def _table(self) -> list[str]:
-        return ["", table(self._heads, self._rows)] if self.choices else []
+        return ["", table(self.heads, self.rows)] if self.choices else []
 
     @property
-    def _heads(self) -> tuple[str, str, str]:
+    def heads(self) -> tuple[str, str, str]:
+        """Of the table of choices."""
         return f"{self.what.capitalize()} ({self.unit})", "probability of being best", "expected loss of efficiency"
 
     @property
-    def _rows(self) -> list[tuple[str, str, str]]:
+    def rows(self) -> list[tuple[str, str, str]]:
+        """A row for each choice, under `heads`."""
         return [
             (f"{c.length:g}", percent(c.probability_best), f"{100 * c.expected_regret:.2f} points") for c in self.choices
         ]
 
     def _repr_html_(self) -> str:
         text = "".join(f"<p>{escape(line)}</p>" for line in [self.headline, *self.sentences()])
-        return text + (html_table(self._heads, self._rows) if self.choices else "")
+        return text + (html_table(self.heads, self.rows) if self.choices else "")

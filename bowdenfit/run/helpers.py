@@ -23,6 +23,8 @@ DRAWING = (
     "matplotlib.backends.backend_agg",
     "matplotlib.backends.backend_svg",
     "bowdenfit.questions.figures",
+    "bowdenfit.pages.page",
+    "jinja2",
 )
 Answers = tuple["Future[Any]", ...]
 Connection: TypeAlias = "connection.Connection[Any, Any]"

@@ -30,15 +30,17 @@ def write_results(found: "Fit", folder: Path, figures: bool, helper: Assistant) 
         helper: Who draws them.
 
     Returns:
-        What is missing, in sentences; a fit whose figures cannot be drawn is kept all the same.
+        What is missing, in sentences; a fit whose figures or report fail is kept all the same.
     """
     from bowdenfit.plots.write import FORMATS
     from bowdenfit.questions.figures import AT_ONCE, draw_figure, figures_of, write_captions
     from bowdenfit.questions.figures import FIGURES as FIGURE_NAMES
     from bowdenfit.questions.kept import answers_of
+    from bowdenfit.questions.report.sections import report_page
+    from bowdenfit.questions.report.verb import write_report
     from bowdenfit.questions.summary.brief_words import summary_text
     from bowdenfit.questions.summary.words import full_text
-    from bowdenfit.results.folder import DETAILS_TEXT, FIGURES, SUMMARY_TEXT, write_text
+    from bowdenfit.results.folder import DETAILS_TEXT, FIGURES, REPORT, SUMMARY_TEXT, write_text
     from bowdenfit.results.store import save
 
     if found.sampled is None:
@@ -55,29 +57,45 @@ def write_results(found: "Fit", folder: Path, figures: bool, helper: Assistant) 
     save(found, found.summary(), folder, True, answers_of(found), data)
     write_text(folder / SUMMARY_TEXT, printable(summary_text(found)))
     write_text(folder / DETAILS_TEXT, printable(full_text(found)))
+    try:  # behind the figures, whose files it takes
+        drawn[REPORT] = helper.submit(write_report, report_page(found, data), folder / FIGURES, folder / REPORT)
+    except Exception as error:
+        failed[REPORT] = error
     for name, figure in drawn.items():
         try:
             figure.result()
         except Exception as error:
             failed[name] = error
     try:
-        write_captions({name: data[name] for name in data.keys() - failed}, folder / FIGURES, found.name)
+        if data:
+            write_captions({name: data[name] for name in data.keys() - failed}, folder / FIGURES, found.name)
     except Exception as error:
         failed["captions"] = error
-    return _without_figures(folder, failed)
+    return _what_is_missing(folder, failed)
 
 
-def _without_figures(folder: Path, failed: dict[str, Exception]) -> tuple[str, ...]:
-    """That some figures are missing, in a sentence."""
-    if not failed:
-        return ()
-    names, error = list(failed), next(iter(failed.values()))
-    why = " ".join(str(error).split()) or type(error).__name__
-    some = f"its figures {few(names)}" if len(names) > 1 else f"its figure {names[0]}"
-    return (
-        f"{folder} holds the whole fit, but {some} could not be drawn ({shorten(why, 200)}); draw them later with "
-        f"bowdenfit plot {folder}.",
-    )
+def _what_is_missing(folder: Path, failed: dict[str, Exception]) -> tuple[str, ...]:
+    """That some figures or the report are missing, in a sentence each."""
+    from bowdenfit.results.folder import REPORT
+
+    figures, sentences = [name for name in failed if name != REPORT], list[str]()
+    if figures:
+        some = f"its figures {few(figures)}" if len(figures) > 1 else f"its figure {figures[0]}"
+        why = _why(failed[figures[0]])
+        sentences.append(
+            f"{folder} holds the whole fit, but {some} could not be drawn ({why}); draw them later with "
+            f"bowdenfit plot {folder}."
+        )
+    if REPORT in failed:
+        sentences.append(
+            f"{folder} holds the whole fit, but its report could not be written ({_why(failed[REPORT])}); write it later "
+            f"with bowdenfit report {folder}."
+        )
+    return tuple(sentences)
+
+
+def _why(error: Exception) -> str:
+    return shorten(" ".join(str(error).split()) or type(error).__name__, 200)
 
 
 def with_sampler(data: Dataset, method: str | None) -> Dataset:

@@ -33,6 +33,7 @@ VERBS = (
     "next",
     "calibrate",
     "plot",
+    "report",
     "simulate",
     "completion",
 )
@@ -315,7 +316,7 @@ def test_a_whole_fit_in_a_process_of_its_own_and_an_interrupt(on_body, tmp_path)
     found = subprocess.run(resumed, cwd=ROOT, env=environment, capture_output=True, text=True, check=False, timeout=300)
     assert found.returncode == 0, found.stderr
     names = {p.name for p in (tmp_path / "fit").iterdir()}
-    known = {"fit.json", "summary.json", "summary.txt", "details.txt", "answers.json", "figures.npz"}
+    known = {"fit.json", "summary.json", "summary.txt", "details.txt", "report.html", "answers.json", "figures.npz"}
     assert names == known | {"posterior.nc", "chain.checkpoint", "figures"}
     assert len(list((tmp_path / "fit" / "figures").iterdir())) == 14
 

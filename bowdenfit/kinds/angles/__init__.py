@@ -25,6 +25,7 @@ ANGLES = Kind(
     quantities=lambda said, _: [("tables, angles, detection_limit", said.detection_limit, "angle")],
     describe=describe,
     warnings=warnings_of,
+    method="Wrap angles along the route followed curves, which were fitted with everything else.",
     implausible=implausible,
     page=page,
     design=AngleDesign,

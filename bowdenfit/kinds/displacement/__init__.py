@@ -32,6 +32,8 @@ DISPLACEMENT = Kind(
     check=check_rows,
     describe=describe,
     warnings=warnings_of,
+    method="The force at the motor followed its displacement as the tension of a rubbing rope does, through every turn of the "
+    "motor.",
     implausible=implausible,
     page=page,
     design=DisplacementDesign,

@@ -22,6 +22,7 @@ EFFICIENCIES = Kind(
     check=check_rows,
     describe=describe,
     alone=lambda table: f"a table of {counted(len(table.efficiency), 'efficiency', 'efficiencies')}",
+    method="The logarithm of a measured efficiency was that of the model, give or take the scatter between mountings.",
     implausible=implausible,
     page=page,
     design=EfficiencyDesign,

@@ -41,6 +41,7 @@ FORCES = Kind(
     describe=describe,
     warnings=warnings,
     alone=alone,
+    method="All readings of one mounting of the cable shared its error, which was integrated out.",
     implausible=implausible,
     page=page,
     design=ForceDesign,

@@ -18,6 +18,8 @@ LOOP = Kind(
     check=check_rows,
     describe=describe,
     warnings=warnings_of,
+    method="A loop in motion gave F_out = min(F_in - 2 P Lambda, F_in exp(-Lambda)) at its preload P and friction "
+    "exponent Lambda.",
     implausible=implausible,
     page=page,
     design=LoopDesign,

@@ -14,6 +14,7 @@ PRELOAD = Kind(
     settings=PreloadTableSettings,
     describe=describe,
     warnings=warnings_of,
+    method="The preload between fixed ends was that of the model at each wrap angle.",
     implausible=implausible,
     page=page,
     design=PreloadDesign,

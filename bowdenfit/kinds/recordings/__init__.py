@@ -39,6 +39,8 @@ RECORDINGS = Kind(
     describe=lambda recordings, _: recordings_text(recordings),
     alone=alone,
     heading="Recordings",
+    method="Recordings were averaged over blocks, phases of sliding were told by a play operator, and all readings of one "
+    "mounting shared its error.",
     implausible=implausible,
     count=count,
     conditions=recorded_angles,

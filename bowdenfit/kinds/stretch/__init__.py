@@ -13,6 +13,7 @@ STRETCH = Kind(
     read=read_stretch,
     describe=describe,
     warnings=warnings_of,
+    method="Under the tension T the rope stretched by e(T) = T/k + d (1 - exp(-T/T_c)), with what friction held back along it.",
     implausible=implausible,
     page=page,
     design=StretchDesign,

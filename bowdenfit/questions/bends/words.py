@@ -5,18 +5,25 @@ from bowdenfit.questions.bends.overview import ElasticOverview, elastic_overview
 from bowdenfit.results.record import Record
 from bowdenfit.words import filled, table
 
+Cells = tuple[tuple[str, ...], tuple[tuple[str, ...], ...]]
+HEADING = "Stretch and preload, median (90 % interval)"
+
 
 def elastic_text(fit: Record) -> str:
     """The answers about stretch, preload and the loop, with their intervals."""
     found = elastic_overview(fit)
     if found is None:
         return ""
+    tables = [table(heads, rows) for heads, rows in elastic_tables(found)]
+    return "\n".join([*([HEADING] if tables else []), *tables, *(filled(s) for s in found.sentences)])
+
+
+def elastic_tables(found: ElasticOverview) -> list[Cells]:
+    """Heads and rows of the answers at wrap angles; none where the cable has none."""
     tables = [_answers(found, columns) for columns in _COLUMNS] if found.bends else []
-    blocks = [*([_HEADING] if tables else []), *(t for t in tables if t), *(filled(s) for s in found.sentences)]
-    return "\n".join(blocks)
+    return [one for one in tables if one is not None]
 
 
-_HEADING = "Stretch and preload, median (90 % interval)"
 _COLUMNS = (
     (
         ("preload", "preload (N)", 3),
@@ -32,17 +39,17 @@ _COLUMNS = (
 )
 
 
-def _answers(found: ElasticOverview, columns: tuple[tuple[str, str, int], ...]) -> str:
-    """Some of the answers, a row for each wrap angle; empty where the cable has none of them."""
+def _answers(found: ElasticOverview, columns: tuple[tuple[str, str, int], ...]) -> Cells | None:
+    """Some of the answers, a row for each wrap angle; None where the cable has none of them."""
     there = [column for column in columns if column[0] in found.bends[0]]
     if not there:
-        return ""
+        return None
     under = f", {found.input_force:g} N" if any(key in _UNDER_LOAD for key, _, _ in there) else ""
-    heads = [f"at (deg){under}", *(head.format(unit=found.friction_unit) for _, head, _ in there)]
-    rows = [
-        [f"{bend['wrap_angle']:g}", *(_interval(bend[key], digits) for key, _, digits in there)] for bend in found.bends
-    ]
-    return table(heads, rows)
+    heads = (f"at (deg){under}", *(head.format(unit=found.friction_unit) for _, head, _ in there))
+    rows = tuple(
+        (f"{bend['wrap_angle']:g}", *(_interval(bend[key], digits) for key, _, digits in there)) for bend in found.bends
+    )
+    return heads, rows
 
 
 _UNDER_LOAD = {"efficiency", "position_error", "stiffness"}

@@ -111,7 +111,7 @@ def draw(recordings: tuple[OverTime, ...], width: float | None = None) -> Figure
     """Input and output force [N] over time, what the cable would give at this input, and the samples left out."""
     whole = evenly(recordings, MOST)
     shown = [beginning(r) for r in whole]
-    times = [span([r.time - _start(r), r.flagged_time - _start(r)], room=0.0) for r in shown]
+    times = [span([r.time - start_of(r), r.flagged_time - start_of(r)], room=0.0) for r in shown]
     forces = [_force_limits(r) for r in shown]
     figure, flat, columns = panels_with_limits([r.name for r in shown], times, forces, 2, 1.5, WIDE, width)
     for axes, recording in zip(flat, shown, strict=True):
@@ -142,7 +142,7 @@ def beginning(recording: OverTime) -> OverTime:
     )
 
 
-def _start(recording: OverTime) -> float:
+def start_of(recording: OverTime) -> float:
     """Time of the first block or sample [s]."""
     return float(min(recording.time[0], recording.flagged_time.min(initial=np.inf)))
 
@@ -156,25 +156,32 @@ def _force_limits(recording: OverTime) -> tuple[float, float]:
 
 
 def _phases(axes: Axes, recording: OverTime) -> None:
-    """Shade what the rope does, from the middle between two blocks to the next such; not where nothing was recorded."""
-    time, stroke = recording.time - _start(recording), recording.stroke
-    gap = _after_gaps(time)
-    change = np.union1d(np.flatnonzero(np.diff(stroke)) + 1, gap)
-    before, after = time[change - 1], time[change]
-    middle, recorded = 0.5 * (before + after), ~np.isin(change, gap)
-    starts = np.append(time[:1], np.where(recorded, middle, after))
-    stops = np.append(np.where(recorded, middle, before), time[-1:])
-    of = stroke[np.append(0, change)]
+    """Shade what the rope does."""
     names = LOOP_PHASES if recording.loop else tuple(name for _, name, _ in PHASES)
     for (value, _, fill), name in zip(PHASES, names, strict=True):
-        spans = [(a, b - a) for a, b in zip(starts[of == value], stops[of == value], strict=True)]
+        spans = [(start, stop - start) for start, stop in phase_spans(recording, value)]
         if spans:
             axes.broken_barh(
                 spans, (0, 1), transform=axes.get_xaxis_transform(), facecolor=fill, linewidth=0, zorder=0.4, label=name
             )
 
 
-def _after_gaps(time: np.ndarray) -> np.ndarray:
+def phase_spans(recording: OverTime, stroke: int) -> list[tuple[float, float]]:
+    """From when to when the rope did one thing [s]: from the middle between two blocks to the next such; not where nothing
+    was recorded.
+    """
+    time = recording.time - start_of(recording)
+    gap = after_gaps(time)
+    change = np.union1d(np.flatnonzero(np.diff(recording.stroke)) + 1, gap)
+    before, after = time[change - 1], time[change]
+    middle, recorded = 0.5 * (before + after), ~np.isin(change, gap)
+    starts = np.append(time[:1], np.where(recorded, middle, after))
+    stops = np.append(np.where(recorded, middle, before), time[-1:])
+    here = recording.stroke[np.append(0, change)] == stroke
+    return list(zip(starts[here].tolist(), stops[here].tolist(), strict=True))
+
+
+def after_gaps(time: np.ndarray) -> np.ndarray:
     """Places of the first block after each stretch without any."""
     steps = np.diff(time)
     return np.flatnonzero(steps > GAP_STEPS * np.median(steps)) + 1
@@ -182,8 +189,8 @@ def _after_gaps(time: np.ndarray) -> np.ndarray:
 
 def _forces(axes: Axes, recording: OverTime, most: int) -> None:
     """What was measured, predicted and fitted, broken where nothing was recorded."""
-    time = recording.time - _start(recording)
-    gaps = _after_gaps(time)
+    time = recording.time - start_of(recording)
+    gaps = after_gaps(time)
 
     def broken(values: np.ndarray) -> np.ndarray:
         return np.insert(values.astype(float), gaps, np.nan)
@@ -211,7 +218,7 @@ def _forces(axes: Axes, recording: OverTime, most: int) -> None:
 
 def _left_out(axes: Axes, recording: OverTime) -> None:
     """Samples left out, by kind, those beyond the axes or without a reading on their edge; and blocks at a range's end."""
-    kinds, start = np.array(recording.flagged_kind, dtype=str), _start(recording)
+    kinds, start = np.array(recording.flagged_kind, dtype=str), start_of(recording)
     for kind in dict.fromkeys(recording.flagged_kind):
         here = kinds == kind
         x = np.tile(recording.flagged_time[here] - start, 2)

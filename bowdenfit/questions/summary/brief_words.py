@@ -1,6 +1,7 @@
 """The summary as it is printed (`summary.txt`): one page with the answer, whether to trust it, what to do next, and numbers."""
 
 import textwrap
+from collections.abc import Sequence
 
 from bowdenfit.kinds import readings_called
 from bowdenfit.questions.check.table_checks import CheckedReading
@@ -15,6 +16,7 @@ LINES = 25
 _LONGEST_NAME, _LONGEST_READING = 44, 36  # characters
 _LEAST_QUANTITIES, _MOST_QUANTITIES, _MOST_OFF = 4, 8, 3  # rows
 _BESIDE = 7  # lines that are neither sentences nor rows: headings, what is left out, blank lines, the last one
+READING_HEADS = ("measured", "expected", "90 % interval")
 _MORE = "Everything else: bowdenfit summary --full"
 
 
@@ -69,14 +71,20 @@ def _off(fit: Record) -> list[str]:
     """Readings that are off, beside what was expected of them; how many there are where none is."""
     off, every = readings_off(fit), checked_readings(fit)
     if not off:
-        return [filled(f"None of {len(every)} readings is off.")] if len(every) > 1 else []
-    rows = [_row(reading) for reading in off[:_MOST_OFF]]
-    heads = (f"Off: {len(off)} of {len(every)} readings", "measured", "expected", "90 % interval")
+        return [filled(none_is_off(every))] if len(every) > 1 else []
+    rows = [reading_row(reading) for reading in off[:_MOST_OFF]]
+    heads = (f"Off: {len(off)} of {len(every)} readings", *READING_HEADS)
     more = len(off) - len(rows)
     return [*table(heads, rows).splitlines(), *([f"and {more} more"] if more > 0 else [])]
 
 
-def _row(reading: CheckedReading) -> tuple[str, str, str, str]:
+def none_is_off(every: Sequence[CheckedReading]) -> str:
+    """That every reading agrees with all the others."""
+    return f"None of {len(every)} readings is off."
+
+
+def reading_row(reading: CheckedReading) -> tuple[str, str, str, str]:
+    """A reading beside what all the others say of it, under `READING_HEADS`."""
     name = readings_called(reading.table).one.format(reading.label)
     measured, expected, low, high = (
         with_unit(reading, value) for value in (reading.reading, reading.expected, reading.q05, reading.q95)

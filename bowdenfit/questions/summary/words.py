@@ -64,18 +64,22 @@ def full_text(fit: Record) -> str:
     return "\n\n".join(block for block in blocks if block) + "\n"
 
 
+def counts_in_words(fit: Record) -> str:
+    """What was fitted to: '17 wrap angles and 4 efficiencies'."""
+    description, tables = fit.dataset.description, fit.dataset.measurements
+    entered = [term_kind(term.name).count(term, description) for term in fit.model.terms]
+    return listed([count for count in (*entered, *(kind.count(table) for kind, table in each_table(tables))) if count])
+
+
 def _title(fit: Record) -> str:
     description = fit.dataset.description
-    tables = fit.dataset.measurements
-    entered = [term_kind(term.name).count(term, description) for term in fit.model.terms]
-    counts = [count for count in (*entered, *(kind.count(table) for kind, table in each_table(tables))) if count]
     line = f"{fit.name}\n{'=' * len(fit.name)}"
     geometry = f"; {description.geometry} geometry" if description.curved else ""
     model = f"; friction model {description.friction_model}" if description.friction_model != "capstan" else ""
     laws = f"; {description.laws_in_words}" if description.laws_in_words else ""
     noise = f"; {description.noise_in_words}" if description.noise != "normal" else ""
-    fitted = filled(f"Fitted to {listed(counts)}{geometry}{laws}{model}{noise}.")
-    remarks = [filled(remark) for remark in tables.remarks]
+    fitted = filled(f"Fitted to {counts_in_words(fit)}{geometry}{laws}{model}{noise}.")
+    remarks = [filled(remark) for remark in fit.dataset.measurements.remarks]
     return "\n".join([line, fitted, *remarks])
 
 

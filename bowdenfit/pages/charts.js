@@ -1,0 +1,180 @@
+"use strict";
+// Charts of this page: drag to zoom, hover or arrow keys to read values; without this script the drawings stand in their place.
+(() => {
+  const BAND = 0.25, NEAR = 12, STEP = 1.6;
+  const make = (tag, parent, given = {}) => parent.appendChild(Object.assign(document.createElement(tag), given));
+  const color = name => getComputedStyle(document.documentElement).getPropertyValue(`--${name}`).trim() || name;
+  const shown = value => String(Number(value.toPrecision(4)));
+
+  function seriesOf(chart) {
+    const all = chart.groups.flatMap(group => group.series);
+    return all.map((one, i) => ({ ...one, partner: one.look === "high" ? i : one.look === "low" ? i + 2 : null }));
+  }
+
+  function looks(one) {
+    const stroke = color(one.color);
+    if (one.look === "points" || one.look === "hollow")
+      return { paths: () => null, stroke, points: { show: true, size: 7, fill: one.look === "points" ? stroke : color("paper") } };
+    if (one.look === "low" || one.look === "high") return { stroke: "transparent", points: { show: false } };
+    return { stroke, width: 2, dash: one.look === "dashed" ? [6, 4] : undefined, points: { show: false } };
+  }
+
+  function shade(plot, spans) {
+    const { ctx, bbox } = plot;
+    ctx.save();
+    ctx.beginPath();
+    ctx.rect(bbox.left, bbox.top, bbox.width, bbox.height);
+    ctx.clip();
+    for (const span of spans) {
+      const from = plot.valToPos(span.start, "x", true), to = plot.valToPos(span.stop, "x", true);
+      ctx.fillStyle = color(span.color);
+      ctx.fillRect(from, bbox.top, Math.max(to - from, 2), bbox.height);
+    }
+    ctx.restore();
+  }
+
+  // The nearest place at which a line has a value; of points only one close to the pointer.
+  function place(plot, number, hovered, series) {
+    const values = plot.data[number], at = plot.cursor.left, x = plot.data[0];
+    const there = i => i >= 0 && i < x.length && values[i] != null;
+    let near = hovered;
+    for (let step = 0; step < x.length && !there(near); step++) near = there(hovered - step) ? hovered - step : hovered + step;
+    const isPoint = ["points", "hollow"].includes(series[number - 1].look);
+    return there(near) && (!isPoint || Math.abs(plot.valToPos(x[near], "x") - at) < NEAR) ? near : null;
+  }
+
+  class Chart {
+    constructor(box) {
+      this.box = box;
+      this.charts = JSON.parse(box.querySelector("script").textContent);
+      this.drawing = box.parentElement.querySelector(".drawing");
+      this.current = 0;
+      this.tools = make("div", box, { className: "tools" });
+      if (this.charts.length > 1) this.addChoice();
+      for (const [words, name, act] of [
+        ["Zoom in", "+", () => this.zoom(1 / STEP)], ["Zoom out", "\u2212", () => this.zoom(STEP)], ["Show all", "All", () => this.whole()],
+      ]) make("button", this.tools, { type: "button", textContent: name, title: words, ariaLabel: words, onclick: act });
+      this.swap = make("button", this.tools, { type: "button", className: "swap", onclick: () => this.show(this.area.hidden) });
+      this.area = make("div", box, { className: "area", tabIndex: 0 });
+      this.area.setAttribute("role", "application");
+      this.area.setAttribute("aria-label", "Chart. Left and right arrow read values, plus and minus zoom, zero shows all.");
+      this.area.addEventListener("keydown", event => this.key(event));
+      this.key_ = make("dl", box, { className: "key" });
+      this.key_.setAttribute("aria-live", "polite");
+      box.hidden = false;
+      this.show(true);
+      new ResizeObserver(() => this.fit()).observe(box);
+      matchMedia("(prefers-color-scheme: dark)").addEventListener("change", () => this.draw());
+    }
+
+    addChoice() {
+      const label = make("label", this.tools, { textContent: "Show " });
+      const choice = make("select", label);
+      this.charts.forEach((chart, i) => make("option", choice, { value: i, textContent: chart.name }));
+      choice.onchange = () => { this.current = Number(choice.value); this.draw(); };
+    }
+
+    show(chart) {
+      this.area.hidden = this.key_.hidden = !chart;
+      this.drawing.classList.toggle("replaced", chart);
+      this.swap.textContent = chart ? "As printed" : "To zoom";
+      for (const button of this.tools.querySelectorAll("button:not(.swap), label")) button.hidden = !chart;
+      if (chart) this.draw();
+    }
+
+    draw() {
+      if (this.area.hidden) return;
+      const chart = this.charts[this.current], series = seriesOf(chart), text = color("ink"), grid = color("rule");
+      this.plot?.destroy();
+      const tables = chart.groups.map(group => [group.x, ...group.series.map(one => one.values)]);
+      const data = uPlot.join(tables, tables.map(table => table.map(() => 1)));
+      this.ends = [data[0][0], data[0].at(-1)];
+      const axis = label => ({ label, stroke: text, grid: { stroke: grid, width: 1 }, ticks: { stroke: grid }, font: "13px system-ui, sans-serif", labelFont: "13px system-ui, sans-serif" });
+      const bands = series.flatMap((one, i) => one.look === "low" ? [{ series: [i + 2, i + 1], fill: color(one.color) + Math.round(255 * BAND).toString(16) }] : []);
+      this.addKey(chart, series);
+      this.plot = new uPlot({
+        ...this.size(),
+        legend: { show: false },
+        scales: { x: { time: false } },
+        axes: [axis(chart.x), { ...axis(chart.y), size: 62 }],
+        series: [{}, ...series.map(looks)],
+        bands,
+        cursor: { dataIdx: (plot, number, hovered) => number === 0 ? hovered : place(plot, number, hovered, series), drag: { x: true, y: false } },
+        hooks: {
+          drawClear: [plot => shade(plot, chart.spans)],
+          setCursor: [plot => this.read(plot, series)],
+          setScale: [(plot, name) => { if (name === "x") this.box.dataset.shown = `${plot.scales.x.min} ${plot.scales.x.max}`; }],
+        },
+      }, data, this.area);
+    }
+
+    addKey(chart, series) {
+      this.key_.replaceChildren();
+      this.values = new Map();
+      const entry = (label, one) => {
+        if (this.values.has(label)) return;
+        const row = make("div", this.key_);
+        const name = make("dt", row);
+        const mark = make("span", name, { className: `mark ${one.look ?? (one.start === one.stop ? "line" : "span")}` });
+        mark.style.color = color(one.color);
+        make("span", name, { textContent: label });
+        this.values.set(label, make("dd", row));
+      };
+      entry(chart.x, { look: "place", color: "muted" });
+      series.forEach(one => entry(one.label, one));
+      chart.spans.forEach(span => entry(span.label, span));
+    }
+
+    read(plot, series) {
+      const at = plot.cursor.idx, found = new Map();
+      if (at != null) {
+        found.set(this.charts[this.current].x, [plot.data[0][at]]);
+        for (const span of this.charts[this.current].spans)
+          if (span.start === span.stop) found.set(span.label, [span.start]);
+          else if (span.start <= plot.data[0][at] && plot.data[0][at] <= span.stop) found.set(span.label, null);
+        series.forEach((one, i) => {
+          const where = plot.cursor.idxs[i + 1];
+          if (where != null) found.set(one.label, [...(found.get(one.label) ?? []), plot.data[i + 1][where]]);
+        });
+      }
+      for (const [label, cell] of this.values) {
+        const values = found.get(label);
+        cell.textContent = !found.has(label) ? "" : values === null ? "here" : values.map(shown).join(" to ");
+      }
+    }
+
+    size() {
+      return { width: Math.max(this.box.clientWidth - 2, 240), height: Math.round(Math.min(Math.max(this.box.clientWidth * 0.5, 260), 420)) };
+    }
+
+    fit() {
+      const { width, height } = this.size();
+      if (this.plot && !this.area.hidden && (width !== this.plot.width || height !== this.plot.height)) this.plot.setSize({ width, height });
+    }
+
+    zoom(factor) {
+      const { min, max } = this.plot.scales.x, read = this.plot.cursor.idx;
+      const middle = read == null ? (min + max) / 2 : this.plot.data[0][read];
+      const low = Math.max(middle - (middle - min) * factor, this.ends[0]), high = Math.min(middle + (max - middle) * factor, this.ends[1]);
+      if (high > low) this.plot.setScale("x", { min: low, max: high });
+    }
+
+    whole() { this.plot.setScale("x", { min: this.ends[0], max: this.ends[1] }); }
+
+    step(by) {
+      const x = this.plot.data[0], { min, max } = this.plot.scales.x;
+      let next = (this.plot.cursor.idx ?? x.findIndex(value => value >= (min + max) / 2)) + by;
+      next = Math.min(Math.max(next, x.findIndex(value => value >= min)), x.findLastIndex(value => value <= max));
+      this.plot.setCursor({ left: this.plot.valToPos(x[next], "x"), top: this.plot.over.clientHeight / 2 });
+    }
+
+    key(event) {
+      const act = { ArrowLeft: () => this.step(-1), ArrowRight: () => this.step(1), "+": () => this.zoom(1 / STEP), "=": () => this.zoom(1 / STEP), "-": () => this.zoom(STEP), 0: () => this.whole(), Escape: () => this.whole() }[event.key];
+      if (!act || event.ctrlKey || event.metaKey || event.altKey) return;
+      event.preventDefault();
+      act();
+    }
+  }
+
+  for (const box of document.querySelectorAll(".chart")) new Chart(box);
+})();

@@ -1,0 +1,92 @@
+"""Sections to one HTML page that stands alone: no request, no script but its own, and whatever is a name stays text."""
+
+from __future__ import annotations
+
+import base64
+import hashlib
+from collections.abc import Mapping
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from bowdenfit.pages.drawing import inline
+from bowdenfit.pages.section import Page, Picture
+from bowdenfit.words import printable
+
+if TYPE_CHECKING:
+    from jinja2 import Environment
+
+MOST_BYTES = 1_450_000  # of a page, so that it can be mailed
+TOO_LARGE = "<p>This figure would make the page too large; it lies in the folder of figures.</p>"
+_HERE, _MARK = Path(__file__).parent, "\0"  # which no text on a page has
+
+
+def render(page: Page, drawings: Mapping[str, str]) -> str:
+    """A page as HTML.
+
+    Args:
+        page: What is on it.
+        drawings: Drawings of its figures as SVG, by name; a figure without one is left out, and one for which there is no
+            room is said to be.
+    """
+    drawn = Page(page.title, page.subtitle, tuple(s.with_pictures(drawings) for s in page.sections))
+    pieces = _assembled(drawn).split(_MARK)
+    room = MOST_BYTES - sum(len(piece.encode()) for piece in pieces)
+    for i, picture in enumerate(drawn.pictures):
+        found = inline(drawings[picture.name], f"d{i}-", picture.title)
+        room -= len(found)
+        pieces[2 * i + 1] = found if room > 0 else TOO_LARGE
+    return "".join(pieces)
+
+
+def _assembled(page: Page) -> str:
+    """The page with marks about the places of its drawings, one after the other."""
+    from markupsafe import Markup
+
+    environment = _environment()
+    scripts = _scripts() if any(picture.charts for picture in page.pictures) else ()
+    styles = [_HERE / "page.css", *([_HERE / "uplot" / "uPlot.min.css"] if scripts else [])]
+    frame = environment.get_template("page.html")
+    return frame.render(
+        page=page,
+        bodies=[Markup(environment.from_string(_text(s.template)).render(s.context)) for s in page.sections],  # noqa: S704
+        style=Markup("\n".join(map(_text, styles))),  # noqa: S704  (ours)
+        scripts=[Markup(script) for script in scripts],  # noqa: S704  (ours)
+        allowed=" ".join(f"'sha256-{_digest(script)}'" for script in scripts) or "'none'",
+    )
+
+
+def _environment() -> Environment:
+    """Templates in which everything is escaped, and nothing steers."""
+    from jinja2 import Environment, FileSystemLoader, StrictUndefined
+    from jinja2.utils import htmlsafe_json_dumps
+    from markupsafe import Markup
+
+    found = Environment(
+        autoescape=True, undefined=StrictUndefined, finalize=_inert, loader=FileSystemLoader(_HERE), trim_blocks=True,
+        lstrip_blocks=True,
+    )  # fmt: skip
+
+    def charts(picture: Picture) -> Markup:
+        return htmlsafe_json_dumps([chart.plain() for chart in picture.charts], separators=(",", ":"))
+
+    found.globals |= {"charts": charts, "place": Markup(f"{_MARK}{_MARK}")}  # noqa: S704  (ours)
+    return found
+
+
+def _inert(value: Any) -> Any:
+    """Text without what turns its direction or cannot be seen; markup is left as it is."""
+    return printable(value) if type(value) is str else value
+
+
+def _scripts() -> tuple[str, str]:
+    """UPlot with its license, and what draws charts with it."""
+    library, terms = _text(_HERE / "uplot" / "uPlot.iife.min.js"), _text(_HERE / "uplot" / "LICENSE")
+    return f"/*\n{terms}\n*/\n{library}", _text(_HERE / "charts.js")
+
+
+def _digest(script: str) -> str:
+    return base64.b64encode(hashlib.sha256(script.encode()).digest()).decode()
+
+
+def _text(path: Path) -> str:
+    return path.read_text(encoding="utf-8")

@@ -1,0 +1,82 @@
+"""The report of a fit, written again."""
+
+from collections.abc import Mapping
+from pathlib import Path
+from tempfile import TemporaryDirectory
+from typing import TYPE_CHECKING, Annotated, Any
+
+from bowdenfit.verb import Argument, Option, Output, Reply, Verb
+
+if TYPE_CHECKING:
+    from bowdenfit.pages.section import Page
+    from bowdenfit.results.record import Record
+
+
+def report(
+    found: Annotated["Record | str | Path", Argument("RESULTS")],
+    output: Annotated[Output, Option(("-o",), metavar="FILE", default="RESULTS/report.html")] = None,
+) -> Path:
+    """Write everything that a fit found on one page: a file that stands alone, to read in a browser, print and hand on.
+
+    Args:
+        found: The fit, or its results folder.
+        output: The file; one that is there is replaced.
+
+    Returns:
+        The file written.
+
+    Raises:
+        UsageError: A fit is given without a file.
+        StoreError: The results folder is missing or damaged, or the file cannot be written.
+    """
+    from bowdenfit.errors import UsageError
+    from bowdenfit.questions.figures import draw_figure, figures_of, kept_figures
+    from bowdenfit.questions.report.sections import report_page
+    from bowdenfit.results.folder import REPORT, folder_to_write
+    from bowdenfit.results.store import load
+
+    kept = dict[str, Any]()
+    if isinstance(found, str | Path):
+        folder = Path(found)
+        output, found, kept = output or folder / REPORT, load(folder), kept_figures(folder)
+    if output is None:
+        raise UsageError("a fit by itself has no folder; name a file for the report.")
+    figures, path = kept or dict(figures_of(found)), Path(output)
+    with folder_to_write(path.parent), TemporaryDirectory() as drawn:
+        for name, data in figures.items():
+            draw_figure(name, data, Path(drawn), ("svg",), found.name)
+        return write_report(report_page(found, figures), Path(drawn), path)
+
+
+def write_report(page: "Page", drawn: Path, path: Path) -> Path:
+    """Write a page whole, with the drawings that lie in a folder; loads no model.
+
+    Args:
+        page: The page.
+        drawn: Where its figures are, as SVG.
+        path: The file.
+    """
+    from bowdenfit.pages.page import render
+    from bowdenfit.results.folder import write_text
+
+    files = {picture.name: drawn / f"{picture.name}.svg" for picture in page.pictures}
+    drawings = {name: file.read_text(encoding="utf-8") for name, file in files.items() if file.exists()}
+    write_text(path, render(page, drawings))
+    return path
+
+
+def _reply(path: Path, _: Mapping[str, Any]) -> Reply:
+    return Reply(f"{path}\n")
+
+
+VERB = Verb(
+    report,
+    _reply,
+    "Write everything that a fit found on one page.",
+    """Write the report of a finished fit: one HTML file with the answer, whether to trust it, figures, checks, a paragraph on
+    methods with citations, and where the numbers come from.
+
+    It asks no other computer for anything, and can be mailed, printed and read in light and dark.
+    """,
+    json="",
+)

@@ -11,6 +11,7 @@ from typing import TypeVar
 Value = TypeVar("Value")
 Given = TypeVar("Given")
 
+_NO_MEMORY = ("RESOURCE_EXHAUSTED", "Cannot allocate memory", "failed to map segment")  # of XLA, the system, its loader
 _FULL = {errno.ENOSPC, errno.EFBIG, errno.EIO, *({errno.EDQUOT} if hasattr(errno, "EDQUOT") else ())}
 
 
@@ -56,6 +57,10 @@ class DiskError(StoreError):
     """There is no room for what is to be written, though the request was good."""
 
     exit_code = 1
+
+
+class MemoryShortageError(BowdenfitError):
+    """The system gives no more memory, though the request was good."""
 
 
 class ConvergenceError(BowdenfitError):
@@ -147,6 +152,23 @@ def disk_error(path: Path, error: OSError) -> StoreError:
     if error.errno in _FULL:
         return DiskError(f"{path} cannot be written ({why}); make room on that disk, or name another folder.")
     return StoreError(f"{path} cannot be written ({why}); name another folder with --output.")
+
+
+def system_error(error: BaseException) -> BowdenfitError | None:
+    """What the system refuses, memory or a file, as an error of ours; None for what is no refusal of the system.
+
+    Args:
+        error: Whatever came up.
+    """
+    if isinstance(error, MemoryError) or any(sign in str(error) for sign in _NO_MEMORY):
+        return MemoryShortageError("memory ran out; close other programs, or run this where there is more of it.")
+    if not isinstance(error, OSError) or error.errno is None:
+        return None
+    if error.errno in _FULL or not error.filename:
+        return disk_error(Path(str(error.filename or "a file")), error)
+    return StoreError(
+        f"{error.filename} cannot be opened ({error.strerror}); check its name, its kind and its permissions."
+    )
 
 
 def nearest(name: str, known: Sequence[str]) -> str:

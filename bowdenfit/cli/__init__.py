@@ -12,7 +12,7 @@ from bowdenfit.cli.commands import command
 from bowdenfit.cli.progress import INTERRUPTED
 from bowdenfit.cli.starting import completion, init
 from bowdenfit.cli.terminal import say
-from bowdenfit.errors import BowdenfitError
+from bowdenfit.errors import BowdenfitError, system_error
 from bowdenfit.verbs import VERBS
 
 _MADE = 50_000  # objects made before Python looks for garbage: most stay, and each look goes through all of them
@@ -55,12 +55,14 @@ def main() -> None:
     except Exception as error:
         if os.environ.get("BOWDENFIT_DEBUG"):
             raise
-        text = (
-            f"Error: something went wrong inside bowdenfit ({type(error).__name__}: {error}). This is our fault: please "
+        error.__traceback__ = None  # what they hold may be all the memory there is
+        ours = (
+            f"something went wrong inside bowdenfit ({type(error).__name__}: {error}). This is our fault: please "
             "report it with what BOWDENFIT_DEBUG=1 prints when you run the command again."
         )
-        say(text, err=True)
-        sys.exit(1)
+        refused = system_error(error)
+        say(f"Error: {refused or ours}", err=True)
+        sys.exit(refused.exit_code if refused else 1)
 
 
 @click.group(context_settings={"help_option_names": ["-h", "--help"], "max_content_width": 110})

@@ -19,7 +19,6 @@ _LENGTH = re.compile(_NUMBER + r"\s*(?P<unit>[^\W\d][^\s]*)?(?=\s|$)")
 _QUANTITY = re.compile(_NUMBER + r"\s*(?P<unit>(?!\.|[eE]\d)\D.*)", re.ASCII)
 
 
-
 @dataclass(frozen=True)
 class Keyword:
     """One keyword of a verb's function.

@@ -10,10 +10,11 @@ from typing import Any, TypeAlias
 
 import click
 
-from bowdenfit.errors import DiskError
+from bowdenfit.errors import DiskError, MemoryShortageError, system_error
 from bowdenfit.verb import Watch
 
 INTERRUPTED = 130
+_NEEDED = 500 << 20  # bytes; a small fit takes so much beside what is loaded by then
 Report: TypeAlias = Callable[..., None]
 
 
@@ -27,7 +28,11 @@ def watch_verb(folder: Path, watch: Watch) -> Iterator[Report]:
     Args:
         folder: Results folder.
         watch: What is kept there, and what the bar shows.
+
+    Raises:
+        MemoryShortageError: There is too little memory to begin.
     """
+    _refuse_without_memory()
     asked = threading.Event()
 
     def stop(*_: object) -> None:
@@ -53,20 +58,35 @@ def watch_verb(folder: Path, watch: Watch) -> Iterator[Report]:
                 show(*progress)
 
             yield report
-    except DiskError as error:
-        if not (folder / watch.kept).exists():
-            raise
-        said = f"What was done so far is kept in {folder}: with room, run the same command with --resume."
-        raise DiskError(f"{error} {said}") from None
     except BaseException as error:  # where an interrupt is wanted, whatever came of it is that interrupt
-        if not (asked.is_set() or isinstance(error, KeyboardInterrupt)):
-            raise
-        if (folder / watch.kept).exists():
+        wanted = asked.is_set() or isinstance(error, KeyboardInterrupt)
+        shortage = error if isinstance(error, DiskError) else system_error(error)
+        kept = (folder / watch.kept).exists()
+        if kept and wanted:
             click.echo(f"\nInterrupted; {watch.remark} {folder}: run the same command with --resume.", err=True)
             raise click.exceptions.Exit(INTERRUPTED) from None
-        raise KeyboardInterrupt from None
+        if kept and isinstance(shortage, DiskError | MemoryShortageError):
+            said = f"What was done so far is kept in {folder}: with room, run the same command with --resume."
+            raise type(shortage)(f"{shortage} {said}") from None
+        if wanted:
+            raise KeyboardInterrupt from None
+        raise
     finally:
         sys.unraisablehook = printed
+
+
+def _refuse_without_memory() -> None:
+    """XLA and OpenBLAS crash or wait for ever where memory runs out, so it is asked for once before they are loaded."""
+    import mmap
+
+    kind = {"flags": mmap.MAP_PRIVATE | mmap.MAP_ANONYMOUS} if hasattr(mmap, "MAP_PRIVATE") else {}
+    try:
+        mmap.mmap(-1, _NEEDED, **kind).close()
+    except OSError:
+        raise MemoryShortageError(
+            f"there are not the {_NEEDED >> 20} MiB of memory that this takes; close other programs, or raise the limit "
+            "(ulimit -d and -v show it, or the container's)."
+        ) from None
 
 
 @contextmanager

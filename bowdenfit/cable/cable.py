@@ -18,7 +18,7 @@ from bowdenfit.cable.registry import CONTACT_LAWS, CURVES, check_names, class_at
 from bowdenfit.description import Contact, Description, PriorDefaults
 from bowdenfit.errors import DescriptionError
 from bowdenfit.parameters.space import Parameter
-from bowdenfit.physics.loop import loop_output_force
+from bowdenfit.physics.loop import loop_input_force, loop_output_force
 
 ANGLE_NOISE = "sigma_theta"
 
@@ -164,12 +164,32 @@ class Cable:
             stroke: +1 pulling, -1 return.
             mounting: Effect of the mounting on the friction exponent [1].
         """
-        angles = self.wrap_angles(values, route)
-        exponent = self.friction_exponent(values, angles) + mounting
-        if self.is_loop:
-            preload = self.elasticity.preload_or_none(values, jnp.sum(angles, axis=-1))
+        exponent, preload = self._friction_at(values, route, mounting)
+        if preload is not None:
             return loop_output_force(input_force, preload, exponent, stroke)
         return self.friction.output_force(values, input_force, exponent, stroke)
+
+    def input_force_at(
+        self,
+        values: Mapping[str, Array],
+        route: Float[Array, " rows"],
+        output_force: Float[Array, ""],
+        stroke: Float[Array, ""],
+        mounting: Float[Array, ""] | float = 0.0,
+    ) -> Float[Array, " rows"]:
+        """Input force [N] that gives an output force [N]: the inverse of `output_force_at`, with the same arguments."""
+        exponent, preload = self._friction_at(values, route, mounting)
+        if preload is not None:
+            return loop_input_force(output_force, preload, exponent, stroke)
+        return self.friction.input_force(values, output_force, exponent, stroke)
+
+    def _friction_at(
+        self, values: Mapping[str, Array], route: Float[Array, " rows"], mounting: Float[Array, ""] | float
+    ) -> tuple[Float[Array, " rows"], Float[Array, " rows"] | None]:
+        """Friction exponent [1] in a mounting, and the preload of a loop [N]; None of a single rope."""
+        angles = self.wrap_angles(values, route)
+        exponent = self.friction_exponent(values, angles) + mounting
+        return exponent, self.elasticity.preload_or_none(values, jnp.sum(angles, axis=-1)) if self.is_loop else None
 
     def loss_at(self, values: Mapping[str, Array], route: Float[Array, " rows"]) -> Float[Array, " rows"]:
         """What is least where efficiency is highest: the friction exponent, or of a loop the efficiency with a minus."""

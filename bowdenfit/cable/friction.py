@@ -269,9 +269,18 @@ class FrictionModel:
         self, values: Mapping[str, Array], input_force: Array, exponent: Array, stroke: Array
     ) -> Float[Array, "..."]:
         """Force at the load side [N] while the rope slides, stroke +1 toward the motor and -1 back."""
+        return self.force(values, self.scaled(values, input_force) - self._shift(values, exponent, stroke))
+
+    def input_force(
+        self, values: Mapping[str, Array], output_force: Array, exponent: Array, stroke: Array
+    ) -> Float[Array, "..."]:
+        """Force at the motor side [N] that gives one at the load side: the inverse of `output_force`."""
+        return self.force(values, self.scaled(values, output_force) + self._shift(values, exponent, stroke))
+
+    def _shift(self, values: Mapping[str, Array], exponent: Array, stroke: Array) -> Array:
+        """What friction takes off the scale g."""
         pulling, returning = self.shifts(values, exponent)
-        shift = jnp.where(stroke > 0, pulling, returning) if self.depends_on_stroke else exponent
-        return self.force(values, self.scaled(values, input_force) - stroke * shift)
+        return stroke * (jnp.where(stroke > 0, pulling, returning) if self.depends_on_stroke else exponent)
 
     def rate(self, values: Mapping[str, Array], speed: Float[Array, "*batch"]) -> Float[Array, "*batch"]:
         """Factor on the friction exponent at a speed [1], 1 at the reference speed, which stands in where none is known.

@@ -97,7 +97,14 @@ def curves_of(model: Model, route: np.ndarray) -> Callable[[Float[Array, " free"
 
 
 def output_force_at(
-    model: Model, z: np.ndarray, route: np.ndarray, input_force: float, stroke: int, mountings: Sequence[np.ndarray]
+    model: Model,
+    z: np.ndarray,
+    route: np.ndarray,
+    force: float,
+    stroke: int,
+    mountings: Sequence[np.ndarray],
+    *,
+    inverse: bool = False,
 ) -> list[np.ndarray]:
     """Output force [N] of every draw (rows) at route values (columns), at the reference speed, in each of some mountings.
 
@@ -105,18 +112,19 @@ def output_force_at(
         model: The model.
         z: Draws, one a row.
         route: Route values; any one number where the cable has no route.
-        input_force: Force at the motor side [N].
+        force: Force at the motor side [N].
         stroke: +1 pulling, -1 return.
         mountings: Effect of each mounting on the friction exponent of each draw [1].
+        inverse: The input force instead, that gives the force at the load side.
     """
     at = jnp.asarray(np.atleast_1d(route), dtype=float)
+    function: Function = model.cable.input_force_at if inverse else model.cable.output_force_at
 
-    def force(z_and_mounting: Float[Array, " free_and_one"]) -> Float[Array, " route"]:
+    def other_end(z_and_mounting: Float[Array, " free_and_one"]) -> Float[Array, " route"]:
         values = model.space.constrain(z_and_mounting[:-1])
-        force_in, direction = jnp.asarray(float(input_force)), jnp.asarray(float(stroke))
-        return model.cable.output_force_at(values, at, force_in, direction, z_and_mounting[-1])
+        return function(values, at, jnp.asarray(float(force)), jnp.asarray(float(stroke)), z_and_mounting[-1])
 
-    program = for_each_draw(force, model.space.size + 1)
+    program = for_each_draw(other_end, model.space.size + 1)
     return [program(np.column_stack([z, mounting])) for mounting in mountings]
 
 

@@ -44,6 +44,27 @@ def loop_output_force(
     return loop_response(input_force, preload, friction_exponent, stroke)[0]
 
 
+def loop_input_force(
+    output_force: Float[Array, "..."],
+    preload: Float[Array, "..."],
+    friction_exponent: Float[Array, "..."],
+    stroke: Float[Array, "..."],
+) -> Float[Array, "..."]:
+    r"""Input force that gives an output force while the loop moves [N]: the inverse of `loop_output_force`.
+
+    .. math:: F_\text{in} = s \max(s F_\text{out} + 2 P \Lambda,\ s F_\text{out} e^{\Lambda},\ s F_\text{out} e^{-\Lambda})
+
+    Args:
+        output_force: F_out, of either sign [N].
+        preload: P, tension of both sides at rest [N].
+        friction_exponent: Lambda of one side [1].
+        stroke: s, +1 moving forward, -1 back [1].
+    """
+    along = stroke * output_force
+    slack = along * jnp.where(along > 0, jnp.exp(friction_exponent), jnp.exp(-friction_exponent))
+    return stroke * jnp.maximum(along + 2 * preload * friction_exponent, slack)
+
+
 def loop_band(
     input_force: Float[Array, "..."], preload: Float[Array, "..."], friction_exponent: Float[Array, "..."]
 ) -> tuple[Float[Array, "..."], Float[Array, "..."]]:

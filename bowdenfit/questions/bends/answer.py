@@ -98,6 +98,13 @@ class Elastic:
         bent, force = self.bent(wrap_angles), float(input_force)
         return self.over(lambda values: bent.output_force(values, jnp.asarray(force), float(stroke), preload))
 
+    def input_force(
+        self, wrap_angles: np.ndarray, output_force: float, stroke: int = 1, preload: float | None = None
+    ) -> np.ndarray:
+        """Input force [N] that gives an output force, of every draw (rows) at wrap angles (columns)."""
+        bent, force = self.bent(wrap_angles), float(output_force)
+        return self.over(lambda values: bent.input_force(values, jnp.asarray(force), float(stroke), preload))
+
     def friction(self, wrap_angles: np.ndarray, preload: float | None = None) -> np.ndarray:
         """Force felt in free motion [N], draws by wrap angles.
 

@@ -10,7 +10,7 @@ from jaxtyping import Float
 from bowdenfit.cable.elasticity import LENGTHENING, PRELOAD, STIFFNESS, STRETCH_FRICTION, Elasticity
 from bowdenfit.errors import UsageError
 from bowdenfit.model import Model
-from bowdenfit.physics.loop import free_motion_loss, loop_output_force, side_tensions, slack_load
+from bowdenfit.physics.loop import free_motion_loss, loop_input_force, loop_output_force, side_tensions, slack_load
 from bowdenfit.physics.stretch import mean_tension
 
 Values = Mapping[str, Array]
@@ -71,6 +71,13 @@ class Bent:
         if self.model.cable.is_loop:
             return loop_output_force(force, self.preload(values, preload)[0], exponent, jnp.asarray(stroke))
         return self.model.cable.friction.output_force(values, force, exponent, jnp.asarray(stroke))
+
+    def input_force(self, values: Values, output_force: Array, stroke: float, preload: float | None) -> Array:
+        """Input force [N] that gives an output force: the inverse of `output_force`."""
+        force, exponent = jnp.broadcast_arrays(output_force, self.exponent(values))
+        if self.model.cable.is_loop:
+            return loop_input_force(force, self.preload(values, preload)[0], exponent, jnp.asarray(stroke))
+        return self.model.cable.friction.input_force(values, force, exponent, jnp.asarray(stroke))
 
     def friction(self, values: Values, preload: float | Array | None = None) -> Float[Array, " bends"]:
         """Force that moving the unloaded cable takes [N]; a single rope has one side to drag."""

@@ -27,7 +27,8 @@ class Question:
     Args:
         wrap_angles: Wrap angles [rad].
         input_force: Force at the motor side [N]; the reference force of the fit where none is stated.
-        stated_force: Whether a force was stated.
+        output_force: Force that is wanted at the load side [N]; None where none is.
+        stated_force: Whether an input force was stated.
         preload: Preload [N] that the cable is given instead of its own; None for its own.
         friction: What may be felt in free motion [N]; None without a limit.
         stroke: +1 pulling, -1 returning.
@@ -35,6 +36,7 @@ class Question:
 
     wrap_angles: np.ndarray
     input_force: float
+    output_force: float | None
     stated_force: bool
     preload: float | None
     friction: float | None
@@ -45,6 +47,7 @@ def question(
     fit: Record,
     wrap_angles: Sequence[tuple[float, str]] = (),
     input_force: Stated = None,
+    output_force: Stated = None,
     preload: Stated = None,
     friction_limit: Stated = None,
     stroke: str = "pull",
@@ -64,6 +67,7 @@ def question(
         elastic_answers(fit).reference_force
         if input_force is None
         else _internal(input_force, "force", "--input-force", 1e-9),
+        None if output_force is None else _internal(output_force, "force", "--output-force", 1e-9),
         input_force is not None,
         None if preload is None else _internal(preload, "force", "--preload", 0.0),
         limit,
@@ -131,6 +135,18 @@ def _force(fit: Record, asked: Question) -> tuple[np.ndarray, list[str]]:
     return pulled(force, asked.input_force, "held by friction" if fit.model.cable.is_loop else "slack")
 
 
+def _input_force(fit: Record, asked: Question) -> list[Row]:
+    """Input force for the output force that is wanted: friction alone holds it where none is needed."""
+    if asked.output_force is None:
+        raise UsageError("--quantity input-force needs the force that is wanted at the load side, as --output-force 100N.")
+    force = elastic_answers(fit).input_force(asked.wrap_angles, asked.output_force, asked.stroke, asked.preload)
+    force, words = pulled(force, asked.output_force, "held by friction alone")
+    limits = measured(fit)
+    notes = [limits.notes(None, load) for load in np.median(force, axis=0)]
+    words = ["; ".join(note for note in (word, *note) if note) for word, note in zip(words, notes, strict=True)]
+    return _rows(fit, asked, {"input_force_N": force}, words)
+
+
 def _preload(fit: Record, asked: Question) -> list[Row]:
     preload, slack = elastic_answers(fit).preload(asked.wrap_angles, asked.preload)
     rows = _rows(fit, asked, {"preload_N": preload, "slack_mm": slack})
@@ -192,6 +208,7 @@ QUANTITIES: Mapping[str, Callable[[Record, Question], list[Row]]] = MappingProxy
     {
         "efficiency": _efficiency,
         "output-force": _output_force,
+        "input-force": _input_force,
         "preload": _preload,
         "friction": _friction,
         "slack-load": _slack_load,

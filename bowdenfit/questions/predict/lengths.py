@@ -19,27 +19,37 @@ _STROKES = {"pull": 1, "return": -1}
 
 
 def predict_at_lengths(
-    fit: Record, lengths: np.ndarray, input_force: tuple[float, str] | None, stroke: str
+    fit: Record,
+    lengths: np.ndarray,
+    input_force: tuple[float, str] | None = None,
+    stroke: str = "pull",
+    output_force: tuple[float, str] | None = None,
 ) -> list[dict[str, Any]]:
-    """Efficiency, or output force, at route values; a note says what lies outside the measurements, and where a rope is slack.
+    """Efficiency or a force at route values; a note says what lies outside the measurements, and where a rope is slack.
 
     Args:
         fit: The fit.
         lengths: Route values.
-        input_force: Force and unit; efficiencies are predicted without.
+        input_force: Force and unit, of which the output force is predicted; efficiencies are predicted without.
         stroke: "pull" or "return".
+        output_force: Force and unit that is wanted, of which the input force is predicted.
 
     Raises:
-        UsageError: The input force is not a positive force, or there is no posterior.
+        UsageError: A force is not a positive force, or there is no posterior.
     """
-    route, sign, asked = fit.dataset.description.route, _STROKES[stroke], None
-    name, force, per = "efficiency", fit.model.cable.friction.conditions.reference_force, 1.0
+    route, sign, limits = fit.dataset.description.route, _STROKES[stroke], measured(fit)
+    name, force, per, asked = "efficiency", fit.model.cable.friction.conditions.reference_force, 1.0, None
     if input_force is not None:
-        name, force = "output_force_N", (asked := _newtons(input_force))
+        name, force = "output_force_N", (asked := _newtons(input_force, "--input-force"))
+    elif output_force is not None:
+        name, force = "input_force_N", (asked := _newtons(output_force, "--output-force"))
     else:
         per = force
-    (mean, words), (mounted, _) = (pulled(found, force) for found in _forces(fit, lengths, force, sign))
-    mean, mounted, limits = mean / per, mounted / per, measured(fit)
+    inverse = output_force is not None
+    none_left = "held by friction alone" if inverse else "slack"
+    found = _forces(fit, lengths, force, sign, inverse)
+    (mean, words), (mounted, _) = (pulled(forces, force, none_left) for forces in found)
+    mean, mounted = mean / per, mounted / per
     of_load = {"at_input_force_N": force} if fit.model.cable.friction.depends_on_load and asked is None else {}
     rows = []
     for i, length in enumerate(lengths):
@@ -55,7 +65,8 @@ def predict_at_lengths(
         }
         row |= {"mounting_q05": float(mounting[0]), "mounting_q95": float(mounting[1])}
         row |= of_load
-        notes = [words[i], *limits.notes(None if route is None else float(length), asked)]
+        load = interval.median if inverse else asked
+        notes = [words[i], *limits.notes(None if route is None else float(length), load)]
         if route is not None:
             row["in_range"] = bool(route.range[0] <= length <= route.range[1])
             notes += (
@@ -90,24 +101,25 @@ def in_unit_of(route: Route | None, lengths: Sequence[Length] | None) -> list[fl
     return found
 
 
-def _forces(fit: Record, lengths: np.ndarray, force: float, sign: int) -> tuple[np.ndarray, np.ndarray]:
-    """Output force [N] of every draw (rows) at route values (columns), and the same in a new mounting."""
+def _forces(fit: Record, lengths: np.ndarray, force: float, sign: int, inverse: bool) -> tuple[np.ndarray, np.ndarray]:
+    """Force at the other end [N] of every draw (rows) at route values (columns), and the same in a new mounting."""
     route, reference = fit.dataset.description.route, fit.model.cable.friction.conditions.reference_force
-    if route is not None and (force, sign, tuple(lengths)) == (reference, 1, tuple(route.choices)):
+    if not inverse and route is not None and (force, sign, tuple(lengths)) == (reference, 1, tuple(route.choices)):
         return fit.along_route.mean, fit.along_route.mounted
     z = fit.draws().flat_z
     with jax.enable_x64(True):
-        mean, mounted = output_force_at(fit.model, z, lengths, force, sign, (np.zeros(len(z)), fit.mounting()))
+        mountings = np.zeros(len(z)), fit.mounting()
+        mean, mounted = output_force_at(fit.model, z, lengths, force, sign, mountings, inverse=inverse)
     return mean, mounted
 
 
-def _newtons(force: tuple[float, str]) -> float:
+def _newtons(force: tuple[float, str], option: str) -> float:
     try:
         newtons = force[0] * conversion_factor(force[1], "force")
     except DatasetError as error:
-        raise UsageError(f"--input-force: {error}.") from None
+        raise UsageError(f"{option}: {error}.") from None
     if not newtons > 0:
         raise UsageError(
-            f"--input-force {force[0]:g}{force[1]} is not positive; write the tension as a positive force."
+            f"{option} {force[0]:g}{force[1]} is not positive; write the tension as a positive force."
         )
     return newtons

@@ -10,9 +10,9 @@ if TYPE_CHECKING:
     from bowdenfit.results.record import Record
 
 Asked = Literal[
-    "efficiency", "output-force", "preload", "friction", "slack-load", "position", "stiffness", "preload-window"
+    "efficiency", "output-force", "input-force", "preload", "friction", "slack-load", "position", "stiffness", "preload-window"
 ]
-AT_LENGTHS = ("efficiency", "output-force")  # all others are asked at wrap angles
+AT_LENGTHS = ("efficiency", "output-force", "input-force")  # all others are asked at wrap angles
 
 
 def predict(
@@ -20,13 +20,14 @@ def predict(
     lengths: Annotated[Sequence[Length] | None, Argument("LENGTHS", many=True)] = None,
     input_force: Annotated[Quantity | None, Option(metavar="FORCE", example="100N")] = None,
     stroke: Annotated[Stroke, Option()] = "pull",
+    output_force: Annotated[Quantity | None, Option(metavar="FORCE", example="100N")] = None,
     *,
-    quantity: Annotated[Asked | None, Option(default="efficiency, or output-force with --input-force")] = None,
+    quantity: Annotated[Asked | None, Option(default="efficiency, or what --input-force and --output-force ask for")] = None,
     wrap_angles: Annotated[Sequence[Quantity], Option(("--wrap-angle",), "90deg", "ANGLE")] = (),
     preload: Annotated[Quantity | None, Option(metavar="FORCE", example="20N")] = None,
     friction_limit: Annotated[Quantity | None, Option(metavar="TORQUE", example="50N*mm")] = None,
 ) -> list[dict[str, Any]]:
-    """Efficiency, output force, or what stretch and preload do, with intervals; one row a route value or wrap angle.
+    """Efficiency, a force, or what stretch and preload do, with intervals; one row a route value or wrap angle.
 
     Args:
         found: The fit.
@@ -34,6 +35,7 @@ def predict(
             if omitted.
         input_force: Force at the motor side, such as 100N.
         stroke: Direction of sliding.
+        output_force: Force that is wanted at the load side, such as 100N: what input force gives it.
         quantity: What to predict.
         wrap_angles: Predict at this wrap angle instead of a length, such as 90deg; may be repeated.
         preload: Preload the cable with this instead of its own, such as 20N.
@@ -49,15 +51,14 @@ def predict(
     from bowdenfit.questions.predict.lengths import in_unit_of, predict_at_lengths
 
     route = found.dataset.description.route
-    if quantity is None:
-        quantity = "efficiency" if input_force is None else "output-force"
+    quantity = _quantity(quantity, input_force, output_force)
     if wrap_angles or quantity not in AT_LENGTHS or (route is None and found.model.cable.is_loop):
         from bowdenfit.questions.predict.bends import predict_at_bends, question
 
         if lengths:
             raise UsageError("predict at lengths or at wrap angles, not at both; leave one of them out.")
         found.draws()
-        asked = question(found, wrap_angles, input_force, preload, friction_limit, stroke)
+        asked = question(found, wrap_angles, input_force, output_force, preload, friction_limit, stroke)
         return predict_at_bends(found, quantity, asked)
     if preload is not None or friction_limit is not None:
         raise UsageError(
@@ -67,13 +68,34 @@ def predict(
         raise UsageError(
             "--quantity efficiency at lengths is that at the fit's own reference force; leave --input-force out."
         )
+    if quantity == "input-force" and output_force is None:
+        raise UsageError("--quantity input-force needs the force that is wanted at the load side, as --output-force 100N.")
     numbers = [length[0] if isinstance(length, tuple) else length for length in lengths or ()]
     if odd := [number for number in numbers if not np.isfinite(number)]:
         raise UsageError(f"{odd[0]} is no length; name the lengths to predict at as numbers.")
     if not lengths and route is not None and not route.choices:
         raise UsageError("the description has no choices; name the lengths to predict at.")
     wanted = np.asarray(in_unit_of(route, lengths) or (route.choices if route else [0.0]), dtype=float)
-    return predict_at_lengths(found, wanted, input_force, stroke)
+    return predict_at_lengths(found, wanted, input_force, stroke, output_force)
+
+
+def _quantity(named: Asked | None, input_force: Quantity | None, output_force: Quantity | None) -> Asked:
+    """What is asked for, where it is not named: what the stated force tells of the other end.
+
+    Raises:
+        UsageError: Forces of both ends are stated, or one that the quantity does not follow from.
+    """
+    from bowdenfit.errors import UsageError
+
+    if input_force is not None and output_force is not None:
+        raise UsageError(
+            "--input-force asks for the force at the load side, --output-force for that at the motor; leave one of them out."
+        )
+    if output_force is not None and named not in (None, "input-force"):
+        raise UsageError(f"--output-force asks for the input force that it takes; leave --quantity {named} out.")
+    if named is not None:
+        return named
+    return "output-force" if input_force is not None else "input-force" if output_force is not None else "efficiency"
 
 
 def _reply(rows: list[dict[str, Any]], _: object = None) -> Reply:
@@ -83,7 +105,7 @@ def _reply(rows: list[dict[str, Any]], _: object = None) -> Reply:
 def _kept(answers: Mapping[str, Any], asked: Mapping[str, Any]) -> Reply | None:
     """Efficiencies while pulling, at lengths that can be bought."""
     known = {length: row for length, row in answers.get("predict", ()) if None not in row.values()}
-    other = any(asked[name] for name in ("input_force", "wrap_angles", "preload", "friction_limit"))
+    other = any(asked[name] for name in ("input_force", "output_force", "wrap_angles", "preload", "friction_limit"))
     lengths = asked["lengths"] or tuple(known)
     if other or (asked["quantity"], asked["stroke"]) not in {(None, "pull"), (AT_LENGTHS[0], "pull")} or not lengths:
         return None
@@ -96,12 +118,13 @@ VERB = Verb(
     predict,
     _reply,
     "Predict efficiency, forces, preload, position or stiffness.",
-    """Predict the efficiency, or the output force for an input force, at LENGTHS (default: the lengths that can be bought)
-    or at wrap angles; or what stretch and preload do at wrap angles.
+    """Predict the efficiency, the output force for an input force, or the input force for a wanted output force, at LENGTHS
+    (default: the lengths that can be bought) or at wrap angles; or what stretch and preload do at wrap angles.
 
     \b
     efficiency      output over input force
-    output-force    force at the load side
+    output-force    force at the load side, of --input-force
+    input-force     force at the motor that gives --output-force
     preload         tension at rest, and slack where there is none
     friction        what moving the unloaded cable takes
     slack-load      input force at which a loop's return side goes slack

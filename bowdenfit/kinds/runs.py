@@ -20,7 +20,7 @@ from bowdenfit.kinds.sliding_rows import ROW_ARRAYS, SlidingRows
 from bowdenfit.physics.friction import transmission_efficiency
 from bowdenfit.types import Labels, Vector
 
-_WEIGHTS = ("weight", "load_squares", "load_products")
+_WEIGHTS = ("weight", "load_squares", "load_products", "drift_squares", "drift_products", "drift_loads")
 _OF_RUNS = ("n", "run_weight", "run_mean", "scatter", "log_weights")
 _LOAD_BINS, _SPEED_BINS, _DELAY_BINS = 24, 24, 8  # of each stroke of a run, where load, speed or a delay matters
 _FEWEST = 6  # runs of a single reading, from which their scatter is parted
@@ -132,6 +132,8 @@ class RunsTerm:
         sd = jnp.sqrt(weights[RUN_SCATTER] ** 2 + from_angles + weights[self.reading_noise] ** 2 / total)
         plain = self._per_run(data, deviation) / data["run_weight"]
         inside = data["load_squares"] * by_load**2 - 2 * data["load_products"] * by_load
+        late = LoadCells.of(values).delay_error
+        inside += late * (late * data["drift_squares"] - 2 * data["drift_products"] + 2 * by_load * data["drift_loads"])
         by_run = jnp.sum(inside.reshape(len(self.labels), -1), axis=1)
         # Cells are equally many for each run: repeating is quicker than indexing.
         of_cell = jnp.repeat(mounting, deviation.shape[0] // len(self.labels))
@@ -192,7 +194,7 @@ class RunsTerm:
 @dataclass(frozen=True)
 class _Deviations:
     """Of cells from their run's mounting effect; of each run: mounting effect, its sd, information, mean deviation, and
-    what the change of friction inside its cells takes off (or adds to) their scatter.
+    what the change of friction and of a delay's part inside its cells takes off (or adds to) their scatter.
     """
 
     within: Array
@@ -212,9 +214,11 @@ def run_sums(cable: Cable, rows: SlidingRows) -> dict[str, Any]:
     def mean(values: np.ndarray) -> np.ndarray:
         return np.bincount(cell, weight * values) / cell_weight
 
-    cell_mean, load = mean(rows.log_ratio), np.log(rows.input_force)
-    cell_load = mean(load)
-    within = np.bincount(cell, weight * (rows.log_ratio - cell_mean[cell]) ** 2)
+    def apart(values: np.ndarray) -> np.ndarray:
+        return values - mean(values)[cell]
+
+    cell_mean, log_load = mean(rows.log_ratio), np.log(rows.input_force)
+    ratio, load, drift = apart(rows.log_ratio), apart(log_load), apart(rows.drift)
     runs, run = np.unique(rows.run[first], return_inverse=True)
     row_run = np.searchsorted(runs, rows.run)
     run_weight = np.bincount(run, cell_weight)
@@ -223,9 +227,12 @@ def run_sums(cable: Cable, rows: SlidingRows) -> dict[str, Any]:
         "run": run,
         "weight": cell_weight,
         "mean": cell_mean,
-        "input_force": np.exp(cell_load),
-        "load_squares": np.bincount(cell, weight * (load - cell_load[cell]) ** 2),
-        "load_products": np.bincount(cell, weight * (load - cell_load[cell]) * (rows.log_ratio - cell_mean[cell])),
+        "input_force": np.exp(mean(log_load)),
+        "load_squares": np.bincount(cell, weight * load**2),
+        "load_products": np.bincount(cell, weight * load * ratio),
+        "drift_squares": np.bincount(cell, weight * drift**2),
+        "drift_products": np.bincount(cell, weight * drift * ratio),
+        "drift_loads": np.bincount(cell, weight * drift * load),
         "output_force": np.exp(mean(np.log(rows.output_force))),
         "velocity": mean(rows.velocity),
         "drift": mean(rows.drift),
@@ -234,7 +241,7 @@ def run_sums(cable: Cable, rows: SlidingRows) -> dict[str, Any]:
         "n": np.bincount(row_run, rows.worth),
         "run_weight": run_weight,
         "run_mean": np.bincount(run, cell_weight * cell_mean) / run_weight,
-        "scatter": np.bincount(run, within),
+        "scatter": np.bincount(row_run, weight * ratio**2),
         "log_weights": np.bincount(row_run, rows.worth * np.log(weight / rows.worth)),
     }
 

@@ -32,6 +32,7 @@ from bowdenfit.dataset import Dataset
 from bowdenfit.description import Description, SamplerSettings
 from bowdenfit.inference.chain import Sampling
 from bowdenfit.inference.compilation import compile_program
+from bowdenfit.inference.coordinates import walker_programs
 from bowdenfit.inference.draws import curves_of, for_each_draw, named_values
 from bowdenfit.inference.ensemble import sample
 from bowdenfit.inference.least_squares import maximum_posterior
@@ -194,9 +195,9 @@ class Bench:
         """Draws of the posterior by bowdenfit's own sampler."""
         objective = self._program(posterior, "objective", make_objective)
         batch = SAMPLER.n_ensembles * SAMPLER.n_walkers // 2
-        density = self._program(posterior, "density", lambda p: p.batched_log_density(batch))
+        programs = self._program(posterior, "walkers", lambda p: walker_programs(p, batch))
         start = maximum_posterior(posterior, objective)
-        z = sample(Sampling(posterior, start, SAMPLER, seed), density).z
+        z = sample(Sampling(posterior, start, SAMPLER, seed), programs).z
         return z.reshape(-1, posterior.model.space.size)
 
     def _refit(

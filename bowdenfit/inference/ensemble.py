@@ -1,13 +1,12 @@
 """Sampling with emcee: several independent ensembles of walkers, started apart, run until they agree.
 
-Moves: emcee's stretch and differential evolution, and draws from a distribution fitted to the other walkers, half of them in
-the values of the parameters instead of z. Not `DESnookerMove`: the one in emcee 3.1.6 does not sample the density it is given,
-and every ensemble agrees on the wrong answer.
+Moves: emcee's stretch and differential evolution, and draws from a distribution fitted to the other walkers; a quarter of them
+in z, a quarter in the values of the parameters, half where friction coefficients follow everything else. Not `DESnookerMove`:
+the one in emcee 3.1.6 does not sample the density it is given, and every ensemble agrees on the wrong answer.
 """
 
 from collections.abc import Callable, Sequence
 from dataclasses import replace
-from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -18,11 +17,11 @@ import numpy as np
 from bowdenfit.description import SamplerSettings
 from bowdenfit.inference.chain import Chain, Progress, Sampling, stuck_walkers, worst
 from bowdenfit.inference.checkpoint import append, records
+from bowdenfit.inference.coordinates import Coordinates, Places, WalkerPrograms, Z, coordinates_of
 from bowdenfit.inference.least_squares import MaximumPosterior
 from bowdenfit.inference.proposals import Proposal, differential_evolution, independent, shares_of_moves, stretch
-from bowdenfit.inference.value_chart import Chart, chart_values, in_values
 
-THIN = 10  # steps from one stored state to the next
+THIN = 10  # steps from one stored state to the next, all in the same coordinates
 _BLOCK = 10  # stored states between two reports
 _FIRST_LOOK = 60  # stored states before the first look; of five data sets the slowest is there after half of that
 _FITTED = 4  # walkers a parameter that a covariance is fitted to half of
@@ -31,50 +30,66 @@ _KEPT_PER_WALKER = 20  # draws at least that are kept of each walker, spread ove
 Moves = Sequence[tuple[Proposal, float]]
 
 
-class SideBySide(emcee.moves.RedBlueMove):
-    """Independent ensembles moved side by side: proposals stay within an ensemble, everything else is shared.
+class Sweep(emcee.moves.Move):
+    """Some steps of independent ensembles side by side, in one kind of coordinates: proposals stay within an ensemble.
 
-    Each ensemble is split in two at random; the walkers of one half are proposed places by those of the other half of
-    their ensemble. All ensembles' proposals are one array, evaluated in one call, which is why this is several times
-    quicker than one sampler after the other.
+    At each step one of the moves is made. Each ensemble is split in two at random; the walkers of one half are proposed
+    places by those of the other half of their ensemble. All ensembles' proposals are one array, evaluated in one call, which
+    is why this is several times quicker than one sampler after the other.
 
     Args:
-        proposal: Where to.
+        moves: Where to, and how often.
+        coordinates: In which coordinates.
         n_ensembles: Number of ensembles; walkers are ordered by ensemble.
     """
 
-    def __init__(self, proposal: Proposal, n_ensembles: int) -> None:
+    def __init__(self, moves: Moves, coordinates: Coordinates, n_ensembles: int) -> None:
         super().__init__()
-        self.proposal, self.n_ensembles = proposal, n_ensembles
+        self.coordinates, self.n_ensembles = coordinates, n_ensembles
+        self.proposals = [proposal for proposal, _ in moves]
+        self.shares = np.array([share for _, share in moves])
 
     def propose(self, model: Any, state: emcee.State) -> tuple[emcee.State, np.ndarray]:
-        """One step of every walker."""
-        n, size = state.coords.shape
+        """`THIN` steps of every walker, and the share that was accepted."""
+        at, accepted = self.coordinates.from_z(state.coords), np.zeros(len(state.coords))
+        for which in model.random.choice(len(self.proposals), size=THIN, p=self.shares):
+            for half in self._halves(model.random, len(state.coords)):
+                accepted += self._move(self.proposals[which], half, model, state, at)
+        return state, accepted / THIN
+
+    def _halves(self, random: np.random.RandomState, n: int) -> Sequence[tuple[np.ndarray, np.ndarray]]:
+        """Positions of those that move and those that rest, (ensemble, walker); twice."""
         walkers = n // self.n_ensembles
-        order = np.argsort(model.random.rand(self.n_ensembles, walkers), axis=1)
+        order = np.argsort(random.rand(self.n_ensembles, walkers), axis=1)
         order += walkers * np.arange(self.n_ensembles)[:, None]
-        accepted = np.zeros(n, dtype=bool)
-        for moving, resting in ((order[:, ::2], order[:, 1::2]), (order[:, 1::2], order[:, ::2])):
-            proposed, factors = self.proposal(state.coords[moving], state.coords[resting], model.random)
-            coords, which = proposed.reshape(-1, size), moving.ravel()
-            log_density = model.log_prob_fn(coords)  # ours gives an array; emcee would go through it number by number
-            gain = factors.ravel() + log_density - state.log_prob[which]
-            better = gain > np.log(model.random.uniform(size=len(which)))
-            state.coords[which[better]] = coords[better]
-            state.log_prob[which[better]] = log_density[better]
-            accepted[which] = better
-        return state, accepted
+        return (order[:, ::2], order[:, 1::2]), (order[:, 1::2], order[:, ::2])
+
+    def _move(
+        self, proposal: Proposal, half: tuple[np.ndarray, np.ndarray], model: Any, state: emcee.State, at: Places
+    ) -> np.ndarray:
+        """Move one half, in z and in the coordinates; who was moved."""
+        (moving, resting), (w, volume) = half, at
+        proposed, factors = proposal(w[moving], w[resting], model.random)
+        new, which = proposed.reshape(-1, w.shape[1]), moving.ravel()
+        z, new_volume = self.coordinates.to_z(new)
+        log_density = model.log_prob_fn(z)  # ours gives an array; emcee would go through it number by number
+        gain = factors.ravel() + volume[which] - new_volume + log_density - state.log_prob[which]
+        better = np.isfinite(new_volume) & (gain > np.log(model.random.uniform(size=len(which))))
+        taken = which[better]
+        state.coords[taken], state.log_prob[taken] = z[better], log_density[better]
+        w[taken], volume[taken] = new[better], new_volume[better]
+        return np.isin(np.arange(len(w)), taken)
 
 
-def default_moves(chart: Chart, n_walkers: int) -> Moves:
+def default_moves(size: int, n_walkers: int) -> Moves:
     """What the walkers do; see `shares_of_moves`.
 
     Args:
-        chart: Values of the parameters over z.
+        size: Number of parameters.
         n_walkers: Walkers of an ensemble; a few cannot tell the shape of a t distribution.
     """
-    fitted = independent if n_walkers >= _FITTED * chart.size else differential_evolution
-    return shares_of_moves(stretch, differential_evolution, fitted, partial(in_values, chart=chart))
+    fitted = independent if n_walkers >= _FITTED * size else differential_evolution
+    return shares_of_moves(stretch, differential_evolution, fitted)
 
 
 def starting_points(start: MaximumPosterior, settings: SamplerSettings, generator: np.random.Generator) -> np.ndarray:
@@ -90,21 +105,23 @@ def starting_points(start: MaximumPosterior, settings: SamplerSettings, generato
     return start.z + (centers + walkers) @ root.T
 
 
-def sample(asked: Sampling, program: Callable[..., Any], moves: Moves | None = None) -> Chain:
+def sample(asked: Sampling, programs: WalkerPrograms, moves: Moves | None = None) -> Chain:
     """Sample by ensembles of walkers.
 
     Args:
         asked: What of, how long, and so on.
-        program: Compiled log density for batches of half of all walkers.
-        moves: Proposals and their weights; `default_moves` if omitted.
+        programs: Compiled for batches of half of all walkers.
+        moves: Proposals and their shares, to be made in z alone; `default_moves`, in all coordinates, if omitted.
     """
     settings, start, seed = asked.settings, asked.start, asked.seed
     points = starting_points(start, settings, np.random.default_rng([seed, 0])).reshape(-1, len(start.z))
     backend = Checkpointed(points.shape, asked.checkpoint, asked.resume)
-    log_density = _in_halves(program, asked.posterior.data, len(points) // 2)
-    moves = moves or default_moves(chart_values(asked.posterior.model.space), settings.n_walkers)
-    moved = [(SideBySide(proposal, settings.n_ensembles), weight) for proposal, weight in moves]
-    sampler = emcee.EnsembleSampler(*points.shape, log_density, vectorize=True, backend=backend, moves=moved)
+    half = len(points) // 2
+    log_density = _in_halves(programs.log_density, asked.posterior.data, half)
+    frames = coordinates_of(asked.posterior, programs, half) if moves is None else [(Z(), 1.0)]
+    moves = moves or default_moves(points.shape[1], settings.n_walkers)
+    sweeps = [(Sweep(moves, coordinates, settings.n_ensembles), share) for coordinates, share in frames]
+    sampler = emcee.EnsembleSampler(*points.shape, log_density, vectorize=True, backend=backend, moves=sweeps)
     # emcee's wrapper prints a traceback of whatever stops an evaluation, the user's interrupt included.
     sampler.log_prob_fn = log_density
     generator = np.random.RandomState(np.random.MT19937(np.random.SeedSequence([seed, 1])))
@@ -117,7 +134,7 @@ def sample(asked: Sampling, program: Callable[..., Any], moves: Moves | None = N
     seen: tuple[float | None, float | None] = (None, None)
     while True:
         while (missing := target - int(backend.iteration)) > 0:
-            sampler.run_mcmc(state, min(missing, _BLOCK), thin_by=THIN, skip_initial_state_check=True)
+            sampler.run_mcmc(state, min(missing, _BLOCK), skip_initial_state_check=True)
             state = None
             asked.report(Progress(int(backend.iteration) * THIN, settings.max_steps, *seen))
         chain = _summarized(asked, backend)

@@ -15,6 +15,7 @@ from bowdenfit.description import SamplerSettings
 from bowdenfit.inference.chain import Sampling
 from bowdenfit.inference.comparison import How, Prediction, weigh_without_each
 from bowdenfit.inference.compilation import compile_program
+from bowdenfit.inference.coordinates import WalkerPrograms
 from bowdenfit.inference.diagnostics import Diagnostics, diagnose_all
 from bowdenfit.inference.draws import in_batches
 from bowdenfit.inference.least_squares import MaximumPosterior
@@ -158,7 +159,7 @@ class LeavingOut:
         settings = readings.settings.model_copy(update={"n_walkers": readings.walkers})
         own_seed = int(np.random.SeedSequence([self.seed, reading]).generate_state(1)[0])
         asked = Sampling(readings.posterior, start, settings, own_seed, likelihood, diagnose=_without_drift)
-        chain = sample(asked, readings.without(reading))
+        chain = sample(asked, WalkerPrograms(readings.without(reading)))
         mean = float(chain.quantities[_RATIO].mean())
         error = chain.diagnostics[_RATIO].mcse_mean / mean if mean > 0 else float("nan")
         return top + float(np.log(mean)) if mean > 0 else -np.inf, error, not chain.reasons and error < _LARGEST_ERROR

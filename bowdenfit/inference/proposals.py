@@ -4,7 +4,7 @@ A proposal takes the half that moves and the half that rests, (ensemble, walker,
 for the moving half, and the log of what the ratio of densities there is to be multiplied by.
 """
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from functools import partial
 from typing import Any
 
@@ -18,25 +18,18 @@ FREEDOM = 5  # degrees of freedom of the t distribution: tails wider than a post
 JITTER = 1e-10  # of each variance; keeps the covariance of walkers on a narrow ridge positive
 
 
-def shares_of_moves(stretch: Any, differential_evolution: Any, fitted: Any, in_values: Callable[[Any], Any]) -> list[Any]:
-    """The moves of an ensemble and how often each is made, by measurement on every data set here.
+def shares_of_moves(stretch: Any, differential_evolution: Any, fitted: Any) -> Sequence[tuple[Any, float]]:
+    """The moves of an ensemble, single or in a batch, and how often each is made, by measurement on every data set here.
 
     Draws from a fitted t distribution find the bulk, and mix best where the posterior is about normal; differential evolution
-    does along bent ridges, stretch moves do in narrow ends; gamma 1 jumps between modes. Half of all is done in values.
+    does along bent ridges, stretch moves do in narrow ends; gamma 1 jumps between modes.
 
     Args:
         stretch, differential_evolution: Moves, in NumPy or in JAX.
         fitted: What draws from a distribution fitted to the resting walkers.
-        in_values: Makes of a move the same in the values of the parameters.
     """
-    return [
-        (stretch, 0.1),
-        (differential_evolution, 0.15),
-        (in_values(differential_evolution), 0.2),
-        (partial(differential_evolution, gamma=1.0), 0.05),
-        (fitted, 0.2),
-        (in_values(fitted), 0.3),
-    ]
+    jumps = partial(differential_evolution, gamma=1.0)
+    return (stretch, 0.1), (differential_evolution, 0.35), (jumps, 0.05), (fitted, 0.5)
 
 
 def stretch(moving: np.ndarray, resting: np.ndarray, random: np.random.RandomState) -> tuple[np.ndarray, np.ndarray]:

@@ -1,4 +1,4 @@
-"""Proposals in the values of the parameters instead of z.
+"""The values of the parameters as coordinates to move in, instead of z.
 
 Readings are nearly linear in friction coefficients and in the coefficients of curves, so that ridges of the posterior that
 are bent in z are straight in values, and a step along one stays on it. Noise scales stay in z, where a funnel is less narrow.
@@ -12,7 +12,6 @@ import jax.numpy as jnp
 import numpy as np
 
 from bowdenfit.inference.compilation import compile_program
-from bowdenfit.inference.proposals import Proposal
 from bowdenfit.parameters.space import ParameterSpace
 
 NODES = np.linspace(-6.0, 6.0, 241)
@@ -76,17 +75,3 @@ def chart_values(space: ParameterSpace) -> Chart:
     bent = np.ptp(slopes, axis=0) > _BENT * np.max(np.abs(slopes), axis=0)
     which = np.flatnonzero(rising & bent & np.array([p.role != "noise" for p in space.free], dtype=bool))
     return Chart(space.size, which, values[:, which])
-
-
-def in_values(proposal: Proposal, chart: Chart) -> Proposal:
-    """The same proposal, made in the coordinates of a chart."""
-
-    def propose(
-        moving: np.ndarray, resting: np.ndarray, random: np.random.RandomState
-    ) -> tuple[np.ndarray, np.ndarray]:
-        present, volume = chart.from_z(moving)
-        places, factors = proposal(present, chart.from_z(resting)[0], random)
-        z, new_volume = chart.to_z(places)
-        return z, factors + volume - new_volume
-
-    return propose

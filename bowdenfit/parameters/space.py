@@ -101,12 +101,22 @@ class ParameterSpace:
             (np.array(where), _stacked(kind, [self.free[i].prior for i in where])) for kind, where in kinds.items()
         )
 
+    @cached_property
+    def _order(self) -> np.ndarray:
+        """From the order of the groups to that of z."""
+        return np.argsort(np.concatenate([where for where, _ in self._groups]))
+
     def vector(self, z: Float[Array, " free"]) -> Float[Array, " free"]:
         """Values of the free parameters [internal units] at z."""
         if not self._groups:
             return z
-        order = np.argsort(np.concatenate([where for where, _ in self._groups]))
-        return jnp.concatenate([prior.constrain(z[where]) for where, prior in self._groups])[order]
+        return jnp.concatenate([prior.constrain(z[where]) for where, prior in self._groups])[self._order]
+
+    def z_of(self, vector: Float[Array, " free"]) -> Float[Array, " free"]:
+        """Z at values of the free parameters [internal units], the inverse of `vector`; NaN at what one cannot be."""
+        if not self._groups:
+            return vector
+        return jnp.concatenate([prior.unconstrain(vector[where]) for where, prior in self._groups])[self._order]
 
     def constrain(self, z: Float[Array, " free"]) -> dict[str, Array]:
         """Named values of all parameters, fixed ones included [internal units], at z."""

@@ -10,10 +10,10 @@ import jax
 import numpy as np
 
 from bowdenfit.inference.chain import Chain, Sampling
+from bowdenfit.inference.coordinates import walker_programs
 from bowdenfit.inference.draws import for_each_draw, replicator
 from bowdenfit.inference.log_density import LogDensity as Density
 from bowdenfit.inference.samplers import NAMES, Drawn, compare_samplers
-from bowdenfit.inference.value_chart import chart_values
 from bowdenfit.model import Model
 from bowdenfit.questions.identify.judgment import compile_slopes, slope_program
 from bowdenfit.results.optimum import optimum_of
@@ -42,7 +42,7 @@ class Programs:
         asked: What questions asked `once` will need, by question.
     """
 
-    samplers: dict[str, Callable[..., Any]]
+    samplers: dict[str, Any]
     optimum: Callable[[np.ndarray], Any] | None
     implied: Callable[[np.ndarray], Any]
     asked: dict[Callable[..., Any], Any]
@@ -56,11 +56,10 @@ class Programs:
 
 def sampling_programs(density: Density, seed: int, beside: Executor) -> Programs:
     """The programs that sampling needs, compiled; and those that its draws will need, compiled beside it."""
-    model, settings, programs = density.model, density.model.description.sampler, dict[str, Callable[..., Any]]()
+    model, settings, programs = density.model, density.model.description.sampler, dict[str, Any]()
     for name in samplers(settings.method):
         if name == "emcee":
-            programs[name] = density.batched_log_density(settings.n_ensembles * settings.n_walkers // 2)
-            chart_values(model.space)  # kept for the sampler
+            programs[name] = walker_programs(density, settings.n_ensembles * settings.n_walkers // 2)
         else:
             programs[name] = import_module(_MODULES[name]).make_program(density, settings)
     optimum = for_each_draw(optimum_of(model), model.space.size) if model.description.route else None

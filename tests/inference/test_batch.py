@@ -104,8 +104,8 @@ def quantiles_of_scatter(posterior: LogDensity, levels: np.ndarray) -> np.ndarra
         positive = np.where(found > 0, found, 1.0)
         z = np.log(positive / mu.median) / mu.log_sd
         density.append(np.mean(np.all(found > 0, axis=1) * np.exp(-0.5 * np.sum(z**2, axis=1)) / positive.prod(axis=1)))
-    below = np.cumsum(np.array(density) * np.exp(-(grid**2) / 2))
-    return np.interp(levels, below / below[-1], grid)
+    at = np.array(density) * np.exp(-(grid**2) / 2)
+    return np.interp(levels, (np.cumsum(at) - at / 2) / at.sum(), grid)
 
 
 @pytest.mark.parametrize("name", [YARN, *(pytest.param(n, marks=pytest.mark.slow) for n in DATA_SETS if n != YARN)])

@@ -11,11 +11,11 @@ from test_proposals import CHART, DEGREES_OF_FREEDOM, DIMENSIONS, ROOT, below_qu
 
 from bowdenfit.dataset import load_dataset
 from bowdenfit.inference import proposals
-from bowdenfit.inference.batch.conditional import Conditional
 from bowdenfit.inference.batch.ensembles import walker_round
 from bowdenfit.inference.batch.frames import IN_Z, Frame, in_values
 from bowdenfit.inference.batch.moves import MOVES, differential_evolution, independent, numbers_of_move, stretch
 from bowdenfit.inference.compilation import compile_program
+from bowdenfit.inference.conditional import Conditional
 from bowdenfit.inference.log_density import LogDensity
 from bowdenfit.model import build_model
 

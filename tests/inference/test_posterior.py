@@ -13,6 +13,7 @@ from snooker import snooker_mixture
 import bowdenfit as bf
 from bowdenfit.description import SamplerSettings
 from bowdenfit.inference.chain import Chain, Sampling, stuck_walkers
+from bowdenfit.inference.coordinates import walker_programs
 from bowdenfit.inference.draws import for_each_draw, named_values
 from bowdenfit.inference.ensemble import sample
 from bowdenfit.inference.least_squares import maximum_posterior
@@ -68,7 +69,7 @@ class Bench:
         names, optimum = named_values(posterior.model), optimum_of(posterior.model)
         self.posterior = posterior
         self._implied = for_each_draw(lambda z: (names(z), optimum(z)), posterior.model.space.size)
-        self._log_density = cache(posterior.batched_log_density)
+        self._programs = cache(lambda batch: walker_programs(posterior, batch))
 
     @cached_property
     def _start(self):
@@ -84,8 +85,8 @@ class Bench:
         return by_name | {"optimal_length": length, "optimal_efficiency": efficiency}
 
     def sample(self, settings: SamplerSettings, seed: int, moves=None) -> Chain:
-        log_density = self._log_density(settings.n_ensembles * settings.n_walkers // 2)
-        return sample(Sampling(self.posterior, self._start, settings, seed), log_density, moves)
+        programs = self._programs(settings.n_ensembles * settings.n_walkers // 2)
+        return sample(Sampling(self.posterior, self._start, settings, seed), programs, moves)
 
 
 @pytest.fixture(scope="module")

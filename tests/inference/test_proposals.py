@@ -9,9 +9,10 @@ from emcee.moves.de import _get_nondiagonal_pairs
 from scipy import stats
 from snooker import snooker
 
-from bowdenfit.inference.ensemble import SideBySide, default_moves
+from bowdenfit.inference.coordinates import Z
+from bowdenfit.inference.ensemble import THIN, Sweep, default_moves
 from bowdenfit.inference.proposals import differential_evolution, independent, stretch
-from bowdenfit.inference.value_chart import NODES, Chart, in_values
+from bowdenfit.inference.value_chart import NODES, Chart
 
 DEGREES_OF_FREEDOM, DIMENSIONS = 4, 5
 _ROOT = np.linalg.cholesky(np.array([[2.0 ** (-abs(i - j)) for j in range(DIMENSIONS)] for i in range(DIMENSIONS)]))
@@ -20,7 +21,7 @@ ROOT = _ROOT * np.array([0.1, 1.0, 1.0, 3.0, 10.0])[:, None]  # correlated, and 
 
 # Two coordinates are bent, as those of positive quantities are; walkers leave the nodes on both sides.
 CHART = Chart(DIMENSIONS, np.array([1, 4]), np.stack([np.exp(0.5 * NODES), np.sinh(NODES)], axis=1))
-MOVES = default_moves(CHART, 64)
+MOVES, IN_Z, IN_BOTH = default_moves(DIMENSIONS, 64), ((Z(), 1.0),), ((Z(), 0.5), (CHART, 0.5))
 
 
 def log_t(x: np.ndarray) -> np.ndarray:
@@ -34,18 +35,18 @@ def draw_t(generator: np.random.Generator, n: int) -> np.ndarray:
     return (generator.standard_normal((n, DIMENSIONS)) @ ROOT.T) * mixing[:, None]
 
 
-def run_side_by_side(moves, log_density, start: np.ndarray, steps: int, seed: int) -> np.ndarray:
-    """States after every tenth step, (state, ensemble, walker, dimension)."""
+def run_side_by_side(moves, log_density, start: np.ndarray, steps: int, seed: int, frames=IN_BOTH) -> np.ndarray:
+    """States after every sweep, (state, ensemble, walker, dimension)."""
     ensembles, walkers, dimensions = start.shape
-    wrapped = [(SideBySide(move, ensembles), weight) for move, weight in moves]
+    sweeps = [(Sweep(moves, coordinates, ensembles), share) for coordinates, share in frames]
     flat = start.reshape(-1, dimensions)
-    sampler = emcee.EnsembleSampler(*flat.shape, log_density, vectorize=True, moves=wrapped)
-    return _run(sampler, flat, steps, seed).reshape(-1, ensembles, walkers, dimensions)
+    sampler = emcee.EnsembleSampler(*flat.shape, log_density, vectorize=True, moves=sweeps)
+    return _run(sampler, flat, steps // THIN, seed).reshape(-1, ensembles, walkers, dimensions)
 
 
-def _run(sampler: emcee.EnsembleSampler, start: np.ndarray, steps: int, seed: int) -> np.ndarray:
+def _run(sampler: emcee.EnsembleSampler, start: np.ndarray, states: int, seed: int, thin: int = 1) -> np.ndarray:
     state = emcee.State(start, random_state=np.random.RandomState(seed).get_state())
-    sampler.run_mcmc(state, steps // 10, thin_by=10, skip_initial_state_check=True)
+    sampler.run_mcmc(state, states, thin_by=thin, skip_initial_state_check=True)
     return sampler.get_chain()
 
 
@@ -66,15 +67,15 @@ def p_value(shares: np.ndarray) -> float:
     return float(min(1.0, stats.ttest_1samp(shares, expected, axis=0).pvalue.min() * len(expected)))
 
 
-def sampled_t(moves, seed: int, ensembles: int = 16, walkers: int = 64) -> np.ndarray:
+def sampled_t(moves, seed: int, ensembles: int = 16, walkers: int = 64, frames=IN_Z) -> np.ndarray:
     """Ensembles started in the target itself, so that only wrong moves can lead away."""
     start = draw_t(np.random.default_rng(seed), ensembles * walkers).reshape(ensembles, walkers, DIMENSIONS)
-    return run_side_by_side(moves, log_t, start, 1200, seed)
+    return run_side_by_side(moves, log_t, start, 1200, seed, frames)
 
 
 def test_the_default_moves_reproduce_a_heavy_tailed_target():
     """A multivariate t with 4 degrees of freedom in 5 dimensions; p < 0.001 by chance once in a thousand seeds."""
-    assert p_value(below_quantiles(sampled_t(MOVES, seed=1)[30:])) > 0.001
+    assert p_value(below_quantiles(sampled_t(MOVES, seed=1, frames=IN_BOTH)[30:])) > 0.001
 
 
 def test_the_snooker_move_does_not_reproduce_the_heavy_tailed_target():
@@ -94,26 +95,21 @@ def test_the_default_moves_find_the_target_from_starts_far_outside():
 # Each move --------------------------------------------------------------------------------------------------------
 
 
-def moves_alone(stretch, differential_evolution, independent, in_values):
-    """Every move of a sampler by its name, of the functions that make them."""
-    return {
-        "stretch": stretch,
-        "differential evolution": differential_evolution,
-        "gamma 1": partial(differential_evolution, gamma=1.0),
-        "independent": independent,
-        "stretch in values": in_values(stretch, CHART),
-        "differential evolution in values": in_values(differential_evolution, CHART),
-        "independent in values": in_values(independent, CHART),
-    }
-
-
-ALONE = moves_alone(stretch, differential_evolution, independent, in_values)
+PROPOSALS = {
+    "stretch": stretch,
+    "differential evolution": differential_evolution,
+    "gamma 1": partial(differential_evolution, gamma=1.0),
+    "independent": independent,
+}
+ALONE = {name: (proposal, IN_Z) for name, proposal in PROPOSALS.items()}
+ALONE |= {f"{name} in values": (proposal, ((CHART, 1.0),)) for name, proposal in PROPOSALS.items()}
 
 
 @pytest.mark.parametrize("name", ALONE)
 def test_every_move_leaves_a_heavy_tailed_target_as_it_is(name):
     """Alone, from starts in the target; p < 0.001 by chance once in a thousand seeds."""
-    assert p_value(below_quantiles(sampled_t([(ALONE[name], 1.0)], seed=3)[30:])) > 0.001
+    proposal, frames = ALONE[name]
+    assert p_value(below_quantiles(sampled_t([(proposal, 1.0)], seed=3, frames=frames)[30:])) > 0.001
 
 
 def without_its_factor(proposal):
@@ -122,10 +118,27 @@ def without_its_factor(proposal):
 
 
 @pytest.mark.filterwarnings("ignore:Precision loss")  # all ensembles without any tails
-@pytest.mark.parametrize("name", ["stretch", "independent", "differential evolution in values"])
+@pytest.mark.parametrize("name", ["stretch", "independent"])
 def test_the_same_test_sees_that_a_factor_is_missing(name):
     """The negative control of the test above."""
-    assert p_value(below_quantiles(sampled_t([(without_its_factor(ALONE[name]), 1.0)], seed=3)[30:])) < 1e-4
+    assert p_value(below_quantiles(sampled_t([(without_its_factor(PROPOSALS[name]), 1.0)], seed=3)[30:])) < 1e-4
+
+
+class WithoutItsVolume:
+    """The coordinates of the chart, as if a unit were as large everywhere."""
+
+    def from_z(self, z):
+        return CHART.from_z(z)[0], np.zeros(len(z))
+
+    def to_z(self, w):
+        return CHART.to_z(w)[0], np.zeros(len(w))
+
+
+@pytest.mark.filterwarnings("ignore:Precision loss")
+def test_the_same_test_sees_that_the_volume_of_coordinates_is_missing_in_a_single_fit():
+    frames = ((WithoutItsVolume(), 1.0),)
+    moves = [(differential_evolution, 1.0)]
+    assert p_value(below_quantiles(sampled_t(moves, seed=3, frames=frames)[30:])) < 1e-4
 
 
 class Told:
@@ -186,9 +199,9 @@ def test_side_by_side_with_one_ensemble_is_distributed_as_emcee_s_own_sampler(mo
     shares = {"side by side": [], "emcee": []}
     for seed in range(8):
         start = draw_t(np.random.default_rng(seed), walkers)
-        alone = run_side_by_side([(ALONE[move], 1.0)], log_t, start[None], steps, seed)
+        alone = run_side_by_side([(PROPOSALS[move], 1.0)], log_t, start[None], steps, seed, IN_Z)
         sampler = emcee.EnsembleSampler(walkers, DIMENSIONS, log_t, vectorize=True, moves=EMCEE_MOVES[move])
-        others = _run(sampler, start, steps, seed + 100)[:, None]
+        others = _run(sampler, start, steps // THIN, seed + 100, THIN)[:, None]
         for name, states in (("side by side", alone), ("emcee", others)):
             shares[name].append(below_quantiles(states)[0])
     p = stats.ttest_ind(*shares.values(), axis=0, equal_var=False).pvalue

@@ -12,6 +12,7 @@ from bowdenfit.description import Description, SamplerSettings
 from bowdenfit.inference.batch.diagnostics import diagnose_few_draws
 from bowdenfit.inference.batch.programs import BatchSettings
 from bowdenfit.inference.chain import Sampling
+from bowdenfit.inference.coordinates import walker_programs
 from bowdenfit.inference.ensemble import sample
 from bowdenfit.inference.least_squares import LeastSquares, least_squares, maximum_posterior
 from bowdenfit.inference.log_density import LogDensity
@@ -49,9 +50,9 @@ class Laboratory:
         """Draws of one posterior in z, one a row, by the package's usual sampler."""
         start = maximum_posterior(posterior, self.program(posterior, make_objective))
         walkers = self.sampler.n_ensembles * self.sampler.n_walkers
-        density = self.program(posterior, lambda p: p.batched_log_density(walkers // 2))
+        programs = self.program(posterior, lambda p: walker_programs(p, walkers // 2))
         asked = Sampling(posterior, start, self.sampler, seed, diagnose=diagnose_few_draws)
-        return sample(asked, density).z.reshape(-1, posterior.model.space.size)
+        return sample(asked, programs).z.reshape(-1, posterior.model.space.size)
 
     def program(self, posterior: LogDensity, make: Callable[[LogDensity], Any]) -> Any:
         """What is compiled once for all data of one shape."""

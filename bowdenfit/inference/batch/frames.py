@@ -1,7 +1,4 @@
-"""Coordinates w in which walkers of a batch move: z, values of the parameters, and coefficients given everything else.
-
-Any one-to-one map leaves what is sampled as it is, because the volume in z of a unit of w is counted.
-"""
+"""The coordinates w of `coordinates`, for walkers of a batch: in JAX, and with the volume in z of a unit of w."""
 
 from collections.abc import Callable, Sequence
 from functools import partial
@@ -12,7 +9,8 @@ import jax.numpy as jnp
 import numpy as np
 from jax import Array
 
-from bowdenfit.inference.batch.conditional import Conditional
+from bowdenfit.inference.conditional import Conditional
+from bowdenfit.inference.coordinates import shares_of_coordinates
 from bowdenfit.inference.value_chart import NODES, Chart
 
 _WIDTH = float(NODES[1] - NODES[0])
@@ -36,15 +34,9 @@ IN_Z = Frame(lambda z, _: z, lambda w, _: (w, jnp.zeros(len(w))))
 
 
 def batch_frames(chart: Chart, conditional: Conditional) -> Frames:
-    """In what walkers of a batch move, and how often.
-
-    By measurement on simulated on-body data, whose scatter between mountings mixes five times as fast for it; where there is no
-    friction coefficient, half of all is done in values as in a single fit.
-    """
-    values = in_values(chart) if len(chart.which) else IN_Z
-    if not conditional.is_told:
-        return (IN_Z, 0.5), (values, 0.5)
-    return (IN_Z, 0.25), (values, 0.25), (in_ridge(conditional), 0.5)
+    """In what walkers of a batch move, and how often."""
+    values = in_values(chart) if len(chart.which) else None
+    return shares_of_coordinates(IN_Z, values, in_ridge(conditional) if conditional.is_told else None)
 
 
 def in_values(chart: Chart) -> Frame:

@@ -11,13 +11,12 @@ References:
 """
 
 from collections.abc import Callable, Sequence
-from functools import partial
 
 import jax
 import jax.numpy as jnp
 from jax import Array
 
-from bowdenfit.inference.proposals import FREEDOM, GAMMA_SPREAD, JITTER, WIDEST_STRETCH
+from bowdenfit.inference.proposals import FREEDOM, GAMMA_SPREAD, JITTER, WIDEST_STRETCH, shares_of_moves
 
 Move = Callable[[Array, Array, Array], tuple[Array, Array]]
 Moves = Sequence[tuple[Move, float]]
@@ -69,9 +68,4 @@ def _log_t(standardized: Array) -> Array:
     return -(FREEDOM + standardized.shape[-1]) / 2 * jnp.log1p(jnp.sum(standardized**2, axis=-1) / FREEDOM)
 
 
-MOVES: Moves = (
-    (stretch, 0.1),
-    (differential_evolution, 0.35),
-    (partial(differential_evolution, gamma=1.0), 0.05),
-    (independent, 0.5),
-)
+MOVES: Moves = shares_of_moves(stretch, differential_evolution, independent)

@@ -9,12 +9,12 @@ import jax
 import numpy as np
 
 from bowdenfit.description import SamplerSettings
-from bowdenfit.inference.batch.conditional import Conditional
 from bowdenfit.inference.batch.ensembles import make_round
 from bowdenfit.inference.batch.frames import batch_frames
 from bowdenfit.inference.batch.laplace import points_of_climb
 from bowdenfit.inference.batch.weights import BLOCK
 from bowdenfit.inference.compilation import compile_program
+from bowdenfit.inference.conditional import Conditional
 from bowdenfit.inference.log_density import LogDensity
 from bowdenfit.inference.objective import noise_scales
 from bowdenfit.inference.value_chart import chart_values

@@ -1,0 +1,131 @@
+"""Coordinates in which friction coefficients follow whatever else is said: their conditional posterior made standard normal.
+
+Readings are nearly linear in the coefficients. Where readings are few and scatter little, the coefficients that go with a wrap
+angle and a scatter lie in a narrow ridge, so narrow that walkers hardly ever find from the wide end of the posterior into the
+narrow one, and small scatters are drawn too seldom. In units of that ridge, about its middle, there is none.
+
+References:
+    Neal 2003, "Slice sampling" (Annals of Statistics 31), section 8, for such a funnel.
+"""
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from functools import cached_property
+from typing import Any
+
+import jax
+import jax.numpy as jnp
+import numpy as np
+from jax import Array
+
+from bowdenfit.inference.compilation import compile_program
+from bowdenfit.inference.log_density import LogDensity
+from bowdenfit.parameters.space import ParameterSpace
+
+
+@dataclass(frozen=True)
+class Conditional:
+    """Friction coefficients of one model given everything else.
+
+    Args:
+        posterior: Its posterior.
+    """
+
+    posterior: LogDensity
+
+    @cached_property
+    def which(self) -> np.ndarray:
+        """Positions of the coefficients."""
+        return np.flatnonzero([p.role == "friction" for p in self.posterior.model.space.free])
+
+    @cached_property
+    def _coefficients(self) -> ParameterSpace:
+        return ParameterSpace(tuple(self.posterior.model.space.free[i] for i in self.which))
+
+    @cached_property
+    def _rubbing(self) -> list[int]:
+        """Positions of the terms whose residuals the coefficients enter at all."""
+        space, own = self.posterior.model.space, self._coefficients
+        free, coefficients = (jax.ShapeDtypeStruct((each.size,), jnp.float64) for each in (space, own))
+
+        def depends(term: Any, data: Any) -> bool:
+            def residuals(coefficients: Array, z: Array) -> Array:
+                return term.residuals(space.constrain(z) | own.constrain(coefficients), data)
+
+            return _depends(residuals, coefficients, free)
+
+        terms = enumerate(zip(self.posterior.model.terms, self.posterior.data, strict=True))
+        return [i for i, each in terms if depends(*each)]
+
+    @property
+    def is_told(self) -> bool:
+        """Whether readings say anything of coefficients."""
+        return len(self.which) > 0 and len(self._rubbing) > 0
+
+    def to_w(self, z: Array, data: Any) -> Array:
+        """W of one z."""
+        return z.at[self.which].set(self._along(z[self.which], self._ridge(z, data)))
+
+    def from_w(self, w: Array, data: Any) -> tuple[Array, Array]:
+        """Z of one w, and log of the volume of a unit of w there; NaN where a coefficient cannot be what w says."""
+        ridge = self._ridge(w, data)
+        z = self._back(w[self.which], ridge)
+        return w.at[self.which].set(z), -self._log_volume(z, ridge)
+
+    def both_ways(self, point: Array, data: Any) -> tuple[tuple[Array, Array], tuple[Array, Array]]:
+        """Of one point, taken for z: w, and log of the volume of a unit of z; taken for w: z, and the same.
+
+        The ridge is where everything but the coefficients says, which z and w have in common.
+        """
+        ridge, own = self._ridge(point, data), point[self.which]
+        w, z = self._along(own, ridge), self._back(own, ridge)
+        return tuple(
+            (point.at[self.which].set(place), self._log_volume(at, ridge)) for place, at in ((w, own), (z, z))
+        )  # type: ignore[return-value]
+
+    def program(self, batch: int) -> Callable[..., Any]:
+        """`both_ways` of a batch of points and data, compiled."""
+        shape = jax.ShapeDtypeStruct((batch, self.posterior.model.space.size), jnp.float64)
+        return compile_program(jax.vmap(self.both_ways, (0, None)), shape, self.posterior.data)
+
+    def _along(self, z: Array, ridge: tuple[Array, Array]) -> Array:
+        center, root = ridge
+        return root.T @ (self._coefficients.vector(z) - center)
+
+    def _back(self, w: Array, ridge: tuple[Array, Array]) -> Array:
+        center, root = ridge
+        return self._coefficients.z_of(center + jax.scipy.linalg.solve_triangular(root, w, trans=1, lower=True))
+
+    def _log_volume(self, z: Array, ridge: tuple[Array, Array]) -> Array:
+        """Log of the volume in w of a unit of the coefficients' z."""
+        _, slopes = jax.jvp(self._coefficients.vector, (z,), (jnp.ones_like(z),))
+        return jnp.sum(jnp.log(slopes)) + jnp.sum(jnp.log(jnp.diagonal(ridge[1])))
+
+    def _ridge(self, z: Array, data: Any) -> tuple[Array, Array]:
+        """Middle of the coefficients and lower triangular root of their precision, from all of z but themselves."""
+        model, own = self.posterior.model, self._coefficients
+        low, middle, high = jax.vmap(own.vector)(jnp.tile(jnp.array([[-1.0], [0.0], [1.0]]), own.size))
+        precision = jnp.diag((2 / (high - low)) ** 2)
+        others = model.space.constrain(z.at[self.which].set(0.0))
+
+        def residuals(coefficients: Array) -> Array:
+            values = others | {p.name: coefficients[i] for i, p in enumerate(own.free)}
+            return jnp.concatenate([model.terms[i].residuals(values, data[i]) for i in self._rubbing])
+
+        now, change = jax.linearize(residuals, middle)
+        slopes = jax.vmap(change)(jnp.eye(own.size))
+        told = slopes @ slopes.T + precision
+        root = jnp.linalg.cholesky(told, symmetrize_input=False)
+        center = middle - jax.scipy.linalg.cho_solve((root, True), slopes @ now)
+        known = jnp.all(jnp.isfinite(root)) & jnp.all(jnp.isfinite(center))
+        return jnp.where(known, center, middle), jnp.where(known, root, jnp.sqrt(precision))
+
+
+def _depends(function: Callable[..., Array], *arguments: Any) -> bool:
+    """Whether anything of the first argument is used on the way to what a function gives."""
+    traced = jax.make_jaxpr(function)(*arguments).jaxpr
+    reached = {traced.invars[0]}
+    for step in traced.eqns:
+        if any(isinstance(var, type(traced.invars[0])) and var in reached for var in step.invars):
+            reached |= set(step.outvars)
+    return any(var in reached for var in traced.outvars if isinstance(var, type(traced.invars[0])))

@@ -12,6 +12,7 @@ from bowdenfit.description.file import Stated
 from bowdenfit.errors import DatasetError
 from bowdenfit.files.row_account import RowAccount
 from bowdenfit.inputs import matching
+from bowdenfit.kinds.asked import Asked
 from bowdenfit.kinds.design import Design
 from bowdenfit.kinds.measurements import Measurements
 from bowdenfit.kinds.pages import Page
@@ -133,6 +134,7 @@ class Kind(Generic[AnyTable]):
         velocity_unit: Which of the two; empty without velocities.
         groups: Group of each row; empty without groups.
         takes_channels: Whether channels can be named on the command line.
+        asked: What is asked of its files where there is no description; None if it is never offered.
     """
 
     name: str
@@ -162,6 +164,7 @@ class Kind(Generic[AnyTable]):
     velocity_unit: Callable[[AnyTable], str] = lambda _: ""
     groups: Callable[[AnyTable], tuple[str, ...]] = lambda _: ()
     takes_channels: bool = False
+    asked: Asked | None = None
 
     def file_name(self, settings: Any) -> str:
         """The file that a table is written to: as stated, or by the name of its kind."""

@@ -14,6 +14,7 @@ from bowdenfit.files.cells import Cell
 from bowdenfit.files.columns import Column, Quantity, require
 from bowdenfit.files.csv_table import RawTable
 from bowdenfit.files.spellings import without_accents
+from bowdenfit.kinds.asked import Wanted
 from bowdenfit.types import Labels, Matrix, Vector
 from bowdenfit.words import shown
 
@@ -142,6 +143,10 @@ def _stroke(cell: Cell, held: str) -> int:
             f"{cell.shown} is no stroke; write pull (+1) or return (-1){held}; rename a column that tells something else."
         )
     return _STROKES[text]
+
+
+RUN = Wanted(Quantity("run", "text"), "which mounting of the cable a row belongs to", optional=True)
+STROKE = Wanted(Quantity("stroke", "text"), "whether a row was read while pulling or returning", optional=True, numbers=(-1, 1))
 
 
 def shared_columns(route: Route | None, contacts: Sequence[str]) -> tuple[Quantity, ...]:

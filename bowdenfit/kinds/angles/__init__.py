@@ -12,6 +12,7 @@ from bowdenfit.kinds.angles.table import (
     read_angles,
     warnings_of,
 )
+from bowdenfit.kinds.asked import Asked
 from bowdenfit.kinds.kind import Kind
 from bowdenfit.kinds.readings import Readings
 
@@ -30,4 +31,5 @@ ANGLES = Kind(
     page=page,
     design=AngleDesign,
     empty=empty,
+    asked=Asked("wrap angles at several lengths of the cable", by_length=True),
 )

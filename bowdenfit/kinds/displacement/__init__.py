@@ -2,6 +2,8 @@
 
 import numpy as np
 
+from bowdenfit.files.columns import Quantity
+from bowdenfit.kinds.asked import Asked, Wanted
 from bowdenfit.kinds.displacement.reader import read_displacement
 from bowdenfit.kinds.displacement.table import DisplacementSettings, DisplacementTable, contradiction
 from bowdenfit.kinds.displacement.words import (
@@ -15,6 +17,7 @@ from bowdenfit.kinds.displacement.words import (
 )
 from bowdenfit.kinds.kind import Kind, itself
 from bowdenfit.kinds.readings import Readings
+from bowdenfit.kinds.rows import RUN, STROKE
 from bowdenfit.kinds.wrap_angles import check_rows
 
 DISPLACEMENT = Kind(
@@ -43,4 +46,14 @@ DISPLACEMENT = Kind(
     bends=lambda table: np.nansum(table.own.angle, axis=1),
     conditions=itself,
     forces=lambda table: table.force[table.used],
+    asked=Asked(
+        "one force, at the motor, and the displacement of the motor",
+        (
+            Wanted(Quantity("force", "force"), "the force at the motor", (Quantity("input_force", "force"),)),
+            Wanted(Quantity("displacement", "length"), "the displacement of the motor", (Quantity("position", "length"),)),
+            RUN,
+            STROKE,
+        ),
+        has_own_angles=True,
+    ),
 )

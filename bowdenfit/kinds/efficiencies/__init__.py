@@ -1,5 +1,7 @@
 """Transmission efficiencies."""
 
+from bowdenfit.files.columns import Quantity
+from bowdenfit.kinds.asked import Asked, Wanted
 from bowdenfit.kinds.efficiencies.table import (
     EfficiencyDesign,
     EfficiencyTable,
@@ -29,4 +31,9 @@ EFFICIENCIES = Kind(
     empty=empty,
     count=lambda table: counted(len(table.efficiency), "efficiency", "efficiencies"),
     conditions=itself,
+    asked=Asked(
+        "efficiencies: output force over input force while pulling",
+        (Wanted(Quantity("efficiency", "ratio"), "the efficiency"),),
+        has_own_angles=True,
+    ),
 )

@@ -3,6 +3,8 @@
 import numpy as np
 
 from bowdenfit.description import Description
+from bowdenfit.files.columns import Quantity
+from bowdenfit.kinds.asked import Asked, Switch, Wanted
 from bowdenfit.kinds.forces.following import check_following
 from bowdenfit.kinds.forces.gained import check_gains
 from bowdenfit.kinds.forces.loads import alone
@@ -12,6 +14,7 @@ from bowdenfit.kinds.forces.words import ForceDesign, count, describe, empty, im
 from bowdenfit.kinds.kind import Kind, itself
 from bowdenfit.kinds.measurements import Measurements
 from bowdenfit.kinds.readings import Readings, efficiencies
+from bowdenfit.kinds.rows import RUN, STROKE
 from bowdenfit.kinds.wrap_angles import check_rows
 
 
@@ -53,4 +56,16 @@ FORCES = Kind(
     typical_speeds=_typical_speeds,
     velocity_unit=lambda table: table.velocity_unit,
     groups=lambda table: table.group,
+    asked=Asked(
+        "forces at both ends of the cable, a row a pair of readings",
+        (
+            Wanted(Quantity("input_force", "force"), "the force at the motor"),
+            Wanted(Quantity("output_force", "force"), "the force at the load"),
+            RUN,
+            STROKE,
+        ),
+        (Switch("run", "Was the cable mounted anew for every row of {}?", "run", "each row"),),
+        has_own_angles=True,
+        several=True,
+    ),
 )

@@ -2,10 +2,13 @@
 
 import numpy as np
 
+from bowdenfit.files.columns import Quantity
+from bowdenfit.kinds.asked import Asked, Wanted
 from bowdenfit.kinds.kind import Kind, itself
 from bowdenfit.kinds.loop.table import LoopTable, read_loop
 from bowdenfit.kinds.loop.words import LoopDesign, contradiction, describe, empty, implausible, page, warnings_of
 from bowdenfit.kinds.readings import Readings
+from bowdenfit.kinds.rows import STROKE
 from bowdenfit.kinds.wrap_angles import check_rows
 from bowdenfit.words import counted
 
@@ -28,4 +31,15 @@ LOOP = Kind(
     bends=lambda table: np.nansum(table.own.angle, axis=1),
     conditions=itself,
     forces=lambda table: table.input_force * table.stroke,
+    asked=Asked(
+        "forces or torques at both ends of a loop of two ropes",
+        (
+            Wanted(Quantity("input_force", "force"), "the force at the motor", (Quantity("input_torque", "torque"),)),
+            Wanted(Quantity("output_force", "force"), "the force at the load", (Quantity("output_torque", "torque"),)),
+            STROKE,
+        ),
+        has_own_angles=True,
+        is_guessed=False,
+        description={"cable": {"kind": "loop"}},
+    ),
 )

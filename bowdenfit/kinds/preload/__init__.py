@@ -1,5 +1,7 @@
 """Preload between fixed ends."""
 
+from bowdenfit.files.columns import Quantity
+from bowdenfit.kinds.asked import Asked, Wanted
 from bowdenfit.kinds.kind import Kind
 from bowdenfit.kinds.preload.table import PreloadTable, PreloadTableSettings, read_preload
 from bowdenfit.kinds.preload.words import PreloadDesign, describe, empty, implausible, page, warnings_of
@@ -22,4 +24,11 @@ PRELOAD = Kind(
     count=lambda table: counted(len(table.preload), "preload"),
     bends=lambda table: table.wrap_angle,
     tensions=lambda table: table.preload,
+    asked=Asked(
+        "preload between fixed ends at several wrap angles",
+        (
+            Wanted(Quantity("preload", "force"), "the preload"),
+            Wanted(Quantity("wrap_angle", "angle"), "the wrap angle of the cable"),
+        ),
+    ),
 )

@@ -2,6 +2,8 @@
 
 import numpy as np
 
+from bowdenfit.files.matching import Quantity
+from bowdenfit.kinds.asked import Asked, Wanted
 from bowdenfit.kinds.kind import Kind
 from bowdenfit.kinds.readings import Readings, efficiencies
 from bowdenfit.kinds.recordings.angles import check_angles, recorded_angles
@@ -51,4 +53,13 @@ RECORDINGS = Kind(
     typical_speeds=_typical_speeds,
     velocity_unit=lambda recordings: recordings.velocity_unit,
     takes_channels=True,
+    asked=Asked(
+        "a recording of two load cells, sampled while the motor moves",
+        (
+            Wanted(Quantity("input_force", "force"), "the force at the motor"),
+            Wanted(Quantity("output_force", "force"), "the force at the load"),
+        ),
+        several=True,
+        is_guessed=False,
+    ),
 )

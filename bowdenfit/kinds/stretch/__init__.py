@@ -1,5 +1,7 @@
 """Stretch of the rope under load."""
 
+from bowdenfit.files.columns import Quantity
+from bowdenfit.kinds.asked import Asked, Wanted
 from bowdenfit.kinds.kind import Kind
 from bowdenfit.kinds.readings import Readings
 from bowdenfit.kinds.stretch.table import StretchTable, read_stretch
@@ -21,4 +23,12 @@ STRETCH = Kind(
     count=lambda table: f"{counted(len(table.load), 'reading')} of stretch",
     bends=lambda table: table.wrap_angle,
     tensions=lambda table: table.load,
+    asked=Asked(
+        "stretch of the rope under load, the far end held",
+        (
+            Wanted(Quantity("load", "force"), "the load on the rope's end"),
+            Wanted(Quantity("wrap_angle", "angle"), "the wrap angle of the cable"),
+            Wanted(Quantity("stretch", "length"), "the stretch"),
+        ),
+    ),
 )

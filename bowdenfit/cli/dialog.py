@@ -1,0 +1,49 @@
+"""Questions in a terminal: a wrong answer is asked again with a sentence, and Ctrl-C or Ctrl-D ends without a trace."""
+
+import sys
+from typing import TypeVar
+
+import click
+
+from bowdenfit.cli.terminal import say
+from bowdenfit.errors import BowdenfitError
+from bowdenfit.questions.start.question import Question
+from bowdenfit.words import filled
+
+Answer = TypeVar("Answer")
+
+
+class Terminal:
+    """A person at a terminal."""
+
+    def ask(self, question: Question[Answer]) -> Answer:
+        """The answer to a question, asked until there is one."""
+        click.echo()
+        say(filled(question.words))
+        for i, option in enumerate(question.options, start=1):
+            say(filled(f"{i}  {option}", "  "))
+        if question.default is None and question.example:
+            such = "" if question.options else f"such as {question.example}; "
+            say(f"({such}no default, because no file says it)")
+        shown = f"[{question.default}]" if question.default is not None else ""
+        while True:
+            typed = click.prompt(shown, default=question.default or "", show_default=False, prompt_suffix="> ")
+            if not typed.strip():
+                say("Something must be written here; Ctrl-C ends it all, and nothing is written.")
+                continue
+            try:
+                return question.read(typed)
+            except BowdenfitError as error:
+                say(filled(f"{str(error)[:1].upper()}{str(error)[1:]}"))
+
+    def say(self, sentence: str) -> None:
+        """What was understood without asking."""
+        say(filled(sentence))
+
+    def settle(self) -> None:
+        """Nothing: everything was answered."""
+
+
+def has_person() -> bool:
+    """Whether somebody can be asked."""
+    return sys.stdin is not None and sys.stdin.isatty() and sys.stdout.isatty()

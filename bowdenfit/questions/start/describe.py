@@ -1,0 +1,156 @@
+"""From files to a description: what they say is taken, what they do not say is asked."""
+
+import re
+from collections.abc import Sequence
+from pathlib import Path
+from typing import Any
+
+from bowdenfit.description import SCHEMA
+from bowdenfit.errors import DatasetError, Faults
+from bowdenfit.kinds import KINDS
+from bowdenfit.kinds.kind import Kind
+from bowdenfit.kinds.stated_angle import stated_angle
+from bowdenfit.questions.start.columns import name_channels, name_columns
+from bowdenfit.questions.start.page import toml_text
+from bowdenfit.questions.start.places import Places, find_places
+from bowdenfit.questions.start.question import Asker, choose, number, quantity, text
+from bowdenfit.questions.start.sheet import Sheet, look, recording_sheet
+from bowdenfit.words import listed
+
+_REMARKS = {
+    "schema": "Written by `bowdenfit init` from the files beside it; `bowdenfit check` says how it is understood.",
+    "route": "What the design question varies, and where the curves of the wrap angles hold.",
+    "contact": "One [[contact]] for each place where the rope rubs; contacts may share a coefficient.",
+}
+
+
+def description_of(paths: Sequence[Path], called: str, ask: Asker) -> str:
+    """The text of a cable.toml for some files.
+
+    Args:
+        paths: The files, which are to lie beside it.
+        called: What the cable is called if nobody says.
+        ask: Whom to ask what the files do not say.
+
+    Raises:
+        DatasetError: A file cannot be read, or holds nothing that can be used.
+    """
+    sheets = _sheets(paths, ask)
+    name = ask.ask(text("What is the cable called?", called))
+    source = ask.ask(text("Who measured it, when, on which bench? (- to leave it out)", "-"))
+    faults = Faults()
+    for sheet in sheets:
+        with faults.noted():
+            if sheet.kind and sheet.kind.takes_channels:
+                name_channels(sheet, ask)
+            else:
+                name_columns(sheet, ask)
+    faults.refuse()
+    ask.settle()
+    places = find_places(sheets, ask)
+    ask.settle()
+    recordings = _recordings([each for each in sheets if each.kind and each.kind.takes_channels], places, ask)
+    ask.settle()
+    page: dict[str, Any] = {"schema": SCHEMA, "name": name} | ({} if source == "-" else {"source": source})
+    for sheet in sheets:
+        assert sheet.kind is not None and sheet.kind.asked is not None  # asked for above
+        page |= sheet.kind.asked.description
+    page |= {"route": places.route} if places.route else {}
+    page |= {"contact": places.contacts, "tables": _tables(sheets)}
+    return toml_text(page | ({"recording": recordings} if recordings else {}), _REMARKS)
+
+
+def _sheets(paths: Sequence[Path], ask: Asker) -> list[Sheet]:
+    """What each file is; asked where it does not say."""
+    faults, sheets = Faults(), list[Sheet]()
+    for path in paths:
+        with faults.noted():
+            sheet = look(path)
+            if sheet.kind is None:
+                sheet = _asked(sheet, ask)
+            assert sheet.kind is not None and sheet.kind.asked is not None
+            ask.say(f"{sheet.file}: {sheet.kind.asked.holds}.")
+            sheets.append(sheet)
+    ask.settle()
+    for kind in {sheet.kind.name: sheet.kind for sheet in sheets if sheet.kind}.values():
+        files = [sheet.file for sheet in sheets if sheet.kind is kind]
+        with faults.noted():
+            if len(files) > 1 and kind.asked is not None and not kind.asked.several:
+                raise DatasetError(
+                    f"{listed(files)} both hold {kind.asked.holds}; put them into one file, below one line of headings."
+                )
+    faults.refuse()
+    return sheets
+
+
+def _asked(sheet: Sheet, ask: Asker) -> Sheet:
+    """A file of which a person has said what it holds."""
+    kinds = [kind for kind in KINDS.values() if kind.asked is not None]
+    options: list[tuple[str, Kind]] = [(kind.asked.holds, kind) for kind in kinds if kind.asked]
+    default = kinds.index(sheet.likely) + 1 if sheet.likely else None
+    columns = listed([each.words for each in sheet.columns])
+    why = f"{sheet.file} does not say what it holds; name its columns as the template has them (bowdenfit init FOLDER)."
+    kind = ask.ask(choose(f"{sheet.file} has the columns {columns}. What does it hold?", options, default, why))
+    if kind.takes_channels:
+        return recording_sheet(sheet.path, "its user says so")
+    sheet.kind = kind
+    return sheet
+
+
+def _tables(sheets: Sequence[Sheet]) -> dict[str, Any]:
+    """[tables]: the files of each kind, with the columns that must be named."""
+    tables: dict[str, Any] = {}
+    for kind in {sheet.kind.name: sheet.kind for sheet in sheets if sheet.kind}.values():
+        these = [sheet for sheet in sheets if sheet.kind is kind]
+        if kind.takes_channels:
+            tables[kind.name] = {}
+            continue
+        said = [_named(each) for each in these]
+        settings: dict[str, object] = {}
+        for each in these:
+            settings |= each.settings
+        if any(columns != said[0] for columns in said):
+            raise DatasetError(
+                f"the columns of {listed([each.file for each in these])} are not called alike; give them the same headings, or "
+                "put them into one file."
+            )
+        files = [each.file for each in these]
+        where: dict[str, Any] = {"files": files} if len(files) > 1 else {"file": files[0]}
+        tables[kind.name] = {**where, **settings, **({"columns": said[0]} if said[0] else {})}
+    return tables
+
+
+def _named(sheet: Sheet) -> dict[str, Any]:
+    """The columns or channels that the description must name."""
+    return {name: source.model_dump(exclude_none=True) for name, source in sheet.sources.items()}
+
+
+def _recordings(sheets: Sequence[Sheet], places: Places, ask: Asker) -> list[dict[str, Any]]:
+    """Every [[recording]]: its file, where it was made, and what its channels are called."""
+    found = []
+    angles = [each["wrap_angle"]["column"] for each in places.contacts if "column" in each["wrap_angle"]]
+    for sheet in sheets:
+        entry: dict[str, Any] = {"file": sheet.file}
+        if places.route:
+            entry["at"] = _length_of(sheet, places, ask)
+        for name in [] if places.route else angles:
+            said = stated_angle(sheet.path)
+            why = f"{sheet.file} does not say its wrap angle; write it into the name of the file, such as run1_90deg.csv."
+            words = f"What was the wrap angle of {sheet.file}, with its unit?"
+            value, unit = ask.ask(quantity(words, "angle", "90 deg", why, said[0] if said else None))
+            entry.setdefault("wrap_angles", {})[name] = {"value": value, "unit": unit}
+        channels = _named(sheet)
+        found.append(entry | ({"channels": channels} if channels else {}))
+    return found
+
+
+def _length_of(sheet: Sheet, places: Places, ask: Asker) -> float:
+    """The length at which a recording was made; proposed where the name of its file has it."""
+    unit = places.route["unit"]
+    named = re.search(rf"(?<![\d.])(\d+(?:[.,]\d+)?)[\s_-]?{re.escape(unit)}(?![a-z])", sheet.path.stem)
+    why = (
+        f"{sheet.file} does not say at which length it was recorded; write it into the name of the file, such as "
+        f"run1_470{unit}.csv."
+    )
+    words = f"At which length, in {unit}, was {sheet.file} recorded?"
+    return ask.ask(number(words, named[1].replace(",", ".") if named else None, why, "470"))

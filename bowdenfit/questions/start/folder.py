@@ -1,0 +1,140 @@
+"""Writing a new data set: in a folder that is there whole or not at all."""
+
+import os
+import shutil
+import tempfile
+from collections.abc import Iterator, Mapping, Sequence
+from contextlib import contextmanager
+from importlib import resources
+from pathlib import Path
+
+from bowdenfit.dataset import DESCRIPTION_FILE
+from bowdenfit.errors import DatasetError, UsageError, disk_error, nearest
+from bowdenfit.inputs import refuse_special
+from bowdenfit.words import listed, shown
+
+TEMPLATES = (DESCRIPTION_FILE, "angles.csv", "forces.csv")
+_PACKAGE, _CHECKOUT = "examples", "datasets"  # where the shipped data sets are, in a wheel and beside the package
+
+
+def refuse_existing(folder: Path) -> None:
+    """Refuse a folder that holds something, before anything is asked.
+
+    Raises:
+        UsageError: It does, or it is a file.
+    """
+    if folder.is_dir() and not any(folder.iterdir()):
+        return
+    if folder.exists() or folder.is_symlink():
+        raise UsageError(f"{folder} exists already; name another folder, nothing was written.")
+
+
+@contextmanager
+def new_folder(folder: Path) -> Iterator[Path]:
+    """A folder to write into, which takes its name when all is written, and is gone if that fails or is interrupted.
+
+    Args:
+        folder: What it will be called.
+
+    Raises:
+        UsageError, StoreError: It exists already, or cannot be written.
+    """
+    refuse_existing(folder)
+    try:
+        folder.parent.mkdir(parents=True, exist_ok=True)
+        place = Path(tempfile.mkdtemp(prefix=f".{folder.name}.", dir=folder.parent))
+    except OSError as error:
+        raise disk_error(folder, error) from None
+    try:
+        yield place
+        place.chmod(0o777 & ~_umask())
+        place.replace(folder)
+    except OSError as error:
+        raise disk_error(folder, error) from None
+    finally:
+        shutil.rmtree(place, ignore_errors=True)
+
+
+def _umask() -> int:
+    """What new files may not have; it can only be read by setting it."""
+    mask = os.umask(0)
+    os.umask(mask)
+    return mask
+
+
+def write_template(folder: Path) -> None:
+    """Write the description and the tables to fill in.
+
+    Raises:
+        UsageError, StoreError: See `new_folder`.
+    """
+    with new_folder(folder) as place:
+        for name in TEMPLATES:
+            text = resources.files("bowdenfit.templates").joinpath(name).read_text(encoding="utf-8")
+            (place / name).write_text(text, encoding="utf-8")
+
+
+def write_data_set(folder: Path, description: str, files: Sequence[Path]) -> None:
+    """Write a description beside copies of the files that it is of.
+
+    Args:
+        folder: Where to.
+        description: Its text.
+        files: The files.
+
+    Raises:
+        UsageError, StoreError: See `new_folder`.
+    """
+    with new_folder(folder) as place:
+        for file in files:
+            shutil.copyfile(file, place / file.name)
+        (place / DESCRIPTION_FILE).write_text(description, encoding="utf-8")
+
+
+def refuse_files(files: Sequence[Path]) -> None:
+    """Refuse files that are not there, or could not lie beside each other.
+
+    Raises:
+        UsageError, DatasetError: Which, and why.
+    """
+    for file in files:
+        refuse_special(file)
+        if not file.is_file():
+            what = "is a folder" if file.is_dir() else "does not exist"
+            raise UsageError(f"{file} {what}; name the files that you measured.")
+    names = [file.name for file in files]
+    if twice := [name for name in names if names.count(name) > 1 or name == DESCRIPTION_FILE]:
+        raise DatasetError(f"a data set cannot hold {shown(twice[0])} twice; rename one of the files.")
+
+
+def examples() -> Mapping[str, Path]:
+    """The shipped data sets by their names: of the wheel, or those beside the package in a checkout."""
+    package = Path(str(resources.files("bowdenfit")))
+    for place in (package / _PACKAGE, package.parent / _CHECKOUT):
+        if place.is_dir():
+            return {path.name: path for path in sorted(place.iterdir()) if (path / DESCRIPTION_FILE).is_file()}
+    return {}
+
+
+def write_example(name: str, folder: Path) -> None:
+    """Copy a shipped data set.
+
+    Raises:
+        UsageError, StoreError: There is none of that name; or see `new_folder`.
+    """
+    known = examples()
+    if name not in known:
+        hint = nearest(name, list(known)) if known else "; none was installed."
+        raise UsageError(f"there is no example {shown(name)}{hint}")
+    with new_folder(folder) as place:
+        shutil.copytree(known[name], place, dirs_exist_ok=True, copy_function=shutil.copyfile)
+
+
+def measured_files(folder: Path, endings: Sequence[str]) -> list[Path]:
+    """The files in a folder that may hold measurements, by their endings."""
+    return [path for path in sorted(folder.iterdir()) if path.suffix.lower() in endings and path.is_file()]
+
+
+def written(folder: Path) -> str:
+    """What was written, in a sentence."""
+    return f"Wrote {listed(sorted(path.name for path in folder.iterdir()))} to {folder}."

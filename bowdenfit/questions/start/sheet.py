@@ -1,0 +1,228 @@
+"""A file that no description names: its columns, what they are known to hold, and what is said of them."""
+
+import re
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field, replace
+from pathlib import Path
+
+import numpy as np
+
+from bowdenfit.files import read_channels
+from bowdenfit.files.clocks import is_clock, names_time
+from bowdenfit.files.headings import heading_of, split_brackets
+from bowdenfit.files.matching import Quantity, candidates, plain_name
+from bowdenfit.files.spellings import spelled
+from bowdenfit.files.tables import read_table
+from bowdenfit.kinds import KINDS
+from bowdenfit.kinds.asked import Wanted
+from bowdenfit.kinds.kind import Kind
+from bowdenfit.kinds.single_file import FORCES, FileKind, file_kind
+from bowdenfit.kinds.unnamed_ends import columns_of
+from bowdenfit.units import ColumnSource, dimension_of, is_unit
+from bowdenfit.words import shown
+
+
+@dataclass(frozen=True)
+class SeenColumn:
+    """A column, or a channel of a recording.
+
+    Args:
+        name: Its heading.
+        below: The unit that stands elsewhere than in the heading; empty without one.
+        unit: Its unit; empty where the file does not say it.
+        numbers: Whether it holds numbers.
+        low, high: Of these.
+        values: How many different things stand in it.
+        blanks: How many of its cells are blank.
+    """
+
+    name: str
+    below: str
+    unit: str
+    numbers: bool
+    low: float = 0.0
+    high: float = 0.0
+    values: int = 0
+    blanks: int = 0
+
+    @property
+    def dimension(self) -> str:
+        """What its unit measures; empty without one."""
+        return dimension_of(self.unit) if self.unit else ""
+
+    @property
+    def words(self) -> str:
+        """Its heading and what it holds."""
+        unit = f" {self.unit}" if self.unit else ", no unit"
+        holds = f"{self.low:.5g} to {self.high:.5g}{unit}" if self.numbers else "words"
+        return f"{shown(self.name)} ({holds})"
+
+    @property
+    def plain(self) -> str:
+        """Its name as tables have it, without its unit: "Sheath angle (deg)" is sheath_angle."""
+        name = split_brackets(self.name)[0]
+        name = re.sub(rf"[\s_]+{re.escape(self.unit)}$", "", name) if self.unit else name
+        return plain_name(name) or plain_name(self.name) or "column"
+
+    @property
+    def source(self) -> ColumnSource:
+        """How a description names it."""
+        return ColumnSource(name=self.name, unit=self.unit or None)
+
+
+@dataclass
+class Sheet:
+    """A file, and what is known of it so far.
+
+    Args:
+        path: Where it is.
+        columns: Its columns or channels, without those of time.
+        kind: The kind of measurement that it holds; None where it does not say.
+        why: Why it is taken for that, as a clause.
+        likely: The kind that it may be where it does not say.
+        sources: Columns that the description must name, by quantity.
+        taken: Headings of the columns that are known.
+        settings: What else stands beside the file in the description.
+        has_clock: Whether a recording says when its samples were taken.
+    """
+
+    path: Path
+    columns: tuple[SeenColumn, ...]
+    kind: Kind | None
+    why: str
+    likely: Kind | None = None
+    sources: dict[str, ColumnSource] = field(default_factory=dict)
+    taken: dict[str, str] = field(default_factory=dict)
+    settings: dict[str, object] = field(default_factory=dict)
+    has_clock: bool = True
+
+    @property
+    def file(self) -> str:
+        """Its name."""
+        return self.path.name
+
+    @property
+    def left(self) -> list[SeenColumn]:
+        """Columns that nothing is known of."""
+        return [each for each in self.columns if each.name not in self.taken.values()]
+
+    def can_be(self, quantity: Quantity) -> list[SeenColumn]:
+        """The columns whose headings say that they are a quantity; an end of the cable may be said by that of the other."""
+        headings = [(each.name, each.below) for each in self.columns]
+        wanted = FORCES if quantity in FORCES else (quantity,)
+        found = [(self.columns[each.position], each.unit or "") for each in candidates(headings, wanted)[quantity.name]]
+        return [column if column.unit else self.with_unit(column, unit) for column, unit in found]
+
+    def take(self, quantity: Quantity, column: SeenColumn) -> None:
+        """A column is a quantity; the description names it where its heading does not say all of that."""
+        self.taken[quantity.name] = column.name
+        said = [each.name for each in self.can_be(quantity)] == [column.name]
+        if not said or (not self._says_unit(quantity, column) and quantity.dimension not in {"text", "ratio"}):
+            self.sources[quantity.name] = column.source
+
+    def _says_unit(self, quantity: Quantity, column: SeenColumn) -> bool:
+        """Whether its unit stands where readers of tables find it."""
+        wanted = FORCES if quantity in FORCES else (quantity,)
+        (place,) = candidates([(column.name, column.below)], wanted)[quantity.name] or (None,)
+        return place is not None and place.unit == column.unit and bool(column.unit)
+
+    def with_unit(self, column: SeenColumn, unit: str) -> SeenColumn:
+        """A column whose unit is known."""
+        known = replace(column, unit=unit)
+        self.columns = tuple(known if each.name == column.name else each for each in self.columns)
+        return known
+
+
+def look(path: Path) -> Sheet:
+    """A file as it presents itself.
+
+    Args:
+        path: The file.
+
+    Raises:
+        DatasetError: It cannot be read.
+    """
+    found = file_kind(path)
+    if not found.other and KINDS[found.kind].takes_channels:
+        return recording_sheet(path, found.why)
+    return _table_sheet(path, found)
+
+
+def recording_sheet(path: Path, why: str) -> Sheet:
+    """A recording as it presents itself.
+
+    Raises:
+        DatasetError: It cannot be read.
+    """
+    file = read_channels(path)
+    signals = [each for each in file.channels if not is_clock(each)]
+    columns = tuple(
+        SeenColumn(each.name, each.unit, each.unit or heading_of(each.name).unit, True, *_range(each.values), len(each.values))
+        for each in signals
+    )
+    kind = next(kind for kind in KINDS.values() if kind.takes_channels)
+    return Sheet(path, columns, kind, why, has_clock=any(each.time is not None for each in signals))
+
+
+def _range(values: np.ndarray) -> tuple[float, float]:
+    known = values[np.isfinite(values)]
+    return (float(known.min()), float(known.max())) if len(known) else (0.0, 0.0)
+
+
+def _table_sheet(path: Path, found: FileKind) -> Sheet:
+    table = read_table(path)
+    of_numbers = {each.name: each for each in columns_of(table)}
+    columns = []
+    for i, (heading, below) in enumerate(zip(table.header, table.units, strict=True)):
+        if not heading or (names_time(heading) and not spelled(heading, below)):
+            continue
+        cells = [row[i] for row in table.rows]
+        numbers, other = of_numbers.get(heading), spelled(heading, below)
+        unit = (other.unit if other else "") or heading_of(heading, below).unit
+        spread = (numbers.low, numbers.high) if numbers else (0.0, 0.0)
+        different, blanks = len({cell.text.strip() for cell in cells}), sum(cell.blank for cell in cells)
+        unit = unit if unit and is_unit(unit) else ""
+        columns.append(SeenColumn(heading, below, unit, numbers is not None, *spread, different, blanks))
+    sheet = Sheet(path, tuple(columns), None, found.why)
+    fits = _kinds_that_fit(sheet)
+    said = [kind for kind in fits if kind.name == found.kind] or fits
+    sheet.kind = said[0] if len(said) == 1 and not found.other else None
+    sheet.likely = said[0] if said else _likely(sheet)
+    return sheet
+
+
+def _kinds_that_fit(sheet: Sheet) -> list[Kind]:
+    """The kinds whose columns a table has by its headings; of these those with most columns."""
+    fits: dict[int, list[Kind]] = {}
+    for kind in KINDS.values():
+        if kind.asked is None or not kind.asked.is_guessed:
+            continue
+        if kind.asked.by_length:
+            if _has(sheet, "angle") and _has(sheet, "length") and not _has(sheet, "force") and not _has(sheet, "ratio"):
+                fits.setdefault(1, []).append(kind)
+            continue
+        if _has_columns(sheet, kind.asked.required):
+            fits.setdefault(len(kind.asked.required), []).append(kind)
+    return fits[max(fits)] if fits else []
+
+
+def _has_columns(sheet: Sheet, wanted: Sequence[Wanted]) -> bool:
+    """Whether headings say all that is wanted."""
+    ways = [(each.quantity, *each.also) for each in wanted]
+    return bool(wanted) and all(any(len(sheet.can_be(one)) == 1 for one in way) for way in ways)
+
+
+def _has(sheet: Sheet, dimension: str) -> list[SeenColumn]:
+    return [each for each in sheet.columns if each.dimension == dimension]
+
+
+def _likely(sheet: Sheet) -> Kind | None:
+    """The kind whose required columns there may be, by their units alone, the most of them."""
+    dimensions = [each.dimension for each in sheet.columns]
+    best: Mapping[int, Kind] = {}
+    for kind in KINDS.values():
+        if kind.asked is not None and kind.asked.is_guessed and kind.asked.required:
+            needed = [each.quantity.dimension for each in kind.asked.required]
+            if all(dimensions.count(each) >= needed.count(each) for each in needed):
+                best = {len(needed): kind, **best}
+    return best[max(best)] if best else None

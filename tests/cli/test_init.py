@@ -1,0 +1,266 @@
+"""From files of some laboratory to a data set that `check` accepts: by questions, or refused with all that is not said."""
+
+import os
+import shutil
+import sys
+import tomllib
+from pathlib import Path
+
+import pexpect
+import pytest
+
+import bowdenfit as bf
+from bowdenfit.errors import BowdenfitError, UsageError
+from bowdenfit.questions.start.describe import description_of
+from bowdenfit.questions.start.folder import examples, new_folder
+from bowdenfit.questions.start.question import quantity
+
+CORPUS = Path(__file__).parents[1] / "files" / "corpus"
+ANGLES = """Measured in March;;
+Seillaenge [mm];Winkel Mantel [deg];Winkel Knie [deg]
+430;12,5;90
+450;20;75
+470;38;60
+490;55;41
+510;70;20
+530;86;
+"""
+FORCES = """L (cm);Kanal 1 [N];Kanal 2 [N];Montage Nr
+44;50,1;39,2;1
+44;100,3;78,0;1
+47;50,2;38,1;2
+47;100,1;75,2;2
+50;50,0;36,2;3
+50;99,8;72,5;3
+"""
+EFFICIENCIES = "length mm,eta mean\n440,78\n470,76\n500,73\n"
+FOREIGN = {"eta.csv": EFFICIENCIES, "kraefte.csv": FORCES, "winkel.csv": ANGLES}
+
+
+class Person:
+    """Answers each question by words in it; anything else by its default, or as its example has it."""
+
+    def __init__(self, **answers):
+        self.answers, self.asked = answers, []
+
+    def ask(self, question):
+        self.asked.append(question)
+        said = next((said for words, said in self.answers.items() if words.replace("_", " ") in question.words), None)
+        return question.read(said or question.default or question.example)
+
+    def say(self, sentence):
+        pass
+
+    def settle(self):
+        pass
+
+
+@pytest.fixture
+def foreign(tmp_path, monkeypatch):
+    """A folder with three files whose headings say little."""
+    folder = tmp_path / "bench"
+    folder.mkdir()
+    for name, text in FOREIGN.items():
+        (folder / name).write_text(text)
+    monkeypatch.chdir(folder)
+    return folder
+
+
+def described(folder, person, *names):
+    """What check makes of the description that a person's answers give."""
+    paths = [folder / name for name in names]
+    (folder / "cable.toml").write_text(description_of(paths, "glove", person))
+    return bf.read(folder)
+
+
+def test_three_foreign_files_become_a_data_set_by_a_persons_answers(foreign):
+    said = {"eta_mean": "%", "force_at_the_motor": "1", "which_mounting": "1", "Blank_cells": "10 deg"}
+    person = Person(**{"kraefte.csv has the columns": "3", "What_does_it_hold": "2"}, **said)
+    data = described(foreign, person, *FOREIGN)
+    page = tomllib.loads((foreign / "cable.toml").read_text())
+    assert page["route"] == {"variable": "cable_length", "unit": "mm", "range": [430, 530]}
+    assert [(c["name"], c["friction"]) for c in page["contact"]] == [("mantel", "mu1"), ("knie", "mu2")]
+    assert page["tables"]["angles"]["detection_limit"] == {"value": 10, "unit": "deg"}
+    forces = next(table for table in data.measurements.tables if hasattr(table, "run_names"))
+    assert forces.input_force[0] == 50.1 and forces.output_force[0] == 39.2
+    assert forces.route.tolist() == [440, 440, 470, 470, 500, 500]
+    assert forces.run_names == ("1", "2", "3")
+
+
+def test_what_the_files_say_is_not_asked(on_body):
+    person = Person()
+    names = ("angles.csv", "efficiencies.csv", "forces.csv")
+    paths = [on_body / name for name in names if (on_body / name).exists()]
+    description_of(paths, "glove", person)
+    said = " ".join(question.words for question in person.asked)
+    for settled in ("In which unit", "Which column", "What does it hold", "Blank cells"):
+        assert settled not in said
+
+
+def test_a_unit_is_asked_for_without_any_default(foreign):
+    person = Person(**{"kraefte.csv has the columns": "3"}, What_does_it_hold="2")
+    described(foreign, person, *FOREIGN)
+    units = [question for question in person.asked if question.words.startswith("In which unit")]
+    assert [question.default for question in units] == [None]
+    assert "eta mean" in units[0].words
+
+
+@pytest.mark.parametrize("path", sorted(CORPUS.glob("*.*")), ids=lambda path: path.name)
+def test_whatever_laboratories_write_becomes_a_data_set_that_check_accepts(path, tmp_path):
+    if path.suffix == ".toml":
+        return
+    shutil.copy(path, tmp_path)
+    data = described(tmp_path, Person(force_at_the_motor="2" if path.name == "unnamed_ends.csv" else "1"), path.name)
+    assert data.measurements.tables
+
+
+def test_where_nobody_can_be_asked_all_that_is_not_said_is_refused_and_nothing_written(foreign, refuse, tmp_path):
+    assert "eta.csv does not say what it holds" in refuse("init", "cable", "--from", *FOREIGN)
+    (foreign / "one.csv").write_text("F_in,F_out\n50,40\n60,48\n")
+    said = refuse("init", "cable", "--from", "one.csv", faults=2)
+    assert "unit of its column 'F_in'; write it into the heading, such as 'F_in (N)'" in said
+    assert "'F_out'" in said
+    (foreign / "two.csv").write_text("F_in (N),F_out (N)\n50,40\n60,48\n")
+    assert "two.csv says no wrap angle; add a column" in refuse("init", "cable", "--from", "two.csv")
+
+
+def test_files_that_say_everything_need_nobody(run, foreign):
+    (foreign / "one.csv").write_text("wrap angle (deg),F_in (N),F_out (N)\n90,50,40\n90,60,48\n180,50,32\n")
+    code, out, err = run("init", "cable", "--from", "one.csv")
+    assert (code, err) == (0, "")
+    assert out.endswith("Next: bowdenfit fit cable   (bowdenfit check cable says how every row was understood)\n")
+    assert run("check", "cable")[0] == 0
+
+
+def test_a_table_with_a_column_of_angles_is_fitted_without_a_description(run, foreign):
+    (foreign / "one.csv").write_text(
+        "wrap angle (deg),F_in (N),F_out (N)\n90,50,41.1\n90,60,49.7\n180,50,34.6\n180,80,54.6\n270,50,28.4\n"
+    )
+    code, out, err = run("fit", "one.csv", "--no-mcmc", "--no-figures")
+    assert "mu" in out, err
+    assert code in {0, 3}
+
+
+def test_several_files_and_one_folder_are_told_apart_behind_from(run, foreign):
+    (foreign / "a.csv").write_text("wrap angle (deg),F_in (N),F_out (N)\n90,50,40\n180,60,38\n")
+    (foreign / "b.csv").write_text("wrap angle (deg),F_in (N),F_out (N)\n90,50,40\n180,60,38\n")
+    assert run("init", "--from", "a.csv", "b.csv", "cable")[0] == 0
+    assert {path.name for path in Path("cable").iterdir()} == {"a.csv", "b.csv", "cable.toml"}
+    assert "does not exist" in run("init", "other", "--from", "a.csv", "c.csv")[2]
+
+
+def test_rows_that_are_wrong_are_said_when_the_description_is_written(run, foreign):
+    (foreign / "one.csv").write_text("wrap angle (deg),F_in (N),F_out (N)\n90,50,40\n90,-60,x\n")
+    code, out, err = run("init", "cable", "--from", "one.csv")
+    assert code == 2
+    assert "Correct them in cable" in out
+    assert "row 3, column 'F_in (N)'" in err and "row 3, column 'F_out (N)'" in err
+
+
+def test_every_example_is_written_whole_and_accepted(run, tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    code, listing, _ = run("init", "--example")
+    assert code == 0
+    assert listing.split() == list(examples()) and "on-body-exoskeleton" in listing
+    for name in examples():
+        code, out, _ = run("init", "--example", name)
+        assert (code, out) == (0, f"Wrote {name}. Next: bowdenfit fit {name}\n")
+        assert run("check", name)[0] == 0
+    assert "did you mean 'on-body-exoskeleton'" in run("init", "--example", "on-body-exoskelton")[2]
+    assert "exists already" in run("init", "--example", "yarn-on-cylinder")[2]
+
+
+def test_a_folder_is_there_whole_or_not_at_all(tmp_path):
+    with pytest.raises(KeyboardInterrupt), new_folder(tmp_path / "cable") as place:
+        (place / "cable.toml").write_text("half")
+        raise KeyboardInterrupt
+    assert not list(tmp_path.iterdir())
+    (tmp_path / "file").write_text("")
+    with pytest.raises(BowdenfitError, match="exists already"), new_folder(tmp_path / "file"):
+        pass
+
+
+@pytest.mark.parametrize("typed", ["12", "deg", "-3 deg", "12 mm", "0 deg", "1e400 deg", ""])
+def test_an_angle_that_is_none_is_refused_in_a_sentence(typed):
+    with pytest.raises(UsageError, match=r"\.$"):
+        quantity("Which angle?", "angle", "90 deg").read(typed)
+
+
+in_a_terminal = pytest.mark.filterwarnings("ignore:os.fork")  # the child is another program at once
+
+
+class Console:
+    """A real terminal of 80 columns in which the program runs."""
+
+    def __init__(self, *arguments):
+        self.child = pexpect.spawn(
+            sys.executable,
+            ["-m", "bowdenfit", *arguments],
+            env={**os.environ, "PYTHONPATH": str(Path(bf.__file__).parents[1])},
+            dimensions=(50, 80),
+            encoding="utf-8",
+            timeout=120,
+        )
+
+    def answer(self, question, said):
+        self.child.expect(question)
+        self.child.expect("> ")
+        self.child.sendline(said)
+
+    def end(self):
+        self.child.expect(pexpect.EOF)
+        self.child.close()
+        return self.child.exitstatus
+
+
+@in_a_terminal
+def test_in_a_terminal_three_foreign_files_become_a_fit_without_an_editor(foreign):
+    console = Console("init")
+    console.answer("Which folder shall be written", "")
+    console.answer("Which files did you measure", "")
+    console.answer("What does it hold", "2")
+    console.answer("What does it hold", "")
+    console.answer("What is the cable called", "Glove")
+    console.answer("Who measured it", "")
+    console.answer("In which unit is the column 'eta mean'", "furlong")
+    console.answer("does not measure a ratio", "%")
+    console.answer("is the force at the motor", "")
+    console.answer("Something must be written here", "1")
+    console.answer("says which mounting", "1")
+    console.answer("Between which lengths", "")
+    console.answer("can be bought", "440 460 480 500 520")
+    for place in ("mantel", "knie"):
+        console.answer(f"What is the place called.*{place}", "")
+        console.answer("follow the length", "")
+    console.answer("Below which angle", "10 deg")
+    console.answer("another place", "")
+    console.answer("'mantel' called", "")
+    console.answer("'knie' called", "mu1")
+    console.child.expect("Next: bowdenfit fit my-cable")
+    assert console.end() == 0
+    fit = Console("fit", "my-cable", "--no-mcmc", "--no-figures")
+    fit.child.expect("Glove")
+    fit.child.expect("Wrote fits/my-cable")
+    assert fit.end() in {0, 3}
+
+
+@in_a_terminal
+@pytest.mark.parametrize("key", ["c", "d"])
+def test_ctrl_c_and_ctrl_d_end_a_dialog_without_a_trace(foreign, key):
+    before = sorted(foreign.rglob("*"))
+    console = Console("init", "cable")
+    console.answer("Which files did you measure", "")
+    console.child.expect("What does it hold")
+    console.child.expect("> ")
+    console.child.sendcontrol(key)
+    console.child.expect("Interrupted.")
+    assert console.end() == 130
+    assert sorted(foreign.rglob("*")) == before
+
+
+@in_a_terminal
+def test_a_folder_that_exists_is_refused_before_the_first_question(foreign):
+    console = Console("init", str(foreign))
+    console.child.expect("exists already")
+    assert "?" not in console.child.before
+    assert console.end() == 2

@@ -10,6 +10,7 @@ from typing import Any
 from bowdenfit.cable.registry import check_names
 from bowdenfit.description import Description
 from bowdenfit.description.file import override
+from bowdenfit.display import Display, Rows
 from bowdenfit.errors import DescriptionError, Faults
 from bowdenfit.files.row_account import RowAccount
 from bowdenfit.inputs import refuse_special
@@ -26,8 +27,8 @@ from bowdenfit.words import printable
 DESCRIPTION_FILE = "cable.toml"
 
 
-@dataclass(frozen=True)
-class Dataset:
+@dataclass(frozen=True, repr=False)
+class Dataset(Display):
     """A description with its measurements.
 
     Args:
@@ -41,6 +42,15 @@ class Dataset:
     measurements: Measurements
     sha256: dict[str, str]
     accounts: tuple[RowAccount, ...] = ()
+
+    def sentences(self) -> list[str]:
+        """What the cable is, and what was measured on it."""
+        said = [line for kind, table in each_table(self.measurements) for line in kind.describe(table, self.description)]
+        return [*self.description.sentences(), *(f"- {line}" for line in said), *self.measurements.remarks]
+
+    def _table(self) -> Rows:
+        rows = [{"file": each.file, "rows": each.rows, "read": each.read} for each in self.accounts]
+        return rows, {"rows": "1", "read": "1"}
 
 
 def load_dataset(

@@ -1,18 +1,28 @@
 """The front desk: a fit as users hold it, which knows its folder and asks every question of its record."""
 
+from collections.abc import Callable
 from dataclasses import fields
+from functools import cached_property
 from pathlib import Path
-from typing import Any
 
+from bowdenfit.display import Rows, text_of
 from bowdenfit.questions.bends.answer import Elastic, elastic_answers
+from bowdenfit.questions.bends.words import bends_text
 from bowdenfit.questions.check.answer import Checks, checks_of
+from bowdenfit.questions.check.words import checks_page
+from bowdenfit.questions.figure_methods import FigureMethods
 from bowdenfit.questions.groups.answer import Groups, groups_of
 from bowdenfit.questions.identify.answer import Identifiability
 from bowdenfit.questions.identify.judgment import identifiability
+from bowdenfit.questions.identify.words import identifiability_text
 from bowdenfit.questions.kept import answers_of
-from bowdenfit.questions.summary.html import fit_page
-from bowdenfit.questions.summary.page import summarize
+from bowdenfit.questions.predict.words import predictions_text
+from bowdenfit.questions.summary.brief_words import summary_text
+from bowdenfit.questions.summary.page import Summary, summarize
+from bowdenfit.questions.summary.parameter_words import drawn_intervals
+from bowdenfit.questions.summary.trust_words import verdict_text
 from bowdenfit.questions.summary.verdict import Verdict, verdict
+from bowdenfit.results.efficiencies import Efficiencies
 from bowdenfit.results.record import Record
 from bowdenfit.results.store import load as load_record
 from bowdenfit.results.store import save
@@ -43,6 +53,11 @@ class Fit(Record):
         """
         save(self, self.summary(), Path(path), force, answers=answers_of(self))
 
+    @cached_property
+    def plot(self) -> FigureMethods:
+        """Its figures, a method each, such as `fit.plot.efficiency()`."""
+        return FigureMethods(self)
+
     @property
     def elastic(self) -> Elastic:
         """Answers about stretch, preload and loops at wrap angles."""
@@ -58,9 +73,9 @@ class Fit(Record):
         """Groups of readings that have coefficients of their own, with their contrasts; None without such, or without draws."""
         return groups_of(self)
 
-    def summary(self) -> dict[str, Any]:
+    def summary(self) -> Summary:
         """Everything on one page, for programs (the contents of summary.json)."""
-        return summarize(self)
+        return Summary(summarize(self), str(self))
 
     def verdict(self) -> Verdict:
         """Whether the answers may be trusted, and if not, why."""
@@ -71,12 +86,17 @@ class Fit(Record):
         """What the draws determine, and what rests on the priors."""
         return identifiability(self)
 
-    def __repr__(self) -> str:
-        state = "converged" if self.converged else "NOT converged" if self.posterior else "least squares only"
-        return f"<bowdenfit.Fit {self.name!r}: {self.model.space.size} parameters, {state}>"
-
-    def _repr_html_(self) -> str:
-        return fit_page(self)
+    def _table(self) -> Rows:
+        """A row a parameter: draws beside least squares."""
+        drawn, squares = drawn_intervals(self), self.least_squares.estimates
+        rows = [
+            {"parameter": p.name}
+            | (vars(drawn[p.name]) if p.name in drawn else {})
+            | ({"least_squares": squares[p.name].value} if p.name in squares else {})
+            | {"prior": p.prior_text, "meaning": p.meaning}
+            for p in self.model.space.parameters
+        ]
+        return rows, self._units
 
 
 def load(path: str | Path) -> Fit:
@@ -86,3 +106,15 @@ def load(path: str | Path) -> Fit:
         StoreError: The folder is missing, unfinished or damaged.
     """
     return Fit.load(path)
+
+
+_WORDS: dict[type, Callable[..., str]] = {
+    Record: summary_text,
+    Verdict: verdict_text,
+    Checks: checks_page,
+    Elastic: bends_text,
+    Identifiability: identifiability_text,
+    Efficiencies: lambda found: predictions_text([row | {"note": ""} for row in found.rows]),
+}
+for _result, _words in _WORDS.items():
+    text_of.register(_result)(_words)

@@ -20,6 +20,7 @@ from bowdenfit.description import (
     PriorDefaults,
     UniformPrior,
 )
+from bowdenfit.display import Display, Rows
 from bowdenfit.errors import DescriptionError, nearest
 from bowdenfit.kinds.angles.table import AngleTable
 from bowdenfit.kinds.measured_cable import measured_cable
@@ -30,10 +31,11 @@ from bowdenfit.kinds.terms import measured_kinds, parameters_asked_for
 from bowdenfit.parameters.priors import HalfCauchy, HalfNormal, LogNormal, Normal, Prior, TruncatedNormal, Uniform
 from bowdenfit.parameters.space import Parameter, ParameterSpace
 from bowdenfit.parameters.symbols import symbol_of
+from bowdenfit.words import listed
 
 
-@dataclass(frozen=True)
-class Model:
+@dataclass(frozen=True, repr=False)
+class Model(Display):
     """Everything inference needs: cable, parameters, terms of the likelihood, and where readings were taken."""
 
     cable: Cable
@@ -45,6 +47,16 @@ class Model:
     def description(self) -> Description:
         """What was said about the cable."""
         return self.cable.description
+
+    def sentences(self) -> list[str]:
+        """What it is made of."""
+        terms = listed([f"{len(term.labels)} of {term.name.replace('_', ' ')}" for term in self.terms])
+        return [f"Model of {self.description.name}: {self.space.size} free parameters; readings: {terms}."]
+
+    def _table(self) -> Rows:
+        every = self.space.parameters
+        rows = [{"parameter": p.name, "unit": p.unit, "prior": p.prior_text, "meaning": p.meaning} for p in every]
+        return rows, {p.name: p.unit for p in every}
 
 
 def build_model(dataset: Dataset) -> Model:

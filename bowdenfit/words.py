@@ -4,7 +4,6 @@ import math
 import re
 import textwrap
 from collections.abc import Collection, Iterable, Sequence
-from html import escape
 
 _LONGEST = 40  # characters of a quoted value
 WIDTH = 78  # of a line; a terminal has 80 columns, and some count bytes
@@ -105,11 +104,3 @@ def narrow_table(heads: Sequence[str], rows: Sequence[Sequence[str]], left: Coll
             shown.append(rest.pop(0))
         blocks.append(table([heads[i] for i in shown], [[row[i] for i in shown] for row in rows], left))
     return "\n\n".join(blocks)
-
-
-def html_table(heads: Sequence[str], rows: Sequence[Sequence[str]]) -> str:
-    """A table for notebooks."""
-    head = "".join(f"<th>{escape(cell)}</th>" for cell in heads)
-    cells = ["".join(f'<td style="white-space:nowrap">{escape(cell)}</td>' for cell in row) for row in rows]
-    body = "".join(f"<tr>{row}</tr>" for row in cells)
-    return f"<table><thead><tr>{head}</tr></thead><tbody>{body}</tbody></table>"

@@ -28,8 +28,9 @@ from bowdenfit.description.values import (
     QuantityValue,
     UniformPrior,
 )
+from bowdenfit.display import Display, Rows
 from bowdenfit.errors import nearest
-from bowdenfit.words import listed
+from bowdenfit.words import counted, listed
 
 __all__ = [
     "BY_GROUP",
@@ -77,7 +78,7 @@ _TAKEN = ("chain", "draw", "optimal_length", "optimal_efficiency")  # of what st
 AnySettings = TypeVar("AnySettings")
 
 
-class Description(Frozen):
+class Description(Display, Frozen):
     """Everything said about a cable and its measurements, defaults filled in."""
 
     schema_: Annotated[int, Field(alias="schema", ge=1, le=SCHEMA)] = SCHEMA
@@ -212,6 +213,21 @@ class Description(Frozen):
     def angle_columns(self) -> tuple[str, ...]:
         """Columns in which rows may carry their own wrap angle."""
         return tuple(dict.fromkeys(c.wrap_angle.column for c in self.contact if c.wrap_angle.column))
+
+    def sentences(self) -> list[str]:
+        """What the cable is."""
+        route, names = self.route, self.coefficients
+        along = f"; {route.variable} {route.range[0]:g} to {route.range[1]:g} {route.unit}" if route else ""
+        coefficients = f"the coefficient{'s' if len(names) > 1 else ''} {listed(names)}"
+        return [f"{self.name}: {counted(len(self.contact), 'contact')} with {coefficients}{along}."]
+
+    def _table(self) -> Rows:
+        rows = [
+            {"contact": c.name, "friction": c.friction, "wrap_angle": c.wrap_angle.value, "unit": c.wrap_angle.unit,
+             "column": c.wrap_angle.column, "curve": c.wrap_angle.curve}
+            for c in self.contact
+        ]  # fmt: skip
+        return rows, {c.name: c.wrap_angle.unit or "" for c in self.contact}
 
     def table(self, of: type[AnySettings]) -> AnySettings | None:
         """What is said of the table whose kind has settings of a class; None if there is no such table."""

@@ -4,9 +4,12 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from bowdenfit.display import Display, Rows
+from bowdenfit.words import decimals
 
-@dataclass(frozen=True)
-class Interval:
+
+@dataclass(frozen=True, repr=False)
+class Interval(Display):
     """A quantity with its uncertainty: moments and the 5 % and 95 % quantiles of its draws."""
 
     mean: float
@@ -20,6 +23,13 @@ class Interval:
         """Of draws of any shape."""
         q05, median, q95 = (float(q) for q in np.quantile(draws, (0.05, 0.5, 0.95)))
         return cls(float(np.mean(draws)), float(np.std(draws)), median, q05, q95)
+
+    def __str__(self) -> str:
+        digits = decimals(self.q95 - self.q05)
+        return f"{self.median:.{digits}f} (90 % interval {self.q05:.{digits}f} to {self.q95:.{digits}f})"
+
+    def _table(self) -> Rows:
+        return [vars(self)], {}
 
     def times(self, factor: float) -> "Interval":
         """In a unit that makes it larger by a factor."""

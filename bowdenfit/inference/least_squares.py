@@ -13,6 +13,7 @@ from typing import ClassVar
 import jax.numpy as jnp
 import numpy as np
 
+from bowdenfit.display import Display, Rows
 from bowdenfit.errors import ConvergenceError
 from bowdenfit.inference.departure import Departure, FarReading
 from bowdenfit.inference.disagreement import Disagreement, disagreements
@@ -62,8 +63,8 @@ class Estimate:
         return [side for side in ("lower", "upper") if np.isinf(getattr(self, side))]
 
 
-@dataclass(frozen=True)
-class LeastSquares:
+@dataclass(frozen=True, repr=False)
+class LeastSquares(Display):
     """Classical least squares without priors.
 
     Args:
@@ -80,6 +81,7 @@ class LeastSquares:
         disagreements: How well each table agrees with everything else; empty of one table alone.
         departures: How residuals depend on where the readings were taken, the least likely by chance first.
         far_readings: Single readings farther out than chance puts one, the farthest first.
+        units: Units of the estimates.
     """
 
     estimates: dict[str, Estimate]
@@ -93,6 +95,17 @@ class LeastSquares:
     disagreements: tuple[Disagreement, ...] = ()
     departures: tuple[Departure, ...] = ()
     far_readings: tuple[FarReading, ...] = ()
+    units: dict[str, str] | None = None
+
+    def sentences(self) -> list[str]:
+        """How many estimates there are."""
+        told = [name for name, estimate in self.estimates.items() if estimate.identified]
+        said = f"Least squares tell {len(told)} of {len(self.estimates)} parameters"
+        return [f"{said}." if self.converged else f"{said}, but did not converge: {self.message}."]
+
+    def _table(self) -> Rows:
+        shown = ("value", "standard_error", "lower", "upper", "remark")
+        return [{"parameter": n} | {key: vars(e)[key] for key in shown} for n, e in self.estimates.items()], self.units or {}
 
 
 @dataclass(frozen=True)
@@ -159,6 +172,7 @@ def least_squares(
         "" if found["succeeded"] else "the solver stopped before it met its tolerance",
         disagreements(terms, space.free, found),
         *departures(basin, scale),
+        units={p.name: p.unit for p in space.parameters},
     )
 
 

@@ -3,11 +3,13 @@
 from dataclasses import dataclass, replace
 from typing import Any, TypeVar
 
+from bowdenfit.display import Display
+
 AnyTable = TypeVar("AnyTable")
 
 
-@dataclass(frozen=True)
-class Measurements:
+@dataclass(frozen=True, repr=False)
+class Measurements(Display):
     """The tables of one cable, each found by its class, and remarks on how they were read.
 
     Args:
@@ -17,6 +19,10 @@ class Measurements:
 
     tables: tuple[Any, ...] = ()
     remarks: tuple[str, ...] = ()
+
+    def sentences(self) -> list[str]:
+        """Which tables there are."""
+        return [f"{', '.join(type(table).__name__ for table in self.tables) or 'No table'}.", *self.remarks]
 
     def table(self, of: type[AnyTable]) -> AnyTable | None:
         """The table of a class; None if nothing of that kind was measured."""

@@ -30,9 +30,9 @@ _TITLE_ROWS, _TITLE_ROW = 2, 0.15
 
 def empty_page(width: float, height: float) -> Figure:
     """A figure of this size without anything on it; sizes in inches."""
-    from matplotlib.figure import Figure
+    from bowdenfit.plots.page import Page
 
-    return Figure(figsize=(width, height))
+    return Page(figsize=(width, height))
 
 
 def panels(

@@ -5,7 +5,7 @@ from __future__ import annotations
 import os
 from collections.abc import Sequence
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, BinaryIO
 
 from bowdenfit.plots.style import DOTS_PER_INCH, in_paper_style
 
@@ -26,25 +26,35 @@ def write_all(figure: Figure, folder: Path, name: str, formats: Sequence[str] = 
     return [write(figure, folder / f"{name}.{ending}") for ending in formats]
 
 
-@in_paper_style
 def write(figure: Figure, path: Path) -> Path:
     """Write one file under a temporary name and rename it; the same figure always gives the same bytes.
 
     Whoever reads the folder meanwhile sees the old file or the new one, never half of one.
     """
-    ending = path.suffix.removeprefix(".")
     temporary = path.with_name(f".{path.name}.part")
-    options: dict[str, Any] = {"format": ending, "dpi": DOTS_PER_INCH, **OPTIONS.get(ending, {})}
     try:
-        try:
-            figure.savefig(temporary, **options)
-        except ValueError:  # a name that someone chose has dollar signs in it, and no formula between them
-            _show_as_written(figure)
-            figure.savefig(temporary, **options)
+        save(figure, temporary, path.suffix.removeprefix("."))
         os.replace(temporary, path)  # noqa: PTH105
     finally:
         temporary.unlink(missing_ok=True)
     return path
+
+
+@in_paper_style
+def save(figure: Figure, target: Path | BinaryIO, ending: str) -> None:
+    """Save a figure as it is meant to look.
+
+    Args:
+        figure: The figure.
+        target: File.
+        ending: Format.
+    """
+    options: dict[str, Any] = {"format": ending, "dpi": DOTS_PER_INCH, **OPTIONS.get(ending, {})}
+    try:
+        figure.savefig(target, **options)
+    except ValueError:  # a name that someone chose has dollar signs in it, and no formula between them
+        _show_as_written(figure)
+        figure.savefig(target, **options)
 
 
 def _show_as_written(figure: Figure) -> None:

@@ -5,7 +5,19 @@ from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
+from bowdenfit.display import Display, Rows
+
 PAGE, TEXT, FIGURES = "json", "txt", ("png", "svg")
+
+
+class Files(Display, list[Path]):
+    """Files that were written."""
+
+    def __str__(self) -> str:
+        return "\n".join(map(str, self))
+
+    def _table(self) -> Rows:
+        return [{"file": str(path)} for path in self], {}
 
 
 def files_of(folder: str | Path, name: str) -> list[Path]:

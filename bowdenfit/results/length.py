@@ -1,20 +1,20 @@
 """The best length with its uncertainty, as plain data that show themselves; loads no model."""
 
 from dataclasses import dataclass
-from html import escape
 from typing import ClassVar
 
 import numpy as np
 
+from bowdenfit.display import Display, Rows
 from bowdenfit.inference.interval import Interval
 from bowdenfit.results.choices import Choice, Window
-from bowdenfit.words import decimals, filled, html_table, percent, table
+from bowdenfit.words import decimals, filled, percent, table
 
 _WORTH_SAYING = 0.005  # probability of an optimum at an end of the range
 
 
-@dataclass(frozen=True)
-class OptimalLength:
+@dataclass(frozen=True, repr=False)
+class OptimalLength(Display):
     """The design answer.
 
     Args:
@@ -67,7 +67,15 @@ class OptimalLength:
         return f"{'cut the cable to' if is_cut else f'the best {self.what} is'} {value} {self.unit}"
 
     def __str__(self) -> str:
-        return "\n".join([self.headline, *(filled(sentence) for sentence in self.sentences()), *self._table()])
+        return "\n".join([self.headline, *(filled(sentence) for sentence in self.sentences()), *self._of_choices()])
+
+    def _table(self) -> Rows:
+        if not self.choices:
+            known = {self.variable: self.length, "efficiency": self.efficiency}
+            rows = [{"quantity": name} | vars(interval) for name, interval in known.items()]
+            return rows, {self.variable: self.unit, "efficiency": "1"}
+        rows = [{self.variable: c.length} | {k: v for k, v in vars(c).items() if k != "length"} for c in self.choices]
+        return rows, {self.variable: self.unit, "probability_best": "1", "expected_regret": "1"}
 
     @property
     def headline(self) -> str:
@@ -115,7 +123,7 @@ class OptimalLength:
             f"{percent(window.probability, 0)} probability; more measurements are needed."
         )
 
-    def _table(self) -> list[str]:
+    def _of_choices(self) -> list[str]:
         return ["", table(self.heads, self.rows)] if self.choices else []
 
     @property
@@ -129,7 +137,3 @@ class OptimalLength:
         return [
             (f"{c.length:g}", percent(c.probability_best), f"{100 * c.expected_regret:.2f} points") for c in self.choices
         ]
-
-    def _repr_html_(self) -> str:
-        text = "".join(f"<p>{escape(line)}</p>" for line in [self.headline, *self.sentences()])
-        return text + (html_table(self.heads, self.rows) if self.choices else "")

@@ -1,7 +1,7 @@
 """The record of a fit: what was fitted to what, the draws, and what follows from them without asking a question."""
 
 from collections.abc import Callable, Iterable
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from functools import cached_property, wraps
 from typing import Any, TypeVar
 
@@ -9,22 +9,25 @@ import jax
 import numpy as np
 
 from bowdenfit.dataset import Dataset
+from bowdenfit.display import Display, Rows
 from bowdenfit.errors import UsageError
 from bowdenfit.inference.diagnostics import Diagnostics, Trajectories
-from bowdenfit.inference.draws import OfDraws, efficiency_at
+from bowdenfit.inference.draws import OfDraws, derived_units, efficiency_at
 from bowdenfit.inference.interval import Interval
 from bowdenfit.inference.least_squares import LeastSquares
 from bowdenfit.inference.samplers import SamplerAgreement
 from bowdenfit.model import Model, build_model
+from bowdenfit.results.efficiencies import Efficiencies
 from bowdenfit.results.length import OptimalLength
 from bowdenfit.results.route_draws import RouteDraws, best_length, compile_along_route, new_mounting, route_draws
+from bowdenfit.words import few
 
 OPTIMAL_LENGTH, OPTIMAL_EFFICIENCY = "optimal_length", "optimal_efficiency"
 Answer = TypeVar("Answer")
 
 
-@dataclass(frozen=True)
-class Draws:
+@dataclass(frozen=True, repr=False)
+class Draws(Display):
     """Draws of a fit; every array has the walkers (ordered by ensemble) first, then the draws of each.
 
     Args:
@@ -42,6 +45,7 @@ class Draws:
         sampler: "emcee" or "nuts", whose chains are ensembles of one walker each.
         trajectories: How the trajectories of NUTS went.
         agreement: Whether a second sampler agrees, where one was asked.
+        units: Of values and optimum by name, where a fit gives them.
     """
 
     z: np.ndarray
@@ -58,6 +62,7 @@ class Draws:
     sampler: str = "emcee"
     trajectories: Trajectories | None = None
     agreement: SamplerAgreement | None = None
+    units: dict[str, str] = field(default_factory=dict)
 
     @property
     def n_effective(self) -> float:
@@ -69,9 +74,21 @@ class Draws:
         """All draws, one a row."""
         return self.z.reshape(-1, self.z.shape[-1])
 
+    def sentences(self) -> list[str]:
+        """How many there are, and what they are worth."""
+        worst = max((d.r_hat for d in self.diagnostics.values()), default=float("nan"))
+        return [
+            f"{self.z[..., 0].size} draws of {few(self.values, 4)} by {self.sampler}; of the least certain of them they are "
+            f"worth {self.n_effective:.0f} independent ones (R-hat at most {worst:.3f})."
+        ]
 
-@dataclass(frozen=True)
-class Provenance:
+    def _table(self) -> Rows:
+        """A column a quantity, a row a draw."""
+        return {name: draws.ravel() for name, draws in (self.values | self.optimum).items()}, self.units
+
+
+@dataclass(frozen=True, repr=False)
+class Provenance(Display):
     """How a fit came about.
 
     Args:
@@ -86,9 +103,16 @@ class Provenance:
     stage_times: dict[str, float] = field(default_factory=dict)
     created: str = ""
 
+    def sentences(self) -> list[str]:
+        """The seed, and what computed."""
+        return [f"Seed {self.seed}; {', '.join(f'{name} {version}' for name, version in self.versions.items())}."]
 
-@dataclass(frozen=True)
-class Record:
+    def _table(self) -> Rows:
+        return [{"stage": stage, "time": seconds} for stage, seconds in self.stage_times.items()], {"time": "s"}
+
+
+@dataclass(frozen=True, repr=False)
+class Record(Display):
     """What was found for one data set; every question is asked of this.
 
     Args:
@@ -98,7 +122,6 @@ class Record:
         converged: Whether the sampler (or, without it, least squares) converged.
         reasons: Why not.
         provenance: Seed, versions, times.
-        answers: What questions asked `once` have answered, by question.
     """
 
     dataset: Dataset
@@ -107,7 +130,7 @@ class Record:
     converged: bool
     reasons: tuple[str, ...]
     provenance: Provenance
-    answers: dict[Callable[..., Any], Any] = field(default_factory=dict, init=False, repr=False, compare=False)
+    _answers: dict[Callable[..., Any], Any] = field(default_factory=dict, init=False, repr=False, compare=False)
 
     @cached_property
     def model(self) -> Model:
@@ -145,11 +168,7 @@ class Record:
         drawn = self.draws()
         return new_mounting(self.dataset.description, drawn.values, len(drawn.flat_z), self.provenance.seed)
 
-    def curves(self) -> tuple[np.ndarray, dict[str, np.ndarray]]:
-        """Route values, and by name the efficiency [1] and wrap angles [deg] of every draw (rows) there."""
-        return self.along_route.grid, self.along_route.curves
-
-    def efficiency(self, lengths: float | Iterable[float] | None = None) -> list[Interval]:
+    def efficiency(self, lengths: float | Iterable[float] | None = None) -> Efficiencies:
         """Efficiency at values of the route variable, with intervals.
 
         Args:
@@ -158,16 +177,18 @@ class Record:
         Raises:
             UsageError: There is no posterior.
         """
-        return [Interval.of(column) for column in self.efficiency_draws(lengths).T]
+        at = self._lengths(lengths)
+        return Efficiencies(map(Interval.of, self.efficiency_draws(at).T), self.dataset.description.route, at)
 
     def efficiency_draws(self, lengths: float | Iterable[float] | None = None) -> np.ndarray:
         """Efficiency of every draw (rows) at values of the route variable (columns); see `efficiency`."""
-        route = self.dataset.description.route
-        if lengths is None:
-            lengths = route.choices if route else 0.0
-        wanted = np.atleast_1d(np.asarray(lengths, dtype=float))
         with jax.enable_x64(True):
-            return efficiency_at(self.model, self.draws().flat_z, wanted)
+            return efficiency_at(self.model, self.draws().flat_z, self._lengths(lengths))
+
+    def _lengths(self, lengths: float | Iterable[float] | None) -> np.ndarray:
+        route = self.dataset.description.route
+        stated = (route.choices if route else 0.0) if lengths is None else lengths
+        return np.atleast_1d(np.asarray(stated, dtype=float))
 
     def optimal_length(self) -> OptimalLength:
         """The design answer: which length is best, how sure that is, and what the choices cost.
@@ -187,26 +208,29 @@ class Record:
         force = friction.conditions.reference_force if friction.depends_on_load else None
         return best_length(route, lengths, efficiencies, self.along_route, force)
 
-    @property
+    @cached_property
     def posterior(self) -> Draws:
-        """The draws; `sampled` is None where there are none.
+        """The draws with their units; `sampled` is None where there are none.
 
         Raises:
             UsageError: There are none.
-        """
-        return self.draws()
-
-    def draws(self) -> Draws:
-        """The posterior.
-
-        Raises:
-            UsageError: There is none.
         """
         if self.sampled is None:
             raise UsageError(
                 "this fit has no posterior, because it was made without MCMC; fit again without --no-mcmc for intervals."
             )
-        return self.sampled
+        return replace(self.sampled, units=self._units)
+
+    def draws(self) -> Draws:
+        """The same."""
+        return self.posterior
+
+    @property
+    def _units(self) -> dict[str, str]:
+        """Of every parameter, derived quantity and answer along the route."""
+        route, units = self.dataset.description.route, {p.name: p.unit for p in self.model.space.parameters}
+        units |= {name: unit for name, (unit, _) in derived_units(self.model).items()}
+        return units | ({OPTIMAL_LENGTH: route.unit, OPTIMAL_EFFICIENCY: "1"} if route else {})
 
     def _needs_route(self) -> None:
         self.draws()
@@ -222,9 +246,9 @@ def once(question: Callable[[Record], Answer]) -> Callable[[Record], Answer]:
 
     @wraps(question)
     def answer(fit: Record) -> Answer:
-        if answer not in fit.answers:
-            fit.answers[answer] = question(fit)
-        found: Answer = fit.answers[answer]
+        if answer not in fit._answers:
+            fit._answers[answer] = question(fit)
+        found: Answer = fit._answers[answer]
         return found
 
     return answer

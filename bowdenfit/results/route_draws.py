@@ -13,6 +13,7 @@ from jaxtyping import Float
 from bowdenfit.cable.load_cells import RUN_SCATTER
 from bowdenfit.cable.noise import noise_law
 from bowdenfit.description import Description, Route
+from bowdenfit.display import Display, Rows
 from bowdenfit.inference.draws import OfDraws, curves_of, for_each_draw
 from bowdenfit.inference.interval import Interval
 from bowdenfit.model import Model
@@ -21,8 +22,8 @@ from bowdenfit.results.length import OptimalLength
 from bowdenfit.results.optimum import GRID_POINTS, route_grid
 
 
-@dataclass(frozen=True)
-class RouteDraws:
+@dataclass(frozen=True, repr=False)
+class RouteDraws(Display):
     """Of every draw (rows).
 
     Args:
@@ -37,6 +38,17 @@ class RouteDraws:
     choices: np.ndarray
     mean: np.ndarray
     mounted: np.ndarray
+
+    def sentences(self) -> list[str]:
+        """What there is."""
+        return [f"{', '.join(self.curves)} of {len(self.choices)} draws at {len(self.grid)} values of the route."]
+
+    def _table(self) -> Rows:
+        """Medians and intervals on the grid."""
+        quantiles = {name: np.quantile(draws, (0.5, 0.05, 0.95), axis=0) for name, draws in self.curves.items()}
+        endings = ("", "_q05", "_q95")
+        columns = {name + ending: q for name, every in quantiles.items() for ending, q in zip(endings, every, strict=True)}
+        return {"route": self.grid} | columns, {name: "1" if name.startswith("efficiency") else "deg" for name in columns}
 
 
 def compile_along_route(model: Model, beside: Executor | None = None) -> OfDraws:

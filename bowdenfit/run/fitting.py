@@ -55,7 +55,7 @@ def run(
     squares, beside = estimated.result()
     watch.seconds |= {f"{stage}, beside": seconds for stage, seconds in beside.items()}
     found = Fit(data, squares, posterior, not reasons, reasons, provenance(seed, watch))
-    found.answers.update(programs.asked)
+    found._answers.update(programs.asked)
     return found
 
 

@@ -230,7 +230,7 @@ def test_comparing_the_families_finds_the_shape_of_the_route(fits):
 
 def test_the_curves_of_every_draw_have_the_shape_of_their_family(fits):
     for name, fit in fits.items():
-        angle = fit.curves()[1]["sheath_angle"]
+        angle = fit.along_route.curves["sheath_angle"]
         assert np.all(angle > 0), name
         assert (np.max(np.abs(np.diff(angle, 2, axis=1))) < 1e-9) == (name == "line")
         rises = np.diff(angle, axis=1) > 0

@@ -10,6 +10,7 @@ import jax.numpy as jnp
 import numpy as np
 
 from bowdenfit.cable.elasticity import PRELOAD
+from bowdenfit.display import Display, Rows
 from bowdenfit.errors import UsageError
 from bowdenfit.inference.draws import for_each_draw
 from bowdenfit.inference.interval import Interval
@@ -20,13 +21,27 @@ from bowdenfit.results.record import Record, once
 
 _BENDS = 25  # wrap angles at which a range of bends is looked at
 _SHOWN = 5  # wrap angles of a summary
+_QUANTILES = 0.5, 0.05, 0.95
+_UNITS = {
+    "preload": "N", "friction": "N", "slack_load": "N", "efficiency": "1", "position_error": "mm", "lost_motion": "mm",
+    "stiffness": "N/mm",
+}  # fmt: skip
 
 
-@dataclass(frozen=True)
-class Elastic:
+@dataclass(frozen=True, repr=False)
+class Elastic(Display):
     """The elastic answers of one fit. Angles are in rad, forces in N, lengths in mm."""
 
     fit: Record
+
+    def _table(self) -> Rows:
+        """The usual answers at the wrap angles that were measured at."""
+        bends, draws, _ = self.usual
+        names = [f"{name}{of}" for name in draws for of in ("", "_q05", "_q95")]
+        values = [q for drawn in draws.values() for q in np.quantile(drawn, _QUANTILES, axis=0)]
+        return {"wrap_angle": np.rad2deg(bends)} | dict(zip(names, values, strict=True)), {"wrap_angle": "deg"} | {
+            name: _UNITS[name.removesuffix("_q05").removesuffix("_q95")] for name in names
+        }
 
     @cached_property
     def contact(self) -> int:

@@ -4,14 +4,15 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from bowdenfit.display import Display, Rows
 from bowdenfit.inference.interval import Interval
 from bowdenfit.words import percent
 
 TAUT = 0.95  # probability with which the recommended preload keeps both sides taut
 
 
-@dataclass(frozen=True)
-class PreloadAnswer:
+@dataclass(frozen=True, repr=False)
+class PreloadAnswer(Display):
     """Which preloads will do.
 
     Args:
@@ -50,6 +51,15 @@ class PreloadAnswer:
     @property
     def _at(self) -> str:
         return "" if np.isnan(self.reference_angle) else f" at {self.reference_angle:.4g} deg"
+
+    def sentences(self) -> list[str]:
+        """Which to set, and why."""
+        return [self.advice, self.sentence()]
+
+    def _table(self) -> Rows:
+        known = {"lowest": self.lowest, "highest": self.highest, "felt": self.felt}
+        rows = [{"preload": name} | vars(interval) for name, interval in known.items() if interval is not None]
+        return rows, {"lowest": "N", "highest": "N", "felt": self.friction_unit}
 
     def sentence(self) -> str:
         """The answer in words."""

@@ -1,12 +1,25 @@
 """Stretch, preload and loops in words: what was fitted, and what the fit answers."""
 
 from bowdenfit.inference.interval import Interval
+from bowdenfit.questions.bends.answer import Elastic
 from bowdenfit.questions.bends.overview import ElasticOverview, elastic_overview
 from bowdenfit.results.record import Record
 from bowdenfit.words import filled, table
 
 Cells = tuple[tuple[str, ...], tuple[tuple[str, ...], ...]]
 HEADING = "Stretch and preload, median (90 % interval)"
+
+
+def bends_text(found: Elastic) -> str:
+    """The answers, or what is missing for them.
+
+    Args:
+        found: The answers of a fit.
+    """
+    return elastic_text(found.fit) or filled(
+        "Nothing measured on this cable tells of stretch or preload, or the fit has no draws; name a table of stretch, of "
+        "preload or of the loop in cable.toml."
+    )
 
 
 def elastic_text(fit: Record) -> str:

@@ -5,6 +5,7 @@ from typing import ClassVar
 
 import numpy as np
 
+from bowdenfit.display import Display, Rows
 from bowdenfit.questions.calibrate.power import Power
 from bowdenfit.words import percent
 
@@ -108,8 +109,8 @@ class Checked:
         return " and ".join(faults) or "ranks are not uniform"
 
 
-@dataclass(frozen=True)
-class Calibration:
+@dataclass(frozen=True, repr=False)
+class Calibration(Display):
     """What a calibration found.
 
     Args:
@@ -143,6 +144,14 @@ class Calibration:
 
     level: ClassVar = LEVEL
     JSON: ClassVar = (..., "is_calibrated", "ranked", "level")
+
+    def _table(self) -> Rows:
+        rows = [
+            {"quantity": q.name} | {f"held_{100 * c.probability:.0f}": c.rate for c in q.coverage}
+            | {"bias": q.bias, "bias_error": q.bias_error, "p_value": q.p_value, "fault": q.fault}
+            for q in self.quantities
+        ]  # fmt: skip
+        return rows, {name: "1" for row in rows for name, value in row.items() if isinstance(value, float)}
 
     @property
     def ranked(self) -> int:

@@ -1,11 +1,13 @@
 """What `bowdenfit calibrate` prints."""
 
+from bowdenfit.display import text_of
 from bowdenfit.questions.calibrate.answer import FEWEST, LEVEL, MOST_UNCONVERGED, Calibration, Checked
 from bowdenfit.words import filled, listed, percent, table
 
 _NAMED = 8  # unconverged replications that are named
 
 
+@text_of.register(Calibration)
 def calibration_text(found: Calibration) -> str:
     """A calibration for people: the verdict, a table of all quantities, and what was left out."""
     blocks = [

@@ -6,6 +6,7 @@ from typing import ClassVar
 
 import numpy as np
 
+from bowdenfit.display import Display, Rows
 from bowdenfit.inference.predictive_checks import place_at_random, predict_without_each, uniformity
 from bowdenfit.inference.prior_sensitivity import FarOut, Sensitivity, far_out, sensitivities
 from bowdenfit.kinds.places import places_of
@@ -20,8 +21,8 @@ _DRAWS = 5000  # that sensitivity to the priors is worked out from
 _STREAM = 5  # of the fit's random numbers
 
 
-@dataclass(frozen=True)
-class Checks:
+@dataclass(frozen=True, repr=False)
+class Checks(Display):
     """All checks of a fit.
 
     Args:
@@ -38,6 +39,9 @@ class Checks:
 
     false_alarm: ClassVar = FALSE_ALARM
     JSON: ClassVar = ("false_alarm", "tables", "readings", "sensitivities", "far_out")
+
+    def _table(self) -> Rows:
+        return [vars(reading) for reading in self.readings], {reading.label: reading.unit for reading in self.readings}
 
     @cached_property
     def readings(self) -> tuple[CheckedReading, ...]:

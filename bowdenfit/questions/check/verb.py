@@ -9,11 +9,12 @@ from bowdenfit.verb import Argument, Option, Reply, Verb
 if TYPE_CHECKING:
     from bowdenfit.dataset import Dataset
     from bowdenfit.questions.check.prior_predictive import PriorPredictive
+    from bowdenfit.questions.check.report import Report
 
 FIGURE = "prior_predictive"
 
 
-def check(dataset: "str | Path | Dataset", **reading: Unpack[Reading]) -> "Dataset":
+def check(dataset: "str | Path | Dataset", **reading: Unpack[Reading]) -> "Report":
     """Read a data set, and build the model where only that can tell whether the description makes sense.
 
     Loading JAX takes longer than everything else here, so the model is built only for names and priors that the
@@ -26,6 +27,7 @@ def check(dataset: "str | Path | Dataset", **reading: Unpack[Reading]) -> "Datas
     Raises:
         DescriptionError, DatasetError: What is wrong, in a sentence.
     """
+    from bowdenfit.questions.check.report import Report
     from bowdenfit.recordings.recording import Recordings
 
     data = read(dataset, **reading)
@@ -43,7 +45,7 @@ def check(dataset: "str | Path | Dataset", **reading: Unpack[Reading]) -> "Datas
 
         with jax.enable_x64(True):
             build_model(data)
-    return data
+    return Report(**vars(data))
 
 
 def show_priors(dataset: "Dataset", folder: str | Path, seed: int = 0) -> "PriorPredictive":

@@ -26,6 +26,16 @@ def checks_text(found: Checks | None) -> str:
     return "\n".join([_HEADING, *(filled(sentence) for sentence in sentences if sentence)])
 
 
+def checks_page(found: Checks) -> str:
+    """The same for one who asks for the checks alone: whether any reading is off comes first.
+
+    Args:
+        found: The checks.
+    """
+    sentences = [_outliers(found), _scatter(found), _decisive(found), _outside(found), priors_text(found)]
+    return "\n".join(filled(sentence) for sentence in sentences if sentence)
+
+
 def _name(reading: CheckedReading) -> str:
     """A reading in words."""
     return readings_called(reading.table).one.format(reading.label)

@@ -8,6 +8,7 @@ import numpy as np
 
 from bowdenfit.cable.load_cells import RUN_SCATTER
 from bowdenfit.description import Description
+from bowdenfit.display import Display, Rows
 from bowdenfit.errors import UsageError
 from bowdenfit.inference.comparison import Difference, Prediction, differences, stacking_weights
 from bowdenfit.inference.interval import Interval
@@ -41,8 +42,8 @@ class ComparedParameter:
     by_fit: dict[str, Interval]
 
 
-@dataclass(frozen=True)
-class Comparison:
+@dataclass(frozen=True, repr=False)
+class Comparison(Display):
     """What sets several fits apart.
 
     Args:
@@ -119,6 +120,9 @@ class Comparison:
             }
             for name, d in self.differences.items()
         ]
+
+    def _table(self) -> Rows:
+        return self.fits, {name: "1" for name, value in self.fits[0].items() if isinstance(value, float)}
 
     @property
     def predicted_readings(self) -> list[dict[str, Any]]:

@@ -4,6 +4,7 @@ from collections import Counter
 
 import numpy as np
 
+from bowdenfit.display import text_of
 from bowdenfit.inference.comparison import SMALL
 from bowdenfit.inference.interval import Interval
 from bowdenfit.questions.compare.answer import Comparison
@@ -14,6 +15,7 @@ _FEW = 20  # readings treated one by one that are named
 _SHORT = {"importance sampling": "-", "moment matching": "moved", "refit": "fitted again", "rough": "rough"}
 
 
+@text_of.register(Comparison)
 def comparison_text(found: Comparison) -> str:
     """A comparison for people: which fit predicts best, what changes between them, and what speed does."""
     heads = ("fit", "model", "score less by", "±", "weight")

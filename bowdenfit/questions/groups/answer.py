@@ -3,11 +3,12 @@
 from collections.abc import Iterator
 from dataclasses import dataclass, replace
 from itertools import combinations
-from typing import ClassVar
+from typing import Any, ClassVar
 
 import numpy as np
 
 from bowdenfit.cable.groups import coefficient_of
+from bowdenfit.display import Display, Rows
 from bowdenfit.inference.interval import Interval
 from bowdenfit.results.record import Record, once
 from bowdenfit.words import decimals
@@ -16,8 +17,8 @@ _ALL_PAIRS = 4  # groups, of which each is compared with each; of more, all with
 _SURE = 0.999  # beyond which draws are too few to say more
 
 
-@dataclass(frozen=True)
-class Contrast:
+@dataclass(frozen=True, repr=False)
+class Contrast(Display):
     """Friction coefficient of one group less that of another.
 
     Args:
@@ -47,9 +48,18 @@ class Contrast:
     def __str__(self) -> str:
         return self.sentence()
 
+    def _table(self) -> Rows:
+        return [self.row], dict.fromkeys(self.row, "1")
 
-@dataclass(frozen=True)
-class Groups:
+    @property
+    def row(self) -> dict[str, Any]:
+        """Of a table."""
+        named = {"coefficient": self.coefficient, "group": self.group, "less": self.less}
+        return named | vars(self.difference) | {"probability": self.probability}
+
+
+@dataclass(frozen=True, repr=False)
+class Groups(Display):
     """The groups of readings that have coefficients of their own.
 
     Args:
@@ -61,6 +71,14 @@ class Groups:
     names: tuple[str, ...]
     predicted: str
     contrasts: tuple[Contrast, ...]
+
+    def sentences(self) -> list[str]:
+        """The contrasts."""
+        return [f"Friction {c.coefficient}, {c.sentence()}." for c in self.contrasts]
+
+    def _table(self) -> Rows:
+        rows = [each.row for each in self.contrasts]
+        return rows, dict.fromkeys(rows[0] if rows else (), "1")
 
     def contrast(self, group: str, less: str, coefficient: str = "") -> Contrast:
         """One of them, either way round.

@@ -1,9 +1,10 @@
 """What the measurements of a cable determine, before any force is measured and after a fit, in words; loads no model."""
 
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Any, ClassVar
 
+from bowdenfit.display import Display, Rows
 from bowdenfit.inference.identifiability import Combination, Knowledge, Known
 from bowdenfit.words import decimals, listed
 
@@ -24,8 +25,8 @@ _REMEDY = (
 )
 
 
-@dataclass(frozen=True)
-class Identifiability:
+@dataclass(frozen=True, repr=False)
+class Identifiability(Display):
     """What is known of the parameters of a cable, by group.
 
     Args:
@@ -34,6 +35,7 @@ class Identifiability:
         measured: Whether readings entered, or only the plan of what to measure.
         groups: Knowledge by group of `GROUPS`, as far as there are such parameters.
         profiles: How the sum of squares of the readings rises with each friction coefficient, the others fitted again.
+        units: Of the parameters.
     """
 
     name: str
@@ -41,6 +43,7 @@ class Identifiability:
     measured: bool
     groups: dict[str, Knowledge]
     profiles: "tuple[Profile, ...]" = ()
+    units: Mapping[str, str] = field(default_factory=dict)
 
     JSON: ClassVar = ("name", "basis", "sentences", "groups", ("profiles", "rises"))
 
@@ -53,6 +56,10 @@ class Identifiability:
         if friction is not None and (friction.undetermined or friction.determined):
             said.append(_REMEDY)
         return said
+
+    def _table(self) -> Rows:
+        rows = [{"parameter": p.name, "group": name} | vars(p) for name, group in self.groups.items() for p in group.parameters]
+        return [{key: value for key, value in row.items() if key != "name"} for row in rows], self.units
 
     @property
     def rises(self) -> dict[str, Any]:

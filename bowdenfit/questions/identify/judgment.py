@@ -35,7 +35,7 @@ def identifiability(fit: Record) -> Identifiability:
     with jax.enable_x64(True):
         _, prior_sd = _linear(fit.model, slope_program(fit), np.median(drawn.flat_z, axis=0))
     groups = _groups(fit.model, np.mean(values, axis=0), spread, prior_sd)
-    return Identifiability(fit.name, DRAWS, True, groups)
+    return Identifiability(fit.name, DRAWS, True, groups, units=fit.posterior.units)
 
 
 def of_maximum(
@@ -54,7 +54,8 @@ def of_maximum(
     with jax.enable_x64(True):
         value, slope = _linear(model, compile_slopes(model), start.z)
     groups = _groups(model, value, covariance * np.outer(slope, slope), slope)
-    return Identifiability(model.description.name, basis, measured, groups, profiles)
+    units = {p.name: p.unit for p in model.space.free}
+    return Identifiability(model.description.name, basis, measured, groups, profiles, units)
 
 
 def _with_tails(model: Model, covariance: np.ndarray) -> np.ndarray:

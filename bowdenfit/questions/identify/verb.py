@@ -39,11 +39,15 @@ def identify(
     """
     import jax
 
+    from bowdenfit.questions.identify.words import identifiability_text
+
     refuse_unknown(identify, reading)
     with jax.enable_x64(True):
         found = _identify(source, reading)
     if output is not None:
-        _write(found, output)
+        from bowdenfit.questions.identify.figure import draw
+
+        write_answer(output, NAME, found, identifiability_text(found), lambda: draw(found))
     return found
 
 
@@ -136,14 +140,6 @@ def _of_plan(path: Path) -> "Identifiability":
     basis = f"the plan, for a cable with the values of {assumed}; nothing has been measured"
     at = information_at(posterior, np.asarray(posterior.model.space.unconstrain(values)))
     return of_maximum(posterior.model, at, basis, False)
-
-
-def _write(found: "Identifiability", folder: str | Path) -> None:
-    from bowdenfit.questions.identify.figure import draw
-    from bowdenfit.questions.identify.words import identifiability_text
-
-    text = identifiability_text(found)
-    write_answer(folder, NAME, found, text, lambda: draw(found))
 
 
 def _reply(found: "Identifiability", asked: dict[str, Any]) -> Reply:

@@ -1,5 +1,6 @@
 """What `bowdenfit identify` prints."""
 
+from bowdenfit.display import text_of
 from bowdenfit.inference.identifiability import OWN, RESTS_ON_PRIOR, Combination, Knowledge, Known
 from bowdenfit.questions.identify.answer import CURVES, Identifiability
 from bowdenfit.words import decimals, filled, narrow_table, percent
@@ -8,6 +9,7 @@ _HARD = 1000.0  # condition number beyond which parameters are hardly told apart
 _ALIKE = 0.9  # correlation beyond which two of them are
 
 
+@text_of.register(Identifiability)
 def identifiability_text(found: Identifiability) -> str:
     """What measurements determine, for people: the answer first, then parameters and combinations."""
     first, *others = found.sentences() or ["There is nothing to determine."]

@@ -19,7 +19,7 @@ def along_route(fit: Record) -> dict[str, Band]:
     if fit.dataset.description.route is None:
         return {}
     if fit.sampled is not None:
-        grid, draws = fit.curves()
+        grid, draws = fit.along_route.grid, fit.along_route.curves
         every = max(1, len(fit.posterior.flat_z) // _DRAWS)
         return {name: Band(grid, np.quantile(d[::every], BAND_QUANTILES, axis=0)) for name, d in draws.items()}
     grid = route_grid(fit.model)

@@ -3,10 +3,12 @@
 from dataclasses import dataclass
 from typing import ClassVar
 
+from bowdenfit.display import Display, Rows
 from bowdenfit.kinds.candidate import Candidate
 from bowdenfit.questions.next.target import Answer
 
 WITHIN = 2.0  # standard errors within which two candidates are as good as each other
+_SHOWN = ("words", "share", "error", "sd", "sd_error", "as_good", "cost")  # columns of a table
 LEAST_SHARE = 0.01  # of the variance; a measurement that takes away less is not worth making
 
 
@@ -111,8 +113,8 @@ class Within:
     JSON: ClassVar = ("usual", ("candidates", "ranked"))
 
 
-@dataclass(frozen=True)
-class NextMeasurement:
+@dataclass(frozen=True, repr=False)
+class NextMeasurement(Display):
     """Candidates from the most to the least worth measuring.
 
     Args:
@@ -155,9 +157,9 @@ class NextMeasurement:
         """Its name."""
         return self.best.name if self.best else None
 
-    def __str__(self) -> str:
-        best = self.best
-        return f"<next measurement for {self.answer.words}: {best.words if best else 'none helps'}>"
+    def _table(self) -> Rows:
+        rows = [{"measurement": r.name} | {key: vars(r)[key] for key in _SHOWN} for r in self.ranked]
+        return rows, {"share": "1", "error": "1", "sd": self.answer.unit or "1", "sd_error": self.answer.unit or "1"}
 
 
 def is_noticeable(share: float, error: float) -> bool:

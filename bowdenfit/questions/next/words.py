@@ -2,6 +2,7 @@
 
 import math
 
+from bowdenfit.display import text_of
 from bowdenfit.kinds.candidate import STROKE_WORDS
 from bowdenfit.kinds.terms import candidate_kinds
 from bowdenfit.questions.next.answer import NextMeasurement, Ranked
@@ -10,7 +11,8 @@ from bowdenfit.words import decimals, few, filled, percent, table
 _MOST_NAMED = 3  # candidates as good as the best that are named in the sentence
 
 
-def next_measurement_text(found: NextMeasurement, top: int) -> str:
+@text_of.register(NextMeasurement)
+def next_measurement_text(found: NextMeasurement, top: int = 10) -> str:
     """What to measure next and when to stop, in sentences and a table of the best candidates.
 
     Args:

@@ -7,6 +7,7 @@ from bowdenfit.questions.predict.words import predictions_csv, predictions_text
 from bowdenfit.verb import Argument, Length, Option, Quantity, Reply, Stroke, Verb
 
 if TYPE_CHECKING:
+    from bowdenfit.questions.predict.answer import Predictions
     from bowdenfit.results.record import Record
 
 Asked = Literal[
@@ -26,7 +27,7 @@ def predict(
     wrap_angles: Annotated[Sequence[Quantity], Option(("--wrap-angle",), "90deg", "ANGLE")] = (),
     preload: Annotated[Quantity | None, Option(metavar="FORCE", example="20N")] = None,
     friction_limit: Annotated[Quantity | None, Option(metavar="TORQUE", example="50N*mm")] = None,
-) -> list[dict[str, Any]]:
+) -> "Predictions":
     """Efficiency, a force, or what stretch and preload do, with intervals; one row a route value or wrap angle.
 
     Args:
@@ -48,6 +49,7 @@ def predict(
     import numpy as np
 
     from bowdenfit.errors import UsageError
+    from bowdenfit.questions.predict.answer import Predictions
     from bowdenfit.questions.predict.lengths import in_unit_of, predict_at_lengths
 
     route = found.dataset.description.route
@@ -59,7 +61,7 @@ def predict(
             raise UsageError("predict at lengths or at wrap angles, not at both; leave one of them out.")
         found.draws()
         asked = question(found, wrap_angles, input_force, output_force, preload, friction_limit, stroke)
-        return predict_at_bends(found, quantity, asked)
+        return Predictions(predict_at_bends(found, quantity, asked))
     if preload is not None or friction_limit is not None:
         raise UsageError(
             "--preload and --friction-limit belong to predictions at wrap angles; name some, as --wrap-angle 90deg."
@@ -76,7 +78,7 @@ def predict(
     if not lengths and route is not None and not route.choices:
         raise UsageError("the description has no choices; name the lengths to predict at.")
     wanted = np.asarray(in_unit_of(route, lengths) or (route.choices if route else [0.0]), dtype=float)
-    return predict_at_lengths(found, wanted, input_force, stroke, output_force)
+    return Predictions(predict_at_lengths(found, wanted, input_force, stroke, output_force))
 
 
 def _quantity(named: Asked | None, input_force: Quantity | None, output_force: Quantity | None) -> Asked:

@@ -40,6 +40,17 @@ def _cell(value: object) -> str:
     return f'"{value}"' if isinstance(value, str) else str(value).lower()
 
 
+def units_of(row: Row) -> dict[str, str]:
+    """Units of the columns, "1" of numbers without one; moments and quantiles have that of what stands before them."""
+    units, unit = dict[str, str](), "1"
+    for name, value in row.items():
+        if isinstance(value, float):
+            own = next((words for ending, words in _UNITS.items() if name.endswith(f"_{ending}")), None)
+            unit = own or ("1" if name == "efficiency" else unit)
+            units[name] = "1" if name.endswith(_PROBABILITY) else unit
+    return units
+
+
 def _quantities(row: Row) -> list[str]:
     """Names of what is predicted: the first has its mean under that name, the others after their own."""
     names = list(row)

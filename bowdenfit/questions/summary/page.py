@@ -4,6 +4,7 @@ from typing import Any
 
 import numpy as np
 
+from bowdenfit.display import Display, Rows
 from bowdenfit.inference.diagnostics import shortfalls
 from bowdenfit.inference.interval import Interval
 from bowdenfit.inference.samplers import recommendation
@@ -24,6 +25,26 @@ from bowdenfit.results.plain import plain
 from bowdenfit.results.record import Draws, Record
 
 SCHEMA = 1
+
+
+class Summary(Display, dict[str, Any]):
+    """The contents of summary.json, which show themselves as people read them.
+
+    Args:
+        page: The contents.
+        text: The same for people.
+    """
+
+    def __init__(self, page: dict[str, Any], text: str) -> None:
+        super().__init__(page)
+        self._text = text
+
+    def __str__(self) -> str:
+        return self._text
+
+    def _table(self) -> Rows:
+        rows = {name: {k: v for k, v in row.items() if k != "least_squares"} for name, row in self["parameters"].items()}
+        return [{"parameter": name} | row for name, row in rows.items()], {name: row["unit"] for name, row in rows.items()}
 
 
 def summarize(fit: Record) -> dict[str, Any]:

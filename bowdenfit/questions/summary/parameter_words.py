@@ -42,16 +42,6 @@ def parameters_text(fit: Record) -> str:
     return "\n".join([shown, *notes])
 
 
-def parameter_cells(parameter: Parameter, known: Interval | None, estimate: Estimate | None) -> tuple[str, ...]:
-    """Name, unit, draws, least squares with its profile interval, prior and meaning, for notebooks."""
-    drawn = ""
-    if known is not None:
-        median, interval, _ = _moments(known)
-        drawn = f"{median} ({interval})"
-    squares = "" if estimate is None else _with_interval(estimate)
-    return parameter.name, _unit(parameter), drawn, squares, parameter.prior_text, parameter.meaning
-
-
 def drawn_intervals(fit: Record) -> dict[str, Interval]:
     """Of every parameter that was sampled; empty without draws."""
     return {p.name: fit.parameter(p.name) for p in fit.model.space.free} if fit.sampled is not None else {}
@@ -84,15 +74,6 @@ def _with_error(estimate: Estimate) -> str:
         return _without_value(estimate)
     digits = _digits(estimate, abs(estimate.value) / 1000)
     return f"{estimate.value:.{digits}f} ± {estimate.standard_error:.{digits}f}"
-
-
-def _with_interval(estimate: Estimate) -> str:
-    if not estimate.identified:
-        return _without_value(estimate)
-    if not (isfinite(estimate.lower) and isfinite(estimate.upper)):
-        return f"{estimate.value:.4g}"
-    digits = _digits(estimate, abs(estimate.value) / 1000)
-    return f"{estimate.value:.{digits}f} ({estimate.lower:.{digits}f} to {estimate.upper:.{digits}f})"
 
 
 def _without_value(estimate: Estimate) -> str:

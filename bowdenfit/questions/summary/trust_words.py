@@ -15,7 +15,7 @@ from bowdenfit.questions.summary.verdict import (
     Verdict,
 )
 from bowdenfit.results.record import Record
-from bowdenfit.words import listed
+from bowdenfit.words import filled, listed
 
 _WRONG = {
     NOT_CONVERGED: "the computation has not settled",
@@ -24,6 +24,16 @@ _WRONG = {
     NOT_DESCRIBED: "the model does not describe these readings",
     NOT_IDENTIFIABLE: "the measurements do not tell every coefficient",
 }
+_SETTLED = "You can trust this: the computation has settled, and the readings agree with the model and with each other."
+_ALONE = (
+    "Nothing speaks against these numbers, but they are least squares alone{}; fit again without --no-mcmc for the full answer."
+)
+
+
+def verdict_text(found: Verdict) -> str:
+    """Whether a fit may be trusted, and if not, why."""
+    said = [warning(found), *reasons(found)] if found.troubles else [_SETTLED if found.sampled else _ALONE.format("")]
+    return "\n".join(filled(sentence) for sentence in said)
 
 
 def warning(found: Verdict) -> str:
@@ -47,12 +57,8 @@ def trust(fit: Record) -> list[str]:
     """What speaks for a fit that may be trusted, and what to keep in mind."""
     if fit.sampled is None:
         best = ", without a best length" if fit.dataset.description.route is not None else ""
-        return [
-            f"Nothing speaks against these numbers, but they are least squares alone{best}; fit again without --no-mcmc for "
-            "the full answer."
-        ]
-    said = ["You can trust this: the computation has settled, and the readings agree with the model and with each other."]
-    return said + [sentence for sentence in (_resting(fit), _alike(fit), _prior_against(fit)) if sentence]
+        return [_ALONE.format(best)]
+    return [_SETTLED] + [sentence for sentence in (_resting(fit), _alike(fit), _prior_against(fit)) if sentence]
 
 
 def next_step(fit: Record) -> str:

@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 from bowdenfit.verb import Argument, Option, Output, Quantity, Reply, Verb
 
 if TYPE_CHECKING:
+    from bowdenfit.questions.writing import Files
     from bowdenfit.results.record import Record
 
 NARROWEST, WIDEST = 3.0, 20.0  # in, of a figure
@@ -56,7 +57,7 @@ def plot(
     figures: Annotated[Sequence[str], Option(("--figure",), metavar="NAME")] = (),
     width: Annotated[Quantity | None, Option(example="3.5in", metavar="LENGTH")] = None,
     formats: Annotated[Sequence[str], Option(("--format",), metavar="ENDING", default="png and svg")] = (),
-) -> list[Path]:
+) -> "Files":
     """Draw the figures of a fit into a folder, and write what each shows, in words, to captions.txt beside them.
 
     Args:
@@ -76,6 +77,7 @@ def plot(
     """
     from bowdenfit.errors import UsageError
     from bowdenfit.questions.figures import draw_figure, write_captions
+    from bowdenfit.questions.writing import Files
     from bowdenfit.results.folder import FIGURES, folder_to_write
 
     if isinstance(found, str | Path):
@@ -86,7 +88,7 @@ def plot(
     shown, cable = _shown(found, figures)
     with folder_to_write(Path(output)) as place:
         files = [path for name, data in shown.items() for path in draw_figure(name, data, place, endings, cable, page)]
-        return [*files, write_captions(shown, place, cable)]
+        return Files([*files, write_captions(shown, place, cable)])
 
 
 def _formats(named: Sequence[str]) -> Sequence[str]:

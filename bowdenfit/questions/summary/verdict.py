@@ -2,6 +2,7 @@
 
 from dataclasses import dataclass
 
+from bowdenfit.display import Display, Rows
 from bowdenfit.questions.check.impossible import implausible_friction, impossible_efficiencies
 from bowdenfit.questions.check.lack_of_fit import say_what_is_not_described
 from bowdenfit.questions.identify.contradiction import contradiction
@@ -12,16 +13,18 @@ NOT_CONVERGED, NOT_IDENTIFIABLE, CONTRADICTORY = "not converged", "not identifia
 IMPOSSIBLE, NOT_DESCRIBED = "made of impossible readings", "not a description of its readings"
 
 
-@dataclass(frozen=True)
-class Verdict:
+@dataclass(frozen=True, repr=False)
+class Verdict(Display):
     """Of one fit.
 
     Args:
         troubles: What is wrong, by kind: `NOT_CONVERGED`, `NOT_IDENTIFIABLE`, `CONTRADICTORY`, `IMPOSSIBLE`,
             `NOT_DESCRIBED`; each with sentences.
+        sampled: Whether there are draws.
     """
 
     troubles: dict[str, tuple[str, ...]]
+    sampled: bool = True
 
     @property
     def trusted(self) -> bool:
@@ -32,6 +35,9 @@ class Verdict:
     def reasons(self) -> tuple[str, ...]:
         """Every sentence."""
         return tuple(sentence for sentences in self.troubles.values() for sentence in sentences)
+
+    def _table(self) -> Rows:
+        return [{"trouble": kind, "reason": reason} for kind, said in self.troubles.items() for reason in said], {}
 
 
 @once
@@ -44,7 +50,7 @@ def verdict(fit: Record) -> Verdict:
         IMPOSSIBLE: _sentences(impossible_efficiencies(fit)) + _sentences(implausible_friction(fit)),
         NOT_DESCRIBED: say_what_is_not_described(fit),
     }
-    return Verdict({kind: sentences for kind, sentences in troubles.items() if sentences})
+    return Verdict({kind: sentences for kind, sentences in troubles.items() if sentences}, fit.sampled is not None)
 
 
 def _sentences(sentence: str) -> tuple[str, ...]:

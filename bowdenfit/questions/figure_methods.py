@@ -1,0 +1,65 @@
+"""The figures of a fit as methods, for notebooks: `fit.plot.efficiency()`."""
+
+from collections.abc import Callable
+from functools import partial
+from typing import TYPE_CHECKING, Any
+
+from bowdenfit.errors import UsageError, nearest
+from bowdenfit.questions.figures import FIGURES, figures_of
+from bowdenfit.results.record import Record
+from bowdenfit.words import listed
+
+if TYPE_CHECKING:
+    from bowdenfit.plots.page import Page
+
+
+class NoSuchFigureError(UsageError, AttributeError):
+    """There is no figure of that name."""
+
+
+class FigureMethods:
+    """A method for each figure that a fit has something to show in, which gives the figure; `dir()` lists them.
+
+    Figures are matplotlib's; pyplot does not know them, so that they are shown once and go when nobody holds them.
+
+    Args:
+        fit: The fit.
+    """
+
+    def __init__(self, fit: Record) -> None:
+        self._fit = fit
+        self._data: dict[str, Any] = {}  # of the figures asked for; None where there is nothing to show
+
+    def __call__(self, name: str) -> "Page":
+        """One of the figures.
+
+        Args:
+            name: Which.
+
+        Raises:
+            UsageError: The fit has no such figure; says which it has.
+        """
+        if name not in FIGURES:
+            raise NoSuchFigureError(f"there is no figure {name!r}{nearest(name, list(FIGURES))}")
+        if self._shown(name) is None:
+            raise UsageError(f"this fit has nothing to show in the figure {name!r}; it has {listed(dir(self))}.")
+        figure: Page = FIGURES[name].draw(self._shown(name))
+        return figure
+
+    def __getattr__(self, name: str) -> "Callable[[], Page]":
+        if name.startswith("_"):
+            raise AttributeError(name)
+        if name not in FIGURES:
+            raise NoSuchFigureError(f"there is no figure {name!r}{nearest(name, list(FIGURES))}")
+        return partial(self, name)
+
+    def __dir__(self) -> list[str]:
+        return [name for name in FIGURES if self._shown(name) is not None]
+
+    def __repr__(self) -> str:
+        return f"Figures of {self._fit.name}: {', '.join(f'plot.{name}()' for name in dir(self))}"
+
+    def _shown(self, name: str) -> Any:
+        if name not in self._data:
+            self._data[name] = dict(figures_of(self._fit, [name])).get(name)
+        return self._data[name]

@@ -1,0 +1,33 @@
+"""Efficiencies with their intervals, one a length: a list that shows itself as `predict` does."""
+
+from collections.abc import Iterable
+from typing import Any
+
+from bowdenfit.description import Route
+from bowdenfit.display import Display, Rows
+from bowdenfit.inference.interval import Interval
+
+
+class Efficiencies(Display, list[Interval]):
+    """Efficiencies [1] at values of the route variable.
+
+    Args:
+        found: One a length.
+        route: The route; None without one.
+        lengths: Route values.
+    """
+
+    def __init__(self, found: Iterable[Interval], route: Route | None, lengths: Iterable[float]) -> None:
+        super().__init__(found)
+        self._at = [{} if route is None else {f"{route.variable}_{route.unit}": float(length)} for length in lengths]
+
+    @property
+    def rows(self) -> list[dict[str, Any]]:
+        """As `predict` gives them."""
+        return [
+            at | {"efficiency": each.median} | {k: v for k, v in vars(each).items() if k != "median"}
+            for at, each in zip(self._at, self, strict=True)
+        ]
+
+    def _table(self) -> Rows:
+        return self.rows, {name: name.rpartition("_")[2] if name in self._at[0] else "1" for name in self.rows[0]}

@@ -1,0 +1,220 @@
+"""Whatever the library hands out shows itself: a few lines in a console, the answer first in a notebook, a table for pandas."""
+
+import ast
+import importlib
+import inspect
+from collections.abc import Iterator
+from html.parser import HTMLParser
+from types import NoneType
+from typing import Any, get_args, get_origin, get_type_hints
+
+import numpy as np
+import pytest
+from IPython.lib.pretty import pretty
+
+import bowdenfit as bf
+from bowdenfit.display import Display, as_html, shortened
+from bowdenfit.questions.calibrate.answer import Calibration, Checked, Coverage
+from bowdenfit.questions.figure_methods import FigureMethods
+from bowdenfit.questions.summary.verdict import CONTRADICTORY, NOT_CONVERGED, Verdict
+
+QUICK = ("sampler.n_walkers=128", "sampler.target_ess=200", "sampler.target_r_hat=1.05", "sampler.max_steps=3000")
+MOST_LINES, MOST_BYTES, MOST_IN_A_NOTEBOOK = 10, 1000, 2000
+PLAIN = {np.ndarray, str, bool, NoneType, FigureMethods}  # what needs no page of its own
+
+
+def known_to(module) -> dict[str, Any]:
+    """Names of a module, with those that it imports for type checkers alone."""
+    names = dict(vars(module))
+    for node in ast.walk(ast.parse(inspect.getsource(module))):
+        if isinstance(node, ast.ImportFrom) and node.module:
+            names |= {a.asname or a.name: getattr(importlib.import_module(node.module), a.name, None) for a in node.names}
+    return names
+
+
+def returned(function) -> Any:
+    """What a function or property says that it gives."""
+    function = inspect.unwrap(getattr(function, "fget", None) or getattr(function, "func", None) or function)
+    return get_type_hints(function, known_to(inspect.getmodule(function))).get("return", NoneType)
+
+
+def parts(hint: Any) -> Iterator[Any]:
+    """The types that a type may be."""
+    origin = get_origin(hint)
+    if origin in (None, tuple, list, dict):
+        yield hint
+    else:
+        for part in get_args(hint):
+            yield from parts(part)
+
+
+def public_functions() -> Iterator[tuple[str, Any]]:
+    """Functions of the package, and methods and properties of a fit."""
+    for name in bf.__all__:
+        if not inspect.isclass(getattr(bf, name)):
+            yield f"bf.{name}", getattr(bf, name)
+    for name in dir(bf.Fit):
+        value = inspect.getattr_static(bf.Fit, name)
+        if not name.startswith("_") and (callable(value) or hasattr(value, "func") or hasattr(value, "fget")):
+            yield f"fit.{name}", value.__func__ if isinstance(value, classmethod) else value
+
+
+RESULTS = {name: list(parts(returned(function))) for name, function in public_functions()}
+CLASSES = sorted({part for every in RESULTS.values() for part in every} - PLAIN, key=str)
+
+
+def test_the_public_functions_are_found_with_what_they_return():
+    names = {part.__name__ for part in CLASSES if isinstance(part, type)}
+    assert names >= {
+        "Calibration", "Checks", "Comparison", "Draws", "Efficiencies", "Elastic", "Files", "Fit", "Groups",
+        "Identifiability", "Interval", "NextMeasurement", "OptimalLength", "Predictions", "Report", "Summary", "Verdict",
+    }  # fmt: skip
+
+
+@pytest.mark.parametrize("result", CLASSES, ids=lambda part: getattr(part, "__name__", str(part)))
+def test_every_public_result_shows_itself(result):
+    assert isinstance(result, type), f"{result} is no class of its own; {[n for n, p in RESULTS.items() if result in p]}"
+    if result.__module__.startswith("bowdenfit"):
+        assert issubclass(result, Display)
+        assert result.__repr__ is Display.__repr__, "its dataclass writes its own; decorate it with repr=False"
+        assert result._repr_html_ is Display._repr_html_
+
+
+class Tags(HTMLParser):
+    """Checks that tags are closed in order."""
+
+    def __init__(self):
+        super().__init__()
+        self.open = []
+
+    def handle_starttag(self, tag, attrs):
+        self.open.append(tag)
+
+    def handle_endtag(self, tag):
+        assert self.open.pop() == tag
+
+
+def look_at(value: Any) -> None:
+    """Asserts that something is short in a notebook and, if it is a result, begins with its answer and has a table."""
+    assert len(pretty(value)) <= MOST_IN_A_NOTEBOOK
+    if not isinstance(value, Display):
+        return
+    text, page = repr(value), value._repr_html_()
+    assert text.strip() and len(text.splitlines()) <= MOST_LINES and len(text.encode()) <= MOST_BYTES
+    assert "object at 0x" not in text and "array(" not in text
+    tags = Tags()
+    tags.feed(page)
+    assert tags.open == [] and page.startswith(("<p><b>", "<h4>"))
+    assert isinstance(value.to_frame().attrs["units"], dict)
+
+
+def answers_of(fit: bf.Fit) -> Iterator[tuple[str, Any]]:
+    """All that a fit gives to one who says nothing more."""
+    for name in dir(fit):
+        if name.startswith("_") or name in {"to_frame", "plot"}:
+            continue
+        value = getattr(fit, name)
+        if inspect.ismethod(value):
+            needed = [p for p in inspect.signature(value).parameters.values() if p.default is p.empty]
+            if needed:
+                continue
+            value = value()
+        yield name, value
+
+
+@pytest.fixture(scope="module")
+def fit(on_body):
+    return bf.fit(on_body, seed=5, settings=QUICK)
+
+
+def test_what_a_fit_gives_is_short_and_begins_with_the_answer(fit):
+    seen = {}
+    for name, value in answers_of(fit):
+        if name != "elastic":  # of which a cable with several contacts has no table
+            look_at(value)
+        seen[name] = value
+    assert {"verdict", "optimal_length", "posterior", "known", "checks", "summary", "least_squares"} <= set(seen)
+    for value in (fit, fit.parameter("mu1"), fit.dataset.description, fit.dataset.measurements, fit.plot):
+        look_at(value)
+    assert repr(fit).startswith("On-body knee exoskeleton: cut the cable to 470 mm.\n")
+    assert repr(fit.verdict()).startswith("You can trust this: ")
+    assert "to_frame" in dir(fit) and "draws" in repr(fit.posterior)
+
+
+def test_what_the_verbs_answer_is_short_and_begins_with_the_answer(fit, on_body, tmp_path):
+    answers = (
+        bf.identify(fit), bf.next_measurement(fit), bf.predict(fit), bf.predict(fit, [455]), bf.compare({"a": fit, "b": fit}),
+        bf.check(on_body), bf.read(on_body), fit.efficiency([455, 465.5]), bf.plot(fit, tmp_path, figures=["efficiency"]),
+    )  # fmt: skip
+    for answer in answers:
+        look_at(answer)
+    assert bf.check(on_body)._repr_html_().startswith("<h4>On-body knee exoskeleton</h4><p><b>Everything could be read.")
+    assert bf.predict(fit, [455])[0]["mean"] == pytest.approx(fit.efficiency(455)[0].mean)
+
+
+def test_tables_have_the_units_of_what_stands_in_them(fit):
+    assert fit.optimal_length().to_frame().attrs["units"]["cable_length"] == "mm"
+    drawn = fit.posterior.to_frame()
+    np.testing.assert_array_equal(drawn["mu1"], fit.posterior.values["mu1"].ravel())
+    assert drawn.attrs["units"].items() >= {"mu1": "1", "optimal_length": "mm", "sigma_theta": "deg"}.items()
+    rows = fit.to_frame().set_index("parameter")
+    assert rows.loc["mu1", "median"] == fit.parameter("mu1").median
+    assert fit.least_squares.to_frame().attrs["units"]["sigma_theta"] == "deg"
+    predicted = bf.predict(fit, [455], (100, "N")).to_frame()
+    assert predicted.attrs["units"].items() >= {"cable_length_mm": "mm", "output_force_N": "N", "q95": "N"}.items()
+    assert bf.next_measurement(fit).to_frame().attrs["units"]["sd"] == "mm"
+    assert bf.identify(fit).to_frame().attrs["units"]["mu1"] == "1"
+    assert set(fit.efficiency([455, 465]).to_frame()["cable_length_mm"]) == {455.0, 465.0}
+
+
+def test_a_fit_without_draws_says_in_a_sentence_what_it_has_not(on_body):
+    fit = bf.fit(on_body, seed=1, mcmc=False)
+    assert fit.sampled is None
+    with pytest.raises(bf.UsageError, match="fit again without --no-mcmc"):
+        fit.posterior.values["mu1"]
+    look_at(fit)
+    look_at(fit.verdict())
+    assert "least squares alone" in repr(fit.verdict())
+
+
+def test_stretch_and_preload_have_a_table():
+    fit = bf.fit("datasets/synthetic-haptic-loop", seed=1, mcmc=False)
+    look_at(fit.elastic)
+    look_at(fit.elastic.preload_window((0.0, 3.0)))
+    table = fit.elastic.to_frame()
+    assert {"preload", "preload_q95", "stiffness"} <= set(table) and table.attrs["units"]["stiffness"] == "N/mm"
+
+
+def test_a_calibration_begins_with_its_verdict():
+    held = (Coverage(0.5, 0.51, 0.4, 0.6), Coverage(0.9, 0.88, 0.8, 0.97))
+    checked = Checked("mu", r"$\mu$", (0.5,) * 30, 0.4, 0.8, held, 0.02, 0.1, 0.9)
+    found = Calibration("Bench", (), 1, 30, (checked,), {}, {}, 0.1)
+    look_at(found)
+    assert repr(found).startswith("CALIBRATED: ") and found.to_frame()["held_90"][0] == 0.88
+
+
+def test_what_is_not_to_be_trusted_says_so_first():
+    verdict = Verdict({NOT_CONVERGED: ("R-hat is 1.2",), CONTRADICTORY: ("a <b>bold</b> run & another disagree",)})
+    assert repr(verdict).startswith("DO NOT USE THESE NUMBERS: ")
+    assert verdict._repr_html_().startswith("<p><b>DO NOT USE THESE NUMBERS: ")
+    assert "a &lt;b&gt;bold&lt;/b&gt; run &amp; another" in verdict._repr_html_()
+    assert list(verdict.to_frame()["trouble"]) == [NOT_CONVERGED, CONTRADICTORY]
+
+
+def test_what_is_long_is_cut_with_a_word_on_how_to_see_the_rest():
+    text = "\n".join(f"line {i} {'x' * 200}" for i in range(50))
+    lines = shortened(text).splitlines()
+    assert len(lines) == MOST_LINES and all(len(line) <= 90 for line in lines)
+    assert lines[-1] == "... and 41 more lines; print() shows them."
+    assert shortened("a\nb") == "a\nb"
+
+
+def test_ruled_columns_become_cells_and_what_stands_below_them_does_not():
+    page = as_html(
+        "Cut it.\n\nHow it went\n      value  90 % interval\n----------------------\nmu1   0.084  0.067 to 0.110    sheath\n"
+        "tau     1.0      0.3 to 4.2 %  scatter <1>\nand 3 more\nHard to tell apart: mu1 and tau, of all those that there are."
+    )
+    assert page.startswith("<p><b>Cut it.</b></p><p>How it went</p><table>")
+    assert page.count("<th>") == 4 and page.count("<tr>") == 3
+    assert ">0.3 to 4.2 %</td>" in page and ">scatter &lt;1&gt;</td>" in page
+    assert page.endswith("</table><p>and 3 more Hard to tell apart: mu1 and tau, of all those that there are.</p>")

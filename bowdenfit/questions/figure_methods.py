@@ -5,12 +5,13 @@ from functools import partial
 from typing import TYPE_CHECKING, Any
 
 from bowdenfit.errors import UsageError, nearest
-from bowdenfit.questions.figures import FIGURES, figures_of
+from bowdenfit.questions.figures import FIGURES, figure_of, figures_of, page_width
 from bowdenfit.results.record import Record
+from bowdenfit.verb import Quantity
 from bowdenfit.words import listed
 
 if TYPE_CHECKING:
-    from bowdenfit.plots.page import Page
+    from bowdenfit.plots.layout import Figure
 
 
 class NoSuchFigureError(UsageError, AttributeError):
@@ -30,23 +31,23 @@ class FigureMethods:
         self._fit = fit
         self._data: dict[str, Any] = {}  # of the figures asked for; None where there is nothing to show
 
-    def __call__(self, name: str) -> "Page":
+    def __call__(self, name: str, width: Quantity | None = None) -> "Figure":
         """One of the figures.
 
         Args:
             name: Which.
+            width: On which words stay as large as they are, such as (3.5, "in"); what suits the figure if omitted.
 
         Raises:
-            UsageError: The fit has no such figure; says which it has.
+            UsageError: The fit has no such figure, and which it has; or none can be so wide.
         """
         if name not in FIGURES:
             raise NoSuchFigureError(f"there is no figure {name!r}{nearest(name, list(FIGURES))}")
         if self._shown(name) is None:
             raise UsageError(f"this fit has nothing to show in the figure {name!r}; it has {listed(dir(self))}.")
-        figure: Page = FIGURES[name].draw(self._shown(name))
-        return figure
+        return figure_of(name, self._shown(name), self._fit.name, page_width(width))
 
-    def __getattr__(self, name: str) -> "Callable[[], Page]":
+    def __getattr__(self, name: str) -> "Callable[..., Figure]":
         if name.startswith("_"):
             raise AttributeError(name)
         if name not in FIGURES:

@@ -39,6 +39,7 @@ from bowdenfit.questions.summary import (
 from bowdenfit.results.arrays import read_arrays
 from bowdenfit.results.folder import FIGURE_DATA, write_text
 from bowdenfit.results.kept import kept
+from bowdenfit.verb import Quantity
 from bowdenfit.words import filled, printable
 
 if TYPE_CHECKING:
@@ -69,6 +70,7 @@ _FILES = (  # first what was measured beside the model, then what follows, then 
 FIGURES = {file.__name__.rpartition(".")[2].removesuffix("_figure"): file for file in _FILES}
 AT_ONCE = ("coefficients", "pairs", "traces")  # whose data are there, so that drawing begins at once
 CAPTIONS = "captions.txt"
+NARROWEST, WIDEST = 3.0, 20.0  # in, of a figure
 
 
 def figures_of(fit: "Record", names: Collection[str] = ()) -> Iterator[tuple[str, Any]]:
@@ -115,6 +117,30 @@ def figure_of(name: str, data: Any, cable: str = "", width: float | None = None)
     figure: Figure = FIGURES[name].draw(data, width)
     title_above(figure, title_of(name, cable))
     return figure
+
+
+def page_width(width: Quantity | None) -> float | None:
+    """Width of the page [in]; None for what suits each figure.
+
+    Args:
+        width: As stated, with its unit.
+
+    Raises:
+        UsageError: It is no length, or none that a figure can have.
+    """
+    from bowdenfit.errors import UsageError
+    from bowdenfit.units import conversion_factor
+
+    if width is None:
+        return None
+    value, unit = width
+    inches = value * conversion_factor(unit, "length") / conversion_factor("in", "length")
+    if not NARROWEST <= inches <= WIDEST:
+        raise UsageError(
+            f"figures cannot be {value:g} {unit} wide; say a width from {NARROWEST:g} in to {WIDEST:g} in, such as 3.5in for a "
+            "column of a paper."
+        )
+    return float(inches)
 
 
 def title_of(name: str, cable: str) -> str:

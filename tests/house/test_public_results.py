@@ -5,6 +5,7 @@ import importlib
 import inspect
 from collections.abc import Iterator
 from html.parser import HTMLParser
+from pathlib import Path
 from types import NoneType
 from typing import Any, get_args, get_origin, get_type_hints
 
@@ -20,7 +21,7 @@ from bowdenfit.questions.summary.verdict import CONTRADICTORY, NOT_CONVERGED, Ve
 
 QUICK = ("sampler.n_walkers=128", "sampler.target_ess=200", "sampler.target_r_hat=1.05", "sampler.max_steps=3000")
 MOST_LINES, MOST_BYTES, MOST_IN_A_NOTEBOOK = 10, 1000, 2000
-PLAIN = {np.ndarray, str, bool, NoneType, FigureMethods}  # what needs no page of its own
+PLAIN = {np.ndarray, str, bool, NoneType, Path, FigureMethods}  # what needs no page of its own
 
 
 def known_to(module) -> dict[str, Any]:

@@ -11,8 +11,6 @@ if TYPE_CHECKING:
     from bowdenfit.questions.writing import Files
     from bowdenfit.results.record import Record
 
-NARROWEST, WIDEST = 3.0, 20.0  # in, of a figure
-
 
 def summary(
     results: Annotated[Path, Argument("RESULTS")], *, full: Annotated[bool, Option()] = False
@@ -76,7 +74,7 @@ def plot(
         StoreError: The results folder is missing or damaged, or the other cannot be written.
     """
     from bowdenfit.errors import UsageError
-    from bowdenfit.questions.figures import draw_figure, write_captions
+    from bowdenfit.questions.figures import draw_figure, page_width, write_captions
     from bowdenfit.questions.writing import Files
     from bowdenfit.results.folder import FIGURES, folder_to_write
 
@@ -84,7 +82,7 @@ def plot(
         output = output or Path(found) / FIGURES
     if output is None:
         raise UsageError("a fit by itself has no folder; name one for the figures.")
-    endings, page = _formats(formats), _page_width(width)
+    endings, page = _formats(formats), page_width(width)
     shown, cable = _shown(found, figures)
     with folder_to_write(Path(output)) as place:
         files = [path for name, data in shown.items() for path in draw_figure(name, data, place, endings, cable, page)]
@@ -100,23 +98,6 @@ def _formats(named: Sequence[str]) -> Sequence[str]:
         if name not in EVERY_FORMAT:
             raise UsageError(f"there is no format {name!r} for figures{nearest(name, list(EVERY_FORMAT))}")
     return tuple(dict.fromkeys(named)) or FORMATS
-
-
-def _page_width(width: Quantity | None) -> float | None:
-    """Width of the page [in]."""
-    from bowdenfit.errors import UsageError
-    from bowdenfit.units import conversion_factor
-
-    if width is None:
-        return None
-    value, unit = width
-    inches = value * conversion_factor(unit, "length") / conversion_factor("in", "length")
-    if not NARROWEST <= inches <= WIDEST:
-        raise UsageError(
-            f"figures cannot be {value:g} {unit} wide; say a width from {NARROWEST:g} in to {WIDEST:g} in, such as 3.5in for a "
-            "column of a paper."
-        )
-    return float(inches)
 
 
 def _shown(found: "Record | str | Path", names: Sequence[str]) -> tuple[dict[str, Any], str]:

@@ -71,11 +71,15 @@ def in_ascii(text: str) -> str:
     return text.translate(_PLAIN).encode("ascii", "replace").decode("ascii")
 
 
+def unbroken(text: str) -> str:
+    """The same with blanks at which no line ends between numbers and their units."""
+    return _KEPT.sub("\N{NO-BREAK SPACE}", text)
+
+
 def filled(text: str, indent: str = "") -> str:
     """A paragraph in lines of at most `WIDTH` characters; no number loses its unit to the next line."""
     hanging = indent + ("  " if text.startswith("- ") else "")
-    kept = _KEPT.sub("\N{NO-BREAK SPACE}", text)
-    lines = textwrap.wrap(kept, WIDTH, initial_indent=indent, subsequent_indent=hanging, break_on_hyphens=False)
+    lines = textwrap.wrap(unbroken(text), WIDTH, initial_indent=indent, subsequent_indent=hanging, break_on_hyphens=False)
     return "\n".join(lines).replace("\N{NO-BREAK SPACE}", " ")
 
 

@@ -77,7 +77,7 @@
     show(chart) {
       this.area.hidden = this.key_.hidden = !chart;
       this.drawing.classList.toggle("replaced", chart);
-      this.swap.textContent = chart ? "As printed" : "To zoom";
+      this.swap.textContent = chart ? "Printed figure" : "Chart to zoom";
       for (const button of this.tools.querySelectorAll("button:not(.swap), label")) button.hidden = !chart;
       if (chart) this.draw();
     }

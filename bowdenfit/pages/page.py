@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any
 
 from bowdenfit.pages.drawing import inline
 from bowdenfit.pages.section import Page, Picture
-from bowdenfit.words import printable
+from bowdenfit.words import printable, unbroken
 
 if TYPE_CHECKING:
     from jinja2 import Environment
@@ -74,8 +74,8 @@ def _environment() -> Environment:
 
 
 def _inert(value: Any) -> Any:
-    """Text without what turns its direction or cannot be seen; markup is left as it is."""
-    return printable(value) if type(value) is str else value
+    """Text without what turns its direction or cannot be seen, numbers beside their units; markup is left as it is."""
+    return unbroken(printable(value)) if type(value) is str else value
 
 
 def _scripts() -> tuple[str, str]:

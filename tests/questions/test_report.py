@@ -167,7 +167,7 @@ def test_without_scripts_and_on_paper_the_drawing_stands_in_place_of_the_chart(c
 
 
 def test_the_report_says_what_the_summary_says(routed):
-    text = (routed / REPORT).read_text(encoding="utf-8")
+    text = (routed / REPORT).read_text(encoding="utf-8").replace("\u00a0", " ")
     fit = bf.load(routed)
     assert fit.optimal_length().headline in text
     assert "You can trust this" in text

@@ -8,6 +8,10 @@ from bowdenfit.kinds.terms import candidate_kinds
 from bowdenfit.questions.next.answer import NextMeasurement, Ranked
 from bowdenfit.words import decimals, few, filled, percent, table
 
+HOW_TO_READ = (
+    "± is one standard deviation, on average over what the reading may turn out to be; two that differ in the last digit are as "
+    "good as each other."
+)
 _MOST_NAMED = 3  # candidates as good as the best that are named in the sentence
 
 
@@ -19,19 +23,20 @@ def next_measurement_text(found: NextMeasurement, top: int = 10) -> str:
         found: The ranking.
         top: How many candidates the table shows.
     """
-    sentences = [*_advice(found), *_load_and_stroke(found), found.stop, *_planned(found), *_repeated(found)]
-    shown = found.ranked[:top]
-    more = len(found.ranked) - len(shown)
+    more = len(found.ranked) - top
     lines = [
-        "\n".join(filled(line) for line in sentences if line),
-        _table(found, shown)
+        "\n".join(filled(line) for line in ranking_sentences(found)),
+        table(*ranking_table(found, top))
         + (f"\n... and {more} more, ranked lower; --top {len(found.ranked)} shows all." if more > 0 else ""),
-        filled(
-            "± is one standard deviation, on average over what the reading may turn out to be; two that differ in the last "
-            "digit are as good as each other."
-        ),
+        filled(HOW_TO_READ),
     ]
     return "\n\n".join(lines) + "\n"
+
+
+def ranking_sentences(found: NextMeasurement) -> list[str]:
+    """What to measure next, at which load, when to stop, and what would come after it."""
+    sentences = [*_advice(found), *_load_and_stroke(found), found.stop, *_planned(found), *_repeated(found)]
+    return [sentence for sentence in sentences if sentence]
 
 
 def _sd(found: NextMeasurement, sd: float) -> str:
@@ -130,7 +135,9 @@ def _repeated(found: NextMeasurement) -> list[str]:
     return [f"Nothing but this would not halve the uncertainty: after {most} times it would still be {still}."]
 
 
-def _table(found: NextMeasurement, shown: tuple[Ranked, ...]) -> str:
+def ranking_table(found: NextMeasurement, top: int) -> tuple[list[str], list[list[str]]]:
+    """Heads and rows of so many of the best candidates."""
+    shown = found.ranked[:top]
     unit = f" ({found.answer.unit})" if found.answer.unit else ""
     digits = _digits(found)
     heads = ["measurement", f"then known to{unit}", "uncertainty less by"]
@@ -138,4 +145,4 @@ def _table(found: NextMeasurement, shown: tuple[Ranked, ...]) -> str:
     if any(r.cost is not None for r in shown):
         heads += ["cost", "variance less by, per cost"]
         rows = [[*row, f"{r.cost:g}", percent(r.worth, 2)] for row, r in zip(rows, shown, strict=True)]
-    return table(heads, rows)
+    return heads, rows

@@ -15,12 +15,15 @@ if TYPE_CHECKING:
 def report(
     found: Annotated["Record | str | Path", Argument("RESULTS")],
     output: Annotated[Output, Option(("-o",), metavar="FILE", default="RESULTS/report.html")] = None,
+    *,
+    ranked: Annotated[bool, Option(("--next",))] = False,
 ) -> Path:
     """Write everything that a fit found on one page: a file that stands alone, to read in a browser, print and hand on.
 
     Args:
         found: The fit, or its results folder.
         output: The file; one that is there is replaced.
+        ranked: Rank what could be measured next too, which takes a few seconds.
 
     Returns:
         The file written.
@@ -31,6 +34,7 @@ def report(
     """
     from bowdenfit.errors import UsageError
     from bowdenfit.questions.figures import draw_figure, figures_of, kept_figures
+    from bowdenfit.questions.next.ranking import next_measurement
     from bowdenfit.questions.report.sections import report_page
     from bowdenfit.results.folder import REPORT, folder_to_write
     from bowdenfit.results.store import load
@@ -41,11 +45,12 @@ def report(
         output, found, kept = output or folder / REPORT, load(folder), kept_figures(folder)
     if output is None:
         raise UsageError("a fit by itself has no folder; name a file for the report.")
+    ranking = next_measurement(found) if ranked else None
     figures, path = kept or dict(figures_of(found)), Path(output)
     with folder_to_write(path.parent), TemporaryDirectory() as drawn:
         for name, data in figures.items():
             draw_figure(name, data, Path(drawn), ("svg",), found.name)
-        return write_report(report_page(found, figures), Path(drawn), path)
+        return write_report(report_page(found, figures, ranking), Path(drawn), path)
 
 
 def write_report(page: "Page", drawn: Path, path: Path) -> Path:

@@ -3,7 +3,10 @@
 import json
 from collections.abc import Callable
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
+
+if TYPE_CHECKING:
+    from bowdenfit.pages.section import Page
 
 from bowdenfit.display import Display, Rows
 
@@ -30,7 +33,9 @@ def files_of(folder: str | Path, name: str) -> list[Path]:
     return [Path(folder) / f"{name}.{ending}" for ending in (PAGE, TEXT, *FIGURES)]
 
 
-def write_answer(folder: str | Path, name: str, answer: Any, text: str, draw: Callable[[], Any]) -> list[Path]:
+def write_answer(
+    folder: str | Path, name: str, answer: Any, text: str, draw: Callable[[], Any], page: "Page | None" = None
+) -> list[Path]:
     """Write an answer as text, as a figure and, last, as JSON; a folder that has the JSON has everything.
 
     Args:
@@ -39,6 +44,7 @@ def write_answer(folder: str | Path, name: str, answer: Any, text: str, draw: Ca
         answer: The answer.
         text: For people.
         draw: Gives the figure.
+        page: The same as a page with that figure; none is written without one.
 
     Returns:
         The files written.
@@ -56,5 +62,24 @@ def write_answer(folder: str | Path, name: str, answer: Any, text: str, draw: Ca
         figure = draw()
         for path in figures:
             write(figure, path)
+        if page is not None:
+            files.insert(0, write_page(page, Path(folder), Path(folder) / f"{name}.html"))
         write_text(page_file, json.dumps(plain(answer), indent=1) + "\n")
     return files
+
+
+def write_page(page: "Page", drawn: Path, path: Path) -> Path:
+    """Write a page whole, with the drawings that lie in a folder; loads no model.
+
+    Args:
+        page: The page.
+        drawn: Where its figures are, as SVG.
+        path: The file.
+    """
+    from bowdenfit.pages.page import render
+    from bowdenfit.results.folder import write_text
+
+    files = {picture.name: drawn / f"{picture.name}.svg" for picture in page.pictures}
+    drawings = {name: file.read_text(encoding="utf-8") for name, file in files.items() if file.exists()}
+    write_text(path, render(page, drawings))
+    return path

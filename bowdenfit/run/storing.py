@@ -37,9 +37,9 @@ def write_results(found: "Fit", folder: Path, figures: bool, helper: Assistant) 
     from bowdenfit.questions.figures import FIGURES as FIGURE_NAMES
     from bowdenfit.questions.kept import answers_of
     from bowdenfit.questions.report.sections import report_page
-    from bowdenfit.questions.report.verb import write_report
     from bowdenfit.questions.summary.brief_words import summary_text
     from bowdenfit.questions.summary.words import full_text
+    from bowdenfit.questions.writing import write_page
     from bowdenfit.results.folder import DETAILS_TEXT, FIGURES, REPORT, SUMMARY_TEXT, write_text
     from bowdenfit.results.store import save
 
@@ -58,7 +58,7 @@ def write_results(found: "Fit", folder: Path, figures: bool, helper: Assistant) 
     write_text(folder / SUMMARY_TEXT, printable(summary_text(found)))
     write_text(folder / DETAILS_TEXT, printable(full_text(found)))
     try:  # behind the figures, whose files it takes
-        drawn[REPORT] = helper.submit(write_report, report_page(found, data), folder / FIGURES, folder / REPORT)
+        drawn[REPORT] = helper.submit(write_page, report_page(found, data), folder / FIGURES, folder / REPORT)
     except Exception as error:
         failed[REPORT] = error
     for name, figure in drawn.items():

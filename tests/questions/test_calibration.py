@@ -9,6 +9,7 @@ import numpy as np
 import pytest
 from cables import CONTACTS, DESIGN, cable, other_design
 from conftest import ROOT
+from reading_room import browser, opened
 from scipy import stats
 from spoiling import copied
 
@@ -29,15 +30,17 @@ from bowdenfit.kinds.recordings.simulation import refuse_saturated
 from bowdenfit.model import build_model
 from bowdenfit.questions.calibrate.acceptable_tables import refusal
 from bowdenfit.questions.calibrate.answer import Calibration, Quantity
-from bowdenfit.questions.calibrate.figure import coverage, ranks, sharpness
+from bowdenfit.questions.calibrate.figure import coverage, draw_calibration, ranks, sharpness
 from bowdenfit.questions.calibrate.findings import findings
 from bowdenfit.questions.calibrate.refit import Laboratory
 from bowdenfit.questions.calibrate.replication import RankedTruth, Replication
+from bowdenfit.questions.calibrate.sections import calibration_page
 from bowdenfit.questions.calibrate.store import keep, open_replications
 from bowdenfit.questions.calibrate.uniformity import UniformRanks, holm
 from bowdenfit.questions.calibrate.words import calibration_text
 from bowdenfit.questions.calibrate.workbench import Plan, Workbench
 from bowdenfit.questions.simulate.simulation import empty_tables, simulated_again, with_readings
+from bowdenfit.questions.writing import write_page
 from bowdenfit.recordings.recording import Recordings
 
 DATA_SETS = (
@@ -437,7 +440,7 @@ def test_the_command_line_calibrates_resumes_and_says_when_too_few_replications_
     assert f"Wrote {folder}." in err
     written = {path.relative_to(folder).as_posix() for path in folder.rglob("*.*")}
     figures = {f"figures/{name}.{e}" for name in ("ranks", "coverage", "sharpness") for e in ("png", "svg")}
-    assert written == {"calibration.json", "summary.txt", "replications.jsonl"} | figures
+    assert written == {"calibration.json", "summary.txt", "replications.jsonl", "report.html"} | figures
     code, _, err = run(*begin, "-n", 2)
     assert code == 2
     assert "--resume" in err
@@ -447,6 +450,17 @@ def test_the_command_line_calibrates_resumes_and_says_when_too_few_replications_
     assert (page["replications"], page["seed"]) == (3, 1)
     assert page["quantities"][0]["name"] == "mu"
     assert len((folder / "replications.jsonl").read_text().splitlines()) == 4
+
+
+def test_the_page_of_a_calibration_opens_without_a_fault(tmp_path):
+    found = replace(findings(replications(50), {"mu": Quantity(r"$\mu$")}), name="</title><script>alert(1)</script>")
+    draw_calibration(found, tmp_path, ("svg",))
+    path = write_page(calibration_page(found), tmp_path, tmp_path / "report.html")
+    with browser() as chromium, opened(chromium, path, width=390) as reader:
+        assert reader.faults() == []
+        assert reader.page.locator("main svg").count() == 3
+        assert "CALIBRATED: for this description and these tables" in reader.page.locator("main").inner_text()
+        assert reader.sheets() <= 6
 
 
 def test_an_interrupted_calibration_says_how_to_go_on(run, tmp_path, monkeypatch):

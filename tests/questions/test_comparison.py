@@ -8,6 +8,7 @@ import jax
 import numpy as np
 import pytest
 from cables import cable, measured
+from reading_room import browser, opened
 from scipy import stats
 
 import bowdenfit as bf
@@ -22,7 +23,10 @@ from bowdenfit.kinds.efficiencies.table import EfficiencyTable
 from bowdenfit.model import build_model
 from bowdenfit.questions.compare.answer import Comparison
 from bowdenfit.questions.compare.common_readings import CommonReadings, Omitted, common_readings
+from bowdenfit.questions.compare.figure import draw
+from bowdenfit.questions.compare.sections import comparison_page
 from bowdenfit.questions.compare.words import comparison_text
+from bowdenfit.questions.writing import write_answer
 
 QUICK = ("sampler.n_walkers=64", "sampler.target_ess=200", "sampler.target_r_hat=1.05", "sampler.max_steps=3000")
 EDGE = {"name": "edge", "friction": "mu_edge", "wrap_angle": {"value": 45, "unit": "deg"}}
@@ -227,6 +231,22 @@ def test_the_sentence_says_what_is_preferred_and_what_that_rests_on():
     assert "efficiency 410 mm fitted again fitted again" in rough
 
 
+def test_the_page_of_a_comparison_opens_without_a_fault(tmp_path):
+    found = by_hand([2.0, 2.1, 1.9, 2.0, 2.1, 2.0], ("rough", "refit", *("importance sampling",) * 4))
+    odd = {"good": "</title><script>alert(1)</script>"}
+    renamed = {
+        part: {odd.get(name, name): value for name, value in getattr(found, part).items()}
+        for part in ("differences", "weights", "predictions", "described")
+    }
+    found = replace(found, **renamed)
+    write_answer(tmp_path, "comparison", found, "", lambda: draw(found), comparison_page(found))
+    with browser() as chromium, opened(chromium, tmp_path / "comparison.html", width=390) as reader:
+        assert reader.faults() == []
+        assert reader.page.locator("main svg").count() == 1
+        assert "The data prefer </title><script>alert(1)</script> over poor" in reader.page.locator("main").inner_text()
+        assert reader.sheets() <= 6
+
+
 def test_one_reading_that_makes_most_of_a_difference_is_named():
     found = by_hand([9.0, 1.0, 1.1, 0.9, 1.0, 1.2])
     found = replace(found, differences=found.differences | {"poor": Difference(14.2, 2.0, 0)})
@@ -313,7 +333,7 @@ def test_published_and_continuous_geometry_are_compared_on_what_both_have(geomet
     assert page["fits"][1]["elpd_difference"] == pytest.approx(page["fits"][0]["elpd"] - page["fits"][1]["elpd"])
     assert (where / "comparison.txt").read_text() == text
     assert {p.name for p in where.iterdir()} == {
-        "comparison.json", "comparison.txt", "comparison.png", "comparison.svg",
+        "comparison.html", "comparison.json", "comparison.txt", "comparison.png", "comparison.svg",
     }  # fmt: skip
     code, _, error = run("compare", geometries / "continuous", geometries / "published", "--output", where)
     assert code != 0

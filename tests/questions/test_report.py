@@ -10,7 +10,7 @@ from reading_room import browser, opened
 
 import bowdenfit as bf
 from bowdenfit.questions.report.sections import report_page
-from bowdenfit.questions.report.verb import write_report
+from bowdenfit.questions.writing import write_page
 from bowdenfit.results.folder import REPORT
 
 DATASETS = Path(__file__).parents[2] / "datasets"
@@ -92,7 +92,7 @@ def test_a_name_that_turns_its_direction_is_written_out(chromium, routed, tmp_pa
     fit = bf.load(routed)
     description = fit.dataset.description.model_copy(update={"name": LONGER})
     odd = replace(fit, dataset=replace(fit.dataset, description=description))
-    path = write_report(report_page(odd, {}), tmp_path, tmp_path / "odd.html")
+    path = write_page(report_page(odd, {}), tmp_path, tmp_path / "odd.html")
     with opened(chromium, path) as reader:
         assert reader.page.locator("h1").text_content().endswith("\\u202egnp.exe")
         assert "\u202e" not in reader.page.content()

@@ -169,16 +169,19 @@ def _fingerprint(plan: "Plan", assumptions: Sequence[str]) -> dict[str, Any]:
 
 
 def _write(found: "Calibration", folder: Path) -> None:
-    """Summary, figures, and calibration.json last."""
+    """Summary, figures, report, and calibration.json last."""
     from bowdenfit.questions.calibrate.figure import draw_calibration
+    from bowdenfit.questions.calibrate.sections import calibration_page
     from bowdenfit.questions.calibrate.store import CALIBRATION
     from bowdenfit.questions.calibrate.words import calibration_text
-    from bowdenfit.results.folder import FIGURES, SUMMARY_TEXT, write_text
+    from bowdenfit.questions.writing import write_page
+    from bowdenfit.results.folder import FIGURES, REPORT, SUMMARY_TEXT, write_text
     from bowdenfit.results.plain import plain
 
     write_text(folder / SUMMARY_TEXT, calibration_text(found))
     if found.quantities:
         draw_calibration(found, folder / FIGURES)
+    write_page(calibration_page(found), folder / FIGURES, folder / REPORT)
     write_text(folder / CALIBRATION, json.dumps(plain(found), indent=1) + "\n")
 
 

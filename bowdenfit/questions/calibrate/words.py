@@ -4,6 +4,7 @@ from bowdenfit.display import text_of
 from bowdenfit.questions.calibrate.answer import FEWEST, LEVEL, MOST_UNCONVERGED, Calibration, Checked
 from bowdenfit.words import filled, listed, percent, table
 
+HEADS = ("quantity", "50 % held", "90 % held", "bias", "")
 _NAMED = 8  # unconverged replications that are named
 
 
@@ -11,15 +12,15 @@ _NAMED = 8  # unconverged replications that are named
 def calibration_text(found: Calibration) -> str:
     """A calibration for people: the verdict, a table of all quantities, and what was left out."""
     blocks = [
-        "\n".join(filled(line) for line in _verdict(found)),
-        filled(_what(found)),
-        _table(found) if found.quantities else "",
-        "\n".join(filled(line) for line in _accounts(found)),
+        "\n".join(filled(line) for line in verdict_sentences(found)),
+        filled(what_was_done(found)),
+        f"{table(HEADS, rows(found))}\n\n{filled(how_to_read(found))}" if found.quantities else "",
+        "\n".join(filled(line) for line in account_sentences(found)),
     ]
     return "\n\n".join(block for block in blocks if block) + "\n"
 
 
-def _what(found: Calibration) -> str:
+def what_was_done(found: Calibration) -> str:
     """What was done."""
     of_rest = f"were stated ({listed(found.truths)}), the others drawn from the priors" if found.truths else ""
     done = (
@@ -31,7 +32,8 @@ def _what(found: Calibration) -> str:
     return done
 
 
-def _verdict(found: Calibration) -> list[str]:
+def verdict_sentences(found: Calibration) -> list[str]:
+    """Whether intervals hold the truth as often as they claim, and which do not."""
     if not found.is_judged:
         few = f"at least {FEWEST} replications must converge, and at most {percent(MOST_UNCONVERGED, 0)} may fail to"
         return [f"NOT JUDGED: {found.ranked} of {found.replications} replications converged; {few}."]
@@ -52,9 +54,13 @@ def _power(found: Calibration) -> str:
     return f"Of one quantity, intervals {seen} are caught by {found.ranked} replications."
 
 
-def _table(found: Calibration) -> str:
-    heads = ("quantity", "50 % held", "90 % held", "bias", "")
-    rows = [_row(q) for q in found.quantities]
+def rows(found: Calibration) -> list[tuple[str, ...]]:
+    """Every quantity, under `HEADS`."""
+    return [_row(q) for q in found.quantities]
+
+
+def how_to_read(found: Calibration) -> str:
+    """What stands under `HEADS`."""
     first = found.quantities[0].coverage
     bands = listed(
         [f"{percent(c.low, 0)} and {percent(c.high, 0)} of the {percent(c.probability, 0)} intervals" for c in first]
@@ -69,8 +75,7 @@ def _table(found: Calibration) -> str:
         )
     else:
         note += "Whether truths lie evenly within what the fits say is judged too. "
-    note += "Bias: estimate less truth, in standard deviations of the estimate."
-    return table(heads, rows) + "\n\n" + filled(note)
+    return note + "Bias: estimate less truth, in standard deviations of the estimate."
 
 
 def _row(q: Checked) -> tuple[str, ...]:
@@ -90,8 +95,8 @@ def _with_all(found: Calibration) -> str:
     return f"Ranked with them, by the draws there are, {says}."
 
 
-def _accounts(found: Calibration) -> list[str]:
-    """What was left out, and why."""
+def account_sentences(found: Calibration) -> list[str]:
+    """How long it took, what was left out, and why."""
     lines = [f"A replication took {found.seconds:.2g} s (median)."]
     if found.engines:
         words = {

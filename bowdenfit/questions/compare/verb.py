@@ -29,7 +29,7 @@ def compare(
         fits: By name.
         leave_out: What is left out of a run at a time to be predicted by the rest: the whole run, its readings at one load, or
             one reading.
-        output: Folder for comparison.json, comparison.txt and the figure; nothing is written without one.
+        output: Folder for comparison.html, comparison.json, comparison.txt and the figure; nothing is written without one.
         force: Replace a comparison in --output.
         report: Called with a sentence before each reading that takes longer, because it would move the posterior.
 
@@ -41,6 +41,7 @@ def compare(
 
     from bowdenfit.questions.compare.answer import compare as compared
     from bowdenfit.questions.compare.figure import draw
+    from bowdenfit.questions.compare.sections import comparison_page
     from bowdenfit.questions.compare.words import comparison_text
 
     if output is not None:
@@ -48,7 +49,7 @@ def compare(
     with jax.enable_x64(True):
         found = compared(fits, report, leave_out)
     if output is not None:
-        write_answer(output, NAME, found, comparison_text(found), lambda: draw(found))
+        write_answer(output, NAME, found, comparison_text(found), lambda: draw(found), comparison_page(found))
     return found
 
 

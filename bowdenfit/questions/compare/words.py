@@ -12,14 +12,29 @@ from bowdenfit.words import counted, filled, give_or_take, listed, narrow_table
 
 _DOMINATES = 0.5  # share of a difference from which one reading is named
 _FEW = 20  # readings treated one by one that are named
+Cells = tuple[tuple[str, ...], list[tuple[str, ...]]]  # heads and rows
+HOW_WELL, WHAT_CHANGES = "How well each predicts a reading left out", "What changes, mean ± sd"
 _SHORT = {"importance sampling": "-", "moment matching": "moved", "refit": "fitted again", "rough": "rough"}
 
 
 @text_of.register(Comparison)
 def comparison_text(found: Comparison) -> str:
     """A comparison for people: which fit predicts best, what changes between them, and what speed does."""
+    blocks = [
+        "\n".join(filled(line) for line in verdict_sentences(found)),
+        f"{HOW_WELL}\n" + narrow_table(*scores(found), left=("model",)),
+        "\n".join(filled(line) for line in basis_sentences(found)),
+        treated_text(found),
+        f"{WHAT_CHANGES}\n" + narrow_table(*parameter_cells(found)),
+        "\n".join(filled(line) for line in speed_sentences(found)),
+    ]
+    return "\n\n".join(block for block in blocks if block) + "\n"
+
+
+def scores(found: Comparison) -> Cells:
+    """How well each fit predicts."""
     heads = ("fit", "model", "score less by", "±", "weight")
-    rows = [
+    rows: list[tuple[str, ...]] = [
         (
             name,
             found.described[name],
@@ -29,18 +44,10 @@ def comparison_text(found: Comparison) -> str:
         )
         for name, d in found.differences.items()
     ]
-    blocks = [
-        "\n".join(filled(line) for line in _verdict(found)),
-        "How well each predicts a reading left out\n" + narrow_table(heads, rows, left=("model",)),
-        "\n".join(filled(line) for line in _basis(found)),
-        _treated(found),
-        _parameters(found),
-        "\n".join(filled(line) for line in _speed(found)),
-    ]
-    return "\n\n".join(block for block in blocks if block) + "\n"
+    return heads, rows
 
 
-def _verdict(found: Comparison) -> list[str]:
+def verdict_sentences(found: Comparison) -> list[str]:
     """What the data prefer, and whether they can tell."""
     best, *others = found.differences
     lines = [_preferred(found, name) for name in others if found.verdict(name) == "clear"]
@@ -92,7 +99,7 @@ def _named(reading: tuple[str, str]) -> str:
     return f"{reading[0].replace('_', ' ')} {reading[1]}"
 
 
-def _basis(found: Comparison) -> list[str]:
+def basis_sentences(found: Comparison) -> list[str]:
     """What is compared, and what is not."""
     counts = Counter(name for name, _ in found.readings)
     parts = "" if found.left_out == "run" else "parts "
@@ -125,7 +132,7 @@ def _says_so(found: Comparison) -> bool:
     return any(found.verdict(name) == "leaning" for name in list(found.differences)[1:])
 
 
-def _treated(found: Comparison) -> str:
+def treated_text(found: Comparison) -> str:
     """Which readings importance sampling could not leave out, and what was done instead."""
     names = list(found.differences)
     ways = {name: found.predictions[name].how for name in names}
@@ -149,7 +156,8 @@ def _treated(found: Comparison) -> str:
     return "\n".join([*(filled(line) for line in lines), narrow_table(("reading", *names), rows)])
 
 
-def _parameters(found: Comparison) -> str:
+def parameter_cells(found: Comparison) -> Cells:
+    """Parameters and the best length in each fit."""
     names = list(found.differences)
     rows = [
         (_head(p, row.unit), *(_shown(row.by_fit.get(name)) for name in names)) for p, row in found.parameters.items()
@@ -159,7 +167,7 @@ def _parameters(found: Comparison) -> str:
         if len(found.optimal_length) == len(names)
         else []
     )
-    return "What changes, mean ± sd\n" + narrow_table(("parameter", *names), rows)
+    return ("parameter", *names), rows
 
 
 def _head(name: str, unit: str) -> str:
@@ -172,7 +180,7 @@ def _shown(interval: Interval | None, unit: str = "") -> str:
     return give_or_take(interval.mean, interval.sd) + (f" {unit}" if unit else "")
 
 
-def _speed(found: Comparison) -> list[str]:
+def speed_sentences(found: Comparison) -> list[str]:
     """The answer on speed, from every fit that allows it."""
     lines = [f"{name}: {effect.sentence()}" for name, effect in found.rate_effects.items()]
     without = [name for name in found.differences if name not in found.rate_effects]

@@ -9,8 +9,8 @@ from bowdenfit.questions.next.answer import NextMeasurement, Ranked
 from bowdenfit.words import decimals, few, filled, percent, table
 
 HOW_TO_READ = (
-    "± is one standard deviation, on average over what the reading may turn out to be; two that differ in the last digit are as "
-    "good as each other."
+    "± is one standard deviation, on average over what the reading may turn out to be; two that differ in the last digit "
+    "are as good as each other."
 )
 _MOST_NAMED = 3  # candidates as good as the best that are named in the sentence
 

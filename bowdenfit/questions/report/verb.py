@@ -8,7 +8,6 @@ from typing import TYPE_CHECKING, Annotated, Any
 from bowdenfit.verb import Argument, Option, Output, Reply, Verb
 
 if TYPE_CHECKING:
-    from bowdenfit.pages.section import Page
     from bowdenfit.results.record import Record
 
 
@@ -36,6 +35,7 @@ def report(
     from bowdenfit.questions.figures import draw_figure, figures_of, kept_figures
     from bowdenfit.questions.next.ranking import next_measurement
     from bowdenfit.questions.report.sections import report_page
+    from bowdenfit.questions.writing import write_page
     from bowdenfit.results.folder import REPORT, folder_to_write
     from bowdenfit.results.store import load
 
@@ -50,24 +50,7 @@ def report(
     with folder_to_write(path.parent), TemporaryDirectory() as drawn:
         for name, data in figures.items():
             draw_figure(name, data, Path(drawn), ("svg",), found.name)
-        return write_report(report_page(found, figures, ranking), Path(drawn), path)
-
-
-def write_report(page: "Page", drawn: Path, path: Path) -> Path:
-    """Write a page whole, with the drawings that lie in a folder; loads no model.
-
-    Args:
-        page: The page.
-        drawn: Where its figures are, as SVG.
-        path: The file.
-    """
-    from bowdenfit.pages.page import render
-    from bowdenfit.results.folder import write_text
-
-    files = {picture.name: drawn / f"{picture.name}.svg" for picture in page.pictures}
-    drawings = {name: file.read_text(encoding="utf-8") for name, file in files.items() if file.exists()}
-    write_text(path, render(page, drawings))
-    return path
+        return write_page(report_page(found, figures, ranking), Path(drawn), path)
 
 
 def _reply(path: Path, _: Mapping[str, Any]) -> Reply:

@@ -1,0 +1,44 @@
+"""A comparison as a page: which fit predicts best, how well each does, and what changes between them."""
+
+from bowdenfit.pages.section import Page, Picture, Table, prose
+from bowdenfit.questions.compare.answer import Comparison
+from bowdenfit.questions.compare.words import (
+    HOW_WELL,
+    WHAT_CHANGES,
+    basis_sentences,
+    parameter_cells,
+    scores,
+    speed_sentences,
+    treated_text,
+    verdict_sentences,
+)
+from bowdenfit.words import listed
+
+HEADING = "Fits side by side"
+CAPTION = (
+    "Above: by how much each fit predicts worse than the best, with one and two standard errors. Middle: the same reading by "
+    "reading, up where a fit predicts it better than the best one does. Below: coefficients of each fit, median and 90 % "
+    "interval."
+)
+
+
+def comparison_page(found: Comparison) -> Page:
+    """The page of a comparison.
+
+    Args:
+        found: The comparison.
+    """
+    heads, rows = scores(found)
+    names, values = parameter_cells(found)
+    sections = (
+        prose("The answer", verdict_sentences(found)),
+        prose(
+            "How well each predicts",
+            basis_sentences(found),
+            [Table(heads, tuple(rows), HOW_WELL, left=(0, 1))],
+            folded=[("Readings on which a fit leans", treated_text(found))],
+            pictures=(Picture("comparison", HEADING, CAPTION),),
+        ),
+        prose("What changes", speed_sentences(found), [Table(names, tuple(values), WHAT_CHANGES)]),
+    )
+    return Page(listed(list(found.differences)), "Comparison by bowdenfit", sections)

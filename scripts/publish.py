@@ -1,18 +1,25 @@
-"""Fit the data sets again and replace what the repository shows of them: `fits/published`, and what README.md says is printed.
+"""Fit the data sets again and replace what the repository shows of them: `fits/published`, and what pages say is printed.
 
     python scripts/publish.py
+    python scripts/publish.py --pages
 
-Takes some minutes. Everything is fitted with seed 1, so that on the same machine and with the same versions nothing changes.
-Look at what changed before committing it: each number that did is a change of the program.
+replaces, with `--pages`, only what README.md and the guides show behind a $, of fits as they are published; else everything,
+which takes some minutes. Everything is fitted with seed 1, so that on the same machine and with the same versions nothing
+changes. Look at what changed before committing it: each number that did is a change of the program.
 """
 
-import re
+import os
 import shutil
+import subprocess
 import sys
 import tempfile
 from pathlib import Path
 
 ROOT = Path(__file__).resolve().parent.parent
+sys.path.insert(0, str(ROOT / "tests" / "support"))
+
+import snippets  # noqa: E402
+
 PUBLISHED = ROOT / "fits" / "published"
 FIRST = "on-body-exoskeleton"
 FITS = {  # data set: its figure, further files
@@ -21,16 +28,17 @@ FITS = {  # data set: its figure, further files
     "synthetic-haptic-loop": ("bending_loss", ()),
     "synthetic-catheter": ("motor_force", ()),
 }
-BLOCK = re.compile(r"(?<=It prints:\n\n```text\n).*?(?=```\n)", re.DOTALL)
 
 
 def main() -> None:
-    """Fit, copy, and put the summary into README.md."""
+    """Fit, copy, and put what commands print into the pages."""
     with tempfile.TemporaryDirectory() as place:
-        for name, (figure, further) in FITS.items():
-            publish(name, Path(place) / name, figure, further)
-        compare(Path(place))
-    replace_printed()
+        fits = Path(place) / "fits"
+        for name, (figure, further) in FITS.items() if "--pages" not in sys.argv else ():
+            publish(name, fits / name, figure, further)
+        if "--pages" not in sys.argv:
+            compare(fits)
+        replace_printed(Path(place))
 
 
 def publish(name: str, fitted: Path, figure: str, further: tuple[str, ...]) -> None:
@@ -65,14 +73,36 @@ def compare(place: Path) -> None:
     (PUBLISHED / name / "comparison.txt").write_text(comparison_text(found), encoding="utf-8")
 
 
-def replace_printed() -> None:
-    """What README.md says that the first fit prints."""
-    path = ROOT / "README.md"
-    text, printed = path.read_text(encoding="utf-8"), (PUBLISHED / FIRST / "summary.txt").read_text(encoding="utf-8")
-    changed, count = BLOCK.subn(lambda _: printed, text)
-    if count != 1:
-        sys.exit("README.md has no block behind 'It prints:'.")
-    path.write_text(changed, encoding="utf-8")
+def replace_printed(place: Path) -> None:
+    """What README.md and the guides show behind a $; what leaves lines out is only compared.
+
+    Args:
+        place: Folder with the fits, in which the commands are run.
+    """
+    (place / "datasets").symlink_to(ROOT / "datasets")
+    for file in (ROOT / "docs" / "files").iterdir():
+        shutil.copy(file, place)
+    for block in snippets.blocks("console"):
+        for words, shown in block.shown:
+            printed = print_of(words, place)
+            if printed is None or snippets.as_shown(shown, printed):
+                continue
+            if snippets.ELISION in shown.splitlines():
+                print(f"{block}: {' '.join(words)} prints something else now:\n{printed}")
+                continue
+            text = block.page.read_text(encoding="utf-8")
+            block.page.write_text(text.replace(shown, printed), encoding="utf-8")
+
+
+def print_of(words: tuple[str, ...], place: Path) -> str | None:
+    """What a command prints; None where its fit is not there."""
+    if words in snippets.PUBLISHED:
+        return snippets.PUBLISHED[words].read_text(encoding="utf-8")
+    if any(word.startswith("fits/") and not (place / word).exists() for word in words):
+        return None
+    surroundings = {**os.environ, "PYTHONPATH": str(ROOT)}
+    command = [sys.executable, "-m", *words]
+    return subprocess.run(command, cwd=place, env=surroundings, capture_output=True, text=True, check=True).stdout
 
 
 if __name__ == "__main__":

@@ -8,7 +8,7 @@ README = (ROOT / "README.md").read_text(encoding="utf-8")
 
 
 def test_the_readme_shows_what_the_first_fit_prints():
-    (shown,) = re.findall(r"It prints:\n\n```text\n(.*?)```\n", README, re.DOTALL)
+    (shown,) = re.findall(r"\$ bowdenfit fit datasets/on-body-exoskeleton\n(.*?)```\n", README, re.DOTALL)
     assert shown == (ROOT / "fits" / "published" / "on-body-exoskeleton" / "summary.txt").read_text(encoding="utf-8")
 
 

@@ -1,0 +1,174 @@
+"""What README.md and the guides show can be typed in: commands, Python, descriptions; and what is printed is what they show.
+
+One fit is made for all of them, that of the README. Other fits are made by the slow tests, with quick settings; by default
+their options are understood, and their data sets read.
+"""
+
+import shutil
+import tomllib
+from contextlib import chdir
+from inspect import signature
+
+import click
+import nptdms
+import numpy as np
+import pytest
+from conftest import ROOT
+from snippets import FIRST, PAGES, PUBLISHED, as_shown, blocks, masked
+
+import bowdenfit as bf
+from bowdenfit.cli import bowdenfit as program
+from bowdenfit.cli.keywords import keywords_of
+from bowdenfit.kinds.settings import parse_description
+from bowdenfit.questions.calibrate.truths import read_truths
+from bowdenfit.reading import Reading
+
+QUICK = [f"--set=sampler.{key}" for key in ("n_walkers=64", "max_steps=400", "target_ess=100", "target_r_hat=1.2")]
+TAKES_LONG = {"fit", "calibrate", "identify", "next"}
+POUND = 4.4482216152605  # N
+CABLE = {"name": "A cable", "contact": [{"name": "sheath", "friction": "mu", "wrap_angle": {"value": 90, "unit": "deg"}}]}
+TABLES = {"forces": {"file": "forces.csv"}}
+SH, CONSOLE, PYTHON, TOML = (blocks(language) for language in ("sh", "console", "python", "toml"))
+
+
+@pytest.fixture(scope="module")
+def place(tmp_path_factory):
+    """A folder as a reader has it: the data sets, the files of the guides, and the first fit."""
+    folder = tmp_path_factory.mktemp("reader")
+    shutil.copytree(ROOT / "datasets", folder / "datasets")
+    for file in (ROOT / "docs" / "files").iterdir():
+        shutil.copy(file, folder / file.name)
+    write_tdms(folder / "bench.tdms", folder / "datasets/synthetic-recordings/recordings/470mm_20rpm.csv")
+    shutil.copytree(ROOT / "datasets" / FIRST, folder / "my-cable")  # as it is once somebody has filled it in
+    bf.fit(folder / "datasets" / FIRST, output=folder / "fits" / FIRST, figures=False, seed=1)
+    return folder
+
+
+def write_tdms(path, source):
+    """A recording as LabVIEW writes it, the motor's force in N and the load's in lbf."""
+    time, force, load, _ = np.loadtxt(source, delimiter=",", skiprows=1).T
+    clock = {"wf_increment": float(time[1] - time[0]), "wf_start_offset": 0.0}
+    with nptdms.TdmsWriter(path) as writer:
+        channels = (("motor", "ai0", force), ("load", "ai1", load / POUND))
+        writer.write_segment([nptdms.ChannelObject(*channel, properties=clock) for channel in channels])
+
+
+@pytest.fixture
+def reader(place, monkeypatch):
+    """The reader's folder, in which everything is run."""
+    monkeypatch.chdir(place)
+    return place
+
+
+def understood(words):
+    """The command of a line and its parameters, as the program reads them; refuses what it does not know."""
+    name, *options = words[1:]
+    verb = program.commands[name]
+    return verb, verb.make_context(name, list(options), parent=click.Context(program)).params
+
+
+def test_every_page_has_its_blocks_found():
+    assert {block.page.name for block in SH} >= {"README.md", "own-cable.md", "recordings.md", "loops.md", "trust.md"}
+    assert len(PYTHON) >= 1
+    assert len(TOML) >= 4
+
+
+@pytest.mark.parametrize("block", SH + CONSOLE, ids=str)
+def test_every_command_can_be_typed_in(block, reader, run, tmp_path):
+    for words in block.commands:
+        if words[0] != "bowdenfit":
+            stands_in_for(words)
+        elif len(words) > 1 and not words[1].startswith("-"):
+            with chdir(tmp_path if words[1] == "init" else reader):
+                tried(words, run)
+
+
+def stands_in_for(words):
+    """What other commands need is there: a script, or an extra of the package."""
+    extras = tomllib.loads((ROOT / "pyproject.toml").read_text())["project"]["optional-dependencies"]
+    named = [word for word in words if word.startswith(("./scripts", "scripts/"))]
+    assert all((ROOT / name).exists() for name in named), words
+    asked = [word.partition("[")[2].rstrip("]") for word in words if "[" in word]
+    assert all(extra in extras for extra in asked), words
+    assert named or words[:2] == ("pip", "install"), f"say what the tests should do with {words}"
+
+
+def tried(words, run):
+    """Run a command where that is quick, else read what it would work on."""
+    verb, given = understood(words)
+    asked = [given[each.name] for each in verb.params if isinstance(each, click.Argument) and isinstance(each.type, click.Path)]
+    paths = [path for each in asked for path in (each if isinstance(each, tuple) else (each,))]
+    if verb.name != "init" and not all(path.exists() for path in paths):
+        return  # fits that another command of the page makes; the slow test makes them
+    if verb.name in TAKES_LONG:
+        keywords = [each for each in keywords_of(bf.fit) if each.name in Reading.__annotations__ and given.get(each.name)]
+        if paths[0].parts[0] != "fits" and paths[0].name != "bench.toml":
+            bf.check(paths[0], **{each.name: each.value(given[each.name]) for each in keywords})
+    else:
+        code, out, err = run(*words[1:])
+        assert code == 0, (words, out, err)
+
+
+@pytest.mark.parametrize("block", CONSOLE, ids=str)
+def test_every_command_prints_what_is_shown(block, reader, run):
+    for words, shown in block.shown:
+        if (published := PUBLISHED.get(words)) is not None:
+            assert as_shown(shown, published.read_text(encoding="utf-8")), words
+        else:
+            code, out, err = run(*words[1:])
+            assert code == 0, err
+            of_a_fit = any(word.startswith("fits/") for word in words)  # which another machine makes with other digits
+            assert as_shown(shown, out) or (of_a_fit and as_shown(masked(shown), masked(out))), f"{words}\n{out}"
+
+
+def test_what_is_shown_of_the_first_fit_is_what_the_program_prints_of_the_published_one(run):
+    folder = ROOT / "fits" / "published" / FIRST
+    code, out, _ = run("summary", folder)
+    assert code == 0
+    assert out == (folder / "summary.txt").read_text(encoding="utf-8")
+
+
+@pytest.mark.parametrize("block", PYTHON, ids=str)
+def test_every_line_of_python_runs(block, reader, monkeypatch):
+    def fit(dataset, **keywords):
+        signature(made).bind(dataset, **keywords)
+        return bf.load(reader / "fits" / FIRST) if dataset == f"datasets/{FIRST}" else made(dataset, **keywords)
+
+    made = bf.fit
+    monkeypatch.setattr(bf, "fit", fit)
+    exec(compile(block.text, str(block), "exec"), {})
+
+
+@pytest.mark.parametrize("block", TOML, ids=str)
+def test_every_description_is_understood(block, tmp_path):
+    said = tomllib.loads(block.text)
+    if block.text.startswith("# truths.toml"):
+        (tmp_path / "truths.toml").write_text(block.text, encoding="utf-8")
+        assert read_truths(tmp_path / "truths.toml") == said
+    else:
+        tables = {} if "tables" in said else {"tables": TABLES}
+        assert parse_description({**CABLE, **tables, **said}).to_json()
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("page", PAGES, ids=lambda page: page.stem)
+def test_every_command_of_a_page_runs_one_after_the_other(page, place, tmp_path, monkeypatch, run):
+    monkeypatch.chdir(tmp_path)
+    shutil.copytree(place, tmp_path, dirs_exist_ok=True)
+    for block in blocks("sh", "console", pages=(page,)):
+        for words in block.commands:
+            if words[0] != "bowdenfit" or len(words) < 2 or words[1].startswith("-"):
+                continue
+            if words[1] == "init":
+                shutil.rmtree(tmp_path / words[2], ignore_errors=True)
+            quick = {"fit": [*QUICK, "--no-figures", "--force"], "calibrate": ["-n", "2", *QUICK, "--force"]}.get(words[1], [])
+            code, out, err = run(*words[1:], *quick)
+            assert code in (0, 3 if quick else 0), (words, out, err)
+
+
+@pytest.mark.slow
+def test_the_first_fit_prints_what_the_readme_shows(reader, run):
+    shown = next(shown for block in CONSOLE for words, shown in block.shown if words[1:] == ("fit", f"datasets/{FIRST}"))
+    code, out, _ = run("fit", f"datasets/{FIRST}", "--seed", "1", "--force", "--no-figures")
+    assert code == 0
+    assert masked(out) == masked(shown)

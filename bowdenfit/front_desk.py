@@ -87,13 +87,12 @@ class Fit(Record):
         return identifiability(self)
 
     def _table(self) -> Rows:
-        """A row a parameter: draws beside least squares."""
+        """A row a parameter: draws beside least squares; priors and meanings are the model's."""
         drawn, squares = drawn_intervals(self), self.least_squares.estimates
         rows = [
             {"parameter": p.name}
             | (vars(drawn[p.name]) if p.name in drawn else {})
             | ({"least_squares": squares[p.name].value} if p.name in squares else {})
-            | {"prior": p.prior_text, "meaning": p.meaning}
             for p in self.model.space.parameters
         ]
         return rows, self._units

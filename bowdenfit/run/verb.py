@@ -51,13 +51,14 @@ def fit(
         in_background: Whether other processes may be started, which is quicker; the calling program must then guard its
             start with `if __name__ == "__main__"`.
         remember_compilations: Whether JAX may keep compiled programs in the user's cache folder; a setting of the process.
-        progress: Called while sampling.
+        progress: Called while sampling; a notebook shows a bar if omitted.
         report: Called with a sentence where the fit is whole but its figures could not be drawn; a warning if omitted.
         reading: Keywords of `bowdenfit.read`.
 
     Raises:
         BowdenfitError: What is wrong, in a sentence; nothing is written then.
     """
+    from bowdenfit.notebook import watched
     from bowdenfit.results.folder import reserved
     from bowdenfit.run.helpers import assistant
     from bowdenfit.run.storing import choose_seed, start_checkpointing, with_sampler, write_results
@@ -70,13 +71,14 @@ def fit(
         held.enter_context(reserved(folder))
         seed = choose_seed(folder, data, mcmc, seed, resume, force)
         helper = held.enter_context(assistant(in_background and (mcmc or drawing), settings, drawing))
+        show = held.enter_context(watched(WATCH, progress)) if mcmc else None
         import jax
 
         from bowdenfit.run.fitting import run
 
         with jax.enable_x64(True):
             begin = partial(start_checkpointing, folder, data, seed, resume)
-            found = run(data, begin, mcmc, seed, resume, progress, helper)
+            found = run(data, begin, mcmc, seed, resume, show, helper)
             for sentence in write_results(found, folder, figures, helper) if folder is not None else ():
                 report(sentence)
     return found
@@ -112,6 +114,7 @@ def _show(bar: Any, progress: "Progress") -> None:
 
 
 _BAR = {"unit": "step", "desc": "sampling", "bar_format": "{desc} {n_fmt} steps, {elapsed}{postfix}"}
+WATCH = Watch(CHAIN, "the checkpoint is kept in", _BAR, _show)
 VERB = Verb(
     fit,
     _reply,
@@ -122,6 +125,6 @@ VERB = Verb(
     """,
     json="Print summary.json instead of the summary for people.",
     results="fits",
-    watch=Watch(CHAIN, "the checkpoint is kept in", _BAR, _show),
+    watch=WATCH,
     behind={"in_background": True, "remember_compilations": True},
 )

@@ -57,7 +57,7 @@ def calibrate(
         seed: Seed of everything random.
         resume: Go on with an interrupted calibration, or add replications.
         force: Replace an earlier calibration in the results folder.
-        progress: Called after every replication with how many are done, and of how many.
+        progress: Called after every replication with how many are done, and of how many; a notebook shows a bar if omitted.
         reading: Keywords of `bowdenfit.read`.
 
     Raises:
@@ -68,6 +68,7 @@ def calibrate(
     plan = _plan(_stated_and_assumed(dataset, reading, assume), _seed(folder, seed, resume), truth)
     import jax
 
+    from bowdenfit.notebook import watched
     from bowdenfit.questions.calibrate.findings import findings
     from bowdenfit.questions.calibrate.quantities import quantities_of
     from bowdenfit.questions.calibrate.store import open_replications
@@ -75,7 +76,8 @@ def calibrate(
     with jax.enable_x64(True):
         quantities = quantities_of(plan)
     done = {} if folder is None else open_replications(folder, _fingerprint(plan, assume), resume, force)
-    _replicate(plan, done, replications, workers, folder, progress)
+    with watched(WATCH, progress) as show:
+        _replicate(plan, done, replications, workers, folder, show)
     how = {"assumed": tuple(assume), "truths": tuple(each.text for each in plan.truths)}
     found = findings(tuple(done.values()), quantities, name=plan.stated.description.name, seed=plan.seed, **how)
     if folder is not None:
@@ -197,6 +199,7 @@ def _show(bar: Any, done: int, total: int) -> None:
     bar.refresh()
 
 
+WATCH = Watch(REPLICATIONS, "what is done is kept in", {"unit": "replication", "desc": "calibrating"}, _show)
 VERB = Verb(
     calibrate,
     _reply,
@@ -213,5 +216,5 @@ VERB = Verb(
     """,
     json="Print calibration.json instead of the summary for people.",
     results="fits/calibration",
-    watch=Watch(REPLICATIONS, "what is done is kept in", {"unit": "replication", "desc": "calibrating"}, _show),
+    watch=WATCH,
 )

@@ -1,0 +1,80 @@
+"""The Python that the pages show runs in a notebook, prints little there, and means something to a strict type checker."""
+
+import ast
+import json
+import re
+import subprocess
+import sys
+
+import nbclient
+import nbformat
+import pytest
+from conftest import ROOT
+
+import bowdenfit
+
+MOST_TEXT = 2000  # characters of one output
+PAGES = sorted([ROOT / "README.md", *(ROOT / "docs").rglob("*.md")])
+CELL = re.compile(r"^```(?:python|\{code-cell\}[^\n]*)\n(.*?)^```", re.MULTILINE | re.DOTALL)
+CELLS = {page: CELL.findall(page.read_text(encoding="utf-8")) for page in PAGES}
+
+
+def run_in_a_kernel(cells, monkeypatch, tmp_path):
+    """A notebook of cells as it is after they were run in the folder of the repository."""
+    monkeypatch.setenv("PYTHONPATH", str(ROOT))
+    monkeypatch.setenv("JUPYTER_PLATFORM_DIRS", "1")
+    monkeypatch.setenv("IPYTHONDIR", str(tmp_path))
+    notebook = nbformat.v4.new_notebook(cells=[nbformat.v4.new_code_cell(cell) for cell in cells])
+    nbclient.NotebookClient(notebook, timeout=300, resources={"metadata": {"path": str(ROOT)}}).execute()
+    return notebook
+
+
+def test_cells_of_the_pages_run_in_a_kernel_and_print_little(monkeypatch, tmp_path):
+    pages = ROOT / "README.md", ROOT / "docs" / "library.md"
+    shown = [statement for page in pages for cell in CELLS[page] for statement in statements(cell)]
+    notebook = run_in_a_kernel([*shown, "fit.summary()"], monkeypatch, tmp_path)
+    by_cell = {cell.source: cell.outputs for cell in notebook.cells}
+    for source, outputs in by_cell.items():
+        for output in outputs:
+            text = output.get("text") or output["data"]["text/plain"]
+            assert len(text) <= MOST_TEXT, (source, text)
+            assert output.get("name") != "stderr", text
+    bar = next(outputs[0]["data"]["text/plain"] for source, outputs in by_cell.items() if "bf.fit(" in source)
+    assert re.fullmatch(r"sampling with emcee \d+ steps, \d\d:\d\d, R-hat 1\.\d+, effective draws \d+", bar)
+    figures = [output for source, outputs in by_cell.items() if "fit.plot.efficiency()" in source for output in outputs]
+    assert len(figures) == 1 and "image/png" in figures[0]["data"]
+    page = next(outputs[0]["data"]["text/html"] for source, outputs in by_cell.items() if source.startswith("fit  "))
+    assert page.startswith("<p><b>On-body knee exoskeleton: cut the cable to 470 mm.</b></p>")
+
+
+def statements(cell):
+    """The statements of a cell one by one, so that each shows what it gives."""
+    lines = cell.split("\n")
+    return ["\n".join(lines[node.lineno - 1 : node.end_lineno]) for node in ast.parse(cell).body]
+
+
+def test_snippets_have_no_error_of_types_and_a_misspelt_keyword_is_one(tmp_path):
+    for page, cells in CELLS.items():
+        if cells:
+            (tmp_path / f"{page.stem.replace('-', '_')}.py").write_text("\n".join(cells), encoding="utf-8")
+    (tmp_path / "misspelt.py").write_text('import bowdenfit as bf\n\nbf.fit("bench", sede=1)\n', encoding="utf-8")
+    settings = {"typeCheckingMode": "strict", "extraPaths": [str(ROOT)], "reportUnusedExpression": False}  # as notebooks have
+    (tmp_path / "pyrightconfig.json").write_text(json.dumps(settings), encoding="utf-8")
+    command = [sys.executable, "-m", "basedpyright", "--outputjson", "--pythonpath", sys.executable, "-p", str(tmp_path)]
+    said = json.loads(subprocess.run(command, capture_output=True, text=True, check=False).stdout)
+    assert said["summary"]["filesAnalyzed"] >= 3
+    errors = [each for each in said["generalDiagnostics"] if each["severity"] == "error"]
+    found = [(each["file"].rpartition("/")[2], each["message"]) for each in errors]
+    assert found == [("misspelt.py", 'No parameter named "sede"')]
+
+
+def test_a_misspelt_keyword_is_refused_by_name_with_the_nearest():
+    for verb in (bowdenfit.fit, bowdenfit.read, bowdenfit.check, bowdenfit.calibrate, bowdenfit.identify):
+        with pytest.raises(bowdenfit.UsageError, match="no keyword 'chanels'; did you mean 'channels'"):
+            verb("datasets/on-body-exoskeleton", chanels=("a",))
+    with pytest.raises(bowdenfit.UsageError, match="did you mean 'seed'"):
+        bowdenfit.fit("datasets/on-body-exoskeleton", sede=1)
+
+
+def test_the_package_says_that_it_has_types():
+    assert (ROOT / "bowdenfit" / "py.typed").exists()

@@ -76,11 +76,22 @@ def unbroken(text: str) -> str:
     return _KEPT.sub("\N{NO-BREAK SPACE}", text)
 
 
-def filled(text: str, indent: str = "") -> str:
-    """A paragraph in lines of at most `WIDTH` characters; no number loses its unit to the next line."""
-    hanging = indent + ("  " if text.startswith("- ") else "")
+def filled(text: str, indent: str = "", hangs: bool = False) -> str:
+    """A paragraph in lines of at most `WIDTH` characters; no number loses its unit to the next line.
+
+    Args:
+        text: The paragraph.
+        indent: What stands before each line.
+        hangs: Whether all lines but the first stand further in, as those of a list do.
+    """
+    hanging = indent + ("  " if hangs or text.startswith("- ") else "")
     lines = textwrap.wrap(unbroken(text), WIDTH, initial_indent=indent, subsequent_indent=hanging, break_on_hyphens=False)
     return "\n".join(lines).replace("\N{NO-BREAK SPACE}", " ")
+
+
+def kept_narrow(line: str, indent: str = "") -> str:
+    """A line as it is where it fits into a terminal, else filled; so that a row of a narrow table stays one."""
+    return (indent + line).rstrip() if len(line) <= WIDTH else filled(line, indent, hangs=True)
 
 
 def table(heads: Sequence[str], rows: Sequence[Sequence[str]], left: Collection[str] = ("prior", "unit")) -> str:

@@ -7,7 +7,7 @@ import numpy as np
 from bowdenfit.kinds.plausibility import FACTOR, SCATTER, beyond
 from bowdenfit.kinds.recordings.accounts import preparation_pages
 from bowdenfit.recordings.recording import PULL, RETURN, Recordings
-from bowdenfit.words import counted, filled, listed, table
+from bowdenfit.words import counted, filled, listed, narrow_table
 
 _FEWEST_BLOCKS = 10  # of each stroke of a plausible recording
 _SAMPLES = ("recording", "samples", "used", "left out", "block")
@@ -31,7 +31,7 @@ def recordings_text(recordings: Recordings) -> list[str]:
     pages = preparation_pages(recordings)
     losses = [(_or_dash(r.strokes.drag, ".3g", " N"),) if recordings.loop else () for r in recordings.each]
     rows = [_row(page, loss) for page, loss in zip(pages, losses, strict=True)]
-    lines = table(_LOOP_HEADS if recordings.loop else _HEADS, rows, left=("left out",)).splitlines()
+    lines = narrow_table(_LOOP_HEADS if recordings.loop else _HEADS, rows, left=("left out",)).splitlines()
     notes = [
         _LOOP_NOTE if recordings.loop else _NOTE,
         *_delay(pages),

@@ -9,7 +9,7 @@ from bowdenfit.kinds.recordings.words import recordings_text
 from bowdenfit.questions.check.file_words import command_words
 from bowdenfit.questions.check.row_words import account_words
 from bowdenfit.recordings.recording import Recordings
-from bowdenfit.words import filled, table
+from bowdenfit.words import filled, narrow_table
 
 _NAMED = 8  # channels whose first and last sample are said
 _HEADS = ("channel", "unit", "samples", "rate", "length", "lowest", "highest", "clock")
@@ -32,7 +32,7 @@ def channels_text(
     title = f"{file.path.name}: {what}, because {why} ({file.kind}, {n} channel{'s' if n != 1 else ''})."
     rows = [_row(channel) for channel in file.channels]
     keep = [i for i, _ in enumerate(_HEADS) if i in (0, 1, 2, 5, 6) or any(row[i] for row in rows)]
-    listing = table(
+    listing = narrow_table(
         [_HEADS[i] for i in keep], [[row[i] for i in keep] for row in rows], left=("channel", "unit", "clock")
     )
     notes = [filled(f"Note: {remark}") for remark in file.remarks]
@@ -43,7 +43,7 @@ def channels_text(
             filled(f"Note: {remark}") for r in recordings.each for remark in (*r.account.remarks, *r.strokes.remarks)
         ]
     elif why_not:
-        lines += ["", filled(f"As a recording it cannot be used yet: {why_not}")]
+        lines += ["", *map(filled, f"As a recording it cannot be used yet: {why_not}".splitlines())]
     several = "Several recordings of one cable go into a cable.toml (bowdenfit init)."
     return "\n".join([*lines, "", *command_words([command]), several]) + "\n"
 

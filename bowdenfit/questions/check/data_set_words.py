@@ -9,41 +9,44 @@ from bowdenfit.kinds.measured_groups import measured_groups
 from bowdenfit.kinds.measurements import Measurements
 from bowdenfit.kinds.stretch.table import StretchTable
 from bowdenfit.questions.check.row_words import row_words
-from bowdenfit.words import counted, listed
+from bowdenfit.words import counted, filled, kept_narrow, listed
 
 
 def check_text(dataset: Dataset) -> str:
     """What was understood of a data set."""
     description, measurements = dataset.description, dataset.measurements
-    warnings = [f"Warning: {warning}" for warning in warnings_of(dataset)]
+    warnings = [filled(f"Warning: {warning}") for warning in warnings_of(dataset)]
     found = f"{counted(len(warnings), 'warning')}, at the end." if warnings else "Nothing is wrong."
     lines = [description.name, "=" * len(description.name), f"Everything could be read. {found}", ""]
     if description.route:
         route = description.route
         choices = f"; {len(route.choices)} lengths can be bought" if route.choices else ""
-        lines.append(f"Route: {route.variable}, {route.range[0]:g} to {route.range[1]:g} {route.unit}{choices}.")
+        said = f"Route: {route.variable}, {route.range[0]:g} to {route.range[1]:g} {route.unit}{choices}."
+        lines.append(kept_narrow(said))
     else:
         lines.append("Route: none, so there is no length to choose.")
     lines += ["", "Contacts:"]
     lines += [
-        f"  {c.name}: {c.friction}, {f'{c.special_law} law, ' if c.special_law else ''}{_angle_source(c, description)}"
+        kept_narrow(
+            f"{c.name}: {c.friction}, {f'{c.special_law} law, ' if c.special_law else ''}{_angle_source(c, description)}", "  "
+        )
         for c in description.contact
     ]
     lines += ["", "Friction coefficients:"]
     settings = {name: _setting(description.friction.get(name)) for name in description.coefficients}
-    lines += [f"  {name}: {setting}{_each(dataset, name)}" for name, setting in settings.items()]
+    lines += [kept_narrow(f"{name}: {setting}{_each(dataset, name)}", "  ") for name, setting in settings.items()]
     lines += ["", "Measurements:"]
     sections: list[str] = []
     for kind, table in each_table(measurements):
-        said = [f"  {line}" for line in kind.describe(table, description)]
+        described = [kept_narrow(line, "  ") for line in kind.describe(table, description)]
         if kind.heading:
-            sections += ["", f"{kind.heading}:", *said]
+            sections += ["", f"{kind.heading}:", *described]
         else:
-            lines += said
+            lines += described
     if description.cable.sharp_bend:
-        lines.append(f"  note: {description.cable.sharp_bend}")
+        lines.append(kept_narrow(f"note: {description.cable.sharp_bend}", "  "))
     lines += sections
-    lines += [f"  note: {remark}" for remark in measurements.remarks]
+    lines += [kept_narrow(f"note: {remark}", "  ") for remark in measurements.remarks]
     lines += ["", "Rows of the files:", *(f"  {line}" for words in row_words(dataset) for line in words.splitlines())]
     lines += ["", *warnings] if warnings else []
     return "\n".join(lines) + "\n"

@@ -1,5 +1,6 @@
 """What `bowdenfit check FILE` says of a table alone: what it is and why, its columns and rows, and the command that fits it."""
 
+import re
 from collections.abc import Mapping, Sequence
 
 from bowdenfit.dataset import Dataset
@@ -11,7 +12,7 @@ from bowdenfit.kinds.fit_commands import FitCommand
 from bowdenfit.kinds.single_file import FileKind, columns_of_kind
 from bowdenfit.kinds.unnamed_ends import columns_of
 from bowdenfit.questions.check.row_words import account_words, first_and_last
-from bowdenfit.words import counted, filled, listed, table
+from bowdenfit.words import WIDTH, counted, filled, listed, narrow_table
 
 _LEFT = ("column", "unit", "read as")
 
@@ -44,7 +45,7 @@ def table_text(
     if data is not None:
         lines += [filled(f"Note: {remark}") for remark in data.measurements.remarks if remark not in raw.lines.remarks]
     if why_not:
-        lines += ["", filled(f"As it stands it cannot be fitted: {why_not}")]
+        lines += ["", *map(filled, f"As it stands it cannot be fitted: {why_not}".splitlines())]
     return "\n".join([*lines, "", *command_words(commands)]) + "\n"
 
 
@@ -52,10 +53,22 @@ def command_words(commands: Sequence[FitCommand]) -> list[str]:
     """The command on a line of its own, so that it can be pasted, and what it takes for granted."""
     lines = []
     for what, command in zip(("a table", "a recording") if len(commands) > 1 else ("",), commands, strict=True):
-        lines += [f"To fit it as {what}:" if what else "To fit it:", f"  {command.text}"]
+        lines += [f"To fit it as {what}:" if what else "To fit it:", on_lines(command.text)]
         granted = listed([f"that {each}" for each in command.provided])
         lines += [filled(f"This takes for granted {granted}; change what is not so.")] if granted else []
     return lines
+
+
+def on_lines(command: str) -> str:
+    """A command that can be pasted, in lines that fit into a terminal where its options let it."""
+    lines = ["  "]
+    for i, part in enumerate(re.split(r" (?=--)", command)):
+        if i and len(lines[-1]) + len(part) + 3 > WIDTH:
+            lines[-1] += " \\"
+            lines.append(f"    {part}")
+        else:
+            lines[-1] += f" {part}" if i else part
+    return "\n".join(lines)
 
 
 def _what(raw: RawTable, data: Dataset | None) -> str:
@@ -78,4 +91,4 @@ def _columns(raw: RawTable, wanted: tuple[Quantity, ...], named: Mapping[str, st
             column = numbers.get(heading)
             spread = [f"{column.low:.5g}", f"{column.high:.5g}"] if column else ["", ""]
             rows.append([heading, heading_of(heading, below).unit or "-", read_as.get(heading, "-"), *spread])
-    return table(["column", "unit", "read as", "lowest", "highest"], rows, left=_LEFT)
+    return narrow_table(["column", "unit", "read as", "lowest", "highest"], rows, left=_LEFT)

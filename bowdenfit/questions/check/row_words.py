@@ -3,7 +3,7 @@
 from bowdenfit.dataset import Dataset
 from bowdenfit.files.row_account import RowAccount
 from bowdenfit.kinds import each_table
-from bowdenfit.words import filled
+from bowdenfit.words import filled, kept_narrow
 
 
 def row_words(dataset: Dataset) -> list[str]:
@@ -24,7 +24,7 @@ def account_words(account: RowAccount, file: str = "") -> list[str]:
     held = "holds a reading" if account.read == 1 else "hold readings"
     lines = [f"{before} {account.rows} rows {account.read} {held}{over if account.headings else ''}."]
     unused = [each.words for each in account.left_out] + [account.beside_in_words] * bool(account.beside)
-    return [*lines, *(filled(f"Not used: {words}.", "  " if file else "") for words in unused)]
+    return [*map(kept_narrow, lines), *(filled(f"Not used: {words}.", "  " if file else "") for words in unused)]
 
 
 def first_and_last(data: Dataset) -> list[str]:

@@ -41,6 +41,16 @@ class Display:
         frame.attrs["units"] = dict(units)
         return frame
 
+    def to_csv(self) -> str:
+        """Its table as CSV; units stand behind the names of the columns, of rows with units of their own in a column."""
+        rows, units = self._table()
+        assert not isinstance(rows, Mapping)  # a verb's answer has rows
+        listed = [{_with_unit(name, units): value for name, value in row.items()} for row in rows]
+        firsts = [next(iter(row.values()), "") for row in listed]
+        if listed and any(isinstance(first, str) and first in units for first in firsts):
+            listed = [{**row, "unit": units.get(str(first), "1")} for row, first in zip(listed, firsts, strict=True)]
+        return csv_text(listed)
+
     def __str__(self) -> str:
         return text_of(self).strip()
 
@@ -49,6 +59,26 @@ class Display:
 
     def _repr_html_(self) -> str:
         return as_html(str(self))
+
+
+def _with_unit(name: str, units: Mapping[str, str]) -> str:
+    """Name of a column with its unit."""
+    unit = units.get(name, "1")
+    return name if unit == "1" else f"{name}_{unit}"
+
+
+def csv_text(rows: Sequence[Mapping[str, Any]]) -> str:
+    """Rows as CSV, with a heading; empty without rows."""
+    lines = [",".join(_csv_cell(value) for value in row.values()) for row in rows]
+    return "\n".join([",".join(next(iter(rows), {})), *lines]) + "\n"
+
+
+def _csv_cell(value: object) -> str:
+    if isinstance(value, float):
+        return f"{value:.6g}"
+    if isinstance(value, str):
+        return '"{}"'.format(value.replace('"', '""'))
+    return "" if value is None else str(value).lower()
 
 
 @singledispatch

@@ -44,7 +44,7 @@ def _run(verb: Verb, keywords: tuple[Keyword, ...], given: dict[str, Any], form:
     """Ask, and print the reply for people, or as "json" or "csv"."""
     asked = {keyword.name: keyword.value(given[keyword.name]) for keyword in keywords}
     reply = _kept(verb, asked)
-    if reply is None or (form == "json" and reply.page is None):
+    if reply is None or (form == "json" and reply.page is None) or (form == "csv" and reply.csv is None):
         reply = _answer(verb, keywords, given, asked)
     say(_page(reply) if form == "json" else reply.csv() if form == "csv" and reply.csv else reply.text, nl=False)
     for note in reply.notes:

@@ -191,7 +191,7 @@ def _reply(found: "Calibration", asked: dict[str, Any]) -> Reply:
     from bowdenfit.questions.calibrate.words import calibration_text
 
     exit_code = 0 if found.is_calibrated else NOT_CALIBRATED
-    return Reply(calibration_text(found), lambda: found, (f"Wrote {asked['output']}.",), exit_code)
+    return Reply(calibration_text(found), lambda: found, (f"Wrote {asked['output']}.",), exit_code, found.to_csv)
 
 
 def _show(bar: Any, done: int, total: int) -> None:
@@ -215,6 +215,7 @@ VERB = Verb(
     Takes a fraction of a second a replication; recordings some. Exit code 3: not calibrated.
     """,
     json="Print calibration.json instead of the summary for people.",
+    csv="Print the quantities as CSV, one a row.",
     results="fits/calibration",
     watch=WATCH,
 )

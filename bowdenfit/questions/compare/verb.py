@@ -76,7 +76,8 @@ def refuse_to_replace(folder: Path, force: bool) -> None:
 def _reply(found: "Comparison", asked: dict[str, Any]) -> Reply:
     from bowdenfit.questions.compare.words import comparison_text
 
-    return Reply(comparison_text(found), lambda: found, (f"Wrote {asked['output']}.",) if asked["output"] else ())
+    notes = (f"Wrote {asked['output']}.",) if asked["output"] else ()
+    return Reply(comparison_text(found), lambda: found, notes, csv=found.to_csv)
 
 
 VERB = Verb(
@@ -96,4 +97,5 @@ VERB = Verb(
 
     Readings that would move the posterior take longer: it is fitted again without them.
     """,
+    csv="Print the fits as CSV, the best first.",
 )

@@ -146,7 +146,7 @@ def _reply(found: "Identifiability", asked: dict[str, Any]) -> Reply:
     from bowdenfit.questions.identify.words import identifiability_text
 
     notes = tuple(f"Wrote {path}." for path in files_of(asked["output"], NAME)) if asked["output"] else ()
-    return Reply(identifiability_text(found), lambda: found, notes)
+    return Reply(identifiability_text(found), lambda: found, notes, csv=found.to_csv)
 
 
 def _kept(answers: Mapping[str, Any], asked: Mapping[str, Any]) -> Reply | None:
@@ -172,5 +172,6 @@ VERB = Verb(
     SOURCE is a plan, before anything is measured (a cable.toml with [design], the lengths and forces that you intend to
     measure at, such as datasets/synthetic-bench/bench.toml); a data set; or the results folder of a fit.
     """,
+    csv="Print the parameters as CSV, one a row.",
     kept=_kept,
 )

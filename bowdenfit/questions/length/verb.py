@@ -23,7 +23,7 @@ def length(found: Annotated["Record", Argument("RESULTS", results=True)]) -> "Op
 
 
 def _reply(answer: "OptimalLength", _: object) -> Reply:
-    return Reply(f"{answer}\n", lambda: answer)
+    return Reply(f"{answer}\n", lambda: answer, csv=answer.to_csv)
 
 
 def _kept(answers: Mapping[str, Any], asked: Mapping[str, Any]) -> Reply | None:
@@ -40,6 +40,7 @@ VERB = Verb(
     _reply,
     "The design answer: which length is best.",
     "The design answer: which length is best, how sure that is, and what the lengths that can be bought cost.",
+    csv="Print the lengths that can be bought as CSV; where none are named, the best length and the efficiency there.",
     warns=True,
     kept=_kept,
 )

@@ -62,7 +62,7 @@ def _reply(found: "NextMeasurement", asked: dict[str, Any]) -> Reply:
     from bowdenfit.questions.next.words import next_measurement_text
 
     notes = tuple(f"Wrote {path}." for path in files_of(asked["output"], NAME)) if asked["output"] else ()
-    return Reply(next_measurement_text(found, asked["top"]), lambda: found, notes)
+    return Reply(next_measurement_text(found, asked["top"]), lambda: found, notes, csv=found.to_csv)
 
 
 VERB = Verb(
@@ -84,5 +84,6 @@ VERB = Verb(
     """,
     name="next",
     json="Print all candidates as JSON.",
+    csv="Print all candidates as CSV.",
     warns=True,
 )

@@ -3,7 +3,8 @@
 from collections.abc import Mapping, Sequence
 from typing import TYPE_CHECKING, Annotated, Any, Literal
 
-from bowdenfit.questions.predict.words import predictions_csv, predictions_text
+from bowdenfit.display import csv_text
+from bowdenfit.questions.predict.words import predictions_text
 from bowdenfit.verb import Argument, Length, Option, Quantity, Reply, Stroke, Verb
 
 if TYPE_CHECKING:
@@ -101,7 +102,7 @@ def _quantity(named: Asked | None, input_force: Quantity | None, output_force: Q
 
 
 def _reply(rows: list[dict[str, Any]], _: object = None) -> Reply:
-    return Reply(predictions_text(rows), lambda: rows, csv=lambda: predictions_csv(rows))
+    return Reply(predictions_text(rows), lambda: rows, csv=lambda: csv_text(rows))
 
 
 def _kept(answers: Mapping[str, Any], asked: Mapping[str, Any]) -> Reply | None:

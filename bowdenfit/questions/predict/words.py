@@ -25,21 +25,6 @@ def predictions_text(rows: Sequence[Row]) -> str:
     return "\n\n".join(block for block in blocks if block) + "\n"
 
 
-def predictions_csv(rows: Sequence[Row]) -> str:
-    """Predictions as CSV, with a heading.
-
-    Args:
-        rows: One a place.
-    """
-    return "\n".join([",".join(rows[0]), *(",".join(_cell(value) for value in row.values()) for row in rows)]) + "\n"
-
-
-def _cell(value: object) -> str:
-    if isinstance(value, float):
-        return f"{value:.6g}"
-    return f'"{value}"' if isinstance(value, str) else str(value).lower()
-
-
 def units_of(row: Row) -> dict[str, str]:
     """Units of the columns, "1" of numbers without one; moments and quantiles have that of what stands before them."""
     units, unit = dict[str, str](), "1"

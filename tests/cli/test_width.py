@@ -1,0 +1,92 @@
+"""What the verbs print fits into a terminal of 80 columns, and their tables come as CSV that programs read."""
+
+import csv
+import io
+import shutil
+from pathlib import Path
+
+import pytest
+
+import bowdenfit as bf
+
+ROOT = Path(__file__).parents[2]
+DATA_SETS = sorted(path.parent for path in (ROOT / "datasets").glob("*/cable.toml"))
+CORPUS = [path for path in sorted((ROOT / "tests" / "files" / "corpus").glob("*.*")) if path.suffix != ".toml"]
+QUICK = ("sampler.n_walkers=128", "sampler.target_ess=200", "sampler.target_r_hat=1.05", "sampler.max_steps=2000")
+WIDTH = 80
+
+
+def too_wide(text):
+    return [line for line in text.splitlines() if len(line) > WIDTH]
+
+
+@pytest.fixture(scope="module")
+def results(on_body, tmp_path_factory):
+    folder = tmp_path_factory.mktemp("width") / "fit"
+    bf.fit(on_body, output=folder, seed=3, settings=QUICK, figures=False)
+    return folder
+
+
+@pytest.mark.parametrize("path", [*DATA_SETS, *CORPUS], ids=lambda path: path.name)
+def test_check_keeps_to_the_terminal_whatever_it_reads(run, monkeypatch, path):
+    monkeypatch.chdir(path.parent)
+    code, out, err = run("check", path.name)
+    assert (code, err) == (0, "")
+    assert not too_wide(out)
+
+
+def test_a_command_to_paste_goes_over_several_lines_as_a_shell_reads_it(run, monkeypatch):
+    monkeypatch.chdir(ROOT)
+    _, out, _ = run("check", "tests/files/corpus/unnamed_ends.csv")
+    assert "--wrap-angle 180deg \\\n    --column input_force='Force 2 (N)' --column" in out
+
+
+def test_every_verb_keeps_to_the_terminal(run, results, tmp_path):
+    shutil.copytree(results, tmp_path / "other")
+    for verb in ("summary", "length", "identify", "next", "predict"):
+        out = run(verb, results)[1]
+        assert out and not too_wide(out), verb
+    assert not too_wide(run("compare", results, tmp_path / "other")[1])
+
+
+@pytest.mark.parametrize(
+    ("verb", "head"),
+    [
+        (("length",), "cable_length_mm"),
+        (("identify",), "parameter"),
+        (("next", "--top", "1"), "measurement"),
+        (("predict",), "cable_length_mm"),
+    ],
+    ids=lambda part: part[0] if isinstance(part, tuple) else "",
+)
+def test_tables_come_as_csv_with_a_heading_and_a_cell_for_every_column(run, results, verb, head):
+    code, out, _ = run(verb[0], results, *verb[1:], "--csv")
+    assert code == 0
+    heads, *rows = csv.reader(io.StringIO(out))
+    assert heads[0] == head
+    assert len(rows) > 1 and {len(row) for row in rows} == {len(heads)}
+    assert "are two forms" in run(verb[0], results, "--csv", "--json")[2]
+
+
+def test_comparisons_and_calibrations_come_as_csv(run, results, tmp_path):
+    shutil.copytree(results, tmp_path / "other")
+    heads, *rows = csv.reader(io.StringIO(run("compare", results, tmp_path / "other", "--csv")[1]))
+    assert (heads[0], len(rows)) == ("name", 2)
+    cable = ROOT / "datasets" / "yarn-on-cylinder"
+    out = run("calibrate", cable, "-n", 3, "-j", 1, "--seed", 1, "-o", tmp_path / "calibration", "--csv")[1]
+    heads, *rows = csv.reader(io.StringIO(out))
+    assert heads[0] == "quantity" and "mu" in {row[0] for row in rows}
+    assert not too_wide((tmp_path / "calibration" / "summary.txt").read_text())
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("folder", DATA_SETS, ids=lambda path: path.name)
+def test_every_verb_keeps_to_the_terminal_on_every_data_set(run, tmp_path, folder):
+    data = bf.read(folder)
+    for name in ("one", "two"):
+        bf.fit(data, output=tmp_path / name, seed=3, figures=False)
+    for verb in ("summary", "identify", "next", *(("length", "predict") if data.description.route else ())):
+        out = run(verb, tmp_path / "one")[1]
+        assert out and not too_wide(out), verb
+    assert not too_wide(run("compare", tmp_path / "one", tmp_path / "two")[1])
+    assert not too_wide(run("calibrate", folder, "-n", 3, "--seed", 1, "-o", tmp_path / "calibration")[1])

@@ -18,6 +18,7 @@ from bowdenfit.units import LARGEST, ColumnSource, conversion_factor, route_conv
 from bowdenfit.words import listed, quoted, shown
 
 Value = TypeVar("Value")
+_ALIKE = 0.5  # likeness from which a quantity that there is not is taken for a misspelled one
 
 
 @dataclass(frozen=True)
@@ -81,10 +82,10 @@ def find_columns(
     """
     sources = {name: _as_in_header(table, source) for name, source in (sources or {}).items()}
     wrong = _wrong_sources(table, [*(quantity.name for quantity in wanted), *unused], sources)
+    found: dict[str, Column] = {name: _unknown(table, name) for name in wrong}
     taken = {source.name for source in sources.values()}
     headings = [("" if text in taken else text, unit) for text, unit in zip(table.header, table.units, strict=True)]
     _check_single_meaning(table, headings, wanted, sources)
-    found: dict[str, Column] = {}
     can_be = candidates(headings, wanted, tuple(sources))
     for quantity in wanted:
         columns = can_be[quantity.name]
@@ -202,14 +203,19 @@ def _usual(dimension: str) -> str:
 
 
 def _wrong_sources(table: RawTable, known: list[str], sources: Mapping[str, ColumnSource]) -> set[str]:
-    """Quantities whose column is none of the file's, serves another already, or cannot be; what is wrong is noted."""
+    """Quantities whose column is none of the file's, serves another already, or cannot be; what is wrong is noted.
+
+    One that is misspelled is wrong under the name that is meant.
+    """
     serves: dict[str, str] = {}
-    wrong = set(sources)
+    wrong = set[str]()
     for name, source in sources.items():
-        with table.faults.noted():
+        try:
             _check_source(table, known, name, source, serves)
             serves[source.name] = name
-            wrong.discard(name)
+        except DatasetError as error:
+            table.faults.found.append(error)
+            wrong |= {name, *difflib.get_close_matches(name, known, n=1, cutoff=_ALIKE)}
     return wrong
 
 
@@ -218,7 +224,7 @@ def _check_source(
 ) -> None:
     """A column that cable.toml names is one of the file's, and serves one known quantity."""
     if name not in known:
-        near = difflib.get_close_matches(name, known, n=1, cutoff=0.5)
+        near = difflib.get_close_matches(name, known, n=1, cutoff=_ALIKE)
         hint = f"did you mean {near[0]}?" if near else f"it can have {', '.join(known)}."
         raise DatasetError(f"a column is named for {shown(name)}, which {table.file} cannot have under columns; {hint}")
     if source.name not in table.header:

@@ -78,7 +78,7 @@ def rows_of(path):
 
 def command_of(text):
     """The one command that `check` prints, as words, and as keywords for notebooks."""
-    (line,) = [line.strip() for line in text.splitlines() if line.strip().startswith("bowdenfit fit ")]
+    (line,) = [line.strip() for line in text.replace("\\\n", " ").splitlines() if line.strip().startswith("bowdenfit fit ")]
     words = shlex.split(line)[1:]
     named = {}
     for option, value in zip(words[2::2], words[3::2], strict=True):

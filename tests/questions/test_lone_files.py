@@ -41,8 +41,8 @@ def recorded(seconds=12.0, rate=50.0, exponent=0.3):
 
 
 def command(text):
-    """What `check` says to paste, as words."""
-    lines = [line.strip() for line in text.splitlines() if line.strip().startswith("bowdenfit fit ")]
+    """What `check` says to paste, over one line or several, as words."""
+    lines = [line.strip() for line in text.replace("\\\n", " ").splitlines() if line.strip().startswith("bowdenfit fit ")]
     return [shlex.split(line)[1:] for line in lines]
 
 

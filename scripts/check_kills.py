@@ -73,8 +73,8 @@ class Job:
 SET = tuple(f"--set={setting}" for setting in SMALL)
 YARN = str(ROOT / "datasets" / "yarn-on-cylinder")
 JOBS = (
-    Job("emcee", ("fit", YARN, *SET), "chain.checkpoint", "fit.json"),
-    Job("nuts", ("fit", YARN, "--sampler", "nuts", *SET), "chain.checkpoint", "fit.json"),
+    Job("emcee", ("fit", YARN, "--no-figures", *SET), "chain.checkpoint", "fit.json"),
+    Job("nuts", ("fit", YARN, "--no-figures", "--sampler", "nuts", *SET), "chain.checkpoint", "fit.json"),
     Job("calibrate", ("calibrate", YARN, "--replications", "6"), "replications.jsonl", "calibration.json"),
     Job("writing", ("fit", YARN, *SET), "chain.checkpoint", "fit.json", earliest=0.5),
 )

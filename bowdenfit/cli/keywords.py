@@ -13,6 +13,7 @@ import click
 
 from bowdenfit.errors import UsageError
 from bowdenfit.verb import Argument, Length, Option, Quantity
+from bowdenfit.words import shown
 
 _NUMBER = r"(?P<value>[+-]?(?:\d+\.?\d*|\.\d+)(?:[eE][+-]?\d+)?)"
 _LENGTH = re.compile(_NUMBER + r"\s*(?P<unit>[^\W\d][^\s]*)?(?=\s|$)")
@@ -163,7 +164,7 @@ def read_quantity(text: str, option: str, example: str) -> Quantity:
     match = _QUANTITY.fullmatch(text.strip())
     value, unit = (float(match["value"]), match["unit"]) if match else (0.0, "")
     if not unit or not math.isfinite(value):
-        raise UsageError(f"{option} {text!r} is not a number with its unit; write it as {example}.")
+        raise UsageError(f"{option} {shown(text)} is not a number with its unit; write it as {example}.")
     return value, unit
 
 
@@ -181,7 +182,7 @@ def read_lengths(given: Sequence[str], name: str) -> list[Length]:
     while text := text.strip():
         match = _LENGTH.match(text)
         if match is None:
-            raise UsageError(f"{name} {text.split()[0]!r} is no number; write lengths as 455, 455mm or 18 in.")
+            raise UsageError(f"{name} {shown(text.split()[0])} is no number; write lengths as 455, 455mm or 18 in.")
         value, unit = float(match["value"]), match["unit"]
         found.append((value, unit) if unit else value)
         text = text[match.end() :]
@@ -192,6 +193,9 @@ def read_named_number(text: str, option: str, example: str) -> tuple[str, float]
     """Kind and number of an option such as angle=0.5."""
     kind, _, number = text.partition("=")
     try:
-        return kind.strip(), float(number)
+        value = float(number)
     except ValueError:
-        raise UsageError(f"{option} {text!r} is not a kind and a number; write it as {example}.") from None
+        value = math.nan
+    if not math.isfinite(value):
+        raise UsageError(f"{option} {shown(text)} is not a kind and a number; write it as {example}.")
+    return kind.strip(), value

@@ -85,9 +85,10 @@ def _archive(path: Path) -> Content:
     try:
         with zipfile.ZipFile(path) as archive:
             names = archive.namelist()
-            if "mimetype" in names and b"opendocument.spreadsheet" in archive.read("mimetype"):
+            if "mimetype" in names and b"opendocument.spreadsheet" in archive.open("mimetype").read(200):
                 return _OPEN_DOCUMENT
-    except (OSError, zipfile.BadZipFile):
+    # Encrypted, packed in an unheard-of way, damaged, another name inside than in the list: zipfile raises anything.
+    except Exception:
         return _ZIP
     return _WORKBOOK if "xl/workbook.xml" in names else _ZIP
 

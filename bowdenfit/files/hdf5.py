@@ -12,6 +12,7 @@ from bowdenfit.files.outcome import UnreadNames, channel_file, is_numeric, numbe
 from bowdenfit.files.sampling import with_interval
 
 MOST_COLUMNS = 64
+_LONGEST = 400  # characters of a path
 _UNITS = ("unit", "units", "Unit", "Units")
 
 
@@ -28,7 +29,7 @@ def read(path: Path) -> ChannelFile:
 
     left_out = UnreadNames()
     with refuse_damage(path), h5py.File(path, "r") as file:
-        chosen = [each for each in _datasets(file, left_out) if _is_recording(each, left_out)]
+        chosen = [each for each in _datasets(file, left_out, set()) if _is_recording(each, left_out)]
         refuse_too_large(path, sum(2 * each.size * max(1, len(each.dtype.names or ())) for each in chosen))
         channels = [channel for each in chosen for channel in _channels(each, left_out)]
         settings = {path: values for each in chosen for path, values in _settings(each).items()}
@@ -36,19 +37,45 @@ def read(path: Path) -> ChannelFile:
     return channel_file(path, "HDF5", with_lone_clock(clocked), left_out, remarks)
 
 
-def _datasets(group: Any, left_out: UnreadNames) -> Iterator[Any]:
-    """All data sets, in the order of the file; links that lead nowhere or out of the file are left alone."""
+def _datasets(group: Any, left_out: UnreadNames, seen: set[int]) -> Iterator[Any]:
+    """All data sets, in the order of the file, but for what lies elsewhere."""
+    import h5py
+
+    for path, member in members(group, left_out, seen):
+        if isinstance(member, h5py.Group):
+            yield from _datasets(member, left_out, seen)
+        elif isinstance(member, h5py.Dataset):
+            yield member
+        else:
+            left_out.add(path, "they are types of numbers, not numbers")
+
+
+def members(group: Any, left_out: UnreadNames, seen: set[int]) -> Iterator[tuple[str, Any]]:
+    """Path and content of what a group holds, in the order of the file, but for links and for what lies in other files.
+
+    Args:
+        group: The group.
+        left_out: Takes the paths of what is left alone.
+        seen: Takes the groups, by their places in the file: one that holds itself is gone through once.
+    """
     import h5py
 
     for key in group:
+        path = f"{group.name.rstrip('/')}/{key}".lstrip("/")
         if not isinstance(group.get(key, getlink=True), h5py.HardLink):
-            left_out.add(f"{group.name.rstrip('/')}/{key}".lstrip("/"), "they are links")
+            left_out.add(path, "they are links")
             continue
         member = group[key]
+        if isinstance(member, h5py.Dataset) and (member.external or member.is_virtual):
+            left_out.add(path, "their numbers lie in other files (write them into this one)")
+            continue
         if isinstance(member, h5py.Group):
-            yield from _datasets(member, left_out)
-        elif isinstance(member, h5py.Dataset):
-            yield member
+            place = h5py.h5o.get_info(member.id).addr
+            if place in seen or len(path) > _LONGEST:
+                left_out.add(path, "they are second names of a group, or lie too deep")
+                continue
+            seen.add(place)
+        yield path, member
 
 
 def _is_recording(dataset: Any, left_out: UnreadNames) -> bool:
@@ -58,7 +85,7 @@ def _is_recording(dataset: Any, left_out: UnreadNames) -> bool:
     numeric = is_numeric(dataset.dtype) or (dataset.dtype.names is not None and len(shape) == 1)
     if not numeric:
         left_out.add(name, "they are text, complex numbers or objects")
-    elif dataset.size < 2:
+    elif (dataset.size or 0) < 2:  # none of a data set without a place for any
         left_out.add(name, "they are single numbers or empty")
     elif len(shape) > 2 or (len(shape) == 2 and min(shape) > MOST_COLUMNS):
         left_out.add(name, f"they have more than two dimensions or {MOST_COLUMNS} columns")

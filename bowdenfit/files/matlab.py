@@ -12,6 +12,7 @@ import numpy as np
 
 from bowdenfit.files.channels import Channel, ChannelFile
 from bowdenfit.files.column_clocks import with_column_clocks, with_lone_clock
+from bowdenfit.files.hdf5 import members
 from bowdenfit.files.outcome import (
     BYTES_PER_SAMPLE,
     UnreadNames,
@@ -177,28 +178,30 @@ def _read_hdf5(path: Path) -> _Variables:
 
     variables = _Variables()
     with h5py.File(path, "r") as file:
-        stored = list(_stored(file, variables.left_out))
+        stored = list(_stored(file, variables.left_out, set()))
         refuse_too_large(path, 2 * sum(dataset.size for _, dataset in stored))
         for name, dataset in stored:
             variables.add(name, np.zeros(0) if "MATLAB_empty" in dataset.attrs else dataset[()].T)
     return variables
 
 
-def _stored(group: Any, left_out: UnreadNames, prefix: str = "") -> Iterator[tuple[str, Any]]:
+def _stored(group: Any, left_out: UnreadNames, seen: set[int], prefix: str = "") -> Iterator[tuple[str, Any]]:
     """The numeric variables of a group and of the structures in it, with their names."""
     import h5py
 
-    for key in group:
-        name, member = f"{prefix}{key}", group[key]
-        kind = _class(member)
+    for path, member in members(group, left_out, seen):
+        key = path.rpartition("/")[2]
+        name, kind = f"{prefix}{key}", _class(member)
         if key.startswith("#"):
             continue
-        if "MATLAB_object_decode" in member.attrs or kind == "function_handle":
+        if isinstance(member, h5py.Datatype) or getattr(member, "shape", ()) is None:
+            left_out.add(name, "they are types of numbers, or empty")
+        elif "MATLAB_object_decode" in member.attrs or kind == "function_handle":
             left_out.add(name, _OBJECTS)
         elif "MATLAB_sparse" in member.attrs:
             left_out.add(name, "they are sparse")
         elif isinstance(member, h5py.Group):
-            yield from _stored(member, left_out, f"{name}.")
+            yield from _stored(member, left_out, seen, f"{name}.")
         elif kind == "char":
             left_out.add(name, _TEXT)
         elif is_numeric(member.dtype) and kind in ("", *_NUMERIC):

@@ -11,6 +11,7 @@ from typing import TypeVar
 Value = TypeVar("Value")
 Given = TypeVar("Given")
 
+_LONGEST = 200  # characters of a file's name in a message
 _NO_MEMORY = ("RESOURCE_EXHAUSTED", "Cannot allocate memory", "failed to map segment")  # of XLA, the system, its loader
 _FULL = {errno.ENOSPC, errno.EFBIG, errno.EIO, *({errno.EDQUOT} if hasattr(errno, "EDQUOT") else ())}
 
@@ -164,10 +165,12 @@ def system_error(error: BaseException) -> BowdenfitError | None:
         return MemoryShortageError("memory ran out; close other programs, or run this where there is more of it.")
     if not isinstance(error, OSError) or error.errno is None:
         return None
+    name = str(error.filename or "a file")
+    name = name if len(name) <= _LONGEST else f"{name[: _LONGEST // 2]}...{name[-_LONGEST // 2 :]}"
     if error.errno in _FULL or not error.filename:
-        return disk_error(Path(str(error.filename or "a file")), error)
+        return disk_error(Path(name), error)
     return StoreError(
-        f"{error.filename} cannot be opened ({error.strerror}); check its name, its kind and its permissions."
+        f"{name} cannot be opened ({error.strerror}); check its name, its kind and its permissions."
     )
 
 

@@ -1,5 +1,6 @@
 """What may be opened at all: regular files of a size that fits what they are, found by patterns that end."""
 
+import errno
 import os
 import stat
 import tomllib
@@ -8,9 +9,12 @@ from pathlib import Path
 from typing import Any
 
 from bowdenfit.errors import BowdenfitError, DatasetError, DescriptionError
+from bowdenfit.words import shown
 
 _LARGEST_TOML = 4_000_000  # bytes; a description has some thousand
 _DEEPEST = 12  # keys below keys; a description has four
+_NO_NAME = {errno.EINVAL, errno.ENAMETOOLONG, errno.ELOOP}
+_OF_THE_SYSTEM = ("/proc/", "/sys/")  # some of these wait for ever, some never end
 _SPECIAL = {
     stat.S_ISFIFO: "a named pipe",
     stat.S_ISCHR: "a device",
@@ -31,8 +35,15 @@ def refuse_special(path: Path, error: Callable[[str], BowdenfitError] = DatasetE
     """
     try:
         mode = path.stat().st_mode
-    except (OSError, ValueError):
+    except (OSError, ValueError) as failure:  # a zero byte is a ValueError
+        if getattr(failure, "errno", errno.EINVAL) in _NO_NAME:
+            raise error(
+                f"{shown(str(path))} cannot be the name of a file ({getattr(failure, 'strerror', failure)}); write it as it is "
+                "seen from the folder of cable.toml."
+            ) from None
         return  # whoever opens it says that it is missing
+    if stat.S_ISREG(mode) and os.path.realpath(path).startswith(_OF_THE_SYSTEM):
+        raise error(f"{path.name} is no file on a disk but made by the system while it is read; copy it, and name that.")
     for is_so, what in _SPECIAL.items():
         if is_so(mode):
             raise error(f"{path.name} is {what}, not a file; copy what it gives into a file, and name that.")

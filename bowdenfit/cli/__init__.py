@@ -2,6 +2,7 @@
 
 import gc
 import os
+import re
 import sys
 import warnings
 from pathlib import Path
@@ -15,6 +16,7 @@ from bowdenfit.cli.terminal import say
 from bowdenfit.errors import BowdenfitError, system_error
 from bowdenfit.verbs import VERBS
 
+_NEW_LINE = re.compile(r"[\r\n](?!- )")  # in the name of a file: our own sentences have new lines before "- " alone
 _MADE = 50_000  # objects made before Python looks for garbage: most stay, and each look goes through all of them
 
 
@@ -44,7 +46,7 @@ def main() -> None:
         error.show()
         sys.exit(error.exit_code)
     except BowdenfitError as error:
-        say(f"Error: {error}", err=True)
+        say(f"Error: {_NEW_LINE.sub('?', str(error))}", err=True)
         sys.exit(error.exit_code)
     except (click.Abort, KeyboardInterrupt):
         click.echo("Interrupted.", err=True)

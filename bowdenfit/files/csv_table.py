@@ -5,6 +5,7 @@ from dataclasses import dataclass, field
 from pathlib import Path
 
 from bowdenfit.errors import DatasetError, Faults
+from bowdenfit.files.apart import LIMITS
 from bowdenfit.files.cells import Cell, Decimals, is_plain_number
 from bowdenfit.files.contents import UNKNOWN, recognize
 from bowdenfit.files.csv_rows import SEPARATORS, CsvRecord, declared_separator, records, too_many_cells
@@ -15,6 +16,7 @@ from bowdenfit.files.text_file import Line, comment_mark, first_bytes, first_lin
 from bowdenfit.words import shown
 
 _FIRST_ROWS, _FIRST_BYTES = 200, 1 << 18
+_LARGEST = 40e6  # bytes; some fifty times as many are needed to read them
 _SEPARATOR, _CONTINUED = "the separator", "the rest of a cell that runs over several rows"
 
 
@@ -66,6 +68,8 @@ def read_csv(path: Path, most: int | None = None) -> RawTable:
         DatasetError: The file is missing, is no text, is empty, has no header or duplicate columns, or a row is longer
             than the header.
     """
+    if most is None:
+        _refuse_large(path)
     name, data = path.name, first_bytes(path, -1 if most is None else _FIRST_BYTES)
     content = recognize(path, data[:1024])
     if content is not UNKNOWN:
@@ -86,6 +90,20 @@ def read_csv(path: Path, most: int | None = None) -> RawTable:
     if all(row.blank for row in rows):
         raise DatasetError(f"{name} is empty; it needs one header row and the measurements below it.")
     return raw_table(name, every, rows, separator)
+
+
+def _refuse_large(path: Path) -> None:
+    """Refuse what no table of readings is, before it fills the memory.
+
+    Raises:
+        DatasetError: The file is too large.
+    """
+    size, largest = path.stat().st_size if path.is_file() else 0, _LARGEST * LIMITS.get()
+    if size > largest:
+        raise DatasetError(
+            f"{path.name} has {size / 1e6:.0f} MB, more than the {largest / 1e6:.0f} MB that a table may have; keep the "
+            "rows that are readings, name a recording as one, or allow more with --reading-limit 4."
+        )
 
 
 def raw_table(name: str, lines: Sequence[Line], rows: Sequence[CsvRecord], separator: str) -> RawTable:

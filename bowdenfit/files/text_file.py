@@ -68,12 +68,12 @@ def first_bytes(path: Path, most: int = -1) -> bytes:
     Raises:
         DatasetError: The file is missing, a folder, empty, or cannot be read.
     """
+    refuse_special(path)
     if path.is_dir():
         raise DatasetError(
             f"{path.name} is a folder, not a recording or a table; give one of the files in it "
             "(only a ROS 2 bag is a folder, and it holds a metadata.yaml)."
         )
-    refuse_special(path)
     try:
         with path.open("rb") as file:
             data = file.read(most)

@@ -83,7 +83,10 @@ def attempt(arguments: list[str], folder: Path, user: int | None, place: Path) -
     """Fork, run, and say what came of it."""
     child = os.fork()
     if not child:
-        begin(arguments, folder, user, place)
+        try:
+            begin(arguments, folder, user, place)
+        finally:
+            os._exit(99)
     until = time.monotonic() + 5 * SECONDS
     while True:
         pid, status, used = os.wait4(child, os.WNOHANG)

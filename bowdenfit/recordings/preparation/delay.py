@@ -13,10 +13,10 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from bowdenfit.recordings.preparation.noise import correlation_time
-from bowdenfit.recordings.preparation.rests import Rests, band_of, play_rows, rests_of, shift_rows, sides, starts
+from bowdenfit.recordings.preparation.rests import USED, Rests, band_of, play_rows, rests_of, shift_rows, sides, starts
 from bowdenfit.recordings.preparation.segments import Segments, reverses, segments_of
 from bowdenfit.recordings.preparation.shapes import OtherVector
-from bowdenfit.types import Flags, Matrix, Vector
+from bowdenfit.types import Flags, Labels, Matrix, Vector
 
 RANGE = 0.25
 COMMON_ERROR = 0.0015
@@ -60,7 +60,7 @@ def estimate_delay(time: Vector, input_force: Vector, output_force: Vector, good
         The delay with its standard error, or 0 with a remark where the recording does not tell.
     """
     segments = segments_of(time, input_force, output_force, good)
-    if segments is None:
+    if segments is None or not len(_usable(segments)):
         return _untold("it has too few good readings above zero force")
     if not reverses(segments):
         return _untold("the force never turns around")
@@ -91,9 +91,15 @@ def _inner(segments: Segments) -> Matrix:
     return weight
 
 
+def _usable(segments: Segments) -> Labels:
+    """Segments with good readings between their ends."""
+    return np.flatnonzero((_inner(segments) > USED).any(axis=1))
+
+
 def _coarse(every: Segments) -> Vector:
     """Best of a grid of exponents and delays for a few of the segments: exponent, ratio, delay."""
-    few = slice(None, None, max(1, len(every.x) // _COARSE_ROWS))
+    usable = _usable(every)
+    few = usable[:: max(1, len(usable) // _COARSE_ROWS)]
     segments = replace(every, x=every.x[few], y=every.y[few], weight=every.weight[few], jitter=every.jitter[few])
     weight = _inner(segments)
     center, half = band_of(segments)

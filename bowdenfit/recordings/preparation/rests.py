@@ -14,6 +14,7 @@ from bowdenfit.recordings.preparation.segments import Segments
 from bowdenfit.recordings.preparation.shapes import OtherVector
 from bowdenfit.types import Matrix, Vector
 
+USED = 0.05  # weight of a point that counts
 _MARGIN = 0.050
 _AWAY = 6.0
 _NEAR = 1.5
@@ -58,7 +59,7 @@ def play_rows(x: Matrix, start: Vector, exponent: OtherVector, rests: Rests | No
 
 def band_of(segments: Segments) -> tuple[float, float]:
     """Middle and half width of the band of x - y [1]."""
-    low, high = np.quantile((segments.x - segments.y)[segments.weight > 0.05], (0.05, 0.95))
+    low, high = np.quantile((segments.x - segments.y)[segments.weight > USED], (0.05, 0.95))
     return float(low + high) / 2, float(high - low) / 2
 
 

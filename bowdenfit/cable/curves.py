@@ -77,7 +77,7 @@ class Curve(ABC):
         return Parameter(name, symbol, meaning, "curve", prior, unit, scale, prior_words=words)
 
     def _symbol(self, letter: str) -> str:
-        """The letter with the first word of the column for a subscript."""
+        """The letter with the first word of the column."""
         return symbol_of(letter, self.column.split("_")[0] or self.column)
 
     def _level(self, detected: Vector, defaults: PriorDefaults) -> Parameter:

@@ -82,7 +82,7 @@ class Drag(FrictionOption):
         meaning = "drag: hidden tension D, which the load cells do not show; D (1 - exp(-Lambda)) of the force is lost"
         prior = HalfCauchy(defaults.drag_share * conditions.load.value)
         by = conditions.load.share(defaults.drag_share)
-        return [Parameter(DRAG, r"$D_\mathrm{hidden}$", meaning, "friction_model", prior, "N", scaled_by=by)]
+        return [Parameter(DRAG, "$D$ hidden", meaning, "friction_model", prior, "N", scaled_by=by)]
 
     def drag(self, values: Mapping[str, Array]) -> Array:
         """D"""

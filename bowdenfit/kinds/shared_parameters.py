@@ -48,10 +48,10 @@ def offsets(at: Circumstances) -> list[Parameter]:
     sd, by = (stated.to("force"), "") if stated is not None else (part * load.value, load.share(part))
     return [
         Parameter(
-            name, f"$b_\\mathrm{{{symbol}}}$", f"offset of the {end} load cell", "sensor",
+            name, f"$b$ {end}", f"offset of the {end} load cell", "sensor",
             Normal(0.0, sd), "N", scaled_by=by,
         )
-        for name, symbol, end in ((INPUT_OFFSET, "in", "input"), (OUTPUT_OFFSET, "out", "output"))
+        for name, end in ((INPUT_OFFSET, "input"), (OUTPUT_OFFSET, "output"))
     ]  # fmt: skip
 
 

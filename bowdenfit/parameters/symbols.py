@@ -1,27 +1,20 @@
-"""Names that people chose, set in matplotlib's math notation, whatever is in them."""
+"""Symbols with names that people chose, whatever is in them.
+
+A name stands behind its letter as plain text: in matplotlib's math notation every letter is placed by itself, for one font, and
+falls apart in a reader with another.
+"""
 
 import re
 
-# What stands for itself between dollar signs; of the rest, what a backslash helps, and what looks like it.
-_PLAIN = re.compile(r"[a-zA-Z0-9+\-*/<>=:,.;!?&'@()\[\]|\u0080-\U0001ffff]")
-_ESCAPED = "%${}_"
-_ALIKE = {" ": r"\ ", "\\": r"\backslash", "^": r"\wedge", "~": r"\sim", "#": "♯", '"': "”", "`": "‘"}
-
-
-def upright(name: str) -> str:
-    """A name in upright letters, such as a subscript; underscores are spaces."""
-    return rf"\mathrm{{{''.join(_set(letter) for letter in name.strip('_ ').replace('_', ' ') or name)}}}"
+_INDEX = re.compile(r"[a-zA-Z0-9]{1,2}")
 
 
 def symbol_of(letter: str, name: str) -> str:
-    """A letter with a name for its subscript."""
-    return rf"${letter}_{upright(name)}$"
+    """A letter with a name behind it, or below it where that is no longer than an index.
 
-
-def _set(letter: str) -> str:
-    if letter in _ALIKE:
-        alike = _ALIKE[letter]
-        return f"{{{alike}}}" if alike.startswith("\\") and alike != r"\ " else alike
-    if letter in _ESCAPED:
-        return f"\\{letter}"
-    return letter if _PLAIN.match(letter) else "?"
+    Args:
+        letter: In matplotlib's math notation.
+        name: Underscores in it are spaces.
+    """
+    plain = name.strip("_ ").replace("_", " ") or name
+    return rf"${letter}_\mathrm{{{plain}}}$" if _INDEX.fullmatch(plain) else f"${letter}$ " + plain.replace("$", r"\$")

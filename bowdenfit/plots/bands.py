@@ -15,6 +15,7 @@ if TYPE_CHECKING:
 
 BAND_QUANTILES = (0.05, 0.25, 0.5, 0.75, 0.95)
 OUTSIDE = "Outside the range of the curves"
+NEW_RUN = "90 % of runs, each on a new mounting"
 
 
 @dataclass(frozen=True)

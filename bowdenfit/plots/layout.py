@@ -25,7 +25,7 @@ TITLE = 0.22  # room for a title of one line
 LABEL_LEFT, LABEL_BELOW = 0.41, 0.25  # from the axes to its labels
 EDGE = 0.08  # from words to the edge of the page
 _MARK, _APART = 2.6, 2.0  # of a legend, in its font size: a mark with its gap, and from one column to the next
-_TITLE_ROWS, _TITLE_ROW = 2, 0.15
+_TITLE_ROWS, _TITLE_ROW, LABEL_ROW = 2, 0.15, 0.13
 
 
 def empty_page(width: float, height: float) -> Figure:
@@ -73,6 +73,31 @@ def place_labels(figure: Figure, axes: Axes) -> None:
     page, box = figure.get_size_inches(), axes.get_position()
     axes.yaxis.set_label_coords(-LABEL_LEFT / (box.width * page[0]), 0.5)
     axes.xaxis.set_label_coords(0.5, -LABEL_BELOW / (box.height * page[1]))
+
+
+def number_width(axes: Axes) -> float:
+    """Width of the widest number left of a panel [in]; 0 where none is shown."""
+    low, high = sorted(axes.get_ylim())
+    axis = axes.yaxis
+    if not axis.get_tick_params()["labelleft"]:
+        return 0.0
+    places = [float(place) for place in axis.get_majorticklocs()]
+    texts = axis.get_major_formatter().format_ticks(places)
+    return max((text_width(t) for t, at in zip(texts, places, strict=True) if t and low <= at <= high), default=0.0)
+
+
+def squeeze(figure: Figure, left: float, to: float) -> None:
+    """Make the left margin wider, at the cost of the panels.
+
+    Args:
+        figure: The page.
+        left, to: The margin as it is and as it shall be [in].
+    """
+    page = figure.get_size_inches()[0]
+    share = (page - RIGHT - to) / (page - RIGHT - left)
+    for axes in figure.axes:
+        box = axes.get_position()
+        axes.set_position(((to + (box.x0 * page - left) * share) / page, box.y0, box.width * share, box.height))
 
 
 def drop_unused(flat: list[Axes], used: int) -> list[Axes]:
@@ -167,11 +192,26 @@ def title_above(figure: Figure, words: str) -> None:
     )  # fmt: skip
 
 
-def _add_room(figure: Figure, room: float) -> None:
-    """Make the page higher at the top, and leave everything else where it is."""
+def label_across(axes: Axes, words: str) -> None:
+    """The name of the lower axis, in several lines where it is wider than the panel and its margins."""
+    figure = axes.figure
+    assert figure is not None  # a panel is on a page
+    page, box = figure.get_size_inches()[0], axes.get_position()  # type: ignore[union-attr]
+    axes.set_xlabel(wrapped(words, page * min(box.width + 0.16 / page, 2 * (1 - box.x0 - box.width / 2)), 8))
+
+
+def room_for_labels(figure: Figure) -> None:
+    """Make the page higher at the bottom where the names of lower axes take several lines."""
+    lines = max((axes.get_xlabel().count("\n") for axes in figure.axes), default=0)
+    if lines:
+        _add_room(figure, 0.0, LABEL_ROW * lines)
+
+
+def _add_room(figure: Figure, above: float, below: float = 0.0) -> None:
+    """Make the page higher, and leave everything else where it is."""
     width, height = figure.get_size_inches()
     boxes = [axes.get_position() for axes in figure.axes]
-    figure.set_size_inches(width, height + room)
+    taller = height + above + below
+    figure.set_size_inches(width, taller)
     for axes, box in zip(figure.axes, boxes, strict=True):
-        share = height / (height + room)
-        axes.set_position((box.x0, box.y0 * share, box.width, box.height * share))
+        axes.set_position((box.x0, (box.y0 * height + below) / taller, box.width, box.height * height / taller))

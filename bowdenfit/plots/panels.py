@@ -7,7 +7,16 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from bowdenfit.plots.layout import LEFT, RIGHT, TITLE, columns_within, drop_unused, panels
+from bowdenfit.plots.layout import (
+    LEFT,
+    RIGHT,
+    TITLE,
+    columns_within,
+    drop_unused,
+    label_across,
+    panels,
+    room_for_labels,
+)
 from bowdenfit.plots.style import MEDIUM, SMALL, WIDE
 
 if TYPE_CHECKING:
@@ -117,8 +126,9 @@ def label_outer(flat: list[Axes], columns: int, x_label: str, y_label: str) -> N
         if i % columns == 0:
             axes.set_ylabel(y_label)
         if i + columns >= len(flat):
-            axes.set_xlabel(x_label)
+            label_across(axes, x_label)
             axes.tick_params(labelbottom=True)
+    room_for_labels(flat[0].figure)  # type: ignore[arg-type]
 
 
 def enlarge_marks(figure: Figure) -> None:

@@ -4,11 +4,23 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 import numpy as np
 
-from bowdenfit.plots.layout import BOTTOM, RIGHT, TITLE, axes_at, columns_within, empty_page, place_labels
+from bowdenfit.plots.layout import (
+    BOTTOM,
+    RIGHT,
+    TITLE,
+    axes_at,
+    columns_within,
+    empty_page,
+    label_across,
+    number_width,
+    place_labels,
+    room_for_labels,
+    squeeze,
+)
 from bowdenfit.plots.panels import CHARACTER, LEAST_WIDTH, alike, finite, set_limits, short
 from bowdenfit.plots.style import GRAY, MEDIUM, SMALL, WIDE
 
@@ -16,7 +28,9 @@ if TYPE_CHECKING:
     from bowdenfit.plots.layout import Axes, Figure
 
 STRIP, GAP = 0.5, 0.1  # in, height of a strip, and from it to its panel
-LEFT, LABEL = 0.68, 0.42  # in, margin, and from the axes to their names
+LEFT = 0.68  # in, margin
+_NUMBERS, _PAD, _TWO_LINES = 0.27, 0.11, 0.28  # in, room for numbers, for what is beside them, and for a name in two lines
+NONE = 1e-9  # below which residuals are none, in any unit
 TALL = 0.85  # height over width of a panel
 _ROOM = 1.2
 
@@ -48,26 +62,51 @@ class Stripped:
         for i, (main, strip) in enumerate(zip(self.mains, self.strips, strict=True)):
             if i % self.columns == 0:
                 main.set_ylabel(y_label)
-                strip.set_ylabel(f"Residual\n({unit})", fontsize=SMALL, linespacing=1.0)
+                name_strip(strip, unit)
             if i + self.columns >= len(self.mains):
-                strip.set_xlabel(x_label)
+                label_across(strip, x_label)
                 strip.tick_params(labelbottom=True)
+        room_for_labels(self.figure)
+        far = max(_NUMBERS, *(number_width(axes) for axes in (*self.mains, *self.strips))) + _PAD
+        squeeze(self.figure, LEFT, max(LEFT, far + _TWO_LINES))
+        for main, strip in zip(self.mains, self.strips, strict=True):
+            place_names(main, strip, far)
 
     def finish_strips(self) -> None:
-        """A zero line on every strip, and the same limits around it on all."""
-        points = [line.get_ydata() for strip in self.strips for line in strip.get_lines()]
-        ends = [part for strip in self.strips for area in strip.collections for part in _heights(area)]
-        off = finite([np.asarray(part, dtype=float) for part in (*points, *ends)])
-        limit = _ROOM * float(np.max(np.abs(off), initial=0.0)) or 1.0
-        for strip in self.strips:
-            strip.axhline(0.0, color=GRAY, linewidth=0.8, zorder=0.9)
-            strip.set_ylim(-limit, limit)
-            strip.locator_params(axis="y", nbins=3)
+        """See `finish_strips`."""
+        finish_strips(self.strips)
 
 
-def _heights(area: Any) -> list[np.ndarray]:
-    """Of the lines in a collection."""
-    return [np.asarray(path.vertices)[:, 1] for path in area.get_paths()]
+def finish_strips(strips: Sequence[Axes]) -> None:
+    """A zero line on every strip, and the same limits around it on all."""
+    off = finite([np.zeros(0), *(np.asarray(line.get_ydata(), dtype=float) for strip in strips for line in strip.get_lines())])
+    limit = _ROOM * float(np.max(np.abs(off), initial=0.0))
+    limit = limit if limit > NONE else 1.0
+    for strip in strips:
+        strip.axhline(0.0, color=GRAY, linewidth=0.8, zorder=0.9)
+        strip.set_ylim(-limit, limit)
+        strip.locator_params(axis="y", nbins=3)
+
+
+def name_strip(strip: Axes, unit: str) -> None:
+    """Name and unit of the residuals, in two lines."""
+    strip.set_ylabel(f"Residual\n({unit})", fontsize=SMALL, linespacing=1.0)
+
+
+def place_names(main: Axes, strip: Axes, far: float | None = None) -> None:
+    """Put the names of panel and strip beside their numbers, in line.
+
+    Args:
+        main: The panel.
+        strip: Its strip.
+        far: From the axes to the names [in]; beside the wider numbers of the two if omitted.
+    """
+    figure = main.figure
+    assert figure is not None  # a panel is on a page
+    far = max(_NUMBERS, number_width(main), number_width(strip)) + _PAD if far is None else far
+    width = figure.get_size_inches()[0] * main.get_position().width  # type: ignore[union-attr]
+    for axes in (main, strip):
+        axes.yaxis.set_label_coords(-far / width, 0.5)
 
 
 def panels_with_strips(
@@ -114,9 +153,8 @@ def panels_with_strips(
         inside = i % columns > 0
         made.mains[-1].tick_params(labelbottom=False, labelleft=not (share_y and inside))
         made.strips[-1].tick_params(labelbottom=not share_x, labelleft=not inside)
-        for axes, far in ((made.mains[-1], LABEL), (made.strips[-1], LABEL - 0.05)):
-            place_labels(figure, axes)
-            axes.yaxis.set_label_coords(-far / inner, 0.5)
+        place_labels(figure, made.mains[-1])
+        place_labels(figure, made.strips[-1])
     set_limits(made.mains, across, "x", share_x)
     set_limits(made.mains, up, "y", share_y)
     return made

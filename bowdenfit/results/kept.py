@@ -13,7 +13,7 @@ from zlib import crc32
 
 from bowdenfit.results.folder import ANSWERS, FIGURE_DATA, FIT, POSTERIOR, write_text
 
-SCHEMA = 1  # counted up with every change of what one of the questions answers
+SCHEMA = 2  # counted up with every change of what one of the questions answers
 _PIECE = 1 << 22  # bytes of a file read at once
 
 

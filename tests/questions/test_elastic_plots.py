@@ -222,9 +222,9 @@ def test_no_words_overlap_or_leave_the_page(case):
 def test_every_axis_is_labeled_or_shares_one_that_is(name, case):
     figure = drawn(name, case)
     for axes in figure.axes:
-        place = axes.get_subplotspec()
-        below = [a for a in figure.axes if a.get_subplotspec().colspan == place.colspan]
-        beside = [a for a in figure.axes if a.get_subplotspec().rowspan == place.rowspan]
+        place = axes.get_position()
+        below = [a for a in figure.axes if abs(a.get_position().x0 - place.x0) < 0.01]
+        beside = [a for a in figure.axes if abs(a.get_position().y0 - place.y0) < 0.01]
         assert any("(" in a.get_xlabel() for a in below)
         assert any("(" in a.get_ylabel() for a in beside)
 
@@ -273,7 +273,7 @@ def test_without_draws_there_are_lines_and_neither_intervals_nor_medians(name):
 def test_stretch_shows_both_branches_and_fills_what_was_read_while_loading():
     data = glove((90.0,))
     (curve,) = data["stretch"]
-    (axes,) = drawn("stretch", data).axes
+    axes, _ = drawn("stretch", data).axes
     up, down = (a for a in axes.get_lines() if len(a.get_xdata()) == len(LOADS))
     np.testing.assert_array_equal(up.get_ydata(), curve.loading[1])
     np.testing.assert_array_equal(down.get_ydata(), curve.unloading[1])
@@ -288,7 +288,7 @@ def test_stretch_shows_both_branches_and_fills_what_was_read_while_loading():
 
 def test_negative_stretch_is_shown_below_a_line_at_zero():
     data = glove()
-    (axes,) = drawn("stretch", data).axes
+    axes, _ = drawn("stretch", data).axes
     lowest = min(c.points_stretch.min() for c in data["stretch"])
     assert axes.get_ylim()[0] < lowest < 0
     assert [a for a in axes.get_lines() if list(a.get_xdata()) == [0, 1] and set(a.get_ydata()) == {0.0}]
@@ -299,7 +299,7 @@ def test_wrap_angles_differ_in_color_and_marker_and_are_sorted():
     figure = drawn("stretch", data)
     assert [text for text in labels_of(figure) if "deg" in text] == ["0 deg", "90 deg", "270 deg"]
     for case, count in (("eight angles", 8), ("twelve angles", 8)):
-        (axes,) = drawn("stretch", case).axes
+        axes, _ = drawn("stretch", case).axes
         named = [a for a in axes.get_lines() if "deg" in a.get_label()]
         assert len({a.get_marker() for a in named}) == len({a.get_color() for a in named}) == count
         luminance = [float(np.array(a.get_color()[:3]) @ (0.299, 0.587, 0.114)) for a in named]
@@ -311,9 +311,25 @@ def test_of_many_wrap_angles_an_even_choice_is_shown_and_this_is_said():
     assert evenly(range(3), 6) == [0, 1, 2]
     assert "8 of 12 shown" in labels_of(drawn("stretch", "twelve angles"))
     loops = drawn("loops", "twelve angles")
-    assert len(loops.axes) == 6 and loops.axes[-1].get_title() == "990 deg"
+    assert len(loops.axes[::2]) == 6 and loops.axes[-2].get_title() == "990 deg"
     assert "6 of 12 wrap angles shown" in labels_of(loops)
     assert not any("shown" in text for name in ("stretch", "loops") for text in labels_of(drawn(name)))
+
+
+@pytest.mark.parametrize("name", ["stretch", "preload", "loops"])
+def test_residuals_below_are_readings_less_the_line(name):
+    data = glove((90.0,))
+    (shown,) = data[name] if isinstance(data[name], tuple) else (data[name],)
+    main, strip = drawn(name, data).axes[:2]
+    read, line = {
+        "stretch": lambda: (shown.points_stretch[~shown.points_unloading], (shown.load, shown.loading)),
+        "preload": lambda: (shown.points_preload, (shown.wrap_angle, shown.preload)),
+        "loops": lambda: (shown.points_output[shown.points_stroke > 0], (shown.input_force, shown.forward)),
+    }[name]()
+    points = strip.get_lines()[0]
+    np.testing.assert_allclose(points.get_ydata(), read - np.interp(points.get_xdata(), line[0], line[1][1]), atol=1e-9)
+    assert strip.get_ylim()[0] == -strip.get_ylim()[1] and "Residual" in strip.get_ylabel()
+    assert main.get_shared_x_axes().joined(main, strip)
 
 
 def test_a_rope_that_was_only_loaded_has_one_branch():
@@ -344,10 +360,10 @@ def test_stretches_of_true_values_are_found_to_the_last_place():
 def test_slack_has_a_panel_only_where_there_is_some(case, panels):
     data = CASES[case]()
     figure = drawn("preload", data)
-    assert len(figure.axes) == panels
+    assert len(figure.axes) == panels + 1  # and a strip of residuals
     assert any("lack" in text for text in labels_of(figure)) == (panels == 2)
     if panels == 2:
-        np.testing.assert_array_equal(figure.axes[1].get_lines()[0].get_ydata(), data["preload"].slack[1])
+        np.testing.assert_array_equal(figure.axes[-1].get_lines()[0].get_ydata(), data["preload"].slack[1])
 
 
 def test_preload_shows_curve_band_and_readings_from_zero():
@@ -399,7 +415,7 @@ def test_bending_loss_without_other_coefficients_or_preloads_has_fewer_panels():
 def test_loops_show_both_ways_and_the_readings_by_stroke():
     data = glove()
     _, recorded, read, _ = data["loops"]
-    _, second, first, _ = drawn("loops", data).axes
+    _, second, first, _ = drawn("loops", data).axes[::2]
     np.testing.assert_array_equal(line(first, "Forward, median").get_ydata(), read.forward[1])
     np.testing.assert_array_equal(line(first, "Back, median").get_ydata(), read.back[1])
     np.testing.assert_array_equal(line(first, "Forward, no preload").get_ydata(), read.capstan)
@@ -414,7 +430,7 @@ def test_loops_show_both_ways_and_the_readings_by_stroke():
 
 def test_the_slack_load_parts_both_branches_with_its_interval():
     data = glove()
-    loop, axes = data["loops"][1], drawn("loops", data).axes[1]
+    loop, axes = data["loops"][1], drawn("loops", data).axes[2]
     assert set(line(axes, "Return side goes slack").get_xdata()) == {loop.slack_load[1]}
     (interval,) = axes.patches
     assert (interval.get_x(), interval.get_x() + interval.get_width()) == pytest.approx(tuple(loop.slack_load[[0, 2]]))
@@ -427,7 +443,7 @@ def test_the_slack_load_parts_both_branches_with_its_interval():
 def test_a_slack_load_outside_the_shown_forces_is_left_out():
     data = glove((90.0,))
     far = dataclasses.replace(data["loops"][0], slack_load=np.array([190.0, 200.0, 210.0]))
-    (axes,) = drawn("loops", {"loops": (far,)}).axes
+    axes, _ = drawn("loops", {"loops": (far,)}).axes
     assert not axes.texts and not axes.patches and axes.get_xlim()[1] < 100
     assert "Return side goes slack" not in labels_of(drawn("loops", {"loops": (far,)}))
 

@@ -9,6 +9,7 @@ import jax
 import jax.numpy as jnp
 import numpy as np
 import pytest
+from figure_words import assert_readable
 from one_page import faults
 from scipy import stats
 
@@ -113,6 +114,7 @@ def test_all_figures_of_the_elastic_side_are_drawn(fit, tmp_path):
     names = {path.stem for path in bf.plot(fit, tmp_path)}
     assert {"stretch", "preload", "bending_loss", "loops", "preload_window"} <= names
     shown = dict(figures_of(fit))
+    assert_readable(shown, fit.name)
     assert [curve.wrap_angle for curve in shown["stretch"]] == pytest.approx([0, 45, 90, 135, 180])
     for curve in shown["stretch"]:
         assert np.all(np.diff(curve.loading[1]) > 0)

@@ -4,6 +4,7 @@ import jax
 import matplotlib.pyplot as plt
 import numpy as np
 import pytest
+from figure_words import assert_readable
 
 import bowdenfit as bf
 from bowdenfit.questions.bends.motor_force_figure import data, draw
@@ -29,9 +30,18 @@ def test_the_loop_of_every_run_goes_through_its_readings(shown):
 
 def test_it_is_drawn_with_a_panel_a_run_and_unused_readings_open(shown):
     figure = draw(shown)
-    assert [axes.get_title() for axes in figure.axes[:3]] == ["180 deg", "360 deg", "540 deg"]
+    assert [axes.get_title() for axes in figure.axes[::2]] == ["180 deg", "360 deg", "540 deg"]
     assert "Not used" in {line.get_label() for line in figure.axes[0].lines}
     plt.close(figure)
+    assert_readable({"motor_force": shown}, "Synthetic catheter")
+
+
+def test_residuals_are_forces_less_those_of_the_loop_at_each_reading(shown):
+    for run, strip in zip(shown, draw(shown).axes[1::2], strict=True):
+        off = run.points_force - run.points_fitted
+        assert np.median(np.abs(off)) < 0.1
+        drawn = np.concatenate([line.get_ydata() for line in strip.lines if line.get_transform() == strip.transData])
+        np.testing.assert_allclose(np.sort(drawn), np.sort(off))
 
 
 def test_other_fits_have_no_such_figure(on_body):

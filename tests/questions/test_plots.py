@@ -9,13 +9,13 @@ from types import SimpleNamespace
 import matplotlib as mpl
 import numpy as np
 import pytest
-from figure_words import check_words, words
+from figure_words import assert_readable, check_words, words
 from kept_data import assert_kept
 from matplotlib.collections import PolyCollection
 
 import bowdenfit as bf
 from bowdenfit.inference.interval import Interval
-from bowdenfit.plots.bands import BAND_QUANTILES, Band
+from bowdenfit.plots.bands import BAND_QUANTILES, NEW_RUN, Band
 from bowdenfit.plots.densities import BINS, bin_numbers, density, enclosed_share
 from bowdenfit.plots.sheet import ticks
 from bowdenfit.plots.write import write
@@ -204,7 +204,9 @@ def fit(on_body):
 
 
 def test_only_figures_that_apply_are_drawn(fit, on_body):
-    assert [name for name, _ in figures_of(fit)] == [*ALL, "checks"]
+    shown = dict(figures_of(fit))
+    assert list(shown) == [*ALL, "checks"]
+    assert_readable(shown, fit.name)
     squares = bf.fit(on_body, mcmc=False)
     assert [name for name, _ in figures_of(squares)] == ["wrap_angles", "efficiency", "residuals"]
     without = bf.fit(on_body.parent / "yarn-on-cylinder", mcmc=False)
@@ -292,7 +294,7 @@ def test_without_draws_there_is_a_line_and_no_band():
         axes = drawn(name, data).axes[0]
         assert line(axes, "Least squares")
         assert not [c for c in axes.collections if isinstance(c, PolyCollection)]
-    assert len(drawn("efficiency", data).axes) == 1
+    assert len(drawn("efficiency", data).axes) == 2  # the curve and its residuals
 
 
 def test_no_curve_is_drawn_outside_the_range():
@@ -317,11 +319,20 @@ def test_efficiency_marks_points_outside_with_their_prediction():
 
 def test_optimum_window_and_choices_stand_below_the_efficiency():
     data = paper_data()
-    _, where, which = drawn("efficiency", data).axes
+    _, strip, where, which = drawn("efficiency", data).axes
+    np.testing.assert_allclose(strip.get_lines()[0].get_ydata(), -0.2, atol=1e-9)
     window = next(p for p in where.patches if "best with 95 %" in p.get_label())
     assert (window.get_x(), window.get_x() + window.get_width()) == (455.0, 484.0)
     heights = [bar.get_height() for bar in which.containers[0]]
     assert heights == [100 * choice.probability_best for choice in data["efficiency"].optimum.choices]
+
+
+def test_runs_stand_beside_the_lines_between_which_nine_of_ten_lie():
+    data = with_many_runs(paper_data())
+    ends = data["efficiency"].efficiency.quantiles[[0, -1]] + [[-0.02], [0.02]]
+    axes = drawn("efficiency", changed(data, "efficiency", new_run=ends)).axes[0]
+    shown = [line.get_ydata() for line in axes.get_lines() if line.get_label() == NEW_RUN]
+    np.testing.assert_allclose(shown, 100 * ends)
 
 
 def test_a_missing_window_is_not_drawn():

@@ -5,6 +5,7 @@ import math
 
 import numpy as np
 import pytest
+from figure_words import assert_readable
 from loop_benches import MU, PRELOAD, folder_of, recorded, several_in
 
 import bowdenfit as bf
@@ -89,6 +90,7 @@ def test_traces_show_what_load_cells_with_known_errors_read(tmp_path):
 
 def test_only_the_figures_that_make_sense_for_a_loop_are_drawn(sampled):
     shown = dict(figures_of(sampled))
+    assert_readable(shown, sampled.name)
     assert {"recordings", "autocorrelation"} <= set(shown)
     assert not set(shown) & {"hysteresis", "sample_efficiency", "dependence"}
     figure = FIGURES["recordings"].draw(shown["recordings"])
@@ -99,7 +101,7 @@ def test_only_the_figures_that_make_sense_for_a_loop_are_drawn(sampled):
 
 def test_points_of_a_loop_s_plane_are_gathered_by_wrap_angle(several):
     fit = bf.fit(several, mcmc=False)
-    angle, force_in, force_out = loop_points(fit)
+    angle, force_in, force_out, _ = loop_points(fit)
     np.testing.assert_allclose(np.rad2deg(np.unique(angle)), [90, 180, 270])
     assert set(loop_points(fit, contact=0)[0]) == set(angle)
     for of_one in np.unique(angle):

@@ -6,6 +6,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from cables import cable, measured
+from figure_words import assert_readable
 from one_page import faults
 
 import bowdenfit as bf
@@ -16,6 +17,7 @@ from bowdenfit.inference.interval import Interval
 from bowdenfit.kinds.designs import design_of
 from bowdenfit.kinds.forces.table import ForceTable
 from bowdenfit.questions.check.data_set_words import check_text
+from bowdenfit.questions.figures import figures_of
 from bowdenfit.questions.identify.confounding import confounded_pairs
 from bowdenfit.questions.recorded import dependence_figure
 from bowdenfit.questions.recorded.rate import RateEffect, rate_effect
@@ -55,6 +57,12 @@ def test_the_summary_of_recordings_is_one_page(plain, with_rate):
     assert faults(summary_text(plain[0])) == []
     assert faults(summary_text(with_rate[0])) == []  # so short that it is not trusted, and begins with that
     assert "no dependence on speed" in " ".join(answer(with_rate[0]))
+
+
+def test_figures_of_recordings_can_be_read(plain, with_rate):
+    assert_readable(dict(figures_of(plain[0])), plain[0].name)
+    shown = dict(figures_of(with_rate[0], ["dependence", "efficiency", "recordings"]))
+    assert_readable(shown, with_rate[0].name)
 
 
 def test_the_coefficients_of_the_synthetic_recordings_lie_in_their_intervals(plain, truth):

@@ -103,6 +103,7 @@ def dependence_on(what, label, x, draws=True, runs=3):
         constant=0.787, points_x=np.tile(points, runs),
         points_efficiency=np.tile(np.interp(points, x, middle), runs) + np.repeat(0.004 * np.arange(runs), 4),
         points_label=tuple(f"mounting {i}" for i in range(runs) for _ in points), place="at 470 mm",
+        points_half=np.full(4 * runs, 0.003), new_run=middle + 0.02 * np.array([[-1], [1]]) if draws else np.zeros((0, len(x))),
     )  # fmt: skip
 
 
@@ -196,14 +197,25 @@ def test_deviations_that_alternate_are_correlated_in_turn():
     np.testing.assert_allclose(correlation, np.resize([1.0, -1.0], 60) * (400 - np.arange(60)) / 400)
 
 
-@pytest.mark.parametrize("name", NAMES[:4])
-def test_eight_of_twenty_recordings_are_shown_from_first_to_last(name):
+@pytest.mark.parametrize(("name", "count"), list(zip(NAMES[:4], (9, 8, 8, 8), strict=True)))
+def test_some_of_twenty_recordings_are_shown_from_first_to_last(name, count):
     figure = drawn(name, "twenty, long names")
-    assert len(figure.axes) == 8
-    assert "8 of 20 recordings shown" in legend_of(figure)
+    assert len(figure.axes) == count
+    assert f"{count} of 20 recordings shown" in legend_of(figure)
     titles = [axes.get_title() for axes in figure.axes]
     assert titles[0].endswith("00") and titles[-1].endswith("19") and all(t.startswith("…") for t in titles)
     assert not any("shown" in text for text in legend_of(drawn(name, "seven")))
+
+
+@pytest.mark.parametrize("width", [None, 3.5])
+def test_recordings_take_no_more_room_however_many_they_are(width):
+    def room(case):
+        figure = FIGURES["recordings"].draw(CASES[case]()["recordings"], width)
+        boxes = [axes.get_position() for axes in figure.axes]
+        return figure.get_size_inches()[1] * (max(b.y1 for b in boxes) - min(b.y0 for b in boxes))
+
+    rooms = [room(case) for case in ("one", "two", "four", "seven", "twenty, long names")]
+    assert max(rooms) < rooms[0] + 0.01
 
 
 @pytest.mark.parametrize(("case", "columns"), [("one", 1), ("two", 2), ("four", 4), ("seven", 4)])
@@ -383,7 +395,12 @@ def test_dependence_shows_curve_constant_and_points():
     assert (first.get_title(), second.get_title()) == ("Load at 470 mm", "Speed at 470 mm")
     assert (first.get_xscale(), second.get_xscale()) == ("linear", "log")
     np.testing.assert_allclose(line(first, "Median").get_ydata(), 100 * load.quantiles[1])
-    np.testing.assert_allclose(line(first, "mounting 1").get_ydata(), 100 * load.points_efficiency[4:8])
+    assert [list(a.get_ydata()) for a in first.get_lines() if a.get_label() == "90 % of runs, each on a new mounting"] == [
+        list(100 * end) for end in load.new_run
+    ]
+    points = next(bars for bars in first.containers if bars.get_label() == "mounting 1")
+    np.testing.assert_allclose(points[0].get_ydata(), 100 * load.points_efficiency[4:8])
+    np.testing.assert_allclose([np.ptp(bar[:, 1]) for bar in points[2][0].get_segments()], 2 * 0.3)
     assert set(line(first, "Capstan equation alone").get_ydata()) == {78.7}
     assert "Measured in 12 runs" in legend_of(drawn("dependence", "two"))
 

@@ -7,7 +7,7 @@ import pytest
 from matplotlib.mathtext import MathTextParser
 
 import bowdenfit as bf
-from bowdenfit.parameters.symbols import symbol_of, upright
+from bowdenfit.parameters.symbols import symbol_of
 from bowdenfit.results.netcdf import read_groups, write_groups
 from bowdenfit.words import printable
 
@@ -44,16 +44,18 @@ def called(on_body, place, name):
     return folder
 
 
-def test_every_printable_letter_can_be_set_in_a_subscript():
+def test_every_printable_letter_can_be_set_behind_a_symbol():
     parser = MathTextParser("path")
     letters = [chr(i) for i in (*range(0x20, 0x250), 0x3BC, 0x2116, 0x4E2D, 0x1F600) if chr(i).isprintable()]
     for letter in letters:
         parser.parse(symbol_of(r"\mu", f"x{letter}y"))
-        parser.parse(f"${upright(letter)}$")
+        parser.parse(symbol_of(r"\mu", letter))
 
 
-def test_an_underscore_in_a_coefficient_s_name_is_a_space_and_no_subscript():
-    assert symbol_of(r"\mu", "sheath_edge") == r"$\mu_\mathrm{sheath\ edge}$"
+def test_a_coefficient_s_name_stands_behind_its_letter_and_only_an_index_below_it():
+    assert symbol_of(r"\mu", "sheath_edge") == r"$\mu$ sheath edge"
+    assert symbol_of(r"\mu", "a $ b") == r"$\mu$ a \$ b"
+    assert symbol_of(r"\mu", "1") == r"$\mu_\mathrm{1}$"
 
 
 def test_odd_names_come_back_from_the_file_of_draws(tmp_path):

@@ -62,11 +62,11 @@ def _stiffness(table: DisplacementTable, at: Circumstances) -> list[Parameter]:
         END_SPRING, r"$K$", "stiffness of the spring at the far end", "elastic", prior, "N/mm", scaled_by=rests
     )
     linear = Parameter(
-        ROPE_STIFFNESS, r"$k_\mathrm{rope}$", "stiffness of rope and sheath together", "elastic", prior, "N/mm",
+        ROPE_STIFFNESS, "$k$ rope", "stiffness of rope and sheath together", "elastic", prior, "N/mm",
         scaled_by=rests,
     )  # fmt: skip
     give = Parameter(
-        ROPE_GIVE, r"$K/k_\mathrm{rope}$", "give of rope and sheath over that of the spring at the far end", "elastic",
+        ROPE_GIVE, "$K/k$ rope", "give of rope and sheath over that of the spring at the far end", "elastic",
         HalfCauchy(at.defaults.rope_give),
     )  # fmt: skip
     at_stop = settings is not None and settings.end == "stop"
@@ -86,4 +86,4 @@ def _offset(table: DisplacementTable, at: Circumstances) -> Parameter:
     by = Scale(float(np.ptp(table.force)) or 1.0, "range of forces", "N")
     prior = Normal(0.0, part * by.value)
     meaning = "offset of the load cell at the motor"
-    return Parameter(INPUT_OFFSET, r"$b_\mathrm{in}$", meaning, "sensor", prior, "N", scaled_by=by.share(part))
+    return Parameter(INPUT_OFFSET, "$b$ input", meaning, "sensor", prior, "N", scaled_by=by.share(part))

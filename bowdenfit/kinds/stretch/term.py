@@ -64,7 +64,7 @@ def _parameters(table: StretchTable, at: Circumstances) -> list[Parameter]:
     largest = Scale(float(np.max(np.abs(table.stretch))) or usual, "largest stretch", "mm")
     spread = Scale(float(np.ptp(table.stretch)) or usual, "range of stretch", "mm")
     own_friction = Parameter(
-        STRETCH_FRICTION, r"$\mu_\mathrm{stretch}$", "friction coefficient while the rope is stretched", "friction",
+        STRETCH_FRICTION, r"$\mu$ stretch", "friction coefficient while the rope is stretched", "friction",
         LogNormal(prior.median, prior.log_sd),
     )  # fmt: skip
     return [

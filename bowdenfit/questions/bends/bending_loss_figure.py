@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -13,6 +13,8 @@ from bowdenfit.plots.captions import curve_words
 from bowdenfit.plots.layout import LEGEND_ROW, TITLE, columns_within, legend_above, panels
 from bowdenfit.plots.panels import label_outer, span
 from bowdenfit.plots.style import BLACK, EFFICIENCY, GRAY, MEDIUM, WIDE, WRAP_ANGLE, in_paper_style, mapped_color
+from bowdenfit.questions.bends.loop_readings import measured_efficiency, readings_of_loop
+from bowdenfit.words import counted
 
 if TYPE_CHECKING:
     from bowdenfit.plots.layout import Axes, Figure
@@ -56,6 +58,7 @@ class BendingLoss:
         fitted_label: Words for it, such as "as fitted, preload 22 N".
         coefficients: Lines for several friction coefficients, with the fitted preload.
         preloads: Lines for several preloads, with the fitted coefficients.
+        points_wrap_angle, points_efficiency: Measured there [deg, 1], between the readings next to the input force.
     """
 
     wrap_angle: np.ndarray
@@ -65,6 +68,8 @@ class BendingLoss:
     fitted_label: str
     coefficients: tuple[EfficiencyLine, ...]
     preloads: tuple[EfficiencyLine, ...]
+    points_wrap_angle: np.ndarray = field(default_factory=lambda: np.zeros(0))
+    points_efficiency: np.ndarray = field(default_factory=lambda: np.zeros(0))
 
 
 def data(fit: Record) -> BendingLoss | None:
@@ -74,13 +79,21 @@ def data(fit: Record) -> BendingLoss | None:
     from bowdenfit.physics.friction import transmission_efficiency
     from bowdenfit.physics.loop import loop_output_force
     from bowdenfit.questions.bends.answer import elastic_answers, typical_preload
-    from bowdenfit.questions.bends.curves import POINTS, Values, of_draws, quantiles, range_of_bends, reference_angle
+    from bowdenfit.questions.bends.curves import (
+        POINTS,
+        Values,
+        loop_bends,
+        of_draws,
+        quantiles,
+        range_of_bends,
+        reference_angle,
+    )
 
-    bends = range_of_bends(fit)
-    if bends is None:
+    bends, measured = range_of_bends(fit), loop_bends(fit)
+    if bends is None or measured is None:
         return None
     elastic, typical = elastic_answers(fit), typical_preload(fit)
-    angles, force = np.linspace(0, bends[1], POINTS), elastic.reference_force
+    angles, force = np.linspace(*bends, POINTS), elastic.reference_force
     preloads = np.unique([float(f"{typical * factor:.2g}") for factor in TIMES_PRELOAD])
     bent = elastic.bent(angles)
 
@@ -115,6 +128,7 @@ def data(fit: Record) -> BendingLoss | None:
             EfficiencyLine(f"preload {preload:g} N", line, capstan)
             for preload, line in zip(preloads, lines["preloads"], strict=True)
         ),
+        *measured_efficiency(readings_of_loop(fit, measured), force),
     )
 
 
@@ -123,7 +137,8 @@ def caption(loss: BendingLoss) -> str:
     return (
         f"Efficiency, output over input force while moving forward, against the wrap angle, at {loss.input_force:.4g} N input "
         f"force. Black: the cable as fitted. {curve_words(len(loss.fitted) > 1)} In color: the same cable with other friction "
-        "coefficients, and with other preloads. Dashed: the capstan equation alone, which has no preload."
+        "coefficients, and with other preloads. Dashed: the capstan equation alone, which has no preload. Circles: measured, "
+        f"between the readings next to that input force, n = {counted(len(loss.points_wrap_angle), 'wrap angle')}."
     )
 
 
@@ -169,6 +184,11 @@ def _fitted(axes: Axes, loss: BendingLoss) -> None:
     name_band(axes, loss.fitted, BLACK)
     axes.plot(loss.wrap_angle, 100 * loss.fitted_capstan, color=BLACK, linestyle=DASHES, linewidth=0.9)
     axes.plot([], [], color=GRAY, linestyle=DASHES, linewidth=0.9, label="Capstan equation alone")
+    if len(loss.points_wrap_angle):
+        axes.plot(
+            loss.points_wrap_angle, 100 * loss.points_efficiency, "o", color=BLACK, markersize=4.5, markerfacecolor="white",
+            zorder=4, label="Measured",
+        )  # fmt: skip
 
 
 def _color(colors: str, number: int, of: int) -> Any:
@@ -179,5 +199,6 @@ def _color(colors: str, number: int, of: int) -> Any:
 def _limits(loss: BendingLoss) -> tuple[float, float]:
     """Efficiencies that show every line, from 0 % to 100 % at most."""
     lines = [v for line in (*loss.coefficients, *loss.preloads) for v in (line.efficiency, line.capstan)]
-    low, high = span([100 * np.asarray(v) for v in (*lines, loss.fitted, loss.fitted_capstan)], room=0.04)
-    return max(low, -2.0), min(high, 102.0)
+    lines += [loss.fitted, loss.fitted_capstan, loss.points_efficiency]
+    low, high = span([100 * np.asarray(v) for v in lines], room=0.04)
+    return max(low, -2.0), min(high, max(102.0, 103 * float(loss.points_efficiency.max(initial=0.0))))

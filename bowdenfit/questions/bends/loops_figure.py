@@ -10,8 +10,10 @@ import numpy as np
 from bowdenfit.plots.bands import draw_quantiles, evenly, middle, name_band, say_of_how_many
 from bowdenfit.plots.captions import curve_words, shown_words, strip_words
 from bowdenfit.plots.layout import legend_above
-from bowdenfit.plots.panels import enlarge_marks, label_outer, panels_with_limits, span
+from bowdenfit.plots.panels import enlarge_marks, span
+from bowdenfit.plots.strips import panels_with_strips
 from bowdenfit.plots.style import BLACK, BLUE, GRAY, LEAST_SQUARES, MEDIAN, PURPLE, VERMILLION, in_paper_style
+from bowdenfit.questions.bends.loop_readings import RECORDED, readings_of_loop
 from bowdenfit.words import counted
 
 if TYPE_CHECKING:
@@ -20,11 +22,14 @@ if TYPE_CHECKING:
 
 HEADING = "Forces of the loop"
 MOST, MOST_COLUMNS = 6, 3
+LEAST_NAMED = 1.5  # in, width of a panel with names of the branches
 WORD_ROOM = 0.075  # share of a panel's width that a word along the line takes
 # stroke, name, marker, size [pt], color
 STROKES = (
     (1, "Read moving forward", "o", 3.4, BLUE),
     (-1, "Read moving back", "s", 3.2, VERMILLION),
+    (RECORDED, "Recorded moving forward", "o", 1.2, BLUE),
+    (-RECORDED, "Recorded moving back", "s", 1.2, VERMILLION),
     (0, "Recorded", "o", 1.2, GRAY),
 )
 
@@ -40,7 +45,7 @@ class LoopCurve:
         capstan: Median output force of a rope without preload, moving forward [N].
         slack_load: Quantiles of the input force at which the return side goes slack [N].
         points_input, points_output: Readings [N].
-        points_stroke: +1 forward, -1 back, 0 of a recording.
+        points_stroke: +1 forward, -1 back; twice that of a recording, and 0 where it is neither.
     """
 
     label: str
@@ -55,7 +60,7 @@ class LoopCurve:
 
 
 def data(fit: Record) -> tuple[LoopCurve, ...] | None:
-    """A curve for each wrap angle that a loop with preload was moved at; None of anything else."""
+    """A curve for each wrap angle that forces of a loop with preload were read at; None of anything else."""
     import jax.numpy as jnp
 
     from bowdenfit.physics.loop import loop_band, slack_load
@@ -65,15 +70,16 @@ def data(fit: Record) -> tuple[LoopCurve, ...] | None:
     bends = loop_bends(fit)
     if bends is None:
         return None
-    elastic, (angle, force_in, force_out, stroke) = elastic_answers(fit), _points(fit, bends)
-    angles = some_of(np.unique(np.round(angle, 9)) if len(angle) else bends, MOST)
-    ends = np.append(force_in, 0.0) if len(angle) else np.array([0.0, 2 * elastic.reference_force])
-    forces = np.linspace(1.05 * ends.min(), 1.05 * ends.max(), POINTS)
-    bent = elastic.bent(angles)
+    angle, force_in, force_out, stroke = readings_of_loop(fit, bends)
+    if not len(angle):
+        return None
+    angles = some_of(np.unique(np.round(angle, 9)), MOST)
+    read = [force_in[np.isclose(angle, bend)] for bend in angles]
+    forces, bent = np.array([np.linspace(f.min(), f.max(), POINTS) for f in read]), elastic_answers(fit).bent(angles)
 
     def curves(values: Values) -> dict[str, Any]:
         exponent, preload = bent.exponent(values), bent.preload(values)[0]
-        force = jnp.broadcast_to(jnp.asarray(forces), (len(angles), POINTS))
+        force = jnp.asarray(forces)
         forward, back = loop_band(force, preload[:, None], exponent[:, None])
         capstan = loop_band(force, jnp.zeros_like(exponent)[:, None], exponent[:, None])[0]
         return {"forward": forward, "back": back, "capstan": capstan, "slack": slack_load(preload, exponent)}
@@ -84,24 +90,8 @@ def data(fit: Record) -> tuple[LoopCurve, ...] | None:
         here = np.isclose(angle, bend)
         points = force_in[here], force_out[here], stroke[here]
         capstan = np.median(draws["capstan"][:, i], axis=0)
-        found.append(LoopCurve(f"{np.rad2deg(bend):.4g} deg", forces, forward, back, capstan, slack, *points))
+        found.append(LoopCurve(f"{np.rad2deg(bend):.4g} deg", forces[i], forward, back, capstan, slack, *points))
     return tuple(found)
-
-
-def _points(fit: Record, bends: np.ndarray) -> np.ndarray:
-    """Wrap angle [rad], input force, output force [N] and stroke (0 of a recording) of every recorded block and reading."""
-    from bowdenfit.kinds.loop.table import LoopTable
-    from bowdenfit.questions.bends.answer import elastic_answers
-    from bowdenfit.questions.recorded.loop_traces import loop_points
-
-    contact, table = elastic_answers(fit).contact, fit.dataset.measurements.table(LoopTable)
-    recorded = loop_points(fit, contact)
-    parts = [np.concatenate([recorded, np.zeros((1, recorded.shape[1]))])]
-    if table is not None:
-        column = fit.dataset.description.contact[contact].wrap_angle.column
-        angle = np.full(len(table.stroke), bends[0]) if column is None else np.nan_to_num(table.own.column(column)[0])
-        parts.append(np.stack([angle, table.input_force, table.output_force, table.stroke]))
-    return np.concatenate(parts, axis=1)
 
 
 def caption(loops: tuple[LoopCurve, ...]) -> str:
@@ -120,24 +110,28 @@ def draw(loops: tuple[LoopCurve, ...], width: float | None = None) -> Figure:
     shown = evenly(loops, MOST)
     across = [span([loop.input_force, loop.points_input], room=0.03) for loop in shown]
     up = [span([loop.forward, loop.back, loop.points_output]) for loop in shown]
-    figure, flat, columns = panels_with_limits([loop.label for loop in shown], across, up, MOST_COLUMNS, width=width)
-    for axes, loop in zip(flat, shown, strict=True):
+    made = panels_with_strips([loop.label for loop in shown], across, up, MOST_COLUMNS, width=width)
+    for axes, strip, loop in zip(made.mains, made.strips, shown, strict=True):
         axes.locator_params(nbins=6, steps=[1, 2, 2.5, 5, 10])
         _curves(axes, loop)
         _readings(axes, loop)
         _slack(axes, loop)
-    label_outer(flat, columns, "Input force (N)", "Output force (N)")
-    say_of_how_many(flat[-1], len(shown), len(loops), "wrap angles")
-    legend_above(figure, flat, columns={1: 2, 2: 3}.get(columns, 4))
-    enlarge_marks(figure)
-    return figure
+        _residuals(strip, loop)
+    made.finish_strips()
+    made.label("Input force (N)", "Output force (N)", "N")
+    say_of_how_many(made.mains[-1], len(shown), len(loops), "wrap angles")
+    legend_above(made.figure, made.mains, columns={1: 2, 2: 3}.get(made.columns, 4))
+    enlarge_marks(made.figure)
+    return made.figure
 
 
 def _curves(axes: Axes, loop: LoopCurve) -> None:
     """Both ways, and the way forward of a rope without preload."""
     name = (MEDIAN if len(loop.forward) > 1 else LEAST_SQUARES).lower()
-    draw_quantiles(axes, loop.input_force, loop.forward, BLUE, label=f"Forward, {name}")
-    draw_quantiles(axes, loop.input_force, loop.back, VERMILLION, label=f"Back, {name}")
+    still = not np.any(loop.points_stroke)
+    for way, line, color, words in ((1, loop.forward, BLUE, "Forward"), (-1, loop.back, VERMILLION, "Back")):
+        if still or np.any(np.sign(loop.points_stroke) == way):
+            draw_quantiles(axes, loop.input_force, line, color, label=f"{words}, {name}")
     name_band(axes, loop.forward)
     axes.plot(
         loop.input_force, loop.capstan, color=BLACK, linestyle=(0, (4, 1.6)), linewidth=1.0, zorder=2.5,
@@ -150,10 +144,24 @@ def _readings(axes: Axes, loop: LoopCurve) -> None:
     for stroke, name, marker, size, color in STROKES:
         here = loop.points_stroke == stroke
         if here.any():
-            edge = {"markeredgewidth": 0.0} if stroke == 0 else {"markeredgewidth": 0.5, "markeredgecolor": "white"}
+            many = abs(stroke) != 1
+            edge = {"markeredgewidth": 0.0} if many else {"markeredgewidth": 0.5, "markeredgecolor": "white"}
             axes.plot(
                 loop.points_input[here], loop.points_output[here], marker, color=color, markersize=size, **edge,
-                zorder=2.2 if stroke == 0 else 3, label=name, rasterized=stroke == 0,
+                zorder=2.2 if many else 3, label=name, rasterized=many,
+            )  # fmt: skip
+
+
+def _residuals(strip: Axes, loop: LoopCurve) -> None:
+    """Output less that of the branch on which it was read."""
+    for stroke, _, marker, size, color in STROKES:
+        here = loop.points_stroke == stroke
+        if stroke and here.any():
+            line = middle(loop.forward if stroke > 0 else loop.back)
+            off = loop.points_output[here] - np.interp(loop.points_input[here], loop.input_force, line)
+            strip.plot(
+                loop.points_input[here], off, marker, color=color, markersize=0.8 * size, markeredgewidth=0,
+                rasterized=abs(stroke) != 1,
             )  # fmt: skip
 
 
@@ -174,7 +182,9 @@ def _slack(axes: Axes, loop: LoopCurve) -> None:
 
 
 def _branches(axes: Axes, loop: LoopCurve, place: float) -> None:
-    """Both branches named along the line, at the end of it that is farther from the loop."""
+    """Both branches named along the line, at the end of it that is farther from the loop; not in a small panel."""
+    if axes.get_position().width * axes.figure.get_size_inches()[0] < LEAST_NAMED:  # type: ignore[union-attr]
+        return
     bottom, top = axes.get_ylim()
     height = float(np.interp(middle(loop.slack_load), loop.input_force, middle(loop.forward + loop.back) / 2))
     y, side = (0.02, "bottom") if height > (bottom + top) / 2 else (0.98, "top")

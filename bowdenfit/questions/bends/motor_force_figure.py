@@ -11,7 +11,8 @@ import numpy as np
 from bowdenfit.plots.bands import draw_quantiles, evenly, name_band, say_of_how_many
 from bowdenfit.plots.captions import curve_words, shown_words, strip_words
 from bowdenfit.plots.layout import legend_above
-from bowdenfit.plots.panels import enlarge_marks, label_outer, panels_with_limits, span
+from bowdenfit.plots.panels import enlarge_marks, span
+from bowdenfit.plots.strips import panels_with_strips
 from bowdenfit.plots.style import BLUE, GRAY, LEAST_SQUARES, MEDIAN, VERMILLION, in_paper_style
 from bowdenfit.words import counted
 
@@ -38,6 +39,7 @@ class MotorForce:
         stroke: +1 pulling, -1 return, there.
         points_displacement, points_force, points_stroke: Readings [mm, N].
         points_used: Whether each is used.
+        points_fitted: Median of the fitted force where each was read [N].
     """
 
     label: str
@@ -48,6 +50,7 @@ class MotorForce:
     points_force: np.ndarray
     points_stroke: np.ndarray
     points_used: np.ndarray
+    points_fitted: np.ndarray
 
 
 def data(fit: Record) -> tuple[MotorForce, ...] | None:
@@ -62,17 +65,21 @@ def data(fit: Record) -> tuple[MotorForce, ...] | None:
     if table is None or term is None:
         return None
     path = _path(table)
-    every = np.arange(len(path.run))
-    along = {"turns": turns_by_depth(path.motion.turns), "angles": term.data["angles"], **readings(path, every)}
+    both = [
+        {"turns": turns_by_depth(way.motion.turns), "angles": term.data["angles"], **readings(way, np.arange(len(way.run)))}
+        for way in (path, table)
+    ]
 
     def curves(values: Values) -> dict[str, Any]:
-        return {"force": term.shown(values, along, term.mounted(values, term.data))}
+        mounted = term.mounted(values, term.data)
+        return {name: term.shown(values, way, mounted) for name, way in zip(("along", "read"), both, strict=True)}
 
-    drawn, found = of_draws(fit, curves)["force"], []
+    draws, found = of_draws(fit, curves), []
+    drawn, fitted = draws["along"], np.median(draws["read"], axis=0)
     for run, name in enumerate(table.run_names):
         here, rows = path.run == run, table.run == run
         label = "" if len(table.run_names) == 1 else name
-        points = table.displacement[rows], table.force[rows], table.motion.stroke[rows], table.used[rows]
+        points = table.displacement[rows], table.force[rows], table.motion.stroke[rows], table.used[rows], fitted[rows]
         curve = path.displacement[here], quantiles(drawn[:, here]), path.motion.stroke[here]
         found.append(MotorForce(label, *curve, *points))
     return tuple(found)
@@ -114,15 +121,17 @@ def draw(runs: tuple[MotorForce, ...], width: float | None = None) -> Figure:
     shown = evenly(runs, MOST)
     across = [span([run.displacement], room=0.03) for run in shown]
     up = [span([run.force, run.points_force]) for run in shown]
-    figure, flat, columns = panels_with_limits([run.label for run in shown], across, up, MOST_COLUMNS, width=width)
-    for axes, run in zip(flat, shown, strict=True):
+    made = panels_with_strips([run.label for run in shown], across, up, MOST_COLUMNS, width=width)
+    for axes, strip, run in zip(made.mains, made.strips, shown, strict=True):
         _loop(axes, run)
-        _readings(axes, run)
-    label_outer(flat, columns, "Displacement at the motor (mm)", "Force at the motor (N)")
-    say_of_how_many(flat[-1], len(shown), len(runs), "runs")
-    legend_above(figure, flat, columns={1: 2, 2: 3}.get(columns, 4))
-    enlarge_marks(figure)
-    return figure
+        _readings(axes, run.points_force, run)
+        _readings(strip, run.points_force - run.points_fitted, run)
+    made.finish_strips()
+    made.label("Displacement at the motor (mm)", "Force at the motor (N)", "N")
+    say_of_how_many(made.mains[-1], len(shown), len(runs), "runs")
+    legend_above(made.figure, made.mains, columns={1: 2, 2: 3}.get(made.columns, 4))
+    enlarge_marks(made.figure)
+    return made.figure
 
 
 def _loop(axes: Axes, run: MotorForce) -> None:
@@ -140,14 +149,14 @@ def _loop(axes: Axes, run: MotorForce) -> None:
     axes.axhline(0.0, color=GRAY, linewidth=0.6, zorder=0.5)
 
 
-def _readings(axes: Axes, run: MotorForce) -> None:
-    """Readings by stroke; those that are not used are open."""
+def _readings(axes: Axes, shown: np.ndarray, run: MotorForce) -> None:
+    """Forces or residuals of the readings by stroke; those that are not used are open."""
     for stroke, name, marker, size, color in _STROKES:
         for used, words in ((True, name), (False, "Not used")):
             here = (run.points_stroke == stroke) & (run.points_used.astype(bool) == used)
             if here.any():
                 axes.plot(
-                    run.points_displacement[here], run.points_force[here], marker, color=color, markersize=size,
+                    run.points_displacement[here], shown[here], marker, color=color, markersize=size,
                     markerfacecolor=color if used else "white", markeredgewidth=0.5,
                     markeredgecolor="white" if used else color, zorder=3, label=words,
                 )  # fmt: skip

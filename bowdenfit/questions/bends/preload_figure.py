@@ -7,10 +7,11 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from bowdenfit.plots.bands import draw_quantiles, name_band
+from bowdenfit.plots.bands import draw_quantiles, middle, name_band
 from bowdenfit.plots.captions import curve_words, strip_words
 from bowdenfit.plots.layout import legend_above, panels
 from bowdenfit.plots.panels import span
+from bowdenfit.plots.strips import STRIP, finish_strips, name_strip, place_names
 from bowdenfit.plots.style import BLACK, BLUE, LEAST_SQUARES, LIGHT, MEDIAN, MEDIUM, WRAP_ANGLE, in_paper_style, percent
 from bowdenfit.words import counted
 
@@ -54,7 +55,7 @@ def data(fit: Record) -> PreloadCurve | None:
 
     if not fit.dataset.description.preload_follows_stretch or not knows_preload(fit.model):
         return None
-    angles = np.linspace(0.0, _largest_bend(fit), POINTS)
+    angles = np.linspace(*_bends(fit), POINTS)
 
     def curves(values: Values) -> dict[str, Any]:
         preload, slack = fit.model.cable.elasticity.preload(values, jnp.asarray(angles))
@@ -68,12 +69,14 @@ def data(fit: Record) -> PreloadCurve | None:
     )
 
 
-def _largest_bend(fit: Record) -> float:
-    """Largest total wrap angle of any reading [rad]; pi without one."""
+def _bends(fit: Record) -> tuple[float, float]:
+    """Smallest and largest total wrap angle of any reading [rad]; from 0 where all are the same, to pi without one."""
     from bowdenfit.kinds import each_table
 
     found = [kind.bends(table) for kind, table in each_table(fit.dataset.measurements) if kind.bends is not None]
-    return max([float(a.max()) for a in found], default=np.pi)
+    every = np.concatenate([np.zeros(0), *found])
+    low, high = (float(every.min()), float(every.max())) if len(every) else (0.0, np.pi)
+    return (low, high) if low < high else (0.0, high or np.pi)
 
 
 def caption(curve: PreloadCurve) -> str:
@@ -92,11 +95,16 @@ def caption(curve: PreloadCurve) -> str:
 def draw(curve: PreloadCurve, width: float | None = None) -> Figure:
     """Preload [N] against the wrap angle [deg], and below it the slack [mm] where there is any."""
     ever_slack = bool(np.max(curve.slack) > 0)
-    figure, flat = panels([2.2, 0.9] if ever_slack else [2.6], 1, 0.02, (0, 0.16), width or MEDIUM, sharex=True)
+    read = len(curve.points_wrap_angle) > 0
+    heights = [2.2, *([STRIP] if read else []), *([0.9] if ever_slack else [])]
+    figure, flat = panels(heights, 1, 0.02, (0, 0.16), width or MEDIUM, sharex=True)
     _preload(flat[0], curve)
+    if read:
+        _residuals(flat[1], curve)
+        place_names(flat[0], flat[1])
     if ever_slack:
-        draw_quantiles(flat[1], curve.wrap_angle, curve.slack, BLUE)
-        _from_zero(flat[1], "Slack (mm)", curve.slack)
+        draw_quantiles(flat[-1], curve.wrap_angle, curve.slack, BLUE)
+        _from_zero(flat[-1], "Slack (mm)", curve.slack)
     for axes in flat:
         _shade_slack(axes, curve)
     flat[-1].set_xlabel(WRAP_ANGLE)
@@ -113,6 +121,15 @@ def _preload(axes: Axes, curve: PreloadCurve) -> None:
     if len(curve.points_wrap_angle):
         axes.plot(curve.points_wrap_angle, curve.points_preload, "o", color=BLACK, zorder=3, label="Reading")
     _from_zero(axes, "Preload (N)", curve.preload, curve.points_preload)
+
+
+def _residuals(strip: Axes, curve: PreloadCurve) -> None:
+    """Readings less the curve."""
+    order = np.argsort(curve.wrap_angle)
+    line = np.interp(curve.points_wrap_angle, curve.wrap_angle[order], middle(curve.preload)[order])
+    strip.plot(curve.points_wrap_angle, curve.points_preload - line, "o", color=BLACK, markersize=3.6)
+    finish_strips([strip])
+    name_strip(strip, "N")
 
 
 def _from_zero(axes: Axes, label: str, *values: np.ndarray) -> None:

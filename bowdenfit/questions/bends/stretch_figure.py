@@ -8,11 +8,12 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from bowdenfit.plots.bands import draw_quantiles, evenly, name_band, say_of_how_many
+from bowdenfit.plots.bands import draw_quantiles, evenly, middle, name_band, say_of_how_many
 from bowdenfit.plots.captions import curve_words, shown_words, strip_words
-from bowdenfit.plots.layout import legend_above, panels
+from bowdenfit.plots.layout import legend_above
 from bowdenfit.plots.panels import span
-from bowdenfit.plots.style import BLACK, GRAY, LEAST_SQUARES, MEDIAN, MEDIUM, in_paper_style, mapped_color
+from bowdenfit.plots.strips import panels_with_strips
+from bowdenfit.plots.style import BLACK, GRAY, LEAST_SQUARES, MEDIAN, in_paper_style, mapped_color
 from bowdenfit.words import counted
 
 if TYPE_CHECKING:
@@ -21,6 +22,7 @@ if TYPE_CHECKING:
 
 HEADING = "Stretch against load"
 MOST, MOST_COLUMNS = 8, 4  # wrap angles in a panel, and columns of its legend
+HEIGHT = 2.6  # in
 DARKEST, LIGHTEST = 0.0, 0.86  # ends of the color map in use; what follows is too light on white
 DASHES = (0, (4, 1.6))
 MARKERS = ("o", "s", "^", "D", "v", "p", "<", "h")  # whose open forms can be told from the filled ones
@@ -58,11 +60,13 @@ def data(fit: Record) -> tuple[StretchCurve, ...] | None:
     table = fit.dataset.measurements.table(StretchTable)
     if table is None:
         return None
-    angles, loads = np.unique(table.wrap_angle), np.linspace(0.0, table.load.max(), POINTS)
+    angles = np.unique(table.wrap_angle)
+    read = [table.load[table.wrap_angle == angle] for angle in angles]
+    loads = np.array([np.linspace(f.min(), f.max(), POINTS) for f in read])
 
     def curves(values: Values) -> dict[str, Any]:
-        elastic, load = fit.model.cable.elasticity, jnp.broadcast_to(jnp.asarray(loads), (len(angles), POINTS))
-        angle, peak = jnp.broadcast_to(jnp.asarray(angles)[:, None], load.shape), jnp.full_like(load, loads[-1])
+        elastic, load = fit.model.cable.elasticity, jnp.asarray(loads)
+        angle, peak = (jnp.broadcast_to(jnp.asarray(a)[:, None], load.shape) for a in (angles, loads[:, -1]))
         stretched = {"loading": load, "unloading": peak}
         return {way: elastic.stretch(values, load, angle, highest) for way, highest in stretched.items()}
 
@@ -73,7 +77,7 @@ def data(fit: Record) -> tuple[StretchCurve, ...] | None:
         down = table.unloading[here]
         back = both["unloading"][:, i] if down.any() else None
         points = table.load[here], table.stretch[here], down
-        found.append(StretchCurve(float(np.rad2deg(angle)), loads, both["loading"][:, i], back, *points))
+        found.append(StretchCurve(float(np.rad2deg(angle)), loads[i], both["loading"][:, i], back, *points))
     return tuple(found)
 
 
@@ -95,16 +99,27 @@ def draw(stretch: tuple[StretchCurve, ...], width: float | None = None) -> Figur
     """Stretch [mm] against load [N], a color for each wrap angle."""
     every = sorted(stretch, key=lambda curve: curve.wrap_angle)
     shown = evenly(every, MOST)
-    figure, (axes,) = panels([2.9], 1, 0.02, (0, 0), width or MEDIUM)
+    across = span([v for c in shown for v in (c.load, c.points_load)], room=0.03)
+    up = span([np.zeros(1), *(v for c in shown for v in (c.loading, c.points_stretch))])
+    made = panels_with_strips([""], [across], [up], 1, HEIGHT, width)
+    (axes,), (strip,) = made.mains, made.strips
     axes.axhline(0.0, color=BLACK, linewidth=0.6)
     rows = _explain(axes, shown)
     for i, curve in enumerate(shown):
         _curve(axes, curve, _color(i, len(shown)), MARKERS[i])
-    axes.set_xlim(*span([v for c in shown for v in (c.load, c.points_load)], room=0.03))
-    axes.set(xlabel="Load (N)", ylabel="Stretch (mm)")
+        _marks(strip, curve, _off(curve), _color(i, len(shown)), MARKERS[i])
+    made.finish_strips()
+    made.label("Load (N)", "Stretch (mm)", "mm")
     say_of_how_many(axes, len(shown), len(every))
-    legend_above(figure, [axes], columns=min(MOST_COLUMNS, 1 - (-len(shown) // rows)))
-    return figure
+    legend_above(made.figure, [axes], columns=min(MOST_COLUMNS, 1 - (-len(shown) // rows)))
+    return made.figure
+
+
+def _off(curve: StretchCurve) -> np.ndarray:
+    """Readings less the branch on which they were read [mm]."""
+    back = curve.loading if curve.unloading is None else curve.unloading
+    up, down = (np.interp(curve.points_load, curve.load, middle(line)) for line in (curve.loading, back))
+    return np.asarray(curve.points_stretch - np.where(curve.points_unloading, down, up))
 
 
 def _color(number: int, of: int) -> Any:
@@ -117,13 +132,17 @@ def _curve(axes: Axes, curve: StretchCurve, color: Any, marker: str) -> None:
     draw_quantiles(axes, curve.load, curve.loading, color)
     if curve.unloading is not None:
         draw_quantiles(axes, curve.load, curve.unloading, color, linestyle=DASHES)
+    _marks(axes, curve, curve.points_stretch, color, marker)
+    axes.plot([], [], marker=marker, markersize=3.8, color=color, label=f"{curve.wrap_angle:.4g} deg")
+
+
+def _marks(axes: Axes, curve: StretchCurve, shown: np.ndarray, color: Any, marker: str) -> None:
+    """Stretch or residuals of the readings, open where the load came down."""
     down = curve.points_unloading.astype(bool)
     for here, fill in ((~down, color), (down, "white")):
         axes.plot(
-            curve.points_load[here], curve.points_stretch[here], marker, color=color, markersize=3.8,
-            markerfacecolor=fill, zorder=3,
-        )  # fmt: skip
-    axes.plot([], [], marker=marker, markersize=3.8, color=color, label=f"{curve.wrap_angle:.4g} deg")
+            curve.points_load[here], shown[here], marker, color=color, markersize=3.8, markerfacecolor=fill, zorder=3
+        )
 
 
 def _explain(axes: Axes, shown: Sequence[StretchCurve]) -> int:

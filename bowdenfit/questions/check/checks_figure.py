@@ -32,6 +32,8 @@ MOST_NAMED = 3  # outliers of a panel that are named
 BACK = "Read on the way back"
 LEAST_LIMIT = 3.2  # standard deviations that the axis shows at least
 MOST_PLACES = 2  # that deviations are shown against
+NUMBER = "Number of the reading"  # what they are shown against where no place varies
+DASHES = (0, (4, 2))
 
 
 @dataclass(frozen=True)
@@ -89,7 +91,7 @@ def _checked(table: TableChecks, outlier: list[bool]) -> CheckedTable:
     return CheckedTable(
         readings_called(table.table).words,
         table.z_score,
-        dict(list(table.places.numbers.items())[:MOST_PLACES]),
+        dict(list(table.places.numbers.items())[:MOST_PLACES]) or {NUMBER: np.arange(1.0, 1 + len(table.labels))},
         table.places.group,
         table.places.back,
         table.decisive,
@@ -118,33 +120,28 @@ def caption(tables: tuple[CheckedTable, ...]) -> str:
 @in_paper_style
 def draw(tables: tuple[CheckedTable, ...], width: float | None = None) -> Figure:
     """One row a table: distribution of the readings in their predictions, and deviations by where they were taken."""
-    page, most = width or WIDE, 1 + max(len(table.numbers) for table in tables)
-    columns = columns_within(page, most, LEAST_WIDTH, 0.62)
-    rows = [-(-(1 + len(table.numbers)) // columns) for table in tables]
+    page, counts = width or WIDE, [bool(len(table.at)) + len(table.numbers) for table in tables]
+    columns = columns_within(page, max(counts), LEAST_WIDTH, 0.62)
+    rows = [-(-count // columns) for count in counts]
     figure, flat = panels([ROW] * sum(rows), columns, TITLE, (0.62, 0.74), page)
     used = []
     for i, table in enumerate(tables):
-        here = flat[sum(rows[:i]) * columns : sum(rows[: i + 1]) * columns]
-        _distribution(here[0], table)
-        used.append(here[0])
-        for axes, (label, numbers) in zip(here[1:], table.numbers.items(), strict=False):
+        here = drop_unused(flat[sum(rows[:i]) * columns : sum(rows[: i + 1]) * columns], counts[i])
+        if len(table.at):
+            _distribution(here[0], table)
+        for axes, (label, numbers) in zip(here[bool(len(table.at)) :], table.numbers.items(), strict=True):
             _deviations(axes, table, label, numbers)
-            used.append(axes)
-        drop_unused(here, 1 + len(table.numbers))
+        here[0].set_title(f"{table.name.capitalize()}: {counted(len(table.labels), 'reading')}", loc="left")
+        used += here
     legend_above(figure, used, columns=3)
     return figure
 
 
 def _distribution(axes: Axes, table: CheckedTable) -> None:
     """Share of readings up to a place in their predictions, less what it should be."""
-    axes.set_title(f"{table.name.capitalize()}: {len(table.labels)} readings")
     axes.axhline(0.0, color=GRAY, linewidth=0.8)
     axes.set_xlim(0.0, 1.0)
     axes.set(xlabel="Predicted probability p", ylabel="Share below p, less p")
-    if not len(table.at):
-        axes.set_ylim(-0.5, 0.5)
-        axes.text(0.5, 0.25, "too few to judge", ha="center", va="center", color=GRAY)
-        return
     at = np.concatenate([[0.0], table.at, [1.0]])
     low, off, high = (np.concatenate([[0.0], part, [0.0]]) for part in (table.low, table.off, table.high))
     axes.fill_between(at, low, high, step="post", color=LIGHT, linewidth=0, label="Where it stays if all is right")
@@ -154,7 +151,8 @@ def _distribution(axes: Axes, table: CheckedTable) -> None:
 def _deviations(axes: Axes, table: CheckedTable, label: str, numbers: np.ndarray) -> None:
     """Deviations in standard deviations against one of the places."""
     z = table.z_score
-    axes.axhspan(-2, 2, color=LIGHT, linewidth=0, zorder=0.4, label="Within two standard deviations")
+    for two in (-2, 2):
+        axes.axhline(two, color=GRAY, linewidth=0.8, linestyle=DASHES, label="Two standard deviations")
     axes.axhline(0.0, color=GRAY, linewidth=0.8)
     groups = list(dict.fromkeys(table.group))
     for i, group in enumerate(groups):

@@ -3,9 +3,10 @@
 import numpy as np
 
 from bowdenfit.pages.chart import Chart, Group, Series, Span
-from bowdenfit.plots.bands import Band
+from bowdenfit.plots.bands import NEW_RUN, Band
 from bowdenfit.plots.style import EFFICIENCY, LEAST_SQUARES, MEDIAN, NARROW_INTERVAL, WIDE_INTERVAL, percent
-from bowdenfit.questions.length.efficiency_figure import READING, RUN, AlongRoute, EfficiencyPoints
+from bowdenfit.questions.length.efficiency_figure import READING, RUN, AlongRoute
+from bowdenfit.questions.length.efficiency_points import EfficiencyPoints
 
 
 def efficiency_chart(data: AlongRoute) -> tuple[Chart]:
@@ -15,9 +16,17 @@ def efficiency_chart(data: AlongRoute) -> tuple[Chart]:
         data: What the figure shows.
     """
     points = [_points(one) for one in data.points if np.isfinite(one.route).any()]
-    groups = (_curve(data.efficiency), *points)
+    groups = (*_of_runs(data), _curve(data.efficiency), *points)
     force = "" if data.at_input_force is None else f", curve at {data.at_input_force:g} N"
     return (Chart("Efficiency", data.route_label, EFFICIENCY + force, groups, _spans(data)),)
+
+
+def _of_runs(data: AlongRoute) -> tuple[Group, ...]:
+    """Between which efficiencies runs lie, each on a mounting of its own."""
+    if data.new_run is None:
+        return ()
+    low, high = 100 * data.new_run
+    return (Group(data.efficiency.route, (Series(NEW_RUN, "low", "blue", low), Series(NEW_RUN, "high", "blue", high))),)
 
 
 def _curve(band: Band) -> Group:

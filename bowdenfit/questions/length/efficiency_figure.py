@@ -7,9 +7,11 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from bowdenfit.plots.bands import BAND_QUANTILES, Band, draw_band, route_limits, shade_outside
+from bowdenfit.plots.bands import BAND_QUANTILES, NEW_RUN, Band, draw_band, route_limits, shade_outside
+from bowdenfit.plots.captions import strip_words
 from bowdenfit.plots.densities import GRID_POINTS, density
 from bowdenfit.plots.layout import TITLE, legend_above, panels
+from bowdenfit.plots.strips import STRIP, finish_strips, name_strip, place_names
 from bowdenfit.plots.style import (
     BLACK,
     BLUE,
@@ -23,6 +25,7 @@ from bowdenfit.plots.style import (
     percent,
     rounded_texts,
 )
+from bowdenfit.questions.length.efficiency_points import EfficiencyPoints, efficiency_points
 from bowdenfit.results.length import OptimalLength
 
 if TYPE_CHECKING:
@@ -34,28 +37,8 @@ HEADING = "Efficiency along the route"
 READING, RUN = ("o", 4.5, "Measured"), ("D", 2.8, "Measured, mean of a run")
 MOST_NUMBERS, LEAST_NUMBER = 16, 0.5  # so many bars have numbers over them, if they are so many percent high
 LEAST_AT_EDGE = 0.005
-
-
-@dataclass(frozen=True)
-class EfficiencyPoints:
-    """Measured efficiencies [1].
-
-    Args:
-        of_runs: Whether each is the mean of a run.
-        labels: Each in words.
-        route: Route value; NaN without a route.
-        measured: Efficiency.
-        predicted: Quantiles (`BAND_QUANTILES`, first axis) of readings drawn anew; one row, least squares', without
-            draws.
-        inside: Whether it lies within the range of the curves.
-    """
-
-    of_runs: bool
-    labels: tuple[str, ...]
-    route: np.ndarray
-    measured: np.ndarray
-    predicted: np.ndarray
-    inside: np.ndarray
+DRAWS = 5000  # of a band
+DOTS = (0, (1, 1.2))
 
 
 @dataclass(frozen=True)
@@ -70,6 +53,8 @@ class AlongRoute:
         optimum: The design answer; None without draws.
         optimal_length: Its draws; None likewise.
         at_input_force: Input force at which the curve holds [N]; None where it is the same at any.
+        new_run: Ends of the interval that holds the efficiency of a run on a new mounting with 90 % probability, along the
+            curve; None where no points are runs.
     """
 
     route_label: str
@@ -79,6 +64,7 @@ class AlongRoute:
     optimum: OptimalLength | None = None
     optimal_length: np.ndarray | None = None
     at_input_force: float | None = None
+    new_run: np.ndarray | None = None
 
 
 def data(fit: Record) -> AlongRoute | None:
@@ -95,27 +81,17 @@ def data(fit: Record) -> AlongRoute | None:
     shown = AlongRoute(route.label, route.range, along_route(fit)["efficiency"], points, at_input_force=force)
     if posterior is None:
         return shown
-    return replace(shown, optimum=fit.optimal_length(), optimal_length=posterior.optimum[OPTIMAL_LENGTH])
+    mounted = _new_run(fit) if any(p.of_runs for p in points) else None
+    return replace(
+        shown, optimum=fit.optimal_length(), optimal_length=posterior.optimum[OPTIMAL_LENGTH], new_run=mounted
+    )
 
 
-def efficiency_points(fit: Record) -> tuple[EfficiencyPoints, ...]:
-    """Every measured efficiency, by table."""
-    from bowdenfit.kinds import readings_called
-    from bowdenfit.kinds.places import route_values
-
-    route, points = fit.dataset.description.route, []
-    for term in fit.model.terms:
-        called, at = readings_called(term.name), route_values(term)
-        if not called.are_efficiencies:
-            continue
-        if route is None or at is None:
-            at = np.full(len(term.labels), np.nan)
-        predicted = fit.least_squares.readings[term.name][None]
-        if fit.sampled is not None:
-            predicted = np.quantile(fit.posterior.replicated[term.name], BAND_QUANTILES, axis=(0, 1))
-        inside = (at >= route.range[0]) & (at <= route.range[1]) if route else np.ones(len(at), dtype=bool)
-        points.append(EfficiencyPoints(called.are_runs, term.labels, at, term.observed(), predicted, inside))
-    return tuple(points)
+def _new_run(fit: Record) -> np.ndarray:
+    """Quantiles of the efficiency of a run along the route, whose mounting shifts the friction exponent."""
+    efficiency, every = fit.along_route.curves["efficiency"], slice(None, None, max(1, len(fit.mounting()) // DRAWS))
+    mounted = efficiency[every] * np.exp(-fit.mounting()[every, None])
+    return np.quantile(mounted, (BAND_QUANTILES[0], BAND_QUANTILES[-1]), axis=0)
 
 
 def caption(data: AlongRoute) -> str:
@@ -126,6 +102,9 @@ def caption(data: AlongRoute) -> str:
         "Efficiency of the cable, output over input force, against the length.",
         "Line: median; bands: the intervals that hold the efficiency of the cable with 50 % and 90 % probability."
         if drawn else "Line: least squares.",
+        "Dotted: nine of ten runs lie between these lines, because no two mountings are alike."
+        if data.new_run is not None else "",
+        strip_words("in percent of the input force") if n else "",
         f"Dots: measured, n = {n}." if n else "No efficiency was measured along the route.",
         f"The curve holds at {data.at_input_force:g} N input force." if data.at_input_force is not None else "",
         "Below: where the best length lies"
@@ -139,15 +118,19 @@ def caption(data: AlongRoute) -> str:
 def draw(data: AlongRoute, width: float | None = None) -> Figure:
     """Efficiency [%] against the route, the density of the optimal length, and each choice's chance to be the best."""
     below = 0 if data.optimum is None else 2 if data.optimum.choices else 1
-    figure, flat = panels([2.3] + [0.75] * below, 1, 0.08, (0.0, TITLE + 0.12), width or WIDE, sharex=True)
+    read = any(np.isfinite(points.route).any() for points in data.points)
+    figure, flat = panels([2.3] + [STRIP] * read + [0.75] * below, 1, 0.08, (0.0, TITLE + 0.02), width or WIDE, sharex=True)
     shown = route_limits(data.route_range, *(points.route for points in data.points))
     _curve_and_points(flat[0], data)
+    if read:
+        _residuals(flat[1], data)
+        place_names(flat[0], flat[1])
     if data.optimum is not None:
-        _optimum(flat[1], data, data.optimum)
-        for axes in flat[:2]:
+        _optimum(flat[1 + read], data, data.optimum)
+        for axes in (flat[0], flat[1 + read]):
             _mark_optimum(axes, data.optimum)
         if data.optimum.choices:
-            _choices(flat[2], data.optimum, float(np.ptp(data.route_range)))
+            _choices(flat[2 + read], data.optimum, float(np.ptp(data.route_range)))
     for axes in flat:
         shade_outside(axes, data.route_range, shown)
     flat[-1].set_xlabel(data.route_label)
@@ -155,8 +138,28 @@ def draw(data: AlongRoute, width: float | None = None) -> Figure:
     return figure
 
 
+def _residuals(strip: Axes, data: AlongRoute) -> None:
+    """Measured less predicted, and where a reading would lie with 90 % probability if it were taken anew."""
+    for points in data.points:
+        marker, size, _ = RUN if points.of_runs else READING
+        middle = points.predicted[len(points.predicted) // 2]
+        for inside, fill in ((points.inside, BLACK), (~points.inside, "white")):
+            strip.plot(
+                points.route[inside], 100 * (points.measured - middle)[inside], marker, color=BLACK, markersize=0.8 * size,
+                markerfacecolor=fill, zorder=3,
+            )  # fmt: skip
+        if len(points.predicted) > 1:
+            low, high = 100 * (points.predicted[[0, -1]] - middle)
+            strip.plot(np.tile(points.route, (2, 1)), np.stack([low, high]), color=BLUE, linewidth=1.0, alpha=0.5)
+    finish_strips([strip])
+    name_strip(strip, "%")
+
+
 def _curve_and_points(axes: Axes, data: AlongRoute) -> None:
     draw_band(axes, data.efficiency, scale=100.0)
+    if data.new_run is not None:
+        for end in data.new_run:
+            axes.plot(data.efficiency.route, 100 * end, color=BLUE, linewidth=0.8, linestyle=DOTS, label=NEW_RUN)
     for points in data.points:
         _measured(axes, points, points.inside, BLACK, "")
         outside = ~points.inside & np.isfinite(points.route)

@@ -9,30 +9,30 @@ from bowdenfit.kinds.recordings.angles import recorded_angles
 from bowdenfit.kinds.resolve_angles import resolve_angles
 from bowdenfit.kinds.row_angles import row_angles
 from bowdenfit.questions.recorded.equations import blocks_shown
-from bowdenfit.recordings.recording import Blocks, Recordings
+from bowdenfit.recordings.recording import Recording, Recordings
 from bowdenfit.results.record import Record
 
 _ALIKE = np.deg2rad(0.05)  # wrap angles that differ by less are shown as one
 
 
 def loop_points(fit: Record, contact: int | None = None) -> np.ndarray:
-    """Wrap angle [rad], input and output force [N] of every block that was read of a loop, the smallest angle first.
+    """Wrap angle [rad], input and output force [N] and stroke of every block that was read of a loop, the smallest angle first.
 
     Args:
         fit: The fit.
         contact: Number of the contact whose wrap angle is meant; that of all contacts together if omitted.
 
     Returns:
-        Three rows; no columns without such recordings.
+        Four rows; no columns without such recordings.
     """
-    recordings, parts = fit.dataset.measurements.table(Recordings), [np.zeros((3, 0))]
+    recordings, parts = fit.dataset.measurements.table(Recordings), [np.zeros((4, 0))]
     if recordings is None or not recordings.loop:
         return parts[0]
     angles = _angles(fit, recordings)
     angle = angles.sum(axis=1) if contact is None else angles[:, contact]
     order = np.argsort(angle, kind="stable")
     for group in np.split(order, np.flatnonzero(np.diff(angle[order]) > _ALIKE) + 1):
-        parts += [_points(float(angle[group].mean()), recordings.each[i].blocks) for i in group.tolist()]
+        parts += [_points(float(angle[group].mean()), recordings.each[i]) for i in group.tolist()]
     return np.concatenate(parts, axis=1)
 
 
@@ -46,8 +46,9 @@ def _angles(fit: Record, recordings: Recordings) -> np.ndarray:
         return np.asarray(resolve_angles(cable, space.constrain(jnp.asarray(z)), rows)[0])
 
 
-def _points(angle: float, blocks: Blocks) -> np.ndarray:
+def _points(angle: float, recording: Recording) -> np.ndarray:
     """Blocks that are readings, moving and at rest."""
+    blocks, stroke = recording.blocks, recording.strokes.stroke * recording.strokes.used_sliding
     shown = blocks_shown(len(blocks.time))
     kept = shown[~blocks.saturated[shown]]
-    return np.stack([np.full(len(kept), angle), blocks.input_force[kept], blocks.output_force[kept]])
+    return np.stack([np.full(len(kept), angle), blocks.input_force[kept], blocks.output_force[kept], stroke[kept]])

@@ -9,9 +9,8 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from bowdenfit.plots.bands import evenly, say_of_how_many
-from bowdenfit.plots.captions import shown_words
-from bowdenfit.plots.layout import legend_above
-from bowdenfit.plots.panels import MOST, draw_marks, extremes, label_outer, panels_with_limits, span
+from bowdenfit.plots.layout import columns_within, legend_above
+from bowdenfit.plots.panels import LEAST_WIDTH, draw_marks, extremes, label_outer, panels_with_limits, span
 from bowdenfit.plots.style import (
     BLACK,
     BLUE,
@@ -25,6 +24,7 @@ from bowdenfit.plots.style import (
     WIDE_INTERVAL,
     in_paper_style,
 )
+from bowdenfit.words import counted
 
 if TYPE_CHECKING:
     from bowdenfit.plots.layout import Axes, Figure
@@ -34,6 +34,8 @@ if TYPE_CHECKING:
 HEADING = "Recordings over time"
 POINTS = 3200  # of each line, all panels together, which is what a page can show
 GAP_STEPS = 5
+HEIGHT, ROW_GAP, LEAST_HEIGHT = 3.5, 0.42, 0.65  # in, of all panels, from one row to the next, of one panel at least
+MOST_IN_TWO = 4  # panels in two columns
 MOST_CYCLES = 8  # of each recording over time
 PER_BLOCK = ("time", "input_force", "output_force", "stroke", "saturated", "predicted", "fitted")
 FORCE, TIME = "Force (N)", "Time from the start (s)"
@@ -92,16 +94,15 @@ def _over_time(trace: Trace) -> OverTime:
 
 def caption(recordings: tuple[OverTime, ...]) -> str:
     """What is drawn, in plain words."""
-    shown = min(len(recordings), MOST)
     band = (
         "the band holds it with 90 % probability, a new mounting included" if len(recordings[0].predicted) > 1 else (
             "the dashed line is the least-squares prediction"
         )
     )
     return (
-        f"Both forces over time of {shown_words(shown, len(recordings), 'recording')}: black the measured output, gray the "
-        f"measured input, blue what the cable would give out at this input ({band}), red the fit with this recording's own "
-        "mounting. Shading: what the rope does. Marks: samples that were left out, by reason. "
+        f"Both forces over time of {counted(len(recordings), 'recording')}, of many evenly chosen ones: black the "
+        f"measured output, gray the measured input, blue what the cable would give out at this input ({band}), red the "
+        "fit with this recording's own mounting. Shading: what the rope does. Marks: samples that were left out, by reason. "
         f"n = {sum(len(r.time) for r in recordings)} blocks of samples."
     )
 
@@ -109,11 +110,15 @@ def caption(recordings: tuple[OverTime, ...]) -> str:
 @in_paper_style
 def draw(recordings: tuple[OverTime, ...], width: float | None = None) -> Figure:
     """Input and output force [N] over time, what the cable would give at this input, and the samples left out."""
-    whole = evenly(recordings, MOST)
+    columns = min(2 if len(recordings) <= MOST_IN_TWO else 3, columns_within(width or WIDE, 3, LEAST_WIDTH, 0.42))
+    rows_with_room = int((HEIGHT + ROW_GAP) / (LEAST_HEIGHT + ROW_GAP))
+    whole = evenly(recordings, columns * rows_with_room)
+    rows = -(-len(whole) // columns)
+    height = (HEIGHT + ROW_GAP) / rows - ROW_GAP
     shown = [beginning(r) for r in whole]
     times = [span([r.time - start_of(r), r.flagged_time - start_of(r)], room=0.0) for r in shown]
     forces = [_force_limits(r) for r in shown]
-    figure, flat, columns = panels_with_limits([r.name for r in shown], times, forces, 2, 1.5, WIDE, width)
+    figure, flat, columns = panels_with_limits([r.name for r in shown], times, forces, columns, height, WIDE, width)
     for axes, recording in zip(flat, shown, strict=True):
         _phases(axes, recording)
         _forces(axes, recording, POINTS // (2 * len(shown)))

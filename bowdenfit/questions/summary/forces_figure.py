@@ -20,8 +20,10 @@ from bowdenfit.plots.style import (
     SMALL,
     VERMILLION,
     WIDE,
+    WRAP_ANGLE,
     in_paper_style,
 )
+from bowdenfit.questions.summary.forces_by_bend import draw_by_bend, limits_of_bends
 from bowdenfit.questions.summary.forces_shown import STROKES, Forces, ForcesHere, forces_shown
 from bowdenfit.words import counted
 
@@ -29,13 +31,13 @@ if TYPE_CHECKING:
     from bowdenfit.plots.layout import Axes, Figure
     from bowdenfit.results.record import Record
 
-HEADING = "Output against input force"
+HEADING = "Forces at both ends of the cable"
 MAIN, STRIP, GAP, ACROSS, LEFT = 2.3, 0.85, 0.12, 0.88, 0.78  # in
 LABEL = 0.56  # in, from the axes to their names: numbers of many digits stand between
 VERDICT_ROW, VERDICT_ROWS = 0.14, 3  # in, and how many at most
 LEAST_WIDTH = 2.6  # in, of a panel with its labels
 MARK, SMALL_MARK, MANY = 3.4, 2.0, 300  # pt, pt, and readings from which marks are small
-RETURN_DASHES = (0, (4, 1.6))
+RETURN_DASHES, NO_FRICTION = (0, (4, 1.6)), (0, (6, 1.5, 1, 1.5))
 ROOM = 1.15
 CAPSTAN, CAPSTAN_DOTS = "Capstan equation", (0, (1, 1.2))
 ALIKE = 1e-3  # of a coefficient, within which it is the same
@@ -55,7 +57,8 @@ def caption(forces: Forces) -> str:
         "lines: least squares"
     )
     return (
-        f"Output against input force, a color for each bend; {band}. Below: how far each reading is off its line, in percent, "
+        f"Output against {'the wrap angle, all about one input force' if forces.by_bend else 'input force'}, a color for each "
+        f"bend; {band}. Below: how far each reading is off its line, in percent, "
         "with the band in which nine of ten single readings should lie. Beside: the friction coefficient that each reading by "
         "itself would have by the capstan equation; where that equation holds it is the same at all loads. "
         f"n = {counted(n, 'reading')}."
@@ -121,9 +124,10 @@ def _marks(axes: Axes, forces: Forces, value: str, name: bool = False) -> None:
         for stroke, mark, fill in ((1, marker, color), (-1, marker, "white"), (0, "x", color)):
             mine = (here.stroke == stroke) & np.isfinite(y)
             if mine.any():
+                x = here.bend if forces.by_bend else here.input_force
                 axes.plot(
-                    here.input_force[mine], y[mine], mark, color=color, markerfacecolor=fill, markersize=size,
-                    markeredgewidth=0.7, zorder=3, clip_on=value != "apparent",
+                    x[mine], y[mine], mark, color=color, markerfacecolor=fill, markersize=size, markeredgewidth=0.7, zorder=3,
+                    clip_on=value != "apparent",
                 )  # fmt: skip
         if name and here.shown and here.label:
             axes.plot([], [], marker=marker, color=color, markersize=MARK, label=here.label)
@@ -132,13 +136,17 @@ def _marks(axes: Axes, forces: Forces, value: str, name: bool = False) -> None:
 def _main(axes: Axes, forces: Forces) -> None:
     """Output against input."""
     every = np.concatenate([here.stroke for here in forces.places])
-    for here, color, _ in _colored(forces):
+    if forces.by_bend:
+        draw_by_bend(axes, forces, "law")
+    for here, color, _ in [] if forces.by_bend else _colored(forces):
         for i, stroke in enumerate(STROKES):
             if np.any(here.stroke == stroke) or not np.any(here.stroke):
                 line = "-" if stroke > 0 else RETURN_DASHES
-                draw_quantiles(axes, here.load, here.law[:, i], color, linestyle=line, linewidth=1.0)
+                draw_quantiles(axes, *_where_read(here, here.law[:, i]), color, linestyle=line, linewidth=1.0)
     load = forces.places[0].load
-    axes.plot(load, load, color=GRAY, linewidth=0.6, label="No friction")
+    bends, pulled = limits_of_bends(forces) if forces.by_bend else (0.0, 0.0), forces.places[0].input_force.mean()
+    unloaded = (bends, (pulled, pulled)) if forces.by_bend else (load, load)
+    axes.plot(*unloaded, color=GRAY, linewidth=0.8, linestyle=NO_FRICTION, label="No friction")
     law = forces.places[0].law
     what = LEAST_SQUARES if len(law) == 1 else "Law"
     for stroke, words, line, fill in ((1, "pulling", "-", GRAY), (-1, "returning", RETURN_DASHES, "white")):
@@ -155,11 +163,19 @@ def _main(axes: Axes, forces: Forces) -> None:
     if forces.count:
         shown = sum(len(here.stroke) for here in forces.places)
         axes.plot([], [], " ", label=f"{shown:,} of {forces.count:,} readings shown")
-    axes.set_xlim(load[0] if forces.logarithmic else 0.0, load[-1])
+    axes.set_xlim(*(bends if forces.by_bend else (load[0] if forces.logarithmic else 0.0, load[-1])))
     out = np.concatenate([here.output_force for here in forces.places])
     axes.set_ylim((0.7 * out.min(), 1.4 * out.max()) if forces.logarithmic else (0.0, 1.08 * max(out.max(), load[-1])))
     axes.set_ylabel("Output force (N)")
     axes.tick_params(labelbottom=False)
+
+
+def _where_read(here: ForcesHere, line: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Loads of a line and its quantiles there, from the lowest reading of the place to its highest."""
+    loads = np.linspace(here.input_force.min(), here.input_force.max(), len(here.load))
+    if here.load[1] / here.load[0] < here.load[-1] / here.load[-2] + ALIKE:  # evenly spaced in the logarithm
+        loads = np.geomspace(loads[0], loads[-1], len(loads))
+    return loads, np.stack([np.interp(loads, here.load, row) for row in line])
 
 
 def _strip(axes: Axes, forces: Forces) -> None:
@@ -167,35 +183,43 @@ def _strip(axes: Axes, forces: Forces) -> None:
     off = np.concatenate([here.off for here in forces.places])
     limit = ROOM * float(np.nanmax(np.abs(off), initial=0.0)) or 1.0
     if len(forces.spread):
-        spread = np.minimum(forces.spread, 10 * limit)
+        read = np.concatenate([here.input_force for here in forces.places])
+        loads = np.linspace(read.min(), read.max(), 4 * len(forces.spread_load))
+        spread = np.minimum(np.interp(loads, forces.spread_load, forces.spread), 10 * limit)
+        if forces.by_bend:
+            every = np.concatenate([here.bend for here in forces.places])
+            loads = np.linspace(every.min(), every.max(), len(loads))
         axes.fill_between(
-            forces.spread_load, -spread, spread, color=LIGHT, linewidth=0, zorder=0.4, label="9 of 10 readings"
+            loads, -spread, spread, color=LIGHT, linewidth=0, zorder=0.4, label="9 of 10 readings"
         )
     axes.axhline(0.0, color=GRAY, linewidth=0.8, zorder=0.9)
     _marks(axes, forces, "off")
     axes.set_ylim(-limit, limit)
-    axes.set(xlabel="Input force (N)", ylabel="Residual (%)")
+    axes.set(xlabel=WRAP_ANGLE if forces.by_bend else "Input force (N)", ylabel="Residual (%)")
     axes.locator_params(axis="y", nbins=5)
 
 
 def _apparent(axes: Axes, forces: Forces) -> None:
     """Apparent coefficient against the load, beside what the capstan equation says: a horizontal line."""
     load = forces.places[0].load
-    axes.set_xlim(load[0] if forces.logarithmic else 0.0, load[-1])
+    axes.set_xlim(*(limits_of_bends(forces) if forces.by_bend else (load[0] if forces.logarithmic else 0.0, load[-1])))
     axes.set_ylim(*_coefficient_limits(forces))
-    colored, bent = _colored(forces), False
-    for here, color in [(colored[0][0], BLACK)] if _all_alike(forces) else [(here, color) for here, color, _ in colored]:
+    if forces.by_bend:
+        draw_by_bend(axes, forces, "apparent_law")
+    colored, bent = [] if forces.by_bend else _colored(forces), False
+    together = colored and _all_alike(forces)
+    for here, color in [(colored[0][0], BLACK)] if together else [(here, color) for here, color, _ in colored]:
         for i, stroke in enumerate(STROKES):
             if np.any(here.stroke == stroke):
                 line = "-" if stroke > 0 else RETURN_DASHES
-                draw_quantiles(axes, here.load, here.apparent_law[:, i], color, linestyle=line, linewidth=1.0)
+                draw_quantiles(axes, *_where_read(here, here.apparent_law[:, i]), color, linestyle=line, linewidth=1.0)
         if np.isfinite(here.capstan) and not _is_level(here):
             axes.axhline(here.capstan, color=color, linestyle=CAPSTAN_DOTS, linewidth=1.1)
             bent = True
     axes.plot([], [], color=GRAY, linestyle=CAPSTAN_DOTS if bent else "-", linewidth=1.1, label=CAPSTAN)
     _marks(axes, forces, "apparent")
     axes.locator_params(axis="y", nbins=6)
-    axes.set(xlabel="Input force (N)", ylabel="Apparent friction coefficient")
+    axes.set(xlabel=WRAP_ANGLE if forces.by_bend else "Input force (N)", ylabel="Apparent friction coefficient")
 
 
 def _all_alike(forces: Forces) -> bool:

@@ -1,7 +1,7 @@
 """What the figure of a table of forces shows: readings at each bend beside the law that was fitted."""
 
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -18,6 +18,7 @@ STROKES = (1, -1)
 _BEND = 5.0  # deg within which wrap angles that were read are one bend
 _LEAST_ANGLE = np.deg2rad(1.0)  # below which there is no apparent coefficient to speak of
 _WIDE = 20.0  # ratio of the largest to the smallest load from which axes are logarithmic
+_ONE_LOAD = 1.1  # ratio of the largest to the smallest load up to which they are one
 _WITHIN_90 = 1.645  # standard deviations
 
 
@@ -36,6 +37,7 @@ class ForcesHere:
         apparent_law: The same of the apparent coefficient.
         capstan: The apparent coefficient that describes its readings best, were it the same at all loads.
         shown: Whether it has a line and a color of its own.
+        bend: Wrap angle of each reading [deg]; empty where it is of no interest.
     """
 
     label: str
@@ -49,6 +51,7 @@ class ForcesHere:
     apparent_law: np.ndarray
     capstan: float
     shown: bool
+    bend: np.ndarray = field(default_factory=lambda: np.zeros(0))
 
 
 @dataclass(frozen=True)
@@ -74,6 +77,14 @@ class Forces:
     verdict: str
     logarithmic: bool
     count: int = 0
+
+    @property
+    def by_bend(self) -> bool:
+        """Whether all readings are about one load, so that the wrap angle is what tells them apart."""
+        load = np.concatenate([here.input_force for here in self.places])
+        bends = [float(here.bend.mean()) for here in self.places if len(here.bend)]
+        one = bool(load.max() < _ONE_LOAD * load.min())
+        return one and len(bends) == len(self.places) and np.ptp(bends) > _BEND
 
 
 def forces_shown(fit: "Record") -> Forces | None:
@@ -166,12 +177,13 @@ def _here(
     expected, bend = (np.median(found[name][:, mine], axis=0) for name in ("rows", "bend"))
     slides = stroke != 0
     off = np.where(slides, 100 * (force_out / expected - 1), np.nan)
-    bend = np.where(slides & (bend > _LEAST_ANGLE), bend, np.nan)
-    apparent = stroke * np.log(force_in / force_out) / bend
+    bent = np.where(slides & (bend > _LEAST_ANGLE), bend, np.nan)
+    apparent = stroke * np.log(force_in / force_out) / bent
     weight = np.where(np.isfinite(apparent), 1 / (force_in**-2 + force_out**-2), 0.0)
     capstan = float(weight @ np.nan_to_num(apparent) / weight.sum()) if weight.sum() else float("nan")
     law, apparent_law = (quantiles(found[name][:, number]) for name in ("law", "apparent"))
-    return ForcesHere(label, force_in, force_out, stroke, off, apparent, load, law, apparent_law, capstan, shown)
+    lines = load, law, apparent_law, capstan, shown
+    return ForcesHere(label, force_in, force_out, stroke, off, apparent, *lines, np.rad2deg(bend))
 
 
 def _spread(fit: "Record", load: np.ndarray, found: Mapping[str, np.ndarray]) -> np.ndarray:

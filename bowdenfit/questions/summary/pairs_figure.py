@@ -21,9 +21,10 @@ if TYPE_CHECKING:
 HEADING = "Which unknowns hang together"
 MOST = 8
 SHARE = 0.996  # of the draws, within the axes
-ROLES = ("friction", "friction_model", "sensor", "noise", "angle")
+ROLES = ("friction", "elastic", "friction_model", "angle", "sensor", "noise")
 FILLS = {0.68: "#5E9FCB", 0.95: "#C3DCEE"}
 MARGIN, GAP, LARGEST, SMALLEST = 0.62, 0.09, 1.45, 0.66  # in
+KEY_ROW = 0.135  # in
 
 
 @dataclass(frozen=True)
@@ -35,7 +36,7 @@ class Pairs:
 
 
 def data(fit: Record) -> Pairs | None:
-    """Coefficients first, what may be confounded with them next, then noise; at most eight together with the optimum.
+    """Coefficients and the rope first, what may be confounded with them next, then noise; at most eight with the optimum.
 
     None where there are no two to draw against each other.
     """
@@ -130,11 +131,12 @@ def _axes(sheet: PanelSheet, quantities: list[SampledQuantity], panels: dict[tup
     for i, quantity in enumerate(quantities):
         below, left = panels[last, i], panels[i, 0]
         sheet.ticks_below(below)
-        sheet.text(below.left + below.width / 2, MARGIN - 0.2, quantity.label, ha="center", va="top", fontsize=SMALL)
+        label = wrapped(quantity.label, below.width + 0.8 * GAP)
+        sheet.text(below.left + below.width / 2, MARGIN - 0.2, label, ha="center", va="top", fontsize=SMALL)
         if i > 0:
             sheet.ticks_left(left)
             middle = left.bottom + left.height / 2
-            sheet.text(0.16, middle, quantity.label, ha="center", va="center", rotation=90, fontsize=SMALL)
+            sheet.text(0.16, middle, label, ha="center", va="center", rotation=90, fontsize=SMALL)
 
 
 def _words(sheet: PanelSheet, data: Pairs, panels: dict[tuple[int, int], Panel], shown: int) -> None:
@@ -144,7 +146,7 @@ def _words(sheet: PanelSheet, data: Pairs, panels: dict[tuple[int, int], Panel],
     x, y = first.left + first.width + 2.5 * GAP, first.bottom + first.height
     entries = [(FILLS[share], f"{100 * share:.0f} % of the draws") for share in FILLS]
     for i, (color, words) in enumerate(entries):
-        top = y - 0.17 * i
+        top = y - KEY_ROW * i
         sheet.areas([np.array([(x, top), (x + 0.2, top), (x + 0.2, top - 0.1), (x, top - 0.1)])], facecolor=color)
         sheet.text(x + 0.26, top - 0.05, words, va="center_baseline", fontsize=SMALL)
     lines = ["Dashed: median and 90 % interval"]
@@ -154,4 +156,4 @@ def _words(sheet: PanelSheet, data: Pairs, panels: dict[tuple[int, int], Panel],
         lines.append(f"{shown} of {len(data.quantities)} unknowns shown")
     lines = [line for words in lines for line in wrapped(words, room).split("\n")]
     for i, words in enumerate(lines, start=len(entries)):
-        sheet.text(x, y - 0.17 * i - 0.05, words, va="center_baseline", fontsize=SMALL)
+        sheet.text(x, y - KEY_ROW * i - 0.05, words, va="center_baseline", fontsize=SMALL)

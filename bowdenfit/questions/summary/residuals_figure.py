@@ -9,6 +9,7 @@ import numpy as np
 
 from bowdenfit.plots.layout import EDGE, RIGHT, axes_at, empty_page, legend_above, text_width
 from bowdenfit.plots.panels import short
+from bowdenfit.plots.strips import NONE
 from bowdenfit.plots.style import (
     BLACK,
     BLUE,
@@ -20,7 +21,7 @@ from bowdenfit.plots.style import (
     WIDE_INTERVAL,
     in_paper_style,
 )
-from bowdenfit.questions.length.efficiency_figure import EfficiencyPoints, efficiency_points
+from bowdenfit.questions.length.efficiency_points import EfficiencyPoints, efficiency_points
 from bowdenfit.words import counted
 
 if TYPE_CHECKING:
@@ -116,5 +117,7 @@ def _rows(axes: Axes, tables: tuple[EfficiencyPoints, ...], residual: bool) -> N
         )  # fmt: skip
     if residual:
         axes.axvline(0, color=GRAY, linewidth=0.8, zorder=0.9)
+        if np.ptp(axes.get_xlim()) < NONE:
+            axes.set_xlim(-1, 1)
     axes.grid(visible=False, axis="y")
     axes.locator_params(axis="x", nbins=5 if not residual else 4)

@@ -120,7 +120,8 @@ def _axes(sheet: PanelSheet, quantities: list[SampledQuantity], panels: list[Pan
         sheet.ticks_left(panel)
         sheet.ticks_below(panel, numbers=last, whole=True)
         middle = panel.bottom + PANEL / 2
-        sheet.text(panel.left - 0.5, middle, quantity.label, ha="center", va="center", rotation=90, fontsize=SMALL)
+        label = wrapped(quantity.label, ROW - 0.04)
+        sheet.text(panel.left - 0.5, middle, label, ha="center", va="center", rotation=90, fontsize=SMALL)
         if last:
             middle = panel.left + panel.width / 2
             sheet.text(middle, panel.bottom - 0.27, across, ha="center", va="center", fontsize=SMALL)

@@ -55,7 +55,7 @@ def _terms(cable, table, angles):
 
 
 def _parameters(table, circumstances):
-    return [Parameter(NOISE, r"$\sigma_\mathrm{loss}$", "noise of a lost force", "noise", HalfNormal(1.0), "N")]
+    return [Parameter(NOISE, r"$\sigma$ loss", "noise of a lost force", "noise", HalfNormal(1.0), "N")]
 
 
 def _draw(table, truth):

@@ -1,0 +1,154 @@
+"""How efficiency depends on load and speed, as plain arrays: curves of the draws, and what was measured."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+if TYPE_CHECKING:
+    import jax
+
+    from bowdenfit.recordings.recording import Recording
+    from bowdenfit.results.record import Record
+
+GRID, BINS = 60, 12  # places of a curve, and points a run that are shown against the load
+CURVES = 4000  # draws of a curve
+Points = tuple[np.ndarray, np.ndarray, np.ndarray, list[str]]  # x, efficiencies, half their intervals, and the run of each
+NORMAL_90 = 1.645  # standard errors to either end of a 90 % interval
+
+
+@dataclass(frozen=True)
+class Dependence:
+    """How efficiency depends on the load or the speed, where the fit allows it to.
+
+    Args:
+        what: "load" or "speed".
+        label: Axis label with unit.
+        x: Loads [N] or speeds (shown unit).
+        quantiles: Efficiency there, 5 %, 50 % and 95 % quantiles (first axis); one row without draws.
+        constant: Efficiency by the capstan equation alone at the reference, for comparison [1].
+        points_x, points_efficiency: Measured, load by load or speed by speed.
+        points_label: Run of each point.
+        place: Where on the route, in words, such as "at 470 mm"; empty without a route.
+        note: What else is to be said; empty if nothing is.
+        points_half: Half the 90 % interval of each, from the scatter of its blocks alone.
+        new_run: Ends of the interval that holds the efficiency of a run on a new mounting with 90 % probability; empty
+            without draws.
+    """
+
+    what: str
+    label: str
+    x: np.ndarray
+    quantiles: np.ndarray
+    constant: float
+    points_x: np.ndarray
+    points_efficiency: np.ndarray
+    points_label: tuple[str, ...]
+    place: str
+    note: str = ""
+    points_half: np.ndarray = field(default_factory=lambda: np.zeros(0))
+    new_run: np.ndarray = field(default_factory=lambda: np.zeros((0, 0)))
+
+
+def dependences(fit: Record) -> tuple[Dependence, ...] | None:
+    """On load, and on speed, as far as the friction model lets efficiency depend on them; None where it does not at all."""
+    from bowdenfit.questions.recorded.lost_force import lost_force
+    from bowdenfit.questions.recorded.rate import SHOWN_SPEED, place_of
+    from bowdenfit.recordings.recording import Recordings
+
+    friction, recordings = fit.model.cable.friction, fit.dataset.measurements.table(Recordings)
+    if recordings is None or not friction.options:
+        return None
+    (at, place), found = place_of(fit), []
+    here = [r for r in recordings.each if not place or r.route == at]
+    if friction.depends_on_load:
+        points = [_by_load(r) for r in here if _pulling(r).any()]
+        forces = np.concatenate([r.blocks.input_force[_pulling(r)] for r in here])
+        low, high = (forces.min(), forces.max()) if len(forces) else (10.0, 100.0)
+        grid = np.linspace(max(low, 1e-3), high, GRID)
+        quantiles, constant, new_run = _curves(fit, at, grid, None)
+        x, efficiency, half, runs = _joined(points)
+        lost = lost_force(fit)
+        note = lost.short() if lost is not None else ""
+        shown = "load", "Input force (N)", grid, quantiles, constant, x, efficiency, runs, place, note, half, new_run
+        found.append(Dependence(*shown))
+    if friction.depends_on_rate:
+        (unit, scale), (low, high) = SHOWN_SPEED[recordings.velocity_unit], friction.conditions.speeds
+        grid = np.linspace(low, high, GRID)
+        quantiles, constant, new_run = _curves(fit, at, None, grid)
+        x, efficiency, half, runs = _joined([_at_speed(r, scale) for r in here])
+        shown = "speed", f"Speed ({unit})", grid * scale, quantiles, constant, x, efficiency, runs, place, "", half, new_run
+        found.append(Dependence(*shown))
+    return tuple(found) or None
+
+
+def _pulling(recording: Recording) -> np.ndarray:
+    """The blocks that are used and in which the motor pulls."""
+    return recording.strokes.used_sliding & (recording.strokes.stroke > 0)
+
+
+def _by_load(recording: Recording) -> Points:
+    """Mean input force and mean efficiency of blocks of similar load, with half its 90 % interval."""
+    used = _pulling(recording)
+    force = recording.blocks.input_force[used]
+    efficiency = recording.blocks.output_force[used] / force
+    order = np.array_split(np.argsort(force), min(BINS, len(force)))
+    means = [np.array([values[part].mean() for part in order]) for values in (force, efficiency)]
+    half = np.array([_half_interval(efficiency[part]) for part in order])
+    return means[0], means[1], half, [recording.run] * len(order)
+
+
+def _half_interval(values: np.ndarray) -> float:
+    """Of the mean with 90 % probability, from the scatter of values; none of a single one."""
+    return float(NORMAL_90 * values.std(ddof=1) / np.sqrt(len(values))) if len(values) > 1 else float("nan")
+
+
+def _at_speed(recording: Recording, scale: float) -> Points:
+    """Mean speed in the unit that is shown, and mean efficiency with half its 90 % interval."""
+    blocks = recording.blocks
+    used = _pulling(recording) & np.isfinite(blocks.velocity)
+    ratio = np.log(blocks.output_force[used] / blocks.input_force[used])
+    speed = np.abs(blocks.velocity[used]).mean() * scale
+    efficiency = np.exp([ratio.mean()])
+    return np.array([speed]), efficiency, efficiency * _half_interval(ratio), [recording.run]
+
+
+def _joined(points: list[Points]) -> tuple[np.ndarray, np.ndarray, np.ndarray, tuple[str, ...]]:
+    x, y, half, runs = zip((np.zeros(0), np.zeros(0), np.zeros(0), []), *points, strict=True)
+    return np.concatenate(x), np.concatenate(y), np.concatenate(half), tuple(run for each in runs for run in each)
+
+
+def _curves(
+    fit: Record, at: float, forces: np.ndarray | None, speeds: np.ndarray | None
+) -> tuple[np.ndarray, float, np.ndarray]:
+    """Quantiles of the efficiency while pulling against load or speed, that at the reference, and the interval of a run."""
+    import jax
+    import jax.numpy as jnp
+
+    from bowdenfit.questions.recorded.traces import QUANTILES, some_draws
+
+    model, friction = fit.model, fit.model.cable.friction
+    where = jnp.asarray([at])
+
+    def efficiency(z: jax.Array) -> tuple[jax.Array, jax.Array]:
+        values = model.space.constrain(z)
+        exponent = model.cable.exponent_at(values, where)[0]
+        reference = friction.efficiency(values, exponent)
+        if forces is not None:
+            x = jnp.asarray(forces)
+            return friction.output_force(values, x, exponent, jnp.ones(())) / x, reference
+        x = jnp.asarray(friction.conditions.reference_force)
+        shift = exponent * friction.rate(values, jnp.asarray(speeds))
+        return friction.output_force(values, x, shift, jnp.ones(())) / x, reference
+
+    with jax.enable_x64(True):
+        curves, reference = jax.jit(jax.vmap(efficiency))(jnp.asarray(some_draws(fit, CURVES)))
+    constant = float(np.median(np.asarray(reference)))
+    if fit.sampled is None:
+        return np.asarray(curves)[:1], constant, np.zeros((0, len(curves[0])))
+    mounting = fit.mounting()[np.linspace(0, len(fit.mounting()) - 1, CURVES).astype(int)]
+    mounted = np.asarray(curves) * np.exp(-mounting[:, None])
+    new_run = np.quantile(mounted, (QUANTILES[0], QUANTILES[-1]), axis=0)
+    return np.quantile(np.asarray(curves), QUANTILES, axis=0), constant, new_run

@@ -3,9 +3,11 @@
 import numpy as np
 
 from bowdenfit.cable.conditions import LEAST_SHARE
+from bowdenfit.recordings.preparation.play import white_noise
 from bowdenfit.recordings.recording import Recording
 
 RECORDED = "recorded_efficiency"  # name of the readings of recordings in results
+_QUIET = 0.1  # share of the drifts' own spread, up to which noise may be in a drift
 _NEAR_LIMIT = 0.005  # of the end of a range, within which a saturated reading is at it
 
 
@@ -22,10 +24,26 @@ def worth_of(recording: Recording, used: np.ndarray) -> np.ndarray:
 
 
 def drift_of(recording: Recording) -> np.ndarray:
-    """Change of log F_out with time [1/s], by which a delay of its channel shifts it."""
+    """Change of log F_out with time [1/s], by which a delay of its channel shifts it.
+
+    From one block to the next where that is clear of noise, else over as many blocks on both sides as that takes, as far as
+    the phase goes: a change that holds noise makes the delay seem smaller than it is, and better known.
+    """
     blocks = recording.blocks
     least = LEAST_SHARE * np.max(np.abs(blocks.output_force))
-    return np.gradient(np.log(np.maximum(blocks.output_force, least)), blocks.time)
+    log_force, at = np.log(np.maximum(blocks.output_force, least)), np.arange(len(blocks.time))
+    noise = white_noise(blocks.output_force) / float(np.median(np.maximum(blocks.output_force, least)))
+    first = np.append(True, np.diff(recording.strokes.stroke) != 0)
+    starts = np.maximum.accumulate(np.where(first, at, 0))
+    ends = np.append(np.flatnonzero(first)[1:], len(at))[np.cumsum(first) - 1] - 1
+    drift, reach = np.gradient(log_force, blocks.time), 1
+    while noise / np.sqrt(2) / reach > _QUIET * np.std(drift * np.gradient(blocks.time)) and reach < len(at) // 2:
+        reach *= 2
+        side = np.minimum(np.minimum(at - starts, ends - at), reach)
+        wide = side > 1
+        before, after = (at - side)[wide], (at + side)[wide]
+        drift[wide] = (log_force[after] - log_force[before]) / (blocks.time[after] - blocks.time[before])
+    return drift
 
 
 def inside_phase(state: np.ndarray) -> np.ndarray:

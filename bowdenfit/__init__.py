@@ -75,11 +75,13 @@ __all__ = [
 ]
 
 
-def __getattr__(name: str) -> Any:
-    """Load a public name when it is first used."""
-    if name in _WHERE:
-        return getattr(import_module(_WHERE[name]), name)
-    raise AttributeError(f"module 'bowdenfit' has no attribute {name!r}")
+if not TYPE_CHECKING:  # to type checkers there are the names above, and no others
+
+    def __getattr__(name: str) -> Any:
+        """Load a public name when it is first used."""
+        if name in _WHERE:
+            return getattr(import_module(_WHERE[name]), name)
+        raise AttributeError(f"module 'bowdenfit' has no attribute {name!r}")
 
 
 def __dir__() -> list[str]:

@@ -4,14 +4,15 @@ import re
 from collections.abc import Iterable, Mapping, Sequence
 from functools import singledispatch
 from html import escape
-from typing import TYPE_CHECKING, Any, TypeAlias
+from typing import TYPE_CHECKING, Any, TypeAlias, TypeVar
 
-from bowdenfit.words import filled, table
+from bowdenfit.words import few, filled, table
 
 if TYPE_CHECKING:
     from pandas import DataFrame
 
 Rows: TypeAlias = tuple[Iterable[Mapping[str, Any]] | Mapping[str, Any], Mapping[str, str]]  # rows or columns, units
+Item = TypeVar("Item")
 _LINES, _WIDTH = 10, 90  # of what a console shows
 _SHOWN = 12  # rows of a table that is not laid out by its verb
 _TITLE, _RULER, _MORE = re.compile(r"=+"), re.compile(r"-{3,}"), re.compile(r"(\.\.\. )?and \d+ more\b")
@@ -59,6 +60,29 @@ class Display:
 
     def _repr_html_(self) -> str:
         return as_html(str(self))
+
+
+class Several(Display, tuple[Item, ...]):
+    """Several of a kind, a row each."""
+
+    def sentences(self) -> Sequence[str]:
+        """How many there are."""
+        return [f"{len(self)} in all."]
+
+    def _table(self) -> Rows:
+        return [vars(each) for each in self], {}
+
+
+class Named(Display, dict[str, Item]):
+    """Several of a kind, by name."""
+
+    def sentences(self) -> Sequence[str]:
+        """Their names."""
+        return [f"{len(self)} in all: {few(self)}."]
+
+    def _table(self) -> Rows:
+        shapes = {name: {"shape": each.shape} if hasattr(each, "shape") else vars(each) for name, each in self.items()}
+        return [{"name": name} | row for name, row in shapes.items()], {}
 
 
 def _with_unit(name: str, units: Mapping[str, str]) -> str:

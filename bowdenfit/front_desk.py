@@ -75,7 +75,7 @@ class Fit(Record):
 
     def summary(self) -> Summary:
         """Everything on one page, for programs (the contents of summary.json)."""
-        return Summary(summarize(self), str(self))
+        return Summary(summarize(self), self.__str__)
 
     def verdict(self) -> Verdict:
         """Whether the answers may be trusted, and if not, why."""

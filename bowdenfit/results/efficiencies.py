@@ -30,4 +30,5 @@ class Efficiencies(Display, list[Interval]):
         ]
 
     def _table(self) -> Rows:
-        return self.rows, {name: name.rpartition("_")[2] if name in self._at[0] else "1" for name in self.rows[0]}
+        rows = self.rows
+        return rows, {name: name.rpartition("_")[2] if name in self._at[0] else "1" for row in rows[:1] for name in row}

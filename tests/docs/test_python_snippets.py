@@ -58,6 +58,7 @@ def test_snippets_have_no_error_of_types_and_a_misspelt_keyword_is_one(tmp_path)
         if cells:
             (tmp_path / f"{page.stem.replace('-', '_')}.py").write_text("\n".join(cells), encoding="utf-8")
     (tmp_path / "misspelt.py").write_text('import bowdenfit as bf\n\nbf.fit("bench", sede=1)\n', encoding="utf-8")
+    (tmp_path / "no_such_name.py").write_text('import bowdenfit as bf\n\nbf.fitt("bench")\n', encoding="utf-8")
     settings = {"typeCheckingMode": "strict", "extraPaths": [str(ROOT)], "reportUnusedExpression": False}  # as notebooks have
     (tmp_path / "pyrightconfig.json").write_text(json.dumps(settings), encoding="utf-8")
     command = [sys.executable, "-m", "basedpyright", "--outputjson", "--pythonpath", sys.executable, "-p", str(tmp_path)]
@@ -65,7 +66,9 @@ def test_snippets_have_no_error_of_types_and_a_misspelt_keyword_is_one(tmp_path)
     assert said["summary"]["filesAnalyzed"] >= 3
     errors = [each for each in said["generalDiagnostics"] if each["severity"] == "error"]
     found = [(each["file"].rpartition("/")[2], each["message"]) for each in errors]
-    assert found == [("misspelt.py", 'No parameter named "sede"')]
+    assert ("misspelt.py", 'No parameter named "sede"') in found
+    assert {file for file, _ in found} == {"misspelt.py", "no_such_name.py"}
+    assert [file for file, _ in found].count("misspelt.py") == 1
 
 
 def test_a_misspelt_keyword_is_refused_by_name_with_the_nearest():

@@ -135,7 +135,11 @@ def test_what_a_fit_gives_is_short_and_begins_with_the_answer(fit):
             look_at(value)
         seen[name] = value
     assert {"verdict", "optimal_length", "posterior", "known", "checks", "summary", "least_squares"} <= set(seen)
-    for value in (fit, fit.parameter("mu1"), fit.dataset.description, fit.dataset.measurements, fit.plot):
+    within = (
+        fit.parameter("mu1"), fit.dataset.description, fit.dataset.measurements, fit.posterior.values, fit.posterior.replicated,
+        fit.posterior.diagnostics, fit.checks.readings, fit.efficiency([]),
+    )  # fmt: skip
+    for value in (fit, fit.plot, *within):
         look_at(value)
     assert repr(fit).startswith("On-body knee exoskeleton: cut the cable to 470 mm.\n")
     assert repr(fit.verdict()).startswith("You can trust this: ")

@@ -6,7 +6,7 @@ from typing import ClassVar
 
 import numpy as np
 
-from bowdenfit.display import Display, Rows
+from bowdenfit.display import Display, Rows, Several
 from bowdenfit.inference.predictive_checks import place_at_random, predict_without_each, uniformity
 from bowdenfit.inference.prior_sensitivity import FarOut, Sensitivity, far_out, sensitivities
 from bowdenfit.kinds.places import places_of
@@ -44,10 +44,10 @@ class Checks(Display):
         return [vars(reading) for reading in self.readings], {reading.label: reading.unit for reading in self.readings}
 
     @cached_property
-    def readings(self) -> tuple[CheckedReading, ...]:
+    def readings(self) -> Several[CheckedReading]:
         """Every reading of every table."""
         among = sum(len(table.labels) for table in self.tables)
-        return tuple(reading for table in self.tables for reading in table.readings(among))
+        return Several(reading for table in self.tables for reading in table.readings(among))
 
     @property
     def outliers(self) -> list[CheckedReading]:

@@ -6,6 +6,7 @@ from dataclasses import replace
 import jax
 import numpy as np
 
+from bowdenfit.display import Several
 from bowdenfit.errors import UsageError, nearest
 from bowdenfit.kinds.candidate import Candidate
 from bowdenfit.kinds.next_run import typical_run
@@ -113,7 +114,7 @@ def _ranked(
                 bool(difference <= WITHIN * error_of_difference(*scaled)), price[i] if costs else None,
             )
         )  # fmt: skip
-    return tuple(ranked)
+    return Several(ranked)
 
 
 def _within(fit: Record, answer: Answer, best: Candidate) -> Within | None:

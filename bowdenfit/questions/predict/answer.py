@@ -13,4 +13,4 @@ class Predictions(Display, list[dict[str, Any]]):
         return predictions_text(self).strip()
 
     def _table(self) -> Rows:
-        return self, units_of(self[0])
+        return self, units_of(self[0] if self else {})

@@ -16,6 +16,8 @@ def predictions_text(rows: Sequence[Row]) -> str:
     Args:
         rows: One a place.
     """
+    if not rows:
+        return "Nothing was asked for.\n"
     if "in_words" in rows[0]:
         return filled(rows[0]["in_words"]) + "\n"
     several = len(rows) > 1

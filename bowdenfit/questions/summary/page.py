@@ -1,5 +1,6 @@
 """The one page that programs read: `summary.json`; people's versions are made from the same numbers."""
 
+from collections.abc import Callable
 from typing import Any
 
 import numpy as np
@@ -32,15 +33,15 @@ class Summary(Display, dict[str, Any]):
 
     Args:
         page: The contents.
-        text: The same for people.
+        text: Gives the same for people.
     """
 
-    def __init__(self, page: dict[str, Any], text: str) -> None:
+    def __init__(self, page: dict[str, Any], text: Callable[[], str]) -> None:
         super().__init__(page)
         self._text = text
 
     def __str__(self) -> str:
-        return self._text
+        return self._text()
 
     def _table(self) -> Rows:
         rows = {name: {k: v for k, v in row.items() if k != "least_squares"} for name, row in self["parameters"].items()}

@@ -10,8 +10,8 @@ References:
 
 from collections.abc import Callable
 from dataclasses import dataclass
-from functools import cached_property
-from typing import Any
+from functools import cached_property, partial
+from typing import Any, NamedTuple
 
 import jax
 import jax.numpy as jnp
@@ -79,33 +79,30 @@ class Conditional:
         """
         ridge, own = self._ridge(point, data), point[self.which]
         w, z = self._along(own, ridge), self._back(own, ridge)
-        return tuple(
-            (point.at[self.which].set(place), self._log_volume(at, ridge)) for place, at in ((w, own), (z, z))
-        )  # type: ignore[return-value]
+        to_w = point.at[self.which].set(w), self._log_volume(own, ridge)
+        return to_w, (point.at[self.which].set(z), self._log_volume(z, ridge))
 
     def program(self, batch: int) -> Callable[..., Any]:
         """`both_ways` of a batch of points and data, compiled."""
         shape = jax.ShapeDtypeStruct((batch, self.posterior.model.space.size), jnp.float64)
         return compile_program(jax.vmap(self.both_ways, (0, None)), shape, self.posterior.data)
 
-    def _along(self, z: Array, ridge: tuple[Array, Array]) -> Array:
-        center, root = ridge
-        return root.T @ (self._coefficients.vector(z) - center)
+    def _along(self, z: Array, ridge: "_Ridge") -> Array:
+        return ridge.root.T @ (self._coefficients.vector(z) - ridge.center)
 
-    def _back(self, w: Array, ridge: tuple[Array, Array]) -> Array:
-        center, root = ridge
-        return self._coefficients.z_of(center + jax.scipy.linalg.solve_triangular(root, w, trans=1, lower=True))
+    def _back(self, w: Array, ridge: "_Ridge") -> Array:
+        return self._coefficients.z_of(ridge.center + ridge.inverse.T @ w)
 
-    def _log_volume(self, z: Array, ridge: tuple[Array, Array]) -> Array:
+    def _log_volume(self, z: Array, ridge: "_Ridge") -> Array:
         """Log of the volume in w of a unit of the coefficients' z."""
         _, slopes = jax.jvp(self._coefficients.vector, (z,), (jnp.ones_like(z),))
-        return jnp.sum(jnp.log(slopes)) + jnp.sum(jnp.log(jnp.diagonal(ridge[1])))
+        return jnp.sum(jnp.log(slopes)) + jnp.sum(jnp.log(jnp.diagonal(ridge.root)))
 
-    def _ridge(self, z: Array, data: Any) -> tuple[Array, Array]:
-        """Middle of the coefficients and lower triangular root of their precision, from all of z but themselves."""
+    def _ridge(self, z: Array, data: Any) -> "_Ridge":
+        """The ridge where everything but the coefficients says."""
         model, own = self.posterior.model, self._coefficients
         low, middle, high = jax.vmap(own.vector)(jnp.tile(jnp.array([[-1.0], [0.0], [1.0]]), own.size))
-        precision = jnp.diag((2 / (high - low)) ** 2)
+        precision = (2 / (high - low)) ** 2
         others = model.space.constrain(z.at[self.which].set(0.0))
 
         def residuals(coefficients: Array) -> Array:
@@ -114,11 +111,20 @@ class Conditional:
 
         now, change = jax.linearize(residuals, middle)
         slopes = jax.vmap(change)(jnp.eye(own.size))
-        told = slopes @ slopes.T + precision
-        root = jnp.linalg.cholesky(told, symmetrize_input=False)
-        center = middle - jax.scipy.linalg.cho_solve((root, True), slopes @ now)
-        known = jnp.all(jnp.isfinite(root)) & jnp.all(jnp.isfinite(center))
-        return jnp.where(known, center, middle), jnp.where(known, root, jnp.sqrt(precision))
+        root = jnp.linalg.cholesky(slopes @ slopes.T + jnp.diag(precision), symmetrize_input=False)
+        inverse = jax.scipy.linalg.solve_triangular(root, jnp.eye(own.size), lower=True)
+        center = middle - inverse.T @ (inverse @ (slopes @ now))
+        known, width = jnp.all(jnp.isfinite(inverse)) & jnp.all(jnp.isfinite(center)), jnp.sqrt(precision)
+        prior = _Ridge(middle, jnp.diag(width), jnp.diag(1 / width))
+        return jax.tree.map(partial(jnp.where, known), _Ridge(center, root, inverse), prior)
+
+
+class _Ridge(NamedTuple):
+    """Middle of the coefficients, lower triangular root of their precision, and its inverse."""
+
+    center: Array
+    root: Array
+    inverse: Array
 
 
 def _depends(function: Callable[..., Array], *arguments: Any) -> bool:

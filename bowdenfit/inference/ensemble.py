@@ -54,7 +54,7 @@ class Sweep(emcee.moves.Move):
         at, accepted = self.coordinates.from_z(state.coords), np.zeros(len(state.coords))
         for which in model.random.choice(len(self.proposals), size=THIN, p=self.shares):
             for half in self._halves(model.random, len(state.coords)):
-                accepted += self._move(self.proposals[which], half, model, state, at)
+                accepted[self._move(self.proposals[which], half, model, state, at)] += 1
         return state, accepted / THIN
 
     def _halves(self, random: np.random.RandomState, n: int) -> Sequence[tuple[np.ndarray, np.ndarray]]:
@@ -67,7 +67,7 @@ class Sweep(emcee.moves.Move):
     def _move(
         self, proposal: Proposal, half: tuple[np.ndarray, np.ndarray], model: Any, state: emcee.State, at: Places
     ) -> np.ndarray:
-        """Move one half, in z and in the coordinates; who was moved."""
+        """Move one half, in z and in the coordinates; positions of those that were moved."""
         (moving, resting), (w, volume) = half, at
         proposed, factors = proposal(w[moving], w[resting], model.random)
         new, which = proposed.reshape(-1, w.shape[1]), moving.ravel()
@@ -78,7 +78,7 @@ class Sweep(emcee.moves.Move):
         taken = which[better]
         state.coords[taken], state.log_prob[taken] = z[better], log_density[better]
         w[taken], volume[taken] = new[better], new_volume[better]
-        return np.isin(np.arange(len(w)), taken)
+        return taken
 
 
 def default_moves(size: int, n_walkers: int) -> Moves:

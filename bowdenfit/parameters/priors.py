@@ -8,10 +8,11 @@ A prior's hyperparameters may be arrays, so that parameters with priors of one k
 from dataclasses import dataclass
 from typing import ClassVar, Protocol, TypeAlias, runtime_checkable
 
+import jax
 import jax.numpy as jnp
 import numpy as np
 from jax import Array
-from jax.scipy.special import erf, erfinv, log_ndtr, ndtr, ndtri
+from jax.scipy.special import erf, erfc, erfinv, ndtr, ndtri
 from jax.scipy.stats import norm
 from jaxtyping import Float
 
@@ -152,15 +153,11 @@ class HalfCauchy:
     allowed_ends: ClassVar = True, False
 
     def constrain(self, z: Float[Numbers, "*any"]) -> Float[Numbers, "*any"]:
-        """Quantile of the half-Cauchy from the nearer tail."""
-        below, above = _split(z)
-        # By the logarithm of the tail, whose derivative stays finite where that of the tail's inverse does not.
-        rest = jnp.pi / 2 * ndtr(-above)
-        safe = jnp.where(rest < _NEAR_ZERO, 1.0, rest)
-        tangent_share = jnp.where(rest < _NEAR_ZERO, 1 + rest**2 / 3, jnp.tan(safe) / safe)
-        log_tangent = log_ndtr(-above) + jnp.log(jnp.pi / 2 * tangent_share)
-        ratio = jnp.where(z < 0, jnp.tan(jnp.pi / 2 * ndtr(below)), jnp.exp(-log_tangent))
-        return (self.scale * ratio) ** self.power
+        """Quantile of the half-Cauchy from the nearer tail, by one error function: it is most of what a small model costs."""
+        distance = jnp.where(z < 0, -z, z)
+        value = self.scale * jnp.where(z < 0, _tangent(distance), jnp.exp(-_log_tangent(distance)))
+        plain = not isinstance(self.power, Array) and bool(np.all(self.power == 1.0))
+        return value if plain else value**self.power
 
     def unconstrain(self, value: Float[Numbers, "*any"]) -> Float[Numbers, "*any"]:
         """Standard normal quantile of the half-Cauchy distribution function."""
@@ -244,6 +241,26 @@ class TruncatedNormal:
     def widening(self, value: np.ndarray, factor: float) -> np.ndarray:
         """See `Prior`."""
         return _widening((value - self.mean) / self.sd, factor)
+
+
+def _tangent(distance: Float[Numbers, "*any"]) -> Float[Numbers, "*any"]:
+    """The standard half-Cauchy's quantile at minus a distance of z from 0."""
+    return jnp.tan(jnp.pi / 4 * erfc(distance * (0.5 * np.sqrt(2.0))))
+
+
+@jax.custom_jvp
+def _log_tangent(distance: Float[Numbers, "*any"]) -> Float[Numbers, "*any"]:
+    """Its logarithm, whose derivative stays finite where that of the quantile's inverse does not."""
+    return jnp.log(jnp.maximum(_tangent(distance), np.finfo(float).tiny))
+
+
+@_log_tangent.defjvp
+def _log_tangent_and_slope(at: tuple[Array], change: tuple[Array]) -> tuple[Numbers, Array]:
+    (distance,), (along,) = at, change
+    both_tails = erfc(distance * (0.5 * np.sqrt(2.0)))
+    density, known = np.sqrt(np.pi / 2) * jnp.exp(-(distance**2) / 2), both_tails > 0
+    slope = density / jnp.sin(jnp.pi / 2 * jnp.where(known, both_tails, 1.0))
+    return _log_tangent(distance), -jnp.where(known, slope, distance) * along
 
 
 def _split(z: Float[Numbers, "*any"]) -> tuple[Float[Numbers, "*any"], Float[Numbers, "*any"]]:

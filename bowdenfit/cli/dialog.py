@@ -24,7 +24,7 @@ class Terminal:
             say(filled(f"{i}  {option}", "  "))
         if question.default is None and question.example:
             such = "" if question.options else f"such as {question.example}; "
-            say(f"({such}no default, because no file says it)")
+            say(f"({such}there is no default, because nothing says it)")
         shown = f"[{question.default}]" if question.default is not None else ""
         while True:
             typed = click.prompt(shown, default=question.default or "", show_default=False, prompt_suffix="> ")

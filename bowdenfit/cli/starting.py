@@ -140,7 +140,7 @@ def _from_files(place: Path, files: Sequence[Path], ask: "Asker") -> None:
     except BowdenfitError as error:
         say(f"The files cannot be fitted yet. Correct them in {folder}, then run: bowdenfit check {folder}")
         raise error from None
-    say(f"Next: bowdenfit fit {folder}   (bowdenfit check {folder} says how every row was understood)")
+    say(f"Next: bowdenfit fit {folder}\n(bowdenfit check {folder} says how every row was understood)")
 
 
 @click.command(short_help="Print the shell completion script.")

@@ -13,6 +13,7 @@ import bowdenfit as bf
 from bowdenfit.errors import BowdenfitError, UsageError
 from bowdenfit.questions.start.describe import description_of
 from bowdenfit.questions.start.folder import examples, new_folder
+from bowdenfit.questions.start.page import toml_text
 from bowdenfit.questions.start.question import quantity
 
 CORPUS = Path(__file__).parents[1] / "files" / "corpus"
@@ -128,7 +129,7 @@ def test_files_that_say_everything_need_nobody(run, foreign):
     (foreign / "one.csv").write_text("wrap angle (deg),F_in (N),F_out (N)\n90,50,40\n90,60,48\n180,50,32\n")
     code, out, err = run("init", "cable", "--from", "one.csv")
     assert (code, err) == (0, "")
-    assert out.endswith("Next: bowdenfit fit cable   (bowdenfit check cable says how every row was understood)\n")
+    assert out.endswith("Next: bowdenfit fit cable\n(bowdenfit check cable says how every row was understood)\n")
     assert run("check", "cable")[0] == 0
 
 
@@ -264,3 +265,28 @@ def test_a_folder_that_exists_is_refused_before_the_first_question(foreign):
     console.child.expect("exists already")
     assert "?" not in console.child.before
     assert console.end() == 2
+
+
+@pytest.mark.parametrize(
+    "page",
+    [
+        {"schema": 1, "name": 'a "cable"\\ \u00e4', "contact": [{"name": "a", "angle": {"value": 1e-7, "unit": "deg"}}] * 2},
+        {"tables": {"forces": {"file": "f.csv", "columns": {f"key {i}": {"name": f"Kanal {i}"} for i in range(9)}}, "a": {}}},
+        {"tables": {"recordings": {}}, "route": {"range": [0.1, 3], "choices": [i / 3 for i in range(60)]}},
+    ],
+)
+def test_what_is_written_is_what_is_read(page):
+    def close(value):
+        if isinstance(value, float):
+            return float(f"{value:.12g}")
+        if isinstance(value, dict):
+            return {key: close(inside) for key, inside in value.items()}
+        return [close(inside) for inside in value] if isinstance(value, list) else value
+
+    assert tomllib.loads(toml_text(page, {"route": "a remark"})) == close(page)
+
+
+def test_a_range_beyond_the_measured_lengths_is_refused(foreign):
+    said = {"eta_mean": "%", "force_at_the_motor": "1", "Between_which": "400 530"}
+    with pytest.raises(UsageError, match="angles were measured from 430 to 530 mm only"):
+        described(foreign, Person(**{"kraefte.csv has the columns": "3", "What_does_it_hold": "2"}, **said), *FOREIGN)

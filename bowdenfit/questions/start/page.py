@@ -2,11 +2,11 @@
 
 import json
 import re
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from typing import Any
 
 _BARE = re.compile(r"[A-Za-z0-9_-]+")
-_LINE = 100  # characters, beyond which a list is written over several lines
+_LINE = 100  # characters, beyond which a table gets a heading of its own
 
 
 def toml_text(page: Mapping[str, Any], remarks: Mapping[str, str]) -> str:
@@ -18,17 +18,35 @@ def toml_text(page: Mapping[str, Any], remarks: Mapping[str, str]) -> str:
     """
     lines = list[str]()
     for key, value in page.items():
-        if lines and lines[-1] and isinstance(value, Mapping | list):
+        is_list = isinstance(value, list) and bool(value) and isinstance(value[0], Mapping)
+        if lines and (is_list or isinstance(value, Mapping)):
             lines.append("")
         lines += [f"# {line}" for line in remarks.get(key, "").splitlines()]
-        if isinstance(value, Mapping):
-            lines += [f"[{_key(key)}]", *(f"{_key(name)} = {_value(said)}" for name, said in value.items()), ""]
-        elif isinstance(value, Sequence) and not isinstance(value, str) and value and isinstance(value[0], Mapping):
-            for each in value:
-                lines += [f"[[{_key(key)}]]", *(f"{_key(name)} = {_value(said)}" for name, said in each.items()), ""]
+        if is_list:
+            for i, each in enumerate(value):
+                lines += [""] * (i > 0) + [f"[[{_key(key)}]]", *map(_line, each, each.values())]
+        elif isinstance(value, Mapping):
+            lines += _section([key], value)
         else:
-            lines.append(f"{_key(key)} = {_value(value)}")
-    return "\n".join(lines).rstrip() + "\n"
+            lines.append(_line(key, value))
+    return "\n".join(lines) + "\n"
+
+
+def _section(path: Sequence[str], page: Mapping[str, Any]) -> Iterator[str]:
+    """A table under its heading; those in it that are long have headings of their own behind it."""
+    long = {key: value for key, value in page.items() if isinstance(value, Mapping) and len(_line(key, value)) > _LINE}
+    short = {key: value for key, value in page.items() if key not in long}
+    if short:
+        yield f"[{'.'.join(map(_key, path))}]"
+        yield from map(_line, short, short.values())
+    for i, (key, value) in enumerate(long.items()):
+        if short or i:
+            yield ""
+        yield from _section([*path, key], value)
+
+
+def _line(key: str, value: Any) -> str:
+    return f"{_key(key)} = {_value(value)}"
 
 
 def _key(name: str) -> str:
@@ -42,9 +60,9 @@ def _value(value: Any) -> str:
     if isinstance(value, float | int):
         return f"{value:.12g}"
     if isinstance(value, Mapping):
-        inside = ", ".join(f"{_key(name)} = {_value(said)}" for name, said in value.items())
+        inside = ", ".join(map(_line, value, value.values()))
         return f"{{ {inside} }}" if inside else "{}"
-    if isinstance(value, Sequence) and not isinstance(value, str):
+    if isinstance(value, list):
         parts = [_value(each) for each in value]
         line = f"[{', '.join(parts)}]"
         return line if len(line) <= _LINE else "[\n" + "".join(f"    {part},\n" for part in parts) + "]"

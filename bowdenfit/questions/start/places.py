@@ -82,19 +82,29 @@ def _along_route(sheet: Sheet, places: Places, ask: Asker) -> None:
         raise DatasetError(f"{sheet.file} has no column of lengths beside the wrap angles; add one, such as cable_length_mm.")
     why = f"{sheet.file} does not say which of its columns is the length; name that column cable_length_mm."
     column = with_unit(sheet, "length", _chosen(sheet, lengths, why, ask), ask)
-    ends = ask.ask(
-        numbers(
-            f"Between which lengths, in {column.unit}, may the best one lie? The curves of the wrap angles hold there.",
-            f"{column.low:g} {column.high:g}",
-            exactly=2,
-        )
-    )
+    ends = ask.ask(_ends(column))
     named = column.plain if column.plain.isascii() and column.plain.endswith("length") else _LENGTH
     places.route = {"variable": named, "unit": column.unit, "range": list(ends)}
     if bought := ask.ask(_choices(ends, column.unit)):
         places.route["choices"] = list(bought)
     take(sheet, places.length, column, ask)
     _curved(sheet, places, ask)
+
+
+def _ends(column: SeenColumn) -> Question[tuple[float, ...]]:
+    """Which lengths may be the best: some of those between which angles were measured."""
+    words = f"Between which lengths, in {column.unit}, may the best one lie? The curves of the wrap angles are fitted there."
+    asked = numbers(words, f"{column.low:.12g} {column.high:.12g}", exactly=2)
+
+    def read(typed: str) -> tuple[float, ...]:
+        found = asked.read(typed)
+        if found[0] < column.low or found[1] > column.high:
+            raise UsageError(
+                f"{shown(typed)}: angles were measured from {column.low:g} to {column.high:g} {column.unit} only; stay between."
+            )
+        return found
+
+    return Question(words, read, asked.default)
 
 
 def _choices(ends: Sequence[float], unit: str) -> Question[tuple[float, ...]]:
@@ -131,7 +141,10 @@ def _curved(sheet: Sheet, places: Places, ask: Asker) -> None:
         blanks = blanks or column.blanks > 0
     if blanks:
         why = f"{sheet.file} has blank cells, and does not say below which angle nothing could be read; write <10 in them."
-        words = f"Blank cells of {sheet.file} are angles too small to be read. Below which angle was nothing read?"
+        words = (
+            f"{sheet.file} has blank cells, which are read as angles too small to be measured; where nothing was measured at "
+            "all, delete the row instead. Below which angle could nothing be measured?"
+        )
         value, unit = ask.ask(quantity(words, "angle", "10 deg", why))
         sheet.settings["detection_limit"] = {"value": value, "unit": unit}
 

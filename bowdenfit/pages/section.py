@@ -106,6 +106,7 @@ def prose(
     items: Iterable[str] = (),
     folded: Iterable[tuple[str, str | Table]] = (),
     pictures: tuple[Picture, ...] = (),
+    headline: str = "",
 ) -> Section:
     """A section without a template of its own.
 
@@ -116,8 +117,10 @@ def prose(
         items: A list below the paragraphs.
         folded: Texts as they are printed, and tables, that only those who ask for them see, with what they are.
         pictures: Figures, at its end.
+        headline: What stands above all, in large letters.
     """
     context = {
+        "headline": headline,
         "sentences": tuple(filter(None, sentences)),
         "tables": tuple(table for table in tables if table.rows),
         "items": tuple(items),

@@ -40,9 +40,10 @@ def calibration_page(found: Calibration) -> Page:
     Args:
         found: The calibration.
     """
+    first, *others = verdict_sentences(found)
     table = [Table(HEADS, tuple(rows(found)))] if found.quantities else []
     sections = (
-        prose("The answer", [*verdict_sentences(found), what_was_done(found)]),
+        prose("The answer", [*others, what_was_done(found)], headline=first),
         prose("Quantity by quantity", [how_to_read(found)] if table else [], table, pictures=PICTURES),
         prose("What was left out", account_sentences(found)),
     )

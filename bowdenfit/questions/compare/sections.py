@@ -29,9 +29,10 @@ def comparison_page(found: Comparison) -> Page:
         found: The comparison.
     """
     heads, rows = scores(found)
+    first, *others = verdict_sentences(found)
     names, values = parameter_cells(found)
     sections = (
-        prose("The answer", verdict_sentences(found)),
+        prose("The answer", others, headline=first),
         prose(
             "How well each predicts",
             basis_sentences(found),

@@ -22,6 +22,9 @@ REFERENCES = {
     "r-hat": "A. Vehtari, A. Gelman, D. Simpson, B. Carpenter and P.-C. Bürkner, Rank-normalization, folding, and "
     "localization: an improved R-hat for assessing convergence of MCMC, Bayesian Analysis 16 (2021), 667-718, "
     "doi:10.1214/20-BA1221.",
+    "nested": "C. C. Margossian, M. D. Hoffman, P. Sountsov, L. Riou-Durand, A. Vehtari and A. Gelman, Nested R-hat: assessing "
+    "the convergence of Markov chain Monte Carlo when running many short chains, Bayesian Analysis 20 (2025), 1587-1614, "
+    "doi:10.1214/24-BA1453.",
     "left-out": "A. Vehtari, A. Gelman and J. Gabry, Practical Bayesian model evaluation using leave-one-out cross-validation "
     "and WAIC, Statistics and Computing 27 (2017), 1413-1432, doi:10.1007/s11222-016-9696-4.",
     "optimistix": "J. Rader, T. Lyons and P. Kidger, Optimistix: modular optimisation in JAX and Equinox (2024), "
@@ -30,13 +33,14 @@ REFERENCES = {
     "arviz": "R. Kumar, C. Carroll, A. Hartikainen and O. Martin, ArviZ: a unified library for exploratory analysis of "
     "Bayesian models in Python, Journal of Open Source Software 4 (2019), 1143, doi:10.21105/joss.01143.",
 }
+_CITED = re.compile(rf"\[({'|'.join(REFERENCES)})\]")
 
 
 def section(fit: Record) -> Section:
     """The paragraphs with numbers in place of the keys of `REFERENCES`, and the references by these numbers."""
     paragraphs = [" ".join(filter(None, [_data(fit), _model(fit), _inference(fit)])), _priors(fit)]
-    keys = list(dict.fromkeys(re.findall(r"\[([a-z-]+)\]", paragraphs[0])))
-    paragraphs[0] = re.sub(r"\[([a-z-]+)\]", lambda key: f"[{keys.index(key[1]) + 1}]", paragraphs[0])
+    keys = list(dict.fromkeys(_CITED.findall(paragraphs[0])))
+    paragraphs[0] = _CITED.sub(lambda cited: f"[{keys.index(cited[1]) + 1}]", paragraphs[0])
     versions = fit.provenance.versions
     context = {
         "trusted": verdict(fit).trusted,
@@ -77,7 +81,7 @@ def _inference(fit: Record) -> str:
         return f"Values are those of least squares: {squares[0].lower()}{squares[1:]}. No posterior was sampled."
     return " ".join([
         f"The joint posterior of {fit.model.space.size} parameters was sampled with {_sampler(fit.posterior)}.",
-        _convergence(fit),
+        _convergence(fit, fit.posterior),
         "Values are medians with central 90 % intervals. Each reading was held against its prediction from all the others by "
         "Pareto-smoothed importance sampling [left-out].",
         f"{squares}, served as a comparison. Diagnostics were computed with ArviZ [arviz]. All random numbers follow from the "
@@ -93,12 +97,10 @@ def _sampler(drawn: Draws) -> str:
     return f"{words} [nuts] [blackjax]" if drawn.sampler == "nuts" else f"emcee [emcee], {words}"
 
 
-def _convergence(fit: Record) -> str:
+def _convergence(fit: Record, drawn: Draws) -> str:
     settings = fit.dataset.description.sampler
-    limits = (
-        f"rank-normalized R-hat below {settings.target_r_hat:g} and effective sample sizes of at least {settings.target_ess} "
-        "[r-hat]"
-    )
+    r_hat = "rank-normalized R-hat [r-hat]" if drawn.sampler == "nuts" else "rank-normalized, nested R-hat [r-hat] [nested]"
+    limits = f"{r_hat} below {settings.target_r_hat:g} and effective sample sizes of at least {settings.target_ess}"
     if not fit.converged:
         return f"Convergence, which is {limits} for every parameter, was NOT reached."
     return f"It was sampled until every parameter had a {limits}."

@@ -63,6 +63,18 @@ def test_drawings_for_which_there_is_no_room_are_left_out_and_that_is_said():
     assert len(page.encode()) < 1_500_000
 
 
+def test_a_page_carries_scripts_only_for_its_charts_and_then_the_terms_of_their_library():
+    chart = Chart("a", "x", "y", (Group(np.arange(2.0), (Series("b", "line", "blue", np.arange(2.0)),)),))
+    with_chart, without = (
+        render(Page("a", "b", (prose("F", (), pictures=(Picture("one", "T", "C.", of),)),)), {"one": SVG.format("")})
+        for of in ((chart,), ())
+    )
+    assert "Copyright (c) 2022 Leon Sorokin" in with_chart
+    assert with_chart.count("sha256-") == 2
+    assert "<script" not in without
+    assert "script-src &#39;none&#39;" in without
+
+
 def test_names_stay_text_wherever_they_stand():
     odd = "</script><b>'\"\u202e{{ 1 }}"
     chart = Chart(odd, odd, odd, (Group(np.arange(2.0), (Series(odd, "line", "blue", np.array([1.0, np.nan])),)),))

@@ -178,6 +178,13 @@ def test_the_report_says_what_the_summary_says(routed):
     assert f"seed {fit.provenance.seed}" in text
 
 
+def test_least_squares_alone_say_so_to_those_who_cite_them(recorded):
+    text = (recorded / REPORT).read_text(encoding="utf-8").replace("\u00a0", " ")
+    assert "Values are those of least squares" in text
+    assert "No posterior was sampled." in text
+    assert "Foreman-Mackey" not in text
+
+
 def test_a_report_is_written_again_over_the_one_there(run, routed):
     (routed / REPORT).write_text("old")
     code, out, _ = run("report", routed)

@@ -110,6 +110,7 @@ class InAnotherProcess(Assistant):
             while (reply := self.ours.recv()) is not None:
                 error, answer = reply
                 if error is not None:
+                    self.ours.recv()  # the end of this job, so that the next one gets its own answer
                     raise error
                 yield answer
         except (EOFError, ConnectionError):

@@ -76,6 +76,16 @@ def test_a_killed_fit_leaves_no_process_behind_not_even_in_the_middle_of_a_job(s
 
 
 @needs_linux
+def test_after_a_job_that_fails_the_next_ones_get_their_own_answers():
+    end = (
+        "second.result()\njobs = [helper.submit(int, 'x'), helper.submit(abs, -3), helper.submit(abs, -4)]\n"
+        "print(type(jobs[0].exception()).__name__, jobs[1].result(), jobs[2].result()); helper.end()"
+    )
+    done = subprocess.run(program(0, end), capture_output=True, text=True, check=True, timeout=60)
+    assert done.stdout.splitlines()[1] == "ValueError 3 4"
+
+
+@needs_linux
 def test_a_process_that_is_ended_from_outside_is_a_sentence():
     end = "import signal; os.kill(helper.process.pid, signal.SIGKILL)\ntry: second.result()\nexcept Exception as e: print(e)"
     done = subprocess.run(program(600, end), capture_output=True, text=True, check=True, timeout=60)

@@ -4,7 +4,7 @@ from typing import Any
 
 from bowdenfit.pages.section import Page
 from bowdenfit.questions.bends import bends_section
-from bowdenfit.questions.check import measured_section
+from bowdenfit.questions.loss import loss_section
 from bowdenfit.questions.next.answer import NextMeasurement
 from bowdenfit.questions.next.next_section import ranking_section
 from bowdenfit.questions.report.figures_section import figures_section
@@ -12,13 +12,14 @@ from bowdenfit.questions.summary import (
     answer_section,
     checks_section,
     coefficients_section,
+    measured_section,
     methods_section,
     next_section,
     provenance_section,
 )
 from bowdenfit.results.record import Record
 
-ABOVE_FIGURES = (answer_section, measured_section, coefficients_section, bends_section)
+ABOVE_FIGURES = (answer_section, measured_section, coefficients_section, loss_section, bends_section)
 BELOW_FIGURES = (methods_section, provenance_section)
 
 

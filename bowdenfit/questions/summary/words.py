@@ -71,16 +71,19 @@ def counts_in_words(fit: Record) -> str:
     return listed([count for count in (*entered, *(kind.count(table) for kind, table in each_table(tables))) if count])
 
 
-def _title(fit: Record) -> str:
+def fitted_to(fit: Record) -> str:
+    """What was fitted to, and by which model where it is not the usual one, in a sentence."""
     description = fit.dataset.description
-    line = f"{fit.name}\n{'=' * len(fit.name)}"
     geometry = f"; {description.geometry} geometry" if description.curved else ""
     model = f"; friction model {description.friction_model}" if description.friction_model != "capstan" else ""
     laws = f"; {description.laws_in_words}" if description.laws_in_words else ""
     noise = f"; {description.noise_in_words}" if description.noise != "normal" else ""
-    fitted = filled(f"Fitted to {counts_in_words(fit)}{geometry}{laws}{model}{noise}.")
+    return f"Fitted to {counts_in_words(fit)}{geometry}{laws}{model}{noise}."
+
+
+def _title(fit: Record) -> str:
     remarks = [filled(remark) for remark in fit.dataset.measurements.remarks]
-    return "\n".join([line, fitted, *remarks])
+    return "\n".join([fit.name, "=" * len(fit.name), filled(fitted_to(fit)), *remarks])
 
 
 def _verdict(fit: Record, page: dict[str, Any]) -> str:

@@ -22,7 +22,7 @@ class Terminal:
         say(filled(question.words))
         for i, option in enumerate(question.options, start=1):
             say(filled(f"{i}  {option}", "  "))
-        if question.default is None and question.example:
+        if question.default is None:
             such = "" if question.options else f"such as {question.example}; "
             say(f"({such}there is no default, because nothing says it)")
         shown = f"[{question.default}]" if question.default is not None else ""

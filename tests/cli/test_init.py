@@ -116,13 +116,28 @@ def test_whatever_laboratories_write_becomes_a_data_set_that_check_accepts(path,
 
 
 def test_where_nobody_can_be_asked_all_that_is_not_said_is_refused_and_nothing_written(foreign, refuse, tmp_path):
-    assert "eta.csv does not say what it holds" in refuse("init", "cable", "--from", *FOREIGN)
+    said = refuse("init", "cable", "--from", *FOREIGN, faults=2)
+    assert "eta.csv does not say what it holds" in said and "kraefte.csv does not say what it holds" in said
     (foreign / "one.csv").write_text("F_in,F_out\n50,40\n60,48\n")
     said = refuse("init", "cable", "--from", "one.csv", faults=2)
     assert "unit of its column 'F_in'; write it into the heading, such as 'F_in (N)'" in said
     assert "'F_out'" in said
     (foreign / "two.csv").write_text("F_in (N),F_out (N)\n50,40\n60,48\n")
-    assert "two.csv says no wrap angle; add a column" in refuse("init", "cable", "--from", "two.csv")
+    assert "no column of two.csv is a wrap angle; add one" in refuse("init", "cable", "--from", "two.csv")
+
+
+@pytest.mark.parametrize(
+    ("text", "said"),
+    [
+        ("Winkel (deg),F_in (N),F_out (N)\n90,50,40\n180,60,38\n", "whether its column 'Winkel (deg)' is the wrap angle"),
+        ("humidity (%),wrap angle (deg)\n78,90\n60,180\n", "does not say what it holds"),
+        ("wrap angle (deg),F_in (N),Cell B (N)\n90,50,40\n180,60,38\n", "does not say what it holds"),
+        ("F_in (N),F_out (N)\n50,40\n60,48\n", "is a wrap angle; add one"),
+    ],
+)
+def test_what_would_only_be_proposed_to_a_person_is_taken_from_nobody(foreign, refuse, text, said):
+    (foreign / "bench_90deg.csv").write_text(text)
+    assert said in refuse("init", "cable", "--from", "bench_90deg.csv")
 
 
 def test_files_that_say_everything_need_nobody(run, foreign):
@@ -223,10 +238,12 @@ def test_in_a_terminal_three_foreign_files_become_a_fit_without_an_editor(foreig
     console.answer("What does it hold", "")
     console.answer("What is the cable called", "Glove")
     console.answer("Who measured it", "")
+    console.answer("is the efficiency", "")
     console.answer("In which unit is the column 'eta mean'", "furlong")
     console.answer("does not measure a ratio", "%")
     console.answer("is the force at the motor", "")
     console.answer("Something must be written here", "1")
+    console.answer("is the force at the load", "")
     console.answer("says which mounting", "1")
     console.answer("Between which lengths", "")
     console.answer("can be bought", "440 460 480 500 520")
@@ -234,6 +251,8 @@ def test_in_a_terminal_three_foreign_files_become_a_fit_without_an_editor(foreig
         console.answer(f"What is the place called.*{place}", "")
         console.answer("follow the length", "")
     console.answer("Below which angle", "10 deg")
+    console.answer("eta.csv is the length", "")
+    console.answer("kraefte.csv is the length", "")
     console.answer("another place", "")
     console.answer("'mantel' called", "")
     console.answer("'knie' called", "mu1")

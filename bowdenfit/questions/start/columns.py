@@ -69,15 +69,13 @@ def _required(sheet: Sheet, wanted: Wanted, options: Sequence[SeenColumn], ask: 
             f"{sheet.file} has no column that could be {wanted.words}; it has {quoted(tuple(c.name for c in sheet.columns))}. "
             "Add that column, or leave the file out."
         )
-    if len(options) == 1:
-        ask.say(f"{sheet.file}: {shown(options[0].name)} is taken as {wanted.words}.")
-        return options[0]
     listed = [(each.words, each) for each in options]
     why = (
         f"{sheet.file} does not say which of its columns is {wanted.words}; name that column {wanted.quantity.name}, with its "
         "unit."
     )
-    return ask.ask(choose(f"Which column of {sheet.file} is {wanted.words}?", listed, None, why))
+    proposed = 1 if len(options) == 1 else None
+    return ask.ask(choose(f"Which column of {sheet.file} is {wanted.words}?", listed, proposed, why))
 
 
 def _optional(sheet: Sheet, wanted: Wanted, ask: Asker) -> SeenColumn | None:

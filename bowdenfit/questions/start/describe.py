@@ -69,7 +69,7 @@ def _sheets(paths: Sequence[Path], ask: Asker) -> list[Sheet]:
             if sheet.kind is None:
                 sheet = _asked(sheet, ask)
             assert sheet.kind is not None and sheet.kind.asked is not None
-            ask.say(f"{sheet.file}: {sheet.kind.asked.holds}.")
+            ask.say(f"{sheet.file} holds {sheet.kind.asked.holds}.")
             sheets.append(sheet)
     ask.settle()
     for kind in {sheet.kind.name: sheet.kind for sheet in sheets if sheet.kind}.values():
@@ -89,7 +89,10 @@ def _asked(sheet: Sheet, ask: Asker) -> Sheet:
     options: list[tuple[str, Kind]] = [(kind.asked.holds, kind) for kind in kinds if kind.asked]
     default = kinds.index(sheet.likely) + 1 if sheet.likely else None
     columns = listed([each.words for each in sheet.columns])
-    why = f"{sheet.file} does not say what it holds; name its columns as the template has them (bowdenfit init FOLDER)."
+    why = (
+        f"{sheet.file} does not say what it holds; name its columns for it, such as input_force_N and output_force_N, "
+        "efficiency_percent, or cable_length_mm beside wrap angles in deg; or run this in a terminal, which asks."
+    )
     kind = ask.ask(choose(f"{sheet.file} has the columns {columns}. What does it hold?", options, default, why))
     if kind.takes_channels:
         return recording_sheet(sheet.path, "its user says so")
@@ -147,10 +150,11 @@ def _recordings(sheets: Sequence[Sheet], places: Places, ask: Asker) -> list[dic
 def _length_of(sheet: Sheet, places: Places, ask: Asker) -> float:
     """The length at which a recording was made; proposed where the name of its file has it."""
     unit = places.route["unit"]
-    named = re.search(rf"(?<![\d.])(\d+(?:[.,]\d+)?)[\s_-]?{re.escape(unit)}(?![a-z])", sheet.path.stem)
+    named = re.findall(rf"(?<![\d.])(\d+(?:[.,]\d+)?)[\s_-]?{re.escape(unit)}(?![a-z])", sheet.path.stem)
     why = (
         f"{sheet.file} does not say at which length it was recorded; write it into the name of the file, such as "
         f"run1_470{unit}.csv."
     )
     words = f"At which length, in {unit}, was {sheet.file} recorded?"
-    return ask.ask(number(words, named[1].replace(",", ".") if named else None, why, "470"))
+    said = named[0].replace(",", ".") if len(named) == 1 else None
+    return ask.ask(number(words, said, "" if said else why, "470"))

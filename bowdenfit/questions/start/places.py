@@ -81,7 +81,8 @@ def _along_route(sheet: Sheet, places: Places, ask: Asker) -> None:
     if not lengths:
         raise DatasetError(f"{sheet.file} has no column of lengths beside the wrap angles; add one, such as cable_length_mm.")
     why = f"{sheet.file} does not say which of its columns is the length; name that column cable_length_mm."
-    column = with_unit(sheet, "length", _chosen(sheet, lengths, why, ask), ask)
+    sure = len(lengths) == 1 and bool(lengths[0].dimension)
+    column = with_unit(sheet, "length", lengths[0] if sure else _chosen(sheet, lengths, why, ask), ask)
     ends = ask.ask(_ends(column))
     named = column.plain if column.plain.isascii() and column.plain.endswith("length") else _LENGTH
     places.route = {"variable": named, "unit": column.unit, "range": list(ends)}
@@ -172,14 +173,15 @@ def _length_of_rows(sheet: Sheet, places: Places, ask: Asker) -> None:
             f"of wrap angles, {places.route['variable']}_{places.route['unit']}."
         )
     why = f"{sheet.file} does not say which of its columns is the length; name it as in the table of wrap angles."
-    take(sheet, places.length, _chosen(sheet, found, why, ask), ask)
+    said = sheet.can_be(places.length)
+    take(sheet, places.length, said[0] if len(said) == 1 else _chosen(sheet, found, why, ask), ask)
 
 
 def _chosen(sheet: Sheet, lengths: Sequence[SeenColumn], why: str, ask: Asker) -> SeenColumn:
     """The column of lengths."""
     options = [(each.words, each) for each in lengths]
-    question = choose(f"Which column of {sheet.file} is the length of the cable?", options, None, why)
-    return lengths[0] if len(lengths) == 1 else ask.ask(question)
+    proposed = 1 if len(lengths) == 1 else None
+    return ask.ask(choose(f"Which column of {sheet.file} is the length of the cable?", options, proposed, why))
 
 
 def _angles_of_rows(sheet: Sheet, places: Places, ask: Asker) -> None:
@@ -191,11 +193,12 @@ def _angles_of_rows(sheet: Sheet, places: Places, ask: Asker) -> None:
     left = [each for each in sheet.left if each.dimension == "angle"]
     missing = [name for name in places.columns if name not in sheet.taken]
     if not places.route and len(missing) == len(left) == 1:
-        take(sheet, Quantity(missing[0], "angle"), left[0], ask)
+        if _is_wrap_angle(sheet, left[0], ask):
+            take(sheet, Quantity(missing[0], "angle"), left[0], ask)
     elif not places.contacts and len(left) == 1:
-        take(sheet, Quantity(_WRAP_ANGLE, "angle"), left[0], ask)
-        places.add("cable", {"column": _WRAP_ANGLE})
-        ask.say(f"{sheet.file}: {shown(left[0].name)} is taken as the wrap angle of the cable in each row.")
+        if _is_wrap_angle(sheet, left[0], ask):
+            take(sheet, Quantity(_WRAP_ANGLE, "angle"), left[0], ask)
+            places.add("cable", {"column": _WRAP_ANGLE})
     elif left and not (places.columns and not places.route):
         listing = "Which of these were measured at places where the rope rubs"
         question = f"{sheet.file} has {listed([shown(each.name) for each in left])}. {listing}?"
@@ -203,6 +206,14 @@ def _angles_of_rows(sheet: Sheet, places: Places, ask: Asker) -> None:
             take(sheet, Quantity(column.plain, "angle"), column, ask)
             name = _name(places, f"What is the place called whose wrap angle is {shown(column.name)}?", _place(column), ask)
             places.add(name, {"column": column.plain})
+
+
+def _is_wrap_angle(sheet: Sheet, column: SeenColumn, ask: Asker) -> bool:
+    """Whether a column of angles is that of the bench, asked where its heading does not say so."""
+    if [each.name for each in sheet.can_be(Quantity(_WRAP_ANGLE, "angle"))] == [column.name]:
+        return True
+    why = f"{sheet.file} does not say whether its column {shown(column.name)} is the wrap angle; name it {_WRAP_ANGLE}_deg."
+    return ask.ask(agree(f"Is {column.words} in {sheet.file} the angle by which the cable was wrapped?", True, why))
 
 
 def _one_angle(sheets: Sequence[Sheet], places: Places, ask: Asker) -> None:
@@ -216,7 +227,7 @@ def _one_angle(sheets: Sequence[Sheet], places: Places, ask: Asker) -> None:
     known = {said[0] for sheet in sheets if (said := stated_angle(sheet.path))}
     default = next(iter(known)) if len(known) == 1 else None
     files = listed([sheet.file for sheet in sheets])
-    why = f"{files} {'say' if len(sheets) > 1 else 'says'} no wrap angle; add a column such as wrap_angle_deg."
+    why = f"no column of {files} is a wrap angle; add one, such as wrap_angle_deg."
     words = "By which angle was the cable wrapped on the bench, all bends together, with its unit?"
     value, unit = ask.ask(quantity(words, "angle", "180 deg", why, default))
     places.add("cable", {"value": value, "unit": unit})
@@ -230,7 +241,8 @@ def _place(column: SeenColumn) -> str:
 def _name(places: Places, words: str, default: str | None, ask: Asker) -> str:
     """The name of a contact, which no other has."""
     taken = {each["name"] for each in places.contacts}
-    asked = text(words, None if default in taken else default, "two places would have the same name.", "edge")
+    proposed = None if default in taken else default
+    asked = text(words, proposed, "" if proposed else "two places would have the same name.", "edge")
 
     def read(typed: str) -> str:
         name = asked.read(typed)

@@ -21,9 +21,9 @@ class Question(Generic[Answer]):
     Args:
         words: The question.
         read: The answer in what was typed; refuses what is none with a sentence.
-        default: What Enter alone says; None where nothing may be guessed.
-        why: Then why nothing may be, and what would say it, in a sentence.
-        example: Then an answer, to show how it is written.
+        default: What Enter alone says; None where nothing may be proposed.
+        why: What the files do not say, and what would say it, in a sentence; with a default beside it, that is only proposed.
+        example: An answer where there is no default, to show how it is written.
         options: What can be answered by a number, from 1, each in words.
     """
 
@@ -52,17 +52,16 @@ class Asker(Protocol):
 
 
 class Nobody:
-    """Where there is no person: defaults count, and what has none is refused in the end, all of it together."""
+    """Where there is no person: what files do not say is refused, all of it together, and proposals are no answers."""
 
     def __init__(self) -> None:
         self.faults = Faults()
 
     def ask(self, question: Question[Answer]) -> Answer:
-        """The default; where there is none, an example, to find out what else is not said."""
-        if question.default is not None:
-            return question.read(question.default)
-        self.faults.found.append(DescriptionError(question.why))
-        return question.read(question.example)
+        """The default; where it is only proposed, or an example, to find out what else is not said."""
+        if question.default is None or question.why:
+            self.faults.found.append(DescriptionError(question.why))
+        return question.read(question.example if question.default is None else question.default)
 
     def say(self, sentence: str) -> None:
         """Nothing."""
@@ -81,8 +80,8 @@ def text(words: str, default: str | None, why: str = "", example: str = "") -> Q
     return Question(words, lambda typed: " ".join(typed.split()), default, why, example)
 
 
-def agree(words: str, default: bool) -> Question[bool]:
-    """A question after yes or no."""
+def agree(words: str, default: bool, why: str = "") -> Question[bool]:
+    """A question after yes or no; `why` where the default is only proposed."""
 
     def read(typed: str) -> bool:
         said = typed.strip().lower()
@@ -90,7 +89,7 @@ def agree(words: str, default: bool) -> Question[bool]:
             raise UsageError(f"{shown(typed)} is neither yes nor no; write y or n.")
         return said in _YES
 
-    return Question(f"{words} (y or n)", read, "y" if default else "n")
+    return Question(f"{words} (y or n)", read, "y" if default else "n", why)
 
 
 def choose(
@@ -102,7 +101,7 @@ def choose(
         words: The question.
         options: Each in words, and what it stands for.
         default: Which of them Enter takes, from 1.
-        why: Why there is no default.
+        why: Why there is no default, or none that is more than proposed.
     """
 
     def read(typed: str) -> Answer:
@@ -131,7 +130,7 @@ def unit(words: str, dimension: str, why: str, default: str | None = None) -> Qu
     Args:
         words: The question.
         dimension: What it measures.
-        why: Why there is no default.
+        why: Why there is none that is more than proposed.
         default: The unit that Enter takes.
     """
 
@@ -155,7 +154,7 @@ def quantity(
         words: The question.
         dimension: What it measures.
         example: How it is written.
-        why: Why there is no default.
+        why: Why there is none that is more than proposed.
         default: What Enter takes.
     """
 

@@ -16,6 +16,14 @@ import bowdenfit
 MOST_TEXT = 2000  # characters of one output
 PAGES = sorted([ROOT / "README.md", *(ROOT / "docs").rglob("*.md")])
 CELL = re.compile(r"^```(?:python|\{code-cell\}[^\n]*)\n(.*?)^```", re.MULTILINE | re.DOTALL)
+CALIBRATING = """
+from bowdenfit.notebook import watched
+from bowdenfit.questions.calibrate.verb import WATCH
+
+with watched(WATCH, None) as report:
+    for n in range(200):
+        report(n + 1, 200)
+"""
 CELLS = {page: CELL.findall(page.read_text(encoding="utf-8")) for page in PAGES}
 
 
@@ -32,7 +40,7 @@ def run_in_a_kernel(cells, monkeypatch, tmp_path):
 def test_cells_of_the_pages_run_in_a_kernel_and_print_little(monkeypatch, tmp_path):
     pages = ROOT / "README.md", ROOT / "docs" / "library.md"
     shown = [statement for page in pages for cell in CELLS[page] for statement in statements(cell)]
-    notebook = run_in_a_kernel([*shown, "fit.summary()"], monkeypatch, tmp_path)
+    notebook = run_in_a_kernel([*shown, "fit.summary()", CALIBRATING], monkeypatch, tmp_path)
     by_cell = {cell.source: cell.outputs for cell in notebook.cells}
     for source, outputs in by_cell.items():
         for output in outputs:
@@ -41,6 +49,7 @@ def test_cells_of_the_pages_run_in_a_kernel_and_print_little(monkeypatch, tmp_pa
             assert output.get("name") != "stderr", text
     bar = next(outputs[0]["data"]["text/plain"] for source, outputs in by_cell.items() if "bf.fit(" in source)
     assert re.fullmatch(r"sampling with emcee \d+ steps, \d\d:\d\d, R-hat 1\.\d+, effective draws \d+", bar)
+    assert by_cell[CALIBRATING][0]["data"]["text/plain"].startswith("calibrating: 100%") and len(by_cell[CALIBRATING]) == 1
     figures = [output for source, outputs in by_cell.items() if "fit.plot.efficiency()" in source for output in outputs]
     assert len(figures) == 1 and "image/png" in figures[0]["data"]
     page = next(outputs[0]["data"]["text/html"] for source, outputs in by_cell.items() if source.startswith("fit  "))

@@ -19,7 +19,7 @@ def fit(on_body):
 def test_shares_are_coefficient_times_angle_over_their_sum_draw_by_draw(fit):
     found = loss_by_contact(fit)
     at = float(np.median(fit.posterior.optimum["optimal_length"]))
-    grid, curves = fit.curves()
+    grid, curves = fit.along_route.grid, fit.along_route.curves
 
     def angle(column):
         return np.deg2rad(np.array([np.interp(at, grid, row) for row in curves[column]]))

@@ -109,12 +109,14 @@ def test_a_panel_without_data_is_refused(what):
     assert any("is empty" in fault for fault in faults(figure))
 
 
-@pytest.mark.parametrize("kind", ["lines", "marks", "areas"])
+@pytest.mark.parametrize("kind", ["lines", "marks", "areas", "bars"])
 def test_entries_of_a_legend_that_look_alike_are_refused(kind):
     figure, axes = page()
     for i in range(2):
         if kind == "areas":
             axes.axvspan(0.2 * i, 0.2 * i + 0.1, color="#E9E9E9", label=f"Area {i}")
+        elif kind == "bars":
+            axes.errorbar([0, 1], [1, i], 0.1, fmt="o", color="black", label=f"Bars {i}")
         else:
             axes.plot([0, 1], [1, i], "-" if kind == "lines" else "o", color="black", label=f"Line {i}")
     axes.legend()
@@ -125,5 +127,7 @@ def test_another_marker_dash_or_color_tells_entries_apart():
     figure, axes = page(color="black")
     for look in ({"linestyle": "--"}, {"linestyle": (0, (1, 1))}, {"marker": "o"}, {"color": "red"}):
         axes.plot([0, 1], [1, 0], **{"color": "black", **look}, label=str(look))
+    for marker in "sX":
+        axes.errorbar([0, 1], [1, 0], 0.1, fmt=marker, color="black", label=marker)
     axes.legend(loc="lower right", bbox_to_anchor=(1.0, 1.0))
     assert not any("look alike" in fault for fault in faults(figure))

@@ -6,6 +6,7 @@ from itertools import combinations
 import numpy as np
 from matplotlib.cbook import is_math_text
 from matplotlib.collections import Collection
+from matplotlib.container import ErrorbarContainer
 from matplotlib.lines import Line2D
 from matplotlib.patches import Patch
 from matplotlib.text import Text
@@ -75,8 +76,11 @@ def _misplaced(figure):
 def _alike(figure):
     """Entries of a legend that look the same."""
     legends = [*figure.legends, *(axes.get_legend() for axes in figure.axes if axes.get_legend())]
+    entries = [entry for axes in figure.axes for entry in zip(*axes.get_legend_handles_labels(), strict=True)]
+    marks = {label: bars[0] for bars, label in entries if isinstance(bars, ErrorbarContainer) and bars[0] is not None}
     for legend in legends:
-        looks = [(_look(handle), text.get_text()) for handle, text in zip(legend.legend_handles, legend.texts, strict=True)]
+        shown = [(text.get_text(), handle) for handle, text in zip(legend.legend_handles, legend.texts, strict=True)]
+        looks = [(_look(marks.get(label, handle)), label) for label, handle in shown]
         for (look, label), (other, other_label) in combinations([(a, b) for a, b in looks if a is not None], 2):
             if look == other:
                 yield f"{label!r} and {other_label!r} look alike in the legend"

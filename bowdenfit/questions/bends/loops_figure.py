@@ -153,14 +153,16 @@ def _readings(axes: Axes, loop: LoopCurve) -> None:
 
 
 def _residuals(strip: Axes, loop: LoopCurve) -> None:
-    """Output less that of the branch on which it was read."""
+    """Output less that of the branch on which it was read; where that is not known, how far it is outside the two."""
     for stroke, _, marker, size, color in STROKES:
         here = loop.points_stroke == stroke
-        if stroke and here.any():
-            line = middle(loop.forward if stroke > 0 else loop.back)
-            off = loop.points_output[here] - np.interp(loop.points_input[here], loop.input_force, line)
+        if here.any():
+            x, output = loop.points_input[here], loop.points_output[here]
+            forward, back = (np.interp(x, loop.input_force, middle(line)) for line in (loop.forward, loop.back))
+            between = np.clip(output, np.minimum(forward, back), np.maximum(forward, back))
+            off = output - (forward if stroke > 0 else back if stroke < 0 else between)
             strip.plot(
-                loop.points_input[here], off, marker, color=color, markersize=0.8 * size, markeredgewidth=0,
+                x, off, marker, color=color, markersize=0.8 * size, markeredgewidth=0,
                 rasterized=abs(stroke) != 1,
             )  # fmt: skip
 

@@ -5,14 +5,15 @@
     ```
 
 What may be written and what counts if nothing is come from the class (with the option `:values:` what counts alone); the words
-stand in the page, or, of a dataclass, in its docstring. A key without words, and words without a key, are warnings, so that the
-page cannot fall behind the program.
+stand in the page, or, of a dataclass or of keywords, in its docstring. A key without words, and words without a key, are
+warnings, so that the page cannot fall behind the program.
 """
 
 import dataclasses
 import types
+from collections.abc import Sequence
 from importlib import import_module
-from typing import Annotated, Any, Literal, Union, get_args, get_origin, get_type_hints
+from typing import Annotated, Any, Literal, Union, get_args, get_origin, get_type_hints, is_typeddict
 
 from docutils import nodes
 from docutils.parsers.rst import directives
@@ -22,6 +23,8 @@ from pydantic_core import PydanticUndefined
 from sphinx.application import Sphinx
 from sphinx.util.docutils import SphinxDirective
 from sphinx.util.logging import getLogger
+
+from bowdenfit.verb import Quantity
 
 _LOG = getLogger(__name__)
 _PLAIN = {str: "text", float: "number", int: "whole number", bool: "`true` or `false`"}
@@ -47,7 +50,7 @@ class Keys(SphinxDirective):
         module, _, name = self.arguments[0].partition(":")
         model = getattr(import_module(module), name)
         words, known = _words(self.content), keys_of(model)
-        if dataclasses.is_dataclass(model):
+        if not issubclass(model, BaseModel):
             words = keywords_in(model)
         for key in words.keys() ^ known.keys():
             what = "has no words" if key in known else f"is no key of {name}"
@@ -63,7 +66,9 @@ class Keys(SphinxDirective):
 
 def keys_of(model: Any) -> dict[str, tuple[Any, str]]:
     """Type and default, in words, of each key."""
-    if not dataclasses.is_dataclass(model):
+    if is_typeddict(model):
+        return {key: (kind, "") for key, kind in get_type_hints(model).items()}
+    if issubclass(model, BaseModel):
         fields = {field.alias or key: field for key, field in model.model_fields.items()}
         return {key: (f.annotation, _NEEDED if f.is_required() else default(f.default)) for key, f in fields.items()}
     hints = get_type_hints(model)
@@ -102,9 +107,13 @@ def written(annotation: Any) -> str:
         return " or ".join(dict.fromkeys(written(each) for each in arguments if each is not type(None)))
     if origin is Literal:
         return ", ".join(f'`"{each}"`' for each in arguments)
+    if annotation == Quantity:
+        return '`(number, "unit")`'
     if origin is tuple:
         fixed = f"`[{', '.join('…' for _ in arguments)}]`"
         return f"list of {_plural(written(arguments[0]))}" if arguments[1:] == (...,) else fixed
+    if origin is Sequence:
+        return f"list of {_plural(written(arguments[0]))}"
     if origin is dict:
         return f"a key for each: {written(arguments[1])}"
     return _PLAIN.get(annotation) or _NAMED.get(annotation.__name__) or "keys of its own"

@@ -12,12 +12,18 @@ from sphinx.application import Sphinx
 _AT = re.compile(r"(?<![\w`])[\w]+@[\w.,]+\w")
 
 
-def plain(_: Sphinx, documented: Any, __: bool) -> None:
-    """Leave the types of a function alone."""
-    function = inspect.unwrap(documented) if callable(documented) else documented
-    for name, annotation in list(getattr(function, "__annotations__", {}).items()):
-        if get_origin(annotation) is Annotated:
-            function.__annotations__[name] = get_args(annotation)[0]
+def plain(app: Sphinx) -> None:
+    """Leave their types alone to the public functions, once the command line has read what it needs of them."""
+    del app
+    import bowdenfit
+    import bowdenfit.cli
+
+    assert bowdenfit.cli.bowdenfit.commands
+    for name in bowdenfit.__all__:
+        if inspect.isfunction(function := getattr(bowdenfit, name)):
+            for key, annotation in function.__annotations__.items():
+                if get_origin(annotation) is Annotated:
+                    function.__annotations__[key] = get_args(annotation)[0]
 
 
 def literal(app: Sphinx, what: str, name: str, documented: Any, options: Any, lines: list[str]) -> None:
@@ -28,6 +34,6 @@ def literal(app: Sphinx, what: str, name: str, documented: Any, options: Any, li
 
 def setup(app: Sphinx) -> dict[str, bool]:
     """Take part whenever a signature or a docstring is shown."""
-    app.connect("autodoc-before-process-signature", plain)
+    app.connect("builder-inited", plain)
     app.connect("autodoc-process-docstring", literal)
     return {"parallel_read_safe": True, "parallel_write_safe": True}

@@ -6,7 +6,7 @@ command that the tests leave alone says so behind it: `# not run here: why`.
 
 import re
 import shlex
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -14,7 +14,7 @@ ROOT = Path(__file__).parents[2]
 PAGES = (ROOT / "README.md", *sorted((ROOT / "docs").glob("*.md")))
 FIRST = "on-body-exoskeleton"  # the data set of the first fit
 PUBLISHED = {  # what commands print of fits that are published
-    ("bowdenfit", "fit", f"datasets/{FIRST}"): ROOT / "fits" / "published" / FIRST / "summary.txt",
+    ("bowdenfit", "fit", FIRST): ROOT / "fits" / "published" / FIRST / "summary.txt",
     ("bowdenfit", "compare", "fits/plain", "fits/rate"): ROOT / "fits/published/synthetic-recordings/comparison.txt",
 }
 ELISION = "..."
@@ -70,10 +70,16 @@ def blocks(*languages: str, pages: tuple[Path, ...] = PAGES) -> list[Block]:
     return found
 
 
-def as_shown(shown: str, printed: str) -> bool:
-    """Whether an output is what a page shows of it, byte for byte where nothing is left out."""
+def as_shown(shown: str, printed: str, as_read: Callable[[str], str] = str) -> bool:
+    """Whether an output is what a page shows of it, byte for byte where nothing is left out.
+
+    Args:
+        shown: On the page.
+        printed: By the command.
+        as_read: What of both is compared, such as `masked`.
+    """
     parts = re.split(rf"^{re.escape(ELISION)}\n", shown, flags=re.MULTILINE)
-    return re.fullmatch("(?:.*\n)*?".join(map(re.escape, parts)), printed) is not None
+    return re.fullmatch("(?s:.*)".join(re.escape(as_read(part)) for part in parts), as_read(printed)) is not None
 
 
 def masked(text: str) -> str:

@@ -111,3 +111,16 @@ def test_a_reading_far_out_is_a_trouble_unless_the_noise_may_have_such(on_body, 
     assert faults(page) == [] and "Off: 1 of 26 readings" in page and "82.0 deg" in page
     assert student.verdict().trusted
     assert student.parameter("mu3").q05 > normal.parameter("mu3").q05 + 0.02
+
+
+def test_least_squares_that_runs_to_no_friction_at_all_is_no_fit_to_trust(on_body, tmp_path):
+    """Two efficiencies exchanged leave a coefficient anywhere from 0 to 1; none of 88 healthy benches did."""
+    exchanged = tmp_path / "exchanged"
+    shutil.copytree(on_body, exchanged)
+    table = (exchanged / "efficiencies.csv").read_text()
+    assert "510,75.3\n550,67.8" in table
+    (exchanged / "efficiencies.csv").write_text(table.replace("510,75.3\n550,67.8", "510,67.8\n550,75.3"))
+    found = bf.fit(exchanged, mcmc=False).verdict()
+    assert list(found.troubles) == [NOT_IDENTIFIABLE]
+    assert "do not determine mu2" in found.reasons[0]
+    assert bf.fit(on_body, mcmc=False).verdict().trusted

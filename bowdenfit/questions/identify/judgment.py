@@ -109,7 +109,7 @@ def say_what_is_not_determined(fit: Record) -> str:
     """
     names = [p.name for p in fit.model.space.free if p.role == "friction" and not _stated(fit, p.name)]
     if fit.sampled is None:
-        return _in_words([name for name in names if _undetermined(fit, name)], None)
+        return _in_words([name for name in names if _undetermined(fit, name) or _nothing_or_anything(fit, name)], None)
     friction = identifiability(fit).groups.get("friction")
     if friction is None:
         return ""
@@ -137,6 +137,16 @@ def _undetermined(fit: Record, name: str) -> bool:
     if any(estimates[p.name].remark == UNDETERMINED for p in stated):
         return False
     return estimates[name].remark == UNDETERMINED
+
+
+def _nothing_or_anything(fit: Record, name: str) -> bool:
+    """Whether least squares runs to no friction at all and does not exclude what its prior thinks usual either.
+
+    A contact that hardly rubs is one of which more is excluded; that contradictory readings do so is as likely.
+    """
+    estimate, parameter = fit.least_squares.estimates[name], fit.model.space.free[fit.model.space.index[name]]
+    usual = float(parameter.prior.constrain(jnp.zeros(1))[0]) * parameter.shown_scale
+    return estimate.at_bound and not estimate.upper < usual
 
 
 def _in_words(lost: list[str], known: Combination | None, how_much: str = "") -> str:

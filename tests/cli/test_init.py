@@ -251,7 +251,6 @@ def test_in_a_terminal_three_foreign_files_become_a_fit_without_an_editor(foreig
         console.answer(f"What is the place called.*{place}", "")
         console.answer("follow the length", "")
     console.answer("Below which angle", "10 deg")
-    console.answer("eta.csv is the length", "")
     console.answer("kraefte.csv is the length", "")
     console.answer("another place", "")
     console.answer("'mantel' called", "")

@@ -8,6 +8,7 @@ from typing import Any
 from bowdenfit.cable.registry import CURVES
 from bowdenfit.errors import DatasetError, UsageError
 from bowdenfit.files.matching import Quantity
+from bowdenfit.files.spellings import without_accents
 from bowdenfit.kinds.stated_angle import stated_angle
 from bowdenfit.questions.start.columns import of_dimension, take, with_unit
 from bowdenfit.questions.start.question import Asker, Question, agree, choose, numbers, one_of, quantity, text
@@ -15,6 +16,7 @@ from bowdenfit.questions.start.sheet import SeenColumn, Sheet
 from bowdenfit.words import listed, quoted, shown
 
 _WRAP_ANGLE, _LENGTH = "wrap_angle", "cable_length"
+_LENGTHS = re.compile(r"length|lange|laenge|longueur|longitud|lunghezza")
 _CURVE = "gaussian"  # what a joint makes of a cable beside it
 _ANGLE_WORDS = re.compile(r"\b(?:wrap|bend|angles?|winkel|umschlingungswinkel|biegewinkel|angulo|angolo)\b|_", re.IGNORECASE)
 
@@ -173,7 +175,7 @@ def _length_of_rows(sheet: Sheet, places: Places, ask: Asker) -> None:
             f"of wrap angles, {places.route['variable']}_{places.route['unit']}."
         )
     why = f"{sheet.file} does not say which of its columns is the length; name it as in the table of wrap angles."
-    said = sheet.can_be(places.length)
+    said = sheet.can_be(places.length) or [each for each in found if _LENGTHS.search(without_accents(each.name).lower())]
     take(sheet, places.length, said[0] if len(said) == 1 else _chosen(sheet, found, why, ask), ask)
 
 

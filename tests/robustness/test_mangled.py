@@ -1,67 +1,84 @@
-"""Valid data sets mangled at random: each is read, or refused in one sentence; never anything else."""
+"""Valid tables, descriptions, options and files mangled at random: each is read, or refused in sentences; never anything else.
 
-import random
-import shutil
-import time
-from pathlib import Path
+By default 2,000 cases; with the marker `slow` 50,000 others.
+"""
+
+import resource
 
 import pytest
-from mangling import DESCRIPTIONS, TABLES
+from attempts import Attempts
+from fuzzing import DATASETS, read_mangled_data_set, read_mangled_file, run_mangled_options, valid_files
+from recorded_files import WRITERS
 
-import bowdenfit as bf
-
-DATASETS = sorted(
-    path for path in (Path(__file__).resolve().parents[2] / "datasets").iterdir() if (path / "cable.toml").exists()
-)
-LONGEST = 900  # characters of a sentence
-SLOWEST = 20.0  # seconds, on a machine that does much besides
+OF_TABLES = {"synthetic-recordings": 20, "synthetic-bench": 120, "synthetic-haptic-loop": 120}
+MOST_MEMORY = 600 << 20  # bytes by which all of them may raise what the process holds
 
 
-def mangled(source, place, chance):
-    """The data set with one of its files mangled, once or twice; the name of that file."""
-    folder = shutil.copytree(source, place, ignore=shutil.ignore_patterns("*.md", "recordings"))
-    for path in source.glob("recordings/*"):
-        (folder / "recordings").mkdir(exist_ok=True)
-        (folder / "recordings" / path.name).symlink_to(path)
-    name = chance.choice(sorted(path.name for path in folder.iterdir() if path.suffix in {".csv", ".toml"}))
-    text = (folder / name).read_text()
-    for _ in range(chance.choice([1, 1, 2])):
-        text = chance.choice(DESCRIPTIONS if name.endswith(".toml") else TABLES)(chance, text) or "\n"
-    (folder / name).write_text(text, encoding="utf-8", errors="surrogatepass")
-    return folder, name
+@pytest.fixture(scope="module")
+def valid(tmp_path_factory):
+    return valid_files(tmp_path_factory.mktemp("valid") / "files")
 
 
-def read_all(tmp_path, source, seeds):
-    """Reads them all; how many were refused."""
-    refused = 0
-    for seed in seeds:
-        folder, name = mangled(source, tmp_path / "cable", random.Random(f"{source.name} {seed}"))
-        before, start = set(tmp_path.rglob("*")), time.monotonic()
-        try:
-            bf.read(folder)
-        except bf.BowdenfitError as error:
-            refused += 1
-            said = str(error)
-            lines = said.splitlines()[1:] if error.faults and "\n" in said else said.splitlines()
-            is_sentence = error.exit_code == 2 and all(10 < len(one) <= LONGEST and one[-1] in ".?)" for one in lines)
-            if not is_sentence:
-                raise AssertionError(f"{source.name}, seed {seed}, {name}: {said}") from None
-        except Exception as error:
-            raise AssertionError(f"{source.name}, seed {seed}, {name}: {type(error).__name__}: {error}") from error
-        assert time.monotonic() - start < SLOWEST, (seed, name)
-        assert set(tmp_path.rglob("*")) == before
-        shutil.rmtree(folder)
-    return refused
+@pytest.fixture(scope="module")
+def attempts():
+    server = Attempts()
+    yield server
+    server.end()
 
 
-@pytest.mark.parametrize("source", DATASETS, ids=lambda path: path.name)
-def test_mangled_data_sets_are_read_or_refused_in_a_sentence(tmp_path, source):
-    count = {"synthetic-recordings": 40, "synthetic-bench": 230, "synthetic-haptic-loop": 230}.get(source.name, 750)
-    assert 0.2 * count < read_all(tmp_path, source, range(count)) < count
+@pytest.fixture(autouse=True)
+def bounded(capfd):
+    before = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss * 1024
+    yield
+    assert resource.getrusage(resource.RUSAGE_SELF).ru_maxrss * 1024 < before + MOST_MEMORY
+    assert capfd.readouterr() == ("", "")
+
+
+def options_of(attempts, place):
+    def run(given):
+        before = set(place.rglob("*"))
+        done = attempts(*given, folder=place)
+        assert set(place.rglob("*")) == before
+        assert done.seconds < 10
+        assert done.memory < MOST_MEMORY
+        return done.code, done.out, done.err
+
+    return run
+
+
+@pytest.mark.parametrize("name", [path.name for path in DATASETS])
+def test_mangled_data_sets_are_read_or_refused_in_sentences(tmp_path, name):
+    count = OF_TABLES.get(name, 220)
+    refused = sum(read_mangled_data_set(tmp_path, name, number).refused for number in range(count))
+    assert 0.2 * count < refused < count
+
+
+@pytest.mark.parametrize("name", WRITERS)
+def test_mangled_files_of_every_kind_are_read_or_refused_in_sentences(tmp_path, valid, name):
+    outcomes = [read_mangled_file(tmp_path, valid, name, number) for number in range(45)]
+    assert sum(each.refused for each in outcomes) > 5
+
+
+def test_mangled_options_are_taken_or_refused_in_sentences(tmp_path, attempts):
+    outcomes = [run_mangled_options(options_of(attempts, tmp_path), number) for number in range(360)]
+    assert 200 < sum(each.refused for each in outcomes) < 360
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("source", DATASETS, ids=lambda path: path.name)
-def test_many_more_mangled_data_sets(tmp_path, source):
-    count = 1_000 if (source / "recordings").exists() else 12_000
-    assert read_all(tmp_path, source, range(1_000, 1_000 + count)) < count
+@pytest.mark.parametrize("name", [path.name for path in DATASETS])
+def test_many_more_mangled_data_sets(tmp_path, name):
+    for number in range(1000, 1000 + (1000 if name == "synthetic-recordings" else 6000)):
+        read_mangled_data_set(tmp_path, name, number)
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("name", WRITERS)
+def test_many_more_mangled_files(tmp_path, valid, name):
+    for number in range(1000, 2000):
+        read_mangled_file(tmp_path, valid, name, number)
+
+
+@pytest.mark.slow
+def test_many_more_mangled_options(tmp_path, attempts):
+    for number in range(1000, 4000):
+        run_mangled_options(options_of(attempts, tmp_path), number)

@@ -1,0 +1,179 @@
+"""The fuzzer: a numbered case mangles something valid, the command line or the library meets it, and what may come of it.
+
+A case is its name and its number, so that any can be had again: `read_mangled_file(place, "a.mat", 17)`.
+"""
+
+import io
+import random
+import shutil
+import time
+import warnings
+from collections.abc import Callable, Sequence
+from contextlib import redirect_stderr, redirect_stdout
+from dataclasses import dataclass
+from pathlib import Path
+
+from byte_mangling import mangled
+from mangling import DESCRIPTIONS, ODD_CELLS, ODD_VALUES, TABLES
+from recorded_files import WRITERS
+
+import bowdenfit as bf
+
+ROOT = Path(__file__).resolve().parents[2] / "datasets"
+DATASETS = sorted(path for path in ROOT.iterdir() if (path / "cable.toml").exists())
+LONGEST = 900  # characters of a sentence
+LONGEST_LIST = 4000  # characters of what is wrong, a line each
+SLOWEST = 20.0  # seconds of CPU
+
+
+class Wrong(AssertionError):
+    """What a case must not do."""
+
+
+@dataclass(frozen=True)
+class Outcome:
+    """What came of a case.
+
+    Args:
+        refused: Whether the input was refused; it was read otherwise.
+        said: In which words.
+    """
+
+    refused: bool
+    said: str = ""
+
+
+def meet(case: str, meets: Callable[[], object], *names: str) -> Outcome:
+    """What comes of a case: the input is read, or refused in sentences that name it, in time and without other words.
+
+    Args:
+        case: How to have it again.
+        meets: What meets the input.
+        names: Of which the refusal has one.
+
+    Raises:
+        Wrong: Anything else.
+    """
+    out, err, start = io.StringIO(), io.StringIO(), time.process_time()
+    try:
+        with redirect_stdout(out), redirect_stderr(err), warnings.catch_warnings():
+            warnings.simplefilter("ignore")  # as the command line does
+            meets()
+        outcome = Outcome(False)
+    except bf.BowdenfitError as error:
+        outcome = Outcome(True, str(error))
+        lines = outcome.said.splitlines()
+        sentences = [line.removeprefix("- ") for line in lines[len(lines) > 1 :]]
+        good = all(10 < len(each) <= LONGEST and each.rstrip()[-1] in ".?)" for each in sentences)
+        if not (good and error.exit_code == 2 and len(outcome.said) < LONGEST_LIST):
+            raise Wrong(f"{case}: {error.exit_code}, {outcome.said}") from None
+        if names and not any(name in outcome.said for name in names):
+            raise Wrong(f"{case} does not name {names}: {outcome.said}") from None
+    except Exception as error:
+        raise Wrong(f"{case}: {type(error).__name__}: {error}") from error
+    if out.getvalue() or err.getvalue():
+        raise Wrong(f"{case}: printed {out.getvalue() + err.getvalue()}")
+    if time.process_time() - start > SLOWEST:
+        raise Wrong(f"{case}: took {time.process_time() - start:.0f} s")
+    return outcome
+
+
+def read_mangled_data_set(place: Path, name: str, number: int) -> Outcome:
+    """A case of a table or a description.
+
+    Args:
+        place: Folder to work in.
+        name: Of the data set.
+        number: Of the case.
+    """
+    source, chance = ROOT / name, random.Random(f"{name} {number}")
+    folder = shutil.copytree(source, place / "cable", ignore=shutil.ignore_patterns("*.md", "recordings"))
+    for path in source.glob("recordings/*"):
+        (folder / "recordings").mkdir(exist_ok=True)
+        (folder / "recordings" / path.name).symlink_to(path)
+    file = chance.choice(sorted(path.name for path in folder.iterdir() if path.suffix in {".csv", ".toml"}))
+    text = (folder / file).read_text()
+    for _ in range(chance.choice([1, 1, 2])):
+        text = chance.choice(DESCRIPTIONS if file.endswith(".toml") else TABLES)(chance, text) or "\n"
+    (folder / file).write_text(text, encoding="utf-8", errors="surrogatepass")
+    before = set(place.rglob("*"))
+    outcome = meet(f"{name} {number}, {file}", lambda: bf.read(folder))
+    if set(place.rglob("*")) != before:
+        raise Wrong(f"{name} {number}: files were written")
+    shutil.rmtree(folder)
+    return outcome
+
+
+def valid_files(place: Path) -> dict[str, bytes]:
+    """A valid file of every kind by its name, written into a folder."""
+    place.mkdir()
+    for name, write in WRITERS.items():
+        write(place / name)
+    return {name: (place / name).read_bytes() for name in WRITERS}
+
+
+def read_mangled_file(place: Path, valid: dict[str, bytes], name: str, number: int) -> Outcome:
+    """A case of a file of any kind.
+
+    Args:
+        place: Folder to work in.
+        valid: The valid files, by their names.
+        name: Of the kind of file.
+        number: Of the case.
+    """
+    (place / name).write_bytes(mangled(random.Random(f"{name} {number}"), valid[name]))
+    return meet(f"{name} {number}", lambda: bf.read(place / name, wrap_angle=(180, "deg")), name, Path(name).stem)
+
+
+SETTINGS = (
+    "friction.mu1.fixed", "friction.mu1.prior", "tables.angles.file", "contact.0.friction", "contact.0.wrap_angle", "name",
+    "schema", "noise", "sampler.max_steps", "sampler.n_walkers", "route.range", "route.unit", "tables.forces", "sensors",
+    "sensors.input_force_noise", "prior.tau", "geometry", "friction_model", "contact", "", ".", "a..b", "contact.99.name",
+)  # fmt: skip
+QUANTITIES = ("input_force", "output_force", "velocity", "time", "stroke", "", "=", "efficiency", "x\x1b[2J")
+OPTIONS: dict[str, Callable[[random.Random], str]] = {
+    "--set": lambda c: f"{c.choice(SETTINGS)}={c.choice((*ODD_VALUES, *ODD_CELLS))}",
+    "--channel": lambda c: f"{c.choice(QUANTITIES)}={c.choice(ODD_CELLS)}:{c.choice(ODD_CELLS)}",
+    "--column": lambda c: f"{c.choice(QUANTITIES)}={c.choice(ODD_CELLS)}:{c.choice(ODD_CELLS)}",
+    "--noise": lambda c: c.choice(("normal", "student", *ODD_CELLS)),
+    "--friction": lambda c: "+".join(c.choices(("capstan", "drag", "load-dependent", "by-group", *ODD_CELLS), k=2)),
+    "--geometry": lambda c: c.choice(("continuous", "published", *ODD_CELLS)),
+    "--undetected": lambda c: c.choice(("zero", "dropped", *ODD_CELLS)),
+    "--wrap-angle": lambda c: c.choice(ODD_CELLS) + c.choice(("deg", "rad", "N", "", " deg", "deg deg", "°")),
+    "--reading-limit": lambda c: c.choice(("1", "1000", *ODD_CELLS)),
+    "--seed": lambda c: c.choice(ODD_CELLS),
+    "--input-force": lambda c: c.choice(ODD_CELLS) + c.choice(("N", "", "lbf")),
+    "--top": lambda c: c.choice(ODD_CELLS),
+    "--cost": lambda c: f"{c.choice(ODD_CELLS)}={c.choice(ODD_CELLS)}",
+    "--candidate": lambda c: f"force@{c.choice(ODD_CELLS)}",
+    "--replications": lambda c: c.choice(ODD_CELLS),
+    "--truth": lambda c: c.choice((*ODD_CELLS, "/dev/zero", "/proc/self/mem")),
+}  # fmt: skip
+GOOD = {"--set": "sampler.max_steps=100", "--noise": "student", "--geometry": "continuous", "--reading-limit": "2"}
+
+
+def run_mangled_options(run: Callable[[Sequence[str]], tuple[int, str, str]], number: int) -> Outcome:
+    """A case of options of the command line.
+
+    Args:
+        run: Runs the command line on arguments: exit code, output and messages.
+        number: Of the case.
+    """
+    chance = random.Random(f"options {number}")
+    source = str(chance.choice(DATASETS)) if chance.random() < 0.8 else chance.choice(ODD_CELLS)
+    # What fits, or asks a fit, is asked for a folder that is not there.
+    verb = chance.choice((*["check"] * 20, "predict", "next", "calibrate", "length", "simulate"))
+    given = [verb, source if verb == "check" else chance.choice(("/nowhere/at/all", *ODD_CELLS))]
+    for _ in range(chance.choice((1, 1, 2, 3))):
+        option = chance.choice(tuple(OPTIONS))
+        good = chance.random() < 0.5 and verb == "check" and option in GOOD
+        given += [option, GOOD[option] if good else OPTIONS[option](chance)]
+    given = [each.replace("\0", "") for each in given]
+    code, out, err = run(given)
+    case = f"options {number}, {given}"
+    ours = err.startswith(("Error: ", "Usage: ")) and "inside bowdenfit" not in err and "Traceback" not in err
+    if code not in {0, 2} or (code == 2 and not ours) or len(err) > LONGEST_LIST or (code == 2 and out):
+        raise Wrong(f"{case}: {code}, {err}")
+    if not all(letter.isprintable() or letter in "\n\t\u00a0" for letter in out + err):
+        raise Wrong(f"{case}: what steers a terminal is printed")
+    return Outcome(code == 2, err)

@@ -16,6 +16,7 @@ from zlib import crc32
 import numpy as np
 
 from bowdenfit.errors import StoreError, disk_error
+from bowdenfit.inputs import refuse_special
 
 _MARK = b"bowdenfit checkpoint 1\n"
 _HEAD = struct.Struct("<QI")  # length and checksum of a record
@@ -38,6 +39,7 @@ def fingerprint_of(path: Path) -> dict[str, Any]:
         ValueError: It is no checkpoint.
         OSError: It cannot be read.
     """
+    refuse_special(path, StoreError)
     with path.open("rb") as file:
         return _fingerprint(file)
 
@@ -51,6 +53,7 @@ def records(path: Path) -> list[Record]:
     Raises:
         StoreError: It cannot be read.
     """
+    refuse_special(path, StoreError)
     try:
         with path.open("r+b") as file:
             _fingerprint(file)

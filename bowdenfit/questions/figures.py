@@ -37,7 +37,7 @@ from bowdenfit.questions.summary import (
     traces_figure,
 )
 from bowdenfit.results.arrays import read_arrays
-from bowdenfit.results.folder import FIGURE_DATA, write_text
+from bowdenfit.results.folder import FIGURE_DATA, read_text, write_text
 from bowdenfit.results.kept import kept
 from bowdenfit.verb import Quantity
 from bowdenfit.words import filled, printable
@@ -180,7 +180,7 @@ def write_captions(shown: Mapping[str, Any], folder: Path, cable: str) -> Path:
         cable: Name of the cable.
     """
     path = folder / CAPTIONS
-    there = path.read_text(encoding="utf-8").split("\n\n") if path.exists() else []
+    there = read_text(path).split("\n\n") if path.exists() else []
     said = {text.partition(":")[0]: text.strip() for text in there if text.strip()}
     for name, data in shown.items():
         said[name] = printable(filled(" ".join(f"{name}: {title_of(name, cable)}. {caption_of(name, data)}".split())))

@@ -77,9 +77,9 @@ def write_page(page: "Page", drawn: Path, path: Path) -> Path:
         path: The file.
     """
     from bowdenfit.pages.page import render
-    from bowdenfit.results.folder import write_text
+    from bowdenfit.results.folder import read_text, write_text
 
     files = {picture.name: drawn / f"{picture.name}.svg" for picture in page.pictures}
-    drawings = {name: file.read_text(encoding="utf-8") for name, file in files.items() if file.exists()}
+    drawings = {name: read_text(file) for name, file in files.items() if file.exists()}
     write_text(path, render(page, drawings))
     return path

@@ -7,6 +7,8 @@ from typing import Any
 
 import numpy as np
 
+from bowdenfit.errors import StoreError
+from bowdenfit.inputs import refuse_special
 from bowdenfit.results.folder import replace_when_whole
 from bowdenfit.results.plain import rebuilt, stored
 
@@ -40,6 +42,7 @@ def read_arrays(path: Path, kinds: Mapping[str, Any]) -> dict[str, Any]:
         path: The file.
         kinds: Annotated type of what is wanted, by name.
     """
+    refuse_special(path, StoreError)
     with np.load(path) as file:
 
         def take(data: Any) -> Any:

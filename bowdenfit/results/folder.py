@@ -3,6 +3,7 @@
 `fit.json` is written last, so a folder that has it is complete. A folder with `chain.checkpoint` alone is an interrupted fit.
 """
 
+import json
 import os
 import shutil
 from collections.abc import Iterator, Mapping
@@ -11,6 +12,7 @@ from pathlib import Path
 from typing import Any
 
 from bowdenfit.errors import StoreError, disk_error
+from bowdenfit.inputs import refuse_special
 
 try:
     import fcntl
@@ -23,6 +25,7 @@ REPORT = "report.html"
 POSTERIOR, CHAIN, FIGURES = "posterior.nc", "chain.checkpoint", "figures"
 ANSWERS, FIGURE_DATA = "answers.json", "figures.npz"
 REPLICATIONS = "replications.jsonl"  # of a calibration
+_LARGEST = 400e6  # bytes of a text
 _WRITTEN = (FIT, ANSWERS, SUMMARY, SUMMARY_TEXT, DETAILS_TEXT, REPORT, FIGURE_DATA, POSTERIOR, CHAIN)
 
 
@@ -58,6 +61,35 @@ def write_text(path: Path, text: str) -> None:
     """Write a text file whole."""
     with replace_when_whole(path) as temporary:
         temporary.write_text(text, encoding="utf-8")
+
+
+def read_text(path: Path) -> str:
+    """Read a text file of a results folder.
+
+    Raises:
+        StoreError: It is no file, too large, or no text.
+        OSError: It is missing, or cannot be read.
+    """
+    refuse_special(path, StoreError)
+    if path.stat().st_size > _LARGEST:
+        raise StoreError(f"{path} is larger than {_LARGEST / 1e6:.0f} MB: it is damaged; restore the folder from a copy.")
+    try:
+        return path.read_text(encoding="utf-8")
+    except ValueError:
+        raise StoreError(f"{path} is damaged: it is no text; fit again, or restore the folder from a copy.") from None
+
+
+def read_page(path: Path) -> Any:
+    """Read a page of JSON of a results folder.
+
+    Raises:
+        StoreError: It is no file, too large, or no JSON.
+        OSError: It is missing, or cannot be read.
+    """
+    try:
+        return json.loads(read_text(path))
+    except (ValueError, RecursionError):  # no JSON, a number of thousands of digits, nested too deeply
+        raise StoreError(f"{path} is damaged; fit again, or restore the folder from a copy.") from None
 
 
 def refuse_to_overwrite(folder: Path, force: bool) -> None:

@@ -11,7 +11,9 @@ from pathlib import Path
 from typing import Any
 from zlib import crc32
 
-from bowdenfit.results.folder import ANSWERS, FIGURE_DATA, FIT, POSTERIOR, write_text
+from bowdenfit.errors import StoreError
+from bowdenfit.inputs import refuse_special
+from bowdenfit.results.folder import ANSWERS, FIGURE_DATA, FIT, POSTERIOR, read_page, write_text
 
 SCHEMA = 2  # counted up with every change of what one of the questions answers
 _PIECE = 1 << 22  # bytes of a file read at once
@@ -38,11 +40,11 @@ def kept(folder: Path, *beside: str) -> dict[str, Any]:
         beside: Files that must be as they were written too.
     """
     try:
-        page = json.loads((folder / ANSWERS).read_text(encoding="utf-8"))
+        page = read_page(folder / ANSWERS)
         as_written = page.pop("crc32") == _own(page) and (page["schema"], page["version"]) == (SCHEMA, _version())
         same = as_written and all(checksum(folder / name) == page["of"][name] for name in (FIT, POSTERIOR, *beside))
         return dict(page["answers"]) if same else {}
-    except (OSError, ValueError, KeyError, TypeError, AttributeError):
+    except (StoreError, OSError, ValueError, KeyError, TypeError, AttributeError):
         return {}
 
 
@@ -54,6 +56,7 @@ def checksum(path: Path) -> int | None:
     """Of a file; None where there is none."""
     if not path.exists():
         return None
+    refuse_special(path, StoreError)
     checksum = 0
     with path.open("rb") as file:
         while piece := file.read(_PIECE):

@@ -8,6 +8,8 @@ from urllib.parse import unquote
 
 import numpy as np
 
+from bowdenfit.errors import StoreError
+from bowdenfit.inputs import refuse_special
 from bowdenfit.results.folder import replace_when_whole
 
 if TYPE_CHECKING:
@@ -87,6 +89,7 @@ def read_groups(path: Path) -> Groups:
     """
     import h5py
 
+    refuse_special(path, StoreError)
     with h5py.File(path) as file:
         return {
             group: {
@@ -116,4 +119,6 @@ def _is_label(member: "h5py.Dataset") -> bool:
 
 
 def _array(member: "h5py.Dataset") -> np.ndarray:
+    if member.external or member.is_virtual:
+        raise ValueError("its draws lie in other files")
     return np.asarray(member[()], dtype=bool if member.attrs.get("dtype") == "bool" else None)

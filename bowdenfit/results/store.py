@@ -4,6 +4,7 @@ import json
 from collections.abc import Mapping
 from dataclasses import asdict, replace
 from pathlib import Path
+from textwrap import shorten
 from types import MappingProxyType
 from typing import Any, get_type_hints
 
@@ -17,7 +18,7 @@ from bowdenfit.kinds import KINDS, each_table
 from bowdenfit.kinds.measurements import Measurements
 from bowdenfit.kinds.settings import parse_description
 from bowdenfit.results.arrays import write_arrays
-from bowdenfit.results.folder import CHAIN, FIGURE_DATA, FIT, POSTERIOR, SUMMARY, folder_to_write, write_text
+from bowdenfit.results.folder import CHAIN, FIGURE_DATA, FIT, POSTERIOR, SUMMARY, folder_to_write, read_page, write_text
 from bowdenfit.results.kept import checksum, keep
 from bowdenfit.results.netcdf import DERIVED, EXPECTED, Coordinates, Groups, read_groups, write_groups
 from bowdenfit.results.plain import rebuilt, stored
@@ -86,15 +87,14 @@ def load(folder: Path) -> Record:
         verdict = page["verdict"]["converged"], tuple(page["verdict"]["reasons"])
         provenance = rebuilt(Provenance, page["provenance"])
     except (LookupError, TypeError, ValueError, AttributeError, OSError, DescriptionError) as error:
-        raise StoreError(
-            f"{folder} is damaged ({type(error).__name__}: {error}); fit again, or restore the folder from a copy."
-        ) from error
+        why = f"{type(error).__name__}: {shorten(str(error), 200)}"
+        raise StoreError(f"{folder} is damaged ({why}); fit again, or restore the folder from a copy.") from error
     return Record(dataset, squares, posterior, *verdict, provenance)
 
 
 def _read_page(folder: Path) -> dict[str, Any]:
     try:
-        page: dict[str, Any] = json.loads((folder / FIT).read_text(encoding="utf-8"))
+        page: dict[str, Any] = read_page(folder / FIT)
     except FileNotFoundError:
         if (folder / CHAIN).exists():
             raise StoreError(
@@ -102,8 +102,6 @@ def _read_page(folder: Path) -> dict[str, Any]:
             ) from None
         what = "is no results folder (it has no fit.json)" if folder.is_dir() else "does not exist"
         raise StoreError(f"{folder} {what}; name a folder that `bowdenfit fit` wrote, such as fits/NAME.") from None
-    except (ValueError, RecursionError):  # no JSON, no UTF-8, a number of thousands of digits
-        raise StoreError(f"{folder / FIT} is damaged; fit again, or restore the folder from a copy.") from None
     schema = page.get("schema", SCHEMA) if isinstance(page, dict) else None
     if not isinstance(schema, int):
         raise StoreError(f"{folder / FIT} is damaged; fit again, or restore the folder from a copy.")

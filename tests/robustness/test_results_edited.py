@@ -55,7 +55,7 @@ def test_an_edited_fit_is_a_sentence(finished, tmp_path, edit):
 
 def test_draws_of_another_fit_are_refused(finished, on_body, tmp_path):
     folder = shutil.copytree(finished, tmp_path / "fit")
-    bf.fit(on_body, output=tmp_path / "other", seed=4, settings=QUICK, figures=False)
+    bf.fit(on_body, output=tmp_path / "other", seed=5, settings=QUICK, figures=False)
     shutil.copy(tmp_path / "other" / "posterior.nc", folder)
     with pytest.raises(bf.StoreError, match=r"posterior\.nc is not as it was written"):
         bf.load(folder)

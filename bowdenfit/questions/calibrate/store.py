@@ -8,7 +8,7 @@ from typing import Any
 
 from bowdenfit.errors import StoreError
 from bowdenfit.questions.calibrate.replication import Replication
-from bowdenfit.results.folder import FIGURES, REPLICATIONS, SUMMARY_TEXT, folder_to_write, write_text
+from bowdenfit.results.folder import FIGURES, REPLICATIONS, SUMMARY_TEXT, folder_to_write, read_text, write_text
 from bowdenfit.results.plain import rebuilt, stored
 
 CALIBRATION = "calibration.json"
@@ -85,7 +85,7 @@ def _lines(path: Path) -> list[dict[str, Any]]:
     """The whole lines of a file of replications, the fingerprint first."""
     if not path.exists():
         raise StoreError(f"{path.parent} holds no calibration to resume; leave --resume out.")
-    text = path.read_text(encoding="utf-8", errors="replace")
+    text = read_text(path)
     whole = text[: text.rfind("\n") + 1].splitlines()
     try:
         lines = [json.loads(line) for line in whole]

@@ -1,6 +1,5 @@
 """The summary of a fit, and its figures."""
 
-import json
 from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
@@ -14,7 +13,7 @@ if TYPE_CHECKING:
 
 def summary(
     results: Annotated[Path, Argument("RESULTS")], *, full: Annotated[bool, Option()] = False
-) -> "tuple[str, str] | Record":
+) -> "tuple[str, Any] | Record":
     """The summary of a finished fit, for people and as JSON; or the fit, where they were not written.
 
     Args:
@@ -24,23 +23,23 @@ def summary(
     Raises:
         StoreError: The folder is missing, unfinished or damaged.
     """
-    from bowdenfit.results.folder import DETAILS_TEXT, FIT, SUMMARY, SUMMARY_TEXT
+    from bowdenfit.results.folder import DETAILS_TEXT, FIT, SUMMARY, SUMMARY_TEXT, read_page, read_text
 
     folder = Path(results)
     if all((folder / name).exists() for name in (FIT, SUMMARY, SUMMARY_TEXT, DETAILS_TEXT)):
         shown = DETAILS_TEXT if full else SUMMARY_TEXT
-        text, page = ((folder / name).read_text(encoding="utf-8") for name in (shown, SUMMARY))
+        text, page = (read_text(folder / shown), read_page(folder / SUMMARY))
         return text, page
     from bowdenfit.results.store import load
 
     return load(folder)
 
 
-def reply(found: "tuple[str, str] | Record", asked: Mapping[str, Any]) -> Reply:
+def reply(found: "tuple[str, Any] | Record", asked: Mapping[str, Any]) -> Reply:
     """What is printed of a fit."""
     if isinstance(found, tuple):
         text, page = found
-        return Reply(text, lambda: json.loads(page))
+        return Reply(text, lambda: page)
     from bowdenfit.questions.summary.brief_words import summary_text
     from bowdenfit.questions.summary.page import summarize
     from bowdenfit.questions.summary.words import full_text
@@ -104,14 +103,14 @@ def _shown(found: "Record | str | Path", names: Sequence[str]) -> tuple[dict[str
     """Data of all figures of a fit, or of some, and the cable; what it was drawn with before is not worked out again."""
     from bowdenfit.errors import UsageError, nearest
     from bowdenfit.questions.figures import FIGURES, figures_of, kept_figures
-    from bowdenfit.results.folder import FIT
+    from bowdenfit.results.folder import FIT, read_page
 
     for name in names:
         if name not in FIGURES:
             raise UsageError(f"there is no figure {name!r}{nearest(name, list(FIGURES))}")
     shown = kept_figures(Path(found), names) if isinstance(found, str | Path) else {}
     if shown and isinstance(found, str | Path):
-        cable = json.loads((Path(found) / FIT).read_text(encoding="utf-8"))["description"]["name"]
+        cable = read_page(Path(found) / FIT)["description"]["name"]
     else:
         if isinstance(found, str | Path):
             from bowdenfit.results.store import load

@@ -2,6 +2,7 @@
 
 import errno
 import os
+import re
 import stat
 import tomllib
 from collections.abc import Callable
@@ -12,6 +13,7 @@ from bowdenfit.errors import BowdenfitError, DatasetError, DescriptionError
 from bowdenfit.words import shown
 
 _LARGEST_TOML = 4_000_000  # bytes; a description has some thousand
+_MOST_DOTS = 300  # of a key, or a sentence
 _DEEPEST = 12  # keys below keys; a description has four
 _NO_NAME = {errno.EINVAL, errno.ENAMETOOLONG, errno.ELOOP}
 _OF_THE_SYSTEM = ("/proc/", "/sys/")  # some of these wait for ever, some never end
@@ -64,6 +66,8 @@ def read_toml_file(path: Path, remedy: str = "") -> tuple[str, dict[str, Any]]:
         if path.stat().st_size > _LARGEST_TOML:
             raise DescriptionError(f"{path.name} is larger than 4 MB; a TOML file that describes a cable has a few kB.")
         text = path.read_text(encoding="utf-8-sig")
+        if any(part.count(".") > _MOST_DOTS for part in re.split(r"[=,\n]", text)):  # tomllib's time grows with their square
+            raise RecursionError
         page = tomllib.loads(text)
     except FileNotFoundError:
         raise DescriptionError(f"{path} does not exist; {remedy or 'check the spelling and the folder'}.") from None

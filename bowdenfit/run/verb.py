@@ -42,14 +42,12 @@ def fit(
         dataset: See `bowdenfit.read`; its keywords are taken too.
         output: Results folder.
         mcmc: Sample the posterior; without it there are no intervals.
-        sampler: What samples: ensembles of walkers, NUTS for many parameters or narrow posteriors, or both, to have one
-            check the other.
+        sampler: Ensembles of walkers, NUTS for many parameters or narrow posteriors, or both, one to check the other.
         figures: Draw the figures.
         seed: Seed of everything random.
         resume: Go on with an interrupted or unconverged fit; refuses changed inputs.
         force: Replace an earlier fit in the results folder.
-        in_background: Whether other processes may be started, which is quicker; the calling program must then guard its
-            start with `if __name__ == "__main__"`.
+        in_background: Start other processes, which is quicker; programs then begin with `if __name__ == "__main__"`.
         remember_compilations: Whether JAX may keep compiled programs in the user's cache folder; a setting of the process.
         progress: Called while sampling; a notebook shows a bar if omitted.
         report: Called with a sentence where the fit is whole but its figures could not be drawn; a warning if omitted.

@@ -17,6 +17,7 @@ PROJECT = tomllib.loads((ROOT / "pyproject.toml").read_text())
 REQUIREMENTS = {
     "runtime": PROJECT["project"]["dependencies"],
     "test": PROJECT["project"]["optional-dependencies"]["test"],
+    "docs": PROJECT["project"]["optional-dependencies"]["docs"],
     "lab": PROJECT["project"]["optional-dependencies"]["lab"],
     "build": PROJECT["build-system"]["requires"],
 }

@@ -38,8 +38,7 @@ def calibrate(
     """Simulation-based calibration: whether intervals of this description hold the truth as often as they claim.
 
     True values are drawn from the priors, tables of the same shape are simulated with them and fitted, and the truth is
-    ranked among the draws. Priors that look at the data (the level of a curve) are those of the data set as measured.
-    Every replication is written as it ends, if `output` says where.
+    ranked among the draws. Priors that look at the data are those of the data set as measured. Every replication is kept.
 
     Truths that are stated instead (`truth`) show what calibration from the priors cannot see, a prior that is wrong for
     such a cable: then the intervals of the coefficients and of the optimum must hold them as often as they claim, to what
@@ -52,8 +51,7 @@ def calibrate(
         output: Results folder.
         assume: Fit with this setting changed, while simulating without: what a wrong assumption costs; may be repeated.
         truth: True values that do not come from the priors: a TOML file with a number or a range for each parameter, such as
-            mu1 = 0.1 and tau = [0.002, 0.3], in the units of the results. Ranges of what can be any positive number are drawn
-            log-uniformly, others uniformly; what is not named is drawn from its prior.
+            mu1 = 0.1 and tau = [0.002, 0.3]. Ranges of positive numbers are drawn log-uniformly, others uniformly.
         seed: Seed of everything random.
         resume: Go on with an interrupted calibration, or add replications.
         force: Replace an earlier calibration in the results folder.

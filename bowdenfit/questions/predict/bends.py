@@ -137,8 +137,7 @@ def _force(fit: Record, asked: Question) -> tuple[np.ndarray, list[str]]:
 
 def _input_force(fit: Record, asked: Question) -> list[Row]:
     """Input force for the output force that is wanted: friction alone holds it where none is needed."""
-    if asked.output_force is None:
-        raise UsageError("--quantity input-force needs the force that is wanted at the load side, as --output-force 100N.")
+    assert asked.output_force is not None  # the verb refuses the question without
     force = elastic_answers(fit).input_force(asked.wrap_angles, asked.output_force, asked.stroke, asked.preload)
     force, words = pulled(force, asked.output_force, "held by friction alone")
     limits = measured(fit)

@@ -41,8 +41,7 @@ def predict(
         quantity: What to predict.
         wrap_angles: Predict at this wrap angle instead of a length, such as 90deg; may be repeated.
         preload: Preload the cable with this instead of its own, such as 20N.
-        friction_limit: What may be felt in free motion, such as 50N*mm (or 5N without a pulley radius), for the preload
-            window.
+        friction_limit: What may be felt in free motion, for the preload window: 50N*mm (or 5N without a pulley radius).
 
     Raises:
         UsageError: There is nothing to predict at, no posterior, or the cable has not what is asked for.
@@ -71,8 +70,6 @@ def predict(
         raise UsageError(
             "--quantity efficiency at lengths is that at the fit's own reference force; leave --input-force out."
         )
-    if quantity == "input-force" and output_force is None:
-        raise UsageError("--quantity input-force needs the force that is wanted at the load side, as --output-force 100N.")
     numbers = [length[0] if isinstance(length, tuple) else length for length in lengths or ()]
     if odd := [number for number in numbers if not np.isfinite(number)]:
         raise UsageError(f"{odd[0]} is no length; name the lengths to predict at as numbers.")
@@ -94,6 +91,8 @@ def _quantity(named: Asked | None, input_force: Quantity | None, output_force: Q
         raise UsageError(
             "--input-force asks for the force at the load side, --output-force for that at the motor; leave one of them out."
         )
+    if named == "input-force" and output_force is None:
+        raise UsageError("--quantity input-force needs the force that is wanted at the load side, as --output-force 100N.")
     if output_force is not None and named not in (None, "input-force"):
         raise UsageError(f"--output-force asks for the input force that it takes; leave --quantity {named} out.")
     if named is not None:

@@ -161,7 +161,7 @@ def session_of(pid: int) -> int:
 
 def is_running(session: int) -> bool:
     """Whether a process of a session is left, after a moment to end."""
-    for _ in range(20):
+    for _ in range(100):
         try:
             os.killpg(session, 0)
         except ProcessLookupError:

@@ -13,6 +13,7 @@ from bowdenfit.description.wrong_keys import wrong_keys
 from bowdenfit.errors import DatasetError, DescriptionError, Faults
 from bowdenfit.inputs import read_toml_file
 from bowdenfit.units import route_conversion_factor
+from bowdenfit.words import shown
 
 Stated = tuple[str, QuantityValue | None, str]
 """Where a quantity stands, the quantity, and what it must measure."""
@@ -55,6 +56,9 @@ def validate(raw: Mapping[str, Any], model: type[Description], file: str) -> Des
     Raises:
         DescriptionError: Keys are unknown, or values are missing or impossible; says all of them.
     """
+    for key, value in raw.items():
+        if _holds_large(value):
+            raise DescriptionError(f"{file}: {shown(key)} holds a whole number of more than 19 digits, which no setting has.")
     try:
         description = model.model_validate(dict(raw))
     except ValidationError as error:
@@ -68,6 +72,13 @@ def validate(raw: Mapping[str, Any], model: type[Description], file: str) -> Des
         check_elastic(description.preload, description.prior, file)
     faults.refuse()
     return description
+
+
+def _holds_large(value: Any) -> bool:
+    """Whether a whole number beyond what TOML allows stands in a value, which Python reads all the same."""
+    if isinstance(value, dict | list):
+        return any(_holds_large(part) for part in (value.values() if isinstance(value, dict) else value))
+    return isinstance(value, int) and not -(2**63) <= value < 2**63
 
 
 def _check_route(route: Route | None, file: str) -> None:
@@ -136,7 +147,7 @@ def _set(raw: dict[str, Any], override: str) -> None:
     for depth, part in enumerate(parents):
         node = (
             node[int(part)]
-            if isinstance(node, list) and part.isdecimal() and int(part) < len(node)
+            if isinstance(node, list) and part.isdecimal() and len(part) < 6 and int(part) < len(node)
             else (node.setdefault(part, {}) if isinstance(node, dict) else None)
         )
         if not isinstance(node, dict | list):

@@ -70,7 +70,7 @@ def _sentence(error: Mapping[str, Any], model: type[BaseModel], file: str, remed
     where = [str(part) for part in error["loc"]]
     place = f"{file}, {'.'.join(where)}" if where else file
     if error["type"] == "extra_forbidden":
-        return f"{file}: unknown key {'.'.join(where)!r}{nearest(where[-1], _siblings(model, where[:-1]))}"
+        return f"{file}: unknown key {shown('.'.join(where))}{nearest(where[-1][:80], _siblings(model, where[:-1]))}"
     if error["type"] == "missing" and where[-1] == "unit" and isinstance(error["input"], dict):
         return f"{place}: the unit is missing; write one, such as {_with_unit(error['input'].get('value'), where[:-1])}."
     if error["type"] == "missing":

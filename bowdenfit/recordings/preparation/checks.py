@@ -111,7 +111,7 @@ def _check_forces(file: str, name: str, force: Vector) -> None:
     if typical > LARGEST_FORCE:
         raise DatasetError(
             f"{file}: {name} reads {typical:.4g} N in its middle, far more than a Bowden cable bears; the usual cause is "
-            f"a wrong unit, or counts of the converter. State the unit: --channel {name}=NAME:UNIT"
+            f"a wrong unit, or counts of the converter. State the unit: --channel {name}=NAME:UNIT."
         )
 
 

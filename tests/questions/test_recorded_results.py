@@ -74,15 +74,18 @@ def test_the_coefficients_of_the_synthetic_recordings_lie_in_their_intervals(pla
 
 
 def test_every_run_s_own_exponent_is_found_to_a_thousandth(plain, truth):
-    """What the cable and the mounting have together, with the delay as fitted: no noise latch, no corner, no lag is left."""
+    """What the cable and the mounting have together: no noise latch, no corner is left.
+
+    The bench has no delay, so all that the output was shifted by is known to be an error.
+    """
     fit, _ = plain
     term = next(t for t in fit.model.terms if t.name == "recorded_efficiency")
-    delay = fit.posterior.values["delay_error"].mean() / 1000
+    delay = -fit.dataset.measurements.table(Recordings).each[0].account.delay
     for i, recording in enumerate(truth["recordings"]):
         cells = term.data["run"] == i
         weight = term.data["weight"][cells]
         found = np.sum(weight * (term.data["mean"] - delay * term.data["drift"])[cells]) / weight.sum()
-        assert found == pytest.approx(recording["exponent"] + recording["run_effect"], abs=0.0015)
+        assert found == pytest.approx(recording["exponent"] + recording["run_effect"], abs=0.001)
 
 
 def test_both_likelihoods_ask_for_the_same_coefficients(recorded, plain):

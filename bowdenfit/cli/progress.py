@@ -14,7 +14,7 @@ from bowdenfit.errors import DiskError, MemoryShortageError, system_error
 from bowdenfit.verb import Watch
 
 INTERRUPTED = 130
-_NEEDED = 500 << 20  # bytes; a small fit takes so much beside what is loaded by then
+_NEEDED = 640 << 20  # bytes; a small fit by NUTS takes so much beside what is loaded by then
 Report: TypeAlias = Callable[..., None]
 
 

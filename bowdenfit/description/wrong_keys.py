@@ -11,6 +11,7 @@ from bowdenfit.errors import BowdenfitError, DescriptionError, nearest, together
 from bowdenfit.words import shown
 
 _INIT = "`bowdenfit init` writes a template that has it"
+_MOST_UNKNOWN = 100  # unknown keys of a file for which a known one is looked for that is meant; no message names more
 _ALIKE = 0.5  # likeness from which an unknown key is taken for a misspelled one, as `nearest` has it
 
 
@@ -27,9 +28,10 @@ def wrong_keys(
         remedy: What to do about a key that is missing.
     """
     found: list[BowdenfitError] = []
-    for cause in _causes(error, raw, model):
+    for number, cause in enumerate(_causes(error, raw, model)):
+        of = model if number < _MOST_UNKNOWN else BaseModel
         for message in cause["msg"].removeprefix("Value error, ").splitlines():
-            fault = DescriptionError(_sentence({**cause, "msg": message}, model, file, remedy))
+            fault = DescriptionError(_sentence({**cause, "msg": message}, of, file, remedy))
             fault.place = tuple(cause["loc"])
             found.append(fault)
     return together(found)
@@ -39,18 +41,19 @@ def _causes(error: ValidationError, raw: Mapping[str, Any], model: type[BaseMode
     """The errors without what others bring about: what is misspelled is not missing too, and a value has one fault."""
     errors: list[dict[str, Any]] = [dict(each) for each in error.errors()]
     meant = set()
-    for each in errors:
-        *parents, name = each["loc"] or ("",)
-        if each["type"] == "extra_forbidden":
-            near = get_close_matches(str(name), _siblings(model, [*map(str, parents)]), n=1, cutoff=_ALIKE)
-            meant |= {(*parents, key) for key in near}
+    unknown = [each for each in errors if each["type"] == "extra_forbidden"]
+    for each in unknown[:_MOST_UNKNOWN]:
+        *parents, name = each["loc"]
+        near = get_close_matches(str(name), _siblings(model, [*map(str, parents)]), n=1, cutoff=_ALIKE)
+        meant |= {(*parents, key) for key in near}
     kept: dict[Any, dict[str, Any]] = {}
     for each in errors:
         written = _written(each["loc"], raw)
         lacking = each["type"] == "missing" and len(each["loc"]) == len(written) + 1
         if not (lacking and tuple(each["loc"]) in meant):
             kept.setdefault(tuple(each["loc"]) if lacking else written, each)
-    return [each for place, each in kept.items() if not any(place == other[: len(place)] for other in kept if place != other)]
+    parents_of_others = {place[:length] for place in kept for length in range(len(place))}
+    return [each for place, each in kept.items() if place not in parents_of_others]
 
 
 def _written(place: Sequence[str | int], raw: Any) -> tuple[str | int, ...]:

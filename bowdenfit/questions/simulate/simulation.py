@@ -49,7 +49,7 @@ def true_values(
     if unknown:
         known = ", ".join(p.name for p in space.parameters)
         raise UsageError(f"{unknown[0]!r} is no parameter of this cable; its parameters are {known}.")
-    drawn = np.asarray(jax.jit(space.vector)(jax.random.normal(key, (space.size,)))) if space.size else np.zeros(0)
+    drawn = np.asarray(space.vector(jax.random.normal(key, (space.size,)))) if space.size else np.zeros(0)
     values = {p.name: float(v) for p, v in zip(space.free, drawn, strict=True)}
     values |= {p.name: float(p.fixed or 0.0) for p in space.fixed}
     return values | {p.name: truth[p.name] / p.shown_scale for p in space.parameters if p.name in truth}
@@ -98,8 +98,7 @@ def simulated_again(
         angle, limit = (np.asarray(beyond["angles"][name]) for name in ("angle", "limit"))
         tables = dataset.measurements.with_tables(replace(angles, angle=angle, limit=limit))
         dataset = replace(dataset, measurements=tables)
-    draw = jax.jit(lambda values, key: drawn_readings(cable, dataset.measurements, values, key, scale))
-    return with_readings(dataset, draw(named, key) | beyond)
+    return with_readings(dataset, drawn_readings(cable, dataset.measurements, named, key, scale) | beyond)
 
 
 def with_readings(dataset: Dataset, readings: Mapping[str, Mapping[str, jax.Array]]) -> Dataset:

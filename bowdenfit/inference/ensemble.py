@@ -73,7 +73,8 @@ class Sweep(emcee.moves.Move):
         new, which = proposed.reshape(-1, w.shape[1]), moving.ravel()
         z, new_volume = self.coordinates.to_z(new)
         log_density = model.log_prob_fn(z)  # ours gives an array; emcee would go through it number by number
-        gain = factors.ravel() + volume[which] - new_volume + log_density - state.log_prob[which]
+        with np.errstate(invalid="ignore"):  # out of reach of the coordinates the volume may be infinite as the density is
+            gain = factors.ravel() + volume[which] - new_volume + log_density - state.log_prob[which]
         better = np.isfinite(new_volume) & (gain > np.log(model.random.uniform(size=len(which))))
         taken = which[better]
         state.coords[taken], state.log_prob[taken] = z[better], log_density[better]

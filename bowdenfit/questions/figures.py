@@ -128,11 +128,12 @@ def page_width(width: Quantity | None) -> float | None:
     Raises:
         UsageError: It is no length, or none that a figure can have.
     """
+    if width is None:
+        return None
+
     from bowdenfit.errors import UsageError
     from bowdenfit.units import conversion_factor
 
-    if width is None:
-        return None
     value, unit = width
     inches = value * conversion_factor(unit, "length") / conversion_factor("in", "length")
     if not NARROWEST <= inches <= WIDEST:

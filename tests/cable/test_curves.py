@@ -241,7 +241,7 @@ def test_the_figure_of_wrap_angles_draws_the_curve_of_each_family(fits):
     readings = [shown.curves[0].angle for fit in fits.values() if (shown := data(fit)) is not None]
     assert len(readings) == len(CURVES)
     for fit in fits.values():
-        (axes,) = draw(data(fit)).axes
+        axes, _ = draw(data(fit)).axes  # and the strip of residuals
         drawn = {line.get_label(): line.get_ydata() for line in axes.lines}
         np.testing.assert_allclose(drawn["Reading"], readings[0])
         assert axes.get_title() == "sheath"

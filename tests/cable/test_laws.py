@@ -155,7 +155,7 @@ def test_summary_and_check_name_the_law(tmp_path, run):
 
 def test_figures_show_the_parameter_of_a_law(fitted):
     assert [p.symbol for p in coefficients_figure.data(fitted)] == [r"$\mu$", "$w$ sheath"]
-    assert any("w_" in quantity.label and "deg" in quantity.label for quantity in pairs_figure.data(fitted).quantities)
+    assert any("$w$ sheath" in quantity.label and "deg" in quantity.label for quantity in pairs_figure.data(fitted).quantities)
 
 
 def test_identifiability_and_the_next_measurement_know_the_parameter_of_a_law(fitted):

@@ -38,7 +38,7 @@ def test_every_row_is_a_reading_or_said_to_be_unused(catheter):
     data = bf.read(catheter)
     table = data.measurements.table(DisplacementTable)
     assert len(table.used) == data.accounts[0].read == 147
-    text = check_text(data)
+    text = " ".join(check_text(data).split())
     assert f"{table.used.sum()} forces against displacement in 3 runs" in text
     assert f"{147 - table.used.sum()} of 147 rows are not used" in text
     assert 120 < table.used.sum() < 147

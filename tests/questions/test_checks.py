@@ -329,7 +329,7 @@ def test_a_figure_of_many_tables_has_no_words_that_overlap():
 def test_the_figure_of_the_checks_has_no_words_that_overlap(fit):
     figure = checks_figure.draw(checks_figure.data(fit))
     check_words(figure, "on body")
-    titles = {axes.get_title() for axes in figure.axes} - {""}
+    titles = {axes.get_title("left") for axes in figure.axes} - {""}
     assert titles == {"Wrap angles: 22 readings", "Efficiencies: 4 readings"}
     assert {axes.get_xlabel() for axes in figure.axes} == {"Predicted probability p", "Cable length (mm)"}
 

@@ -59,7 +59,7 @@ def test_the_report_speaks_of_moving_forward_and_back(several):
         assert words in " ".join(text.split())
     for words in ("pulling", "switching", "sliding"):
         assert words not in text
-    line = next(line for line in text.splitlines() if line.strip().startswith("r1 "))
+    line = [line for line in text.splitlines() if line.strip().startswith("r1 ")][-1]
     assert line.split()[-1] == "-"
     assert line.split()[-2] == "N"
 

@@ -13,7 +13,7 @@ from bowdenfit.questions.figures import FIGURES, figures_of, kept_figures
 from bowdenfit.questions.length.verb import VERB as LENGTH
 from bowdenfit.questions.predict.verb import VERB as PREDICT
 from bowdenfit.results.folder import ANSWERS, FIGURE_DATA
-from bowdenfit.results.kept import keep, kept
+from bowdenfit.results.kept import SCHEMA, keep, kept
 from bowdenfit.results.plain import stored
 
 QUICK = ("sampler.n_walkers=128", "sampler.target_ess=200", "sampler.target_r_hat=1.05", "sampler.max_steps=4000")
@@ -98,8 +98,9 @@ def test_help_loads_no_arrays_and_reading_tables_neither_jax_nor_pint(on_body):
 def test_a_figure_is_drawn_again_without_a_model(results, tmp_path):
     done = without(HEAVY - {"matplotlib"}, "plot", results, "--figure", "efficiency", "-o", tmp_path)
     assert (done.returncode, done.stderr) == (0, "")
-    assert sorted(path.name for path in tmp_path.iterdir()) == ["efficiency.png", "efficiency.svg"]
-    for path in tmp_path.iterdir():
+    drawn = [tmp_path / name for name in ("efficiency.png", "efficiency.svg")]
+    assert sorted(tmp_path.iterdir()) == [tmp_path / "captions.txt", *drawn]
+    for path in drawn:
         assert path.read_bytes() == (results / "figures" / path.name).read_bytes()
 
 
@@ -149,6 +150,7 @@ def test_some_of_the_lengths_that_can_be_bought_are_predicted_as_they_are_alone(
         {"lengths": (450.0, 455.25)},
         {"stroke": "return"},
         {"input_force": (100.0, "N")},
+        {"output_force": (100.0, "N")},
         {"quantity": "output-force"},
         {"wrap_angles": [(90.0, "deg")]},
         {"preload": (20.0, "N")},
@@ -157,7 +159,7 @@ def test_some_of_the_lengths_that_can_be_bought_are_predicted_as_they_are_alone(
     ids=str,
 )
 def test_another_question_is_not_answered_by_what_was_kept(results, other):
-    asked = {"lengths": (), "input_force": None, "stroke": "pull", "quantity": None, "wrap_angles": ()}
+    asked = {"lengths": (), "input_force": None, "stroke": "pull", "quantity": None, "wrap_angles": (), "output_force": None}
     asked |= {"preload": None, "friction_limit": None}
     answers = kept(results)
     assert PREDICT.kept(answers, asked) is not None
@@ -183,7 +185,7 @@ def _spoil_draws(folder):
         _spoil_draws,
         lambda f: (f / "posterior.nc").unlink(),
         lambda f: _edit(f / ANSWERS, '"variable": "cable_length"', '"variable": "cable_length "'),
-        lambda f: _edit(f / ANSWERS, '"schema": 1', '"schema": 0'),
+        lambda f: _edit(f / ANSWERS, f'"schema": {SCHEMA}', '"schema": 0'),
         lambda f: _edit(f / ANSWERS, '"version": "', '"version": "0.0'),
         lambda f: (f / ANSWERS).write_text("{}"),
         lambda f: (f / ANSWERS).write_text("["),

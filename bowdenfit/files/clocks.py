@@ -67,7 +67,7 @@ def is_clock(channel: Channel) -> bool:
     a unit of time must also never run backwards.
     """
     factor = _time_factor(channel.unit)
-    rises = len(channel.values) > 1 and bool(np.all(np.diff(channel.values) >= 0))
+    rises = len(channel.values) > 1 and bool(np.all(channel.values[1:] >= channel.values[:-1]))
     if names_time(channel.name) and (rises or not _TENSION.fullmatch(channel.name)):
         return not channel.unit or factor is not None
     return factor is not None and rises

@@ -103,7 +103,7 @@ def layout_of(rows: Rows, decimal: str) -> Layout | None:
 
 def is_index(values: Vector) -> bool:
     """Whether a column without heading only counts its rows, as pandas writes its index."""
-    return len(values) > 1 and values[0] in (0, 1) and bool(np.all(np.diff(values) == 1))
+    return len(values) > 1 and values[0] in (0, 1) and bool(np.all(values[1:] == values[:-1] + 1))
 
 
 def _longest_run(kinds: Sequence[Sequence[Kind]], summaries: Sequence[bool]) -> tuple[int, int, int]:

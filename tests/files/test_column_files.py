@@ -12,7 +12,7 @@ import openpyxl
 import pyarrow
 import pyarrow.parquet
 import pytest
-from hypothesis import given, settings
+from hypothesis import example, given, settings
 from hypothesis import strategies as st
 
 from bowdenfit.errors import DatasetError
@@ -472,6 +472,7 @@ FLOATS = st.floats(allow_nan=False, allow_infinity=False, width=64)
     ),
     end=st.sampled_from(["\n", "\r\n"]),
 )
+@example(table=[[0.0, 1.7976931348623157e308], [0.0, -9.9792015476736e291]], habit=(",", "."), end="\n")
 def test_any_numbers_written_as_csv_come_back_to_the_last_bit(table, habit, end):
     separator, decimal = habit
     text = io.StringIO()

@@ -21,6 +21,7 @@ _TAIL = 0.02  # share of the weight on either side that a Pareto distribution is
 _LEAST_TAIL = 20  # draws that such a fit takes
 _LEAST = 1e-12  # probability below which no difference is made
 _DRAWS = 10_000  # of a prediction that are enough to place a reading in
+_FARTHEST = 1e100  # as which a reading counts that a wandering walker puts beyond all numbers
 _SIMULATIONS = 1000  # of the band that a distribution of uniform numbers stays in
 
 
@@ -64,7 +65,8 @@ def predict_without_each(
     for likelihood, drawn, reading, bound in zip(log_likelihood.T, replicated.T, observed, at_most, strict=True):
         log_weights, k = smooth_weights(-likelihood, share)
         weights = np.exp(log_weights - log_weights.max())[::every]
-        rows.append((*_place(drawn[::every], weights / weights.sum(), float(reading), bool(bound)), k))
+        within = np.clip(np.nan_to_num(drawn[::every], nan=_FARTHEST), -_FARTHEST, _FARTHEST)
+        rows.append((*_place(within, weights / weights.sum(), float(reading), bool(bound)), k))
     return LeftOut(*np.array(rows).reshape(-1, 9).T)
 
 

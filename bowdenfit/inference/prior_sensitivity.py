@@ -16,7 +16,7 @@ from typing import ClassVar
 
 import numpy as np
 
-from bowdenfit.inference.psis import RELIABLE_K, smooth_weights
+from bowdenfit.inference.psis import RELIABLE_K, power_weights, smooth_weights
 from bowdenfit.parameters.priors import Prior
 from bowdenfit.parameters.space import Parameter
 
@@ -189,7 +189,8 @@ class _Weighted:
     def width(self, parameter: str, values: np.ndarray, order: np.ndarray, plain: np.ndarray) -> Width:
         """What it does to the width of a quantity's interval."""
         wide, narrow = (_quantiles(values, order, weights) for weights in (self.doubled, self.halved))
-        doubled, halved = (float((q[2] - q[0]) / (plain[2] - plain[0])) for q in (wide, narrow))
+        whole = plain[2] - plain[0]  # none of an optimum that nine of ten draws have at the end of the range
+        doubled, halved = (float((q[2] - q[0]) / whole) if whole > 0 else float("nan") for q in (wide, narrow))
         return Width(parameter, doubled, halved, self.k_doubled, self.k_halved)
 
 
@@ -211,7 +212,7 @@ def _scaled(part: np.ndarray) -> Callable[[np.ndarray], float]:
     """Function that gives a quantity's sensitivity to one part of the log density."""
     from arviz_stats.base import array_stats
 
-    lower, upper = (np.exp(array_stats.power_scale_lw(part, alpha, axis=(-2, -1))) for alpha in _POWERS)
+    lower, upper = (power_weights(part, alpha) for alpha in _POWERS)
 
     def sense(draws: np.ndarray) -> float:
         return float(array_stats.power_scale_sense(draws, lower, upper, *_POWERS))

@@ -108,6 +108,13 @@ def test_a_reading_that_hangs_on_one_draw_is_decisive_and_one_that_says_nothing_
     assert (found.tail > 0.9).all()
 
 
+def test_readings_that_a_draw_puts_beyond_all_numbers_are_far_out_without_a_warning():
+    replicated = np.random.default_rng(1).standard_normal((2000, 1))
+    replicated[:3, 0] = np.inf, -np.inf, np.nan
+    found = predict_without_each(np.zeros((2000, 1)), replicated, np.array([0.5]), np.array([False]), 2000)
+    assert abs(found.median[0]) < 0.1 and abs(found.below[0] - stats.norm.cdf(0.5)) < 0.05
+
+
 def test_uniform_numbers_stay_in_the_band_and_others_do_not():
     """Of 100 uniform samples 1 leaves a 99 % band on average; more than 6 do in 1 of 10 000 runs, and the seed is fixed."""
     rng = np.random.default_rng(3)
@@ -149,6 +156,16 @@ def test_power_scaling_tells_what_decides(reading, sd, expected):
     assert found.diagnosis == expected
     assert found.parameter == "mu"
     assert (found.prior > SENSITIVE) == (expected != "readings decide")
+
+
+def test_draws_that_are_alike_or_few_are_weighed_without_a_warning():
+    """Walkers that stood still leave ties in the tail, and quantities that nine of ten draws have at an end no interval."""
+    z = np.random.default_rng(0).standard_normal((32, 50))
+    still = np.where(np.arange(32)[:, None] < 8, 4.0, z)
+    for draws in (still, -still, z[:2, :6]):
+        at_end = np.where(np.arange(draws.size).reshape(draws.shape) % 50 == 0, 1.0, 0.0)
+        (found, edge) = sensitivities({"mu": draws, "edge": at_end}, {"mu": draws}, {"mu": draws}, -(draws**2), STANDARD)
+        assert np.isfinite([found.prior, found.likelihood]).all() and np.isnan(edge.widths[0].doubled)
 
 
 def test_the_median_with_a_wider_prior_is_that_of_another_fit():

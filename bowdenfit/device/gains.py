@@ -1,0 +1,131 @@
+r"""How large the gain on the torque at the joint may be: until the sampled loop oscillates, and while it is passive.
+
+While the rope slides, friction is a constant and the plant is linear: motor and joint on the stiffness K and the damping b_c
+of the rope. The controller commands :math:`-K_f T_j` a sample late. NumPy alone, over draws at once.
+"""
+
+from collections.abc import Callable
+from dataclasses import dataclass
+
+import numpy as np
+
+LARGEST, LEAST = 1e4, 1e-4  # gains that are looked for
+_HALVINGS = 40
+_ROUNDING = 1e-6  # of a spectral radius: undamped motion of the whole device stands at 1
+_FREQUENCIES, _SHARES = 240, 25
+
+
+@dataclass(frozen=True)
+class Linear:
+    """The device while the rope slides; numbers or arrays over draws.
+
+    Args:
+        stiffness: K [N m/rad].
+        rope_damping: b_c [N m s/rad].
+        motor_inertia, joint_inertia: J_m and J_j, with the hand's [kg m^2].
+        motor_damping, joint_damping: b_m and b_j, with the hand's [N m s/rad].
+        hand_stiffness: k_h toward its path [N m/rad].
+        sample: T_s [s].
+    """
+
+    stiffness: np.ndarray
+    rope_damping: np.ndarray
+    motor_inertia: np.ndarray
+    joint_inertia: np.ndarray
+    motor_damping: np.ndarray
+    joint_damping: np.ndarray
+    hand_stiffness: np.ndarray
+    sample: np.ndarray
+
+    def arrays(self) -> tuple[np.ndarray, ...]:
+        """All of them, as long as each other."""
+        return tuple(np.atleast_1d(part) for part in np.broadcast_arrays(*vars(self).values()))
+
+
+def sampled(device: Linear) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """A, B and C of the sampled plant: motor and joint angle and speed from one sample to the next, and T_j of them."""
+    k, c, j_m, j_j, b_m, b_j, k_h, sample = device.arrays()
+    zero, one = np.zeros_like(k), np.ones_like(k)
+    rows = [
+        [zero, one, zero, zero, zero],
+        [-k / j_m, -(c + b_m) / j_m, k / j_m, c / j_m, 1 / j_m],
+        [zero, zero, zero, one, zero],
+        [k / j_j, c / j_j, -(k + k_h) / j_j, -(c + b_j) / j_j, zero],
+        [zero] * 5,
+    ]
+    together = exponential(np.stack([np.stack(row, axis=-1) for row in rows], axis=-2) * sample[:, None, None])
+    return together[:, :4, :4], together[:, :4, 4:], np.stack([k, c, -k, -c], axis=-1)[:, None, :]
+
+
+def exponential(matrices: np.ndarray) -> np.ndarray:
+    """Matrix exponentials, by scaling, a Taylor series and squaring."""
+    norm = float(np.max(np.abs(matrices).sum(axis=-1), initial=1e-9))
+    halvings = max(0, int(np.ceil(np.log2(norm))) + 4)
+    scaled = matrices / 2.0**halvings
+    term = total = np.broadcast_to(np.eye(matrices.shape[-1]), matrices.shape)
+    for order in range(1, 13):
+        term = term @ scaled / order
+        total = total + term
+    for _ in range(halvings):
+        total = total @ total
+    return total
+
+
+def spectral_radius(parts: tuple[np.ndarray, np.ndarray, np.ndarray], gain: np.ndarray) -> np.ndarray:
+    """Largest eigenvalue of [[A, B], [-K_f C, 0]] by size: below 1 every oscillation dies out."""
+    a, b, c = parts
+    fed_back = -np.reshape(gain, (-1, 1, 1)) * c
+    closed = np.concatenate(
+        [np.concatenate([a, b], axis=2), np.concatenate([fed_back, np.zeros((len(a), 1, 1))], axis=2)], axis=1
+    )
+    radius: np.ndarray = np.max(np.abs(np.linalg.eigvals(closed)), axis=1)
+    return radius
+
+
+def stable_gain(device: Linear) -> np.ndarray:
+    """Largest K_f with which the loop does not oscillate by itself, by draw; `LARGEST` where none does."""
+    parts = sampled(device)
+    return _largest(lambda gain: spectral_radius(parts, gain) <= 1 + _ROUNDING, len(parts[0]), LARGEST)
+
+
+def passive_gain(device: Linear, stable: np.ndarray) -> np.ndarray:
+    r"""Largest K_f up to which :math:`\min_\omega \text{Re}\,Z(j\omega) \ge 0`: no passive hand can make it oscillate.
+
+    .. math:: Z = J_j s + b_j + \frac{1}{s} \frac{K + b_c s}{1 + (K + b_c s)(1 + K_f e^{-1.5 T_s s})/(J_m s^2 + b_m s)}
+
+    The delay is a sample, and half of one for the held command. Dry friction, which only helps, is left out.
+
+    Args:
+        device: The device, without a hand.
+        stable: Of `stable_gain`; no gain above that is passive.
+    """
+    k, c, j_m, j_j, b_m, b_j, _, sample = (part[:, None] for part in device.arrays())
+    s = 1j * np.geomspace(1e-3, 1.0, _FREQUENCIES) * np.pi / sample
+    rope, motor = k + c * s, j_m * s**2 + b_m * s
+    late = np.exp(-1.5 * sample * s)
+
+    def passive(gain: np.ndarray) -> np.ndarray:
+        impedance = j_j * s + b_j + rope / (s * (1 + rope * (1 + gain[:, None] * late) / motor))
+        return np.all(impedance.real >= -1e-9 * np.abs(impedance), axis=1)
+
+    shares = np.linspace(0.0, 1.0, _SHARES)[1:]
+    failed = np.array(
+        [~passive(share * stable) for share in shares]
+    )  # a large gain may hide the rope, and be passive again
+    first = np.where(failed.any(axis=0), failed.argmax(axis=0), len(shares))
+    return np.minimum(
+        _largest(passive, len(k), (first + 1.0) / len(shares) * stable, first / len(shares) * stable), stable
+    )
+
+
+def _largest(
+    holds: Callable[[np.ndarray], np.ndarray], draws: int, most: np.ndarray | float, least: np.ndarray | float = LEAST
+) -> np.ndarray:
+    """Largest gain between two for which something holds, by draw; 0 where it does for none."""
+    low, high = np.broadcast_to(np.maximum(least, LEAST), draws), np.broadcast_to(most, draws)
+    always, never = holds(high), ~holds(low)
+    for _ in range(_HALVINGS):
+        middle = np.sqrt(low * high)
+        good = holds(middle)
+        low, high = np.where(good, middle, low), np.where(good, high, middle)
+    return np.where(never, 0.0, np.where(always, high, low))

@@ -1,0 +1,90 @@
+r"""A pull-pull loop as torques at its pulleys, with all of its friction in one node between two halves that give.
+
+Each half passes :math:`S(d) = K d + \text{clip}(K d, \pm P r)` for a twist d: twice the stiffness of the loop while both sides
+are taut, and half of that once the return side is slack. The node holds still while the torque at the joint lies inside the
+band of the loop, and slides along its limits otherwise: the loop's play operator, whatever moves.
+"""
+
+from dataclasses import dataclass
+
+import jax
+import jax.numpy as jnp
+from jax import Array
+from jaxtyping import Float
+
+from bowdenfit.physics.stretch import mean_tension
+
+Each = Float[Array, "*runs"]
+
+
+@jax.tree_util.register_dataclass
+@dataclass(frozen=True)
+class Transmission:
+    """A loop at one bend, or in many runs at once.
+
+    Args:
+        stiffness: K, of the whole loop at the joint with the motor held [N m/rad].
+        preload: P r, preload times the pulley's radius [N m].
+        exponent: Lambda, friction exponent of one side [1].
+    """
+
+    stiffness: Each
+    preload: Each
+    exponent: Each
+
+    @property
+    def friction(self) -> Each:
+        """T_f = 2 r P Lambda, what moving it takes while both sides are taut [N m]."""
+        return 2 * self.preload * self.exponent
+
+    def passed(self, twist: Each) -> Each:
+        """S, torque that half of the loop passes on at a twist [rad]."""
+        force = self.stiffness * twist
+        return force + jnp.clip(force, -self.preload, self.preload)
+
+    def twist(self, torque: Each) -> Each:
+        """The twist of a half that passes a torque [N m]: the inverse of `passed`."""
+        return (
+            jnp.where(jnp.abs(torque) < 2 * self.preload, torque / 2, torque - jnp.sign(torque) * self.preload)
+            / self.stiffness
+        )
+
+    def stored(self, twist: Each) -> Each:
+        """Elastic energy of a half at a twist [J]."""
+        force = self.stiffness * twist
+        soft = jnp.clip(force, -self.preload, self.preload)
+        return (force**2 / 2 + soft * force - soft**2 / 2) / self.stiffness
+
+    def lower(self, torque: Each) -> Each:
+        """f_-, torque at the joint while it moves forward, from that at the motor [N m]; see `loop_output_force`."""
+        growth = jnp.where(torque > 0, jnp.exp(-self.exponent), jnp.exp(self.exponent))
+        return jnp.minimum(torque - self.friction, torque * growth)
+
+    def settled(self, node: Each, motor: Each, joint: Each) -> Each:
+        """Where the node comes to stand between the angles of motor and joint, from where it stood [rad]."""
+        return jnp.clip(node, self._least(motor, joint), -self._least(-motor, -joint))
+
+    def torques(self, node: Each, motor: Each, joint: Each) -> tuple[Each, Each]:
+        """T_m and T_j, what the loop takes from the motor and gives the joint [N m]."""
+        return self.passed(motor - node), self.passed(node - joint)
+
+    def _least(self, motor: Each, joint: Each) -> Each:
+        """x_-, the least place of the node: the root of S(x - q_j) = f_-(S(q_m - x)), between the kinks of either side."""
+        one = jnp.ones_like(self.exponent)
+        slack = self.preload / self.stiffness
+        by_load = self.twist(2 * self.preload / mean_tension(one, self.exponent))
+        by_return = self.twist(2 * self.preload / mean_tension(one, -self.exponent))
+        kinks = jnp.stack(
+            [joint - slack, joint + slack, motor - slack, motor + slack, motor - by_load, motor + by_return]
+        )
+        left = self.passed(kinks - joint) - self.lower(self.passed(motor - kinks))  # grows with the place
+        before, behind = left <= 0, left > 0
+        at, less = (jnp.max(jnp.where(before, each, -jnp.inf), axis=0) for each in (kinks, left))
+        to, more = (jnp.min(jnp.where(behind, each, jnp.inf), axis=0) for each in (kinks, left))
+        first, last = jnp.isinf(at), jnp.isinf(to)
+        slope_before = self.stiffness * (1 + jnp.exp(-self.exponent))
+        slope_behind = self.stiffness * (1 + jnp.exp(self.exponent))
+        slope = jnp.where(
+            first, slope_before, jnp.where(last, slope_behind, (more - less) / jnp.where(first | last, 1.0, to - at))
+        )
+        return jnp.where(first, to - more / slope, at - less / slope)

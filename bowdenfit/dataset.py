@@ -12,6 +12,7 @@ from bowdenfit.description import Description
 from bowdenfit.description.file import override
 from bowdenfit.display import Display, Rows
 from bowdenfit.errors import DescriptionError, Faults
+from bowdenfit.files import is_ros2_folder
 from bowdenfit.files.row_account import RowAccount
 from bowdenfit.inputs import refuse_special
 from bowdenfit.kinds import KINDS, each_table
@@ -73,13 +74,16 @@ def load_dataset(
     """
     if path.suffix.lower() not in {".toml", ""} and not path.exists():
         raise DescriptionError(f"{path} does not exist; check the spelling and the folder.")
-    file, faults = path if path.suffix == ".toml" else path / DESCRIPTION_FILE, Faults()
+    is_file = path.suffix.lower() == ".toml" and not path.is_dir()
+    file, faults = path if is_file else path / DESCRIPTION_FILE, Faults()
     description = load_description(file, overrides, columns, faults)
     return read_dataset(description, file.parent, {file.name: _sha256(file)}, channels, faults)
 
 
 def is_lone_file(path: Path) -> bool:
-    """Whether a data set is one file without a description."""
+    """Whether a data set is one file, or the folder of a ROS 2 bag, without a description."""
+    if path.is_dir():
+        return is_ros2_folder(path) and not (path / DESCRIPTION_FILE).exists()
     return path.suffix.lower() not in {".toml", ""} and path.is_file()
 
 
@@ -173,6 +177,11 @@ def read_dataset(
 
 
 def _sha256(path: Path) -> str:
+    """Of a file, or of the names and contents of those in a folder."""
+    if path.is_dir():
+        inside = sorted(file for file in path.rglob("*") if file.is_file())
+        listed = "".join(f"{_sha256(file)}  {file.relative_to(path)}\n" for file in inside)
+        return hashlib.sha256(listed.encode(errors="surrogateescape")).hexdigest()
     refuse_special(path)
     with path.open("rb") as file:
         return hashlib.file_digest(file, "sha256").hexdigest()

@@ -74,6 +74,10 @@ def _answer(verb: Verb, keywords: tuple[Keyword, ...], given: dict[str, Any], as
         asked[found] = _loaded(given[found])
     if verb.results and asked["output"] is None:
         asked["output"] = Path(verb.results) / _name_of(Path(asked["dataset"]))
+    if asked.get("output") is not None:
+        from bowdenfit.results.folder import refuse_unwritable
+
+        refuse_unwritable(asked["output"])
     behind = dict(verb.behind)
     if "report" in inspect.signature(verb.function).parameters:
         behind["report"] = lambda sentence: say(sentence, err=True)

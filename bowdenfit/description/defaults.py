@@ -8,6 +8,7 @@ from pydantic import BeforeValidator, Field, model_validator
 from bowdenfit.description.values import Frozen, LogNormalPrior, NonNegative, Positive, QuantityValue
 
 Sampler = Literal["emcee", "nuts", "both"]
+THIN = 10  # steps of a walker from one state that is stored to the next; draws are those of the second half
 _OR_ZERO = BeforeValidator(lambda said: {"value": 0.0, "unit": "N"} if said == 0 else said)  # 0 needs no unit
 
 
@@ -85,13 +86,20 @@ class SamplerSettings(Frozen):
     """
 
     method: Sampler = "emcee"
-    n_ensembles: Annotated[int, Field(ge=2)] = 4
-    n_walkers: Annotated[int, Field(ge=16, multiple_of=2)] = 256
-    n_chains: Annotated[int, Field(ge=4)] = 16
+    n_ensembles: Annotated[int, Field(ge=2, le=100)] = 4
+    n_walkers: Annotated[int, Field(ge=16, le=10_000, multiple_of=2)] = 256
+    n_chains: Annotated[int, Field(ge=4, le=1000)] = 16
     target_acceptance: Annotated[float, Field(ge=0.6, lt=1)] = 0.98
-    max_steps: Annotated[int, Field(ge=200)] = 12000
+    max_steps: Annotated[int, Field(ge=200, le=10_000_000)] = 12000
     target_r_hat: Annotated[float, Field(gt=1)] = 1.01
     target_ess: Annotated[int, Field(ge=100)] = 1000
+
+    @property
+    def most_draws(self) -> int:
+        """Draws that there can be after `max_steps`, even if none depended on the one before; of two samplers the fewer."""
+        of_walkers = self.n_ensembles * self.n_walkers * self.max_steps // (2 * THIN)
+        of_chains = self.n_chains * self.max_steps
+        return {"emcee": of_walkers, "nuts": of_chains, "both": min(of_walkers, of_chains)}[self.method]
 
 
 class PriorDefaults(Frozen):

@@ -37,7 +37,7 @@ def read_channels(path: Path) -> ChannelFile:
         DatasetError: The file is missing, empty, unreadable, damaged, too large, not what its ending says, or of no
             kind that can be read; or its library is not installed.
     """
-    ending = ".bag" if _is_ros2_folder(path) else _checked_ending(path)
+    ending = ".bag" if is_ros2_folder(path) else _checked_ending(path)
     if str(FORMATS[ending]).startswith(f"{__name__}.") and ending not in TEXT:
         from bowdenfit.files.apart import read_apart
 
@@ -47,19 +47,19 @@ def read_channels(path: Path) -> ChannelFile:
 
 def read_here(path: Path) -> ChannelFile:
     """The same, in this process."""
-    reader = FORMATS[".bag" if _is_ros2_folder(path) else _checked_ending(path)]
+    reader = FORMATS[".bag" if is_ros2_folder(path) else _checked_ending(path)]
     result: ChannelFile = import_module(reader).read(path) if isinstance(reader, str) else reader(path)
     return result
 
 
-def _is_ros2_folder(path: Path) -> bool:
+def is_ros2_folder(path: Path) -> bool:
     """Whether this is the folder that ROS 2 calls a bag."""
     return path.is_dir() and (path / "metadata.yaml").is_file()
 
 
 def _checked_ending(path: Path) -> str:
     """The ending of a file that is what it says."""
-    content = recognize(path, first_bytes(path, 1024))
+    content = recognize(path, first_bytes(path, 4096))
     ending = path.suffix.lower()
     if ending not in FORMATS or not content.suits(ending):
         raise _refusal(path, content)

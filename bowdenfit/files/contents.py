@@ -34,10 +34,11 @@ class Content:
 UNKNOWN = Content("a file of unknown kind", (*TEXT, ".mat"), "export the recording as CSV")  # MATLAB 4 has no mark
 _EXPORT = "open it in the program that wrote it and export the recording as CSV"
 _UNPACK = "unpack it and give the file inside"
+_HDF, _BEHIND = b"\x89HDF\r\n\x1a\n", (512, 1024, 2048)  # it may stand behind bytes that are the user's own
 _STARTS = {  # the longer start before the shorter one
     b"MATLAB 5": Content("a MATLAB file", (".mat",)),
     b"MATLAB 7": Content("a MATLAB 7.3 file", (".mat",)),
-    b"\x89HDF\r\n\x1a\n": Content("an HDF5 file", (".h5", ".hdf5")),
+    _HDF: Content("an HDF5 file", (".h5", ".hdf5")),
     b"TDSm": Content("a TDMS file of National Instruments", (".tdms",)),
     b"TDSh": Content("the index of a TDMS file", (), "give the .tdms file that lies next to it"),
     b"MDF     ": Content("an MDF measurement file", (".mf4", ".mdf")),
@@ -73,11 +74,14 @@ def recognize(path: Path, head: bytes) -> Content:
 
     Args:
         path: The file; looked into further only where it is an archive.
-        head: Its first bytes, some hundred at least.
+        head: Its first bytes, the first 4096.
     """
     if head.startswith(b"PK\x03\x04"):
         return _archive(path)
-    return next((content for start, content in _STARTS.items() if head.startswith(start)), None) or _markup(head)
+    found = next((content for start, content in _STARTS.items() if head.startswith(start)), None)
+    if found is None and any(head.startswith(_HDF, at) for at in _BEHIND):
+        return _STARTS[_HDF]
+    return found or _markup(head)
 
 
 def _archive(path: Path) -> Content:

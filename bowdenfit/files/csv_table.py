@@ -71,7 +71,7 @@ def read_csv(path: Path, most: int | None = None) -> RawTable:
     if most is None:
         _refuse_large(path)
     name, data = path.name, first_bytes(path, -1 if most is None else _FIRST_BYTES)
-    content = recognize(path, data[:1024])
+    content = recognize(path, data[:4096])
     if content is not UNKNOWN:
         raise DatasetError(f"{name} is {content.what}, not a CSV file; save the table as CSV and name that file.")
     _, every = first_lines(data, name, whole=most is None, most=most)

@@ -15,13 +15,13 @@ import jax
 import numpy as np
 
 from bowdenfit.description import SamplerSettings
+from bowdenfit.description.defaults import THIN
 from bowdenfit.inference.chain import Chain, Progress, Sampling, stuck_walkers, worst
 from bowdenfit.inference.checkpoint import append, records
 from bowdenfit.inference.coordinates import Coordinates, Places, WalkerPrograms, Z, coordinates_of
 from bowdenfit.inference.least_squares import MaximumPosterior
 from bowdenfit.inference.proposals import Proposal, differential_evolution, independent, shares_of_moves, stretch
 
-THIN = 10  # steps from one stored state to the next, all in the same coordinates
 _BLOCK = 10  # stored states between two reports
 _FIRST_LOOK = 60  # stored states before the first look; of five data sets the slowest is there after half of that
 _FITTED = 4  # walkers a parameter that a covariance is fitted to half of
@@ -199,7 +199,7 @@ def _summarized(asked: Sampling, backend: emcee.backends.Backend) -> Chain:
     """Draws from the second half of every walker's path, with their diagnostics."""
     stored = int(backend.iteration)
     wanted = max(_KEPT_PER_WALKER, 2 * asked.settings.target_ess // backend.shape[0])
-    kept = np.unique(np.linspace(stored // 2, stored - 1, wanted).round().astype(int))
+    kept = np.unique(np.linspace(stored // 2, stored - 1, min(stored, wanted)).round().astype(int))
     # In this order in memory, as in a loaded fit: sums must agree to the last bit.
     z = np.ascontiguousarray(np.asarray(backend.get_chain()[kept]).transpose(1, 0, 2))
     acceptance = float(np.mean(backend.accepted)) / stored

@@ -39,7 +39,7 @@ WARM_UP = sum(WINDOWS)
 MOST_DOUBLINGS = 10  # of a trajectory
 FINE_EVERY, FINER = 10, 16  # every so many trajectories one with so much shorter steps; a block has a whole number
 _FIRST_LOOK = 5  # blocks of draws before the first look
-_KEPT = 20_480  # draws of all chains that are kept, spread evenly; as many as of emcee's walkers by default
+_KEPT = 20_480  # draws of all chains that are kept at least, spread evenly; as many as of emcee's walkers by default
 _FIRST_STEP, _STREAM = 0.1, 3
 _STATISTICS = ("diverging", "energy", "acceptance_rate", "tree_depth", "n_steps")
 
@@ -178,7 +178,8 @@ def _summarized(asked: Sampling, blocks: Sequence[Block]) -> tuple[Chain, bool]:
     drawn = {name: np.concatenate([b[name] for b in blocks[WARM_UP:]]) for name in ("z", *_STATISTICS)}
     steps, chains = drawn["energy"].shape
     fine = _fine(steps)
-    kept = np.unique(np.linspace(0, steps - 1, min(steps, max(_KEPT // chains, 1))).round().astype(int))
+    wanted = max(_KEPT, 2 * asked.settings.target_ess) // chains
+    kept = np.unique(np.linspace(0, steps - 1, min(steps, wanted)).round().astype(int))
     z = np.ascontiguousarray(drawn["z"][kept].transpose(1, 0, 2))
     trajectories = Trajectories(
         WARM_UP * BLOCK,

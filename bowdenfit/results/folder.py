@@ -3,6 +3,7 @@
 `fit.json` is written last, so a folder that has it is complete. A folder with `chain.checkpoint` alone is an interrupted fit.
 """
 
+import errno
 import json
 import os
 import shutil
@@ -90,6 +91,29 @@ def read_page(path: Path) -> Any:
         return json.loads(read_text(path))
     except (ValueError, RecursionError):  # no JSON, a number of thousands of digits, nested too deeply
         raise StoreError(f"{path} is damaged; fit again, or restore the folder from a copy.") from None
+
+
+def refuse_unwritable(target: Path) -> None:
+    """Stop before anything is computed that could not be written.
+
+    Args:
+        target: File or folder; it and folders above it may be missing.
+
+    Raises:
+        StoreError: It cannot be made, as far as that can be told without making it.
+    """
+    place = target
+    try:
+        while not place.exists():
+            if place.is_symlink():
+                raise OSError(errno.ENOENT, "it is a link that leads nowhere")
+            place = place.parent
+        if place != target and not place.is_dir():
+            raise OSError(errno.ENOTDIR, os.strerror(errno.ENOTDIR))
+        if not os.access(place if place.is_dir() else place.parent, os.W_OK | os.X_OK):
+            raise OSError(errno.EACCES, os.strerror(errno.EACCES))
+    except OSError as error:
+        raise disk_error(target, error) from None
 
 
 def refuse_to_overwrite(folder: Path, force: bool) -> None:

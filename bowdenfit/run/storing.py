@@ -8,7 +8,7 @@ from textwrap import shorten
 from typing import TYPE_CHECKING, Any, get_args
 
 from bowdenfit.dataset import Dataset
-from bowdenfit.description import Sampler
+from bowdenfit.description import Sampler, SamplerSettings
 from bowdenfit.errors import DescriptionError, StoreError, UsageError
 from bowdenfit.kinds.settings import parse_description
 from bowdenfit.results.folder import CHAIN, clear, read_checkpoint, refuse_to_overwrite, start_checkpoint
@@ -102,8 +102,23 @@ def with_sampler(data: Dataset, method: str | None) -> Dataset:
     """The same data set, to be sampled by another method than its description says; the description's if None.
 
     Raises:
-        UsageError: There is no such sampler.
+        UsageError: There is no such sampler, or it cannot reach what is asked of it.
     """
+    asked = _with_method(data, method)
+    _refuse_out_of_reach(asked.description.sampler)
+    return asked
+
+
+def _refuse_out_of_reach(settings: SamplerSettings) -> None:
+    """Refuse a target that sampling would miss at its last step, however well it goes."""
+    if settings.target_ess > settings.most_draws:
+        raise UsageError(
+            f"sampler.target_ess asks for {settings.target_ess:,} effective draws, but after sampler.max_steps = "
+            f"{settings.max_steps:,} steps there are {settings.most_draws:,} draws at most; ask for fewer, or allow more steps."
+        )
+
+
+def _with_method(data: Dataset, method: str | None) -> Dataset:
     if method is None:
         return data
     if method not in get_args(Sampler):

@@ -195,7 +195,7 @@ def test_resume_tops_up_a_finished_fit_and_refuses_another_sampler(saved):
     fit, folder = saved
     with pytest.raises(bf.StoreError, match="description changed"):
         bf.fit(YARN, output=folder, resume=True, settings=QUICK)
-    more = ("sampler.max_steps=500", "sampler.target_ess=100000")
+    more = ("sampler.max_steps=500", "sampler.target_r_hat=1.0000001")
     longer = bf.fit(YARN, output=folder, sampler="nuts", resume=True, settings=(*QUICK, *more), figures=False)
     assert (fit.posterior.steps, longer.posterior.steps) == (300, 500)
     np.testing.assert_array_equal(longer.posterior.z[:, :300], fit.posterior.z)

@@ -9,8 +9,9 @@ from emcee.moves.de import _get_nondiagonal_pairs
 from scipy import stats
 from snooker import snooker
 
+from bowdenfit.description.defaults import THIN
 from bowdenfit.inference.coordinates import Z
-from bowdenfit.inference.ensemble import THIN, Sweep, default_moves
+from bowdenfit.inference.ensemble import Sweep, default_moves
 from bowdenfit.inference.proposals import differential_evolution, independent, stretch
 from bowdenfit.inference.value_chart import NODES, Chart
 

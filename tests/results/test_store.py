@@ -193,7 +193,7 @@ def test_resume_tops_up_a_finished_fit(saved, on_body, tmp_path):
         output=copy,
         figures=False,
         resume=True,
-        settings=(*QUICK, "sampler.max_steps=600", "sampler.target_ess=100000"),
+        settings=(*QUICK, "sampler.max_steps=600", "sampler.target_r_hat=1.0000001"),
     )
     assert (more.posterior.steps, fit.posterior.steps) == (600, 400)
     assert not more.converged

@@ -113,3 +113,20 @@ def test_settings_that_lead_nowhere_are_sentences(on_body, setting):
     with pytest.raises(bf.DescriptionError) as refused:
         bf.check(on_body, settings=[setting])
     assert len(str(refused.value)) < 600
+
+
+@pytest.mark.parametrize(
+    ("settings", "says"),
+    [
+        (["sampler.target_ess=1e12"], "614,400 draws at most"),
+        (["sampler.method=nuts", "sampler.target_ess=200000"], "192,000 draws at most"),
+        (["sampler.max_steps=200", "sampler.n_walkers=32", "sampler.target_ess=1281"], "1,280 draws at most"),
+        (["sampler.max_steps=1e18"], "max_steps"),
+        (["sampler.n_walkers=1e9"], "n_walkers"),
+    ],
+)
+def test_targets_that_no_sampling_can_reach_are_refused_at_the_start(on_body, tmp_path, settings, says):
+    with pytest.raises(bf.BowdenfitError, match=says) as refused:
+        bf.fit(on_body, output=tmp_path / "fit", settings=settings)
+    assert refused.value.exit_code == 2
+    assert not (tmp_path / "fit").exists()

@@ -3,6 +3,7 @@
 import os
 import subprocess
 import sys
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -10,7 +11,7 @@ import pytest
 import bowdenfit as bf
 from bowdenfit.errors import DiskError
 from bowdenfit.inference.checkpoint import append, fingerprint_of, heading, records
-from bowdenfit.results.folder import folder_to_write, reserved
+from bowdenfit.results.folder import folder_to_write, refuse_unwritable, reserved
 
 QUICK = ("sampler.n_walkers=32", "sampler.max_steps=200", "sampler.target_ess=100")
 
@@ -91,3 +92,22 @@ def test_what_is_left_of_an_ended_fit_is_replaced_with_force(on_body, tmp_path):
         bf.fit(on_body, output=tmp_path / "fit", mcmc=False, figures=False)
     bf.fit(on_body, output=tmp_path / "fit", mcmc=False, figures=False, force=True)
     assert not (tmp_path / "fit" / ".posterior.nc.partial").exists()
+
+
+@pytest.mark.parametrize("place", ["file/x", "link", "link/x", "n" * 300, "/dev/null/x", "pipe/x/y"])
+def test_what_cannot_be_written_is_refused_before_anything_is_computed(tmp_path, monkeypatch, place):
+    monkeypatch.chdir(tmp_path)
+    (tmp_path / "file").write_text("x")
+    (tmp_path / "link").symlink_to("link")
+    os.mkfifo(tmp_path / "pipe")
+    with pytest.raises(bf.StoreError, match="cannot be written"):
+        refuse_unwritable(Path(place))
+
+
+@pytest.mark.parametrize("place", [".", "new", "new/one/below", "full", "full/file", "full/new"])
+def test_what_can_be_written_is_not_refused(tmp_path, monkeypatch, place):
+    monkeypatch.chdir(tmp_path)
+    (tmp_path / "full").mkdir()
+    (tmp_path / "full" / "file").write_text("x")
+    refuse_unwritable(Path(place))
+    assert sorted(each.name for each in tmp_path.rglob("*")) == ["file", "full"]

@@ -118,6 +118,13 @@ def _bag2(path: Path, plugin: StoragePlugin) -> None:
     shutil.rmtree(folder)
 
 
+def db3_folder(path: Path) -> None:
+    """A ROS 2 bag as it is recorded: a folder."""
+    types = get_typestore(Stores.ROS2_HUMBLE)
+    with Bag2Writer(path, version=8, storage_plugin=StoragePlugin.SQLITE3) as writer:
+        _topics(writer, types, types.serialize_cdr)
+
+
 def _topics(writer: object, types: object, pack: Callable[..., bytes]) -> None:
     message = types.types["std_msgs/msg/Float64"]
     for name in ("input_force_N", "output_force_N"):

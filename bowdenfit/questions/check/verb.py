@@ -90,9 +90,11 @@ def describe(
             readings lie outside; a wrong unit shows here before anything is fitted.
         reading: Keywords of `bowdenfit.read`.
     """
+    from bowdenfit.dataset import is_lone_file
     from bowdenfit.questions.check.data_set_words import check_text
 
-    if dataset.is_file() and dataset.suffix.lower() != ".toml" and not reading.get("wrap_angle"):
+    is_file = dataset.is_file() and dataset.suffix.lower() != ".toml"
+    if (is_file or is_lone_file(dataset)) and not reading.get("wrap_angle"):
         from bowdenfit.files.apart import limits_times
         from bowdenfit.questions.check.lone_file import lone_file_text
 

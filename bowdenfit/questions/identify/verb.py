@@ -70,7 +70,7 @@ def _identify(source: "str | Path | Dataset | Record", reading: Reading) -> "Ide
 
 def _is_plan(path: Path) -> bool:
     """Whether a file is a plan: a description with [design]."""
-    if path.suffix != ".toml" or not path.is_file():
+    if path.suffix.lower() != ".toml" or not path.is_file():
         return False
     try:
         return "design" in read_toml_file(path)[1]

@@ -9,6 +9,7 @@ from bowdenfit.types import Vector
 
 FEWEST_SAMPLES = 20
 LARGEST_FORCE = 1e6
+SHORTEST_STEP, LONGEST_STEP = 1e-9, 86_400.0  # s, of any converter, and of what is still a recording
 _MOST_REPEATED = 0.5
 
 
@@ -23,7 +24,7 @@ def check(raw: RawRecording) -> tuple[str, ...]:
 
     Raises:
         DatasetError: A channel and its clock differ in length, a channel is too short, never moves or is far too large,
-            a clock runs backwards or stands still, or the two clocks do not overlap.
+            a clock runs backwards, stands still or has steps that no bench has, or the two clocks do not overlap.
     """
     channels = {
         "input_force": (raw.input_time, raw.input_force),
@@ -90,6 +91,12 @@ def _check_clock(file: str, name: str, time: Vector) -> None:
         raise DatasetError(
             f"{file}: the time of {name} runs backwards at sample {at + 2}, from {time[at]:.10g} s to "
             f"{time[at + 1]:.10g} s; the usual cause is two recordings in one file. Split the file there."
+        )
+    step = (time[-1] - time[0]) / max(len(time) - 1, 1)
+    if step and not SHORTEST_STEP <= step <= LONGEST_STEP:
+        raise DatasetError(
+            f"{file}: the samples of {name} are {step:.3g} s apart, which no bench records; the usual cause is a wrong unit of "
+            "the time, or another column than the time. State it: --channel time=NAME:UNIT."
         )
     repeated = _share_repeated(time)
     if repeated > _MOST_REPEATED:

@@ -23,6 +23,7 @@ if TYPE_CHECKING:
     from bowdenfit.questions.calibrate.verb import calibrate
     from bowdenfit.questions.check.verb import check
     from bowdenfit.questions.compare.verb import compare
+    from bowdenfit.questions.export.verb import export
     from bowdenfit.questions.identify.verb import identify
     from bowdenfit.questions.next.verb import next_measurement
     from bowdenfit.questions.predict.verb import predict
@@ -37,6 +38,7 @@ _WHERE = {
     "calibrate": "bowdenfit.questions.calibrate.verb",
     "check": "bowdenfit.questions.check.verb",
     "compare": "bowdenfit.questions.compare.verb",
+    "export": "bowdenfit.questions.export.verb",
     "fit": "bowdenfit.run.verb",
     "identify": "bowdenfit.questions.identify.verb",
     "load": "bowdenfit.front_desk",
@@ -63,6 +65,7 @@ __all__ = [
     "calibrate",
     "check",
     "compare",
+    "export",
     "fit",
     "identify",
     "load",

@@ -240,7 +240,8 @@ class FrictionModel:
     def _options(self) -> list[FrictionOption]:
         return [FRICTION_OPTIONS[name] for name in self.options]
 
-    def _scale(self, values: Mapping[str, Array]) -> tuple[Array, Array, float]:
+    def scale(self, values: Mapping[str, Array]) -> tuple[Array, Array, float]:
+        """Exponent p [1], drag D [N] and reference force [N] of the scale g, see `bowdenfit.physics.friction.force_scale`."""
         exponent, drag = jnp.zeros(()), jnp.zeros(())
         for option in self._options:
             exponent, drag = exponent + option.load_exponent(values), drag + option.drag(values)
@@ -248,15 +249,15 @@ class FrictionModel:
 
     def scaled(self, values: Mapping[str, Array], force: Float[Array, "*batch"]) -> Float[Array, "*batch"]:
         """The scale g of forces [1]."""
-        return force_scale(force, *self._scale(values))
+        return force_scale(force, *self.scale(values))
 
     def force(self, values: Mapping[str, Array], scaled: Float[Array, "*batch"]) -> Float[Array, "*batch"]:
         """Forces [N] at values of g."""
-        return force_from_scale(scaled, *self._scale(values))
+        return force_from_scale(scaled, *self.scale(values))
 
     def slope(self, values: Mapping[str, Array], force: Float[Array, "*batch"]) -> Float[Array, "*batch"]:
         """Derivative of g by the force [1/N]."""
-        return force_scale_slope(force, *self._scale(values))
+        return force_scale_slope(force, *self.scale(values))
 
     def shifts(self, values: Mapping[str, Array], exponent: Float[Array, "*batch"]) -> tuple[Array, Array]:
         """Exponent while pulling and while returning [1], of one that is the mean of both."""

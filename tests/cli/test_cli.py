@@ -31,6 +31,7 @@ VERBS = (
     "identify",
     "compare",
     "next",
+    "export",
     "calibrate",
     "plot",
     "report",

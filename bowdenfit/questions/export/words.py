@@ -1,0 +1,46 @@
+"""Names of people in files of programs: whatever they hold, they stay text."""
+
+import textwrap
+from collections.abc import Iterable
+from importlib.resources import files
+from string import Template
+
+_WIDTH = 110
+
+
+def comment(sentences: Iterable[str], before: str) -> str:
+    """Sentences as lines of a comment, ASCII alone, in which nothing ends the comment or goes on behind it.
+
+    Args:
+        sentences: A line or more each.
+        before: What begins a line, such as " * ".
+    """
+    lines = [line for text in sentences for line in textwrap.wrap(plain(text), _WIDTH) or [""]]
+    return "\n".join(before + line for line in lines)
+
+
+def plain(text: str) -> str:
+    """Text as one line of ASCII without anything that begins or ends a comment, or that C reads as something else."""
+    found = "".join(x if " " <= x <= "~" and x != "\\" else ascii(x)[1:-1].replace("\\", "~") for x in text)
+    for bad in ("*/", "/*", "??", "--", "%{", "%}"):
+        while bad in found:
+            found = found.replace(bad, f"{bad[0]} {bad[1]}")
+    return found
+
+
+def filled_template(name: str, **values: object) -> str:
+    """A template of this folder with its places filled.
+
+    Args:
+        name: Of the file.
+        values: By the name of the place.
+    """
+    text = files("bowdenfit.questions.export").joinpath("templates", name).read_text(encoding="utf-8")
+    return Template(text).substitute(values)
+
+
+def identifier(name: str) -> str:
+    """A name as file systems and programs take one: letters of ASCII, digits and single underscores."""
+    found = "".join(x.lower() if x.isascii() and x.isalnum() else " " for x in name)
+    word = "_".join(found.split())[:40].strip("_")
+    return word if word[:1].isalpha() else f"cable_{word}".strip("_")

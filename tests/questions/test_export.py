@@ -1,0 +1,121 @@
+"""Exported files against predictions of the fit they come from."""
+
+import csv
+import json
+
+import numpy as np
+import pytest
+from exported import HOSTILE, cable
+
+import bowdenfit as bf
+from bowdenfit.errors import UsageError
+from bowdenfit.questions.export.lookup import table_of_draws
+from bowdenfit.questions.export.tables import transmission
+from bowdenfit.questions.export.transmission import LEVELS
+from bowdenfit.questions.export.words import plain
+
+QUICK = ("sampler.n_walkers=64", "sampler.target_ess=100", "sampler.target_r_hat=1.1", "sampler.max_steps=1000")
+
+
+@pytest.fixture(scope="module")
+def fit(on_body):
+    """A quick fit of the on-body data."""
+    return bf.fit(on_body, seed=5, settings=QUICK)
+
+
+@pytest.fixture(scope="module")
+def of_load(tmp_path_factory):
+    """A quick fit of a rope with drag, whose friction is not the same both ways."""
+    path = tmp_path_factory.mktemp("bench") / "bench.csv"
+    rng = np.random.default_rng(2)
+    rows = [
+        (bend, force, (force + 4) * np.exp(-0.1 * (1.05 if stroke == "pull" else -0.95) * np.deg2rad(bend)) - 4, stroke)
+        for bend in (90, 180, 270) for force in (20, 50, 100) for stroke in ("pull", "return")
+    ]  # fmt: skip
+    lines = [f"{bend},{force},{out + 0.1 * rng.standard_normal():.3f},{stroke}" for bend, force, out, stroke in rows]
+    path.write_text("\n".join(["wrap_angle_deg,input_force_N,output_force_N,stroke", *lines]) + "\n")
+    return bf.fit(path, seed=1, settings=QUICK, friction="drag+stroke-dependent")
+
+
+def read_back(text):
+    """Rows of a CSV with remarks at its top, as numbers by column."""
+    rows = list(csv.reader(line for line in text.splitlines() if not line.startswith("#")))
+    return {name: list(column) for name, column in zip(rows[0], zip(*rows[1:], strict=True), strict=True)}
+
+
+def test_the_lookup_table_says_what_predict_says(fit, tmp_path):
+    done = bf.export(fit, "csv", tmp_path / "table.csv", points=5)
+    columns = read_back(done.file.read_text())
+    rows = bf.predict(fit, [430, 455, 480, 505, 530])
+    for name in ("efficiency", "mean", "sd", "q05", "q95", "mounting_q05", "mounting_q95"):
+        np.testing.assert_array_equal(np.array(columns[name], dtype=float), [row[name] for row in rows])
+    assert columns["cable_length_mm"] == ["430.0", "455.0", "480.0", "505.0", "530.0"]
+    np.testing.assert_allclose(
+        np.exp(-np.array(columns["friction_exponent_q95"], dtype=float)), [row["q05"] for row in rows], rtol=1e-5
+    )
+
+
+@pytest.mark.parametrize("stroke", ["pull", "return"])
+def test_quantiles_of_friction_give_the_intervals_of_predictions(of_load, stroke):
+    found = transmission(of_load, points=3)
+    at, reference = found.places.at, found.reference_force
+    rows = bf.predict(of_load, wrap_angles=[(x, "rad") for x in at], input_force=(reference, "N"), stroke=stroke)
+    row, sign = (0, 1) if stroke == "pull" else (1, -1)
+    assert found.of_load
+    quantiles = ("q95", "output_force_N", "q05")[::sign]
+    for level, quantile in zip(("q05", "q50", "q95"), quantiles, strict=True):
+        one = found.levels[LEVELS.index(level)]
+        scale = one.load_exponent, one.drag, reference
+        shift = sign * one.exponent[row]
+        there = (reference + one.drag) * np.exp(-shift) - one.drag
+        assert scale[0] == 0
+        np.testing.assert_allclose(there, [r[quantile] for r in rows], rtol=1e-6)
+
+
+def test_draws_are_cables_of_the_posterior_in_mountings_of_their_own(fit):
+    found = transmission(fit, points=2, draws=400)
+    drawn = np.array([level.exponent[0] for level in found.levels[len(LEVELS) :]])
+    of_mountings = [found.levels[LEVELS.index(f"mounting_{q}")].exponent[0] for q in ("q05", "q95")]
+    inside = np.mean((drawn > of_mountings[0]) & (drawn < of_mountings[1]))
+    assert 0.9 - 4.4 * 0.011 < inside < 0.9 + 4.4 * 0.011  # binomial of 800, half of them dependent: less than 1 in 10^4
+    columns = read_back(table_of_draws(found))
+    assert len(columns["draw"]) == 800
+    np.testing.assert_array_equal(np.array(columns["friction_exponent_pull"], dtype=float).reshape(-1, 2), drawn)
+
+
+def test_every_file_says_fit_seed_version_and_range(fit, tmp_path):
+    for to in ("c", "csv"):
+        text = bf.export(fit, to, tmp_path / f"file.{to}", points=3).file.read_text()
+        version = fit.provenance.versions["bowdenfit"]
+        assert all(words in text for words in ("On-body knee exoskeleton", "seed 5", f"bowdenfit {version}", "430 to 530 mm"))
+
+
+def test_the_command_writes_a_file_and_does_not_replace_one(fit, tmp_path, run, refuse, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    fit.save("fits")
+    code, out, _ = run("export", "fits", "--to", "c", "--points", 3, "--draws", 2)
+    assert code in (0, 3)
+    assert out == "Wrote on_body_knee_exoskeleton.h.\n"
+    assert "add --force" in refuse("export", "fits", "--to", "c")
+    code, out, _ = run("export", "fits", "--to", "csv", "--points", 3, "--json", "-o", "new/table.csv")
+    assert json.loads(out)["format"] == "csv" and (tmp_path / "new" / "table.csv").exists()
+    assert "draws; ask for so many at most" in refuse("export", "fits", "--to", "csv", "--draws", 9999)
+
+
+def test_a_fit_without_draws_is_refused_in_words(on_body, tmp_path):
+    fit = bf.fit(on_body, seed=1, mcmc=False)
+    with pytest.raises(UsageError, match="without MCMC"):
+        bf.export(fit, "c", tmp_path / "bowden.h")
+    assert not (tmp_path / "bowden.h").exists()
+
+
+def test_hostile_names_are_harmless_in_csv():
+    text = table_of_draws(cable("rope", name=HOSTILE))
+    columns = read_back(text)
+    assert list(columns) == ["draw", "wrap_angle_rad", "friction_exponent_pull", "friction_exponent_return"]
+    assert text.isascii()
+
+
+def test_plain_text_holds_nothing_that_steers():
+    assert plain(HOSTILE).isascii() and plain(HOSTILE).isprintable()
+    assert not any(bad in plain(HOSTILE + "/*/*/-->") for bad in ("*/", "/*", "??", "--", "\\", "%{", "%}"))

@@ -1,0 +1,105 @@
+"""Cables as tables, made up for tests of what is exported, and what the package's own equations say of them."""
+
+import jax.numpy as jnp
+import numpy as np
+
+from bowdenfit.physics.friction import force_from_scale, force_scale, rate_factor
+from bowdenfit.physics.hysteresis import play_operator
+from bowdenfit.physics.loop import loop_input_force, loop_output_force
+from bowdenfit.questions.export.transmission import DRAW, LEVELS, About, Level, Places, Transmission
+
+HOSTILE = (
+    "*/ int x; /* ??/ \\ \n#error </x> & ]]> --> <!-- \" ' : - { [ # %{ %} ... \r\u2028\x1b[31m \u202e $about ${place} "
+    "!!python/object/apply:os.system ['true'] \x00 \u03b8"
+)
+CASES = ("loop", "rope", "load", "rate", "stroke", "one place")
+
+
+def cable(case: str, draws: int = 3, name: str = "test cable") -> Transmission:
+    """A cable of one of the `CASES`, with friction that differs by level and place."""
+    rng = np.random.default_rng(CASES.index(case))
+    at = np.sort(rng.uniform(0.2, 3.0, 1 if case == "one place" else 37))
+    levels = []
+    for i, called in enumerate([*LEVELS, *(f"{DRAW}{k + 1}" for k in range(draws))]):
+        exponent = (0.05 + 0.02 * i) * at * (1 + 0.1 * rng.standard_normal(at.shape))
+        both = np.stack([exponent, exponent * (0.9 if case == "stroke" else 1.0)])
+        levels.append(
+            Level(
+                called, both, 2 * (10 + i + at) * exponent if case == "loop" else 0 * at,
+                (0.0 if i == 1 else 0.1 * i) if case == "load" else 0.0, 0.5 * i if case == "load" else 0.0,
+                (0.3 + 0.01 * i, 4.0, 0.002) if case == "rate" else (0.0, 1.0, 0.0),
+            )
+        )  # fmt: skip
+    places = Places("place", "", np.zeros(1)) if case == "one place" else Places("wrap_angle", "rad", at)
+    about = About(name, 7, "0.1.0", "2026-01-01T00:00:00+00:00", ("loads 5 to 200 N",))
+    options = {"load": ("drag", "load-dependent"), "rate": ("rate-dependent",), "stroke": ("stroke-dependent",)}.get(case, ())
+    speed = (20.0, "mm/s") if case == "rate" else (0.0, "")
+    return Transmission(about, places, tuple(levels), case == "loop", options, 50.0, *speed, 1e-6)
+
+
+def points(found: Transmission, n: int, seed: int) -> dict[str, np.ndarray]:
+    """Questions of all kinds: any level, places inside and outside the range, forces of every size."""
+    rng = np.random.default_rng(seed)
+    low, high = found.places.at[0], found.places.at[-1]
+    force = np.exp(rng.uniform(np.log(0.1), np.log(2000.0), n))
+    return {
+        "level": rng.integers(0, len(found.levels), n),
+        "place": rng.uniform(low - 0.3 * (high - low) - 0.1, high + 0.3 * (high - low) + 0.1, n),
+        "speed": rng.uniform(-60, 60, n),
+        "force": force * np.where(found.is_loop, rng.choice([-1.0, 1.0], n), 1.0),
+        "stroke": rng.choice([-1.0, 1.0], n),
+    }
+
+
+def _there(found: Transmission, asked: dict[str, np.ndarray], stroke: np.ndarray):
+    """Exponent and taut loss of each question."""
+    at, places = asked["place"], found.places.at
+    exponent, taut = np.zeros(len(at)), np.zeros(len(at))
+    for k, level in enumerate(found.levels):
+        for row, sign in enumerate((1.0, -1.0)):
+            mine = (asked["level"] == k) & (stroke == sign)
+            exponent[mine] = np.interp(at[mine], places, level.exponent[row])
+            taut[mine] = np.interp(at[mine], places, level.taut_loss)
+            if found.of_rate:
+                speeds = jnp.asarray(asked["speed"][mine]), jnp.asarray(found.reference_speed)
+                here, reference = (np.asarray(rate_factor(v, *map(jnp.asarray, level.rate))) for v in speeds)
+                exponent[mine] *= here / reference
+    return exponent, taut
+
+
+def of_equations(found: Transmission, asked: dict[str, np.ndarray], *, inverse: bool = False) -> np.ndarray:
+    """Output forces (input forces) by `bowdenfit.physics`."""
+    stroke, force = asked["stroke"], asked["force"]
+    exponent, taut = _there(found, asked, stroke)
+    if found.is_loop:
+        function = loop_input_force if inverse else loop_output_force
+        return np.asarray(function(force, taut / (2 * exponent), exponent, stroke))
+    sign = -stroke if inverse else stroke
+    answers = np.zeros(len(force))
+    for k, level in enumerate(found.levels):
+        mine = asked["level"] == k
+        scale = jnp.asarray(level.load_exponent), jnp.asarray(level.drag), found.reference_force
+        g = force_scale(jnp.asarray(force[mine]), *scale) - sign[mine] * exponent[mine]
+        answers[mine] = np.asarray(force_from_scale(g, *scale))
+    return np.maximum(answers, 0.0)
+
+
+def followed(found: Transmission, level: int, place: float, speed: float, force: np.ndarray) -> np.ndarray:
+    """Output forces through a motion, from the middle of the band on, by the package's play operator on its own scale."""
+    n = len(force)
+    asked = {"level": np.full(n, level), "place": np.full(n, place), "speed": np.full(n, speed), "force": force}
+    ends = [of_equations(found, asked | {"stroke": np.full(n, stroke)}) for stroke in (1.0, -1.0)]
+    if found.is_loop:
+        return np.asarray(play_operator(*ends, 0.5 * (ends[0][0] + ends[1][0]))[0])
+    one = found.levels[level]
+    scale = jnp.asarray(one.load_exponent), jnp.asarray(one.drag), found.reference_force
+    low, high = (force_scale(jnp.asarray(end), *scale) for end in ends)
+    start = force_scale(jnp.asarray(0.5 * (ends[0][0] + ends[1][0])), *scale)
+    return np.asarray(force_from_scale(play_operator(low, high, start)[0], *scale))
+
+
+def motion(found: Transmission, n: int) -> np.ndarray:
+    """An input force that goes to and fro by much and little."""
+    t = np.linspace(0, 1, n)
+    walk = np.sin(40 * t) + 0.3 * np.sin(313 * t) + 0.05 * np.sin(2011 * t)
+    return 80 * walk if found.is_loop else 100 + 60 * walk

@@ -1,11 +1,11 @@
 """How results show themselves: a console has the first lines of what their verb prints, a notebook a page, pandas a table."""
 
-import re
+import inspect
 from collections.abc import Iterable, Mapping, Sequence
 from functools import singledispatch
-from html import escape
 from typing import TYPE_CHECKING, Any, TypeAlias, TypeVar
 
+from bowdenfit.html_text import as_html
 from bowdenfit.words import few, filled, table
 
 if TYPE_CHECKING:
@@ -14,16 +14,21 @@ if TYPE_CHECKING:
 Rows: TypeAlias = tuple[Iterable[Mapping[str, Any]] | Mapping[str, Any], Mapping[str, str]]  # rows or columns, units
 Item = TypeVar("Item")
 _LINES, _WIDTH = 10, 90  # of what a console shows
+_FEW = 3  # of what a tuple may hold to be shown as Python does
+_LONGEST = 60  # characters of a cell
 _SHOWN = 12  # rows of a table that is not laid out by its verb
-_TITLE, _RULER, _MORE = re.compile(r"=+"), re.compile(r"-{3,}"), re.compile(r"(\.\.\. )?and \d+ more\b")
-_COLUMNS = re.compile(r" {2,}")
 
 
 class Display:
     """A result that shows itself; a class says its `sentences`, the answer first, and the rows of its table with their units.
 
-    Words that are laid out elsewhere are registered with `text_of`.
+    Words that are laid out elsewhere are registered with `text_of`. What a dataclass holds of several shows itself, too.
     """
+
+    def __post_init__(self) -> None:
+        for name, value in vars(self).items():
+            if not name.startswith("_"):
+                vars(self)[name] = several(value)
 
     def sentences(self) -> Sequence[str]:
         """What it says, the answer first."""
@@ -62,6 +67,24 @@ class Display:
         return as_html(str(self))
 
 
+class Part(Display):
+    """Something inside a result: what its docstring says of it, and a row a field."""
+
+    def sentences(self) -> Sequence[str]:
+        """What it is."""
+        return [inspect.cleandoc(self.__doc__ or "").partition("\n")[0]]
+
+    def _table(self) -> Rows:
+        return [{"field": name, "value": in_short(value)} for name, value in _public(self).items()], {}
+
+
+class Inner:
+    """Something that computes inside a result: its fields in short."""
+
+    def __repr__(self) -> str:
+        return shortened(filled(f"{type(self).__name__}: {_fields(self)}."))
+
+
 class Several(Display, tuple[Item, ...]):
     """Several of a kind, a row each."""
 
@@ -70,7 +93,7 @@ class Several(Display, tuple[Item, ...]):
         return [f"{len(self)} in all."]
 
     def _table(self) -> Rows:
-        return [vars(each) for each in self], {}
+        return _alike([_public(each) for each in self]), {}
 
 
 class Named(Display, dict[str, Item]):
@@ -78,11 +101,50 @@ class Named(Display, dict[str, Item]):
 
     def sentences(self) -> Sequence[str]:
         """Their names."""
-        return [f"{len(self)} in all: {few(self)}."]
+        return [f"{len(self)} in all: {few(map(str, self))}."]
 
     def _table(self) -> Rows:
-        shapes = {name: {"shape": each.shape} if hasattr(each, "shape") else vars(each) for name, each in self.items()}
-        return [{"name": name} | row for name, row in shapes.items()], {}
+        rows = _alike([_public(each) for each in self.values()])
+        return [{"name": name} | row for name, row in zip(self, rows, strict=True)], {}
+
+
+def several(value: Any) -> Any:
+    """Tuples of more than a few and dictionaries as what shows itself; anything else as it is."""
+    if type(value) is dict:
+        return Named({name: several(each) for name, each in value.items()})
+    if type(value) is tuple and (len(value) > _FEW or any(hasattr(each, "__dict__") for each in value)):
+        return Several(map(several, value))
+    return value
+
+
+def in_short(value: Any) -> str:
+    """A value in a few words."""
+    if isinstance(value, float):
+        return f"{value:.4g}"
+    if hasattr(value, "shape"):
+        return f"array of {' x '.join(map(str, value.shape)) or 'one number'}"
+    if isinstance(value, Sequence | Mapping) and not isinstance(value, str):
+        return f"{len(value)} in all" if len(value) > _FEW else ", ".join(map(in_short, value))
+    text = type(value).__name__ if hasattr(value, "__dict__") else "" if value is None else str(value)
+    return text if len(text) <= _LONGEST else f"{text[:_LONGEST]} ..."
+
+
+def _public(value: Any) -> dict[str, Any]:
+    """Fields of a value, or itself."""
+    if isinstance(value, Mapping):
+        return {str(name): each for name, each in value.items()}
+    if isinstance(value, Sequence) or not hasattr(value, "__dict__"):
+        return {"value": value}
+    return {name: each for name, each in vars(value).items() if not name.startswith("_")}
+
+
+def _fields(value: Any) -> str:
+    return ", ".join(f"{name} {in_short(each)}".strip() for name, each in _public(value).items())
+
+
+def _alike(rows: list[dict[str, Any]]) -> list[dict[str, Any]]:
+    """Rows as they are where all have the same columns, else in short."""
+    return rows if len({tuple(row) for row in rows}) <= 1 else [{"value": in_short(row)} for row in rows]
 
 
 def _with_unit(name: str, units: Mapping[str, str]) -> str:
@@ -113,13 +175,9 @@ def text_of(result: Any) -> str:
     if isinstance(rows, Mapping) or not (shown := list(rows)):
         return said
     heads = [f"{name} ({units[name]})" if units.get(name, "1") != "1" else name for name in shown[0]]
-    cells = [[_cell(value) for value in row.values()] for row in shown[:_SHOWN]]
+    cells = [[in_short(value) for value in row.values()] for row in shown[:_SHOWN]]
     more = f"\n... and {len(shown) - _SHOWN} more" if len(shown) > _SHOWN else ""
     return "\n\n".join(part for part in (said, table(heads, cells) + more) if part)
-
-
-def _cell(value: object) -> str:
-    return f"{value:.4g}" if isinstance(value, float) else "" if value is None else str(value)
 
 
 def shortened(text: str) -> str:
@@ -128,57 +186,3 @@ def shortened(text: str) -> str:
     if len(lines) <= _LINES:
         return "\n".join(lines)
     return "\n".join([*lines[: _LINES - 1], f"... and {len(lines) - _LINES + 1} more lines; print() shows them."])
-
-
-def as_html(text: str) -> str:
-    """A text that a verb prints as a notebook shows it: its first sentence in bold, ruled columns as tables."""
-    title, _, body = text.strip().partition("\n")
-    ruler, _, below = body.partition("\n")
-    is_titled = bool(_TITLE.fullmatch(ruler))
-    first, rest = _first_sentence(below if is_titled else text.strip())
-    blocks = [_block(block.splitlines()) for block in rest.strip("\n").split("\n\n") if block]
-    return f"{f'<h4>{escape(title)}</h4>' if is_titled else ''}<p><b>{escape(first)}</b></p>{''.join(blocks)}"
-
-
-def _first_sentence(text: str) -> tuple[str, str]:
-    """The lines up to the first that ends a sentence, and what follows."""
-    lines = text.splitlines() or [""]
-    for n, line in enumerate(lines, start=1):
-        if not line or line.endswith("."):
-            return " ".join(lines[:n]).strip(), "\n".join(lines[n:])
-    return " ".join(lines), ""
-
-
-def _block(lines: list[str]) -> str:
-    """Lines without a blank one between them: prose, a list, or columns below what stands above them."""
-    ruled = next((i for i, line in enumerate(lines) if _RULER.fullmatch(line)), None)
-    if ruled:
-        end = next((i for i in range(ruled + 1, len(lines)) if not _continues(lines[ruled - 1 : i], lines[i])), len(lines))
-        head, *rows = _cells([lines[ruled - 1], *lines[ruled + 1 : end]])
-        above, below = (_block(part) if part else "" for part in (lines[: ruled - 1], lines[end:]))
-        return above + _html_table(head, rows) + below
-    if any(line.startswith((" ", "- ")) for line in lines):
-        return f"<pre>{escape(chr(10).join(lines))}</pre>"
-    return f"<p>{escape(' '.join(lines))}</p>"
-
-
-def _continues(above: list[str], line: str) -> bool:
-    """Whether a line is a row of the table above it, and not what is said below."""
-    columns = len(_cells(above[:1] + above[2:])[0])
-    return not _MORE.match(line) and (len(above) == 2 or len(_cells([above[0], *above[2:], line])[0]) >= columns)
-
-
-def _cells(lines: list[str]) -> list[list[str]]:
-    """Cells of columns that two blanks or more divide in every line."""
-    width = max(map(len, lines))
-    covered = "".join(" " if all(line[i : i + 1].isspace() or i >= len(line) for line in lines) else "x" for i in range(width))
-    starts = [0, *(found.end() for found in _COLUMNS.finditer(covered) if found.start() and found.end() < width)]
-    return [[line[a:b].strip() for a, b in zip(starts, [*starts[1:], width], strict=True)] for line in lines]
-
-
-def _html_table(heads: Sequence[str], rows: Sequence[Sequence[str]]) -> str:
-    """A table without styling of its own."""
-    head = "".join(f"<th>{escape(cell)}</th>" for cell in heads)
-    cells = ["".join(f'<td style="white-space:nowrap">{escape(cell)}</td>' for cell in row) for row in rows]
-    body = "".join(f"<tr>{row}</tr>" for row in cells)
-    return f"<table><thead><tr>{head}</tr></thead><tbody>{body}</tbody></table>"

@@ -16,6 +16,7 @@ from bowdenfit.cable.groups import coefficient_of
 from bowdenfit.cable.laws import Capstan, ContactLaw, parameter_of
 from bowdenfit.cable.registry import CONTACT_LAWS, CURVES, check_names, class_at
 from bowdenfit.description import Contact, Description, PriorDefaults
+from bowdenfit.display import Inner
 from bowdenfit.errors import DescriptionError
 from bowdenfit.parameters.space import Parameter
 from bowdenfit.physics.loop import loop_input_force, loop_output_force
@@ -23,8 +24,8 @@ from bowdenfit.physics.loop import loop_input_force, loop_output_force
 ANGLE_NOISE = "sigma_theta"
 
 
-@dataclass(frozen=True)
-class Cable:
+@dataclass(frozen=True, repr=False)
+class Cable(Inner):
     """Contacts in series along one route.
 
     Args:

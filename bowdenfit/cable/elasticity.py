@@ -10,6 +10,7 @@ from jaxtyping import Float
 
 from bowdenfit.cable.laws import ContactLaw
 from bowdenfit.description import Description, PriorDefaults
+from bowdenfit.display import Inner
 from bowdenfit.parameters.priors import HalfCauchy, HalfNormal, LogNormal, TruncatedNormal
 from bowdenfit.parameters.scale import Scale
 from bowdenfit.parameters.space import Parameter
@@ -29,8 +30,8 @@ LENGTHENING, PRELOAD, STRETCH_ZERO, STRETCH_FRICTION = "lengthening", "preload",
 Values = Mapping[str, Array]
 
 
-@dataclass(frozen=True)
-class Elasticity:
+@dataclass(frozen=True, repr=False)
+class Elasticity(Inner):
     """Stretch and preload of one cable; every function takes the values of its parameters [internal units].
 
     Args:

@@ -106,6 +106,11 @@ class Description(Display, Frozen):
 
     model_config = ConfigDict(frozen=True, extra="forbid", populate_by_name=True)
 
+    def model_post_init(self, context: Any) -> None:
+        """What it holds of several shows itself."""
+        del context
+        Display.__post_init__(self)
+
     @field_validator("friction_model")
     @classmethod
     def _hyphens(cls, model: str) -> str:

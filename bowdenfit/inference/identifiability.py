@@ -16,6 +16,8 @@ from typing import ClassVar
 
 import numpy as np
 
+from bowdenfit.display import Part
+
 OWN = 0.25  # share of the prior variance below which a parameter may be known by itself: half the prior's sd
 RESTS_ON_PRIOR = 0.8  # share above which the prior alone speaks
 NOTHING = 0.9  # share above which the measurements say nothing of a combination
@@ -92,8 +94,8 @@ class Combination:
         return " ".join([lead, *(f"{'-' if self.weights[n] < 0 else '+'} {factors[n]}{n}" for n in others)])
 
 
-@dataclass(frozen=True)
-class Knowledge:
+@dataclass(frozen=True, repr=False)
+class Knowledge(Part):
     """What is known of several parameters together.
 
     Args:

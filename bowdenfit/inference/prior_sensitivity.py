@@ -16,6 +16,7 @@ from typing import ClassVar
 
 import numpy as np
 
+from bowdenfit.display import Part
 from bowdenfit.inference.psis import RELIABLE_K, power_weights, smooth_weights
 from bowdenfit.parameters.priors import Prior
 from bowdenfit.parameters.space import Parameter
@@ -52,8 +53,8 @@ class Width:
         return float(np.exp(max(known))) if known else float("nan")
 
 
-@dataclass(frozen=True)
-class Sensitivity:
+@dataclass(frozen=True, repr=False)
+class Sensitivity(Part):
     """How much a quantity depends on the priors and on the readings.
 
     Args:

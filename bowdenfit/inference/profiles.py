@@ -24,6 +24,7 @@ from functools import cache
 
 import numpy as np
 
+from bowdenfit.display import Part
 from bowdenfit.inference.linearized import blocks, linearize
 from bowdenfit.inference.log_density import LogDensity
 from bowdenfit.inference.objective import LOWER_END, Objective, Problem, Solution, may_end
@@ -40,8 +41,8 @@ _MOST_STEPS = 50
 _LEAST_STEP, _MOST_STEP, _LONGEST_STEP = 1e-6, 1.0, 8.0  # first step from the minimum, and all others [z]
 
 
-@dataclass(frozen=True)
-class Profile:
+@dataclass(frozen=True, repr=False)
+class Profile(Part):
     """How the sum of squares rises on both sides of the minimum.
 
     Args:

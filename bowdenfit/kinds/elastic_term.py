@@ -12,13 +12,14 @@ from jaxtyping import Float
 
 from bowdenfit.cable.cable import Cable
 from bowdenfit.cable.noise import noise_law, scatter
+from bowdenfit.display import Inner
 from bowdenfit.kinds.bounds import first_less, joined, last_less
 
 Expected = Callable[[Cable, Mapping[str, Array], Mapping[str, Any]], Array]
 
 
-@dataclass(frozen=True)
-class ElasticTerm:
+@dataclass(frozen=True, repr=False)
+class ElasticTerm(Inner):
     r"""Likelihood of a table of stretch, or of preload.
 
     .. math:: \Delta L_i \sim \text{Normal}(e(\bar T_i) + g \theta_i - \Delta L_0,\ \sigma_L), \qquad

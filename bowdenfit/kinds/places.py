@@ -7,6 +7,7 @@ from typing import Any
 import numpy as np
 
 from bowdenfit.description import Description
+from bowdenfit.display import Part
 from bowdenfit.kinds import kind_of
 from bowdenfit.kinds.inside_runs import STROKE as STROKE
 from bowdenfit.kinds.measurements import Measurements
@@ -17,8 +18,8 @@ RUN = "Run"
 _ONE_PLACE = 0.02  # of all route values, within which those of a run are one
 
 
-@dataclass(frozen=True)
-class Places:
+@dataclass(frozen=True, repr=False)
+class Places(Part):
     """Where the readings of one table were taken.
 
     Args:

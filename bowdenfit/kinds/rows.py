@@ -9,6 +9,7 @@ from typing import Protocol
 import numpy as np
 
 from bowdenfit.description import Route
+from bowdenfit.display import Part
 from bowdenfit.errors import DatasetError
 from bowdenfit.files.cells import Cell
 from bowdenfit.files.columns import Column, Quantity, require
@@ -30,8 +31,8 @@ _STROKE_WORDS = {
 _STROKES = {word: stroke for stroke, words in _STROKE_WORDS.items() for word in words.split()}
 
 
-@dataclass(frozen=True)
-class RowOrigin:
+@dataclass(frozen=True, repr=False)
+class RowOrigin(Part):
     """Where each row of a table was read, so that any row can be named.
 
     Args:
@@ -54,8 +55,8 @@ class RowOrigin:
         return f"{self.files[self.file[i]]}, row {self.row[i]}"
 
 
-@dataclass(frozen=True)
-class OwnAngles:
+@dataclass(frozen=True, repr=False)
+class OwnAngles(Part):
     """Wrap angles measured row by row: NaN where a row has none and the curve must serve.
 
     Args:

@@ -13,6 +13,7 @@ from jaxtyping import Float
 from bowdenfit.cable.cable import Cable
 from bowdenfit.cable.load_cells import FORCE_NOISE, OUTPUT_OFFSET, RUN_SCATTER, LoadCells
 from bowdenfit.cable.noise import noise_law, scatter
+from bowdenfit.display import Inner
 from bowdenfit.kinds.inside_runs import InsideRuns, inside_runs
 from bowdenfit.kinds.padding import rounded_up
 from bowdenfit.kinds.resolve_angles import resolve_angles
@@ -28,8 +29,8 @@ _LEAST_SHARE = 1e-3  # of the variance of a mounting, that of the noise of a rea
 _ALIKE = 0.05  # speeds that differ by less than this fraction are one
 
 
-@dataclass(frozen=True)
-class RunsTerm:
+@dataclass(frozen=True, repr=False)
+class RunsTerm(Inner):
     r"""Likelihood of sliding readings, one value a run.
 
     With the log ratio :math:`r = s \log(F_\text{in}/F_\text{out})`, s = +1 pulling and -1 return,

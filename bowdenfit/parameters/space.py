@@ -10,6 +10,7 @@ import numpy as np
 from jax import Array
 from jaxtyping import Float
 
+from bowdenfit.display import Part, Several
 from bowdenfit.errors import DescriptionError
 from bowdenfit.parameters.priors import Prior
 
@@ -56,13 +57,14 @@ class Parameter:
         return stated or self.prior.text(self.unit, self.shown_scale, 3 if self.scaled_by else 6)
 
 
-@dataclass(frozen=True)
-class ParameterSpace:
+@dataclass(frozen=True, repr=False)
+class ParameterSpace(Part):
     """All parameters of a model, and the map from z (free parameters, standard normal) to named values."""
 
     parameters: tuple[Parameter, ...]
 
     def __post_init__(self) -> None:
+        super().__post_init__()
         names = [p.name for p in self.parameters]
         for name in names:
             if names.count(name) > 1:
@@ -74,7 +76,7 @@ class ParameterSpace:
     @cached_property
     def free(self) -> tuple[Parameter, ...]:
         """The parameters that are inferred, in the order of z."""
-        return tuple(p for p in self.parameters if p.fixed is None)
+        return Several(p for p in self.parameters if p.fixed is None)
 
     @cached_property
     def fixed(self) -> tuple[Parameter, ...]:

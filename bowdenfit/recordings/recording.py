@@ -10,6 +10,7 @@ from dataclasses import dataclass, field
 import numpy as np
 from jaxtyping import Float
 
+from bowdenfit.display import Part
 from bowdenfit.types import Flags, Labels, Vector
 
 PULL, RETURN, SWITCH = 1, -1, 0
@@ -58,8 +59,8 @@ class Flagged:
     output_force: Vector
 
 
-@dataclass(frozen=True)
-class Account:
+@dataclass(frozen=True, repr=False)
+class Account(Part):
     """What the preparation did, and where every sample went.
 
     Args:
@@ -94,8 +95,8 @@ class Account:
     remarks: tuple[str, ...]
 
 
-@dataclass(frozen=True)
-class Blocks:
+@dataclass(frozen=True, repr=False)
+class Blocks(Part):
     """A prepared recording: means over short blocks on one clock.
 
     Args:
@@ -115,8 +116,8 @@ class Blocks:
     saturated: Flags
 
 
-@dataclass(frozen=True)
-class Strokes:
+@dataclass(frozen=True, repr=False)
+class Strokes(Part):
     """What the cable did in each block, and what that says about it before any model of the whole cable.
 
     Args:
@@ -148,8 +149,8 @@ class Strokes:
     remarks: tuple[str, ...]
 
 
-@dataclass(frozen=True)
-class Recording:
+@dataclass(frozen=True, repr=False)
+class Recording(Part):
     """One recording, ready for a fit.
 
     Args:
@@ -175,8 +176,8 @@ class Recording:
     account: Account
 
 
-@dataclass(frozen=True)
-class Recordings:
+@dataclass(frozen=True, repr=False)
+class Recordings(Part):
     """All recordings of a data set.
 
     Args:

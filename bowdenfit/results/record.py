@@ -9,7 +9,7 @@ import jax
 import numpy as np
 
 from bowdenfit.dataset import Dataset
-from bowdenfit.display import Display, Named, Rows
+from bowdenfit.display import Display, Rows
 from bowdenfit.errors import UsageError
 from bowdenfit.inference.diagnostics import Diagnostics, Trajectories
 from bowdenfit.inference.draws import OfDraws, derived_units, efficiency_at
@@ -219,8 +219,7 @@ class Record(Display):
             raise UsageError(
                 "this fit has no posterior, because it was made without MCMC; fit again without --no-mcmc for intervals."
             )
-        named: dict[str, Any] = {name: Named(value) for name, value in vars(self.sampled).items() if isinstance(value, dict)}
-        return replace(self.sampled, **named | {"units": self._units})
+        return replace(self.sampled, units=self._units)
 
     def draws(self) -> Draws:
         """The same."""

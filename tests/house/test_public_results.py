@@ -14,7 +14,8 @@ import pytest
 from IPython.lib.pretty import pretty
 
 import bowdenfit as bf
-from bowdenfit.display import Display, as_html, shortened
+from bowdenfit.display import Display, Inner, shortened
+from bowdenfit.html_text import as_html
 from bowdenfit.questions.calibrate.answer import Calibration, Checked, Coverage
 from bowdenfit.questions.figure_methods import FigureMethods
 from bowdenfit.questions.summary.verdict import CONTRADICTORY, NOT_CONVERGED, Verdict
@@ -109,6 +110,43 @@ def look_at(value: Any) -> None:
     assert isinstance(value.to_frame().attrs["units"], dict)
 
 
+def reachable(value: Any, name: str, seen: dict[int, Any]) -> Iterator[tuple[str, Any]]:
+    """Something, and all that attributes and indices lead to from there.
+
+    Arrays, which NumPy shows in its own way, and what only computes are where it ends.
+    """
+    if id(value) in seen or isinstance(value, np.ndarray):
+        return
+    seen[id(value)] = value
+    yield name, value
+    if isinstance(value, dict | list | tuple):
+        for key, each in list(value.items() if isinstance(value, dict) else enumerate(value))[:3]:
+            yield from reachable(each, f"{name}[{key!r}]", seen)
+    if not type(value).__module__.startswith("bowdenfit") or isinstance(value, Inner):
+        return
+    for key in dir(value):
+        if key.startswith(("_", "model_")):  # those are pydantic's
+            continue
+        try:
+            each = getattr(value, key)
+        except (AttributeError, bf.BowdenfitError):  # which says what there is not
+            continue
+        if not inspect.isroutine(each) and not inspect.isclass(each):
+            yield from reachable(each, f"{name}.{key}", seen)
+
+
+def look_inside(value: Any, name: str) -> int:
+    """Asserts that all that can be reached from there is short in a notebook; how much that is."""
+    seen: dict[int, Any] = {}
+    for where, each in reachable(value, name, seen):
+        ours = type(each).__module__.startswith("bowdenfit")
+        assert len(pretty(each)) <= MOST_IN_A_NOTEBOOK, f"{where}: {pretty(each)[:300]}"
+        assert not ours or len(repr(each).splitlines()) <= MOST_LINES, f"{where}: {each!r}"
+        if isinstance(each, Display):
+            assert each._repr_html_() and (where.endswith("elastic") or "units" in each.to_frame().attrs), where
+    return len(seen)
+
+
 def answers_of(fit: bf.Fit) -> Iterator[tuple[str, Any]]:
     """All that a fit gives to one who says nothing more."""
     for name in dir(fit):
@@ -157,6 +195,15 @@ def test_what_the_verbs_answer_is_short_and_begins_with_the_answer(fit, on_body,
     assert bf.predict(fit, [455])[0]["mean"] == pytest.approx(fit.efficiency(455)[0].mean)
 
 
+def test_all_that_can_be_reached_from_a_result_is_short(fit, on_body):
+    compared = bf.compare({"a": fit, "b": fit})
+    results = {"compare": compared, "identify": bf.identify(fit), "next": bf.next_measurement(fit), "predict": bf.predict(fit)}
+    for name, value in {"fit": fit, "summary": fit.summary(), "optimal_length": fit.optimal_length(), **results}.items():
+        assert look_inside(value, name) > 3
+    assert look_inside(bf.read("datasets/synthetic-recordings"), "read") > 100
+    assert list(compared.predictions["a"].to_frame()["field"])[:2] == ["elpd", "pareto_k"]
+
+
 def test_tables_have_the_units_of_what_stands_in_them(fit):
     assert fit.optimal_length().to_frame().attrs["units"]["cable_length"] == "mm"
     drawn = fit.posterior.to_frame()
@@ -185,6 +232,7 @@ def test_a_fit_without_draws_says_in_a_sentence_what_it_has_not(on_body):
 def test_stretch_and_preload_have_a_table():
     fit = bf.fit("datasets/synthetic-haptic-loop", seed=1, mcmc=False)
     look_at(fit.elastic)
+    assert look_inside(fit, "fit") > 100
     look_at(fit.elastic.preload_window((0.0, 3.0)))
     table = fit.elastic.to_frame()
     assert {"preload", "preload_q95", "stiffness"} <= set(table) and table.attrs["units"]["stiffness"] == "N/mm"

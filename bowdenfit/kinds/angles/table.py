@@ -8,6 +8,7 @@ import numpy as np
 
 from bowdenfit.cable.registry import CURVES
 from bowdenfit.description import Description, Finite, QuantityValue, Table
+from bowdenfit.display import Part
 from bowdenfit.files.cells import Cell
 from bowdenfit.files.columns import Column, Quantity, find_columns, require
 from bowdenfit.files.tables import read_table
@@ -43,8 +44,8 @@ def contradiction(settings: AngleSettings | None, description: Description) -> s
     return ""
 
 
-@dataclass(frozen=True)
-class AngleTable:
+@dataclass(frozen=True, repr=False)
+class AngleTable(Part):
     """Wrap angle of each curved contact against the route variable.
 
     Args:

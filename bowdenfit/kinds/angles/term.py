@@ -11,6 +11,7 @@ from jaxtyping import Float
 
 from bowdenfit.cable.cable import ANGLE_NOISE, Cable
 from bowdenfit.cable.noise import noise_law, scatter
+from bowdenfit.display import Inner
 from bowdenfit.kinds.angles.bench import detection_limit, drawn_angles
 from bowdenfit.kinds.angles.table import AngleSettings, AngleTable
 from bowdenfit.kinds.angles.undetected import EVENTS, count
@@ -22,8 +23,8 @@ from bowdenfit.parameters.priors import HalfCauchy
 from bowdenfit.parameters.space import Parameter
 
 
-@dataclass(frozen=True)
-class AnglesTerm:
+@dataclass(frozen=True, repr=False)
+class AnglesTerm(Inner):
     r"""Likelihood of an angle table.
 
     Detected angles are :math:`\text{Normal}(\theta(l), \sigma_\theta)`; one below the detection limit L contributes

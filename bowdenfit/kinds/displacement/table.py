@@ -4,6 +4,7 @@ from dataclasses import dataclass
 from typing import Literal
 
 from bowdenfit.description import Description, QuantityValue, Table
+from bowdenfit.display import Part
 from bowdenfit.kinds.displacement.turns import Motion
 from bowdenfit.kinds.rows import (
     OwnAngles,
@@ -23,8 +24,8 @@ class DisplacementSettings(Table):
     rows: Literal["in order", "sliding"] | None = None
 
 
-@dataclass(frozen=True)
-class DisplacementTable:
+@dataclass(frozen=True, repr=False)
+class DisplacementTable(Part):
     """Force at the motor against displacement.
 
     Args:

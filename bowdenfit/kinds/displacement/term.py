@@ -14,6 +14,7 @@ from bowdenfit.cable.cable import Cable
 from bowdenfit.cable.elasticity import BEDDING_LOAD, BEDDING_STRETCH, STIFFNESS
 from bowdenfit.cable.load_cells import FORCE_NOISE, RUN_SCATTER, LoadCells
 from bowdenfit.cable.noise import noise_law, scatter
+from bowdenfit.display import Inner
 from bowdenfit.kinds.angles.table import AngleTable
 from bowdenfit.kinds.bench import Remeasurement, Truth
 from bowdenfit.kinds.displacement.arrays import angles_of_runs, order_of, readings, turns_by_depth, zero_names
@@ -37,8 +38,8 @@ Values = Mapping[str, Array]
 Data = Mapping[str, Any]
 
 
-@dataclass(frozen=True)
-class DisplacementTerm:
+@dataclass(frozen=True, repr=False)
+class DisplacementTerm(Inner):
     r"""Likelihood of the force at the motor against displacement, reading by reading.
 
     .. math:: F_{ij} = f(x_{ij}, \Lambda_i + m_i) + e_{ij}, \quad m_i \sim \text{Normal}(0, \tau), \quad

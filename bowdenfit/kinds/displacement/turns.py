@@ -5,6 +5,7 @@ from itertools import pairwise
 
 import numpy as np
 
+from bowdenfit.display import Part
 from bowdenfit.types import Flags, Labels, Vector
 
 LEAST_SHARE = 0.01  # of all displacements, that the motor must go back for a turn; less is jitter
@@ -29,8 +30,8 @@ class Turns:
     depth: Labels
 
 
-@dataclass(frozen=True)
-class Motion:
+@dataclass(frozen=True, repr=False)
+class Motion(Part):
     """How the motor moved at each reading.
 
     Args:

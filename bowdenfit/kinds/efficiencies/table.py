@@ -5,6 +5,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from bowdenfit.description import Description, Finite
+from bowdenfit.display import Part
 from bowdenfit.files.cells import Cell
 from bowdenfit.files.columns import Column, Quantity, find_columns, require
 from bowdenfit.files.tables import read_table
@@ -19,8 +20,8 @@ from bowdenfit.words import counted, percent
 _SDS = 4.5  # stated standard deviations above 1, which one healthy row of 300,000 exceeds
 
 
-@dataclass(frozen=True)
-class EfficiencyTable:
+@dataclass(frozen=True, repr=False)
+class EfficiencyTable(Part):
     """Measured transmission efficiencies.
 
     Args:

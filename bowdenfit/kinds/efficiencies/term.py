@@ -14,6 +14,7 @@ from bowdenfit.cable.cable import Cable
 from bowdenfit.cable.load_cells import RUN_SCATTER, LoadCells
 from bowdenfit.cable.noise import noise_law, scatter
 from bowdenfit.description import Description
+from bowdenfit.display import Inner
 from bowdenfit.errors import DescriptionError
 from bowdenfit.kinds.angles.table import AngleTable
 from bowdenfit.kinds.bench import Remeasurement, drawn_by_term
@@ -27,8 +28,8 @@ from bowdenfit.parameters.space import ParameterSpace
 from bowdenfit.physics.friction import transmission_efficiency
 
 
-@dataclass(frozen=True)
-class EfficienciesTerm:
+@dataclass(frozen=True, repr=False)
+class EfficienciesTerm(Inner):
     r"""Likelihood of an efficiency table.
 
     .. math:: -\log\eta_i \sim \text{Normal}\left(-\log\eta(\Lambda_i) + g,\ \sqrt{\tau^2 + (s_i/\eta_i)^2

@@ -13,11 +13,12 @@ from jaxtyping import Float
 from bowdenfit.cable.cable import Cable
 from bowdenfit.cable.load_cells import FORCE_NOISE, RUN_SCATTER, LoadCells
 from bowdenfit.cable.noise import noise_law, scatter
+from bowdenfit.display import Inner
 from bowdenfit.kinds.resolve_angles import resolve_angles
 
 
-@dataclass(frozen=True)
-class HeldForcesTerm:
+@dataclass(frozen=True, repr=False)
+class HeldForcesTerm(Inner):
     r"""Likelihood of forces read while nothing slides: inside the friction band, nothing more.
 
     .. math:: \log\left[\Phi\left(\frac{\Lambda - r}{s}\right) - \Phi\left(\frac{-\Lambda - r}{s}\right)\right],

@@ -7,6 +7,7 @@ from pathlib import Path
 
 import numpy as np
 
+from bowdenfit.display import Part
 from bowdenfit.errors import DatasetError, Faults
 from bowdenfit.files.cells import Cell
 from bowdenfit.files.columns import Column, Quantity, find_columns, require, taken_in_pairs
@@ -30,8 +31,8 @@ from bowdenfit.units import INTERNAL_UNITS, speed_dimension
 _UNUSED = ("time", "position")  # columns that a force table may have and that nothing reads
 
 
-@dataclass(frozen=True)
-class ForceTable:
+@dataclass(frozen=True, repr=False)
+class ForceTable(Part):
     """Pairs of forces read at both ends.
 
     Args:

@@ -6,6 +6,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from bowdenfit.description.pulleys import Pulleys
+from bowdenfit.display import Part
 from bowdenfit.errors import DatasetError, together
 from bowdenfit.files.columns import Column, Quantity, find_columns, require
 from bowdenfit.files.csv_table import RawTable
@@ -29,8 +30,8 @@ from bowdenfit.words import shown
 _UNUSED = ("time", "position", "run")  # columns that such a table may have and that nothing reads
 
 
-@dataclass(frozen=True)
-class LoopTable:
+@dataclass(frozen=True, repr=False)
+class LoopTable(Part):
     """Forces at both ends of a pull-pull loop while it moves.
 
     Args:

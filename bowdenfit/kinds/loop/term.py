@@ -15,6 +15,7 @@ from bowdenfit.cable.elasticity import PRELOAD as REFERENCE_PRELOAD
 from bowdenfit.cable.elasticity import spread_matrix
 from bowdenfit.cable.load_cells import FORCE_NOISE, RUN_SCATTER, LoadCells
 from bowdenfit.cable.noise import noise_law, scatter
+from bowdenfit.display import Inner
 from bowdenfit.kinds.angles.table import AngleTable
 from bowdenfit.kinds.bench import Remeasurement, Truth
 from bowdenfit.kinds.candidate import Candidate, CandidateKind, Simulation, Situation, one_reading_each, some_loads
@@ -31,8 +32,8 @@ LOOP_FORCE = "loop_output_force"
 LOOP_MOUNTING = "loop_mounting"
 
 
-@dataclass(frozen=True)
-class LoopTerm:
+@dataclass(frozen=True, repr=False)
+class LoopTerm(Inner):
     r"""Likelihood of a loop table.
 
     .. math:: F_{\text{out},i} \sim \text{Normal}\left(f(F_{\text{in},i}),\ \sqrt{\sigma_F^2 (1 + f'^2)

@@ -5,6 +5,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from bowdenfit.description import Table
+from bowdenfit.display import Part
 from bowdenfit.files.columns import Quantity, find_columns, require
 from bowdenfit.files.tables import read_table
 from bowdenfit.kinds.kind import Found, Source
@@ -23,8 +24,8 @@ class PreloadTableSettings(Table):
         return True
 
 
-@dataclass(frozen=True)
-class PreloadTable:
+@dataclass(frozen=True, repr=False)
+class PreloadTable(Part):
     """Preload between fixed ends at wrap angles.
 
     Args:

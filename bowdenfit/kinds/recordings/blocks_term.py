@@ -19,6 +19,7 @@ from bowdenfit.cable.cable import Cable
 from bowdenfit.cable.drive import Each, Loop, Recorded, Rope, drive_of
 from bowdenfit.cable.load_cells import BLOCK_NOISE, RUN_SCATTER, LoadCells
 from bowdenfit.cable.noise import noise_law
+from bowdenfit.display import Inner
 from bowdenfit.kinds.padding import rounded_up
 from bowdenfit.kinds.recordings.side_by_side import WITHOUT_WEIGHT
 from bowdenfit.kinds.resolve_angles import resolve_angles
@@ -49,8 +50,8 @@ class Mounted:
     total: Array
 
 
-@dataclass(frozen=True)
-class BlocksTerm(ABC):
+@dataclass(frozen=True, repr=False)
+class BlocksTerm(Inner, ABC):
     r"""Likelihood of every block of whole recordings, one value a run.
 
     The output is linear in the mounting effect m ~ Normal(0, tau) of a run but for changes of contact (and, of a loop, while

@@ -6,6 +6,7 @@ from itertools import product
 
 import numpy as np
 
+from bowdenfit.display import Part
 from bowdenfit.files.cells import Cell
 from bowdenfit.files.columns import Column, Quantity, find_columns, require
 from bowdenfit.files.csv_table import RawTable
@@ -23,8 +24,8 @@ _FEWEST = 2  # readings beyond one a group below which a falling stretch may be 
 _SURE = 0.9  # how closely the stretch must follow the falling line for its sign to be refused
 
 
-@dataclass(frozen=True)
-class StretchTable:
+@dataclass(frozen=True, repr=False)
+class StretchTable(Part):
     """Stretch of the rope, seen at its loaded end while the far end is held, under loads and at wrap angles.
 
     Args:

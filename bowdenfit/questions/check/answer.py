@@ -50,19 +50,19 @@ class Checks(Display):
         return Several(reading for table in self.tables for reading in table.readings(among))
 
     @property
-    def outliers(self) -> list[CheckedReading]:
+    def outliers(self) -> Several[CheckedReading]:
         """Readings so far out that chance does as much in one healthy fit of a hundred, the farthest first."""
-        return sorted((r for r in self.readings if r.outlier), key=lambda r: r.chance)
+        return Several(sorted((r for r in self.readings if r.outlier), key=lambda r: r.chance))
 
     @property
-    def decisive(self) -> list[CheckedReading]:
+    def decisive(self) -> Several[CheckedReading]:
         """Readings without which the fit would be a markedly different one, the most decisive first."""
-        return sorted((r for r in self.readings if r.decisive), key=lambda r: -r.pareto_k)
+        return Several(sorted((r for r in self.readings if r.decisive), key=lambda r: -r.pareto_k))
 
     @property
-    def conflicts(self) -> list[Sensitivity]:
+    def conflicts(self) -> Several[Sensitivity]:
         """Quantities that a prior and the readings pull to different values."""
-        return [s for s in self.sensitivities if s.diagnosis == "conflict"]
+        return Several(s for s in self.sensitivities if s.diagnosis == "conflict")
 
 
 @once

@@ -1,5 +1,6 @@
 """What priors do to coefficients, design answers and the widths of their intervals, in sentences."""
 
+from collections.abc import Sequence
 from math import isfinite
 
 from bowdenfit.inference.prior_sensitivity import Sensitivity, Width
@@ -74,7 +75,7 @@ def _felt(s: Sensitivity) -> str:
     return name if s.parameter == s.quantity else f"{name} (that of {s.parameter})"
 
 
-def _with_wider_prior(found: list[Sensitivity]) -> str:
+def _with_wider_prior(found: Sequence[Sensitivity]) -> str:
     """How far the quantity that moves most would move with a wider prior."""
     known = [s for s in found if isfinite(s.wider) and s.sd]
     if not known:

@@ -5,6 +5,7 @@ from typing import ClassVar
 
 import numpy as np
 
+from bowdenfit.display import Part
 from bowdenfit.inference.predictive_checks import LeftOut, Uniformity
 from bowdenfit.inference.psis import RELIABLE_K
 from bowdenfit.kinds.places import Places
@@ -13,8 +14,8 @@ _LEAST_FREEDOM = 5  # of the tails of a prediction by few readings, where priors
 FALSE_ALARM = 0.01  # chance that a healthy fit is said to have an outlier; the same for the other kinds of alarm
 
 
-@dataclass(frozen=True)
-class CheckedReading:
+@dataclass(frozen=True, repr=False)
+class CheckedReading(Part):
     """One reading beside its prediction from all the others.
 
     Args:
@@ -64,8 +65,8 @@ class CheckedReading:
         return None if self.is_bound else self.reading
 
 
-@dataclass(frozen=True)
-class TableChecks:
+@dataclass(frozen=True, repr=False)
+class TableChecks(Part):
     """All readings of one table.
 
     Args:

@@ -8,7 +8,7 @@ import numpy as np
 
 from bowdenfit.cable.load_cells import RUN_SCATTER
 from bowdenfit.description import Description
-from bowdenfit.display import Display, Rows
+from bowdenfit.display import Display, Named, Rows, Several
 from bowdenfit.errors import UsageError
 from bowdenfit.inference.comparison import Difference, Prediction, differences, stacking_weights
 from bowdenfit.inference.interval import Interval
@@ -104,9 +104,9 @@ class Comparison(Display):
         return self.differences[name].verdict(len(self.readings))
 
     @property
-    def fits(self) -> list[dict[str, Any]]:
+    def fits(self) -> Several[dict[str, Any]]:
         """How well each predicts, the best first."""
-        return [
+        return Several(
             {
                 "name": name,
                 "model": self.described[name],
@@ -119,28 +119,28 @@ class Comparison(Display):
                 "verdict": "best" if name == self.best else self.verdict(name),
             }
             for name, d in self.differences.items()
-        ]
+        )
 
     def _table(self) -> Rows:
         return self.fits, {name: "1" for name, value in self.fits[0].items() if isinstance(value, float)}
 
     @property
-    def predicted_readings(self) -> list[dict[str, Any]]:
+    def predicted_readings(self) -> Several[dict[str, Any]]:
         """What each fit says of each reading."""
-        return [
+        return Several(
             {"table": table, "label": label, "fits": {name: p.of_reading(i) for name, p in self.predictions.items()}}
             for i, (table, label) in enumerate(self.readings)
-        ]
+        )
 
     @property
-    def intervals(self) -> dict[str, dict[str, Interval]]:
+    def intervals(self) -> Named[dict[str, Interval]]:
         """Parameters by name and fit."""
-        return {name: row.by_fit for name, row in self.parameters.items()}
+        return Named({name: row.by_fit for name, row in self.parameters.items()})
 
     @property
-    def optimal_lengths(self) -> dict[str, Any]:
+    def optimal_lengths(self) -> Named[Any]:
         """Optimal lengths by fit, with their unit."""
-        return {name: vars(interval) | {"unit": unit} for name, (interval, unit) in self.optimal_length.items()}
+        return Named({name: vars(interval) | {"unit": unit} for name, (interval, unit) in self.optimal_length.items()})
 
 
 def compare(

@@ -4,7 +4,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Any, ClassVar
 
-from bowdenfit.display import Display, Rows
+from bowdenfit.display import Display, Named, Rows
 from bowdenfit.inference.identifiability import Combination, Knowledge, Known
 from bowdenfit.words import decimals, listed
 
@@ -62,9 +62,9 @@ class Identifiability(Display):
         return [{key: value for key, value in row.items() if key != "name"} for row in rows], self.units
 
     @property
-    def rises(self) -> dict[str, Any]:
+    def rises(self) -> Named[Any]:
         """Profiles by the name of their coefficient."""
-        return {p.name: {"value": p.values, "rise": p.rise} for p in self.profiles}
+        return Named({p.name: Named({"value": p.values, "rise": p.rise}) for p in self.profiles})
 
 
 def say_what_is_determined(found: Knowledge, measured: bool, opening: str = "") -> str:

@@ -3,7 +3,7 @@
 from dataclasses import dataclass
 from typing import ClassVar
 
-from bowdenfit.display import Display, Rows
+from bowdenfit.display import Display, Part, Rows
 from bowdenfit.kinds.candidate import Candidate
 from bowdenfit.questions.next.target import Answer
 
@@ -12,8 +12,8 @@ _SHOWN = ("words", "share", "error", "sd", "sd_error", "as_good", "cost")  # col
 LEAST_SHARE = 0.01  # of the variance; a measurement that takes away less is not worth making
 
 
-@dataclass(frozen=True)
-class Ranked:
+@dataclass(frozen=True, repr=False)
+class Ranked(Part):
     """One candidate and what it would do.
 
     Args:
@@ -98,8 +98,8 @@ class Step:
     sd: float
 
 
-@dataclass(frozen=True)
-class Within:
+@dataclass(frozen=True, repr=False)
+class Within(Part):
     """At which load and of which stroke the readings of the best candidate tell most.
 
     Args:

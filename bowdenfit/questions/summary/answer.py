@@ -1,5 +1,6 @@
 """What a fit says on one page: the answer, whether to trust it, what to do next, and the numbers behind it."""
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 from bowdenfit.cable.load_cells import RUN_SCATTER
@@ -62,10 +63,10 @@ def checked_readings(fit: Record) -> tuple[CheckedReading, ...]:
     return found.readings if found else ()
 
 
-def readings_off(fit: Record) -> list[CheckedReading]:
+def readings_off(fit: Record) -> Sequence[CheckedReading]:
     """Readings that lie farther from what all the others say than chance puts one, the farthest first."""
     found = checks_of(fit)
-    return found.outliers if found else []
+    return found.outliers if found else ()
 
 
 def _quantity(fit: Record, parameter: Parameter) -> Quantity | None:

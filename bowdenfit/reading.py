@@ -5,7 +5,7 @@ from inspect import signature
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any, Literal, TypedDict, Unpack
 
-from bowdenfit.verb import Option, Quantity
+from bowdenfit.verb import Option, Quantity, with_named_keywords
 
 if TYPE_CHECKING:
     from bowdenfit.dataset import Dataset
@@ -54,6 +54,7 @@ _SETTINGS = {  # keywords that stand for a setting of cable.toml
 }
 
 
+@with_named_keywords
 def read(dataset: "str | Path | Dataset", **reading: Unpack[Reading]) -> "Dataset":
     """Read and check a data set, without fitting anything.
 
@@ -100,5 +101,4 @@ def refuse_unknown(verb: Callable[..., Any], reading: Reading) -> None:
 
     for name in reading:
         if name not in Reading.__annotations__:
-            known = [k for k in signature(verb).parameters if k != "reading"] + list(Reading.__annotations__)
-            raise UsageError(f"there is no keyword {name!r}{nearest(name, known)}")
+            raise UsageError(f"there is no keyword {name!r}{nearest(name, list(signature(verb).parameters))}")

@@ -4,14 +4,16 @@ A keyword becomes an option by `Annotated[type, Option(...)]`; its name, type an
 says of it, are the option's. A keyword without belongs to programs alone. Loads nothing, so that `--help` is instant.
 """
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass, field
+from inspect import Parameter, signature
 from pathlib import Path
-from typing import Any, Literal, TypeAlias
+from typing import Annotated, Any, ForwardRef, Literal, TypeAlias, TypeVar, get_args, get_origin
 
 Quantity: TypeAlias = tuple[float, str]  # a number and its unit
 Length: TypeAlias = float | Quantity  # a number of the route's unit, or with its own
 LARGEST_SEED = 2**31 - 1
+Function = TypeVar("Function", bound=Callable[..., Any])
 
 
 @dataclass(frozen=True)
@@ -119,6 +121,33 @@ class Verb:
     behind: Mapping[str, Any] = field(default_factory=dict)
     warns: bool = False
     kept: Callable[[Mapping[str, Any], Mapping[str, Any]], Reply | None] | None = None
+
+    def __post_init__(self) -> None:
+        with_named_keywords(self.function)
+
+
+def with_named_keywords(function: Function) -> Function:
+    """A function whose signature is as its callers read it in help and in notebooks: no options, and every keyword by name."""
+    stated = signature(function)
+    parameters = [each for parameter in stated.parameters.values() for each in _as_called(parameter)]
+    vars(function)["__signature__"] = stated.replace(parameters=parameters)
+    return function
+
+
+def _as_called(parameter: Parameter) -> Iterator[Parameter]:
+    """A parameter with its plain type; of keywords in a record each by itself."""
+    if parameter.kind is not Parameter.VAR_KEYWORD or not get_args(parameter.annotation):
+        yield parameter.replace(annotation=_without_option(parameter.annotation))
+        return
+    (record,) = get_args(parameter.annotation)
+    for name, annotation in record.__annotations__.items():
+        default = () if "Sequence" in str(annotation) else None
+        yield Parameter(name, Parameter.KEYWORD_ONLY, default=default, annotation=_without_option(annotation))
+
+
+def _without_option(annotation: Any) -> Any:
+    kind = get_args(annotation)[0] if get_origin(annotation) is Annotated else annotation
+    return kind.__forward_arg__ if isinstance(kind, ForwardRef) else kind
 
 
 Output: TypeAlias = str | Path | None

@@ -7,7 +7,7 @@ from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from types import UnionType
-from typing import Annotated, Any, Literal, Union, get_args, get_origin, get_type_hints
+from typing import Annotated, Any, Literal, Union, Unpack, get_args, get_origin, get_type_hints
 
 import click
 
@@ -116,16 +116,15 @@ def keywords_of(function: Callable[..., Any]) -> tuple[Keyword, ...]:
         function: Of a verb; its docstring says what each is for.
     """
     words, own, shared = _words(function), [], list[Keyword]()
-    for name, parameter in inspect.signature(function).parameters.items():
-        if parameter.kind is inspect.Parameter.VAR_KEYWORD:
-            (record,) = get_args(parameter.annotation)
+    stated = inspect.signature(function).parameters
+    for name, annotation in function.__annotations__.items():
+        if get_origin(annotation) is Unpack:
+            (record,) = get_args(annotation)
             hints, about = get_type_hints(record, include_extras=True), _words(record)
-            shared = [
-                _keyword(key, hint, () if "Sequence" in str(hint) else None, about) for key, hint in hints.items()
-            ]
-        elif get_origin(parameter.annotation) is Annotated:
-            default = None if parameter.default is inspect.Parameter.empty else parameter.default
-            own.append(_keyword(name, parameter.annotation, default, words))
+            shared = [_keyword(key, hint, stated[key].default, about) for key, hint in hints.items()]
+        elif get_origin(annotation) is Annotated:
+            default = None if stated[name].default is inspect.Parameter.empty else stated[name].default
+            own.append(_keyword(name, annotation, default, words))
     arguments = [keyword for keyword in own if isinstance(keyword.mark, Argument)]
     return (*arguments, *shared, *(keyword for keyword in own if keyword not in arguments))
 

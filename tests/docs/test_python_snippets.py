@@ -1,7 +1,9 @@
 """The Python that the pages show runs in a notebook, prints little there, and means something to a strict type checker."""
 
 import ast
+import inspect
 import json
+import pydoc
 import re
 import subprocess
 import sys
@@ -12,6 +14,7 @@ import pytest
 from conftest import ROOT
 
 import bowdenfit
+from bowdenfit.reading import Reading
 
 MOST_TEXT = 2000  # characters of one output
 PAGES = sorted([ROOT / "README.md", *(ROOT / "docs").glob("*.md")])  # notebooks also use pandas, whose own types are partial
@@ -88,6 +91,17 @@ def test_a_misspelt_keyword_is_refused_by_name_with_the_nearest():
             verb("datasets/on-body-exoskeleton", chanels=("a",))
     with pytest.raises(bowdenfit.UsageError, match="did you mean 'seed'"):
         bowdenfit.fit("datasets/on-body-exoskeleton", sede=1)
+
+
+def test_help_shows_every_keyword_by_name_and_none_of_its_options():
+    functions = {name: getattr(bowdenfit, name) for name in bowdenfit.__all__ if inspect.isroutine(getattr(bowdenfit, name))}
+    assert set(functions) >= {"fit", "read", "check", "predict", "calibrate"}
+    for name, function in functions.items():
+        said = pydoc.plain(pydoc.render_doc(function))
+        assert "Option(" not in said and "Annotated" not in said and "**reading" not in said, name
+    for name in ("fit", "read", "check", "identify", "calibrate"):
+        assert set(Reading.__annotations__) < set(inspect.signature(functions[name]).parameters)
+    assert "seed: int | None = None" in pydoc.plain(pydoc.render_doc(bowdenfit.fit))
 
 
 def test_the_package_says_that_it_has_types():

@@ -4,7 +4,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Unpack
 
 from bowdenfit.reading import Reading, read
-from bowdenfit.verb import Argument, Option, Reply, Verb
+from bowdenfit.verb import Argument, Option, Reply, Verb, with_named_keywords
 
 if TYPE_CHECKING:
     from bowdenfit.dataset import Dataset
@@ -14,6 +14,7 @@ if TYPE_CHECKING:
 FIGURE = "prior_predictive"
 
 
+@with_named_keywords
 def check(dataset: "str | Path | Dataset", **reading: Unpack[Reading]) -> "Report":
     """Read a data set, and build the model where only that can tell whether the description makes sense.
 

@@ -165,7 +165,13 @@ class Cable(Inner):
             stroke: +1 pulling, -1 return.
             mounting: Effect of the mounting on the friction exponent [1].
         """
-        exponent, preload = self._friction_at(values, route, mounting)
+        return self.output_force_bent(values, self.wrap_angles(values, route), input_force, stroke, mounting)
+
+    def output_force_bent(
+        self, values: Mapping[str, Array], angles: Array, input_force: Array, stroke: Array, mounting: Array | float = 0.0
+    ) -> Float[Array, "..."]:
+        """Output force [N] at wrap angles [rad], contacts last; arguments as of `output_force_at`."""
+        exponent, preload = self._friction_bent(values, angles, mounting)
         if preload is not None:
             return loop_output_force(input_force, preload, exponent, stroke)
         return self.friction.output_force(values, input_force, exponent, stroke)
@@ -179,16 +185,21 @@ class Cable(Inner):
         mounting: Float[Array, ""] | float = 0.0,
     ) -> Float[Array, " rows"]:
         """Input force [N] that gives an output force [N]: the inverse of `output_force_at`, with the same arguments."""
-        exponent, preload = self._friction_at(values, route, mounting)
+        return self.input_force_bent(values, self.wrap_angles(values, route), output_force, stroke, mounting)
+
+    def input_force_bent(
+        self, values: Mapping[str, Array], angles: Array, output_force: Array, stroke: Array, mounting: Array | float = 0.0
+    ) -> Float[Array, "..."]:
+        """Input force [N] at wrap angles [rad], contacts last; arguments as of `input_force_at`."""
+        exponent, preload = self._friction_bent(values, angles, mounting)
         if preload is not None:
             return loop_input_force(output_force, preload, exponent, stroke)
         return self.friction.input_force(values, output_force, exponent, stroke)
 
-    def _friction_at(
-        self, values: Mapping[str, Array], route: Float[Array, " rows"], mounting: Float[Array, ""] | float
-    ) -> tuple[Float[Array, " rows"], Float[Array, " rows"] | None]:
+    def _friction_bent(
+        self, values: Mapping[str, Array], angles: Array, mounting: Array | float
+    ) -> tuple[Array, Array | None]:
         """Friction exponent [1] in a mounting, and the preload of a loop [N]; None of a single rope."""
-        angles = self.wrap_angles(values, route)
         exponent = self.friction_exponent(values, angles) + mounting
         return exponent, self.elasticity.preload_or_none(values, jnp.sum(angles, axis=-1)) if self.is_loop else None
 

@@ -40,9 +40,9 @@ def predict_at_lengths(
     route, sign, limits = fit.dataset.description.route, _STROKES[stroke], measured(fit)
     name, force, per, asked = "efficiency", fit.model.cable.friction.conditions.reference_force, 1.0, None
     if input_force is not None:
-        name, force = "output_force_N", (asked := _newtons(input_force, "--input-force"))
+        name, force = "output_force_N", (asked := newtons(input_force, "--input-force"))
     elif output_force is not None:
-        name, force = "input_force_N", (asked := _newtons(output_force, "--output-force"))
+        name, force = "input_force_N", (asked := newtons(output_force, "--output-force"))
     else:
         per = force
     inverse = output_force is not None
@@ -113,7 +113,12 @@ def _forces(fit: Record, lengths: np.ndarray, force: float, sign: int, inverse: 
     return mean, mounted
 
 
-def _newtons(force: tuple[float, str], option: str) -> float:
+def newtons(force: tuple[float, str], option: str) -> float:
+    """A positive force [N].
+
+    Raises:
+        UsageError: It is none.
+    """
     try:
         newtons = force[0] * conversion_factor(force[1], "force")
     except DatasetError as error:

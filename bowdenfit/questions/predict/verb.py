@@ -1,6 +1,7 @@
 """Predicting what a cable does at lengths or wrap angles."""
 
 from collections.abc import Mapping, Sequence
+from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any, Literal
 
 from bowdenfit.display import csv_text
@@ -8,12 +9,17 @@ from bowdenfit.questions.predict.words import predictions_text
 from bowdenfit.verb import Argument, Length, Option, Quantity, Reply, Stroke, Verb
 
 if TYPE_CHECKING:
+    import numpy as np
+
     from bowdenfit.questions.predict.answer import Predictions
     from bowdenfit.results.record import Record
 
 Asked = Literal[
     "efficiency", "output-force", "input-force", "preload", "friction", "slack-load", "position", "stiffness", "preload-window"
 ]
+_ELSEWHERE = (  # what is not kept
+    "input_force", "output_force", "wrap_angles", "preload", "friction_limit", "contact", "gait", "gait_column",
+)  # fmt: skip
 AT_LENGTHS = ("efficiency", "output-force", "input-force")  # all others are asked at wrap angles
 
 
@@ -28,6 +34,9 @@ def predict(
     wrap_angles: Annotated[Sequence[Quantity], Option(("--wrap-angle",), "90deg", "ANGLE")] = (),
     preload: Annotated[Quantity | None, Option(metavar="FORCE", example="20N")] = None,
     friction_limit: Annotated[Quantity | None, Option(metavar="TORQUE", example="50N*mm")] = None,
+    contact: Annotated[str | None, Option(metavar="NAME")] = None,
+    gait: Annotated[str | Path | None, Option(metavar="FILE")] = None,
+    gait_column: Annotated[str | None, Option(metavar="HEADING")] = None,
 ) -> "Predictions":
     """Efficiency, a force, or what stretch and preload do, with intervals; one row a route value or wrap angle.
 
@@ -42,19 +51,24 @@ def predict(
         wrap_angles: Predict at this wrap angle instead of a length, such as 90deg; may be repeated.
         preload: Preload the cable with this instead of its own, such as 20N.
         friction_limit: What may be felt in free motion, for the preload window: 50N*mm (or 5N without a pulley radius).
+        contact: Contact that the wrap angles are those of, while the others keep theirs, as a knee bends one of them: the mean
+            over these wrap angles is predicted.
+        gait: Table with those wrap angles in a column, a row each, such as those of a stride at equal times.
+        gait_column: Its heading, where it is not one that means a wrap angle.
 
     Raises:
         UsageError: There is nothing to predict at, no posterior, or the cable has not what is asked for.
     """
-    import numpy as np
-
     from bowdenfit.errors import UsageError
     from bowdenfit.questions.predict.answer import Predictions
-    from bowdenfit.questions.predict.lengths import in_unit_of, predict_at_lengths
+    from bowdenfit.questions.predict.lengths import predict_at_lengths
 
     route = found.dataset.description.route
     quantity = _quantity(quantity, input_force, output_force)
-    if wrap_angles or quantity not in AT_LENGTHS or (route is None and found.model.cable.is_loop):
+    if contact is not None or gait is not None or gait_column is not None:
+        if quantity not in AT_LENGTHS or preload is not None or friction_limit is not None:
+            raise UsageError(f"--contact and --gait are asked of {', '.join(AT_LENGTHS)}; leave the rest out.")
+    elif wrap_angles or quantity not in AT_LENGTHS or (route is None and found.model.cable.is_loop):
         from bowdenfit.questions.predict.bends import predict_at_bends, question
 
         if lengths:
@@ -70,13 +84,33 @@ def predict(
         raise UsageError(
             "--quantity efficiency at lengths is that at the fit's own reference force; leave --input-force out."
         )
+    wanted = _lengths(found, lengths)
+    if contact is not None or gait is not None:
+        from bowdenfit.questions.predict.gait import gait_of, predict_over_gait
+
+        bent = gait_of(found, contact, wrap_angles, gait, gait_column)
+        return Predictions(predict_over_gait(found, wanted, bent, input_force, stroke, output_force))
+    return Predictions(predict_at_lengths(found, wanted, input_force, stroke, output_force))
+
+
+def _lengths(found: "Record", lengths: Sequence[Length] | None) -> "np.ndarray":
+    """Route values to predict at, by default those of the description; any one number without a route.
+
+    Raises:
+        UsageError: There are none, or one is no number.
+    """
+    import numpy as np
+
+    from bowdenfit.errors import UsageError
+    from bowdenfit.questions.predict.lengths import in_unit_of
+
+    route = found.dataset.description.route
     numbers = [length[0] if isinstance(length, tuple) else length for length in lengths or ()]
     if odd := [number for number in numbers if not np.isfinite(number)]:
         raise UsageError(f"{odd[0]} is no length; name the lengths to predict at as numbers.")
     if not lengths and route is not None and not route.choices:
         raise UsageError("the description has no choices; name the lengths to predict at.")
-    wanted = np.asarray(in_unit_of(route, lengths) or (route.choices if route else [0.0]), dtype=float)
-    return Predictions(predict_at_lengths(found, wanted, input_force, stroke, output_force))
+    return np.asarray(in_unit_of(route, lengths) or (route.choices if route else [0.0]), dtype=float)
 
 
 def _quantity(named: Asked | None, input_force: Quantity | None, output_force: Quantity | None) -> Asked:
@@ -107,7 +141,7 @@ def _reply(rows: list[dict[str, Any]], _: object = None) -> Reply:
 def _kept(answers: Mapping[str, Any], asked: Mapping[str, Any]) -> Reply | None:
     """Efficiencies while pulling, at lengths that can be bought."""
     known = {length: row for length, row in answers.get("predict", ()) if None not in row.values()}
-    other = any(asked[name] for name in ("input_force", "output_force", "wrap_angles", "preload", "friction_limit"))
+    other = any(asked[name] for name in _ELSEWHERE)
     lengths = asked["lengths"] or tuple(known)
     if other or (asked["quantity"], asked["stroke"]) not in {(None, "pull"), (AT_LENGTHS[0], "pull")} or not lengths:
         return None
@@ -135,6 +169,8 @@ VERB = Verb(
     preload-window  lowest preload without slack over these bends, highest for --friction-limit, and the best
 
     LENGTHS are in the unit of the route, or have their own: 455, 455mm, 18 in.
+
+    --contact NAME with several --wrap-angle, or --gait FILE, gives the mean while this contact bends, such as over a stride.
 
     The 90 % interval is that of the cable's mean (q05 to q95 with --csv and --json); that of any one mounting also holds
     the scatter from one mounting of the cable to the next. A note marks what lies outside the

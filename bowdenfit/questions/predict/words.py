@@ -33,7 +33,7 @@ def units_of(row: Row) -> dict[str, str]:
     for name, value in row.items():
         if isinstance(value, float):
             own = next((words for ending, words in _UNITS.items() if name.endswith(f"_{ending}")), None)
-            unit = own or ("1" if name == "efficiency" else unit)
+            unit = own or ("1" if name.endswith("efficiency") else unit)
             units[name] = "1" if name.endswith(_PROBABILITY) else unit
     return units
 
@@ -52,8 +52,8 @@ def _place(row: Row) -> str | None:
 
 def _unit(name: str) -> tuple[str, str]:
     """A column's name in words, and its unit; efficiencies are shown in percent."""
-    if name == "efficiency":
-        return name, "%"
+    if name.endswith("efficiency"):
+        return name.replace("_", " "), "%"
     unit = next((unit for unit in _UNITS if name.endswith(f"_{unit}")), None)
     if unit is not None:
         return name.removesuffix(f"_{unit}").replace("_", " "), _UNITS[unit]

@@ -1,0 +1,190 @@
+"""Predictions while a contact bends, such as over a gait: the mean over its wrap angles, with the least and the most."""
+
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import jax
+import jax.numpy as jnp
+import numpy as np
+from jax import Array
+
+from bowdenfit.errors import DatasetError, UsageError, nearest
+from bowdenfit.files.columns import Quantity, find_columns, require
+from bowdenfit.files.tables import read_table
+from bowdenfit.inference.draws import for_each_draw
+from bowdenfit.inference.interval import Interval
+from bowdenfit.kinds.rows import read_angle
+from bowdenfit.questions.bends.equations import bending_contact
+from bowdenfit.questions.predict.lengths import newtons
+from bowdenfit.questions.predict.outside import measured, pulled
+from bowdenfit.results.record import Record
+from bowdenfit.units import ColumnSource, conversion_factor
+from bowdenfit.words import counted
+
+_MOST_ANGLES = 512  # of a gait; of more so many quantiles stand for them
+_STROKES = {"pull": 1.0, "return": -1.0}
+
+
+@dataclass(frozen=True)
+class Gait:
+    """Wrap angles that one contact goes through while the others keep theirs.
+
+    Args:
+        contact: Its number.
+        name: Its name.
+        angles: Wrap angles [rad], each for as long as the others.
+        stated: How many were stated.
+    """
+
+    contact: int
+    name: str
+    angles: np.ndarray
+    stated: int
+
+    @property
+    def words(self) -> str:
+        """'mean over 101 wrap angles of 'bracket edge', 0 to 45 deg'"""
+        low, high = np.rad2deg([self.angles.min(), self.angles.max()])
+        if self.stated == 1:
+            return f"{self.name!r} bent by {low:.4g} deg"
+        return f"mean over {counted(self.stated, 'wrap angle')} of {self.name!r}, {low:.4g} to {high:.4g} deg"
+
+
+def gait_of(
+    fit: Record, contact: str | None, angles: Sequence[tuple[float, str]], file: str | Path | None, column: str | None
+) -> Gait:
+    """The gait that is asked for.
+
+    Args:
+        fit: The fit.
+        contact: Name of the contact; the only one that can be meant if omitted.
+        angles: Its wrap angles with their units; or they stand in
+        file: a table,
+        column: under this heading, where it is not one that means a wrap angle.
+
+    Raises:
+        UsageError: There is no such contact, or no wrap angle.
+        DatasetError: The table cannot be read.
+    """
+    contacts = [c.name for c in fit.dataset.description.contact]
+    if contact is not None and contact not in contacts:
+        raise UsageError(f"--contact {contact!r}: there is no such contact{nearest(contact, contacts)}")
+    number = bending_contact(fit.model) if contact is None else contacts.index(contact)
+    if bool(angles) == (file is not None):
+        raise UsageError(
+            "--contact needs the wrap angles that it goes through: as --wrap-angle 45deg, which may be repeated, or a table of "
+            "them as --gait FILE; name one of the two."
+        )
+    found = _stated(angles) if file is None else _read(Path(file), column)
+    shown = found
+    if len(found) > _MOST_ANGLES:
+        shown = np.quantile(found, (np.arange(_MOST_ANGLES) + 0.5) / _MOST_ANGLES)
+    return Gait(number, contacts[number], shown, len(found))
+
+
+def _stated(angles: Sequence[tuple[float, str]]) -> np.ndarray:
+    try:
+        found = np.array([value * conversion_factor(unit, "angle") for value, unit in angles])
+    except DatasetError as error:
+        raise UsageError(f"--wrap-angle: {error}.") from None
+    if np.any(found < 0) or not np.all(np.isfinite(found)):
+        raise UsageError("--wrap-angle: a wrap angle is negative; it is the sum of all bends, so write it without a sign.")
+    return found
+
+
+def _read(path: Path, column: str | None) -> np.ndarray:
+    """Wrap angles of a table [rad]."""
+    table = read_table(path)
+    named = {} if column is None else {"wrap_angle": ColumnSource(name=column)}
+    found = require(table, find_columns(table, (Quantity("wrap_angle", "angle"),), named), "wrap_angle", "wrap_angle_deg")
+    angles = np.array(found.each(lambda cell: read_angle(cell, found), np.nan))
+    table.faults.refuse()
+    if not len(angles):
+        raise DatasetError(f"{path.name} has a heading and no rows; a gait needs a row for each wrap angle.")
+    return angles
+
+
+def predict_over_gait(
+    fit: Record,
+    lengths: np.ndarray,
+    gait: Gait,
+    input_force: tuple[float, str] | None = None,
+    stroke: str = "pull",
+    output_force: tuple[float, str] | None = None,
+) -> list[dict[str, Any]]:
+    """Efficiency, output force or input force at route values: the mean over a gait, and of it the least and the most.
+
+    Args:
+        fit: The fit.
+        lengths: Route values.
+        gait: Wrap angles of one contact.
+        input_force: Force and unit, of which the output force is predicted; efficiencies are predicted without.
+        stroke: "pull" or "return".
+        output_force: Force and unit that is wanted, of which the input force is predicted.
+    """
+    route, limits = fit.dataset.description.route, measured(fit)
+    friction = fit.model.cable.friction
+    force, per, name, none_left = friction.conditions.reference_force, 1.0, "efficiency", "slack"
+    if output_force is not None:
+        name, force = "input_force_N", newtons(output_force, "--output-force")
+        none_left = "held by friction alone"
+    elif input_force is not None:
+        name, force = "output_force_N", newtons(input_force, "--input-force")
+    else:
+        per = force
+    drawn = _forces(fit, lengths, gait, force, _STROKES[stroke], inverse=output_force is not None)
+    words = pulled(drawn["mean"], force, none_left)[1]
+    of_load = {"at_input_force_N": force} if friction.depends_on_load and name == "efficiency" else {}
+    rows = []
+    for i, length in enumerate(lengths):
+        row: dict[str, Any] = {} if route is None else {f"{route.variable}_{route.unit}": float(length)}
+        row |= _interval(name, drawn["mean"][:, i] / per)
+        mounting = np.quantile(drawn["mounted"][:, i] / per, (0.05, 0.95))
+        row |= {"mounting_q05": float(mounting[0]), "mounting_q95": float(mounting[1])} | of_load
+        if len(gait.angles) > 1:
+            for which in ("least", "most"):
+                row |= _interval(f"{which}_{name}", drawn[which][:, i] / per, f"{which}_{name}_")
+        load = None if name == "efficiency" else float(np.median(drawn["mean"][:, i])) if output_force else force
+        notes = [words[i], gait.words, *limits.notes(None if route is None else float(length), load)]
+        if route is not None:
+            row["in_range"] = bool(route.range[0] <= length <= route.range[1])
+            notes += [] if row["in_range"] else [f"outside the curves, {route.range[0]:g} to {route.range[1]:g} {route.unit}"]
+        rows.append(row | {"note": "; ".join(note for note in notes if note)})
+    return rows
+
+
+def _interval(name: str, draws: np.ndarray, before: str = "") -> dict[str, float]:
+    found = Interval.of(np.maximum(draws, 0.0))
+    return {name: found.median} | {f"{before}{key}": getattr(found, key) for key in ("mean", "sd", "q05", "q95")}
+
+
+def _forces(fit: Record, lengths: np.ndarray, gait: Gait, force: float, sign: float, *, inverse: bool) -> dict[str, np.ndarray]:
+    """Forces at the other end [N] of every draw (rows) at route values (columns): the mean, in a new mounting, and the ends."""
+    model, cable = fit.model, fit.model.cable
+    function: Callable[..., Array] = cable.input_force_bent if inverse else cable.output_force_bent
+
+    def over(values: Mapping[str, Array], at: Array, bends: Array, mounting: Array) -> tuple[Array, Array, Array]:
+        angles = cable.wrap_angles(values, at)
+
+        def step(carry: tuple[Array, Array, Array], bend: Array) -> tuple[tuple[Array, Array, Array], None]:
+            bent = angles.at[:, gait.contact].set(bend)
+            found = jnp.maximum(function(values, bent, jnp.asarray(force), jnp.asarray(sign), mounting), 0.0)
+            total, least, most = carry
+            return (total + found, jnp.minimum(least, found), jnp.maximum(most, found)), None
+
+        start = jnp.zeros(len(at)), jnp.full(len(at), jnp.inf), jnp.zeros(len(at))
+        (total, least, most), _ = jax.lax.scan(step, start, bends)
+        return total / len(bends), least, most
+
+    def implied(z_and_mounting: Array, at: Array, bends: Array) -> dict[str, Array]:
+        values = model.space.constrain(z_and_mounting[:-1])
+        mean, least, most = over(values, at, bends, jnp.zeros(()))
+        return {"mean": mean, "least": least, "most": most, "mounted": over(values, at, bends, z_and_mounting[-1])[0]}
+
+    with jax.enable_x64(True):
+        data = jnp.asarray(lengths, dtype=float), jnp.asarray(gait.angles)
+        program = for_each_draw(implied, model.space.size + 1, *data, run_once=True)
+        found: dict[str, np.ndarray] = program(np.column_stack([fit.draws().flat_z, fit.mounting()]))
+    return found

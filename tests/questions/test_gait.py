@@ -1,0 +1,112 @@
+"""Predictions while a contact bends: the mean over a gait."""
+
+import numpy as np
+import pytest
+
+import bowdenfit as bf
+from bowdenfit.errors import UsageError
+
+QUICK = ("sampler.n_walkers=128", "sampler.target_ess=300", "sampler.target_r_hat=1.05", "sampler.max_steps=4000")
+
+
+@pytest.fixture(scope="module")
+def fit(on_body):
+    """A fit of the on-body data, whose last contact is bent with the knee."""
+    return bf.fit(on_body, seed=5, settings=QUICK)
+
+
+@pytest.fixture(scope="module")
+def swing(tmp_path_factory):
+    """The knee swings back from 45 deg to straight, at equal times."""
+    path = tmp_path_factory.mktemp("gait") / "swing.csv"
+    path.write_text("\n".join(["time_s,wrap_angle_deg", *(f"{i / 100},{x:.3f}" for i, x in enumerate(np.linspace(45, 0, 91)))]))
+    return path
+
+
+def at_470(fit, *angles, **more):
+    """The row of 470 mm, with the bracket edge bent."""
+    (row,) = bf.predict(fit, [470], contact="bracket edge", wrap_angles=[(x, "deg") for x in angles], **more)
+    return row
+
+
+def test_the_figures_of_the_bent_knee_come_out(fit, swing):
+    assert at_470(fit, 45)["efficiency"] == pytest.approx(0.788, abs=0.004)
+    assert at_470(fit, 20)["efficiency"] == pytest.approx(0.867, abs=0.006)
+    assert at_470(fit, 0)["efficiency"] == pytest.approx(0.936, abs=0.008)
+    (row,) = bf.predict(fit, [470], contact="bracket edge", gait=swing)
+    assert row["efficiency"] == pytest.approx(0.861, abs=0.006)
+    assert row["least_efficiency"] == pytest.approx(0.788, abs=0.004)
+    assert row["most_efficiency"] == pytest.approx(0.936, abs=0.008)
+    assert "mean over 91 wrap angles of 'bracket edge', 0 to 45 deg" in row["note"]
+
+
+def test_the_nominal_angle_gives_what_is_predicted_without_a_gait(fit):
+    (plain,) = bf.predict(fit, [470])
+    for name, value in plain.items():
+        if name not in ("note",):
+            assert at_470(fit, 45)[name] == pytest.approx(value, rel=1e-12), name
+
+
+def test_a_swing_at_even_angles_has_the_mean_of_its_closed_form(fit, swing):
+    mu = fit.posterior.values["mu3"].ravel()
+    straight = fit.efficiency_draws([470])[:, 0] * np.exp(mu * np.pi / 4)
+    (row,) = bf.predict(fit, [470], contact="bracket edge", gait=swing)
+    step = np.exp(-mu * np.deg2rad(0.5))
+    mean = straight * (1 - step**91) / (1 - step) / 91  # a geometric series of steps of half a degree
+    assert row["efficiency"] == pytest.approx(np.median(mean), rel=1e-9)
+    assert row["q05"] == pytest.approx(np.quantile(mean, 0.05), rel=1e-9)
+
+
+def test_the_best_length_does_not_move_with_the_angle_of_a_contact_that_stays(fit):
+    lengths = [440, 455, 470, 485, 500]
+    bent = [(x, "deg") for x in (0, 10, 60)]
+    gait = bf.predict(fit, lengths, contact="bracket edge", wrap_angles=bent)
+    nominal = bf.predict(fit, lengths)
+    assert np.argmax([row["efficiency"] for row in gait]) == np.argmax([row["efficiency"] for row in nominal])
+    ratios = [a["efficiency"] / b["efficiency"] for a, b in zip(gait, nominal, strict=True)]
+    assert np.ptp(ratios) < 2e-3  # the angle multiplies the efficiency of every length alike, draw by draw
+
+
+def test_forces_over_a_gait_are_those_of_its_angles(fit):
+    wanted = at_470(fit, 0, 45, output_force=(100, "N"))
+    assert wanted["least_input_force_N"] == pytest.approx(at_470(fit, 0, output_force=(100, "N"))["input_force_N"], rel=1e-12)
+    assert wanted["most_input_force_N"] == pytest.approx(at_470(fit, 45, output_force=(100, "N"))["input_force_N"], rel=1e-12)
+    arrives = at_470(fit, 20, input_force=(0.2, "kN"))
+    assert arrives["output_force_N"] == pytest.approx(200 * at_470(fit, 20)["efficiency"], rel=1e-12)
+
+
+def test_a_long_gait_is_stood_for_by_its_quantiles(fit, tmp_path):
+    table, rng = tmp_path / "walk.csv", np.random.default_rng(3)
+    angles = 30 + 30 * np.sin(rng.uniform(0, 2 * np.pi, 3000))
+    table.write_text("\n".join(["knee (deg)", *(f"{x:.4f}" for x in angles)]))
+    (row,) = bf.predict(fit, [470], contact="bracket edge", gait=table, gait_column="knee (deg)")
+    mu = fit.posterior.values["mu3"].ravel()
+    straight = fit.efficiency_draws([470])[:, 0] * np.exp(mu * np.pi / 4)
+    mean = straight * sum(np.exp(-mu * angle) for angle in np.deg2rad(angles)) / 3000
+    assert row["efficiency"] == pytest.approx(np.median(mean), rel=1e-5)
+    assert "3000 wrap angles" in row["note"]
+
+
+def test_the_command_says_the_mean_and_its_ends(fit, swing, run, tmp_path):
+    fit.save(tmp_path / "fit")
+    code, out, _ = run("predict", tmp_path / "fit", "470", "--contact", "bracket edge", "--gait", swing)
+    assert code == 0
+    assert out.startswith("Efficiency at 470 mm: 8") and "Least efficiency at 470 mm: 7" in out
+    assert max(map(len, out.splitlines())) <= 80
+
+
+def test_bad_gaits_are_refused_in_words(fit, swing, refuse, tmp_path):
+    fit.save(tmp_path / "fit")
+    folder = tmp_path / "fit"
+    assert "there is no such contact" in refuse("predict", folder, "--contact", "braket edge", "--gait", swing)
+    assert "name one of the two" in refuse("predict", folder, "--contact", "bracket edge")
+    assert "name one of the two" in refuse(
+        "predict", folder, "--contact", "bracket edge", "--gait", swing, "--wrap-angle", "45deg"
+    )
+    assert "does not say which of them is bent" in refuse("predict", folder, "--gait", swing)
+    assert "leave the rest out" in refuse("predict", folder, "--contact", "bracket edge", "--quantity", "preload")
+    (tmp_path / "bad.csv").write_text("wrap_angle_deg\n45\n-3\n")
+    assert "row 3" in refuse("predict", folder, "--contact", "bracket edge", "--gait", tmp_path / "bad.csv")
+    assert "missing.csv" in refuse("predict", folder, "--contact", "bracket edge", "--gait", tmp_path / "missing.csv")
+    with pytest.raises(UsageError, match="write it without a sign"):
+        at_470(fit, -5)

@@ -100,7 +100,7 @@ def _page(reply: Reply) -> str:
     """An answer as JSON."""
     from bowdenfit.results.plain import plain
 
-    return json.dumps(plain(reply.page()), indent=1) + "\n" if reply.page else reply.text
+    return json.dumps(plain(reply.page()), indent=1, allow_nan=False) + "\n" if reply.page else reply.text
 
 
 def _loaded(results: Path | tuple[Path, ...]) -> "Fit | dict[str, Fit]":

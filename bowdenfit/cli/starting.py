@@ -10,13 +10,14 @@ import click
 
 from bowdenfit.cli.terminal import say
 from bowdenfit.errors import BowdenfitError, UsageError
-from bowdenfit.words import filled
+from bowdenfit.words import filled, printable
 
 if TYPE_CHECKING:
     from bowdenfit.questions.start.question import Asker
 
 FOLDER = "my-cable"
 _MOST_FILES = 12  # that are proposed
+_LONGEST_NAME = 80  # of a cable
 
 
 @click.command(short_help="Start a data set: by questions, from files, from an example, or with a template.")
@@ -130,7 +131,8 @@ def _from_files(place: Path, files: Sequence[Path], ask: "Asker") -> None:
     from bowdenfit.questions.start.folder import refuse_files, write_data_set, written
 
     refuse_files(files)
-    text = description_of(files, place.name.replace("-", " ").replace("_", " "), ask)
+    called = printable(place.name.replace("-", " ").replace("_", " "))[:_LONGEST_NAME]
+    text = description_of(files, (called.strip() and called) or "cable", ask)
     write_data_set(place, text, files)
     click.echo()
     say(filled(written(place)))

@@ -1,5 +1,6 @@
 """What a kind of measurement declares of itself, as far as NumPy goes; its term in the likelihood is declared beside it."""
 
+import os
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
@@ -53,7 +54,8 @@ class Source:
         named = [name for part in stated if part for name in ([part] if isinstance(part, str) else part)]
         paths: list[Path] = []
         for name in named:
-            matches = matching(self.folder, name) if any(c in name for c in "*?[") else [self.folder / name]
+            is_pattern = any(c in name for c in "*?[") and not os.path.isfile(self.folder / name)  # noqa: PTH113  (any name)
+            matches = matching(self.folder, name) if is_pattern else [self.folder / name]
             if not matches:
                 raise DatasetError(
                     f"no file in {self.folder} matches {name!r}, which cable.toml names for the table {self.kind}."

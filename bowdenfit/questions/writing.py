@@ -64,7 +64,7 @@ def write_answer(
             write(figure, path)
         if page is not None:
             files.insert(0, write_page(page, Path(folder), Path(folder) / f"{name}.html"))
-        write_text(page_file, json.dumps(plain(answer), indent=1) + "\n")
+        write_text(page_file, json.dumps(plain(answer), indent=1, allow_nan=False) + "\n")
     return files
 
 

@@ -32,7 +32,13 @@ _WRITTEN = (FIT, ANSWERS, SUMMARY, SUMMARY_TEXT, DETAILS_TEXT, REPORT, FIGURE_DA
 
 @contextmanager
 def replace_when_whole(path: Path) -> Iterator[Path]:
-    """A temporary name beside `path` to write to; it becomes `path` only if nothing went wrong."""
+    """A temporary name beside `path` to write to; it becomes `path` only if nothing went wrong.
+
+    Raises:
+        StoreError: A device, a pipe or a folder would be replaced by a file.
+    """
+    if path.exists() and not path.is_file():
+        raise StoreError(f"{path} is no file and stays as it is; name a file that is new, or that may be replaced.")
     temporary = path.with_name(f".{path.name}.partial")
     try:
         yield temporary
@@ -110,6 +116,8 @@ def refuse_unwritable(target: Path) -> None:
             place = place.parent
         if place != target and not place.is_dir():
             raise OSError(errno.ENOTDIR, os.strerror(errno.ENOTDIR))
+        if not (place.is_dir() or place.is_file()):
+            raise OSError(errno.EEXIST, "it is a device or a pipe")
         if not os.access(place if place.is_dir() else place.parent, os.W_OK | os.X_OK):
             raise OSError(errno.EACCES, os.strerror(errno.EACCES))
     except OSError as error:
@@ -150,7 +158,7 @@ def _is_ours(path: Path) -> bool:
 
 @contextmanager
 def reserved(folder: Path | None) -> Iterator[None]:
-    """A results folder that no other process fits into meanwhile; the reservation ends with this process at the latest.
+    """A results folder that no other process writes into meanwhile; the reservation ends with this process at the latest.
 
     Args:
         folder: The folder, made if missing; None for none, and nothing is reserved where a file lies in its place.
@@ -180,7 +188,7 @@ def _lock(held: int, folder: Path) -> None:
         fcntl.flock(held, fcntl.LOCK_EX | fcntl.LOCK_NB)
     except BlockingIOError:
         raise StoreError(
-            f"another fit is being written into {folder}; wait for it, or name another folder with --output."
+            f"another fit or calibration is being written into {folder}; wait for it, or name another folder with --output."
         ) from None
 
 

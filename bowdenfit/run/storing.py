@@ -9,12 +9,12 @@ from typing import TYPE_CHECKING, Any, get_args
 
 from bowdenfit.dataset import Dataset
 from bowdenfit.description import Sampler, SamplerSettings
-from bowdenfit.errors import DescriptionError, StoreError, UsageError
+from bowdenfit.errors import DescriptionError, DiskError, StoreError, UsageError, system_error
 from bowdenfit.kinds.settings import parse_description
 from bowdenfit.results.folder import CHAIN, clear, read_checkpoint, refuse_to_overwrite, start_checkpoint
 from bowdenfit.run.helpers import Assistant
 from bowdenfit.verb import LARGEST_SEED
-from bowdenfit.words import few, printable
+from bowdenfit.words import few, listed, printable
 
 if TYPE_CHECKING:
     from bowdenfit.front_desk import Fit
@@ -31,6 +31,9 @@ def write_results(found: "Fit", folder: Path, figures: bool, helper: Assistant) 
 
     Returns:
         What is missing, in sentences; a fit whose figures or report fail is kept all the same.
+
+    Raises:
+        StoreError: The fit itself, or for want of room what belongs to it, could not be written.
     """
     from bowdenfit.plots.write import FORMATS
     from bowdenfit.questions.figures import AT_ONCE, draw_figure, figures_of, write_captions
@@ -55,8 +58,11 @@ def write_results(found: "Fit", folder: Path, figures: bool, helper: Assistant) 
         except Exception as error:  # whatever is wrong with a figure, the fit is to be kept
             failed[name] = error
     save(found, found.summary(), folder, True, answers_of(found), data)
-    write_text(folder / SUMMARY_TEXT, printable(summary_text(found)))
-    write_text(folder / DETAILS_TEXT, printable(full_text(found)))
+    for name, words in ((SUMMARY_TEXT, summary_text), (DETAILS_TEXT, full_text)):
+        try:
+            write_text(folder / name, printable(words(found)))
+        except Exception as error:
+            failed[name] = error
     try:  # behind the figures, whose files it takes
         drawn[REPORT] = helper.submit(write_page, report_page(found, data), folder / FIGURES, folder / REPORT)
     except Exception as error:
@@ -75,23 +81,29 @@ def write_results(found: "Fit", folder: Path, figures: bool, helper: Assistant) 
 
 
 def _what_is_missing(folder: Path, failed: dict[str, Exception]) -> tuple[str, ...]:
-    """That some figures or the report are missing, in a sentence each."""
-    from bowdenfit.results.folder import REPORT
+    """That some figures, texts or the report are missing, in a sentence each.
 
-    figures, sentences = [name for name in failed if name != REPORT], list[str]()
-    if figures:
-        some = f"its figures {few(figures)}" if len(figures) > 1 else f"its figure {figures[0]}"
-        why = _why(failed[figures[0]])
-        sentences.append(
-            f"{folder} holds the whole fit, but {some} could not be drawn ({why}); draw them later with "
-            f"bowdenfit plot {folder}."
-        )
-    if REPORT in failed:
-        sentences.append(
-            f"{folder} holds the whole fit, but its report could not be written ({_why(failed[REPORT])}); write it later "
-            f"with bowdenfit report {folder}."
-        )
-    return tuple(sentences)
+    Raises:
+        DiskError: The same, where it is for want of room.
+    """
+    from bowdenfit.results.folder import DETAILS_TEXT, REPORT, SUMMARY_TEXT
+
+    texts = [name for name in (SUMMARY_TEXT, DETAILS_TEXT) if name in failed]
+    figures = [name for name in failed if name not in {REPORT, *texts}]
+    some = f"its figures {few(figures)}" if len(figures) > 1 else f"its figure {few(figures)}"
+    parts = (
+        (figures, some, "drawn", f"draw them later with bowdenfit plot {folder}"),
+        (texts, listed(texts), "written", f"bowdenfit summary {folder} prints it"),
+        ([REPORT] if REPORT in failed else [], "its report", "written", f"write it later with bowdenfit report {folder}"),
+    )
+    sentences = tuple(
+        f"{folder} holds the whole fit, but {part} could not be {done} ({_why(failed[names[0]])}); {remedy}."
+        for names, part, done, remedy in parts
+        if names
+    )
+    if any(isinstance(system_error(error) or error, DiskError) for error in failed.values()):
+        raise DiskError(" ".join(sentences))
+    return sentences
 
 
 def _why(error: Exception) -> str:

@@ -1,12 +1,16 @@
 """Names that people choose: whatever is in them works in tables, files and figures, or `check` refuses it."""
 
+import json
 import shutil
 
 import numpy as np
 import pytest
+from click.testing import CliRunner
 from matplotlib.mathtext import MathTextParser
 
 import bowdenfit as bf
+from bowdenfit.cli import bowdenfit
+from bowdenfit.errors import DiskError
 from bowdenfit.parameters.symbols import symbol_of
 from bowdenfit.results.netcdf import read_groups, write_groups
 from bowdenfit.words import printable
@@ -108,3 +112,37 @@ def test_a_fit_whose_figures_cannot_be_drawn_is_kept_and_drawn_later(on_body, tm
 
 def test_nothing_that_is_printed_steers_a_terminal():
     assert printable("a\x1b[31m\u202eb\tµ ± 1\u00a0N\n") == "a\\x1b[31m\\u202eb\tµ ± 1\u00a0N\n"
+
+
+def test_a_fit_whose_figures_find_no_room_is_kept_and_ends_as_a_failure_of_the_disk(on_body, tmp_path, monkeypatch):
+    from bowdenfit.questions.figures import FIGURES
+    from bowdenfit.run import storing
+
+    def full(*_):
+        raise OSError(28, "No space left on device")
+
+    monkeypatch.setattr(FIGURES["wrap_angles"], "draw", full)
+    monkeypatch.setattr(storing, "printable", full)
+    with pytest.raises(DiskError, match=r"whole fit, but summary\.txt and details\.txt could not be written") as said:
+        bf.fit(on_body, output=tmp_path / "fit", seed=3, mcmc=False)
+    assert "its figure wrap_angles could not be drawn" in str(said.value) and said.value.exit_code == 1
+    assert bf.load(tmp_path / "fit").converged
+    assert not (tmp_path / "fit" / "summary.txt").exists()
+
+
+@pytest.mark.parametrize("name", ["angles[1].csv", "*.csv", "a?b.csv", "[a-.csv", 'a b\'s "c".csv'])
+def test_files_may_be_called_like_patterns(on_body, tmp_path, name):
+    folder = shutil.copytree(on_body, tmp_path / "cable")
+    (folder / "angles.csv").rename(folder / name)
+    text = (folder / "cable.toml").read_text()
+    assert '"angles.csv"' in text
+    (folder / "cable.toml").write_text(text.replace('"angles.csv"', json.dumps(name)))
+    assert bf.read(folder).sha256.keys() >= {name, "cable.toml"}
+
+
+@pytest.mark.parametrize("called", ["---", " ", "\udcff", "a\x1b[31m", "x" * 120])
+def test_a_new_data_set_may_be_called_anything_that_a_folder_may(on_body, tmp_path, called):
+    files = [str(on_body / f"{table}.csv") for table in ("angles", "efficiencies")]
+    done = CliRunner().invoke(bowdenfit, ["init", str(tmp_path / called), "--from", *files])
+    assert done.exit_code == 0, done.exception
+    assert bf.read(tmp_path / called).measurements

@@ -11,8 +11,9 @@ import pytest
 import bowdenfit as bf
 from bowdenfit.errors import DiskError
 from bowdenfit.inference.checkpoint import append, fingerprint_of, heading, records
-from bowdenfit.results.folder import folder_to_write, refuse_unwritable, reserved
+from bowdenfit.results.folder import folder_to_write, refuse_unwritable, reserved, write_text
 
+YARN = Path(__file__).resolve().parents[2] / "datasets" / "yarn-on-cylinder"
 QUICK = ("sampler.n_walkers=32", "sampler.max_steps=200", "sampler.target_ess=100")
 
 
@@ -79,7 +80,7 @@ def test_a_disk_without_room_is_no_mistake_of_the_user(tmp_path):
 
 
 def test_two_fits_into_one_folder_are_told_apart_at_the_start(on_body, tmp_path):
-    with reserved(tmp_path / "fit"), pytest.raises(bf.StoreError, match="another fit is being written"):
+    with reserved(tmp_path / "fit"), pytest.raises(bf.StoreError, match="another fit or calibration is being written"):
         bf.fit(on_body, output=tmp_path / "fit", mcmc=False, figures=False)
     assert not (tmp_path / "fit").exists()
     bf.fit(on_body, output=tmp_path / "fit", mcmc=False, figures=False)
@@ -111,3 +112,22 @@ def test_what_can_be_written_is_not_refused(tmp_path, monkeypatch, place):
     (tmp_path / "full" / "file").write_text("x")
     refuse_unwritable(Path(place))
     assert sorted(each.name for each in tmp_path.rglob("*")) == ["file", "full"]
+
+
+def test_nothing_but_files_is_replaced_by_a_file(tmp_path):
+    os.mkfifo(tmp_path / "pipe")
+    (tmp_path / "null").symlink_to("/dev/null")
+    (tmp_path / "folder").mkdir()
+    for name in ("pipe", "null", "folder"):
+        with pytest.raises(bf.StoreError, match="is no file and stays as it is"):
+            write_text(tmp_path / name, "x")
+    with pytest.raises(bf.StoreError, match="a device or a pipe"):
+        refuse_unwritable(tmp_path / "pipe")
+    assert (tmp_path / "pipe").is_fifo() and (tmp_path / "null").is_char_device() and (tmp_path / "folder").is_dir()
+    assert not list(tmp_path.glob(".*"))
+
+
+def test_a_calibration_is_refused_where_something_else_is_being_written(tmp_path):
+    with reserved(tmp_path / "cal"), pytest.raises(bf.StoreError, match="another fit or calibration is being written"):
+        bf.calibrate(YARN, replications=1, workers=1, output=tmp_path / "cal", seed=3)
+    assert not (tmp_path / "cal").exists()

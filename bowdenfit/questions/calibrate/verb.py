@@ -70,16 +70,18 @@ def calibrate(
     from bowdenfit.questions.calibrate.findings import findings
     from bowdenfit.questions.calibrate.quantities import quantities_of
     from bowdenfit.questions.calibrate.store import open_replications
+    from bowdenfit.results.folder import reserved
 
     with jax.enable_x64(True):
         quantities = quantities_of(plan)
-    done = {} if folder is None else open_replications(folder, _fingerprint(plan, assume), resume, force)
-    with watched(WATCH, progress) as show:
-        _replicate(plan, done, replications, workers, folder, show)
-    how = {"assumed": tuple(assume), "truths": tuple(each.text for each in plan.truths)}
-    found = findings(tuple(done.values()), quantities, name=plan.stated.description.name, seed=plan.seed, **how)
-    if folder is not None:
-        _write(found, folder)
+    with reserved(folder):
+        done = {} if folder is None else open_replications(folder, _fingerprint(plan, assume), resume, force)
+        with watched(WATCH, progress) as show:
+            _replicate(plan, done, replications, workers, folder, show)
+        how = {"assumed": tuple(assume), "truths": tuple(each.text for each in plan.truths)}
+        found = findings(tuple(done.values()), quantities, name=plan.stated.description.name, seed=plan.seed, **how)
+        if folder is not None:
+            _write(found, folder)
     return found
 
 
@@ -175,14 +177,15 @@ def _write(found: "Calibration", folder: Path) -> None:
     from bowdenfit.questions.calibrate.store import CALIBRATION
     from bowdenfit.questions.calibrate.words import calibration_text
     from bowdenfit.questions.writing import write_page
-    from bowdenfit.results.folder import FIGURES, REPORT, SUMMARY_TEXT, write_text
+    from bowdenfit.results.folder import FIGURES, REPORT, SUMMARY_TEXT, folder_to_write, write_text
     from bowdenfit.results.plain import plain
 
-    write_text(folder / SUMMARY_TEXT, calibration_text(found))
-    if found.quantities:
-        draw_calibration(found, folder / FIGURES)
-    write_page(calibration_page(found), folder / FIGURES, folder / REPORT)
-    write_text(folder / CALIBRATION, json.dumps(plain(found), indent=1) + "\n")
+    with folder_to_write(folder):
+        write_text(folder / SUMMARY_TEXT, calibration_text(found))
+        if found.quantities:
+            draw_calibration(found, folder / FIGURES)
+        write_page(calibration_page(found), folder / FIGURES, folder / REPORT)
+        write_text(folder / CALIBRATION, json.dumps(plain(found), indent=1, allow_nan=False) + "\n")
 
 
 def _reply(found: "Calibration", asked: dict[str, Any]) -> Reply:

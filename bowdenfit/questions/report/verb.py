@@ -21,7 +21,7 @@ def report(
 
     Args:
         found: The fit, or its results folder.
-        output: The file; one that is there is replaced.
+        output: The file, one that is there is replaced; or a folder for report.html.
         ranked: Rank what could be measured next too, which takes a few seconds.
 
     Returns:
@@ -47,6 +47,7 @@ def report(
         raise UsageError("a fit by itself has no folder; name a file for the report.")
     ranking = next_measurement(found) if ranked else None
     figures, path = kept or dict(figures_of(found)), Path(output)
+    path = path / REPORT if path.is_dir() else path
     with folder_to_write(path.parent), TemporaryDirectory() as drawn:
         for name, data in figures.items():
             draw_figure(name, data, Path(drawn), ("svg",), found.name)

@@ -102,6 +102,8 @@ def refuse_files(files: Sequence[Path]) -> None:
         if not file.is_file():
             what = "is a folder" if file.is_dir() else "does not exist"
             raise UsageError(f"{file} {what}; name the files that you measured.")
+        if not file.name.isprintable():
+            raise DatasetError(f"a cable.toml cannot name the file {shown(file.name)}; rename it in letters that print.")
     names = [file.name for file in files]
     if twice := [name for name in names if names.count(name) > 1 or name == DESCRIPTION_FILE]:
         raise DatasetError(f"a data set cannot hold {shown(twice[0])} twice; rename one of the files.")
@@ -127,7 +129,9 @@ def write_example(name: str, folder: Path) -> None:
         hint = nearest(name, list(known)) if known else "; none was installed."
         raise UsageError(f"there is no example {shown(name)}{hint}")
     with new_folder(folder) as place:
-        shutil.copytree(known[name], place, dirs_exist_ok=True, copy_function=shutil.copyfile)
+        for file in sorted(known[name].rglob("*")):  # shutil.copytree hides what the system says
+            copy = place / file.relative_to(known[name])
+            copy.mkdir() if file.is_dir() else shutil.copyfile(file, copy)
 
 
 def measured_files(folder: Path, endings: Sequence[str]) -> list[Path]:

@@ -11,8 +11,8 @@ if TYPE_CHECKING:
     from bowdenfit.questions.export.transmission import Transmission
     from bowdenfit.results.record import Record
 
-Target = Literal["c", "csv"]
-_ENDINGS: Mapping[str, str] = {"c": ".h", "csv": ".csv"}
+Target = Literal["c", "matlab", "csv"]
+_ENDINGS: Mapping[str, str] = {"c": ".h", "csv": ".csv", "matlab": ".m"}
 _NOT_TRUSTED = 3
 
 
@@ -54,18 +54,23 @@ def export(
     refuse_what_is_not_expressed(found, to, draws)
     judged = verdict(found)
     tables = transmission(found, points, draws, " and ".join(judged.troubles))
-    written = _writer(to)(found, tables)
+    written = _writer(to, path)(found, tables)
     with folder_to_write(path.parent), replace_when_whole(path) as temporary:
         temporary.write_bytes(written)
     return Exported(path, to, tuple(tables.sentences), judged.trusted)
 
 
-def _writer(to: str) -> "Callable[[Record, Transmission], bytes]":
+def _writer(to: str, path: Path) -> "Callable[[Record, Transmission], bytes]":
     """What gives the bytes of a file in a format."""
     if to == "c":
         from bowdenfit.questions.export.c import header
 
         return lambda _, found: header(found).encode("ascii")
+    if to == "matlab":
+        from bowdenfit.questions.export.matlab import function, function_name
+
+        name = function_name(path)
+        return lambda _, found: function(found, name).encode("ascii")
     from bowdenfit.questions.export.lookup import lookup_table, table_of_draws
     from bowdenfit.questions.export.transmission import LEVELS
 
@@ -86,8 +91,9 @@ VERB = Verb(
     mean and of any one mounting.
 
     \b
-    c    a header (C99): output force, input force, friction while moving to and fro, compensation
-    csv  a lookup table that says what bowdenfit predict says; with --draws, cables drawn from the posterior
+    c       a header (C99): output force, input force, friction while moving to and fro, compensation
+    matlab  a function of MATLAB and Octave that says the same
+    csv     a lookup table that says what bowdenfit predict says; with --draws, cables drawn from the posterior
 
     Every file says which fit it was written from, with which seed and version, and over which range it holds. Outside that
     range the nearest end counts, and a flag tells.

@@ -1,0 +1,79 @@
+"""The MATLAB function against the package's own equations, run by Octave."""
+
+import shutil
+import subprocess
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+from exported import CASES, HOSTILE, cable, followed, motion, of_equations, points
+
+from bowdenfit.errors import UsageError
+from bowdenfit.questions.export.matlab import function, function_name
+from bowdenfit.questions.export.transmission import LEVELS
+
+OCTAVE = shutil.which("octave-cli")
+needs_octave = pytest.mark.skipif(OCTAVE is None, reason="Octave is not installed")
+ON_LEAVING = "error: ignoring const execution_exception& while preparing to exit"  # of some builds of Octave, whatever is run
+SCRIPT = """
+for name = {%s}
+  f = str2func(name{1});
+  in = dlmread([name{1} '.csv']);
+  out = zeros(rows(in), 4);
+  for level = unique(in(:, 1))'
+    k = in(:, 1) == level;
+    [out(k, 1), out(k, 4)] = f('output', level, in(k, 2), in(k, 3), in(k, 4), in(k, 5));
+    out(k, 2) = f('input', level, in(k, 2), in(k, 3), in(k, 4), in(k, 5));
+    out(k, 3) = f('compensation', 0, in(k, 2), in(k, 3), in(k, 4), in(k, 5));
+  end
+  dlmwrite([name{1} '.out'], out, 'precision', '%%.17g');
+  force = dlmread([name{1} '.motion']);
+  state = NaN;
+  for i = 2:numel(force)
+    state = f('step', force(1), in(1, 2), 31, force(i), 0, state);
+    force(i) = state;
+  end
+  dlmwrite([name{1} '.stepped'], force(2:end), 'precision', '%%.17g');
+end
+"""
+
+
+@needs_octave
+def test_octave_says_what_the_equations_say_and_follows_the_play_operator(tmp_path):
+    asked, names = {}, [f"bowden_{case.replace(' ', '_')}" for case in CASES]
+    for case, name in zip(CASES, names, strict=True):
+        found = cable(case, name=HOSTILE if case == "rope" else "plain")
+        asked[case] = points(found, 1000, seed=4)
+        (tmp_path / f"{name}.m").write_text(function(found, name))
+        columns = [asked[case][key] + (1 if key == "level" else 0) for key in ("level", "place", "speed", "force", "stroke")]
+        np.savetxt(tmp_path / f"{name}.csv", np.column_stack(columns), delimiter=",", fmt="%.17g")
+        np.savetxt(tmp_path / f"{name}.motion", [3, *motion(found, 4000)[::100]], fmt="%.17g")
+    (tmp_path / "ask.m").write_text(SCRIPT % ", ".join(f"'{name}'" for name in names))
+    assert OCTAVE is not None
+    done = subprocess.run([OCTAVE, "--norc", "--quiet", "ask.m"], cwd=tmp_path, capture_output=True, text=True)
+    assert done.returncode == 0, done.stderr
+    assert set(done.stderr.splitlines()) <= {ON_LEAVING}
+    for case, name in zip(CASES, names, strict=True):
+        found, questions = cable(case), asked[case]
+        output, needed, compensation, flags = np.loadtxt(tmp_path / f"{name}.out", delimiter=",").T
+        np.testing.assert_allclose(output, of_equations(found, questions), rtol=1e-9, atol=1e-9, err_msg=case)
+        np.testing.assert_allclose(needed, of_equations(found, questions, inverse=True), rtol=1e-9, atol=1e-9)
+        least = of_equations(found, questions | {"level": np.full(1000, LEVELS.index("mounting_q05"))}, inverse=True)
+        np.testing.assert_allclose(compensation, least - questions["force"], rtol=1e-9, atol=1e-8)
+        at = found.places.at
+        outside = ((questions["place"] < at[0]) | (questions["place"] > at[-1])) & (case != "one place")
+        np.testing.assert_array_equal(flags.astype(int) & 1, outside)
+        place = float(questions["place"][0])
+        expected = followed(found, 2, place, 31.0, motion(found, 4000)[::100])
+        np.testing.assert_allclose(np.loadtxt(tmp_path / f"{name}.stepped"), expected, rtol=1e-9, atol=1e-9)
+
+
+def test_a_function_is_named_as_its_file_and_names_stay_comments():
+    assert function_name(Path("folder/my_cable.m")) == "my_cable"
+    for bad in ("my-cable.m", "1.m", "cable.txt", "_x.m"):
+        with pytest.raises(UsageError, match="the name of a function"):
+            function_name(Path(bad))
+    about = replace(cable("rope").about, cable=HOSTILE)
+    top = function(replace(cable("rope"), about=about), "bowden").splitlines()[1:8]
+    assert all(line.startswith("%") for line in top)

@@ -24,6 +24,7 @@ if TYPE_CHECKING:
     from bowdenfit.questions.check.verb import check
     from bowdenfit.questions.compare.verb import compare
     from bowdenfit.questions.export.verb import export
+    from bowdenfit.questions.fleet.verb import fleet
     from bowdenfit.questions.identify.verb import identify
     from bowdenfit.questions.next.verb import next_measurement
     from bowdenfit.questions.predict.verb import predict
@@ -40,6 +41,7 @@ _WHERE = {
     "compare": "bowdenfit.questions.compare.verb",
     "export": "bowdenfit.questions.export.verb",
     "fit": "bowdenfit.run.verb",
+    "fleet": "bowdenfit.questions.fleet.verb",
     "identify": "bowdenfit.questions.identify.verb",
     "load": "bowdenfit.front_desk",
     "next_measurement": "bowdenfit.questions.next.verb",
@@ -67,6 +69,7 @@ __all__ = [
     "compare",
     "export",
     "fit",
+    "fleet",
     "identify",
     "load",
     "next_measurement",

@@ -76,8 +76,7 @@ def read(dataset: "str | Path | Dataset", **reading: Unpack[Reading]) -> "Datase
     if isinstance(dataset, Dataset):
         return dataset
     refuse_special(Path(dataset))
-    stated = {key: reading.get(name) for name, key in _SETTINGS.items()}
-    changes = [*reading.get("settings", ()), *(f'{key}="{value}"' for key, value in stated.items() if value is not None)]
+    changes = changed_settings(reading)
     sources = parse_channels(reading.get("channels", ()))
     columns = parse_sources(reading.get("columns", ()), "--column")
     wrap_angle = reading.get("wrap_angle")
@@ -85,6 +84,16 @@ def read(dataset: "str | Path | Dataset", **reading: Unpack[Reading]) -> "Datase
         if wrap_angle is not None or is_lone_file(Path(dataset)):
             return single_file_dataset(Path(dataset), wrap_angle, changes, sources, columns)
         return load_dataset(Path(dataset), changes, sources, columns)
+
+
+def changed_settings(reading: Reading) -> list[str]:
+    """Settings of cable.toml that keywords change, as on the command line.
+
+    Args:
+        reading: The keywords.
+    """
+    stated = {key: reading.get(name) for name, key in _SETTINGS.items()}
+    return [*reading.get("settings", ()), *(f'{key}="{value}"' for key, value in stated.items() if value is not None)]
 
 
 def refuse_unknown(verb: Callable[..., Any], reading: Reading) -> None:

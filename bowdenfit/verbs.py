@@ -4,6 +4,7 @@ from bowdenfit.questions.calibrate.verb import VERB as CALIBRATE
 from bowdenfit.questions.check.verb import VERB as CHECK
 from bowdenfit.questions.compare.verb import VERB as COMPARE
 from bowdenfit.questions.export.verb import VERB as EXPORT
+from bowdenfit.questions.fleet.verb import VERB as FLEET
 from bowdenfit.questions.identify.verb import VERB as IDENTIFY
 from bowdenfit.questions.length.verb import VERB as LENGTH
 from bowdenfit.questions.next.verb import VERB as NEXT
@@ -14,4 +15,4 @@ from bowdenfit.questions.summary.verb import PLOT_VERB as PLOT
 from bowdenfit.questions.summary.verb import SUMMARY_VERB as SUMMARY
 from bowdenfit.run.verb import VERB as FIT
 
-VERBS = (CHECK, FIT, SUMMARY, PREDICT, LENGTH, IDENTIFY, NEXT, COMPARE, EXPORT, CALIBRATE, PLOT, REPORT, SIMULATE)
+VERBS = (CHECK, FIT, SUMMARY, PREDICT, LENGTH, IDENTIFY, NEXT, COMPARE, EXPORT, CALIBRATE, FLEET, PLOT, REPORT, SIMULATE)

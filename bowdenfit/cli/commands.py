@@ -73,7 +73,7 @@ def _answer(verb: Verb, keywords: tuple[Keyword, ...], given: dict[str, Any], as
     if found is not None:
         asked[found] = _loaded(given[found])
     if verb.results and asked["output"] is None:
-        asked["output"] = Path(verb.results) / _name_of(Path(asked["dataset"]))
+        asked["output"] = Path(verb.results) / _name_of(Path(asked[keywords[0].name]))
     if asked.get("output") is not None:
         from bowdenfit.results.folder import refuse_unwritable
 

@@ -50,11 +50,12 @@ class Conditional:
 
         def depends(term: Any, data: Any) -> bool:
             def residuals(coefficients: Array, z: Array) -> Array:
-                return term.residuals(space.constrain(z) | own.constrain(coefficients), data)
+                return term.residuals(self.posterior.values(z, every) | own.constrain(coefficients), data)
 
             return _depends(residuals, coefficients, free)
 
-        terms = enumerate(zip(self.posterior.model.terms, self.posterior.data, strict=True))
+        every = self.posterior.data
+        terms = enumerate(zip(self.posterior.model.terms, every, strict=False))
         return [i for i, each in terms if depends(*each)]
 
     @property
@@ -103,7 +104,7 @@ class Conditional:
         model, own = self.posterior.model, self._coefficients
         low, middle, high = jax.vmap(own.vector)(jnp.tile(jnp.array([[-1.0], [0.0], [1.0]]), own.size))
         precision = (2 / (high - low)) ** 2
-        others = model.space.constrain(z.at[self.which].set(0.0))
+        others = self.posterior.values(z.at[self.which].set(0.0), data)
 
         def residuals(coefficients: Array) -> Array:
             values = others | {p.name: coefficients[i] for i, p in enumerate(own.free)}

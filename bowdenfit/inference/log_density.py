@@ -48,10 +48,15 @@ class LogDensity:
         """
         return tuple(getattr(term, "padded", term.data) for term in self.model.terms)
 
+    def values(self, z: Float[Array, " free"], data: Any) -> dict[str, Array]:
+        """Named values of all parameters [internal units] at z; `data` may say more than the model of them."""
+        del data
+        return self.model.space.constrain(z)
+
     def log_likelihoods(self, z: Float[Array, " free"], data: Any) -> dict[str, Array]:
         """Log likelihood of every reading, by term."""
-        values = self.model.space.constrain(z)
-        return {t.name: t.log_likelihood(values, d) for t, d in zip(self.model.terms, data, strict=True)}
+        values = self.values(z, data)
+        return {t.name: t.log_likelihood(values, d) for t, d in zip(self.model.terms, data, strict=False)}
 
     def log_density(self, z: Float[Array, " free"], data: Any) -> Float[Array, ""]:
         """Log posterior density in z, up to the evidence; minus infinity where it cannot be computed."""
@@ -61,8 +66,8 @@ class LogDensity:
 
     def residuals(self, z: Float[Array, " free"], data: Any) -> dict[str, Array]:
         """Standardized residuals by term; half their sum of squares is minus log likelihood, up to a constant."""
-        values = self.model.space.constrain(z)
-        return {t.name: t.residuals(values, d) for t, d in zip(self.model.terms, data, strict=True)}
+        values = self.values(z, data)
+        return {t.name: t.residuals(values, d) for t, d in zip(self.model.terms, data, strict=False)}
 
     def batched_log_density(self, batch: int) -> Any:
         """Compiled log density of a batch of z; of one shape only, so that it is compiled once."""

@@ -1,7 +1,5 @@
 """From a data set to a finished fit: the stages in their order, and what runs beside them."""
 
-import platform
-import re
 from collections.abc import Callable, Iterator
 from concurrent.futures import ThreadPoolExecutor
 from datetime import UTC, datetime
@@ -14,12 +12,11 @@ from bowdenfit.inference.chain import Sampling
 from bowdenfit.inference.least_squares import least_squares, maximum_posterior
 from bowdenfit.inference.log_density import LogDensity as Density
 from bowdenfit.inference.objective import make_objective
+from bowdenfit.inference.versions import versions
 from bowdenfit.model import build_model
 from bowdenfit.results.record import Provenance
 from bowdenfit.run.helpers import Assistant, Stopwatch, load_beside
 from bowdenfit.run.sampling import LIBRARIES, draws_of, samplers, sampling_programs
-
-VERSIONED = ("bowdenfit", "jax", "optimistix", "emcee", "blackjax", "arviz-stats", "numpy", "scipy")
 
 
 def run(
@@ -74,15 +71,4 @@ def classical(density: Density) -> Iterator[Any]:
 
 def provenance(seed: int, watch: Stopwatch) -> Provenance:
     """Seed, versions and times of a fit that ends now."""
-    from importlib.metadata import PackageNotFoundError, distribution
-
-    def of(package: str) -> str:
-        try:
-            found = distribution(package)
-        except PackageNotFoundError:
-            return "(not installed)"
-        stated = re.search(r"^Version: (.+)$", found.read_text("METADATA") or "", re.MULTILINE)  # parsing all takes longer
-        return stated[1] if stated else found.version
-
-    versions = {package: of(package) for package in VERSIONED} | {"python": platform.python_version()}
-    return Provenance(seed, versions, watch.seconds, datetime.now(UTC).isoformat(timespec="seconds"))
+    return Provenance(seed, dict(versions()), watch.seconds, datetime.now(UTC).isoformat(timespec="seconds"))

@@ -12,10 +12,11 @@ from concurrent.futures import Future, ThreadPoolExecutor
 from contextlib import contextmanager
 from dataclasses import dataclass, field
 from importlib import import_module
-from multiprocessing import connection, get_context, parent_process
+from multiprocessing import connection, get_context
 from typing import Any, TypeAlias
 
 from bowdenfit.errors import BowdenfitError
+from bowdenfit.inference.engines.processes import end_with_parent
 
 COMPUTING = ("jax", "bowdenfit.run.fitting")  # what this process and the other both need
 DRAWING = (
@@ -172,7 +173,7 @@ def _serve(requests: "Connection", theirs: "Connection | None", settings: Callab
     signal.signal(signal.SIGTERM, signal.SIG_DFL)
     if theirs is not None:
         theirs.close()
-    threading.Thread(target=_end_with_parent, daemon=True).start()
+    end_with_parent()
     import jax
 
     jax.config.update("jax_platforms", "cpu")
@@ -197,13 +198,6 @@ def _replies(function: Callable[..., Any], arguments: tuple[Any, ...]) -> Iterat
         error.add_note(traceback.format_exc())
         yield error, None
     yield None
-
-
-def _end_with_parent() -> None:
-    parent = parent_process()
-    assert parent is not None  # this is a started process
-    connection.wait([parent.sentinel])
-    os._exit(1)
 
 
 def load(*modules: str) -> None:

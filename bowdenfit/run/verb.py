@@ -7,6 +7,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any, Literal, Unpack
 from warnings import warn
 
+from bowdenfit.inference.engines.processes import settings_of_process
 from bowdenfit.questions.summary.verb import reply
 from bowdenfit.reading import Reading, read, refuse_unknown
 from bowdenfit.results.folder import CHAIN
@@ -64,7 +65,7 @@ def fit(
     refuse_unknown(fit, reading)
     folder = Path(output) if output is not None else None
     data = with_sampler(read(dataset, **reading), sampler)
-    drawing, settings = figures and folder is not None, _remember_compilations if remember_compilations else _no_settings
+    drawing, settings = figures and folder is not None, settings_of_process(remember_compilations)
     with ExitStack() as held:
         held.enter_context(reserved(folder))
         seed = choose_seed(folder, data, mcmc, seed, resume, force)
@@ -80,20 +81,6 @@ def fit(
             for sentence in write_results(found, folder, figures, helper) if folder is not None else ():
                 report(sentence)
     return found
-
-
-def _remember_compilations() -> None:
-    """Keep compiled programs in the user's cache folder."""
-    import jax
-    from platformdirs import user_cache_dir
-
-    jax.config.update("jax_compilation_cache_dir", user_cache_dir("bowdenfit"))
-    jax.config.update("jax_persistent_cache_min_compile_time_secs", 0.1)
-    jax.config.update("jax_persistent_cache_min_entry_size_bytes", -1)
-
-
-def _no_settings() -> None:
-    """JAX stays as it is."""
 
 
 def _reply(found: "Fit", asked: dict[str, Any]) -> Reply:

@@ -33,6 +33,7 @@ VERBS = (
     "next",
     "export",
     "calibrate",
+    "fleet",
     "plot",
     "report",
     "simulate",

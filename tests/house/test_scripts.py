@@ -19,6 +19,7 @@ REQUIREMENTS = {
     "test": PROJECT["project"]["optional-dependencies"]["test"],
     "docs": PROJECT["project"]["optional-dependencies"]["docs"],
     "lab": PROJECT["project"]["optional-dependencies"]["lab"],
+    "cluster": PROJECT["project"]["optional-dependencies"]["cluster"],
     "build": PROJECT["build-system"]["requires"],
 }
 PINS = [line for line in (ROOT / "constraints.txt").read_text().splitlines() if line and not line.startswith("#")]

@@ -67,9 +67,12 @@ def implausible(real: ForceTable, made: ForceTable) -> str:
 
 def page(table: ForceTable, description: Description) -> Page:
     """Headings and rows of its file."""
+    measured = np.isfinite(table.own.angle).any(axis=0)
+    angles = np.rad2deg(table.own.angle[:, measured])
     rows = [
         [
             *route_cells(table.route[i], description),
+            *("" if np.isnan(angle) else f"{angle:.6g}" for angle in angles[i]),
             table.run_names[table.run[i]],
             STROKE_NAMES[int(table.stroke[i])],
             f"{table.input_force[i]:.3f}",
@@ -77,7 +80,8 @@ def page(table: ForceTable, description: Description) -> Page:
         ]
         for i in range(len(table.run))
     ]
-    return [*route_heading(description), "run", "stroke", "input_force_N", "output_force_N"], rows
+    names = [f"{name}_deg" for name, there in zip(table.own.names, measured, strict=True) if there]
+    return [*route_heading(description), *names, "run", "stroke", "input_force_N", "output_force_N"], rows
 
 
 class ForceDesign(Design):

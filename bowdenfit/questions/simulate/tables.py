@@ -66,7 +66,7 @@ def read_bench(path: Path) -> BenchPlan:
             "input_forces = [20, 40, 60] (in N)."
         )
     truth = truth_of(raw, path.name)
-    cable = {name: value for name, value in raw.items() if name not in {"design", "truth"}}
+    cable = {name: value for name, value in raw.items() if name not in {"design", "fleet", "truth"}}
     description = parse_description(cable, path.name)
     return BenchPlan(text, description, read_design(raw["design"], description, path.name), truth)
 
@@ -116,15 +116,15 @@ def table_texts(description: Description, measured: Measurements) -> dict[str, s
     return texts
 
 
-def description_lines(text: str, command: str, design: str) -> list[str]:
-    """The plan without its opening comment and without the tables of its truth and its design."""
+def description_lines(text: str, command: str, *designs: str) -> list[str]:
+    """The plan without its opening comment and without the tables of its truth and its designs."""
     lines = text.splitlines()
     while lines and lines[0].lstrip().startswith("#"):
         lines = lines[1:]
     kept, skipping = [f"# Written by `{command}`; the truth is in truth.json."], False
     for line in lines:
         if heading := _HEADING.fullmatch(line):
-            skipping = heading[1].split(".")[0].strip("\"' ") in {"truth", design}
+            skipping = heading[1].split(".")[0].strip("\"' ") in {"truth", *designs}
         if not skipping:
             kept.append(line)
     while not kept[-1].strip():

@@ -17,6 +17,7 @@ def simulate(
     seed: Annotated[int | None, Option(least=0, most=LARGEST_SEED, default="drawn, and recorded")] = None,
     noise: Annotated[bool, Option()] = True,
     recordings: Annotated[bool, Option()] = False,
+    fleet: Annotated[bool, Option()] = False,
 ) -> "Dataset":
     """Make a data set from known truth. Only recordings need an `output`; tables without one are not written.
 
@@ -26,19 +27,24 @@ def simulate(
         seed: Seed of everything random.
         noise: Readings that scatter, or exactly as the model expects them.
         recordings: Recordings, sample by sample, as a bench gives them; BENCH has [recordings].
+        fleet: Many cables that wear, inspected again and again; BENCH has [fleet]. Answers with the first inspection.
 
     Raises:
         BowdenfitError: What is wrong, in a sentence.
     """
     import jax
 
-    from bowdenfit.errors import StoreError
+    from bowdenfit.errors import StoreError, UsageError
 
+    if fleet and recordings:
+        raise UsageError("--fleet and --recordings both say what to make; leave one of them out.")
     seed = secrets.randbelow(LARGEST_SEED) if seed is None else seed
     if output is not None and Path(output).exists() and any(p.name != Path(bench).name for p in Path(output).iterdir()):
         raise StoreError(f"{output} exists already; name another folder with --output, nothing was written.")
     if recordings:
         return _simulated_recordings(Path(bench), output, seed, noise)
+    if fleet:
+        return _simulated_fleet(Path(bench), output, seed, noise)
     from bowdenfit.questions.simulate.tables import make, read_bench, write
 
     plan = read_bench(Path(bench))
@@ -67,8 +73,21 @@ def _simulated_recordings(bench: Path, output: str | Path | None, seed: int, noi
     return load_dataset(Path(output))
 
 
+def _simulated_fleet(bench: Path, output: str | Path | None, seed: int, noise: bool) -> "Dataset":
+    import jax
+
+    from bowdenfit.questions.simulate.fleet import read_fleet_plan, simulate_fleet, write_fleet
+
+    plan = read_fleet_plan(bench)
+    with jax.enable_x64(True):
+        made, truth = simulate_fleet(plan, seed, noise)
+    if output is not None:
+        write_fleet(plan, made, truth, Path(output))
+    return made[0].dataset
+
+
 def _reply(_: "Dataset", asked: dict[str, Any]) -> Reply:
-    return Reply(f"Wrote {asked['output']}. Next: bowdenfit fit {asked['output']}\n")
+    return Reply(f"Wrote {asked['output']}. Next: bowdenfit {'fleet' if asked['fleet'] else 'fit'} {asked['output']}\n")
 
 
 VERB = Verb(
@@ -80,7 +99,8 @@ VERB = Verb(
     BENCH is a cable.toml with two more tables: [truth] with the value of each parameter (what is missing is drawn from its
     prior), and [design] with the lengths and forces to measure at; datasets/synthetic-bench/bench.toml is one. With
     --recordings it has [recordings] in place of [design]: what the motor does, what the bench is like, and what its load
-    cells get wrong; datasets/synthetic-recordings/bench.toml is one. The truth and the seed are written beside the tables.
+    cells get wrong; datasets/synthetic-recordings/bench.toml is one. With --fleet it has [fleet] besides: how many cables there
+    are, and how they wear; datasets/synthetic-fleet/bench.toml is one. The truth and the seed are written beside the tables.
     """,
     json="",
 )

@@ -1,0 +1,197 @@
+"""Which data sets one program serves, and how their priors become data of it.
+
+Default priors of quantities with a unit are in proportion to what was measured, so that every data set has priors of its own.
+Here they are those of a unit scale, and the scale is one more array of the data: z, and the density in it, are the same.
+"""
+
+import hashlib
+import re
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, fields, replace
+from functools import lru_cache
+from typing import Any
+
+import jax
+import jax.numpy as jnp
+import numpy as np
+from jax import Array
+
+from bowdenfit.cable.cable import Cable
+from bowdenfit.dataset import DESCRIPTION_FILE, Dataset
+from bowdenfit.inference.log_density import LogDensity
+from bowdenfit.kinds.term import Term
+from bowdenfit.model import Model, build_model
+from bowdenfit.parameters.priors import HalfCauchy, HalfNormal, LogNormal, Normal, Prior
+from bowdenfit.parameters.space import Parameter, ParameterSpace
+
+_ABOUT = {"name", "source", "license", "file", "files"}  # keys of a description that no fit depends on
+_ELSEWHERE = 1.37  # factor on loads and speeds by which it is seen whether a program depends on them
+_OF_TABLE = ("cable", "data", "labels", "rows")  # of a term: what is data, or named in the key by itself
+_ADDRESS = re.compile(r"0x[0-9a-f]+")
+
+
+@dataclass(frozen=True)
+class ScaledDensity(LogDensity):
+    """The posterior of data whose last array has the scales of the priors that are in proportion to measurements."""
+
+    def values(self, z: Array, data: Any) -> dict[str, Array]:
+        """See `LogDensity.values`."""
+        unit = super().values(z, data)
+        return unit | {name: unit[name] * data[-1][i] for i, name in enumerate(_scaled(self.model.space))}
+
+
+@dataclass(frozen=True)
+class Shaped:
+    """A data set as one of many that a program serves.
+
+    Args:
+        posterior: Of unit scale, the same program for all of one key.
+        data: Its own data.
+        key: What the program depends on; the same for all that it serves.
+    """
+
+    posterior: ScaledDensity
+    data: Any
+    key: str
+
+
+def shaped(dataset: Dataset) -> Shaped:
+    """A data set with its scales as data.
+
+    Args:
+        dataset: What was measured.
+    """
+    model = build_model(dataset)
+    units = [_unit(parameter) for parameter in model.space.parameters]
+    space = ParameterSpace(tuple(parameter for parameter, _ in units))
+    scales = np.array([scale for parameter, scale in units if parameter.fixed is None and scale is not None], dtype=float)
+    data = (*LogDensity(model).padded, scales)
+    cable = replace(model.cable, nominal=dict.fromkeys(model.cable.nominal, 1.0)) if _has_angles(model) else model.cable
+    posterior = ScaledDensity(_of(cable, space, model.terms), data)
+    return Shaped(posterior, data, _key(posterior))
+
+
+def _has_angles(model: Model) -> bool:
+    """Whether every row has its own angle wherever else the mean angle of all rows would serve."""
+    nominal = [c.name in model.cable.nominal for c in model.description.contact]
+    return all("is_own" in term.data and np.all(term.data["is_own"][..., nominal]) for term in model.terms)
+
+
+def _of(cable: Cable, space: ParameterSpace, terms: Sequence[Term]) -> Model:
+    """The model of the same terms with another cable."""
+    return Model(cable, space, tuple(replace(term, cable=cable) for term in terms))  # type: ignore[type-var]
+
+
+def _scaled(space: ParameterSpace) -> list[str]:
+    """Parameters whose priors the data scale."""
+    return [p.name for p in space.free if p.scaled_by and _scale(p.prior) is not None]
+
+
+def _unit(parameter: Parameter) -> tuple[Parameter, float | None]:
+    """A parameter with the prior of a unit scale, and the scale; None where it is not scaled by measurements."""
+    scale = _scale(parameter.prior) if parameter.scaled_by else None
+    if scale is None:
+        return parameter, None
+    prior = parameter.prior
+    unit = {field: 1.0 for field in ("scale", "sd", "median") if hasattr(prior, field)}
+    return replace(parameter, prior=replace(prior, **unit), prior_words="", scaled_by="measurements"), scale  # type: ignore[type-var]
+
+
+def _scale(prior: Prior) -> float | None:
+    """The factor between a prior and that of unit scale; None where it is more than a factor."""
+    match prior:
+        case HalfCauchy(scale=scale):
+            return float(scale)
+        case HalfNormal(sd=sd):
+            return float(sd)
+        case Normal(mean=mean, sd=sd) if mean == 0:
+            return float(sd)
+        case LogNormal(median=median):
+            return float(median)
+    return None
+
+
+def _key(posterior: ScaledDensity) -> str:
+    """What its program depends on: shapes, parameters, description, and conditions where they matter."""
+    shapes = jax.tree.map(lambda array: (np.shape(array), str(np.asarray(array).dtype)), posterior.data)
+    terms = [_about(term) for term in posterior.model.terms]
+    said = _said(posterior.model.description.to_json())
+    cable = posterior.model.cable
+    cheap = f"{shapes} {posterior.model.space.parameters} {said} {terms} {dict(cable.nominal)}"
+    matters = _depends(_Lazily(posterior, cheap))
+    return _digest(f"{cheap} {cable.friction.conditions}" if matters else cheap)
+
+
+def input_hash(dataset: Dataset) -> str:
+    """What was measured and how it is described, whatever it is called and wherever it lies.
+
+    Args:
+        dataset: Read from files.
+    """
+    read = [checksum for name, checksum in dataset.sha256.items() if name != DESCRIPTION_FILE]
+    return _digest(f"{_said(dataset.description.to_json())} {read}")
+
+
+def _said(page: Any) -> Any:
+    """A description without what no fit depends on."""
+    if isinstance(page, Mapping):
+        return {key: _said(value) for key, value in page.items() if key not in _ABOUT}
+    return [_said(each) for each in page] if isinstance(page, list | tuple) else page
+
+
+def _about(term: Term) -> str:
+    """What a term is beside its data; arrays by what is in them."""
+    parts = [f"{type(term).__name__} {len(term.labels)}"]
+    for each in fields(term):  # type: ignore[arg-type]
+        if each.name not in _OF_TABLE:
+            leaves, tree = jax.tree.flatten(getattr(term, each.name))
+            parts.append(f"{each.name} {tree} {[_leaf(leaf) for leaf in leaves]}")
+    return " ".join(parts)
+
+
+def _leaf(leaf: Any) -> str:
+    return _digest(leaf.tobytes().hex()) if isinstance(leaf, np.ndarray) else repr(leaf)
+
+
+def _digest(text: str) -> str:
+    return hashlib.sha256(text.encode()).hexdigest()[:32]
+
+
+@dataclass(frozen=True)
+class _Lazily:
+    """A posterior that is looked at once for all of the same cheap key."""
+
+    posterior: ScaledDensity
+
+    cheap: str
+
+    def __hash__(self) -> int:
+        return hash(self.cheap)
+
+    def __eq__(self, other: object) -> bool:
+        return isinstance(other, _Lazily) and self.cheap == other.cheap
+
+
+@lru_cache(maxsize=256)
+def _depends(asked: _Lazily) -> bool:
+    """Whether a program depends on the loads and speeds that were measured at."""
+    model = asked.posterior.model
+    at, friction = model.cable.friction.conditions, model.cable.friction
+    numbers: dict[str, Any] = {
+        each.name: value * _ELSEWHERE
+        for each in fields(at)
+        if isinstance(value := getattr(at, each.name), float) and np.isfinite(value)
+    }
+    elsewhere = replace(at, **numbers, speeds=(at.speeds[0] * _ELSEWHERE, at.speeds[1] * _ELSEWHERE))
+    cable = replace(model.cable, friction=replace(friction, conditions=elsewhere))
+    other = _of(cable, model.space, model.terms)
+    return _program(asked.posterior) != _program(replace(asked.posterior, model=other))
+
+
+def _program(posterior: ScaledDensity) -> str:
+    """The density and the residuals as JAX traces them, with all constants."""
+    z, text = jnp.zeros(posterior.model.space.size), ""
+    for function in (posterior.log_density, posterior.residuals):
+        traced = jax.make_jaxpr(function)(z, posterior.data)
+        text += f"{traced.jaxpr} {[np.asarray(const).tolist() for const in traced.consts]}"
+    return _ADDRESS.sub("", text)

@@ -1,0 +1,139 @@
+"""The engine that is asked for: local, dask://HOST:PORT, slurm, or any executor."""
+
+import os
+from collections.abc import Callable, Iterator
+from concurrent.futures import Executor, ProcessPoolExecutor
+from contextlib import contextmanager
+from functools import partial
+from multiprocessing import get_context
+from pathlib import Path
+from typing import Any
+
+from bowdenfit.errors import UsageError
+from bowdenfit.inference.engines.engine import Engine, EngineError, HereOrInProcesses, in_threads
+from bowdenfit.inference.engines.processes import nothing, start_worker
+from bowdenfit.inputs import refuse_special
+from bowdenfit.words import shown
+
+ENGINES = "local, dask://HOST:PORT or slurm"
+OF_A_JOB = 4096  # data sets of a job of Slurm at the most; each job loads and compiles all over again
+JOBS = 16  # of Slurm at a time, if nothing else is said
+_ANSWERS_WITHIN, _WORKERS_WITHIN = 10, 60  # seconds
+_MINUTES = 240  # of a job of Slurm; SBATCH_TIMELIMIT says otherwise
+
+
+def cores() -> int:
+    """That this process may use."""
+    return len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
+
+
+@contextmanager
+def open_engine(
+    engine: str | Executor,
+    workers: int | None = None,
+    folder: Path | None = None,
+    may_start_processes: bool = False,
+    prepare: Callable[[], None] = nothing,
+) -> Iterator[Engine[Any, Any]]:
+    """An engine, which ends with what is done inside.
+
+    Args:
+        engine: Its name, or an executor of one's own, which is left open.
+        workers: Processes here, or jobs at a time.
+        folder: Where Slurm's jobs write; asked for by that alone.
+        may_start_processes: Whether this program guards its start, as the command line does.
+        prepare: Called first in every process that is started here.
+
+    Raises:
+        UsageError: There is no such engine, or it is not installed.
+        EngineError: It does not answer.
+    """
+    if isinstance(engine, Executor):
+        yield Engine(lambda: engine, workers or cores(), "the executor")
+        return
+    found: Engine[Any, Any]
+    if engine == "local":
+        found = _local((workers or cores()) if may_start_processes else 1, prepare)
+    elif engine.startswith("dask://"):
+        with _dask_client(engine.removeprefix("dask://")) as (client, count):
+            yield Engine(lambda: client.get_executor(pure=False), count, engine)
+        return
+    elif engine == "slurm":
+        if folder is None:
+            raise UsageError("--engine slurm needs a folder that all its nodes see; name it with --output.")
+        found = Engine(partial(slurm, folder, workers or JOBS), workers or JOBS, "slurm", OF_A_JOB)
+    else:
+        raise UsageError(f"there is no engine {shown(engine)}; known here: {ENGINES}.")
+    try:
+        yield found
+    finally:
+        found.close()
+
+
+def _local(workers: int, prepare: Callable[[], None]) -> Engine[Any, Any]:
+    def processes() -> Executor:
+        return ProcessPoolExecutor(workers, get_context("spawn"), start_worker, (prepare,))
+
+    return HereOrInProcesses(processes, workers)
+
+
+@contextmanager
+def _dask_client(address: str) -> Iterator[tuple[Any, int]]:
+    """A client of a Dask cluster that answers, and how many pieces its workers do at once."""
+    try:
+        from distributed import Client
+    except ImportError:
+        raise _not_installed("distributed") from None
+    try:
+        client = Client(f"tcp://{address}", timeout=_ANSWERS_WITHIN, set_as_default=False)
+    except (OSError, ValueError, TypeError) as error:  # a timeout is an OSError
+        raise EngineError(
+            f"the scheduler at {shown(address)} does not answer ({type(error).__name__}); start it with `dask scheduler`, and "
+            "write the address that it prints behind tcp:// as --engine dask://HOST:PORT."
+        ) from None
+    try:
+        try:
+            client.wait_for_workers(1, timeout=_WORKERS_WITHIN)
+        except TimeoutError:
+            raise EngineError(
+                f"the scheduler at {shown(address)} has no worker; start some with `dask worker tcp://{address}`."
+            ) from None
+        yield client, max(sum(client.nthreads().values()), 1)
+    finally:
+        client.close()
+
+
+def slurm(folder: Path, jobs: int, cluster: str = "slurm") -> Executor:
+    """An executor of Slurm's jobs, or of processes here that stand for them.
+
+    Args:
+        folder: Where they write; all nodes must see it.
+        jobs: At a time.
+        cluster: "slurm", or "local" for processes here.
+
+    Raises:
+        UsageError: submitit is not installed, or there is no Slurm here.
+    """
+    try:
+        import submitit
+    except ImportError:
+        raise _not_installed("submitit") from None
+    refuse_special(folder)
+    try:
+        inner = submitit.AutoExecutor(folder.resolve(), cluster=cluster)
+    except RuntimeError:
+        raise UsageError(
+            "there is no Slurm here (no srun and sbatch); run this on a login node of the cluster, or leave --engine out."
+        ) from None
+    inner.update_parameters(timeout_min=_MINUTES, name="bowdenfit")
+
+    def submit(function: Callable[..., Any], *arguments: Any) -> Any:
+        return inner.submit(function, *arguments).result()
+
+    return in_threads(submit, jobs)
+
+
+def _not_installed(library: str) -> UsageError:
+    return UsageError(f"this engine needs {library}, which is not installed; install bowdenfit[cluster].")
+
+

@@ -1,0 +1,172 @@
+"""An engine does many independent pieces of work, and gives back each as it is done.
+
+What a piece gives may depend on itself alone, never on the engine, so that any engine gives the same.
+"""
+
+import time
+import traceback
+from collections.abc import Callable, Iterator, Sequence
+from concurrent.futures import (
+    FIRST_COMPLETED,
+    BrokenExecutor,
+    CancelledError,
+    Executor,
+    Future,
+    ThreadPoolExecutor,
+    wait,
+)
+from dataclasses import dataclass, field
+from typing import Any, Generic, TypeAlias, TypeVar
+
+from bowdenfit.errors import BowdenfitError
+
+Work = TypeVar("Work")
+Result = TypeVar("Result")
+Outcome: TypeAlias = tuple[Exception | None, Any]
+_AHEAD = 2  # pieces that a worker is given at once, so that it need not wait for the next
+_TIMES = 3  # that a piece is tried when workers die of it
+_WORTH_PROCESSES = 5.0  # compilations that the work must last for each process, before more processes pay
+
+
+class EngineError(BowdenfitError):
+    """Workers died, or a cluster cannot be reached, though the request was good."""
+
+
+@dataclass
+class Engine(Generic[Work, Result]):
+    """An executor, and how it is used.
+
+    Args:
+        executor: Makes the executor; called again when it is broken.
+        workers: How many pieces are done at a time.
+        name: In words.
+        most: Data sets of a piece; few, so that little is lost when it is interrupted, or many where starting costs much.
+        begun: The executor in use.
+    """
+
+    executor: Callable[[], Executor]
+    workers: int
+    name: str
+    most: int = 128
+    begun: Executor | None = field(default=None, init=False)
+
+    def results(self, function: Callable[[Work], Result], pieces: Sequence[Work]) -> Iterator[Result]:
+        """What a function gives of every piece, in the order in which they are done.
+
+        Args:
+            function: Of one piece; known to workers by its name.
+            pieces: The work.
+
+        Raises:
+            BowdenfitError: What the function refuses.
+            EngineError: Workers die of the same piece again and again, or are lost.
+        """
+        left = [(piece, 1) for piece in reversed(pieces)]
+        running: dict[Future[Outcome], tuple[Work, int]] = {}
+        try:
+            while left or running:
+                while left and len(running) < _AHEAD * self.workers:
+                    running[self._submit(function, left[-1][0])] = left[-1]
+                    left.pop()
+                done, _ = wait(running, return_when=FIRST_COMPLETED)
+                for future in done:
+                    piece, tried = running.pop(future)
+                    try:
+                        refused, result = future.result()
+                    except (Exception, CancelledError) as error:  # of the engine: what the function raises is in the outcome
+                        left.append((piece, self._counted(tried, error)))
+                        continue
+                    if refused is not None:
+                        raise refused
+                    yield result
+        finally:
+            for future in running:
+                future.cancel()
+
+    def _submit(self, function: Callable[[Work], Result], piece: Work) -> "Future[Outcome]":
+        if self.begun is None:
+            self.begun = self.executor()
+        try:
+            return self.begun.submit(attempt, function, piece)
+        except BrokenExecutor:
+            self.close()
+            self.begun = self.executor()
+            return self.begun.submit(attempt, function, piece)
+
+    def _counted(self, tried: int, error: Exception) -> int:
+        """How often a piece will have been tried, if it may be tried again."""
+        why = " ".join(f"{type(error).__name__}: {error}".split())[:300]
+        if isinstance(error, ImportError | AttributeError):
+            raise EngineError(
+                f"a worker of {self.name} cannot load what it is to do ({why}); install the same bowdenfit there as here."
+            ) from None
+        if tried >= _TIMES:
+            raise EngineError(
+                f"workers of {self.name} were lost {tried} times at the same work ({why}); the usual cause is too little "
+                "memory: give each worker more, or have fewer of them."
+            ) from None
+        return tried + 1
+
+    def close(self) -> None:
+        """End what was begun."""
+        if self.begun is not None:
+            self.begun.shutdown(wait=False, cancel_futures=True)
+            self.begun = None
+
+
+def attempt(function: Callable[[Any], Any], piece: Any) -> Outcome:
+    """What a function gives, or what it raises, so that no engine can take it for a fault of its own.
+
+    Args:
+        function: Of one piece.
+        piece: The work.
+    """
+    try:
+        return None, function(piece)
+    except Exception as error:
+        error.add_note(traceback.format_exc())
+        return error, None
+
+
+class HereOrInProcesses(Engine[Work, Result]):
+    """One process, until it is seen that more of them are quicker.
+
+    Every new process loads and compiles all over again, so that the work must last for some compilations of each. The first
+    piece compiles, the second shows what one takes without.
+
+    Args:
+        executor: Makes the executor of several processes.
+        workers: How many; 1 if none may be started.
+    """
+
+    def __init__(self, executor: Callable[[], Executor], workers: int) -> None:
+        super().__init__(executor, workers, "this machine")
+
+    def results(self, function: Callable[[Work], Result], pieces: Sequence[Work]) -> Iterator[Result]:
+        """See `Engine`."""
+        seconds = list[float]()
+        for number, piece in enumerate(pieces):
+            if self.workers > 1 and len(seconds) == 2:
+                compiling, each = max(seconds[0] - seconds[1], 0.0), seconds[1]
+                if each * (len(pieces) - number) > _WORTH_PROCESSES * compiling * self.workers:
+                    yield from super().results(function, pieces[number:])
+                    return
+            begin = time.perf_counter()
+            result = function(piece)
+            seconds.append(time.perf_counter() - begin)
+            yield result
+
+
+def in_threads(submit: Callable[..., Any], most: int) -> Executor:
+    """An executor of something that waits for its own answer.
+
+    Args:
+        submit: Does a piece somewhere else, and waits.
+        most: Pieces at once.
+    """
+
+    class Waiting(ThreadPoolExecutor):
+        def submit(self, function: Callable[..., Any], /, *arguments: Any, **named: Any) -> "Future[Any]":
+            return super().submit(submit, function, *arguments, **named)
+
+    return Waiting(most)

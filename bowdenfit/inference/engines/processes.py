@@ -1,0 +1,54 @@
+"""Processes that are started here: they end with the one that started them, and leave interrupts to it."""
+
+import os
+import signal
+import threading
+from collections.abc import Callable
+
+
+def start_worker(prepare: Callable[[], None]) -> None:
+    """What a new process does first.
+
+    Args:
+        prepare: Called when it has been made sure that the process ends.
+    """
+    signal.signal(signal.SIGINT, signal.SIG_IGN)
+    signal.signal(signal.SIGTERM, signal.SIG_DFL)
+    end_with_parent()
+    prepare()
+
+
+def end_with_parent() -> None:
+    """Let this process end as soon as the one that started it has ended, however that was."""
+    from multiprocessing import connection, parent_process
+
+    def wait() -> None:
+        parent = parent_process()
+        assert parent is not None  # this is a started process
+        connection.wait([parent.sentinel])
+        os._exit(1)
+
+    threading.Thread(target=wait, daemon=True).start()
+
+
+def settings_of_process(remember: bool) -> Callable[[], None]:
+    """What a process that computes does first.
+
+    Args:
+        remember: Whether JAX may keep compiled programs in the user's cache folder.
+    """
+    return remember_compilations if remember else nothing
+
+
+def remember_compilations() -> None:
+    """Keep compiled programs in the user's cache folder."""
+    import jax
+    from platformdirs import user_cache_dir
+
+    jax.config.update("jax_compilation_cache_dir", user_cache_dir("bowdenfit"))
+    jax.config.update("jax_persistent_cache_min_compile_time_secs", 0.1)
+    jax.config.update("jax_persistent_cache_min_entry_size_bytes", -1)
+
+
+def nothing() -> None:
+    """What is done first where nothing is."""

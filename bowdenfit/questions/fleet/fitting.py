@@ -1,0 +1,143 @@
+"""From the data sets of a fleet to its draws and its answer: pieces of work by shape, and what they give in order."""
+
+import json
+import math
+from collections.abc import Mapping, Sequence
+from dataclasses import fields
+from typing import Any
+
+import numpy as np
+
+from bowdenfit.description import SamplerSettings
+from bowdenfit.inference.batch.pieces import Example, Piece, PieceFit
+from bowdenfit.inference.batch.programs import CHUNK, BatchSettings
+from bowdenfit.inference.draws import derived_units
+from bowdenfit.inference.interval import Interval
+from bowdenfit.inference.versions import versions
+from bowdenfit.model import Model, build_model
+from bowdenfit.questions.fleet.answer import Broken, Fitted, Fleet
+from bowdenfit.questions.fleet.cases import Case
+from bowdenfit.questions.fleet.store import SEPARATOR
+from bowdenfit.results.fleet_folder import FleetDraws
+from bowdenfit.words import counted
+
+# Standard deviations to a twentieth: a tenth is then hardly ever exceeded by more than half as much.
+SETTINGS = BatchSettings(
+    SamplerSettings(n_ensembles=2, n_walkers=64, max_steps=20_000, target_ess=400, target_r_hat=1.03), target_sd_error=0.05
+)
+_SMALLEST, _LARGEST = CHUNK, 8 * CHUNK  # data sets of a piece; what is lost when a fleet is interrupted
+
+
+def pieces_of(cases: Sequence[Case], seed: int, settings: BatchSettings, workers: int, most: int = _LARGEST) -> list[Piece]:
+    """The work, by shape; how it is cut decides nothing of what comes of a data set.
+
+    Args:
+        cases: What is to be fitted.
+        seed: Of the fleet.
+        settings: How carefully.
+        workers: At a time.
+        most: Data sets of a piece.
+    """
+    found = list[Piece]()
+    for key, members in _by_shape(cases).items():
+        each = -(-len(members) // (4 * workers))  # so that all workers end at about the same time
+        size = min(max(-(-each // CHUNK) * CHUNK, _SMALLEST), most)
+        example = Example(key, members[0].dataset)
+        for part in (members[i : i + size] for i in range(0, len(members), size)):
+            names, data = tuple(case.hash for case in part), tuple(case.shaped.data for case in part)
+            found.append(Piece(example, settings, names, data, tuple(case.seed(seed) for case in part), versions()))
+    return found
+
+
+def _by_shape(cases: Sequence[Case]) -> dict[str, list[Case]]:
+    shapes: dict[str, list[Case]] = {}
+    for case in cases:
+        shapes.setdefault(case.shaped.key, []).append(case)
+    return shapes
+
+
+def quantities_of(model: Model) -> dict[str, dict[str, str]]:
+    """What a fit draws, in order: of each quantity unit, symbol, meaning, role and prior.
+
+    Args:
+        model: What was fitted.
+    """
+    found: dict[str, dict[str, str]] = {}
+    for p in model.space.free:
+        numbers = {f.name: getattr(p.prior, f.name) for f in fields(p.prior)}  # type: ignore[arg-type]
+        prior = json.dumps({"kind": type(p.prior).__name__, **numbers})
+        found[p.name] = {"units": p.unit, "symbol": p.symbol, "long_name": p.meaning, "role": p.role}
+        if not p.scaled_by:  # else each data set has its own
+            found[p.name]["prior"] = prior
+    derived = {name: {"units": unit, "symbol": symbol} for name, (unit, symbol) in derived_units(model).items()}
+    return found | derived
+
+
+def gathered(
+    name: str, cases: Sequence[Case], fits: Mapping[str, PieceFit], broken: Sequence[Broken], seed: int
+) -> tuple[Fleet, FleetDraws | None]:
+    """The answer, and the draws of all that could be fitted; None where nothing could be.
+
+    Args:
+        name: Of the fleet.
+        cases: What was fitted, in the order of cables and cycles.
+        fits: What came of each, by the hash of its input.
+        broken: What could not be read.
+        seed: Of the fleet.
+    """
+    shapes = _by_shape(cases)
+    quantities = {key: quantities_of(build_model(members[0].dataset)) for key, members in shapes.items()}
+    drawn = [case for case in cases if len(fits[case.hash].values)]
+    failed = [Broken(c.inspection.label, fits[c.hash].reasons[0]) for c in cases if not len(fits[c.hash].values)]
+    numbers = {key: i for i, key in enumerate(shapes, start=1)}
+    fitted = tuple(_fitted(case, fits[case.hash], quantities[case.shaped.key], numbers[case.shaped.key]) for case in drawn)
+    every: dict[str, dict[str, str]] = {}
+    for of_shape in quantities.values():
+        every |= {quantity: about for quantity, about in of_shape.items() if quantity not in every}
+    units = {quantity: about["units"] for quantity, about in every.items()}
+    words = tuple(_in_words(number, members) for number, members in zip(numbers.values(), shapes.values(), strict=True))
+    answer = Fleet(name, fitted, (*broken, *failed), units, words, seed, dict(versions()))
+    return answer, _draws(answer, drawn, fits, quantities, every) if drawn else None
+
+
+def _in_words(number: int, members: Sequence[Case]) -> str:
+    cables = list(dict.fromkeys(case.inspection.cable for case in members))
+    return f"model {number} for {counted(len(members), 'inspection')} ({cables[0]}{' and others' if len(cables) > 1 else ''})"
+
+
+def _fitted(case: Case, fit: PieceFit, quantities: Mapping[str, Any], shape: int) -> Fitted:
+    at, lubricated = case.inspection, case.inspection.lubricated
+    intervals = {name: Interval.of(draws) for name, draws in zip(quantities, fit.values, strict=True)}
+    flag = None if math.isnan(lubricated) else bool(lubricated)
+    numbers = fit.engine, fit.pareto_k, fit.n_effective, fit.reasons
+    return Fitted(at.label, at.cable, at.cycles, at.temperature, flag, shape, *numbers, intervals)
+
+
+def _draws(
+    answer: Fleet,
+    cases: Sequence[Case],
+    fits: Mapping[str, PieceFit],
+    quantities: Mapping[str, Mapping[str, Any]],
+    every: Mapping[str, Mapping[str, str]],
+) -> FleetDraws:
+    """All draws in one; NaN where a data set has no such quantity."""
+    of_case = [dict(zip(quantities[c.shaped.key], fits[c.hash].values, strict=True)) for c in cases]
+    count = fits[cases[0].hash].values.shape[1]
+    missing = np.full(count, np.nan)
+    values = {name: np.stack([own.get(name, missing) for own in of_case]) for name in every}
+    mine = [fits[c.hash] for c in cases]
+    texts = {
+        "engine": [fit.engine for fit in mine],
+        "reasons": [SEPARATOR.join(fit.reasons) for fit in mine],
+        "shape": [case.shaped.key for case in cases],
+        "input": [case.hash for case in cases],
+    }
+    stats: dict[str, np.ndarray] = {name: np.array(column, dtype=object) for name, column in texts.items()}
+    stats |= {name: np.array([getattr(fit, name) for fit in mine]) for name in ("pareto_k", "n_effective")}
+    stats["trusted"] = np.array([not fit.reasons for fit in mine])
+    names = "cycles", "temperature", "lubricated"
+    cycles, temperature, lubricated = (np.array([getattr(c.inspection, n) for c in cases]) for n in names)
+    labels, cables = (tuple(getattr(c.inspection, n) for c in cases) for n in ("label", "cable"))
+    about: dict[str, Any] = {"name": answer.name, "seed": answer.seed, "versions": answer.versions}
+    about["quantities"] = {key: list(of_shape) for key, of_shape in quantities.items()}
+    return FleetDraws(labels, cables, cycles, temperature, lubricated, values, stats, every, about)

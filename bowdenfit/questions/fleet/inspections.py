@@ -1,0 +1,195 @@
+"""Which cables a fleet has and when each was inspected: by fleet.csv, or by the names of folders."""
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass
+from pathlib import Path
+
+from bowdenfit.dataset import DESCRIPTION_FILE
+from bowdenfit.errors import DatasetError, UsageError
+from bowdenfit.files.cells import Cell
+from bowdenfit.files.columns import Column, Quantity, find_columns, require
+from bowdenfit.files.csv_table import RawTable
+from bowdenfit.files.tables import read_table
+from bowdenfit.inputs import refuse_special
+from bowdenfit.results.fleet_folder import COLUMNS, FLEET_TABLE
+from bowdenfit.words import few, shown
+
+_TEMPERATURES = {"temperature_degC": 0.0, "temperature_C": 0.0, "temperature_K": -273.15}  # what each adds to be in °C
+_COLDEST, _HOTTEST = -100.0, 400.0  # degC
+_YES, _NO = {"yes", "y", "true", "1"}, {"no", "n", "false", "0"}
+UNKNOWN = math.nan
+
+
+@dataclass(frozen=True)
+class Inspection:
+    """One inspection of one cable.
+
+    Args:
+        cable: Name of the cable.
+        cycles: That it had made; NaN where nobody says.
+        temperature: [°C]; NaN where nobody says.
+        lubricated: 1 if it was, 0 if not; NaN where nobody says.
+        place: Folder with a cable.toml, or a table that the description of the fleet holds for.
+    """
+
+    cable: str
+    cycles: float
+    temperature: float
+    lubricated: float
+    place: Path
+
+    @property
+    def label(self) -> str:
+        """The cable, and after how many cycles."""
+        return self.cable if math.isnan(self.cycles) else f"{self.cable} after {self.cycles:.15g} cycles"
+
+
+def read_inspections(folder: Path) -> list[Inspection]:
+    """All inspections in a folder, in the order of cables and cycles.
+
+    Args:
+        folder: With fleet.csv, or with a folder for each cable; in that either its cable.toml, or one folder for each
+            inspection that is called by the number of cycles.
+
+    Raises:
+        DatasetError: There are none; or a cable stands there twice with the same cycles, or inspections in fleet.csv run
+            backwards.
+        UsageError: There is no such folder.
+    """
+    refuse_special(folder)
+    if not folder.is_dir():
+        raise UsageError(f"{folder} is no folder; name the one with {FLEET_TABLE}, or with a folder for each cable.")
+    table = folder / FLEET_TABLE
+    found = _of_table(table) if table.exists() else _of_folders(folder)
+    names = {cable: i for i, cable in enumerate(sorted({each.cable for each in found}))}
+    return sorted(found, key=lambda each: (names[each.cable], -1.0 if math.isnan(each.cycles) else each.cycles))
+
+
+def _of_folders(folder: Path) -> list[Inspection]:
+    """Inspections by the names of folders."""
+    found = list[Inspection]()
+    for cable in sorted(path for path in folder.iterdir() if path.is_dir()):
+        if (cable / DESCRIPTION_FILE).is_file():
+            found.append(Inspection(cable.name, UNKNOWN, UNKNOWN, UNKNOWN, cable))
+            continue
+        of_cable = sorted(path for path in cable.iterdir() if (path / DESCRIPTION_FILE).is_file())
+        found += [Inspection(cable.name, _cycles_of(each), UNKNOWN, UNKNOWN, each) for each in of_cable]
+    if not found:
+        raise DatasetError(
+            f"{folder} holds no fleet: write {FLEET_TABLE} with the columns {', '.join(COLUMNS)}, or a folder with "
+            f"{DESCRIPTION_FILE} and tables for each cable."
+        )
+    _refuse_twice([(each, str(each.place)) for each in found])
+    return found
+
+
+def _cycles_of(place: Path) -> float:
+    try:
+        cycles = float(place.name)
+    except ValueError:
+        cycles = UNKNOWN
+    if not (math.isfinite(cycles) and cycles >= 0):
+        raise DatasetError(
+            f"{place} is no number of cycles, which the folder of an inspection is called by, such as "
+            f"{place.parent.name}/25000; rename it, or write {FLEET_TABLE}."
+        )
+    return cycles
+
+
+def _of_table(path: Path) -> list[Inspection]:
+    """Inspections by fleet.csv."""
+    table = read_table(path)
+    texts = ("cable", "file", "lubricated", *_TEMPERATURES)
+    found = find_columns(table, (*(Quantity(name, "text") for name in texts), Quantity("cycles", "ratio")))
+    cables = [cell.text.strip() for cell in require(table, found, "cable", "cable").each(_filled, _blank(table))]
+    files = [cell.text.strip() for cell in require(table, found, "file", "file").each(_filled, _blank(table))]
+    none = [UNKNOWN] * len(table.rows)
+    cycles = found["cycles"].each(_cycles, UNKNOWN) if "cycles" in found else none
+    lubricated = found["lubricated"].each(_flag, UNKNOWN) if "lubricated" in found else none
+    temperature = _temperatures(table, found) or none
+    table.faults.refuse()
+    rows = [row[0].row for row in table.rows]
+    places = [path.parent / file for file in files]
+    inspections = list(map(Inspection, cables, cycles, temperature, lubricated, places))
+    numbered = list(zip(inspections, [f"{path.name}, row {row}" for row in rows], strict=True))
+    _refuse_twice(numbered)
+    _refuse_backwards(numbered)
+    if not inspections:
+        raise DatasetError(f"{path.name} has no row; write one for each inspection.")
+    return inspections
+
+
+def _blank(table: RawTable) -> Cell:
+    return Cell(table.file, table.header_row, "", "")
+
+
+def _filled(cell: Cell) -> Cell:
+    if cell.blank or "\0" in cell.text:
+        raise cell.refuse("the cell is blank; every inspection has a cable and a file.")
+    return cell
+
+
+def _cycles(cell: Cell) -> float:
+    value = UNKNOWN if cell.blank else cell.number()
+    if value < 0:
+        raise cell.refuse(f"{cell.shown} cycles cannot be; write how many the cable had made, 0 when it was new.")
+    return value
+
+
+def _flag(cell: Cell) -> float:
+    said = cell.text.strip().lower()
+    if cell.blank or said in _YES | _NO:
+        return UNKNOWN if cell.blank else float(said in _YES)
+    raise cell.refuse(f"{cell.shown} does not say whether the cable was lubricated; write yes or no.")
+
+
+def _temperatures(table: RawTable, found: dict[str, Column]) -> list[float]:
+    """Temperatures [°C]; empty without a column."""
+    there = [name for name in _TEMPERATURES if name in found]
+    bare = [heading for heading in table.header if heading.strip().lower() in {"temperature", "temp"}]
+    if bare or len(there) > 1:
+        named = ", ".join(map(shown, bare or there))
+        raise DatasetError(
+            f"{table.file}: {named} must be one column that says its unit; call it temperature_degC or temperature_K."
+        )
+
+    def read(cell: Cell) -> float:
+        value = UNKNOWN if cell.blank else cell.number() + _TEMPERATURES[there[0]]
+        if value < _COLDEST or value > _HOTTEST:
+            raise cell.refuse(f"{cell.shown} is no temperature at which a cable is inspected; correct it, or its unit.")
+        return value
+
+    return found[there[0]].each(read, UNKNOWN) if there else []
+
+
+def _refuse_twice(numbered: Sequence[tuple[Inspection, str]]) -> None:
+    """A cable cannot be inspected twice after the same cycles: one would count as two."""
+    before: dict[str, str] = {}
+    for each, where in numbered:
+        if each.label in before:
+            missing = "" if math.isfinite(each.cycles) else " without a number of cycles"
+            raise DatasetError(
+                f"{each.label} stands twice{missing}: {before[each.label]} and {where}. The usual cause is a row that was "
+                "copied; delete one, correct the cycles, or put the readings of both into one table."
+            )
+        before[each.label] = where
+
+
+def _refuse_backwards(numbered: Sequence[tuple[Inspection, str]]) -> None:
+    """Inspections of a cable stand in the order in which they were made, so that cycles that fall are a mistake."""
+    last: dict[str, tuple[float, str]] = {}
+    wrong = list[str]()
+    for each, where in numbered:
+        before, place = last.get(each.cable, (-1.0, ""))
+        if each.cycles < before:
+            wrong.append(f"{where} ({each.cable}: {each.cycles:.15g} after {before:.15g} in {place.split(', ')[-1]})")
+        if not math.isnan(each.cycles):
+            last[each.cable] = each.cycles, where
+    if wrong:
+        raise DatasetError(
+            f"cycles run backwards: {few(wrong)}. The usual cause is a wrong number, or a counter that was set to 0; write the "
+            "cycles that the cable had made in all, and the rows of a cable in the order of its inspections."
+        )
+
+

@@ -1,0 +1,139 @@
+"""The results folder of a fleet: what is fitted is kept as soon as it is there, each piece in a file of its own."""
+
+import hashlib
+import json
+import shutil
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from bowdenfit.errors import StoreError
+from bowdenfit.inference.batch.pieces import PieceFit
+from bowdenfit.results.arrays import read_arrays, write_arrays
+from bowdenfit.results.fleet_folder import FLEET_DRAWS, FLEET_PAGE, read_fleet_draws
+from bowdenfit.results.folder import SUMMARY_TEXT, folder_to_write, read_page, write_text
+
+KEPT, BEGUN, JOBS = "kept", "begun.json", "jobs"  # folder of pieces, what they were made for, and what Slurm writes
+_FITS = "fits"
+_WHAT = {"seed": "the seed", "versions": "a version of bowdenfit or of a library"}
+SEPARATOR = "\n"  # between reasons in fleet.nc
+
+
+@dataclass(frozen=True)
+class FleetStore:
+    """A results folder.
+
+    Args:
+        folder: The folder.
+        begun: What must not change between an interrupted fleet and its continuation.
+    """
+
+    folder: Path
+    begun: Mapping[str, Any]
+
+    def open(self, resume: bool, force: bool) -> dict[str, PieceFit]:
+        """What was fitted before, by the hash of its input, in a folder that is ready for more.
+
+        Args:
+            resume: Whether to go on with what is there.
+            force: Whether to replace it.
+
+        Raises:
+            StoreError: The folder holds something else, or what it holds was made otherwise.
+        """
+        finished, kept = self.folder / FLEET_PAGE, self.folder / KEPT
+        if resume:
+            self._refuse_changed()
+            before = self._of_finished() if finished.exists() else {}
+            return before | self._of_pieces()
+        if (finished.exists() or kept.exists()) and not force:
+            raise StoreError(f"{self.folder} holds a fleet already; go on with --resume, or start over with --force.")
+        if self.folder.exists() and not (finished.exists() or kept.exists()) and any(self.folder.iterdir()):
+            raise StoreError(f"{self.folder} exists and holds no fleet; name another with --output.")
+        with folder_to_write(self.folder):
+            for name in (FLEET_PAGE, FLEET_DRAWS, SUMMARY_TEXT):
+                (self.folder / name).unlink(missing_ok=True)
+            self._remove_pieces()
+            self._begin()
+        return {}
+
+    def _begin(self) -> None:
+        (self.folder / KEPT).mkdir(parents=True, exist_ok=True)
+        write_text(self.folder / KEPT / BEGUN, json.dumps(dict(self.begun), indent=1) + "\n")
+
+    def _refuse_changed(self) -> None:
+        before = begun_before(self.folder)
+        changed = [name for name in _WHAT if before.get(name) != json.loads(json.dumps(self.begun[name]))]
+        if changed:
+            raise StoreError(
+                f"{self.folder} cannot be resumed because {_WHAT[changed[0]]} changed since; undo the change, or start over "
+                "with --force."
+            )
+        with folder_to_write(self.folder):
+            self._begin()
+
+    def _of_finished(self) -> dict[str, PieceFit]:
+        """What a finished fleet has."""
+        drawn, found = read_fleet_draws(self.folder), dict[str, PieceFit]()
+        quantities: dict[str, list[str]] = drawn.about["quantities"]
+        stats = {name: [_text(each) for each in values] for name, values in drawn.stats.items()}
+        for i, name in enumerate(stats["input"]):
+            own = quantities[stats["shape"][i]]
+            values = [drawn.values[each][i] for each in own]
+            reasons = tuple(stats["reasons"][i].split(SEPARATOR)) if stats["reasons"][i] else ()
+            k, worth = (float(drawn.stats[each][i]) for each in ("pareto_k", "n_effective"))
+            found[name] = PieceFit(name, np.stack(values), stats["engine"][i], k, worth, reasons)
+        return found
+
+    def _of_pieces(self) -> dict[str, PieceFit]:
+        """What an interrupted fleet kept; a piece that is damaged is fitted again."""
+        found: dict[str, PieceFit] = {}
+        for path in sorted((self.folder / KEPT).glob("*.npz")):
+            try:
+                fits: Sequence[PieceFit] = read_arrays(path, {_FITS: tuple[PieceFit, ...]})[_FITS]
+            except (OSError, ValueError, KeyError, TypeError, LookupError):
+                path.unlink(missing_ok=True)
+                continue
+            found |= {fit.name: fit for fit in fits}
+        return found
+
+    def keep(self, fits: Sequence[PieceFit]) -> None:
+        """Keep what came of a piece; it is there whole, or not at all.
+
+        Args:
+            fits: What came of it.
+        """
+        name = hashlib.sha256(" ".join(fit.name for fit in fits).encode()).hexdigest()[:16]
+        with folder_to_write(self.folder / KEPT) as kept:
+            write_arrays(kept / f"{name}.npz", {_FITS: tuple(fits)})
+
+    def finish(self) -> None:
+        """Remove pieces, once fleet.nc holds them."""
+        self._remove_pieces()
+
+    def _remove_pieces(self) -> None:
+        for name in (KEPT, JOBS):
+            if (self.folder / name).is_dir():
+                shutil.rmtree(self.folder / name, ignore_errors=True)
+
+
+def begun_before(folder: Path) -> dict[str, Any]:
+    """What the fleet in a folder was begun with.
+
+    Raises:
+        StoreError: There is none, or it is damaged.
+    """
+    for path in (folder / KEPT / BEGUN, folder / FLEET_PAGE):
+        if path.exists():
+            page = read_page(path)
+            if isinstance(page, dict) and isinstance(page.get("seed"), int):
+                return page
+            raise StoreError(f"{path} is damaged; start over with --force.")
+    raise StoreError(f"{folder} holds no fleet to resume; leave --resume out.")
+
+
+def _text(value: Any) -> str:
+    return value.decode() if isinstance(value, bytes) else str(value)

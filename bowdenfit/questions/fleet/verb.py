@@ -1,0 +1,192 @@
+"""Fitting many cables at once, each kept as soon as it is done."""
+
+import json
+import secrets
+import time
+from collections.abc import Callable
+from concurrent.futures import Executor
+from datetime import timedelta
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Any, Unpack
+
+from bowdenfit.inference.engines.processes import settings_of_process
+from bowdenfit.reading import Reading, refuse_unknown
+from bowdenfit.verb import LARGEST_SEED, Argument, Option, Output, Reply, Verb, Watch
+
+if TYPE_CHECKING:
+    from bowdenfit.inference.batch.pieces import PieceFit
+    from bowdenfit.inference.engines.engine import Engine
+    from bowdenfit.questions.fleet.answer import Broken, Fleet
+    from bowdenfit.questions.fleet.cases import Case
+    from bowdenfit.questions.fleet.inspections import Inspection
+    from bowdenfit.questions.fleet.store import FleetStore
+    from bowdenfit.results.fleet_folder import FleetDraws
+
+NOT_TRUSTED = 3
+Report = Callable[[int, int, float], None]
+
+
+def fleet(
+    folder: Annotated["str | Path", Argument("FOLDER")],
+    *,
+    output: Annotated[Output, Option(("-o",), default="fits/NAME OF FOLDER")] = None,
+    engine: Annotated["str | Executor", Option(metavar="ENGINE")] = "local",
+    workers: Annotated[int | None, Option(("-j",), least=1, default="all cores; 16 jobs of Slurm")] = None,
+    seed: Annotated[int | None, Option(least=0, most=LARGEST_SEED, default="drawn, and recorded")] = None,
+    resume: Annotated[bool, Option()] = False,
+    force: Annotated[bool, Option()] = False,
+    in_background: bool = False,
+    remember_compilations: bool = False,
+    progress: Report | None = None,
+    **reading: Unpack[Reading],
+) -> "Fleet":
+    """Fit every inspection of every cable by itself, many in one program; nothing depends on engine, workers or order.
+
+    Args:
+        folder: With fleet.csv (cable, cycles, temperature_degC, lubricated, file) and fleet.toml, which describes the cables
+            as a cable.toml does; or with a folder for each cable, or for each cable and in it for each number of cycles, that
+            has its own cable.toml.
+        output: Results folder.
+        engine: Who works: local (this process, or more of them where that is quicker), dask://HOST:PORT or slurm; in a program
+            any `concurrent.futures.Executor`.
+        workers: Processes here, or jobs at a time.
+        seed: Seed of everything random.
+        resume: Go on with an interrupted fleet, or add cables and inspections.
+        force: Replace an earlier fleet in the results folder.
+        in_background: Start other processes where that is quicker; programs then begin with `if __name__ == "__main__"`.
+        remember_compilations: Whether JAX may keep compiled programs in the user's cache folder; a setting of the process.
+        progress: Called after every piece of work with inspections done, of how many, and seconds so far.
+        reading: Keywords of `bowdenfit.read`.
+
+    Raises:
+        BowdenfitError: What is wrong, in a sentence; broken inspections are named in the answer, and the rest goes on.
+    """
+    from bowdenfit.notebook import watched
+    from bowdenfit.questions.fleet.inspections import read_inspections
+    from bowdenfit.results.folder import reserved
+
+    refuse_unknown(fleet, reading)
+    place, prepare = Path(output) if output is not None else None, settings_of_process(remember_compilations)
+    inspections = read_inspections(Path(folder))
+    with reserved(place), watched(WATCH, progress) as show:
+        import jax
+
+        from bowdenfit.inference.engines.choice import open_engine
+        from bowdenfit.questions.fleet.fitting import gathered
+        from bowdenfit.questions.fleet.store import JOBS
+
+        store, seed = _store(place, seed, resume)
+        prepare()
+        with jax.enable_x64(True):
+            cases, broken = _read(Path(folder), inspections, reading)
+            fits = store.open(resume, force) if store else {}
+            with open_engine(engine, workers, place and place / JOBS, in_background, prepare) as opened:
+                _fit(opened, cases, seed, store, fits, show)
+            answer, drawn = gathered(Path(folder).resolve().name, cases, fits, broken, seed)
+        if store is not None:
+            _write(answer, drawn, store)
+    return answer
+
+
+def _read(folder: Path, inspections: "list[Inspection]", reading: Reading) -> "tuple[list[Case], list[Broken]]":
+    """What can be fitted, and what is broken."""
+    from bowdenfit.questions.fleet.answer import Broken
+    from bowdenfit.questions.fleet.cases import read_cases, refuse_where_none
+
+    found = list(read_cases(folder, inspections, reading))
+    broken = [each for each in found if isinstance(each, Broken)]
+    cases = [each for each in found if not isinstance(each, Broken)]
+    refuse_where_none(cases, broken)
+    return cases, broken
+
+
+def _store(place: Path | None, seed: int | None, resume: bool) -> "tuple[FleetStore | None, int]":
+    """The results folder, and the seed: as stated, else that of the fleet to go on with, else a new one."""
+    from bowdenfit.errors import UsageError
+    from bowdenfit.inference.versions import versions
+    from bowdenfit.questions.fleet.store import FleetStore, begun_before
+
+    if resume and place is None:
+        raise UsageError("--resume needs the results folder of a fleet; name it with --output.")
+    if seed is None:
+        seed = int(begun_before(place)["seed"]) if resume and place is not None else secrets.randbelow(LARGEST_SEED)
+    return (None if place is None else FleetStore(place, {"seed": seed, "versions": versions()})), seed
+
+
+def _fit(
+    opened: "Engine[Any, list[PieceFit]]",
+    cases: "list[Case]",
+    seed: int,
+    store: "FleetStore | None",
+    fits: "dict[str, PieceFit]",
+    report: Report | None,
+) -> None:
+    """Fit what is left, and keep each piece as it ends."""
+    from bowdenfit.inference.batch.pieces import fit_piece
+    from bowdenfit.questions.fleet.fitting import SETTINGS, pieces_of
+
+    todo = [case for case in cases if case.hash not in fits]
+    begin, before, total = time.monotonic(), len(cases) - len(todo), len(cases)
+    done = before
+    pieces = pieces_of(todo, seed, SETTINGS, opened.workers, opened.most)
+    for piece_fits in opened.results(fit_piece, pieces):
+        if store is not None:
+            store.keep(piece_fits)
+        fits |= {fit.name: fit for fit in piece_fits}
+        done += len(piece_fits)
+        if report is not None:
+            report(done, total, (time.monotonic() - begin) / (done - before))
+
+
+def _write(answer: "Fleet", drawn: "FleetDraws | None", store: "FleetStore") -> None:
+    """The draws, the summary and, last, fleet.json; then what was kept of pieces is not needed any more."""
+    from bowdenfit.questions.fleet.words import fleet_text
+    from bowdenfit.results.fleet_folder import FLEET_DRAWS, FLEET_PAGE, write_fleet_draws
+    from bowdenfit.results.folder import SUMMARY_TEXT, folder_to_write, write_text
+    from bowdenfit.results.plain import plain
+    from bowdenfit.words import printable
+
+    with folder_to_write(store.folder) as folder:
+        if drawn is not None:
+            write_fleet_draws(folder / FLEET_DRAWS, drawn)
+        write_text(folder / SUMMARY_TEXT, printable(fleet_text(answer)))
+        write_text(folder / FLEET_PAGE, json.dumps(plain(answer), indent=1) + "\n")
+    store.finish()
+
+
+def _reply(found: "Fleet", asked: dict[str, Any]) -> Reply:
+    from bowdenfit.questions.fleet.words import fleet_text
+
+    exit_code = 0 if found.is_trusted else NOT_TRUSTED
+    return Reply(fleet_text(found), lambda: found, (f"Wrote {asked['output']}.",), exit_code, found.to_csv)
+
+
+def _show(bar: Any, done: int, total: int, seconds: float) -> None:
+    """How many are done, how many a minute, and how long the rest will take."""
+    bar.total, bar.n = total, done
+    left = timedelta(seconds=round(seconds * (total - done)))
+    bar.set_postfix_str(f"{60 / max(seconds, 1e-9):.0f} cables a minute, {left} left", refresh=False)
+    bar.refresh()
+
+
+_BAR = {"unit": "cable", "desc": "fitting", "bar_format": "{desc} {n_fmt} of {total_fmt} cables, {elapsed}{postfix}"}
+WATCH = Watch("kept", "what is done is kept in", _BAR, _show)
+VERB = Verb(
+    fleet,
+    _reply,
+    "Fit many cables, inspected again and again, on one machine or a cluster.",
+    """Fit every inspection of every cable in FOLDER by itself, many in one program, into one fleet.nc.
+
+    FOLDER has fleet.csv, a row an inspection with the columns cable, cycles, temperature_degC, lubricated and file, and
+    fleet.toml, which says of all of them what cable.toml says of one; or a folder for each cable with a cable.toml of its own,
+    or CABLE/CYCLES/cable.toml. datasets/synthetic-fleet is one.
+
+    What is done is kept piece by piece; --resume goes on, with cables that were added too. Broken inspections are named, and
+    the others are fitted. Exit code 3: some could not be fitted, or must not be trusted.
+    """,
+    json="Print fleet.json instead of the summary for people.",
+    csv="Print medians and intervals of all inspections as CSV, one a row.",
+    results="fits",
+    watch=WATCH,
+    behind={"in_background": True, "remember_compilations": True},
+)

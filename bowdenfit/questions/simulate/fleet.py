@@ -1,0 +1,184 @@
+"""Fleets from known truth: many cables of one description, inspected while they wear.
+
+    log mu_ik(c) = a_ik + b_i c / c_ref + gamma l + alpha (T - T_0),  a_ik ~ Normal(m_k, s_a),  b_i ~ Normal(m_b, s_b)
+
+for cable i, coefficient k, c cycles, l = 1 after lubrication, and temperature T. What scatters from one mounting to the next,
+and how load cells do, is the same for all.
+"""
+
+import json
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Annotated, Any
+
+import jax
+import jax.numpy as jnp
+import numpy as np
+from pydantic import Field, ValidationError
+
+from bowdenfit.dataset import Dataset
+from bowdenfit.description.values import Finite, Frozen, NonNegative, Positive
+from bowdenfit.description.wrong_keys import wrong_keys
+from bowdenfit.errors import DescriptionError
+from bowdenfit.inference.compilation import compile_program
+from bowdenfit.kinds.drawn_readings import drawn_readings, with_drawn_readings
+from bowdenfit.model import build_model
+from bowdenfit.questions.simulate.simulation import empty_tables, true_values
+from bowdenfit.questions.simulate.tables import (
+    TRUTH_FILE,
+    BenchPlan,
+    description_lines,
+    plan_page,
+    read_bench,
+    table_texts,
+)
+from bowdenfit.results.fleet_folder import COLUMNS, FLEET_DESCRIPTION, FLEET_TABLE
+from bowdenfit.results.folder import write_text
+
+READINGS = "readings"
+
+
+class FleetDesign(Frozen):
+    """[fleet] of a plan; the medians of the coefficients of new, dry cables are in [truth].
+
+    Args:
+        cables: How many.
+        cycles: At which each is inspected.
+        reference_cycles: Cycles that the wear rate is stated for.
+        spread: Standard deviation of log coefficients between cables.
+        wear: Mean growth of log coefficients in the reference cycles.
+        wear_spread: Its standard deviation between cables.
+        lubricated: Share of the inspections that are made after lubrication.
+        lubrication: What lubrication adds to log coefficients.
+        temperature: Range that the temperature of each inspection is drawn from [°C].
+        reference_temperature: Temperature that the coefficients are stated for [°C].
+        per_degree: What a degree adds to log coefficients [1/K].
+    """
+
+    cables: Annotated[int, Field(ge=1, le=1_000_000)]
+    cycles: tuple[NonNegative, ...] = (0.0,)
+    reference_cycles: Positive = 10_000.0
+    spread: NonNegative = 0.2
+    wear: Finite = 0.0
+    wear_spread: NonNegative = 0.0
+    lubricated: Annotated[float, Field(ge=0, le=1)] = 0.0
+    lubrication: Finite = 0.0
+    temperature: tuple[Finite, Finite] = (20.0, 20.0)
+    reference_temperature: Finite = 20.0
+    per_degree: Finite = 0.0
+
+
+class _Plan(Frozen):
+    """What of a plan is about the fleet."""
+
+    fleet: FleetDesign
+
+
+@dataclass(frozen=True)
+class FleetPlan:
+    """What to simulate: a bench, and the cables that are measured on it."""
+
+    bench: BenchPlan
+    fleet: FleetDesign
+
+
+@dataclass(frozen=True)
+class SimulatedInspection:
+    """One inspection.
+
+    Args:
+        cable: Name of the cable.
+        cycles: It has made.
+        temperature: [°C].
+        lubricated: Whether it was lubricated.
+        values: True parameters [shown units].
+        dataset: Tables.
+    """
+
+    cable: str
+    cycles: float
+    temperature: float
+    lubricated: bool
+    values: dict[str, float]
+    dataset: Dataset
+
+    @property
+    def file(self) -> str:
+        """Of its table, as seen from the folder."""
+        return f"{READINGS}/{self.cable}-{self.cycles:.0f}.csv"
+
+
+def read_fleet_plan(path: Path) -> FleetPlan:
+    """Read a plan with [fleet].
+
+    Raises:
+        DescriptionError: The file is missing or no TOML, or a table or key in it is wrong.
+    """
+    _, raw = plan_page(path)
+    if "fleet" not in raw:
+        raise DescriptionError(f"{path.name} has no [fleet]: say how many cables, such as cables = 40, cycles = [0, 50000].")
+    try:
+        fleet = _Plan.model_validate({"fleet": raw["fleet"]}).fleet
+    except ValidationError as error:
+        raise wrong_keys(error, raw, _Plan, path.name, "write it, such as cables = 40") from None
+    return FleetPlan(read_bench(path), fleet)
+
+
+def simulate_fleet(plan: FleetPlan, seed: int, noise: bool = True) -> tuple[list[SimulatedInspection], dict[str, Any]]:
+    """All inspections, and the truth: of the population, and of each cable.
+
+    Args:
+        plan: What to simulate.
+        seed: Seed of everything random; a cable is the same whatever others there are.
+        noise: Whether readings scatter.
+    """
+    bench, fleet = plan.bench, plan.fleet
+    tables = empty_tables(bench.description, bench.design)
+    model = build_model(Dataset(bench.description, tables, {}))
+    scale = {p.name: p.shown_scale for p in model.space.parameters}
+    common = true_values(bench.description, tables, bench.truth, jax.random.key(seed))
+    worn = list(model.cable.coefficients)
+
+    def readings(values: dict[str, jax.Array], words: jax.Array) -> Any:
+        return drawn_readings(model.cable, tables, values, jax.random.wrap_key_data(words), 1.0 if noise else 0.0)
+
+    of_values = {name: jax.ShapeDtypeStruct((), jnp.float64) for name in common}
+    program = compile_program(readings, of_values, jax.ShapeDtypeStruct((2,), jnp.uint32), run_once=True)
+    found, truth, digits = list[SimulatedInspection](), dict[str, Any](), len(str(fleet.cables))
+    for number in range(1, fleet.cables + 1):
+        generator, name = np.random.default_rng([seed, number]), f"cable-{number:0{digits}d}"
+        start = {k: np.log(common[k]) + fleet.spread * generator.standard_normal() for k in worn}
+        wear = fleet.wear + fleet.wear_spread * generator.standard_normal()
+        truth[name] = {"log_start": start, "wear": wear}
+        for cycles in fleet.cycles:
+            temperature = round(float(generator.uniform(*fleet.temperature)), 1)
+            lubricated = bool(generator.uniform() < fleet.lubricated)
+            more = wear * cycles / fleet.reference_cycles + fleet.lubrication * lubricated
+            more += fleet.per_degree * (temperature - fleet.reference_temperature)
+            values = common | {k: float(np.exp(start[k] + more)) for k in worn}
+            drawn = program(values, generator.integers(2**32, size=2, dtype=np.uint32))
+            dataset = Dataset(bench.description, with_drawn_readings(bench.description, tables, drawn), {})
+            shown = {k: value * scale[k] for k, value in values.items()}
+            found.append(SimulatedInspection(name, cycles, temperature, lubricated, shown, dataset))
+    return found, {"seed": seed, "population": fleet.model_dump() | {"truth": dict(bench.truth)}, "cables": truth}
+
+
+def write_fleet(plan: FleetPlan, made: list[SimulatedInspection], truth: dict[str, Any], folder: Path) -> None:
+    """Write the description, fleet.csv, a table for each inspection, and truth.json.
+
+    Raises:
+        DescriptionError: The bench fills several tables an inspection.
+    """
+    text = "\n".join(description_lines(plan.bench.text, "bowdenfit simulate --fleet", "design", "fleet")) + "\n"
+    (folder / READINGS).mkdir(parents=True, exist_ok=True)
+    rows = [",".join(COLUMNS)]
+    for each in made:
+        texts = list(table_texts(each.dataset.description, each.dataset.measurements).values())
+        if len(texts) != 1:
+            raise DescriptionError("a simulated fleet has one table an inspection; leave one under [tables] of the plan.")
+        write_text(folder / each.file, texts[0])
+        lubricated = "yes" if each.lubricated else "no"
+        rows.append(f"{each.cable},{each.cycles:.0f},{each.temperature:g},{lubricated},{each.file}")
+    write_text(folder / FLEET_DESCRIPTION, text)
+    write_text(folder / FLEET_TABLE, "\n".join(rows) + "\n")
+    write_text(folder / TRUTH_FILE, json.dumps(truth, indent=1) + "\n")

@@ -1,0 +1,115 @@
+"""A fleet as files: the table of its inspections, and fleet.nc, the draws of all cables in one ArviZ tree."""
+
+import io
+import json
+from collections.abc import Mapping
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from bowdenfit.errors import StoreError
+from bowdenfit.inputs import refuse_special
+from bowdenfit.results.folder import replace_when_whole
+from bowdenfit.types import Vector
+
+FLEET_TABLE, FLEET_DESCRIPTION = "fleet.csv", "fleet.toml"  # of the measurements: its inspections, and what all have in common
+COLUMNS = ("cable", "cycles", "temperature_degC", "lubricated", "file")
+FLEET_DRAWS, FLEET_PAGE = "fleet.nc", "fleet.json"
+_METADATA = {"cycles": "1", "temperature": "degC", "lubricated": "1"}
+_POSTERIOR = "posterior"
+
+
+@dataclass(frozen=True)
+class FleetDraws:
+    """Draws of all inspections that were fitted, in the order of cables and cycles.
+
+    Args:
+        label: Of each inspection; no two are alike.
+        cable: Name of its cable.
+        cycles: That the cable had made; NaN where that is not known.
+        temperature: [°C]; NaN where it is not known.
+        lubricated: 1 if it was, 0 if not, NaN where that is not known.
+        values: Draws of equal weight by parameter in shown units, (inspection, draw); NaN where an inspection has no such
+            parameter.
+        stats: Of each inspection by name: the engine that drew, Pareto k, whether it may be trusted.
+        attributes: Of each parameter: unit, symbol, meaning, role and prior.
+        about: Of the fleet: its name, seed and versions.
+    """
+
+    label: tuple[str, ...]
+    cable: tuple[str, ...]
+    cycles: Vector
+    temperature: Vector
+    lubricated: Vector
+    values: Mapping[str, np.ndarray]
+    stats: Mapping[str, np.ndarray]
+    attributes: Mapping[str, Mapping[str, str]]
+    about: Mapping[str, Any]
+
+
+def write_fleet_draws(path: Path, fleet: FleetDraws) -> None:
+    """Write fleet.nc whole: groups posterior and sample_stats, with dimensions chain, draw and cable.
+
+    Args:
+        path: The file.
+        fleet: The draws.
+    """
+    import h5netcdf
+    import h5py
+
+    text = h5py.string_dtype()
+    in_memory = io.BytesIO()  # HDF5 does not survive a disk that is full
+    with h5netcdf.File(in_memory, "w") as file:
+        file.attrs["fleet"] = json.dumps(dict(fleet.about))
+        for name in (_POSTERIOR, "sample_stats"):
+            group = file.create_group(name)
+            group.dimensions["cable"] = len(fleet.label)
+            for of_cable, labels in (("cable", fleet.label), ("cable_name", fleet.cable)):
+                group.create_variable(of_cable, ("cable",), dtype=text, data=np.array(labels, dtype=object))
+            for of_cable, unit in _METADATA.items():
+                group.create_variable(of_cable, ("cable",), data=getattr(fleet, of_cable)).attrs["units"] = unit
+        posterior, stats = file[_POSTERIOR], file["sample_stats"]
+        count = next((draws.shape[1] for draws in fleet.values.values()), 0)
+        for dimension, length in (("chain", 1), ("draw", count)):
+            posterior.dimensions[dimension] = length
+            posterior.create_variable(dimension, (dimension,), data=np.arange(length))
+        metadata = " ".join(("cable_name", *_METADATA))
+        for name, draws in fleet.values.items():
+            variable = posterior.create_variable(name, ("chain", "draw", "cable"), data=draws.T[None])
+            variable.attrs.update({**fleet.attributes.get(name, {}), "coordinates": metadata})
+        for name, each in fleet.stats.items():
+            kind = {"dtype": text} if each.dtype == object else {}
+            data = each.astype("int8") if each.dtype == bool else each
+            stats.create_variable(name, ("cable",), data=data, **kind).attrs["coordinates"] = metadata
+    with replace_when_whole(path) as temporary:
+        temporary.write_bytes(in_memory.getbuffer())
+
+
+def read_fleet_draws(folder: Path) -> FleetDraws:
+    """Read the fleet.nc of a results folder.
+
+    Raises:
+        StoreError: There is none, or it is damaged.
+    """
+    import h5py
+
+    path = folder / FLEET_DRAWS
+    refuse_special(path, StoreError)
+    if not path.is_file():
+        what = "holds an unfinished fleet; finish it with --resume" if folder.is_dir() else "does not exist"
+        raise StoreError(f"{path} cannot be read: {folder} {what}, or name a folder that `bowdenfit fleet` wrote.")
+    try:
+        with h5py.File(path) as file:
+            group, stats = file[_POSTERIOR], file["sample_stats"]
+            fixed = {"cable", "cable_name", "chain", "draw", *_METADATA}
+            values = {name: np.ascontiguousarray(group[name][0].T) for name in group if name not in fixed}
+            attributes = {name: {k: v for k, v in group[name].attrs.items() if isinstance(v, str)} for name in values}
+            labels, names = (tuple(group[name].asstr()[()]) for name in ("cable", "cable_name"))
+            cycles, temperature, lubricated = (np.asarray(group[name][()]) for name in _METADATA)
+            known = {name: np.asarray(stats[name][()]) for name in stats if name not in fixed}
+            about = json.loads(file.attrs["fleet"])
+    except (OSError, KeyError, ValueError, TypeError, AttributeError) as error:
+        raise StoreError(f"{path} is damaged ({error}); fit the fleet again, or restore the folder from a copy.") from None
+    return FleetDraws(labels, names, cycles, temperature, lubricated, values, known, attributes, about)

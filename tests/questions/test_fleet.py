@@ -1,0 +1,86 @@
+"""Fleets: many cables fitted by themselves, the same whoever fits them, and broken ones named."""
+
+import json
+import shutil
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+import bowdenfit as bf
+from bowdenfit.results.fleet_folder import FLEET_DRAWS, FLEET_TABLE, read_fleet_draws
+
+FLEET = Path(__file__).parents[2] / "datasets" / "synthetic-fleet"
+
+
+def some(folder: Path, rows) -> Path:
+    """A fleet of some inspections of the synthetic one, in another folder."""
+    shutil.copytree(FLEET / "readings", folder / "readings")
+    shutil.copy(FLEET / "fleet.toml", folder)
+    heading, *lines = (FLEET / FLEET_TABLE).read_text().splitlines()
+    (folder / FLEET_TABLE).write_text("\n".join([heading, *(lines[i] for i in rows)]) + "\n")
+    return folder
+
+
+@pytest.fixture(scope="module")
+def fitted(tmp_path_factory):
+    """Six inspections of two cables, and the folder of what came of them."""
+    folder = tmp_path_factory.mktemp("fleet")
+    results = folder / "results"
+    return bf.fleet(some(folder / "fleet", range(6)), output=results, seed=7), results
+
+
+def test_the_shipped_fleet_is_what_its_plan_makes(run, tmp_path):
+    code, _, _ = run("simulate", FLEET / "bench.toml", "--fleet", "-o", tmp_path / "made", "--seed", 20261122)
+    assert code == 0
+    for path in sorted((tmp_path / "made").rglob("*.*")):
+        assert path.read_text() == (FLEET / path.relative_to(tmp_path / "made")).read_text(), path.name
+
+
+def test_every_inspection_finds_its_truth(fitted):
+    """Within 4.5 standard deviations of the draws: of twelve coefficients one is outside by chance once in ten thousand."""
+    found, results = fitted
+    assert found.is_trusted
+    page = json.loads((FLEET / "truth.json").read_text())
+    population, drawn = page["population"], read_fleet_draws(results)
+    for i, cable in enumerate(drawn.cable):
+        truth = page["cables"][cable]
+        more = truth["wear"] * drawn.cycles[i] / population["reference_cycles"]
+        more += population["lubrication"] * drawn.lubricated[i]
+        more += population["per_degree"] * (drawn.temperature[i] - population["reference_temperature"])
+        for name, start in truth["log_start"].items():
+            logs = np.log(drawn.values[name][i])
+            assert abs(logs.mean() - start - more) < 4.5 * logs.std()
+
+
+def test_the_draws_are_those_of_single_fits(fitted):
+    """Means to 0.1 and standard deviations to 15 %: what both know them to; one data set, one seed."""
+    _, results = fitted
+    drawn = read_fleet_draws(results)
+    table = FLEET / "readings" / "cable-01-0.csv"
+    settings = ['tables.forces.file="readings/cable-01-0.csv"']
+    single = bf.fit(FLEET / "fleet.toml", seed=1, settings=settings).posterior.values
+    assert table.exists()
+    for name in ("mu_sheath", "mu_edge", "tau", "sigma_F"):
+        one, other = np.log(drawn.values[name][0]), np.log(single[name].ravel())
+        assert abs(one.mean() - other.mean()) < 0.1 * other.std()
+        assert abs(one.std() / other.std() - 1) < 0.15
+
+
+def test_draws_depend_neither_on_order_nor_on_what_else_is_fitted(fitted, tmp_path):
+    _, results = fitted
+    together = read_fleet_draws(results)
+    bf.fleet(some(tmp_path / "fleet", (4,)), output=tmp_path / "one", seed=7)
+    alone = read_fleet_draws(tmp_path / "one")
+    where = together.label.index(alone.label[0])
+    for name, draws in alone.values.items():
+        np.testing.assert_array_equal(draws[0], together.values[name][where])
+
+
+def test_a_fleet_can_be_continued_with_new_inspections_and_comes_out_the_same(fitted, tmp_path):
+    _, results = fitted
+    folder = some(tmp_path / "fleet", range(3))
+    bf.fleet(folder, output=tmp_path / "results", seed=7)
+    shutil.rmtree(folder)
+    bf.fleet(some(folder, range(6)), output=tmp_path / "results", resume=True)
+    assert (tmp_path / "results" / FLEET_DRAWS).read_bytes() == (results / FLEET_DRAWS).read_bytes()

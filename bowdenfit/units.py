@@ -23,6 +23,10 @@ INTERNAL_UNITS = {
     "angular_velocity": "rad/s",
     "torque": "N*mm",
     "ratio": "1",
+    "inertia": "kg*m^2",
+    "angular_damping": "N*m*s/rad",
+    "angular_stiffness": "N*m/rad",
+    "stiffness": "N/mm",
 }
 _EXAMPLES = {
     "force": "N, kN, lbf, kgf",
@@ -33,6 +37,10 @@ _EXAMPLES = {
     "angular_velocity": "r/min, rad/s, deg/s",
     "torque": "N*m, N*mm, lbf*inch",
     "ratio": "%, 1",
+    "inertia": "kg*m^2, g*cm^2",
+    "angular_damping": "N*m*s/rad, N*mm*s/rad",
+    "angular_stiffness": "N*m/rad, N*m/deg",
+    "stiffness": "N/mm, kN/m",
 }
 # What most tables are written in, with the factor to the internal unit: pint's registry takes a fifth of a second to make.
 _USUAL = {
@@ -55,6 +63,10 @@ _USUAL = {
     "N*m": ("torque", 1000.0),
     "%": ("ratio", 0.01),
     "1": ("ratio", 1.0),
+    "kg*m^2": ("inertia", 1.0),
+    "N*m*s/rad": ("angular_damping", 1.0),
+    "N*m/rad": ("angular_stiffness", 1.0),
+    "N/mm": ("stiffness", 1.0),
 }
 _AS_PINT_SAYS = {"r/min": "rpm", "rev/min": "rpm", "1/min": "rpm", "u/min": "rpm"}  # the last is German
 # Names with products, quotients and small powers. Pint would compute whatever else it is given, such as 9**9**9.
@@ -147,7 +159,8 @@ def conversion_factor(unit: str, dimension: str, to: str | None = None) -> float
     if (of_usual and of_usual != dimension) or not _same_kind(_parsed(unit), _parsed(to or INTERNAL_UNITS[dimension])):
         hint = " (kg is a mass: for the weight of that mass write kgf)" if unit.strip() in {"kg", "g", "lb"} else ""
         raise DatasetError(
-            f"the unit {shown(unit)} does not measure {'a ' if dimension != 'angle' else 'an '}{dimension}{hint}; "
+            f"the unit {shown(unit)} does not measure {'an' if dimension[0] in 'aeiou' else 'a'} "
+            f"{dimension.replace('_', ' ')}{hint}; "
             f"use one such as {_EXAMPLES.get(dimension, to)}"
         )
     target = _parsed(to or INTERNAL_UNITS[dimension])

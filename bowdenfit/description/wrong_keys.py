@@ -7,6 +7,7 @@ from typing import Any
 from pydantic import BaseModel, ValidationError
 
 from bowdenfit.description import SCHEMA, QuantityValue
+from bowdenfit.description.device_keys import KEYS
 from bowdenfit.errors import BowdenfitError, DescriptionError, nearest, together
 from bowdenfit.words import shown
 
@@ -101,7 +102,8 @@ def _with_unit(value: Any, where: Sequence[str]) -> str:
     """A number with a unit that fits its place, as TOML."""
     number = value if isinstance(value, int | float) and not isinstance(value, bool) else 20
     key = ".".join(where)
-    unit = "deg" if "angle" in key else "N" if "force" in key or key == "preload.value" else "mm"
+    unit = KEYS[key].example.split('"')[1] if key in KEYS else "mm"
+    unit = "deg" if "angle" in key else "N" if "force" in key or key == "preload.value" else unit
     return f'{{ value = {number}, unit = "{unit}" }}'
 
 

@@ -84,8 +84,8 @@ def test_draws_are_cables_of_the_posterior_in_mountings_of_their_own(fit):
 
 
 def test_every_file_says_fit_seed_version_and_range(fit, tmp_path):
-    for to in ("c", "csv"):
-        text = bf.export(fit, to, tmp_path / f"file.{to}", points=3).file.read_text()
+    for to, ending in (("c", "h"), ("csv", "csv"), ("matlab", "m"), ("yaml", "yaml")):
+        text = bf.export(fit, to, tmp_path / f"file.{ending}", points=3).file.read_text()
         version = fit.provenance.versions["bowdenfit"]
         assert all(words in text for words in ("On-body knee exoskeleton", "seed 5", f"bowdenfit {version}", "430 to 530 mm"))
 

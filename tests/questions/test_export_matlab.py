@@ -17,9 +17,25 @@ OCTAVE = shutil.which("octave-cli")
 needs_octave = pytest.mark.skipif(OCTAVE is None, reason="Octave is not installed")
 ON_LEAVING = "error: ignoring const execution_exception& while preparing to exit"  # of some builds of Octave, whatever is run
 SCRIPT = """
+1;
+function check(f, in)
+  k = find(in(:, 1) == in(1, 1))(1:12);
+  [one, flag] = f('output', in(1, 1), in(k, 2), in(k, 3), in(k, 4), in(k, 5));
+  for shape = {[1, 12], [3, 4], [2, 3, 2]}
+    as = @(column) reshape(in(k, column), shape{1});
+    [out, flags] = f('output', in(1, 1), as(2), as(3), as(4), as(5));
+    assert(out, reshape(one, shape{1}));
+    assert(flags, reshape(flag, shape{1}));
+    state = f('step', in(1, 1), as(2), 0, 10, 0, NaN);
+    assert(size(state), shape{1});
+    assert(all(isfinite(state(:))));
+    assert(f('step', in(1, 1), as(2), 0, 10, 0, state), state);
+  end
+end
 for name = {%s}
   f = str2func(name{1});
   in = dlmread([name{1} '.csv']);
+  check(f, in);
   out = zeros(rows(in), 4);
   for level = unique(in(:, 1))'
     k = in(:, 1) == level;

@@ -15,7 +15,7 @@ from bowdenfit.inference.draws import for_each_draw
 from bowdenfit.model import Model
 from bowdenfit.physics.friction import force_scale
 from bowdenfit.questions.bends.answer import elastic_answers
-from bowdenfit.questions.bends.equations import Bent, bending_contact
+from bowdenfit.questions.bends.equations import Bent, bending_contact, knows_stretch
 from bowdenfit.questions.export.transmission import (
     DRAW,
     LEVELS,
@@ -65,8 +65,14 @@ def transmission(fit: Record, points: int = 101, draws: int = 0, distrust: str =
         About(fit.name, made.seed, version, made.created, _measured(fit, bent), group, distrust),
         places, tuple(levels), cable.is_loop, cable.friction.options, conditions.reference_force, conditions.reference_speed,
         conditions.velocity_unit or "mm/s" if cable.friction.depends_on_rate else "",
-        _missed(np.median(mean["effective"][:, 0], axis=0)),
+        _missed(np.median(mean["effective"][:, 0], axis=0)), _radius(fit),
     )  # fmt: skip
+
+
+def _radius(fit: Record) -> float:
+    """Radius of the pulley at the load side [mm]; 0 where none is stated."""
+    stated = fit.dataset.description.cable.output_pulley_radius
+    return stated.to("length") if stated is not None else 0.0
 
 
 def _places(fit: Record, points: int) -> tuple[Places, bool]:
@@ -129,6 +135,7 @@ def _of_draws(fit: Record, at: np.ndarray, bent: bool, middle: Middle, mounting:
         return {
             "own": own, "effective": _at_reference(friction, values, own, middle) if friction.depends_on_load else own,
             "taut_loss": 2 * preload * exponent, "load_exponent": load_exponent, "drag": drag, **rate,
+            "stiffness": _stiffness(model, values, at, bent),
         }  # fmt: skip
 
     with jax.enable_x64(True):
@@ -145,6 +152,13 @@ def _there(model: Model, values: Mapping[str, Array], at: Array, bent: bool) -> 
     angles = model.cable.wrap_angles(values, at)
     preload = model.cable.elasticity.preload_or_none(values, jnp.sum(angles, axis=-1))
     return model.cable.friction_exponent(values, angles), preload
+
+
+def _stiffness(model: Model, values: Mapping[str, Array], at: Array, bent: bool) -> Array:
+    """Stiffness of an unloaded loop at wrap angles [N/mm]; nothing where nothing tells it."""
+    if not (model.cable.is_loop and bent and knows_stretch(model)):
+        return jnp.zeros(0)
+    return Bent(model, bending_contact(model), at).stiffness(values, 0.0)
 
 
 def _at_reference(friction: FrictionModel, values: Mapping[str, Array], own: Array, middle: Array) -> Array:
@@ -180,8 +194,9 @@ def _rate(found: Arrays, which: slice) -> tuple[float, float, float]:
 def _quantiles(found: Arrays, middle: Middle, before: str = "") -> list[Level]:
     """Levels over the draws."""
     effective, taut_loss, rate = found["effective"], found["taut_loss"], _rate(found, slice(None))
+    stiffness = np.median(found["stiffness"], axis=0)
     return [
-        Level(before + name, np.quantile(effective, q, axis=0), np.quantile(taut_loss, q, axis=0), *middle, rate)
+        Level(before + name, np.quantile(effective, q, axis=0), np.quantile(taut_loss, q, axis=0), *middle, rate, stiffness)
         for name, q in QUANTILES.items()
         if before + name in LEVELS
     ]
@@ -193,7 +208,7 @@ def _single(found: Arrays, n: int, seed: int) -> list[Level]:
     return [
         Level(
             f"{DRAW}{i + 1}", found["own"][k], found["taut_loss"][k], float(found["load_exponent"][k]),
-            float(found["drag"][k]), _rate(found, slice(k, k + 1)),
+            float(found["drag"][k]), _rate(found, slice(k, k + 1)), found["stiffness"][k],
         )
         for i, k in enumerate(picked)
     ]  # fmt: skip

@@ -3,7 +3,7 @@
 A level is how much friction there is: little (5 %), median, much (95 %), the same of any one mounting, or that of one draw.
 """
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
 import numpy as np
 
@@ -68,6 +68,7 @@ class Level:
         load_exponent: p of the scale g, see `bowdenfit.physics.friction.force_scale` [1].
         drag: D of that scale [N].
         rate: Stribeck rise [1], Stribeck speed and viscous coefficient, see `bowdenfit.physics.friction.rate_factor`.
+        stiffness: Of a taut loop seen at the load side with the motor held, by place [N/mm]; empty where nothing tells it.
     """
 
     name: str
@@ -76,6 +77,7 @@ class Level:
     load_exponent: float = 0.0
     drag: float = 0.0
     rate: tuple[float, float, float] = (0.0, 1.0, 0.0)
+    stiffness: np.ndarray = field(default_factory=lambda: np.zeros(0))
 
 
 @dataclass(frozen=True)
@@ -92,6 +94,7 @@ class Transmission:
         reference_speed: At which the coefficients hold, in `speed_unit`.
         speed_unit: "mm/s" or "rad/s"; empty where friction does not depend on speed.
         between: Largest error of the median exponent between two places [1].
+        radius: Of the pulley at the load side [mm]; 0 where none is stated.
     """
 
     about: About
@@ -103,6 +106,7 @@ class Transmission:
     reference_speed: float
     speed_unit: str
     between: float
+    radius: float = 0.0
 
     @property
     def median(self) -> Level:

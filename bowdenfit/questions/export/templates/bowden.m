@@ -34,8 +34,8 @@ $about
         [high, second] = slid(T, level, place, speed, force, -ones(size(force)), 1);
         flags = bitor(first, second);
         answer = min(max(state, low), high);
-        new = isnan(state) & ~isnan(force);
         middle = (low + high) / 2;
+        new = isnan(state + 0 * middle);
         answer(new) = middle(new);
         answer(isnan(low) | isnan(high)) = NaN;
     elseif strcmp(what, 'output')

@@ -11,8 +11,8 @@ if TYPE_CHECKING:
     from bowdenfit.questions.export.transmission import Transmission
     from bowdenfit.results.record import Record
 
-Target = Literal["c", "matlab", "yaml", "csv"]
-_ENDINGS: Mapping[str, str] = {"c": ".h", "csv": ".csv", "matlab": ".m", "yaml": ".yaml"}
+Target = Literal["c", "fmu", "matlab", "yaml", "csv"]
+_ENDINGS: Mapping[str, str] = {"c": ".h", "csv": ".csv", "fmu": ".fmu", "matlab": ".m", "yaml": ".yaml"}
 _NOT_TRUSTED = 3
 
 
@@ -71,6 +71,10 @@ def _writer(to: str, path: Path) -> "Callable[[Record, Transmission], bytes]":
 
         name = function_name(path)
         return lambda _, found: function(found, name).encode("ascii")
+    if to == "fmu":
+        from bowdenfit.questions.export.fmu import unit
+
+        return lambda fit, found: unit(found, fit.name)
     if to == "yaml":
         from bowdenfit.questions.export.parameters import parameters
 
@@ -97,6 +101,7 @@ VERB = Verb(
     \b
     c       a header (C99): output force, input force, friction while moving to and fro, compensation
     matlab  a function of MATLAB and Octave that says the same
+    fmu     a functional mock-up unit (FMI 2.0, co-simulation) of that header, compiled here, with its sources
     yaml    parameters of a controller, as ROS 2 reads them: friction by place, and what may be fed forward
     csv     a lookup table that says what bowdenfit predict says; with --draws, cables drawn from the posterior
 

@@ -27,6 +27,7 @@ if TYPE_CHECKING:
     from bowdenfit.questions.fleet.verb import fleet
     from bowdenfit.questions.identify.verb import identify
     from bowdenfit.questions.next.verb import next_measurement
+    from bowdenfit.questions.pool.verb import pool
     from bowdenfit.questions.predict.verb import predict
     from bowdenfit.questions.report.verb import report
     from bowdenfit.questions.simulate.verb import simulate
@@ -46,6 +47,7 @@ _WHERE = {
     "load": "bowdenfit.front_desk",
     "next_measurement": "bowdenfit.questions.next.verb",
     "plot": "bowdenfit.questions.summary.verb",
+    "pool": "bowdenfit.questions.pool.verb",
     "predict": "bowdenfit.questions.predict.verb",
     "read": "bowdenfit.reading",
     "report": "bowdenfit.questions.report.verb",
@@ -74,6 +76,7 @@ __all__ = [
     "load",
     "next_measurement",
     "plot",
+    "pool",
     "predict",
     "read",
     "report",

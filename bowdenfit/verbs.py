@@ -8,6 +8,7 @@ from bowdenfit.questions.fleet.verb import VERB as FLEET
 from bowdenfit.questions.identify.verb import VERB as IDENTIFY
 from bowdenfit.questions.length.verb import VERB as LENGTH
 from bowdenfit.questions.next.verb import VERB as NEXT
+from bowdenfit.questions.pool.verb import VERB as POOL
 from bowdenfit.questions.predict.verb import VERB as PREDICT
 from bowdenfit.questions.report.verb import VERB as REPORT
 from bowdenfit.questions.simulate.verb import VERB as SIMULATE
@@ -15,4 +16,4 @@ from bowdenfit.questions.summary.verb import PLOT_VERB as PLOT
 from bowdenfit.questions.summary.verb import SUMMARY_VERB as SUMMARY
 from bowdenfit.run.verb import VERB as FIT
 
-VERBS = (CHECK, FIT, SUMMARY, PREDICT, LENGTH, IDENTIFY, NEXT, COMPARE, EXPORT, CALIBRATE, FLEET, PLOT, REPORT, SIMULATE)
+VERBS = (CHECK, FIT, SUMMARY, PREDICT, LENGTH, IDENTIFY, NEXT, COMPARE, EXPORT, CALIBRATE, FLEET, POOL, PLOT, REPORT, SIMULATE)

@@ -53,17 +53,37 @@ def make_program(posterior: LogDensity, settings: SamplerSettings) -> Callable[.
         posterior: The posterior.
         settings: Number of chains and the acceptance that their step sizes aim at.
     """
-    size, chains = posterior.model.space.size, settings.n_chains
+    size = posterior.model.space.size
+    return block_program(posterior.log_density, (size, size), posterior.data, settings)
+
+
+def block_program(
+    log_density: Callable[[Array, Any], Array],
+    mass: tuple[int, ...],
+    data: Any,
+    settings: SamplerSettings,
+    fine: bool = True,
+) -> Callable[..., Any]:
+    """The same of any density.
+
+    Args:
+        log_density: Of z and data.
+        mass: Shape of the inverse mass matrix; of one dimension where it is diagonal.
+        data: Or its shapes.
+        settings: Number of chains and the acceptance that their step sizes aim at.
+        fine: Whether every tenth trajectory takes finer steps.
+    """
+    chains, finer = settings.n_chains, _fine(BLOCK) & fine
     kernel, (_, adapted, _) = nuts.build_kernel(), dual_averaging_adaptation(settings.target_acceptance)
 
     def block(
         seed: Array, number: Array, z: Array, tuning: Array, adapting: Array, inverse_mass: Array, data: Any
     ) -> dict[str, Array]:
-        def log_density(z: Array) -> Array:
-            return posterior.log_density(z, data)
+        def density(z: Array) -> Array:
+            return log_density(z, data)
 
         def move(key: Array, state: Any, step_size: Array) -> Any:
-            return kernel(key, state, log_density, step_size, inverse_mass, MOST_DOUBLINGS)
+            return kernel(key, state, density, step_size, inverse_mass, MOST_DOUBLINGS)
 
         def step(carried: Any, turn: Any) -> Any:
             (states, tuning), (key, fine) = carried, turn
@@ -77,15 +97,15 @@ def make_program(posterior: LogDensity, settings: SamplerSettings) -> Callable[.
             return (states, tuning), (states.position, info.is_divergent, info.energy, acceptance, *lengths)
 
         keys = jax.random.split(jax.random.fold_in(jax.random.key(seed), number), BLOCK)
-        states = jax.vmap(lambda one: nuts.init(one, log_density))(z)
+        states = jax.vmap(lambda one: nuts.init(one, density))(z)
         carried = states, DualAveragingAdaptationState(*tuning)
-        (_, tuned), steps = jax.lax.scan(step, carried, (keys, _fine(BLOCK)))
+        (_, tuned), steps = jax.lax.scan(step, carried, (keys, finer))
         found = dict(zip(("z", *_STATISTICS), steps, strict=True))
         return found | {"tuning": jnp.stack(tuned), "inverse_mass": inverse_mass}
 
     whole, flag = jax.ShapeDtypeStruct((), jnp.uint32), jax.ShapeDtypeStruct((), jnp.bool_)
-    shapes = [jax.ShapeDtypeStruct(shape, jnp.float64) for shape in ((chains, size), (5, chains), (size, size))]
-    return compile_program(block, whole, whole, shapes[0], shapes[1], flag, shapes[2], posterior.data)
+    shapes = [jax.ShapeDtypeStruct(shape, jnp.float64) for shape in ((chains, mass[0]), (5, chains), mass)]
+    return compile_program(block, whole, whole, shapes[0], shapes[1], flag, shapes[2], data)
 
 
 def _fine(steps: int) -> np.ndarray:
@@ -124,7 +144,7 @@ def sample(asked: Sampling, program: Callable[..., Any]) -> Chain:
     seen: tuple[float | None, float | None] = (None, None)
     while True:
         while len(blocks) < target:
-            z, tuning, mass = _before(blocks, points, asked.start.covariance)
+            z, tuning, mass = before(blocks, points, asked.start.covariance)
             numbers = np.uint32(seed), np.uint32(len(blocks))
             done = program(*numbers, z, tuning, np.bool_(len(blocks) < WARM_UP), mass, posterior.data)
             blocks.append(jax.tree.map(np.asarray, done))
@@ -144,10 +164,16 @@ def _next_look(blocks: int) -> int:
     return blocks + (blocks - WARM_UP + 2) // 3
 
 
-def _before(
+def before(
     blocks: Sequence[Block], points: np.ndarray, covariance: np.ndarray
 ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Positions, tuning and inverse mass matrix that the next block starts with."""
+    """Positions, tuning and inverse mass matrix that the next block starts with.
+
+    Args:
+        blocks: All before it.
+        points: Where chains start.
+        covariance: That the first inverse mass matrix is; of one dimension where that is diagonal.
+    """
     if not blocks:
         return points, _untuned(_FIRST_STEP, len(points)), covariance
     z, tuning, mass = blocks[-1]["z"][-1], blocks[-1]["tuning"], blocks[-1]["inverse_mass"]
@@ -158,7 +184,8 @@ def _before(
     if len(blocks) == WARM_UP:
         return z, np.concatenate([tuning[:1], np.full((1, len(z)), average), tuning[2:]]), mass
     window = np.concatenate([block["z"] for block in blocks[-WINDOWS[ends.index(len(blocks))] :]])
-    return z, _untuned(float(np.exp(average)), len(z)), _shrunk(window.reshape(-1, z.shape[1]))
+    found = _shrunk(window.reshape(-1, z.shape[1])) if mass.ndim > 1 else _shrunk_variances(window.reshape(-1, len(mass)))
+    return z, _untuned(float(np.exp(average)), len(z)), found
 
 
 def _untuned(step_size: float, chains: int) -> np.ndarray:
@@ -171,6 +198,12 @@ def _shrunk(draws: np.ndarray) -> np.ndarray:
     """Covariance of draws (rows), shrunk toward a small multiple of the identity as Stan does."""
     n, size = draws.shape
     return n / (n + 5) * np.cov(draws.T).reshape(size, size) + 1e-3 * 5 / (n + 5) * np.eye(size)
+
+
+def _shrunk_variances(draws: np.ndarray) -> np.ndarray:
+    """The same of variances alone, in coordinates that are about standard normal, to which they are shrunk."""
+    n = len(draws)
+    return n / (n + 5) * draws.var(axis=0, ddof=1) + 5 / (n + 5)
 
 
 def _summarized(asked: Sampling, blocks: Sequence[Block]) -> tuple[Chain, bool]:

@@ -1,0 +1,206 @@
+r"""A population of cables that wear, given what single fits say of each inspection.
+
+Log coefficients of cable i at its inspection j, after c cycles, lubricated (l = 1) or not, at temperature T:
+
+.. math:: \theta_{ijk} = a_{ik} + b_i \frac{c_{ij}}{c_{ref}} + \gamma l_{ij} + \alpha (T_{ij} - T_0), \qquad
+          a_{ik} \sim \mathrm{Normal}(m_k, s_k), \quad b_i \sim \mathrm{Normal}(m_b, s_b)
+
+Every inspection keeps its own scatter and noise, which single fits have integrated out. Cables are drawn in coordinates in
+which each is nearly standard normal given its population, whether its data say much or little, so that there is no funnel.
+"""
+
+from dataclasses import dataclass
+from functools import cached_property
+from typing import Any
+
+import jax.numpy as jnp
+import numpy as np
+from jax import Array
+from jaxtyping import Float
+
+from bowdenfit.inference.population.summaries import Summaries
+from bowdenfit.parameters.priors import HalfNormal, Normal, Prior
+
+SPREAD, WEAR, WEAR_SPREAD = HalfNormal(0.5), Normal(0.0, 1.0), HalfNormal(0.3)
+LUBRICATION, PER_DEGREE = Normal(0.0, 1.0), Normal(0.0, 0.05)
+REFERENCE_TEMPERATURE = 20.0  # degC
+
+
+@dataclass(frozen=True)
+class Inspected:
+    """What is known of all inspections, in rows.
+
+    Args:
+        cable: Number of the cable of each, from 0.
+        cycles: Over the reference; None where wear cannot be told.
+        effects: What else friction may depend on, by name, a column each: 1 after lubrication, and degrees above the reference.
+        known: Whether an inspection has a coefficient, (inspection, coefficient).
+        summaries: Of their log coefficients.
+        prior_mean, prior_sd: Of the mean log coefficients of the population, (coefficient,).
+    """
+
+    cable: np.ndarray
+    cycles: np.ndarray | None
+    effects: dict[str, np.ndarray]
+    known: np.ndarray
+    summaries: Summaries
+    prior_mean: np.ndarray
+    prior_sd: np.ndarray
+
+    @property
+    def cables(self) -> int:
+        """How many there are."""
+        return int(self.cable.max()) + 1
+
+    @property
+    def coefficients(self) -> int:
+        """How many there are."""
+        return int(self.known.shape[1])
+
+    @cached_property
+    def data(self) -> dict[str, Any]:
+        """Arrays that the density is computed from, (cable, inspection, ...)."""
+        place = np.array([np.sum(self.cable[:j] == i) for j, i in enumerate(self.cable)])
+        shape = self.cables, int(place.max()) + 1
+
+        def spread(values: np.ndarray, empty: float = 0.0) -> np.ndarray:
+            found = np.full((*shape, *values.shape[1:]), empty)
+            found[self.cable, place] = values
+            return found
+
+        s, counts = self.summaries, self.known.sum(axis=1)
+        root = _roots(s.scale, self.known)
+        information = np.einsum("jab,jac->jbc", root, root) * ((s.freedom + counts) / (s.freedom + counts + 2))[:, None, None]
+        design = self.design
+        moved = np.einsum("jkd,jkl,jle->jde", design, information, design)
+        toward = np.einsum("jkd,jkl,jl->jd", design, information, s.center)
+        ones = np.ones(self.coefficients)
+        columns = np.stack([*self.effects.values(), np.zeros(len(counts))], axis=1)  # so that there is one at the least
+        by_effect = np.einsum("jkd,jkl,l,je->jde", design, information, ones, columns)
+        return {
+            "center": spread(s.center), "root": spread(root), "freedom": spread(s.freedom, 1.0), "counts": spread(counts * 1.0),
+            "effects": spread(columns), "cycles": spread(design[:, 0, -1]),
+            "precision": spread(moved).sum(axis=1), "toward": spread(toward).sum(axis=1),
+            "by_effect": spread(by_effect).sum(axis=1), "prior_mean": self.prior_mean, "prior_sd": self.prior_sd,
+        }  # fmt: skip
+
+    @property
+    def design(self) -> np.ndarray:
+        """Derivatives of log coefficients by those of the new cable and its wear, (inspection, coefficient, ...)."""
+        found = np.broadcast_to(np.eye(self.coefficients), (len(self.cable), self.coefficients, self.coefficients))
+        if self.cycles is None:
+            return found
+        worn = np.broadcast_to(self.cycles[:, None, None], (len(self.cable), self.coefficients, 1))
+        return np.concatenate([found, worn], axis=2)
+
+
+def _roots(scale: np.ndarray, known: np.ndarray) -> np.ndarray:
+    """Matrices W with |W x|^2 = x' scale^-1 x in what is known, and nothing of what is not."""
+    found = np.zeros_like(scale)
+    for j, mine in enumerate(known):
+        inside = np.ix_(mine, mine)
+        found[j][inside] = np.linalg.inv(np.linalg.cholesky(scale[j][inside]))
+    return found
+
+
+@dataclass(frozen=True)
+class PopulationDensity:
+    """Log density of a population and its cables in coordinates z.
+
+    Args:
+        coefficients: How many.
+        wears: Whether there is wear to be told.
+        effects: Names of what else friction may depend on.
+        cables: How many.
+    """
+
+    coefficients: int
+    wears: bool
+    effects: tuple[str, ...]
+    cables: int
+
+    @property
+    def each(self) -> int:
+        """Numbers of a cable: its log coefficients when new, and its wear."""
+        return self.coefficients + self.wears
+
+    @property
+    def names(self) -> tuple[str, ...]:
+        """Of what describes the population, in the order of z."""
+        k = range(self.coefficients)
+        wear = ("wear", "wear_spread") if self.wears else ()
+        return (*(f"mean_{i}" for i in k), *(f"spread_{i}" for i in k), *wear, *self.effects)
+
+    @property
+    def size(self) -> int:
+        """Of z."""
+        return len(self.names) + self.cables * self.each
+
+    def population(self, z: Float[Array, " size"], data: dict[str, Any]) -> dict[str, Array]:
+        """What describes the population: means, spreads and effects, (cable's number,) and (effect,)."""
+        k = self.coefficients
+        mean = data["prior_mean"] + data["prior_sd"] * z[:k]
+        spread, rest = SPREAD.constrain(z[k : 2 * k]), z[2 * k :]
+        if self.wears:
+            mean = jnp.append(mean, WEAR.constrain(rest[0]))
+            spread, rest = jnp.append(spread, WEAR_SPREAD.constrain(rest[1])), rest[2:]
+        priors: dict[str, Prior] = {"lubrication": LUBRICATION, "per_degree": PER_DEGREE}
+        effects = [priors[name].constrain(rest[i]) for i, name in enumerate(self.effects)]
+        return {"mean": mean, "spread": spread, "effects": jnp.stack([*effects, jnp.zeros(())])}
+
+    def cables_of(
+        self, z: Float[Array, " size"], data: dict[str, Any], found: dict[str, Array]
+    ) -> tuple[Float[Array, "cable each"], Float[Array, " cable"]]:
+        """Log coefficients when new and wear of every cable, and the log of the volume that z is stretched by."""
+        inner = z[len(self.names) :].reshape(self.cables, self.each)
+        weight = found["spread"] ** -2
+        toward = data["toward"] - data["by_effect"] @ found["effects"] + weight * found["mean"]
+        rows = _cholesky([[data["precision"][:, i, j] + (weight[i] if i == j else 0.0) for j in range(i + 1)]
+                          for i in range(self.each)])  # fmt: skip
+        forward: list[Array] = []
+        for i, row in enumerate(rows):
+            forward.append((toward[:, i] - sum(row[j] * forward[j] for j in range(i))) / row[i])
+        values: list[Any] = [None] * self.each
+        for i in reversed(range(self.each)):
+            behind = sum(rows[j][i] * values[j] for j in range(i + 1, self.each))
+            values[i] = (forward[i] + inner[:, i] - behind) / rows[i][i]
+        return jnp.stack(values, axis=1), -sum(jnp.log(rows[i][i]) for i in range(self.each))  # type: ignore[return-value]
+
+    def log_density(self, z: Float[Array, " size"], data: dict[str, Any]) -> Float[Array, ""]:
+        """Log posterior density in z, up to a constant."""
+        found = self.population(z, data)
+        values, volume = self.cables_of(z, data, found)
+        away = (values - found["mean"]) / found["spread"]
+        of_cables = jnp.sum(volume) - jnp.sum(away**2) / 2 - self.cables * jnp.sum(jnp.log(found["spread"]))
+        before = -jnp.sum(z[: len(self.names)] ** 2) / 2
+        return before + of_cables + jnp.sum(log_likelihood(self.log_coefficients(values, found, data), data))
+
+    def log_coefficients(
+        self, values: Float[Array, "cable each"], found: dict[str, Array], data: dict[str, Any]
+    ) -> Float[Array, "cable inspection coefficient"]:
+        """At every inspection."""
+        k = self.coefficients
+        shift = data["effects"] @ found["effects"]
+        if self.wears:
+            shift = shift + data["cycles"] * values[:, k:]
+        return values[:, None, :k] + shift[:, :, None]
+
+
+def log_likelihood(
+    at: Float[Array, "cable inspection coefficient"], data: dict[str, Any]
+) -> Float[Array, "cable inspection"]:
+    """Of log coefficients at every inspection, up to a constant; 0 where there is no inspection."""
+    away = jnp.einsum("ijkl,ijl->ijk", data["root"], at - data["center"])
+    return -(data["freedom"] + data["counts"]) / 2 * jnp.log1p(jnp.sum(away**2, axis=2) / data["freedom"])
+
+
+def _cholesky(lower: list[list[Any]]) -> list[list[Any]]:
+    """Lower Cholesky factors of many small matrices at once, entry by entry: much quicker than one after the other."""
+    rows: list[list[Any]] = []
+    for i, given in enumerate(lower):
+        row: list[Any] = []
+        for j in range(i):
+            row.append((given[j] - sum(row[m] * rows[j][m] for m in range(j))) / rows[j][j])
+        row.append(jnp.sqrt(given[i] - sum(entry**2 for entry in row)))
+        rows.append(row)
+    return rows

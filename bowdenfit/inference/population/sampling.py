@@ -1,0 +1,110 @@
+"""Drawing a population and its cables together, with NUTS, until the population is known well enough."""
+
+from collections.abc import Collection
+from dataclasses import dataclass
+from functools import lru_cache
+from typing import Any
+
+import jax
+import numpy as np
+
+from bowdenfit.description import SamplerSettings
+from bowdenfit.inference.compilation import compile_program
+from bowdenfit.inference.diagnostics import diagnose, shortfalls
+from bowdenfit.inference.nuts import BLOCK, WARM_UP, before, block_program
+from bowdenfit.inference.population.model import Inspected, PopulationDensity
+from bowdenfit.words import percent
+
+_SETTINGS = SamplerSettings(n_chains=4, target_acceptance=0.8, target_ess=400, target_r_hat=1.02)
+_FIRST, _MORE, _MOST = 20, 10, 100  # blocks after warm-up at the first look, until the next, and at all
+_AT_ONCE = _SETTINGS.n_chains * BLOCK  # draws whose values are computed together
+_MOST_DIVERGENT = 0.001  # share of trajectories
+
+
+@dataclass(frozen=True)
+class PopulationDraws:
+    """Draws of a population with its cables, of equal weight.
+
+    Args:
+        mean, spread: Of log coefficients of new cables and of wear, (draw, number).
+        effects: Of lubrication and of a degree, as far as they are told, (draw, effect).
+        cables: Log coefficients of each cable when new, and its wear, (draw, cable, number).
+        reasons: Why they should not be trusted; empty if they may.
+        n_effective: Effective number of draws of the worst number of the population.
+    """
+
+    mean: np.ndarray
+    spread: np.ndarray
+    effects: np.ndarray
+    cables: np.ndarray
+    reasons: tuple[str, ...]
+    n_effective: float
+
+
+def draw_population(inspected: Inspected, seed: int, without: Collection[int] = ()) -> PopulationDraws:
+    """Draw a population and its cables.
+
+    Args:
+        inspected: What is known of all inspections.
+        seed: Of everything random.
+        without: Cables whose inspections are not looked at, by number.
+    """
+    wears = inspected.cycles is not None
+    density = PopulationDensity(inspected.coefficients, wears, tuple(inspected.effects), inspected.cables)
+    data = _blind(inspected.data, without)
+    shapes = tuple((name, np.shape(value)) for name, value in data.items())
+    program, values_of = _compiled(density, shapes)
+    generator = np.random.default_rng([seed, 5])
+    start = 0.3 * generator.standard_normal((_SETTINGS.n_chains, density.size))
+    blocks: list[dict[str, np.ndarray]] = []
+    target = WARM_UP + _FIRST
+    while True:
+        while len(blocks) < target:
+            z, tuning, mass = before(blocks, start, np.ones(density.size))
+            adapting = np.bool_(len(blocks) < WARM_UP)
+            done = program(np.uint32(seed), np.uint32(len(blocks)), z, tuning, adapting, mass, data)
+            blocks.append({name: np.asarray(value) for name, value in done.items()})
+        z = np.concatenate([block["z"] for block in blocks[WARM_UP:]]).transpose(1, 0, 2)
+        divergent = np.mean([block["diverging"] for block in blocks[WARM_UP:]])
+        reasons, worth = _shortfalls(z[:, :, : len(density.names)], density.names, float(divergent))
+        if not reasons or target >= WARM_UP + _MOST:
+            break
+        target += _MORE
+    parts = z.reshape(-1, _AT_ONCE, density.size)
+    every = zip(*(values_of(part, data) for part in parts), strict=True)
+    mean, spread, effects, cables = (np.concatenate([np.asarray(part) for part in each]) for each in every)
+    return PopulationDraws(mean, spread, effects[:, :-1], cables, reasons, worth)
+
+
+def _blind(data: dict[str, Any], cables: Collection[int]) -> dict[str, Any]:
+    """The data without those of some cables."""
+    found = dict(data)
+    for name in ("root", "precision", "toward", "by_effect") if cables else ():
+        found[name] = data[name].copy()
+        found[name][list(cables)] = 0.0
+    return found
+
+
+def _shortfalls(z: np.ndarray, names: tuple[str, ...], divergent: float) -> tuple[tuple[str, ...], float]:
+    """What keeps the draws from being trusted, in words, and the effective number of the worst."""
+    found = {name: diagnose(np.ascontiguousarray(z[:, :, i]), len(z)) for i, name in enumerate(names)}
+    reasons = shortfalls(found, _SETTINGS.target_r_hat, _SETTINGS.target_ess)
+    if divergent > _MOST_DIVERGENT:
+        reasons = (*reasons, f"{percent(divergent)} of the trajectories diverged")
+    return reasons, min(min(d.ess_bulk, d.ess_tail) for d in found.values())
+
+
+@lru_cache(maxsize=16)
+def _compiled(density: PopulationDensity, shapes: tuple[tuple[str, tuple[int, ...]], ...]) -> tuple[Any, Any]:
+    """What draws, and what gives the values of draws; the same for all fleets of one shape."""
+    data = {name: jax.ShapeDtypeStruct(shape, np.float64) for name, shape in shapes}
+    program = block_program(density.log_density, (density.size,), data, _SETTINGS, fine=False)
+
+    def values(z: jax.Array, data: dict[str, Any]) -> tuple[jax.Array, ...]:
+        found = density.population(z, data)
+        return found["mean"], found["spread"], found["effects"], density.cables_of(z, data, found)[0]
+
+    rows = jax.ShapeDtypeStruct((_AT_ONCE, density.size), np.float64)
+    many = compile_program(jax.vmap(values, (0, None)), rows, data, run_once=True)
+    return program, many
+

@@ -1,0 +1,198 @@
+"""What a fleet says when its cables are looked at together."""
+
+from dataclasses import dataclass
+from typing import Any, ClassVar
+
+from bowdenfit.display import Display, Part, Rows
+from bowdenfit.inference.interval import Interval
+
+
+@dataclass(frozen=True, repr=False)
+class Asked(Part):
+    """Until which efficiency a cable serves, and where.
+
+    Args:
+        efficiency: Below which it has failed.
+        wrap_angles: At which [rad], by coefficient.
+        cycles: Before which failing is asked for; None if it is not.
+    """
+
+    efficiency: float
+    wrap_angles: dict[str, float]
+    cycles: float | None
+
+
+@dataclass(frozen=True, repr=False)
+class Life(Part):
+    """Cycles until the efficiency falls below what is asked for, dry and at the reference temperature.
+
+    Args:
+        median: Of its cycles; infinite where it more likely lasts for ever.
+        q05: One in twenty falls below before.
+        fails: Probability of falling below before the cycles that were asked for; None where none were.
+        lasts: Probability that it never does, because its friction does not grow.
+        extrapolated: Whether the median, or the cycles asked for, lie beyond the longest that was inspected.
+    """
+
+    median: float
+    q05: float
+    fails: float | None
+    lasts: float
+    extrapolated: bool
+
+
+@dataclass(frozen=True, repr=False)
+class PooledCable(Part):
+    """A cable, drawn toward the population as far as its data allow.
+
+    Args:
+        cable: Its name.
+        inspections: How many it has.
+        last: Cycles at the last of them; NaN where nobody says.
+        coefficients: When new, dry and at the reference temperature, by name.
+        alone: The same from its own inspections, without the population; None where they cannot tell.
+        wear: Growth of friction in the reference cycles as a share; None where wear is not told.
+        life: See `Life`; None where it is not asked for.
+        chance: Probability that a cable of this population is as far from the others; in how many fleets one is.
+        unlike: How it differs from the rest, in words; empty if it does not.
+        worth: Effective number of its draws by themselves, of the inspection where the population agrees with them least.
+    """
+
+    cable: str
+    inspections: int
+    last: float
+    coefficients: dict[str, Interval]
+    alone: dict[str, Interval | None]
+    wear: Interval | None
+    life: Life | None
+    chance: float
+    unlike: str
+    worth: float
+
+
+@dataclass(frozen=True, repr=False)
+class Effect(Part):
+    """By which share something changes friction.
+
+    Args:
+        name: "wear" in the reference cycles, "lubrication", or "per_degree".
+        share: The share; 0.1 where it grows by a tenth.
+        probability: That it has the sign of its median.
+    """
+
+    name: str
+    share: Interval
+    probability: float
+
+
+@dataclass(frozen=True, repr=False)
+class NextInspection(Part):
+    """The inspection that tells most.
+
+    Args:
+        cable: Of which cable.
+        cycles: After how many.
+        target: What it tells about: "failing" (probability of failing before the cycles asked for) or "wear".
+        before: Standard deviation of that now.
+        after: What it would be, on average over what may be read.
+        probability: Of failing now; None where that is not the target.
+    """
+
+    cable: str
+    cycles: float
+    target: str
+    before: float
+    after: float
+    probability: float | None
+
+
+@dataclass(frozen=True, repr=False)
+class LeftOut(Part):
+    """An inspection that is not pooled.
+
+    Args:
+        inspection: Which.
+        why: In a few words.
+    """
+
+    inspection: str
+    why: str
+
+
+@dataclass(frozen=True, repr=False)
+class Pool(Display):
+    """Cables of a fleet looked at together.
+
+    Args:
+        name: Of the fleet.
+        cables: In the order of the fleet.
+        inspections: How many are pooled.
+        left_out: Those that are not.
+        coefficients: Of a new cable of this population, dry and at the reference temperature; its scatter is in it.
+        typical: Of the middle of the population, by name.
+        spreads: Standard deviation of log coefficients between cables, by name, and of the wear under "wear".
+        wear: In the reference cycles, of the middle of the population; None where it cannot be told.
+        effects: Of what else was told.
+        reference_cycles: Cycles that wear is stated for: the longest inspected.
+        reference_temperature: Temperature that coefficients are stated for [°C].
+        asked: What life is until; None where it is not asked for.
+        new: Life of a new cable of this population; None where there is none.
+        mixed: Coefficients of which cables do not look like one population, with the probability of that by chance.
+        next: The inspections that tell most, the best first.
+        notes: What is not told and why, and what was taken for granted, a sentence each.
+        reasons: Why the answer should not be trusted; empty if it may.
+        seed: Of everything random.
+    """
+
+    name: str
+    cables: tuple[PooledCable, ...]
+    inspections: int
+    left_out: tuple[LeftOut, ...]
+    coefficients: dict[str, Interval]
+    typical: dict[str, Interval]
+    spreads: dict[str, Interval]
+    wear: Effect | None
+    effects: tuple[Effect, ...]
+    reference_cycles: float
+    reference_temperature: float
+    asked: Asked | None
+    new: Life | None
+    mixed: dict[str, float]
+    next: tuple[NextInspection, ...]
+    notes: tuple[str, ...]
+    reasons: tuple[str, ...]
+    seed: int
+
+    JSON: ClassVar = ("is_trusted", ...)
+
+    @property
+    def is_trusted(self) -> bool:
+        """Whether the answer may be trusted."""
+        return not self.reasons
+
+    @property
+    def unlike(self) -> tuple[PooledCable, ...]:
+        """Cables that are unlike the rest, the one furthest off first."""
+        return tuple(sorted((each for each in self.cables if each.unlike), key=lambda each: each.chance))
+
+    def cable(self, name: str) -> PooledCable:
+        """One of the cables.
+
+        Raises:
+            KeyError: There is none of this name.
+        """
+        for each in self.cables:
+            if each.cable == name:
+                return each
+        raise KeyError(f"there is no cable {name!r}; there are {', '.join(c.cable for c in self.cables)}.")
+
+    def _table(self) -> Rows:
+        """A row for each cable and quantity."""
+        rows: list[dict[str, Any]] = []
+        for each in self.cables:
+            of_cable: dict[str, Interval] = dict(each.coefficients) | ({"wear": each.wear} if each.wear else {})
+            life = each.life
+            fails = {"life_cycles": life.median if life else None, "fails": life.fails if life else None}
+            rows += [{"quantity": name, "cable": each.cable, **vars(interval), **fails} for name, interval in of_cable.items()]
+        names = (*self.typical, *(("wear",) if self.wear else ()))
+        return rows, dict.fromkeys(names, "1")

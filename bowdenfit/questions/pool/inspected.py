@@ -1,0 +1,189 @@
+"""From the draws of a fleet to what is pooled: which inspections and coefficients, and what can be told from them."""
+
+import json
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from bowdenfit.errors import StoreError
+from bowdenfit.inference.population.model import REFERENCE_TEMPERATURE, Inspected
+from bowdenfit.inference.population.summaries import Summaries, summarized
+from bowdenfit.questions.pool.answer import LeftOut
+from bowdenfit.results.fleet_folder import FleetDraws
+from bowdenfit.words import counted, few, listed
+
+FRICTION = "friction"  # the role of what is pooled
+_SMALLEST = 1e-12  # that a coefficient may be drawn as
+
+
+@dataclass(frozen=True)
+class Given:
+    """What of a fleet is pooled.
+
+    Args:
+        cables: Names, in the order of their numbers.
+        coefficients: Names.
+        symbols: Of the coefficients, for axes.
+        inspected: What is known of all inspections.
+        logs: Draws of their log coefficients, (inspection, draw, coefficient).
+        labels: Of the inspections.
+        cycles: Of the inspections; NaN where nobody says.
+        reference_cycles: That wear is stated for.
+        left_out: Inspections that are not pooled.
+        notes: What is not told and why, a sentence each.
+    """
+
+    cables: tuple[str, ...]
+    coefficients: tuple[str, ...]
+    symbols: dict[str, str]
+    inspected: Inspected
+    logs: np.ndarray
+    labels: tuple[str, ...]
+    cycles: np.ndarray
+    reference_cycles: float
+    left_out: tuple[LeftOut, ...]
+    notes: tuple[str, ...]
+
+
+def given(drawn: FleetDraws) -> Given:
+    """What of a fleet is pooled.
+
+    Args:
+        drawn: Draws of all inspections.
+
+    Raises:
+        StoreError: Nothing can be pooled.
+    """
+    notes: list[str] = []
+    values, about = _by_meaning(drawn, notes)
+    if not values:
+        raise StoreError(
+            "no friction coefficient of this fleet can be pooled; only coefficients that were fitted under a prior on their "
+            "logarithm (LogNormal, or a value with its uncertainty) are."
+        )
+    kept, left_out = _kept(drawn, values, notes)
+    if not kept.any():
+        raise StoreError(f"none of {len(kept)} inspections can be pooled. {left_out[0].inspection}: {left_out[0].why}.")
+    cycles = drawn.cycles[kept]
+    cables = tuple(dict.fromkeys(name for name, keep in zip(drawn.cable, kept, strict=True) if keep))
+    number = np.array([cables.index(name) for name, keep in zip(drawn.cable, kept, strict=True) if keep])
+    logs = np.log(np.maximum(np.stack([each[kept] for each in values.values()], axis=2), _SMALLEST))
+    priors = [_log_prior(about[name]) for name in values]
+    mean, sd = (np.array([prior[i] for prior in priors]) for i in (0, 1))
+    known = np.isfinite(logs).all(axis=1)
+    reference = float(np.nanmax(cycles)) if np.isfinite(cycles).any() else 0.0
+    worn = cycles / reference if _tells_wear(cycles, notes) else None
+    effects = _effects(drawn, kept, notes)
+    inspected = Inspected(number, worn, effects, known, _summaries(logs, known, mean, sd), mean, sd)
+    symbols = {name: about[name].get("symbol", name) for name in values}
+    labels = tuple(name for name, keep in zip(drawn.label, kept, strict=True) if keep)
+    return Given(cables, tuple(values), symbols, inspected, logs, labels, cycles, reference, left_out, tuple(notes))
+
+
+def _summaries(logs: np.ndarray, known: np.ndarray, mean: np.ndarray, sd: np.ndarray) -> Summaries:
+    """Of all inspections, those that have the same coefficients together."""
+    count, coefficients = known.shape
+    center, scale, freedom = np.zeros((count, coefficients)), np.zeros((count, coefficients, coefficients)), np.ones(count)
+    for pattern in np.unique(known, axis=0):
+        rows, columns = np.flatnonzero((known == pattern).all(axis=1)), np.flatnonzero(pattern)
+        found = summarized(logs[rows][:, :, columns], mean[columns], sd[columns])
+        center[np.ix_(rows, columns)], freedom[rows] = found.center, found.freedom
+        scale[np.ix_(rows, columns, columns)] = found.scale
+    return Summaries(center, scale, freedom)
+
+
+def _by_meaning(drawn: FleetDraws, notes: list[str]) -> tuple[dict[str, np.ndarray], dict[str, Mapping[str, str]]]:
+    """Draws and attributes of coefficients, those of one name that mean different things under names of their own."""
+    shapes = [_text(key) for key in drawn.stats["shape"]]
+    meanings: Mapping[str, Mapping[str, str]] = drawn.about.get("meanings", {})
+    values: dict[str, np.ndarray] = {}
+    about: dict[str, Mapping[str, str]] = {}
+    without: list[str] = []
+    for name, draws in drawn.values.items():
+        if drawn.attributes[name].get("role") != FRICTION:
+            continue
+        if _log_prior(drawn.attributes[name]) is None:
+            without.append(name)
+            continue
+        said = [meanings.get(key, {}).get(name, "") for key in shapes]
+        every = list(dict.fromkeys(text for text, row in zip(said, draws, strict=True) if np.isfinite(row).all()))
+        for i, text in enumerate(every):
+            mine = np.array([each == text for each in said])
+            called = name if len(every) == 1 else f"{name} ({i + 1})"
+            values[called] = np.where(mine[:, None], draws, np.nan)
+            about[called] = drawn.attributes[name]
+        if len(every) > 1:
+            meant = listed([f"{name} ({i + 1}) is {text}" for i, text in enumerate(every)])
+            notes.append(f"{name} does not mean the same for all cables, so it is pooled by what it means: {meant}.")
+    if without:
+        notes.append(f"{listed(without)} cannot be pooled, because no prior on the logarithm says where to begin.")
+    return values, about
+
+
+def _log_prior(about: Mapping[str, str]) -> Any:
+    """Mean and standard deviation of the log coefficient in single fits; None where there is none."""
+    try:
+        prior = json.loads(about["prior"])
+        if prior["kind"] == "LogNormal":
+            return float(np.log(prior["median"])), float(prior["log_sd"])
+        if prior["kind"] == "TruncatedNormal" and prior["mean"] > 0:
+            return float(np.log(prior["mean"])), float(prior["sd"] / prior["mean"])
+    except (KeyError, ValueError, TypeError):
+        return None
+    return None
+
+
+def _kept(drawn: FleetDraws, values: Mapping[str, np.ndarray], notes: list[str]) -> tuple[np.ndarray, tuple[LeftOut, ...]]:
+    """Which inspections are pooled, and why others are not."""
+    trusted = drawn.stats["trusted"].astype(bool)
+    has = np.any([np.isfinite(draws).all(axis=1) for draws in values.values()], axis=0)
+    some, dated = np.isfinite(drawn.cycles).any(), np.isfinite(drawn.cycles)
+    left = []
+    for i, label in enumerate(drawn.label):
+        if not trusted[i]:
+            left.append(LeftOut(label, "its fit must not be trusted"))
+        elif not has[i]:
+            left.append(LeftOut(label, "it has none of the coefficients that are pooled"))
+        elif some and not dated[i]:
+            left.append(LeftOut(label, "nobody says after how many cycles it was made"))
+    kept = trusted & has & (dated if some else np.ones(len(has), dtype=bool))
+    if left:
+        named = few([each.inspection for each in left])
+        notes.append(f"{counted(len(left), 'inspection')} could not be pooled ({named}); why stands in the JSON.")
+    return kept, tuple(left)
+
+
+def _tells_wear(cycles: np.ndarray, notes: list[str]) -> bool:
+    """Whether wear can be told."""
+    if not np.isfinite(cycles).any():
+        notes.append("Nobody says after how many cycles cables were inspected, so nothing is told of wear and life.")
+        return False
+    if np.ptp(cycles) == 0:
+        every = f"{cycles[0]:,.15g} cycles"
+        notes.append(f"All inspections were made after {every}, so nothing is told of wear and life.")
+        return False
+    return True
+
+
+def _effects(drawn: FleetDraws, kept: np.ndarray, notes: list[str]) -> dict[str, np.ndarray]:
+    """Columns of what else friction may depend on, where every inspection says it and it was not always the same."""
+    columns = {"lubrication": drawn.lubricated[kept], "per_degree": drawn.temperature[kept] - REFERENCE_TEMPERATURE}
+    words = {"lubrication": "whether the cable was lubricated", "per_degree": "the temperature"}
+    found = {}
+    for name, column in columns.items():
+        missing = int(np.isnan(column).sum())
+        if missing and missing < len(column):
+            some = counted(missing, "inspection does", "inspections do")
+            notes.append(f"{some} not say {words[name]}, so it is not allowed for; what it does counts as scatter.")
+        elif not missing and np.ptp(column) > 0:
+            found[name] = column
+        elif not missing and column[0] != 0:
+            at = "lubricated" if name == "lubrication" else f"at {drawn.temperature[kept][0]:g} °C"
+            notes.append(f"Every inspection was made {at}, so all that is said holds {at}.")
+    return found
+
+
+def _text(value: Any) -> str:
+    return value.decode() if isinstance(value, bytes) else str(value)

@@ -1,0 +1,203 @@
+r"""Which cable is unlike the rest, and whether all are of one kind.
+
+Each number of a cable, its log coefficients when new and its wear, is compared with what the population of the other cables
+foretells of it, as far as its own inspections tell it:
+
+.. math:: t_{ik} = (\hat u_{ik} - m_k) / \sqrt{s_k^2 + v_{ik}}
+
+and its inspections with each other, so that wear that is not straight and an inspection that disagrees are seen too. The least
+of these probabilities, times their number, is the cable's. Cables that are far off by median and median deviation, which
+several of them cannot hide behind, are left out of the population; for the others its draws are weighted by one over
+the likelihood of the cable in question. Whether cables are of one kind is the test of Anderson and
+Darling for a normal distribution.
+
+References:
+    Gelman, Meng and Stern 1996, "Posterior predictive assessment" (Statistica Sinica 6); Holm 1979, "A simple sequentially
+    rejective multiple test procedure" (Scandinavian Journal of Statistics 6); Stephens 1986, in D'Agostino and Stephens,
+    "Goodness-of-fit techniques", table 4.9, for the distribution of the statistic with estimated mean and variance.
+"""
+
+import numpy as np
+
+from bowdenfit.inference.population.model import Inspected
+from bowdenfit.inference.population.sampling import PopulationDraws
+from bowdenfit.inference.psis import smooth_weights
+
+FALSE_ALARM, OF_KINDS = 0.05, 0.01  # of fleets in which all cables are alike: of naming any, and of seeing two kinds
+_POPULATIONS, _REPEATS = 200, 100  # draws of the population, and cables drawn from each
+_ERRORS = 20_000  # of the inspections of a cable
+_RANK = 1e-9
+_FEWEST_TO_LEAVE_OUT, _FAR = 5, 3.5  # cables, and typical deviations from the median
+_NORMAL_DEVIATION = 0.6745  # median deviation of a normal distribution in standard deviations
+_FEWEST = 8  # cables of which can be said whether they are of one kind
+
+
+def far_off(inspected: Inspected, drawn: PopulationDraws) -> tuple[int, ...]:
+    """Cables that may be unlike the rest, by number: at most a third of them.
+
+    Args:
+        inspected: What is known.
+        drawn: Of the population.
+    """
+    if inspected.cables < _FEWEST_TO_LEAVE_OUT:
+        return ()
+    values = drawn.cables.mean(axis=0)
+    away = np.abs(values - np.median(values, axis=0))
+    typical = np.median(away, axis=0) / _NORMAL_DEVIATION
+    worst = (away / np.maximum(typical, np.finfo(float).tiny)).max(axis=1)
+    most = np.argsort(-worst)[: inspected.cables // 3]
+    return tuple(int(i) for i in sorted(most) if worst[i] > _FAR)
+
+
+def chances(inspected: Inspected, drawn: PopulationDraws, seed: int, without: tuple[int, ...] = ()) -> np.ndarray:
+    """Probability that a cable of this population is as far from the others as each is, (cable,).
+
+    Args:
+        inspected: What is known.
+        drawn: Of the population.
+        seed: Of everything random.
+        without: Cables that the population was drawn without.
+    """
+    generator = np.random.default_rng([seed, 7])
+    which = np.linspace(0, len(drawn.mean) - 1, _POPULATIONS).round().astype(int)
+    core = drawn.mean[which], drawn.spread[which], drawn.effects[which]
+    return np.array([_chance(inspected, i, *core, generator, i not in without) for i in range(inspected.cables)])
+
+
+def _chance(
+    inspected: Inspected,
+    cable: int,
+    mean: np.ndarray,
+    spread: np.ndarray,
+    effects: np.ndarray,
+    generator: np.random.Generator,
+    is_in: bool,
+) -> float:
+    """Of one cable, which may be in the population or not."""
+    rows = np.flatnonzero(inspected.cable == cable)
+    known = inspected.known[rows].ravel()
+    design = inspected.design[rows].reshape(known.size, -1)[known]
+    scale, count = np.zeros((known.size, known.size)), inspected.coefficients
+    for place, row in enumerate(rows):
+        inside = slice(place * count, (place + 1) * count)
+        scale[inside, inside] = inspected.summaries.scale[row]
+    scale = scale[np.ix_(known, known)]
+    shift = np.zeros((len(mean), len(known)))
+    if inspected.effects:
+        columns = np.stack(list(inspected.effects.values()), axis=1)[rows]
+        shift = np.repeat(effects @ columns.T, count, axis=1)
+    away = inspected.summaries.center[rows].ravel()[known] - mean @ design.T - shift[:, known]
+    root = np.linalg.cholesky(np.einsum("ad,hd,bd->hab", design, spread**2, design) + scale)
+    distance = np.sum(np.linalg.solve(root, away[:, :, None])[..., 0] ** 2, axis=1)
+    size = np.log(np.diagonal(root, axis1=1, axis2=2)).sum(axis=1)
+    log = distance / 2 + size if is_in else np.zeros(len(mean))
+    weights = np.exp(smooth_weights(log)[0])  # of the population without this cable
+    noise = _noise(inspected, rows, scale, known, generator)
+    found = [_within(away.mean(axis=0), noise, scale, design)]
+    precision = np.linalg.inv(scale)
+    for k in np.flatnonzero((design != 0).any(axis=0)):
+        others = np.arange(design.shape[1]) != k
+        loose = np.median(spread, axis=0) ** -2 * others  # as far as its own inspections do not tell the others
+        gain = np.linalg.solve(design.T @ precision @ design + np.diag(loose), design.T @ precision)[k]
+        blur = gain @ design - ~others  # of what the others of this cable are
+        own = noise @ gain
+        seen = away @ gain
+        drawn = generator.standard_normal((len(mean), _REPEATS, mean.shape[1])) * spread[:, None]
+        repeated = drawn[:, :, k] + drawn @ blur + generator.choice(own, drawn.shape[:2])
+        beyond = np.sum(np.abs(repeated) >= np.abs(seen)[:, None], axis=1)
+        found.append(float((1 / _REPEATS / len(mean) + weights @ beyond / _REPEATS) / weights.sum()))
+    return min(1.0, len(found) * min(found))
+
+
+def _noise(
+    inspected: Inspected, rows: np.ndarray, scale: np.ndarray, known: np.ndarray, generator: np.random.Generator
+) -> np.ndarray:
+    """Errors of the inspections of a cable, (repeat, number)."""
+    freedom = inspected.summaries.freedom[rows]
+    found = generator.standard_normal((_ERRORS, len(scale))) @ np.linalg.cholesky(scale).T
+    stretch = np.sqrt(freedom / generator.chisquare(freedom, (_ERRORS, len(rows))))
+    stretched: np.ndarray = found * np.repeat(stretch, inspected.coefficients, axis=1)[:, known]
+    return stretched
+
+
+def _within(away: np.ndarray, noise: np.ndarray, scale: np.ndarray, design: np.ndarray) -> float:
+    """Probability that inspections of a cable disagree as much with each other, or with straight wear; 1 where they cannot."""
+    root = np.linalg.inv(np.linalg.cholesky(scale))
+    left, sizes, _ = np.linalg.svd(root @ design)
+    free = left[:, np.sum(sizes > _RANK * sizes.max()) :]
+    if not free.shape[1]:
+        return 1.0
+    seen, repeated = np.sum((free.T @ root @ away) ** 2), np.sum((noise @ root.T @ free) ** 2, axis=1)
+    return float((1 + np.sum(repeated >= seen)) / (1 + len(repeated)))
+
+
+def holm(chances: np.ndarray) -> np.ndarray:
+    """Probabilities, each that of any as small among so many, by Holm's procedure.
+
+    Args:
+        chances: By themselves.
+    """
+    order, found = np.argsort(chances), np.empty(len(chances))
+    found[order] = np.minimum(np.maximum.accumulate(chances[order] * np.arange(len(chances), 0, -1)), 1.0)
+    return found
+
+
+def departures(drawn: PopulationDraws, core: PopulationDraws) -> np.ndarray:
+    """Of each cable from the middle of a population, in its spreads between cables, (cable, number).
+
+    Args:
+        drawn: All cables.
+        core: The population without those that are far off.
+    """
+    found: np.ndarray = (np.median(drawn.cables, axis=0) - np.median(core.mean, axis=0)) / np.median(core.spread, axis=0)
+    return found
+
+
+def mixed(inspected: Inspected, drawn: PopulationDraws, names: tuple[str, ...]) -> dict[str, float]:
+    """Numbers in which cables do not look like one population, with the probability of that by chance in such a fleet.
+
+    Args:
+        inspected: What is known.
+        drawn: Of the population.
+        names: Of the numbers of a cable.
+    """
+    data, effects = inspected.data, drawn.effects.mean(axis=0)
+    shift = data["by_effect"][:, :, : len(effects)] @ effects
+    found: dict[str, float] = {}
+    precision = data["precision"]
+    for k, name in enumerate(names):
+        known = np.diagonal(precision, axis1=1, axis2=2)[:, k] > 0
+        others = [i for i in range(len(names)) if i != k]
+        weight = np.zeros((len(names), len(names)))
+        weight[others, others] = 1 / np.mean(drawn.spread[:, others], axis=0) ** 2  # as far as its own data do not tell
+        toward = data["toward"] - shift + weight @ drawn.mean.mean(axis=0)
+        covariance = np.linalg.inv(precision[known] + weight)
+        estimate = np.einsum("ij,ij->i", covariance[:, k], toward[known])
+        variance = covariance[:, k, k] + np.mean(drawn.spread[:, k]) ** 2
+        standardized = (estimate - drawn.mean[:, k].mean()) / np.sqrt(variance)
+        if known.sum() >= _FEWEST:
+            found[name] = anderson_darling(standardized)
+    adjusted = holm(np.array(list(found.values())))
+    return {name: float(p) for name, p in zip(found, adjusted, strict=True) if p < OF_KINDS}
+
+
+def anderson_darling(values: np.ndarray) -> float:
+    """Probability of values as far from a normal distribution of unknown mean and variance, by Stephens' approximation.
+
+    Args:
+        values: At least eight.
+    """
+    from scipy.special import log_ndtr
+
+    n = len(values)
+    z = np.sort((values - values.mean()) / values.std(ddof=1))
+    i = np.arange(1, n + 1)
+    squared = -n - np.mean((2 * i - 1) * (log_ndtr(z) + log_ndtr(-z[::-1])))
+    a = squared * (1 + 0.75 / n + 2.25 / n**2)
+    if a < 0.2:
+        return float(1 - np.exp(-13.436 + 101.14 * a - 223.73 * a**2))
+    if a < 0.34:
+        return float(1 - np.exp(-8.318 + 42.796 * a - 59.938 * a**2))
+    if a < 0.6:
+        return float(np.exp(0.9177 - 4.279 * a - 1.38 * a**2))
+    return float(np.exp(1.2937 - 5.709 * a + 0.0186 * a**2)) if a < 10 else 0.0

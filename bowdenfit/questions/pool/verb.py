@@ -1,0 +1,123 @@
+"""Looking at the cables of a fleet together."""
+
+import math
+import re
+from collections.abc import Sequence
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Any
+
+from bowdenfit.verb import LARGEST_SEED, Argument, Option, Quantity, Reply, Verb
+
+if TYPE_CHECKING:
+    from bowdenfit.questions.pool.answer import Asked, Pool
+
+NAME = "pool"
+NOT_TRUSTED = 3
+_NAMED = re.compile(r"(?P<name>[^=]+)=\s*(?P<value>\d+\.?\d*|\.\d+)\s*(?P<unit>[A-Za-z°][\w°]*)")
+_MOST_TURNS = 100
+
+
+def pool(
+    results: Annotated["str | Path", Argument("FLEET")],
+    *,
+    until: Annotated[Quantity | None, Option(metavar="EFFICIENCY", example="60%")] = None,
+    wrap_angles: Annotated[Sequence[str], Option(("--wrap-angle",), metavar="COEFFICIENT=ANGLE")] = (),
+    cycles: Annotated[int | None, Option(least=1)] = None,
+    seed: Annotated[int | None, Option(least=0, most=LARGEST_SEED, default="that of the fleet")] = None,
+) -> "Pool":
+    """Look at the cables of a fleet together: what they have in common, how they wear, and how long each lasts.
+
+    Args:
+        results: Results folder that `bowdenfit fleet` wrote.
+        until: Efficiency until which a cable serves, such as 60%.
+        wrap_angles: Wrap angles at which that holds, one for each friction coefficient, such as mu_sheath=180deg.
+        cycles: Before so many cycles the probability of falling below it is said.
+        seed: Seed of everything random.
+
+    Raises:
+        UsageError: Life is asked for without what it depends on.
+        StoreError: There is no fleet, or nothing in it can be pooled.
+    """
+    import jax
+
+    from bowdenfit.questions.pool.pooling import pooled
+    from bowdenfit.results.fleet_folder import read_fleet_draws
+
+    drawn = read_fleet_draws(Path(results))
+    asked = asked_of(until, wrap_angles, cycles, [n for n, a in drawn.attributes.items() if a.get("role") == "friction"])
+    seed = int(drawn.about.get("seed", 0)) if seed is None else seed
+    with jax.enable_x64(True):
+        return pooled(drawn, asked, seed)
+
+
+def asked_of(
+    until: Quantity | None, wrap_angles: Sequence[str], cycles: int | None, coefficients: Sequence[str]
+) -> "Asked | None":
+    """What life is until; None where it is not asked for.
+
+    Raises:
+        UsageError: Something is missing, or cannot be.
+    """
+    from bowdenfit.errors import UsageError
+    from bowdenfit.questions.pool.answer import Asked
+    from bowdenfit.units import conversion_factor
+
+    if until is None:
+        if wrap_angles or cycles is not None:
+            raise UsageError("--wrap-angle and --cycles ask how long cables last; say until which efficiency, as --until 60%.")
+        return None
+    value, unit = until
+    efficiency = value * conversion_factor(unit, "ratio")
+    if not 0 < efficiency < 1:
+        raise UsageError(f"--until {value:g}{unit} is no efficiency that a cable falls to; write it as 60% or 0.6 1.")
+    angles = dict(_angle(text) for text in wrap_angles)
+    wrong = [name for name in angles if name not in coefficients]
+    missing = [name for name in coefficients if name not in angles]
+    if wrong or missing:
+        what = f"there is no coefficient {wrong[0]!r}" if wrong else f"none is said for {missing[0]}"
+        example = " ".join(f"--wrap-angle {name}=90deg" for name in coefficients)
+        raise UsageError(f"how long a cable lasts depends on its wrap angles, and {what}; write {example}, with yours.")
+    return Asked(efficiency, {name: angles[name] for name in coefficients}, None if cycles is None else float(cycles))
+
+
+def _angle(text: str) -> tuple[str, float]:
+    """Coefficient and wrap angle [rad] of an option such as mu_sheath=180deg.
+
+    Raises:
+        UsageError: It is something else, or no angle that a cable wraps.
+    """
+    from bowdenfit.errors import DatasetError, UsageError
+    from bowdenfit.units import conversion_factor
+    from bowdenfit.words import shown
+
+    match = _NAMED.fullmatch(text.strip())
+    try:
+        angle = float(match["value"]) * conversion_factor(match["unit"], "angle") if match else math.nan
+    except DatasetError:
+        angle = math.nan
+    if match is None or not 0 <= angle < _MOST_TURNS * 2 * math.pi:
+        raise UsageError(f"--wrap-angle {shown(text)} is no coefficient with its wrap angle; write it as mu_sheath=180deg.")
+    return match["name"].strip(), angle
+
+
+def _reply(found: "Pool", _: dict[str, Any]) -> Reply:
+    from bowdenfit.questions.pool.words import pool_text
+
+    return Reply(pool_text(found), lambda: found, (), 0 if found.is_trusted else NOT_TRUSTED, found.to_csv)
+
+
+VERB = Verb(
+    pool,
+    _reply,
+    "Look at the cables of a fleet together: wear, life, and which is unlike the rest.",
+    """Look at the cables of FLEET together, a results folder that `bowdenfit fleet` wrote.
+
+    Says how friction grows with cycles, what lubrication and temperature do, how much cables differ, and what a new one will be
+    like; each cable is drawn toward the others as far as its own inspections leave it open. Names cables that are unlike the
+    rest, and what to inspect next.
+
+    With --until and a --wrap-angle for each coefficient: how many cycles each cable and a new one last, and with --cycles the
+    probability of failing before. Exit code 3: must not be trusted.
+    """,
+    csv="Print cables as CSV, a row a quantity.",
+)

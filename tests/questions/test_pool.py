@@ -1,0 +1,174 @@
+"""Cables of a fleet together: population, wear, life, who is unlike the rest, and what is refused."""
+
+import json
+from dataclasses import replace
+
+import jax
+import numpy as np
+import pytest
+from pooled_fleets import REFERENCE, Truth, fleet_draws
+
+import bowdenfit as bf
+from bowdenfit.questions.pool.answer import Asked
+from bowdenfit.questions.pool.inspected import given
+from bowdenfit.questions.pool.life import cycles_until, life_of
+from bowdenfit.questions.pool.pooling import pooled
+from bowdenfit.questions.pool.unlike import anderson_darling, holm
+from bowdenfit.questions.pool.words import pool_text
+from bowdenfit.results.fleet_folder import FLEET_DRAWS, write_fleet_draws
+
+ASKED = Asked(0.6, {"mu_0": np.pi, "mu_1": 0.3}, 100_000.0)
+
+
+def pool(drawn, asked=None, seed=1):
+    with jax.enable_x64(True):
+        return pooled(drawn, asked, seed)
+
+
+@pytest.fixture(scope="module")
+def fleet():
+    """A fleet whose third cable is half as slippery again and whose eighth wears five spreads quicker, and its truth."""
+    return fleet_draws(3, shifts={2: 1.3}, wears={7: 0.6})
+
+
+@pytest.fixture(scope="module")
+def found(fleet):
+    return pool(fleet[0], ASKED)
+
+
+def test_the_population_and_every_cable_are_found(fleet, found):
+    """Within 4 standard deviations: of 40 numbers one is outside by chance in 400 runs; the seed is fixed."""
+    truth = fleet[1]
+    assert found.is_trusted
+    for cable, values in zip(found.cables, truth, strict=True):
+        known = [cable.coefficients["mu_0"], cable.coefficients["mu_1"], cable.wear]
+        for interval, value in zip(known, (*np.exp(values[:2]), np.expm1(values[2])), strict=True):
+            assert abs(interval.mean - value) < 4 * interval.sd
+    (oil,) = found.effects
+    assert abs(oil.share.mean - np.expm1(-0.2)) < 4 * oil.share.sd < 0.1
+
+
+def test_cables_unlike_the_rest_are_named_and_no_others(found):
+    assert {each.cable for each in found.unlike} == {"cable-03", "cable-08"}
+    assert "mu" in found.cable("cable-03").unlike and "above" in found.cable("cable-03").unlike
+    assert "wear lies" in found.cable("cable-08").unlike
+
+
+def test_words_answer_first_and_keep_to_the_page(found):
+    text = pool_text(found)
+    assert text.startswith("made: ") and "below 60 % after" in text.splitlines()[0]
+    assert max(len(line.encode()) for line in text.splitlines()) <= 80
+    assert "cable-03 is unlike the rest" in text and "Inspect cable-" in text
+    assert not any(word in text.lower() for word in ("posterior", "draws", "r-hat", "hyper", "log "))
+
+
+def test_cables_are_drawn_toward_the_rest_as_far_as_their_data_allow(fleet, found):
+    """Wear is nearer to the truth than what a line through a cable's own inspections says of it."""
+    own = []
+    for i in range(12):
+        rows = slice(3 * i, 3 * i + 3)
+        seen = np.median(np.log(fleet[0].values["mu_0"][rows]), axis=1) + 0.2 * fleet[0].lubricated[rows]
+        own.append(np.polyfit(fleet[0].cycles[rows] / REFERENCE, seen, 1)[0])
+    alike = [i for i in range(12) if i != 7]
+    pooled_errors = [np.log1p(found.cables[i].wear.mean) - fleet[1][i, 2] for i in alike]
+    assert np.std(pooled_errors) < 0.9 * np.std([own[i] - fleet[1][i, 2] for i in alike])
+
+
+def test_life_is_the_closed_formula():
+    logs, wear = np.log([[0.1, 0.15]] * 3), np.array([0.2, 0.0, 0.2])
+    cycles = cycles_until(ASKED, logs, wear, 50_000.0)
+    at = np.exp(-np.exp(0.2 * cycles[0] / 50_000.0) * (0.1 * np.pi + 0.15 * 0.3))
+    assert at == pytest.approx(0.6) and np.isinf(cycles[1])
+    life = life_of(ASKED, cycles, 50_000.0)
+    assert life.lasts == pytest.approx(1 / 3) and life.extrapolated and life.fails == pytest.approx(2 / 3)
+    assert cycles_until(replace(ASKED, efficiency=0.9), logs, wear, 1.0).tolist() == [0.0, 0.0, 0.0]
+
+
+def test_a_normal_sample_passes_and_two_heaps_do_not():
+    """Of 400 normal samples of 20, 1 % at most; 13 would be chance in a thousand. Two heaps six spreads apart are seen."""
+    generator = np.random.default_rng(5)
+    small = sum(anderson_darling(generator.standard_normal(20)) < 0.01 for _ in range(400))
+    assert small <= 13
+    heaps = generator.standard_normal(20) + 6 * (np.arange(20) % 2)
+    assert anderson_darling(heaps) < 0.01
+
+
+def test_holms_procedure_is_the_textbooks():
+    np.testing.assert_allclose(holm(np.array([0.01, 0.04, 0.03, 0.005])), [0.03, 0.06, 0.06, 0.02])
+
+
+def test_what_cannot_be_told_is_said(fleet):
+    drawn = fleet[0]
+    same = given(replace(drawn, cycles=np.zeros(36)))
+    assert same.inspected.cycles is None and "nothing is told of wear" in " ".join(same.notes)
+    some = drawn.lubricated.copy()
+    some[4] = np.nan
+    assert "does not say whether the cable was lubricated" in " ".join(given(replace(drawn, lubricated=some)).notes)
+    undated = drawn.cycles.copy()
+    undated[0] = np.nan
+    left = given(replace(drawn, cycles=undated)).left_out
+    assert [each.inspection for each in left] == ["cable-01 after 0 cycles"] and "how many cycles" in left[0].why
+    trusted = drawn.stats["trusted"].copy()
+    trusted[5] = 0
+    (left,) = given(replace(drawn, stats=drawn.stats | {"trusted": trusted})).left_out
+    assert "must not be trusted" in left.why
+    with pytest.raises(bf.StoreError, match="no friction coefficient"):
+        given(replace(drawn, attributes={name: {"role": "noise"} for name in drawn.values}))
+
+
+def test_coefficients_that_mean_different_things_are_pooled_apart(fleet):
+    drawn = fleet[0]
+    shape = np.array(["one"] * 18 + ["two"] * 18, dtype=object)
+    about = dict(drawn.about) | {"meanings": {"one": {"mu_0": "sheath"}, "two": {"mu_0": "ring"}}}
+    apart = given(replace(drawn, stats=drawn.stats | {"shape": shape}, about=about))
+    assert apart.coefficients == ("mu_0 (1)", "mu_0 (2)", "mu_1")
+    assert "mu_0 (2) is ring" in " ".join(apart.notes)
+    assert apart.inspected.known.sum(axis=0).tolist() == [18, 18, 36]
+
+
+@pytest.mark.parametrize(
+    ("arguments", "said"),
+    [
+        (("--cycles", "1000"), "say until which efficiency"),
+        (("--until", "60%"), "none is said for mu_0"),
+        (("--until", "160%", "--wrap-angle", "mu_0=1rad"), "is no efficiency"),
+        (("--until", "60%", "--wrap-angle", "mu_0"), "write it as mu_sheath=180deg"),
+        (("--until", "60%", "--wrap-angle", "mu_9=90deg"), "there is no coefficient 'mu_9'"),
+    ],
+)
+def test_life_without_what_it_depends_on_is_refused(run, fleet, tmp_path, arguments, said):
+    write_fleet_draws(tmp_path / FLEET_DRAWS, fleet[0])
+    code, _, error = run("pool", tmp_path, *arguments)
+    assert code == 2 and said in " ".join(error.split())
+
+
+def test_a_folder_without_a_fleet_is_refused(run, tmp_path):
+    code, _, error = run("pool", tmp_path)
+    assert code == 2 and "fleet.nc cannot be read" in " ".join(error.split())
+
+
+def test_the_answer_is_json_and_csv(run, fleet, found, tmp_path):
+    write_fleet_draws(tmp_path / FLEET_DRAWS, fleet[0])
+    angles = ("--until", "60%", "--wrap-angle", f"mu_0={np.pi}rad", "--wrap-angle", "mu_1=0.3rad", "--cycles", 100_000)
+    code, out, _ = run("pool", tmp_path, *angles, "--json", "--seed", 1)
+    page = json.loads(out)
+    assert code == 0 and page["is_trusted"] and len(page["cables"]) == 12
+    assert page["new"]["fails"] == found.new.fails
+    assert found.to_csv().startswith("quantity,cable,mean,sd")
+
+
+@pytest.mark.slow
+def test_one_cable_has_no_population():
+    drawn, _ = fleet_draws(1, cables=1)
+    alone = pool(drawn, ASKED)
+    assert alone.new is None and not alone.unlike and not alone.spreads
+    assert "one cable only" in pool_text(alone)
+
+
+@pytest.mark.slow
+def test_two_makes_pooled_as_one_are_seen():
+    drawn, _ = fleet_draws(11, cables=20, shifts=dict.fromkeys(range(10), 1.5), truth=Truth(spread=0.15))
+    found = pool(drawn)
+    assert found.mixed and "do not look like one population" in pool_text(found)
+    alike, _ = fleet_draws(12, cables=20)
+    assert not pool(alike).mixed

@@ -19,6 +19,7 @@ extensions = [
     "myst_nb",
     "description_keys",
     "docstrings",
+    "library",
     "mathml",
     "repository_pages",
     "verb_help",
@@ -49,6 +50,6 @@ nb_ipywidgets_js = {}  # these would come from a network
 
 autodoc_member_order = "bysource"
 autodoc_typehints_format = "short"
-autodoc_preserve_defaults = True
+autodoc_preserve_defaults = False  # verbs have more keywords than stand in their source
 napoleon_google_docstring = True
 napoleon_use_rtype = False

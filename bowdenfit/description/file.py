@@ -15,6 +15,8 @@ from bowdenfit.inputs import read_toml_file
 from bowdenfit.units import route_conversion_factor
 from bowdenfit.words import shown
 
+_FLEET = "fleet.toml"  # stands in the folder of many cables, which have no description of their own
+
 Stated = tuple[str, QuantityValue | None, str]
 """Where a quantity stands, the quantity, and what it must measure."""
 
@@ -30,6 +32,8 @@ def read_toml(path: Path, overrides: Sequence[str] = ()) -> tuple[str, dict[str,
         DescriptionError: The file is missing or no TOML, or a setting leads nowhere.
     """
     remedy = "name a folder that holds a cable.toml, or write one with `bowdenfit init FOLDER`"
+    if (path.parent / _FLEET).is_file():
+        remedy = f"the folder holds a fleet: `bowdenfit fleet {path.parent}` reads, checks and fits all of its cables"
     text, raw = read_toml_file(path, remedy)
     return text, override(raw, overrides)
 

@@ -5,6 +5,8 @@ their options are understood, and their data sets read.
 """
 
 import shutil
+import subprocess
+import time
 import tomllib
 
 import click
@@ -12,6 +14,7 @@ import nptdms
 import numpy as np
 import pytest
 from conftest import ROOT
+from distributed.cli import dask_scheduler, dask_worker
 from snippets import FIRST, PAGES, PUBLISHED, as_shown, blocks, masked
 
 import bowdenfit as bf
@@ -19,14 +22,16 @@ from bowdenfit.cli import bowdenfit as program
 from bowdenfit.cli.keywords import keywords_of
 from bowdenfit.kinds.settings import parse_description
 from bowdenfit.questions.calibrate.truths import read_truths
+from bowdenfit.questions.fleet.inspections import read_inspections
 from bowdenfit.reading import Reading
 
 QUICK = [f"--set=sampler.{key}" for key in ("n_walkers=64", "max_steps=400", "target_ess=100", "target_r_hat=1.2")]
-TAKES_LONG = {"fit", "calibrate", "identify", "next"}
+TAKES_LONG = {"fit", "fleet", "calibrate", "identify", "next"}
+CLUSTER = {"scheduler": dask_scheduler.main, "worker": dask_worker.main}
 POUND = 4.4482216152605  # N
 CABLE = {"name": "A cable", "contact": [{"name": "sheath", "friction": "mu", "wrap_angle": {"value": 90, "unit": "deg"}}]}
 TABLES = {"forces": {"file": "forces.csv"}}
-SH, CONSOLE, TOML = (blocks(language) for language in ("sh", "console", "toml"))
+SH, CONSOLE, TOML, C, MATLAB = (blocks(language) for language in ("sh", "console", "toml", "c", "matlab"))
 
 
 @pytest.fixture(scope="module")
@@ -81,7 +86,10 @@ def test_every_command_can_be_typed_in(block, reader, run):
 
 
 def stands_in_for(words):
-    """What other commands need is there: a script, or an extra of the package."""
+    """What other commands need is there: a script, an extra of the package, or an option of Dask."""
+    if words[0] == "dask":
+        CLUSTER[words[1]].make_context(words[1], [word for word in words[2:] if word != "&"])
+        return
     extras = tomllib.loads((ROOT / "pyproject.toml").read_text())["project"]["optional-dependencies"]
     named = [word for word in words if word.startswith(("./scripts", "scripts/"))]
     assert all((ROOT / name).exists() for name in named), words
@@ -99,7 +107,9 @@ def tried(words, run):
         shutil.rmtree(given["folder"] or given["example"], ignore_errors=True)
     elif not all(path.exists() for path in paths):
         return  # fits that another command of the page makes; the slow test makes them
-    if verb.name in TAKES_LONG:
+    if verb.name == "fleet":
+        assert read_inspections(paths[0])
+    elif verb.name in TAKES_LONG:
         keywords = [each for each in keywords_of(bf.fit) if each.name in Reading.__annotations__ and given.get(each.name)]
         if paths[0].parts[0] != "fits" and paths[0].name != "bench.toml":
             bf.check(paths[0], **{each.name: each.value(given[each.name]) for each in keywords})
@@ -138,13 +148,51 @@ def test_every_description_is_understood(block, tmp_path):
         assert parse_description({**CABLE, **tables, **said}).to_json()
 
 
+@pytest.mark.parametrize("block", C, ids=str)
+@pytest.mark.skipif(shutil.which("gcc") is None, reason="gcc is not installed")
+def test_every_program_in_c_compiles_without_a_warning_and_runs(block, reader, tmp_path):
+    bf.export(bf.load(f"fits/{FIRST}"), "c", tmp_path / "cable.h")
+    (tmp_path / "main.c").write_text(block.text, encoding="utf-8")
+    strict = ["-std=c99", "-pedantic", "-Wall", "-Wextra", "-Werror"]
+    subprocess.run(["gcc", *strict, "main.c", "-o", "main", "-lm"], cwd=tmp_path, check=True, timeout=60)
+    done = subprocess.run([tmp_path / "main"], capture_output=True, text=True, check=False, timeout=60)
+    assert done.returncode == 0 and any(char.isdigit() for char in done.stdout), done
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("block", MATLAB, ids=str)
+@pytest.mark.skipif(shutil.which("octave") is None, reason="octave is not installed")
+def test_everything_in_matlab_runs_in_octave(block, reader, tmp_path):
+    bf.export(bf.load(f"fits/{FIRST}"), "matlab", tmp_path / "cable.m")
+    command = ["octave", "--quiet", "--no-gui", "--eval", block.text]
+    done = subprocess.run(command, cwd=tmp_path, capture_output=True, text=True, check=False, timeout=120)
+    assert (done.returncode, done.stderr) == (0, "") and done.stdout.count(" = ") == block.text.count(" = "), done
+
+
+@pytest.fixture
+def others():
+    """Programs that run beside the reader's commands, as those behind which an & stands; they end with the test."""
+    started = []
+
+    def start(words):
+        started.append(subprocess.Popen(words[: words.index("&")], stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL))
+        time.sleep(2)  # so that one that the next needs is there
+
+    yield start
+    for each in reversed(started):
+        each.terminate()
+        each.wait(60)
+
+
 @pytest.mark.slow
 @pytest.mark.parametrize("page", PAGES, ids=lambda page: page.stem)
-def test_every_command_of_a_page_runs_one_after_the_other(page, place, tmp_path, monkeypatch, run):
+def test_every_command_of_a_page_runs_one_after_the_other(page, place, others, tmp_path, monkeypatch, run):
     monkeypatch.chdir(tmp_path)
     shutil.copytree(place, tmp_path, dirs_exist_ok=True)
     for block in blocks("sh", "console", pages=(page,)):
         for words in block.commands:
+            if words[-1] == "&":
+                others(words)
             if words[0] != "bowdenfit" or len(words) < 2 or words[1].startswith("-"):
                 continue
             if words[1] == "init":

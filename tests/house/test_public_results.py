@@ -19,6 +19,7 @@ from bowdenfit.html_text import as_html
 from bowdenfit.questions.calibrate.answer import Calibration, Checked, Coverage
 from bowdenfit.questions.figure_methods import FigureMethods
 from bowdenfit.questions.summary.verdict import CONTRADICTORY, NOT_CONVERGED, Verdict
+from bowdenfit.verbs import VERBS
 
 QUICK = ("sampler.n_walkers=128", "sampler.target_ess=200", "sampler.target_r_hat=1.05", "sampler.max_steps=3000")
 MOST_LINES, MOST_BYTES, MOST_IN_A_NOTEBOOK = 10, 1000, 2000
@@ -80,6 +81,23 @@ def test_every_public_result_shows_itself(result):
         assert issubclass(result, Display)
         assert result.__repr__ is Display.__repr__, "its dataclass writes its own; decorate it with repr=False"
         assert result._repr_html_ is Display._repr_html_
+
+
+def test_a_verb_loads_the_words_of_what_it_answers():
+    """Else its answer would show itself without them where nothing else has loaded them."""
+    for verb in VERBS:
+        package = verb.function.__module__.rpartition(".")[0]
+        words = Path(inspect.getfile(verb.function)).with_name("words.py")
+        if words.exists() and "@text_of.register" in words.read_text(encoding="utf-8"):
+            loaded = {name for node in ast.walk(ast.parse(inspect.getsource(verb.function))) for name in imported(node)}
+            assert f"{package}.words" in loaded, f"bf.{verb.function.__name__} answers with words that it does not load"
+
+
+def imported(node) -> list[str]:
+    """Modules that a line imports."""
+    if isinstance(node, ast.ImportFrom):
+        return [node.module or ""]
+    return [each.name for each in node.names] if isinstance(node, ast.Import) else []
 
 
 class Tags(HTMLParser):

@@ -4,7 +4,12 @@ import re
 import tomllib
 from pathlib import Path
 
+import click
+
+from bowdenfit.cli import bowdenfit as program
+
 ROOT = Path(__file__).parents[2]
+REFERENCE = {"index", "api", "commands", "changelog"}  # which the guides lead to
 README = (ROOT / "README.md").read_text(encoding="utf-8")
 
 
@@ -18,6 +23,19 @@ def test_the_readme_is_short_and_its_links_and_those_of_the_guides_lead_somewher
     for page in (ROOT / "README.md", *(ROOT / "docs").glob("*.md")):
         for target in re.findall(r"\]\(([^)#:]+)\)", page.read_text(encoding="utf-8")):
             assert (page.parent / target).exists(), f"{page.name}: {target}"
+
+
+def test_the_readme_has_a_line_for_every_verb():
+    table = README.split("## All verbs")[1].split("\n## ")[0]
+    named = {name for row in table.splitlines() if row.startswith("| `") for name in re.findall(r"`(\w+)`", row.split("|")[1])}
+    assert named == set(program.list_commands(click.Context(program)))
+
+
+def test_every_guide_can_be_reached_from_the_readme_and_from_the_first_page():
+    first = (ROOT / "docs" / "index.md").read_text(encoding="utf-8")
+    for page in (ROOT / "docs").glob("*.md"):
+        assert page.stem == "index" or page.stem in first, page.name
+        assert page.stem in REFERENCE or f"docs/{page.name}" in README, page.name
 
 
 def test_the_citation_is_of_this_version_and_license():

@@ -40,9 +40,8 @@ def calibrate(
     True values are drawn from the priors, tables of the same shape are simulated with them and fitted, and the truth is
     ranked among the draws. Priors that look at the data are those of the data set as measured. Every replication is kept.
 
-    Truths that are stated instead (`truth`) show what calibration from the priors cannot see, a prior that is wrong for
-    such a cable: then the intervals of the coefficients and of the optimum must hold them as often as they claim, to what
-    chance does, and ranks need not be uniform.
+    Truths that are stated instead (`truth`) show what calibration from the priors cannot see, a prior that is wrong for such a
+    cable: intervals of coefficients and optimum must hold them as often as they claim; ranks need not be uniform.
 
     Args:
         dataset: See `bowdenfit.read`; its keywords are taken too.
@@ -55,7 +54,7 @@ def calibrate(
         seed: Seed of everything random.
         resume: Go on with an interrupted calibration, or add replications.
         force: Replace an earlier calibration in the results folder.
-        progress: Called after every replication with how many are done, and of how many; a notebook shows a bar if omitted.
+        progress: Called after every replication with how many are done, and of how many; notebooks show a bar if omitted.
         reading: Keywords of `bowdenfit.read`.
 
     Raises:
@@ -66,6 +65,7 @@ def calibrate(
     plan = _plan(_stated_and_assumed(dataset, reading, assume), _seed(folder, seed, resume), truth)
     import jax
 
+    import bowdenfit.questions.calibrate.words  # noqa: F401  (what the answer says of itself)
     from bowdenfit.notebook import watched
     from bowdenfit.questions.calibrate.findings import findings
     from bowdenfit.questions.calibrate.quantities import quantities_of
@@ -78,11 +78,15 @@ def calibrate(
         done = {} if folder is None else open_replications(folder, _fingerprint(plan, assume), resume, force)
         with watched(WATCH, progress) as show:
             _replicate(plan, done, replications, workers, folder, show)
-        how = {"assumed": tuple(assume), "truths": tuple(each.text for each in plan.truths)}
-        found = findings(tuple(done.values()), quantities, name=plan.stated.description.name, seed=plan.seed, **how)
-        if folder is not None:
-            _write(found, folder)
+        found = findings(tuple(done.values()), quantities, assumed=tuple(assume), **_told(plan))
+        _write(found, folder)
     return found
+
+
+def _told(plan: "Plan") -> dict[str, Any]:
+    """What the answer says of a plan."""
+    truths = tuple(each.text for each in plan.truths)
+    return {"name": plan.stated.description.name, "seed": plan.seed, "truths": truths}
 
 
 def _folder(output: str | Path | None, resume: bool) -> Path | None:
@@ -170,8 +174,10 @@ def _fingerprint(plan: "Plan", assumptions: Sequence[str]) -> dict[str, Any]:
     return dict(json.loads(json.dumps(page)))
 
 
-def _write(found: "Calibration", folder: Path) -> None:
-    """Summary, figures, report, and calibration.json last."""
+def _write(found: "Calibration", folder: Path | None) -> None:
+    """Summary, figures, report, and calibration.json last; nothing without a folder."""
+    if folder is None:
+        return
     from bowdenfit.questions.calibrate.figure import draw_calibration
     from bowdenfit.questions.calibrate.sections import calibration_page
     from bowdenfit.questions.calibrate.store import CALIBRATION

@@ -44,8 +44,7 @@ def fleet(
 
     Args:
         folder: With fleet.csv (cable, cycles, temperature_degC, lubricated, file) and fleet.toml, which describes the cables
-            as a cable.toml does; or with a folder for each cable, or for each cable and in it for each number of cycles, that
-            has its own cable.toml.
+            as a cable.toml does; or with a folder that has a cable.toml for each cable, or for its inspections by cycles.
         output: Results folder.
         engine: Who works: local (this process, or more of them where that is quicker), dask://HOST:PORT or slurm; in a program
             any `concurrent.futures.Executor`.
@@ -61,6 +60,7 @@ def fleet(
     Raises:
         BowdenfitError: What is wrong, in a sentence; broken inspections are named in the answer, and the rest goes on.
     """
+    import bowdenfit.questions.fleet.words  # noqa: F401  (what the answer says of itself)
     from bowdenfit.notebook import watched
     from bowdenfit.questions.fleet.inspections import read_inspections
     from bowdenfit.results.folder import reserved

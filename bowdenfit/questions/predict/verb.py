@@ -59,24 +59,52 @@ def predict(
     Raises:
         UsageError: There is nothing to predict at, no posterior, or the cable has not what is asked for.
     """
-    from bowdenfit.errors import UsageError
     from bowdenfit.questions.predict.answer import Predictions
-    from bowdenfit.questions.predict.lengths import predict_at_lengths
 
-    route = found.dataset.description.route
     quantity = _quantity(quantity, input_force, output_force)
-    if contact is not None or gait is not None or gait_column is not None:
-        if quantity not in AT_LENGTHS or preload is not None or friction_limit is not None:
-            raise UsageError(f"--contact and --gait are asked of {', '.join(AT_LENGTHS)}; leave the rest out.")
-    elif wrap_angles or quantity not in AT_LENGTHS or (route is None and found.model.cable.is_loop):
+    over_gait = any(each is not None for each in (contact, gait, gait_column))
+    without_route = found.dataset.description.route is None and found.model.cable.is_loop
+    if not over_gait and (wrap_angles or quantity not in AT_LENGTHS or without_route):
         from bowdenfit.questions.predict.bends import predict_at_bends, question
 
-        if lengths:
-            raise UsageError("predict at lengths or at wrap angles, not at both; leave one of them out.")
+        _refuse_both(lengths)
         found.draws()
         asked = question(found, wrap_angles, input_force, output_force, preload, friction_limit, stroke)
         return Predictions(predict_at_bends(found, quantity, asked))
-    if preload is not None or friction_limit is not None:
+    _refuse_of_bends(quantity, over_gait, preload, friction_limit, input_force)
+    wanted = _lengths(found, lengths)
+    if over_gait:
+        from bowdenfit.questions.predict.gait import gait_of, predict_over_gait
+
+        bent = gait_of(found, contact, wrap_angles, gait, gait_column)
+        return Predictions(predict_over_gait(found, wanted, bent, input_force, stroke, output_force))
+    from bowdenfit.questions.predict.lengths import predict_at_lengths
+
+    return Predictions(predict_at_lengths(found, wanted, input_force, stroke, output_force))
+
+
+def _refuse_both(lengths: Sequence[Length] | None) -> None:
+    """Refuse lengths where wrap angles are asked for."""
+    from bowdenfit.errors import UsageError
+
+    if lengths:
+        raise UsageError("predict at lengths or at wrap angles, not at both; leave one of them out.")
+
+
+def _refuse_of_bends(
+    quantity: Asked,
+    over_gait: bool,
+    preload: Quantity | None,
+    friction_limit: Quantity | None,
+    input_force: Quantity | None,
+) -> None:
+    """Refuse at lengths what is predicted at wrap angles alone."""
+    from bowdenfit.errors import UsageError
+
+    of_bends = preload is not None or friction_limit is not None
+    if over_gait and (quantity not in AT_LENGTHS or of_bends):
+        raise UsageError(f"--contact and --gait are asked of {', '.join(AT_LENGTHS)}; leave the rest out.")
+    if of_bends:
         raise UsageError(
             "--preload and --friction-limit belong to predictions at wrap angles; name some, as --wrap-angle 90deg."
         )
@@ -84,13 +112,6 @@ def predict(
         raise UsageError(
             "--quantity efficiency at lengths is that at the fit's own reference force; leave --input-force out."
         )
-    wanted = _lengths(found, lengths)
-    if contact is not None or gait is not None:
-        from bowdenfit.questions.predict.gait import gait_of, predict_over_gait
-
-        bent = gait_of(found, contact, wrap_angles, gait, gait_column)
-        return Predictions(predict_over_gait(found, wanted, bent, input_force, stroke, output_force))
-    return Predictions(predict_at_lengths(found, wanted, input_force, stroke, output_force))
 
 
 def _lengths(found: "Record", lengths: Sequence[Length] | None) -> "np.ndarray":

@@ -11,6 +11,7 @@ from pathlib import Path
 from bowdenfit.dataset import DESCRIPTION_FILE
 from bowdenfit.errors import DatasetError, UsageError, disk_error, nearest
 from bowdenfit.inputs import refuse_special
+from bowdenfit.results.fleet_folder import FLEET_DESCRIPTION
 from bowdenfit.words import listed, shown
 
 TEMPLATES = (DESCRIPTION_FILE, "angles.csv", "forces.csv")
@@ -114,8 +115,14 @@ def examples() -> Mapping[str, Path]:
     package = Path(str(resources.files("bowdenfit")))
     for place in (package / _PACKAGE, package.parent / _CHECKOUT):
         if place.is_dir():
-            return {path.name: path for path in sorted(place.iterdir()) if (path / DESCRIPTION_FILE).is_file()}
+            found = (path for path in sorted(place.iterdir()) if (path / DESCRIPTION_FILE).is_file() or is_fleet(path))
+            return {path.name: path for path in found}
     return {}
+
+
+def is_fleet(folder: Path) -> bool:
+    """Whether a folder holds many cables, which are fitted by `bowdenfit fleet`."""
+    return (folder / FLEET_DESCRIPTION).is_file()
 
 
 def write_example(name: str, folder: Path) -> None:

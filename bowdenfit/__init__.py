@@ -26,6 +26,7 @@ if TYPE_CHECKING:
     from bowdenfit.questions.export.verb import export
     from bowdenfit.questions.fleet.verb import fleet
     from bowdenfit.questions.identify.verb import identify
+    from bowdenfit.questions.metabolic.verb import metabolic
     from bowdenfit.questions.next.verb import next_measurement
     from bowdenfit.questions.pool.verb import pool
     from bowdenfit.questions.predict.verb import predict
@@ -45,6 +46,7 @@ _WHERE = {
     "fleet": "bowdenfit.questions.fleet.verb",
     "identify": "bowdenfit.questions.identify.verb",
     "load": "bowdenfit.front_desk",
+    "metabolic": "bowdenfit.questions.metabolic.verb",
     "next_measurement": "bowdenfit.questions.next.verb",
     "plot": "bowdenfit.questions.summary.verb",
     "pool": "bowdenfit.questions.pool.verb",
@@ -74,6 +76,7 @@ __all__ = [
     "fleet",
     "identify",
     "load",
+    "metabolic",
     "next_measurement",
     "plot",
     "pool",

@@ -7,6 +7,7 @@ from bowdenfit.questions.export.verb import VERB as EXPORT
 from bowdenfit.questions.fleet.verb import VERB as FLEET
 from bowdenfit.questions.identify.verb import VERB as IDENTIFY
 from bowdenfit.questions.length.verb import VERB as LENGTH
+from bowdenfit.questions.metabolic.verb import VERB as METABOLIC
 from bowdenfit.questions.next.verb import VERB as NEXT
 from bowdenfit.questions.pool.verb import VERB as POOL
 from bowdenfit.questions.predict.verb import VERB as PREDICT
@@ -16,4 +17,7 @@ from bowdenfit.questions.summary.verb import PLOT_VERB as PLOT
 from bowdenfit.questions.summary.verb import SUMMARY_VERB as SUMMARY
 from bowdenfit.run.verb import VERB as FIT
 
-VERBS = (CHECK, FIT, SUMMARY, PREDICT, LENGTH, IDENTIFY, NEXT, COMPARE, EXPORT, CALIBRATE, FLEET, POOL, PLOT, REPORT, SIMULATE)
+VERBS = (
+    CHECK, FIT, SUMMARY, PREDICT, LENGTH, IDENTIFY, NEXT, COMPARE, EXPORT, CALIBRATE, FLEET, POOL, PLOT, REPORT, SIMULATE,
+    METABOLIC,
+)  # fmt: skip

@@ -40,6 +40,7 @@ def pool(
     """
     import jax
 
+    from bowdenfit.questions.pool import words  # noqa: F401  (how the answer shows itself)
     from bowdenfit.questions.pool.pooling import pooled
     from bowdenfit.results.fleet_folder import read_fleet_draws
 

@@ -1,0 +1,134 @@
+r"""Paired comparisons of a few persons: Student's t, from each person's numbers or from what was printed of them.
+
+References:
+    Brockway 1987, "Derivation of formulae used to calculate energy expenditure in man" (Human Nutrition: Clinical Nutrition
+    41C, 463-471); Student 1908, "The probable error of a mean" (Biometrika 6); Holm 1979, "A simple sequentially rejective
+    multiple test procedure" (Scandinavian Journal of Statistics 6).
+"""
+
+import math
+from collections.abc import Sequence
+
+import numpy as np
+from scipy.special import nctdtr, stdtr, stdtrit
+
+_OXYGEN, _CARBON_DIOXIDE, _NITROGEN = 16.58, 4.51, 5.90  # kJ/l, kJ/l and kJ/g
+LEVEL, POWER = 0.05, 0.8
+_MOST_PERSONS = 100_000
+
+
+def brockway(oxygen: np.ndarray | float, carbon_dioxide: np.ndarray | float, nitrogen: float = 0.0) -> np.ndarray | float:
+    r"""Metabolic rate [W], :math:`16.58 V_{O_2} + 4.51 V_{CO_2} - 5.90 N` in kJ (Brockway 1987).
+
+    Args:
+        oxygen: Taken up [ml/min].
+        carbon_dioxide: Given off [ml/min].
+        nitrogen: In urine [g/min]; hardly anybody who walks measures it.
+    """
+    return (_OXYGEN * oxygen + _CARBON_DIOXIDE * carbon_dioxide - 1000 * _NITROGEN * nitrogen) / 60
+
+
+def t_of(differences: np.ndarray) -> tuple[float, float]:
+    """Mean difference and its standard error.
+
+    Args:
+        differences: A number for each person.
+    """
+    return float(np.mean(differences)), float(np.std(differences, ddof=1) / math.sqrt(len(differences)))
+
+
+def two_sided(t: float, persons: int) -> float:
+    """Probability of a t as far from 0 by chance.
+
+    Args:
+        t: Mean difference over its standard error.
+        persons: How many.
+    """
+    return float(2 * stdtr(persons - 1, -abs(t)))
+
+
+def t_of_p(p: float, persons: int) -> float:
+    """The t, without its sign, that has a two-sided probability."""
+    return float(-stdtrit(persons - 1, p / 2))
+
+
+def half_width(error: float, persons: int, level: float = 1 - LEVEL) -> float:
+    """Half the width of the interval that holds the true difference in so many studies of all.
+
+    Args:
+        error: Standard error.
+        persons: How many.
+        level: The share of studies.
+    """
+    return float(stdtrit(persons - 1, (1 + level) / 2)) * error
+
+
+def probability_below(mean: float, error: float, persons: int, before: float = math.inf) -> float:
+    """Probability that the true difference is negative.
+
+    Args:
+        mean, error: Of the difference, and its standard error.
+        persons: How many.
+        before: Standard deviation of what differences were expected before, about 0; infinite where nothing was.
+    """
+    if math.isinf(before):
+        return float(stdtr(persons - 1, -mean / error))
+    at = np.linspace(-12, 12, 200_001) * before
+    weight = np.exp(-((at / before) ** 2) / 2) * (1 + ((at - mean) / error) ** 2 / (persons - 1)) ** (-persons / 2)
+    return float((weight[at < 0].sum() + weight[at == 0].sum() / 2) / weight.sum())
+
+
+def holm(chances: Sequence[float]) -> list[float]:
+    """Probabilities for several comparisons at once, by Holm's procedure.
+
+    Args:
+        chances: Of each by itself.
+    """
+    order = sorted(range(len(chances)), key=lambda i: chances[i])
+    found, least = [0.0] * len(chances), 0.0
+    for rank, i in enumerate(order):
+        least = max(least, min(1.0, (len(chances) - rank) * chances[i]))
+        found[i] = least
+    return found
+
+
+def power(effect: float, persons: int, level: float = LEVEL) -> float:
+    """Probability that a true difference is found.
+
+    Args:
+        effect: The difference over the standard deviation of persons' differences.
+        persons: How many.
+        level: Of the two-sided test.
+    """
+    limit, shift = t_of_p(level, persons), abs(effect) * math.sqrt(persons)
+    below = float(nctdtr(persons - 1, shift, -limit))
+    return 1 - float(nctdtr(persons - 1, shift, limit)) + (0.0 if math.isnan(below) else below)
+
+
+def persons_needed(effect: float, share: float = POWER) -> int | None:
+    """Persons with whom a true difference is found in so many studies of all; None where they are too many.
+
+    Args:
+        effect: See `power`.
+        share: The share.
+    """
+    low, high = 2, 4
+    while power(effect, high) < share:
+        low, high = high, 2 * high
+        if high > _MOST_PERSONS:
+            return None
+    while high - low > 1:
+        middle = (low + high) // 2
+        low, high = (low, middle) if power(effect, middle) >= share else (middle, high)
+    return high
+
+
+def least_found(persons: int, share: float = POWER) -> float:
+    """Difference, over the standard deviation of persons' differences, that is found in so many studies of all."""
+    low, high = 0.0, 1.0
+    while power(high, persons) < share:
+        high *= 2
+    for _ in range(60):
+        middle = (low + high) / 2
+        low, high = (low, middle) if power(middle, persons) >= share else (middle, high)
+    return high

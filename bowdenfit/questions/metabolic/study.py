@@ -1,0 +1,161 @@
+"""A study of what walking costs, as its folder has it: metabolic.toml, and a table of persons or what was printed."""
+
+import math
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Annotated, Any
+
+import numpy as np
+from pydantic import BaseModel, ConfigDict, Field, ValidationError
+
+from bowdenfit.errors import DatasetError, DescriptionError
+from bowdenfit.files.tables import read_table
+from bowdenfit.inputs import read_toml_file
+from bowdenfit.questions.metabolic.paired import brockway
+
+FILE = "metabolic.toml"
+_GAS = ("VO2_ml_per_min", "VCO2_ml_per_min", "mass_kg")
+_NET = "net_W_per_kg"
+Digits = Annotated[str, Field(pattern=r"^-?\d+(\.\d+)?$")]
+
+
+class _Frozen(BaseModel):
+    model_config = ConfigDict(frozen=True, extra="forbid")
+
+
+class Condition(_Frozen):
+    """What was printed of one condition: mean net cost [W/kg] and its standard error, as written."""
+
+    name: str
+    mean: Digits | None = None
+    sem: Digits | None = None
+
+
+class Printed(_Frozen):
+    """What was printed of a condition less another: probability by chance, and change in percent, as written."""
+
+    condition: str
+    less: str
+    p: Digits | None = None
+    percent: Digits | None = None
+
+
+class Study(_Frozen):
+    """A study; keys of metabolic.toml.
+
+    Args:
+        name, source, license: What it is, and where it comes from.
+        persons: How many walked in every condition.
+        order: Conditions in the order in which they were walked; empty where each person had an order of its own.
+        rest: Condition that is taken off the others, in a table of gas.
+        table: File with a row for each person and condition.
+        condition: What was printed.
+        difference: What was printed of pairs.
+    """
+
+    schema_: int = Field(alias="schema", ge=1, le=1)
+    name: str
+    source: str = ""
+    license: str = ""
+    persons: Annotated[int, Field(ge=2, le=10_000)] | None = None
+    order: tuple[str, ...] = ()
+    rest: str = ""
+    table: str = ""
+    condition: tuple[Condition, ...] = ()
+    difference: tuple[Printed, ...] = ()
+
+
+@dataclass(frozen=True)
+class Costs:
+    """Net metabolic cost of every person [W/kg], (person, condition), NaN where a person did not walk in one."""
+
+    persons: tuple[str, ...]
+    conditions: tuple[str, ...]
+    net: np.ndarray
+
+
+def read_study(folder: Path) -> tuple[Study, Costs | None]:
+    """A study and, where it has them, the numbers of each person.
+
+    Raises:
+        DescriptionError: metabolic.toml is missing or wrong.
+        DatasetError: The table is.
+    """
+    path = folder / FILE
+    if not path.is_file():
+        raise DescriptionError(f"{path} does not exist; it says what was measured. datasets/on-body-metabolic has one.")
+    _, raw = read_toml_file(path)
+    try:
+        study = Study.model_validate(raw)
+    except ValidationError as error:
+        first = error.errors()[0]
+        place = ".".join(map(str, first["loc"])) or "the file"
+        raise DescriptionError(
+            f"{path.name}: {place} is wrong ({first['msg']}); numbers that were printed are written as text with all their "
+            'digits, such as mean = "6.30", and datasets/on-body-metabolic shows every key.'
+        ) from None
+    if study.table:
+        return study, _costs(study, folder / study.table)
+    _refuse_incomplete(study, path.name)
+    return study, None
+
+
+def _refuse_incomplete(study: Study, file: str) -> None:
+    """What was printed is enough for one comparison at the least."""
+    names = [each.name for each in study.condition]
+    twice = next((name for name in names if names.count(name) > 1), None)
+    if twice is not None:
+        raise DescriptionError(f"{file}: the condition {twice!r} stands twice; delete one.")
+    for each in study.difference:
+        unknown = next((name for name in (each.condition, each.less) if name not in names), None)
+        if unknown is not None:
+            raise DescriptionError(f"{file}: a difference is of {unknown!r}, which no condition is called; correct the name.")
+    if study.persons is None:
+        raise DescriptionError(f"{file}: nobody says how many persons walked; write persons = 5, or name their table.")
+    if len(names) < 2 or not study.difference:
+        raise DescriptionError(f"{file}: nothing can be compared; write two [[condition]] and a [[difference]], or a table.")
+    for each in study.difference:
+        if each.p is not None and not 0 < float(each.p) < 1:
+            raise DescriptionError(f"{file}: p = {each.p} is no probability between 0 and 1; correct it.")
+
+
+def _costs(study: Study, path: Path) -> Costs:
+    """Net cost of each person."""
+    table = read_table(path)
+    columns = {heading.strip(): i for i, heading in enumerate(table.header)}
+    needed = ("person", "condition", *((_NET,) if _NET in columns else _GAS))
+    missing = next((name for name in needed if name not in columns), None)
+    if missing is not None:
+        raise DatasetError(
+            f"{table.file} has no column {missing}; write person, condition and {_NET}, or person, condition, "
+            f"{', '.join(_GAS)}."
+        )
+    found: dict[tuple[str, str], float] = {}
+    for row in table.rows:
+        cells = {name: row[columns[name]] for name in needed}
+        who, where = cells["person"].text.strip(), cells["condition"].text.strip()
+        if (who, where) in found:
+            raise cells["person"].refuse(f"{who} stands twice for {where}; give each person one row a condition.")
+        numbers = [cells[name].number() for name in needed[2:]]
+        if not all(map(math.isfinite, numbers)) or (len(numbers) > 1 and min(numbers) <= 0):
+            raise cells[needed[2]].refuse("a number here is blank, or not above 0; correct it, or leave the row out.")
+        found[who, where] = numbers[0] if len(numbers) == 1 else _rate(*numbers)
+    persons, conditions = (tuple(dict.fromkeys(key[i] for key in found)) for i in (0, 1))
+    gross = np.array([[found.get((who, where), math.nan) for where in conditions] for who in persons])
+    if _NET not in columns:
+        if study.rest not in conditions:
+            raise DescriptionError(
+                f"{FILE}: {table.file} has gas, and net cost is what walking costs more than rest; write rest = \"NAME\" with "
+                "the condition in which persons rested."
+            )
+        at = conditions.index(study.rest)
+        gross = np.delete(gross - gross[:, [at]], at, axis=1)
+        conditions = tuple(name for name in conditions if name != study.rest)
+    if len(persons) < 2 or len(conditions) < 2:
+        raise DatasetError(f"{table.file} has {len(persons)} persons and {len(conditions)} conditions; it takes two of each.")
+    return Costs(persons, conditions, gross)
+
+
+def _rate(oxygen: float, carbon_dioxide: float, mass: float) -> Any:
+    """W/kg"""
+    return brockway(oxygen, carbon_dioxide) / mass

@@ -1,0 +1,46 @@
+"""Looking at a study of metabolic cost again."""
+
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Any
+
+from bowdenfit.verb import Argument, Reply, Verb
+
+if TYPE_CHECKING:
+    from bowdenfit.questions.metabolic.answer import Metabolic
+
+
+def metabolic(dataset: Annotated["str | Path", Argument("DATASET")]) -> "Metabolic":
+    """What a study of metabolic cost shows: paired differences with intervals, and what of its numbers cannot be right.
+
+    Args:
+        dataset: Folder with metabolic.toml, and perhaps a table of persons.
+
+    Raises:
+        BowdenfitError: What is wrong, in a sentence.
+    """
+    from bowdenfit.questions.metabolic import words  # noqa: F401  (how the answer shows itself)
+    from bowdenfit.questions.metabolic.answer import answered
+    from bowdenfit.questions.metabolic.study import read_study
+
+    return answered(*read_study(Path(dataset)))
+
+
+def _reply(found: "Metabolic", _: dict[str, Any]) -> Reply:
+    from bowdenfit.questions.metabolic.words import metabolic_text
+
+    return Reply(metabolic_text(found), lambda: found, csv=found.to_csv)
+
+
+VERB = Verb(
+    metabolic,
+    _reply,
+    "Look at a study of what walking costs with and without a device.",
+    """Look again at a study of metabolic cost: DATASET has metabolic.toml, and either a table of persons (net_W_per_kg, or
+    oxygen and carbon dioxide, from which Brockway's equation gives the rate) or what was printed of it.
+
+    Says for each pair of conditions the difference with its interval, whether it is shown with all pairs looked at together,
+    with what probability one is lower, and how many persons it would take; and which printed numbers cannot all be right.
+    datasets/on-body-metabolic is one.
+    """,
+    csv="Print the comparisons as CSV, one a row.",
+)

@@ -5,7 +5,8 @@ import os
 import re
 import stat
 import tomllib
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
 
@@ -49,6 +50,23 @@ def refuse_special(path: Path, error: Callable[[str], BowdenfitError] = DatasetE
     for is_so, what in _SPECIAL.items():
         if is_so(mode):
             raise error(f"{path.name} is {what}, not a file; copy what it gives into a file, and name that.")
+
+
+@contextmanager
+def or_damaged(error: BowdenfitError) -> Iterator[None]:
+    """Whatever a library stumbles over in a damaged file is that error: it may be of any kind, and say anything.
+
+    Args:
+        error: What is raised instead; errors of ours, of the system and for want of memory stay what they are.
+    """
+    try:
+        yield
+    except (BowdenfitError, MemoryError):
+        raise
+    except Exception as stumbled:
+        if isinstance(stumbled, OSError) and stumbled.errno is not None and stumbled.filename is not None:
+            raise
+        raise error from stumbled
 
 
 def read_toml_file(path: Path, remedy: str = "") -> tuple[str, dict[str, Any]]:

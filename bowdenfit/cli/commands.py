@@ -62,7 +62,7 @@ def _kept(verb: Verb, asked: dict[str, Any]) -> Reply | None:
     answers = kept(source)
     try:
         reply = verb.kept(answers, asked) if answers else None
-    except (KeyError, TypeError, ValueError):  # kept when the answer had another shape
+    except (LookupError, TypeError, ValueError, AttributeError):  # kept when the answer had another shape
         return None
     return _with_warning(reply, answers["troubles"], source) if reply and verb.warns else reply
 

@@ -7,6 +7,7 @@ leaves them unreadable.)
 
 import io
 import json
+import os
 import struct
 from collections.abc import Iterator, Mapping
 from pathlib import Path
@@ -16,10 +17,11 @@ from zlib import crc32
 import numpy as np
 
 from bowdenfit.errors import StoreError, disk_error
-from bowdenfit.inputs import refuse_special
+from bowdenfit.inputs import or_damaged, refuse_special
 
 _MARK = b"bowdenfit checkpoint 1\n"
 _HEAD = struct.Struct("<QI")  # length and checksum of a record
+_LONGEST = 1 << 24  # bytes of what it was started for
 Record = dict[str, np.ndarray]
 
 
@@ -44,29 +46,40 @@ def fingerprint_of(path: Path) -> dict[str, Any]:
         return _fingerprint(file)
 
 
-def records(path: Path) -> list[Record]:
+def records(path: Path, shapes: Mapping[str, tuple[int, ...]]) -> list[Record]:
     """Records in their order; what stands behind the last whole one is cut off.
 
     Args:
         path: The checkpoint.
+        shapes: Of the arrays of numbers that a record has, by name.
 
     Raises:
-        StoreError: It cannot be read.
+        StoreError: It cannot be read, or holds other records.
     """
     refuse_special(path, StoreError)
+    damaged = damaged_checkpoint(path)
     try:
-        with path.open("r+b") as file:
+        with or_damaged(damaged), path.open("r+b") as file:
             _fingerprint(file)
             found, end = list[Record](), file.tell()
             for record in _whole(file):
                 found.append(record)
                 end = file.tell()
+            if any({n: a.shape for n, a in record.items() if a.dtype.kind in "biuf"} != shapes for record in found):
+                raise damaged
             file.truncate(end)
-    except ValueError:
-        raise StoreError(f"{path} is damaged and cannot be resumed; start over with --force.") from None
     except OSError as error:
         raise disk_error(path, error) from None
     return found
+
+
+def damaged_checkpoint(path: Path) -> StoreError:
+    """That a checkpoint is not as it was written.
+
+    Args:
+        path: The checkpoint.
+    """
+    return StoreError(f"{path} is damaged and cannot be resumed; start over with --force.")
 
 
 def append(path: Path, record: Mapping[str, np.ndarray]) -> None:
@@ -91,15 +104,15 @@ def append(path: Path, record: Mapping[str, np.ndarray]) -> None:
 
 
 def _fingerprint(file: BinaryIO) -> dict[str, Any]:
-    if file.readline() != _MARK:
+    if file.readline(len(_MARK)) != _MARK:
         raise ValueError("no checkpoint")
-    return dict(json.loads(file.readline()))
+    return dict(json.loads(file.readline(_LONGEST)))
 
 
 def _whole(file: BinaryIO) -> Iterator[Record]:
     while len(head := file.read(_HEAD.size)) == _HEAD.size:
         length, checksum = _HEAD.unpack(head)
-        content = file.read(length)
+        content = file.read(min(length, os.fstat(file.fileno()).st_size))
         if len(content) < length or crc32(content) != checksum:
             return
         with np.load(io.BytesIO(content)) as arrays:

@@ -17,7 +17,7 @@ import numpy as np
 from bowdenfit.description import SamplerSettings
 from bowdenfit.description.defaults import THIN
 from bowdenfit.inference.chain import Chain, Progress, Sampling, stuck_walkers, worst
-from bowdenfit.inference.checkpoint import append, records
+from bowdenfit.inference.checkpoint import append, damaged_checkpoint, records
 from bowdenfit.inference.coordinates import Coordinates, Places, WalkerPrograms, Z, coordinates_of
 from bowdenfit.inference.least_squares import MaximumPosterior
 from bowdenfit.inference.proposals import Proposal, differential_evolution, independent, shares_of_moves, stretch
@@ -25,6 +25,7 @@ from bowdenfit.inference.proposals import Proposal, differential_evolution, inde
 _BLOCK = 10  # stored states between two reports
 _FIRST_LOOK = 60  # stored states before the first look; of five data sets the slowest is there after half of that
 _FITTED = 4  # walkers a parameter that a covariance is fitted to half of
+_OF_RANDOM = {"random_key": (624,), "random_place": (2,), "random_normal": ()}  # shapes of what makes random numbers
 _KEPT_PER_WALKER = 20  # draws at least that are kept of each walker, spread over the second half of its path
 
 Moves = Sequence[tuple[Proposal, float]]
@@ -164,11 +165,15 @@ class Checkpointed(emcee.backends.Backend):
         super().__init__()
         self.reset(*shape)
         self.checkpoint: Path | None = None
-        before = records(checkpoint) if checkpoint is not None and resume else []
+        like = {"z": shape, "log_density": shape[:1], "accepted": shape[:1]} | _OF_RANDOM
+        before = records(checkpoint, like) if checkpoint is not None and resume else []
         self.grow(len(before), None)
         for record in before:
-            keys = record["random_key"], *(int(i) for i in record["random_place"]), float(record["random_normal"])
-            state = emcee.State(record["z"], log_prob=record["log_density"], random_state=("MT19937", *keys))
+            keys, (place, has_normal) = record["random_key"], (int(i) for i in record["random_place"])
+            if checkpoint is not None and not 0 <= place <= len(keys):  # else the generator would read beyond its keys
+                raise damaged_checkpoint(checkpoint)
+            generator = "MT19937", keys, place, has_normal, float(record["random_normal"])
+            state = emcee.State(record["z"], log_prob=record["log_density"], random_state=generator)
             self.save_step(state, record["accepted"])
         self.checkpoint = checkpoint
 

@@ -135,7 +135,7 @@ def sample(asked: Sampling, program: Callable[..., Any]) -> Chain:
     """
     posterior, settings, seed = asked.posterior, asked.settings, asked.seed
     points = starting_points(posterior, asked.start, settings, np.random.default_rng([seed, _STREAM]))
-    blocks = records(asked.checkpoint) if asked.checkpoint is not None and asked.resume else []
+    blocks = records(asked.checkpoint, _shapes(*points.shape)) if asked.checkpoint is not None and asked.resume else []
     limit = WARM_UP + max(settings.max_steps // BLOCK, 1)
     target = WARM_UP + _FIRST_LOOK
     while target < len(blocks):  # the looks of a sampling that nothing interrupted
@@ -157,6 +157,12 @@ def sample(asked: Sampling, program: Callable[..., Any]) -> Chain:
         if not could_improve or target >= limit:
             return chain
         target = min(_next_look(target), limit)
+
+
+def _shapes(chains: int, size: int) -> dict[str, tuple[int, ...]]:
+    """Of what a block is kept as."""
+    steps = dict.fromkeys(_STATISTICS, (BLOCK, chains))
+    return {"z": (BLOCK, chains, size), "tuning": (5, chains), "inverse_mass": (size, size), **steps}
 
 
 def _next_look(blocks: int) -> int:

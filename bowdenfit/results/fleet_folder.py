@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 
 from bowdenfit.errors import StoreError
-from bowdenfit.inputs import refuse_special
+from bowdenfit.inputs import or_damaged, refuse_special
 from bowdenfit.results.folder import replace_when_whole
 from bowdenfit.types import Vector
 
@@ -100,16 +100,14 @@ def read_fleet_draws(folder: Path) -> FleetDraws:
     if not path.is_file():
         what = "holds an unfinished fleet; finish it with --resume" if folder.is_dir() else "does not exist"
         raise StoreError(f"{path} cannot be read: {folder} {what}, or name a folder that `bowdenfit fleet` wrote.")
-    try:
-        with h5py.File(path) as file:
-            group, stats = file[_POSTERIOR], file["sample_stats"]
-            fixed = {"cable", "cable_name", "chain", "draw", *_METADATA}
-            values = {name: np.ascontiguousarray(group[name][0].T) for name in group if name not in fixed}
-            attributes = {name: {k: v for k, v in group[name].attrs.items() if isinstance(v, str)} for name in values}
-            labels, names = (tuple(group[name].asstr()[()]) for name in ("cable", "cable_name"))
-            cycles, temperature, lubricated = (np.asarray(group[name][()]) for name in _METADATA)
-            known = {name: np.asarray(stats[name][()]) for name in stats if name not in fixed}
-            about = json.loads(file.attrs["fleet"])
-    except (OSError, KeyError, ValueError, TypeError, AttributeError) as error:
-        raise StoreError(f"{path} is damaged ({error}); fit the fleet again, or restore the folder from a copy.") from None
+    damaged = StoreError(f"{path} is damaged; fit the fleet again, or restore the folder from a copy.")
+    with or_damaged(damaged), h5py.File(path) as file:
+        group, stats = file[_POSTERIOR], file["sample_stats"]
+        fixed = {"cable", "cable_name", "chain", "draw", *_METADATA}
+        values = {name: np.ascontiguousarray(group[name][0].T) for name in group if name not in fixed}
+        attributes = {name: {k: v for k, v in group[name].attrs.items() if isinstance(v, str)} for name in values}
+        labels, names = (tuple(group[name].asstr()[()]) for name in ("cable", "cable_name"))
+        cycles, temperature, lubricated = (np.asarray(group[name][()]) for name in _METADATA)
+        known = {name: np.asarray(stats[name][()]) for name in stats if name not in fixed}
+        about = json.loads(file.attrs["fleet"])
     return FleetDraws(labels, names, cycles, temperature, lubricated, values, known, attributes, about)

@@ -14,6 +14,7 @@ from typing import Any
 
 from bowdenfit.errors import StoreError, disk_error
 from bowdenfit.inputs import refuse_special
+from bowdenfit.verb import LARGEST_SEED
 
 try:
     import fcntl
@@ -219,12 +220,26 @@ def read_checkpoint(folder: Path) -> dict[str, Any]:
     Raises:
         StoreError: There is no checkpoint, or it is damaged.
     """
-    from bowdenfit.inference.checkpoint import fingerprint_of
+    from bowdenfit.inference.checkpoint import damaged_checkpoint, fingerprint_of
 
     path = folder / CHAIN
     if not path.exists():
         raise StoreError(f"{folder} holds no checkpoint ({CHAIN}) to resume from; fit without --resume.")
     try:
-        return fingerprint_of(path)
-    except (OSError, ValueError):
-        raise StoreError(f"{path} is damaged and cannot be resumed; start over with --force.") from None
+        found = fingerprint_of(path)
+        refuse_no_seed(found["seed"])
+        if isinstance(found["description"], dict) and isinstance(found["sha256"], dict):
+            return found
+    except (OSError, ValueError, LookupError, TypeError, RecursionError):
+        pass
+    raise damaged_checkpoint(path)
+
+
+def refuse_no_seed(seed: Any) -> None:
+    """Refuse what no run was started with.
+
+    Raises:
+        ValueError: It is no seed.
+    """
+    if type(seed) is not int or not 0 <= seed <= LARGEST_SEED:
+        raise ValueError("no seed")

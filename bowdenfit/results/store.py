@@ -70,6 +70,9 @@ def save(
         write_text(folder / FIT, page)
 
 
+_STUMBLED = (LookupError, TypeError, ValueError, AttributeError, ArithmeticError, RuntimeError)  # over what was changed
+
+
 def load(folder: Path) -> Record:
     """Read a results folder.
 
@@ -86,7 +89,7 @@ def load(folder: Path) -> Record:
         posterior = _posterior(folder / POSTERIOR, page["posterior"]) if page["posterior"] else None
         verdict = page["verdict"]["converged"], tuple(page["verdict"]["reasons"])
         provenance = rebuilt(Provenance, page["provenance"])
-    except (LookupError, TypeError, ValueError, AttributeError, OSError, DescriptionError) as error:
+    except (*_STUMBLED, OSError, DescriptionError) as error:
         why = f"{type(error).__name__}: {shorten(str(error), 200)}"
         raise StoreError(f"{folder} is damaged ({why}); fit again, or restore the folder from a copy.") from error
     return Record(dataset, squares, posterior, *verdict, provenance)

@@ -7,8 +7,17 @@ from pathlib import Path
 from typing import Any
 
 from bowdenfit.errors import StoreError
+from bowdenfit.inputs import or_damaged
 from bowdenfit.questions.calibrate.replication import Replication
-from bowdenfit.results.folder import FIGURES, REPLICATIONS, SUMMARY_TEXT, folder_to_write, read_text, write_text
+from bowdenfit.results.folder import (
+    FIGURES,
+    REPLICATIONS,
+    SUMMARY_TEXT,
+    folder_to_write,
+    read_text,
+    refuse_no_seed,
+    write_text,
+)
 from bowdenfit.results.plain import rebuilt, stored
 
 CALIBRATION = "calibration.json"
@@ -58,7 +67,9 @@ def seed_of(folder: Path) -> int:
         StoreError: There is none.
     """
     try:
-        return int(_lines(folder / REPLICATIONS)[0]["seed"])
+        seed = _lines(folder / REPLICATIONS)[0]["seed"]
+        refuse_no_seed(seed)
+        return int(seed)
     except (KeyError, TypeError, ValueError):
         raise _damaged(folder / REPLICATIONS) from None
 
@@ -74,11 +85,19 @@ def _read_replications(path: Path, fingerprint: Mapping[str, Any]) -> dict[int, 
     # A line that was being written when the program was stopped is made again.
     with folder_to_write(path.parent):
         write_text(path, "".join(json.dumps(line) + "\n" for line in (before, *pages)))
-    try:
+    with or_damaged(_damaged(path)):
         found = [rebuilt(Replication, page) for page in pages]
-    except (KeyError, TypeError, ValueError):
-        raise _damaged(path) from None
-    return {each.number: each for each in found}
+        if not (all(map(_is_whole, found)) and len({frozenset(each.ranked) for each in found if each.ranked}) <= 1):
+            raise ValueError("something else was kept")
+        return {each.number: each for each in found}
+
+
+def _is_whole(one: Replication) -> bool:
+    """Whether a replication that was read is one that was kept."""
+    counts = (one.number, one.steps, *one.redrawn.values())
+    texts = (one.engine, *one.reasons)
+    good = all(type(count) is int and count >= 0 for count in counts) and all(isinstance(text, str) for text in texts)
+    return good and bool(one.ranked or one.reasons) and all(0 <= each.rank <= 1 for each in one.ranked.values())
 
 
 def _lines(path: Path) -> list[dict[str, Any]]:

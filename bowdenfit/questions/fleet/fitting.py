@@ -9,6 +9,7 @@ from typing import Any
 import numpy as np
 
 from bowdenfit.description import SamplerSettings
+from bowdenfit.errors import StoreError
 from bowdenfit.inference.batch.pieces import Example, Piece, PieceFit
 from bowdenfit.inference.batch.programs import CHUNK, BatchSettings
 from bowdenfit.inference.draws import derived_units
@@ -88,6 +89,9 @@ def gathered(
     shapes = _by_shape(cases)
     quantities = {key: quantities_of(build_model(members[0].dataset)) for key, members in shapes.items()}
     drawn = [case for case in cases if len(fits[case.hash].values)]
+    for case in drawn:  # what was kept may have been changed
+        if fits[case.hash].values.shape != (len(quantities[case.shaped.key]), fits[drawn[0].hash].values.shape[1]):
+            raise StoreError(f"what was kept of {case.inspection.label} is damaged; start over with --force.")
     failed = [Broken(c.inspection.label, fits[c.hash].reasons[0]) for c in cases if not len(fits[c.hash].values)]
     numbers = {key: i for i, key in enumerate(shapes, start=1)}
     fitted = tuple(_fitted(case, fits[case.hash], quantities[case.shaped.key], numbers[case.shaped.key]) for case in drawn)

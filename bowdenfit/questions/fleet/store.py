@@ -12,9 +12,10 @@ import numpy as np
 
 from bowdenfit.errors import StoreError
 from bowdenfit.inference.batch.pieces import PieceFit
+from bowdenfit.inputs import or_damaged
 from bowdenfit.results.arrays import read_arrays, write_arrays
-from bowdenfit.results.fleet_folder import FLEET_DRAWS, FLEET_PAGE, read_fleet_draws
-from bowdenfit.results.folder import SUMMARY_TEXT, folder_to_write, read_page, write_text
+from bowdenfit.results.fleet_folder import FLEET_DRAWS, FLEET_PAGE, FleetDraws, read_fleet_draws
+from bowdenfit.results.folder import SUMMARY_TEXT, folder_to_write, read_page, refuse_no_seed, write_text
 
 KEPT, BEGUN, JOBS = "kept", "begun.json", "jobs"  # folder of pieces, what they were made for, and what Slurm writes
 _FITS = "fits"
@@ -77,7 +78,12 @@ class FleetStore:
 
     def _of_finished(self) -> dict[str, PieceFit]:
         """What a finished fleet has."""
-        drawn, found = read_fleet_draws(self.folder), dict[str, PieceFit]()
+        drawn, path = read_fleet_draws(self.folder), self.folder / FLEET_DRAWS
+        with or_damaged(StoreError(f"{path} is damaged; restore the folder from a copy, or start over with --force.")):
+            return self._as_fits(drawn)
+
+    def _as_fits(self, drawn: FleetDraws) -> dict[str, PieceFit]:
+        found = dict[str, PieceFit]()
         quantities: dict[str, list[str]] = drawn.about["quantities"]
         stats = {name: [_text(each) for each in values] for name, values in drawn.stats.items()}
         for i, name in enumerate(stats["input"]):
@@ -92,9 +98,13 @@ class FleetStore:
         """What an interrupted fleet kept; a piece that is damaged is fitted again."""
         found: dict[str, PieceFit] = {}
         for path in sorted((self.folder / KEPT).glob("*.npz")):
+            damaged = StoreError(f"{path} is damaged")
             try:
-                fits: Sequence[PieceFit] = read_arrays(path, {_FITS: tuple[PieceFit, ...]})[_FITS]
-            except (OSError, ValueError, KeyError, TypeError, LookupError):
+                with or_damaged(damaged):
+                    fits: Sequence[PieceFit] = read_arrays(path, {_FITS: tuple[PieceFit, ...]})[_FITS]
+                    if not all(_is_whole(fit) for fit in fits):
+                        raise damaged
+            except StoreError:
                 path.unlink(missing_ok=True)
                 continue
             found |= {fit.name: fit for fit in fits}
@@ -129,10 +139,16 @@ def begun_before(folder: Path) -> dict[str, Any]:
     for path in (folder / KEPT / BEGUN, folder / FLEET_PAGE):
         if path.exists():
             page = read_page(path)
-            if isinstance(page, dict) and isinstance(page.get("seed"), int):
-                return page
-            raise StoreError(f"{path} is damaged; start over with --force.")
+            with or_damaged(StoreError(f"{path} is damaged; start over with --force.")):
+                refuse_no_seed(page["seed"])
+                return dict(page)
     raise StoreError(f"{folder} holds no fleet to resume; leave --resume out.")
+
+
+def _is_whole(fit: PieceFit) -> bool:
+    """Whether a fit that was read is one that was kept."""
+    texts = isinstance(fit.name, str) and isinstance(fit.engine, str) and all(isinstance(each, str) for each in fit.reasons)
+    return texts and isinstance(fit.values, np.ndarray) and fit.values.ndim == 2 and fit.values.dtype == np.float64
 
 
 def _text(value: Any) -> str:

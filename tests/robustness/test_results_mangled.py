@@ -1,0 +1,72 @@
+"""Whatever is done to the files of a results folder: `--resume` and later questions read them, or refuse them in a sentence."""
+
+from pathlib import Path
+
+import pytest
+from fuzzing_results import (
+    ask_fit,
+    begun_calibration,
+    begun_fleet,
+    interrupted_fit,
+    read_mangled_results,
+    resume_calibration,
+    resume_fit,
+    resume_fleet,
+)
+
+import bowdenfit as bf
+
+YARN = Path(__file__).resolve().parents[2] / "datasets" / "yarn-on-cylinder"
+FLEET = {"fleet.nc": 25, "kept/*.npz": 25, "kept/begun.json": 20}
+MANY = 1000
+
+
+def refused(count, *of_case):
+    return sum(read_mangled_results(*of_case[:3], number, *of_case[3:]).refused for number in range(count))
+
+
+@pytest.fixture(scope="module")
+def interrupted(tmp_path_factory):
+    data = bf.read(YARN)
+    return interrupted_fit(tmp_path_factory.mktemp("interrupted") / "fit", data), lambda folder: resume_fit(folder, data)
+
+
+@pytest.fixture(scope="module")
+def calibration(tmp_path_factory):
+    return begun_calibration(tmp_path_factory.mktemp("begun") / "calibration")
+
+
+@pytest.fixture(scope="module")
+def fleet(tmp_path_factory):
+    return begun_fleet(tmp_path_factory.mktemp("begun") / "fleet")
+
+
+@pytest.fixture(scope="module")
+def finished(tmp_path_factory):
+    folder = tmp_path_factory.mktemp("finished") / "fit"
+    bf.fit(YARN, output=folder, seed=3, mcmc=False, figures=False)
+    return folder
+
+
+@pytest.mark.parametrize("count", [60, pytest.param(MANY, marks=pytest.mark.slow)])
+def test_a_mangled_checkpoint_is_resumed_or_refused(tmp_path, interrupted, count):
+    folder, resume = interrupted
+    assert 0.4 * count < refused(count, tmp_path, folder, "chain.checkpoint", resume) < count
+
+
+@pytest.mark.parametrize("count", [60, pytest.param(MANY, marks=pytest.mark.slow)])
+def test_mangled_replications_are_resumed_or_refused(tmp_path, calibration, count):
+    found = refused(count, tmp_path, calibration, "replications.jsonl", resume_calibration, str(tmp_path))
+    assert 0.4 * count < found < count
+
+
+@pytest.mark.parametrize("times", [1, pytest.param(30, marks=pytest.mark.slow)])
+@pytest.mark.parametrize("name", FLEET)
+def test_a_mangled_fleet_is_resumed_or_refused(tmp_path, fleet, name, times):
+    assert refused(times * FLEET[name], tmp_path, fleet, name, resume_fleet) < times * FLEET[name]
+
+
+@pytest.mark.parametrize("times", [1, pytest.param(30, marks=pytest.mark.slow)])
+@pytest.mark.parametrize("name", ["fit.json", "answers.json", "summary.json"])
+def test_a_mangled_fit_is_read_or_refused(tmp_path, finished, name, times):
+    assert refused(times * 20, tmp_path, finished, name, ask_fit) < times * 20

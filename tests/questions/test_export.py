@@ -102,6 +102,24 @@ def test_the_command_writes_a_file_and_does_not_replace_one(fit, tmp_path, run, 
     assert "draws; ask for so many at most" in refuse("export", "fits", "--to", "csv", "--draws", 9999)
 
 
+@pytest.mark.slow
+def test_a_loop_is_exported_with_its_stiffness_at_the_wrap_angle_asked_for(tmp_path, run, refuse, monkeypatch, on_body):
+    monkeypatch.chdir(tmp_path)
+    fit = bf.fit(on_body.with_name("synthetic-haptic-loop"), seed=5, settings=QUICK)
+    fit.save("fits")
+    code, out, _ = run("export", "fits", "--to", "mujoco", "--at", "100deg", "--points", 5)
+    assert code in (0, 3)
+    assert "Friction is that at wrap_angle 100 deg.\nIt holds up to" in out
+    text = (tmp_path / "synthetic_haptic_loop.xml").read_text()
+    found = transmission(fit, 5)
+    rows = bf.predict(fit, quantity="stiffness", wrap_angles=[(x, "rad") for x in found.places.at], input_force=(1e-6, "N"))
+    np.testing.assert_allclose(found.median.stiffness, [row["stiffness_N_per_mm"] for row in rows], rtol=1e-6)
+    assert found.radii == (20.0, 20.0)
+    assert repr(2000 * float(np.interp(np.deg2rad(100), found.places.at, found.median.stiffness))) in text
+    assert "is asked of mujoco" in refuse("export", "fits", "--to", "c", "--at", "100deg")
+    assert "--at 100mm" in refuse("export", "fits", "--to", "mujoco", "--force", "--at", "100mm")
+
+
 def test_a_fit_without_draws_is_refused_in_words(on_body, tmp_path):
     fit = bf.fit(on_body, seed=1, mcmc=False)
     with pytest.raises(UsageError, match="without MCMC"):

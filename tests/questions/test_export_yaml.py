@@ -36,7 +36,7 @@ def test_every_number_is_read_back_to_its_last_bit(case):
 
 
 def test_what_may_be_fed_forward_is_a_torque_where_the_pulley_is_known():
-    found = replace(cable("loop"), radius=15.0)
+    found = replace(cable("loop"), radii=(20.0, 15.0))
     page = read(parameters(found))
     least = found.levels[LEVELS.index("mounting_q05")].taut_loss
     np.testing.assert_allclose(page["feed_forward"]["coulomb_N_m"], 0.015 * least, rtol=1e-15)

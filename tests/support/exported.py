@@ -1,5 +1,7 @@
 """Cables as tables, made up for tests of what is exported, and what the package's own equations say of them."""
 
+from dataclasses import replace
+
 import jax.numpy as jnp
 import numpy as np
 
@@ -35,6 +37,12 @@ def cable(case: str, draws: int = 3, name: str = "test cable") -> Transmission:
     options = {"load": ("drag", "load-dependent"), "rate": ("rate-dependent",), "stroke": ("stroke-dependent",)}.get(case, ())
     speed = (20.0, "mm/s") if case == "rate" else (0.0, "")
     return Transmission(about, places, tuple(levels), case == "loop", options, 50.0, *speed, 1e-6)
+
+
+def with_rope(found: Transmission, stiffness: float = 100.0, radii: tuple[float, float] = (15.0, 20.0)) -> Transmission:
+    """The same, of a rope whose stiffness is known [N/mm], on pulleys [mm]."""
+    by_place = stiffness * (1 + 0.1 * np.arange(len(found.places.at)) / len(found.places.at))
+    return replace(found, levels=tuple(replace(level, stiffness=by_place) for level in found.levels), radii=radii)
 
 
 def points(found: Transmission, n: int, seed: int) -> dict[str, np.ndarray]:

@@ -43,9 +43,9 @@ def _page(found: Transmission) -> dict[str, Any]:
         page["coulomb_N"] = {level.name: level.taut_loss for level in levels}
         least = next(level for level in levels if level.name == _LEAST_FRICTION).taut_loss
         page["feed_forward"] = {"coulomb_N": least, "probability_that_friction_exceeds_it": _EXCEEDED}
-        if found.radius:
-            page["coulomb_N_m"] = {level.name: level.taut_loss * found.radius / 1000 for level in levels}
-            page["feed_forward"]["coulomb_N_m"] = least * found.radius / 1000
+        if found.radii[1]:
+            page["coulomb_N_m"] = {level.name: level.taut_loss * found.radii[1] / 1000 for level in levels}
+            page["feed_forward"]["coulomb_N_m"] = least * found.radii[1] / 1000
     if found.of_load:
         page["load"] = {
             "reference_force_N": found.reference_force,

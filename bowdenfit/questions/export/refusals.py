@@ -3,9 +3,11 @@
 from collections.abc import Mapping
 from types import MappingProxyType
 
-from bowdenfit.errors import UsageError
+from bowdenfit.errors import DatasetError, UsageError
 from bowdenfit.questions.export.tables import EXPRESSED
+from bowdenfit.questions.export.transmission import Places
 from bowdenfit.results.record import Record
+from bowdenfit.units import conversion_factor, route_conversion_factor
 from bowdenfit.words import listed
 
 NAMES: Mapping[str, str] = MappingProxyType(
@@ -30,3 +32,29 @@ def refuse_what_is_not_expressed(fit: Record, to: str, draws: int) -> None:
             f"{NAMES[to]}{' of draws' if to == 'csv' else ''} cannot express the friction model {listed(unknown)}; export the "
             "lookup table instead, with --to csv."
         )
+
+
+def place_of(fit: Record, places: Places, to: str, at: tuple[float, str] | None) -> float | None:
+    """Where a format that holds at one place does, in the unit of the tables; None if not said.
+
+    Args:
+        fit: The fit.
+        places: Where friction is tabled.
+        to: The format.
+        at: What was said.
+
+    Raises:
+        UsageError: It has another unit, or the format holds everywhere, or friction is the same everywhere.
+    """
+    if at is None:
+        return None
+    if to != "mujoco":
+        raise UsageError(f"--at is asked of mujoco; {NAMES[to]} has tables over the whole range. Leave it out.")
+    if not places.unit:
+        raise UsageError("friction of this cable is the same everywhere; leave --at out.")
+    route = fit.dataset.description.route
+    try:
+        factor = conversion_factor(at[1], "angle") if route is None else route_conversion_factor(at[1], route.unit)
+    except DatasetError as error:
+        raise UsageError(f"--at {at[0]:g}{at[1]}: {error}.") from None
+    return at[0] * factor

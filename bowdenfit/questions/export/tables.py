@@ -65,14 +65,18 @@ def transmission(fit: Record, points: int = 101, draws: int = 0, distrust: str =
         About(fit.name, made.seed, version, made.created, _measured(fit, bent), group, distrust),
         places, tuple(levels), cable.is_loop, cable.friction.options, conditions.reference_force, conditions.reference_speed,
         conditions.velocity_unit or "mm/s" if cable.friction.depends_on_rate else "",
-        _missed(np.median(mean["effective"][:, 0], axis=0)), _radius(fit),
+        _missed(np.median(mean["effective"][:, 0], axis=0)), _radii(fit),
     )  # fmt: skip
 
 
-def _radius(fit: Record) -> float:
-    """Radius of the pulley at the load side [mm]; 0 where none is stated."""
-    stated = fit.dataset.description.cable.output_pulley_radius
-    return stated.to("length") if stated is not None else 0.0
+def _radii(fit: Record) -> tuple[float, float]:
+    """Radii of the pulleys at the motor and at the load side [mm]; 0 where none is stated."""
+    cable = fit.dataset.description.cable
+    at_motor, at_load = (
+        0.0 if stated is None else stated.to("length")
+        for stated in (cable.input_pulley_radius, cable.output_pulley_radius)
+    )
+    return at_motor, at_load
 
 
 def _places(fit: Record, points: int) -> tuple[Places, bool]:
@@ -155,10 +159,11 @@ def _there(model: Model, values: Mapping[str, Array], at: Array, bent: bool) -> 
 
 
 def _stiffness(model: Model, values: Mapping[str, Array], at: Array, bent: bool) -> Array:
-    """Stiffness of an unloaded loop at wrap angles [N/mm]; nothing where nothing tells it."""
-    if not (model.cable.is_loop and bent and knows_stretch(model)):
+    """Stiffness at wrap angles, of an unloaded loop or of a rope under the reference force [N/mm]; nothing if not told."""
+    if not (bent and knows_stretch(model)):
         return jnp.zeros(0)
-    return Bent(model, bending_contact(model), at).stiffness(values, 0.0)
+    load = 0.0 if model.cable.is_loop else model.cable.friction.conditions.reference_force
+    return Bent(model, bending_contact(model), at).stiffness(values, load)
 
 
 def _at_reference(friction: FrictionModel, values: Mapping[str, Array], own: Array, middle: Array) -> Array:

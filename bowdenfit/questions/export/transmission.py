@@ -68,7 +68,8 @@ class Level:
         load_exponent: p of the scale g, see `bowdenfit.physics.friction.force_scale` [1].
         drag: D of that scale [N].
         rate: Stribeck rise [1], Stribeck speed and viscous coefficient, see `bowdenfit.physics.friction.rate_factor`.
-        stiffness: Of a taut loop seen at the load side with the motor held, by place [N/mm]; empty where nothing tells it.
+        stiffness: Of a taut loop, or of a rope under the reference force, seen at the load side with the motor held, by place
+            [N/mm]; empty where nothing tells it.
     """
 
     name: str
@@ -94,7 +95,7 @@ class Transmission:
         reference_speed: At which the coefficients hold, in `speed_unit`.
         speed_unit: "mm/s" or "rad/s"; empty where friction does not depend on speed.
         between: Largest error of the median exponent between two places [1].
-        radius: Of the pulley at the load side [mm]; 0 where none is stated.
+        radii: Of the pulleys at the motor and at the load side [mm]; 0 where none is stated.
     """
 
     about: About
@@ -106,7 +107,7 @@ class Transmission:
     reference_speed: float
     speed_unit: str
     between: float
-    radius: float = 0.0
+    radii: tuple[float, float] = (0.0, 0.0)
 
     @property
     def median(self) -> Level:

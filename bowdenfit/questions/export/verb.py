@@ -1,18 +1,17 @@
 """Writing a fitted cable as other programs read it."""
 
-from collections.abc import Callable, Mapping
+from collections.abc import Mapping
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any, Literal
 
-from bowdenfit.verb import Argument, Option, Output, Reply, Verb
+from bowdenfit.verb import Argument, Option, Output, Quantity, Reply, Verb
 
 if TYPE_CHECKING:
     from bowdenfit.questions.export.answer import Exported
-    from bowdenfit.questions.export.transmission import Transmission
     from bowdenfit.results.record import Record
 
-Target = Literal["c", "fmu", "matlab", "yaml", "csv"]
-_ENDINGS: Mapping[str, str] = {"c": ".h", "csv": ".csv", "fmu": ".fmu", "matlab": ".m", "yaml": ".yaml"}
+Target = Literal["c", "fmu", "mujoco", "matlab", "yaml", "csv"]
+_ENDINGS: Mapping[str, str] = {"c": ".h", "csv": ".csv", "fmu": ".fmu", "matlab": ".m", "mujoco": ".xml", "yaml": ".yaml"}
 _NOT_TRUSTED = 3
 
 
@@ -23,6 +22,7 @@ def export(
     *,
     points: Annotated[int, Option(least=2, most=2001)] = 101,
     draws: Annotated[int, Option(least=0, most=10_000)] = 0,
+    at: Annotated[Quantity | None, Option(example="90deg", metavar="PLACE", default="the middle of the range")] = None,
     force: Annotated[bool, Option()] = False,
 ) -> "Exported":
     """Write a fitted cable as another program reads it, with quantiles, and draws where some are asked for.
@@ -33,6 +33,7 @@ def export(
         output: The file.
         points: Number of lengths or wrap angles in a table.
         draws: Number of draws beside the quantiles, each of a cable in a mounting of its own; as CSV in place of them.
+        at: Wrap angle, or length, at which a model for MuJoCo holds.
         force: Replace a file that is there.
 
     Raises:
@@ -41,9 +42,10 @@ def export(
     """
     from bowdenfit.errors import StoreError
     from bowdenfit.questions.export.answer import Exported
-    from bowdenfit.questions.export.refusals import refuse_what_is_not_expressed
+    from bowdenfit.questions.export.refusals import place_of, refuse_what_is_not_expressed
     from bowdenfit.questions.export.tables import transmission
     from bowdenfit.questions.export.words import identifier
+    from bowdenfit.questions.export.writers import WRITERS, Asked
     from bowdenfit.questions.summary.verdict import verdict
     from bowdenfit.results.folder import folder_to_write, replace_when_whole
 
@@ -54,37 +56,10 @@ def export(
     refuse_what_is_not_expressed(found, to, draws)
     judged = verdict(found)
     tables = transmission(found, points, draws, " and ".join(judged.troubles))
-    written = _writer(to, path)(found, tables)
+    written = WRITERS[to](Asked(found, tables, path, place_of(found, tables.places, to, at)))
     with folder_to_write(path.parent), replace_when_whole(path) as temporary:
-        temporary.write_bytes(written)
-    return Exported(path, to, tuple(tables.sentences), judged.trusted)
-
-
-def _writer(to: str, path: Path) -> "Callable[[Record, Transmission], bytes]":
-    """What gives the bytes of a file in a format."""
-    if to == "c":
-        from bowdenfit.questions.export.c import header
-
-        return lambda _, found: header(found).encode("ascii")
-    if to == "matlab":
-        from bowdenfit.questions.export.matlab import function, function_name
-
-        name = function_name(path)
-        return lambda _, found: function(found, name).encode("ascii")
-    if to == "fmu":
-        from bowdenfit.questions.export.fmu import unit
-
-        return lambda fit, found: unit(found, fit.name)
-    if to == "yaml":
-        from bowdenfit.questions.export.parameters import parameters
-
-        return lambda _, found: parameters(found).encode("ascii")
-    from bowdenfit.questions.export.lookup import lookup_table, table_of_draws
-    from bowdenfit.questions.export.transmission import LEVELS
-
-    return lambda fit, found: (
-        table_of_draws(found) if len(found.levels) > len(LEVELS) else lookup_table(fit, found)
-    ).encode()
+        temporary.write_bytes(written.content)
+    return Exported(path, to, tuple(tables.sentences), judged.trusted, written.remarks)
 
 
 def _reply(answer: "Exported", _: Mapping[str, Any]) -> Reply:
@@ -100,6 +75,7 @@ VERB = Verb(
 
     \b
     c       a header (C99): output force, input force, friction while moving to and fro, compensation
+    mujoco  a loop that stays taut as MJCF (cable.xml), or any cable whose stretch is known as a callback (--output cable.py)
     matlab  a function of MATLAB and Octave that says the same
     fmu     a functional mock-up unit (FMI 2.0, co-simulation) of that header, compiled here, with its sources
     yaml    parameters of a controller, as ROS 2 reads them: friction by place, and what may be fed forward

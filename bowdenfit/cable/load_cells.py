@@ -26,7 +26,7 @@ class LoadCells:
         input_offset: b_in [N].
         output_offset: b_out [N].
         gain_error: gamma, relative gain error between the two [1].
-        delay_error: By how much the delay between the two was estimated too large [s].
+        delay_error: By how much the output still comes later than it was shifted back by: its delay, less the estimate [s].
     """
 
     input_offset: Array | float

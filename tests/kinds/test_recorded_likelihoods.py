@@ -281,6 +281,19 @@ def test_without_anything_that_changes_the_scale_whole_recordings_are_sums_over_
     np.testing.assert_allclose(whole.data["n"], sums.data["n"], rtol=0.02)  # blocks before the first slide
 
 
+@pytest.mark.parametrize("likelihood", ["runs", "whole"])
+@pytest.mark.parametrize("late", [-0.004, 0.004])
+def test_an_output_that_comes_later_than_it_was_shifted_back_by_has_a_positive_error_of_its_delay(likelihood, late):
+    """The bench shifts the whole output in time; forces that change by 2 to 300 % a second tell 4 ms to a tenth."""
+    recording = _recorded(1.5, faults=Faults(delay=late), profile=SHORT, rate=200.0)
+    recordings = Recordings(("angle",), (recording,), "mm/s", delay_sd=0.01)
+    model = _model([recording], likelihood)
+    (term,) = model.terms if likelihood == "runs" else (_whole(model, recordings.each),)
+    grid = np.linspace(-0.008, 0.008, 33)
+    found = jax.jit(jax.vmap(lambda d: term.log_likelihood(_named(BLOCK) | {"delay_error": d}, term.data)[0]))(grid)
+    assert grid[int(np.argmax(found))] == pytest.approx(late, abs=0.0006)
+
+
 ALL = "drag+load-dependent+rate-dependent"
 FULL = BLOCK | {"drag": 3.0, "load_exponent": 0.2, "stribeck": 0.2, "stribeck_speed": 15.0, "viscous": 0.002}
 FULL |= {"input_offset": 0.4, "output_offset": -0.3, "gain_error": 0.01, "delay_error": 0.002}

@@ -1,8 +1,8 @@
 """Recordings measured again on the computer, at the level of prepared blocks.
 
-The input force of every block is kept and stands for the true one; the play operator of a cable with known coefficients
-makes the output force of it, all sensors' errors and the noise of blocks are added, and the strokes are found anew as a
-reader finds them. What happens before blocks are made (clipping, spikes, sampling) is not simulated.
+The input force of every block is kept, smoothed, and stands for the true one; the play operator of a cable with known
+coefficients makes the output force of it, all sensors' errors and the noise of blocks are added, and the strokes are found anew
+as a reader finds them. What happens before blocks are made (clipping, spikes, sampling) is not simulated.
 """
 
 from collections.abc import Mapping
@@ -19,8 +19,8 @@ from bowdenfit.description import Description
 from bowdenfit.errors import DatasetError
 from bowdenfit.kinds.bench import Truth
 from bowdenfit.kinds.recordings.angles import recorded_angles
-from bowdenfit.kinds.recordings.blocks import worth_of
 from bowdenfit.kinds.recordings.side_by_side import beside
+from bowdenfit.kinds.recordings.true_input import likely_input
 from bowdenfit.recordings.recording import Blocks, Recording, Recordings, Strokes
 from bowdenfit.recordings.strokes import cable_of, find_strokes
 
@@ -28,8 +28,8 @@ from bowdenfit.recordings.strokes import cable_of, find_strokes
 def drawn_recordings(recordings: Recordings, truth: Truth) -> dict[str, jax.Array]:
     """Forces of every block (rows) of every recording (columns), padded to the longest, and the delay's error [s].
 
-    All recordings of a run share the effect of its mounting. Noise is as the likelihood counts it: blocks that together
-    are worth one independent reading share one error.
+    All recordings of a run share the effect of its mounting. Noise is as the likelihood counts it: it stays alike from block
+    to block for as long as a block is worth less than an independent reading, and blocks of fewer samples have more.
 
     Args:
         recordings: The recordings as measured.
@@ -42,14 +42,14 @@ def drawn_recordings(recordings: Recordings, truth: Truth) -> dict[str, jax.Arra
     run = np.array([recordings.runs.index(r.run) for r in recordings.each])
     mounting = values[RUN_SCATTER] * truth.scatter(of_run, (len(recordings.runs),))[run]
     exponent = cable.friction_exponent(values, angles + scale * error)
-    force, velocity = (
-        jnp.asarray(beside([getattr(r.blocks, name) for r in recordings.each])) for name in ("input_force", "velocity")
-    )
+    force = jnp.asarray(beside([likely_input(r.blocks.input_force) for r in recordings.each]))
+    velocity = jnp.asarray(beside([r.blocks.velocity for r in recordings.each]))
     cells, drive = LoadCells.of(values), drive_of(cable, values, angles, velocity, exponent)
     at_least = jnp.maximum(force, drive.least_force)
     output, _ = drive.follow(at_least, scale * mounting, _starts(drive, recordings, at_least, scale * mounting))
-    places = beside([_readings_of(r) for r in recordings.each]).astype(int)
-    shape, noise = (places.max() + 1, len(recordings.each)), scale * values[BLOCK_NOISE]
+    places = beside([errors_shared(len(r.blocks.time), r.strokes.correlation) for r in recordings.each]).astype(int)
+    fewer = jnp.asarray(beside([np.sqrt(r.blocks.samples.mean() / r.blocks.samples) for r in recordings.each]))
+    shape, noise = (places.max() + 1, len(recordings.each)), scale * values[BLOCK_NOISE] * fewer
     noises = ((cable.description.sensors.noise_ratio * noise, of_input), (noise, of_output))
     errors = [sd * jax.random.normal(k, shape)[places, np.arange(shape[1])] for sd, k in noises]
     return {
@@ -75,10 +75,25 @@ def _start(recording: Recording) -> float:
     return float(np.clip((ratio + strokes.center) / strokes.exponent, -1.0, 1.0))
 
 
-def _readings_of(recording: Recording) -> np.ndarray:
-    """Number of the independent reading that each block belongs to."""
-    worth = worth_of(recording, np.arange(len(recording.blocks.time)))
-    return np.floor(np.cumsum(np.minimum(worth, 1.0)) - 1e-9)
+def errors_shared(blocks: int, correlation: float) -> np.ndarray:
+    """Which error each block has, for means of many blocks to scatter as those of a `correlation`-th as many would.
+
+    With errors shared by blocks in groups, the mean of N scatters by as much as that of N / c independent ones if c is the size
+    of the group that a block is in, on average over blocks. So a share c - k of the blocks, with k the whole part of c, is in
+    groups of k + 1, and the others in groups of k; squares of errors then scatter as those of N / c readings do, too.
+
+    Args:
+        blocks: How many.
+        correlation: c, at least 1.
+    """
+    least = int(correlation)
+    owed, starts, at = 0.0, [], 0
+    while at < blocks:
+        starts.append(at)
+        more = int(owed + (correlation - least) * (least + 1) >= least + 1)
+        owed += (correlation - least) * (least + more) - more * (least + 1)
+        at += least + more
+    return np.searchsorted(starts, np.arange(blocks), "right") - 1
 
 
 def recorded_again(description: Description, recordings: Recordings, drawn: Mapping[str, np.ndarray]) -> Recordings:

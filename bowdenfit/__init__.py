@@ -23,6 +23,7 @@ if TYPE_CHECKING:
     from bowdenfit.questions.calibrate.verb import calibrate
     from bowdenfit.questions.check.verb import check
     from bowdenfit.questions.compare.verb import compare
+    from bowdenfit.questions.compensate.verb import compensate
     from bowdenfit.questions.export.verb import export
     from bowdenfit.questions.fleet.verb import fleet
     from bowdenfit.questions.identify.verb import identify
@@ -41,6 +42,7 @@ _WHERE = {
     "calibrate": "bowdenfit.questions.calibrate.verb",
     "check": "bowdenfit.questions.check.verb",
     "compare": "bowdenfit.questions.compare.verb",
+    "compensate": "bowdenfit.questions.compensate.verb",
     "export": "bowdenfit.questions.export.verb",
     "fit": "bowdenfit.run.verb",
     "fleet": "bowdenfit.questions.fleet.verb",
@@ -71,6 +73,7 @@ __all__ = [
     "calibrate",
     "check",
     "compare",
+    "compensate",
     "export",
     "fit",
     "fleet",

@@ -3,6 +3,7 @@
 from bowdenfit.questions.calibrate.verb import VERB as CALIBRATE
 from bowdenfit.questions.check.verb import VERB as CHECK
 from bowdenfit.questions.compare.verb import VERB as COMPARE
+from bowdenfit.questions.compensate.verb import VERB as COMPENSATE
 from bowdenfit.questions.export.verb import VERB as EXPORT
 from bowdenfit.questions.fleet.verb import VERB as FLEET
 from bowdenfit.questions.identify.verb import VERB as IDENTIFY
@@ -18,6 +19,6 @@ from bowdenfit.questions.summary.verb import SUMMARY_VERB as SUMMARY
 from bowdenfit.run.verb import VERB as FIT
 
 VERBS = (
-    CHECK, FIT, SUMMARY, PREDICT, LENGTH, IDENTIFY, NEXT, COMPARE, EXPORT, CALIBRATE, FLEET, POOL, PLOT, REPORT, SIMULATE,
-    METABOLIC,
+    CHECK, FIT, SUMMARY, PREDICT, LENGTH, IDENTIFY, NEXT, COMPARE, COMPENSATE, EXPORT, CALIBRATE, FLEET, POOL, PLOT, REPORT,
+    SIMULATE, METABOLIC,
 )  # fmt: skip

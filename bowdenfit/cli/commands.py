@@ -87,7 +87,16 @@ def _answer(verb: Verb, keywords: tuple[Keyword, ...], given: dict[str, Any], as
         with watch_verb(asked["output"], verb.watch) as progress:
             answer = verb.function(**asked, **behind, progress=progress)
     reply = verb.reply(answer, asked)
-    return _with_warning(reply, asked[found].verdict().troubles, given[found]) if verb.warns and found else reply
+    return _with_warning(reply, _troubles(asked[found], given[found]), given[found]) if verb.warns and found else reply
+
+
+def _troubles(fit: Any, results: Path) -> Collection[str]:
+    """Why a fit is not to be trusted: as its folder has kept it, else worked out."""
+    from bowdenfit.results.kept import kept
+
+    answers = kept(results) if isinstance(results, Path) else None
+    known: Collection[str] = answers["troubles"] if answers and "troubles" in answers else fit.verdict().troubles
+    return known
 
 
 def _with_warning(reply: Reply, troubles: Collection[str], results: Path) -> Reply:

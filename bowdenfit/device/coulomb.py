@@ -25,5 +25,9 @@ def largest_share(margin: np.ndarray, nominal: np.ndarray, risk: float) -> float
         nominal: F that is fed forward at each bend, before the share [N m].
         risk: Such as 0.05.
     """
-    ratio = np.min(margin / np.maximum(nominal, 1e-300), axis=1)
-    return float(np.quantile(ratio, risk, method="lower"))
+    return float(np.quantile(np.min(shares(margin, nominal), axis=1), risk, method="lower"))
+
+
+def shares(margin: np.ndarray, nominal: np.ndarray) -> np.ndarray:
+    """Share of F that each draw bears at each bend; infinite where nothing is fed forward."""
+    return np.where(nominal > 0, margin / np.maximum(nominal, 1e-300), np.inf)

@@ -10,7 +10,7 @@ from dataclasses import dataclass
 import numpy as np
 
 LARGEST, LEAST = 1e4, 1e-4  # gains that are looked for
-_HALVINGS = 40
+_HALVINGS = 26
 _ROUNDING = 1e-6  # of a spectral radius: undamped motion of the whole device stands at 1
 _FREQUENCIES, _SHARES = 240, 25
 

@@ -6,15 +6,14 @@ band of the loop, and slides along its limits otherwise: the loop's play operato
 """
 
 from dataclasses import dataclass
+from typing import Any, TypeAlias
 
 import jax
 import jax.numpy as jnp
-from jax import Array
-from jaxtyping import Float
 
 from bowdenfit.physics.stretch import mean_tension
 
-Each = Float[Array, "*runs"]
+Each: TypeAlias = Any  # an array over runs, of JAX or NumPy, or one number for all of them
 
 
 @jax.tree_util.register_dataclass

@@ -30,6 +30,7 @@ VERBS = (
     "length",
     "identify",
     "compare",
+    "compensate",
     "next",
     "export",
     "calibrate",

@@ -7,7 +7,10 @@ JARGON = (
     r"\blog rad\b", r"\w*(Normal|Cauchy)\(", r"\bcensored\b", r"\bposterior\b", r"\bR-hat\b", r"\beffective sample\b",
     r"\bs\.e\.", r"\b1 \w+s were\b", r"\b1 (runs|readings|recordings)\b", r"\+-", r"\d%",
 )  # fmt: skip
-ANSWER = re.compile(r"cut the cable to \d|coefficients? of friction:? |best (guess|\w+ \w+) is \d|DO NOT USE", re.IGNORECASE)
+ANSWER = re.compile(
+    r"cut the cable to \d|coefficients? of friction:? |best (guess|\w+ \w+) is \d|DO NOT USE|feed (forward|back) |feels ",
+    re.IGNORECASE,
+)
 
 
 def faults(page: str, lines: int = 25) -> list[str]:

@@ -1,0 +1,1 @@
+"""How much of a cable's friction may a controller hide?"""

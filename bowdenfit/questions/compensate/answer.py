@@ -1,0 +1,143 @@
+"""How much friction may be hidden: what is fed forward and fed back, with which probability, and what is left to feel."""
+
+from dataclasses import dataclass
+
+from bowdenfit.display import Display, Part, Rows
+from bowdenfit.inference.interval import Interval
+from bowdenfit.questions.compensate.simulated import Simulated
+
+
+@dataclass(frozen=True, repr=False)
+class FeedForward(Part):
+    """F_cst that is fed forward, at one value for all bends or scheduled by bend.
+
+    Args:
+        share: c, of the median friction at each bend; for one value, of that where it is most.
+        torque: F_cst where friction is most [N m].
+        risk: Probability that the device moves by itself at some bend.
+        left: Median torque that is left to feel where friction is most [N m].
+        decided_at: Wrap angle that limits it most often [deg].
+    """
+
+    share: float
+    torque: float
+    risk: float
+    left: float
+    decided_at: float
+
+
+@dataclass(frozen=True, repr=False)
+class Bend(Part):
+    """What is known at one wrap angle.
+
+    Args:
+        wrap_angle: [deg].
+        friction: What moving the device takes, of motor and loop [N m].
+        scheduled: F_cst of the schedule [N m].
+        left_scheduled, left_fixed: Median of what is left to feel [N m]; negative where the device is pushed on.
+    """
+
+    wrap_angle: float
+    friction: Interval
+    scheduled: float
+    left_scheduled: float
+    left_fixed: float
+
+
+@dataclass(frozen=True, repr=False)
+class Gain(Part):
+    """K_f on the torque measured at the joint.
+
+    Args:
+        safe: Largest gain with which the loop oscillates with at most the risk, hands off or on [1].
+        stable: Largest gain that does not oscillate, by draw [1].
+        passive: Largest gain with which no passive hand can make it oscillate, at that risk [1].
+        with_hand: Whether a hand that is described counts, too.
+        decided_by: Input that decides it most, in words.
+        decided_share: Share of the scatter of the largest gain that goes with it.
+        left: What is left to feel where friction is most, at the safe gain [N m].
+    """
+
+    safe: float
+    stable: Interval
+    passive: float
+    with_hand: bool
+    decided_by: str
+    decided_share: float
+    left: Interval
+
+
+@dataclass(frozen=True, repr=False)
+class Preload(Part):
+    """What another preload would do.
+
+    Args:
+        preload: At the reference angle [N].
+        felt: Friction of the loop where it is most [N m].
+        slack_from: Torque of the motor from which a side is slack, where that is least [N m].
+    """
+
+    preload: float
+    felt: Interval
+    slack_from: Interval
+
+
+@dataclass(frozen=True, repr=False)
+class Compensation(Display):
+    """How much of a cable's friction a controller may hide.
+
+    Args:
+        cable: Name of the cable.
+        device: Name of the device; empty without one.
+        law: The law that was asked for; None for both.
+        bends: Lowest and highest wrap angle [deg].
+        risk: Probability that is accepted.
+        draws: How many.
+        scatter: Median scatter of the friction exponent from mounting to mounting [1].
+        scatter_from_fit: Whether the measurements tell it; else it was stated.
+        dead_zone: Speed below which nothing is fed forward [rad/s]; 0 where none is stated.
+        chatters_below: Dead zone below which the motor chatters, one count of the encoder in the time of the filter [rad/s].
+        fixed: One value for all bends; None where another law was asked for.
+        scheduled: A value by bend; None where another law was asked for.
+        share_without_scatter: The scheduled share that would seem safe from the coefficients alone.
+        by_bend: Every bend looked at.
+        gain: Of the active law; None where it was not asked for, or cannot be told.
+        missing: Keys of device.toml that a gain needs and that are not said.
+        preloads: What other preloads would do.
+        slack: Probability that the loop is slack at rest at some of the bends.
+        simulated: The device through time; None without simulation.
+    """
+
+    cable: str
+    device: str
+    law: str | None
+    bends: tuple[float, float]
+    risk: float
+    draws: int
+    scatter: float
+    scatter_from_fit: bool
+    dead_zone: float
+    chatters_below: float | None
+    fixed: FeedForward | None
+    scheduled: FeedForward | None
+    share_without_scatter: float
+    by_bend: tuple[Bend, ...]
+    gain: Gain | None
+    missing: tuple[str, ...]
+    preloads: tuple[Preload, ...]
+    slack: float
+    simulated: Simulated | None = None
+
+    @property
+    def most(self) -> Bend:
+        """The bend at which friction is most."""
+        return max(self.by_bend, key=lambda bend: bend.friction.median)
+
+    def _table(self) -> Rows:
+        rows = [
+            {"wrap_angle": bend.wrap_angle, "friction": bend.friction.median, "friction_q05": bend.friction.q05,
+             "friction_q95": bend.friction.q95, "scheduled": bend.scheduled, "left_scheduled": bend.left_scheduled,
+             "left_fixed": bend.left_fixed}
+            for bend in self.by_bend
+        ]  # fmt: skip
+        return rows, {"wrap_angle": "deg"} | {name: "N*m" for name in (rows[0] if rows else {}) if name != "wrap_angle"}

@@ -1,0 +1,149 @@
+"""The device through time: what its sensors show, as figures 9 to 11 of the haptic paper, and whether it moves by itself."""
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from bowdenfit.device.control import Controller
+from bowdenfit.device.felt import felt
+from bowdenfit.device.motion import Hand, Runs, simulate, swinging
+from bowdenfit.device.plant import Motion, Plant
+from bowdenfit.display import Part
+from bowdenfit.inference.interval import Interval
+
+NONE, KARNOPP, ACTIVE = "none", "karnopp", "active"
+HALF_WAY = 0.5  # of the hand's path [rad]
+_PERIOD, _SECONDS, _SINCE = 1.25, 2.5, 0.625  # of the movement to and fro [s]
+_FASTER = 2.0  # times the dead zone, which a push and the movement reach at least
+_PUSH = 3.0  # s
+_LATE = 50  # samples at the end of a push, which tell whether it goes on
+_KEPT = 4  # every so many samples are kept of a trace
+_AT_REST = 0.05  # rad/s, where there is no dead zone
+
+
+@dataclass(frozen=True, repr=False)
+class Trace(Part):
+    """The torques of one device, that of the middle friction, while a hand moves it to and fro.
+
+    Args:
+        time: [s].
+        motor, joint: What the rope takes from the motor and gives the joint [N m].
+    """
+
+    time: np.ndarray
+    motor: np.ndarray
+    joint: np.ndarray
+
+
+@dataclass(frozen=True, repr=False)
+class Law(Part):
+    """One law, in every simulated device.
+
+    Args:
+        name: "none", "karnopp" or "active".
+        felt: Mean torque at the joint against the motion [N m].
+        peak: The largest, where the motion turns round [N m].
+        trace: Of one device.
+    """
+
+    name: str
+    felt: Interval
+    peak: Interval
+    trace: Trace
+
+
+@dataclass(frozen=True, repr=False)
+class Simulated(Part):
+    """The device through time.
+
+    Args:
+        draws: Devices that were simulated.
+        wrap_angle: At which the hand moved them [deg].
+        laws: Each law.
+        went_on: Share of the devices that went on by themselves after a push with no hand on, each at the bend where it bears
+            least; None without feeding forward.
+        speed: Largest of the hand [rad/s].
+    """
+
+    draws: int
+    wrap_angle: float
+    laws: tuple[Law, ...]
+    went_on: float | None
+    speed: float
+
+
+@dataclass(frozen=True)
+class Devices:
+    """Devices that are simulated, a number each, or one for all.
+
+    Args:
+        plant: At the bend where friction is most, without a hand.
+        hand: That moves it.
+        hand_inertia: Which then counts with the joint [kg m^2].
+        sample: T_s [s].
+        noise: Of the torque sensor [N m].
+        fed_forward: F_cst there [N m].
+        gain: K_f.
+        control: What the controller is besides.
+        wrap_angle: Of the bend [deg].
+        seed: Of the noise.
+    """
+
+    plant: Plant
+    hand: Hand
+    hand_inertia: np.ndarray
+    sample: float
+    noise: float
+    fed_forward: float | None
+    gain: float | None
+    control: Controller
+    wrap_angle: float
+    seed: int
+
+
+def moved(devices: Devices, middle: int) -> tuple[tuple[Law, ...], float]:
+    """Every law while a hand moves the device to and fro, and the hand's largest speed [rad/s].
+
+    Args:
+        devices: The devices.
+        middle: Number of the one of which traces are kept.
+    """
+    period = min(_PERIOD, 2 * np.pi * HALF_WAY / (_FASTER * max(float(devices.control.dead_zone), 1e-9)))
+    path = swinging(2 * period, devices.sample, HALF_WAY, period)
+    plant = replace(devices.plant, joint_inertia=devices.plant.joint_inertia + devices.hand_inertia)
+    laws = {NONE: devices.control}
+    if devices.fed_forward is not None:
+        laws[KARNOPP] = replace(devices.control, coulomb=devices.fed_forward)
+    if devices.gain is not None:
+        laws[ACTIVE] = replace(devices.control, gain=devices.gain, active_zone=np.inf)
+    found = []
+    for name, control in laws.items():
+        runs = simulate(
+            plant, control, devices.hand, path, sample=devices.sample, noise=devices.noise, seed=devices.seed
+        )
+        known = felt(runs, max(float(devices.control.dead_zone), _AT_REST), since=_SINCE * period / _PERIOD)
+        found.append(Law(name, Interval.of(known.mean), Interval.of(known.peak), _trace(runs, middle)))
+    return tuple(found), 2 * np.pi * HALF_WAY / period
+
+
+def _trace(runs: Runs, middle: int) -> Trace:
+    return Trace(
+        runs.time[::_KEPT], runs.motor_torque[::_KEPT, middle].copy(), runs.joint_torque[::_KEPT, middle].copy()
+    )
+
+
+def goes_on(plant: Plant, control: Controller, sample: float) -> np.ndarray:
+    """Whether each device goes on by itself after a push, with no hand on.
+
+    Args:
+        plant: Of every device at its own bend.
+        control: Which feeds forward.
+        sample: T_s [s].
+    """
+    zone = np.maximum(np.asarray(control.dead_zone), _AT_REST)
+    pushed = np.broadcast_to(_FASTER * zone, np.shape(plant.loop.preload))
+    start = replace(Motion.at_rest(np.zeros(np.shape(pushed))), motor_speed=pushed, joint_speed=pushed)
+    path = np.zeros((round(_PUSH / sample), 2))
+    seen = simulate(plant, control, Hand(0.0, 0.0), path, start=start, sample=sample)
+    late: np.ndarray = np.abs(seen.speed[-_LATE:]).max(axis=0) > zone / 2
+    return late

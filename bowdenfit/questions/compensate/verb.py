@@ -1,0 +1,127 @@
+"""Asking how much of a cable's friction a controller may hide."""
+
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Any, Literal
+
+from bowdenfit.questions.writing import FIGURES, files_of, write_answer
+from bowdenfit.verb import Argument, Option, Output, Quantity, Reply, Verb
+
+if TYPE_CHECKING:
+    from bowdenfit.questions.compensate.answer import Compensation
+    from bowdenfit.results.record import Record
+
+NAME, TRACES = "compensation", "compensation_traces"
+Law = Literal["karnopp", "active"]
+Bends = str | tuple[Quantity, Quantity]
+_PERCENT = (5.0, "%")
+
+
+def compensate(
+    found: Annotated["Record", Argument("RESULTS", results=True)],
+    device: Annotated[str | Path | None, Option(metavar="FILE")] = None,
+    *,
+    wrap_angle: Annotated[
+        Bends | None, Option(metavar="FROM:TO", default="all that were measured, such as 45deg:180deg")
+    ] = None,
+    law: Annotated[Law | None, Option(default="both")] = None,
+    schedule: Annotated[bool, Option()] = False,
+    simulate: Annotated[bool, Option()] = False,
+    risk: Annotated[Quantity | None, Option(example="5%", metavar="PERCENT", default="5%")] = None,
+    output: Annotated[Output, Option(("-o",))] = None,
+) -> "Compensation":
+    """How much of a loop's friction a controller may hide before the device moves by itself, and what is left to feel.
+
+    Args:
+        found: The fit.
+        device: A device.toml that says what the fit does not: inertias, damping, the controller.
+        wrap_angle: Range of wrap angles that must be safe.
+        law: Feed forward by the motion's direction (karnopp), or feed back the measured torque (active).
+        schedule: Simulate what is fed forward by bend, not one value for all bends.
+        simulate: Simulate 400 devices through time: what is felt, and how many move by themselves.
+        risk: Probability that is accepted.
+        output: Folder for compensation.json, the text and the figures.
+
+    Raises:
+        UsageError: The fit is of no loop, has no posterior, or was not measured at these wrap angles.
+        DescriptionError: Something that the answer needs is not said by the device, or has no sd.
+        StoreError: `output` cannot be written.
+    """
+    from dataclasses import replace
+
+    from bowdenfit.description.device import asked_for, read_device
+    from bowdenfit.questions.compensate.gain import NEEDED
+    from bowdenfit.questions.compensate.ranking import compensation_of
+    from bowdenfit.questions.compensate.simulation import simulated
+
+    described = None if device is None else read_device(Path(device))
+    answer, loop = compensation_of(found, described, wrap_angle, law, _share(risk))
+    if simulate:
+        if described is None:
+            raise asked_for("a simulation", NEEDED)
+        answer = replace(answer, simulated=simulated(found, described, loop, answer, schedule))
+    if output is not None:
+        _write(answer, Path(output))
+    return answer
+
+
+def _share(risk: Quantity | None) -> float:
+    """A probability, from 0.1 % to a half.
+
+    Raises:
+        UsageError: It is none.
+    """
+    from bowdenfit.errors import DatasetError, UsageError
+    from bowdenfit.units import conversion_factor
+
+    value, unit = risk or _PERCENT
+    try:
+        share = value * conversion_factor(unit, "ratio")
+    except DatasetError as error:
+        raise UsageError(f"--risk: {error}.") from None
+    if not 0.001 <= share <= 0.5:
+        raise UsageError(f"--risk {value:g}{unit} is not between 0.1 % and 50 %; write it as 5%.")
+    return float(share)
+
+
+def _write(answer: "Compensation", folder: Path) -> None:
+    from bowdenfit.plots.write import write
+    from bowdenfit.questions.compensate.figure import draw, draw_traces
+    from bowdenfit.questions.compensate.words import compensation_text
+    from bowdenfit.results.folder import folder_to_write
+
+    if answer.simulated is not None:
+        with folder_to_write(folder):
+            traces = draw_traces(answer)
+            for ending in FIGURES:
+                write(traces, folder / f"{TRACES}.{ending}")
+    write_answer(folder, NAME, answer, compensation_text(answer), lambda: draw(answer))
+
+
+def _reply(found: "Compensation", asked: dict[str, Any]) -> Reply:
+    from bowdenfit.questions.compensate.words import compensation_text
+
+    files = files_of(asked["output"], NAME) if asked["output"] else []
+    if files and found.simulated is not None:
+        files += [Path(asked["output"]) / f"{TRACES}.{ending}" for ending in FIGURES]
+    notes = tuple(f"Wrote {path}." for path in files)
+    return Reply(compensation_text(found), lambda: found, notes, csv=found.to_csv)
+
+
+VERB = Verb(
+    compensate,
+    _reply,
+    "How much friction a controller may hide.",
+    """How much of a loop's friction a controller may hide before the device moves by itself, over all that the fit leaves open
+    and over mountings, and what is left to feel.
+
+    \b
+    karnopp   a torque in the direction of motion, fed forward outside a dead zone
+    active    the torque measured at the joint, fed back
+
+    One torque for all bends must suit the bend with the least friction; by bend it may be more. What the fit does not tell
+    is asked for by name in device.toml; datasets/haptic-teleoperation has one.
+    """,
+    json="Print as JSON.",
+    csv="Print all bends as CSV.",
+    warns=True,
+)

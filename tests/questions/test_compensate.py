@@ -1,0 +1,195 @@
+"""How much friction may be hidden: probabilities over draws and mountings, words, files, figures, and what is refused."""
+
+import json
+from pathlib import Path
+
+import numpy as np
+import pytest
+from figure_words import faults
+from one_page import faults as faults_of_page
+
+import bowdenfit as bf
+from bowdenfit.description.device import read_device
+from bowdenfit.device.coulomb import moves_by_itself
+from bowdenfit.errors import DescriptionError, UsageError
+from bowdenfit.questions.bends.loop_draws import loop_draws
+from bowdenfit.questions.compensate.figure import draw, draw_traces
+from bowdenfit.questions.compensate.ranking import compensation_of
+from bowdenfit.questions.compensate.words import compensation_text
+
+DATA = Path(__file__).parents[2] / "datasets"
+DEVICE = DATA / "haptic-teleoperation" / "device.toml"
+QUICK = ("sampler.n_walkers=64", "sampler.target_ess=100", "sampler.target_r_hat=1.1", "sampler.max_steps=1000")
+RANGE = "45deg:180deg"
+
+
+@pytest.fixture(scope="module")
+def fit():
+    """A quick fit of the loop."""
+    return bf.fit(DATA / "synthetic-haptic-loop", seed=5, settings=QUICK)
+
+
+@pytest.fixture(scope="module")
+def found(fit):
+    return bf.compensate(fit, DEVICE, wrap_angle=RANGE)
+
+
+def device(folder, old, new):
+    text = DEVICE.read_text()
+    assert text.count(old) == 1, old
+    path = folder / "device.toml"
+    path.write_text(text.replace(old, new))
+    return path
+
+
+def test_the_share_keeps_its_risk_over_draws_in_mountings_of_their_own(fit, found):
+    bends = np.deg2rad([bend.wrap_angle for bend in found.by_bend])
+    draws = loop_draws(fit, bends, read_device(DEVICE), np.ones(1))
+    motor = 0.01 + 2e-3 * 0.8 + 0.0022 * np.random.default_rng(1).standard_normal((len(draws.friction), 1))
+    for fed in ([bend.scheduled for bend in found.by_bend], [found.fixed.torque] * len(bends)):
+        risk = np.mean(np.any(moves_by_itself(np.array(fed), draws.friction, motor, 1.0), axis=1))
+        assert risk == pytest.approx(0.05, abs=0.012), "another draw of the motor than the answer's own"
+    assert found.scheduled.risk <= 0.05
+    assert found.fixed.risk <= 0.05
+
+
+def test_by_bend_more_may_be_fed_forward_than_at_one_value_for_all(found):
+    most = found.most
+    assert most.wrap_angle == pytest.approx(180)
+    assert most.friction.median == pytest.approx(0.23, rel=0.05)
+    assert found.fixed.torque < 0.1 * most.friction.median
+    assert found.fixed.decided_at == pytest.approx(45)
+    assert found.scheduled.left < 0.25 * found.fixed.left
+    assert most.left_fixed == pytest.approx(found.fixed.left)
+
+
+def test_coefficients_alone_promise_too_much(found):
+    assert found.scheduled.share + 0.03 < found.share_without_scatter < 1
+
+
+def test_more_scatter_of_mountings_allows_less(fit, tmp_path, found):
+    scatter = 'mounting_scatter = { value = 0.01, unit = "1" }'
+    more = bf.compensate(fit, device(tmp_path, scatter, scatter.replace("0.01", "0.02")), wrap_angle=RANGE)
+    none = bf.compensate(fit, device(tmp_path, scatter, scatter.replace("0.01", "0")), wrap_angle=RANGE)
+    assert more.scheduled.share < found.scheduled.share - 0.03 < none.scheduled.share
+    assert none.scheduled.share == pytest.approx(found.share_without_scatter, abs=0.005)
+    assert "for this mounting alone" in compensation_text(none)
+
+
+def test_without_a_device_what_helps_counts_as_nothing(fit, found, tmp_path):
+    path = tmp_path / "device.toml"
+    path.write_text('name = "bare"\n[rope]\nmounting_scatter = { value = 0.01, unit = "1" }\n')
+    bare = bf.compensate(fit, path, wrap_angle=RANGE)
+    assert bare.fixed.torque < found.fixed.torque - 0.008
+    assert bare.gain is None
+    assert "motor.inertia" in bare.missing
+    assert "motor, inertia" in compensation_text(bare)
+
+
+def test_the_gain_is_that_of_the_least_damped_ropes(found):
+    gain = found.gain
+    assert gain.decided_by == "the damping of the rope"
+    assert gain.decided_share > 0.5
+    assert gain.safe <= gain.stable.q05 * 1.0001
+    assert 2 < gain.safe / gain.passive < 12
+    assert gain.left.median == pytest.approx(found.most.friction.median / (1 + gain.safe), rel=0.01)
+
+
+def test_less_preload_is_felt_less_until_a_side_is_slack(found):
+    felt, slack = (np.array([getattr(row, name).median for row in found.preloads]) for name in ("felt", "slack_from"))
+    assert np.all(np.diff(felt) > 0)
+    assert np.all(np.diff(slack) >= 0)
+    assert slack[0] == 0 < slack[-1]
+
+
+def test_springs_make_the_cable_softer(fit, tmp_path):
+    bends = np.deg2rad([90.0, 180.0])
+    sprung = device(tmp_path, "[rope] ", '[rope]\nspring = { value = 5, unit = "N/mm", sd = 1e-9 }\n#')
+    stiff, soft = (loop_draws(fit, bends, read_device(path), np.ones(1)).stiffness for path in (DEVICE, sprung))
+    np.testing.assert_allclose(1 / soft, 1 / stiff + 1 / (2 * 5e3 * 0.02**2), rtol=1e-6)
+
+
+@pytest.mark.parametrize("schedule", [pytest.param(False, marks=pytest.mark.slow), True])
+def test_simulated_devices_do_what_was_foretold(fit, schedule, tmp_path):
+    seen = bf.compensate(fit, DEVICE, wrap_angle=RANGE, schedule=schedule, simulate=True, output=tmp_path / "answer")
+    none, karnopp, active = seen.simulated.laws
+    fed = seen.scheduled if schedule else seen.fixed
+    assert none.felt.median == pytest.approx(seen.most.friction.median, abs=5e-3)
+    assert karnopp.felt.median == pytest.approx(fed.left, abs=0.01)
+    assert karnopp.peak.median == pytest.approx(none.peak.median, rel=0.1), "it sticks where it turns round"
+    assert active.felt.median == pytest.approx(seen.gain.left.median, rel=0.05)
+    assert seen.simulated.went_on <= 0.05 + 2.6 * np.sqrt(0.05 * 0.95 / 400), "0.5 % of the time by chance"
+    assert seen.simulated.went_on > 0.01
+    text = compensation_text(seen)
+    assert faults_of_page(text) == []
+    assert len(text.splitlines()) <= 25
+    page = json.loads((tmp_path / "answer" / "compensation.json").read_text())
+    assert page["fixed"]["torque"] == seen.fixed.torque
+    assert len(page["simulated"]["laws"]) == 3
+    assert (tmp_path / "answer" / "compensation.txt").read_text() == text
+    for figure in (draw(seen), draw_traces(seen)):
+        assert list(faults(figure)) == []
+
+
+def test_words_fit_a_page_whatever_is_asked(fit, found):
+    asked = (("180deg", None), ("180deg", "karnopp"), ("180deg", "active"), ("0deg:90deg", None))
+    answers = [found, *(compensation_of(fit, read_device(DEVICE), bends, law, 0.05)[0] for bends, law in asked)]
+    for answer in answers:
+        assert np.isfinite(answer.scheduled.torque if answer.scheduled else answer.gain.safe)
+        text = compensation_text(answer)
+        assert faults_of_page(text) == []
+        assert len(text.splitlines()) <= 25
+        assert list(faults(draw(answer))) == []
+        assert "nan" not in text
+    assert answers[3].fixed is None
+    assert answers[2].gain is None
+    assert "slack somewhere from 0 to 90 deg" in compensation_text(answers[-1])
+
+
+def test_what_cannot_be_answered_is_refused(fit, tmp_path, on_body):
+    def refused(error, **asked):
+        with pytest.raises(error) as raised:
+            bf.compensate(fit, **{"device": DEVICE, "wrap_angle": RANGE} | asked)
+        assert str(raised.value)[-1] in ".?"
+        return str(raised.value)
+
+    assert "leaves the wrap angles measured, 0 to 180 deg" in refused(UsageError, wrap_angle="45deg:270deg")
+    assert "write a range as 45deg:180deg" in refused(UsageError, wrap_angle="180deg:45deg")
+    assert "is not a number" in refused(UsageError, wrap_angle="all")
+    assert "does not measure an angle" in refused(UsageError, wrap_angle="45N:180N")
+    assert "--risk 90% is not between" in refused(UsageError, risk=(90.0, "%"))
+    assert "under [rope] of device.toml" in refused(DescriptionError, device=None)
+    without = device(tmp_path, "mounting_scatter", "# mounting_scatter")
+    assert "cannot tell how the next one will differ" in refused(DescriptionError, device=without)
+    both = device(tmp_path, "[rope] ", '[rope]\nstiffness = { value = 20, unit = "N*m/rad", sd = 2 }\n#')
+    assert "tells it already" in refused(DescriptionError, device=both)
+    radius = device(tmp_path, "[joint]", '[joint]\npulley_radius = { value = 25, unit = "mm" }')
+    assert "20 mm; leave it out" in refused(DescriptionError, device=radius)
+    bare = tmp_path / "bare.toml"
+    bare.write_text('name = "bare"\n[rope]\nmounting_scatter = { value = 0.01, unit = "1" }\n')
+    assert "inertia = { value = 0.0007" in refused(DescriptionError, device=bare, law="active")
+    assert "encoder_counts" in refused(DescriptionError, device=bare, simulate=True)
+    no_sd = device(tmp_path, ", sd = 0.004", "")
+    assert "rope.damping: 0.02 N*m*s/rad has no sd" in refused(DescriptionError, device=no_sd)
+    squares = bf.fit(DATA / "synthetic-haptic-loop", seed=1, mcmc=False)
+    with pytest.raises(UsageError, match="posterior"):
+        bf.compensate(squares, DEVICE)
+    rope = bf.fit(on_body, seed=1, mcmc=False)
+    with pytest.raises(UsageError, match="pull-pull loop"):
+        compensation_of(rope, read_device(DEVICE), "45deg", None, 0.05)
+
+
+def test_the_verb_prints_and_writes_what_the_library_answers(fit, run, tmp_path):
+    fit.save(tmp_path / "fit")
+    asked = ("compensate", tmp_path / "fit", "--device", DEVICE, "--wrap-angle", RANGE)
+    code, out, err = run(*asked, "--output", tmp_path / "answer")
+    assert code == 0
+    assert out.startswith("Feed forward by bend, 0.8")
+    assert "compensation.json" in err
+    code, out, _ = run(*asked, "--json", "--law", "active")
+    assert code == 0
+    page = json.loads(out)
+    assert page["fixed"] is None
+    assert page["gain"]["safe"] > 0
+    assert run(*asked, "--csv")[1].startswith("wrap_angle_deg,friction_N*m")
+    assert run("compensate", tmp_path / "fit")[0] == 2

@@ -6,10 +6,12 @@ from dataclasses import replace
 import jax
 import numpy as np
 import pytest
+from figure_words import NARROW, faults
 from pooled_fleets import REFERENCE, Truth, fleet_draws
 
 import bowdenfit as bf
 from bowdenfit.questions.pool.answer import Asked
+from bowdenfit.questions.pool.figures import captions, figures_of
 from bowdenfit.questions.pool.inspected import given
 from bowdenfit.questions.pool.life import cycles_until, life_of
 from bowdenfit.questions.pool.pooling import pooled
@@ -72,6 +74,14 @@ def test_cables_are_drawn_toward_the_rest_as_far_as_their_data_allow(fleet, foun
     alike = [i for i in range(12) if i != 7]
     pooled_errors = [np.log1p(found.cables[i].wear.mean) - fleet[1][i, 2] for i in alike]
     assert np.std(pooled_errors) < 0.9 * np.std([own[i] - fleet[1][i, 2] for i in alike])
+
+
+def test_figures_can_be_read(found):
+    drawn = [(name, width, figure) for width in (None, NARROW) for name, figure in figures_of(found, width).items()]
+    assert len(drawn) == 6
+    wrong = [f"{name} at {width}: {fault}" for name, width, figure in drawn for fault in faults(figure)]
+    assert not wrong, "\n".join(wrong)
+    assert all("n = 12 cables" in said for said in captions(found).values())
 
 
 def test_life_is_the_closed_formula():
@@ -150,10 +160,15 @@ def test_a_folder_without_a_fleet_is_refused(run, tmp_path):
 def test_the_answer_is_json_and_csv(run, fleet, found, tmp_path):
     write_fleet_draws(tmp_path / FLEET_DRAWS, fleet[0])
     angles = ("--until", "60%", "--wrap-angle", f"mu_0={np.pi}rad", "--wrap-angle", "mu_1=0.3rad", "--cycles", 100_000)
-    code, out, _ = run("pool", tmp_path, *angles, "--json", "--seed", 1)
+    code, out, _ = run("pool", tmp_path, *angles, "--json", "--seed", 1, "-o", tmp_path / "out")
     page = json.loads(out)
     assert code == 0 and page["is_trusted"] and len(page["cables"]) == 12
     assert page["new"]["fails"] == found.new.fails
+    page_file = (tmp_path / "out" / "pool.html").read_text()
+    assert "cable-03 is unlike the rest" in page_file and page_file.count("<svg") == 3
+    assert json.loads((tmp_path / "out" / "pool.json").read_text()) == page
+    code, _, error = run("pool", tmp_path, "-o", tmp_path / "out")
+    assert code == 2 and "add --force" in " ".join(error.split())
     assert found.to_csv().startswith("quantity,cable,mean,sd")
 
 

@@ -3,6 +3,8 @@
 from dataclasses import dataclass
 from typing import Any, ClassVar
 
+import numpy as np
+
 from bowdenfit.display import Display, Part, Rows
 from bowdenfit.inference.interval import Interval
 
@@ -107,6 +109,25 @@ class NextInspection(Part):
 
 
 @dataclass(frozen=True, repr=False)
+class Curves(Part):
+    """What is drawn over cycles, dry and at the reference temperature.
+
+    Args:
+        cycles: At which.
+        new: Of a new cable 5 %, 50 % and 95 % of its efficiency, or of its friction over that when new; (3, cycles).
+        cables: Of each cable the median of that, (cable, cycles).
+        new_fails: Probability that a new cable has fallen below the efficiency asked for; None where none is.
+        fails: The same of each cable, (cable, cycles).
+    """
+
+    cycles: np.ndarray
+    new: np.ndarray
+    cables: np.ndarray
+    new_fails: np.ndarray | None
+    fails: np.ndarray | None
+
+
+@dataclass(frozen=True, repr=False)
 class LeftOut(Part):
     """An inspection that is not pooled.
 
@@ -138,6 +159,7 @@ class Pool(Display):
         asked: What life is until; None where it is not asked for.
         new: Life of a new cable of this population; None where there is none.
         mixed: Coefficients of which cables do not look like one population, with the probability of that by chance.
+        curves: What is drawn over cycles; None where wear cannot be told.
         next: The inspections that tell most, the best first.
         notes: What is not told and why, and what was taken for granted, a sentence each.
         reasons: Why the answer should not be trusted; empty if it may.
@@ -158,6 +180,7 @@ class Pool(Display):
     asked: Asked | None
     new: Life | None
     mixed: dict[str, float]
+    curves: Curves | None
     next: tuple[NextInspection, ...]
     notes: tuple[str, ...]
     reasons: tuple[str, ...]

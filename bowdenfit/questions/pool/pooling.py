@@ -8,6 +8,7 @@ from bowdenfit.inference.interval import Interval
 from bowdenfit.inference.population.model import REFERENCE_TEMPERATURE
 from bowdenfit.inference.population.sampling import PopulationDraws, draw_population
 from bowdenfit.questions.pool.answer import Asked, Effect, Life, Pool, PooledCable
+from bowdenfit.questions.pool.curves import curves_of
 from bowdenfit.questions.pool.inspected import Given, given
 from bowdenfit.questions.pool.life import cycles_until, life_of
 from bowdenfit.questions.pool.next import next_inspections
@@ -50,6 +51,7 @@ def pooled(drawn: FleetDraws, asked: Asked | None, seed: int) -> Pool:
         asked,
         None if asked is None or alone else _life(known, asked, new),
         {} if alone else mixed(known.inspected, population, names),
+        curves_of(known, population, asked, new) if wears else None,
         next_inspections(known, population, asked, seed),
         (*known.notes, *_more_notes(known, drawn)),
         population.reasons,

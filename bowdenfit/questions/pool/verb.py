@@ -1,12 +1,13 @@
 """Looking at the cables of a fleet together."""
 
+import json
 import math
 import re
 from collections.abc import Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
-from bowdenfit.verb import LARGEST_SEED, Argument, Option, Quantity, Reply, Verb
+from bowdenfit.verb import LARGEST_SEED, Argument, Option, Output, Quantity, Reply, Verb
 
 if TYPE_CHECKING:
     from bowdenfit.questions.pool.answer import Asked, Pool
@@ -24,6 +25,8 @@ def pool(
     wrap_angles: Annotated[Sequence[str], Option(("--wrap-angle",), metavar="COEFFICIENT=ANGLE")] = (),
     cycles: Annotated[int | None, Option(least=1)] = None,
     seed: Annotated[int | None, Option(least=0, most=LARGEST_SEED, default="that of the fleet")] = None,
+    output: Annotated[Output, Option(("-o",))] = None,
+    force: Annotated[bool, Option()] = False,
 ) -> "Pool":
     """Look at the cables of a fleet together: what they have in common, how they wear, and how long each lasts.
 
@@ -33,10 +36,12 @@ def pool(
         wrap_angles: Wrap angles at which that holds, one for each friction coefficient, such as mu_sheath=180deg.
         cycles: Before so many cycles the probability of falling below it is said.
         seed: Seed of everything random.
+        output: Folder for pool.html, pool.json, pool.txt and the figures; nothing is written without one.
+        force: Replace an earlier answer in --output.
 
     Raises:
         UsageError: Life is asked for without what it depends on.
-        StoreError: There is no fleet, or nothing in it can be pooled.
+        StoreError: There is no fleet, or nothing in it can be pooled; or `output` holds something already.
     """
     import jax
 
@@ -44,11 +49,51 @@ def pool(
     from bowdenfit.questions.pool.pooling import pooled
     from bowdenfit.results.fleet_folder import read_fleet_draws
 
+    if output is not None:
+        refuse_to_replace(Path(output), force)
     drawn = read_fleet_draws(Path(results))
     asked = asked_of(until, wrap_angles, cycles, [n for n, a in drawn.attributes.items() if a.get("role") == "friction"])
     seed = int(drawn.about.get("seed", 0)) if seed is None else seed
     with jax.enable_x64(True):
-        return pooled(drawn, asked, seed)
+        found = pooled(drawn, asked, seed)
+    if output is not None:
+        _write(found, Path(output))
+    return found
+
+
+def refuse_to_replace(folder: Path, force: bool) -> None:
+    """Stop before anything is computed if the answer would have no place.
+
+    Raises:
+        StoreError: The folder holds something else already, or an earlier answer.
+    """
+    from bowdenfit.errors import StoreError
+
+    if not folder.exists() or (folder.is_dir() and not any(folder.iterdir())):
+        return
+    if not (folder / f"{NAME}.json").exists():
+        raise StoreError(f"{folder} exists and holds no pooled fleet; name another with --output.")
+    if not force:
+        raise StoreError(f"{folder} holds a pooled fleet already; add --force to replace it, or name another with --output.")
+
+
+def _write(found: "Pool", folder: Path) -> None:
+    """Figures, the page, the words and, last, the JSON: a folder that has it has everything."""
+    from bowdenfit.plots.write import write_all
+    from bowdenfit.questions.pool.figures import figures_of
+    from bowdenfit.questions.pool.sections import pool_page
+    from bowdenfit.questions.pool.words import pool_text
+    from bowdenfit.questions.writing import write_page
+    from bowdenfit.results.folder import folder_to_write, write_text
+    from bowdenfit.results.plain import plain
+    from bowdenfit.words import printable
+
+    with folder_to_write(folder):
+        for name, figure in figures_of(found).items():
+            write_all(figure, folder, name)
+        write_page(pool_page(found), folder, folder / f"{NAME}.html")
+        write_text(folder / f"{NAME}.txt", printable(pool_text(found)))
+        write_text(folder / f"{NAME}.json", json.dumps(plain(found), indent=1, allow_nan=False) + "\n")
 
 
 def asked_of(
@@ -101,10 +146,11 @@ def _angle(text: str) -> tuple[str, float]:
     return match["name"].strip(), angle
 
 
-def _reply(found: "Pool", _: dict[str, Any]) -> Reply:
+def _reply(found: "Pool", asked: dict[str, Any]) -> Reply:
     from bowdenfit.questions.pool.words import pool_text
 
-    return Reply(pool_text(found), lambda: found, (), 0 if found.is_trusted else NOT_TRUSTED, found.to_csv)
+    notes = (f"Wrote {asked['output']}.",) if asked["output"] else ()
+    return Reply(pool_text(found), lambda: found, notes, 0 if found.is_trusted else NOT_TRUSTED, found.to_csv)
 
 
 VERB = Verb(

@@ -57,11 +57,11 @@ def life_sentences(found: Pool) -> list[str]:
     if asked.cycles is not None:
         count = _cycles(asked.cycles)
         likely = [(each, life) for each, life in lives if (life.fails or 0) > 0.5]
-        worst = sorted(lives, key=lambda pair: -(pair[1].fails or 0))
-        named = listed([f"{each.cable} ({_probability(life.fails)})" for each, life in worst[:3]])
+        worst = sorted(lives, key=lambda pair: pair[1].median)
+        named = listed([f"{each.cable} ({_life(life)})" for each, life in worst[:3]])
         lines.append(
             f"Before {count}, {len(likely)} of {_many(found)} fall below {percent(asked.efficiency, 0)} more likely than not; "
-            f"most likely {named}."
+            f"the first are {named}."
         )
         if found.new is not None:
             lines.append(f"A new one does so with probability {_probability(found.new.fails)}.")

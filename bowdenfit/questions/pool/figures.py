@@ -1,0 +1,199 @@
+"""A pooled fleet in figures: coefficients of its cables drawn toward the population, wear, and how many have failed."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from bowdenfit.plots.layout import (
+    LEFT,
+    RIGHT,
+    TITLE,
+    axes_at,
+    empty_page,
+    legend_above,
+    place_labels,
+    text_width,
+    title_above,
+)
+from bowdenfit.plots.panels import short
+from bowdenfit.plots.style import (
+    BLACK,
+    BLUE,
+    GRAY,
+    LIGHT,
+    MEDIAN,
+    MEDIUM,
+    VERMILLION,
+    WIDE,
+    WIDE_INTERVAL,
+    in_paper_style,
+)
+
+if TYPE_CHECKING:
+    from bowdenfit.inference.interval import Interval
+    from bowdenfit.plots.layout import Axes, Figure
+    from bowdenfit.questions.pool.answer import Curves, Pool
+
+MOST_CABLES, LONGEST_NAME, MOST_COEFFICIENTS = 60, 18, 2
+_ROW, _BELOW, _HEIGHT = 0.115, 0.45, 2.3  # in
+HEADINGS = {
+    "pooled-coefficients": "Cables drawn toward the others",
+    "pooled-wear": "Wear",
+    "pooled-life": "How many have failed",
+}
+
+
+def figures_of(found: Pool, width: float | None = None) -> dict[str, Figure]:
+    """All figures of a pooled fleet, by name.
+
+    Args:
+        found: The pooled fleet.
+        width: Of the page [in]; what suits each if omitted.
+    """
+    figures = {"pooled-coefficients": coefficients(found, width)}
+    if found.curves is not None:
+        figures["pooled-wear"] = wear(found, found.curves, width)
+        if found.curves.fails is not None and found.curves.new_fails is not None:
+            figures["pooled-life"] = life(found, found.curves, found.curves.fails, found.curves.new_fails, width)
+    return figures
+
+
+def captions(found: Pool) -> dict[str, str]:
+    """What each figure shows, in plain words."""
+    asked = found.asked
+    what = f"efficiency falls below {100 * asked.efficiency:g} %" if asked is not None else ""
+    return {
+        "pooled-coefficients": (
+            "Each cable by itself from its first inspection (open), and drawn toward the others as far as its own inspections "
+            "leave it open (filled, with 90 % interval); gray: where nine of ten new cables lie. n = "
+            f"{len(found.cables)} cables; red ones are unlike the rest."
+        ),
+        "pooled-wear": (
+            f"{'Efficiency' if asked else 'Friction over that of the new cable'} of each cable (thin) and of a new one (thick, "
+            f"with 90 % interval), dry and at {found.reference_temperature:g} °C. n = {len(found.cables)} cables, inspected up to "
+            "the dotted line; beyond it wear is taken to go on as it did."
+        ),
+        "pooled-life": (
+            f"Probability that {what} before so many cycles: of each cable (thin) and of a new one (thick). n = "
+            f"{len(found.cables)} cables."
+        ),
+    }
+
+
+@in_paper_style
+def coefficients(found: Pool, width: float | None = None) -> Figure:
+    """Coefficients and wear of every cable, alone and pooled."""
+    names = [name for name in found.typical if any(name in each.coefficients for each in found.cables)][:MOST_COEFFICIENTS]
+    columns = [*names, *(["wear"] if found.wear is not None else [])]
+    order = sorted(found.cables, key=lambda each: (names[0] in each.coefficients, _median(each.coefficients.get(names[0]))))
+    step = -(-len(order) // MOST_CABLES)
+    shown = [each for i, each in enumerate(order) if i % step == 0 or each.unlike]
+    page = width or (WIDE if len(columns) > 1 else MEDIUM)
+    labels = [short(each.cable, LONGEST_NAME) for each in shown]
+    left = max(0.3, 0.2 + max(map(text_width, labels)))
+    across = page >= MEDIUM
+    inner = (page - left - RIGHT - 0.2 * (len(columns) - 1)) / len(columns) if across else page - left - RIGHT
+    height = max(0.6, 0.1 + _ROW * len(shown))
+    rows = 1 if across else len(columns)
+    figure = empty_page(page, rows * (TITLE + height + _BELOW))
+    panels = []
+    for i, name in enumerate(columns):
+        bottom = _BELOW + (rows - 1 - (0 if across else i)) * (TITLE + height + _BELOW)
+        axes = axes_at(figure, left + (i * (inner + 0.2) if across else 0.0), bottom, inner, height)
+        for y, each in enumerate(shown):
+            pooled = each.wear if name == "wear" else each.coefficients.get(name)
+            _cable(axes, y, pooled, each.alone.get(name), bool(each.unlike), name == "wear")
+        _population(axes, found, name)
+        axes.set_yticks(range(len(shown)), labels if i == 0 or not across else [])
+        axes.set(ylim=(-0.7, len(shown) - 0.3), xlabel=_label(found, name))
+        axes.grid(axis="y", visible=False)
+        axes.locator_params(axis="x", nbins=max(2, int(inner / 0.55)))
+        place_labels(figure, axes)
+        panels.append(axes)
+    legend_above(figure, panels, columns=3)
+    return _titled(figure, "pooled-coefficients", found)
+
+
+def _cable(axes: Axes, y: int, pooled: Interval | None, alone: Interval | None, unlike: bool, percent: bool) -> None:
+    """One cable in one panel."""
+    if pooled is None:
+        return
+    color, times = VERMILLION if unlike else BLUE, 100.0 if percent else 1.0
+    if alone is not None:
+        axes.plot([times * alone.median], [y], "o", color=GRAY, markerfacecolor="white", markersize=3.2, label="By itself")
+    axes.plot([times * pooled.q05, times * pooled.q95], [y, y], "-", color=color, linewidth=1.0)
+    label = "Unlike the rest" if unlike else f"Pooled, {WIDE_INTERVAL}"
+    axes.plot([times * pooled.median], [y], "s" if unlike else "o", color=color, markersize=2.6, label=label)
+
+
+def _population(axes: Axes, found: Pool, name: str) -> None:
+    """Where nine of ten new cables lie."""
+    new = found.coefficients.get(name)
+    if new is not None:
+        axes.axvspan(new.q05, new.q95, color=LIGHT, linewidth=0, zorder=0, label="Nine of ten new cables")
+
+
+def _label(found: Pool, name: str) -> str:
+    return f"Wear (% in {found.reference_cycles:,.0f} cycles)" if name == "wear" else name.replace("_", " ")
+
+
+@in_paper_style
+def wear(found: Pool, curves: Curves, width: float | None = None) -> Figure:
+    """Efficiency or friction over cycles."""
+    figure, axes = _panel(width)
+    times = 100.0 if found.asked is not None else 1.0
+    for i, line in enumerate(curves.cables):
+        axes.plot(curves.cycles, times * line, "-", color=GRAY, linewidth=0.5, alpha=0.7, label="A cable" if i == 0 else None)
+    if len(found.cables) > 1:
+        low, middle, high = times * curves.new
+        axes.fill_between(curves.cycles, low, high, color=BLUE, alpha=0.18, linewidth=0, label=f"New cable, {WIDE_INTERVAL}")
+        axes.plot(curves.cycles, middle, "-", color=BLUE, linewidth=1.8, label=f"New cable, {MEDIAN.lower()}")
+    axes.axvline(found.reference_cycles, color=BLACK, linestyle=":", linewidth=0.8, label="Longest inspected")
+    if found.asked is not None:
+        axes.axhline(100 * found.asked.efficiency, color=VERMILLION, linestyle="--", linewidth=1.0, label="Asked for")
+    axes.set_ylabel("Efficiency (%)" if found.asked is not None else "Friction / when new")
+    return _finished(figure, axes, curves, "pooled-wear", found)
+
+
+@in_paper_style
+def life(found: Pool, curves: Curves, fails: np.ndarray, new_fails: np.ndarray, width: float | None = None) -> Figure:
+    """Probability of having failed over cycles."""
+    figure, axes = _panel(width)
+    for i, line in enumerate(fails):
+        axes.plot(curves.cycles, line, "-", color=GRAY, linewidth=0.5, alpha=0.7, label="A cable" if i == 0 else None)
+    if len(found.cables) > 1:
+        axes.plot(curves.cycles, new_fails, "-", color=BLUE, linewidth=1.8, label="New cable")
+    axes.axvline(found.reference_cycles, color=BLACK, linestyle=":", linewidth=0.8, label="Longest inspected")
+    if found.asked is not None and found.asked.cycles is not None:
+        axes.axvline(found.asked.cycles, color=VERMILLION, linestyle="--", linewidth=1.0, label="Asked for")
+    axes.set(ylim=(-0.02, 1.02), ylabel="Probability of having failed")
+    return _finished(figure, axes, curves, "pooled-life", found)
+
+
+def _panel(width: float | None) -> tuple[Figure, Axes]:
+    page = width or MEDIUM
+    figure = empty_page(page, 0.12 + _HEIGHT + _BELOW)
+    return figure, axes_at(figure, LEFT, _BELOW, page - LEFT - 2 * RIGHT, _HEIGHT)
+
+
+def _finished(figure: Figure, axes: Axes, curves: Curves, name: str, found: Pool) -> Figure:
+    from matplotlib.ticker import FuncFormatter
+
+    thousands = curves.cycles[-1] >= 10_000
+    axes.xaxis.set_major_formatter(FuncFormatter(lambda value, _: f"{value / (1000 if thousands else 1):,.6g}"))
+    axes.set(xlim=(0.0, float(curves.cycles[-1])), xlabel="Cycles (thousands)" if thousands else "Cycles")
+    axes.locator_params(axis="x", nbins=6)
+    place_labels(figure, axes)
+    legend_above(figure, [axes], columns=4)
+    return _titled(figure, name, found)
+
+
+def _titled(figure: Figure, name: str, found: Pool) -> Figure:
+    title_above(figure, f"{HEADINGS[name]} \N{EN DASH} {found.name}" if found.name else HEADINGS[name])
+    return figure
+
+
+def _median(interval: Interval | None) -> float:
+    return interval.median if interval is not None else 0.0

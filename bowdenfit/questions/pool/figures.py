@@ -72,8 +72,8 @@ def captions(found: Pool) -> dict[str, str]:
         ),
         "pooled-wear": (
             f"{'Efficiency' if asked else 'Friction over that of the new cable'} of each cable (thin) and of a new one (thick, "
-            f"with 90 % interval), dry and at {found.reference_temperature:g} °C. n = {len(found.cables)} cables, inspected up to "
-            "the dotted line; beyond it wear is taken to go on as it did."
+            f"with 90 % interval), dry and at {found.reference_temperature:g} °C. n = {len(found.cables)} cables, inspected up "
+            "to the dotted line; beyond it wear is taken to go on as it did."
         ),
         "pooled-life": (
             f"Probability that {what} before so many cycles: of each cable (thin) and of a new one (thick). n = "

@@ -143,14 +143,15 @@ def _label(found: Pool, name: str) -> str:
 def wear(found: Pool, curves: Curves, width: float | None = None) -> Figure:
     """Efficiency or friction over cycles."""
     figure, axes = _panel(width)
+    at, scale = curves.cycles / _scale(curves), _scale(curves)
     times = 100.0 if found.asked is not None else 1.0
     for i, line in enumerate(curves.cables):
-        axes.plot(curves.cycles, times * line, "-", color=GRAY, linewidth=0.5, alpha=0.7, label="A cable" if i == 0 else None)
+        axes.plot(at, times * line, "-", color=GRAY, linewidth=0.5, alpha=0.7, label="A cable" if i == 0 else None)
     if len(found.cables) > 1:
         low, middle, high = times * curves.new
-        axes.fill_between(curves.cycles, low, high, color=BLUE, alpha=0.18, linewidth=0, label=f"New cable, {WIDE_INTERVAL}")
-        axes.plot(curves.cycles, middle, "-", color=BLUE, linewidth=1.8, label=f"New cable, {MEDIAN.lower()}")
-    axes.axvline(found.reference_cycles, color=BLACK, linestyle=":", linewidth=0.8, label="Longest inspected")
+        axes.fill_between(at, low, high, color=BLUE, alpha=0.18, linewidth=0, label=f"New cable, {WIDE_INTERVAL}")
+        axes.plot(at, middle, "-", color=BLUE, linewidth=1.8, label=f"New cable, {MEDIAN.lower()}")
+    axes.axvline(found.reference_cycles / scale, color=BLACK, linestyle=":", linewidth=0.8, label="Longest inspected")
     if found.asked is not None:
         axes.axhline(100 * found.asked.efficiency, color=VERMILLION, linestyle="--", linewidth=1.0, label="Asked for")
     axes.set_ylabel("Efficiency (%)" if found.asked is not None else "Friction / when new")
@@ -161,15 +162,21 @@ def wear(found: Pool, curves: Curves, width: float | None = None) -> Figure:
 def life(found: Pool, curves: Curves, fails: np.ndarray, new_fails: np.ndarray, width: float | None = None) -> Figure:
     """Probability of having failed over cycles."""
     figure, axes = _panel(width)
+    at, scale = curves.cycles / _scale(curves), _scale(curves)
     for i, line in enumerate(fails):
-        axes.plot(curves.cycles, line, "-", color=GRAY, linewidth=0.5, alpha=0.7, label="A cable" if i == 0 else None)
+        axes.plot(at, line, "-", color=GRAY, linewidth=0.5, alpha=0.7, label="A cable" if i == 0 else None)
     if len(found.cables) > 1:
-        axes.plot(curves.cycles, new_fails, "-", color=BLUE, linewidth=1.8, label="New cable")
-    axes.axvline(found.reference_cycles, color=BLACK, linestyle=":", linewidth=0.8, label="Longest inspected")
+        axes.plot(at, new_fails, "-", color=BLUE, linewidth=1.8, label="New cable")
+    axes.axvline(found.reference_cycles / scale, color=BLACK, linestyle=":", linewidth=0.8, label="Longest inspected")
     if found.asked is not None and found.asked.cycles is not None:
-        axes.axvline(found.asked.cycles, color=VERMILLION, linestyle="--", linewidth=1.0, label="Asked for")
+        axes.axvline(found.asked.cycles / scale, color=VERMILLION, linestyle="--", linewidth=1.0, label="Asked for")
     axes.set(ylim=(-0.02, 1.02), ylabel="Probability of having failed")
     return _finished(figure, axes, curves, "pooled-life", found)
+
+
+def _scale(curves: Curves) -> float:
+    """Cycles that a unit of the axis is."""
+    return 1000.0 if curves.cycles[-1] >= 10_000 else 1.0
 
 
 def _panel(width: float | None) -> tuple[Figure, Axes]:
@@ -179,11 +186,8 @@ def _panel(width: float | None) -> tuple[Figure, Axes]:
 
 
 def _finished(figure: Figure, axes: Axes, curves: Curves, name: str, found: Pool) -> Figure:
-    from matplotlib.ticker import FuncFormatter
-
-    thousands = curves.cycles[-1] >= 10_000
-    axes.xaxis.set_major_formatter(FuncFormatter(lambda value, _: f"{value / (1000 if thousands else 1):,.6g}"))
-    axes.set(xlim=(0.0, float(curves.cycles[-1])), xlabel="Cycles (thousands)" if thousands else "Cycles")
+    scale = _scale(curves)
+    axes.set(xlim=(0.0, float(curves.cycles[-1]) / scale), xlabel="Cycles (thousands)" if scale > 1 else "Cycles")
     axes.locator_params(axis="x", nbins=6)
     place_labels(figure, axes)
     legend_above(figure, [axes], columns=4)

@@ -25,7 +25,8 @@ extensions = [
     "verb_help",
 ]
 exclude_patterns = ["extensions"]
-nitpicky = False  # types of libraries are named in signatures, and a page without a network cannot link to them
+nitpicky = True
+nitpick_ignore_regex = [("py:class", ".*")]  # types in signatures, of libraries and of what has no page, cannot be linked to
 default_role = "code"  # single backquotes in docstrings
 
 html_theme = "furo"

@@ -9,6 +9,7 @@ changes. Look at what changed before committing it: each number that did is a ch
 of the first fit alone is 0.6 MB, much of which changes with any number; `bowdenfit report FIT` writes one.
 """
 
+import json
 import os
 import shutil
 import subprocess
@@ -19,7 +20,9 @@ from pathlib import Path
 ROOT = Path(__file__).resolve().parent.parent
 sys.path[:0] = [str(ROOT), str(ROOT / "tests" / "support")]
 
+import on_body_numbers  # noqa: E402
 import snippets  # noqa: E402
+import told  # noqa: E402
 
 PUBLISHED = ROOT / "fits" / "published"
 FIRST = "on-body-exoskeleton"
@@ -39,7 +42,9 @@ def main() -> None:
             publish(name, fits / name, figure, further)
         if "--pages" not in sys.argv:
             compare(fits)
+            tell(fits, Path(place))
         replace_printed(Path(place))
+        print(*told.missing(), sep="\n")
 
 
 def publish(name: str, fitted: Path, figure: str, further: tuple[str, ...]) -> None:
@@ -72,6 +77,15 @@ def compare(place: Path) -> None:
     rate = bf.fit(ROOT / "datasets" / name, friction="rate-dependent", seed=1)
     found = bf.compare({"plain": bf.load(place / name), "rate": rate})
     (PUBLISHED / name / "comparison.txt").write_text(comparison_text(found), encoding="utf-8")
+
+
+def tell(fits: Path, place: Path) -> None:
+    """Numbers that pages tell in sentences; those that tell others are printed at the end."""
+    import bowdenfit as bf
+
+    numbers = on_body_numbers.numbers(bf.load(fits / FIRST), place)
+    text = json.dumps(numbers, indent=1, ensure_ascii=False)
+    (PUBLISHED / FIRST / "told.json").write_text(f"{text}\n", encoding="utf-8")
 
 
 def replace_printed(place: Path) -> None:

@@ -76,7 +76,7 @@ def _folder_and_files(
 
 def _example(name: str, place: Path | None, files: Sequence[Path]) -> None:
     """Write an example, or say which there are."""
-    from bowdenfit.questions.start.folder import examples, is_fleet, write_example
+    from bowdenfit.questions.start.folder import examples, verb_of, write_example
 
     if files:
         raise UsageError("--from and --example both say what to write; leave one of them out.")
@@ -86,8 +86,7 @@ def _example(name: str, place: Path | None, files: Sequence[Path]) -> None:
         return
     folder = place or Path(name)
     write_example(name, folder)
-    verb = "fleet" if is_fleet(folder) else "fit"
-    say(f"Wrote {folder}. Next: bowdenfit {verb} {shlex.quote(str(folder))}")
+    say(f"Wrote {folder}. Next: bowdenfit {verb_of(folder)} {shlex.quote(str(folder))}")
 
 
 def _asked_folder(ask: "Asker") -> Path:

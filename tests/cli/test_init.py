@@ -180,10 +180,11 @@ def test_every_example_is_written_whole_and_accepted(run, tmp_path, monkeypatch)
     assert listing.split() == list(examples()) and "on-body-exoskeleton" in listing
     for name in examples():
         code, out, _ = run("init", "--example", name)
-        verb = "fleet" if name == "synthetic-fleet" else "fit"
+        verb = {"synthetic-fleet": "fleet", "on-body-metabolic": "metabolic"}.get(name, "fit")
         assert (code, out) == (0, f"Wrote {name}. Next: bowdenfit {verb} {name}\n")
-        code, _, err = run("check", name)
-        assert code == 0 or (verb == "fleet" and "the folder holds a fleet: `bowdenfit fleet synthetic-fleet`" in err)
+        assert run("check", name)[0] == (0 if verb == "fit" else 2)
+    assert {"synthetic-fleet", "on-body-metabolic"} < set(examples())
+    assert "the folder holds a fleet: `bowdenfit fleet synthetic-fleet`" in run("check", "synthetic-fleet")[2]
     assert "did you mean 'on-body-exoskeleton'" in run("init", "--example", "on-body-exoskelton")[2]
     assert "exists already" in run("init", "--example", "yarn-on-cylinder")[2]
 

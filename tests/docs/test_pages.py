@@ -2,15 +2,18 @@
 
 import json
 import os
+import re
 import subprocess
 import sys
 from html.parser import HTMLParser
 from pathlib import Path
-from urllib.parse import unquote
+from urllib.parse import unquote, urlsplit
 
 import pytest
 from conftest import ROOT
 
+SITES = {"docs.dask.org", "keepachangelog.com", "pint.readthedocs.io", "semver.org"}
+"""Where pages lead on the network, each looked over by a person: the tests have no network and cannot follow them."""
 MOST_TEXT = 2000  # characters of one output
 
 
@@ -65,6 +68,15 @@ def test_every_link_inside_the_documentation_leads_to_a_page_and_to_a_place_on_i
             file = (path.parent / target).resolve() if target else path
             assert file.exists(), f"{path.name}: {link}"
             assert not place or file not in pages or place in pages[file].names, f"{path.name}: {link}"
+
+
+def test_links_to_the_network_are_well_formed_and_lead_to_known_sites(pages):
+    found = {link for page in pages.values() for link in page.links if "://" in link}
+    for link in found:
+        parts = urlsplit(link)
+        assert parts.scheme == "https" and parts.port is None and not parts.username, link
+        assert re.fullmatch(r"(/[\w.~-]*)*", parts.path) and parts.path[-1:] != "." and not parts.query, link
+    assert {urlsplit(link).hostname for link in found} == SITES
 
 
 def test_no_page_needs_a_network(pages):

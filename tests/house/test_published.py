@@ -5,6 +5,7 @@ import tomllib
 from pathlib import Path
 
 import click
+import told
 
 from bowdenfit.cli import bowdenfit as program
 
@@ -16,6 +17,11 @@ README = (ROOT / "README.md").read_text(encoding="utf-8")
 def test_the_readme_shows_what_the_first_fit_prints():
     (shown,) = re.findall(r"\$ bowdenfit fit on-body-exoskeleton\n(.*?)```\n", README, re.DOTALL)
     assert shown == (ROOT / "fits" / "published" / "on-body-exoskeleton" / "summary.txt").read_text(encoding="utf-8")
+
+
+def test_what_pages_tell_in_sentences_is_what_fits_say():
+    assert told.missing() == []
+    assert len(list(told.sentences())) > 20
 
 
 def test_the_readme_is_short_and_its_links_and_those_of_the_guides_lead_somewhere():

@@ -15,6 +15,7 @@ from bowdenfit.results.fleet_folder import FLEET_DESCRIPTION
 from bowdenfit.words import listed, shown
 
 TEMPLATES = (DESCRIPTION_FILE, "angles.csv", "forces.csv")
+_VERBS = {DESCRIPTION_FILE: "fit", FLEET_DESCRIPTION: "fleet", "metabolic.toml": "metabolic"}  # that read such a description
 _PACKAGE, _CHECKOUT = "examples", "datasets"  # where the shipped data sets are, in a wheel and beside the package
 
 
@@ -115,14 +116,13 @@ def examples() -> Mapping[str, Path]:
     package = Path(str(resources.files("bowdenfit")))
     for place in (package / _PACKAGE, package.parent / _CHECKOUT):
         if place.is_dir():
-            found = (path for path in sorted(place.iterdir()) if (path / DESCRIPTION_FILE).is_file() or is_fleet(path))
-            return {path.name: path for path in found}
+            return {path.name: path for path in sorted(place.iterdir()) if verb_of(path)}
     return {}
 
 
-def is_fleet(folder: Path) -> bool:
-    """Whether a folder holds many cables, which are fitted by `bowdenfit fleet`."""
-    return (folder / FLEET_DESCRIPTION).is_file()
+def verb_of(folder: Path) -> str:
+    """The verb that reads a folder, by the description that stands in it; empty where none does."""
+    return next((verb for file, verb in _VERBS.items() if (folder / file).is_file()), "")
 
 
 def write_example(name: str, folder: Path) -> None:

@@ -1,0 +1,70 @@
+"""Numbers of the on-body measurements that pages tell in sentences, from fits beside the published one.
+
+`scripts/publish.py` writes them to `fits/published/on-body-exoskeleton/told.json`; `tests/support/told.py` says in which
+sentences they stand, and holds the pages to them.
+"""
+
+import shutil
+from pathlib import Path
+
+import bowdenfit as bf
+
+DATA = Path(__file__).resolve().parent.parent / "datasets" / "on-body-exoskeleton"
+
+
+def numbers(published: bf.Fit, place: Path) -> dict[str, str]:
+    """What the pages tell, as they write it.
+
+    Args:
+        published: The fit of the data set.
+        place: Folder for changed copies of the data set.
+    """
+    again = {"seed": 1, "figures": False}
+    without, mistaken = changed(place / "without", "efficiencies.csv"), changed(place / "mistaken", "angles.csv")
+    fits = {
+        "published": bf.fit(DATA, geometry="published", **again),
+        "student": bf.fit(DATA, noise="student", **again),
+        "without": bf.fit(without, **again),
+        "mistaken": bf.fit(mistaken, **again),
+        "mistaken_student": bf.fit(mistaken, noise="student", **again),
+    }
+    told = {"least_squares": str(bf.fit(DATA, mcmc=False, **again))}
+    told |= {f"{name}_length": length(fit) for name, fit in fits.items()}
+    told |= {f"{name}_mu3": span(fit, "mu3") for name, fit in {"plain": published, **fits}.items()}
+    told |= {f"{name}_trusted": str(fit.verdict().trusted) for name, fit in fits.items()}
+    told |= {f"without_{name}": share(fits["without"], name) for name in ("mu1", "mu2", "mu3")}
+    compared = bf.compare({"continuous": published, "published": fits["published"]})
+    return told | {"compared": str(compared).partition("\n\n")[0].replace("\n", " ")} | to_measure(published)
+
+
+def changed(folder: Path, file: str) -> Path:
+    """A copy of the data set without its efficiency at 550 mm, or with an angle of 28 degrees written as 82."""
+    shutil.copytree(DATA, folder)
+    rows = (DATA / file).read_text(encoding="utf-8").splitlines()
+    rows = rows[:-1] if file == "efficiencies.csv" else [row.replace("480,17,28", "480,17,82") for row in rows]
+    assert rows != (DATA / file).read_text(encoding="utf-8").splitlines()
+    (folder / file).write_text("\n".join(rows) + "\n", encoding="utf-8")
+    return folder
+
+
+def length(fit: bf.Fit) -> str:
+    """Best length with its interval and standard deviation [mm]."""
+    found = fit.optimal_length().length
+    return f"{found.median:.0f} mm ({found.q05:.0f} to {found.q95:.0f} mm; ± {found.sd:.1f} mm)"
+
+
+def span(fit: bf.Fit, name: str) -> str:
+    """Ends of an interval."""
+    found = fit.parameter(name)
+    return f"{found.q05:.3f} to {found.q95:.3f}"
+
+
+def share(fit: bf.Fit, name: str) -> str:
+    """Standard deviation of a coefficient in percent of it."""
+    found = fit.parameter(name)
+    return f"{100 * found.sd / found.mean:.0f} %"
+
+
+def to_measure(fit: bf.Fit) -> dict[str, str]:
+    """What to measure next, for the best length and for mu3."""
+    return {"next_length": str(bf.next_measurement(fit)), "next_mu3": str(bf.next_measurement(fit, "mu3"))}

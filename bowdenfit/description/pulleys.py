@@ -1,4 +1,4 @@
-"""The pulleys of a loop, which turn torques into forces."""
+"""The pulleys at a cable's ends, which turn torques into forces."""
 
 from dataclasses import dataclass
 
@@ -9,7 +9,7 @@ from bowdenfit.errors import DatasetError
 
 @dataclass(frozen=True)
 class Pulleys:
-    """Radii of a loop's pulleys at the motor and at the load side [mm]; None if not stated."""
+    """Radii of the pulleys at the motor and at the load side [mm]; None if not stated."""
 
     input_radius: float | None = None
     output_radius: float | None = None

@@ -9,7 +9,7 @@ LEAST_BEND_RATIO = 20.0  # rope diameters; haptic paper, equation 2
 
 
 class CableSettings(Frozen):
-    """What kind of cable it is: one rope, or a pull-pull loop of two; radii of the loop's pulleys; sizes to check."""
+    """What kind of cable it is: one rope, or a pull-pull loop of two; radii of the pulleys; sizes to check."""
 
     kind: Literal["single", "loop"] = "single"
     input_pulley_radius: QuantityValue | None = None

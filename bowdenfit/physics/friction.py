@@ -146,3 +146,26 @@ def rate_factor(
         Factor on every friction coefficient [1].
     """
     return 1 + stribeck * jnp.exp(-((speed / stribeck_speed) ** 2)) + viscous * jnp.abs(speed)
+
+
+def rate_slope(
+    speed: Float[Array, "*batch"],
+    stribeck: Float[Array, ""],
+    stribeck_speed: Float[Array, ""],
+    viscous: Float[Array, ""],
+) -> Float[Array, "*batch"]:
+    r"""Derivative of `rate_factor` by the speed; where it is negative a rope that is pulled through a spring sticks and slips.
+
+    .. math:: \frac{1}{\mu} \frac{d\mu}{dv} = -\frac{2 a v}{v_s^2} \exp\left(-\left(\frac{v}{v_s}\right)^2\right) + c
+
+    Args:
+        speed: v, above 0, in any unit.
+        stribeck: a [1].
+        stribeck_speed: v_s, in the unit of v.
+        viscous: c, in one over the unit of v.
+
+    Returns:
+        Slope, in one over the unit of v.
+    """
+    u = speed / stribeck_speed
+    return -2 * stribeck * u / stribeck_speed * jnp.exp(-(u**2)) + viscous

@@ -118,6 +118,22 @@ def free_motion_loss(
     return 2 * preload * friction_exponent
 
 
+def dynamic_range(
+    largest_force: Float[Array, "*#batch"], preload: Float[Array, "*batch"], friction_exponent: Float[Array, "*#batch"]
+) -> Float[Array, "*batch"]:
+    r"""Largest force, or torque, over that which moving the unloaded loop takes, :math:`F_\text{max}/(2 P \Lambda)` [1].
+
+    Args:
+        largest_force: F_max, of which the device is capable [N].
+        preload: P [N].
+        friction_exponent: Lambda of one side [1].
+
+    References:
+        Haptic paper, section 2 (torque dynamic range); radii of the pulleys cancel.
+    """
+    return largest_force / free_motion_loss(preload, friction_exponent)
+
+
 def slack_load(preload: Float[Array, "*batch"], friction_exponent: Float[Array, "*#batch"]) -> Float[Array, "*batch"]:
     r"""Input force at which the return side goes slack [N], :math:`2 P \Lambda/(1 - e^{-\Lambda})`.
 

@@ -104,6 +104,29 @@ def _implicit(primals: tuple[Any, ...], tangents: tuple[Any, ...]) -> tuple[Arra
     return tension, jnp.where(jnp.broadcast_to(extended > 0, tension.shape), step, 0.0)
 
 
+def with_springs(
+    stiffness: Float[Array, "*batch"], spring: Float[Array, "*#batch"], sides: int
+) -> Float[Array, "*batch"]:
+    r"""Stiffness of a cable whose ropes each have a spring in series.
+
+    .. math:: \frac 1 K = \frac 1{K_\text{cable}} + \frac 1{n k_\text{spring}}
+
+    with the n = 2 ropes of a taut loop side by side, which both give; in torques, both sides times :math:`r^2`.
+
+    Args:
+        stiffness: Of the cable, all ropes together [N/mm].
+        spring: k_spring, of each of the springs [N/mm].
+        sides: n, ropes that are taut, 1 or 2.
+
+    Returns:
+        Stiffness [N/mm].
+
+    References:
+        Haptic paper, section 5 (springs that keep the preload lower the stiffness).
+    """
+    return 1 / (1 / stiffness + 1 / (sides * spring))
+
+
 def mean_tension(force: Float[Array, "*batch"], friction_exponent: Float[Array, "*#batch"]) -> Float[Array, "*batch"]:
     r"""Tension averaged along a rope that slides toward the force on its end.
 

@@ -14,7 +14,7 @@ from bowdenfit.words import quoted, shown
 
 
 def to_recording(
-    file: ChannelFile, name: str, sources: Mapping[str, ColumnSource], pulleys: Pulleys | None = None
+    file: ChannelFile, name: str, sources: Mapping[str, ColumnSource], pulleys: Pulleys, *, is_loop: bool
 ) -> tuple[RawRecording, str]:
     """A recording from the channels of a file.
 
@@ -23,17 +23,18 @@ def to_recording(
         name: Name of the recording.
         sources: Channels that the user has named, by quantity; the others are found by their names. The time may also
             be given as a rate, such as "1000 Hz"; a minus sign before a unit turns the sign.
-        pulleys: Of a loop, whose channels may be torques; None for a single rope.
+        pulleys: By whose radii channels of torques become forces.
+        is_loop: Whether the cable is a pull-pull loop; a single rope's channels are torques where they or the radius say so.
 
     Returns:
         The recording, and the unit of its velocity: "mm/s", "rad/s", or empty without one.
 
     Raises:
-        DatasetError: A channel is missing or named twice, or has no unit or clock, or a unit of another kind; a torque is
-            named for a single rope, or its pulley's radius is not stated.
+        DatasetError: A channel is missing or named twice, or has no unit or clock, or a unit of another kind; or the radius
+            of a torque's pulley is not stated.
     """
     found = {q.name: channel for q in WANTED if (channel := find_channel(file, q, sources)) is not None}
-    torques = _torques(file, found, sources, pulleys)
+    torques = _torques(file, found, sources, pulleys, is_loop)
     found |= torques
     for quantity in ("input_force", "output_force"):
         if quantity not in found:
@@ -59,25 +60,22 @@ def to_recording(
             forces["output_force"],
             clocks.get("velocity", np.zeros(0)),
             velocity,
-            pulleys is not None,
+            is_loop,
         ),
         unit,
     )
 
 
 def _torques(
-    file: ChannelFile, found: Mapping[str, Channel], sources: Mapping[str, ColumnSource], pulleys: Pulleys | None
+    file: ChannelFile, found: Mapping[str, Channel], sources: Mapping[str, ColumnSource], pulleys: Pulleys, is_loop: bool
 ) -> dict[str, Channel]:
     """Channels of torque in the place of forces, by the force that each becomes."""
     torques = {}
     for quantity in TORQUES:
         force = quantity.name.replace("torque", "force")
-        if pulleys is None and quantity.name in sources:
-            raise DatasetError(
-                f"{file.path.name}: {quantity.name} is named for a single rope, whose ends are measured as forces; if the "
-                'cable is a pull-pull loop, write kind = "loop" under [cable] in cable.toml.'
-            )
-        if pulleys is None or (force in sources and quantity.name not in sources):
+        radius = pulleys.input_radius if force == "input_force" else pulleys.output_radius
+        expected = is_loop or radius is not None or quantity.name in sources
+        if not expected or (force in sources and quantity.name not in sources):
             continue
         channel = find_channel(file, quantity, sources)
         if channel is not None and force in found and (force in sources or quantity.name not in sources):
@@ -91,12 +89,12 @@ def _torques(
 
 
 def _from_torque(
-    file: ChannelFile, channel: Channel, force: str, sources: Mapping[str, ColumnSource], pulleys: Pulleys | None
+    file: ChannelFile, channel: Channel, force: str, sources: Mapping[str, ColumnSource], pulleys: Pulleys
 ) -> np.ndarray:
     """Forces [N] from the torques of a pulley and its radius."""
     end = force.removesuffix("_force")
     torques = converted(file, channel, f"{end}_torque", sources.get(f"{end}_torque"), "torque")
-    return (pulleys or Pulleys()).forces(torques, end, file.path.name)
+    return pulleys.forces(torques, end, file.path.name)
 
 
 def _check_distinct(file: ChannelFile, one: Channel, other: Channel) -> None:

@@ -19,7 +19,7 @@ WANTED = (
     Quantity("velocity", "speed"),
     Quantity("time", "time"),
 )
-TORQUES = (Quantity("input_torque", "torque"), Quantity("output_torque", "torque"))  # of a loop's pulleys
+TORQUES = (Quantity("input_torque", "torque"), Quantity("output_torque", "torque"))  # of pulleys
 RATE = re.compile(r"(?P<rate>[+-]?(?:[0-9]+\.?[0-9]*|\.[0-9]+)(?:e[+-]?[0-9]+)?)\s*(?P<unit>k?Hz)", re.IGNORECASE)
 _PATH = re.compile(r"[/.]")
 

@@ -40,6 +40,21 @@ def test_the_figures_of_the_bent_knee_come_out(fit, swing):
     assert "mean over 91 wrap angles of 'bracket edge', 0 to 45 deg" in row["note"]
 
 
+def test_the_torque_at_the_joint_is_the_moment_arm_times_what_arrives(fit, tmp_path):
+    angles, arms = np.linspace(45, 0, 31), np.linspace(60, 40, 31)
+    path = tmp_path / "arms.csv"
+    rows = (f"{angle:.6f},{arm:.6f}" for angle, arm in zip(angles, arms, strict=True))
+    path.write_text("\n".join(["wrap_angle_deg,moment_arm_mm", *rows]))
+    (row,) = bf.predict(fit, [470], contact="bracket edge", gait=path, input_force=(100, "N"))
+    mu = fit.posterior.values["mu3"].ravel()
+    straight = fit.efficiency_draws([470])[:, 0] * np.exp(mu * np.pi / 4)
+    torque = 0.1 * arms * straight[:, None] * np.exp(-mu[:, None] * np.deg2rad(angles))  # 100 N times mm, in N m
+    assert row["torque_N_m"] == pytest.approx(np.median(torque.mean(axis=1)), rel=1e-7)
+    assert row["most_torque_N_m_q95"] == pytest.approx(np.quantile(torque.max(axis=1), 0.95), rel=1e-7)
+    assert "torque_N_m" not in bf.predict(fit, [470], contact="bracket edge", gait=path)[0]
+    assert "N*m" in str(bf.predict(fit, [470], contact="bracket edge", gait=path, input_force=(100, "N")))
+
+
 def test_the_nominal_angle_gives_what_is_predicted_without_a_gait(fit):
     (plain,) = bf.predict(fit, [470])
     for name, value in plain.items():
@@ -110,3 +125,14 @@ def test_bad_gaits_are_refused_in_words(fit, swing, refuse, tmp_path):
     assert "missing.csv" in refuse("predict", folder, "--contact", "bracket edge", "--gait", tmp_path / "missing.csv")
     with pytest.raises(UsageError, match="write it without a sign"):
         at_470(fit, -5)
+
+
+def test_springs_and_dynamic_ranges_that_cannot_be_told_are_refused(fit):
+    at = {"wrap_angles": [(90, "deg")]}
+    for asked, words in (
+        ({"quantity": "stiffness", "spring": (5, "N")}, "does not measure a stiffness"),
+        ({"quantity": "friction", "spring": (5, "N/mm")}, "--spring is asked of --quantity stiffness"),
+        ({"quantity": "dynamic-range"}, "asked of pull-pull loops"),
+    ):
+        with pytest.raises(UsageError, match=words):
+            bf.predict(fit, **asked, **at)

@@ -69,9 +69,38 @@ def test_a_file_with_both_force_and_torque_is_refused(tmp_path):
         load_dataset(path)
 
 
-def test_a_torque_of_a_single_rope_is_refused(tmp_path):
-    path = folder_of(tmp_path, [as_torques(recorded(seconds=3.0))])
+def of_a_rope(folder, columns, cable=""):
+    """The same bench, called one rope."""
+    path = folder_of(folder, [columns], cable=cable)
     text = (path / "cable.toml").read_text().replace('kind = "loop"', 'kind = "single"')
     (path / "cable.toml").write_text(text)
-    with pytest.raises(DatasetError, match=r'named for a single rope.*kind = "loop"'):
-        load_dataset(path, channels=parse_channels(["input_torque=input_torque_N_m:N*m"]))
+    return path
+
+
+def pulled():
+    """Forces at both ends of one rope that is pulled to and fro and never slack."""
+    columns = recorded(seconds=6.0)
+    force = 60 + 0.5 * columns["input_force_N"]
+    bounds = force * np.exp(-0.3), force * np.exp(0.3)
+    output, held = np.zeros(len(force)), 0.0
+    for i, (low, high) in enumerate(zip(*bounds, strict=True)):
+        output[i] = held = min(max(held, low), high)
+    return columns | {"input_force_N": force, "output_force_N": output}
+
+
+def test_torques_of_a_single_rope_are_forces_over_the_radii_too(tmp_path):
+    for name in ("forces", "torques"):
+        (tmp_path / name).mkdir()
+    forces = load_dataset(of_a_rope(tmp_path / "forces", pulled())).measurements.table(Recordings)
+    path = of_a_rope(tmp_path / "torques", as_torques(pulled(), unit="N_mm"), f"{IN_RADIUS}\n{OUT_RADIUS}")
+    found = load_dataset(path).measurements.table(Recordings)
+    assert forces is not None and found is not None
+    for end in ("input_force", "output_force"):
+        one, other = (getattr(r.each[0].blocks, end) for r in (forces, found))
+        np.testing.assert_allclose(one, other, atol=1e-6)
+
+
+def test_a_torque_of_a_single_rope_without_a_radius_is_refused(tmp_path):
+    path = of_a_rope(tmp_path, as_torques(recorded(seconds=3.0)))
+    with pytest.raises(DatasetError, match=r"gives input_torque, but the radius .* input_pulley_radius = "):
+        load_dataset(path, channels=parse_channels([f"{end}_torque={end}_torque_N_m:N*m" for end in ("input", "output")]))

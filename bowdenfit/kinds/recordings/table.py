@@ -145,10 +145,11 @@ def _to_read(description: Description, path: Path, entry: RecordingFile, channel
     assert table is not None  # the caller asked
     page = entry.prepare or table.prepare
     sources = _known(table.channels, description) | _known(entry.channels, description) | dict(channels)
-    pulleys = description.cable.pulleys if description.cable.kind == "loop" else None
     file = read_channels(path)
     rows = rows_where(file, entry.where)
-    raw, unit = to_recording(rows, _name(path, entry), sources, pulleys)
+    raw, unit = to_recording(
+        rows, _name(path, entry), sources, description.cable.pulleys, is_loop=description.cable.kind == "loop"
+    )
     entry = placed_by_channels(description, rows, entry, sources)
     stated = page.delay.sd_to("time") if isinstance(page.delay, QuantityValue) else None
     if entry.velocity is not None and not unit:

@@ -15,6 +15,8 @@ from bowdenfit.errors import UsageError
 from bowdenfit.inference.draws import for_each_draw
 from bowdenfit.inference.interval import Interval
 from bowdenfit.kinds import each_table
+from bowdenfit.physics.loop import dynamic_range
+from bowdenfit.physics.stretch import with_springs
 from bowdenfit.questions.bends.equations import Bent, bending_contact, knows_preload, knows_stretch
 from bowdenfit.questions.bends.preload_window import TAUT, PreloadAnswer
 from bowdenfit.results.record import Record, once
@@ -173,15 +175,41 @@ class Elastic(Display):
         extended, elastic = np.atleast_1d(np.asarray(extensions, dtype=float)), self.fit.model.cable.elasticity
         return self.over(lambda values: elastic.tension(values, jnp.asarray(extended)))
 
-    def stiffness(self, wrap_angles: np.ndarray, load: float, preload: float | None = None) -> np.ndarray:
+    def stiffness(
+        self, wrap_angles: np.ndarray, load: float, preload: float | None = None, spring: float | None = None
+    ) -> np.ndarray:
         """Stiffness seen at the load side [N/mm], draws by wrap angles.
+
+        Args:
+            wrap_angles: Wrap angles [rad].
+            load: Input force [N].
+            preload: Preload that the cable is given instead of its own [N].
+            spring: Stiffness of a spring in series with each rope [N/mm]; None for none.
 
         Raises:
             UsageError: Nothing says how the rope stretches.
         """
         self._needs_stretch()
-        bent = self.stretched(wrap_angles)
-        return self.over(lambda values: bent.stiffness(values, float(load), preload))
+        bent, is_loop = self.stretched(wrap_angles), self.fit.model.cable.is_loop
+
+        def answer(values: Mapping[str, Any]) -> Any:
+            found = bent.stiffness(values, float(load), preload)
+            if spring is None:
+                return found
+            one, both = (with_springs(found, jnp.asarray(spring), sides) for sides in (1, 2))
+            return jnp.where(bent.slack_load(values, preload) > load, both, one) if is_loop else one
+
+        return self.over(answer)
+
+    def dynamic_range(self, wrap_angles: np.ndarray, largest_force: float, preload: float | None = None) -> np.ndarray:
+        """Largest force over what moving the unloaded loop takes [1], draws by wrap angles.
+
+        Raises:
+            UsageError: The cable has no preload, and none is stated.
+        """
+        self._needs_preload(preload)
+        bent, force = self.bent(wrap_angles), jnp.asarray(float(largest_force))
+        return self.over(lambda values: dynamic_range(force, bent.preload(values, preload)[0], bent.exponent(values)))
 
     def preload_window(
         self, bends: tuple[float, float], input_force: float = 0.0, friction: float | None = None

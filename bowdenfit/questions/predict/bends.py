@@ -32,6 +32,7 @@ class Question:
         preload: Preload [N] that the cable is given instead of its own; None for its own.
         friction: What may be felt in free motion [N]; None without a limit.
         stroke: +1 pulling, -1 returning.
+        spring: Stiffness of a spring in series with each rope [N/mm]; None without.
     """
 
     wrap_angles: np.ndarray
@@ -41,6 +42,7 @@ class Question:
     preload: float | None
     friction: float | None
     stroke: int
+    spring: float | None = None
 
 
 def question(
@@ -51,6 +53,7 @@ def question(
     preload: Stated = None,
     friction_limit: Stated = None,
     stroke: str = "pull",
+    spring: Stated = None,
 ) -> Question:
     """A question from numbers with units; wrap angles are those measured at if none is named.
 
@@ -72,6 +75,7 @@ def question(
         None if preload is None else _internal(preload, "force", "--preload", 0.0),
         limit,
         _STROKES[stroke],
+        None if spring is None else _internal(spring, "stiffness", "--spring", 1e-9),
     )
 
 
@@ -97,6 +101,8 @@ def predict_at_bends(fit: Record, quantity: str, asked: Question) -> list[Row]:
         UsageError: There is no posterior, no wrap angle, or the cable has not what is asked for.
     """
     fit.draws()
+    if asked.spring is not None and quantity != "stiffness":
+        raise UsageError("--spring is asked of --quantity stiffness, which springs in series lower; leave it out.")
     if not len(asked.wrap_angles):
         raise UsageError(
             "nothing was measured at a wrap angle of its own; name those to predict at, as --wrap-angle 90deg."
@@ -179,12 +185,21 @@ def _position(fit: Record, asked: Question) -> list[Row]:
 
 
 def _stiffness(fit: Record, asked: Question) -> list[Row]:
-    stiffness = elastic_answers(fit).stiffness(asked.wrap_angles, asked.input_force, asked.preload)
+    stiffness = elastic_answers(fit).stiffness(asked.wrap_angles, asked.input_force, asked.preload, asked.spring)
     columns = {"stiffness_N_per_mm": stiffness}
     arm, unit = friction_arm(fit)
     if unit != "N":
         columns["stiffness_N_m_per_rad"] = stiffness * arm**2 / 1000
     return _rows(fit, asked, columns)
+
+
+def _dynamic_range(fit: Record, asked: Question) -> list[Row]:
+    """Largest torque of the device over the friction felt in free motion."""
+    _needs_loop(fit, "dynamic-range")
+    if not asked.stated_force:
+        raise UsageError("--quantity dynamic-range needs the largest force at the motor, as --input-force 100N.")
+    drawn = elastic_answers(fit).dynamic_range(asked.wrap_angles, asked.input_force, asked.preload)
+    return _rows(fit, asked, {"dynamic_range": drawn})
 
 
 def _window(fit: Record, asked: Question) -> list[Row]:
@@ -213,6 +228,7 @@ QUANTITIES: Mapping[str, Callable[[Record, Question], list[Row]]] = MappingProxy
         "slack-load": _slack_load,
         "position": _position,
         "stiffness": _stiffness,
+        "dynamic-range": _dynamic_range,
         "preload-window": _window,
     }
 )

@@ -24,6 +24,7 @@ from bowdenfit.units import ColumnSource, conversion_factor
 from bowdenfit.words import counted
 
 _MOST_ANGLES = 512  # of a gait; of more so many quantiles stand for them
+_TORQUE = "torque_N_m"
 _STROKES = {"pull": 1.0, "return": -1.0}
 
 
@@ -36,12 +37,14 @@ class Gait:
         name: Its name.
         angles: Wrap angles [rad], each for as long as the others.
         stated: How many were stated.
+        arms: Moment arm of the rope at the joint at each angle [mm]; None where none is stated.
     """
 
     contact: int
     name: str
     angles: np.ndarray
     stated: int
+    arms: np.ndarray | None = None
 
     @property
     def words(self) -> str:
@@ -77,11 +80,14 @@ def gait_of(
             "--contact needs the wrap angles that it goes through: as --wrap-angle 45deg, which may be repeated, or a table of "
             "them as --gait FILE; name one of the two."
         )
-    found = _stated(angles) if file is None else _read(Path(file), column)
-    shown = found
-    if len(found) > _MOST_ANGLES:
-        shown = np.quantile(found, (np.arange(_MOST_ANGLES) + 0.5) / _MOST_ANGLES)
-    return Gait(number, contacts[number], shown, len(found))
+    found, arms = (_stated(angles), None) if file is None else _read(Path(file), column)
+    if len(found) <= _MOST_ANGLES:
+        return Gait(number, contacts[number], found, len(found), arms)
+    middles = (np.arange(_MOST_ANGLES) + 0.5) / _MOST_ANGLES * len(found) - 0.5
+    order, at = np.argsort(found, kind="stable"), np.arange(len(found))
+    shown, shorter = (None if of is None else np.interp(middles, at, of[order]) for of in (found, arms))
+    assert shown is not None
+    return Gait(number, contacts[number], shown, len(found), shorter)
 
 
 def _stated(angles: Sequence[tuple[float, str]]) -> np.ndarray:
@@ -94,16 +100,18 @@ def _stated(angles: Sequence[tuple[float, str]]) -> np.ndarray:
     return found
 
 
-def _read(path: Path, column: str | None) -> np.ndarray:
-    """Wrap angles of a table [rad]."""
+def _read(path: Path, column: str | None) -> tuple[np.ndarray, np.ndarray | None]:
+    """Wrap angles of a table [rad], and moment arms where it has some [mm]."""
     table = read_table(path)
     named = {} if column is None else {"wrap_angle": ColumnSource(name=column)}
-    found = require(table, find_columns(table, (Quantity("wrap_angle", "angle"),), named), "wrap_angle", "wrap_angle_deg")
+    columns = find_columns(table, (Quantity("wrap_angle", "angle"), Quantity("moment_arm", "length")), named)
+    found = require(table, columns, "wrap_angle", "wrap_angle_deg")
     angles = np.array(found.each(lambda cell: read_angle(cell, found), np.nan))
+    arms = np.array(columns["moment_arm"].numbers()) if "moment_arm" in columns else None
     table.faults.refuse()
     if not len(angles):
         raise DatasetError(f"{path.name} has a heading and no rows; a gait needs a row for each wrap angle.")
-    return angles
+    return angles, arms
 
 
 def predict_over_gait(
@@ -114,7 +122,10 @@ def predict_over_gait(
     stroke: str = "pull",
     output_force: tuple[float, str] | None = None,
 ) -> list[dict[str, Any]]:
-    """Efficiency, output force or input force at route values: the mean over a gait, and of it the least and the most.
+    r"""Efficiency, output force or input force at route values: the mean over a gait, and of it the least and the most.
+
+    With an input force and moment arms the torque at the joint too,
+    :math:`\tau(\varphi) = r(\varphi) F_\text{in} e^{-\Lambda(\theta(\varphi))}`.
 
     Args:
         fit: The fit.
@@ -146,6 +157,9 @@ def predict_over_gait(
         if len(gait.angles) > 1:
             for which in ("least", "most"):
                 row |= _interval(f"{which}_{name}", drawn[which][:, i] / per, f"{which}_{name}_")
+        if name == "output_force_N" and gait.arms is not None:
+            for which in ("", "most_"):
+                row |= _interval(f"{which}{_TORQUE}", drawn[f"{which}torque"][:, i] / 1000, f"{which}{_TORQUE}_")
         load = None if name == "efficiency" else float(np.median(drawn["mean"][:, i])) if output_force else force
         notes = [words[i], gait.words, *limits.notes(None if route is None else float(length), load)]
         if route is not None:
@@ -165,26 +179,31 @@ def _forces(fit: Record, lengths: np.ndarray, gait: Gait, force: float, sign: fl
     model, cable = fit.model, fit.model.cable
     function: Callable[..., Array] = cable.input_force_bent if inverse else cable.output_force_bent
 
-    def over(values: Mapping[str, Array], at: Array, bends: Array, mounting: Array) -> tuple[Array, Array, Array]:
+    def over(values: Mapping[str, Array], at: Array, bends: Array, mounting: Array) -> dict[str, Array]:
         angles = cable.wrap_angles(values, at)
 
-        def step(carry: tuple[Array, Array, Array], bend: Array) -> tuple[tuple[Array, Array, Array], None]:
-            bent = angles.at[:, gait.contact].set(bend)
+        def step(carry: dict[str, Array], bend: Array) -> tuple[dict[str, Array], None]:
+            bent = angles.at[:, gait.contact].set(bend[0])
             found = jnp.maximum(function(values, bent, jnp.asarray(force), jnp.asarray(sign), mounting), 0.0)
-            total, least, most = carry
-            return (total + found, jnp.minimum(least, found), jnp.maximum(most, found)), None
+            torque = bend[1] * found
+            return {
+                "mean": carry["mean"] + found / len(bends), "least": jnp.minimum(carry["least"], found),
+                "most": jnp.maximum(carry["most"], found), "torque": carry["torque"] + torque / len(bends),
+                "most_torque": jnp.maximum(carry["most_torque"], torque),
+            }, None  # fmt: skip
 
-        start = jnp.zeros(len(at)), jnp.full(len(at), jnp.inf), jnp.zeros(len(at))
-        (total, least, most), _ = jax.lax.scan(step, start, bends)
-        return total / len(bends), least, most
+        none = jnp.zeros(len(at))
+        start = {"mean": none, "least": none + jnp.inf, "most": none, "torque": none, "most_torque": none - jnp.inf}
+        return jax.lax.scan(step, start, bends)[0]
 
     def implied(z_and_mounting: Array, at: Array, bends: Array) -> dict[str, Array]:
         values = model.space.constrain(z_and_mounting[:-1])
-        mean, least, most = over(values, at, bends, jnp.zeros(()))
-        return {"mean": mean, "least": least, "most": most, "mounted": over(values, at, bends, z_and_mounting[-1])[0]}
+        mounted = over(values, at, bends, z_and_mounting[-1])["mean"]
+        return over(values, at, bends, jnp.zeros(())) | {"mounted": mounted}
 
     with jax.enable_x64(True):
-        data = jnp.asarray(lengths, dtype=float), jnp.asarray(gait.angles)
+        arms = np.zeros(len(gait.angles)) if gait.arms is None else gait.arms
+        data = jnp.asarray(lengths, dtype=float), jnp.asarray(np.column_stack([gait.angles, arms]))
         program = for_each_draw(implied, model.space.size + 1, *data, run_once=True)
         found: dict[str, np.ndarray] = program(np.column_stack([fit.draws().flat_z, fit.mounting()]))
     return found

@@ -15,10 +15,11 @@ if TYPE_CHECKING:
     from bowdenfit.results.record import Record
 
 Asked = Literal[
-    "efficiency", "output-force", "input-force", "preload", "friction", "slack-load", "position", "stiffness", "preload-window"
-]
+    "efficiency", "output-force", "input-force", "preload", "friction", "slack-load", "position", "stiffness", "dynamic-range",
+    "preload-window",
+]  # fmt: skip
 _ELSEWHERE = (  # what is not kept
-    "input_force", "output_force", "wrap_angles", "preload", "friction_limit", "contact", "gait", "gait_column",
+    "input_force", "output_force", "wrap_angles", "preload", "friction_limit", "spring", "contact", "gait", "gait_column",
 )  # fmt: skip
 AT_LENGTHS = ("efficiency", "output-force", "input-force")  # all others are asked at wrap angles
 
@@ -34,6 +35,7 @@ def predict(
     wrap_angles: Annotated[Sequence[Quantity], Option(("--wrap-angle",), "90deg", "ANGLE")] = (),
     preload: Annotated[Quantity | None, Option(metavar="FORCE", example="20N")] = None,
     friction_limit: Annotated[Quantity | None, Option(metavar="TORQUE", example="50N*mm")] = None,
+    spring: Annotated[Quantity | None, Option(metavar="STIFFNESS", example="5N/mm")] = None,
     contact: Annotated[str | None, Option(metavar="NAME")] = None,
     gait: Annotated[str | Path | None, Option(metavar="FILE")] = None,
     gait_column: Annotated[str | None, Option(metavar="HEADING")] = None,
@@ -51,6 +53,7 @@ def predict(
         wrap_angles: Predict at this wrap angle instead of a length, such as 90deg; may be repeated.
         preload: Preload the cable with this instead of its own, such as 20N.
         friction_limit: What may be felt in free motion, for the preload window: 50N*mm (or 5N without a pulley radius).
+        spring: Stiffness of springs in series, one with each rope, for the stiffness: 5N/mm.
         contact: Contact that the wrap angles are those of, while the others keep theirs, as a knee bends one of them: the mean
             over these wrap angles is predicted.
         gait: Table with those wrap angles in a column, a row each, such as those of a stride at equal times.
@@ -69,9 +72,9 @@ def predict(
 
         _refuse_both(lengths)
         found.draws()
-        asked = question(found, wrap_angles, input_force, output_force, preload, friction_limit, stroke)
+        asked = question(found, wrap_angles, input_force, output_force, preload, friction_limit, stroke, spring)
         return Predictions(predict_at_bends(found, quantity, asked))
-    _refuse_of_bends(quantity, over_gait, preload, friction_limit, input_force)
+    _refuse_of_bends(quantity, over_gait, preload or spring, friction_limit, input_force)
     wanted = _lengths(found, lengths)
     if over_gait:
         from bowdenfit.questions.predict.gait import gait_of, predict_over_gait
@@ -106,7 +109,7 @@ def _refuse_of_bends(
         raise UsageError(f"--contact and --gait are asked of {', '.join(AT_LENGTHS)}; leave the rest out.")
     if of_bends:
         raise UsageError(
-            "--preload and --friction-limit belong to predictions at wrap angles; name some, as --wrap-angle 90deg."
+            "--preload, --spring and --friction-limit belong to predictions at wrap angles; name some, as --wrap-angle 90deg."
         )
     if quantity == "efficiency" and input_force is not None:
         raise UsageError(
@@ -186,12 +189,14 @@ VERB = Verb(
     friction        what moving the unloaded cable takes
     slack-load      input force at which a loop's return side goes slack
     position        error and lost motion at the load side, by stretch, slack and backlash
-    stiffness       seen at the load side, motor locked
+    stiffness       seen at the load side, motor locked; with --spring, of springs in series too
+    dynamic-range   of a loop: the largest force, --input-force, over that of moving it unloaded
     preload-window  lowest preload without slack over these bends, highest for --friction-limit, and the best
 
     LENGTHS are in the unit of the route, or have their own: 455, 455mm, 18 in.
 
-    --contact NAME with several --wrap-angle, or --gait FILE, gives the mean while this contact bends, such as over a stride.
+    --contact NAME with several --wrap-angle, or --gait FILE, gives the mean while this contact bends, such as over a stride;
+    with moment arms in that file (moment_arm_mm) and --input-force, the torque at the joint too.
 
     The 90 % interval is that of the cable's mean (q05 to q95 with --csv and --json); that of any one mounting also holds
     the scatter from one mounting of the cable to the next. A note marks what lies outside the

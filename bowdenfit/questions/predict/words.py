@@ -6,7 +6,7 @@ from typing import Any
 from bowdenfit.words import decimals, few, filled, narrow_table, percent
 
 Row = Mapping[str, Any]
-_UNITS = {"N_m_per_rad": "N*m/rad", "N_per_mm": "N/mm", "N_mm": "N*mm", "N": "N", "mm": "mm", "deg": "deg"}
+_UNITS = {"N_m_per_rad": "N*m/rad", "N_per_mm": "N/mm", "N_mm": "N*mm", "N_m": "N*m", "N": "N", "mm": "mm", "deg": "deg"}
 _MOUNTING, _PROBABILITY = "mounting", "_probability"
 
 

@@ -59,7 +59,7 @@ def rate_effect(fit: Record) -> RateEffect | None:
     if fit.sampled is None or not friction.depends_on_rate:
         return None
     unit, scale = SHOWN_SPEED[friction.conditions.velocity_unit]
-    slow, fast = _typical_speeds(fit)
+    slow, fast = typical_speeds(fit)
     at, place = place_of(fit)
     with jax.enable_x64(True):
         difference = _differences(fit, at, slow, fast)
@@ -67,7 +67,7 @@ def rate_effect(fit: Record) -> RateEffect | None:
     return RateEffect(slow * scale, fast * scale, unit, place, interval, float(np.mean(difference < 0)))
 
 
-def _typical_speeds(fit: Record) -> tuple[float, float]:
+def typical_speeds(fit: Record) -> tuple[float, float]:
     """The lowest and the highest typical speed of a recording or run, internal unit."""
     speeds = [speed for kind, table in each_table(fit.dataset.measurements) for speed in kind.typical_speeds(table)]
     return min(speeds), max(speeds)

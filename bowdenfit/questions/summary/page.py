@@ -20,6 +20,7 @@ from bowdenfit.questions.identify.contradiction import agreement_page
 from bowdenfit.questions.loss.answer import loss_by_contact
 from bowdenfit.questions.recorded.lost_force import lost_force
 from bowdenfit.questions.recorded.rate import rate_effect
+from bowdenfit.questions.recorded.stick_slip import stick_slip
 from bowdenfit.questions.summary.verdict import verdict
 from bowdenfit.recordings.recording import Recordings
 from bowdenfit.results.plain import plain
@@ -91,6 +92,8 @@ def summarize(fit: Record) -> dict[str, Any]:
     effect = rate_effect(fit)
     if effect is not None:
         page["rate_effect"] = effect
+    if (falls := stick_slip(fit)) is not None:
+        page["stick_slip"] = falls
     if fit.sampled is not None:
         page["sampler"] = _sampler(fit, fit.posterior)
         if fit.posterior.agreement is not None:

@@ -17,6 +17,7 @@ from bowdenfit.questions.identify.judgment import identifiability
 from bowdenfit.questions.loss.words import loss_text
 from bowdenfit.questions.recorded.lost_force import lost_force
 from bowdenfit.questions.recorded.rate import SHOWN_SPEED, rate_effect
+from bowdenfit.questions.recorded.stick_slip import stick_slip
 from bowdenfit.questions.summary.page import summarize
 from bowdenfit.questions.summary.parameter_words import parameters_text
 from bowdenfit.questions.summary.sampler_words import sampler_sentences, sampler_text
@@ -221,6 +222,8 @@ def _friction_model(fit: Record) -> str:
     effect = rate_effect(fit)
     if effect is not None:
         lines.append(effect.sentence())
+    if (falls := stick_slip(fit)) is not None:
+        lines.append(falls.sentence())
     return "\n".join(filled(line) for line in lines)
 
 

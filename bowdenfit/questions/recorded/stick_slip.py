@@ -1,0 +1,70 @@
+"""Whether friction falls with speed, so that a compliant drive sticks and slips: its probability, where rate was fitted."""
+
+from dataclasses import dataclass
+
+import jax
+import jax.numpy as jnp
+import numpy as np
+from jaxtyping import Array, Float
+
+from bowdenfit.cable.friction import STRIBECK, STRIBECK_SPEED, VISCOUS
+from bowdenfit.inference.draws import for_each_draw
+from bowdenfit.physics.friction import rate_slope
+from bowdenfit.questions.recorded.rate import SHOWN_SPEED, typical_speeds
+from bowdenfit.results.record import Record, once
+from bowdenfit.words import percent
+
+_SHOWN = 5  # speeds
+
+
+@dataclass(frozen=True)
+class StickSlip:
+    r"""Probability that friction falls with speed, from the lowest speed measured to the highest.
+
+    Args:
+        speeds: In `unit`.
+        unit: "r/min" or "mm/s".
+        probabilities: That :math:`d\mu/dv < 0` there, by speed.
+    """
+
+    speeds: tuple[float, ...]
+    unit: str
+    probabilities: tuple[float, ...]
+
+    def sentence(self) -> str:
+        """'Probability that friction falls with speed, ...: 84 % at 3 r/min, 2 % at 60 r/min.'"""
+        shown = dict.fromkeys((0, len(self.speeds) - 1))
+        each = ", ".join(f"{percent(self.probabilities[i], 0)} at {self.speeds[i]:.3g} {self.unit}" for i in shown)
+        return f"Probability that friction falls with speed, so that a compliant drive sticks and slips: {each}."
+
+
+@once
+def stick_slip(fit: Record) -> StickSlip | None:
+    """At speeds from the lowest to the highest measured; None where the fit has no rate, or no draws."""
+    friction = fit.model.cable.friction
+    if fit.sampled is None or not friction.depends_on_rate:
+        return None
+    unit, scale = SHOWN_SPEED[friction.conditions.velocity_unit]
+    slow, fast = typical_speeds(fit)
+    speeds = np.unique(np.geomspace(max(slow, 1e-9), max(fast, 1e-9), _SHOWN))
+    falls = np.mean(slopes(fit, speeds) < 0, axis=0)
+    return StickSlip(tuple(float(speed * scale) for speed in speeds), unit, tuple(float(p) for p in falls))
+
+
+def slopes(fit: Record, speeds: np.ndarray) -> np.ndarray:
+    """Slope of the friction coefficient by the speed, over the coefficient at speed 0 without Stribeck's rise, draws by speeds.
+
+    Args:
+        fit: A fit whose friction depends on the rate.
+        speeds: In the internal unit of its velocities.
+    """
+    space = fit.model.space
+
+    def slope(z: Float[Array, " parameters"], at: Float[Array, " speeds"]) -> Float[Array, " speeds"]:
+        values = space.constrain(z)
+        return rate_slope(at, *(values[name] for name in (STRIBECK, STRIBECK_SPEED, VISCOUS)))
+
+    with jax.enable_x64(True):
+        program = for_each_draw(slope, space.size, jnp.asarray(speeds, dtype=float), run_once=True)
+        found: np.ndarray = program(fit.posterior.flat_z)
+    return found

@@ -70,6 +70,7 @@ class Slave(Frozen):
     inertia: Quantity = None
     damping: Quantity = None
     friction: Quantity = None
+    largest_torque: Quantity = None
 
 
 class Wall(Frozen):

@@ -65,6 +65,7 @@ KEYS: Mapping[str, Key] = MappingProxyType(
         "slave.inertia": _of(*INERTIA, 1e-3, "inertia of the slave behind its gearbox", may_be_zero=False),
         "slave.damping": _of(*DAMPING, 5e-3, "viscous damping of the slave"),
         "slave.friction": _of(*TORQUE, 0.03, "dry friction of the slave"),
+        "slave.largest_torque": _set("torque", '{ value = 2.5, unit = "N*m" }', "largest torque of the slave's motor"),
         "wall.stiffness": _set("angular_stiffness", '{ value = 100, unit = "N*m/rad" }', "stiffness of the wall"),
         "wall.damping": _of(*DAMPING, 0.02, "damping of the wall"),
         "coupling.master_stiffness": _set("angular_stiffness", '{ value = 10, unit = "N*m/rad" }', "k_m, of the master"),

@@ -1,0 +1,198 @@
+r"""Master and slave as one sampled loop, haptic paper, figure 8: what is felt in free motion and contact, when it is stable.
+
+.. math:: \tau_m = k_m (q_s - q_p) + d_m (\dot q_s - \dot q_p) - C_2 T_e - K_f T_j, \qquad
+          \tau_s = k_s (q_p - q_s) + d_s (\dot q_p - \dot q_s) - C_3 T_j
+
+with the position q_p of the master at its motor: at the joint the same gains are unstable, because the rope lies between.
+NumPy alone, over draws at once; while everything slides dry friction is a constant, and the loop is linear.
+"""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from bowdenfit.device.gains import exponential
+
+Number = float | np.ndarray
+_PLANT, _SIGNALS = 6, 6  # angles and speeds of motor, joint and slave; angle, speed and torque of either side
+_ROUNDING = 1e-6  # of a spectral radius: the whole device, which nothing holds, stands at 1
+
+
+@dataclass(frozen=True)
+class Gains:
+    """What is sent, and how it acts.
+
+    Args:
+        master_stiffness, master_damping: k_m [N m/rad] and d_m [N m s/rad].
+        slave_stiffness, slave_damping: k_s and d_s.
+        torque_to_master: C_2 [1].
+        torque_to_slave: C_3 [1].
+        local_gain: K_f [1].
+        damps_alone: Whether d_m damps the master by itself, as with two channels, of which no position comes back.
+    """
+
+    master_stiffness: float
+    master_damping: float
+    slave_stiffness: float
+    slave_damping: float
+    torque_to_master: float
+    torque_to_slave: float
+    local_gain: float = 0.0
+    damps_alone: bool = False
+
+    def two_channels(self) -> "Gains":
+        """The slave's torque back and the master's position on, with the same damping: direct force feedback."""
+        return Gains(
+            0.0, self.master_damping, self.slave_stiffness, self.slave_damping, self.torque_to_master, 0.0, 0.0, True
+        )
+
+    def with_local(self, gain: float) -> "Gains":
+        """The same with another gain on the master's own torque."""
+        return Gains(
+            self.master_stiffness, self.master_damping, self.slave_stiffness, self.slave_damping, self.torque_to_master,
+            self.torque_to_slave, gain,
+        )  # fmt: skip
+
+
+@dataclass(frozen=True)
+class Pair:
+    """Master, slave, hand and wall while everything slides; numbers or arrays over draws, in SI units.
+
+    Args:
+        stiffness, rope_damping: K and b_c of the loop.
+        motor_inertia, motor_damping: J_m and b_m.
+        joint_inertia, joint_damping: J_j and b_j, without the hand's.
+        hand_inertia, hand_damping, hand_stiffness: Of the hand.
+        slave_inertia, slave_damping: J_s and b_s.
+        wall_stiffness, wall_damping: k_e and b_e; 0 in free motion.
+        sample, filter_time: T_s, and the time constant of the filter of speeds [s].
+    """
+
+    stiffness: Number
+    rope_damping: Number
+    motor_inertia: Number
+    motor_damping: Number
+    joint_inertia: Number
+    joint_damping: Number
+    hand_inertia: Number
+    hand_damping: Number
+    hand_stiffness: Number
+    slave_inertia: Number
+    slave_damping: Number
+    wall_stiffness: Number
+    wall_damping: Number
+    sample: Number
+    filter_time: Number
+
+
+def free_torque(gains: Gains, rope_friction: Number, motor_friction: Number, slave_friction: Number) -> Number:
+    r"""What a slow hand feels in free motion [N m].
+
+    .. math:: T_h = \frac{T_f + F_m + (k_m/k_s) F_s}{1 + K_f + C_3 k_m/k_s}
+
+    Four channels lower friction without any local control: the slave, pushed by what the hand gives, pulls the master along.
+
+    Args:
+        gains: The coupling.
+        rope_friction, motor_friction, slave_friction: T_f, F_m and F_s [N m].
+    """
+    ratio = gains.master_stiffness / gains.slave_stiffness
+    return (rope_friction + motor_friction + ratio * slave_friction) / (
+        1 + gains.local_gain + gains.torque_to_slave * ratio
+    )
+
+
+def felt_stiffness(gains: Gains, stiffness: Number, wall: Number) -> Number:
+    r"""Stiffness that a slow hand feels in contact [N m/rad], from the balance of torques at motor and slave.
+
+    With equal stiffnesses, C_2 = C_3 = 1 and without local feedback it is :math:`1/(1/K + 1/k_e)`.
+
+    Args:
+        gains: The coupling.
+        stiffness: K of the loop with its springs [N m/rad].
+        wall: k_e [N m/rad].
+    """
+    k_m, k_s, c_2, c_3 = (
+        gains.master_stiffness, gains.slave_stiffness, gains.torque_to_master, gains.torque_to_slave,
+    )  # fmt: skip
+    # per unit of T_h: k_s (q_p - q_s) + C_3 = k_e q_s and k_m (q_s - q_p) - C_2 k_e q_s + 1 + K_f = 0
+    slave = (1 + gains.local_gain + c_3 * k_m / k_s) / (wall * (k_m / k_s + c_2))
+    master = slave + (wall * slave - c_3) / k_s
+    return 1 / (master + 1 / stiffness)
+
+
+def contact_radius(pair: Pair, gains: Gains, delay: int) -> np.ndarray:
+    """Spectral radius of the sampled loop while master and slave move together, with the wall where there is one.
+
+    Args:
+        pair: What moves.
+        gains: The coupling; its commands act a sample late.
+        delay: Samples that all that is sent from side to side is late by.
+    """
+    radius: np.ndarray = np.max(np.abs(np.linalg.eigvals(closed_loop(pair, gains, delay))), axis=1)
+    return radius
+
+
+def is_stable(radius: np.ndarray) -> np.ndarray:
+    """Whether every oscillation dies out."""
+    return np.asarray(radius <= 1 + _ROUNDING)
+
+
+def closed_loop(pair: Pair, gains: Gains, delay: int) -> np.ndarray:
+    """From one sample to the next: plant, angles before, filtered speeds, commands, and what is on its way."""
+    a, b, torques = _plant(pair)
+    n, size = len(a), _PLANT + 6 + _SIGNALS * delay
+    before, speeds, commands, sent = slice(6, 8), slice(8, 10), slice(10, 12), slice(12, size)
+    sample, filter_time = (np.broadcast_to(x, n) for x in (pair.sample, pair.filter_time))
+    share = 1 - np.exp(-sample / filter_time)
+    whole = np.zeros((n, size, size))
+    whole[:, :_PLANT, :_PLANT], whole[:, :_PLANT, commands] = a, b
+    signals = np.zeros((n, _SIGNALS, size))  # angle, speed, torque of the master, then of the slave
+    for side, angle in enumerate((0, 4)):
+        whole[:, before.start + side, angle] = 1
+        row = whole[:, speeds.start + side]
+        row[:, angle], row[:, before.start + side] = share / sample, -share / sample
+        row[:, speeds.start + side] = 1 - share
+        signals[:, 3 * side, angle], signals[:, 3 * side + 1] = 1, row
+        signals[:, 3 * side + 2, :_PLANT] = torques[:, side]
+    late = signals if delay == 0 else whole[:, :0]
+    if delay:
+        whole[:, sent.start : sent.start + _SIGNALS] = signals
+        for k in range(1, delay):
+            at = sent.start + _SIGNALS * k
+            whole[:, at : at + _SIGNALS, at - _SIGNALS : at] = np.eye(_SIGNALS)
+        late = np.zeros((n, _SIGNALS, size))
+        late[:, :, size - _SIGNALS :] = np.eye(_SIGNALS)
+    k_m, d_m, k_s, d_s = (
+        gains.master_stiffness, gains.master_damping, gains.slave_stiffness, gains.slave_damping,
+    )  # fmt: skip
+    comes_back = 0.0 if gains.damps_alone else d_m
+    whole[:, commands.start] = np.einsum(
+        "i,nij->nj", np.array([-k_m, -d_m, -gains.local_gain, 0, 0, 0]), signals
+    ) + np.einsum("i,nij->nj", np.array([0, 0, 0, k_m, comes_back, -gains.torque_to_master]), late)
+    whole[:, commands.start + 1] = np.einsum("i,nij->nj", np.array([0, 0, 0, -k_s, -d_s, 0]), signals) + np.einsum(
+        "i,nij->nj", np.array([k_s, d_s, -gains.torque_to_slave, 0, 0, 0]), late
+    )
+    return whole
+
+
+def _plant(pair: Pair) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """The sampled plant, and T_j and T_e of its states."""
+    k, c, j_m, b_m, j_j, b_j, j_h, b_h, k_h, j_s, b_s, k_e, b_e, sample, _ = (
+        np.atleast_1d(part) for part in np.broadcast_arrays(*vars(pair).values())
+    )
+    zero, one, j = np.zeros_like(k), np.ones_like(k), j_j + j_h
+    rows = [
+        [zero, one, zero, zero, zero, zero, zero, zero],
+        [-k / j_m, -(c + b_m) / j_m, k / j_m, c / j_m, zero, zero, 1 / j_m, zero],
+        [zero, zero, zero, one, zero, zero, zero, zero],
+        [k / j, c / j, -(k + k_h) / j, -(c + b_j + b_h) / j, zero, zero, zero, zero],
+        [zero, zero, zero, zero, zero, one, zero, zero],
+        [zero, zero, zero, zero, -k_e / j_s, -(b_e + b_s) / j_s, zero, 1 / j_s],
+        *([zero] * 8 for _ in range(2)),
+    ]
+    rates = np.stack([np.stack(row, axis=-1) for row in rows], axis=-2)
+    moved = exponential(rates * sample[:, None, None])
+    at_joint = np.stack([k, c, -k, -c, zero, zero], axis=-1)
+    at_wall = np.stack([zero, zero, zero, zero, k_e, b_e], axis=-1)
+    return moved[:, :_PLANT, :_PLANT], moved[:, :_PLANT, _PLANT:], np.stack([at_joint, at_wall], axis=1)

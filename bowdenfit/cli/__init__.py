@@ -23,6 +23,7 @@ _MADE = 50_000  # objects made before Python looks for garbage: most stay, and e
 def start() -> None:
     """The program: `main`, and an end at once; to take apart what was loaded takes Python 0.3 s."""
     gc.set_threshold(_MADE)
+    os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")  # it takes 32 MiB a thread when loaded, and waits for ever if it may not
     if not (sys.warnoptions or os.environ.get("BOWDENFIT_DEBUG")):
         warnings.simplefilter("ignore")  # of libraries, in words of their own; what matters is said in ours
     for name in ("stdout", "stderr"):

@@ -1,5 +1,6 @@
 """While something long runs: a bar that says where it stands, and an interrupt that keeps what is done."""
 
+import os
 import signal
 import sys
 import threading
@@ -15,6 +16,7 @@ from bowdenfit.verb import Watch
 
 INTERRUPTED = 130
 _NEEDED = 640 << 20  # bytes; a small fit by NUTS takes so much beside what is loaded by then
+_ADDRESSES, _ADDRESSES_PER_CORE = 1500 << 20, 150 << 20  # bytes; of threads and their heaps most is never used
 Report: TypeAlias = Callable[..., None]
 
 
@@ -79,14 +81,18 @@ def _refuse_without_memory() -> None:
     """XLA and OpenBLAS crash or wait for ever where memory runs out, so it is asked for once before they are loaded."""
     import mmap
 
-    kind = {"flags": mmap.MAP_PRIVATE | mmap.MAP_ANONYMOUS} if hasattr(mmap, "MAP_PRIVATE") else {}
-    try:
-        mmap.mmap(-1, _NEEDED, **kind).close()
-    except OSError:
-        raise MemoryShortageError(
-            f"there are not the {_NEEDED >> 20} MiB of memory that this takes; close other programs, or raise the limit "
-            "(ulimit -d and -v show it, or the container's)."
-        ) from None
+    asked = [(_NEEDED, {"flags": mmap.MAP_PRIVATE | mmap.MAP_ANONYMOUS} if hasattr(mmap, "MAP_PRIVATE") else {})]
+    if hasattr(mmap, "PROT_READ"):  # addresses alone, which take no memory
+        addresses = _ADDRESSES + (os.cpu_count() or 1) * _ADDRESSES_PER_CORE
+        asked.append((addresses, {"flags": mmap.MAP_PRIVATE | mmap.MAP_ANONYMOUS, "prot": mmap.PROT_READ}))
+    for size, kind in asked:
+        try:
+            mmap.mmap(-1, size, **kind).close()
+        except OSError:
+            raise MemoryShortageError(
+                f"there are not the {size >> 20} MiB of memory that this takes; close other programs, or raise the limit "
+                "(ulimit -d and -v show it, or the container's)."
+            ) from None
 
 
 @contextmanager

@@ -7,6 +7,7 @@ import errno
 import json
 import os
 import shutil
+import tempfile
 from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
 from pathlib import Path
@@ -46,6 +47,42 @@ def replace_when_whole(path: Path) -> Iterator[Path]:
         os.replace(temporary, path)  # noqa: PTH105  (Path.replace says the same; this is the usual word for it)
     finally:
         temporary.unlink(missing_ok=True)
+
+
+@contextmanager
+def filled_when_whole(folder: Path) -> Iterator[Path]:
+    """A folder beside `folder` to write into; what is in it moves there when all is written, and is gone if that fails.
+
+    Args:
+        folder: What it will be called; what lies there already and is called otherwise stays.
+
+    Raises:
+        StoreError: It cannot be written.
+    """
+    try:
+        folder.parent.mkdir(parents=True, exist_ok=True)
+        place = Path(tempfile.mkdtemp(prefix=f".{folder.name[:40]}.", dir=folder.parent))
+    except OSError as error:
+        raise disk_error(folder, error) from None
+    try:
+        yield place
+        if folder.exists() and any(folder.iterdir()):
+            for path in place.iterdir():
+                path.replace(folder / path.name)
+        else:
+            place.chmod(0o777 & ~_umask())
+            place.replace(folder)
+    except OSError as error:
+        raise disk_error(folder, error) from None
+    finally:
+        shutil.rmtree(place, ignore_errors=True)
+
+
+def _umask() -> int:
+    """What new files may not have; it can only be read by setting it."""
+    mask = os.umask(0)
+    os.umask(mask)
+    return mask
 
 
 @contextmanager

@@ -9,7 +9,7 @@ import traceback
 from abc import ABC, abstractmethod
 from collections.abc import Callable, Iterable, Iterator
 from concurrent.futures import Future, ThreadPoolExecutor
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from dataclasses import dataclass, field
 from importlib import import_module
 from multiprocessing import connection, get_context
@@ -207,8 +207,13 @@ def load(*modules: str) -> None:
 
 
 def load_beside(*modules: str) -> None:
-    """Load modules in a thread, which gets its time while XLA compiles."""
-    threading.Thread(target=load, args=modules).start()
+    """Load modules in a thread, which gets its time while XLA compiles; what fails there fails where they are needed."""
+
+    def quietly() -> None:
+        with suppress(Exception):
+            load(*modules)
+
+    threading.Thread(target=quietly).start()
 
 
 @dataclass

@@ -28,7 +28,9 @@ def refused(count, *of_case):
 @pytest.fixture(scope="module")
 def interrupted(tmp_path_factory):
     data = bf.read(YARN)
-    return interrupted_fit(tmp_path_factory.mktemp("interrupted") / "fit", data), lambda folder: resume_fit(folder, data)
+    return interrupted_fit(tmp_path_factory.mktemp("interrupted") / "fit", data), lambda folder: resume_fit(
+        folder, data
+    )
 
 
 @pytest.fixture(scope="module")

@@ -33,7 +33,7 @@ from bowdenfit.questions.simulate.tables import (
     table_texts,
 )
 from bowdenfit.results.fleet_folder import COLUMNS, FLEET_DESCRIPTION, FLEET_TABLE
-from bowdenfit.results.folder import write_text
+from bowdenfit.results.folder import filled_when_whole, write_text
 
 READINGS = "readings"
 
@@ -170,15 +170,16 @@ def write_fleet(plan: FleetPlan, made: list[SimulatedInspection], truth: dict[st
         DescriptionError: The bench fills several tables an inspection.
     """
     text = "\n".join(description_lines(plan.bench.text, "bowdenfit simulate --fleet", "design", "fleet")) + "\n"
-    (folder / READINGS).mkdir(parents=True, exist_ok=True)
-    rows = [",".join(COLUMNS)]
+    rows, files = [",".join(COLUMNS)], dict[str, str]()
     for each in made:
         texts = list(table_texts(each.dataset.description, each.dataset.measurements).values())
         if len(texts) != 1:
             raise DescriptionError("a simulated fleet has one table an inspection; leave one under [tables] of the plan.")
-        write_text(folder / each.file, texts[0])
+        files[each.file] = texts[0]
         lubricated = "yes" if each.lubricated else "no"
         rows.append(f"{each.cable},{each.cycles:.0f},{each.temperature:g},{lubricated},{each.file}")
-    write_text(folder / FLEET_DESCRIPTION, text)
-    write_text(folder / FLEET_TABLE, "\n".join(rows) + "\n")
-    write_text(folder / TRUTH_FILE, json.dumps(truth, indent=1) + "\n")
+    files |= {FLEET_DESCRIPTION: text, FLEET_TABLE: "\n".join(rows) + "\n", TRUTH_FILE: json.dumps(truth, indent=1) + "\n"}
+    with filled_when_whole(folder) as place:
+        (place / READINGS).mkdir()
+        for name, content in files.items():
+            write_text(place / name, content)

@@ -19,7 +19,8 @@ from bowdenfit.kinds.designs import read_design
 from bowdenfit.kinds.measurements import Measurements
 from bowdenfit.kinds.settings import parse_description
 from bowdenfit.questions.simulate.simulation import empty_tables, simulate, true_values
-from bowdenfit.results.store import write_text
+from bowdenfit.results.folder import filled_when_whole, write_text
+from bowdenfit.words import shown
 
 TRUTH_FILE = "truth.json"
 _HEADING = re.compile(r"\s*\[\[?\s*([A-Za-z\"'][^\],]*?)\s*\]\]?\s*(#.*)?")
@@ -98,11 +99,20 @@ def write(bench: BenchPlan, dataset: Dataset, truth: Mapping[str, float], folder
 
 
 def write_folder(folder: Path, cable: str, files: Mapping[str, str], truth: Mapping[str, Any]) -> None:
-    """Write cable.toml, the other files by their names, and truth.json."""
+    """Write cable.toml, the other files by their names, and truth.json; all of them or none.
+
+    Raises:
+        DescriptionError: One of them would lie elsewhere.
+        StoreError: The folder cannot be written.
+    """
     texts = {DESCRIPTION_FILE: cable, **files, TRUTH_FILE: json.dumps(truth, indent=1) + "\n"}
-    for name, text in texts.items():
-        (folder / name).parent.mkdir(parents=True, exist_ok=True)
-        write_text(folder / name, text)
+    outside = [name for name in texts if Path(name).is_absolute() or ".." in Path(name).parts or "\0" in name]
+    if outside:
+        raise DescriptionError(f"the plan names the file {shown(outside[0])}, outside of what is made; name one inside.")
+    with filled_when_whole(folder) as place:
+        for name, text in texts.items():
+            (place / name).parent.mkdir(parents=True, exist_ok=True)
+            write_text(place / name, text)
 
 
 def table_texts(description: Description, measured: Measurements) -> dict[str, str]:

@@ -1,17 +1,16 @@
 """Writing a new data set: in a folder that is there whole or not at all."""
 
-import os
 import shutil
-import tempfile
 from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from importlib import resources
 from pathlib import Path
 
 from bowdenfit.dataset import DESCRIPTION_FILE
-from bowdenfit.errors import DatasetError, UsageError, disk_error, nearest
+from bowdenfit.errors import DatasetError, UsageError, nearest
 from bowdenfit.inputs import refuse_special
 from bowdenfit.results.fleet_folder import FLEET_DESCRIPTION
+from bowdenfit.results.folder import filled_when_whole
 from bowdenfit.words import listed, shown
 
 TEMPLATES = (DESCRIPTION_FILE, "angles.csv", "forces.csv")
@@ -42,26 +41,8 @@ def new_folder(folder: Path) -> Iterator[Path]:
         UsageError, StoreError: It exists already, or cannot be written.
     """
     refuse_existing(folder)
-    try:
-        folder.parent.mkdir(parents=True, exist_ok=True)
-        place = Path(tempfile.mkdtemp(prefix=f".{folder.name}.", dir=folder.parent))
-    except OSError as error:
-        raise disk_error(folder, error) from None
-    try:
+    with filled_when_whole(folder) as place:
         yield place
-        place.chmod(0o777 & ~_umask())
-        place.replace(folder)
-    except OSError as error:
-        raise disk_error(folder, error) from None
-    finally:
-        shutil.rmtree(place, ignore_errors=True)
-
-
-def _umask() -> int:
-    """What new files may not have; it can only be read by setting it."""
-    mask = os.umask(0)
-    os.umask(mask)
-    return mask
 
 
 def write_template(folder: Path) -> None:

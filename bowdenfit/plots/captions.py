@@ -12,7 +12,7 @@ def curve_words(drawn: bool, what: str = "") -> str:
     """
     of = f" of {what}" if what else ""
     if not drawn:
-        return f"Line: least-squares estimate{of}; without draws there is no band."
+        return f"Line: least-squares estimate{of}; without sampling there is no band."
     return f"Line: median{of}; band: the interval that holds it with 90 % probability, measurements and priors considered."
 
 

@@ -157,6 +157,19 @@ def make_logarithmic(axes: Axes, which: str, ratio: float) -> None:
     axis.set_minor_formatter(NullFormatter())
 
 
+def show_plain_numbers(axes: Axes, which: str) -> None:
+    """Numbers as they are, without a power of ten beside the axis.
+
+    Args:
+        axes: Panel.
+        which: "x" or "y".
+    """
+    from matplotlib.ticker import FuncFormatter
+
+    axis = axes.xaxis if which == "x" else axes.yaxis
+    axis.set_major_formatter(FuncFormatter(lambda value, _: f"{value:,.6g}".replace("-", "\N{MINUS SIGN}")))
+
+
 def draw_marks(
     axes: Axes, x: np.ndarray, y: np.ndarray, mark: tuple[str, str], label: str, fill: str | None = None
 ) -> None:

@@ -26,6 +26,7 @@ TITLE_SIZE = 8  # pt
 LEAST = 6  # pt, of any words
 DOTS_PER_INCH = 160
 
+IN_WORDS = {"log rad": "log of the angle in rad"}  # units that few would understand
 EFFICIENCY, WRAP_ANGLE = "Efficiency (%)", "Wrap angle (deg)"
 WIDE_INTERVAL, NARROW_INTERVAL, MEDIAN, LEAST_SQUARES = "90 % interval", "50 % interval", "Median", "Least squares"
 
@@ -91,7 +92,7 @@ def percent(fraction: float) -> str:
 
 def axis_label(symbol: str, unit: str) -> str:
     """Symbol and unit for an axis; no unit is written where there is none."""
-    return symbol if unit in {"", "1"} else f"{symbol} ({unit})"
+    return symbol if unit in {"", "1"} else f"{symbol} ({IN_WORDS.get(unit, unit)})"
 
 
 def rounded_texts(values: Iterable[float], spread: float) -> list[str]:

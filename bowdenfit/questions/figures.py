@@ -21,6 +21,7 @@ from bowdenfit.questions.bends import (
     stretch_figure,
 )
 from bowdenfit.questions.check import checks_figure
+from bowdenfit.questions.figure_files import titled, write_captions
 from bowdenfit.questions.length import efficiency_figure, wrap_angles_figure
 from bowdenfit.questions.recorded import (
     autocorrelation_figure,
@@ -37,10 +38,9 @@ from bowdenfit.questions.summary import (
     traces_figure,
 )
 from bowdenfit.results.arrays import read_arrays
-from bowdenfit.results.folder import FIGURE_DATA, read_text, write_text
+from bowdenfit.results.folder import FIGURE_DATA
 from bowdenfit.results.kept import kept
 from bowdenfit.verb import Quantity
-from bowdenfit.words import filled, printable
 
 if TYPE_CHECKING:
     from bowdenfit.plots.layout import Figure
@@ -69,7 +69,6 @@ _FILES = (  # first what was measured beside the model, then what follows, then 
 )
 FIGURES = {file.__name__.rpartition(".")[2].removesuffix("_figure"): file for file in _FILES}
 AT_ONCE = ("coefficients", "pairs", "traces")  # whose data are there, so that drawing begins at once
-CAPTIONS = "captions.txt"
 NARROWEST, WIDEST = 3.0, 20.0  # in, of a figure
 
 
@@ -146,7 +145,7 @@ def page_width(width: Quantity | None) -> float | None:
 
 def title_of(name: str, cable: str) -> str:
     """Heading of a figure with the name of the cable."""
-    return f"{FIGURES[name].HEADING} \N{EN DASH} {cable}" if cable else FIGURES[name].HEADING
+    return titled(FIGURES[name].HEADING, cable)
 
 
 def caption_of(name: str, data: Any) -> str:
@@ -172,7 +171,7 @@ def draw_figure(
     return write_all(figure_of(name, data, cable, width), folder, name, formats)
 
 
-def write_captions(shown: Mapping[str, Any], folder: Path, cable: str) -> Path:
+def write_figure_captions(shown: Mapping[str, Any], folder: Path, cable: str) -> Path:
     """Write the captions of some figures, a paragraph each, beside those of the others in the folder.
 
     Args:
@@ -180,10 +179,5 @@ def write_captions(shown: Mapping[str, Any], folder: Path, cable: str) -> Path:
         folder: Where the figures are.
         cable: Name of the cable.
     """
-    path = folder / CAPTIONS
-    there = read_text(path).split("\n\n") if path.exists() else []
-    said = {text.partition(":")[0]: text.strip() for text in there if text.strip()}
-    for name, data in shown.items():
-        said[name] = printable(filled(" ".join(f"{name}: {title_of(name, cable)}. {caption_of(name, data)}".split())))
-    write_text(path, "\n\n".join(said[name] for name in FIGURES if name in said) + "\n")
-    return path
+    said = {name: f"{title_of(name, cable)}. {caption_of(name, data)}" for name, data in shown.items()}
+    return write_captions(said, folder, FIGURES)

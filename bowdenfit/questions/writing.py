@@ -1,16 +1,16 @@
 """Writing an answer to a folder: for people, as a figure, and for programs; in one way for all questions."""
 
 import json
-from collections.abc import Callable
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-if TYPE_CHECKING:
-    from bowdenfit.pages.section import Page
-
 from bowdenfit.display import Display, Rows
 
-PAGE, TEXT, FIGURES = "json", "txt", ("png", "svg")
+if TYPE_CHECKING:
+    from bowdenfit.pages.section import Page
+    from bowdenfit.questions.figure_files import AnswerFigure
+
+PAGE, TEXT = "json", "txt"
 
 
 class Files(Display, list[Path]):
@@ -30,11 +30,13 @@ def files_of(folder: str | Path, name: str) -> list[Path]:
         folder: Where they are.
         name: Of the answer.
     """
-    return [Path(folder) / f"{name}.{ending}" for ending in (PAGE, TEXT, *FIGURES)]
+    from bowdenfit.plots.write import EVERY_FORMAT
+
+    return [Path(folder) / f"{name}.{ending}" for ending in (PAGE, TEXT, *EVERY_FORMAT)]
 
 
 def write_answer(
-    folder: str | Path, name: str, answer: Any, text: str, draw: Callable[[], Any], page: "Page | None" = None
+    folder: str | Path, name: str, answer: Any, text: str, figure: "AnswerFigure", cable: str = "", page: "Page | None" = None
 ) -> list[Path]:
     """Write an answer as text, as a figure and, last, as JSON; a folder that has the JSON has everything.
 
@@ -43,7 +45,8 @@ def write_answer(
         name: Of the files.
         answer: The answer.
         text: For people.
-        draw: Gives the figure.
+        figure: File of its figure.
+        cable: Name of the cable; empty where there are several.
         page: The same as a page with that figure; none is written without one.
 
     Returns:
@@ -52,16 +55,14 @@ def write_answer(
     Raises:
         StoreError: The folder cannot be written.
     """
-    from bowdenfit.plots.write import write
+    from bowdenfit.questions.figure_files import write_figure
     from bowdenfit.results.folder import folder_to_write, write_text
     from bowdenfit.results.plain import plain
 
-    page_file, text_file, *figures = files = files_of(folder, name)
+    page_file, text_file, *_ = files = files_of(folder, name)
     with folder_to_write(Path(folder)):
         write_text(text_file, text)
-        figure = draw()
-        for path in figures:
-            write(figure, path)
+        write_figure(figure, answer, Path(folder), name, cable)
         if page is not None:
             files.insert(0, write_page(page, Path(folder), Path(folder) / f"{name}.html"))
         write_text(page_file, json.dumps(plain(answer), indent=1, allow_nan=False) + "\n")

@@ -36,7 +36,7 @@ def write_results(found: "Fit", folder: Path, figures: bool, helper: Assistant) 
         StoreError: The fit itself, or for want of room what belongs to it, could not be written.
     """
     from bowdenfit.plots.write import FORMATS
-    from bowdenfit.questions.figures import AT_ONCE, draw_figure, figures_of, write_captions
+    from bowdenfit.questions.figures import AT_ONCE, draw_figure, figures_of, write_figure_captions
     from bowdenfit.questions.figures import FIGURES as FIGURE_NAMES
     from bowdenfit.questions.kept import answers_of
     from bowdenfit.questions.report.sections import report_page
@@ -74,7 +74,7 @@ def write_results(found: "Fit", folder: Path, figures: bool, helper: Assistant) 
             failed[name] = error
     try:
         if data:
-            write_captions({name: data[name] for name in data.keys() - failed}, folder / FIGURES, found.name)
+            write_figure_captions({name: data[name] for name in data.keys() - failed}, folder / FIGURES, found.name)
     except Exception as error:
         failed["captions"] = error
     return _what_is_missing(folder, failed)

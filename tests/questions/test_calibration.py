@@ -28,9 +28,10 @@ from bowdenfit.kinds.forces.table import ForceTable
 from bowdenfit.kinds.forces.term import HeldForcesTerm
 from bowdenfit.kinds.recordings.simulation import refuse_saturated
 from bowdenfit.model import build_model
+from bowdenfit.questions.calibrate import coverage_figure, ranks_figure, sharpness_figure
 from bowdenfit.questions.calibrate.acceptable_tables import refusal
 from bowdenfit.questions.calibrate.answer import Calibration, Quantity
-from bowdenfit.questions.calibrate.figure import coverage, draw_calibration, ranks, sharpness
+from bowdenfit.questions.calibrate.figures import draw_calibration
 from bowdenfit.questions.calibrate.findings import findings
 from bowdenfit.questions.calibrate.refit import Laboratory
 from bowdenfit.questions.calibrate.replication import RankedTruth, Replication
@@ -318,7 +319,8 @@ def test_replications_that_did_not_converge_are_counted_and_named_and_too_many_l
 
 def test_a_calibration_s_figures_show_every_quantity():
     found = findings(replications(50, 0.5), {"mu": Quantity(r"$\mu$")})
-    for figure in (ranks(found), coverage(found), sharpness(found)):
+    for file in (ranks_figure, coverage_figure, sharpness_figure):
+        figure = file.draw(found)
         figure.canvas.draw()
         words = {text.get_text() for axes in figure.axes for text in (*axes.get_yticklabels(), axes.title)}
         assert any(r"$\mu$" in word for word in words)
@@ -439,8 +441,8 @@ def test_the_command_line_calibrates_resumes_and_says_when_too_few_replications_
     assert "NOT JUDGED: 2 of 2" in out
     assert f"Wrote {folder}." in err
     written = {path.relative_to(folder).as_posix() for path in folder.rglob("*.*")}
-    figures = {f"figures/{name}.{e}" for name in ("ranks", "coverage", "sharpness") for e in ("png", "svg")}
-    assert written == {"calibration.json", "summary.txt", "replications.jsonl", "report.html"} | figures
+    figures = {f"figures/{name}.{e}" for name in ("ranks", "coverage", "sharpness") for e in ("png", "svg", "pdf")}
+    assert written == {"calibration.json", "figures/captions.txt", "summary.txt", "replications.jsonl", "report.html"} | figures
     code, _, err = run(*begin, "-n", 2)
     assert code == 2
     assert "--resume" in err
@@ -454,7 +456,7 @@ def test_the_command_line_calibrates_resumes_and_says_when_too_few_replications_
 
 def test_the_page_of_a_calibration_opens_without_a_fault(tmp_path):
     found = replace(findings(replications(50), {"mu": Quantity(r"$\mu$")}), name="</title><script>alert(1)</script>")
-    draw_calibration(found, tmp_path, ("svg",))
+    draw_calibration(found, tmp_path)
     path = write_page(calibration_page(found), tmp_path, tmp_path / "report.html")
     with browser() as chromium, opened(chromium, path, width=390) as reader:
         assert reader.faults() == []

@@ -21,9 +21,9 @@ from bowdenfit.inference.psis import reliable_k
 from bowdenfit.kinds.designs import design_of
 from bowdenfit.kinds.efficiencies.table import EfficiencyTable
 from bowdenfit.model import build_model
+from bowdenfit.questions.compare import comparison_figure
 from bowdenfit.questions.compare.answer import Comparison
 from bowdenfit.questions.compare.common_readings import CommonReadings, Omitted, common_readings
-from bowdenfit.questions.compare.figure import draw
 from bowdenfit.questions.compare.sections import comparison_page
 from bowdenfit.questions.compare.words import comparison_text
 from bowdenfit.questions.writing import write_answer
@@ -239,7 +239,7 @@ def test_the_page_of_a_comparison_opens_without_a_fault(tmp_path):
         for part in ("differences", "weights", "predictions", "described")
     }
     found = replace(found, **renamed)
-    write_answer(tmp_path, "comparison", found, "", lambda: draw(found), comparison_page(found))
+    write_answer(tmp_path, "comparison", found, "", comparison_figure, page=comparison_page(found))
     with browser() as chromium, opened(chromium, tmp_path / "comparison.html", width=390) as reader:
         assert reader.faults() == []
         assert reader.page.locator("main svg").count() == 1
@@ -333,7 +333,7 @@ def test_published_and_continuous_geometry_are_compared_on_what_both_have(geomet
     assert page["fits"][1]["elpd_difference"] == pytest.approx(page["fits"][0]["elpd"] - page["fits"][1]["elpd"])
     assert (where / "comparison.txt").read_text() == text
     assert {p.name for p in where.iterdir()} == {
-        "comparison.html", "comparison.json", "comparison.txt", "comparison.png", "comparison.svg",
+        "comparison.html", "comparison.json", "comparison.txt", "comparison.png", "comparison.svg", "comparison.pdf", "captions.txt",
     }  # fmt: skip
     code, _, error = run("compare", geometries / "continuous", geometries / "published", "--output", where)
     assert code != 0

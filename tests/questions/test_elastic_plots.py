@@ -247,7 +247,7 @@ def test_no_legend_covers_a_panel_or_a_title(name, case):
     [
         ("stretch", {"Load (N)", "Stretch (mm)", "270 deg", "Median, loading", "Median, unloading", "90 % interval"}),
         ("preload", {"Wrap angle (deg)", "Preload (N)", "Slack (mm)", "Reading", "Slack in more than 50 % of them",
-                     "Slack in 5 % to 50 % of the draws"}),
+                     "Slack with 5 % to 50 % probability"}),
         ("bending_loss", {"Wrap angle (deg)", "Efficiency (%)", "Friction, at 50 N input force", "coefficient 0.05",
                           "Preload, at 50 N input force", "preload 35 N", "As fitted, preload 22 N",
                           "Capstan equation alone"}),
@@ -341,7 +341,7 @@ def test_slack_is_shaded_by_its_probability_in_both_panels():
     data = glove()
     curve = data["preload"]
     for axes in drawn("preload", data).axes:
-        ((light, dark),) = spans(axes, "Slack in 5 % to 50 % of the draws")
+        ((light, dark),) = spans(axes, "Slack with 5 % to 50 % probability")
         ((start, stop),) = spans(axes, "Slack in more than 50 % of them")
         assert light < dark == pytest.approx(start, abs=0.2) and stop == curve.wrap_angle[-1]
         np.testing.assert_allclose(

@@ -88,7 +88,7 @@ def test_predictions_outside_the_loads_measured_are_marked_in_text_and_json(drag
 def test_a_rope_pulls_or_is_slack():
     force, words = pulled(np.array([[1.0, -1.0, 3.0], [1.0, -2.0, -1.0]]), 10.0)
     np.testing.assert_array_equal(force, [[1.0, 0.0, 3.0], [1.0, 0.0, 0.0]])
-    assert words == ["", "slack", "slack in 50 % of the draws"]
+    assert words == ["", "slack", "slack with 50 % probability"]
 
 
 def test_what_was_measured_says_what_lies_outside():

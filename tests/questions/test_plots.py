@@ -256,7 +256,7 @@ def test_every_axis_says_what_it_shows_or_shares_one_that_does(case):
         ("efficiency", {"Cable length (mm)", "Efficiency (%)", "Density (1/mm)", "Probability (%)"}),
         ("coefficients", {r"$\mu_1$", r"$\mu_2$", r"$\mu_3$", "Density"}),
         ("pairs", {r"$\mu_1$", r"$\sigma_\theta$ (deg)", "Optimum (mm)", "Efficiency at\noptimum (%)"}),
-        ("traces", {r"$\mu_1$", r"$\sigma_\theta$ (deg)", "Optimum (mm)", "Draw of each walker"}),
+        ("traces", {r"$\mu_1$", r"$\sigma_\theta$ (deg)", "Optimum (mm)", "Step of the sampling"}),
         ("residuals", {"Efficiency (%)", "Measured less predicted median\n(percentage points)"}),
     ],
 )
@@ -345,7 +345,7 @@ def test_a_missing_window_is_not_drawn():
 def test_an_optimum_at_the_edge_is_said_to_be_there():
     share = at_the_edge()["efficiency"].optimum.at_edge
     assert share > 0.1
-    assert f"{100 * share:.3g} % of the draws at an end of the range" in [
+    assert f"at an end of the range with {100 * share:.3g} % probability" in [
         t for t, _ in words(drawn("efficiency", at_the_edge()))
     ]
 
@@ -355,7 +355,7 @@ def test_coefficients_show_prior_posterior_and_least_squares():
     axes = drawn("coefficients", data).axes
     assert len(axes) == 3
     for panel, p in zip(axes, data["coefficients"], strict=True):
-        assert {"Posterior", "Prior"} <= {artist.get_label() for artist in panel.get_lines()}
+        assert {"With the measurements", "Before them (prior)"} <= {artist.get_label() for artist in panel.get_lines()}
         low, median, high = (f"{q:.3f}" for q in np.quantile(p.draws, (0.05, 0.5, 0.95)))
         if p.symbol == r"$\mu_1$":
             assert panel.get_title() == f"Median {median}\n90 % interval {low} to {high}"

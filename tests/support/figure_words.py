@@ -10,11 +10,14 @@ from matplotlib.container import ErrorbarContainer
 from matplotlib.lines import Line2D
 from matplotlib.patches import Patch
 from matplotlib.text import Text
+from one_page import jargon
 
-from bowdenfit.questions.figures import figure_of
+from bowdenfit.questions.figure_files import answer_figure
+from bowdenfit.questions.figures import caption_of, figure_of
 
 NARROW = 3.5  # in, a column of a paper
 LEAST = 6.0  # pt
+_FORMULA = re.compile(r"\$[^$]*\$")
 _COMMAND = re.compile(r"\\[a-zA-Z]+|\\.")
 _WORD = re.compile(r"[^\W\d_]{3,}")
 
@@ -54,12 +57,27 @@ def assert_readable(shown, cable, widths=(None, NARROW)):
     """
     drawn = [(name, width, figure_of(name, data, cable, width)) for name, data in shown.items() for width in widths]
     wrong = [f"{name} at {width}: {fault}" for name, width, figure in drawn for fault in faults(figure)]
+    wrong += [f"caption of {name}: {fault}" for name, data in shown.items() for fault in jargon(caption_of(name, data))]
     assert not wrong, "\n".join(wrong)
+
+
+def assert_answer_readable(file, found, cable):
+    """The figure of an answer has no fault, and its caption is in plain words.
+
+    Args:
+        file: Of the figure.
+        found: The answer.
+        cable: Name of the cable.
+    """
+    said = file.caption(found)
+    assert " n = " in said
+    assert not (wrong := [*faults(answer_figure(file, found, cable)), *jargon(said)]), "\n".join(wrong)
 
 
 def faults(figure):
     """What is wrong with a figure, in sentences."""
-    return [*_misplaced(figure), *_alike(figure), *_empty(figure), *_garbled(figure), *_small(figure)]
+    found = [*_misplaced(figure), *_alike(figure), *_empty(figure), *_garbled(figure), *_small(figure)]
+    return found + [f"{text!r} has {fault}" for text, _ in words(figure) for fault in jargon(_FORMULA.sub(" ", text))]
 
 
 def _misplaced(figure):

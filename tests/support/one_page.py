@@ -24,4 +24,13 @@ def faults(page: str, lines: int = 25) -> list[str]:
     found = [f"wider than 80: {row}" for row in rows if len(row.encode()) > 80]
     found += [f"{len(rows)} lines"] if len(rows) > lines else []
     found += ["no answer in three lines"] if not ANSWER.search(" ".join(rows[:3])) else []
-    return found + [f"jargon: {word[0]!r}" for pattern in JARGON if (word := re.search(pattern, page, re.IGNORECASE))]
+    return found + jargon(page)
+
+
+def jargon(text: str) -> list[str]:
+    """Words that an engineer need not know, and counts that are wrong.
+
+    Args:
+        text: A page, a caption or a label.
+    """
+    return [f"jargon: {word[0]!r}" for pattern in JARGON if (word := re.search(pattern, text, re.IGNORECASE))]

@@ -178,7 +178,7 @@ def _write(found: "Calibration", folder: Path | None) -> None:
     """Summary, figures, report, and calibration.json last; nothing without a folder."""
     if folder is None:
         return
-    from bowdenfit.questions.calibrate.figure import draw_calibration
+    from bowdenfit.questions.calibrate.figures import draw_calibration
     from bowdenfit.questions.calibrate.sections import calibration_page
     from bowdenfit.questions.calibrate.store import CALIBRATION
     from bowdenfit.questions.calibrate.words import calibration_text
@@ -188,8 +188,7 @@ def _write(found: "Calibration", folder: Path | None) -> None:
 
     with folder_to_write(folder):
         write_text(folder / SUMMARY_TEXT, calibration_text(found))
-        if found.quantities:
-            draw_calibration(found, folder / FIGURES)
+        draw_calibration(found, folder / FIGURES)
         write_page(calibration_page(found), folder / FIGURES, folder / REPORT)
         write_text(folder / CALIBRATION, json.dumps(plain(found), indent=1, allow_nan=False) + "\n")
 

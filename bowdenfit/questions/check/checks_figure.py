@@ -171,7 +171,7 @@ def _deviations(axes: Axes, table: CheckedTable, label: str, numbers: np.ndarray
     if lean.any():
         axes.plot(
             numbers[lean], z[lean], "o", color=VERMILLION, markerfacecolor="none", markersize=7.5, markeredgewidth=0.9,
-            label="The fit leans on it (k above 0.7)",
+            label="The fit leans on it",
         )  # fmt: skip
     limit = max(LEAST_LIMIT, 1.15 * float(np.nanmax(np.abs(z), initial=0.0)))
     axes.set_ylim(-limit, limit)

@@ -7,19 +7,44 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from bowdenfit.plots.layout import TITLE, drop_unused, legend_above, panels
-from bowdenfit.plots.style import BLACK, BLUE, EFFICIENCY, SERIES_MARKERS, VERMILLION, WIDE_INTERVAL, in_paper_style
+from bowdenfit.plots.style import (
+    BLACK,
+    BLUE,
+    EFFICIENCY,
+    MEDIUM,
+    SERIES_MARKERS,
+    VERMILLION,
+    WIDE,
+    WIDE_INTERVAL,
+    in_paper_style,
+)
+from bowdenfit.words import counted
 
 if TYPE_CHECKING:
     from bowdenfit.plots.layout import Axes, Figure
     from bowdenfit.questions.check.prior_predictive import PriorPredictive, PriorTable
 
+HEADING = "What the priors hold possible"
 ROW, COLUMNS = 1.9, 2  # in; panels in a row
 WIDEST = "99 % interval by the priors"
 WITHIN, WIDE_RANGE = (
     0.01,
     20.0,
 )  # of the axis, that counts as one place; times the readings, beyond which scales are wide
+_GROUP_MARKERS = SERIES_MARKERS[1:]  # the first is of tables without groups
 SHIFT = 0.006  # of the axis, between contacts whose readings would hide each other
+
+
+def caption(data: PriorPredictive) -> str:
+    """What is drawn, in plain words."""
+    n = sum(len(table.reading) for table in data.tables)
+    said = (
+        "What readings the priors alone hold possible, before anything is fitted, beside the measured ones: thick lines hold "
+        "90 %, thin ones 99 %. Readings outside these have a color of their own; the usual cause is a unit."
+    )
+    if data.efficiency is not None:
+        said += " Efficiency of the cable: median, and the same intervals as bands."
+    return f"{said} n = {counted(n, 'reading')}."
 
 
 @in_paper_style
@@ -27,7 +52,8 @@ def draw(data: PriorPredictive) -> Figure:
     """Efficiency along the route by the priors, and a panel for each table with its readings."""
     n = len(data.tables) + (data.efficiency is not None)
     rows = -(-n // COLUMNS)
-    figure, flat = panels([ROW] * rows, COLUMNS, TITLE, (0.7, 0.78))
+    columns = min(COLUMNS, n)
+    figure, flat = panels([ROW] * rows, columns, TITLE, (0.7, 0.78), WIDE if columns > 1 else MEDIUM)
     flat = drop_unused(flat, n)
     for axes, table in zip(flat, data.tables, strict=False):
         _readings(axes, table)
@@ -47,7 +73,8 @@ def _readings(axes: Axes, table: PriorTable) -> None:
         at, low, lower, upper, high = _intervals(table.numbers[mine], table.quantiles[:, mine], WITHIN * span)
         axes.vlines(at + shift, low, high, color=BLUE, linewidth=0.8, alpha=0.7, label=WIDEST)
         axes.vlines(at + shift, lower, upper, color=BLUE, linewidth=3.2, alpha=0.35, label=WIDE_INTERVAL)
-        name, marker = group.replace("_", " ") or "Measured", SERIES_MARKERS[i % 8] if len(groups) > 1 else "o"
+        name = group.replace("_", " ") or "Measured"
+        marker = _GROUP_MARKERS[i % len(_GROUP_MARKERS)] if len(groups) > 1 else "o"
         x, reading, out = table.numbers[mine] + shift, table.reading[mine], table.outside[mine]
         axes.plot(x[~out], reading[~out], marker, color=BLACK, markersize=3.4, zorder=3, label=name)
         if (out & np.isfinite(reading)).any():
@@ -55,6 +82,8 @@ def _readings(axes: Axes, table: PriorTable) -> None:
                 x[out], reading[out], marker, color=VERMILLION, markersize=4.2, zorder=3, label="Measured, outside"
             )
     _scale(axes, table)
+    if np.all(table.numbers == np.round(table.numbers)):
+        axes.locator_params(axis="x", integer=True)
     axes.set_title(table.name.capitalize())
     axes.set(xlabel=table.place, ylabel=table.label)
 

@@ -50,7 +50,7 @@ def check(dataset: "str | Path | Dataset", **reading: Unpack[Reading]) -> "Repor
 
 
 def show_priors(dataset: "Dataset", folder: str | Path, seed: int = 0) -> "PriorPredictive":
-    """Draw what the priors alone hold possible beside what was measured, PNG and SVG; fit nothing.
+    """Draw what the priors alone hold possible beside what was measured, PNG, SVG and PDF; fit nothing.
 
     Args:
         dataset: The data set.
@@ -65,15 +65,15 @@ def show_priors(dataset: "Dataset", folder: str | Path, seed: int = 0) -> "Prior
     """
     import jax
 
-    from bowdenfit.plots.write import write_all
-    from bowdenfit.questions.check.prior_figure import draw
+    from bowdenfit.questions.check import prior_figure
     from bowdenfit.questions.check.prior_predictive import prior_predictive
+    from bowdenfit.questions.figure_files import write_figure
     from bowdenfit.results.folder import folder_to_write
 
     with jax.enable_x64(True):
         found = prior_predictive(dataset, seed)
     with folder_to_write(Path(folder)) as place:
-        write_all(draw(found), place, FIGURE)
+        write_figure(prior_figure, found, place, FIGURE, found.name)
     return found
 
 

@@ -2,6 +2,7 @@
 
 from bowdenfit.pages.section import Page, Picture, Table, prose
 from bowdenfit.questions.compare.answer import Comparison
+from bowdenfit.questions.compare.comparison_figure import HEADING, caption
 from bowdenfit.questions.compare.words import (
     HOW_WELL,
     WHAT_CHANGES,
@@ -13,13 +14,6 @@ from bowdenfit.questions.compare.words import (
     verdict_sentences,
 )
 from bowdenfit.words import listed
-
-HEADING = "Fits side by side"
-CAPTION = (
-    "Above: by how much each fit predicts worse than the best, with one and two standard errors. Middle: the same reading by "
-    "reading, up where a fit predicts it better than the best one does. Below: coefficients of each fit, median and 90 % "
-    "interval."
-)
 
 
 def comparison_page(found: Comparison) -> Page:
@@ -38,7 +32,7 @@ def comparison_page(found: Comparison) -> Page:
             basis_sentences(found),
             [Table(heads, tuple(rows), HOW_WELL, left=(0, 1))],
             folded=[("Readings on which a fit leans", treated_text(found))],
-            pictures=(Picture("comparison", HEADING, CAPTION),),
+            pictures=(Picture("comparison", HEADING, caption(found)),),
         ),
         prose("What changes", speed_sentences(found), [Table(names, tuple(values), WHAT_CHANGES)]),
     )

@@ -39,8 +39,8 @@ def compare(
     """
     import jax
 
+    from bowdenfit.questions.compare import comparison_figure
     from bowdenfit.questions.compare.answer import compare as compared
-    from bowdenfit.questions.compare.figure import draw
     from bowdenfit.questions.compare.sections import comparison_page
     from bowdenfit.questions.compare.words import comparison_text
 
@@ -49,7 +49,9 @@ def compare(
     with jax.enable_x64(True):
         found = compared(fits, report, leave_out)
     if output is not None:
-        write_answer(output, NAME, found, comparison_text(found), lambda: draw(found), comparison_page(found))
+        names = {fit.name for fit in fits.values()}
+        cable = names.pop() if len(names) == 1 else ""
+        write_answer(output, NAME, found, comparison_text(found), comparison_figure, cable, comparison_page(found))
     return found
 
 

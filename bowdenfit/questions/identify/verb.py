@@ -45,9 +45,9 @@ def identify(
     with jax.enable_x64(True):
         found = _identify(source, reading)
     if output is not None:
-        from bowdenfit.questions.identify.figure import draw
+        from bowdenfit.questions.identify import identifiability_figure
 
-        write_answer(output, NAME, found, identifiability_text(found), lambda: draw(found))
+        write_answer(output, NAME, found, identifiability_text(found), identifiability_figure, found.name)
     return found
 
 

@@ -45,7 +45,7 @@ def next_measurement(
         UsageError: The fit has no posterior, or the answer, a candidate or a cost makes no sense.
         StoreError: The results folder is missing or damaged, or `output` cannot be written.
     """
-    from bowdenfit.questions.next.figure import draw
+    from bowdenfit.questions.next import next_figure
     from bowdenfit.questions.next.ranking import next_measurement as ranked
     from bowdenfit.questions.next.words import next_measurement_text
     from bowdenfit.results.store import load
@@ -54,7 +54,7 @@ def next_measurement(
     ranking = ranked(fit, answer, candidates, costs)
     if output is not None:
         text = next_measurement_text(ranking, top)
-        write_answer(output, NAME, ranking, text, lambda: draw(ranking))
+        write_answer(output, NAME, ranking, text, next_figure, fit.name)
     return ranking
 
 

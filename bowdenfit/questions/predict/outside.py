@@ -66,7 +66,7 @@ def pulled(force: np.ndarray, input_force: float, word: str = "slack") -> tuple[
         word: What a rope is that does not pull.
     """
     share = np.mean(force <= _ROUNDING * input_force, axis=0)
-    words = [word if s > _SURELY else f"{word} in {percent(s, 0)} of the draws" if s > _HARDLY else "" for s in share]
+    words = [word if s > _SURELY else f"{word} with {percent(s, 0)} probability" if s > _HARDLY else "" for s in share]
     return np.maximum(force, 0.0), words
 
 

@@ -73,7 +73,7 @@ def caption(parameters: tuple[Coefficient, ...]) -> str:
         f"What the measurements say of {counted(len(parameters), 'coefficient')}. Shaded: how plausible each value is, "
         "measurements and priors considered; dashed: by the prior alone; square with bar: the least-squares estimate with its "
         "standard error. Above each panel stand the median and the interval that holds the value with 90 % probability. "
-        f"n = {parameters[0].draws.size} draws."
+        f"n = {parameters[0].draws.size} sampled values."
     )
 
 
@@ -96,9 +96,9 @@ def _panel(axes: Axes, parameter: Coefficient) -> None:
     grid, lower = np.linspace(*shown, GRID_POINTS), support(draws, parameter.prior)
     posterior = density(draws, grid, lower)
     axes.fill_between(grid, posterior, color=BLUE, alpha=0.38, linewidth=0)
-    axes.plot(grid, posterior, color=BLUE, label="Posterior")
+    axes.plot(grid, posterior, color=BLUE, label="With the measurements")
     prior = density(parameter.prior, grid, lower)
-    axes.plot(grid, prior, color=BLACK, linestyle="--", linewidth=1.0, label="Prior")
+    axes.plot(grid, prior, color=BLACK, linestyle="--", linewidth=1.0, label="Before them (prior)")
     _least_squares(axes, parameter, shown, 0.08 * posterior.max())
     axes.set(xlim=shown, ylim=(0, 1.2 * posterior.max()), xlabel=axis_label(parameter.symbol, parameter.unit))
     axes.set_ylabel("Density" if parameter.unit == "1" else f"Density (1/{parameter.unit})")

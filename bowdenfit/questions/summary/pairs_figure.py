@@ -50,9 +50,9 @@ def caption(data: Pairs) -> str:
     """What is drawn, in plain words."""
     return (
         "Every two unknowns against each other, and each alone on the diagonal. Dark and light: the smallest areas that "
-        "hold 68 % and 95 % of the draws; a long slanted area means that the measurements tell a combination of the two "
-        "better than either alone. Dashed: median and 90 % interval. "
-        f"n = {data.quantities[0].draws.size} draws."
+        "hold the truth with 68 % and 95 % probability; a long slanted area means that the measurements tell a combination of "
+        "the two better than either alone. Dashed: median and 90 % interval. "
+        f"n = {data.quantities[0].draws.size} sampled values."
     )
 
 
@@ -144,7 +144,7 @@ def _words(sheet: PanelSheet, data: Pairs, panels: dict[tuple[int, int], Panel],
     first = panels[0, 0]
     room = sheet.figure.get_size_inches()[0] - first.left - first.width - 2.5 * GAP - EDGE
     x, y = first.left + first.width + 2.5 * GAP, first.bottom + first.height
-    entries = [(FILLS[share], f"{100 * share:.0f} % of the draws") for share in FILLS]
+    entries = [(FILLS[share], f"{100 * share:.0f} % probability") for share in FILLS]
     for i, (color, words) in enumerate(entries):
         top = y - KEY_ROW * i
         sheet.areas([np.array([(x, top), (x + 0.2, top), (x + 0.2, top - 0.1), (x, top - 0.1)])], facecolor=color)

@@ -45,9 +45,9 @@ def data(fit: Record) -> Paths | None:
 def caption(data: Paths) -> str:
     """What is drawn, in plain words."""
     return (
-        "Whether the sampling can be relied on: the path of every sampled unknown through the draws, a color for each "
+        "Whether the sampling can be relied on: the path of every unknown through the sampling, a color for each "
         "independent start. They should lie on top of each other and go neither up nor down. Right of each panel: where "
-        f"each spent its time. n = {data.n_ensembles} independent starts, {data.quantities[0].draws.size} draws in all."
+        f"each spent its time. n = {data.n_ensembles} independent starts, {data.quantities[0].draws.size} sampled values."
     )
 
 
@@ -66,8 +66,8 @@ def draw(data: Paths, width: float | None = None) -> Figure:
     panels = [_panel(q, page / columns, i // rows, rows - 1 - i % rows) for i, q in enumerate(quantities)]
     for number in range(data.n_ensembles):
         _ensemble(sheet, number, panels, quantities, data.n_ensembles)
-    _axes(sheet, quantities, panels, rows, "Draw of each chain" if chains else "Draw of each walker")
-    _legend(sheet, data.n_ensembles, chains, key)
+    _axes(sheet, quantities, panels, rows, "Step of the sampling")
+    _legend(sheet, data.n_ensembles, key)
     return sheet.finished()
 
 
@@ -130,12 +130,12 @@ def _axes(sheet: PanelSheet, quantities: list[SampledQuantity], panels: list[Pan
 def _key(chains: bool) -> str:
     """What lines and bands are."""
     if chains:
-        return f"Line: median of each {STRETCHES}th of a chain; shaded: its {WIDE_INTERVAL}; right of each panel: density"
-    return f"Thick: median of an ensemble's walkers; thin: their {WIDE_INTERVAL}; right of each panel: density"
+        return f"Line: median of each {STRETCHES}th of the steps; shaded: its {WIDE_INTERVAL}; right of each panel: density"
+    return f"Thick: median of the values at a step; thin: their {WIDE_INTERVAL}; right of each panel: density"
 
 
-def _legend(sheet: PanelSheet, n_ensembles: int, chains: bool, key: str) -> None:
-    """One entry an ensemble (or chain), and what line and band are."""
+def _legend(sheet: PanelSheet, n_ensembles: int, key: str) -> None:
+    """One entry a start, and what line and band are."""
     width, height = sheet.figure.get_size_inches()
     most = min(MOST_NAMES, int((width - EDGE) / NAME))
     shown = n_ensembles if n_ensembles <= most else most - 1
@@ -144,7 +144,7 @@ def _legend(sheet: PanelSheet, n_ensembles: int, chains: bool, key: str) -> None
         x, y = width / 2 + step * (number - (shown + bool(more)) / 2), height - 0.14
         color, line = SERIES_COLORS[number], SERIES_LINES[number % len(SERIES_LINES)]
         sheet.lines([np.array([(x, y), (x + 0.25, y)])], color=color, linestyle=line, linewidth=1.2)
-        sheet.text(x + 0.3, y, f"{'Chain' if chains else 'Ensemble'} {number + 1}", va="center_baseline", fontsize=SMALL)
+        sheet.text(x + 0.3, y, f"Start {number + 1}", va="center_baseline", fontsize=SMALL)
     if more:
         sheet.text(width / 2 + step * (shown - 1) / 2, height - 0.14, f"and {more} more", va="center_baseline", fontsize=SMALL)
     sheet.text(width / 2, height - 0.24, key, ha="center", va="top", fontsize=SMALL, linespacing=1.25)

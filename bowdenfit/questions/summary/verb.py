@@ -73,7 +73,7 @@ def plot(
         StoreError: The results folder is missing or damaged, or the other cannot be written.
     """
     from bowdenfit.errors import UsageError
-    from bowdenfit.questions.figures import draw_figure, page_width, write_captions
+    from bowdenfit.questions.figures import draw_figure, page_width, write_figure_captions
     from bowdenfit.questions.writing import Files
     from bowdenfit.results.folder import FIGURES, folder_to_write
 
@@ -85,7 +85,7 @@ def plot(
     shown, cable = _shown(found, figures)
     with folder_to_write(Path(output)) as place:
         files = [path for name, data in shown.items() for path in draw_figure(name, data, place, endings, cable, page)]
-        return Files([*files, write_captions(shown, place, cable)])
+        return Files([*files, write_figure_captions(shown, place, cable)])
 
 
 def _formats(named: Sequence[str]) -> Sequence[str]:

@@ -9,30 +9,48 @@ import numpy as np
 
 from bowdenfit.kinds.terms import candidate_kinds
 from bowdenfit.plots.bands import route_limits, shade_outside
-from bowdenfit.plots.layout import LEFT, TITLE, legend_above, panels
-from bowdenfit.plots.style import BLACK, GRAY, SERIES_COLORS, SERIES_LINES, SERIES_MARKERS, in_paper_style
+from bowdenfit.plots.layout import LEFT, TITLE, legend_above, panels, text_width, wrapped
+from bowdenfit.plots.panels import show_plain_numbers
+from bowdenfit.plots.style import BLACK, GRAY, SERIES_COLORS, SERIES_LINES, SERIES_MARKERS, axis_label, in_paper_style
+from bowdenfit.words import counted
 
 if TYPE_CHECKING:
     from bowdenfit.plots.layout import Axes, Figure
-    from bowdenfit.questions.next.answer import NextMeasurement, Ranked
+    from bowdenfit.questions.next.answer import NextMeasurement
 
+HEADING = "What to measure next"
 PAGE = 5.6  # in
 MOST = 14  # candidates in the figure without a route
 ROW = 0.19  # in, of each of them
-_PER_LETTER = 0.058  # in, of a label's width
+LONGEST = 2.8  # in, of a label
+
+
+def caption(found: NextMeasurement) -> str:
+    """What is drawn, in plain words."""
+    best = f" Circle: {found.best.words}, most worth measuring." if found.best is not None else ""
+    gray = " Gray: outside the range of the curves." if _goes_along(found) and found.route_label else ""
+    return (
+        f"How well {found.answer.words} would be known after one more measurement, as one standard deviation, on average over "
+        "what it may read; bars: two standard errors of that estimate. Dashed: as well as it is known now."
+        f"{best}{gray} n = {counted(len(found.ranked), 'measurement')} considered."
+    )
 
 
 @in_paper_style
 def draw(found: NextMeasurement) -> Figure:
     """Expected standard deviation of the answer, against the route with a line for each kind; else a row a candidate."""
+    return _along_route(found) if _goes_along(found) else _in_rows(found)
+
+
+def _goes_along(found: NextMeasurement) -> bool:
+    """Whether all candidates have places along the route, and nothing else that tells them apart."""
     along = [r for r in found.ranked if math.isfinite(r.candidate.route) and math.isnan(r.candidate.load)]
-    places = {r.candidate.route for r in along}
-    return _along_route(found, along) if len(along) == len(found.ranked) and len(places) > 1 else _in_rows(found)
+    return len(along) == len(found.ranked) and len({r.candidate.route for r in along}) > 1
 
 
 def _name(found: NextMeasurement) -> str:
     """What the axis shows."""
-    return f"Standard deviation ({found.answer.unit})" if found.answer.unit else "Standard deviation"
+    return axis_label("Known to ±, one standard deviation", found.answer.unit)
 
 
 def _title(axes: Axes, found: NextMeasurement, start: float = 0.0) -> None:
@@ -49,7 +67,8 @@ def _limits(found: NextMeasurement) -> tuple[float, float]:
     return max(0.0, least - 1.5 * change), now + 0.3 * change
 
 
-def _along_route(found: NextMeasurement, along: list[Ranked]) -> Figure:
+def _along_route(found: NextMeasurement) -> Figure:
+    along = found.ranked
     figure, (axes,) = panels([2.4], 1, TITLE, (0, 0), PAGE)
     kinds = [kind for kind in candidate_kinds().values() if any(r.candidate.kind == kind.name for r in along)]
     for i, kind in enumerate(kinds):
@@ -67,6 +86,7 @@ def _along_route(found: NextMeasurement, along: list[Ranked]) -> Figure:
     _now(axes, found, horizontal=True)
     axes.set(xlabel=found.route_label, ylabel=_name(found))
     axes.set_ylim(*_limits(found))
+    show_plain_numbers(axes, "y")
     _title(axes, found)
     legend_above(figure, [axes], columns=2)
     return figure
@@ -87,7 +107,8 @@ def _now(axes: Axes, found: NextMeasurement, horizontal: bool) -> None:
 def _in_rows(found: NextMeasurement) -> Figure:
     """A row for each of the best candidates."""
     shown = found.ranked[:MOST]
-    room = max(LEFT, 0.15 + _PER_LETTER * max(len(r.words) for r in shown))
+    names = [wrapped(r.words, LONGEST, most=1) for r in shown]
+    room = max(LEFT, 0.15 + max(map(text_width, names)))
     figure, (axes,) = panels([max(1.0, ROW * (len(shown) + 1))], 1, TITLE, (0, 0), PAGE)
     box = axes.get_position()
     axes.set_position((room / PAGE, box.y0, box.x1 - room / PAGE, box.height))
@@ -97,9 +118,11 @@ def _in_rows(found: NextMeasurement) -> Figure:
         markersize=4, label="Expected after this measurement",
     )  # fmt: skip
     _now(axes, found, horizontal=False)
-    axes.set_yticks(rows, [r.words for r in shown])
+    axes.set_yticks(rows, names)
     axes.set_ylim(len(shown) - 0.4, -0.6)
     axes.set_xlim(*_limits(found))
+    show_plain_numbers(axes, "x")
+    axes.locator_params(axis="x", nbins=4)
     axes.set_xlabel(_name(found))
     _title(axes, found, -0.9 * room / (PAGE * axes.get_position().width))
     axes.grid(visible=False, axis="y")

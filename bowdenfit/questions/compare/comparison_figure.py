@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from bowdenfit.plots.layout import TITLE, axes_at, empty_page, legend_above, place_labels
+from bowdenfit.plots.layout import TITLE, axes_at, empty_page, legend_above, place_labels, wrapped
 from bowdenfit.plots.panels import short
 from bowdenfit.plots.style import (
     BLACK,
@@ -21,6 +21,7 @@ from bowdenfit.plots.style import (
     axis_label,
     in_paper_style,
 )
+from bowdenfit.words import counted
 
 if TYPE_CHECKING:
     from bowdenfit.inference.interval import Interval
@@ -29,6 +30,7 @@ if TYPE_CHECKING:
 
 MOST_LABELED = 40  # readings that are named below the axis
 MOST_COLUMNS = 4  # panels of parameters side by side
+LEAST_ROOM, _APART = 0.3, 0.08  # in, of a name of a table, and to the next
 LONGEST_NAME = 22  # characters of a fit's name that have room
 _CHARACTER, _ROW = 0.062, 0.23  # in, of a name
 _RIGHT, _BELOW = 0.18, 0.45
@@ -36,9 +38,22 @@ _MIDDLE = 1.7  # in, height of the middle panel
 _GAP = 0.62
 
 
+HEADING = "Fits side by side"
+
+
+def caption(found: Comparison) -> str:
+    """What is drawn, in plain words."""
+    return (
+        "Above: by how much each fit predicts worse than the best, with one and two standard errors. Middle: the same reading "
+        "by reading, up where a fit predicts it better than the best one does. Below: coefficients of each fit, median and "
+        "90 % interval. The score says how probable the readings were: 2.3 less is ten times less probable; "
+        f"n = {counted(len(found.readings), 'reading')} left out, each predicted by the others."
+    )
+
+
 @in_paper_style
 def draw(found: Comparison) -> Figure:
-    """Differences of elpd with standard errors, their contributions by reading, and parameters side by side."""
+    """Differences of the score with standard errors, their contributions by reading, and parameters side by side."""
     cells = _cells(found)
     names = [short(name, LONGEST_NAME) for name in found.differences]
     left = max(0.66, 0.2 + _CHARACTER * max(map(len, names)))
@@ -87,7 +102,7 @@ def _cells(found: Comparison) -> list[tuple[str, dict[str, Interval]]]:
     lengths = {name: interval for name, (interval, _) in found.optimal_length.items()}
     if lengths:
         unit = next(iter(found.optimal_length.values()))[1]
-        cells.append((axis_label("$l^*$", unit), lengths))
+        cells.append((axis_label("Best length", unit), lengths))
     return cells
 
 
@@ -102,8 +117,8 @@ def _differences(axes: Axes, found: Comparison, names: list[str]) -> None:
         axes.plot([-difference.elpd], [i], marker, color=color, markeredgecolor="white", markersize=6)
     axes.axvline(0.0, color=BLACK, linewidth=0.7)
     axes.set_yticks(range(len(names)), names)
-    axes.set(ylim=(len(names) - 0.5, -0.5), xlabel="elpd less that of the best, with one and two standard errors")
-    axes.set_title(f"Prediction of readings left out ({len(found.readings)} readings)", loc="left")
+    axes.set(ylim=(len(names) - 0.5, -0.5), xlabel="Score less that of the best, with one and two standard errors")
+    axes.set_title(f"Prediction of {counted(len(found.readings), 'reading')} left out", loc="left")
     axes.grid(axis="y", visible=False)
     place_labels(axes.figure, axes)  # type: ignore[arg-type]
 
@@ -117,7 +132,7 @@ def _by_reading(axes: Axes, found: Comparison, names: list[str]) -> None:
         place = x + (i - 1 - (len(others) - 1) / 2) * width
         axes.bar(place, -found.pointwise(name), width, color=SERIES_COLORS[i % len(SERIES_COLORS)], label=names[i])
     axes.axhline(0.0, color=BLACK, linewidth=0.7)
-    axes.set(xlim=(-0.6, len(x) - 0.4), ylabel="Difference of elpd")
+    axes.set(xlim=(-0.6, len(x) - 0.4), ylabel="Difference of score")
     axes.set_title("The same by reading: up where the fit predicts it better than the best one does", loc="left")
     low, high = axes.get_ylim()
     axes.set_ylim(low, high + 0.16 * (high - low))  # room for the names of the tables
@@ -138,8 +153,10 @@ def _tables(axes: Axes, found: Comparison) -> None:
         n = len(list(group))
         if number % 2:
             axes.axvspan(start - 0.5, start + n - 0.5, color=LIGHT, linewidth=0, zorder=0)
+        room = n / (np.ptp(axes.get_xlim()) or 1.0) * axes.get_position().width * WIDE - _APART
+        name = wrapped(_plain(table), room, most=1) if room > LEAST_ROOM else ""
         axes.annotate(
-            _plain(table), (start - 0.4, 1.0), xycoords=("data", "axes fraction"), xytext=(0, -8),
+            name, (start - 0.4, 1.0), xycoords=("data", "axes fraction"), xytext=(0, -8),
             textcoords="offset points", fontsize=SMALL, color=GRAY,
         )  # fmt: skip
         start += n
@@ -157,7 +174,7 @@ def _parameter(
             axes.plot([by_fit[name].median], [i], marker, color=color, markeredgecolor="white", markersize=6)
     axes.set(ylim=(len(fits) - 0.5, -0.5), xlabel=label)
     axes.set_yticks(range(len(fits)), names if named else [])
-    axes.locator_params(axis="x", nbins=4)
+    axes.locator_params(axis="x", nbins=3)
     axes.grid(axis="y", visible=False)
     page, box = axes.figure.get_size_inches(), axes.get_position()  # type: ignore[union-attr]
     axes.xaxis.set_label_coords(0.5, -0.25 / (box.height * page[1]))

@@ -6,8 +6,10 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from bowdenfit.plots.layout import empty_page
-from bowdenfit.plots.style import BLUE, GRAY, LIGHT, SMALL, WIDE, in_paper_style
+from bowdenfit.plots.layout import empty_page, text_width, wrapped
+from bowdenfit.plots.panels import show_plain_numbers
+from bowdenfit.plots.style import BLUE, GRAY, LEAST, LIGHT, SMALL, WIDE, in_paper_style
+from bowdenfit.words import counted
 
 if TYPE_CHECKING:
     from bowdenfit.inference.identifiability import Knowledge
@@ -15,10 +17,29 @@ if TYPE_CHECKING:
     from bowdenfit.plots.layout import Axes, Figure
     from bowdenfit.questions.identify.answer import Identifiability
 
+HEADING = "What the measurements determine"
 _ROW, _TOP, _BOTTOM, _NAMES, _GAP = 0.24, 0.34, 0.5, 1.75, 0.35  # in
 _PROFILE, _ACROSS = 1.75, 4  # height of a row of profiles [in], and how many are in it
 _NINETY, _HIGHEST = 2.71, 12.0  # rise at the ends of a 90 % interval, and the highest shown
+_LONG = 0.3  # in, of numbers of which two have room below a profile
+_CELL = 0.24  # in, room that a number in the map takes
 _MOST = 0.05  # weight below which a cell of the map is left empty
+
+
+def caption(found: Identifiability) -> str:
+    """What is drawn, in plain words."""
+    n = sum(len(group.parameters) for group in found.groups.values())
+    said = (
+        "Left: of what was open about each parameter beforehand (the variance of its prior), the share that the measurements "
+        "settle. Right: independent weighted sums of the parameters, the best known first, with the weight of each in units of "
+        "its prior's standard deviation; below each how much of the sum's prior variance is left."
+    )
+    if found.profiles:
+        said += (
+            " Below: rise of the sum of squares of the readings when one coefficient is moved and the others follow; where it "
+            "crosses the dashed line, a 90 % interval ends, and where it stays flat, the readings say nothing."
+        )
+    return f"{said} Judged at {found.basis}; n = {counted(n, 'parameter')}."
 
 
 @in_paper_style
@@ -53,7 +74,9 @@ def _profile(axes: Axes, one: Profile, first: bool) -> None:
     axes.plot(one.values, one.rise, color=BLUE)
     axes.axhline(_NINETY, color=GRAY, linestyle="--", linewidth=0.8)
     axes.set_ylim(-0.5, _HIGHEST)
-    axes.set_xlabel(one.name)
+    axes.set_xlabel(_words(one.name, (WIDE - 0.5) / _ACROSS, 8))
+    axes.locator_params(axis="x", nbins=2 if text_width(f"{one.values[0]:.2g}") < _LONG else 1)
+    show_plain_numbers(axes, "x")
     if first:
         axes.set_title("Sum of squares of the readings above its minimum (dashed: 90 % limit)", loc="left")
         axes.set_ylabel("Rise")
@@ -65,7 +88,7 @@ def _shares(axes: Axes, name: str, group: Knowledge) -> None:
     places = np.arange(len(names))
     axes.barh(places, told, color=BLUE, height=0.62)
     axes.barh(places, 100 - told, left=told, color=LIGHT, height=0.62)
-    axes.set_yticks(places, names)
+    axes.set_yticks(places, [_words(name, _NAMES - 0.2) for name in names])
     axes.set_ylim(len(names) - 0.5, -0.5)
     axes.set_xlim(0, 100)
     axes.grid(visible=False)
@@ -79,8 +102,9 @@ def _combinations(axes: Axes, group: Knowledge) -> None:
     weights = np.array([[d.weights.get(n, 0.0) * prior_sd[n] for n in names] for d in group.directions]).T
     weights = weights / np.maximum(np.sqrt(np.sum(weights**2, axis=0)), 1e-300)
     axes.imshow(weights, cmap="RdBu_r", vmin=-1, vmax=1, aspect="auto")
+    room = axes.get_position().width * WIDE / len(group.directions)
     for (row, column), weight in np.ndenumerate(weights):
-        if abs(weight) > _MOST:
+        if abs(weight) > _MOST and room > _CELL:
             dark = abs(weight) > 0.6
             axes.text(
                 column,
@@ -92,11 +116,18 @@ def _combinations(axes: Axes, group: Knowledge) -> None:
                 color="white" if dark else "black",
             )
     axes.set_yticks([])
-    axes.set_xticks(np.arange(len(group.directions)), [_known(d.share) for d in group.directions])
+    shown = [_known(d.share) for d in group.directions]
+    slanted = max(map(text_width, shown)) + 0.04 > room
+    axes.set_xticks(np.arange(len(shown)), shown, rotation=90 if slanted else 0, fontsize=LEAST if slanted else SMALL)
     axes.tick_params(length=0)
     axes.grid(visible=False)
     axes.set_title("Combinations, the best known first", loc="left")
     axes.set_xlabel("Left of the prior variance (%)")
+
+
+def _words(name: str, room: float, size: float = SMALL) -> str:
+    """A parameter's name as words, its end left out where there is no room for it [in]."""
+    return wrapped(name.replace("_", " "), room, size, most=1)
 
 
 def _known(share: float) -> str:

@@ -4,6 +4,7 @@ import math
 import re
 import textwrap
 from collections.abc import Collection, Iterable, Sequence
+from itertools import zip_longest
 
 _LONGEST = 40  # characters of a quoted value
 WIDTH = 78  # of a line; a terminal has 80 columns, and some count bytes
@@ -108,8 +109,26 @@ def table(heads: Sequence[str], rows: Sequence[Sequence[str]], left: Collection[
     return "\n".join([lines[0], "-" * len(lines[0]), *lines[1:]])
 
 
+def _broken(heads: Sequence[str], rows: Sequence[Sequence[str]]) -> tuple[Sequence[str], list[Sequence[str]]]:
+    """The same with those cells in several rows for which there is no room beside the first column, or in it."""
+    first, *others = (max(len(row[i]) for row in [heads, *rows]) for i in range(len(heads)))
+    if first + 2 + max(others, default=0) <= WIDTH:
+        return heads, list(rows)
+    left = min(first, max(WIDTH - sum(2 + w for w in others), WIDTH // 2))
+    rooms = [left, *(max(1, WIDTH - 2 - left) for _ in others)]
+    parts = [[textwrap.wrap(c, room) or [""] for c, room in zip(row, rooms, strict=True)] for row in [heads, *rows]]
+    lines = [[tuple(column) for column in zip_longest(*row, fillvalue="")] for row in parts]
+    if len(lines[0]) > 1:  # a heading is one line
+        return heads, list(rows)
+    return lines[0][0], [line for row in lines[1:] for line in row]
+
+
 def narrow_table(heads: Sequence[str], rows: Sequence[Sequence[str]], left: Collection[str] = ("prior", "unit")) -> str:
-    """A table of at most `WIDTH` characters: columns that find no place stand below, beside the first again."""
+    """A table of at most `WIDTH` characters: columns that find no place stand below, beside the first again.
+
+    Cells that are too wide even so are broken into lines.
+    """
+    heads, rows = _broken(heads, rows)
     widths = [max(len(row[i]) for row in [heads, *rows]) for i in range(len(heads))]
     blocks, rest = list[str](), list(range(1, len(heads)))
     while rest or not blocks:

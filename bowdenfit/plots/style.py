@@ -26,7 +26,7 @@ TITLE_SIZE = 8  # pt
 LEAST = 6  # pt, of any words
 DOTS_PER_INCH = 160
 
-IN_WORDS = {"log rad": "log of the angle in rad"}  # units that few would understand
+IN_WORDS = {"log rad": "log angle"}  # units that few would understand
 EFFICIENCY, WRAP_ANGLE = "Efficiency (%)", "Wrap angle (deg)"
 WIDE_INTERVAL, NARROW_INTERVAL, MEDIAN, LEAST_SQUARES = "90 % interval", "50 % interval", "Median", "Least squares"
 

@@ -333,7 +333,8 @@ def test_published_and_continuous_geometry_are_compared_on_what_both_have(geomet
     assert page["fits"][1]["elpd_difference"] == pytest.approx(page["fits"][0]["elpd"] - page["fits"][1]["elpd"])
     assert (where / "comparison.txt").read_text() == text
     assert {p.name for p in where.iterdir()} == {
-        "comparison.html", "comparison.json", "comparison.txt", "comparison.png", "comparison.svg", "comparison.pdf", "captions.txt",
+        "comparison.html", "comparison.json", "comparison.txt", "comparison.png", "comparison.svg",
+        "comparison.pdf", "captions.txt",
     }  # fmt: skip
     code, _, error = run("compare", geometries / "continuous", geometries / "published", "--output", where)
     assert code != 0

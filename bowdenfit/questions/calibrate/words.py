@@ -89,10 +89,10 @@ def _row(q: Checked) -> tuple[str, ...]:
 def _with_all(found: Calibration) -> str:
     """What would be said if those that did not converge were ranked too."""
     if found.faults_with_all == found.faults:
-        return "Ranked by the draws there are, they would change nothing."
+        return "Ranked as far as they came, they would change nothing."
     wrong = [f"{name} ({fault})" for name, fault in found.faults_with_all.items()]
     says = f"wrong would be {listed(wrong)}" if wrong else "nothing would be wrong"
-    return f"Ranked with them, by the draws there are, {says}."
+    return f"Ranked with them, as far as they came, {says}."
 
 
 def account_sentences(found: Calibration) -> list[str]:
@@ -100,9 +100,9 @@ def account_sentences(found: Calibration) -> list[str]:
     lines = [f"A replication took {found.seconds:.2g} s (median)."]
     if found.engines:
         words = {
-            "laplace": "weighted draws about the maxima of the posterior",
-            "ensembles": "ensembles of walkers",
-            "nuts": "NUTS",
+            "laplace": "a normal approximation, corrected",
+            "ensembles": "full sampling",
+            "nuts": "sampling by gradients",
         }
         lines[0] += f" Fitted by {listed([f'{words.get(name, name)} ({n})' for name, n in found.engines.items()])}."
     if found.redrawn:
@@ -121,7 +121,7 @@ def account_sentences(found: Calibration) -> list[str]:
         first = found.unconverged[numbers[0]]
         lines.append(
             f"{len(numbers)} replications did not converge and are not ranked (numbers {named}), such as {numbers[0]}: "
-            f"{first}. Whether draws converge follows from the readings, whatever the truth is, so that leaving some "
+            f"{first}. Whether a fit converges follows from the readings, whatever the truth is, so that leaving some "
             f"out leaves ranks uniform. {_with_all(found)}"
         )
     return lines

@@ -97,7 +97,8 @@ VERB = Verb(
     parts instead, its readings at one load at a time: then the comparison says which model describes the cable as it was
     mounted, not how well it foretells the next mounting.
 
-    Readings that would move the posterior take longer: it is fitted again without them.
+    Readings that would move the posterior take longer: it is fitted again without them. The score is the expected log
+    predictive density of leave-one-out (elpd in the JSON).
     """,
     csv="Print the fits as CSV, the best first.",
 )

@@ -107,7 +107,7 @@ def basis_sentences(found: Comparison) -> list[str]:
     n = len(found.readings)
     lines = [
         f"Compared on {counted(n, 'reading')}, each left out and predicted by the others: {what}. The score says how "
-        "probable the readings were: 2.3 less is ten times less probable (in the JSON it is elpd, of leave-one-out). The "
+        "probable the readings were: 2.3 less is ten times less probable. The "
         "weights make the mixture of the models that predicts best."
     ]
     if found.left_out != "run":

@@ -7,7 +7,7 @@ from bowdenfit.questions.fleet.answer import Fleet
 from bowdenfit.words import counted, decimals, filled, give_or_take, listed, table
 
 _NAMED = 12  # broken or untrusted inspections that are named
-_ENGINES = {"laplace": "weighted draws", "ensembles": "ensembles of walkers", "nuts": "NUTS"}
+_ENGINES = {"laplace": "a normal approximation, corrected", "ensembles": "full sampling", "nuts": "sampling by gradients"}
 _HEADS = ("quantity", "unit", "middle", "from", "to", "± of one")
 
 
@@ -72,7 +72,7 @@ def _what_was_done(found: Fleet) -> list[str]:
         models = listed(list(found.shapes))
         lines.append(f"The descriptions or designs differ, so {len(found.shapes)} models were fitted: {models}.")
     drawn = listed([f"{_ENGINES.get(name, name)} ({n})" for name, n in found.engines.items()])
-    lines.append(f"Drawn by {drawn}; seed {found.seed}." if found.fitted else f"Seed {found.seed}.")
+    lines.append(f"Fitted by {drawn}; seed {found.seed}." if found.fitted else f"Seed {found.seed}.")
     unknown = sum(math.isnan(each.cycles) for each in found.fitted)
     if unknown:
         some = counted(unknown, "inspection")

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from bowdenfit.plots.layout import empty_page, text_width, wrapped
-from bowdenfit.plots.panels import show_plain_numbers
+from bowdenfit.plots.sheet import ticks
 from bowdenfit.plots.style import BLUE, GRAY, LEAST, LIGHT, SMALL, WIDE, in_paper_style
 from bowdenfit.words import counted
 
@@ -21,7 +21,7 @@ HEADING = "What the measurements determine"
 _ROW, _TOP, _BOTTOM, _NAMES, _GAP = 0.24, 0.34, 0.5, 1.75, 0.35  # in
 _PROFILE, _ACROSS = 1.75, 4  # height of a row of profiles [in], and how many are in it
 _NINETY, _HIGHEST = 2.71, 12.0  # rise at the ends of a 90 % interval, and the highest shown
-_LONG = 0.3  # in, of numbers of which two have room below a profile
+_APART = 0.08  # in, between numbers below a profile
 _CELL = 0.24  # in, room that a number in the map takes
 _MOST = 0.05  # weight below which a cell of the map is left empty
 
@@ -75,8 +75,8 @@ def _profile(axes: Axes, one: Profile, first: bool) -> None:
     axes.axhline(_NINETY, color=GRAY, linestyle="--", linewidth=0.8)
     axes.set_ylim(-0.5, _HIGHEST)
     axes.set_xlabel(_words(one.name, (WIDE - 0.5) / _ACROSS, 8))
-    axes.locator_params(axis="x", nbins=2 if text_width(f"{one.values[0]:.2g}") < _LONG else 1)
-    show_plain_numbers(axes, "x")
+    width = axes.get_position().width * WIDE
+    axes.set_xticks(*ticks(axes.get_xlim(), lambda texts: width / (max(map(text_width, texts)) + _APART)))
     if first:
         axes.set_title("Sum of squares of the readings above its minimum (dashed: 90 % limit)", loc="left")
         axes.set_ylabel("Rise")

@@ -21,14 +21,23 @@ def default_candidates(fit: Record) -> tuple[Candidate, ...]:
     Raises:
         UsageError: There is nothing that could be simulated.
     """
-    at = situation_of(fit.model, fit.dataset.measurements)
-    found = [c for kind in candidate_kinds().values() for c in kind.offered(at) if not why_not(fit, c)]
+    found = _offered(fit)
     if not found:
         raise UsageError(
-            "this fit's tables hold nothing whose next reading can be simulated (recordings of a loop cannot be yet); name "
-            "candidates with --candidate, such as preload@90deg."
+            "this fit's tables hold nothing whose next reading can be simulated (recordings of a loop and displacements cannot "
+            "be yet); name candidates with --candidate, such as preload@90deg of a loop or force@90deg of a single cable."
         )
-    return tuple(found)
+    return found
+
+
+def can_be_ranked(fit: Record) -> bool:
+    """Whether the tables of the description hold anything whose next reading can be simulated."""
+    return bool(_offered(fit))
+
+
+def _offered(fit: Record) -> tuple[Candidate, ...]:
+    at = situation_of(fit.model, fit.dataset.measurements)
+    return tuple(c for kind in candidate_kinds().values() for c in kind.offered(at) if not why_not(fit, c))
 
 
 def why_not(fit: Record, candidate: Candidate) -> str:

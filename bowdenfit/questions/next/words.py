@@ -130,9 +130,9 @@ def _repeated(found: NextMeasurement) -> list[str]:
     if half == 1:
         return []
     if half is not None:
-        return [f"Nothing but this would take about {half} times to halve the uncertainty."]
+        return [f"By itself it would halve the uncertainty after about {half} times."]
     still = _sd(found, repeats.sd[-1])
-    return [f"Nothing but this would not halve the uncertainty: after {most} times it would still be {still}."]
+    return [f"By itself it would not halve the uncertainty: after {most} times that would still be {still}."]
 
 
 def ranking_table(found: NextMeasurement, top: int) -> tuple[list[str], list[list[str]]]:

@@ -42,8 +42,14 @@ class LostForce:
         load = "at any load" if self.at_any_load else "even at the smallest load"
         return (
             f"Drag: while pulling{where}, {_shown(self.lost)} of the force is lost {load}, as if "
-            f"{_shown(self.hidden_tension)} of tension did not show at the cells. The parameter drag is that hidden tension D; "
-            "it costs D (1 - exp(-Lambda)), Lambda being the sum of friction coefficient times wrap angle."
+            f"{_shown(self.hidden_tension)} of tension did not show at the cells."
+        )
+
+    def explained(self) -> str:
+        """The same, and which parameter that is."""
+        return (
+            f"{self.sentence()} The parameter drag is that hidden tension D; it costs D (1 - exp(-Lambda)), Lambda being the "
+            "sum of friction coefficient times wrap angle."
         )
 
     def short(self) -> str:

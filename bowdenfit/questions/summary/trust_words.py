@@ -5,6 +5,7 @@ from bowdenfit.questions.check.answer import checks_of
 from bowdenfit.questions.check.table_checks import CheckedReading
 from bowdenfit.questions.identify.confounding import confounded_pairs
 from bowdenfit.questions.identify.judgment import identifiability
+from bowdenfit.questions.next.candidates import can_be_ranked
 from bowdenfit.questions.summary.answer import readings_off
 from bowdenfit.questions.summary.verdict import (
     CONTRADICTORY,
@@ -71,6 +72,8 @@ def next_step(fit: Record) -> str:
     again = f"; in doubt, measure {_named(found.decisive[0])} again, on which the answer leans most" if found.decisive else ""
     if fit.dataset.description.route is not None and fit.optimal_length().is_settled:
         return f"Next: nothing needs to be measured{again}. bowdenfit next says what would narrow it."
+    if not can_be_ranked(fit):
+        return f"Next: any measurement of another kind or at other bends would tell more{again}."
     return f"Next: bowdenfit next says which measurement would tell most{again}."
 
 

@@ -208,7 +208,7 @@ def _friction_model(fit: Record) -> str:
             "that stands beside them."
         )
         lost = lost_force(fit)
-        lines += [lost.sentence()] if lost is not None else []
+        lines += [lost.explained()] if lost is not None else []
     if friction.depends_on_stroke:
         lines.append(
             "Coefficients are the mean of pulling and returning; efficiencies and the best length are those of pulling."

@@ -30,9 +30,19 @@ def files_of(folder: str | Path, name: str) -> list[Path]:
         folder: Where they are.
         name: Of the answer.
     """
+    return [*(Path(folder) / f"{name}.{ending}" for ending in (PAGE, TEXT)), *figures_of(folder, name)]
+
+
+def figures_of(folder: str | Path, name: str) -> list[Path]:
+    """The figure of an answer in every format.
+
+    Args:
+        folder: Where they are.
+        name: Of the answer.
+    """
     from bowdenfit.plots.write import EVERY_FORMAT
 
-    return [Path(folder) / f"{name}.{ending}" for ending in (PAGE, TEXT, *EVERY_FORMAT)]
+    return [Path(folder) / f"{name}.{ending}" for ending in EVERY_FORMAT]
 
 
 def write_answer(

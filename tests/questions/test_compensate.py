@@ -5,7 +5,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from figure_words import faults
+from figure_words import assert_answer_readable
 from one_page import faults as faults_of_page
 
 import bowdenfit as bf
@@ -13,7 +13,7 @@ from bowdenfit.description.device import read_device
 from bowdenfit.device.coulomb import moves_by_itself
 from bowdenfit.errors import DescriptionError, UsageError
 from bowdenfit.questions.bends.loop_draws import loop_draws
-from bowdenfit.questions.compensate.figure import draw, draw_traces
+from bowdenfit.questions.compensate import compensation_figure, compensation_traces_figure
 from bowdenfit.questions.compensate.ranking import compensation_of
 from bowdenfit.questions.compensate.words import compensation_text
 
@@ -127,8 +127,8 @@ def test_simulated_devices_do_what_was_foretold(fit, schedule, tmp_path):
     assert page["fixed"]["torque"] == seen.fixed.torque
     assert len(page["simulated"]["laws"]) == 3
     assert (tmp_path / "answer" / "compensation.txt").read_text() == text
-    for figure in (draw(seen), draw_traces(seen)):
-        assert list(faults(figure)) == []
+    for file in (compensation_figure, compensation_traces_figure):
+        assert_answer_readable(file, seen, "Loop")
 
 
 def test_words_fit_a_page_whatever_is_asked(fit, found):
@@ -139,7 +139,7 @@ def test_words_fit_a_page_whatever_is_asked(fit, found):
         text = compensation_text(answer)
         assert faults_of_page(text) == []
         assert len(text.splitlines()) <= 25
-        assert list(faults(draw(answer))) == []
+        assert_answer_readable(compensation_figure, answer, "Loop")
         assert "nan" not in text
     assert answers[3].fixed is None
     assert answers[2].gain is None

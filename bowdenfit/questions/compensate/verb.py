@@ -3,7 +3,7 @@
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any, Literal
 
-from bowdenfit.questions.writing import FIGURES, files_of, write_answer
+from bowdenfit.questions.writing import figures_of, files_of, write_answer
 from bowdenfit.verb import Argument, Option, Output, Quantity, Reply, Verb
 
 if TYPE_CHECKING:
@@ -60,7 +60,7 @@ def compensate(
             raise asked_for("a simulation", NEEDED)
         answer = replace(answer, simulated=simulated(found, described, loop, answer, schedule))
     if output is not None:
-        _write(answer, Path(output))
+        _write(answer, Path(output), found.name)
     return answer
 
 
@@ -83,18 +83,16 @@ def _share(risk: Quantity | None) -> float:
     return float(share)
 
 
-def _write(answer: "Compensation", folder: Path) -> None:
-    from bowdenfit.plots.write import write
-    from bowdenfit.questions.compensate.figure import draw, draw_traces
+def _write(answer: "Compensation", folder: Path, cable: str) -> None:
+    from bowdenfit.questions.compensate import compensation_figure, compensation_traces_figure
     from bowdenfit.questions.compensate.words import compensation_text
+    from bowdenfit.questions.figure_files import write_figure
     from bowdenfit.results.folder import folder_to_write
 
     if answer.simulated is not None:
         with folder_to_write(folder):
-            traces = draw_traces(answer)
-            for ending in FIGURES:
-                write(traces, folder / f"{TRACES}.{ending}")
-    write_answer(folder, NAME, answer, compensation_text(answer), lambda: draw(answer))
+            write_figure(compensation_traces_figure, answer, folder, TRACES, cable)
+    write_answer(folder, NAME, answer, compensation_text(answer), compensation_figure, cable)
 
 
 def _reply(found: "Compensation", asked: dict[str, Any]) -> Reply:
@@ -102,7 +100,7 @@ def _reply(found: "Compensation", asked: dict[str, Any]) -> Reply:
 
     files = files_of(asked["output"], NAME) if asked["output"] else []
     if files and found.simulated is not None:
-        files += [Path(asked["output"]) / f"{TRACES}.{ending}" for ending in FIGURES]
+        files += figures_of(asked["output"], TRACES)
     notes = tuple(f"Wrote {path}." for path in files)
     return Reply(compensation_text(found), lambda: found, notes, csv=found.to_csv)
 

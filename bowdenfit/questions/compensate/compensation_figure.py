@@ -1,4 +1,4 @@
-"""What may be hidden by bend, what preload does, and the torques through time as in figures 9 to 11 of the haptic paper."""
+"""What may be hidden by bend, and what preload does."""
 
 from __future__ import annotations
 
@@ -8,38 +8,34 @@ import numpy as np
 
 from bowdenfit.plots.layout import TITLE, legend_above, panels
 from bowdenfit.plots.style import BLUE, GREEN, SERIES_LINES, VERMILLION, WRAP_ANGLE, in_paper_style
-from bowdenfit.questions.compensate.simulated import ACTIVE, KARNOPP, NONE
+from bowdenfit.words import counted
 
 if TYPE_CHECKING:
     from bowdenfit.plots.layout import Axes, Figure
     from bowdenfit.questions.compensate.answer import Compensation
-    from bowdenfit.questions.compensate.simulated import Law
 
-_TITLES = {NONE: "Nothing hidden", KARNOPP: "Fed forward", ACTIVE: "Fed back"}
+HEADING = "How much friction may be hidden"
 _HEIGHT = 1.9  # in
 _TORQUE = "Torque (N m)"
 
 
+def caption(found: Compensation) -> str:
+    """What is drawn, in plain words."""
+    fed = " Dashed and dotted: what a controller may feed forward without the device moving by itself." if found.fixed else ""
+    return (
+        f"Left: friction of the loop by wrap angle, median and 90 % interval.{fed} Right: torque that is felt in free motion, "
+        "and torque from which on the rope goes slack, by preload, median and 90 % interval. "
+        f"n = {counted(len(found.by_bend), 'bend')} and {counted(len(found.preloads), 'preload')}."
+    )
+
+
 @in_paper_style
 def draw(found: Compensation) -> Figure:
-    """Friction with what may be fed forward, and the preload; below them the simulated torques, a panel a law."""
+    """Friction with what may be fed forward, and the preload."""
     figure, (friction, preload) = panels([_HEIGHT], 2, TITLE, (0.75, 0))
     _friction(friction, found)
     _preload(preload, found)
     legend_above(figure, [friction, preload], columns=3)
-    return figure
-
-
-@in_paper_style
-def draw_traces(found: Compensation) -> Figure:
-    """Torques at motor and joint while a hand moves the device to and fro, a panel a law."""
-    seen = found.simulated
-    assert seen is not None  # asked only of a simulation
-    figure, shown = panels([_HEIGHT], len(seen.laws), TITLE, (0.25, 0), sharey=True)
-    for axes, law in zip(shown, seen.laws, strict=True):
-        _torques(axes, law)
-    shown[0].set_ylabel(_TORQUE)
-    legend_above(figure, shown, columns=2)
     return figure
 
 
@@ -80,17 +76,3 @@ def _preload(axes: Axes, found: Compensation) -> None:
     axes.set(xlabel="Preload (N)", ylabel=_TORQUE)
     axes.set_ylim(bottom=0)
     axes.set_title("What preload does", loc="left")
-
-
-def _torques(axes: Axes, law: Law) -> None:
-    axes.plot(law.trace.time, law.trace.motor, color=BLUE, linewidth=0.9, label="At the motor")
-    axes.plot(
-        law.trace.time,
-        law.trace.joint,
-        color=VERMILLION,
-        linestyle=SERIES_LINES[1],
-        linewidth=0.9,
-        label="At the joint",
-    )
-    axes.set_xlabel("Time (s)")
-    axes.set_title(_TITLES[law.name], loc="left")

@@ -1,0 +1,56 @@
+"""Torques of a simulated device through time, as in figures 9 to 11 of the haptic paper."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+from bowdenfit.plots.layout import TITLE, legend_above, panels
+from bowdenfit.plots.style import BLUE, SERIES_LINES, VERMILLION, in_paper_style
+from bowdenfit.questions.compensate.simulated import ACTIVE, KARNOPP, NONE
+from bowdenfit.words import counted
+
+if TYPE_CHECKING:
+    from bowdenfit.plots.layout import Axes, Figure
+    from bowdenfit.questions.compensate.answer import Compensation
+    from bowdenfit.questions.compensate.simulated import Law
+
+HEADING = "Torques while a hand moves the device"
+_TITLES = {NONE: "Nothing hidden", KARNOPP: "Fed forward", ACTIVE: "Fed back"}
+_HEIGHT = 1.9  # in
+_TORQUE = "Torque (N m)"
+
+
+def caption(found: Compensation) -> str:
+    """What is drawn, in plain words."""
+    n = len(found.simulated.laws) if found.simulated is not None else 0
+    return (
+        "Simulated torques at the motor and at the joint while a hand moves the device to and fro, a panel for each way of "
+        f"hiding friction. n = {counted(n, 'simulation')}."
+    )
+
+
+@in_paper_style
+def draw(found: Compensation) -> Figure:
+    """Torques at motor and joint while a hand moves the device to and fro, a panel a law."""
+    seen = found.simulated
+    assert seen is not None  # asked only of a simulation
+    figure, shown = panels([_HEIGHT], len(seen.laws), TITLE, (0.25, 0), sharey=True)
+    for axes, law in zip(shown, seen.laws, strict=True):
+        _torques(axes, law)
+    shown[0].set_ylabel(_TORQUE)
+    legend_above(figure, shown, columns=2)
+    return figure
+
+
+def _torques(axes: Axes, law: Law) -> None:
+    axes.plot(law.trace.time, law.trace.motor, color=BLUE, linewidth=0.9, label="At the motor")
+    axes.plot(
+        law.trace.time,
+        law.trace.joint,
+        color=VERMILLION,
+        linestyle=SERIES_LINES[1],
+        linewidth=0.9,
+        label="At the joint",
+    )
+    axes.set_xlabel("Time (s)")
+    axes.set_title(_TITLES[law.name], loc="left")

@@ -8,13 +8,12 @@ import numpy as np
 
 from bowdenfit.plots.bands import draw_quantiles
 from bowdenfit.plots.style import GRAY
+from bowdenfit.questions.summary.forces_marks import RETURN_DASHES
 from bowdenfit.questions.summary.forces_shown import STROKES
 
 if TYPE_CHECKING:
     from bowdenfit.plots.layout import Axes
     from bowdenfit.questions.summary.forces_shown import Forces
-
-DASHES = (0, (4, 1.6))
 
 
 def draw_by_bend(axes: Axes, forces: Forces, value: str) -> None:
@@ -32,7 +31,7 @@ def draw_by_bend(axes: Axes, forces: Forces, value: str) -> None:
             rows = [
                 [np.interp(here.input_force.mean(), here.load, row) for row in getattr(here, value)[:, i]] for here in places
             ]
-            draw_quantiles(axes, at, np.array(rows).T, GRAY, linestyle="-" if stroke > 0 else DASHES, linewidth=1.0)
+            draw_quantiles(axes, at, np.array(rows).T, GRAY, linestyle="-" if stroke > 0 else RETURN_DASHES, linewidth=1.0)
 
 
 def limits_of_bends(forces: Forces) -> tuple[float, float]:

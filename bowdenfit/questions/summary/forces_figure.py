@@ -6,25 +6,24 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from bowdenfit.plots.bands import draw_quantiles, middle, name_band
+from bowdenfit.plots.bands import draw_quantiles, name_band
 from bowdenfit.plots.layout import BOTTOM, RIGHT, axes_at, empty_page, legend_above, place_labels, wrapped
 from bowdenfit.plots.panels import make_logarithmic
 from bowdenfit.plots.style import (
-    BLACK,
     GRAY,
     GREEN,
     LEAST_SQUARES,
     LIGHT,
-    SERIES_COLORS,
-    SERIES_MARKERS,
     SMALL,
     VERMILLION,
     WIDE,
     WRAP_ANGLE,
     in_paper_style,
 )
+from bowdenfit.questions.summary.apparent_friction import draw_apparent
 from bowdenfit.questions.summary.forces_by_bend import draw_by_bend, limits_of_bends
-from bowdenfit.questions.summary.forces_shown import STROKES, Forces, ForcesHere, forces_shown
+from bowdenfit.questions.summary.forces_marks import MARK, RETURN_DASHES, colored_places, draw_readings, where_read
+from bowdenfit.questions.summary.forces_shown import STROKES, Forces, forces_shown
 from bowdenfit.words import counted
 
 if TYPE_CHECKING:
@@ -36,13 +35,8 @@ MAIN, STRIP, GAP, ACROSS, LEFT = 2.3, 0.85, 0.12, 0.88, 0.78  # in
 LABEL = 0.56  # in, from the axes to their names: numbers of many digits stand between
 VERDICT_ROW, VERDICT_ROWS = 0.14, 3  # in, and how many at most
 LEAST_WIDTH = 2.6  # in, of a panel with its labels
-MARK, SMALL_MARK, MANY = 3.4, 2.0, 300  # pt, pt, and readings from which marks are small
-RETURN_DASHES, NO_FRICTION = (0, (4, 1.6)), (0, (6, 1.5, 1, 1.5))
+NO_FRICTION = (0, (6, 1.5, 1, 1.5))
 ROOM = 1.15
-CAPSTAN, CAPSTAN_DOTS = "Capstan equation", (0, (1, 1.2))
-ALIKE = 1e-3  # of a coefficient, within which it is the same
-FROM_ZERO = 0.6  # lowest over highest coefficient below which the axis begins at 0
-_OUTER = (0.02, 0.98)  # quantiles of the readings between which the axis of the coefficient is made
 
 
 def data(fit: Record) -> Forces | None:
@@ -77,7 +71,7 @@ def draw(forces: Forces, width: float | None = None) -> Figure:
             make_logarithmic(axes, name, float(read.max() / read.min()))
     _main(main, forces)
     _strip(strip, forces)
-    _apparent(beside, forces)
+    draw_apparent(beside, forces)
     inner = page * main.get_position().width
     for axes in (main, strip, beside):
         place_labels(figure, axes)
@@ -107,42 +101,16 @@ def _verdict(forces: Forces) -> str:
     return f"Not trusted. {forces.verdict.partition(';')[0].rstrip('.')}."
 
 
-def _colored(forces: Forces) -> list[tuple[ForcesHere, str, str]]:
-    """The places with lines of their own, with color and marker."""
-    shown = [here for here in forces.places if here.shown]
-    return [(here, SERIES_COLORS[i % 8], SERIES_MARKERS[i % 8]) for i, here in enumerate(shown)]
-
-
-def _marks(axes: Axes, forces: Forces, value: str, name: bool = False) -> None:
-    """Readings of all places: filled while pulling, open while returning, crosses where held, gray without a line."""
-    size = MARK if sum(len(here.stroke) for here in forces.places) < MANY else SMALL_MARK
-    low, high = axes.get_ylim() if value == "apparent" else (-np.inf, np.inf)
-    looks = {id(here): (color, marker) for here, color, marker in _colored(forces)}
-    for here in forces.places:
-        color, marker = looks.get(id(here), (GRAY, "."))
-        y = np.clip(getattr(here, value), low, high)
-        for stroke, mark, fill in ((1, marker, color), (-1, marker, "white"), (0, "x", color)):
-            mine = (here.stroke == stroke) & np.isfinite(y)
-            if mine.any():
-                x = here.bend if forces.by_bend else here.input_force
-                axes.plot(
-                    x[mine], y[mine], mark, color=color, markerfacecolor=fill, markersize=size, markeredgewidth=0.7, zorder=3,
-                    clip_on=value != "apparent",
-                )  # fmt: skip
-        if name and here.shown and here.label:
-            axes.plot([], [], marker=marker, color=color, markersize=MARK, label=here.label)
-
-
 def _main(axes: Axes, forces: Forces) -> None:
     """Output against input."""
     every = np.concatenate([here.stroke for here in forces.places])
     if forces.by_bend:
         draw_by_bend(axes, forces, "law")
-    for here, color, _ in [] if forces.by_bend else _colored(forces):
+    for here, color, _ in [] if forces.by_bend else colored_places(forces):
         for i, stroke in enumerate(STROKES):
             if np.any(here.stroke == stroke) or not np.any(here.stroke):
                 line = "-" if stroke > 0 else RETURN_DASHES
-                draw_quantiles(axes, *_where_read(here, here.law[:, i]), color, linestyle=line, linewidth=1.0)
+                draw_quantiles(axes, *where_read(here, here.law[:, i]), color, linestyle=line, linewidth=1.0)
     load = forces.places[0].load
     bends, pulled = limits_of_bends(forces) if forces.by_bend else (0.0, 0.0), forces.places[0].input_force.mean()
     unloaded = (bends, (pulled, pulled)) if forces.by_bend else (load, load)
@@ -157,7 +125,7 @@ def _main(axes: Axes, forces: Forces) -> None:
     if np.any(every == 0):
         axes.plot([], [], "x", color=GRAY, markersize=MARK, label="Held")
     name_band(axes, law)
-    _marks(axes, forces, "output_force", name=True)
+    draw_readings(axes, forces, "output_force", name=True)
     if not all(here.shown for here in forces.places):
         axes.plot([], [], ".", color=GRAY, label="Elsewhere")
     if forces.count:
@@ -168,14 +136,6 @@ def _main(axes: Axes, forces: Forces) -> None:
     axes.set_ylim((0.7 * out.min(), 1.4 * out.max()) if forces.logarithmic else (0.0, 1.08 * max(out.max(), load[-1])))
     axes.set_ylabel("Output force (N)")
     axes.tick_params(labelbottom=False)
-
-
-def _where_read(here: ForcesHere, line: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Loads of a line and its quantiles there, from the lowest reading of the place to its highest."""
-    loads = np.linspace(here.input_force.min(), here.input_force.max(), len(here.load))
-    if here.load[1] / here.load[0] < here.load[-1] / here.load[-2] + ALIKE:  # evenly spaced in the logarithm
-        loads = np.geomspace(loads[0], loads[-1], len(loads))
-    return loads, np.stack([np.interp(loads, here.load, row) for row in line])
 
 
 def _strip(axes: Axes, forces: Forces) -> None:
@@ -193,55 +153,7 @@ def _strip(axes: Axes, forces: Forces) -> None:
             loads, -spread, spread, color=LIGHT, linewidth=0, zorder=0.4, label="9 of 10 readings"
         )
     axes.axhline(0.0, color=GRAY, linewidth=0.8, zorder=0.9)
-    _marks(axes, forces, "off")
+    draw_readings(axes, forces, "off")
     axes.set_ylim(-limit, limit)
     axes.set(xlabel=WRAP_ANGLE if forces.by_bend else "Input force (N)", ylabel="Residual (%)")
     axes.locator_params(axis="y", nbins=5)
-
-
-def _apparent(axes: Axes, forces: Forces) -> None:
-    """Apparent coefficient against the load, beside what the capstan equation says: a horizontal line."""
-    load = forces.places[0].load
-    axes.set_xlim(*(limits_of_bends(forces) if forces.by_bend else (load[0] if forces.logarithmic else 0.0, load[-1])))
-    axes.set_ylim(*_coefficient_limits(forces))
-    if forces.by_bend:
-        draw_by_bend(axes, forces, "apparent_law")
-    colored, bent = [] if forces.by_bend else _colored(forces), False
-    together = colored and _all_alike(forces)
-    for here, color in [(colored[0][0], BLACK)] if together else [(here, color) for here, color, _ in colored]:
-        for i, stroke in enumerate(STROKES):
-            if np.any(here.stroke == stroke):
-                line = "-" if stroke > 0 else RETURN_DASHES
-                draw_quantiles(axes, *_where_read(here, here.apparent_law[:, i]), color, linestyle=line, linewidth=1.0)
-        if np.isfinite(here.capstan) and not _is_level(here):
-            axes.axhline(here.capstan, color=color, linestyle=CAPSTAN_DOTS, linewidth=1.1)
-            bent = True
-    axes.plot([], [], color=GRAY, linestyle=CAPSTAN_DOTS if bent else "-", linewidth=1.1, label=CAPSTAN)
-    _marks(axes, forces, "apparent")
-    axes.locator_params(axis="y", nbins=6)
-    axes.set(xlabel=WRAP_ANGLE if forces.by_bend else "Input force (N)", ylabel="Apparent friction coefficient")
-
-
-def _all_alike(forces: Forces) -> bool:
-    """Whether several places have one coefficient, so that their lines are one."""
-    lines = np.array([middle(here.apparent_law) for here in forces.places if here.shown])
-    return bool(len(lines) > 1 and np.ptp(lines) < ALIKE * np.max(np.abs(lines)))
-
-
-def _is_level(here: ForcesHere) -> bool:
-    """Whether the law is the capstan equation's: the same coefficient at all loads."""
-    line = middle(here.apparent_law)
-    return bool(np.ptp(line) < ALIKE * np.max(np.abs(line)))
-
-
-def _coefficient_limits(forces: Forces) -> tuple[float, float]:
-    """From the readings but for a few far ones, and from the laws; far ones are drawn on the edge."""
-    readings = np.concatenate([here.apparent for here in forces.places])
-    readings = readings[np.isfinite(readings)]
-    if not len(readings):
-        return 0.0, 1.0
-    lines = [value for here in forces.places if here.shown for value in (here.capstan, *middle(here.apparent_law)[0])]
-    outer = np.quantile(readings, _OUTER)
-    low, high = min(*outer, np.nanmedian(lines)), max(*outer, np.nanmedian(lines))
-    room = 0.15 * (high - low) or 0.1 * abs(high)
-    return (low - room if low > FROM_ZERO * high else min(0.0, low - room)), high + room

@@ -52,7 +52,7 @@ def answers(function: Any) -> list[type]:
     known = dict(vars(module))
     for node in ast.walk(ast.parse(inspect.getsource(module))):  # with what is imported for type checkers alone
         if isinstance(node, ast.ImportFrom) and node.module:
-            known |= {each.asname or each.name: getattr(import_module(node.module), each.name) for each in node.names}
+            known |= {each.asname or each.name: getattr(import_module(node.module), each.name, None) for each in node.names}
     hint = get_type_hints(function, known)["return"]
     parts = (hint, *get_args(hint))
     return [part for part in parts if inspect.isclass(part) and issubclass(part, Display)]

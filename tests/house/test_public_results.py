@@ -96,7 +96,7 @@ def test_a_verb_loads_the_words_of_what_it_answers():
 def imported(node) -> list[str]:
     """Modules that a line imports."""
     if isinstance(node, ast.ImportFrom):
-        return [node.module or ""]
+        return [node.module or "", *(f"{node.module}.{each.name}" for each in node.names)]
     return [each.name for each in node.names] if isinstance(node, ast.Import) else []
 
 

@@ -49,6 +49,7 @@ def compensate(
     from dataclasses import replace
 
     from bowdenfit.description.device import asked_for, read_device
+    from bowdenfit.questions.compensate import words  # noqa: F401  (how the answer shows itself)
     from bowdenfit.questions.compensate.gain import NEEDED
     from bowdenfit.questions.compensate.ranking import compensation_of
     from bowdenfit.questions.compensate.simulation import simulated

@@ -34,6 +34,7 @@ if TYPE_CHECKING:
     from bowdenfit.questions.report.verb import report
     from bowdenfit.questions.simulate.verb import simulate
     from bowdenfit.questions.summary.verb import plot
+    from bowdenfit.questions.teleoperate.verb import teleoperate
     from bowdenfit.reading import read
     from bowdenfit.run.verb import fit
 
@@ -56,6 +57,7 @@ _WHERE = {
     "read": "bowdenfit.reading",
     "report": "bowdenfit.questions.report.verb",
     "simulate": "bowdenfit.questions.simulate.verb",
+    "teleoperate": "bowdenfit.questions.teleoperate.verb",
     **dict.fromkeys(
         ("BowdenfitError", "ConvergenceError", "DatasetError", "DescriptionError", "StoreError", "UsageError"),
         "bowdenfit.errors",
@@ -87,6 +89,7 @@ __all__ = [
     "read",
     "report",
     "simulate",
+    "teleoperate",
 ]
 
 

@@ -16,9 +16,10 @@ from bowdenfit.questions.report.verb import VERB as REPORT
 from bowdenfit.questions.simulate.verb import VERB as SIMULATE
 from bowdenfit.questions.summary.verb import PLOT_VERB as PLOT
 from bowdenfit.questions.summary.verb import SUMMARY_VERB as SUMMARY
+from bowdenfit.questions.teleoperate.verb import VERB as TELEOPERATE
 from bowdenfit.run.verb import VERB as FIT
 
 VERBS = (
-    CHECK, FIT, SUMMARY, PREDICT, LENGTH, IDENTIFY, NEXT, COMPARE, COMPENSATE, EXPORT, CALIBRATE, FLEET, POOL, PLOT, REPORT,
-    SIMULATE, METABOLIC,
+    CHECK, FIT, SUMMARY, PREDICT, LENGTH, IDENTIFY, NEXT, COMPARE, COMPENSATE, TELEOPERATE, EXPORT, CALIBRATE, FLEET, POOL,
+    PLOT, REPORT, SIMULATE, METABOLIC,
 )  # fmt: skip

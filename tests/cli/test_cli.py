@@ -31,6 +31,7 @@ VERBS = (
     "identify",
     "compare",
     "compensate",
+    "teleoperate",
     "next",
     "export",
     "calibrate",

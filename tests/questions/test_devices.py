@@ -1,4 +1,4 @@
-"""How much friction may be hidden: probabilities over draws and mountings, words, files, figures, and what is refused."""
+"""Compensation and teleoperation: probabilities over draws and mountings, words, files, figures, and what is refused."""
 
 import json
 from pathlib import Path
@@ -16,6 +16,10 @@ from bowdenfit.questions.bends.loop_draws import loop_draws
 from bowdenfit.questions.compensate import compensation_figure, compensation_traces_figure
 from bowdenfit.questions.compensate.ranking import compensation_of
 from bowdenfit.questions.compensate.words import compensation_text
+from bowdenfit.questions.teleoperate.contact import bounces
+from bowdenfit.questions.teleoperate.figure import draw as draw_remote
+from bowdenfit.questions.teleoperate.stability import hardest_wall
+from bowdenfit.questions.teleoperate.words import teleoperation_text
 
 DATA = Path(__file__).parents[2] / "datasets"
 DEVICE = DATA / "haptic-teleoperation" / "device.toml"
@@ -193,3 +197,90 @@ def test_the_verb_prints_and_writes_what_the_library_answers(fit, run, tmp_path)
     assert page["gain"]["safe"] > 0
     assert run(*asked, "--csv")[1].startswith("wrap_angle_deg,friction_N*m")
     assert run("compensate", tmp_path / "fit")[0] == 2
+
+
+@pytest.fixture(scope="module")
+def remote(fit):
+    return bf.teleoperate(fit, DEVICE, wrap_angle=RANGE)
+
+
+def test_couplings_stand_in_the_order_that_the_paper_tells(remote):
+    four, two, *local = remote.schemes
+    assert four.free.median < 0.7 * two.free.median, "four channels are felt less"
+    assert two.hardest < 0.5 * four.hardest, "and bear harder walls"
+    assert [each.free.median for each in local] == sorted((each.free.median for each in local), reverse=True)
+    assert four.free.median > local[0].free.median
+    assert four.hardest > local[0].hardest > local[1].hardest > 0, "contact with local feedback is less stable"
+    assert four.stiffness.median > local[0].stiffness.median
+
+
+def test_what_is_felt_is_what_is_simulated(remote):
+    seen, stated = remote.contact, remote.stated
+    speed = np.gradient(seen.master, seen.time)
+    slow = (seen.time > 0.5) & (seen.time < 2) & (np.abs(speed) > 0.5)
+    felt = np.mean((seen.hand_torque * np.sign(speed))[slow])
+    assert felt == pytest.approx(stated.free.median, rel=0.25), "with what damping adds"
+    assert seen.bounces is False
+    assert seen.wall_torque[-1] > 0.5
+
+
+def test_the_hardest_wall_is_where_the_probability_is_crossed_first():
+    walls = np.array([1.0, 10.0, 100.0, 1000.0])
+    assert hardest_wall(walls, np.array([1.0, 1.0, 0.9, 1.0]), 0.95) == pytest.approx(10**1.5)
+    assert hardest_wall(walls, np.ones(4), 0.95) is None
+    assert hardest_wall(walls, np.zeros(4), 0.95) == 0
+
+
+def test_a_slave_that_leaves_the_wall_late_bounces():
+    time = np.arange(0, 5, 0.1)
+    torque = np.where(time > 2.05, 1.0, 0.0)
+    assert bounces(time, torque) is False
+    assert bounces(time, torque * (time < 4)) is True
+    assert bounces(time, 0 * time) is None
+
+
+def test_words_and_files_of_teleoperation_can_be_read(fit, run, tmp_path):
+    fit.save(tmp_path / "fit")
+    asked = ("teleoperate", tmp_path / "fit", DEVICE, "--wrap-angle", "180deg")
+    code, out, _ = run(*asked, "--output", tmp_path / "answer")
+    assert code == 0
+    assert faults_of_page(out) == []
+    page = json.loads((tmp_path / "answer" / "teleoperation.json").read_text())
+    assert len(page["schemes"][0]["stable"]) == len(page["walls"])
+    assert (tmp_path / "answer" / "teleoperation.png").stat().st_size > 10_000
+    assert run(*asked, "--csv")[1].startswith("coupling,wall_stiffness_N*m/rad,stable")
+
+
+def test_the_figure_of_teleoperation_is_readable(remote):
+    assert list(faults(draw_remote(remote))) == []
+
+
+def test_gains_that_diverge_are_said_as_such_with_the_limit_that_was_crossed(fit, tmp_path):
+    hard = 'master_stiffness = { value = 5, unit = "N*m/rad" }'
+    diverging = bf.teleoperate(fit, device(tmp_path, hard, hard.replace("5", "500")), wrap_angle="90deg")
+    text = " ".join(teleoperation_text(diverging).split())
+    assert "as stated: it oscillates in free motion already, with 100 % probability" in text
+    assert "at most 1 is stable" in text
+    assert diverging.stated.radius > 1
+    assert diverging.stated.hardest == 0
+    assert np.all(np.isfinite(diverging.contact.hand_torque))
+    assert "no wall without bouncing" in text
+
+
+def test_teleoperation_that_cannot_be_answered_is_refused(fit, tmp_path):
+    def refused(error, path=DEVICE, **asked):
+        with pytest.raises(error) as raised:
+            bf.teleoperate(fit, path, **asked)
+        return str(raised.value)
+
+    assert "leaves the wrap angles measured" in refused(UsageError, wrap_angle="45deg:270deg")
+    text = refused(DescriptionError, device(tmp_path, "[wall]", "[wall] #").with_name("none.toml"))
+    assert "does not exist" in text
+    path = device(tmp_path, "torque_to_master = ", "# ")
+    assert "C_2, share of the slave's torque that is sent back; write torque_to_master = " in refused(
+        DescriptionError, path
+    )
+    path = device(tmp_path, "encoder_counts", "# ")
+    assert "encoder_counts = 2000" in refused(DescriptionError, path)
+    path = device(tmp_path, ", sd = 0.004 }\nfriction", " }\nfriction")
+    assert "slave.damping: 0.02 N*m*s/rad has no sd" in refused(DescriptionError, path)

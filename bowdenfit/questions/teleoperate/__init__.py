@@ -1,0 +1,1 @@
+"""What does a hand feel of a remote wall through a cable, and which walls does it touch without bouncing?"""

@@ -1,0 +1,71 @@
+"""Which walls are stable, and one contact through time as in figures 12 to 14 of the haptic paper."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from bowdenfit.plots.layout import TITLE, legend_above, panels
+from bowdenfit.plots.style import BLUE, GRAY, SERIES_COLORS, SERIES_LINES, SERIES_MARKERS, VERMILLION, in_paper_style
+from bowdenfit.questions.teleoperate.contact import OPEN
+
+if TYPE_CHECKING:
+    from bowdenfit.plots.layout import Axes, Figure
+    from bowdenfit.questions.teleoperate.answer import Teleoperation
+
+_HEIGHT, _DOWN = 1.7, 0.62  # in
+
+
+@in_paper_style
+def draw(found: Teleoperation) -> Figure:
+    """Probability of stable contact by wall, then positions, torques, and torque against position."""
+    figure, (walls, position, torque, stiffness) = panels([_HEIGHT, _HEIGHT], 2, TITLE, (0.75, _DOWN))
+    _walls(walls, found)
+    _through_time(position, torque, found)
+    _contact(stiffness, found)
+    legend_above(figure, [walls, position, stiffness], columns=4)
+    return figure
+
+
+def _walls(axes: Axes, found: Teleoperation) -> None:
+    for i, scheme in enumerate(found.schemes):
+        axes.plot(
+            found.walls, 100 * scheme.stable, color=SERIES_COLORS[i + 2], linestyle=SERIES_LINES[i % 4],
+            marker=SERIES_MARKERS[i], markersize=3, label=f"{scheme.name[0].upper()}{scheme.name[1:]}",
+        )  # fmt: skip
+    axes.axhline(100 * found.probability, color=GRAY, linewidth=0.8)
+    axes.set_xscale("log")
+    axes.set(xlabel="Stiffness of the wall (N m/rad)", ylabel="Stable contact (%)", ylim=(-3, 103))
+    axes.set_title("Which walls are stable", loc="left")
+
+
+def _through_time(position: Axes, torque: Axes, found: Teleoperation) -> None:
+    seen = found.contact
+    for axes, master, slave in ((position, seen.master, seen.slave), (torque, seen.hand_torque, seen.wall_torque)):
+        axes.plot(seen.time, master, color=BLUE, linewidth=1.0, label="Master and hand")
+        axes.plot(seen.time, slave, color=VERMILLION, linestyle=SERIES_LINES[1], linewidth=1.0, label="Slave and wall")
+        axes.set_xlabel("Time (s)")
+    position.set_ylabel("Angle (rad)")
+    position.set_title("Positions", loc="left")
+    torque.set_ylabel("Torque (N m)")
+    torque.set_title("Torques of hand and wall", loc="left")
+
+
+def _contact(axes: Axes, found: Teleoperation) -> None:
+    seen, stated = found.contact, found.stated.stiffness
+    touching = seen.time > OPEN
+    axes.plot(seen.master[touching], seen.hand_torque[touching], color=BLUE, linewidth=1.0)
+    axes.plot(
+        seen.slave[touching], seen.wall_torque[touching], color=VERMILLION, linestyle=SERIES_LINES[1], linewidth=1.0
+    )
+    hard = seen.wall_torque > 0
+    if stated is not None and np.any(touching & hard):
+        first = int(np.argmax(touching & hard))
+        at = seen.master[first] + np.array([0.0, 0.6 / stated.median])
+        axes.plot(
+            at, seen.hand_torque[first] + stated.median * (at - at[0]), color=GRAY, linestyle=SERIES_LINES[2],
+            label="Stiffness by the formula",
+        )  # fmt: skip
+    axes.set(xlabel="Angle (rad)", ylabel="Torque (N m)")
+    axes.set_title("Stiffness felt and touched", loc="left")

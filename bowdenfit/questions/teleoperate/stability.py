@@ -1,0 +1,130 @@
+"""From the draws of a fit and what is said of master and slave to what is felt, and which walls are stable."""
+
+from collections.abc import Mapping
+
+import numpy as np
+
+from bowdenfit.description.device import ENCODER, Device, asked_for
+from bowdenfit.device.coupling import Gains, Pair, contact_radius, felt_stiffness, free_torque, is_stable
+from bowdenfit.device.known import drawn
+from bowdenfit.inference.interval import Interval
+from bowdenfit.questions.bends.loop_draws import LoopDraws, loop_draws, range_of_bends
+from bowdenfit.questions.teleoperate.answer import Scheme, Teleoperation
+from bowdenfit.questions.teleoperate.contact import through_time
+from bowdenfit.results.record import Record
+
+DRAWS = 150
+WALLS = np.geomspace(1.0, 3000.0, 13)  # N m/rad
+LOCAL = (0.5, 1.0)  # gains on the master's own torque that are looked at beside the stated one
+_PAIR = (
+    "rope.damping", "motor.inertia", "motor.damping", "joint.inertia", "joint.damping", "hand.inertia", "hand.damping",
+    "hand.stiffness", "slave.inertia", "slave.damping",
+)  # fmt: skip
+_COUPLING = (
+    "coupling.master_stiffness", "coupling.master_damping", "coupling.slave_stiffness", "coupling.slave_damping",
+    "coupling.torque_to_master", "coupling.torque_to_slave", "coupling.local_gain",
+)  # fmt: skip
+NEEDED = (
+    *_PAIR, "wall.damping", "controller.sample_time", "controller.filter_time", "motor.friction", "slave.friction",
+    "wall.stiffness", "motor.largest_torque", "slave.largest_torque", *_COUPLING, "coupling.delay",
+)  # fmt: skip
+Bends = str | tuple[tuple[float, str], tuple[float, str]] | None
+Drawn = Mapping[str, np.ndarray]
+
+
+def teleoperation_of(fit: Record, device: Device, bends: Bends, probability: float) -> Teleoperation:
+    """The answer.
+
+    Args:
+        fit: The fit.
+        device: Master, slave, hand, wall and what is sent.
+        bends: Range of wrap angles.
+        probability: With which contact must be stable.
+
+    Raises:
+        UsageError, DescriptionError: The fit does not tell it, or something that it needs is not stated.
+    """
+    angles = range_of_bends(fit, bends)
+    loop = loop_draws(fit, angles, device, np.ones(1))
+    _refuse_missing(device, loop)
+    assert loop.stiffness is not None
+    stated = device.needed("teleoperation", *NEEDED)
+    n = len(loop.friction)
+    at = np.unique(np.linspace(0, n - 1, min(n, DRAWS)).round().astype(int))
+    known = {name: values[at] for name, values in drawn(stated, n, fit.provenance.seed).items()}
+    bend = np.random.default_rng([fit.provenance.seed, 43]).integers(len(angles), size=len(at))
+    stiffness = loop.stiffness[at, bend]
+    gains = _gains({key: stated[key].value for key in _COUPLING})
+    delay = round(stated["coupling.delay"].value / stated["controller.sample_time"].value)
+    most = int(np.argmax(np.median(loop.friction, axis=0)))
+    felt = {"rope": loop.friction[at, most], "motor": known["motor.friction"], "slave": known["slave.friction"]}
+    schemes = {"as stated": gains, "two channels": gains.two_channels()}
+    schemes |= {f"local feedback {gain:g}": gains.with_local(gain) for gain in LOCAL if gain > gains.local_gain}
+    wall = stated["wall.stiffness"].value
+    found = tuple(
+        _scheme(name, each, known, stiffness, delay, felt, wall, probability) for name, each in schemes.items()
+    )
+    at_wall = float(np.mean(is_stable(contact_radius(_pair(known, stiffness, wall), gains, delay))))
+    return Teleoperation(
+        fit.name, device.name, (float(np.rad2deg(angles[0])), float(np.rad2deg(angles[-1]))), probability, len(at), WALLS, wall,
+        at_wall, found, through_time(device, loop, stated, gains, delay, most),
+    )  # fmt: skip
+
+
+def _gains(stated: Mapping[str, float]) -> Gains:
+    k_m, d_m, k_s, d_s, c_2, c_3, k_f = (stated[key] for key in _COUPLING)
+    return Gains(k_m, d_m, k_s, d_s, c_2, c_3, k_f)
+
+
+def _refuse_missing(device: Device, loop: LoopDraws) -> None:
+    needs_stiffness = ("rope.stiffness",) if loop.stiffness is None else ()
+    count = [ENCODER] if device.controller.encoder_counts is None else []
+    if missing := [*device.lacking(*NEEDED, *needs_stiffness), *count]:
+        raise asked_for("teleoperation", missing)
+
+
+def _pair(known: Drawn, stiffness: np.ndarray, wall: float) -> Pair:
+    """Every device with a wall of one stiffness, or in free motion."""
+    damping = known["wall.damping"] if wall > 0 else np.zeros_like(stiffness)
+    rope, j_m, b_m, j_j, b_j, j_h, b_h, k_h, j_s, b_s = (known[key] for key in _PAIR)
+    sample, filter_time = known["controller.sample_time"], known["controller.filter_time"]
+    walls = np.full_like(stiffness, wall)
+    return Pair(stiffness, rope, j_m, b_m, j_j, b_j, j_h, b_h, k_h, j_s, b_s, walls, damping, sample, filter_time)
+
+
+def _scheme(
+    name: str,
+    gains: Gains,
+    known: Drawn,
+    stiffness: np.ndarray,
+    delay: int,
+    felt: Drawn,
+    wall: float,
+    probability: float,
+) -> Scheme:
+    """What is felt with one coupling, and which walls are stable."""
+    radius = contact_radius(_pair(known, stiffness, 0.0), gains, delay)
+    stable = np.array([np.mean(is_stable(contact_radius(_pair(known, stiffness, k), gains, delay))) for k in WALLS])
+    own = None if gains.damps_alone else Interval.of(np.asarray(felt_stiffness(gains, stiffness, wall)))
+    free = Interval.of(np.asarray(free_torque(gains, felt["rope"], felt["motor"], felt["slave"])))
+    in_the_open = float(np.mean(is_stable(radius)))
+    hardest = 0.0 if in_the_open < probability else hardest_wall(WALLS, stable, probability)
+    return Scheme(name, free, own, in_the_open, stable, hardest, float(np.median(radius)))
+
+
+def hardest_wall(walls: np.ndarray, stable: np.ndarray, probability: float) -> float | None:
+    """Hardest wall up to which every softer one is stable with a probability; None where none looked at is too hard.
+
+    Args:
+        walls: Stiffnesses from the softest to the hardest [N m/rad].
+        stable: Probability that contact with each is stable.
+        probability: Such as 0.95.
+    """
+    too_hard = stable < probability
+    if not too_hard.any():
+        return None
+    first = int(np.argmax(too_hard))
+    if first == 0:
+        return 0.0
+    share = (stable[first - 1] - probability) / (stable[first - 1] - stable[first])
+    return float(walls[first - 1] * (walls[first] / walls[first - 1]) ** share)

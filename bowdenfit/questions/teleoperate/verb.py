@@ -1,0 +1,71 @@
+"""Asking what a hand feels of a remote wall through a cable."""
+
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Any
+
+from bowdenfit.questions.writing import files_of, write_answer
+from bowdenfit.verb import Argument, Option, Output, Quantity, Reply, Verb
+
+if TYPE_CHECKING:
+    from bowdenfit.questions.teleoperate.answer import Teleoperation
+    from bowdenfit.results.record import Record
+
+NAME = "teleoperation"
+PROBABILITY = 0.95  # with which contact must be stable
+Bends = str | tuple[Quantity, Quantity]
+
+
+def teleoperate(
+    found: Annotated["Record", Argument("RESULTS", results=True)],
+    device: Annotated[str | Path, Argument("DEVICE")],
+    *,
+    wrap_angle: Annotated[
+        Bends | None, Option(metavar="FROM:TO", default="all that were measured, such as 45deg:180deg")
+    ] = None,
+    output: Annotated[Output, Option(("-o",))] = None,
+) -> "Teleoperation":
+    """What a hand feels through a loop of a slave and its wall, and which walls are touched without bouncing.
+
+    Args:
+        found: The fit.
+        device: A device.toml that describes master, slave, hand, wall, and what is sent between them.
+        wrap_angle: Range of wrap angles that the cable is bent to.
+        output: Folder for teleoperation.json, the text and the figure.
+
+    Raises:
+        UsageError: The fit is of no loop, has no posterior, or was not measured at these wrap angles.
+        DescriptionError: Something that the answer needs is not said by the device, or has no sd.
+        StoreError: `output` cannot be written.
+    """
+    from bowdenfit.description.device import read_device
+    from bowdenfit.questions.teleoperate.figure import draw
+    from bowdenfit.questions.teleoperate.stability import teleoperation_of
+    from bowdenfit.questions.teleoperate.words import teleoperation_text
+
+    answer = teleoperation_of(found, read_device(Path(device)), wrap_angle, PROBABILITY)
+    if output is not None:
+        write_answer(output, NAME, answer, teleoperation_text(answer), lambda: draw(answer))
+    return answer
+
+
+def _reply(found: "Teleoperation", asked: dict[str, Any]) -> Reply:
+    from bowdenfit.questions.teleoperate.words import teleoperation_text
+
+    notes = tuple(f"Wrote {path}." for path in files_of(asked["output"], NAME)) if asked["output"] else ()
+    return Reply(teleoperation_text(found), lambda: found, notes, csv=found.to_csv)
+
+
+VERB = Verb(
+    teleoperate,
+    _reply,
+    "What a hand feels of a remote wall through a cable.",
+    """What a hand feels through a loop of a slave and its wall, over all that the fit leaves open: torque in free motion,
+    stiffness in contact, and which walls are touched without bouncing, with four channels between master and slave, with
+    two, and with feedback of the master's own torque.
+
+    DEVICE is a device.toml; datasets/haptic-teleoperation has one, whose README says what is printed and what assumed.
+    """,
+    json="Print as JSON.",
+    csv="Print probabilities by wall as CSV.",
+    warns=True,
+)

@@ -153,6 +153,43 @@ def test_the_limit_cycle_is_foretold_in_a_thousand_runs():
     assert np.mean(said == goes_on) >= 0.99
 
 
+def known_of(readings, noise, draw, n=4000):
+    """Draws of the friction exponent of a new mounting, and of the cable's mean, from exponents read in several mountings.
+
+    With the priors that truths come from, so that what is said with 95 % probability holds in 95 % of cables.
+    """
+    scatters = np.linspace(0.004, 0.02, 60)
+    variance = scatters[:, None] ** 2 + noise**2
+    k = len(readings)
+    precision = k / variance[:, 0] + 1 / 0.05**2
+    mean = (readings.sum() / variance[:, 0] + 0.2 / 0.05**2) / precision
+    spread = np.sum((readings - 0.2) ** 2) / variance[:, 0]
+    log_weight = -0.5 * (k * np.log(variance[:, 0]) + spread + np.log(precision) - precision * (mean - 0.2) ** 2)
+    weight = np.exp(log_weight - log_weight.max())
+    which = draw.choice(len(scatters), n, p=weight / weight.sum())
+    exponent = mean[which] + draw.standard_normal(n) / np.sqrt(precision[which])
+    return exponent + scatters[which] * draw.standard_normal(n), exponent
+
+
+def test_two_hundred_cables_move_by_themselves_as_often_as_was_accepted_and_oftener_if_mountings_are_forgotten():
+    draw, cables, noise, torque, risk = np.random.default_rng(11), 200, 1e-3, 0.35, 0.05
+    truth, scatter = 0.2 + 0.05 * draw.standard_normal(cables), draw.uniform(0.004, 0.02, cables)
+    mounted = truth[:, None] + scatter[:, None] * draw.standard_normal((cables, 7))
+    fed = []
+    for one in mounted:
+        drawn = known_of(one[:6] + noise * draw.standard_normal(6), noise, draw)
+        margins = [2 * torque * exponent[:, None] + F_M + 2 * B * DEAD_ZONE for exponent in drawn]
+        usual = [np.median(2 * torque * exponent) + F_M for exponent in drawn]
+        fed.append([largest_share(m, np.array([u]), risk) * u for m, u in zip(margins, usual, strict=True)])
+    pushed = np.full((cables, 2), 2.0 * DEAD_ZONE)
+    start = replace(Motion.at_rest(np.zeros((cables, 2))), motor_speed=pushed, joint_speed=pushed)
+    friction = np.repeat(2 * torque * mounted[:, 6:], 2, axis=1)
+    seen = simulate(plant(friction), controller(np.array(fed)), Hand(0.0, 0.0), np.zeros((3000, 2)), start=start)
+    went_on = np.sum(np.abs(seen.speed[-50:]).max(axis=0) > 0.5 * DEAD_ZONE, axis=0)
+    assert 4 <= went_on[0] <= 17, "95 % of a binomial of 200 at 5 %"
+    assert went_on[1] > 2 * went_on[0], "what coefficients alone promise"
+
+
 def test_the_share_keeps_the_risk_it_is_asked_for():
     margin = np.random.default_rng(1).lognormal(0.0, 0.1, (4001, 3))
     share = largest_share(margin, np.ones(3), 0.05)

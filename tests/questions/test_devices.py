@@ -16,8 +16,8 @@ from bowdenfit.questions.bends.loop_draws import loop_draws
 from bowdenfit.questions.compensate import compensation_figure, compensation_traces_figure
 from bowdenfit.questions.compensate.ranking import compensation_of
 from bowdenfit.questions.compensate.words import compensation_text
+from bowdenfit.questions.teleoperate import teleoperation_figure
 from bowdenfit.questions.teleoperate.contact import bounces
-from bowdenfit.questions.teleoperate.figure import draw as draw_remote
 from bowdenfit.questions.teleoperate.stability import hardest_wall
 from bowdenfit.questions.teleoperate.words import teleoperation_text
 
@@ -173,7 +173,11 @@ def test_what_cannot_be_answered_is_refused(fit, tmp_path, on_body):
     bare.write_text('name = "bare"\n[rope]\nmounting_scatter = { value = 0.01, unit = "1" }\n')
     assert "inertia = { value = 0.0007" in refused(DescriptionError, device=bare, law="active")
     assert "encoder_counts" in refused(DescriptionError, device=bare, simulate=True)
-    no_sd = device(tmp_path, ", sd = 0.004", "")
+    no_sd = device(
+        tmp_path,
+        'damping = { value = 0.02, unit = "N*m*s/rad", sd = 0.004 }\nmounting',
+        'damping = { value = 0.02, unit = "N*m*s/rad" }\nmounting',
+    )
     assert "rope.damping: 0.02 N*m*s/rad has no sd" in refused(DescriptionError, device=no_sd)
     squares = bf.fit(DATA / "synthetic-haptic-loop", seed=1, mcmc=False)
     with pytest.raises(UsageError, match="posterior"):
@@ -252,7 +256,7 @@ def test_words_and_files_of_teleoperation_can_be_read(fit, run, tmp_path):
 
 
 def test_the_figure_of_teleoperation_is_readable(remote):
-    assert list(faults(draw_remote(remote))) == []
+    assert_answer_readable(teleoperation_figure, remote, remote.cable)
 
 
 def test_gains_that_diverge_are_said_as_such_with_the_limit_that_was_crossed(fit, tmp_path):

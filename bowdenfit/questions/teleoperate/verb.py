@@ -38,13 +38,13 @@ def teleoperate(
         StoreError: `output` cannot be written.
     """
     from bowdenfit.description.device import read_device
-    from bowdenfit.questions.teleoperate.figure import draw
+    from bowdenfit.questions.teleoperate import teleoperation_figure
     from bowdenfit.questions.teleoperate.stability import teleoperation_of
     from bowdenfit.questions.teleoperate.words import teleoperation_text
 
     answer = teleoperation_of(found, read_device(Path(device)), wrap_angle, PROBABILITY)
     if output is not None:
-        write_answer(output, NAME, answer, teleoperation_text(answer), lambda: draw(answer))
+        write_answer(output, NAME, answer, teleoperation_text(answer), teleoperation_figure, found.name)
     return answer
 
 

@@ -10,6 +10,8 @@ import hand_bench
 import jax
 import numpy as np
 import pytest
+from conftest import ROOT
+from made_again import measured_again
 
 import bowdenfit as bf
 from bowdenfit.dataset import load_dataset
@@ -120,6 +122,29 @@ def test_at_most_one_healthy_bench_in_a_hundred_raises_an_alarm(tmp_path, judge,
     else:
         count = alarms(judge, lambda path, seed: forces(path, seed, **HEALTHY[bench]), tmp_path, 500)
     assert count <= 5
+
+
+AGAIN = {"loop and stretch": ("synthetic-haptic-loop", {}), "recordings": ("synthetic-recordings", {"sigma_block": 0.3})}
+
+
+def alarms_again(judge, what, count):
+    """How many of a data set's tables measured again are said not to be described."""
+    name, values = AGAIN[what]
+    made = measured_again(ROOT / "datasets" / name, count, **values)
+    return int(np.sum([any(d.worth_saying for d in judge.of(data)) for data in made]))
+
+
+@pytest.mark.parametrize("what", AGAIN)
+def test_healthy_recordings_loops_and_stretch_raise_no_alarm(judge, what):
+    """More than one of eight does in 3 of 10 000 runs of this test with other seeds."""
+    assert alarms_again(judge, what, 8) <= 1
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("what", AGAIN)
+def test_at_most_one_healthy_recording_or_loop_in_a_hundred_raises_an_alarm(judge, what):
+    """As for forces; it found none of 500 recordings."""
+    assert alarms_again(judge, what, 500) <= 5
 
 
 def test_chances_of_healthy_benches_are_uniform(tmp_path, judge):

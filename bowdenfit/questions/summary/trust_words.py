@@ -27,7 +27,8 @@ _WRONG = {
 }
 _SETTLED = "You can trust this: the computation has settled, and the readings agree with the model and with each other."
 _ALONE = (
-    "Nothing speaks against these numbers, but they are least squares alone{}; fit again without --no-mcmc for the full answer."
+    "Nothing speaks against these numbers, but they are least squares alone{}. A mistake in a single reading, such as "
+    "two of them exchanged, may go unseen; fit again without --no-mcmc for the full answer."
 )
 
 

@@ -10,6 +10,7 @@ from pathlib import Path
 import click
 
 from bowdenfit.cli.commands import command
+from bowdenfit.cli.interrupts import listening, was_asked
 from bowdenfit.cli.progress import INTERRUPTED
 from bowdenfit.cli.starting import completion, init
 from bowdenfit.cli.terminal import say
@@ -40,7 +41,9 @@ def start() -> None:
 def main() -> None:
     """Run the command line; every error the user can cause is a sentence and an exit code."""
     try:
-        sys.exit(bowdenfit.main(standalone_mode=False) or 0)
+        with listening():
+            code = bowdenfit.main(standalone_mode=False) or 0
+        sys.exit(code)
     except click.exceptions.Exit as stop:
         sys.exit(stop.exit_code)
     except click.ClickException as error:
@@ -56,6 +59,9 @@ def main() -> None:
         os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
         sys.exit(1)
     except Exception as error:
+        if was_asked():  # whatever came of it is that interrupt
+            click.echo("Interrupted.", err=True)
+            sys.exit(INTERRUPTED)
         if os.environ.get("BOWDENFIT_DEBUG"):
             raise
         error.__traceback__ = None  # what they hold may be all the memory there is

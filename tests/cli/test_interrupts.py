@@ -33,3 +33,33 @@ def test_an_interrupt_while_something_is_loaded_is_one_line(module, on_body):
 def test_without_the_first_moments_an_interrupt_is_a_traceback(on_body):
     """So the test above can fail."""
     assert "Traceback" in _interrupted("bowdenfit.cli", "click", str(on_body)).stderr
+
+
+SWALLOWED = """
+class Deaf:
+    def __del__(self):
+        os.kill(os.getpid(), signal.SIGINT)
+class Finder:
+    def find_spec(self, name, *_):
+        if name == {module!r}:
+            Deaf()
+            time.sleep(30)
+"""
+TURNED = """
+class Finder:
+    def find_spec(self, name, *_):
+        if name == {module!r}:
+            try:
+                os.kill(os.getpid(), signal.SIGINT)
+            except KeyboardInterrupt:
+                raise RuntimeError("an error of a library's own")
+"""
+
+
+@pytest.mark.parametrize("library", [SWALLOWED, TURNED], ids=["swallows", "turns into an error"])
+def test_an_interrupt_that_a_library_swallows_is_heard_all_the_same(library, on_body):
+    code = INTERRUPT_WHILE_LOADING.replace("class Finder:\n", library.lstrip() + "class Unused:\n")
+    code = code.replace("import os, signal, sys", "import os, signal, sys, time")
+    code = code.format(program="bowdenfit.__main__", module="bowdenfit.dataset", folder=str(on_body))
+    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=False, timeout=60)
+    assert (done.returncode, done.stdout, done.stderr.strip()) == (130, "", "Interrupted.")

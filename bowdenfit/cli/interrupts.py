@@ -1,0 +1,50 @@
+"""Interrupts that are not lost: one that somebody swallowed is raised again until it is heard.
+
+Python prints and forgets an interrupt that arrives inside a callback of the garbage collector or of a compiled library, and
+some libraries turn it into an error of their own.
+"""
+
+import signal
+import sys
+from collections.abc import Iterator
+from contextlib import contextmanager
+
+_AGAIN = 0.3  # s
+_asked: list[bool] = []
+
+
+@contextmanager
+def listening() -> Iterator[None]:
+    """Meanwhile an interrupt raises `KeyboardInterrupt` again and again until that leaves this context."""
+    _asked.clear()
+    printed, before = sys.unraisablehook, signal.getsignal(signal.SIGINT)
+
+    def lost(what: "sys.UnraisableHookArgs") -> None:
+        if not issubclass(what.exc_type, KeyboardInterrupt):
+            printed(what)
+
+    sys.unraisablehook = lost
+    if before is signal.default_int_handler:  # a shell may have made this deaf to interrupts
+        signal.signal(signal.SIGINT, _interrupt)
+    try:
+        yield
+    finally:
+        if _asked and hasattr(signal, "setitimer"):
+            signal.signal(signal.SIGALRM, signal.SIG_IGN)
+            signal.setitimer(signal.ITIMER_REAL, 0.0)
+        if before is signal.default_int_handler:
+            signal.signal(signal.SIGINT, before)
+        sys.unraisablehook = printed
+
+
+def _interrupt(*_: object) -> None:
+    _asked.append(True)
+    if hasattr(signal, "setitimer"):
+        signal.signal(signal.SIGALRM, _interrupt)
+        signal.setitimer(signal.ITIMER_REAL, _AGAIN)
+    raise KeyboardInterrupt
+
+
+def was_asked() -> bool:
+    """Whether there was an interrupt."""
+    return bool(_asked)

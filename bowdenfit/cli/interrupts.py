@@ -8,6 +8,7 @@ import signal
 import sys
 from collections.abc import Iterator
 from contextlib import contextmanager
+from types import TracebackType
 
 _AGAIN = 0.3  # s
 _asked: list[bool] = []
@@ -17,13 +18,17 @@ _asked: list[bool] = []
 def listening() -> Iterator[None]:
     """Meanwhile an interrupt raises `KeyboardInterrupt` again and again until that leaves this context."""
     _asked.clear()
-    printed, before = sys.unraisablehook, signal.getsignal(signal.SIGINT)
+    printed, shown, before = sys.unraisablehook, sys.excepthook, signal.getsignal(signal.SIGINT)
 
     def lost(what: "sys.UnraisableHookArgs") -> None:
         if not issubclass(what.exc_type, KeyboardInterrupt):
             printed(what)
 
-    sys.unraisablehook = lost
+    def refused(kind: type[BaseException], error: BaseException, trace: TracebackType | None) -> None:
+        if not issubclass(kind, KeyboardInterrupt):  # which compiled code prints before it goes on
+            shown(kind, error, trace)
+
+    sys.unraisablehook, sys.excepthook = lost, refused
     if before is signal.default_int_handler:  # a shell may have made this deaf to interrupts
         signal.signal(signal.SIGINT, _interrupt)
     try:
@@ -34,7 +39,7 @@ def listening() -> Iterator[None]:
             signal.setitimer(signal.ITIMER_REAL, 0.0)
         if before is signal.default_int_handler:
             signal.signal(signal.SIGINT, before)
-        sys.unraisablehook = printed
+        sys.unraisablehook, sys.excepthook = printed, shown
 
 
 def _interrupt(*_: object) -> None:

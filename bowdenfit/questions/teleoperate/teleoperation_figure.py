@@ -79,5 +79,6 @@ def _contact(axes: Axes, found: Teleoperation) -> None:
             at, seen.hand_torque[first] + stated.median * (at - at[0]), color=GRAY, linestyle=SERIES_LINES[2],
             label="Stiffness by the formula",
         )  # fmt: skip
+    axes.locator_params(axis="x", nbins=5)
     axes.set(xlabel="Angle (rad)", ylabel="Torque (N m)")
     axes.set_title("Stiffness felt and touched", loc="left")

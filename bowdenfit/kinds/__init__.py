@@ -13,10 +13,11 @@ from bowdenfit.kinds.measurements import Measurements
 from bowdenfit.kinds.preload import PRELOAD
 from bowdenfit.kinds.readings import Readings
 from bowdenfit.kinds.recordings import RECORDINGS
+from bowdenfit.kinds.ringdown import RINGDOWN
 from bowdenfit.kinds.stretch import STRETCH
 
 KINDS: dict[str, Kind[Any]] = {
-    kind.name: kind for kind in (ANGLES, EFFICIENCIES, FORCES, RECORDINGS, STRETCH, PRELOAD, LOOP, DISPLACEMENT)
+    kind.name: kind for kind in (ANGLES, EFFICIENCIES, FORCES, RECORDINGS, STRETCH, PRELOAD, LOOP, DISPLACEMENT, RINGDOWN)
 }
 """Every kind by its name, in the order in which tables are read, fitted and spoken of."""
 

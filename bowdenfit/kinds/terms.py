@@ -32,13 +32,14 @@ from bowdenfit.kinds.loop.term import LOOP, LOOP_MOUNTING
 from bowdenfit.kinds.measurements import Measurements
 from bowdenfit.kinds.preload.term import PRELOAD, PRELOAD_NOISE
 from bowdenfit.kinds.recordings.term import RECORDINGS
+from bowdenfit.kinds.ringdown.term import RINGDOWN
 from bowdenfit.kinds.shared_parameters import gain_error
 from bowdenfit.kinds.stretch.term import STRETCH, STRETCH_NOISE
 from bowdenfit.kinds.term import Circumstances, TermKind
 from bowdenfit.parameters.space import Parameter
 
 TERMS: dict[str, TermKind] = {
-    kind.name: kind for kind in (ANGLES, EFFICIENCIES, FORCES, RECORDINGS, STRETCH, PRELOAD, LOOP, DISPLACEMENT)
+    kind.name: kind for kind in (ANGLES, EFFICIENCIES, FORCES, RECORDINGS, STRETCH, PRELOAD, LOOP, DISPLACEMENT, RINGDOWN)
 }
 """What each kind adds to the likelihood."""
 

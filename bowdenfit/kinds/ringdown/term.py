@@ -1,0 +1,138 @@
+"""Ring-downs in the likelihood: the free vibration of the joint against the rope, read with noise."""
+
+from collections.abc import Mapping
+from dataclasses import replace
+from typing import Any
+
+import jax
+import jax.numpy as jnp
+import numpy as np
+from jax import Array
+from jaxtyping import Float
+
+from bowdenfit.cable.cable import Cable
+from bowdenfit.kinds.angles.table import AngleTable
+from bowdenfit.kinds.bench import Remeasurement, drawn_by_term
+from bowdenfit.kinds.elastic_term import ElasticTerm
+from bowdenfit.kinds.ringdown.table import RingDownTable
+from bowdenfit.kinds.term import Circumstances, TermKind
+from bowdenfit.parameters.priors import HalfCauchy, HalfNormal, LogNormal, Normal, TruncatedNormal
+from bowdenfit.parameters.space import Parameter
+from bowdenfit.physics.ring_down import ring_down
+
+INERTIA, STIFFNESS, DAMPING, FRICTION = "ring_inertia", "ring_stiffness", "rope_damping", "ring_friction"
+NOISE = "sigma_ringdown"
+_LOG_SD = 0.5  # of inertia and stiffness about what period and added inertia say
+_TIMES = 1.5  # what damping, or friction, would be if it alone stopped the joint
+_NOISE_SHARE, _REST_SHARE = 0.02, 0.1
+_MORE_SWINGS = 3  # times those that are seen
+
+
+def of_run(name: str, run: int) -> str:
+    """Name of a run's own parameter."""
+    return f"ring_{name}_{run + 1}"
+
+
+def ring_down_term(cable: Cable, table: RingDownTable, angles: AngleTable | None = None) -> ElasticTerm:
+    """The term of a table of ring-downs."""
+    del angles
+    swings = _sampling(table)[1]
+    data = {
+        "reading": table.reading, "at_most": np.zeros(0), "time": table.time, "run": table.run, "added": table.added,
+        "torque": np.full(len(table.added), float(table.is_torque)), "swings": np.zeros(swings),
+    }  # fmt: skip
+    labels = tuple(f"{1000 * time:.4g} ms" for time in table.time)
+    return ElasticTerm(cable, data, labels, "ringdown", "N m" if table.is_torque else "rad", NOISE, _reading)
+
+
+def _sampling(table: RingDownTable) -> tuple[float, int]:
+    """Interval between rows [s], and how many half swings are followed."""
+    seen = max(table.half_swings(run)[0] for run in range(len(table.added)))
+    return float(np.median(np.diff(table.time[table.run == 0]))), _MORE_SWINGS * seen + 5
+
+
+def _reading(_: Cable, values: Mapping[str, Array], data: Mapping[str, Any]) -> Float[Array, " rows"]:
+    r"""Angle [rad], or torque :math:`K x + b_c \dot x` in the rope [N m], each with what is read at rest."""
+    run, n = data["run"], len(data["added"])
+    amplitude, rest, release = (
+        jnp.stack([values[of_run(name, i)] for i in range(n)]) for name in ("amplitude", "rest", "release")
+    )
+    stiffness, damping = values[STIFFNESS], values[DAMPING]
+    angle, speed = ring_down(
+        data["time"] - release[run], run, amplitude, values[INERTIA] + data["added"], stiffness, damping, values[FRICTION],
+        len(data["swings"]),
+    )  # fmt: skip
+    return rest[run] + jnp.where(data["torque"][run] > 0, stiffness * angle + damping * speed, angle)
+
+
+def _parameters(table: RingDownTable, at: Circumstances) -> list[Parameter]:
+    """Inertia, stiffness, damping and friction, and how each run was released and read."""
+    inertia = table.inertia if np.isfinite(table.inertia) else float(np.max(table.added))
+    first = int(np.argmin(table.added))
+    seen, half = table.half_swings(first)
+    omega = np.pi / half
+    stiffness = (inertia + table.added[first]) * omega**2
+    runs = [table.reading[table.run == run] for run in range(len(table.added))]
+    away = [float(reading[0] - np.median(reading[-max(len(reading) // 10, 3) :])) for reading in runs]
+    size = float(np.max(np.abs(away))) or 1.0
+    angle = size / stiffness if table.is_torque else size
+    step, unit = _sampling(table)[0], "N*m" if table.is_torque else "rad"
+    decay = 2 * np.sqrt(stiffness * (inertia + table.added[first])) * np.log(10) / (np.pi * seen)  # to a tenth
+    by = f"the period, {2000 * np.pi / omega:.3g} ms, and an inertia of {inertia:.3g} kg m^2"
+    found = [
+        _inertia(table, inertia),
+        Parameter(
+            STIFFNESS, "$K$", "stiffness against which the released joint swings", "elastic",
+            LogNormal(stiffness, 2 * _LOG_SD), "N*m/rad", scaled_by=by,
+        ),
+        Parameter(
+            DAMPING, "$b_c$", "viscous damping of rope and joint", "elastic",
+            HalfNormal(_TIMES * decay), "N*m*s/rad", scaled_by=by,
+        ),
+        Parameter(
+            FRICTION, "$F_r$", "dry friction of the released joint", "elastic",
+            HalfNormal(_TIMES * 0.45 * stiffness * angle / seen), "N*m",
+            scaled_by=f"the first deflection, {size:.3g} {unit}, over {seen} half swings",
+        ),
+        Parameter(
+            NOISE, r"$\sigma_r$", at.noise.meaning("standard deviation of a reading of the ring-down"), "noise",
+            HalfCauchy(_NOISE_SHARE * size), unit, scaled_by=f"the first deflection, {size:.3g} {unit}",
+        ),
+    ]  # fmt: skip
+    for run, begun in enumerate(away):
+        start, called = begun / stiffness if table.is_torque else begun, f"of ring-down {run + 1}"
+        found += [
+            Parameter(
+                of_run("amplitude", run), f"$x_{{{run + 1}}}$", f"deflection {called}", "sensor", Normal(start, angle), "rad"
+            ),
+            Parameter(
+                of_run("rest", run), f"$q_{{{run + 1}}}$", f"reading without a load {called}", "sensor",
+                Normal(float(np.median(runs[run][-max(len(runs[run]) // 10, 3) :])), _REST_SHARE * size), unit,
+            ),
+            Parameter(
+                of_run("release", run), f"$t_{{{run + 1}}}$", f"time of release {called}", "sensor", Normal(0.0, step), "s"
+            ),
+        ]  # fmt: skip
+    return found
+
+
+def _inertia(table: RingDownTable, size: float) -> Parameter:
+    """Inertia of what swings: as stated, or found by adding a known one."""
+    free = Parameter(
+        INERTIA, "$J$", "inertia of the released joint", "elastic", LogNormal(size, 2 * _LOG_SD), "kg*m^2",
+        scaled_by=f"the largest added inertia, {size:.3g} kg m^2",
+    )  # fmt: skip
+    if np.isnan(table.inertia):
+        return free
+    if np.isnan(table.inertia_sd):
+        return replace(free, fixed=table.inertia, prior_words="fixed (stated)", scaled_by="")
+    return replace(free, prior=TruncatedNormal(table.inertia, table.inertia_sd), scaled_by="")
+
+
+RINGDOWN = TermKind(
+    "ringdown",
+    lambda cable, table, _: (ring_down_term(cable, table),),
+    _parameters,
+    Remeasurement(drawn_by_term(ring_down_term, "reading", lambda key: jax.random.fold_in(key, 11))),
+    where=lambda _, term: {"Time (s)": np.asarray(term.data["time"])},
+)

@@ -26,7 +26,7 @@ extensions = [
 ]
 exclude_patterns = ["extensions"]
 nitpicky = True
-nitpick_ignore_regex = [("py:class", ".*")]  # types in signatures, of libraries and of what has no page, cannot be linked to
+nitpick_ignore_regex = [("py:class", ".*"), ("py:exc", ".*")]  # of libraries, and of what has no page
 default_role = "code"  # single backquotes in docstrings
 
 html_theme = "furo"

@@ -43,6 +43,8 @@ def test_every_inspection_finds_its_truth(fitted):
     assert found.is_trusted
     page = json.loads((FLEET / "truth.json").read_text())
     population, drawn = page["population"], read_fleet_draws(results)
+    (meanings,) = drawn.about["meanings"].values()
+    assert meanings == {"mu_sheath": "friction of sheath", "mu_edge": "friction of edge"}
     for i, cable in enumerate(drawn.cable):
         truth = page["cables"][cable]
         more = truth["wear"] * drawn.cycles[i] / population["reference_cycles"]

@@ -74,6 +74,17 @@ def quantities_of(model: Model) -> dict[str, dict[str, str]]:
     return found | derived
 
 
+def _meanings(model: Model) -> dict[str, str]:
+    """What each friction coefficient is of, in words; two are the same where these are."""
+    option = model.description.friction_model
+    found: dict[str, list[str]] = {}
+    for contact in model.description.contact:
+        law = f" by {contact.special_law}" if contact.special_law else ""
+        found.setdefault(contact.friction, []).append(f"friction of {contact.name}{law}")
+    special = "" if option == "capstan" else f", {option}"
+    return {name: f"{' and '.join(places)}{special}" for name, places in found.items()}
+
+
 def gathered(
     name: str, cases: Sequence[Case], fits: Mapping[str, PieceFit], broken: Sequence[Broken], seed: int
 ) -> tuple[Fleet, FleetDraws | None]:
@@ -87,7 +98,8 @@ def gathered(
         seed: Of the fleet.
     """
     shapes = _by_shape(cases)
-    quantities = {key: quantities_of(build_model(members[0].dataset)) for key, members in shapes.items()}
+    models = {key: build_model(members[0].dataset) for key, members in shapes.items()}
+    quantities = {key: quantities_of(model) for key, model in models.items()}
     drawn = [case for case in cases if len(fits[case.hash].values)]
     for case in drawn:  # what was kept may have been changed
         if fits[case.hash].values.shape != (len(quantities[case.shaped.key]), fits[drawn[0].hash].values.shape[1]):
@@ -101,7 +113,8 @@ def gathered(
     units = {quantity: about["units"] for quantity, about in every.items()}
     words = tuple(_in_words(number, members) for number, members in zip(numbers.values(), shapes.values(), strict=True))
     answer = Fleet(name, fitted, (*broken, *failed), units, words, seed, dict(versions()))
-    return answer, _draws(answer, drawn, fits, quantities, every) if drawn else None
+    meanings = {key: _meanings(model) for key, model in models.items()}
+    return answer, _draws(answer, drawn, fits, quantities, every, meanings) if drawn else None
 
 
 def _in_words(number: int, members: Sequence[Case]) -> str:
@@ -123,6 +136,7 @@ def _draws(
     fits: Mapping[str, PieceFit],
     quantities: Mapping[str, Mapping[str, Any]],
     every: Mapping[str, Mapping[str, str]],
+    meanings: Mapping[str, Mapping[str, str]],
 ) -> FleetDraws:
     """All draws in one; NaN where a data set has no such quantity."""
     of_case = [dict(zip(quantities[c.shaped.key], fits[c.hash].values, strict=True)) for c in cases]
@@ -143,5 +157,6 @@ def _draws(
     cycles, temperature, lubricated = (np.array([getattr(c.inspection, n) for c in cases]) for n in names)
     labels, cables = (tuple(getattr(c.inspection, n) for c in cases) for n in ("label", "cable"))
     about: dict[str, Any] = {"name": answer.name, "seed": answer.seed, "versions": answer.versions}
+    about["meanings"] = meanings
     about["quantities"] = {key: list(of_shape) for key, of_shape in quantities.items()}
     return FleetDraws(labels, cables, cycles, temperature, lubricated, values, stats, every, about)

@@ -18,9 +18,9 @@ def metabolic(dataset: Annotated["str | Path", Argument("DATASET")]) -> "Metabol
     Raises:
         BowdenfitError: What is wrong, in a sentence.
     """
-    from bowdenfit.questions.metabolic import words  # noqa: F401  (how the answer shows itself)
     from bowdenfit.questions.metabolic.answer import answered
     from bowdenfit.questions.metabolic.study import read_study
+    from bowdenfit.questions.metabolic.words import metabolic_text  # noqa: F401  (how the answer shows itself)
 
     return answered(*read_study(Path(dataset)))
 

@@ -45,8 +45,8 @@ def pool(
     """
     import jax
 
-    from bowdenfit.questions.pool import words  # noqa: F401  (how the answer shows itself)
     from bowdenfit.questions.pool.pooling import pooled
+    from bowdenfit.questions.pool.words import pool_text  # noqa: F401  (how the answer shows itself)
     from bowdenfit.results.fleet_folder import read_fleet_draws
 
     if output is not None:

@@ -71,6 +71,7 @@ _USUAL = {
 _AS_PINT_SAYS = {"r/min": "rpm", "rev/min": "rpm", "1/min": "rpm", "u/min": "rpm"}  # the last is German
 # Names with products, quotients and small powers. Pint would compute whatever else it is given, such as 9**9**9.
 _WRITTEN = re.compile(r"[\w°%‰/*^().·\s-]{1,40}")
+_DEGREE, _DEGREE_OR_GON = re.compile(r"\bGrad\b"), re.compile(r"\bgrad\b")  # the first is German, and giga-radians to pint
 _NO_UNIT = re.compile(r"\d\d|%%|(?:\*\*|\^)[\s(-]*\d[\s)]*(?:\*\*|\^)")
 
 
@@ -187,7 +188,11 @@ def _parsed(unit: str) -> "pint.Unit":
     unknown = f"the unit {shown(unit)} is not known; use one such as N, lbf, mm, inch, deg, rad, %"
     if text in {"1", "-", ""}:
         text = "dimensionless"
-    text = _AS_PINT_SAYS.get(text.lower(), text)
+    text = _DEGREE.sub("deg", _AS_PINT_SAYS.get(text.lower(), text))
+    if _DEGREE_OR_GON.search(text):
+        raise DatasetError(
+            f"the unit {shown(unit)} is a degree in German and a hundredth of a right angle elsewhere; write deg, or gradian"
+        )
     if not _WRITTEN.fullmatch(text) or _NO_UNIT.search(text):
         raise DatasetError(unknown)
     try:

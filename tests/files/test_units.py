@@ -5,7 +5,7 @@ import sys
 
 import pytest
 
-from bowdenfit import units
+from bowdenfit import DatasetError, units
 
 
 @pytest.mark.parametrize("unit", units._USUAL)
@@ -24,3 +24,10 @@ def test_a_table_in_usual_units_is_read_without_pint(on_body):
     code = f"import sys, bowdenfit as bf; bf.read({str(on_body)!r}); print('pint' in sys.modules, 'jax' in sys.modules)"
     done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
     assert done.stdout.split() == ["False", "False"]
+
+
+def test_a_degree_in_german_is_no_giga_radian_and_what_may_be_a_gon_is_refused():
+    assert units.conversion_factor("Grad", "angle") == pytest.approx(units.conversion_factor("deg", "angle"), rel=1e-15)
+    assert units.dimension_of("Grad/s") == "angular_velocity"
+    with pytest.raises(DatasetError, match="a degree in German and a hundredth of a right angle elsewhere; write deg"):
+        units.conversion_factor("grad", "angle")

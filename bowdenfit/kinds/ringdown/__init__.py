@@ -10,7 +10,7 @@ RINGDOWN = Kind(
     name="ringdown",
     table=RingDownTable,
     readings=(
-        Readings("ringdown", "ring-down", "readings of the ring-down", "the reading at {}", "Angle (rad) or torque (N m)"),
+        Readings("ringdown", "ringdown", "readings of the ring-down", "the reading at {}", "Angle (rad) or torque (N m)"),
     ),
     read=read_ring_down,
     settings=RingDownSettings,

@@ -6,6 +6,7 @@ import shutil
 from pathlib import Path
 
 import pytest
+from one_page import faults, jargon
 
 import bowdenfit as bf
 
@@ -43,10 +44,29 @@ def test_a_command_to_paste_goes_over_several_lines_as_a_shell_reads_it(run, mon
 
 def test_every_verb_keeps_to_the_terminal(run, results, tmp_path):
     shutil.copytree(results, tmp_path / "other")
-    for verb in ("summary", "length", "identify", "next", "predict"):
-        out = run(verb, results)[1]
+    printed = {verb: run(verb, results)[1] for verb in ("summary", "length", "identify", "next", "predict")}
+    printed["compare"] = run("compare", results, tmp_path / "other")[1]
+    for verb, out in printed.items():
         assert out and not too_wide(out), verb
-    assert not too_wide(run("compare", results, tmp_path / "other")[1])
+        assert jargon(out) == [], verb
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("path", DATA_SETS, ids=lambda path: path.name)
+def test_every_verb_answers_in_plain_words_whatever_the_data_set(run, tmp_path, path):
+    """Each keeps to the terminal; what does not apply is refused in a sentence."""
+    results, calibration = tmp_path / "fit", tmp_path / "calibration"
+    said = {"check": run("check", path), "fit": run("fit", path, "-o", results, "--seed", 1, "--no-figures")}
+    shutil.copytree(results, tmp_path / "other")
+    for verb in ("summary", "length", "identify", "next", "predict"):
+        said[verb] = run(verb, results)
+    said["plan"], said["compare"] = run("identify", path), run("compare", results, tmp_path / "other")
+    said["calibrate"] = run("calibrate", path, "-n", 20, "--seed", 1, "-o", calibration)
+    for verb, (code, out, err) in said.items():
+        assert code in (0, 3) or (verb in ("length", "next") and code == 2 and err.startswith("Error: ")), (verb, err)
+        assert not too_wide(out), verb
+        assert jargon(out) == [], verb
+    assert not faults(said["summary"][1])
 
 
 @pytest.mark.parametrize(

@@ -7,12 +7,12 @@ from pathlib import Path
 import pytest
 from jaxtyping import install_import_hook
 
-with install_import_hook("bowdenfit", "beartype.beartype"):
-    pass
+# Modules are loaded when they are first needed, so that the hook stays.
+install_import_hook("bowdenfit", "type_checks.check")
 
-import jax
+import jax  # noqa: E402
 
-from bowdenfit import cli
+from bowdenfit import cli  # noqa: E402
 
 jax.config.update("jax_enable_x64", True)
 jax.config.update("jax_numpy_dtype_promotion", "standard")

@@ -3,11 +3,11 @@
 from dataclasses import dataclass
 
 import numpy as np
+from jaxtyping import Float
 
 from bowdenfit.description import Description
 from bowdenfit.errors import DescriptionError
 from bowdenfit.parameters.scale import Scale
-from bowdenfit.types import Vector
 from bowdenfit.units import speed_dimension
 
 LEAST_SHARE = 1e-5  # of the loads; an offset cannot take more of a rope's reading than this leaves
@@ -62,9 +62,9 @@ class Conditions:
 
 def make_conditions(
     description: Description,
-    forces: Vector,
-    tensions: Vector,
-    speeds: Vector,
+    forces: Float[np.ndarray, " forces"],
+    tensions: Float[np.ndarray, " tensions"],
+    speeds: Float[np.ndarray, " speeds"],
     velocity_unit: str,
     groups: tuple[str, ...] = (),
 ) -> Conditions:

@@ -21,12 +21,12 @@ from bowdenfit.cable.friction import FrictionModel
 from bowdenfit.cable.load_cells import LoadCells
 from bowdenfit.physics.hysteresis import play_operator
 from bowdenfit.physics.loop import loop_band
-from bowdenfit.types import Vector
 
 LEAST_EXPONENT = 1e-9  # below which friction would push, with whatever the mounting does to it
 
 Recorded = Float[Array, "time recordings"]
 Each = Float[Array, " recordings"]
+Shown = Float[np.ndarray, "*batch"]
 
 
 @dataclass(frozen=True)
@@ -81,12 +81,12 @@ class Rope:
         return jnp.log(shown), cells.shown_change(slope) / (self.friction.slope(self.values, output_force) * shown)
 
     @staticmethod
-    def reading(shown: Vector) -> Vector:
+    def reading(shown: Shown) -> Shown:
         """What is compared of a shown output force: its logarithm."""
         return np.log(np.maximum(shown, LEAST_SHARE * np.max(np.abs(shown))))
 
     @staticmethod
-    def without_delay(shown: Recorded, late: Recorded) -> Recorded:
+    def without_delay(shown: Float[Array, "*batch"], late: Float[Array, "*batch"]) -> Float[Array, "*batch"]:
         """A shown output force [N] less what a delay added to its `reading`."""
         return shown * jnp.exp(-late)
 
@@ -132,12 +132,12 @@ class Loop:
         return cells.shown_output(output_force), cells.shown_change(slope)
 
     @staticmethod
-    def reading(shown: Vector) -> Vector:
+    def reading(shown: Shown) -> Shown:
         """What is compared of a shown output force: itself [N]."""
         return shown
 
     @staticmethod
-    def without_delay(shown: Recorded, late: Recorded) -> Recorded:
+    def without_delay(shown: Float[Array, "*batch"], late: Float[Array, "*batch"]) -> Float[Array, "*batch"]:
         """A shown output force [N] less what a delay added to it."""
         return shown - late
 

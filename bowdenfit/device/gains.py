@@ -6,6 +6,7 @@ of the rope. The controller commands :math:`-K_f T_j` a sample late. NumPy alone
 
 from collections.abc import Callable
 from dataclasses import dataclass
+from typing import TypeAlias
 
 import numpy as np
 
@@ -13,6 +14,9 @@ LARGEST, LEAST = 1e4, 1e-4  # gains that are looked for
 _HALVINGS = 26
 _ROUNDING = 1e-6  # of a spectral radius: undamped motion of the whole device stands at 1
 _FREQUENCIES, _SHARES = 240, 25
+
+
+Numbers: TypeAlias = float | np.ndarray
 
 
 @dataclass(frozen=True)
@@ -28,14 +32,14 @@ class Linear:
         sample: T_s [s].
     """
 
-    stiffness: np.ndarray
-    rope_damping: np.ndarray
-    motor_inertia: np.ndarray
-    joint_inertia: np.ndarray
-    motor_damping: np.ndarray
-    joint_damping: np.ndarray
-    hand_stiffness: np.ndarray
-    sample: np.ndarray
+    stiffness: Numbers
+    rope_damping: Numbers
+    motor_inertia: Numbers
+    joint_inertia: Numbers
+    motor_damping: Numbers
+    joint_damping: Numbers
+    hand_stiffness: Numbers
+    sample: Numbers
 
     def arrays(self) -> tuple[np.ndarray, ...]:
         """All of them, as long as each other."""

@@ -26,8 +26,8 @@ class Hand:
         damping: b_h [N m s/rad].
     """
 
-    stiffness: Each
-    damping: Each
+    stiffness: Each | float
+    damping: Each | float
 
 
 @dataclass(frozen=True)

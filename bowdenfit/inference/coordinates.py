@@ -5,7 +5,7 @@ Any one-to-one map leaves what is sampled as it is, because the volume in w of a
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
-from typing import Any, NamedTuple, Protocol
+from typing import Any, NamedTuple, Protocol, runtime_checkable
 
 import jax
 import numpy as np
@@ -17,6 +17,7 @@ from bowdenfit.inference.value_chart import chart_values
 Places = tuple[np.ndarray, np.ndarray]  # of walkers (rows), and log of the volume in w of a unit of z there
 
 
+@runtime_checkable
 class Coordinates(Protocol):
     """What walkers move in."""
 

@@ -15,6 +15,7 @@ is told too, with sigma from the distances.
 from dataclasses import dataclass
 
 import numpy as np
+from jaxtyping import Float
 
 from bowdenfit.types import Labels, Vector
 
@@ -88,7 +89,7 @@ def expected_forces(
     )
 
 
-def _slopes(input_force: Vector, output_force: Vector, group: Labels, noise_ratio: float) -> Vector:
+def _slopes(input_force: Vector, output_force: Vector, group: Labels, noise_ratio: float) -> Float[np.ndarray, " groups"]:
     """Slope of each group: the line through the origin with the least squares of its distances in units of their noise."""
     of_input, of_both, of_output = (
         np.bincount(group, product) for product in (input_force**2, input_force * output_force, output_force**2)

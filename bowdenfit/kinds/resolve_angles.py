@@ -17,4 +17,4 @@ def resolve_angles(
     variance = rows["known_variance"]
     if ANGLE_NOISE in values:
         variance = variance + jnp.where(rows["noisy"], values[ANGLE_NOISE] ** 2, 0.0)
-    return angles, variance
+    return angles, jnp.asarray(variance)

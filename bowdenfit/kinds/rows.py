@@ -4,7 +4,7 @@ from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from difflib import get_close_matches
 from functools import partial
-from typing import Protocol
+from typing import Protocol, runtime_checkable
 
 import numpy as np
 
@@ -82,6 +82,7 @@ class OwnAngles(Part):
         return self.angle[:, k], self.sd[:, k]
 
 
+@runtime_checkable
 class ForceRows(Protocol):
     """Under what forces were measured, row by row."""
 
@@ -96,6 +97,7 @@ class ForceRows(Protocol):
         ...
 
 
+@runtime_checkable
 class Rows(ForceRows, Protocol):
     """The same of a table, whose rows can be named."""
 

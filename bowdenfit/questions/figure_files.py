@@ -2,7 +2,7 @@
 
 from collections.abc import Iterable, Mapping
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, Protocol
+from typing import TYPE_CHECKING, Any, Protocol, runtime_checkable
 
 from bowdenfit.plots.layout import title_above
 from bowdenfit.plots.style import in_paper_style
@@ -16,6 +16,7 @@ if TYPE_CHECKING:
 CAPTIONS = "captions.txt"
 
 
+@runtime_checkable
 class AnswerFigure(Protocol):
     """A figure file of an answer."""
 

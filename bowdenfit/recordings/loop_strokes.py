@@ -9,9 +9,9 @@ import numpy as np
 from bowdenfit.description import Phase
 from bowdenfit.errors import DatasetError, DescriptionError
 from bowdenfit.recordings.preparation.play import Hysteresis, play_between, white_noise
-from bowdenfit.recordings.preparation.robust import robust_cost, robust_minimum
+from bowdenfit.recordings.preparation.robust import Deviations, robust_cost, robust_minimum
 from bowdenfit.recordings.recording import PULL, Blocks
-from bowdenfit.types import Flags, Labels, Matrix, Vector
+from bowdenfit.types import Flags, Labels, Vector
 
 _FIT_BLOCKS = 2000  # more than these say no more about the loop
 _LOSSES = (0.03, 0.1, 0.25, 0.45, 0.7, 0.9, 1.0)  # of the largest difference of the forces, where the fit is begun
@@ -52,7 +52,7 @@ def fit_force_loop(force_in: Vector, force_out: Vector, taut: bool = True, slack
     apart, noise = float(np.quantile(np.abs(x - y), 0.98)), _noise(x, y)
     scale, told = max(apart, noise), np.array([taut, slack, True], dtype=float)
 
-    def model(p: np.ndarray) -> tuple[Vector, Matrix]:
+    def model(p: np.ndarray) -> Deviations:
         residuals, slopes = _residuals(x, y, scale, noise, p * told)
         return residuals, slopes * told
 
@@ -134,7 +134,7 @@ def _deviation(x: Vector, y: Vector, loss: float, exponent: float, center: float
     return y + center - followed, followed, state
 
 
-def _residuals(x: Vector, y: Vector, scale: float, noise: float, p: np.ndarray) -> tuple[Vector, Matrix]:
+def _residuals(x: Vector, y: Vector, scale: float, noise: float, p: np.ndarray) -> Deviations:
     """Deviations in units of their noise and what is known beforehand of the center, with slopes by all parameters.
 
     Args:

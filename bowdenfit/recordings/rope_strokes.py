@@ -9,9 +9,9 @@ from bowdenfit.description import Phase
 from bowdenfit.errors import DatasetError
 from bowdenfit.recordings.one_way import refuse_dead, sliding_one_way
 from bowdenfit.recordings.preparation.play import Hysteresis, contact_through_noise, play, white_noise
-from bowdenfit.recordings.preparation.robust import robust_minimum
+from bowdenfit.recordings.preparation.robust import Deviations, robust_minimum
 from bowdenfit.recordings.recording import PULL, RETURN, SWITCH, Blocks
-from bowdenfit.types import Flags, Labels, Matrix, Vector
+from bowdenfit.types import Flags, Labels, Vector
 from bowdenfit.words import percent
 
 _FIT_BLOCKS = 1000  # more than these say no more about the loop
@@ -42,7 +42,7 @@ def fit_loop(force_in: Vector, force_out: Vector) -> Hysteresis:
     if high - low < _ONE_PHASE * noise or low > 0 or high < 0:  # one phase: all of the ratio is friction
         width, center = max(abs(float(np.median(ratio))), _LEAST_EXPONENT), 0.0
 
-    def model(p: np.ndarray) -> tuple[Vector, Matrix]:
+    def model(p: np.ndarray) -> Deviations:
         return _residuals(few_in, few_out, (noise_in, noise_out), level, p)
 
     fits = []
@@ -135,7 +135,7 @@ def _follow(
 
 def _residuals(
     force_in: Vector, force_out: Vector, noise: tuple[float, float], level: float, p: np.ndarray
-) -> tuple[Vector, Matrix]:
+) -> Deviations:
     """Deviations in units of their noise and what is known beforehand of center and drag, with slopes by all parameters.
 
     Args:

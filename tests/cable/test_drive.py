@@ -87,7 +87,8 @@ def _reading(drive, cells, force):
 
 @pytest.mark.parametrize("drive", [_rope(), Loop(jnp.array([5.0, 20.0]), jnp.asarray(EXPONENT))], ids=["rope", "loop"])
 def test_a_delay_is_taken_out_of_the_reading_that_it_was_added_to(drive):
-    force, late = np.abs(_forces(60.0)) + 1.0, 0.01
+    force = np.abs(_forces(60.0)) + 1.0
+    late = np.full_like(force, 0.01)
     np.testing.assert_allclose(
         drive.reading(np.asarray(drive.without_delay(jnp.asarray(force), jnp.asarray(late)))),
         drive.reading(force) - late,

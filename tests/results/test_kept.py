@@ -1,5 +1,6 @@
 """What is asked most of a finished fit is read back: quickly, exactly as it would be worked out, and of that fit alone."""
 
+import inspect
 import json
 import shutil
 import subprocess
@@ -159,8 +160,7 @@ def test_some_of_the_lengths_that_can_be_bought_are_predicted_as_they_are_alone(
     ids=str,
 )
 def test_another_question_is_not_answered_by_what_was_kept(results, other):
-    asked = {"lengths": (), "input_force": None, "stroke": "pull", "quantity": None, "wrap_angles": (), "output_force": None}
-    asked |= {"preload": None, "friction_limit": None}
+    asked = {name: one.default for name, one in inspect.signature(PREDICT.function).parameters.items()}
     answers = kept(results)
     assert PREDICT.kept(answers, asked) is not None
     assert PREDICT.kept(answers, asked | other) is None

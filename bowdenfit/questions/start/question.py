@@ -3,7 +3,7 @@
 import re
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
-from typing import Generic, Protocol, TypeVar
+from typing import Generic, Protocol, TypeVar, runtime_checkable
 
 from bowdenfit.errors import DatasetError, DescriptionError, Faults, UsageError, nearest
 from bowdenfit.units import conversion_factor
@@ -35,6 +35,7 @@ class Question(Generic[Answer]):
     options: tuple[str, ...] = ()
 
 
+@runtime_checkable
 class Asker(Protocol):
     """Who puts questions: a terminal, or nobody."""
 

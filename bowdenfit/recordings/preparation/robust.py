@@ -4,17 +4,21 @@ from collections.abc import Callable
 from typing import TypeAlias
 
 import numpy as np
+from jaxtyping import Float
 
 from bowdenfit.recordings.preparation.shapes import OtherVector
-from bowdenfit.types import Matrix, Vector
+from bowdenfit.types import Vector
 
 _MOST_STEPS = 200
 _LEAST_CHANGE = 1e-14  # of the cost
 _DAMPING = 1e-3
 _MOST_DAMPING = 1e12
 
-Model: TypeAlias = Callable[[np.ndarray], tuple[Vector, Matrix]]
-"""Residuals [standard deviations] at parameters, and their slopes: a column for each parameter."""
+Deviations: TypeAlias = tuple[Float[np.ndarray, " residuals"], Float[np.ndarray, "residuals parameters"]]
+"""Residuals [standard deviations], and their slopes: a column for each parameter."""
+
+Model: TypeAlias = Callable[[np.ndarray], Deviations]
+"""Deviations at parameters."""
 
 
 def robust_cost(residuals: Vector) -> float:

@@ -4,6 +4,7 @@ from dataclasses import dataclass
 from typing import Annotated
 
 import numpy as np
+from jaxtyping import Float
 from pydantic import Field
 
 from bowdenfit.description import NonNegative, Positive
@@ -46,7 +47,7 @@ class Motion:
     position: Vector
     velocity: Vector
     acceleration: Vector
-    turns: Vector
+    turns: Float[np.ndarray, " turns"]
     reversals: tuple[float, ...]
 
     def at(self, time: Vector) -> tuple[Vector, Vector]:

@@ -1,0 +1,41 @@
+"""The checker of types at run time: beartype, as every function of bowdenfit is checked by it in the tests.
+
+A number is a number: where `float` is written NumPy's and JAX's scalars may stand too, as Python's own arithmetic and the type
+checkers have it. Where an array of JAX is written one of NumPy may stand, as in JAX's own functions; its shape is checked.
+"""
+
+from functools import reduce
+from operator import or_
+from types import UnionType
+from typing import Any, Union, get_args, get_origin
+
+import jax
+import numpy as np
+from beartype import BeartypeConf, FrozenDict, beartype
+from jax.core import Tracer
+
+_INTEGER = int | np.integer | jax.Array
+_NUMBER = float | np.floating | _INTEGER
+_BOOLEAN = bool | np.bool_ | jax.Array
+_ARRAY = jax.Array | Tracer | np.ndarray | np.generic | float | int
+_CONFIGURATION = BeartypeConf(
+    hint_overrides=FrozenDict(
+        {float: _NUMBER, int: _INTEGER, bool: _BOOLEAN, jax.Array: _ARRAY, np.ndarray: np.ndarray | np.generic}
+    )
+)
+
+
+def check(function: Any) -> Any:
+    """The function, checked at every call: jaxtyping's shapes and Python's types."""
+    if not isinstance(function, type):
+        function.__annotations__ = {name: _of_either(hint) for name, hint in function.__annotations__.items()}
+    return beartype(function, conf=_CONFIGURATION)
+
+
+def _of_either(hint: Any) -> Any:
+    """A hint, of arrays of JAX or NumPy where it is of JAX's."""
+    if get_origin(hint) in (Union, UnionType):
+        return reduce(or_, (_of_either(one) for one in get_args(hint)))
+    if getattr(hint, "array_type", None) is jax.Array:
+        return hint.dtype[jax.Array | np.ndarray, hint.dim_str]
+    return hint

@@ -209,12 +209,12 @@ def test_completion_is_printed_for(run, shell):
 
 
 def test_a_fit_that_has_not_converged_exits_with_3_and_says_why(run, on_body, tmp_path):
-    few = ("max_steps=200", "n_ensembles=2", "n_walkers=32", "target_ess=600")
+    few = ("max_steps=200", "n_ensembles=2", "n_walkers=32", "target_ess=300")
     settings = [option for key in few for option in ("--set", f"sampler.{key}")]
     code, out, err = run("fit", on_body, "--output", tmp_path / "fit", "--seed", 1, "--no-figures", *settings)
     assert code == 3
     assert "DO NOT USE THESE NUMBERS: the computation has not settled" in " ".join(out.split())
-    assert "should be at least 600" in run("summary", tmp_path / "fit", "--full")[1]
+    assert "should be at least 300" in run("summary", tmp_path / "fit", "--full")[1]
     assert (tmp_path / "fit" / "fit.json").exists()
     assert run("length", tmp_path / "fit")[2].startswith("Warning")
 

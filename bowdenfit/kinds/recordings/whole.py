@@ -38,7 +38,7 @@ class WholeRecordingsTerm(BlocksTerm):
         guess = jnp.zeros_like(drive.exponent)
         if not self.cable.friction.depends_on_load:  # else the loop's width means another exponent at every scale
             guess = data["exponent"] - self._typical(drive, data)
-        return guess, _REACH * data["exponent"]
+        return guess, _REACH * jnp.asarray(data["exponent"])
 
     def _typical(self, drive: Rope, data: Data) -> Each:
         """Friction exponent of each recording at its mean speed [1]."""

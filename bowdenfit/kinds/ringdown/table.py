@@ -4,6 +4,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 
 import numpy as np
+from jaxtyping import Float
 
 from bowdenfit.description import Table
 from bowdenfit.description.values import QuantityValue
@@ -46,7 +47,7 @@ class RingDownTable(Part):
     reading: Vector
     is_torque: bool
     run: Labels
-    added: Vector
+    added: Float[np.ndarray, " runs"]
     inertia: float
     inertia_sd: float
     origin: RowOrigin

@@ -15,7 +15,6 @@ from bowdenfit.questions.pool.next import next_inspections
 from bowdenfit.questions.pool.unlike import FALSE_ALARM, chances, departures, far_off, holm, mixed
 from bowdenfit.results.fleet_folder import FleetDraws
 
-LEAST_WORTH = 100.0  # effective draws of an inspection, below which its summary is asked about its tails
 _FAR = 2.0  # spreads from the middle from which a number is named as what is off
 _WEAR = "wear"
 

@@ -7,8 +7,9 @@ from pathlib import Path
 import pytest
 from jaxtyping import install_import_hook
 
-# Modules are loaded when they are first needed, so that the hook stays.
-install_import_hook("bowdenfit", "type_checks.check")
+# The rooms whose functions are about arrays. They are loaded when they are first needed, so that the hook stays.
+CHECKED = ("physics", "cable", "recordings", "kinds", "device")
+install_import_hook([f"bowdenfit.{room}" for room in CHECKED], "type_checks.check")
 
 import jax  # noqa: E402
 

@@ -4,6 +4,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 
 import numpy as np
+from jaxtyping import Float
 
 from bowdenfit.display import Inner
 from bowdenfit.kinds.sliding_rows import SlidingRows
@@ -57,7 +58,7 @@ def inside_runs(cell: Labels, run: Labels, rows: SlidingRows, noise_ratio: float
     group[order] = where.ravel()
     total = np.bincount(group, weight)
 
-    def mean(values: Vector) -> Vector:
+    def mean(values: Vector) -> Float[np.ndarray, " readings"]:
         return np.asarray(np.bincount(group, weight * values) / total)
 
     one = np.unique(group, return_index=True)[1]

@@ -43,7 +43,7 @@ def read_arrays(path: Path, kinds: Mapping[str, Any]) -> dict[str, Any]:
         kinds: Annotated type of what is wanted, by name.
     """
     refuse_special(path, StoreError)
-    with np.load(path) as file:
+    with path.open("rb") as opened, np.load(opened) as file:  # what is opened here is closed where it is no archive
 
         def take(data: Any) -> Any:
             if isinstance(data, list):

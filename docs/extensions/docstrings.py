@@ -15,10 +15,10 @@ def literal(app: Sphinx, what: str, name: str, documented: Any, options: Any, li
     lines[:] = [_AT.sub(lambda match: f"``{match[0]}``", line) for line in lines]
 
 
-def readable(app: Sphinx, what: str, name: str, documented: Any, options: Any, signature: str, returned: str) -> Any:
+def readable(app: Sphinx, what: str, name: str, documented: Any, options: Any, signature: str | None, back: str | None) -> Any:
     """A function that is the default of a keyword by its name; as Python shows it, no signature could be read."""
     del app, what, name, documented, options
-    return _FUNCTION.sub(r"\1", signature or ""), returned
+    return (_FUNCTION.sub(r"\1", signature), back) if signature else None
 
 
 def setup(app: Sphinx) -> dict[str, bool]:

@@ -467,9 +467,9 @@ def test_the_command_prints_the_ranking_and_writes_its_folder(folder, tmp_path, 
     assert code == 0
     assert "and 1 more, ranked lower; --top 3 shows all" in out
     written = sorted(path.name for path in (tmp_path / "plan").iterdir())
-    assert written == [f"next_measurement.{ending}" for ending in ("json", "png", "svg", "txt")]
+    assert written == ["captions.txt", *(f"next_measurement.{ending}" for ending in ("json", "pdf", "png", "svg", "txt"))]
     assert (tmp_path / "plan" / "next_measurement.txt").read_text() == out
-    assert err.count("Wrote") == 4
+    assert err.count("Wrote") == len(written) - 1  # captions go with the figure
 
 
 def test_the_command_gives_json(folder, run):

@@ -159,7 +159,9 @@ def test_the_command_line_calibrates_with_stated_truths_and_goes_on_only_with_th
     code, out, _ = run(*begin, "-n", 2)
     assert code == 3
     assert "were stated (mu log-uniform from 0.1 to 0.3)" in " ".join(out.split())
-    assert {path.name for path in (folder / "figures").iterdir()} == {"coverage.png", "coverage.svg"}
+    assert {path.name for path in (folder / "figures").iterdir()} == {
+        "captions.txt", "coverage.pdf", "coverage.png", "coverage.svg",
+    }  # fmt: skip
     file.write_text("mu = 0.2\n")
     code, _, err = run(*begin, "-n", 3, "--resume")
     assert code == 2

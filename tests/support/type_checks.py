@@ -1,4 +1,4 @@
-"""The checker of types at run time: beartype, as every function of bowdenfit is checked by it in the tests.
+"""The checker of types at run time: beartype, by which the functions of some rooms are checked in the tests.
 
 A number is a number: where `float` is written NumPy's and JAX's scalars may stand too, as Python's own arithmetic and the type
 checkers have it. Where an array of JAX is written one of NumPy may stand, as in JAX's own functions; its shape is checked.
@@ -37,5 +37,5 @@ def _of_either(hint: Any) -> Any:
     if get_origin(hint) in (Union, UnionType):
         return reduce(or_, (_of_either(one) for one in get_args(hint)))
     if getattr(hint, "array_type", None) is jax.Array:
-        return hint.dtype[jax.Array | np.ndarray, hint.dim_str]
+        return hint.dtype[jax.Array | np.ndarray | np.generic, hint.dim_str]
     return hint

@@ -102,7 +102,9 @@ def _path(table: DisplacementTable) -> DisplacementTable:
         run.append(np.full(len(x[-1]), number))
     displacement, of_run = np.concatenate(x), np.concatenate(run)
     motion = sliding(np.concatenate(stroke), displacement, of_run) if table.sliding else in_order(displacement, of_run)
-    return replace(table, displacement=displacement, run=of_run, motion=motion)
+    no_force, nowhere = np.zeros(len(of_run)), np.full(len(of_run), np.nan)
+    every = np.ones(len(of_run), dtype=bool)
+    return replace(table, route=nowhere, force=no_force, displacement=displacement, motion=motion, run=of_run, used=every)
 
 
 def caption(runs: tuple[MotorForce, ...]) -> str:

@@ -31,7 +31,7 @@ class LossTerm:
         return ((len(self.labels), len(self.labels)),)
 
     def expected(self, values, data):
-        exponent = self.cable.exponent_at(values, jnp.zeros(()))
+        exponent = self.cable.exponent_at(values, jnp.zeros(1))
         return data["input_force"] * -jnp.expm1(-exponent)
 
     def residuals(self, values, data):

@@ -12,7 +12,7 @@ from urllib.parse import unquote, urlsplit
 import pytest
 from conftest import ROOT
 
-SITES = {"docs.dask.org", "keepachangelog.com", "pint.readthedocs.io", "semver.org"}
+SITES = {"docs.dask.org", "github.com", "keepachangelog.com", "pint.readthedocs.io", "semver.org"}
 """Where pages lead on the network, each looked over by a person: the tests have no network and cannot follow them."""
 MOST_TEXT = 2000  # characters of one output
 

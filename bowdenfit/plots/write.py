@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 import os
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager, nullcontext
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, BinaryIO
 
@@ -12,13 +13,13 @@ from bowdenfit.plots.style import DOTS_PER_INCH, in_paper_style
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
-FORMATS = ("png", "svg")  # what a fit writes
-EVERY_FORMAT = (*FORMATS, "pdf")
+FORMATS = ("png", "svg", "pdf")
 OPTIONS: dict[str, dict[str, Any]] = {
     "png": {"pil_kwargs": {"compress_level": 2}},  # half the time of the usual 6, a tenth more bytes
     "svg": {"metadata": {"Date": None}},
     "pdf": {"metadata": {"CreationDate": None}},
 }
+_TYPESETTING = ("GSUB", "GPOS", "GDEF")  # tables of a font that a PDF, whose letters have their places, never looks at
 
 
 def write_all(figure: Figure, folder: Path, name: str, formats: Sequence[str] = FORMATS) -> list[Path]:
@@ -50,11 +51,31 @@ def save(figure: Figure, target: Path | BinaryIO, ending: str) -> None:
         ending: Format.
     """
     options: dict[str, Any] = {"format": ending, "dpi": DOTS_PER_INCH, **OPTIONS.get(ending, {})}
+    with _lean_fonts() if ending == "pdf" else nullcontext():
+        try:
+            figure.savefig(target, **options)
+        except ValueError:  # a name that someone chose has dollar signs in it, and no formula between them
+            _show_as_written(figure)
+            figure.savefig(target, **options)
+
+
+@contextmanager
+def _lean_fonts() -> Iterator[None]:
+    """Fonts go into a PDF without tables for typesetting, which take longer to cut down than all the rest takes to write.
+
+    matplotlib has no setting for that; where fontTools no longer keeps its list here, writing just takes longer.
+    """
+    from fontTools.subset import Options
+
+    usual = getattr(Options, "_drop_tables_default", None)
+    if usual is None:
+        yield
+        return
+    Options._drop_tables_default = [*usual, *_TYPESETTING]
     try:
-        figure.savefig(target, **options)
-    except ValueError:  # a name that someone chose has dollar signs in it, and no formula between them
-        _show_as_written(figure)
-        figure.savefig(target, **options)
+        yield
+    finally:
+        Options._drop_tables_default = usual
 
 
 def _show_as_written(figure: Figure) -> None:

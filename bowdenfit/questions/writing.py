@@ -40,9 +40,9 @@ def figures_of(folder: str | Path, name: str) -> list[Path]:
         folder: Where they are.
         name: Of the answer.
     """
-    from bowdenfit.plots.write import EVERY_FORMAT
+    from bowdenfit.plots.write import FORMATS
 
-    return [Path(folder) / f"{name}.{ending}" for ending in EVERY_FORMAT]
+    return [Path(folder) / f"{name}.{ending}" for ending in FORMATS]
 
 
 def write_answer(

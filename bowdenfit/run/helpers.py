@@ -23,6 +23,7 @@ DRAWING = (
     "matplotlib.figure",
     "matplotlib.backends.backend_agg",
     "matplotlib.backends.backend_svg",
+    "matplotlib.backends.backend_pdf",
     "bowdenfit.questions.figures",
     "bowdenfit.pages.page",
     "jinja2",

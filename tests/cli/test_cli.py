@@ -321,7 +321,7 @@ def test_a_whole_fit_in_a_process_of_its_own_and_an_interrupt(on_body, tmp_path)
     names = {p.name for p in (tmp_path / "fit").iterdir()}
     known = {"fit.json", "summary.json", "summary.txt", "details.txt", "report.html", "answers.json", "figures.npz"}
     assert names == known | {"posterior.nc", "chain.checkpoint", "figures"}
-    assert len(list((tmp_path / "fit" / "figures").iterdir())) == 15  # seven as PNG and SVG, and their captions
+    assert len(list((tmp_path / "fit" / "figures").iterdir())) == 22  # seven as PNG, SVG and PDF, and their captions
 
 
 @pytest.mark.parametrize(

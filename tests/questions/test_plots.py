@@ -1,15 +1,19 @@
 """The figures: what they draw, what they leave out, and how they are written."""
 
 import dataclasses
+import io
 import pickle
+import re
 import subprocess
 import sys
+import zlib
 from types import SimpleNamespace
 
 import matplotlib as mpl
 import numpy as np
 import pytest
 from figure_words import assert_readable, check_words, words
+from fontTools.ttLib import TTFont
 from kept_data import assert_kept
 from matplotlib.collections import PolyCollection
 
@@ -18,7 +22,7 @@ from bowdenfit.inference.interval import Interval
 from bowdenfit.plots.bands import BAND_QUANTILES, NEW_RUN, Band
 from bowdenfit.plots.densities import BINS, bin_numbers, density, enclosed_share
 from bowdenfit.plots.sheet import ticks
-from bowdenfit.plots.write import write
+from bowdenfit.plots.write import FORMATS, write
 from bowdenfit.questions.figures import FIGURES, draw_figure, figures_of
 from bowdenfit.questions.length.efficiency_figure import AlongRoute, EfficiencyPoints
 from bowdenfit.questions.length.wrap_angles_figure import AngleCurve, WrapAngles
@@ -446,10 +450,10 @@ def test_ticks_are_round_and_within_the_axis(limits):
     assert limits[0] <= values.min() <= values.max() <= limits[1]
 
 
-def test_all_figures_are_written_in_both_formats_and_nothing_else(tmp_path):
+def test_all_figures_are_written_in_every_format_and_nothing_else(tmp_path):
     before = dict(mpl.rcParams)
     written = [path for name, data in paper_data().items() for path in draw_figure(name, data, tmp_path / "figures")]
-    assert [path.name for path in written] == [f"{name}.{ending}" for name in paper_data() for ending in ("png", "svg")]
+    assert [path.name for path in written] == [f"{name}.{ending}" for name in paper_data() for ending in FORMATS]
     assert sorted(written) == sorted((tmp_path / "figures").iterdir())
     assert all(1_000 < path.stat().st_size < 500_000 for path in written)
     assert dict(mpl.rcParams) == before
@@ -467,6 +471,20 @@ def test_the_same_data_give_the_same_bytes_with_words_as_text(tmp_path):
     for path in (tmp_path / "first").iterdir():
         assert path.read_bytes() == (tmp_path / "second" / path.name).read_bytes()
     assert "Wrap angle (deg)</text>" in (tmp_path / "first" / "wrap_angles.svg").read_text(encoding="utf-8")
+
+
+def test_a_pdf_has_letters_that_can_be_searched_and_nothing_for_typesetting(tmp_path, capfd):
+    name = "Łódź λ <b> $x (50 %)"
+    for folder in (tmp_path / "first", tmp_path / "second"):
+        draw_figure("coefficients", paper_data()["coefficients"], folder, ("pdf",), name)
+    page = (tmp_path / "first" / "coefficients.pdf").read_bytes()
+    assert page == (tmp_path / "second" / "coefficients.pdf").read_bytes()
+    assert page.startswith(b"%PDF") and b"/FontFile2" in page and b"/Type3" not in page
+    streams = [zlib.decompress(part) for part in re.findall(rb"stream\r?\n(.*?)\r?\nendstream", page, re.DOTALL)]
+    fonts = [TTFont(io.BytesIO(stream)) for stream in streams if stream[:4] == b"\x00\x01\x00\x00"]
+    assert fonts
+    assert not any({"GSUB", "GPOS", "GDEF"} & set(font.keys()) for font in fonts)
+    assert any(b"beginbfchar" in stream or b"beginbfrange" in stream for stream in streams)  # from glyphs to letters
 
 
 def test_a_failed_write_leaves_the_old_file_and_no_temporary_one(tmp_path):

@@ -99,7 +99,7 @@ def test_help_loads_no_arrays_and_reading_tables_neither_jax_nor_pint(on_body):
 def test_a_figure_is_drawn_again_without_a_model(results, tmp_path):
     done = without(HEAVY - {"matplotlib"}, "plot", results, "--figure", "efficiency", "-o", tmp_path)
     assert (done.returncode, done.stderr) == (0, "")
-    drawn = [tmp_path / name for name in ("efficiency.png", "efficiency.svg")]
+    drawn = [tmp_path / name for name in ("efficiency.pdf", "efficiency.png", "efficiency.svg")]
     assert sorted(tmp_path.iterdir()) == [tmp_path / "captions.txt", *drawn]
     for path in drawn:
         assert path.read_bytes() == (results / "figures" / path.name).read_bytes()

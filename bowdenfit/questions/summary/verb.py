@@ -62,7 +62,7 @@ def plot(
         output: Folder for the figures.
         figures: Draw only this figure, such as efficiency; may be repeated.
         width: Width of the page, such as 3.5in or 88mm for a column of a paper; words keep their size.
-        formats: Write this format: png, svg or pdf; may be repeated.
+        formats: Write this format alone: png, svg or pdf; may be repeated.
 
     Returns:
         The files written.
@@ -89,13 +89,13 @@ def plot(
 
 
 def _formats(named: Sequence[str]) -> Sequence[str]:
-    """Endings of the files; those of a fit where none is named."""
+    """Endings of the files; all where none is named."""
     from bowdenfit.errors import UsageError, nearest
-    from bowdenfit.plots.write import EVERY_FORMAT, FORMATS
+    from bowdenfit.plots.write import FORMATS
 
     for name in named:
-        if name not in EVERY_FORMAT:
-            raise UsageError(f"there is no format {name!r} for figures{nearest(name, list(EVERY_FORMAT))}")
+        if name not in FORMATS:
+            raise UsageError(f"there is no format {name!r} for figures{nearest(name, list(FORMATS))}")
     return tuple(dict.fromkeys(named)) or FORMATS
 
 

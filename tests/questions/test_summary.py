@@ -82,7 +82,8 @@ def test_the_page_of_a_name_and_reasons_without_end_is_still_a_page(fit):
     page = summary_text(long)
     assert faults(page) == []
     assert "the measurements contradict each other" in " ".join(page.splitlines()[:3])
-    assert "[...]" in page
+    assert "Reason 0: word" in page
+    assert re.search(r"^\[\d sentences more: bowdenfit summary --full\]\nWhat they would say: cut", page, re.MULTILINE)
 
 
 def test_no_line_of_the_full_summary_is_too_wide_for_a_terminal_of_130(fit):

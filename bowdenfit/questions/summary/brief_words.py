@@ -10,7 +10,7 @@ from bowdenfit.questions.summary.answer import answer, checked_readings, quantit
 from bowdenfit.questions.summary.trust_words import next_step, reasons, trust, warning
 from bowdenfit.questions.summary.verdict import verdict
 from bowdenfit.results.record import Record
-from bowdenfit.words import WIDTH, filled, table
+from bowdenfit.words import WIDTH, counted, filled, table
 
 LINES = 25
 _LONGEST_NAME, _LONGEST_READING = 44, 36  # characters
@@ -22,18 +22,29 @@ _MORE = "Everything else: bowdenfit summary --full"
 
 def summary_text(fit: Record) -> str:
     """One page for people: at most `LINES` lines, as a terminal of 80 columns shows them."""
-    above, off = _said(fit), _off(fit)
-    rows = LINES - len(above) - len(off) - _BESIDE
-    shown = _quantities(fit, min(max(rows, _LEAST_QUANTITIES), _MOST_QUANTITIES))
+    said, off = _said(fit), _off(fit)
+    rows = LINES - sum(map(len, said)) - len(off) - _BESIDE
+    shown = _quantities(fit, min(max(rows, _LEAST_QUANTITIES), _MOST_QUANTITIES), rows)
     below = [line for block in (shown, off, [_MORE]) for line in (["", *block] if block else [])]
-    room = LINES - len(below)
-    if len(above) > room:
-        above = [*above[: room - 1], "[...]"]
-    return "\n".join([*above, *below]) + "\n"
+    return "\n".join([*_within(said, LINES - len(below)), *below]) + "\n"
 
 
-def _said(fit: Record) -> list[str]:
-    """The answer, whether to trust it, and what to do next, each from a line of its own on."""
+def _within(said: list[list[str]], room: int) -> list[str]:
+    """Sentences in so many lines: the first and the last stay, of the others as many as there is room for, in their order."""
+    first, *others, last = said
+    if sum(map(len, said)) <= room:
+        return [line for sentence in said for line in sentence]
+    left, kept = room - len(first) - len(last) - 1, list[list[str]]()
+    for sentence in others:
+        if (left := left - len(sentence)) < 0:
+            break
+        kept.append(sentence)
+    more = f"[{counted(len(others) - len(kept), 'sentence')} more: bowdenfit summary --full]"
+    return [line for sentence in (first, *kept, [more], last) for line in sentence][:room]
+
+
+def _said(fit: Record) -> list[list[str]]:
+    """Lines of the answer, of whether to trust it and of what to do next, each sentence from a line of its own on."""
     found, name = verdict(fit), textwrap.shorten(fit.name, _LONGEST_NAME, placeholder="...")
     first, *others = answer(fit)
     first = first[0].lower() + first[1:]
@@ -41,30 +52,37 @@ def _said(fit: Record) -> list[str]:
         sentences = [f"{name}: {first}", *others, *trust(fit), next_step(fit)]
     else:
         sentences = [f"{name}: {warning(found)}", *reasons(found), f"What they would say: {first}"]
-    return [line for sentence in sentences if sentence for line in filled(sentence).splitlines()]
+    return [filled(sentence).splitlines() for sentence in sentences if sentence]
 
 
-def _quantities(fit: Record, most: int) -> list[str]:
-    """The coefficients in a table of so many rows at most."""
+def _quantities(fit: Record, most: int, lines: int) -> list[str]:
+    """The coefficients in a table of so many rows at most; what they are takes further lines while there is room."""
     found = quantities(fit)
     shown = found[:most]
     if not shown:
         return []
     wide = max(len(q.interval) for q in shown)
     rows = [(q.name, q.value, f"{q.interval:>{wide}} {q.unit}".rstrip()) for q in shown]
-    lines = table(("", "value", f"{'90 % interval':>{wide}}"), rows, left=(f"{'90 % interval':>{wide}}",)).splitlines()
-    start = max(map(len, lines)) + 2
-    meanings = [_meaning(q.what, WIDTH - start) for q in shown]
-    lines[2:] = [f"{line:<{start}}{meaning}".rstrip() for line, meaning in zip(lines[2:], meanings, strict=True)]
+    heads = ("", "value", f"{'90 % interval':>{wide}}")
+    printed = table(heads, rows, left=heads[-1:]).splitlines()
+    start = max(map(len, printed)) + 2
     more = len(found) - len(shown)
-    return [*lines, *([f"and {more} more"] if more > 0 else [])]
+    made, spare = printed[:2], lines - len(shown) + (more <= 0)
+    for line, q in zip(printed[2:], shown, strict=True):
+        meaning = _meaning(q.what, WIDTH - start, spare)
+        spare -= len(meaning) - 1
+        made += [f"{line:<{start}}{meaning[0]}".rstrip(), *(" " * start + further for further in meaning[1:])]
+    return [*made, *([f"and {more} more"] if more > 0 else [])]
 
 
-def _meaning(what: str, room: int) -> str:
-    """What a coefficient is; the names of those that are no friction say it themselves where there is no room."""
-    if len(what) > room and not what.startswith("friction"):
-        return ""
-    return textwrap.shorten(what, room, placeholder=" ...")
+def _meaning(what: str, room: int, spare: int) -> list[str]:
+    """What a coefficient is, in one line and as many more as there are to spare, else cut; the names of those that are no
+    friction say it themselves where there is no room.
+    """
+    whole = textwrap.wrap(what, room) or [""]
+    if len(whole) <= 1 + max(spare, 0):
+        return whole
+    return [textwrap.shorten(what, room, placeholder=" ...") if what.startswith("friction") else ""]
 
 
 def _off(fit: Record) -> list[str]:

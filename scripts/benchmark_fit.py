@@ -141,7 +141,7 @@ class Bench:
         output = ["--output", str(results), "--force"] if results is not None else []
         # matplotlib's list of fonts is no compiled program, so it stays where the cache is emptied.
         environment = {"XDG_CACHE_HOME": str(self.folder / cache), "MPLCONFIGDIR": str(self.folder / "matplotlib")}
-        environment |= {"PYTHONPATH": str(tree)}
+        environment |= {"PYTHONPATH": str(tree), "JAX_COMPILATION_CACHE_DIR": ""}
         return measured(["-m", "bowdenfit.cli", *arguments, *output], environment, results, tree)
 
     def rows(self) -> Iterator[Row]:

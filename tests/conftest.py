@@ -1,11 +1,39 @@
 """Settings of every test: 64-bit floats, strict promotion of types, and shapes checked at run time."""
 
 import os
+import shutil
 import sys
+import tempfile
 from pathlib import Path
 
 import pytest
-from jaxtyping import install_import_hook
+
+ROOT = Path(__file__).parent.parent
+PROGRAMS = "JAX_COMPILATION_CACHE_DIR"
+
+
+def keep_what_is_compiled() -> str | None:
+    """Let workers, and what tests start, load what another process has compiled: half of the tests' time otherwise.
+
+    Returns:
+        A folder for the programs of JAX that is new, if there is none yet.
+    """
+    if sys.dont_write_bytecode:  # the machine keeps sources clean, and every process compiles all libraries
+        sys.dont_write_bytecode = False
+        sys.pycache_prefix = str(ROOT / ".pytest_cache" / "byte_code")
+        os.environ["PYTHONPYCACHEPREFIX"] = sys.pycache_prefix
+        os.environ.pop("PYTHONDONTWRITEBYTECODE", None)  # none after -B
+    if PROGRAMS in os.environ:
+        return None
+    os.environ[PROGRAMS] = tempfile.mkdtemp(prefix="bowdenfit-programs-")
+    os.environ["JAX_PERSISTENT_CACHE_MIN_COMPILE_TIME_SECS"] = "0"
+    os.environ["JAX_PERSISTENT_CACHE_MIN_ENTRY_SIZE_BYTES"] = "-1"
+    return os.environ[PROGRAMS]
+
+
+NEW = keep_what_is_compiled()  # before anything large is loaded
+
+from jaxtyping import install_import_hook  # noqa: E402
 
 # The rooms whose functions are about arrays. They are loaded when they are first needed, so that the hook stays.
 CHECKED = ("physics", "cable", "recordings", "kinds", "device")
@@ -18,10 +46,13 @@ from bowdenfit import cli  # noqa: E402
 jax.config.update("jax_enable_x64", True)
 jax.config.update("jax_numpy_dtype_promotion", "standard")
 
-ROOT = Path(__file__).parent.parent
-
-
 MOST_MEMORY = 3 * 2**30  # bytes of a process, beyond which it drops what it has compiled
+
+
+def pytest_unconfigure():
+    """Leave no programs behind."""
+    if NEW is not None:
+        shutil.rmtree(NEW, ignore_errors=True)
 
 
 @pytest.fixture(scope="module", autouse=True)

@@ -41,10 +41,12 @@ def settings_of_process(remember: bool) -> Callable[[], None]:
 
 
 def remember_compilations() -> None:
-    """Keep compiled programs in the user's cache folder."""
+    """Keep compiled programs in the user's cache folder, unless JAX has been told of another."""
     import jax
     from platformdirs import user_cache_dir
 
+    if os.environ.get("JAX_COMPILATION_CACHE_DIR"):
+        return
     jax.config.update("jax_compilation_cache_dir", user_cache_dir("bowdenfit"))
     jax.config.update("jax_persistent_cache_min_compile_time_secs", 0.1)
     jax.config.update("jax_persistent_cache_min_entry_size_bytes", -1)

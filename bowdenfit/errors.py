@@ -11,6 +11,7 @@ from typing import TypeVar
 Value = TypeVar("Value")
 Given = TypeVar("Given")
 
+MEMORY_RAN_OUT = "memory ran out; close other programs, or run this where there is more of it."
 _LONGEST = 200  # characters of a file's name in a message
 _NO_MEMORY = ("RESOURCE_EXHAUSTED", "Cannot allocate memory", "failed to map segment")  # of XLA, the system, its loader
 _FULL = {errno.ENOSPC, errno.EFBIG, errno.EIO, *({errno.EDQUOT} if hasattr(errno, "EDQUOT") else ())}
@@ -162,7 +163,7 @@ def system_error(error: BaseException) -> BowdenfitError | None:
         error: Whatever came up.
     """
     if isinstance(error, MemoryError) or any(sign in str(error) for sign in _NO_MEMORY):
-        return MemoryShortageError("memory ran out; close other programs, or run this where there is more of it.")
+        return MemoryShortageError(MEMORY_RAN_OUT)
     if not isinstance(error, OSError) or error.errno is None:
         return None
     name = str(error.filename or "a file")

@@ -13,6 +13,7 @@ from bowdenfit.cli.commands import command
 from bowdenfit.cli.interrupts import listening, was_asked
 from bowdenfit.cli.progress import INTERRUPTED
 from bowdenfit.cli.starting import completion, init
+from bowdenfit.cli.supervised import is_limited, supervise
 from bowdenfit.cli.terminal import say
 from bowdenfit.errors import BowdenfitError, system_error
 from bowdenfit.verbs import VERBS
@@ -27,9 +28,26 @@ def start() -> None:
     os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")  # it takes 32 MiB a thread when loaded, and waits for ever if it may not
     if not (sys.warnoptions or os.environ.get("BOWDENFIT_DEBUG")):
         warnings.simplefilter("ignore")  # of libraries, in words of their own; what matters is said in ours
+    _open_what_is_closed()
     for name in ("stdout", "stderr"):
         if getattr(sys, name) is None:  # closed by whoever started this
             setattr(sys, name, Path(os.devnull).open("w", encoding="utf-8"))  # noqa: SIM115  (for as long as this runs)
+    if is_limited():
+        supervise(_run)
+    _run()
+
+
+def _open_what_is_closed() -> None:
+    """Let no file that is opened later be taken for standard output, where libraries print."""
+    for number in range(3):
+        try:
+            os.fstat(number)
+        except OSError:
+            os.open(os.devnull, os.O_RDWR)  # which takes the first number that is free
+
+
+def _run() -> None:
+    """`main`, and the end of this process."""
     try:
         main()
     except SystemExit as stop:

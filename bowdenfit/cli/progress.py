@@ -11,11 +11,13 @@ from typing import Any, TypeAlias
 
 import click
 
+from bowdenfit.cli.supervised import say_if_aborted
 from bowdenfit.errors import DiskError, MemoryShortageError, system_error
+from bowdenfit.inference.engines.memory import BUFFERS, refuse_shortage
 from bowdenfit.verb import Watch
 
 INTERRUPTED = 130
-_NEEDED = 640 << 20  # bytes; a small fit by NUTS takes so much beside what is loaded by then
+_NEEDED = 576 << 20  # bytes; a small fit by NUTS takes so much beside what is loaded by then and the buffers of linear algebra
 _ADDRESSES, _ADDRESSES_PER_CORE = 1500 << 20, 150 << 20  # bytes; of threads and their heaps most is never used
 Report: TypeAlias = Callable[..., None]
 
@@ -35,6 +37,7 @@ def watch_verb(folder: Path, watch: Watch) -> Iterator[Report]:
         MemoryShortageError: There is too little memory to begin.
     """
     _refuse_without_memory()
+    say_if_aborted(folder / watch.kept, _kept_in(folder))
     asked = threading.Event()
 
     def stop(*_: object) -> None:
@@ -68,8 +71,7 @@ def watch_verb(folder: Path, watch: Watch) -> Iterator[Report]:
             click.echo(f"\nInterrupted; {watch.remark} {folder}: run the same command with --resume.", err=True)
             raise click.exceptions.Exit(INTERRUPTED) from None
         if kept and isinstance(shortage, DiskError | MemoryShortageError):
-            said = f"What was done so far is kept in {folder}: with room, run the same command with --resume."
-            raise type(shortage)(f"{shortage} {said}") from None
+            raise type(shortage)(f"{shortage} {_kept_in(folder)}") from None
         if wanted:
             raise KeyboardInterrupt from None
         raise
@@ -77,22 +79,14 @@ def watch_verb(folder: Path, watch: Watch) -> Iterator[Report]:
         sys.unraisablehook = printed
 
 
+def _kept_in(folder: Path) -> str:
+    return f"What was done so far is kept in {folder}: with room, run the same command with --resume."
+
+
 def _refuse_without_memory() -> None:
     """XLA and OpenBLAS crash or wait for ever where memory runs out, so it is asked for once before they are loaded."""
-    import mmap
-
-    asked = [(_NEEDED, {"flags": mmap.MAP_PRIVATE | mmap.MAP_ANONYMOUS} if hasattr(mmap, "MAP_PRIVATE") else {})]
-    if hasattr(mmap, "PROT_READ"):  # addresses alone, which take no memory
-        addresses = _ADDRESSES + (os.cpu_count() or 1) * _ADDRESSES_PER_CORE
-        asked.append((addresses, {"flags": mmap.MAP_PRIVATE | mmap.MAP_ANONYMOUS, "prot": mmap.PROT_READ}))
-    for size, kind in asked:
-        try:
-            mmap.mmap(-1, size, **kind).close()
-        except OSError:
-            raise MemoryShortageError(
-                f"there are not the {size >> 20} MiB of memory that this takes; close other programs, or raise the limit "
-                "(ulimit -d and -v show it, or the container's)."
-            ) from None
+    refuse_shortage(_NEEDED + BUFFERS)
+    refuse_shortage(_ADDRESSES + (os.cpu_count() or 1) * _ADDRESSES_PER_CORE, addresses=True)
 
 
 @contextmanager

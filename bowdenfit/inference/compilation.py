@@ -8,6 +8,8 @@ from typing import Any
 import jax
 import jax.numpy as jnp
 
+from bowdenfit.inference.engines.memory import refuse_shortage, take_buffers
+
 # XLA's newer fusion emitters take twice as long to compile the small elementwise functions here, which then run no
 # faster; measured on two cores by scripts/benchmark_fit.py.
 _OPTIONS: dict[str, Any] = {"xla_cpu_use_fusion_emitters": False, "xla_cpu_parallel_codegen_split_count": 2}
@@ -22,7 +24,12 @@ def compile_program(
     Args:
         run_once: Whether compiling costs more than running, so that optimization does not pay.
         beside: Compiles it while this thread goes on; the first call waits for that.
+
+    Raises:
+        MemoryShortageError: There is too little memory for it, which the compiler cannot say.
     """
+    take_buffers()
+    refuse_shortage()
     lowered = jax.jit(function).lower(*shapes)
     options = (_RUN_ONCE if run_once else _OPTIONS) if jax.default_backend() == "cpu" else {}
     if beside is None:

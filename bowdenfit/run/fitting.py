@@ -9,6 +9,7 @@ from typing import Any
 from bowdenfit.dataset import Dataset
 from bowdenfit.front_desk import Fit
 from bowdenfit.inference.chain import Sampling
+from bowdenfit.inference.engines.memory import refuse_shortage
 from bowdenfit.inference.least_squares import least_squares, maximum_posterior
 from bowdenfit.inference.log_density import LogDensity as Density
 from bowdenfit.inference.objective import make_objective
@@ -47,13 +48,24 @@ def run(
     with watch.stage("wait for the start"):
         center = start.result()
     files = begin(), resume
-    asked = Sampling(density, center, settings, seed, programs.quantities, *files, progress or (lambda _: None))
+    asked = Sampling(density, center, settings, seed, programs.quantities, *files, _with_memory(progress))
     posterior, reasons = draws_of(programs, asked, watch)
     squares, beside = estimated.result()
     watch.seconds |= {f"{stage}, beside": seconds for stage, seconds in beside.items()}
     found = Fit(data, squares, posterior, not reasons, reasons, provenance(seed, watch))
     found._answers.update(programs.asked)
     return found
+
+
+def _with_memory(progress: Callable[..., None] | None) -> Callable[..., None]:
+    """A report that stops sampling where memory runs out, as long as that can still be said."""
+
+    def report(*where: Any) -> None:
+        refuse_shortage()
+        if progress is not None:
+            progress(*where)
+
+    return report
 
 
 def classical(density: Density) -> Iterator[Any]:

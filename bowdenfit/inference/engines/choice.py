@@ -1,6 +1,5 @@
 """The engine that is asked for: local, dask://HOST:PORT, slurm, or any executor."""
 
-import os
 from collections.abc import Callable, Iterator
 from concurrent.futures import Executor, ProcessPoolExecutor
 from contextlib import contextmanager
@@ -11,7 +10,7 @@ from typing import Any
 
 from bowdenfit.errors import UsageError
 from bowdenfit.inference.engines.engine import Engine, EngineError, HereOrInProcesses, in_threads
-from bowdenfit.inference.engines.processes import nothing, start_worker
+from bowdenfit.inference.engines.processes import cores, nothing, start_worker
 from bowdenfit.inputs import refuse_special
 from bowdenfit.words import shown
 
@@ -20,11 +19,6 @@ OF_A_JOB = 4096  # data sets of a job of Slurm at the most; each job loads and c
 JOBS = 16  # of Slurm at a time, if nothing else is said
 _ANSWERS_WITHIN, _WORKERS_WITHIN = 10, 60  # seconds
 _MINUTES = 240  # of a job of Slurm; SBATCH_TIMELIMIT says otherwise
-
-
-def cores() -> int:
-    """That this process may use."""
-    return len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
 
 
 @contextmanager

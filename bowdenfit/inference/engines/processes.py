@@ -6,6 +6,11 @@ import threading
 from collections.abc import Callable
 
 
+def cores() -> int:
+    """That this process may use."""
+    return len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
+
+
 def start_worker(prepare: Callable[[], None]) -> None:
     """What a new process does first.
 

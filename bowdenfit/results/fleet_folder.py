@@ -11,12 +11,14 @@ import numpy as np
 
 from bowdenfit.errors import StoreError
 from bowdenfit.inputs import or_damaged, refuse_special
-from bowdenfit.results.folder import replace_when_whole
+from bowdenfit.results.folder import read_page, replace_when_whole
+from bowdenfit.results.kept import checksum
 from bowdenfit.types import Vector
 
 FLEET_TABLE, FLEET_DESCRIPTION = "fleet.csv", "fleet.toml"  # of the measurements: its inspections, and what all have in common
 COLUMNS = ("cable", "cycles", "temperature_degC", "lubricated", "file")
 FLEET_DRAWS, FLEET_PAGE = "fleet.nc", "fleet.json"
+CHECKSUM = "draws_crc32"  # in fleet.json, of fleet.nc
 _METADATA = {"cycles": "1", "temperature": "degC", "lubricated": "1"}
 _POSTERIOR = "posterior"
 
@@ -101,6 +103,7 @@ def read_fleet_draws(folder: Path) -> FleetDraws:
         what = "holds an unfinished fleet; finish it with --resume" if folder.is_dir() else "does not exist"
         raise StoreError(f"{path} cannot be read: {folder} {what}, or name a folder that `bowdenfit fleet` wrote.")
     damaged = StoreError(f"{path} is damaged; fit the fleet again, or restore the folder from a copy.")
+    _refuse_changed(folder, damaged)
     with or_damaged(damaged), h5py.File(path) as file:
         group, stats = file[_POSTERIOR], file["sample_stats"]
         fixed = {"cable", "cable_name", "chain", "draw", *_METADATA}
@@ -111,3 +114,19 @@ def read_fleet_draws(folder: Path) -> FleetDraws:
         known = {name: np.asarray(stats[name][()]) for name in stats if name not in fixed}
         about = json.loads(file.attrs["fleet"])
     return FleetDraws(labels, names, cycles, temperature, lubricated, values, known, attributes, about)
+
+
+def _refuse_changed(folder: Path, damaged: StoreError) -> None:
+    """Refuse draws that are not those that fleet.json was written for.
+
+    Raises:
+        StoreError: They are others, or fleet.json is missing or damaged.
+    """
+    try:
+        page = read_page(folder / FLEET_PAGE)
+    except FileNotFoundError:
+        raise StoreError(f"{folder} holds an unfinished fleet; finish it with `bowdenfit fleet ... --resume`.") from None
+    if not isinstance(page, dict):
+        raise StoreError(f"{folder / FLEET_PAGE} is damaged; fit the fleet again, or restore the folder from a copy.")
+    if page.get(CHECKSUM) not in {None, checksum(folder / FLEET_DRAWS)}:
+        raise damaged

@@ -17,7 +17,8 @@ from bowdenfit.questions.pool.life import cycles_until, life_of
 from bowdenfit.questions.pool.pooling import pooled
 from bowdenfit.questions.pool.unlike import anderson_darling, holm
 from bowdenfit.questions.pool.words import pool_text
-from bowdenfit.results.fleet_folder import FLEET_DRAWS, write_fleet_draws
+from bowdenfit.results.fleet_folder import CHECKSUM, FLEET_DRAWS, FLEET_PAGE, write_fleet_draws
+from bowdenfit.results.kept import checksum
 
 ASKED = Asked(0.6, {"mu_0": np.pi, "mu_1": 0.3}, 100_000.0)
 
@@ -136,6 +137,11 @@ def test_coefficients_that_mean_different_things_are_pooled_apart(fleet):
     assert apart.inspected.known.sum(axis=0).tolist() == [18, 18, 36]
 
 
+def finished_fleet(folder, drawn):
+    write_fleet_draws(folder / FLEET_DRAWS, drawn)
+    (folder / FLEET_PAGE).write_text(json.dumps({CHECKSUM: checksum(folder / FLEET_DRAWS)}))
+
+
 @pytest.mark.parametrize(
     ("arguments", "said"),
     [
@@ -147,7 +153,7 @@ def test_coefficients_that_mean_different_things_are_pooled_apart(fleet):
     ],
 )
 def test_life_without_what_it_depends_on_is_refused(run, fleet, tmp_path, arguments, said):
-    write_fleet_draws(tmp_path / FLEET_DRAWS, fleet[0])
+    finished_fleet(tmp_path, fleet[0])
     code, _, error = run("pool", tmp_path, *arguments)
     assert code == 2 and said in " ".join(error.split())
 
@@ -157,8 +163,26 @@ def test_a_folder_without_a_fleet_is_refused(run, tmp_path):
     assert code == 2 and "fleet.nc cannot be read" in " ".join(error.split())
 
 
+def test_draws_that_are_not_as_they_were_written_are_refused(run, fleet, tmp_path):
+    finished_fleet(tmp_path, fleet[0])
+    as_written = (tmp_path / FLEET_DRAWS).read_bytes()
+    place = as_written.find(fleet[0].values["mu_0"].tobytes()[:8])
+    assert place > 0  # a draw, so that what is changed would be read without a word
+    (tmp_path / FLEET_DRAWS).write_bytes(as_written[:place] + b"\x01" + as_written[place + 1 :])
+    code, _, error = run("pool", tmp_path)
+    assert code == 2 and "fleet.nc is damaged" in " ".join(error.split())
+    (tmp_path / FLEET_DRAWS).write_bytes(as_written)
+    for page in ("[]", "{", "[" * 100_000, "\x00"):
+        (tmp_path / FLEET_PAGE).write_text(page)
+        code, _, error = run("pool", tmp_path)
+        assert code == 2 and "fleet.json is damaged" in " ".join(error.split())
+    (tmp_path / FLEET_PAGE).unlink()
+    code, _, error = run("pool", tmp_path)
+    assert code == 2 and "unfinished fleet" in " ".join(error.split())
+
+
 def test_the_answer_is_json_and_csv(run, fleet, found, tmp_path):
-    write_fleet_draws(tmp_path / FLEET_DRAWS, fleet[0])
+    finished_fleet(tmp_path, fleet[0])
     angles = ("--until", "60%", "--wrap-angle", f"mu_0={np.pi}rad", "--wrap-angle", "mu_1=0.3rad", "--cycles", 100_000)
     code, out, _ = run("pool", tmp_path, *angles, "--json", "--seed", 1, "-o", tmp_path / "out")
     page = json.loads(out)

@@ -139,18 +139,20 @@ def _fit(
 
 
 def _write(answer: "Fleet", drawn: "FleetDraws | None", store: "FleetStore") -> None:
-    """The draws, the summary and, last, fleet.json; then what was kept of pieces is not needed any more."""
+    """The draws, the summary and, last, fleet.json, all of them or none; what was kept of pieces is not needed then."""
     from bowdenfit.questions.fleet.words import fleet_text
-    from bowdenfit.results.fleet_folder import FLEET_DRAWS, FLEET_PAGE, write_fleet_draws
-    from bowdenfit.results.folder import SUMMARY_TEXT, folder_to_write, write_text
+    from bowdenfit.results.fleet_folder import CHECKSUM, FLEET_DRAWS, FLEET_PAGE, write_fleet_draws
+    from bowdenfit.results.folder import SUMMARY_TEXT, filled_when_whole, write_text
+    from bowdenfit.results.kept import checksum
     from bowdenfit.results.plain import plain
     from bowdenfit.words import printable
 
-    with folder_to_write(store.folder) as folder:
+    with filled_when_whole(store.folder, FLEET_PAGE) as folder:
         if drawn is not None:
             write_fleet_draws(folder / FLEET_DRAWS, drawn)
         write_text(folder / SUMMARY_TEXT, printable(fleet_text(answer)))
-        write_text(folder / FLEET_PAGE, json.dumps(plain(answer), indent=1) + "\n")
+        page = plain(answer) | {CHECKSUM: checksum(folder / FLEET_DRAWS)}
+        write_text(folder / FLEET_PAGE, json.dumps(page, indent=1) + "\n")
     store.finish()
 
 

@@ -1,6 +1,8 @@
 """Writing an answer to a folder: for people, as a figure, and for programs; in one way for all questions."""
 
 import json
+import shutil
+from collections.abc import Mapping
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -46,18 +48,24 @@ def figures_of(folder: str | Path, name: str) -> list[Path]:
 
 
 def write_answer(
-    folder: str | Path, name: str, answer: Any, text: str, figure: "AnswerFigure", cable: str = "", page: "Page | None" = None
+    folder: str | Path,
+    name: str,
+    answer: Any,
+    text: str,
+    figures: "Mapping[str, AnswerFigure]",
+    cable: str = "",
+    page: "Page | None" = None,
 ) -> list[Path]:
-    """Write an answer as text, as a figure and, last, as JSON; a folder that has the JSON has everything.
+    """Write an answer as text, as figures and, last, as JSON: all of them or none; a folder that has the JSON has everything.
 
     Args:
         folder: Where to; made if missing. Earlier files of these names are replaced.
         name: Of the files.
         answer: The answer.
         text: For people.
-        figure: File of its figure.
+        figures: Files of its figures, by their names.
         cable: Name of the cable; empty where there are several.
-        page: The same as a page with that figure; none is written without one.
+        page: The same as a page with these figures; none is written without one.
 
     Returns:
         The files written.
@@ -65,17 +73,22 @@ def write_answer(
     Raises:
         StoreError: The folder cannot be written.
     """
-    from bowdenfit.questions.figure_files import write_figure
-    from bowdenfit.results.folder import folder_to_write, write_text
+    from bowdenfit.questions.figure_files import CAPTIONS, write_figure
+    from bowdenfit.results.folder import filled_when_whole, write_text
     from bowdenfit.results.plain import plain
 
     page_file, text_file, *_ = files = files_of(folder, name)
-    with folder_to_write(Path(folder)):
-        write_text(text_file, text)
-        write_figure(figure, answer, Path(folder), name, cable)
+    files += [path for each in figures if each != name for path in figures_of(folder, each)]
+    with filled_when_whole(Path(folder), page_file.name) as place:
+        if (Path(folder) / CAPTIONS).is_file():  # of figures that stay
+            shutil.copyfile(Path(folder) / CAPTIONS, place / CAPTIONS)
+        write_text(place / text_file.name, text)
+        for each, figure in figures.items():
+            write_figure(figure, answer, place, each, cable)
         if page is not None:
-            files.insert(0, write_page(page, Path(folder), Path(folder) / f"{name}.html"))
-        write_text(page_file, json.dumps(plain(answer), indent=1, allow_nan=False) + "\n")
+            written = write_page(page, place, place / f"{name}.html")
+            files.insert(0, Path(folder) / written.name)
+        write_text(place / page_file.name, json.dumps(plain(answer), indent=1, allow_nan=False) + "\n")
     return files
 
 

@@ -28,6 +28,7 @@ REPORT = "report.html"
 POSTERIOR, CHAIN, FIGURES = "posterior.nc", "chain.checkpoint", "figures"
 ANSWERS, FIGURE_DATA = "answers.json", "figures.npz"
 REPLICATIONS = "replications.jsonl"  # of a calibration
+_PARTIAL = ".partial"  # ends the names of what is being written
 _LARGEST = 400e6  # bytes of a text
 _WRITTEN = (FIT, ANSWERS, SUMMARY, SUMMARY_TEXT, DETAILS_TEXT, REPORT, FIGURE_DATA, POSTERIOR, CHAIN)
 
@@ -41,7 +42,7 @@ def replace_when_whole(path: Path) -> Iterator[Path]:
     """
     if path.exists() and not path.is_file():
         raise StoreError(f"{path} is no file and stays as it is; name a file that is new, or that may be replaced.")
-    temporary = path.with_name(f".{path.name}.partial")
+    temporary = path.with_name(f".{path.name}{_PARTIAL}")
     try:
         yield temporary
         os.replace(temporary, path)  # noqa: PTH105  (Path.replace says the same; this is the usual word for it)
@@ -50,24 +51,29 @@ def replace_when_whole(path: Path) -> Iterator[Path]:
 
 
 @contextmanager
-def filled_when_whole(folder: Path) -> Iterator[Path]:
-    """A folder beside `folder` to write into; what is in it moves there when all is written, and is gone if that fails.
+def filled_when_whole(folder: Path, last: str = "") -> Iterator[Path]:
+    """A folder beside or inside `folder` to write into; what is in it moves there when all is written, else it is gone.
 
     Args:
         folder: What it will be called; what lies there already and is called otherwise stays.
+        last: File that says that the others are there: it is gone while they move, and comes last.
 
     Raises:
         StoreError: It cannot be written.
     """
+    there = folder.is_dir()  # perhaps a disk of its own, or one in a folder that may not be written
     try:
         folder.parent.mkdir(parents=True, exist_ok=True)
-        place = Path(tempfile.mkdtemp(prefix=f".{folder.name[:40]}.", dir=folder.parent))
+        name = f".{folder.resolve().name[:40]}."
+        place = Path(tempfile.mkdtemp(prefix=name, suffix=_PARTIAL, dir=folder if there else folder.parent))
     except OSError as error:
         raise disk_error(folder, error) from None
     try:
         yield place
-        if folder.exists() and any(folder.iterdir()):
-            for path in place.iterdir():
+        if there:
+            if last:
+                (folder / last).unlink(missing_ok=True)
+            for path in sorted(place.iterdir(), key=lambda path: path.name == last):
                 path.replace(folder / path.name)
         else:
             place.chmod(0o777 & ~_umask())
@@ -76,6 +82,11 @@ def filled_when_whole(folder: Path) -> Iterator[Path]:
         raise disk_error(folder, error) from None
     finally:
         shutil.rmtree(place, ignore_errors=True)
+
+
+def is_empty(folder: Path) -> bool:
+    """Whether nothing lies in a folder, or nothing but what is left of writing that was ended."""
+    return all(path.name.startswith(".") and path.name.endswith(_PARTIAL) for path in folder.iterdir())
 
 
 def _umask() -> int:
@@ -190,7 +201,7 @@ def refuse_to_overwrite(folder: Path, force: bool) -> None:
 
 def _is_ours(path: Path) -> bool:
     """Whether a fit writes what lies in a results folder, or people write it there (*.md)."""
-    name = path.name.removeprefix(".").removesuffix(".partial")
+    name = path.name.removeprefix(".").removesuffix(_PARTIAL)
     return path.suffix == ".md" or name in {*_WRITTEN, FIGURES}
 
 
@@ -234,7 +245,7 @@ def clear(folder: Path) -> None:
     """Remove what an earlier fit wrote, and nothing else; the mark of a finished fit goes first."""
     for name in _WRITTEN:
         (folder / name).unlink(missing_ok=True)
-        (folder / f".{name}.partial").unlink(missing_ok=True)
+        (folder / f".{name}{_PARTIAL}").unlink(missing_ok=True)
     if (folder / FIGURES).is_dir():
         shutil.rmtree(folder / FIGURES)
 

@@ -51,7 +51,7 @@ def compare(
     if output is not None:
         names = {fit.name for fit in fits.values()}
         cable = names.pop() if len(names) == 1 else ""
-        write_answer(output, NAME, found, comparison_text(found), comparison_figure, cable, comparison_page(found))
+        write_answer(output, NAME, found, comparison_text(found), {NAME: comparison_figure}, cable, comparison_page(found))
     return found
 
 
@@ -65,7 +65,9 @@ def refuse_to_replace(folder: Path, force: bool) -> None:
     Raises:
         StoreError: The folder holds something else already, or an earlier comparison.
     """
-    if not folder.exists() or (folder.is_dir() and not any(folder.iterdir())):
+    from bowdenfit.results.folder import is_empty
+
+    if not folder.exists() or (folder.is_dir() and is_empty(folder)):
         return
     if not (folder / f"{NAME}.json").exists():
         raise StoreError(f"{folder} exists and holds no comparison; name another with --output.")

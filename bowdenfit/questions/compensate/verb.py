@@ -87,13 +87,11 @@ def _share(risk: Quantity | None) -> float:
 def _write(answer: "Compensation", folder: Path, cable: str) -> None:
     from bowdenfit.questions.compensate import compensation_figure, compensation_traces_figure
     from bowdenfit.questions.compensate.words import compensation_text
-    from bowdenfit.questions.figure_files import write_figure
-    from bowdenfit.results.folder import folder_to_write
 
+    figures = {NAME: compensation_figure}
     if answer.simulated is not None:
-        with folder_to_write(folder):
-            write_figure(compensation_traces_figure, answer, folder, TRACES, cable)
-    write_answer(folder, NAME, answer, compensation_text(answer), compensation_figure, cable)
+        figures[TRACES] = compensation_traces_figure
+    write_answer(folder, NAME, answer, compensation_text(answer), figures, cable)
 
 
 def _reply(found: "Compensation", asked: dict[str, Any]) -> Reply:

@@ -47,7 +47,7 @@ def identify(
     if output is not None:
         from bowdenfit.questions.identify import identifiability_figure
 
-        write_answer(output, NAME, found, identifiability_text(found), identifiability_figure, found.name)
+        write_answer(output, NAME, found, identifiability_text(found), {NAME: identifiability_figure}, found.name)
     return found
 
 

@@ -54,7 +54,7 @@ def next_measurement(
     ranking = ranked(fit, answer, candidates, costs)
     if output is not None:
         text = next_measurement_text(ranking, top)
-        write_answer(output, NAME, ranking, text, next_figure, fit.name)
+        write_answer(output, NAME, ranking, text, {NAME: next_figure}, fit.name)
     return ranking
 
 

@@ -68,8 +68,9 @@ def refuse_to_replace(folder: Path, force: bool) -> None:
         StoreError: The folder holds something else already, or an earlier answer.
     """
     from bowdenfit.errors import StoreError
+    from bowdenfit.results.folder import is_empty
 
-    if not folder.exists() or (folder.is_dir() and not any(folder.iterdir())):
+    if not folder.exists() or (folder.is_dir() and is_empty(folder)):
         return
     if not (folder / f"{NAME}.json").exists():
         raise StoreError(f"{folder} exists and holds no pooled fleet; name another with --output.")
@@ -78,22 +79,23 @@ def refuse_to_replace(folder: Path, force: bool) -> None:
 
 
 def _write(found: "Pool", folder: Path) -> None:
-    """Figures, the page, the words and, last, the JSON: a folder that has it has everything."""
+    """Figures, the page, the words and, last, the JSON, all of them or none: a folder that has it has everything."""
     from bowdenfit.plots.write import write_all
     from bowdenfit.questions.pool.figures import figures_of
     from bowdenfit.questions.pool.sections import pool_page
     from bowdenfit.questions.pool.words import pool_text
     from bowdenfit.questions.writing import write_page
-    from bowdenfit.results.folder import folder_to_write, write_text
+    from bowdenfit.results.folder import filled_when_whole, write_text
     from bowdenfit.results.plain import plain
     from bowdenfit.words import printable
 
-    with folder_to_write(folder):
+    page = f"{NAME}.json"
+    with filled_when_whole(folder, page) as place:
         for name, figure in figures_of(found).items():
-            write_all(figure, folder, name)
-        write_page(pool_page(found), folder, folder / f"{NAME}.html")
-        write_text(folder / f"{NAME}.txt", printable(pool_text(found)))
-        write_text(folder / f"{NAME}.json", json.dumps(plain(found), indent=1, allow_nan=False) + "\n")
+            write_all(figure, place, name)
+        write_page(pool_page(found), place, place / f"{NAME}.html")
+        write_text(place / f"{NAME}.txt", printable(pool_text(found)))
+        write_text(place / page, json.dumps(plain(found), indent=1, allow_nan=False) + "\n")
 
 
 def asked_of(

@@ -10,7 +10,7 @@ from bowdenfit.dataset import DESCRIPTION_FILE
 from bowdenfit.errors import DatasetError, UsageError, nearest
 from bowdenfit.inputs import refuse_special
 from bowdenfit.results.fleet_folder import FLEET_DESCRIPTION
-from bowdenfit.results.folder import filled_when_whole
+from bowdenfit.results.folder import filled_when_whole, is_empty
 from bowdenfit.words import listed, shown
 
 TEMPLATES = (DESCRIPTION_FILE, "angles.csv", "forces.csv")
@@ -24,7 +24,7 @@ def refuse_existing(folder: Path) -> None:
     Raises:
         UsageError: It does, or it is a file.
     """
-    if folder.is_dir() and not any(folder.iterdir()):
+    if folder.is_dir() and is_empty(folder):
         return
     if folder.exists() or folder.is_symlink():
         raise UsageError(f"{folder} exists already; name another folder, nothing was written.")

@@ -44,7 +44,7 @@ def teleoperate(
 
     answer = teleoperation_of(found, read_device(Path(device)), wrap_angle, PROBABILITY)
     if output is not None:
-        write_answer(output, NAME, answer, teleoperation_text(answer), teleoperation_figure, found.name)
+        write_answer(output, NAME, answer, teleoperation_text(answer), {NAME: teleoperation_figure}, found.name)
     return answer
 
 

@@ -35,6 +35,7 @@ from bowdenfit.words import counted, listed
 __all__ = [
     "BY_GROUP",
     "SCHEMA",
+    "TAKEN",
     "CableSettings",
     "Contact",
     "Description",
@@ -74,7 +75,7 @@ SCHEMA = 1
 BY_GROUP = "by-group"
 Geometry = Literal["continuous", "published"]
 Noise = Literal["normal", "student"]
-_TAKEN = ("chain", "draw", "optimal_length", "optimal_efficiency")  # of what stands beside the coefficients in a file of draws
+TAKEN = ("chain", "draw", "optimal_length", "optimal_efficiency")  # of what stands beside the coefficients in a file of draws
 AnySettings = TypeVar("AnySettings")
 
 
@@ -139,7 +140,7 @@ class Description(Display, Frozen):
         """What names contradict."""
         used = [c.friction for c in self.contact]
         for name in self.coefficients:
-            if name in _TAKEN:
+            if name in TAKEN:
                 yield f"a friction coefficient cannot be called {name!r}, which results hold already; rename it"
             if len({c.by_group for c in self.contact if c.friction == name}) > 1:
                 yield f"by_group is not the same in all contacts of {name!r}; write it in each, or use two names"

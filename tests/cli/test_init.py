@@ -11,8 +11,10 @@ import pytest
 
 import bowdenfit as bf
 from bowdenfit.errors import BowdenfitError, UsageError
+from bowdenfit.model import build_model
 from bowdenfit.questions.start.describe import description_of
 from bowdenfit.questions.start.folder import examples, new_folder
+from bowdenfit.questions.start.names import coefficient_name
 from bowdenfit.questions.start.page import toml_text
 from bowdenfit.questions.start.question import quantity
 
@@ -203,6 +205,46 @@ def test_a_folder_is_there_whole_or_not_at_all(tmp_path):
 def test_an_angle_that_is_none_is_refused_in_a_sentence(typed):
     with pytest.raises(UsageError, match=r"\.$"):
         quantity("Which angle?", "angle", "90 deg").read(typed)
+
+
+@pytest.mark.parametrize(
+    ("typed", "said"),
+    [
+        ("", "the name is empty"),
+        ("mu\u200b1", "cannot be printed"),
+        ("m" * 81, "at most 80"),
+        ("by group", "this is the name of the coefficient"),
+        ("optimal_length", "another number"),
+        ("knie_b", "another number"),
+        ("displacement_zero_3", "another number"),
+        ("NAME OF THE CABLE", "left from the template"),
+    ],
+)
+def test_a_coefficient_is_not_called_what_check_would_refuse(typed, said):
+    with pytest.raises(UsageError, match=said):
+        coefficient_name("What is it called?", "mu1", ("knie",)).read(typed)
+
+
+def test_a_coefficient_may_be_called_what_check_accepts_and_never_what_a_fit_calls_something_else():
+    question = coefficient_name("What is it called?", "mu1", ())
+    assert [question.read(name) for name in ("mu1", " µ  edge ", "knie_mu", "friction")] == ["mu1", "µ edge", "knie_mu", "friction"]
+    for name in examples():
+        if name in {"synthetic-fleet", "on-body-metabolic"}:
+            continue
+        space = build_model(bf.read(examples()[name])).space
+        others = [each.name for each in space.parameters if each.role not in {"friction", "curve"}]
+        assert others, name
+        for other in others:
+            with pytest.raises(UsageError, match="another number"):
+                question.read(other)
+
+
+def test_a_name_that_is_refused_is_asked_for_again_before_anything_is_written(foreign):
+    said = {"eta_mean": "%", "force_at_the_motor": "1", "'knie' called": "tau"}
+    with pytest.raises(UsageError, match="'tau' is what results call another number; write another name, such as mu2."):
+        described(foreign, Person(**{"kraefte.csv has the columns": "3", "What_does_it_hold": "2"}, **said), *FOREIGN)
+    with pytest.raises(UsageError, match="write what the cable is called"):
+        described(foreign, Person(cable_called="NAME OF THE CABLE", What_does_it_hold="2"), "eta.csv")
 
 
 in_a_terminal = pytest.mark.filterwarnings("ignore:os.fork")  # the child is another program at once

@@ -11,6 +11,7 @@ from bowdenfit.kinds import KINDS
 from bowdenfit.kinds.kind import Kind
 from bowdenfit.kinds.stated_angle import stated_angle
 from bowdenfit.questions.start.columns import name_channels, name_columns
+from bowdenfit.questions.start.names import cable_name
 from bowdenfit.questions.start.page import toml_text
 from bowdenfit.questions.start.places import Places, find_places
 from bowdenfit.questions.start.question import Asker, choose, number, quantity, text
@@ -36,7 +37,7 @@ def description_of(paths: Sequence[Path], called: str, ask: Asker) -> str:
         DatasetError: A file cannot be read, or holds nothing that can be used.
     """
     sheets = _sheets(paths, ask)
-    name = ask.ask(text("What is the cable called?", called))
+    name = ask.ask(cable_name("What is the cable called?", called))
     source = ask.ask(text("Who measured it, when, on which bench? (- to leave it out)", "-"))
     faults = Faults()
     for sheet in sheets:

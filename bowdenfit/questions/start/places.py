@@ -11,7 +11,8 @@ from bowdenfit.files.matching import Quantity
 from bowdenfit.files.spellings import without_accents
 from bowdenfit.kinds.stated_angle import stated_angle
 from bowdenfit.questions.start.columns import of_dimension, take, with_unit
-from bowdenfit.questions.start.question import Asker, Question, agree, choose, numbers, one_of, quantity, text
+from bowdenfit.questions.start.names import coefficient_name, place_name
+from bowdenfit.questions.start.question import Asker, Question, agree, choose, numbers, one_of, quantity
 from bowdenfit.questions.start.sheet import SeenColumn, Sheet
 from bowdenfit.words import listed, quoted, shown
 
@@ -242,17 +243,7 @@ def _place(column: SeenColumn) -> str:
 
 def _name(places: Places, words: str, default: str | None, ask: Asker) -> str:
     """The name of a contact, which no other has."""
-    taken = {each["name"] for each in places.contacts}
-    proposed = None if default in taken else default
-    asked = text(words, proposed, "" if proposed else "two places would have the same name.", "edge")
-
-    def read(typed: str) -> str:
-        name = asked.read(typed)
-        if not name or name in taken:
-            raise UsageError(f"{shown(name)} is {'another place already' if name else 'no name'}; write another one.")
-        return name
-
-    return ask.ask(Question(words, read, asked.default, asked.why, asked.example))
+    return ask.ask(place_name(words, default, {each["name"] for each in places.contacts}))
 
 
 def _coefficients(places: Places, ask: Asker) -> None:
@@ -263,4 +254,4 @@ def _coefficients(places: Places, ask: Asker) -> None:
     ask.say("Places of the same materials may share a coefficient of friction; they then have the same name here.")
     for i, contact in enumerate(places.contacts, start=1):
         words = f"What is the coefficient of friction at {shown(contact['name'])} called?"
-        contact["friction"] = ask.ask(text(words, f"mu{i}"))
+        contact["friction"] = ask.ask(coefficient_name(words, f"mu{i}", places.columns))

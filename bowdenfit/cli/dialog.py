@@ -5,6 +5,7 @@ from typing import TypeVar
 
 import click
 
+from bowdenfit.cli.interrupts import line_of
 from bowdenfit.cli.terminal import say
 from bowdenfit.errors import BowdenfitError
 from bowdenfit.questions.start.question import Question
@@ -27,7 +28,7 @@ class Terminal:
             say(f"({such}there is no default, because nothing says it)")
         shown = f"[{question.default}]" if question.default is not None else ""
         while True:
-            typed = click.prompt(shown, default=question.default or "", show_default=False, prompt_suffix="> ")
+            typed = _typed(f"{shown}> ") or question.default or ""
             if not typed.strip():
                 say("Something must be written here; Ctrl-C ends it all, and nothing is written.")
                 continue
@@ -42,6 +43,21 @@ class Terminal:
 
     def settle(self) -> None:
         """Nothing: everything was answered."""
+
+
+def _typed(prompt: str) -> str:
+    """What is typed behind a prompt."""
+    say(prompt, nl=False)
+    sys.stdout.flush()
+    try:
+        line = line_of(sys.stdin)
+    except KeyboardInterrupt:
+        click.echo()
+        raise
+    if not line:
+        click.echo()
+        raise click.Abort
+    return line.rstrip("\n")
 
 
 def has_person() -> bool:

@@ -4,11 +4,14 @@ Python prints and forgets an interrupt that arrives inside a callback of the gar
 some libraries turn it into an error of their own.
 """
 
+import os
+import select
 import signal
 import sys
 from collections.abc import Iterator
 from contextlib import contextmanager
 from types import TracebackType
+from typing import TextIO
 
 _AGAIN = 0.3  # s
 _asked: list[bool] = []
@@ -40,6 +43,25 @@ def listening() -> Iterator[None]:
         if before is signal.default_int_handler:
             signal.signal(signal.SIGINT, before)
         sys.unraisablehook, sys.excepthook = printed, shown
+
+
+def line_of(terminal: TextIO) -> str:
+    """The next line that is typed; empty where the input has ended.
+
+    An interrupt that arrives after Python has looked for one, and before the system waits for the terminal, would otherwise be
+    heard no sooner than the next key. It writes into a pipe, and the system waits for both.
+    """
+    reader, writer = os.pipe()
+    os.set_blocking(writer, False)
+    before = signal.set_wakeup_fd(writer, warn_on_full_buffer=False)
+    try:
+        while terminal not in select.select([terminal, reader], [], [])[0]:
+            os.read(reader, 1)
+        return terminal.readline()
+    finally:
+        signal.set_wakeup_fd(before)
+        os.close(reader)
+        os.close(writer)
 
 
 def _interrupt(*_: object) -> None:

@@ -1,9 +1,14 @@
 """Ctrl-C at any moment is one line: while the program is still loading, too."""
 
+import os
+import signal
 import subprocess
 import sys
+import threading
 
 import pytest
+
+from bowdenfit.cli.interrupts import line_of
 
 INTERRUPT_WHILE_LOADING = """
 import os, signal, sys
@@ -63,3 +68,30 @@ def test_an_interrupt_that_a_library_swallows_is_heard_all_the_same(library, on_
     code = code.format(program="bowdenfit.__main__", module="bowdenfit.dataset", folder=str(on_body))
     done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=False, timeout=60)
     assert (done.returncode, done.stdout, done.stderr.strip()) == (130, "", "Interrupted.")
+
+
+def test_an_interrupt_just_before_the_terminal_is_read_is_heard_without_another_key():
+    """Another thread takes the signal here, so that nothing wakes the system where it waits for a key."""
+    keyboard, screen = os.openpty()
+    before = signal.signal(signal.SIGINT, signal.default_int_handler)
+    late = threading.Timer(20, os.write, (keyboard, b"a key\n"))
+    threading.Timer(0.2, lambda: signal.pthread_kill(threading.get_ident(), signal.SIGINT)).start()
+    late.start()
+    try:
+        with os.fdopen(screen) as terminal, pytest.raises(KeyboardInterrupt):
+            line_of(terminal)
+        assert late.is_alive(), "no sooner than the next key"
+    finally:
+        late.cancel()
+        os.close(keyboard)
+        signal.signal(signal.SIGINT, before)
+
+
+def test_a_line_is_read_as_it_is_typed_and_an_ended_input_is_empty():
+    keyboard, screen = os.openpty()
+    with os.fdopen(screen) as terminal:
+        os.write(keyboard, "Größe 1\nanother\n".encode())
+        assert [line_of(terminal), line_of(terminal)] == ["Größe 1\n", "another\n"]
+        os.write(keyboard, b"\x04")
+        assert line_of(terminal) == ""
+    os.close(keyboard)

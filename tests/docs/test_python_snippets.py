@@ -3,8 +3,10 @@
 import ast
 import inspect
 import json
+import os
 import pydoc
 import re
+import shutil
 import subprocess
 import sys
 
@@ -19,6 +21,8 @@ from bowdenfit.reading import Reading
 MOST_TEXT = 2000  # characters of one output
 PAGES = sorted([ROOT / "README.md", *(ROOT / "docs").glob("*.md"), *(ROOT / "docs" / "notebooks").glob("*.md")])
 CELL = re.compile(r"^```(?:python|\{code-cell\}[^\n]*)\n(.*?)^```", re.MULTILINE | re.DOTALL)
+IN_A_KERNEL = (ROOT / "README.md", ROOT / "docs" / "library.md")
+PROGRAMS = (ROOT / "docs" / "fleets.md",)
 CALIBRATING = """
 from bowdenfit.notebook import watched
 from bowdenfit.questions.calibrate.verb import WATCH
@@ -43,8 +47,7 @@ def run_in_a_kernel(cells, monkeypatch, tmp_path):
 
 
 def test_cells_of_the_pages_run_in_a_kernel_and_print_little(monkeypatch, tmp_path):
-    pages = ROOT / "README.md", ROOT / "docs" / "library.md"
-    shown = [statement for page in pages for cell in CELLS[page] for statement in statements(cell)]
+    shown = [statement for page in IN_A_KERNEL for cell in CELLS[page] for statement in statements(cell)]
     notebook = run_in_a_kernel([*shown, "fit.summary()", CALIBRATING], monkeypatch, tmp_path)
     by_cell = {cell.source: cell.outputs for cell in notebook.cells}
     for source, outputs in by_cell.items():
@@ -56,9 +59,28 @@ def test_cells_of_the_pages_run_in_a_kernel_and_print_little(monkeypatch, tmp_pa
     assert re.fullmatch(r"sampling with emcee \d+ steps, \d\d:\d\d, R-hat 1\.\d+, effective draws \d+", bar)
     assert by_cell[CALIBRATING][0]["data"]["text/plain"].startswith("calibrating: 100%") and len(by_cell[CALIBRATING]) == 1
     figures = [output for source, outputs in by_cell.items() if "fit.plot.efficiency()" in source for output in outputs]
-    assert len(figures) == len(pages) and all("image/png" in figure["data"] for figure in figures)
+    assert len(figures) == len(IN_A_KERNEL) and all("image/png" in figure["data"] for figure in figures)
     page = next(outputs[0]["data"]["text/html"] for source, outputs in by_cell.items() if source.startswith("fit  "))
     assert page.startswith("<p><b>On-body knee exoskeleton: cut the cable to 470 mm.</b></p>")
+
+
+def test_every_page_with_python_has_it_run():
+    with_python = {page for page, cells in CELLS.items() if cells}
+    assert with_python == {*IN_A_KERNEL, *PROGRAMS, *(ROOT / "docs" / "notebooks").glob("*.md")}  # these when pages are built
+
+
+@pytest.mark.parametrize("page", PROGRAMS, ids=lambda page: page.stem)
+def test_programs_of_the_pages_run_by_themselves(page, tmp_path):
+    """Programs whose helpers import them again cannot be run in a kernel; of the fleet they get two inspections."""
+    fleet = shutil.copytree(ROOT / "datasets" / "synthetic-fleet", tmp_path / "synthetic-fleet") / "fleet.csv"
+    fleet.write_text("".join(fleet.read_text().splitlines(keepends=True)[:3]))
+    for i, cell in enumerate(CELLS[page]):
+        (tmp_path / f"program_{i}.py").write_text(cell, encoding="utf-8")
+        command = [sys.executable, f"program_{i}.py"]
+        variables = {**os.environ, "PYTHONPATH": str(ROOT)}
+        done = subprocess.run(command, cwd=tmp_path, env=variables, capture_output=True, text=True, check=False, timeout=300)
+        assert done.returncode == 0, done.stderr
+        assert "cable-01" in done.stdout and 0 < len(done.stdout) <= MOST_TEXT
 
 
 def statements(cell):

@@ -7,6 +7,8 @@ stamp="$environment/bowdenfit.stamp"
 
 # A robot workspace often puts packages of its own here, which would hide the pinned ones.
 unset PYTHONPATH PYTHONHOME
+# Where byte code is not kept, as in many containers, each process compiles all of JAX anew: 9 s of CPU instead of 3.
+unset PYTHONDONTWRITEBYTECODE
 # Some machines have pip install for the user by default, which it refuses to do inside an environment.
 export PIP_USER=0
 # Hard links from uv's cache fail with a warning when the cache lies on another file system.

@@ -227,7 +227,8 @@ def test_a_coefficient_is_not_called_what_check_would_refuse(typed, said):
 
 def test_a_coefficient_may_be_called_what_check_accepts_and_never_what_a_fit_calls_something_else():
     question = coefficient_name("What is it called?", "mu1", ())
-    assert [question.read(name) for name in ("mu1", " µ  edge ", "knie_mu", "friction")] == ["mu1", "µ edge", "knie_mu", "friction"]
+    kept = ("mu1", " µ  edge ", "knie_mu", "friction")
+    assert [question.read(name) for name in kept] == ["mu1", "µ edge", "knie_mu", "friction"]
     for name in examples():
         if name in {"synthetic-fleet", "on-body-metabolic"}:
             continue
@@ -241,7 +242,7 @@ def test_a_coefficient_may_be_called_what_check_accepts_and_never_what_a_fit_cal
 
 def test_a_name_that_is_refused_is_asked_for_again_before_anything_is_written(foreign):
     said = {"eta_mean": "%", "force_at_the_motor": "1", "'knie' called": "tau"}
-    with pytest.raises(UsageError, match="'tau' is what results call another number; write another name, such as mu2."):
+    with pytest.raises(UsageError, match="'tau' is what results call another number; write another name, such as mu2"):
         described(foreign, Person(**{"kraefte.csv has the columns": "3", "What_does_it_hold": "2"}, **said), *FOREIGN)
     with pytest.raises(UsageError, match="write what the cable is called"):
         described(foreign, Person(cable_called="NAME OF THE CABLE", What_does_it_hold="2"), "eta.csv")

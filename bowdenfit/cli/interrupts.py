@@ -52,10 +52,11 @@ def line_of(terminal: TextIO) -> str:
     heard no sooner than the next key. It writes into a pipe, and the system waits for both.
     """
     reader, writer = os.pipe()
+    both: list[TextIO | int] = [terminal, reader]
     os.set_blocking(writer, False)
     before = signal.set_wakeup_fd(writer, warn_on_full_buffer=False)
     try:
-        while terminal not in select.select([terminal, reader], [], [])[0]:
+        while terminal not in select.select(both, [], [])[0]:
             os.read(reader, 1)
         return terminal.readline()
     finally:

@@ -2,7 +2,7 @@
 
 from bowdenfit.display import text_of
 from bowdenfit.questions.calibrate.answer import FEWEST, LEVEL, MOST_UNCONVERGED, Calibration, Checked
-from bowdenfit.words import filled, listed, percent, table
+from bowdenfit.words import counted, filled, listed, percent, table
 
 HEADS = ("quantity", "50 % held", "90 % held", "bias", "")
 _NAMED = 8  # unconverged replications that are named
@@ -95,6 +95,14 @@ def _with_all(found: Calibration) -> str:
     return f"Ranked with them, as far as they came, {says}."
 
 
+def _unranked(numbers: list[int]) -> str:
+    """Which replications are not ranked, up to the reason of the first."""
+    if len(numbers) == 1:
+        return f"1 replication did not converge and is not ranked, number {numbers[0]}"
+    named = ", ".join(str(n) for n in numbers[:_NAMED]) + (" ..." if len(numbers) > _NAMED else "")
+    return f"{len(numbers)} replications did not converge and are not ranked (numbers {named}), such as {numbers[0]}"
+
+
 def account_sentences(found: Calibration) -> list[str]:
     """How long it took, what was left out, and why."""
     lines = [f"A replication took {found.seconds:.2g} s (median)."]
@@ -111,17 +119,16 @@ def account_sentences(found: Calibration) -> list[str]:
             [f"{reason} ({count})" for reason, count in sorted(found.redrawn.items(), key=lambda item: -item[1])]
         )
         lines.append(
-            f"{n} simulated data sets were drawn again, truth and tables together, because no bench would hand them in: {why}. "
+            f"{counted(n, 'simulated data set was', 'simulated data sets were')} drawn again, truth and tables together, because "
+            f"no bench would hand {'it' if n == 1 else 'them'} in: {why}. "
             "The rule looks at the simulated readings alone"
             f"{', whatever the truth is' if found.truths else ', so it leaves the ranks uniform'}."
         )
     if found.unconverged:
         numbers = list(found.unconverged)
-        named = ", ".join(str(n) for n in numbers[:_NAMED]) + (" ..." if len(numbers) > _NAMED else "")
         first = found.unconverged[numbers[0]]
         lines.append(
-            f"{len(numbers)} replications did not converge and are not ranked (numbers {named}), such as {numbers[0]}: "
-            f"{first}. Whether a fit converges follows from the readings, whatever the truth is, so that leaving some "
+            f"{_unranked(numbers)}: {first}. Whether a fit converges follows from the readings, whatever the truth is, so that leaving some "
             f"out leaves ranks uniform. {_with_all(found)}"
         )
     return lines

@@ -85,10 +85,10 @@ class PanelSheet:
         places = panel.x(values)
         self._strokes += [np.array([(x, panel.bottom), (x, panel.bottom - TICK)]) for x in places]
         for x, number in zip(places, texts if numbers else (), strict=numbers):
-            corner = x < panel.left + TICK
+            first, last = x < panel.left + TICK, x > panel.left + panel.width - TICK  # stay clear of the neighbors' numbers
             self.text(
-                x - TICK * corner, panel.bottom - 1.8 * TICK, number, ha="left" if corner else "center", va="top",
-                fontsize=TICK_SIZE,
+                x + TICK * (int(last) - int(first)), panel.bottom - 1.8 * TICK, number,
+                ha="left" if first else "right" if last else "center", va="top", fontsize=TICK_SIZE,
             )  # fmt: skip
 
     def ticks_left(self, panel: Panel) -> None:

@@ -53,6 +53,16 @@ def test_nothing_overlaps_or_leaves_the_page(case):
     check_words(forces_figure.draw(CASES[case]), case)
 
 
+@pytest.mark.parametrize(("wide", "shown"), [(0.9, True), (40.0, False)], ids=["wide", "no end"])
+def test_the_band_of_the_coefficient_is_seen_whole_unless_readings_would_shrink_to_a_line(wide, shown):
+    (here,) = _forces().places
+    band = here.apparent_law[1] * np.array([1 - wide, 1.0, 1 + wide])[:, None, None]
+    beside = forces_figure.draw(replace(_forces(), places=(replace(here, apparent_law=band),))).axes[2]
+    low, high = beside.get_ylim()
+    assert (low <= band.min() and band.max() <= high) == shown
+    assert high - low < 0.3  # of a coefficient of 0.1
+
+
 @pytest.mark.parametrize("trusted", [True, False])
 def test_the_verdict_stands_above_the_readings(trusted):
     said = " ".join(text for text, _ in words(forces_figure.draw(_forces(trusted=trusted)))).replace("\n", " ")

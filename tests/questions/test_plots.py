@@ -21,7 +21,7 @@ import bowdenfit as bf
 from bowdenfit.inference.interval import Interval
 from bowdenfit.plots.bands import BAND_QUANTILES, NEW_RUN, Band
 from bowdenfit.plots.densities import BINS, bin_numbers, density, enclosed_share
-from bowdenfit.plots.sheet import ticks
+from bowdenfit.plots.sheet import Panel, PanelSheet, ticks
 from bowdenfit.plots.write import FORMATS, write
 from bowdenfit.questions.figures import FIGURES, draw_figure, figures_of
 from bowdenfit.questions.length.efficiency_figure import AlongRoute, EfficiencyPoints
@@ -177,6 +177,14 @@ def with_constant_draws(data):
     return changed(data, "traces", quantities=all_constant(data["traces"].quantities))
 
 
+def with_long_names(data):
+    name = "$\\mu$ a rope of a rather long name, braided"
+    friction = tuple(dataclasses.replace(c, symbol=f"{name} {i}") for i, c in enumerate(data["coefficients"]))
+    data = data | {"coefficients": friction}
+    pairs = [positive(c) for c in friction] + data["pairs"].quantities[3:]
+    return changed(data, "pairs", quantities=pairs)
+
+
 def at_the_edge():
     rng = np.random.default_rng(1)
     return paper_data(np.minimum(525 + 6 * rng.standard_normal((WALKERS, DRAWS)), RANGE[1]))
@@ -190,6 +198,7 @@ CASES = {
     "five contacts": lambda: with_five_contacts(paper_data()),
     "constant draws": lambda: with_constant_draws(paper_data()),
     "optimum at the edge": at_the_edge,
+    "long names": lambda: with_long_names(paper_data()),
 }
 ALL = ["wrap_angles", "efficiency", "residuals", "coefficients", "pairs", "traces"]
 
@@ -448,6 +457,14 @@ def test_ticks_are_round_and_within_the_axis(limits):
     values, texts = ticks(limits, lambda _: 4.0)
     assert len(values) == len(set(texts)) > 0
     assert limits[0] <= values.min() <= values.max() <= limits[1]
+
+
+def test_numbers_at_the_edges_of_neighbors_keep_apart():
+    sheet = PanelSheet(3.2, 1.5)
+    for i, shown in enumerate([(0.003, 0.02), (0.0, 0.42)]):
+        sheet.ticks_below(Panel(0.5 + 1.085 * i, 0.5, 1.0, 0.8, shown, (0.0, 1.0)))
+    check_words(sheet.finished(), "neighbors")
+    assert {"0.02", "0.0"} <= {text for text, _ in words(sheet.figure)}
 
 
 def test_all_figures_are_written_in_every_format_and_nothing_else(tmp_path):

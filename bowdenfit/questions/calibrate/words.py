@@ -119,8 +119,8 @@ def account_sentences(found: Calibration) -> list[str]:
             [f"{reason} ({count})" for reason, count in sorted(found.redrawn.items(), key=lambda item: -item[1])]
         )
         lines.append(
-            f"{counted(n, 'simulated data set was', 'simulated data sets were')} drawn again, truth and tables together, because "
-            f"no bench would hand {'it' if n == 1 else 'them'} in: {why}. "
+            f"{counted(n, 'simulated data set was', 'simulated data sets were')} drawn again, truth and tables together, "
+            f"because no bench would hand {'it' if n == 1 else 'them'} in: {why}. "
             "The rule looks at the simulated readings alone"
             f"{', whatever the truth is' if found.truths else ', so it leaves the ranks uniform'}."
         )
@@ -128,7 +128,7 @@ def account_sentences(found: Calibration) -> list[str]:
         numbers = list(found.unconverged)
         first = found.unconverged[numbers[0]]
         lines.append(
-            f"{_unranked(numbers)}: {first}. Whether a fit converges follows from the readings, whatever the truth is, so that leaving some "
-            f"out leaves ranks uniform. {_with_all(found)}"
+            f"{_unranked(numbers)}: {first}. Whether a fit converges follows from the readings, whatever the truth is, so that "
+            f"leaving some out leaves ranks uniform. {_with_all(found)}"
         )
     return lines

@@ -173,6 +173,10 @@ def _deviations(axes: Axes, table: CheckedTable, label: str, numbers: np.ndarray
             numbers[lean], z[lean], "o", color=VERMILLION, markerfacecolor="none", markersize=7.5, markeredgewidth=0.9,
             label="The fit leans on it",
         )  # fmt: skip
+    if np.all(numbers == np.round(numbers)):  # as of runs and groups, between which there is nothing
+        axes.locator_params(axis="x", integer=True)
+        if np.ptp(numbers) == 0:
+            axes.set_xlim(numbers[0] - 1, numbers[0] + 1)
     limit = max(LEAST_LIMIT, 1.15 * float(np.nanmax(np.abs(z), initial=0.0)))
     axes.set_ylim(-limit, limit)
     for i in np.flatnonzero(table.outlier & np.isfinite(z))[:MOST_NAMED]:

@@ -19,6 +19,7 @@ if TYPE_CHECKING:
 CAPSTAN, CAPSTAN_DOTS = "Capstan equation", (0, (1, 1.2))
 ALIKE = 1e-3  # of a coefficient, within which it is the same
 FROM_ZERO = 0.6  # lowest over highest coefficient below which the axis begins at 0
+_MOST_BAND = 4  # times as much as the readings may the axis leave for a band, above and below
 _OUTER = (0.02, 0.98)  # quantiles of the readings between which the axis of the coefficient is made
 
 
@@ -58,7 +59,7 @@ def _is_level(here: ForcesHere) -> bool:
 
 
 def _coefficient_limits(forces: Forces) -> tuple[float, float]:
-    """From the readings but for a few far ones, and from the laws; far ones are drawn on the edge."""
+    """From the readings but for a few far ones, and from the laws with their bands; far ones are drawn on the edge."""
     readings = np.concatenate([here.apparent for here in forces.places])
     readings = readings[np.isfinite(readings)]
     if not len(readings):
@@ -66,5 +67,8 @@ def _coefficient_limits(forces: Forces) -> tuple[float, float]:
     lines = [value for here in forces.places if here.shown for value in (here.capstan, *middle(here.apparent_law)[0])]
     outer = np.quantile(readings, _OUTER)
     low, high = min(*outer, np.nanmedian(lines)), max(*outer, np.nanmedian(lines))
+    bands = np.array([here.apparent_law[[0, -1]] for here in forces.places if here.shown])
+    reach = max(_MOST_BAND * (high - low), abs(high))
+    low, high = max(min(low, np.nanmin(bands)), low - reach), min(max(high, np.nanmax(bands)), high + reach)
     room = 0.15 * (high - low) or 0.1 * abs(high)
     return (low - room if low > FROM_ZERO * high else min(0.0, low - room)), high + room

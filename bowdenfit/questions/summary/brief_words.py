@@ -82,7 +82,8 @@ def _meaning(what: str, room: int, spare: int) -> list[str]:
     whole = textwrap.wrap(what, room) or [""]
     if len(whole) <= 1 + max(spare, 0):
         return whole
-    return [textwrap.shorten(what, room, placeholder=" ...") if what.startswith("friction") else ""]
+    cut = textwrap.shorten(what, room, placeholder=" ...") if what.startswith("friction") else ""
+    return ["" if cut.strip() == "..." else cut]
 
 
 def _off(fit: Record) -> list[str]:

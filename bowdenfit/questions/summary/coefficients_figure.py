@@ -8,7 +8,15 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from bowdenfit.plots.densities import GRID_POINTS, density, limits, support
-from bowdenfit.plots.layout import TITLE, columns_within, drop_unused, legend_above, panels
+from bowdenfit.plots.layout import (
+    TITLE,
+    columns_within,
+    drop_unused,
+    label_across,
+    legend_above,
+    panels,
+    room_for_labels,
+)
 from bowdenfit.plots.style import (
     BLACK,
     BLUE,
@@ -88,6 +96,7 @@ def draw(parameters: tuple[Coefficient, ...], width: float | None = None) -> Fig
     for axes, parameter in zip(flat, parameters, strict=True):
         _panel(axes, parameter)
     legend_above(figure, flat, columns=3)
+    room_for_labels(figure)
     return figure
 
 
@@ -100,7 +109,8 @@ def _panel(axes: Axes, parameter: Coefficient) -> None:
     prior = density(parameter.prior, grid, lower)
     axes.plot(grid, prior, color=BLACK, linestyle="--", linewidth=1.0, label="Before them (prior)")
     _least_squares(axes, parameter, shown, 0.08 * posterior.max())
-    axes.set(xlim=shown, ylim=(0, 1.2 * posterior.max()), xlabel=axis_label(parameter.symbol, parameter.unit))
+    axes.set(xlim=shown, ylim=(0, 1.2 * posterior.max()), )
+    label_across(axes, axis_label(parameter.symbol, parameter.unit))
     axes.set_ylabel("Density" if parameter.unit == "1" else f"Density (1/{parameter.unit})")
     axes.set_title(_title(parameter))
 

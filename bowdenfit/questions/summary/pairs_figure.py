@@ -131,7 +131,7 @@ def _axes(sheet: PanelSheet, quantities: list[SampledQuantity], panels: dict[tup
     for i, quantity in enumerate(quantities):
         below, left = panels[last, i], panels[i, 0]
         sheet.ticks_below(below)
-        label = wrapped(quantity.label, below.width + 0.8 * GAP)
+        label = wrapped(quantity.label, below.width + 0.8 * GAP, most=2)
         sheet.text(below.left + below.width / 2, MARGIN - 0.2, label, ha="center", va="top", fontsize=SMALL)
         if i > 0:
             sheet.ticks_left(left)

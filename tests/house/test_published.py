@@ -5,6 +5,7 @@ import tomllib
 from pathlib import Path
 
 import click
+import pytest
 import told
 
 from bowdenfit.cli import bowdenfit as program
@@ -29,6 +30,23 @@ def test_the_readme_is_short_and_its_links_and_those_of_the_guides_lead_somewher
     for page in (ROOT / "README.md", *(ROOT / "docs").glob("*.md")):
         for target in re.findall(r"\]\(([^)#:]+)\)", page.read_text(encoding="utf-8")):
             assert (page.parent / target).exists(), f"{page.name}: {target}"
+
+
+@pytest.mark.parametrize("source", [None, "https://example.org/cables/bowdenfit/"])
+def test_a_package_index_gets_no_link_or_image_that_is_dead_there(source, monkeypatch):
+    monkeypatch.syspath_prepend(ROOT / "scripts")
+    from index_page import IndexPage
+
+    metadata = {"urls": {"Source": source}} if source else {}
+    IndexPage(str(ROOT), {}).update(metadata)
+    page = metadata["readme"]["text"]
+    targets = re.findall(r"\]\(([^)]*)\)", page)
+    files = {file for file in re.findall(r"\]\(([^)]*)\)", README) if "://" not in file}
+    assert all(target.startswith("https://") for target in targets) and all(file in page for file in files)
+    assert page.count("![") == (1 if source else 0)
+    if source:
+        assert f"{source}raw/HEAD/fits/published/on-body-exoskeleton/figures/efficiency.png" in targets
+        assert [target for target in targets if "//" in target.removeprefix("https://")] == []
 
 
 def test_the_readme_has_a_line_for_every_verb():

@@ -1,8 +1,8 @@
 """The page that a package index shows: README.md with every link and image such that they work there.
 
-An index shows images and follows links only where they begin with https://; names of files are dead there, and it strips images that
-stand in the page itself. With a line `Source = "https://..."` under `[project.urls]` they lead to that repository, as GitHub names
-its files; without one each says in words which file of the source distribution it is. Hatchling asks this module while it builds.
+An index shows images and follows links only where they begin with https://; names of files are dead there, and an image in the
+page itself is stripped. With a line `Source = "https://..."` under `[project.urls]` they lead to that repository, as GitHub
+names its files; without one each says in words which file of the source distribution it is. Hatchling asks while it builds.
 """
 
 import re

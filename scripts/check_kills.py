@@ -2,13 +2,15 @@
 
     python scripts/check_kills.py [--kills N] [--seed S]
 
-Each time a small fit by emcee or NUTS, or a calibration, is started in a process of its own and ended by SIGINT, SIGTERM
-or SIGKILL after a random part of the time that it takes; or memory runs out, as it does under a limit that a container or a
-shell sets (of a random size around what it needs), or by the kernel, which ends one of its processes at such a time. A fourth
-job is a fit by emcee too, ended in the second half, where its results are written. Then the same command is given again, with
---resume where a checkpoint is said to be kept or is there, with --force where anything else is left. It must end as usual, with
-the same draws (or replications) as one that nothing ended; no process of the first may be left; one that was asked to end must
-have ended with 130 and a sentence, or have finished; and one that ends with 0 or 3 must have finished.
+Each time a small fit by emcee or NUTS, a calibration, or a fleet is started in a process of its own and ended by SIGINT,
+SIGTERM or SIGKILL after a random part of the time that it takes; or memory runs out, as it does under a limit that a
+container or a shell sets (of a random size around what it needs), or by the kernel, which ends one of its processes at such
+a time. A fourth job is a fit by emcee too, ended in the second half, where its results are written. Where a limit leaves
+too little, that must be said in a sentence, with exit code 1 and nothing that a library prints. Then the same command is
+given again, with --resume where a checkpoint is said to be kept or is there, with --force where anything else is left. It
+must end as usual, with the same draws (or replications) as one that nothing ended; no process of the first may be left; one
+that was asked to end must have ended with 130 and a sentence, or have finished; and one that ends with 0 or 3 must have
+finished.
 
 Prints each kill, and ends with 1 if a promise was broken.
 """
@@ -18,6 +20,7 @@ import json
 import os
 import random
 import resource
+import shutil
 import signal
 import subprocess
 import sys
@@ -35,7 +38,8 @@ HEAR = (
     "import os, resource as r, signal, sys; signal.signal(signal.SIGINT, signal.SIG_DFL); "
     "r.setrlimit(r.RLIMIT_DATA, (int(sys.argv[1]),) * 2); os.execv(sys.argv[2], sys.argv[2:])"
 )
-LITTLE, MUCH = 400e6, 900e6  # bytes, between which a fit has too little or enough
+LITTLE, MUCH = 700e6, 1300e6  # bytes, between which a fit has too little or enough
+INSPECTIONS = 18  # of the fleet
 
 
 @dataclass(frozen=True)
@@ -66,18 +70,33 @@ class Job:
             import bowdenfit as bf
 
             return bf.load(folder).posterior.z.tobytes()
+        if self.done == "fleet.json":
+            from bowdenfit.results.fleet_folder import read_fleet_draws
+
+            drawn = read_fleet_draws(folder)
+            return drawn.label, {name: values.tobytes() for name, values in drawn.values.items()}
         lines = [json.loads(line) for line in (folder / self.kept).read_text().splitlines()[1:]]
         return sorted((line["number"], json.dumps(line["ranked"])) for line in lines)
 
 
 SET = tuple(f"--set={setting}" for setting in SMALL)
 YARN = str(ROOT / "datasets" / "yarn-on-cylinder")
+FLEET = ROOT / "datasets" / "synthetic-fleet"
 JOBS = (
     Job("emcee", ("fit", YARN, "--no-figures", *SET), "chain.checkpoint", "fit.json"),
     Job("nuts", ("fit", YARN, "--no-figures", "--sampler", "nuts", *SET), "chain.checkpoint", "fit.json"),
     Job("calibrate", ("calibrate", YARN, "--replications", "6"), "replications.jsonl", "calibration.json"),
     Job("writing", ("fit", YARN, *SET), "chain.checkpoint", "fit.json", earliest=0.5),
 )
+
+
+def fleet_job(place: Path) -> Job:
+    """The fit of a small fleet, by two processes where that pays; its measurements are laid into a folder."""
+    shutil.copytree(FLEET / "readings", place / "readings")
+    shutil.copy(FLEET / "fleet.toml", place)
+    lines = (FLEET / "fleet.csv").read_text(encoding="utf-8").splitlines()[: INSPECTIONS + 1]
+    (place / "fleet.csv").write_text("\n".join(lines) + "\n", encoding="utf-8")
+    return Job("fleet", ("fleet", str(place), "--workers", "2"), "kept", "fleet.json")
 
 
 def main() -> None:
@@ -88,9 +107,10 @@ def main() -> None:
     asked = parser.parse_args()
     chance, broken = random.Random(asked.seed), 0
     with tempfile.TemporaryDirectory() as place:
-        whole = {job.name: run_whole(job, Path(place) / job.name) for job in JOBS}
+        jobs = (*JOBS, fleet_job(Path(place) / "measured"))
+        whole = {job.name: run_whole(job, Path(place) / job.name) for job in jobs}
         for number in range(asked.kills):
-            job, sent = JOBS[number % len(JOBS)], SIGNALS[number // len(JOBS) % len(SIGNALS)]
+            job, sent = jobs[number % len(jobs)], SIGNALS[number // len(jobs) % len(SIGNALS)]
             seconds, result = whole[job.name]
             at = chance.uniform(job.earliest * seconds, 1.05 * seconds)
             said, wrong = kill_once(job, sent, at, result, Path(place) / f"{number}")
@@ -132,6 +152,8 @@ def kill_once(job: Job, sent: signal.Signals | None, at: float, result: object, 
         return said, f"exit code {process.returncode}, but {job.done} is missing"
     if sent in {signal.SIGINT, signal.SIGTERM} and not finished and process.returncode not in {130, -sent}:
         return said, f"exit code {process.returncode}"
+    if starved and not finished and (process.returncode != 1 or not err.startswith("Error: ") or len(err.splitlines()) > 1):
+        return said, f"exit code {process.returncode}, and said {err[:300]!r}"
     if is_running(process.pid):
         return said, "a process is left"
     if "--resume" in err and not (folder / job.kept).exists():

@@ -1,6 +1,5 @@
 """While something long runs: a bar that says where it stands, and an interrupt that keeps what is done."""
 
-import os
 import signal
 import sys
 import threading
@@ -13,12 +12,10 @@ import click
 
 from bowdenfit.cli.supervised import say_if_aborted
 from bowdenfit.errors import DiskError, MemoryShortageError, system_error
-from bowdenfit.inference.engines.memory import BUFFERS, refuse_shortage
+from bowdenfit.inference.engines.memory import refuse_too_little
 from bowdenfit.verb import Watch
 
 INTERRUPTED = 130
-_NEEDED = 576 << 20  # bytes; a small fit by NUTS takes so much beside what is loaded by then and the buffers of linear algebra
-_ADDRESSES, _ADDRESSES_PER_CORE = 1500 << 20, 150 << 20  # bytes; of threads and their heaps most is never used
 Report: TypeAlias = Callable[..., None]
 
 
@@ -36,7 +33,7 @@ def watch_verb(folder: Path, watch: Watch) -> Iterator[Report]:
     Raises:
         MemoryShortageError: There is too little memory to begin.
     """
-    _refuse_without_memory()
+    refuse_too_little()
     say_if_aborted(folder / watch.kept, _kept_in(folder))
     asked = threading.Event()
 
@@ -81,12 +78,6 @@ def watch_verb(folder: Path, watch: Watch) -> Iterator[Report]:
 
 def _kept_in(folder: Path) -> str:
     return f"What was done so far is kept in {folder}: with room, run the same command with --resume."
-
-
-def _refuse_without_memory() -> None:
-    """XLA and OpenBLAS crash or wait for ever where memory runs out, so it is asked for once before they are loaded."""
-    refuse_shortage(_NEEDED + BUFFERS)
-    refuse_shortage(_ADDRESSES + (os.cpu_count() or 1) * _ADDRESSES_PER_CORE, addresses=True)
 
 
 @contextmanager

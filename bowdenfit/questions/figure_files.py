@@ -62,6 +62,17 @@ def write_figure(figure: AnswerFigure, found: Any, folder: Path, name: str, cabl
     return written
 
 
+def bring_captions(there: Path, place: Path) -> None:
+    """Copy the captions of figures that stay in a folder, to be written again with those of others.
+
+    Args:
+        there: The folder.
+        place: Where others are being written.
+    """
+    if (there / CAPTIONS).is_file():
+        write_text(place / CAPTIONS, read_text(there / CAPTIONS))
+
+
 def write_captions(said: Mapping[str, str], folder: Path, order: Iterable[str] = ()) -> Path:
     """Write the captions of some figures, a paragraph each, beside those of the others in the folder.
 

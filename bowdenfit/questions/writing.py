@@ -1,7 +1,6 @@
 """Writing an answer to a folder: for people, as a figure, and for programs; in one way for all questions."""
 
 import json
-import shutil
 from collections.abc import Mapping
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -73,15 +72,14 @@ def write_answer(
     Raises:
         StoreError: The folder cannot be written.
     """
-    from bowdenfit.questions.figure_files import CAPTIONS, write_figure
+    from bowdenfit.questions.figure_files import bring_captions, write_figure
     from bowdenfit.results.folder import filled_when_whole, write_text
     from bowdenfit.results.plain import plain
 
     page_file, text_file, *_ = files = files_of(folder, name)
     files += [path for each in figures if each != name for path in figures_of(folder, each)]
     with filled_when_whole(Path(folder), page_file.name) as place:
-        if (Path(folder) / CAPTIONS).is_file():  # of figures that stay
-            shutil.copyfile(Path(folder) / CAPTIONS, place / CAPTIONS)
+        bring_captions(Path(folder), place)
         write_text(place / text_file.name, text)
         for each, figure in figures.items():
             write_figure(figure, answer, place, each, cable)

@@ -7,6 +7,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any, Literal, Unpack
 from warnings import warn
 
+from bowdenfit.inference.engines.memory import refuse_too_little
 from bowdenfit.inference.engines.processes import settings_of_process
 from bowdenfit.questions.summary.verb import reply
 from bowdenfit.reading import Reading, read, refuse_unknown
@@ -63,6 +64,7 @@ def fit(
     from bowdenfit.run.storing import choose_seed, start_checkpointing, with_sampler, write_results
 
     refuse_unknown(fit, reading)
+    refuse_too_little()
     folder = Path(output) if output is not None else None
     data = with_sampler(read(dataset, **reading), sampler)
     drawing, settings = figures and folder is not None, settings_of_process(remember_compilations)

@@ -68,6 +68,16 @@ def test_a_fit_under_too_low_a_limit_is_refused_at_the_start(on_body, tmp_path, 
 
 
 @pytest.mark.skipif(sys.platform != "linux", reason="limits of data are Linux's")
+def test_the_library_refuses_too_little_memory_too(tmp_path):
+    recordings = "datasets/synthetic-recordings"  # whose fit by NUTS once waited for ever under this limit
+    fit = f"import bowdenfit as bf; bf.fit({recordings!r}, sampler='nuts', output={str(tmp_path / 'fit')!r})"
+    done = limited("RLIMIT_DATA", 700, "-c", fit)
+    assert done.returncode == 1
+    assert "MemoryShortageError: there are not the" in done.stderr.splitlines()[-1]
+    assert not (tmp_path / "fit").exists()
+
+
+@pytest.mark.skipif(sys.platform != "linux", reason="limits of data are Linux's")
 def test_linear_algebra_asks_for_no_memory_once_it_has_its_buffers():
     done = subprocess.run(
         [sys.executable, "-c", LINEAR_ALGEBRA, "take"],

@@ -4,7 +4,11 @@ import pytest
 
 import bowdenfit as bf
 from bowdenfit.errors import DiskError
+from bowdenfit.plots import write
+from bowdenfit.plots.layout import empty_page
+from bowdenfit.questions.check.verb import show_priors
 from bowdenfit.questions.simulate import fleet, tables
+from bowdenfit.questions.writing import write_answer
 from bowdenfit.results.folder import filled_when_whole
 
 
@@ -46,6 +50,52 @@ def test_a_plan_writes_nothing_outside_its_folder(on_body, tmp_path, name):
         bf.simulate(tmp_path / "bench.toml", output=tmp_path / "made" / "deep", seed=3)
     assert sorted(tmp_path.parent.iterdir()) == before
     assert [path.name for path in tmp_path.rglob("*") if path.is_file()] == ["bench.toml"]
+
+
+def write_some_answer(folder):
+    class Drawn:
+        HEADING = "A figure"
+
+        def draw(self, found):
+            return empty_page(3.0, 2.0)
+
+        def caption(self, found):
+            return "What is drawn."
+
+    write_answer(folder, "answer", {"x": 1.0}, "text", {"answer": Drawn(), "traces": Drawn()})
+
+
+def write_priors(folder):
+    show_priors(bf.read("datasets/yarn-on-cylinder"), folder)
+
+
+@pytest.mark.parametrize("ask", [write_some_answer, write_priors])
+def test_an_answer_that_finds_no_room_leaves_nothing_and_an_earlier_one_stays(tmp_path, monkeypatch, ask):
+    room = []
+
+    def save(figure, target, ending):
+        if len(room) != 1:
+            target.write_bytes(b"a figure")
+            room.append(target)
+            return
+        target.write_bytes(b"half")
+        raise OSError(28, "No space left on device", str(target))
+
+    monkeypatch.setattr(write, "save", save)
+    for folder in (tmp_path / "new", tmp_path / "there"):
+        if folder.name == "there":
+            folder.mkdir()
+            (folder / "captions.txt").write_text("other: of another figure.\n")
+        before = {path: path.read_bytes() for path in tmp_path.rglob("*.*")}
+        room.clear()
+        with pytest.raises(DiskError, match=r"cannot be written \(No space left on device\)"):
+            ask(folder)
+        assert {path: path.read_bytes() for path in tmp_path.rglob("*.*")} == before
+    assert room
+    monkeypatch.setattr(write, "save", lambda figure, target, ending: target.write_bytes(b"a figure"))
+    ask(tmp_path / "there")
+    assert "other: of another figure." in (tmp_path / "there" / "captions.txt").read_text()
+    assert len(list((tmp_path / "there").iterdir())) >= 4
 
 
 def test_what_lay_in_a_folder_stays_beside_what_is_filled_in(tmp_path):

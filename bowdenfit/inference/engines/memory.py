@@ -17,7 +17,8 @@ from bowdenfit.inference.engines.processes import cores
 AT_ONCE = 64 << 20  # bytes; what compiling a program, or a block of sampling, takes at a time
 _BUFFER = 32 << 20  # bytes; one of OpenBLAS
 _OF_PYTHON = 3  # threads at most that call one
-BUFFERS = (2 * _OF_PYTHON + cores()) * _BUFFER  # bytes; all that are taken
+_NEEDED = 576 << 20  # bytes; a small fit by NUTS takes so much beside what is loaded by then and these buffers
+_ADDRESSES, _ADDRESSES_PER_CORE = 1500 << 20, 150 << 20  # bytes; of threads and their heaps most is never used
 # Modules that bring one, and whether threads of XLA call it too.
 _MODULES = {"numpy.linalg._umath_linalg": False, "scipy.linalg.cython_lapack": True}
 
@@ -42,6 +43,17 @@ def refuse_shortage(size: int = AT_ONCE, addresses: bool = False) -> None:
             f"there are not the {size >> 20} MiB of memory that this takes; close other programs, or raise the limit "
             "(ulimit -d and -v show it, or the container's)."
         ) from None
+
+
+@cache
+def refuse_too_little() -> None:
+    """Stop before a process begins to compute for long, where a small fit would run out of memory.
+
+    Raises:
+        MemoryShortageError: The system refuses that much.
+    """
+    refuse_shortage(_NEEDED + (2 * _OF_PYTHON + cores()) * _BUFFER)
+    refuse_shortage(_ADDRESSES + cores() * _ADDRESSES_PER_CORE, addresses=True)
 
 
 @cache

@@ -7,6 +7,7 @@ from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any, Unpack
 
+from bowdenfit.inference.engines.memory import refuse_too_little
 from bowdenfit.reading import Reading, read, refuse_unknown
 from bowdenfit.results.folder import REPLICATIONS
 from bowdenfit.verb import LARGEST_SEED, Argument, Option, Output, Reply, Verb, Watch
@@ -61,6 +62,7 @@ def calibrate(
         BowdenfitError: What is wrong, in a sentence; a data set that cannot be replicated is refused.
     """
     refuse_unknown(calibrate, reading)
+    refuse_too_little()
     folder = _folder(output, resume)
     plan = _plan(_stated_and_assumed(dataset, reading, assume), _seed(folder, seed, resume), truth)
     import jax

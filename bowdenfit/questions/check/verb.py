@@ -67,12 +67,13 @@ def show_priors(dataset: "Dataset", folder: str | Path, seed: int = 0) -> "Prior
 
     from bowdenfit.questions.check import prior_figure
     from bowdenfit.questions.check.prior_predictive import prior_predictive
-    from bowdenfit.questions.figure_files import write_figure
-    from bowdenfit.results.folder import folder_to_write
+    from bowdenfit.questions.figure_files import bring_captions, write_figure
+    from bowdenfit.results.folder import filled_when_whole
 
     with jax.enable_x64(True):
         found = prior_predictive(dataset, seed)
-    with folder_to_write(Path(folder)) as place:
+    with filled_when_whole(Path(folder)) as place:
+        bring_captions(Path(folder), place)
         write_figure(prior_figure, found, place, FIGURE, found.name)
     return found
 

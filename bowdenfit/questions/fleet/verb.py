@@ -9,6 +9,7 @@ from datetime import timedelta
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any, Unpack
 
+from bowdenfit.inference.engines.memory import refuse_too_little
 from bowdenfit.inference.engines.processes import settings_of_process
 from bowdenfit.reading import Reading, refuse_unknown
 from bowdenfit.verb import LARGEST_SEED, Argument, Option, Output, Reply, Verb, Watch
@@ -66,6 +67,7 @@ def fleet(
     from bowdenfit.results.folder import reserved
 
     refuse_unknown(fleet, reading)
+    refuse_too_little()
     place, prepare = Path(output) if output is not None else None, settings_of_process(remember_compilations)
     inspections = read_inspections(Path(folder))
     with reserved(place), watched(WATCH, progress) as show:

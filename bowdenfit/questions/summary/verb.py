@@ -73,9 +73,10 @@ def plot(
         StoreError: The results folder is missing or damaged, or the other cannot be written.
     """
     from bowdenfit.errors import UsageError
+    from bowdenfit.questions.figure_files import bring_captions
     from bowdenfit.questions.figures import draw_figure, page_width, write_figure_captions
     from bowdenfit.questions.writing import Files
-    from bowdenfit.results.folder import FIGURES, folder_to_write
+    from bowdenfit.results.folder import FIGURES, filled_when_whole
 
     if isinstance(found, str | Path):
         output = output or Path(found) / FIGURES
@@ -83,9 +84,11 @@ def plot(
         raise UsageError("a fit by itself has no folder; name one for the figures.")
     endings, page = _formats(formats), page_width(width)
     shown, cable = _shown(found, figures)
-    with folder_to_write(Path(output)) as place:
+    with filled_when_whole(Path(output)) as place:
+        bring_captions(Path(output), place)
         files = [path for name, data in shown.items() for path in draw_figure(name, data, place, endings, cable, page)]
-        return Files([*files, write_figure_captions(shown, place, cable)])
+        files.append(write_figure_captions(shown, place, cable))
+    return Files(Path(output) / path.name for path in files)
 
 
 def _formats(named: Sequence[str]) -> Sequence[str]:

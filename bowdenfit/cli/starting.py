@@ -51,6 +51,7 @@ def init(folder: Path | None, more: tuple[Path, ...], files: tuple[Path, ...], e
         raise UsageError(f"name the folder to write, such as bowdenfit init {FOLDER}.")
     ask: Asker = Terminal() if has_person() else Nobody()
     refuse_existing(place or Path(FOLDER))
+    ask.say("Enter takes the answer that stands in brackets; Ctrl-C ends it all, and nothing is written.")
     place = place or _asked_folder(ask)
     if not given and has_person():
         given = _asked_files(ask)

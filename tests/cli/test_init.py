@@ -108,6 +108,14 @@ def test_a_unit_is_asked_for_without_any_default(foreign):
     assert "eta mean" in units[0].words
 
 
+@pytest.mark.parametrize("heading", ["rendement", "eta", "Wirkungsgrad", "efficiency", "eta mean"])
+def test_a_unit_that_a_person_says_of_efficiencies_is_kept_whatever_they_are_called(foreign, heading):
+    (foreign / "eta.csv").write_text(EFFICIENCIES.replace("eta mean", heading))
+    data = described(foreign, Person(What_does_it_hold="2", In_which_unit="%", Blank_cells="10 deg"), "eta.csv", "winkel.csv")
+    (table,) = [table for table in data.measurements.tables if hasattr(table, "efficiency")]
+    assert table.efficiency.tolist() == pytest.approx([0.78, 0.76, 0.73])
+
+
 @pytest.mark.parametrize("path", sorted(CORPUS.glob("*.*")), ids=lambda path: path.name)
 def test_whatever_laboratories_write_becomes_a_data_set_that_check_accepts(path, tmp_path):
     if path.suffix == ".toml":

@@ -117,7 +117,8 @@ class Sheet:
         """A column is a quantity; the description names it where its heading does not say all of that."""
         self.taken[quantity.name] = column.name
         said = [each.name for each in self.can_be(quantity)] == [column.name]
-        if not said or (not self._says_unit(quantity, column) and quantity.dimension not in {"text", "ratio"}):
+        may_have_none = quantity.dimension == "text" or (quantity.dimension == "ratio" and not column.unit)
+        if not said or not (may_have_none or self._says_unit(quantity, column)):
             self.sources[quantity.name] = column.source
 
     def _says_unit(self, quantity: Quantity, column: SeenColumn) -> bool:

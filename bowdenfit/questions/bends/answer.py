@@ -345,7 +345,9 @@ def friction_arm(fit: Record) -> tuple[float, str]:
 
 
 def typical_preload(fit: Record) -> float:
-    """Preload by least squares, or the median of its prior where the measurements do not tell it [N]."""
+    """Preload [N]: its median, or least squares without draws, or the median of its prior where these do not tell it."""
+    if fit.sampled is not None and PRELOAD in fit.sampled.values:
+        return fit.parameter(PRELOAD).median
     estimate = fit.least_squares.estimates[PRELOAD].value
     if np.isfinite(estimate):
         return float(estimate)

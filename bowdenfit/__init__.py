@@ -7,10 +7,11 @@ Everything a notebook needs is here; importing it loads nothing heavy and change
     fit.optimal_length()
 """
 
-from importlib import import_module
-from typing import TYPE_CHECKING, Any
+TYPE_CHECKING = False  # typing's, unloaded: until the command line listens, an interrupt is a traceback of Python's
 
 if TYPE_CHECKING:
+    from typing import Any
+
     from bowdenfit.errors import (
         BowdenfitError,
         ConvergenceError,
@@ -95,8 +96,10 @@ __all__ = [
 
 if not TYPE_CHECKING:  # to type checkers there are the names above, and no others
 
-    def __getattr__(name: str) -> Any:
+    def __getattr__(name: str) -> "Any":
         """Load a public name when it is first used."""
+        from importlib import import_module
+
         if name in _WHERE:
             return getattr(import_module(_WHERE[name]), name)
         raise AttributeError(f"module 'bowdenfit' has no attribute {name!r}")

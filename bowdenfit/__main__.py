@@ -13,13 +13,10 @@ def _interrupted(*_: object) -> None:
 
 def start() -> None:
     """Load the command line, which takes a moment, and run it."""
-    heard = signal.getsignal(signal.SIGINT) is signal.default_int_handler  # a shell may have made this deaf to interrupts
-    if heard:
-        signal.signal(signal.SIGINT, _interrupted)
+    if signal.getsignal(signal.SIGINT) is signal.default_int_handler:  # a shell may have made this deaf to interrupts
+        signal.signal(signal.SIGINT, _interrupted)  # until the command line listens, and once it no longer does
     from bowdenfit.cli import start as run
 
-    if heard:
-        signal.signal(signal.SIGINT, signal.default_int_handler)
     run()
 
 

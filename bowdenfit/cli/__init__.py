@@ -61,6 +61,8 @@ def main() -> None:
     try:
         with listening():
             code = bowdenfit.main(standalone_mode=False) or 0
+            if was_asked():  # while the last was loaded
+                raise KeyboardInterrupt
         sys.exit(code)
     except click.exceptions.Exit as stop:
         sys.exit(stop.exit_code)

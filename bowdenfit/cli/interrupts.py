@@ -1,26 +1,32 @@
 """Interrupts that are not lost: one that somebody swallowed is raised again until it is heard.
 
 Python prints and forgets an interrupt that arrives inside a callback of the garbage collector or of a compiled library, and
-some libraries turn it into an error of their own.
+some libraries turn it into an error of their own. While a compiled library is loaded, an exception that it did not expect ends
+the process as a crash does, so an interrupt waits for the end of that.
 """
 
 import os
 import select
 import signal
 import sys
-from collections.abc import Iterator
+import time
+from collections.abc import Callable, Iterator
 from contextlib import contextmanager
-from types import TracebackType
-from typing import TextIO
+from types import FrameType, TracebackType
+from typing import TextIO, TypeAlias
 
-_AGAIN = 0.3  # s
+_SOON, _AGAIN, _PATIENCE = 0.05, 0.3, 3.0  # s
+_LOADER = "<frozen importlib"  # what Python's own loader is in tracebacks
+Handler: TypeAlias = Callable[[int, FrameType | None], None]
 _asked: list[bool] = []
+_since: list[float] = []  # when interrupts were looked at
 
 
 @contextmanager
 def listening() -> Iterator[None]:
     """Meanwhile an interrupt raises `KeyboardInterrupt` again and again until that leaves this context."""
     _asked.clear()
+    _since.clear()
     printed, shown, before = sys.unraisablehook, sys.excepthook, signal.getsignal(signal.SIGINT)
 
     def lost(what: "sys.UnraisableHookArgs") -> None:
@@ -32,7 +38,7 @@ def listening() -> Iterator[None]:
             shown(kind, error, trace)
 
     sys.unraisablehook, sys.excepthook = lost, refused
-    if before is signal.default_int_handler:  # a shell may have made this deaf to interrupts
+    if callable(before):  # a shell may have made this deaf to interrupts
         signal.signal(signal.SIGINT, _interrupt)
     try:
         yield
@@ -40,7 +46,7 @@ def listening() -> Iterator[None]:
         if _asked and hasattr(signal, "setitimer"):
             signal.signal(signal.SIGALRM, signal.SIG_IGN)
             signal.setitimer(signal.ITIMER_REAL, 0.0)
-        if before is signal.default_int_handler:
+        if callable(before):
             signal.signal(signal.SIGINT, before)
         sys.unraisablehook, sys.excepthook = printed, shown
 
@@ -65,12 +71,34 @@ def line_of(terminal: TextIO) -> str:
         os.close(writer)
 
 
-def _interrupt(*_: object) -> None:
+def _interrupt(_: int, frame: FrameType | None) -> None:
     _asked.append(True)
-    if hasattr(signal, "setitimer"):
-        signal.signal(signal.SIGALRM, _interrupt)
-        signal.setitimer(signal.ITIMER_REAL, _AGAIN)
+    if is_loading(frame):
+        call_soon(_interrupt)
+        return
+    call_soon(_interrupt, _AGAIN)
     raise KeyboardInterrupt
+
+
+def call_soon(handler: Handler, seconds: float = _SOON) -> None:
+    """Call a handler of signals in a moment, where the system can."""
+    if hasattr(signal, "setitimer"):
+        signal.signal(signal.SIGALRM, handler)
+        signal.setitimer(signal.ITIMER_REAL, seconds)
+
+
+def is_loading(frame: FrameType | None) -> bool:
+    """Whether what was interrupted is the loading of a module, which nothing should be raised in, and may be waited for still.
+
+    Args:
+        frame: What was running.
+    """
+    _since.append(time.monotonic())
+    if not hasattr(signal, "setitimer") or _since[-1] - _since[0] > _PATIENCE:
+        return False
+    while frame is not None and not frame.f_code.co_filename.startswith(_LOADER):
+        frame = frame.f_back
+    return frame is not None
 
 
 def was_asked() -> bool:

@@ -6,10 +6,12 @@ import threading
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from pathlib import Path
+from types import FrameType
 from typing import Any, TypeAlias
 
 import click
 
+from bowdenfit.cli.interrupts import call_soon, is_loading
 from bowdenfit.cli.supervised import say_if_aborted
 from bowdenfit.errors import DiskError, MemoryShortageError, system_error
 from bowdenfit.inference.engines.memory import refuse_too_little
@@ -37,9 +39,11 @@ def watch_verb(folder: Path, watch: Watch) -> Iterator[Report]:
     say_if_aborted(folder / watch.kept, _kept_in(folder))
     asked = threading.Event()
 
-    def stop(*_: object) -> None:
+    def stop(_: int, frame: FrameType | None) -> None:
         asked.set()
-        raise KeyboardInterrupt
+        if not is_loading(frame):
+            raise KeyboardInterrupt
+        call_soon(stop)
 
     printed = sys.unraisablehook
 
@@ -60,6 +64,8 @@ def watch_verb(folder: Path, watch: Watch) -> Iterator[Report]:
                 show(*progress)
 
             yield report
+            if asked.is_set():
+                raise KeyboardInterrupt
     except BaseException as error:  # where an interrupt is wanted, whatever came of it is that interrupt
         wanted = asked.is_set() or isinstance(error, KeyboardInterrupt)
         shortage = error if isinstance(error, DiskError) else system_error(error)

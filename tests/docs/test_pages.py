@@ -6,14 +6,24 @@ import re
 import subprocess
 import sys
 from html.parser import HTMLParser
+from importlib.metadata import metadata
 from pathlib import Path
 from urllib.parse import unquote, urlsplit
 
 import pytest
 from conftest import ROOT
 
-SITES = {"docs.dask.org", "github.com", "keepachangelog.com", "pint.readthedocs.io", "semver.org"}
-"""Where pages lead on the network, each looked over by a person: the tests have no network and cannot follow them."""
+LINKS = {
+    "https://docs.dask.org": "",  # distributed names another page there
+    "https://github.com/pradyunsg/furo": "furo",
+    "https://keepachangelog.com": "",
+    "https://pint.readthedocs.io": "pint",
+    "https://semver.org": "",
+}
+"""Where pages lead on the network, and the installed package that names that address as its own.
+
+The tests have no network and cannot follow them. Those that no package names were looked over by a person.
+"""
 MOST_TEXT = 2000  # characters of one output
 
 
@@ -76,7 +86,10 @@ def test_links_to_the_network_are_well_formed_and_lead_to_known_sites(pages):
         parts = urlsplit(link)
         assert parts.scheme == "https" and parts.port is None and not parts.username, link
         assert re.fullmatch(r"(/[\w.~-]*)*", parts.path) and parts.path[-1:] != "." and not parts.query, link
-    assert {urlsplit(link).hostname for link in found} == SITES
+    assert {link.rstrip("/") for link in found} == set(LINKS)
+    for link, package in LINKS.items():
+        named = metadata(package).get_all("Project-URL") if package else [f"address, {link}"]
+        assert link in {each.partition(", ")[2].rstrip("/") for each in named}, link
 
 
 def test_no_page_needs_a_network(pages):

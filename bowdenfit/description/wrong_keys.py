@@ -14,6 +14,8 @@ from bowdenfit.words import shown
 _INIT = "`bowdenfit init` writes a template that has it"
 _MOST_UNKNOWN = 100  # unknown keys of a file for which a known one is looked for that is meant; no message names more
 _ALIKE = 0.5  # likeness from which an unknown key is taken for a misspelled one, as `nearest` has it
+_LONGEST_KEY = 80  # letters that are said of one
+_LARGE = 1e15  # a number that nobody measures
 
 
 def wrong_keys(
@@ -72,7 +74,8 @@ def _written(place: Sequence[str | int], raw: Any) -> tuple[str | int, ...]:
 def _sentence(error: Mapping[str, Any], model: type[BaseModel], file: str, remedy: str) -> str:
     """What is wrong with one key."""
     where = [str(part) for part in error["loc"]]
-    place = f"{file}, {'.'.join(where)}" if where else file
+    said = [part if len(part) <= _LONGEST_KEY else f"{part[:_LONGEST_KEY]}..." for part in where]
+    place = f"{file}, {'.'.join(said)}" if where else file
     if error["type"] == "extra_forbidden":
         return f"{file}: unknown key {shown('.'.join(where))}{nearest(where[-1][:80], _siblings(model, where[:-1]))}"
     if error["type"] == "missing" and where[-1] == "unit" and isinstance(error["input"], dict):
@@ -82,8 +85,8 @@ def _sentence(error: Mapping[str, Any], model: type[BaseModel], file: str, remed
     if error["type"] == "model_type":
         return f"{place}: {_written_as(error, where)}"
     message = error["msg"]
-    if where == ["schema"]:
-        message = f"schema {error['input']} is newer than this program, which reads up to {SCHEMA}; update bowdenfit"
+    if where == ["schema"] and isinstance(error["input"], int) and error["input"] > SCHEMA:
+        message = f"schema {shown(error['input'])} is newer than this program, which reads up to {SCHEMA}; update bowdenfit"
     found = f" (found {shown(error['input'])})" if not isinstance(error["input"], dict | list) and where else ""
     sentence = f"{place}: {message[:1].lower() + message[1:]}{found}"
     return sentence if sentence.endswith((".", "?")) else f"{sentence}."
@@ -100,7 +103,7 @@ def _written_as(error: Mapping[str, Any], where: Sequence[str]) -> str:
 
 def _with_unit(value: Any, where: Sequence[str]) -> str:
     """A number with a unit that fits its place, as TOML."""
-    number = value if isinstance(value, int | float) and not isinstance(value, bool) else 20
+    number = value if isinstance(value, int | float) and not isinstance(value, bool) and abs(value) < _LARGE else 20
     key = ".".join(where)
     unit = KEYS[key].example.split('"')[1] if key in KEYS else "mm"
     unit = "deg" if "angle" in key else "N" if "force" in key or key == "preload.value" else unit

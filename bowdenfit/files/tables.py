@@ -3,6 +3,7 @@
 from pathlib import Path
 
 from bowdenfit.files.csv_table import RawTable, read_csv
+from bowdenfit.inputs import refuse_special
 
 WORKBOOKS = (".xlsx", ".xlsm")
 
@@ -17,6 +18,7 @@ def read_table(path: Path, most: int | None = None) -> RawTable:
     Raises:
         DatasetError: See `read_csv` and `read_workbook`.
     """
+    refuse_special(path)
     if path.suffix.lower() not in WORKBOOKS:
         return read_csv(path, most)
     from bowdenfit.files.apart import call_apart

@@ -8,6 +8,7 @@ import resource
 import pytest
 from attempts import Attempts
 from fuzzing import DATASETS, read_mangled_data_set, read_mangled_file, run_mangled_options, valid_files
+from fuzzing_folders import FOLDERS, read_mangled_folder
 from recorded_files import WRITERS
 
 OF_TABLES = {"synthetic-recordings": 20, "synthetic-bench": 120, "synthetic-haptic-loop": 120}
@@ -59,6 +60,13 @@ def test_mangled_files_of_every_kind_are_read_or_refused_in_sentences(tmp_path, 
     assert sum(each.refused for each in outcomes) > 5
 
 
+@pytest.mark.parametrize("name", FOLDERS)
+def test_mangled_devices_studies_and_fleets_are_read_or_refused_in_sentences(tmp_path, name):
+    count = 60 if name == "fleet" else 120
+    refused = sum(read_mangled_folder(tmp_path, name, number).refused for number in range(count))
+    assert 0.2 * count < refused < count
+
+
 def test_mangled_options_are_taken_or_refused_in_sentences(tmp_path, attempts):
     outcomes = [run_mangled_options(options_of(attempts, tmp_path), number) for number in range(360)]
     assert 200 < sum(each.refused for each in outcomes) < 360
@@ -76,6 +84,13 @@ def test_many_more_mangled_data_sets(tmp_path, name):
 def test_many_more_mangled_files(tmp_path, valid, name):
     for number in range(1000, 2000):
         read_mangled_file(tmp_path, valid, name, number)
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("name", FOLDERS)
+def test_many_more_mangled_devices_studies_and_fleets(tmp_path, name):
+    for number in range(1000, 3000):
+        read_mangled_folder(tmp_path, name, number)
 
 
 @pytest.mark.slow

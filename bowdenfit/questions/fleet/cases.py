@@ -61,10 +61,14 @@ def read_cases(folder: Path, inspections: Iterable[Inspection], reading: Reading
     descriptions: dict[Path, Description] = {}
     before: dict[str, str] = {}
     for each in inspections:
+        try:
+            refuse_special(each.place)
+        except DatasetError as error:
+            yield Broken(each.label, str(error))
+            continue
         if not each.place.is_dir() and folder not in descriptions:
             descriptions[folder] = _common_description(folder, reading)
         try:
-            refuse_special(each.place)
             if each.place.is_dir():
                 dataset = read(each.place, **reading)
             else:

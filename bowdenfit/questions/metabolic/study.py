@@ -12,11 +12,13 @@ from bowdenfit.errors import DatasetError, DescriptionError
 from bowdenfit.files.tables import read_table
 from bowdenfit.inputs import read_toml_file
 from bowdenfit.questions.metabolic.paired import brockway
+from bowdenfit.words import shown
 
 FILE = "metabolic.toml"
 _GAS = ("VO2_ml_per_min", "VCO2_ml_per_min", "mass_kg")
 _NET = "net_W_per_kg"
-Digits = Annotated[str, Field(pattern=r"^-?\d+(\.\d+)?$")]
+Digits = Annotated[str, Field(pattern=r"^-?[0-9]{1,6}(\.[0-9]{1,12})?$")]
+Name = Annotated[str, Field(min_length=1, max_length=120)]
 
 
 class _Frozen(BaseModel):
@@ -26,7 +28,7 @@ class _Frozen(BaseModel):
 class Condition(_Frozen):
     """What was printed of one condition: mean net cost [W/kg] and its standard error, as written."""
 
-    name: str
+    name: Name
     mean: Digits | None = None
     sem: Digits | None = None
 
@@ -34,8 +36,8 @@ class Condition(_Frozen):
 class Printed(_Frozen):
     """What was printed of a condition less another: probability by chance, and change in percent, as written."""
 
-    condition: str
-    less: str
+    condition: Name
+    less: Name
     p: Digits | None = None
     percent: Digits | None = None
 
@@ -54,7 +56,7 @@ class Study(_Frozen):
     """
 
     schema_: int = Field(alias="schema", ge=1, le=1)
-    name: str
+    name: Name
     source: str = ""
     license: str = ""
     persons: Annotated[int, Field(ge=2, le=10_000)] | None = None
@@ -89,7 +91,7 @@ def read_study(folder: Path) -> tuple[Study, Costs | None]:
         study = Study.model_validate(raw)
     except ValidationError as error:
         first = error.errors()[0]
-        place = ".".join(map(str, first["loc"])) or "the file"
+        place = shown(".".join(map(str, first["loc"]))) if first["loc"] else "the file"
         raise DescriptionError(
             f"{path.name}: {place} is wrong ({first['msg']}); numbers that were printed are written as text with all their "
             'digits, such as mean = "6.30", and datasets/on-body-metabolic shows every key.'

@@ -60,7 +60,12 @@ class Rope:
         return self.friction.scaled(self.values, force)
 
     def follow(
-        self, input_force: Recorded, mounting: Each, start: Each, restart: Recorded | None = None
+        self,
+        input_force: Recorded,
+        mounting: Each,
+        start: Each,
+        restart: Recorded | None = None,
+        noise: Recorded | None = None,
     ) -> tuple[Recorded, Recorded]:
         """Output force [N], and the derivative of its `scaled` by the friction exponent [1].
 
@@ -69,10 +74,14 @@ class Rope:
             mounting: Effect of the mounting on the friction exponent [1].
             start: `scaled` of the output force before the first time.
             restart: The same where it must be set anew, because the input before was not known; NaN elsewhere.
+            noise: What the output is expected to follow beyond what the rope does: what a reading of the input has in it
+                that is no motion, where the rope slides; 0 elsewhere [N].
         """
         x, band = self.scaled(input_force), self.band(mounting)
         (pulling, returning), slopes = jax.jvp(partial(self.friction.shifts, self.values), (band,), (jnp.ones_like(band),))
         y, slope = play_operator(x - pulling, x + returning, start, (-slopes[0], slopes[1]), restart)
+        if noise is not None:
+            y = y + self.scaled(jnp.maximum(input_force + noise, self.least_force)) - x
         return jnp.maximum(self.friction.force(self.values, y), self.least_force), slope
 
     def shown(self, cells: LoadCells, output_force: Recorded, slope: Recorded) -> tuple[Recorded, Recorded]:
@@ -116,7 +125,12 @@ class Loop:
         return force
 
     def follow(
-        self, input_force: Recorded, mounting: Each, start: Each, restart: Recorded | None = None
+        self,
+        input_force: Recorded,
+        mounting: Each,
+        start: Each,
+        restart: Recorded | None = None,
+        noise: Recorded | None = None,
     ) -> tuple[Recorded, Recorded]:
         """Output force and its derivative by the friction exponent [N]; arguments as of `Rope.follow`."""
         exponent = self.band(mounting)
@@ -125,7 +139,11 @@ class Loop:
             return loop_band(input_force, self.preload, exponent)
 
         (low, high), slopes = jax.jvp(limits, (exponent,), (jnp.ones_like(exponent),))
-        return play_operator(low, high, start, slopes, restart)
+        y, slope = play_operator(low, high, start, slopes, restart)
+        if noise is None:
+            return y, slope
+        lower, upper = loop_band(input_force + noise, self.preload, exponent)
+        return y + jnp.where(y - low < high - y, lower - low, upper - high), slope
 
     def shown(self, cells: LoadCells, output_force: Recorded, slope: Recorded) -> tuple[Recorded, Recorded]:
         """What the output's cell shows, and its derivative by the friction exponent, of what `follow` gave [N]."""

@@ -8,7 +8,8 @@ import numpy as np
 
 from bowdenfit.description import Phase
 from bowdenfit.errors import DatasetError, DescriptionError
-from bowdenfit.recordings.preparation.play import Hysteresis, play_between, white_noise
+from bowdenfit.recordings.preparation.likely_input import likely_input
+from bowdenfit.recordings.preparation.play import Hysteresis, clear_of_turns, play_between, white_noise
 from bowdenfit.recordings.preparation.robust import Deviations, robust_cost, robust_minimum
 from bowdenfit.recordings.recording import PULL, Blocks
 from bowdenfit.types import Flags, Labels, Vector
@@ -48,20 +49,21 @@ def fit_force_loop(force_in: Vector, force_out: Vector, taut: bool = True, slack
         slack: Whether the return side may go slack; else all is lost as while both sides are taut.
     """
     thin = slice(None, None, -(-len(force_in) // _FIT_BLOCKS))
-    x, y = force_in[thin], force_out[thin]
+    likely = likely_input(force_in)
+    x, moved, y = force_in[thin], likely[thin], force_out[thin]
     apart, noise = float(np.quantile(np.abs(x - y), 0.98)), _noise(x, y)
     scale, told = max(apart, noise), np.array([taut, slack, True], dtype=float)
 
     def model(p: np.ndarray) -> Deviations:
-        residuals, slopes = _residuals(x, y, scale, noise, p * told)
+        residuals, slopes = _residuals(x, moved, y, scale, noise, p * told)
         return residuals, slopes * told
 
     starts = sorted(_starts(x, y, scale), key=lambda p: robust_cost(model(p)[0]))[:2]
     best, cost = min((robust_minimum(model, start, *_LIMITS) for start in starts), key=lambda fit: fit[1])
     loss, exponent, center = (best * told * [scale, 1.0, scale]).tolist()
-    deviation, followed, state = _deviation(force_in, force_out, loss, exponent, center)
-    found = deviation, followed, state, state
-    return Hysteresis(force_in, force_out, exponent, center, loss, *found, cost / len(x))
+    deviation, followed, state = _deviation(force_in, likely, force_out, loss, exponent, center)
+    state = clear_of_turns(state, likely)
+    return Hysteresis(force_in, force_out, exponent, center, loss, deviation, followed, state, cost / len(x))
 
 
 @dataclass(frozen=True)
@@ -128,27 +130,31 @@ def _starts(x: Vector, y: Vector, scale: float) -> list[np.ndarray]:
     ]
 
 
-def _deviation(x: Vector, y: Vector, loss: float, exponent: float, center: float) -> tuple[Vector, Vector, Labels]:
-    """Deviation of the output from the operator, the operator's output, and its contact."""
-    followed, state = play_between(*loop_limits(x, loss, exponent), float(y[0]) + center)
+def _deviation(
+    x: Vector, moved: Vector, y: Vector, loss: float, exponent: float, center: float
+) -> tuple[Vector, Vector, Labels]:
+    """Deviation of the output from the operator, the operator's output, and its contact; see `rope_strokes`."""
+    limits, shown = loop_limits(moved, loss, exponent), loop_limits(x, loss, exponent)
+    followed, state = play_between(*limits, float(y[0]) + center)
+    followed += np.select([state > 0, state < 0], [after - before for before, after in zip(limits, shown, strict=True)])
     return y + center - followed, followed, state
 
 
-def _residuals(x: Vector, y: Vector, scale: float, noise: float, p: np.ndarray) -> Deviations:
+def _residuals(x: Vector, moved: Vector, y: Vector, scale: float, noise: float, p: np.ndarray) -> Deviations:
     """Deviations in units of their noise and what is known beforehand of the center, with slopes by all parameters.
 
     Args:
-        x, y: Input and output force [N].
+        x, moved, y: Input force as read and as it likely was, and output force [N].
         scale: Force that loss and center are measured in [N].
         noise: Standard deviation of a deviation [N].
         p: Loss over the scale, exponent, and center over the scale.
     """
     loss, exponent, center = scale * float(p[0]), float(p[1]), scale * float(p[2])
-    deviation, followed, state = _deviation(x, y, loss, exponent, center)
+    deviation, followed, state = _deviation(x, moved, y, loss, exponent, center)
     touched = np.maximum.accumulate(np.where(state != 0, np.arange(len(state)), -1))
-    known, at = touched >= 0, x[touched]
-    side = np.where(known, state[touched], 0)
-    taut = followed == at - side * loss  # else the return side is slack
+    known, side = touched >= 0, np.where(touched >= 0, state[touched], 0)
+    at = np.where(state != 0, x, moved[touched])
+    taut = np.isclose(followed, at - side * loss, rtol=0, atol=1e-9 * scale)  # else the return side is slack
     slopes = np.stack(
         [np.where(taut, scale * side, 0), np.where(taut, 0, side * np.abs(followed)), scale * known], axis=1
     )

@@ -8,7 +8,8 @@ import numpy as np
 from bowdenfit.description import Phase
 from bowdenfit.errors import DatasetError
 from bowdenfit.recordings.one_way import refuse_dead, sliding_one_way
-from bowdenfit.recordings.preparation.play import Hysteresis, contact_through_noise, play, white_noise
+from bowdenfit.recordings.preparation.likely_input import likely_input
+from bowdenfit.recordings.preparation.play import Hysteresis, clear_of_turns, play, white_noise
 from bowdenfit.recordings.preparation.robust import Deviations, robust_minimum
 from bowdenfit.recordings.recording import PULL, RETURN, SWITCH, Blocks
 from bowdenfit.types import Flags, Labels, Vector
@@ -32,7 +33,8 @@ def fit_loop(force_in: Vector, force_out: Vector) -> Hysteresis:
         force_out: Output force, all above 0 [N].
     """
     thin = slice(None, None, -(-len(force_in) // _FIT_BLOCKS))
-    few_in, few_out = force_in[thin], force_out[thin]
+    likely = likely_input(force_in)
+    few_in, few_likely, few_out = force_in[thin], likely[thin], force_out[thin]
     ratio = np.log(few_in / few_out)
     low, high = np.quantile(ratio, (0.05, 0.95))
     width, center = max((high - low) / 2, _LEAST_EXPONENT), (high + low) / 2
@@ -43,7 +45,7 @@ def fit_loop(force_in: Vector, force_out: Vector) -> Hysteresis:
         width, center = max(abs(float(np.median(ratio))), _LEAST_EXPONENT), 0.0
 
     def model(p: np.ndarray) -> Deviations:
-        return _residuals(few_in, few_out, (noise_in, noise_out), level, p)
+        return _residuals(few_in, few_likely, few_out, (noise_in, noise_out), level, p)
 
     fits = []
     for start in ([width, center, 0.0025], [width * 0.8, 0.0, 0.09]):
@@ -52,12 +54,9 @@ def fit_loop(force_in: Vector, force_out: Vector) -> Hysteresis:
             break
     best, cost = min(fits, key=lambda fit: fit[1])
     exponent, middle, drag = float(best[0]), float(best[1]), level * float(best[2])
-    x, shown = np.log(force_in + drag), np.log(force_out + drag) + middle
-    output, state = play(x, exponent, float(shown[0]))
-    of_input = white_noise(force_in) / (force_in + drag)
-    followed, sliding = contact_through_noise(x - exponent, x + exponent, output, state, of_input)
-    found = shown - followed, followed, state, sliding
-    return Hysteresis(force_in, force_out, exponent, middle, drag, *found, cost / len(few_in))
+    deviation, followed, state = _follow(force_in, likely, force_out, exponent, middle, drag)
+    state = clear_of_turns(state, likely)
+    return Hysteresis(force_in, force_out, exponent, middle, drag, deviation, followed, state, cost / len(few_in))
 
 
 class RopeStrokes:
@@ -71,9 +70,11 @@ class RopeStrokes:
     )
 
     def usable(self, blocks: Blocks) -> Flags:
-        """Where both forces stand clear of their noise, so that their logarithms say something."""
+        """Where both forces stand clear of their noise, so that their logarithms say something; not chosen by that noise."""
         forces = (blocks.input_force, blocks.output_force)
-        return ~blocks.saturated & np.all([force > _CLEAR_OF_NOISE * white_noise(force) for force in forces], axis=0)
+        return ~blocks.saturated & np.all(
+            [likely_input(force) > _CLEAR_OF_NOISE * white_noise(force) for force in forces], axis=0
+        )
 
     def refuse(self, loop: Hysteresis, velocity: Vector, file: str, name: str, by_hand: Sequence[Phase]) -> None:
         """Refuse a recording whose channels are the wrong way round, or that holds nothing but the return."""
@@ -125,31 +126,36 @@ def _plain_loop(ratio: Vector, state: Labels) -> tuple[float, float]:
 
 
 def _follow(
-    force_in: Vector, force_out: Vector, exponent: float, center: float, drag: float
+    force_in: Vector, likely: Vector, force_out: Vector, exponent: float, center: float, drag: float
 ) -> tuple[Vector, Vector, Labels]:
-    """Deviation of the output from the operator, the operator's output, and its contact."""
-    x, y = np.log(force_in + drag), np.log(force_out + drag)
-    followed, state = play(x, exponent, float(y[0] + center))
+    """Deviation of the output from the operator, the operator's output, and its contact.
+
+    The operator follows the likely input force; where the rope slides, the reading's noise is in its output as it is.
+    """
+    x, moved, y = (np.log(force + drag) for force in (force_in, likely, force_out))
+    followed, state = play(moved, exponent, float(y[0] + center))
+    followed += np.where(state != 0, x - moved, 0.0)
     return y + center - followed, followed, state
 
 
 def _residuals(
-    force_in: Vector, force_out: Vector, noise: tuple[float, float], level: float, p: np.ndarray
+    force_in: Vector, likely: Vector, force_out: Vector, noise: tuple[float, float], level: float, p: np.ndarray
 ) -> Deviations:
     """Deviations in units of their noise and what is known beforehand of center and drag, with slopes by all parameters.
 
     Args:
-        force_in, force_out: Forces [N].
+        force_in, likely, force_out: Forces [N].
         noise: Standard deviations of the forces [N].
         level: Force that drag is measured in [N].
         p: Friction exponent, center, and drag over the level.
     """
     drag = level * float(p[2])
-    deviation, _, state = _follow(force_in, force_out, float(p[0]), float(p[1]), drag)
+    deviation, _, state = _follow(force_in, likely, force_out, float(p[0]), float(p[1]), drag)
     touched = np.maximum.accumulate(np.where(state != 0, np.arange(len(state)), -1))
     known, one_in, one_out = touched >= 0, 1 / (force_in + drag), 1 / (force_out + drag)
+    one_followed = np.where(state != 0, one_in, 1 / (likely + drag)[touched])
     scale = np.hypot(noise[0] * one_in, noise[1] * one_out)
-    by_drag = one_out - np.where(known, one_in[touched], one_out[0])
+    by_drag = one_out - np.where(known, one_followed, one_out[0])
     by_drag += deviation * (noise[0] ** 2 * one_in**3 + noise[1] ** 2 * one_out**3) / scale**2
     slopes = np.stack([np.where(known, state[touched], 0), known, level * by_drag], axis=1) / scale[:, None]
     weak = np.sqrt(len(force_in)) * 0.1

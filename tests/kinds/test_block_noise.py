@@ -16,7 +16,8 @@ from bowdenfit.kinds.recordings.simulation import recorded_again
 from bowdenfit.kinds.recordings.term import recordings_term
 from bowdenfit.kinds.runs import RunsTerm
 from bowdenfit.model import build_model
-from bowdenfit.recordings.preparation.play import contact_through_noise, play
+from bowdenfit.recordings.preparation.likely_input import likely_input
+from bowdenfit.recordings.preparation.play import play
 from bowdenfit.recordings.recording import Recordings
 
 TIMES = 8
@@ -97,26 +98,25 @@ def test_drifts_hold_less_noise_than_the_change_from_block_to_block(bench):
     assert np.mean(shares) < 0.3
 
 
-def noisy_pull(dip: float) -> tuple[np.ndarray, float]:
+def noisy_pull(dip: float) -> np.ndarray:
     """A log force that rises, with noise, and falls back in the middle by so many of its standard deviations."""
     sd, rise = 0.01, np.linspace(0.0, 1.0, 200)
     rise[95:105] -= dip * sd
-    return rise + sd * np.random.default_rng(1).standard_normal(200), sd
+    return rise + sd * np.random.default_rng(1).standard_normal(200)
 
 
 def test_a_pull_with_noise_counts_as_sliding_throughout():
-    x, sd = noisy_pull(0.0)
-    output, state = play(x, 0.2, x[0] - 0.2)
-    assert np.mean(state == 1) < 0.7
-    output, sliding = contact_through_noise(x - 0.2, x + 0.2, output, state, np.full(200, sd))
-    assert np.mean(sliding == 1) > 0.99
-    np.testing.assert_allclose(output[sliding == 1], x[sliding == 1] - 0.2)
+    x = noisy_pull(0.0)
+    assert np.mean(play(x, 0.2, x[0] - 0.2)[1] == 1) < 0.7
+    likely = likely_input(x)
+    output, state = play(likely, 0.2, likely[0] - 0.2)
+    assert np.mean(state == 1) > 0.99
+    np.testing.assert_allclose(output[state == 1], likely[state == 1] - 0.2)
 
 
 def test_a_reversal_far_beyond_noise_is_no_noise():
-    x, sd = noisy_pull(20.0)
-    output, state = play(x, 0.2, x[0] - 0.2)
-    _, sliding = contact_through_noise(x - 0.2, x + 0.2, output, state, np.full(200, sd))
-    assert not sliding[96:104].any()
-    assert np.mean(sliding[:90] == 1) > 0.95
-    assert np.mean(sliding[120:] == 1) > 0.95
+    likely = likely_input(noisy_pull(20.0))
+    _, state = play(likely, 0.2, likely[0] - 0.2)
+    assert not state[96:104].any()
+    assert np.mean(state[:90] == 1) > 0.95
+    assert np.mean(state[120:] == 1) > 0.95

@@ -14,6 +14,7 @@ from bowdenfit.cable.drive import Loop
 from bowdenfit.dataset import load_dataset
 from bowdenfit.kinds.recordings.loops import LoopRecordingsTerm
 from bowdenfit.model import build_model
+from bowdenfit.recordings.loop_strokes import loop_limits
 
 VALUES = {"mu": MU, "preload": PRELOAD, "tau": 0.02, "sigma_block": 0.1}
 
@@ -44,16 +45,25 @@ def test_the_slope_of_the_operator_is_its_derivative():
     np.testing.assert_allclose(restarted[:200], y[:200])
 
 
+def passed_on(force, noise, output, preload, exponent):
+    """What of the input's noise is in the output, by the end of the band that this is nearer to."""
+    ends = [loop_limits(x, 2 * preload * exponent, exponent) for x in (force, force + noise)]
+    below = output - ends[0][0] < ends[0][1] - output
+    return np.where(below, ends[1][0] - ends[0][0], ends[1][1] - ends[0][1])
+
+
 def integrated(term, values) -> float:
     """Log likelihood of a term's only run with its mounting effect integrated by quadrature, the operator written out."""
     data = {name: np.asarray(array) for name, array in term.data.items()}
     weight, noise, preload = data["weight"][:, 0], values["sigma_block"], values["preload"]
-    force, output = data["input_force"][:, 0], data["output_force"][:, 0]
+    force, output, noise_in = (data[k][:, 0] for k in ("likely_force", "output_force", "input_noise"))
     gain = math.exp(values.get("gain_error", 0.0))
     constant = (data["log_weights"][0] - data["n"][0] * np.log(2 * np.pi)) / 2 - data["n"][0] * np.log(noise)
 
     def log_joint(m):
-        apart = output - output_of(force, preload, values["mu"] * math.pi + m, float(output[0]) * gain) / gain
+        exponent = values["mu"] * math.pi + m
+        stands = output_of(force, preload, exponent, float(output[0]) * gain)
+        apart = output - (stands + passed_on(force, noise_in, stands, preload, exponent)) / gain
         return constant - np.sum(weight * apart**2) / (2 * noise**2) + stats.norm.logpdf(m, 0, values["tau"])
 
     grid = np.linspace(-0.15, 0.15, 601)

@@ -336,12 +336,12 @@ def test_the_mounting_effect_of_a_whole_recording_integrates_out(name):
     values = BLOCK | {} if name == "capstan" else BLOCK | {"drag": drag, "gain_error": gain,
         "input_offset": of_input, "output_offset": of_output}  # fmt: skip
     data = {key: np.asarray(array)[..., 0] for key, array in term.data.items()}
-    x = np.log(data["input_force"] - of_input + drag)
+    x, passed = (np.log(data["likely_force"] + more - of_input + drag) for more in (0, data["input_noise"]))
     start = np.log((data["output_force"][0] - of_output) * np.exp(gain) + drag)
     noise, tau = values["sigma_block"], values["tau"]
 
     def log_joint(m):
-        y, _ = play(x, MU * 2.5 + m, float(start))
+        y = play(x, MU * 2.5 + m, float(start))[0] + passed - x
         shown = (np.exp(y) - drag) * np.exp(-gain) + of_output
         squares = np.sum(data["weight"] * (data["reading"] - np.log(shown)) ** 2)
         return float(-squares / (2 * noise**2) + stats.norm.logpdf(m, 0.0, tau))
@@ -419,7 +419,7 @@ def test_least_squares_of_faultless_recordings_returns_what_they_were_made_with(
         float(rate_factor(jnp.asarray(stated_at), *map(jnp.asarray, RATE.values()))) if "stribeck" in truth else 1.0
     )
     by_bins = 2e-3 if "stribeck" in truth else 5e-4  # two dozen bins of the load, and of the speed
-    limit = by_bins if likelihood == "runs" else 1e-4 if "stribeck" in truth else 1e-10
+    limit = by_bins if likelihood == "runs" else 2e-4 if "stribeck" in truth else 1e-10
     for name, value in ({"mu": mu} | truth).items():
         assert estimates[name].identified
         assert estimates[name].value == pytest.approx(value, rel=limit)

@@ -13,8 +13,8 @@ from bowdenfit.kinds.angles.table import AngleTable
 from bowdenfit.kinds.drawn_readings import drawn_readings
 from bowdenfit.kinds.recordings.simulation import errors_shared, recorded_again
 from bowdenfit.kinds.recordings.term import recordings_term
-from bowdenfit.kinds.recordings.true_input import likely_input
 from bowdenfit.model import build_model
+from bowdenfit.recordings.preparation.likely_input import likely_input
 from bowdenfit.recordings.recording import Recordings
 
 TIMES = 12

@@ -9,7 +9,7 @@ from bowdenfit.kinds.readings import Readings, efficiencies
 from bowdenfit.kinds.recordings.angles import check_angles, recorded_angles
 from bowdenfit.kinds.recordings.settings import RecordingsTable, contradiction, quantities_of
 from bowdenfit.kinds.recordings.table import read_recordings
-from bowdenfit.kinds.recordings.words import alone, count, implausible, recordings_text, warnings
+from bowdenfit.kinds.recordings.words import alone, count, implausible, recordings_text
 from bowdenfit.recordings.recording import Recordings
 from bowdenfit.types import Vector
 
@@ -44,7 +44,6 @@ RECORDINGS = Kind(
     method="Recordings were averaged over blocks, phases of sliding were told by a play operator, and all readings of one "
     "mounting shared its error.",
     implausible=implausible,
-    warnings=warnings,
     count=count,
     conditions=recorded_angles,
     forces=_forces,

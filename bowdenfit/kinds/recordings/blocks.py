@@ -3,11 +3,15 @@
 import numpy as np
 
 from bowdenfit.cable.conditions import LEAST_SHARE
+from bowdenfit.recordings.preparation.likely_input import likely_input
 from bowdenfit.recordings.preparation.play import white_noise
-from bowdenfit.recordings.recording import Recording
+from bowdenfit.recordings.recording import Blocks, Recording
+from bowdenfit.types import Vector
 
 RECORDED = "recorded_efficiency"  # name of the readings of recordings in results
 _QUIET = 0.1  # share of the drifts' own spread, up to which noise may be in a drift
+_CORNER = 1  # blocks before and after a turn, over which the force changes as it does there
+_LEAST_KNOWN = 1e-9
 _NEAR_LIMIT = 0.005  # of the end of a range, within which a saturated reading is at it
 
 
@@ -46,26 +50,39 @@ def drift_of(recording: Recording) -> np.ndarray:
     return drift
 
 
+def likely_forces(blocks: Blocks) -> tuple[Vector, Vector]:
+    """Input and output force of each block with as little of their noise as can be, above 0 [N]; see `likely_input`."""
+    each = (blocks.input_force, blocks.output_force)
+    likely_in, likely_out = (np.maximum(likely_input(f), LEAST_SHARE * np.max(np.abs(f))) for f in each)
+    return likely_in, likely_out
+
+
 def inside_phase(state: np.ndarray) -> np.ndarray:
     """Blocks whose neighbors are in the same phase: at a corner a block's mean is of two phases."""
     same = np.diff(state) == 0
     return np.append(True, same) & np.append(same, True)
 
 
-def standing_share(state: np.ndarray) -> np.ndarray:
+def standing_share(state: np.ndarray, force: np.ndarray) -> np.ndarray:
     """What a block is worth beside others of its phase: all of it while sliding, a share of one while standing still.
 
     The operator stands where the highest (or lowest) input left it, noise and all: every block of that phase has this one
-    error in common, and together they are worth no more than one reading with twice the noise.
+    error in common, and together they are worth no more than one reading with twice the noise. Where inside its block the
+    force turned is not known either, which is an error of about half the change of a block there.
+
+    Args:
+        state: Contact of each block.
+        force: Its input force [N].
     """
+    if not len(state):
+        return np.ones(0)
     phase = np.append(0, np.cumsum(np.diff(state) != 0))
-    return np.where(state == 0, 0.5 / np.bincount(phase)[phase], 1.0)
-
-
-def last_contact(state: np.ndarray) -> np.ndarray:
-    """The last contact up to each block; 0 before the first."""
-    at = np.maximum.accumulate(np.where(state != 0, np.arange(len(state)), -1))
-    return np.where(at >= 0, state[np.maximum(at, 0)], 0).astype(int)
+    first = np.flatnonzero(np.append(True, np.diff(phase) != 0))
+    change = np.abs(np.diff(likely_input(force), prepend=force[0]))
+    near = np.clip(first[:, None] + np.arange(-_CORNER, _CORNER + 1), 0, len(state) - 1)
+    noise, turn = white_noise(force), np.max(change[near], axis=1) / 2
+    known = np.maximum(noise**2 / np.maximum(noise**2 + turn**2, 1e-300), _LEAST_KNOWN)
+    return np.where(state == 0, (0.5 * known / np.bincount(phase))[phase], 1.0)
 
 
 def _at_limit(recording: Recording, force: np.ndarray) -> np.ndarray:

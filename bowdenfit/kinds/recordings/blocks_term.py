@@ -105,8 +105,9 @@ class BlocksTerm(Inner, ABC):
     def _followed(self, drive: Rope | Loop, cells: LoadCells, data: Data, mounting: Each) -> tuple[Recorded, Recorded]:
         """Deviation of the readings from the operator's output, and the output's derivative by the exponent."""
         stands = drive.scaled(cells.true_output(data["output_force"], drive.least_force))
-        force = cells.true_input(data["input_force"], drive.least_force)
-        followed = drive.follow(force, mounting, stands[0], jnp.where(data["restart"], stands, jnp.nan))
+        force = cells.true_input(data["likely_force"], drive.least_force)
+        anew = jnp.where(data["restart"], stands, jnp.nan)
+        followed = drive.follow(force, mounting, stands[0], anew, data["input_noise"])
         expected, loading = drive.shown(cells, *followed)
         return data["reading"] + cells.late(data["drift"]) - expected, loading
 

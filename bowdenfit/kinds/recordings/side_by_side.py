@@ -16,12 +16,13 @@ from bowdenfit.kinds.recordings.blocks import (
     worth_of,
 )
 from bowdenfit.kinds.sliding_rows import ROW_ARRAYS
+from bowdenfit.recordings.preparation.likely_input import likely_input
 from bowdenfit.recordings.recording import Recording, Recordings
 
 MOST_BLOCKS = 600  # of one recording in the play operator; more say no more once noise is averaged
-_FREE = ("weight", "worth", "censored", "share", "drift", "restart")
+_FREE = ("weight", "worth", "censored", "share", "drift", "restart", "input_noise")
 WITHOUT_WEIGHT = (*_FREE, "moving")  # arrays that are 0 where a recording has ended; the others stay as they were
-_HELD = ("input_force", "output_force", "velocity")
+_HELD = ("input_force", "likely_force", "output_force", "velocity")
 
 
 @dataclass(frozen=True)
@@ -58,10 +59,14 @@ class Thinned:
             np.maximum(self.mean(force), drive.least_share * np.max(np.abs(force)))
             for force in (blocks.input_force, blocks.output_force)
         )
+        likely = self.mean(likely_input(blocks.input_force))
+        sliding = self.recording.strokes.contact[self.starts] != 0
         off = input_saturated(self.recording)
         lost = self.any_of(off)
         return self._censored(output_saturated(self.recording) & censored, force_out, lost) | {
             "input_force": force_in,
+            "likely_force": likely,
+            "input_noise": np.where(sliding, force_in - likely, 0.0),
             "output_force": force_out,
             "velocity": self.mean(blocks.velocity),
             "worth": self._worth(usable & ~off, lost),
@@ -73,7 +78,7 @@ class Thinned:
         """What each group is worth: the blocks that count, inside their phases, unless its input is not known."""
         contact = self.recording.strokes.contact
         each = worth_of(self.recording, np.arange(len(contact))) * (counted & inside_phase(contact))
-        return np.add.reduceat(each * standing_share(contact), self.starts) * ~lost
+        return np.add.reduceat(each * standing_share(contact, self.recording.blocks.input_force), self.starts) * ~lost
 
     def _censored(self, saturated: np.ndarray, force_out: np.ndarray, lost: np.ndarray) -> dict[str, np.ndarray]:
         """Which end of the range the output lies beyond, and what that says.
@@ -111,14 +116,15 @@ def side_by_side(
     free = {name: beside([p[name] for p in parts], "constant") for name in _FREE}
     worth = free.pop("worth")
     counted = free["weight"] > 0
-    ratio = np.where(counted, free["weight"], 1.0) / np.where(counted, worth, 1.0)
-    log_weights = np.where(counted, worth * np.log(ratio), 0.0)
+    readings = np.minimum(worth, 1.0)  # blocks that are joined are one reading, however well it is known
+    ratio = np.where(counted, free["weight"], 1.0) / np.where(counted, readings, 1.0)
+    log_weights = np.where(counted, readings * np.log(ratio), 0.0)
     arrays = (
         {name: angles[name] for name in ROW_ARRAYS} | {name: beside([p[name] for p in parts]) for name in _HELD} | free
     )
     return arrays | {
         "run": run,
-        "n": np.bincount(run, worth.sum(axis=0)),
+        "n": np.bincount(run, readings.sum(axis=0)),
         "log_weights": np.bincount(run, log_weights.sum(axis=0)),
     }
 

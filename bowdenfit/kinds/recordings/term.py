@@ -19,7 +19,7 @@ from bowdenfit.kinds.recordings.blocks import (
     drift_of,
     input_saturated,
     inside_phase,
-    last_contact,
+    likely_forces,
     positive,
     restarts,
     standing_share,
@@ -38,7 +38,7 @@ from bowdenfit.kinds.sliding_rows import ROW_ARRAYS, SlidingRows
 from bowdenfit.kinds.term import Circumstances, TermKind
 from bowdenfit.parameters.priors import Normal
 from bowdenfit.parameters.space import Parameter
-from bowdenfit.recordings.preparation.play import play
+from bowdenfit.recordings.preparation.play import clear_of_turns, last_contact, play
 from bowdenfit.recordings.recording import Recording, Recordings
 
 
@@ -125,16 +125,20 @@ def _all_blocks(recording: Recording, noise_ratio: float) -> BlocksUsed:
     """
     kept_at, blocks, strokes = positive(recording), recording.blocks, recording.strokes
     x, y = np.log(blocks.input_force[kept_at]), np.log(blocks.output_force[kept_at])
-    followed, (state, last) = _followed_in_parts(recording, kept_at, x, y)
+    likely_in, likely_out = likely_forces(blocks)
+    moved = np.log(likely_in[kept_at])
+    followed, (state, last) = _followed_in_parts(recording, kept_at, moved, y)
+    followed += np.where(state != 0, x - moved, 0.0)
     inside = inside_phase(state)
     kept = (last != 0) & inside
     used, stroke = np.flatnonzero(kept_at)[kept], last[kept]
     ratio = strokes.exponent - stroke * (y - followed)[kept]
-    force_in, force_out = blocks.input_force[used], blocks.output_force[used]
-    of_output_alone = np.where(state[kept] == 0, 1 + (noise_ratio * force_out / force_in) ** 2, 1.0)
-    worth = worth_of(recording, used) * of_output_alone * standing_share(state)[kept]
-    tells = 1 / ((noise_ratio / force_in) ** 2 + 1 / force_out**2)
-    return BlocksUsed(used, stroke, force_in, force_out, ratio, worth, tells)
+    slides = state[kept] != 0
+    likely_in, likely_out = likely_in[used], likely_out[used]
+    of_output_alone = np.where(slides, 1.0, 1 + (noise_ratio * likely_out / likely_in) ** 2)
+    worth = worth_of(recording, used) * of_output_alone * standing_share(state, blocks.input_force[kept_at])[kept]
+    tells = 1 / ((noise_ratio / likely_in) ** 2 + 1 / likely_out**2)
+    return BlocksUsed(used, stroke, blocks.input_force[used], blocks.output_force[used], ratio, worth, tells)
 
 
 def _followed_in_parts(
@@ -147,7 +151,7 @@ def _followed_in_parts(
     for start, stop in zip(starts, np.append(starts[1:], len(x))[: len(starts)], strict=True):
         part = slice(start, stop)
         followed[part], state[part] = play(x[part], strokes.exponent, float(y[start] + strokes.center))
-        last[part] = last_contact(state[part])
+        last[part], state[part] = last_contact(state[part]), clear_of_turns(state[part], x[part])
     return followed, np.stack([state, last])
 
 

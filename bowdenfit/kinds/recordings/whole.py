@@ -11,7 +11,7 @@ from jaxtyping import Float
 
 from bowdenfit.cable.drive import Each, Rope
 from bowdenfit.cable.noise import scatter
-from bowdenfit.kinds.recordings.blocks import RECORDED, positive
+from bowdenfit.kinds.recordings.blocks import RECORDED, likely_forces, positive
 from bowdenfit.kinds.recordings.blocks_term import BlocksTerm, Data, Values
 from bowdenfit.kinds.recordings.side_by_side import group_blocks, side_by_side
 from bowdenfit.physics.friction import transmission_efficiency
@@ -87,6 +87,6 @@ def _blocks(recording: Recording, censored: bool, noise_ratio: float) -> dict[st
     """Blocks of one recording; while the rope stands still the input's noise is not in the output."""
     groups = group_blocks(recording)
     arrays = groups.arrays(Rope, positive(recording), censored)
-    standing = recording.strokes.contact[groups.starts] == 0
-    variance = np.where(standing, 0.0, (noise_ratio / arrays["input_force"]) ** 2) + 1 / arrays["output_force"] ** 2
-    return arrays | {"weight": arrays["worth"] / variance}
+    likely_in, likely_out = (groups.mean(force) for force in likely_forces(recording.blocks))
+    of_input = noise_ratio * (recording.strokes.contact[groups.starts] != 0)
+    return arrays | {"weight": arrays["worth"] / ((of_input / likely_in) ** 2 + 1 / likely_out**2)}

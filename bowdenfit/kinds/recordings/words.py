@@ -4,17 +4,11 @@ from typing import Any
 
 import numpy as np
 
-from bowdenfit.description import Description
-from bowdenfit.kinds.measurements import Measurements
 from bowdenfit.kinds.plausibility import FACTOR, SCATTER, beyond
 from bowdenfit.kinds.recordings.accounts import preparation_pages
-from bowdenfit.kinds.recordings.settings import RecordingsTable
-from bowdenfit.recordings.preparation.play import white_noise
-from bowdenfit.recordings.recording import PULL, RETURN, Recording, Recordings
+from bowdenfit.recordings.recording import PULL, RETURN, Recordings
 from bowdenfit.words import counted, filled, listed, narrow_table
 
-_CLEAR = 1.5  # of the noise: change from block to block, from which few peaks of noise pass for motion
-_AHEAD = 8  # blocks, over which a change of force is told through noise
 _FEWEST_BLOCKS = 10  # of each stroke of a plausible recording
 _SAMPLES = ("recording", "samples", "used", "left out", "block")
 _HEADS = (*_SAMPLES, "pulling", "switching", "returning", "sliding", "exponent")
@@ -45,30 +39,6 @@ def recordings_text(recordings: Recordings) -> list[str]:
         *_by_hand(pages),
     ]
     return [*lines, *(line for note in notes for line in filled(note).splitlines())]
-
-
-def warnings(recordings: Recordings, description: Description, _: Measurements) -> list[str]:
-    """That an operator over every block takes peaks of noise for motion, where noise is as large as the change of a block."""
-    table = description.table(RecordingsTable)
-    if not recordings.loop and (table is None or table.likelihood == "runs"):
-        return []
-    noisy = [r.name for r in recordings.each if _change_of_a_block(r) < _CLEAR * white_noise(r.blocks.input_force)]
-    if not noisy:
-        return []
-    remedy = "average over longer blocks (block, under prepare)"
-    return [
-        f"The input's noise is about as large as its change from block to block in {listed(noisy)}: every block is followed "
-        "(whole recordings), which takes peaks of noise for motion, so that friction may come out some percent too large; "
-        + (f"{remedy}." if recordings.loop else f'{remedy}, or set likelihood = "runs".')
-    ]
-
-
-def _change_of_a_block(recording: Recording) -> float:
-    """Typical change of the input force from one block to the next while the rope slides [N]; infinite where it hardly does."""
-    force, stroke = recording.blocks.input_force, recording.strokes.stroke
-    inside = (stroke[_AHEAD:] == stroke[:-_AHEAD]) & (stroke[_AHEAD:] != 0)
-    change = np.abs(force[_AHEAD:] - force[:-_AHEAD])[inside] / _AHEAD
-    return float(np.median(change)) if len(change) else np.inf
 
 
 def _row(page: dict[str, Any], loss: tuple[str, ...]) -> tuple[str, ...]:

@@ -18,6 +18,7 @@ from bowdenfit.kinds.recordings.side_by_side import beside
 from bowdenfit.kinds.resolve_angles import resolve_angles
 from bowdenfit.kinds.row_angles import row_angles
 from bowdenfit.model import Model
+from bowdenfit.recordings.preparation.likely_input import likely_input
 from bowdenfit.recordings.recording import Recordings
 
 DRAWS = 200  # enough for the edges of a band
@@ -69,7 +70,8 @@ def _arrays(model: Model, recordings: Recordings, angles: AngleTable | None) -> 
         name: beside([getattr(r.blocks, name)[s] for r, s in both])
         for name in ("input_force", "output_force", "velocity")
     }
-    return rows | held | {"drift": beside(rates, "constant")}
+    likely = beside([likely_input(r.blocks.input_force)[s] for r, s in both])
+    return rows | held | {"likely_force": likely, "drift": beside(rates, "constant")}
 
 
 def _followed(model: Model) -> Callable[[Array, Array, Mapping[str, Any]], tuple[Array, Array]]:
@@ -80,7 +82,7 @@ def _followed(model: Model) -> Callable[[Array, Array, Mapping[str, Any]], tuple
         drive = drive_of(model.cable, values, resolve_angles(model.cable, values, data)[0], data["velocity"])
         cells, least = LoadCells.of(values), drive.least_force
         start = drive.scaled(cells.true_output(data["output_force"][0], least))
-        output, _ = drive.follow(cells.true_input(data["input_force"], least), mounting, start)
+        output, _ = drive.follow(cells.true_input(data["likely_force"], least), mounting, start)
         return drive.without_delay(cells.shown_output(output), cells.late(data["drift"])), drive.exponent
 
     return follow

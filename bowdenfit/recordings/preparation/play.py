@@ -6,8 +6,6 @@ import numpy as np
 
 from bowdenfit.types import Labels, Vector
 
-_BEYOND_NOISE = 6.0  # of two blocks, one the highest of many: with fewer, blocks would still be chosen by their noise
-
 
 @dataclass(frozen=True)
 class Hysteresis:
@@ -23,7 +21,6 @@ class Hysteresis:
         deviation: Of log(F_out + drag) from `followed`, block by block [1]; of a pull-pull loop of F_out [N].
         followed: Output of the operator, in the same units; of a single rope on its limit wherever it slides.
         state: Contact of each block; see `play_between`.
-        sliding: The same of a single rope through noise; see `contact_through_noise`.
         cost: Robust sum of squares of the deviations, in units of their noise, over twice their number.
     """
 
@@ -35,7 +32,6 @@ class Hysteresis:
     deviation: Vector
     followed: Vector
     state: Labels
-    sliding: Labels
     cost: float
 
 
@@ -77,30 +73,24 @@ def play_between(lower: Vector, upper: Vector, start: float) -> tuple[Vector, La
     return np.array(output), np.array(state, dtype=int)
 
 
-def contact_through_noise(
-    lower: Vector, upper: Vector, output: Vector, state: Labels, noise: Vector
-) -> tuple[Vector, Labels]:
-    """What `play_between` gives, with contact also where noise alone makes a sliding rope seem to stand.
-
-    With noise on an input that rises, the operator touches its limit at new peaks alone. Blocks taken for sliding by that would
-    be chosen by their own noise: they scatter less than all (by a tenth where noise is as large as the change from block to
-    block), and their log ratio is too large. So between two contacts on one side the output counts as in contact throughout,
-    if nowhere in between the limit is farther from it than noise makes it: `_BEYOND_NOISE` standard deviations.
+def clear_of_turns(state: Labels, force: Vector) -> Labels:
+    """Contact without the level on which it ends, where that is longer than a block: noise hides when in it the rope stopped.
 
     Args:
-        lower, upper: Limits.
-        output: The operator's output.
-        state: Its contact.
-        noise: Standard deviation of the limits.
+        state: Contact of each block with an operator that follows `force`.
+        force: A likely input force, which noise makes level in steps; see `likely_input`.
     """
-    output, state = output.copy(), state.copy()
-    touched = np.flatnonzero(state)
-    for before, after in zip(touched[:-1].tolist(), touched[1:].tolist(), strict=True):
-        side, between = state[before], slice(before + 1, after)
-        limit = lower[between] if side > 0 else upper[between]
-        if state[after] == side and np.all(side * (output[between] - limit) < _BEYOND_NOISE * noise[between]):
-            output[between], state[between] = limit, side
-    return output, state
+    step = (np.diff(state) != 0) | (np.diff(force) != 0)
+    level = np.append(0, np.cumsum(step))
+    ends = np.flatnonzero(np.diff(state) != 0)
+    stopping = np.isin(level, level[ends]) & (np.bincount(level)[level] > 1)
+    return np.where(stopping, 0, state)
+
+
+def last_contact(state: Labels) -> Labels:
+    """The last contact up to each block; 0 before the first."""
+    at = np.maximum.accumulate(np.where(state != 0, np.arange(len(state)), -1))
+    return np.where(at >= 0, state[np.maximum(at, 0)], 0).astype(int)
 
 
 def white_noise(series: Vector) -> float:

@@ -41,11 +41,13 @@ install_import_hook([f"bowdenfit.{room}" for room in CHECKED], "type_checks.chec
 
 import jax  # noqa: E402
 
+import bowdenfit as bf  # noqa: E402
 from bowdenfit import cli  # noqa: E402
 
 jax.config.update("jax_enable_x64", True)
 jax.config.update("jax_numpy_dtype_promotion", "standard")
 
+QUICK = ("sampler.n_walkers=128", "sampler.target_ess=300", "sampler.target_r_hat=1.05", "sampler.max_steps=4000")
 MOST_MEMORY = 3 * 2**30  # bytes of a process, beyond which it drops what it has compiled
 
 
@@ -68,6 +70,25 @@ def bounded_memory():
 def on_body() -> Path:
     """The data set of the on-body exoskeleton paper."""
     return ROOT / "datasets" / "on-body-exoskeleton"
+
+
+@pytest.fixture(scope="session")
+def finished(on_body, tmp_path_factory) -> tuple[bf.Fit, Path]:
+    """A quick, converged fit of the on-body data, and the folder with all its results; no test changes either."""
+    folder = tmp_path_factory.mktemp("finished") / "fit"
+    return bf.fit(on_body, output=folder, seed=11, settings=QUICK), folder
+
+
+@pytest.fixture(scope="session")
+def quick_fit(finished) -> bf.Fit:
+    """The quick fit, as it was made."""
+    return finished[0]
+
+
+@pytest.fixture(scope="session")
+def quick_results(finished) -> Path:
+    """The folder of the quick fit."""
+    return finished[1]
 
 
 @pytest.fixture(scope="session")

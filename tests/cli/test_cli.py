@@ -44,11 +44,9 @@ VERBS = (
 
 
 @pytest.fixture(scope="module")
-def results(on_body, tmp_path_factory):
+def results(quick_results):
     """A quick, converged fit with everything in its folder."""
-    folder = tmp_path_factory.mktemp("cli") / "fit"
-    bf.fit(on_body, output=folder, seed=11, settings=QUICK)
-    return folder
+    return quick_results
 
 
 def test_help_names_every_verb_and_the_exit_codes(run):

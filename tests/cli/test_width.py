@@ -13,7 +13,6 @@ import bowdenfit as bf
 ROOT = Path(__file__).parents[2]
 DATA_SETS = sorted(path.parent for path in (ROOT / "datasets").glob("*/cable.toml"))
 CORPUS = [path for path in sorted((ROOT / "tests" / "files" / "corpus").glob("*.*")) if path.suffix != ".toml"]
-QUICK = ("sampler.n_walkers=128", "sampler.target_ess=200", "sampler.target_r_hat=1.05", "sampler.max_steps=2000")
 WIDTH = 80
 
 
@@ -22,10 +21,8 @@ def too_wide(text):
 
 
 @pytest.fixture(scope="module")
-def results(on_body, tmp_path_factory):
-    folder = tmp_path_factory.mktemp("width") / "fit"
-    bf.fit(on_body, output=folder, seed=3, settings=QUICK, figures=False)
-    return folder
+def results(quick_results):
+    return quick_results
 
 
 @pytest.mark.parametrize("path", [*DATA_SETS, *CORPUS], ids=lambda path: path.name)

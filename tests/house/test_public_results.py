@@ -21,7 +21,6 @@ from bowdenfit.questions.figure_methods import FigureMethods
 from bowdenfit.questions.summary.verdict import CONTRADICTORY, NOT_CONVERGED, Verdict
 from bowdenfit.verbs import VERBS
 
-QUICK = ("sampler.n_walkers=128", "sampler.target_ess=200", "sampler.target_r_hat=1.05", "sampler.max_steps=3000")
 MOST_LINES, MOST_BYTES, MOST_IN_A_NOTEBOOK = 10, 1000, 2000
 PLAIN = {np.ndarray, str, bool, NoneType, Path, FigureMethods}  # what needs no page of its own
 
@@ -180,8 +179,8 @@ def answers_of(fit: bf.Fit) -> Iterator[tuple[str, Any]]:
 
 
 @pytest.fixture(scope="module")
-def fit(on_body):
-    return bf.fit(on_body, seed=5, settings=QUICK)
+def fit(quick_fit):
+    return quick_fit
 
 
 def test_what_a_fit_gives_is_short_and_begins_with_the_answer(fit):

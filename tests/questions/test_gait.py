@@ -6,13 +6,11 @@ import pytest
 import bowdenfit as bf
 from bowdenfit.errors import UsageError
 
-QUICK = ("sampler.n_walkers=128", "sampler.target_ess=300", "sampler.target_r_hat=1.05", "sampler.max_steps=4000")
-
 
 @pytest.fixture(scope="module")
-def fit(on_body):
+def fit(quick_fit):
     """A fit of the on-body data, whose last contact is bent with the knee."""
-    return bf.fit(on_body, seed=5, settings=QUICK)
+    return quick_fit
 
 
 @pytest.fixture(scope="module")

@@ -11,9 +11,9 @@ QUICK = ("sampler.n_walkers=64", "sampler.target_ess=100", "sampler.target_r_hat
 
 
 @pytest.fixture(scope="module")
-def fit(on_body):
+def fit(quick_fit):
     """A quick fit of the on-body data."""
-    return bf.fit(on_body, seed=5, settings=QUICK)
+    return quick_fit
 
 
 def test_shares_are_coefficient_times_angle_over_their_sum_draw_by_draw(fit):

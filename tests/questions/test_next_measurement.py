@@ -40,17 +40,14 @@ from bowdenfit.results.optimum import optimum_of
 from bowdenfit.results.record import Draws
 from bowdenfit.results.record import Provenance as Origin
 
-QUICK = ("sampler.n_walkers=128", "sampler.target_ess=200", "sampler.target_r_hat=1.05", "sampler.max_steps=3000")
 N = 12_800
 LIMIT = 10.0  # deg, below which the on-body paper detects no angle
 
 
 @pytest.fixture(scope="module")
-def folder(on_body, tmp_path_factory):
+def folder(quick_results):
     """Results folder of a quick fit of the on-body data."""
-    path = tmp_path_factory.mktemp("next") / "fit"
-    bf.fit(on_body, output=path, seed=5, settings=QUICK, figures=False)
-    return path
+    return quick_results
 
 
 @pytest.fixture(scope="module")

@@ -36,7 +36,6 @@ from bowdenfit.results.choices import Choice, Window
 from bowdenfit.results.length import OptimalLength
 from bowdenfit.results.record import OPTIMAL_EFFICIENCY, OPTIMAL_LENGTH
 
-QUICK = ("sampler.n_walkers=64", "sampler.target_ess=100", "sampler.target_r_hat=1.05", "sampler.max_steps=2000")
 LABEL = "Cable length (mm)"
 RANGE = (430.0, 530.0)
 GRID = np.linspace(*RANGE, 41)
@@ -212,8 +211,8 @@ def line(axes, label):
 
 
 @pytest.fixture(scope="module")
-def fit(on_body):
-    return bf.fit(on_body, seed=1, settings=QUICK)
+def fit(quick_fit):
+    return quick_fit
 
 
 def test_only_figures_that_apply_are_drawn(fit, on_body):

@@ -19,9 +19,9 @@ QUICK = ("sampler.n_walkers=128", "sampler.target_ess=200", "sampler.target_r_ha
 
 
 @pytest.fixture(scope="module")
-def fit(on_body):
+def fit(quick_fit):
     """A quick fit of the on-body data."""
-    return bf.fit(on_body, seed=5, settings=QUICK)
+    return quick_fit
 
 
 def masked(text: str) -> str:

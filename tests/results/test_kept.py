@@ -17,7 +17,6 @@ from bowdenfit.results.folder import ANSWERS, FIGURE_DATA
 from bowdenfit.results.kept import SCHEMA, keep, kept
 from bowdenfit.results.plain import stored
 
-QUICK = ("sampler.n_walkers=128", "sampler.target_ess=200", "sampler.target_r_hat=1.05", "sampler.max_steps=4000")
 HEAVY = {
     "jax",
     "scipy",
@@ -49,11 +48,9 @@ main()
 
 
 @pytest.fixture(scope="module")
-def results(on_body, tmp_path_factory):
+def results(quick_results):
     """A quick, converged fit with everything in its folder."""
-    folder = tmp_path_factory.mktemp("kept") / "fit"
-    bf.fit(on_body, output=folder, seed=11, settings=QUICK)
-    return folder
+    return quick_results
 
 
 @pytest.fixture(scope="module")

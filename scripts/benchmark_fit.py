@@ -1,15 +1,22 @@
 """How long a fit takes and how much memory it needs, beside another checkout and beside the same job written plainly.
 
-    python scripts/benchmark_fit.py [--repeats N] [--against TREE] [--record]
+    python scripts/benchmark_fit.py [--repeats N] [--against TREE] [--only NAME ...] [--record]
 
 Run it with the Python of the environment that bowdenfit and its tests use, on a machine that does nothing else: it takes
 several minutes, measures everything in one go, and prints one table. Every number is the median of N fresh processes
-(default 3). `--record` puts the table at the head of docs/benchmarks.md, with the machine, the date and the commit.
+(default 3). `--only` measures some of it: rows by their names, "plain" (other samplers), "many" (many cables), "counts".
+`--record` puts the table at the head of docs/benchmarks.md, with the machine, the date and the commit.
 
-Whole processes: wall time from start to exit, imports, compilation, figures and files included, and the peak of the
-resident memory of the process and those it starts, shared pages counted in each. No program is kept from before ("cold"),
-but for "cache filled". With `--against`, another checkout does the same in turns, and each pair gives a ratio; the lowest
-and the highest of them stand beside their median. Commands on a finished fit read the one that their own checkout wrote.
+Whole processes: wall time from start to exit, imports, compilation, figures and files included; the time that processors
+spent on the process and those it starts, which says something on a busy machine too; and the peak of their resident
+memory, shared pages counted in each. "load" is how many processes wanted to compute on the machine, from the lowest to the
+highest; where it is above the number of cores by more than one or two, wall times say little. No program is kept from
+before ("cold"), but for "cache filled"; byte code is kept. With `--against`, another checkout does the same in turns, and
+each pair gives a ratio; the lowest and the highest of them stand beside their median. Commands on a finished fit read the
+one that their own checkout wrote.
+
+"calibrate, 200": 200 replications of the on-body data. Of the other checkout as few are run as are needed for the time of
+one more (FEW), and the rest is reckoned as if each took as long. "1000 cables": scripts/benchmark_batch.py says of what.
 
 To 1000 effective draws (bulk, the worst of all 11 parameters) of the joint posterior of the on-body data, by the programs
 in scripts/baselines, which draw and write nothing: from the start of the process to the first look at the draws that finds
@@ -28,8 +35,8 @@ import argparse
 import json
 import os
 import tempfile
-from collections.abc import Iterator, Sequence
-from dataclasses import dataclass
+from collections.abc import Collection, Iterator, Sequence
+from dataclasses import dataclass, replace
 from datetime import date
 from pathlib import Path
 
@@ -59,6 +66,8 @@ READS: dict[str, tuple[str, ...]] = {  # FIT stands for a finished fit of the on
     "--help": ("--help",),
 }
 PLAIN = {"blackjax": "plain_blackjax.py", "emcee and NumPy": "plain_emcee.py", "NumPyro": "plain_numpyro.py"}
+CALIBRATE, MANY, FEW = "calibrate, 200", 200, (2, 6)
+CABLES = "1000 cables"
 TARGETS = {  # ratios
     "fit": 0.45,
     "fit --no-mcmc": 0.55,
@@ -67,6 +76,7 @@ TARGETS = {  # ratios
     "fit, bench": 0.5,
     "cold fit beside blackjax": 0.75,
     "to 1000, beside emcee and NumPy": 0.6,
+    CALIBRATE: 0.1,
 }
 SECONDS = {
     "summary": 0.5,
@@ -75,6 +85,7 @@ SECONDS = {
     "predict 455": 1.0,
     "identify": 0.5,
     "plot one": 0.5,
+    CABLES: 60.0,
 }  # targets
 RECORD = ROOT / "docs" / "benchmarks.md"
 HEAD = "# Benchmarks\n\nWritten by `scripts/benchmark_fit.py --record`; its head says what each number is. The newest first.\n"
@@ -100,27 +111,32 @@ class Row:
     runs: list[Run]
     against: list[Run]
 
-    @property
-    def ratios(self) -> list[float]:
-        """Of wall times, pair by pair."""
-        return [a.seconds / b.seconds for a, b in zip(self.runs, self.against, strict=True)] if self.against else []
+    def ratios(self, of: str) -> list[float]:
+        """Of wall times ("seconds") or of processor time ("cpu"), pair by pair; none where either was not measured."""
+        pairs = [(getattr(a, of), getattr(b, of)) for a, b in zip(self.runs, self.against, strict=False)]
+        return [ours / theirs for ours, theirs in pairs if ours and theirs]
 
     def cells(self) -> list[str]:
-        """Wall time and memory, those of the other, ratio with its spread, target."""
+        """Times and memory, those of the other, ratios with their spread, target, load."""
         sides = [side for runs in (self.runs, self.against) for side in _side(runs)]
-        ratios, target = self.ratios, f"{TARGETS.get(self.name, '-')}"
-        said = [f"{x:.2f}" for x in (np.median(ratios), min(ratios), max(ratios))] if ratios else ["-"] * 3
-        return [self.name, *sides, *said, f"{SECONDS[self.name]} s" if self.name in SECONDS else target]
+        said = [spread(self.ratios(of)) for of in ("seconds", "cpu")]
+        target = f"{SECONDS[self.name]} s" if self.name in SECONDS else f"{TARGETS.get(self.name, '-')}"
+        loads = [run.load for run in (*self.runs, *self.against)]
+        return [self.name, *sides, *said, target, f"{min(loads):.0f} to {max(loads):.0f}" if any(loads) else "-"]
 
 
-COLUMNS = ["", "wall [s]", "peak [MiB]", "other [s]", "peak [MiB]", "ratio", "lowest", "highest", "target"]
+SIDE = ["wall [s]", "CPU [s]", "peak [MiB]"]
+COLUMNS = ["", *SIDE, *(f"other {head}" for head in SIDE), "wall ratio", "CPU ratio", "target", "load"]
+
+
+def spread(ratios: list[float]) -> str:
+    """The median, and in brackets the lowest and the highest."""
+    return f"{np.median(ratios):.2f} ({min(ratios):.2f} to {max(ratios):.2f})" if ratios else "-"
 
 
 def _side(runs: list[Run]) -> list[str]:
-    if not runs:
-        return ["-", "-"]
-    memory = float(np.median([run.memory for run in runs]))
-    return [f"{np.median([run.seconds for run in runs]):.2f}", f"{memory:.0f}" if memory else "-"]
+    numbers = [[getattr(run, of) for run in runs] for of in ("seconds", "cpu", "memory")]
+    return [f"{np.median(each):.{digits}f}" if any(each) else "-" for each, digits in zip(numbers, (2, 2, 0), strict=True)]
 
 
 @dataclass(frozen=True)
@@ -130,6 +146,11 @@ class Bench:
     folder: Path
     repeats: int
     other: Path | None
+    only: Collection[str]
+
+    def asked(self, name: str) -> bool:
+        """Whether a row or a group of them is to be measured."""
+        return not self.only or name in self.only
 
     @property
     def trees(self) -> list[Path]:
@@ -146,13 +167,41 @@ class Bench:
 
     def rows(self) -> Iterator[Row]:
         """All commands, cold or not, in turns."""
-        for tree in self.trees:
-            self.command(tree, ["fit", DATASET, "--seed", "1"], "unmeasured", self.finished(tree))
         for name, arguments in FITS.items():
-            yield self.row(name, ["fit", *arguments, "--seed", "1"], cold=True)
-        yield self.row("fit, cache filled", ["fit", DATASET, "--seed", "1"], writes=True)
-        for name, arguments in READS.items():
+            if self.asked(name):
+                yield self.row(name, ["fit", *arguments, "--seed", "1"], cold=True)
+        filled, reads = "fit, cache filled", {name: words for name, words in READS.items() if self.asked(name)}
+        for tree in self.trees if reads or self.asked(filled) else ():
+            self.command(tree, ["fit", DATASET, "--seed", "1"], "unmeasured", self.finished(tree))
+        if self.asked(filled):
+            yield self.row(filled, ["fit", DATASET, "--seed", "1"], writes=True)
+        for name, arguments in reads.items():
             yield self.row(name, arguments)
+
+    def calibrations(self) -> Row:
+        """Many replications here; of the other checkout few, from which as many are reckoned."""
+        say(CALIBRATE)
+        ours = [self._calibration(ROOT, MANY)]
+        return Row(CALIBRATE, ours, [] if self.other is None else [self._reckoned(self.other)])
+
+    def _reckoned(self, tree: Path) -> Run:
+        few, more = (self._calibration(tree, n) for n in FEW)
+        left = (MANY - FEW[1]) / (FEW[1] - FEW[0])
+        seconds, cpu = (b + left * (b - a) for a, b in ((few.seconds, more.seconds), (few.cpu, more.cpu)))
+        return replace(more, seconds=seconds, cpu=cpu)
+
+    def _calibration(self, tree: Path, n: int) -> Run:
+        at = self.folder / f"calibration_{n}_{self.trees.index(tree)}"
+        asked = ["calibrate", DATASET, "--replications", str(n), "--seed", "1"]
+        return self.command(tree, asked, f"{at.name}_cache", at)
+
+    def cables(self) -> tuple[Row, str]:
+        """Numbers of simple cables in one process; the row of the largest number, and what is printed of all."""
+        say(CABLES)
+        environment = {"PYTHONPATH": search_path(), "JAX_COMPILATION_CACHE_DIR": ""}
+        run = measured([str(ROOT / "scripts" / "benchmark_batch.py")], environment)
+        last = run.output.splitlines()[-1].split()
+        return Row(CABLES, [replace(run, seconds=float(last[1]), cpu=0.0)], []), run.output
 
     def row(self, name: str, arguments: Sequence[str], cold: bool = False, writes: bool = False) -> Row:
         """One command."""
@@ -185,23 +234,20 @@ def samplers(folder: Path, repeats: int) -> dict[str, list[Sampler]]:
     return found
 
 
-def beside_plain(found: dict[str, list[Sampler]], fits: Row) -> Iterator[Row]:
+def beside_plain(found: dict[str, list[Sampler]], fits: Row | None) -> Iterator[Row]:
     """Bowdenfit beside the plain programs: to 1000 effective draws, and a whole cold fit."""
     runs = {name: [Run(0.0, s.to_target, 0.0, "") for s in each] for name, each in found.items()}
     for name in PLAIN:
         yield Row(f"to 1000, beside {name}", runs["bowdenfit"], runs[name])
-    for name in PLAIN:
+    for name in PLAIN if fits is not None else ():
         yield Row(f"cold fit beside {name}", fits.runs, runs[name])
-
-
-def batch_rows() -> Iterator[Row]:
-    """Many cables in one program: cost of 1000 cables, of 200 replications of `calibrate`; measured by a script of its own."""
-    yield from ()
 
 
 def stage_rows(rows: Sequence[Row]) -> Table:
     """Seconds of each stage of the cold fits, one column a fit."""
     fits = {row.name: typical(row.runs) for row in rows if row.name in FITS}
+    if not fits:
+        return []
     stages = list(dict.fromkeys(stage for run in fits.values() for stage in run.stages))
     shown = [["stage [s]", *fits]]
     for stage in stages:
@@ -249,22 +295,36 @@ def main() -> None:
         "--against", type=Path, metavar="TREE", help="another checkout, whose runs are paired with ours"
     )
     parser.add_argument("--record", action="store_true", help="keep the table in docs/benchmarks.md")
+    parser.add_argument("--only", nargs="+", default=(), metavar="NAME", help="rows, or plain, many, counts [default: all]")
     asked = parser.parse_args()
-    repeats, other = max(asked.repeats, 1), asked.against and asked.against.resolve()
+    other = asked.against and asked.against.resolve()
     with tempfile.TemporaryDirectory() as folder:
         os.environ.update(byte_code(Path(folder)))
-        rows = list(Bench(Path(folder), repeats, other).rows())
-        found = samplers(Path(folder), repeats)
-        rows += [*beside_plain(found, rows[0]), *batch_rows()]
+        rows, remarks = measurements(Bench(Path(folder), max(asked.repeats, 1), other, asked.only))
         stages = stage_rows(rows)
-    table, remarks = [COLUMNS, *(row.cells() for row in rows)], [*counts(), *disagreements(found)]
-    show(table)
-    show(stages)
+    table = [COLUMNS, *(row.cells() for row in rows)]
+    for each in filter(None, (table, stages)):
+        show(each)
     against = f" Other: commit {commit(other)}." if other else ""
     print("\n".join([*remarks, machine(*LIBRARIES) + against]))
     if asked.record:
         title = f"## {date.today().isoformat()}, {commit(ROOT)}"
-        record([title, machine(*LIBRARIES) + against, markdown(table), markdown(stages), *remarks])
+        tables = [markdown(each) for each in (table, stages) if each]
+        record([title, machine(*LIBRARIES) + against, *tables, *remarks])
+
+
+def measurements(bench: Bench) -> tuple[list[Row], list[str]]:
+    """All rows that are asked for, and what is to be said besides."""
+    rows, remarks = list(bench.rows()), list[str]()
+    if bench.asked("plain"):
+        found = samplers(bench.folder, bench.repeats)
+        rows += beside_plain(found, next((row for row in rows if row.name == "fit"), None))
+        remarks += disagreements(found)
+    if bench.asked("many"):
+        row, printed = bench.cables()
+        rows += [bench.calibrations(), row]
+        remarks.append(f"```text\n{printed}```")
+    return rows, [*remarks, *(counts() if bench.asked("counts") else ())]
 
 
 if __name__ == "__main__":

@@ -18,13 +18,20 @@ NOT_TRUSTED = 3  # exit code of a fit that has not converged
 
 @dataclass(frozen=True)
 class Run:
-    """One process: when it started on the shared clock, its wall time [s], peak memory [MiB] and standard output."""
+    """One process: when it started on the shared clock, its wall time [s], peak memory [MiB] and standard output.
+
+    Args:
+        cpu: Seconds that it and those it started have computed.
+        load: How many processes wanted to compute on this machine in the minute before it ended.
+    """
 
     started: float
     seconds: float
     memory: float
     output: str
     results: Path | None = None
+    cpu: float = 0.0
+    load: float = 0.0
 
     @property
     def stages(self) -> dict[str, float]:
@@ -66,7 +73,7 @@ def measured(
         print("Warning: a fit did not converge; its times mean little.", file=sys.stderr)
     elif process.returncode:
         sys.exit(f"{' '.join(arguments)} ended with exit code {process.returncode}:\n{written[1]}")
-    return Run(started, seconds, memory, written[0], results)
+    return Run(started, seconds, memory, written[0], results, usage.ru_utime + usage.ru_stime, os.getloadavg()[0])
 
 
 def _read(file) -> str:

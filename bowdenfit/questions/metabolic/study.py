@@ -91,7 +91,7 @@ def read_study(folder: Path) -> tuple[Study, Costs | None]:
         study = Study.model_validate(raw)
     except ValidationError as error:
         first = error.errors()[0]
-        place = shown(".".join(map(str, first["loc"]))) if first["loc"] else "the file"
+        place = shown(".".join(map(str, first["loc"])))[1:-1] if first["loc"] else "the file"
         raise DescriptionError(
             f"{path.name}: {place} is wrong ({first['msg']}); numbers that were printed are written as text with all their "
             'digits, such as mean = "6.30", and datasets/on-body-metabolic shows every key.'

@@ -5,6 +5,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+import yaml
 from figure_words import assert_answer_readable
 from one_page import faults as faults_of_page
 
@@ -44,6 +45,21 @@ def device(folder, old, new):
     path = folder / "device.toml"
     path.write_text(text.replace(old, new))
     return path
+
+
+def test_parameters_of_a_controller_hold_what_may_be_compensated(fit, tmp_path):
+    said = bf.compensate(fit, DEVICE)  # over all bends that were measured
+    bf.export(fit, "yaml", tmp_path / "cable.yaml", device=DEVICE, points=5)
+    page = yaml.safe_load((tmp_path / "cable.yaml").read_text())["/**"]["ros__parameters"]["bowden"]["compensation"]
+    assert page["wrap_angle_deg"] == [bend.wrap_angle for bend in said.by_bend]
+    assert page["scheduled"]["torque_N_m"] == [bend.scheduled for bend in said.by_bend]
+    assert (page["fixed"]["torque_N_m"], page["fixed"]["share"]) == (said.fixed.torque, said.fixed.share)
+    assert (page["scheduled"]["share"], page["dead_zone_rad_per_s"]) == (said.scheduled.share, said.dead_zone)
+    assert (page["gain"]["safe"], page["gain"]["stable_up_to"]["q05"]) == (said.gain.safe, said.gain.stable.q05)
+    assert page["accepted_probability"] == 0.05 and page["friction_N_m"]["q95"][0] > page["friction_N_m"]["q50"][0]
+    with pytest.raises(UsageError, match="a C header tells of the cable alone"):
+        bf.export(fit, "c", tmp_path / "cable.h", device=DEVICE)
+    assert not (tmp_path / "cable.h").exists()
 
 
 def test_the_share_keeps_its_risk_over_draws_in_mountings_of_their_own(fit, found):

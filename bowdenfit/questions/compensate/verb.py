@@ -14,6 +14,8 @@ NAME, TRACES = "compensation", "compensation_traces"
 Law = Literal["karnopp", "active"]
 Bends = str | tuple[Quantity, Quantity]
 _PERCENT = (5.0, "%")
+ACCEPTED = _PERCENT[0] / 100
+"""Probability of moving by itself that is accepted if nothing is said."""
 
 
 def compensate(

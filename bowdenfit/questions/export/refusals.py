@@ -34,6 +34,16 @@ def refuse_what_is_not_expressed(fit: Record, to: str, draws: int) -> None:
         )
 
 
+def refuse_compensation(to: str) -> None:
+    """Refuse a device for a format that does not write what may be compensated.
+
+    Raises:
+        UsageError: It does not.
+    """
+    if to != "yaml":
+        raise UsageError(f"--device is asked of yaml; {NAMES[to]} tells of the cable alone. Leave it out, or write --to yaml.")
+
+
 def place_of(fit: Record, places: Places, to: str, at: tuple[float, str] | None) -> float | None:
     """Where a format that holds at one place does, in the unit of the tables; None if not said.
 

@@ -23,6 +23,7 @@ def export(
     points: Annotated[int, Option(least=2, most=2001)] = 101,
     draws: Annotated[int, Option(least=0, most=10_000)] = 0,
     at: Annotated[Quantity | None, Option(example="90deg", metavar="PLACE", default="the middle of the range")] = None,
+    device: Annotated[str | Path | None, Option(metavar="FILE")] = None,
     force: Annotated[bool, Option()] = False,
 ) -> "Exported":
     """Write a fitted cable as another program reads it, with quantiles, and draws where some are asked for.
@@ -34,10 +35,13 @@ def export(
         points: Number of lengths or wrap angles in a table.
         draws: Number of draws beside the quantiles, each of a cable in a mounting of its own; as CSV in place of them.
         at: Wrap angle, or length, at which a model for MuJoCo holds.
+        device: A device.toml, of which YAML then has what may be compensated, too: see `bowdenfit compensate`.
         force: Replace a file that is there.
 
     Raises:
-        UsageError: There is no posterior, or the format cannot express the cable; another that can is named.
+        UsageError: There is no posterior, or the format cannot express the cable or what may be compensated; another that can
+            is named.
+        DescriptionError: The device does not say what is needed.
         StoreError: The file is there already, or cannot be written.
     """
     from bowdenfit.errors import StoreError
@@ -54,12 +58,24 @@ def export(
         raise StoreError(f"{path} exists already; add --force to replace it, or name another file with --output.")
     found.draws()
     refuse_what_is_not_expressed(found, to, draws)
+    compensation = None if device is None else _compensation(found, to, Path(device))
     judged = verdict(found)
     tables = transmission(found, points, draws, " and ".join(judged.troubles))
-    written = WRITERS[to](Asked(found, tables, path, place_of(found, tables.places, to, at)))
+    written = WRITERS[to](Asked(found, tables, path, place_of(found, tables.places, to, at), compensation))
     with folder_to_write(path.parent), replace_when_whole(path) as temporary:
         temporary.write_bytes(written.content)
     return Exported(path, to, tuple(tables.sentences), judged.trusted, written.remarks)
+
+
+def _compensation(found: "Record", to: str, device: Path) -> dict[str, Any]:
+    from bowdenfit.description.device import read_device
+    from bowdenfit.questions.compensate.ranking import compensation_of
+    from bowdenfit.questions.compensate.verb import ACCEPTED
+    from bowdenfit.questions.export.compensation import compensation_parameters
+    from bowdenfit.questions.export.refusals import refuse_compensation
+
+    refuse_compensation(to)
+    return compensation_parameters(compensation_of(found, read_device(device), None, None, ACCEPTED)[0])
 
 
 def _reply(answer: "Exported", _: Mapping[str, Any]) -> Reply:
@@ -78,7 +94,8 @@ VERB = Verb(
     mujoco  a loop that stays taut as MJCF (cable.xml), or any cable whose stretch is known as a callback (--output cable.py)
     matlab  a function of MATLAB and Octave that says the same
     fmu     a functional mock-up unit (FMI 2.0, co-simulation) of that header, compiled here, with its sources
-    yaml    parameters of a controller, as ROS 2 reads them: friction by place, and what may be fed forward
+    yaml    parameters of a controller, as ROS 2 reads them: friction by place, and what may be fed forward; with --device
+            the largest safe share and gain, too
     csv     a lookup table that says what bowdenfit predict says; with --draws, cables drawn from the posterior
 
     Every file says which fit it was written from, with which seed and version, and over which range it holds. Outside that

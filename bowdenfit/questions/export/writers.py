@@ -4,6 +4,7 @@ from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from pathlib import Path
 from types import MappingProxyType
+from typing import Any
 
 from bowdenfit.questions.export.c import header
 from bowdenfit.questions.export.fmu import unit
@@ -24,12 +25,14 @@ class Asked:
         found: Its tables.
         path: The file.
         place: Where a format that holds at one place does; None for the middle of the range.
+        compensation: What may be compensated, by name; None where that was not asked.
     """
 
     fit: Record
     found: Transmission
     path: Path
     place: float | None
+    compensation: Mapping[str, Any] | None = None
 
 
 @dataclass(frozen=True)
@@ -64,7 +67,7 @@ def _mujoco(asked: Asked) -> Written:
 
 
 def _yaml(asked: Asked) -> Written:
-    return Written(parameters(asked.found).encode("ascii"))
+    return Written(parameters(asked.found, asked.compensation).encode("ascii"))
 
 
 WRITERS: Mapping[str, Callable[[Asked], Written]] = MappingProxyType(

@@ -22,7 +22,8 @@ def play_operator(
     Of a single rope the limits are :math:`x \mp \Lambda` on the scale g on which friction is a shift, x = g(F_in) and
     y = g(F_out): while pulling the output follows at :math:`x - \Lambda`, on the return at :math:`x + \Lambda`, and in
     between it stands still, however the input moves inside the band. It remembers noise peaks of the input as if the rope
-    had moved: average recordings down to the mechanical bandwidth first.
+    had moved: average recordings down to the mechanical bandwidth first, and lead it through what is left as
+    `bowdenfit.recordings.preparation.likely_input` has it.
 
     The slope is that of the limit that was touched last, where it was touched: kept while the output stands still, and 0
     before the rope has slid at all.

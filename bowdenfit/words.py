@@ -6,6 +6,7 @@ import textwrap
 from collections.abc import Collection, Iterable, Sequence
 from itertools import zip_longest
 
+_LARGE = 1e7  # from which on powers of ten are easier to read than zeros
 _LONGEST = 40  # characters of a quoted value
 WIDTH = 78  # of a line; a terminal has 80 columns, and some count bytes
 _KEPT = re.compile(r"(?<=\d) (?=(?:mm|N|deg|ms|points)\b|[%±])|(?<=±) (?=\d)")  # blanks at which no line ends
@@ -49,6 +50,12 @@ def decimals(scale: float) -> int:
     if not math.isfinite(scale) or scale <= 0:
         return 4
     return min(max(1 - math.floor(math.log10(scale)), 0), 8)
+
+
+def significant(value: float, digits: int = 3) -> str:
+    """A number to so many significant digits, without powers of ten where people would write zeros: '0.0123', '1040'."""
+    text = f"{value:.{digits}g}"
+    return f"{float(text):.0f}" if "e+" in text and abs(value) < _LARGE else text
 
 
 def counted(n: int, noun: str, several: str = "") -> str:

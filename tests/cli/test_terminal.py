@@ -5,7 +5,7 @@ import io
 import pytest
 
 from bowdenfit.cli import terminal
-from bowdenfit.words import WIDTH, filled, in_ascii
+from bowdenfit.words import WIDTH, filled, in_ascii, significant
 
 
 @pytest.mark.parametrize(
@@ -33,3 +33,12 @@ def test_no_number_loses_its_unit_or_its_error_to_the_next_line(start):
     assert all(len(line) <= max(WIDTH, start) for line in lines)
     assert not any(line.startswith(("±", "%", "N ")) or line.endswith("±") for line in lines)
     assert " ".join(" ".join(lines).split()) in (text, text[:WIDTH] + " " + text[WIDTH:])
+
+
+@pytest.mark.parametrize(
+    ("value", "shown"),
+    [(1036.4, "1040"), (19_951.0, "20000"), (0.01234, "0.0123"), (99.96, "100"), (-5.6e3, "-5600"), (3e9, "3e+09")],
+)
+def test_large_numbers_have_zeros_and_no_powers_of_ten(value, shown):
+    assert significant(value) == shown
+    assert float(shown) == float(f"{value:.3g}")

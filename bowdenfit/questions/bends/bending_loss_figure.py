@@ -14,7 +14,7 @@ from bowdenfit.plots.layout import LEGEND_ROW, TITLE, columns_within, legend_abo
 from bowdenfit.plots.panels import label_outer, span
 from bowdenfit.plots.style import BLACK, EFFICIENCY, GRAY, MEDIUM, WIDE, WRAP_ANGLE, in_paper_style, mapped_color
 from bowdenfit.questions.bends.loop_readings import measured_efficiency, readings_of_loop
-from bowdenfit.words import counted
+from bowdenfit.words import counted, significant
 
 if TYPE_CHECKING:
     from bowdenfit.plots.layout import Axes, Figure
@@ -119,13 +119,13 @@ def data(fit: Record) -> BendingLoss | None:
         force,
         quantiles(draws["fitted"]),
         capstan,
-        " ".join(filter(None, (f"as fitted, preload {typical:.3g} N", reference_angle(fit)))),
+        " ".join(filter(None, (f"as fitted, preload {significant(typical)} N", reference_angle(fit)))),
         tuple(
             EfficiencyLine(f"coefficient {factor * coefficient:.2g}", line, capstan**factor)
             for factor, line in zip(TIMES_COEFFICIENT, lines["coefficients"], strict=True)
         ),
         tuple(
-            EfficiencyLine(f"preload {preload:g} N", line, capstan)
+            EfficiencyLine(f"preload {significant(preload)} N", line, capstan)
             for preload, line in zip(preloads, lines["preloads"], strict=True)
         ),
         *measured_efficiency(readings_of_loop(fit, measured), force),
@@ -135,7 +135,8 @@ def data(fit: Record) -> BendingLoss | None:
 def caption(loss: BendingLoss) -> str:
     """What is drawn, in plain words."""
     return (
-        f"Efficiency, output over input force while moving forward, against the wrap angle, at {loss.input_force:.4g} N input "
+        "Efficiency, output over input force while moving forward, against the wrap angle, at "
+        f"{significant(loss.input_force, 4)} N input "
         f"force. Black: the cable as fitted. {curve_words(len(loss.fitted) > 1)} In color: the same cable with other friction "
         "coefficients, and with other preloads. Dashed: the capstan equation alone, which has no preload. Circles: measured, "
         f"between the readings next to that input force, n = {counted(len(loss.points_wrap_angle), 'wrap angle')}."
@@ -154,7 +155,7 @@ def draw(loss: BendingLoss, width: float | None = None) -> Figure:
     for axes, (what, colors, lines) in zip(flat, sides, strict=True):
         _lines(axes, loss, lines, colors)
         _fitted(axes, loss)
-        axes.set_title(f"{what}, at {loss.input_force:.4g} N input force", pad=6 + 72 * rows * LEGEND_ROW)
+        axes.set_title(f"{what}, at {significant(loss.input_force, 4)} N input force", pad=6 + 72 * rows * LEGEND_ROW)
     label_outer(flat, columns, WRAP_ANGLE, EFFICIENCY)
     flat[0].set_ylim(*_limits(loss))
     legend_above(figure, flat, columns=4 if len(sides) > 1 else 2)

@@ -12,6 +12,7 @@ from bowdenfit.questions.bends.answer import elastic_answers, friction_arm, has_
 from bowdenfit.questions.bends.equations import bending_contact
 from bowdenfit.questions.bends.preload_window import PreloadAnswer
 from bowdenfit.results.record import Record, once
+from bowdenfit.words import significant
 
 _CLOSE = -0.9  # correlation of logarithms beyond which only a product is said to be known
 
@@ -78,6 +79,6 @@ def products_with_preload(fit: Record) -> list[str]:
         known = Interval.of(preload * friction)
         sentences.append(
             f"The measurements hardly tell {PRELOAD} and {name} apart; what they do determine is {PRELOAD} x {name} = "
-            f"{known.median:.3g} N (90 % interval {known.q05:.3g} to {known.q95:.3g} N)."
+            f"{significant(known.median)} N (90 % interval {significant(known.q05)} to {significant(known.q95)} N)."
         )
     return sentences

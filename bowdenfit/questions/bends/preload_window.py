@@ -6,7 +6,7 @@ import numpy as np
 
 from bowdenfit.display import Display, Rows
 from bowdenfit.inference.interval import Interval
-from bowdenfit.words import percent
+from bowdenfit.words import percent, significant
 
 TAUT = 0.95  # probability with which the recommended preload keeps both sides taut
 
@@ -44,7 +44,8 @@ class PreloadAnswer(Display):
         """Which preload to set."""
         low, high = (f"{angle:.4g}" for angle in self.bends)
         return (
-            f"Preload it with {self.best:.3g} N{self._at}: that is felt least of those that keep the cable taut from {low} to "
+            f"Preload it with {significant(self.best)} N{self._at}: that is felt least of those that keep the cable taut "
+            f"from {low} to "
             f"{high} deg."
         )
 
@@ -66,17 +67,20 @@ class PreloadAnswer(Display):
         low, high = (f"{angle:.4g}" for angle in self.bends)
         at = self._at
         under = f" under up to {self.input_force:g} N" if self.input_force > 0 else ""
-        lowest, felt, unit = self.lowest, self.felt, self.friction_unit
+        best, unit = significant(self.best), self.friction_unit
+        lowest, least, most = map(significant, (self.lowest.median, self.lowest.q05, self.lowest.q95))
+        felt, low_felt, high_felt = map(significant, (self.felt.median, self.felt.q05, self.felt.q95))
         parts = [
-            f"Over bends from {low} to {high} deg{under} the cable stays taut from a preload of {lowest.median:.3g} N{at} on "
-            f"(90 % interval {lowest.q05:.3g} to {lowest.q95:.3g} N). Least friction is felt without slack, with "
-            f"{percent(TAUT, 0)} probability, at {self.best:.3g} N: then free motion takes {felt.median:.3g} {unit} "
-            f"({felt.q05:.3g} to {felt.q95:.3g}) at the bend where it is most."
+            f"Over bends from {low} to {high} deg{under} the cable stays taut from a preload of {lowest} N{at} on "
+            f"(90 % interval {least} to {most} N). Least friction is felt without slack, with "
+            f"{percent(TAUT, 0)} probability, at {best} N: then free motion takes {felt} {unit} "
+            f"({low_felt} to {high_felt}) at the bend where it is most."
         ]
         if self.highest is not None:
             parts.append(
-                f"To be felt as no more than {self.friction_limit:.3g} {unit}, preload must not exceed "
-                f"{self.highest.median:.3g} N{at} ({self.highest.q05:.3g} to {self.highest.q95:.3g} N)."
+                f"To be felt as no more than {significant(self.friction_limit)} {unit}, preload must not exceed "
+                f"{significant(self.highest.median)} N{at} ({significant(self.highest.q05)} to "
+                f"{significant(self.highest.q95)} N)."
             )
             if self.possible < TAUT:
                 parts.append(f"That leaves a preload that does both with a probability of only {percent(self.possible, 0)}.")

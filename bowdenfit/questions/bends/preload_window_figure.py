@@ -24,6 +24,7 @@ from bowdenfit.plots.style import (
     percent,
 )
 from bowdenfit.questions.bends.preload_figure import stretches
+from bowdenfit.words import significant
 
 if TYPE_CHECKING:
     from bowdenfit.plots.layout import Axes, Figure
@@ -130,7 +131,7 @@ def _title(window: PreloadWindow) -> str:
     """The bends and the input force that the window is for."""
     low, high = window.bends
     bends = f"{low:.4g} deg" if low == high else f"{low:.4g} deg to {high:.4g} deg"
-    loaded = f"input force up to {window.input_force:.4g} N" if window.input_force > 0 else "no load"
+    loaded = f"input force up to {significant(window.input_force, 4)} N" if window.input_force > 0 else "no load"
     return f"Bends {bends}, {loaded}"
 
 
@@ -154,7 +155,7 @@ def _mark_lowest(axes: Axes, window: PreloadWindow) -> None:
     low, high = axes.get_xlim()
     lowest, which = float(middle(window.lowest)), MEDIAN if len(window.friction) > 1 else LEAST_SQUARES
     if not low <= lowest <= high:
-        axes.plot([], [], " ", label=f"Lowest preload off the axis, {lowest:.3g} N")
+        axes.plot([], [], " ", label=f"Lowest preload off the axis, {significant(lowest)} N")
         return
     axes.axvline(lowest, color=VERMILLION, linewidth=1.0, zorder=1.5, label=f"Lowest preload, {which.lower()}")
     if window.lowest[-1] > window.lowest[0]:

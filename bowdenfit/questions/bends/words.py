@@ -4,7 +4,7 @@ from bowdenfit.inference.interval import Interval
 from bowdenfit.questions.bends.answer import Elastic
 from bowdenfit.questions.bends.overview import ElasticOverview, elastic_overview
 from bowdenfit.results.record import Record
-from bowdenfit.words import filled, table
+from bowdenfit.words import filled, significant, table
 
 Cells = tuple[tuple[str, ...], tuple[tuple[str, ...], ...]]
 HEADING = "Stretch and preload, median (90 % interval)"
@@ -69,4 +69,4 @@ _UNDER_LOAD = {"efficiency", "position_error", "stiffness"}
 
 
 def _interval(known: Interval, digits: int) -> str:
-    return f"{known.median:.{digits}g} ({known.q05:.{digits}g} to {known.q95:.{digits}g})"
+    return f"{significant(known.median, digits)} ({significant(known.q05, digits)} to {significant(known.q95, digits)})"

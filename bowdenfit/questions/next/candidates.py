@@ -8,6 +8,7 @@ from bowdenfit.kinds.measurements import Measurements
 from bowdenfit.kinds.terms import candidate_kinds
 from bowdenfit.model import Model
 from bowdenfit.results.record import Record
+from bowdenfit.words import significant
 
 
 def situation_of(model: Model, measurements: Measurements) -> Situation:
@@ -77,7 +78,7 @@ def words_of(fit: Record, candidate: Candidate) -> str:
     if candidate.angles:
         angles = " and ".join(f"{angle:.4g}" for angle in np.rad2deg(candidate.angles))
         what += f" at {angles} deg"
-    what += f" under {candidate.load:.3g} N" if np.isfinite(candidate.load) else ""
+    what += f" under {significant(candidate.load)} N" if np.isfinite(candidate.load) else ""
     return what + (f" while {STROKE_WORDS[candidate.stroke]}" if candidate.stroke else "")
 
 

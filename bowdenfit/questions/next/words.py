@@ -6,7 +6,7 @@ from bowdenfit.display import text_of
 from bowdenfit.kinds.candidate import STROKE_WORDS
 from bowdenfit.kinds.terms import candidate_kinds
 from bowdenfit.questions.next.answer import NextMeasurement, Ranked
-from bowdenfit.words import decimals, few, filled, percent, table
+from bowdenfit.words import decimals, few, filled, percent, significant, table
 
 HOW_TO_READ = (
     "± is one standard deviation, on average over what the reading may turn out to be; two that differ in the last digit "
@@ -80,7 +80,7 @@ def _how(found: NextMeasurement, best: Ranked) -> str:
         return ""
     if found.loads is None or math.isfinite(best.candidate.load):
         return ", mounted anew"
-    low, high = (f"{load:.3g}" for load in found.loads)
+    low, high = map(significant, found.loads)
     return f", mounted anew, at {low} N" if low == high else f", mounted anew, at {low} to {high} N as so far"
 
 
@@ -109,7 +109,7 @@ def _where(ranked: Ranked) -> str:
     """'at 64 N while pulling'"""
     load, stroke = ranked.candidate.load, ranked.candidate.stroke
     way = f"while {STROKE_WORDS[stroke]}" if stroke else "of both strokes"
-    return f"all at {load:.3g} N {way}"
+    return f"all at {significant(load)} N {way}"
 
 
 def _planned(found: NextMeasurement) -> list[str]:

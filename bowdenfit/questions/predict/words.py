@@ -3,7 +3,7 @@
 from collections.abc import Iterator, Mapping, Sequence
 from typing import Any
 
-from bowdenfit.words import decimals, few, filled, narrow_table, percent
+from bowdenfit.words import decimals, few, filled, narrow_table, percent, significant
 
 Row = Mapping[str, Any]
 _UNITS = {"N_m_per_rad": "N*m/rad", "N_per_mm": "N/mm", "N_mm": "N*mm", "N_m": "N*m", "N": "N", "mm": "mm", "deg": "deg"}
@@ -125,7 +125,7 @@ def _columns(rows: Sequence[Row]) -> Iterator[list[str]]:
 def _notes(rows: Sequence[Row]) -> list[str]:
     """What holds of all, and what lies outside where."""
     of_load = rows[0].get("at_input_force_N")
-    said = [] if of_load is None else [f"At an input force of {of_load:.3g} N, because friction depends on the load."]
+    said = [] if of_load is None else [f"At an input force of {significant(of_load)} N, because friction depends on the load."]
     for note in dict.fromkeys(row["note"] for row in rows if row["note"]):
         where = [_at(row) for row in rows if row["note"] == note]
         said.append(f"{'Everywhere' if len(where) == len(rows) > 1 else few(where, 4)}: {note}.")

@@ -1,6 +1,7 @@
 """How results show themselves: a console has the first lines of what their verb prints, a notebook a page, pandas a table."""
 
 import inspect
+import re
 from collections.abc import Iterable, Mapping, Sequence
 from functools import singledispatch
 from typing import TYPE_CHECKING, Any, TypeAlias, TypeVar
@@ -17,6 +18,8 @@ _LINES, _WIDTH = 10, 90  # of what a console shows
 _FEW = 3  # of what a tuple may hold to be shown as Python does
 _LONGEST = 60  # characters of a cell
 _SHOWN = 12  # rows of a table that is not laid out by its verb
+_WORD = re.compile(r"\w[\w./%°-]*")
+_FORMULA = re.compile(r"(?![+-]?[\d.]*\Z)[=+@\t\r-]")  # how one begins, and no number does
 
 
 class Display:
@@ -156,14 +159,25 @@ def _with_unit(name: str, units: Mapping[str, str]) -> str:
 def csv_text(rows: Sequence[Mapping[str, Any]]) -> str:
     """Rows as CSV, with a heading; empty without rows."""
     lines = [",".join(_csv_cell(value) for value in row.values()) for row in rows]
-    return "\n".join([",".join(next(iter(rows), {})), *lines]) + "\n"
+    return "\n".join([",".join(map(csv_heading, next(iter(rows), {}))), *lines]) + "\n"
+
+
+def csv_heading(name: str) -> str:
+    """A heading of a column: in quotes where it is more than a word."""
+    return name if _WORD.fullmatch(name) else csv_quoted(name)
+
+
+def csv_quoted(text: str) -> str:
+    """A text in quotes; a spreadsheet takes it for a text even where it begins as a formula does."""
+    guard = "'" if _FORMULA.match(text) else ""
+    return '"{}{}"'.format(guard, text.replace('"', '""'))
 
 
 def _csv_cell(value: object) -> str:
     if isinstance(value, float):
         return f"{value:.6g}"
     if isinstance(value, str):
-        return '"{}"'.format(value.replace('"', '""'))
+        return csv_quoted(value)
     return "" if value is None else str(value).lower()
 
 

@@ -5,6 +5,7 @@ import os
 import re
 import sys
 import warnings
+from contextlib import suppress
 from pathlib import Path
 
 import click
@@ -14,11 +15,12 @@ from bowdenfit.cli.interrupts import listening, was_asked
 from bowdenfit.cli.progress import INTERRUPTED
 from bowdenfit.cli.starting import completion, init
 from bowdenfit.cli.supervised import is_limited, supervise
-from bowdenfit.cli.terminal import say
+from bowdenfit.cli.terminal import NoReaderError, say
 from bowdenfit.errors import BowdenfitError, system_error
 from bowdenfit.verbs import VERBS
 
 _NEW_LINE = re.compile(r"[\r\n](?!- )")  # in the name of a file: our own sentences have new lines before "- " alone
+_NO_READER = 141  # exit code, as shells have it of a process whose output nobody reads on
 _MADE = 50_000  # objects made before Python looks for garbage: most stay, and each look goes through all of them
 
 
@@ -51,8 +53,9 @@ def _run() -> None:
     try:
         main()
     except SystemExit as stop:
-        sys.stdout.flush()
-        sys.stderr.flush()
+        for stream in (sys.stdout, sys.stderr):
+            with suppress(OSError):  # whoever read them has ended
+                stream.flush()
         os._exit(stop.code if isinstance(stop.code, int) else 0 if stop.code is None else 1)
 
 
@@ -70,17 +73,17 @@ def main() -> None:
         error.show()
         sys.exit(error.exit_code)
     except BowdenfitError as error:
-        say(f"Error: {_NEW_LINE.sub('?', str(error))}", err=True)
+        _complain(f"Error: {_NEW_LINE.sub('?', str(error))}")
         sys.exit(error.exit_code)
     except (click.Abort, KeyboardInterrupt):
-        click.echo("Interrupted.", err=True)
+        _complain("Interrupted.")
         sys.exit(INTERRUPTED)
-    except BrokenPipeError:
+    except NoReaderError:
         os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
-        sys.exit(1)
+        sys.exit(_NO_READER)
     except Exception as error:
         if was_asked():  # whatever came of it is that interrupt
-            click.echo("Interrupted.", err=True)
+            _complain("Interrupted.")
             sys.exit(INTERRUPTED)
         if os.environ.get("BOWDENFIT_DEBUG"):
             raise
@@ -90,8 +93,14 @@ def main() -> None:
             "report it with what BOWDENFIT_DEBUG=1 prints when you run the command again."
         )
         refused = system_error(error)
-        say(f"Error: {refused or ours}", err=True)
+        _complain(f"Error: {refused or ours}")
         sys.exit(refused.exit_code if refused else 1)
+
+
+def _complain(text: str) -> None:
+    """Say what went wrong, where that can be said; the exit code says it in any case."""
+    with suppress(OSError):
+        say(text, err=True)
 
 
 @click.group(context_settings={"help_option_names": ["-h", "--help"], "max_content_width": 110})

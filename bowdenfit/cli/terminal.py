@@ -8,6 +8,10 @@ import click
 from bowdenfit.words import in_ascii, printable
 
 
+class NoReaderError(OSError):
+    """Whoever read what is said has ended, as `head` does after some lines."""
+
+
 def say(text: str, err: bool = False, nl: bool = True) -> None:
     """Print to standard output, or to standard error.
 
@@ -15,10 +19,16 @@ def say(text: str, err: bool = False, nl: bool = True) -> None:
         text: What is said.
         err: Whether it goes to standard error.
         nl: Whether the line ends after it.
+
+    Raises:
+        NoReaderError: Nobody reads it.
     """
     stream = sys.stderr if err else sys.stdout
     said = printable(text)
-    click.echo(said if shows(said, getattr(stream, "encoding", None)) else in_ascii(said), nl=nl, err=err)
+    try:
+        click.echo(said if shows(said, getattr(stream, "encoding", None)) else in_ascii(said), nl=nl, err=err)
+    except BrokenPipeError:  # of which click makes a failure
+        raise NoReaderError from None
 
 
 def shows(text: str, encoding: str | None) -> bool:

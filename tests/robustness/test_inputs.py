@@ -3,6 +3,8 @@
 import os
 import shutil
 import socket
+import subprocess
+import sys
 import time
 
 import pytest
@@ -130,3 +132,18 @@ def test_targets_that_no_sampling_can_reach_are_refused_at_the_start(on_body, tm
         bf.fit(on_body, output=tmp_path / "fit", settings=settings)
     assert refused.value.exit_code == 2
     assert not (tmp_path / "fit").exists()
+
+
+@pytest.mark.parametrize(
+    ("output", "code", "said"), [("| true", 141, ""), (">&-", 0, ""), ("2>&- >&-", 0, ""), ("2>/dev/full", 0, "On-body")]
+)
+def test_output_that_nobody_reads_is_no_failure(output, code, said):
+    command = f"set -o pipefail; {sys.executable} -m bowdenfit metabolic datasets/on-body-metabolic {output}"
+    done = subprocess.run(["bash", "-c", command], capture_output=True, text=True, check=False, timeout=60)
+    assert (done.returncode, done.stderr) == (code, "") and done.stdout.startswith(said)
+
+
+@pytest.mark.parametrize("output", ["2>&-", "2>/dev/full"])
+def test_a_refusal_that_nobody_reads_is_one_all_the_same(output):
+    done = subprocess.run(["bash", "-c", f"{sys.executable} -m bowdenfit check /nowhere {output}"], check=False, timeout=60)
+    assert done.returncode == 2

@@ -1,5 +1,6 @@
 """Names that people choose: whatever is in them works in tables, files and figures, or `check` refuses it."""
 
+import csv
 import json
 import shutil
 
@@ -10,6 +11,7 @@ from matplotlib.mathtext import MathTextParser
 
 import bowdenfit as bf
 from bowdenfit.cli import bowdenfit
+from bowdenfit.display import csv_text
 from bowdenfit.errors import DiskError
 from bowdenfit.parameters.symbols import symbol_of
 from bowdenfit.results.netcdf import read_groups, write_groups
@@ -146,3 +148,15 @@ def test_a_new_data_set_may_be_called_anything_that_a_folder_may(on_body, tmp_pa
     done = CliRunner().invoke(bowdenfit, ["init", str(tmp_path / called), "--from", *files])
     assert done.exit_code == 0, done.exception
     assert bf.read(tmp_path / called).measurements
+
+
+@pytest.mark.parametrize("name", ["=1+1", "a,b", '"q', "@x", "-2+3", "+x", "cable length", "a;b"])
+def test_csv_has_names_as_text_that_no_spreadsheet_computes(name):
+    (heading, other), (cell, number) = csv.reader(csv_text([{name: name, "length_mm": -1.5}]).splitlines())
+    assert other == "length_mm" and number == "-1.5"
+    assert heading == cell and heading in {name, f"'{name}"}
+    assert heading[0] not in "=+-@"
+
+
+def test_numbers_and_plain_words_stay_as_they_are_in_csv():
+    assert csv_text([{"low_W/kg": -0.5, "n": "-12.5"}]) == 'low_W/kg,n\n-0.5,"-12.5"\n'

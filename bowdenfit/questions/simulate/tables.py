@@ -122,8 +122,13 @@ def table_texts(description: Description, measured: Measurements) -> dict[str, s
         settings = description.tables.stated.get(kind.name)
         if settings and kind.page:
             heads, rows = kind.page(table, description)
-            texts[kind.file_name(settings)] = "\n".join(",".join(row) for row in [heads, *rows]) + "\n"
+            texts[kind.file_name(settings)] = "\n".join(",".join(map(_cell, row)) for row in [heads, *rows]) + "\n"
     return texts
+
+
+def _cell(text: str) -> str:
+    """A cell as CSV has it; a heading that holds a comma is one all the same."""
+    return '"{}"'.format(text.replace('"', '""')) if set(text) & set(',"\r\n') else text
 
 
 def description_lines(text: str, command: str, *designs: str) -> list[str]:

@@ -78,8 +78,7 @@ def fit(
         from bowdenfit.run.fitting import run
 
         with jax.enable_x64(True):
-            begin = partial(start_checkpointing, folder, data, seed, resume)
-            found = run(data, begin, mcmc, seed, resume, show, helper)
+            found = run(data, partial(start_checkpointing, folder, data, seed, resume), mcmc, seed, resume, show, helper)
             for sentence in write_results(found, folder, figures, helper) if folder is not None else ():
                 report(sentence)
     return found

@@ -8,6 +8,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any, Unpack
 
 from bowdenfit.inference.engines.memory import refuse_too_little
+from bowdenfit.notebook import watched
 from bowdenfit.reading import Reading, read, refuse_unknown
 from bowdenfit.results.folder import REPLICATIONS
 from bowdenfit.verb import LARGEST_SEED, Argument, Option, Output, Reply, Verb, Watch
@@ -68,7 +69,6 @@ def calibrate(
     import jax
 
     import bowdenfit.questions.calibrate.words  # noqa: F401  (what the answer says of itself)
-    from bowdenfit.notebook import watched
     from bowdenfit.questions.calibrate.findings import findings
     from bowdenfit.questions.calibrate.quantities import quantities_of
     from bowdenfit.questions.calibrate.store import open_replications

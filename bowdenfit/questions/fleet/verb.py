@@ -47,8 +47,7 @@ def fleet(
         folder: With fleet.csv (cable, cycles, temperature_degC, lubricated, file) and fleet.toml, which describes the cables
             as a cable.toml does; or with a folder that has a cable.toml for each cable, or for its inspections by cycles.
         output: Results folder.
-        engine: Who works: local (this process, or more of them where that is quicker), dask://HOST:PORT or slurm; in a program
-            any `concurrent.futures.Executor`.
+        engine: local (this process, or more where quicker), dask://HOST:PORT or slurm; or any `concurrent.futures.Executor`.
         workers: Processes here, or jobs at a time.
         seed: Seed of everything random.
         resume: Go on with an interrupted fleet, or add cables and inspections.

@@ -20,7 +20,7 @@ def keep_what_is_compiled() -> str | None:
     """
     if sys.dont_write_bytecode:  # the machine keeps sources clean, and every process compiles all libraries
         sys.dont_write_bytecode = False
-        sys.pycache_prefix = str(ROOT / ".pytest_cache" / "byte_code")
+        sys.pycache_prefix = str(ROOT / ".pytest_cache" / "compiled")
         os.environ["PYTHONPYCACHEPREFIX"] = sys.pycache_prefix
         os.environ.pop("PYTHONDONTWRITEBYTECODE", None)  # none after -B
     if PROGRAMS in os.environ:

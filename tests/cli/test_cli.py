@@ -296,7 +296,7 @@ def test_a_whole_fit_in_a_process_of_its_own_and_an_interrupt(on_body, tmp_path)
         "2",
     ]
     settings = [f"--set={key}" for key in (*QUICK, "sampler.target_ess=100000", "sampler.max_steps=200000")]
-    environment = os.environ | {"XDG_CACHE_HOME": str(tmp_path / "cache")}
+    environment = os.environ | {"XDG_CACHE_HOME": str(tmp_path / "cache"), "JAX_COMPILATION_CACHE_DIR": ""}
     # A shell that runs the tests in the background makes its children deaf to interrupts; this one hears again.
     hear = "import os, signal, sys; signal.signal(signal.SIGINT, signal.SIG_DFL); os.execv(sys.argv[1], sys.argv[1:])"
     listening = [sys.executable, "-c", hear, *command, *settings]

@@ -58,7 +58,9 @@ def test_a_fit_that_may_not_write_more_keeps_what_it_sampled_and_is_resumed(on_b
     limited = f"import os, resource as r, sys; {limit_size}; os.execv(sys.argv[2], sys.argv[2:])"
 
     def run(*before, after=()):
-        environment = os.environ | {"XDG_CACHE_HOME": str(tmp_path / "cache")}  # programs are cut off there too
+        # What is compiled is cut off too, so it stays here; Python takes half a file of byte code for a whole one.
+        own = {"XDG_CACHE_HOME": str(tmp_path / "cache"), "JAX_COMPILATION_CACHE_DIR": ""}
+        environment = os.environ | own | {"PYTHONDONTWRITEBYTECODE": "1"}
         return subprocess.run(
             [*before, *command, *after], env=environment, capture_output=True, text=True, check=False, timeout=240
         )

@@ -1,15 +1,18 @@
 """Do two samplers of one density agree? On chains whose truth is known, and by fits with both."""
 
 from dataclasses import replace
+from functools import lru_cache
 from pathlib import Path
 
 import numpy as np
 import pytest
+from figure_words import assert_readable
 from scipy import stats
 
 import bowdenfit as bf
 from bowdenfit.inference import nuts
 from bowdenfit.inference.samplers import FALSE_ALARM, Drawn, SamplerAgreement, compare_samplers, recommendation
+from bowdenfit.questions.figures import figures_of
 from bowdenfit.questions.summary.words import full_text
 
 DATA = Path(__file__).parents[2] / "datasets"
@@ -141,14 +144,28 @@ def test_samplers_that_disagree_are_a_reason_not_to_trust(monkeypatch):
 DATA_SETS = sorted(path.parent.name for path in DATA.glob("*/cable.toml"))
 
 
-@pytest.mark.parametrize(
+EACH = pytest.mark.parametrize(
     "name", [pytest.param(n, marks=[] if n == "yarn-on-cylinder" else pytest.mark.slow) for n in DATA_SETS]
 )
+
+
+@lru_cache(maxsize=1)  # the tests of one data set follow one another
+def fitted_by_both(name):
+    return bf.fit(DATA / name, sampler="both", seed=1)
+
+
+@EACH
 def test_emcee_and_nuts_agree_on_every_data_set(name):
     """Mean, sd, 5 % and 95 % quantile of every parameter, l* and eta*; chance fails this once in a thousand seeds.
 
     The small on-body data are also fitted by both above, in every run of the tests.
     """
-    found = bf.fit(DATA / name, sampler="both", seed=1)
+    found = fitted_by_both(name)
     assert found.posterior.agreement.agree, found.posterior.agreement.sentence()
     assert found.converged, found.reasons
+
+
+@EACH
+def test_figures_of_draws_can_be_read_on_every_data_set(name):
+    found = fitted_by_both(name)
+    assert_readable(dict(figures_of(found)), found.name)

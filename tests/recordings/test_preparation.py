@@ -7,10 +7,13 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from scipy.optimize import isotonic_regression
+from scipy.signal import savgol_filter
 
 from bowdenfit.description import ForceLimits, Preparation, QuantityValue
 from bowdenfit.errors import DatasetError
 from bowdenfit.questions.simulate.bench import BenchFriction, BenchSettings, Faults, MotorProfile, simulate_recording
+from bowdenfit.recordings.preparation import likely_input as likely_input_file
 from bowdenfit.recordings.preparation import prepare
 from bowdenfit.recordings.preparation.bandwidth import bandwidth_of
 from bowdenfit.recordings.preparation.clock import DROPOUT, GOOD, SATURATED, SPIKE, Sampled, read_at, spread
@@ -502,3 +505,14 @@ def test_all_rows_follow_the_play_operator_value_by_value(rows, points, rested):
                 low = high = min(level, high) if heading[row, t] < 0 else max(level, low)
             y = min(max(y, low), high)
             assert found[e, row, t] == y
+
+
+@pytest.mark.parametrize("blocks", [7, 8, 50, 1000])
+def test_the_likely_input_is_smoothed_and_pooled_as_scipy_does(blocks):
+    force = np.cumsum(np.random.default_rng(blocks).standard_normal(blocks)) + 0.1 * np.arange(blocks)
+    pooled = likely_input_file._isotonic(force)
+    np.testing.assert_allclose(pooled, isotonic_regression(force).x, atol=1e-12)
+    assert np.all(np.diff(pooled) >= 0) and np.any(pooled != force)
+    level = np.tile([0.0, 1.0, 0.0, -1.0], blocks)[:blocks] + 1e-3 * force  # much noise, none of it beyond what may change
+    smooth = likely_input_file._smooth(level, 100.0)
+    np.testing.assert_allclose(smooth, savgol_filter(level, 7, 2), atol=1e-12)

@@ -24,8 +24,9 @@ from bowdenfit.inference.population.sampling import PopulationDraws
 from bowdenfit.inference.psis import smooth_weights
 
 FALSE_ALARM, OF_KINDS = 0.05, 0.01  # of fleets in which all cables are alike: of naming any, and of seeing two kinds
-_POPULATIONS, _REPEATS = 200, 100  # draws of the population, and cables drawn from each
-_ERRORS = 20_000  # of the inspections of a cable
+_POPULATIONS = 1000  # draws of the population
+_REPEATS, _MORE = 20, 500  # cables drawn from each: of any, and where few of them were as far off
+_SMALL = 0.01  # probability, of which the smallest of many cables are to be told apart
 _RANK = 1e-9
 _FEWEST_TO_LEAVE_OUT, _FAR = 5, 3.5  # cables, and typical deviations from the median
 _NORMAL_DEVIATION = 0.6745  # median deviation of a normal distribution in standard deviations
@@ -57,11 +58,19 @@ def chances(inspected: Inspected, drawn: PopulationDraws, seed: int, without: tu
         drawn: Of the population.
         seed: Of everything random.
         without: Cables that the population was drawn without.
+
+    Among a thousand cables only a probability of a few millionths names one, so that small ones are found again from half a
+    million repetitions.
     """
     generator = np.random.default_rng([seed, 7])
     which = np.linspace(0, len(drawn.mean) - 1, _POPULATIONS).round().astype(int)
     core = drawn.mean[which], drawn.spread[which], drawn.effects[which]
-    return np.array([_chance(inspected, i, *core, generator, i not in without) for i in range(inspected.cables)])
+
+    def of(cable: int, repeats: int) -> float:
+        return _chance(inspected, cable, *core, generator, cable not in without, repeats)
+
+    found = [of(cable, _REPEATS) for cable in range(inspected.cables)]
+    return np.array([of(cable, _MORE) if chance < _SMALL else chance for cable, chance in enumerate(found)])
 
 
 def _chance(
@@ -72,6 +81,7 @@ def _chance(
     effects: np.ndarray,
     generator: np.random.Generator,
     is_in: bool,
+    repeats: int,
 ) -> float:
     """Of one cable, which may be in the population or not."""
     rows = np.flatnonzero(inspected.cable == cable)
@@ -92,7 +102,7 @@ def _chance(
     size = np.log(np.diagonal(root, axis1=1, axis2=2)).sum(axis=1)
     log = distance / 2 + size if is_in else np.zeros(len(mean))
     weights = np.exp(smooth_weights(log)[0])  # of the population without this cable
-    noise = _noise(inspected, rows, scale, known, generator)
+    noise = _noise(inspected, rows, scale, known, generator, len(mean) * repeats)
     found = [_within(away.mean(axis=0), noise, scale, design)]
     precision = np.linalg.inv(scale)
     for k in np.flatnonzero((design != 0).any(axis=0)):
@@ -102,20 +112,25 @@ def _chance(
         blur = gain @ design - ~others  # of what the others of this cable are
         own = noise @ gain
         seen = away @ gain
-        drawn = generator.standard_normal((len(mean), _REPEATS, mean.shape[1])) * spread[:, None]
+        drawn = generator.standard_normal((len(mean), repeats, mean.shape[1])) * spread[:, None]
         repeated = drawn[:, :, k] + drawn @ blur + generator.choice(own, drawn.shape[:2])
         beyond = np.sum(np.abs(repeated) >= np.abs(seen)[:, None], axis=1)
-        found.append(float((1 / _REPEATS / len(mean) + weights @ beyond / _REPEATS) / weights.sum()))
+        found.append(float((1 / repeats / len(mean) + weights @ beyond / repeats) / weights.sum()))
     return min(1.0, len(found) * min(found))
 
 
 def _noise(
-    inspected: Inspected, rows: np.ndarray, scale: np.ndarray, known: np.ndarray, generator: np.random.Generator
+    inspected: Inspected,
+    rows: np.ndarray,
+    scale: np.ndarray,
+    known: np.ndarray,
+    generator: np.random.Generator,
+    repeats: int,
 ) -> np.ndarray:
     """Errors of the inspections of a cable, (repeat, number)."""
     freedom = inspected.summaries.freedom[rows]
-    found = generator.standard_normal((_ERRORS, len(scale))) @ np.linalg.cholesky(scale).T
-    stretch = np.sqrt(freedom / generator.chisquare(freedom, (_ERRORS, len(rows))))
+    found = generator.standard_normal((repeats, len(scale))) @ np.linalg.cholesky(scale).T
+    stretch = np.sqrt(freedom / generator.chisquare(freedom, (repeats, len(rows))))
     stretched: np.ndarray = found * np.repeat(stretch, inspected.coefficients, axis=1)[:, known]
     return stretched
 

@@ -2,8 +2,10 @@
 
 import os
 import shutil
+import signal
 import sys
 import tomllib
+from functools import partial
 from pathlib import Path
 
 import pexpect
@@ -270,6 +272,7 @@ class Console:
             dimensions=(50, 80),
             encoding="utf-8",
             timeout=120,
+            preexec_fn=partial(signal.signal, signal.SIGINT, signal.SIG_DFL),  # tests in the background are deaf to it
         )
 
     def answer(self, question, said):

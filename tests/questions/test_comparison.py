@@ -239,7 +239,7 @@ def test_the_page_of_a_comparison_opens_without_a_fault(tmp_path):
         for part in ("differences", "weights", "predictions", "described")
     }
     found = replace(found, **renamed)
-    write_answer(tmp_path, "comparison", found, "", comparison_figure, page=comparison_page(found))
+    write_answer(tmp_path, "comparison", found, "", {"comparison": comparison_figure}, page=comparison_page(found))
     with browser() as chromium, opened(chromium, tmp_path / "comparison.html", width=390) as reader:
         assert reader.faults() == []
         assert reader.page.locator("main svg").count() == 1

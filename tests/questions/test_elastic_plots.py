@@ -498,7 +498,7 @@ def test_the_same_data_give_the_same_small_files(tmp_path):
     data = CASES["twelve angles"]()
     for folder in ("first", "second"):
         written = [path for name in NAMES for path in draw_figure(name, data[name], tmp_path / folder)]
-    assert [path.name for path in written] == [f"{name}.{ending}" for name in NAMES for ending in ("png", "svg")]
+    assert [path.name for path in written] == [f"{name}.{ending}" for name in NAMES for ending in ("png", "svg", "pdf")]
     for path in (tmp_path / "first").iterdir():
         assert path.read_bytes() == (tmp_path / "second" / path.name).read_bytes()
         assert 1_000 < path.stat().st_size < 500_000, path.name

@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING, Any, Protocol, runtime_checkable
 
 from bowdenfit.plots.layout import title_above
 from bowdenfit.plots.style import in_paper_style
-from bowdenfit.plots.write import FORMATS, write_all
+from bowdenfit.plots.write import write_all
 from bowdenfit.results.folder import read_text, write_text
 from bowdenfit.words import filled, printable
 
@@ -57,7 +57,7 @@ def write_figure(figure: AnswerFigure, found: Any, folder: Path, name: str, cabl
         name: Of the files.
     """
     folder.mkdir(parents=True, exist_ok=True)
-    written = write_all(answer_figure(figure, found, cable), folder, name, FORMATS)
+    written = write_all(answer_figure(figure, found, cable), folder, name)
     write_captions({name: f"{titled(figure.HEADING, cable)}. {figure.caption(found)}"}, folder)
     return written
 

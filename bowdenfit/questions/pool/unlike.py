@@ -53,14 +53,14 @@ def far_off(inspected: Inspected, drawn: PopulationDraws) -> tuple[int, ...]:
 def chances(inspected: Inspected, drawn: PopulationDraws, seed: int, without: tuple[int, ...] = ()) -> np.ndarray:
     """Probability that a cable of this population is as far from the others as each is, (cable,).
 
+    Among a thousand cables only a probability of a few millionths names one, so that small ones are found again from half a
+    million repetitions.
+
     Args:
         inspected: What is known.
         drawn: Of the population.
         seed: Of everything random.
         without: Cables that the population was drawn without.
-
-    Among a thousand cables only a probability of a few millionths names one, so that small ones are found again from half a
-    million repetitions.
     """
     generator = np.random.default_rng([seed, 7])
     which = np.linspace(0, len(drawn.mean) - 1, _POPULATIONS).round().astype(int)

@@ -109,7 +109,7 @@ def _panel(axes: Axes, parameter: Coefficient) -> None:
     prior = density(parameter.prior, grid, lower)
     axes.plot(grid, prior, color=BLACK, linestyle="--", linewidth=1.0, label="Before them (prior)")
     _least_squares(axes, parameter, shown, 0.08 * posterior.max())
-    axes.set(xlim=shown, ylim=(0, 1.2 * posterior.max()), )
+    axes.set(xlim=shown, ylim=(0, 1.2 * posterior.max()))
     label_across(axes, axis_label(parameter.symbol, parameter.unit))
     axes.set_ylabel("Density" if parameter.unit == "1" else f"Density (1/{parameter.unit})")
     axes.set_title(_title(parameter))

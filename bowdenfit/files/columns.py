@@ -146,7 +146,7 @@ def require(table: RawTable, found: Mapping[str, Column], name: str, example: st
 
 
 def _missing(table: RawTable, name: str, example: str) -> DatasetError:
-    _, _, unit = example.removeprefix(name).partition("_")
+    _, _, unit = example.partition(" or ")[0].removeprefix(name).partition("_")
     option = naming(name, "NAME", unit.replace("_", "*"))
     return DatasetError(
         f"{table.file} has no column {name}{_nearest(name, table.header)}; it has {quoted(table.header)}. Name the column "

@@ -59,8 +59,8 @@ FORCES = Kind(
     asked=Asked(
         "forces at both ends of the cable, a row a pair of readings",
         (
-            Wanted(Quantity("input_force", "force"), "the force at the motor"),
-            Wanted(Quantity("output_force", "force"), "the force at the load"),
+            Wanted(Quantity("input_force", "force"), "the force at the motor", (Quantity("input_torque", "torque"),)),
+            Wanted(Quantity("output_force", "force"), "the force at the load", (Quantity("output_torque", "torque"),)),
             RUN,
             STROKE,
         ),

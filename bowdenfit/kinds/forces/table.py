@@ -1,18 +1,21 @@
 """Pairs of forces read at both ends of a cable, in runs: one run is one mounting."""
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from functools import partial
 from pathlib import Path
 
 import numpy as np
 
+from bowdenfit.description.pulleys import Pulleys
 from bowdenfit.display import Part
 from bowdenfit.errors import DatasetError, Faults
 from bowdenfit.files.cells import Cell
-from bowdenfit.files.columns import Column, Quantity, find_columns, require, taken_in_pairs
+from bowdenfit.files.columns import Column, Quantity, find_columns, taken_in_pairs
+from bowdenfit.files.csv_table import RawTable
 from bowdenfit.files.row_account import RowAccount
 from bowdenfit.files.tables import read_table
+from bowdenfit.kinds.ends import ENDS, end_column, forces_of
 from bowdenfit.kinds.forces.mountings import each_row_apart, mountings, numbered_anew
 from bowdenfit.kinds.groups import GROUP, NO_GROUP, read_groups
 from bowdenfit.kinds.kind import Found, Source
@@ -131,11 +134,11 @@ def _one_velocity_unit(tables: Sequence[ForceTable]) -> str:
 
 def _read_force_file(path: Path, source: Source) -> tuple[ForceTable, list[str], RowAccount]:
     table, route, contacts = read_table(path), source.description.route, source.description.angle_columns
-    forces = (Quantity("input_force", "force"), Quantity("output_force", "force"))
     others = (Quantity("run", "text"), Quantity("stroke", "text"), Quantity("velocity", "speed"), GROUP)
-    found = find_columns(table, (*forces, *others, *shared_columns(route, contacts)), source.columns, _UNUSED)
-    columns = [require(table, found, q.name, f"{q.name}_N") for q in forces]
-    input_force, output_force = (np.array(c.each(partial(_force, c), np.nan)) for c in columns)
+    found = find_columns(table, (*ENDS, *others, *shared_columns(route, contacts)), source.columns, _UNUSED)
+    pulleys, nothing = source.description.cable.pulleys, np.full(len(table.rows), np.nan)
+    read = partial(_tensions, table, found, pulleys)
+    input_force, output_force = table.faults.each(read, ("input", "output"), nothing)
     own = read_own_angles(table, found, contacts)
     route_values = read_route(table, found, route)
     groups = source.settings.groups == "called by numbers", source.description.by_group
@@ -197,6 +200,12 @@ def _places(route: Vector, own: OwnAngles, unit: str) -> list[str]:
     rows, units = np.column_stack([route, np.rad2deg(own.angle)]), [unit, *["deg"] * len(own.names)]
     known = [[(value, unit) for value, unit in zip(row, units, strict=True) if np.isfinite(value)] for row in rows]
     return [", ".join(f"{value:g} {unit}".rstrip() for value, unit in row) or "all" for row in known]
+
+
+def _tensions(table: RawTable, found: Mapping[str, Column], pulleys: Pulleys, end: str) -> Vector:
+    """Tensions at one end [N], from its forces, or from its torques and the radius of its pulley."""
+    column = end_column(table, found, end)
+    return forces_of(np.array(column.each(partial(_force, column), np.nan)), table, found, end, pulleys)
 
 
 def _force(column: Column, cell: Cell) -> float:

@@ -8,10 +8,11 @@ import numpy as np
 from bowdenfit.description.pulleys import Pulleys
 from bowdenfit.display import Part
 from bowdenfit.errors import DatasetError, together
-from bowdenfit.files.columns import Column, Quantity, find_columns, require
+from bowdenfit.files.columns import Column, Quantity, find_columns
 from bowdenfit.files.csv_table import RawTable
 from bowdenfit.files.matching import meanings
 from bowdenfit.files.tables import read_table
+from bowdenfit.kinds.ends import ENDS, end_column, forces_of
 from bowdenfit.kinds.kind import Found, Source
 from bowdenfit.kinds.rows import (
     OwnAngles,
@@ -65,12 +66,11 @@ def read_loop(source: Source) -> Found[LoopTable]:
     """
     path, route, contacts = source.file, source.description.route, source.description.angle_columns
     table, pulleys = read_table(path), source.description.cable.pulleys
-    ends = [Quantity(f"{end}_{what}", what) for end in ("input", "output") for what in ("force", "torque")]
     others = (Quantity("stroke", "text"), Quantity("preload", "force"))
-    found = find_columns(table, (*ends, *others, *shared_columns(route, contacts)), source.columns, _UNUSED)
+    found = find_columns(table, (*ENDS, *others, *shared_columns(route, contacts)), source.columns, _UNUSED)
     check_spelling(table, found, others)
     nothing = np.full(len(table.rows), np.nan)
-    ends_read = table.faults.each(lambda end: _end(table, found, end, pulleys), ("input", "output"), nothing)
+    ends_read = table.faults.each(lambda end: _end_forces(table, found, end, pulleys), ("input", "output"), nothing)
     input_force, output_force = ends_read
     stroke = read_strokes(found, len(table.rows), held="")
     preload = nothing
@@ -102,14 +102,10 @@ def read_loop(source: Source) -> Found[LoopTable]:
     return Found(made, {path.name: path}, tuple(remarks), (table.account,))
 
 
-def _end(table: RawTable, found: Mapping[str, Column], end: str, pulleys: Pulleys) -> Vector:
+def _end_forces(table: RawTable, found: Mapping[str, Column], end: str, pulleys: Pulleys) -> Vector:
     """Forces at one end [N], from its force column or from its torques and the radius of its pulley."""
-    force, torque = f"{end}_force", f"{end}_torque"
-    if force in found and torque in found:
-        raise DatasetError(f"{table.file} has both {force} and {torque}; leave one of the two columns out.")
-    if torque not in found:
-        return np.asarray(require(table, found, force, f"{force}_N or {torque}_N_m").numbers())
-    return pulleys.forces(np.asarray(found[torque].numbers()), end, table.file)
+    read = np.asarray(end_column(table, found, end, is_loop=True).numbers())
+    return forces_of(read, table, found, end, pulleys)
 
 
 def _plain_angle(heading: str) -> bool:

@@ -1,12 +1,12 @@
 """The description of a device, `device.toml`: what a plant and its controller need beside the cable, with units and sds."""
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from math import pi
 from pathlib import Path
 from typing import Annotated
 
-from pydantic import ConfigDict, Field, ValidationError
+from pydantic import ConfigDict, Field, PrivateAttr, ValidationError
 
 from bowdenfit.description import SCHEMA
 from bowdenfit.description.device_keys import KEYS, Key
@@ -38,9 +38,10 @@ class Joint(Frozen):
 
 
 class Rope(Frozen):
-    """What the fit of the cable does not tell of it."""
+    """What the fit of the cable does not tell of it; `ringdown` is the results folder of a fit that tells its damping."""
 
     damping: Quantity = None
+    ringdown: Annotated[str, Field(min_length=1, max_length=4096)] | None = None
     stiffness: Quantity = None
     mounting_scatter: Quantity = None
     spring: Quantity = None
@@ -100,10 +101,14 @@ class Known:
     Args:
         value: The value.
         sd: Its standard deviation.
+        draws: Of a fit that tells it, in place of a Normal distribution.
+        beside: Key of what those draws hold too, which is then to be taken from them.
     """
 
     value: float
     sd: float = 0.0
+    draws: tuple[float, ...] = ()
+    beside: str = ""
 
 
 class Device(Frozen):
@@ -122,6 +127,13 @@ class Device(Frozen):
     coupling: Coupling = Coupling()
 
     model_config = ConfigDict(frozen=True, extra="forbid", populate_by_name=True)
+    _told: dict[str, Known] = PrivateAttr(default_factory=dict)
+
+    def told(self, more: Mapping[str, Known]) -> "Device":
+        """The same with quantities that a fit tells [SI]."""
+        device = self.model_copy()
+        device._told = {**self._told, **more}
+        return device
 
     def states(self, *keys: str) -> bool:
         """Whether it says all of these."""
@@ -129,7 +141,7 @@ class Device(Frozen):
 
     def lacking(self, *keys: str) -> list[str]:
         """Those that it does not say."""
-        return [key for key in keys if self._stated(key) is None]
+        return [key for key in keys if key not in self._told and self._stated(key) is None]
 
     def known(self, *keys: str) -> dict[str, Known]:
         """Quantities by key, of those that are stated [SI].
@@ -140,7 +152,9 @@ class Device(Frozen):
         faults, found = Faults(), {}
         for key in keys:
             with faults.noted():
-                if (stated := self._stated(key)) is not None:
+                if key in self._told:
+                    found[key] = self._told[key]
+                elif (stated := self._stated(key)) is not None:
                     found[key] = _known(key, stated)
         faults.refuse()
         return found
@@ -191,7 +205,7 @@ def _asked(what: str, key: str) -> str:
     if key not in KEYS:
         return f"{what} needs the counts of the encoder in a turn; write encoder_counts = 2000 under [{part}] of device.toml."
     known = KEYS[key]
-    return f"{what} needs the {known.meaning}; write {name} = {known.example} under [{part}] of device.toml."
+    return f"{what} needs the {known.meaning}; write {name} = {known.example} under [{part}] of device.toml{known.remedy}."
 
 
 def _known(key: str, stated: QuantityValue) -> Known:

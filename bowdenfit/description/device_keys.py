@@ -15,6 +15,7 @@ class Key:
         meaning: In words.
         is_measured: Whether it is known by measuring, so that an answer needs its sd; others are set.
         may_be_zero: Whether 0 is possible.
+        remedy: What else tells it, as the end of a sentence.
     """
 
     dimension: str
@@ -22,15 +23,18 @@ class Key:
     meaning: str
     is_measured: bool = True
     may_be_zero: bool = True
+    remedy: str = ""
 
 
 def _set(dimension: str, example: str, meaning: str, *, may_be_zero: bool = False) -> Key:
     return Key(dimension, example, meaning, False, may_be_zero)
 
 
-def _of(dimension: str, unit: str, value: float, meaning: str, *, may_be_zero: bool = True) -> Key:
+def _of(
+    dimension: str, unit: str, value: float, meaning: str, *, may_be_zero: bool = True, remedy: str = ""
+) -> Key:
     example = f'{{ value = {value:g}, unit = "{unit}", sd = {value / 10:.2g} }}'
-    return Key(dimension, example, meaning, True, may_be_zero)
+    return Key(dimension, example, meaning, True, may_be_zero, remedy)
 
 
 INERTIA, DAMPING, STIFFNESS = ("inertia", "kg*m^2"), ("angular_damping", "N*m*s/rad"), ("angular_stiffness", "N*m/rad")
@@ -44,7 +48,11 @@ KEYS: Mapping[str, Key] = MappingProxyType(
         "joint.inertia": _of(*INERTIA, 1e-3, "inertia of the joint and what is fixed to it", may_be_zero=False),
         "joint.damping": _of(*DAMPING, 1e-3, "viscous damping of the joint"),
         "joint.pulley_radius": _set("length", '{ value = 20, unit = "mm" }', "radius of the pulley at the joint"),
-        "rope.damping": _of(*DAMPING, 0.02, "damping of the rope while it is stretched, between motor and joint"),
+        "rope.damping": _of(
+            *DAMPING, 0.02, "damping of the rope while it is stretched, between motor and joint",
+            remedy=', or ringdown = "..." with the results of a fit that has a table ringdown: the joint released, and left to '
+            "swing until it stands still",
+        ),
         "rope.stiffness": _of(*STIFFNESS, 20, "stiffness at the joint with the motor held", may_be_zero=False),
         "rope.mounting_scatter": _set(
             "ratio", '{ value = 0.01, unit = "1" }',

@@ -117,13 +117,15 @@ class MaximumPosterior:
 
 
 def maximum_posterior(posterior: LogDensity, objective: Objective) -> MaximumPosterior:
-    """Maximum of the posterior with the noise scales at their prior medians.
+    """Maximum of the posterior with the noise scales at their prior medians, from every start that a parameter names.
 
     Raises:
         ConvergenceError: The residuals are not finite at the start.
     """
     n = posterior.model.space.size
-    found = Problem(posterior, objective, with_priors=True).solve(np.zeros(n))
+    problem = Problem(posterior, objective, with_priors=True)
+    starts = product(*(p.starts for p in posterior.model.space.free))
+    found = min((problem.solve(np.array(start)) for start in starts), key=_squares_with_priors)
     if not all(np.all(np.isfinite(r)) for r in found["residuals"].values()):
         raise ConvergenceError(
             "the model cannot be computed at the prior medians; the usual cause is a prior or a fixed value that is "
@@ -132,6 +134,11 @@ def maximum_posterior(posterior: LogDensity, objective: Objective) -> MaximumPos
     # The prior of each z has unit information; a noise scale gets that alone, its residuals say nothing here.
     information = found["jacobian"].T @ found["jacobian"] + np.eye(n)
     return MaximumPosterior(found["z"], np.linalg.inv(information))
+
+
+def _squares_with_priors(found: Solution) -> float:
+    total = float(np.sum(found["stacked"] ** 2))
+    return total if np.isfinite(total) else float("inf")
 
 
 def least_squares(

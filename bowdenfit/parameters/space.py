@@ -32,6 +32,7 @@ class Parameter:
         fixed: Value [internal unit] where it is held fixed, else None.
         prior_words: What is said of the prior instead of what it says itself in the shown unit.
         scaled_by: What of the measurements a default prior is in proportion to; empty where it is to nothing.
+        starts: z from which the largest density is looked for; more than one where it may have several maxima.
     """
 
     name: str
@@ -44,6 +45,7 @@ class Parameter:
     fixed: float | None = None
     prior_words: str = ""
     scaled_by: str = ""
+    starts: tuple[float, ...] = (0.0,)
 
     @property
     def label(self) -> str:

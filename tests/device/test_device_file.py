@@ -31,8 +31,8 @@ def test_quantities_are_read_in_si_units(tmp_path):
     device = read_device(written(tmp_path, 'friction = { value = 0.01, unit = "N*m", sd = 0.002 }',
                                  'friction = { value = 10, unit = "N*mm", sd = 2 }'))  # fmt: skip
     found = device.needed("an answer", "motor.friction", "controller.sample_time", "controller.dead_zone", "motor.inertia")
-    assert astuple(found["motor.friction"]) == pytest.approx((0.01, 0.002))
-    assert astuple(found["controller.sample_time"]) == pytest.approx((1e-3, 2e-5))
+    assert astuple(found["motor.friction"])[:2] == pytest.approx((0.01, 0.002))
+    assert astuple(found["controller.sample_time"])[:2] == pytest.approx((1e-3, 2e-5))
     assert found["controller.dead_zone"] == Known(0.8)
     assert found["motor.inertia"].value == 7e-4
     assert device.count == pytest.approx(2 * 3.14159265 / 2000)

@@ -15,6 +15,7 @@ from bowdenfit.kinds.angles.table import AngleTable
 from bowdenfit.kinds.bench import Remeasurement, drawn_by_term
 from bowdenfit.kinds.elastic_term import ElasticTerm
 from bowdenfit.kinds.ringdown.table import RingDownTable
+from bowdenfit.kinds.ringdown.turns import decay as decay_of_turns
 from bowdenfit.kinds.term import Circumstances, TermKind
 from bowdenfit.parameters.priors import HalfCauchy, HalfNormal, LogNormal, Normal, TruncatedNormal
 from bowdenfit.parameters.space import Parameter
@@ -24,7 +25,9 @@ INERTIA, STIFFNESS, DAMPING, FRICTION = "ring_inertia", "ring_stiffness", "rope_
 NOISE = "sigma_ringdown"
 _LOG_SD = 0.5  # of inertia and stiffness about what period and added inertia say
 _TIMES = 1.5  # what damping, or friction, would be if it alone stopped the joint
-_NOISE_SHARE, _REST_SHARE = 0.02, 0.1
+_NOISE_SHARE, _REST_SHARE = 0.005, 0.1  # of the first deflection: an encoder of a thousand or so counts a turn; zero of a sensor
+_STARTS = (-1.5, 0.0, 1.5)  # z: how many half swings friction leaves is a whole number, and each has a best fit of its own
+_FARTHEST = 2.5
 _MORE_SWINGS = 3  # times those that are seen
 
 
@@ -78,6 +81,8 @@ def _parameters(table: RingDownTable, at: Circumstances) -> list[Parameter]:
     angle = size / stiffness if table.is_torque else size
     step, unit = _sampling(table)[0], "N*m" if table.is_torque else "rad"
     decay = 2 * np.sqrt(stiffness * (inertia + table.added[first])) * np.log(10) / (np.pi * seen)  # to a tenth
+    damping, friction = HalfNormal(_TIMES * decay), HalfNormal(_TIMES * 0.45 * stiffness * angle / seen)
+    looks = _first_looks(table, first, stiffness * (inertia + table.added[first]), stiffness * angle / size)
     by = f"the period, {2000 * np.pi / omega:.3g} ms, and an inertia of {inertia:.3g} kg m^2"
     found = [
         _inertia(table, inertia),
@@ -87,12 +92,12 @@ def _parameters(table: RingDownTable, at: Circumstances) -> list[Parameter]:
         ),
         Parameter(
             DAMPING, "$b_c$", "viscous damping of rope and joint", "elastic",
-            HalfNormal(_TIMES * decay), "N*m*s/rad", scaled_by=by,
+            damping, "N*m*s/rad", scaled_by=by, starts=_starts(damping, looks[0]),
         ),
         Parameter(
             FRICTION, "$F_r$", "dry friction of the released joint", "elastic",
-            HalfNormal(_TIMES * 0.45 * stiffness * angle / seen), "N*m",
-            scaled_by=f"the first deflection, {size:.3g} {unit}, over {seen} half swings",
+            friction, "N*m",
+            scaled_by=f"the first deflection, {size:.3g} {unit}, over {seen} half swings", starts=_starts(friction, looks[1]),
         ),
         Parameter(
             NOISE, r"$\sigma_r$", at.noise.meaning("standard deviation of a reading of the ring-down"), "noise",
@@ -114,6 +119,26 @@ def _parameters(table: RingDownTable, at: Circumstances) -> list[Parameter]:
             ),
         ]  # fmt: skip
     return found
+
+
+def _first_looks(table: RingDownTable, run: int, product: float, stiffness: float) -> tuple[float, float]:
+    """Damping [N m s/rad] and friction [N m] by the turns of a run.
+
+    Args:
+        table: The table.
+        run: Number of the run.
+        product: K J [N m kg m^2/rad].
+        stiffness: Torque per unit of the reading.
+    """
+    rho, held = decay_of_turns(table, run)
+    log_decay = -np.log(rho)
+    return float(2 * np.sqrt(product) * log_decay / np.hypot(np.pi, log_decay)), held * stiffness
+
+
+def _starts(prior: HalfNormal, look: float) -> tuple[float, ...]:
+    """z from which the largest density is looked for."""
+    seen = float(prior.unconstrain(jnp.asarray(max(look, 1e-9))))
+    return (*_STARTS, float(np.clip(seen, -_FARTHEST, _FARTHEST)))
 
 
 def _inertia(table: RingDownTable, size: float) -> Parameter:

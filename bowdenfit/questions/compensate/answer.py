@@ -6,6 +6,9 @@ from bowdenfit.display import Display, Part, Rows
 from bowdenfit.inference.interval import Interval
 from bowdenfit.questions.compensate.simulated import Simulated
 
+ROPE_DAMPING = "the damping of the rope"
+"""The input that usually decides the largest gain, and that a ring-down tells."""
+
 
 @dataclass(frozen=True, repr=False)
 class FeedForward(Part):
@@ -56,6 +59,7 @@ class Gain(Part):
         decided_by: Input that decides it most, in words.
         decided_share: Share of the scatter of the largest gain that goes with it.
         left: What is left to feel where friction is most, at the safe gain [N m].
+        from_ring_down: Whether the damping of the rope comes from a ring-down; else it was stated.
     """
 
     safe: float
@@ -65,6 +69,7 @@ class Gain(Part):
     decided_by: str
     decided_share: float
     left: Interval
+    from_ring_down: bool = False
 
 
 @dataclass(frozen=True, repr=False)

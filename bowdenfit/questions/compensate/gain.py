@@ -7,7 +7,7 @@ from bowdenfit.device.gains import Linear, passive_gain, stable_gain
 from bowdenfit.device.known import drawn
 from bowdenfit.inference.interval import Interval
 from bowdenfit.questions.bends.loop_draws import LoopDraws
-from bowdenfit.questions.compensate.answer import Gain
+from bowdenfit.questions.compensate.answer import ROPE_DAMPING, Gain
 from bowdenfit.results.record import Record
 
 _PLANT = ("motor.inertia", "motor.damping", "joint.inertia", "joint.damping", "rope.damping", "controller.sample_time")
@@ -17,7 +17,7 @@ _DRAWS, _LOOKED_AT = 300, 3  # draws, and bends among them
 _NAMES = {
     "motor.inertia": "the inertia of the motor", "motor.damping": "the damping of the motor",
     "joint.inertia": "the inertia of the joint", "joint.damping": "the damping of the joint",
-    "rope.damping": "the damping of the rope", "controller.sample_time": "the sampling time",
+    "rope.damping": ROPE_DAMPING, "controller.sample_time": "the sampling time",
     "stiffness": "the stiffness of the cable",
 }  # fmt: skip
 
@@ -38,9 +38,8 @@ def gain_of(fit: Record, device: Device, loop: LoopDraws, felt: np.ndarray, risk
     assert loop.stiffness is not None
     n = len(loop.stiffness)
     has_hand = device.states(*HAND)
-    known = drawn(
-        device.needed("the gain of the active law", *NEEDED, *(HAND if has_hand else ())), n, fit.provenance.seed
-    )
+    stated = device.needed("the gain of the active law", *NEEDED, *(HAND if has_hand else ()))
+    known = drawn(stated, n, fit.provenance.seed)
     at = np.unique(np.linspace(0, n - 1, min(n, _DRAWS)).round().astype(int))
     bends = np.unique(np.linspace(0, len(loop.bends) - 1, _LOOKED_AT).round().astype(int))
     some = {name: values[at] for name, values in known.items()}
@@ -56,7 +55,7 @@ def gain_of(fit: Record, device: Device, loop: LoopDraws, felt: np.ndarray, risk
     first = max(shares, key=lambda name: shares[name])
     return Gain(
         safe, Interval.of(least), float(np.quantile(passive, risk, method="lower")), has_hand, _NAMES[first], shares[first],
-        Interval.of(felt / (1 + safe)),
+        Interval.of(felt / (1 + safe)), bool(stated["rope.damping"].draws),
     )  # fmt: skip
 
 

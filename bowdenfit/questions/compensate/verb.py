@@ -50,13 +50,14 @@ def compensate(
     """
     from dataclasses import replace
 
-    from bowdenfit.description.device import asked_for, read_device
+    from bowdenfit.description.device import asked_for
+    from bowdenfit.questions.bends.ring_down import device_for
     from bowdenfit.questions.compensate import words  # noqa: F401  (how the answer shows itself)
     from bowdenfit.questions.compensate.gain import NEEDED
     from bowdenfit.questions.compensate.ranking import compensation_of
     from bowdenfit.questions.compensate.simulation import simulated
 
-    described = None if device is None else read_device(Path(device))
+    described = None if device is None else device_for(found, Path(device))
     answer, loop = compensation_of(found, described, wrap_angle, law, _share(risk))
     if simulate:
         if described is None:

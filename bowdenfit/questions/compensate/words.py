@@ -3,7 +3,7 @@
 from collections.abc import Iterator
 
 from bowdenfit.display import text_of
-from bowdenfit.questions.compensate.answer import Compensation, FeedForward
+from bowdenfit.questions.compensate.answer import ROPE_DAMPING, Compensation, FeedForward, Gain
 from bowdenfit.questions.compensate.simulated import ACTIVE, KARNOPP, NONE
 from bowdenfit.words import decimals, filled, listed, percent, table
 
@@ -79,7 +79,7 @@ def _fed_back(found: Compensation) -> Iterator[str]:
     if gain.safe <= 0:
         yield (
             "No gain on the measured torque is safe: some devices that fit what is known oscillate with the least of them. "
-            f"What decides is {gain.decided_by}; measure it, and damp the rope."
+            f"What decides is {gain.decided_by}; {_measure(gain)}, and damp the rope."
         )
         return
     most = "10000 or more" if gain.safe >= 9999 else f"at most {gain.safe:.2g}"
@@ -88,8 +88,15 @@ def _fed_back(found: Compensation) -> Iterator[str]:
         f"oscillates, {'hands off or on' if gain.with_hand else 'hands off'}. That leaves {newton_metres(gain.left.median)} to "
         f"feel. Up to {gain.passive:.2g} no hand can make it oscillate. The largest gain is {gain.stable.q05:.2g} to "
         f"{gain.stable.q95:.2g} (90 % interval); {percent(gain.decided_share, 0)} of that goes with {gain.decided_by}: "
-        "measure it."
+        f"{_measure(gain)}."
     )
+
+
+def _measure(gain: Gain) -> str:
+    """What to do about the input that decides."""
+    if gain.decided_by != ROPE_DAMPING:
+        return "measure it"
+    return "which a ring-down told; measure more of them" if gain.from_ring_down else "measure it by a ring-down"
 
 
 def _cautions(found: Compensation) -> Iterator[str]:

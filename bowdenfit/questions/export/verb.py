@@ -68,14 +68,14 @@ def export(
 
 
 def _compensation(found: "Record", to: str, device: Path) -> dict[str, Any]:
-    from bowdenfit.description.device import read_device
+    from bowdenfit.questions.bends.ring_down import device_for
     from bowdenfit.questions.compensate.ranking import compensation_of
     from bowdenfit.questions.compensate.verb import ACCEPTED
     from bowdenfit.questions.export.compensation import compensation_parameters
     from bowdenfit.questions.export.refusals import refuse_compensation
 
     refuse_compensation(to)
-    return compensation_parameters(compensation_of(found, read_device(device), None, None, ACCEPTED)[0])
+    return compensation_parameters(compensation_of(found, device_for(found, device), None, None, ACCEPTED)[0])
 
 
 def _reply(answer: "Exported", _: Mapping[str, Any]) -> Reply:

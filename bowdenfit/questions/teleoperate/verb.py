@@ -37,12 +37,12 @@ def teleoperate(
         DescriptionError: Something that the answer needs is not said by the device, or has no sd.
         StoreError: `output` cannot be written.
     """
-    from bowdenfit.description.device import read_device
+    from bowdenfit.questions.bends.ring_down import device_for
     from bowdenfit.questions.teleoperate import teleoperation_figure
     from bowdenfit.questions.teleoperate.stability import teleoperation_of
     from bowdenfit.questions.teleoperate.words import teleoperation_text
 
-    answer = teleoperation_of(found, read_device(Path(device)), wrap_angle, PROBABILITY)
+    answer = teleoperation_of(found, device_for(found, Path(device)), wrap_angle, PROBABILITY)
     if output is not None:
         write_answer(output, NAME, answer, teleoperation_text(answer), {NAME: teleoperation_figure}, found.name)
     return answer

@@ -1,6 +1,5 @@
 """Damping of the rope from a ring-down: named by device.toml or of the fit itself, with what it holds of the joint taken off."""
 
-from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -36,7 +35,7 @@ class Fitted:
         return self
 
 
-def device(folder, new=f'ringdown = "../bar"\nmounting', more=("", "")):
+def device(folder, new='ringdown = "../bar"\nmounting', more=("", "")):
     text = DEVICE.read_text()
     assert text.count(STATED) == 1 and more[0] in text
     (folder / "device.toml").write_text(text.replace(STATED, new).replace(*more, 1))
@@ -78,7 +77,7 @@ def test_the_fits_own_ring_down_counts_and_tells_an_inertia_that_is_not_stated(t
 @pytest.mark.parametrize(
     ("own", "other", "change", "says"),
     [
-        (False, Fitted(), {"new": STATED.replace("\n", '\nringdown = "../bar"\n')}, "names a ring-down, which tells it already"),
+        (False, Fitted(), {"new": STATED.replace("\n", '\nringdown = "../bar"\n')}, "names a ring-down, which tells it"),
         (True, Fitted(), {"new": STATED}, "the fit itself has a ring-down, which tells it already"),
         (False, Fitted(rings=False), {}, "bar was fitted without a table ringdown; name the results of one"),
         (False, Fitted(TOTAL / 30), {}, "joint.damping: 0.001 N.m.s/rad is more than the 0.000[45].* correct it"),

@@ -136,7 +136,7 @@ def _first_looks(table: RingDownTable, run: int, product: float, stiffness: floa
 
 
 def _starts(prior: HalfNormal, look: float) -> tuple[float, ...]:
-    """z from which the largest density is looked for."""
+    """Z from which the largest density is looked for."""
     seen = float(prior.unconstrain(jnp.asarray(max(look, 1e-9))))
     return (*_STARTS, float(np.clip(seen, -_FARTHEST, _FARTHEST)))
 

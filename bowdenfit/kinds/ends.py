@@ -25,7 +25,8 @@ def end_column(table: RawTable, found: Mapping[str, Column], end: str, *, is_loo
     force, torque = f"{end}_force", f"{end}_torque"
     if force in found and torque in found:
         raise DatasetError(f"{table.file} has both {force} and {torque}; leave one of the two columns out.")
-    return found[torque] if torque in found else require(table, found, force, f"{force}_N" + (f" or {torque}_N_m" if is_loop else ""))
+    named = f"{force}_N or {torque}_N_m" if is_loop else f"{force}_N"
+    return found[torque] if torque in found else require(table, found, force, named)
 
 
 def forces_of(values: Vector, table: RawTable, found: Mapping[str, Column], end: str, pulleys: Pulleys) -> Vector:

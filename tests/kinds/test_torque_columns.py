@@ -41,7 +41,7 @@ def test_torques_over_the_radii_are_forces(tmp_path, headings, scales):
     [
         ("input_torque_N_m,output_force_N", (0.015, 1.0), "", r"the radius of that pulley is not known.*input_pulley_radius"),
         ("input_torque_N_m,output_torque_N_m", (-0.015, 0.012), RADII, r"'-0.3' is not positive"),
-        ("input_torque_N_m,input_force_N", (0.015, 1.0), RADII, r"(?s)both input_force and input_torque.*no column output_force"),
+        ("input_torque_N_m,input_force_N", (0.015, 1.0), RADII, r"(?s)both input_force and input_torque.*no column"),
         ("input_torque_N,output_force_N", (0.015, 1.0), RADII, r"torque"),
     ],
 )  # fmt: skip

@@ -1,4 +1,4 @@
-"""Damping of the rope from a ring-down: named by device.toml or of the fit itself, with what it holds of the joint taken off."""
+"""Damping of the rope from a ring-down: named by device.toml or of the fit itself, less that of the joint."""
 
 from pathlib import Path
 

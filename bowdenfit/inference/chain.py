@@ -87,12 +87,12 @@ class Sampling:
         return Chain(z, derived, diagnostics, n_ensembles, reasons=reasons, **of_sampler)
 
 
-def stuck_walkers(z: np.ndarray, what: str = "walkers") -> tuple[str, ...]:
+def stuck_walkers(z: np.ndarray) -> tuple[str, ...]:
     """Walkers that never moved in half their path; a few of them far out pass every other check."""
     count = int(np.sum(np.ptp(z[..., 0], axis=1) == 0)) if z.shape[1] > 1 and z.shape[2] else 0
     if not count:
         return ()
-    return (f"{count} of {len(z)} {what} did not move in the second half of their path, far from where the others are",)
+    return (f"{count} of {len(z)} sampled paths did not move in their second half, far from where the others are",)
 
 
 def worst(chain: Chain) -> tuple[float, float]:

@@ -43,8 +43,9 @@ def diagnose_all(draws: Mapping[str, ChainDraws], n_ensembles: int) -> dict[str,
 def diagnose(draws: ChainDraws, n_ensembles: int) -> Diagnostics:
     """Diagnostics of one quantity.
 
-    Walkers are the chains of the effective sample size; R-hat compares whole ensembles, because the walkers of one
-    ensemble move by each other's positions and are not independent.
+    R-hat compares whole ensembles, because the walkers of one ensemble move by each other's positions and are not independent.
+    Effective sample sizes and the error of the mean are those of `as_chains`, which others read: of walkers that keep twenty
+    draws each, taken for chains, they would come out up to 1.3 times too large.
 
     Args:
         draws: One row a walker, ordered by ensemble.
@@ -61,16 +62,29 @@ def diagnose(draws: ChainDraws, n_ensembles: int) -> Diagnostics:
     if np.ptp(draws) == 0.0:  # a quantity that cannot vary, such as an optimum always at the edge
         return Diagnostics(1.0, float(draws.size), float(draws.size), 0.0, 0.0)
     superchains = np.repeat(np.arange(n_ensembles), len(draws) // n_ensembles)
-    axes = {"chain_axis": 0, "draw_axis": 1}
+    chains, axes = as_chains(draws, n_ensembles), {"chain_axis": 0, "draw_axis": 1}
     with warnings.catch_warnings():
         warnings.simplefilter("ignore", RuntimeWarning)  # ties of an optimum at the edge divide by zero inside
         return Diagnostics(
             float(array_stats.rhat_nested(draws, superchain_ids=superchains, method="rank", **axes)),
-            float(array_stats.ess(draws, method="bulk", **axes)),
-            float(array_stats.ess(draws, method="tail", prob=(0.05, 0.95), **axes)),
-            float(array_stats.mcse(draws, method="mean", **axes)),
+            float(array_stats.ess(chains, method="bulk", **axes)),
+            float(array_stats.ess(chains, method="tail", prob=(0.05, 0.95), **axes)),
+            float(array_stats.mcse(chains, method="mean", **axes)),
             _drift(draws),
         )
+
+
+def as_chains(draws: np.ndarray, n_ensembles: int) -> np.ndarray:
+    """Draws of walkers as those of one chain an ensemble: the path of one walker after the other.
+
+    So autocorrelations stay those of the paths; a step of all walkers after the other would pass them off as independent, and
+    a chain for each walker is too short for the usual R-hat.
+
+    Args:
+        draws: One row a walker, ordered by ensemble; further axes stay as they are.
+        n_ensembles: Number of independent ensembles.
+    """
+    return draws.reshape(n_ensembles, -1, *draws.shape[2:])
 
 
 def _drift(draws: ChainDraws) -> float:
@@ -92,14 +106,25 @@ def shortfalls(diagnostics: Mapping[str, Diagnostics], target_r_hat: float, targ
     reasons = []
     for name, d in diagnostics.items():
         if not d.r_hat < target_r_hat:
-            reasons.append(f"R-hat of {name} is {d.r_hat:.3f} and should be below {target_r_hat:g}")
+            wider, most = percent(d.r_hat - 1), percent(target_r_hat - 1)
+            reasons.append(f"{name} spreads {wider} wider over all starts than within one, and should less than {most}")
         if not d.drift < MAXIMUM_DRIFT:
-            reasons.append(f"{name} still drifts along the chain, by {percent(d.drift, 0)} of its spread")
+            reasons.append(f"{name} still drifts while it is sampled, by {percent(d.drift, 0)} of its spread")
         low = min(d.ess_bulk, d.ess_tail)
         if not low >= target_ess:
-            which = "bulk" if d.ess_bulk <= d.ess_tail else "tail"
-            reasons.append(f"{which} effective sample size of {name} is {low:.0f} and should be at least {target_ess}")
+            reasons.append(too_few(f"the {'middle' if d.ess_bulk <= d.ess_tail else 'ends'} of {name}", low, target_ess))
     return tuple(reasons)
+
+
+def too_few(what: str, worth: float, least: int) -> str:
+    """That too few effective draws were made, in words.
+
+    Args:
+        what: Of what.
+        worth: Effective sample size.
+        least: What it should be.
+    """
+    return f"for {what} the samples are worth {worth:.0f} independent ones, and should be worth at least {least}"
 
 
 @dataclass(frozen=True)
@@ -157,7 +182,7 @@ def trajectory_shortfalls(trajectories: Trajectories) -> tuple[str, ...]:
         if diverged > most * drawn:
             reasons.append(
                 f"{diverged} of {drawn} trajectories{which} diverged, and 1 in {1 / most:.0f} is the most: a narrow corner of "
-                "the posterior may be missing; raise sampler.target_acceptance, or state what is known as priors"
+                "what is likely may be missing; raise sampler.target_acceptance, or state what is known as priors"
             )
     if not trajectories.energy_mixing >= LEAST_ENERGY_MIXING:
         reasons.append(

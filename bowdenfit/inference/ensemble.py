@@ -209,6 +209,6 @@ def _summarized(asked: Sampling, backend: emcee.backends.Backend) -> Chain:
     z = np.ascontiguousarray(np.asarray(backend.get_chain()[kept]).transpose(1, 0, 2))
     acceptance = float(np.mean(backend.accepted)) / stored
     chain = asked.chain_of(z, asked.settings.n_ensembles, steps=stored * THIN, acceptance=acceptance)
-    too_short = f"each walker took {stored * THIN} steps, and {_FIRST_LOOK * THIN} are the least that can be judged"
+    too_short = f"the sampling took {stored * THIN} steps, and {_FIRST_LOOK * THIN} are the least that can be judged"
     first = (too_short,) if stored < _FIRST_LOOK else ()
     return replace(chain, reasons=(*first, *chain.reasons, *stuck_walkers(z)))

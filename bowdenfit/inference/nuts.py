@@ -234,5 +234,5 @@ def _summarized(asked: Sampling, blocks: Sequence[Block]) -> tuple[Chain, bool]:
     )
     went = {"acceptance": float(drawn["acceptance_rate"].mean()), "sampler": "nuts", "trajectories": trajectories}
     chain = asked.chain_of(z, chains, steps=steps, **went)
-    reasons = (*chain.reasons, *stuck_walkers(z[:, z.shape[1] // 2 :], "chains"))
+    reasons = (*chain.reasons, *stuck_walkers(z[:, z.shape[1] // 2 :]))
     return replace(chain, reasons=(*reasons, *trajectory_shortfalls(trajectories))), bool(reasons)

@@ -12,6 +12,7 @@ import numpy as np
 
 from bowdenfit.dataset import Dataset
 from bowdenfit.errors import DescriptionError, StoreError
+from bowdenfit.inference.diagnostics import as_chains
 from bowdenfit.inference.draws import derived_units
 from bowdenfit.inference.least_squares import LeastSquares
 from bowdenfit.kinds import KINDS, each_table
@@ -168,7 +169,7 @@ def posterior_page(fit: Record) -> tuple[Groups, Coordinates, dict[str, str], di
     groups = {name: variables for name, variables in groups.items() if variables or name != DERIVED}
     attributes = {"provenance": json.dumps(asdict(fit.provenance)), "name": fit.name}
     for name in groups.keys() - _NOT_DRAWN:
-        groups[name] = {variable: _as_chains(draws, posterior.n_ensembles) for variable, draws in groups[name].items()}
+        groups[name] = {variable: as_chains(draws, posterior.n_ensembles) for variable, draws in groups[name].items()}
     return groups, labels, attributes, _variable_attributes(fit)
 
 
@@ -179,15 +180,6 @@ def _walkers(posterior: Draws) -> dict[str, np.ndarray]:
         return {}
     walkers = np.arange(rows, dtype=np.int32) % (rows // posterior.n_ensembles)
     return {WALKER: np.repeat(walkers, draws).reshape(rows, draws)}
-
-
-def _as_chains(draws: np.ndarray, chains: int) -> np.ndarray:
-    """Draws of walkers (ordered by ensemble) as those of one chain an ensemble: the path of one walker after the other.
-
-    So autocorrelations stay those of the paths, and others count effective draws as we do; a step of all walkers after the
-    other would pass them off as independent. A chain for each walker is too short for the usual R-hat.
-    """
-    return draws.reshape(chains, -1, *draws.shape[2:])
 
 
 def _as_walkers(groups: Groups) -> Groups:

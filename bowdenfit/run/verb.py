@@ -13,6 +13,7 @@ from bowdenfit.questions.summary.verb import reply
 from bowdenfit.reading import Reading, read, refuse_unknown
 from bowdenfit.results.folder import CHAIN
 from bowdenfit.verb import LARGEST_SEED, Argument, Option, Output, Reply, Verb, Watch
+from bowdenfit.words import percent
 
 if TYPE_CHECKING:
     from bowdenfit.dataset import Dataset
@@ -91,11 +92,11 @@ def _reply(found: "Fit", asked: dict[str, Any]) -> Reply:
 
 
 def _show(bar: Any, progress: "Progress") -> None:
-    """Steps, R-hat and effective sample size."""
+    """Steps, how much wider all starts spread than one (R-hat), and the effective sample size."""
     bar.n = progress.steps
     bar.set_description_str(f"sampling with {progress.sampler}", refresh=False)
     if progress.r_hat is not None and progress.ess is not None:
-        bar.set_postfix_str(f"R-hat {progress.r_hat:.3f}, effective draws {progress.ess:.0f}", refresh=False)
+        bar.set_postfix_str(f"starts differ by {percent(max(progress.r_hat - 1, 0.0))}, worth {progress.ess:.0f} samples", refresh=False)
     bar.refresh()
 
 

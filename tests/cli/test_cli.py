@@ -212,7 +212,7 @@ def test_a_fit_that_has_not_converged_exits_with_3_and_says_why(run, on_body, tm
     code, out, err = run("fit", on_body, "--output", tmp_path / "fit", "--seed", 1, "--no-figures", *settings)
     assert code == 3
     assert "DO NOT USE THESE NUMBERS: the computation has not settled" in " ".join(out.split())
-    assert "should be at least 300" in run("summary", tmp_path / "fit", "--full")[1]
+    assert "should be worth at least 300" in run("summary", tmp_path / "fit", "--full")[1]
     assert (tmp_path / "fit" / "fit.json").exists()
     assert run("length", tmp_path / "fit")[2].startswith("Warning")
 

@@ -5,7 +5,8 @@ from dataclasses import replace
 
 import numpy as np
 
-from bowdenfit.inference.diagnostics import MAXIMUM_DRIFT, Diagnostics, diagnose_all
+from bowdenfit.inference.diagnostics import MAXIMUM_DRIFT, Diagnostics, diagnose_all, too_few
+from bowdenfit.words import percent
 
 _ENOUGH = 1000.0  # effective draws
 
@@ -25,7 +26,7 @@ def diagnose_few_draws(draws: Mapping[str, np.ndarray], n_ensembles: int) -> dic
 def remembered(diagnostics: Mapping[str, Diagnostics], least: int) -> tuple[str, ...]:
     """Where too few effective draws were made for walkers to have forgotten where they started, in words."""
     return tuple(
-        f"bulk effective sample size of {name} is {d.ess_bulk:.0f} and should be at least {least}"
+        too_few(f"the middle of {name}", d.ess_bulk, least)
         for name, d in diagnostics.items()
         if not d.ess_bulk >= least
     )
@@ -45,7 +46,7 @@ def sd_errors(draws: Mapping[str, np.ndarray]) -> dict[str, float]:
 def uncertain_sds(errors: Mapping[str, float], most: float) -> tuple[str, ...]:
     """Which standard deviations are not known well enough, in words."""
     return tuple(
-        f"the standard deviation of {name} is known to {error:.1%} and should be to {most:.1%}"
+        f"the standard deviation of {name} is known to {percent(error)} and should be to {percent(most)}"
         for name, error in errors.items()
         if not error <= most
     )

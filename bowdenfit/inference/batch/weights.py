@@ -14,7 +14,7 @@ from functools import cached_property
 import numpy as np
 
 from bowdenfit.inference.batch.mixture import Mixture
-from bowdenfit.inference.diagnostics import Diagnostics
+from bowdenfit.inference.diagnostics import Diagnostics, too_few
 from bowdenfit.inference.psis import reliable_k, smooth_weights
 
 BLOCK = 2048  # draws of a round
@@ -79,12 +79,12 @@ class Weighted:
         most, reasons = reliable_k(len(self.z)), []
         if not self.pareto_k <= most:
             reasons.append(
-                f"Pareto k of the importance weights is {self.pareto_k:.2f} and should be at most {most:.2f}"
+                f"the approximation that was corrected is too coarse, {self.pareto_k:.2f} where {most:.2f} is the most"
             )
         for name, d in diagnostics.items():
             low = min(d.ess_bulk, d.ess_tail)
             if not low >= target_ess:
-                reasons.append(f"effective sample size of {name} is {low:.0f} and should be at least {target_ess}")
+                reasons.append(too_few(name, low, target_ess))
         return tuple(reasons)
 
 

@@ -1,13 +1,13 @@
 """The program `bowdenfit`, or `python -m bowdenfit`: from its first moment on an interrupt is one line, and no traceback."""
 
+import _signal as signal  # what the module `signal` is of, without what that loads: until then an interrupt is a traceback
 import os
-import signal
 
 _INTERRUPTED = 130
 
 
 def _interrupted(*_: object) -> None:
-    os.write(2, b"\nInterrupted.\n")
+    os.write(2, b"\nInterrupted.\n" if os.isatty(2) else b"Interrupted.\n")  # a terminal shows ^C before it
     os._exit(_INTERRUPTED)
 
 

@@ -77,7 +77,7 @@ class Watch:
     """How a verb that takes long is watched and interrupted.
 
     Args:
-        kept: File in the results folder that lets it go on later.
+        kept: File in the results folder that lets it go on later; empty where nothing does.
         remark: What is kept; the folder follows.
         bar: Options of the progress bar.
         show: Moves the bar by what the function reports.

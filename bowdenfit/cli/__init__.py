@@ -7,6 +7,7 @@ import sys
 import warnings
 from contextlib import suppress
 from pathlib import Path
+from typing import NoReturn
 
 import click
 
@@ -15,7 +16,7 @@ from bowdenfit.cli.interrupts import listening, was_asked
 from bowdenfit.cli.progress import INTERRUPTED
 from bowdenfit.cli.starting import completion, init
 from bowdenfit.cli.supervised import is_limited, supervise
-from bowdenfit.cli.terminal import NoReaderError, say
+from bowdenfit.cli.terminal import NoReaderError, say, say_interrupted
 from bowdenfit.errors import BowdenfitError, system_error
 from bowdenfit.verbs import VERBS
 
@@ -76,15 +77,13 @@ def main() -> None:
         _complain(f"Error: {_NEW_LINE.sub('?', str(error))}")
         sys.exit(error.exit_code)
     except (click.Abort, KeyboardInterrupt):
-        _complain("Interrupted.")
-        sys.exit(INTERRUPTED)
+        _end_interrupted()
     except NoReaderError:
         os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
         sys.exit(_NO_READER)
     except Exception as error:
         if was_asked():  # whatever came of it is that interrupt
-            _complain("Interrupted.")
-            sys.exit(INTERRUPTED)
+            _end_interrupted()
         if os.environ.get("BOWDENFIT_DEBUG"):
             raise
         error.__traceback__ = None  # what they hold may be all the memory there is
@@ -101,6 +100,12 @@ def _complain(text: str) -> None:
     """Say what went wrong, where that can be said; the exit code says it in any case."""
     with suppress(OSError):
         say(text, err=True)
+
+
+def _end_interrupted() -> NoReturn:
+    with suppress(OSError):
+        say_interrupted()
+    sys.exit(INTERRUPTED)
 
 
 @click.group(context_settings={"help_option_names": ["-h", "--help"], "max_content_width": 110})

@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
+from bowdenfit.cli.interrupts import was_asked
 from bowdenfit.cli.keywords import Keyword, keywords_of
 from bowdenfit.cli.progress import watch_verb
 from bowdenfit.cli.terminal import say
@@ -46,6 +47,8 @@ def _run(verb: Verb, keywords: tuple[Keyword, ...], given: dict[str, Any], form:
     reply = _kept(verb, asked)
     if reply is None or (form == "json" and reply.page is None) or (form == "csv" and reply.csv is None):
         reply = _answer(verb, keywords, given, asked)
+    if was_asked():  # while the last was loaded
+        raise KeyboardInterrupt
     say(_page(reply) if form == "json" else reply.csv() if form == "csv" and reply.csv else reply.text, nl=False)
     for note in reply.notes:
         say(note, err=True)

@@ -13,6 +13,7 @@ import click
 
 from bowdenfit.cli.interrupts import call_soon, is_loading
 from bowdenfit.cli.supervised import say_if_aborted
+from bowdenfit.cli.terminal import say_interrupted
 from bowdenfit.errors import DiskError, MemoryShortageError, system_error
 from bowdenfit.inference.engines.memory import refuse_too_little
 from bowdenfit.verb import Watch
@@ -22,21 +23,24 @@ Report: TypeAlias = Callable[..., None]
 
 
 @contextmanager
-def watch_verb(folder: Path, watch: Watch) -> Iterator[Report]:
+def watch_verb(folder: Path | None, watch: Watch) -> Iterator[Report]:
     """Gives what to call while something long runs; says how to go on when the user (or the system) stops it.
 
     An interrupt that arrives inside a callback of the garbage collector is lost: Python prints it and goes on. So it is
     remembered, not printed, and raised again by the next call.
 
     Args:
-        folder: Results folder.
+        folder: Results folder, where there is one.
         watch: What is kept there, and what the bar shows.
 
     Raises:
         MemoryShortageError: There is too little memory to begin.
     """
     refuse_too_little()
-    say_if_aborted(folder / watch.kept, _kept_in(folder))
+    kept = folder / watch.kept if folder is not None and watch.kept else None
+    go_on = f"What was done so far is kept in {folder}: with room, run the same command with --resume."
+    if kept is not None:
+        say_if_aborted(kept, go_on)
     asked = threading.Event()
 
     def stop(_: int, frame: FrameType | None) -> None:
@@ -69,21 +73,17 @@ def watch_verb(folder: Path, watch: Watch) -> Iterator[Report]:
     except BaseException as error:  # where an interrupt is wanted, whatever came of it is that interrupt
         wanted = asked.is_set() or isinstance(error, KeyboardInterrupt)
         shortage = error if isinstance(error, DiskError) else system_error(error)
-        kept = (folder / watch.kept).exists()
-        if kept and wanted:
-            click.echo(f"\nInterrupted; {watch.remark} {folder}: run the same command with --resume.", err=True)
+        is_kept = kept is not None and kept.exists()
+        if is_kept and wanted:
+            say_interrupted(f"{watch.remark} {folder}: run the same command with --resume")
             raise click.exceptions.Exit(INTERRUPTED) from None
-        if kept and isinstance(shortage, DiskError | MemoryShortageError):
-            raise type(shortage)(f"{shortage} {_kept_in(folder)}") from None
+        if is_kept and isinstance(shortage, DiskError | MemoryShortageError):
+            raise type(shortage)(f"{shortage} {go_on}") from None
         if wanted:
             raise KeyboardInterrupt from None
         raise
     finally:
         sys.unraisablehook = printed
-
-
-def _kept_in(folder: Path) -> str:
-    return f"What was done so far is kept in {folder}: with room, run the same command with --resume."
 
 
 @contextmanager

@@ -31,6 +31,16 @@ def say(text: str, err: bool = False, nl: bool = True) -> None:
         raise NoReaderError from None
 
 
+def say_interrupted(how_to_go_on: str = "") -> None:
+    """Say in one line that this was interrupted; a terminal shows ^C before it.
+
+    Args:
+        how_to_go_on: Behind a semicolon, where something is kept.
+    """
+    apart = "\n" if sys.stderr is not None and sys.stderr.isatty() else ""
+    say(f"{apart}Interrupted{how_to_go_on and f'; {how_to_go_on}'}.", err=True)
+
+
 def shows(text: str, encoding: str | None) -> bool:
     """Whether a terminal of an encoding can show a text; one of the locale C says that it has no more than ASCII.
 

@@ -96,7 +96,8 @@ def _show(bar: Any, progress: "Progress") -> None:
     bar.n = progress.steps
     bar.set_description_str(f"sampling with {progress.sampler}", refresh=False)
     if progress.r_hat is not None and progress.ess is not None:
-        bar.set_postfix_str(f"starts differ by {percent(max(progress.r_hat - 1, 0.0))}, worth {progress.ess:.0f} samples", refresh=False)
+        differ = percent(max(progress.r_hat - 1, 0.0))
+        bar.set_postfix_str(f"starts differ by {differ}, worth {progress.ess:.0f} samples", refresh=False)
     bar.refresh()
 
 

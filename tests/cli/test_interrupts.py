@@ -44,6 +44,13 @@ def test_without_the_first_moments_an_interrupt_is_raised_while_something_is_loa
     assert _interrupted("bowdenfit.cli", "click", str(on_body)).returncode == 77
 
 
+def test_nothing_is_loaded_before_the_program_hears_an_interrupt():
+    """Until then one is a traceback of Python's, as it is while Python itself starts."""
+    code = "import sys; before = {*sys.modules}; import bowdenfit.__main__; print(*sorted({*sys.modules} - before))"
+    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True, timeout=60)
+    assert {*done.stdout.split()} <= {"bowdenfit", "bowdenfit.__main__", "_signal"}
+
+
 INTERRUPT_IN_A_LIBRARY = """
 import os, signal, sys, time, tomllib
 signal.signal(signal.SIGINT, signal.default_int_handler)

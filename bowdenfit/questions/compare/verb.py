@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING, Annotated, Any, Literal
 
 from bowdenfit.errors import StoreError
 from bowdenfit.questions.writing import write_answer
-from bowdenfit.verb import Argument, Option, Output, Reply, Verb
+from bowdenfit.verb import Argument, Option, Output, Reply, Verb, Watch
 
 if TYPE_CHECKING:
     from bowdenfit.questions.compare.answer import Comparison
@@ -21,7 +21,7 @@ def compare(
     leave_out: Annotated[Literal["run", "load", "reading"] | None, Option(default="run, or load where runs are few")] = None,
     output: Annotated[Output, Option(("-o",))] = None,
     force: Annotated[bool, Option()] = False,
-    report: Callable[[str], None] | None = None,
+    progress: Callable[[str], None] | None = None,
 ) -> "Comparison":
     """Compare fits of the same measurements.
 
@@ -31,7 +31,7 @@ def compare(
             one reading.
         output: Folder for comparison.html, comparison.json, comparison.txt and the figure; nothing is written without one.
         force: Replace a comparison in --output.
-        report: Called with a sentence before each reading that takes longer, because it would move the posterior.
+        progress: Called with a sentence before each reading that takes longer, because it would move the posterior.
 
     Raises:
         UsageError: There are fewer than two, one has no posterior, or they are not of the same readings.
@@ -39,6 +39,7 @@ def compare(
     """
     import jax
 
+    from bowdenfit.notebook import watched
     from bowdenfit.questions.compare import comparison_figure
     from bowdenfit.questions.compare.answer import compare as compared
     from bowdenfit.questions.compare.sections import comparison_page
@@ -46,8 +47,8 @@ def compare(
 
     if output is not None:
         refuse_to_replace(Path(output), force)
-    with jax.enable_x64(True):
-        found = compared(fits, report, leave_out)
+    with jax.enable_x64(True), watched(WATCH, progress) as show:
+        found = compared(fits, show, leave_out)
     if output is not None:
         names = {fit.name for fit in fits.values()}
         cable = names.pop() if len(names) == 1 else ""
@@ -84,6 +85,11 @@ def _reply(found: "Comparison", asked: dict[str, Any]) -> Reply:
     return Reply(comparison_text(found), lambda: found, notes, csv=found.to_csv)
 
 
+def _show(bar: Any, sentence: str) -> None:
+    bar.set_description_str(sentence)
+
+
+WATCH = Watch("", "", {"desc": "comparing", "bar_format": "{desc} {elapsed}"}, _show)
 VERB = Verb(
     compare,
     _reply,
@@ -103,4 +109,5 @@ VERB = Verb(
     predictive density of leave-one-out (elpd in the JSON).
     """,
     csv="Print the fits as CSV, the best first.",
+    watch=WATCH,
 )

@@ -2,6 +2,8 @@
 
 import json
 import shutil
+from concurrent.futures import ProcessPoolExecutor
+from multiprocessing import get_context
 from pathlib import Path
 
 import numpy as np
@@ -77,6 +79,15 @@ def test_draws_depend_neither_on_order_nor_on_what_else_is_fitted(fitted, tmp_pa
     where = together.label.index(alone.label[0])
     for name, draws in alone.values.items():
         np.testing.assert_array_equal(draws[0], together.values[name][where])
+
+
+def test_a_process_that_is_started_anew_writes_the_same_file(fitted, tmp_path):
+    """To the last bit; clusters are in test_fleet_engines.py."""
+    _, results = fitted
+    folder = some(tmp_path / "fleet", range(6))
+    with ProcessPoolExecutor(1, get_context("spawn")) as executor:
+        bf.fleet(folder, output=tmp_path / "results", seed=7, engine=executor, workers=1)
+    assert (tmp_path / "results" / FLEET_DRAWS).read_bytes() == (results / FLEET_DRAWS).read_bytes()
 
 
 def test_a_fleet_can_be_continued_with_new_inspections_and_comes_out_the_same(fitted, tmp_path):

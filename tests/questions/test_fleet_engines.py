@@ -1,0 +1,90 @@
+"""A fleet is the same file to the last bit whichever cluster fits it, and whoever dies meanwhile."""
+
+import os
+import signal
+import subprocess
+import sys
+import time
+from pathlib import Path
+
+import pytest
+
+import bowdenfit as bf
+from bowdenfit.inference.engines.choice import slurm
+from bowdenfit.questions.fleet.store import KEPT
+from bowdenfit.results.fleet_folder import FLEET_DRAWS
+
+FLEET = Path(__file__).parents[2] / "datasets" / "synthetic-fleet"
+SEED = 7
+
+
+@pytest.fixture(scope="module")
+def whole(tmp_path_factory) -> bytes:
+    """The file of the whole fleet, fitted in this process; one of its inspections is drawn by ensembles."""
+    folder = tmp_path_factory.mktemp("whole") / "results"
+    assert set(bf.fleet(FLEET, output=folder, seed=SEED).engines) == {"laplace", "ensembles"}
+    return (folder / FLEET_DRAWS).read_bytes()
+
+
+@pytest.fixture(scope="module")
+def cluster():
+    """A Dask cluster on this machine: two workers, which are replaced when they die."""
+    from distributed import LocalCluster
+
+    with LocalCluster(n_workers=2, threads_per_worker=1, host="127.0.0.1", dashboard_address=None) as found:
+        yield found
+
+
+def by_dask(cluster) -> str:
+    return cluster.scheduler_address.replace("tcp://", "dask://")
+
+
+@pytest.mark.slow
+def test_a_dask_cluster_writes_the_same_file(whole, cluster, tmp_path):
+    bf.fleet(FLEET, output=tmp_path, seed=SEED, engine=by_dask(cluster))
+    assert (tmp_path / FLEET_DRAWS).read_bytes() == whole
+
+
+@pytest.mark.slow
+def test_jobs_as_slurm_has_them_write_the_same_file(whole, tmp_path):
+    with slurm(tmp_path / "jobs", 2, "local") as executor:
+        bf.fleet(FLEET, output=tmp_path / "results", seed=SEED, engine=executor, workers=2)
+    assert (tmp_path / "results" / FLEET_DRAWS).read_bytes() == whole
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("after", [1, 3])
+def test_a_dask_worker_that_is_killed_in_the_middle_changes_nothing(whole, cluster, tmp_path, after):
+    """Both are killed, so that one of them was at work."""
+    from distributed import Client
+
+    pieces, killed = list[int](), list[int]()
+
+    def kill(done, total, _):
+        pieces.append(done)
+        if len(pieces) == after:
+            assert done < total
+            with Client(cluster.scheduler_address, set_as_default=False) as client:
+                killed.extend(client.run(os.getpid).values())
+            for process in killed:
+                os.kill(process, signal.SIGKILL)
+
+    bf.fleet(FLEET, output=tmp_path, seed=SEED, engine=by_dask(cluster), progress=kill)
+    assert len(killed) == 2
+    assert (tmp_path / FLEET_DRAWS).read_bytes() == whole
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("engine", ["local", "dask"])
+def test_a_client_that_is_killed_goes_on_and_writes_the_same_file(whole, tmp_path, engine, request):
+    where = by_dask(request.getfixturevalue("cluster")) if engine == "dask" else engine
+    words = [sys.executable, "-m", "bowdenfit", "fleet", FLEET, "-o", tmp_path / "results", "--engine", where]
+    pieces = tmp_path / "results" / KEPT
+    with subprocess.Popen([*words, "--seed", str(SEED)], stderr=subprocess.DEVNULL) as client:
+        while client.poll() is None and not list(pieces.glob("*.npz")):
+            time.sleep(0.005)
+        client.kill()
+    assert client.returncode == -signal.SIGKILL and not (tmp_path / "results" / FLEET_DRAWS).exists()
+    kept = len(list(pieces.glob("*.npz")))
+    subprocess.run([*words, "--resume"], check=True, capture_output=True)
+    assert kept > 0 and (tmp_path / "results" / FLEET_DRAWS).read_bytes() == whole

@@ -15,13 +15,15 @@ from bowdenfit.inference.batch.mixture import Mixture
 Gradients = Callable[[np.ndarray], tuple[np.ndarray, np.ndarray]]
 
 STARTS = 4  # places that each density is climbed from: the prior medians, and draws of the prior
-_ASIDE = (-2.0, 1.5, 3.0)  # standard deviations from its maximum at which each noise scale is held
+# Standard deviations from its maximum at which each noise scale is held, as many as starts; the highest are where everything
+# else is widest, which decides how well standard deviations are known.
+_ASIDE = (-2.0, 2.0, 4.0, 6.0)
 _MOST_STEPS, _DIFFERENCE = 30, 1e-5
 _FLAT = 0.2  # least curvature that is believed; the prior's is 1
 _LONGEST = 3.0  # step, in standard deviations of the prior
 _TOP = 1e-4  # gain that a step promises at which the top is near enough to draw about it
 _STUCK = 1e8  # damping at which no step gains anything
-_LEAST_SHARE = 0.02  # of each part in the draws
+_LEAST_SHARE = 0.1  # of each part in the draws, before they are made to sum to 1
 
 
 @dataclass(frozen=True)
@@ -104,7 +106,7 @@ def mixtures(gradients: Gradients, noise: np.ndarray, seeds: np.ndarray) -> list
     aside = []
     for which in np.flatnonzero(noise):
         unit = np.arange(size) == which
-        starts = best[:, None] + np.array([*_ASIDE, 0.0])[:, None] * spread[:, None] * unit
+        starts = best[:, None] + np.array(_ASIDE)[:, None] * spread[:, None] * unit
         aside.append((unit.astype(float), climb(gradients, starts, np.tile(1.0 - unit, (STARTS, 1)))))
     found = [_mixture(tops, aside, spread, cable) for cable in range(len(seeds))]
     return [mixture if np.isfinite(tops.value[i]).any() else None for i, mixture in enumerate(found)]

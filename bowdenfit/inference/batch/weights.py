@@ -98,12 +98,13 @@ def weighted_draws(
         generator: Of everything random here.
         enough: Whether draws are enough.
     """
-    z, log_density = np.zeros((0, mixture.center.shape[1])), np.zeros(0)
+    z, log_density, log_proposed = np.zeros((0, mixture.center.shape[1])), np.zeros(0), np.zeros(0)
     for look in _LOOKS:
         while len(z) < look * BLOCK:
             more = mixture.draw(generator, BLOCK)
             z, log_density = np.concatenate([z, more]), np.concatenate([log_density, (yield more)])
-        weighted = Weighted(z, log_density, mixture.log_density(z))
+            log_proposed = np.concatenate([log_proposed, mixture.log_density(more)])
+        weighted = Weighted(z, log_density, log_proposed)
         if effective_draws(weighted.log_weights) < _WORTH * len(z) or enough(weighted):
             break
     return weighted

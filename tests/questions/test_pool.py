@@ -57,6 +57,21 @@ def test_cables_unlike_the_rest_are_named_and_no_others(found):
     assert "wear lies" in found.cable("cable-08").unlike
 
 
+def test_cables_that_are_all_alike_or_all_unlike_are_said_to_be(found):
+    assert "all cables are alike" not in pool_text(found) and "All cables are unlike" not in pool_text(found)
+    no_spread = {name: replace(each, q05=0.001, q95=0.02) for name, each in found.spreads.items()}
+    text = pool_text(replace(found, spreads=no_spread))
+    assert "all cables are alike: they differ by at most 2.0 %" in " ".join(text.split())
+    known = {**no_spread, "wear": found.spreads["wear"]}
+    assert "all cables are alike" not in pool_text(replace(found, spreads=known))
+    wide = replace(found.coefficients["mu_1"], q05=0.02, q95=0.2)
+    apart = replace(found, coefficients=found.coefficients | {"mu_1": wide}, mixed={})
+    assert "All cables are unlike" not in pool_text(apart)
+    nobody = tuple(replace(each, unlike="") for each in found.cables)
+    assert "All cables are unlike in mu_0 (" in " ".join(pool_text(replace(apart, cables=nobody)).split())
+    assert "mu_1 (0.02 to 0.2 of nine in ten)" in " ".join(pool_text(replace(apart, cables=nobody)).split())
+
+
 def test_words_answer_first_and_keep_to_the_page(found):
     text = pool_text(found)
     assert text.startswith("made: ") and "below 60 % after" in text.splitlines()[0]
@@ -202,6 +217,15 @@ def test_one_cable_has_no_population():
     alone = pool(drawn, ASKED)
     assert alone.new is None and not alone.unlike and not alone.spreads
     assert "one cable only" in pool_text(alone)
+
+
+@pytest.mark.slow
+def test_fleets_without_and_with_nothing_in_common():
+    """Of one kind to the last digit, and of two times the spread that anybody expects."""
+    alike = pool(fleet_draws(21, truth=Truth(spread=0.0, wear_spread=0.0))[0])
+    assert "all cables are alike" in pool_text(alike) and not alike.unlike
+    unlike = pool(fleet_draws(22, cables=16, truth=Truth(spread=1.0))[0])
+    assert "All cables are unlike in mu_0" in pool_text(unlike)
 
 
 @pytest.mark.slow

@@ -9,6 +9,8 @@ from bowdenfit.words import counted, decimals, filled, listed, percent, table
 
 _NAMED, _SHOWN = 5, 12  # unlike cables, and cables in the table
 _SURE = 0.999
+_NONE = 0.1  # 5 % of a spread over its 95 %, below which it cannot be told from none
+_ANY = 5.0  # 95 % of new cables over their 5 %, above which one cable tells little of another
 
 
 @text_of.register(Pool)
@@ -93,7 +95,19 @@ def unlike_sentences(found: Pool) -> list[str]:
             f"These cables do not look like one population in {names}: there are heaps or stragglers, as where cables of two "
             "makes are pooled. Pool each make by itself, or a new cable is not what is said here."
         )
-    return lines or ["No cable is unlike the rest."]
+    return [*(lines or ["No cable is unlike the rest."]), *kind_sentences(found)]
+
+
+def kind_sentences(found: Pool) -> list[str]:
+    """Whether all cables are alike, or all unlike."""
+    if found.spreads and all(each.q05 < _NONE * each.q95 for each in found.spreads.values()):
+        most = max(found.spreads.values(), key=lambda each: each.q95)
+        return [f"As far as these inspections tell all cables are alike: they differ by at most {percent(most.q95)}."]
+    apart = {name: new for name, new in found.coefficients.items() if new.q95 > _ANY * new.q05}
+    if not apart or found.unlike or found.mixed:  # a few that stand apart are said by name
+        return []
+    named = listed([f"{name} ({new.q05:.2g} to {new.q95:.2g} of nine in ten)" for name, new in apart.items()])
+    return [f"All cables are unlike in {named}: one of them tells little of another, and nothing is drawn toward a middle."]
 
 
 def next_sentences(found: Pool) -> list[str]:

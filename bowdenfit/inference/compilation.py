@@ -28,9 +28,9 @@ def compile_program(
     Raises:
         MemoryShortageError: There is too little memory for it, which the compiler cannot say.
     """
-    take_buffers()
     refuse_shortage()
     lowered = jax.jit(function).lower(*shapes)
+    take_buffers(loaded=run_once)
     options = (_RUN_ONCE if run_once else _OPTIONS) if jax.default_backend() == "cpu" else {}
     if beside is None:
         return _compiled(lowered, options)

@@ -7,9 +7,11 @@ computed, when a refusal is still a sentence.
 
 import mmap
 from collections.abc import Callable
+from contextlib import suppress
 from ctypes import CDLL, c_int, c_void_p
 from functools import cache
 from importlib import import_module
+from sys import modules
 
 from bowdenfit.errors import MemoryShortageError
 from bowdenfit.inference.engines.processes import cores
@@ -56,21 +58,29 @@ def refuse_too_little() -> None:
     refuse_shortage(_ADDRESSES + cores() * _ADDRESSES_PER_CORE, addresses=True)
 
 
-@cache
-def take_buffers() -> None:
+def take_buffers(loaded: bool = False) -> None:
     """Let linear algebra have the memory that it will want in this process, so that no call of it waits for some.
+
+    Args:
+        loaded: Whether to pass over what nothing has loaded yet; JAX loads SciPy's, which takes half a second, when it lowers
+            a function that needs it.
 
     Raises:
         MemoryShortageError: The system refuses it.
     """
-    for name, of_xla in _MODULES.items():
+    for name in _MODULES:
+        if not loaded or name in modules:
+            _take_buffers_of(name)
+
+
+@cache
+def _take_buffers_of(name: str) -> None:
+    """Take those of one module, once."""
+    with suppress(AttributeError):  # of another library than OpenBLAS, or one that keeps this to itself
         library = CDLL(import_module(name).__file__)
-        try:
-            take, give = library.blas_memory_alloc, library.blas_memory_free
-        except AttributeError:  # another library than OpenBLAS, or one that keeps this to itself
-            continue
+        take, give = library.blas_memory_alloc, library.blas_memory_free
         take.argtypes, take.restype, give.argtypes, give.restype = [c_int], c_void_p, [c_void_p], None
-        _take(take, give, _OF_PYTHON + of_xla * cores())
+        _take(take, give, _OF_PYTHON + _MODULES[name] * cores())
 
 
 def _take(take: Callable[[int], int | None], give: Callable[[int], None], count: int) -> None:

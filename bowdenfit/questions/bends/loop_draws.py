@@ -93,10 +93,10 @@ def loop_draws(fit: Record, bends: np.ndarray, device: Device | None, preloads: 
 
         def implied(z_and_mounting: Array) -> dict[str, Array]:
             values = fit.model.space.constrain(z_and_mounting[:-1])
-            alone, preload = bent.exponent(values), bent.preload(values)[0]
+            every = bent.preloads(values, jnp.concatenate([jnp.reshape(values[PRELOAD], 1), jnp.asarray(references)]))
+            alone, preload, others = bent.exponent(values), every[0], every[1:]
             exponent = jnp.maximum(alone + z_and_mounting[-1], LEAST_EXPONENT)
             found = {"exponent": exponent, "preload": preload, "without_mounting": free_motion_loss(preload, alone)}
-            others = bent.preloads(values, jnp.asarray(references))
             found["felt"] = jnp.max(free_motion_loss(others, exponent), axis=1)
             found["slack_from"] = jnp.min(slack_load(others, exponent), axis=1)
             return found | ({"stiffness": bent.stiffness(values, 0.0)} if stretches else {})

@@ -27,6 +27,7 @@ INTERNAL_UNITS = {
     "angular_damping": "N*m*s/rad",
     "angular_stiffness": "N*m/rad",
     "stiffness": "N/mm",
+    "rate": "1/s",
 }
 _EXAMPLES = {
     "force": "N, kN, lbf, kgf",
@@ -41,6 +42,7 @@ _EXAMPLES = {
     "angular_damping": "N*m*s/rad, N*mm*s/rad",
     "angular_stiffness": "N*m/rad, N*m/deg",
     "stiffness": "N/mm, kN/m",
+    "rate": "1/s, 1/min",
 }
 # What most tables are written in, with the factor to the internal unit: pint's registry takes a fifth of a second to make.
 _USUAL = {

@@ -55,6 +55,9 @@ class ControllerSettings(Frozen):
     dead_zone: Quantity = None
     torque_noise: Quantity = None
     encoder_counts: Annotated[int, Field(ge=4, le=10**9)] | None = None
+    integral_gain: Quantity = None
+    active_zone: Quantity = None
+    linear_dead_zone: bool = False
 
 
 class Hand(Frozen):
@@ -92,6 +95,8 @@ class Coupling(Frozen):
     torque_to_slave: Quantity = None
     local_gain: Quantity = None
     delay: Quantity = None
+    position_to_slave: Quantity = None
+    position_to_master: Quantity = None
 
 
 @dataclass(frozen=True)

@@ -67,6 +67,12 @@ KEYS: Mapping[str, Key] = MappingProxyType(
         "controller.torque_noise": _set(
             "torque", '{ value = 1, unit = "N*mm" }', "noise of the torque sensor, one standard deviation", may_be_zero=True
         ),
+        "controller.integral_gain": _set(
+            "rate", '{ value = 2, unit = "1/s" }', "K_i, gain on the integral of the torque at the joint", may_be_zero=True
+        ),
+        "controller.active_zone": _set(
+            "angular_velocity", '{ value = 0.8, unit = "rad/s" }', "speed below which torque is fed back", may_be_zero=True
+        ),
         "hand.inertia": _of(*INERTIA, 1e-3, "inertia of the hand"),
         "hand.damping": _of(*DAMPING, 0.1, "damping of the hand"),
         "hand.stiffness": _of(*STIFFNESS, 5, "stiffness of the hand"),
@@ -92,6 +98,12 @@ KEYS: Mapping[str, Key] = MappingProxyType(
         ),
         "coupling.local_gain": _set(
             "ratio", '{ value = 0, unit = "1" }', "K_f, gain on the master's own torque", may_be_zero=True
+        ),
+        "coupling.position_to_slave": _set(
+            "ratio", '{ value = 1, unit = "1" }', "C_1, scale of the master's position that the slave follows"
+        ),
+        "coupling.position_to_master": _set(
+            "ratio", '{ value = 1, unit = "1" }', "C_4, scale of the slave's position that the master follows"
         ),
         "coupling.delay": _set(
             "time", '{ value = 0, unit = "ms" }', "delay of what is sent from side to side", may_be_zero=True

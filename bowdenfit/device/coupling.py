@@ -1,13 +1,13 @@
 r"""Master and slave as one sampled loop, haptic paper, figure 8: what is felt in free motion and contact, when it is stable.
 
-.. math:: \tau_m = k_m (q_s - q_p) + d_m (\dot q_s - \dot q_p) - C_2 T_e - K_f T_j, \qquad
-          \tau_s = k_s (q_p - q_s) + d_s (\dot q_p - \dot q_s) - C_3 T_j
+.. math:: \tau_m = k_m (C_4 q_s - q_p) + d_m (C_4 \dot q_s - \dot q_p) - C_2 T_e - K_f T_j, \qquad
+          \tau_s = k_s (C_1 q_p - q_s) + d_s (C_1 \dot q_p - \dot q_s) - C_3 T_j
 
 with the position q_p of the master at its motor: at the joint the same gains are unstable, because the rope lies between.
 NumPy alone, over draws at once; while everything slides dry friction is a constant, and the loop is linear.
 """
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -29,6 +29,7 @@ class Gains:
         torque_to_slave: C_3 [1].
         local_gain: K_f [1].
         damps_alone: Whether d_m damps the master by itself, as with two channels, of which no position comes back.
+        position_to_slave, position_to_master: C_1 and C_4, of which one is 1 over the other [1].
     """
 
     master_stiffness: float
@@ -39,19 +40,16 @@ class Gains:
     torque_to_slave: float
     local_gain: float = 0.0
     damps_alone: bool = False
+    position_to_slave: float = 1.0
+    position_to_master: float = 1.0
 
     def two_channels(self) -> "Gains":
         """The slave's torque back and the master's position on, with the same damping: direct force feedback."""
-        return Gains(
-            0.0, self.master_damping, self.slave_stiffness, self.slave_damping, self.torque_to_master, 0.0, 0.0, True
-        )
+        return replace(self, master_stiffness=0.0, torque_to_slave=0.0, local_gain=0.0, damps_alone=True)
 
     def with_local(self, gain: float) -> "Gains":
         """The same with another gain on the master's own torque."""
-        return Gains(
-            self.master_stiffness, self.master_damping, self.slave_stiffness, self.slave_damping, self.torque_to_master,
-            self.torque_to_slave, gain,
-        )  # fmt: skip
+        return replace(self, local_gain=gain)
 
 
 @dataclass(frozen=True)
@@ -88,7 +86,7 @@ class Pair:
 def free_torque(gains: Gains, rope_friction: Number, motor_friction: Number, slave_friction: Number) -> Number:
     r"""What a slow hand feels in free motion [N m].
 
-    .. math:: T_h = \frac{T_f + F_m + (k_m/k_s) F_s}{1 + K_f + C_3 k_m/k_s}
+    .. math:: T_h = \frac{T_f + F_m + C_4 (k_m/k_s) F_s}{1 + K_f + C_3 C_4 k_m/k_s}
 
     Four channels lower friction without any local control: the slave, pushed by what the hand gives, pulls the master along.
 
@@ -96,7 +94,7 @@ def free_torque(gains: Gains, rope_friction: Number, motor_friction: Number, sla
         gains: The coupling.
         rope_friction, motor_friction, slave_friction: T_f, F_m and F_s [N m].
     """
-    ratio = gains.master_stiffness / gains.slave_stiffness
+    ratio = gains.position_to_master * gains.master_stiffness / gains.slave_stiffness
     return (rope_friction + motor_friction + ratio * slave_friction) / (
         1 + gains.local_gain + gains.torque_to_slave * ratio
     )
@@ -112,12 +110,12 @@ def felt_stiffness(gains: Gains, stiffness: Number, wall: Number) -> Number:
         stiffness: K of the loop with its springs [N m/rad].
         wall: k_e [N m/rad].
     """
-    k_m, k_s, c_2, c_3 = (
-        gains.master_stiffness, gains.slave_stiffness, gains.torque_to_master, gains.torque_to_slave,
+    k_m, k_s, c_1, c_4 = (
+        gains.master_stiffness, gains.slave_stiffness, gains.position_to_slave, gains.position_to_master,
     )  # fmt: skip
-    # per unit of T_h: k_s (q_p - q_s) + C_3 = k_e q_s and k_m (q_s - q_p) - C_2 k_e q_s + 1 + K_f = 0
-    slave = (1 + gains.local_gain + c_3 * k_m / k_s) / (wall * (k_m / k_s + c_2))
-    master = slave + (wall * slave - c_3) / k_s
+    # per unit of T_h: k_s (C_1 q_p - q_s) + C_3 = k_e q_s and k_m (C_4 q_s - q_p) - C_2 k_e q_s + 1 + K_f = 0
+    pulled = (k_m * c_4 - gains.torque_to_master * wall) / (wall + k_s)
+    master = (1 + gains.local_gain + pulled * gains.torque_to_slave) / (k_m - pulled * k_s * c_1)
     return 1 / (master + 1 / stiffness)
 
 
@@ -167,11 +165,12 @@ def closed_loop(pair: Pair, gains: Gains, delay: int) -> np.ndarray:
         gains.master_stiffness, gains.master_damping, gains.slave_stiffness, gains.slave_damping,
     )  # fmt: skip
     comes_back = 0.0 if gains.damps_alone else d_m
+    c_1, c_4 = gains.position_to_slave, gains.position_to_master
     whole[:, commands.start] = np.einsum(
         "i,nij->nj", np.array([-k_m, -d_m, -gains.local_gain, 0, 0, 0]), signals
-    ) + np.einsum("i,nij->nj", np.array([0, 0, 0, k_m, comes_back, -gains.torque_to_master]), late)
+    ) + np.einsum("i,nij->nj", np.array([0, 0, 0, c_4 * k_m, c_4 * comes_back, -gains.torque_to_master]), late)
     whole[:, commands.start + 1] = np.einsum("i,nij->nj", np.array([0, 0, 0, -k_s, -d_s, 0]), signals) + np.einsum(
-        "i,nij->nj", np.array([k_s, d_s, -gains.torque_to_slave, 0, 0, 0]), late
+        "i,nij->nj", np.array([c_1 * k_s, c_1 * d_s, -gains.torque_to_slave, 0, 0, 0]), late
     )
     return whole
 

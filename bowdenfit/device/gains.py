@@ -1,7 +1,7 @@
 r"""How large the gain on the torque at the joint may be: until the sampled loop oscillates, and while it is passive.
 
 While the rope slides, friction is a constant and the plant is linear: motor and joint on the stiffness K and the damping b_c
-of the rope. The controller commands :math:`-K_f T_j` a sample late. NumPy alone, over draws at once.
+of the rope. The controller commands :math:`-K_f T_j - K_i \int T_j` a sample late. NumPy alone, over draws at once.
 """
 
 from collections.abc import Callable
@@ -31,6 +31,7 @@ class Linear:
         motor_damping, joint_damping: b_m and b_j, with the hand's [N m s/rad].
         hand_stiffness: k_h toward its path [N m/rad].
         sample: T_s [s].
+        integral_gain: K_i, which is set [1/s].
     """
 
     stiffness: Numbers
@@ -41,6 +42,7 @@ class Linear:
     joint_damping: Numbers
     hand_stiffness: Numbers
     sample: Numbers
+    integral_gain: Numbers = 0.0
 
     def arrays(self) -> tuple[np.ndarray, ...]:
         """All of them, as long as each other."""
@@ -49,7 +51,7 @@ class Linear:
 
 def sampled(device: Linear) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     """A, B and C of the sampled plant: motor and joint angle and speed from one sample to the next, and T_j of them."""
-    k, c, j_m, j_j, b_m, b_j, k_h, sample = device.arrays()
+    k, c, j_m, j_j, b_m, b_j, k_h, sample, _ = device.arrays()
     zero, one = np.zeros_like(k), np.ones_like(k)
     rows = [
         [zero, one, zero, zero, zero],
@@ -76,27 +78,40 @@ def exponential(matrices: np.ndarray) -> np.ndarray:
     return total
 
 
-def spectral_radius(parts: tuple[np.ndarray, np.ndarray, np.ndarray], gain: np.ndarray) -> np.ndarray:
-    """Largest eigenvalue of [[A, B], [-K_f C, 0]] by size: below 1 every oscillation dies out."""
+def spectral_radius(
+    parts: tuple[np.ndarray, np.ndarray, np.ndarray], gain: np.ndarray, integral: np.ndarray | float = 0.0
+) -> np.ndarray:
+    """Largest eigenvalue of the sampled loop by size: below 1 every oscillation dies out.
+
+    Of [[A, B], [-K_f C, 0]] without integral; with it, what adds up is one more state.
+
+    Args:
+        parts: A, B and C.
+        gain: K_f.
+        integral: K_i T_s.
+    """
     a, b, c = parts
-    fed_back = -np.reshape(gain, (-1, 1, 1)) * c
-    closed = np.concatenate(
-        [np.concatenate([a, b], axis=2), np.concatenate([fed_back, np.zeros((len(a), 1, 1))], axis=2)], axis=1
-    )
+    n, adds = len(a), bool(np.any(integral))
+    closed = np.zeros((n, 5 + adds, 5 + adds))
+    closed[:, :4, :4], closed[:, :4, 4:5] = a, b
+    closed[:, 4, :4] = -np.reshape(gain + integral, (-1, 1)) * c[:, 0]
+    if adds:
+        closed[:, 4, 5], closed[:, 5, 5], closed[:, 5, :4] = -np.asarray(integral), 1.0, c[:, 0]
     radius: np.ndarray = np.max(np.abs(np.linalg.eigvals(closed)), axis=1)
     return radius
 
 
 def stable_gain(device: Linear) -> np.ndarray:
     """Largest K_f with which the loop does not oscillate by itself, by draw; `LARGEST` where none does."""
-    parts = sampled(device)
-    return _largest(lambda gain: spectral_radius(parts, gain) <= 1 + _ROUNDING, len(parts[0]))
+    parts, integral = sampled(device), (device.arrays()[8] * device.arrays()[7])
+    return _largest(lambda gain: spectral_radius(parts, gain, integral) <= 1 + _ROUNDING, len(parts[0]))
 
 
 def passive_gain(device: Linear, stable: np.ndarray) -> np.ndarray:
     r"""Largest K_f up to which :math:`\min_\omega \text{Re}\,Z(j\omega) \ge 0`: no passive hand can make it oscillate.
 
-    .. math:: Z = J_j s + b_j + \frac{1}{s} \frac{K + b_c s}{1 + (K + b_c s)(1 + K_f e^{-1.5 T_s s})/(J_m s^2 + b_m s)}
+    .. math:: Z = J_j s + b_j + \frac{1}{s} \frac{K + b_c s}{1 + (K + b_c s)(1 + G e^{-1.5 T_s s})/(J_m s^2 + b_m s)},
+              \quad G = K_f + \frac{K_i T_s}{1 - e^{-T_s s}}
 
     The delay is a sample, and half of one for the held command. Dry friction, which only helps, is left out.
 
@@ -104,19 +119,20 @@ def passive_gain(device: Linear, stable: np.ndarray) -> np.ndarray:
         device: The device, without a hand.
         stable: Of `stable_gain`; no gain above that is passive.
     """
-    k, c, j_m, j_j, b_m, b_j, _, sample = (part[:, None] for part in device.arrays())
+    k, c, j_m, j_j, b_m, b_j, _, sample, k_i = (part[:, None] for part in device.arrays())
     s = 1j * np.geomspace(1e-3, 1.0, _FREQUENCIES) * np.pi / sample
     rope, motor = k + c * s, j_m * s**2 + b_m * s
-    given, alone, fed_back = rope / s, 1 + rope / motor, rope / motor * np.exp(-1.5 * sample * s)
+    given, fed_back = rope / s, rope / motor * np.exp(-1.5 * sample * s)
+    alone = 1 + rope / motor + fed_back * k_i * sample / (1 - np.exp(-sample * s))
     # Re Z >= 0 is a quadratic inequality in K_f at each frequency: square K_f^2 + slope K_f + margin >= 0.
     square = b_j * np.abs(fed_back) ** 2
     slope = 2 * b_j * (alone * fed_back.conj()).real + (given * fed_back.conj()).real
     margin = b_j * np.abs(alone) ** 2 + (given * alone.conj()).real
-    margin = np.maximum(margin + _NOTHING * np.abs(given * alone), 0.0)
+    margin = margin + _NOTHING * np.abs(given * alone)
     under = slope**2 - 4 * square * margin
     crosses = (slope < 0) & (under >= 0)
     root = 2 * margin / np.where(crosses, np.sqrt(np.maximum(under, 0.0)) - slope, 1.0)
-    return np.minimum(np.min(np.where(crosses, root, np.inf), axis=1), stable)
+    return np.minimum(np.min(np.where(margin < 0, 0.0, np.where(crosses, root, np.inf)), axis=1), stable)
 
 
 def _largest(holds: Callable[[np.ndarray], np.ndarray], draws: int) -> np.ndarray:

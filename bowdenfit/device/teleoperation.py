@@ -153,8 +153,9 @@ def _program(steps: int, delay: int) -> Callable[..., dict[str, Any]]:
 def _commands(sent: Any, own: Each, late: Each) -> Each:
     """Torques of master and slave, of what each side sees itself and of what came late from the other [N m]."""
     k_m, d_m, k_s, d_s = (sent[f"{side}_{what}"] for side in ("master", "slave") for what in ("stiffness", "damping"))
-    master = k_m * (late[3] - own[0]) + sent["comes_back"] * late[4] - d_m * own[1]
-    slave = k_s * (late[0] - own[3]) + d_s * (late[1] - own[4])
+    c_1, c_4 = sent["position_to_slave"], sent["position_to_master"]
+    master = k_m * (c_4 * late[3] - own[0]) + sent["comes_back"] * c_4 * late[4] - d_m * own[1]
+    slave = k_s * (c_1 * late[0] - own[3]) + d_s * (c_1 * late[1] - own[4])
     return jnp.stack(
         [
             master - sent["torque_to_master"] * late[5] - sent["local_gain"] * own[2],

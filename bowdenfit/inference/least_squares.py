@@ -124,7 +124,7 @@ def maximum_posterior(posterior: LogDensity, objective: Objective) -> MaximumPos
     """
     n = posterior.model.space.size
     problem = Problem(posterior, objective, with_priors=True)
-    starts = product(*(p.starts for p in posterior.model.space.free))
+    starts = product(*map(_starts, posterior.model.space.free))
     found = min((problem.solve(np.array(start)) for start in starts), key=_squares_with_priors)
     if not all(np.all(np.isfinite(r)) for r in found["residuals"].values()):
         raise ConvergenceError(
@@ -134,6 +134,13 @@ def maximum_posterior(posterior: LogDensity, objective: Objective) -> MaximumPos
     # The prior of each z has unit information; a noise scale gets that alone, its residuals say nothing here.
     information = found["jacobian"].T @ found["jacobian"] + np.eye(n)
     return MaximumPosterior(found["z"], np.linalg.inv(information))
+
+
+def _starts(parameter: Parameter) -> tuple[float, ...]:
+    if np.isnan(parameter.first_look):
+        return parameter.starts
+    look = float(parameter.prior.unconstrain(jnp.asarray(parameter.first_look)))
+    return (*parameter.starts, float(np.clip(look, -_FARTHEST, _FARTHEST)))
 
 
 def _squares_with_priors(found: Solution) -> float:

@@ -32,7 +32,9 @@ class Parameter:
         fixed: Value [internal unit] where it is held fixed, else None.
         prior_words: What is said of the prior instead of what it says itself in the shown unit.
         scaled_by: What of the measurements a default prior is in proportion to; empty where it is to nothing.
-        starts: z from which the largest density is looked for; more than one where it may have several maxima.
+        starts: z from which the largest density is looked for; more than one where it may have several maxima,
+            none where the first look tells.
+        first_look: Value [internal unit] from which it is looked for as well; NaN where there is none.
     """
 
     name: str
@@ -46,6 +48,7 @@ class Parameter:
     prior_words: str = ""
     scaled_by: str = ""
     starts: tuple[float, ...] = (0.0,)
+    first_look: float = float("nan")
 
     @property
     def label(self) -> str:

@@ -119,6 +119,54 @@ def test_above_the_largest_gain_an_eigenvalue_leaves_the_unit_circle():
     assert np.all(spectral_radius(parts, 1.01 * largest) > 1 + 1e-4)
 
 
+@pytest.mark.parametrize("integral", [5.0, 40.0])
+def test_the_largest_gain_beside_an_integral_is_that_of_the_simulated_device(integral):
+    linear, hand = DEVICES["a damped rope"]
+    largest = stable_gain(replace(linear, integral_gain=integral))[0]
+    gains = largest * np.array([0.95, 1.05])
+    moving = plant(motor_friction=0.0, rope_damping=0.05, joint_inertia=3e-3)
+    path = np.stack([2e-3 * np.arange(900), np.full(900, 2.0)], axis=1)
+    start = replace(Motion.at_rest(np.zeros(())), motor_speed=np.asarray(2.0), joint_speed=np.asarray(2.0))
+    law = replace(controller(gain=gains, active_zone=np.inf), integral_gain=integral, largest_torque=1e9)
+    torque = np.diff(simulate(moving, law, hand, path, start=start, step=1e-5).joint_torque, axis=0)
+    early, late = (np.mean(torque[part] ** 2, axis=0) for part in (slice(200, 400), slice(600, 800)))
+    assert late[0] < 0.5 * early[0]
+    assert late[1] > 0.9 * early[1], "it goes on; slack of the return side bounds it"
+
+
+def test_an_integral_lets_less_gain_be_and_makes_what_is_left_fade():
+    device = Linear(20.0, 0.02, 7e-4, 1e-3, B, B + 0.05, 5.0, 1e-3, np.array([0.0, 100.0, 1000.0]))
+    assert np.all(np.diff(stable_gain(device)) < 0)
+    one_way = np.stack([0.5 * np.arange(1500) * 1e-3, np.full(1500, 0.5)], axis=1)
+    law = replace(controller(gain=1.0, active_zone=np.inf), integral_gain=np.array([0.0, 5.0]))
+    left = -simulate(plant(), law, HAND, one_way).joint_torque
+    at = [np.mean(left[part], axis=0) for part in (slice(280, 320), slice(680, 720))]
+    assert at[1][0] == pytest.approx(at[0][0], rel=0.03)
+    assert at[1][1] / at[0][1] == pytest.approx(np.exp(-0.4 * 5.0 / 2.0), rel=0.1), "with 1 + K_f over K_i"
+
+
+def test_with_an_integral_a_hand_may_be_found_that_shakes_it():
+    device = Linear(20.0, 0.02, 7e-4, 1e-3, B, B, 0.0, 1e-3, np.array([0.0, 200.0]))
+    passive = passive_gain(device, stable_gain(device))
+    assert passive[0] > 0
+    assert passive[1] == 0
+
+
+def impedance(gain, b_c, s, sample=1e-3):
+    rope, motor = 20.0 + b_c * s, 7e-4 * s**2 + B * s
+    return 1e-3 * s + B + rope / (s * (1 + rope * (1 + gain * np.exp(-1.5 * sample * s)) / motor))
+
+
+@pytest.mark.parametrize("b_c", [0.01, 0.02, 0.05])
+def test_the_passive_gain_is_where_the_impedance_first_loses_its_real_part(b_c):
+    device = Linear(20.0, b_c, 7e-4, 1e-3, B, B, 0.0, 1e-3)
+    largest = passive_gain(device, stable_gain(device))[0]
+    s = 1j * np.geomspace(1e-3, 1.0, 2000) * np.pi / 1e-3
+    shares = [np.min(impedance(share * largest, b_c, s).real) for share in (0.2, 0.6, 0.98, 1.02)]
+    assert min(shares[:3]) > 0
+    assert shares[3] < 0
+
+
 def test_what_no_passive_hand_can_shake_is_several_times_less():
     device = Linear(20.0, np.array([0.01, 0.02, 0.05]), 7e-4, 1e-3, B, B, 0.0, 1e-3)
     largest = stable_gain(device)

@@ -82,6 +82,32 @@ def test_the_stiffness_that_is_felt_is_that_of_cable_and_wall(scheme):
     assert slope == pytest.approx(felt_stiffness(SCHEMES[scheme], STIFFNESS, WALL), rel=0.05)
 
 
+@lru_cache
+def scaled():
+    """The slave moves half as far, with torques and stiffnesses that suit."""
+    halved = replace(
+        FOUR, position_to_slave=0.5, position_to_master=2.0, torque_to_slave=0.5, torque_to_master=0.5,
+        master_stiffness=2.5, master_damping=0.015,
+    )  # fmt: skip
+    moved = 1.5 * path(1e-3)
+    sampled = Sampled(2 * np.pi / 2000, 6e-3, 2.5)
+    return halved, teleoperated(PLANT, HAND, slave(WALL), sampled, halved, moved, delay=1)
+
+
+def test_a_slave_that_moves_half_as_far_is_felt_by_the_formulas_too():
+    halved, runs = scaled()
+    late = (runs.time > 1.2) & (runs.time < 2)
+    assert np.std((runs.slave - 0.5 * runs.joint)[late]) < 0.05 * np.std(0.5 * runs.joint[late])
+    assert in_the_open(runs) == pytest.approx(free_torque(halved, T_F, F_M, F_S), rel=0.1)
+    pushing = (runs.time > 2.55) & (runs.time < 2.95)
+    slope = np.polyfit(runs.joint[pushing], runs.hand_torque[pushing], 1)[0]
+    assert slope == pytest.approx(felt_stiffness(halved, STIFFNESS, WALL), rel=0.05)
+    assert slope < 0.5 * felt_stiffness(FOUR, STIFFNESS, WALL), "which is another than without scales"
+    assert is_stable(contact_radius(pair(0.0), halved, 1))[0]
+    unsuited = replace(halved, master_stiffness=5.0, torque_to_slave=1.0)
+    assert not is_stable(contact_radius(pair(0.0), unsuited, 1))[0], "the loop of positions and torques is doubled"
+
+
 def test_with_equal_gains_it_is_that_of_springs_in_series():
     assert felt_stiffness(FOUR, STIFFNESS, WALL) == pytest.approx(1 / (1 / STIFFNESS + 1 / WALL))
     assert felt_stiffness(FOUR, STIFFNESS, WALL) == pytest.approx(8.6, abs=0.1), (

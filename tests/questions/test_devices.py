@@ -115,6 +115,31 @@ def test_the_gain_is_that_of_the_least_damped_ropes(found):
     assert gain.left.median == pytest.approx(found.most.friction.median / (1 + gain.safe), rel=0.01)
 
 
+def test_what_a_controller_does_besides_is_read_and_counts(fit, found, tmp_path):
+    said = "[controller]\nintegral_gain = { value = 5, unit = \"1/s\" }\nlinear_dead_zone = true"
+    path = device(tmp_path, "[controller]", f'{said}\nactive_zone = {{ value = 60, unit = "rad/s" }}')
+    integrated = bf.compensate(fit, path, wrap_angle=RANGE, law="active")
+    assert (found.gain.integral, integrated.gain.integral) == (0.0, 5.0)
+    assert integrated.gain.safe < found.gain.safe
+    text = " ".join(compensation_text(integrated).split())
+    assert "beside 5 1/s times its integral" in text
+    assert "Some hand can make it oscillate at any gain." in text
+    assert faults_of_page(compensation_text(integrated)) == []
+    none = bf.compensate(fit, device(tmp_path, "[controller]", said.replace("5", "300")), wrap_angle=RANGE, law="active")
+    assert none.gain.safe == 0
+    assert "or integrate less than 300 1/s" in " ".join(compensation_text(none).split())
+
+
+def test_scales_of_positions_belong_together(fit, tmp_path):
+    scaled = "[coupling]\nposition_to_slave = { value = 0.5, unit = \"1\" }\n#"
+    apart = scaled.replace("#", 'position_to_master = { value = 1, unit = "1" }\n#')
+    with pytest.raises(DescriptionError, match="1 is not 1 over coupling.position_to_slave, 0.5: .* write 2"):
+        bf.teleoperate(fit, device(tmp_path, "[coupling] ", apart), wrap_angle="90deg")
+    found = bf.teleoperate(fit, device(tmp_path, "[coupling] ", scaled), wrap_angle="90deg")
+    assert found.stated.stiffness.median < 40
+    assert np.all(np.isfinite(found.contact.hand_torque))
+
+
 def test_less_preload_is_felt_less_until_a_side_is_slack(found):
     felt, slack = (np.array([getattr(row, name).median for row in found.preloads]) for name in ("felt", "slack_from"))
     assert np.all(np.diff(felt) > 0)

@@ -27,7 +27,7 @@ _LOG_SD = 0.5  # of inertia and stiffness about what period and added inertia sa
 _TIMES = 1.5  # what damping, or friction, would be if it alone stopped the joint
 _NOISE_SHARE, _REST_SHARE = 0.005, 0.1  # of the first deflection: as of an encoder of 2000 counts a turn; zero of a sensor
 _STARTS = (-1.5, 0.0, 1.5)  # z: how many half swings friction leaves is a whole number, and each has a best fit of its own
-_FARTHEST = 2.5
+_LEAST = 1e-9  # of a first look, which a positive prior must hold
 _MORE_SWINGS = 3  # times those that are seen
 
 
@@ -88,16 +88,17 @@ def _parameters(table: RingDownTable, at: Circumstances) -> list[Parameter]:
         _inertia(table, inertia),
         Parameter(
             STIFFNESS, "$K$", "stiffness against which the released joint swings", "elastic",
-            LogNormal(stiffness, 2 * _LOG_SD), "N*m/rad", scaled_by=by,
+            LogNormal(stiffness, 2 * _LOG_SD), "N*m/rad", scaled_by=by, starts=(), first_look=stiffness,
         ),
         Parameter(
             DAMPING, "$b_c$", "viscous damping of rope and joint", "elastic",
-            damping, "N*m*s/rad", scaled_by=by, starts=_starts(damping, looks[0]),
+            damping, "N*m*s/rad", scaled_by=by, starts=_STARTS, first_look=looks[0],
         ),
         Parameter(
             FRICTION, "$F_r$", "dry friction of the released joint", "elastic",
             friction, "N*m",
-            scaled_by=f"the first deflection, {size:.3g} {unit}, over {seen} half swings", starts=_starts(friction, looks[1]),
+            scaled_by=f"the first deflection, {size:.3g} {unit}, over {seen} half swings", starts=_STARTS,
+            first_look=looks[1],
         ),
         Parameter(
             NOISE, r"$\sigma_r$", at.noise.meaning("standard deviation of a reading of the ring-down"), "noise",
@@ -132,13 +133,8 @@ def _first_looks(table: RingDownTable, run: int, product: float, stiffness: floa
     """
     rho, held = decay_of_turns(table, run)
     log_decay = -np.log(rho)
-    return float(2 * np.sqrt(product) * log_decay / np.hypot(np.pi, log_decay)), held * stiffness
-
-
-def _starts(prior: HalfNormal, look: float) -> tuple[float, ...]:
-    """Z from which the largest density is looked for."""
-    seen = float(prior.unconstrain(jnp.asarray(max(look, 1e-9))))
-    return (*_STARTS, float(np.clip(seen, -_FARTHEST, _FARTHEST)))
+    damping = float(2 * np.sqrt(product) * log_decay / np.hypot(np.pi, log_decay))
+    return max(damping, _LEAST), max(held * stiffness, _LEAST)
 
 
 def _inertia(table: RingDownTable, size: float) -> Parameter:

@@ -60,6 +60,7 @@ class Gain(Part):
         decided_share: Share of the scatter of the largest gain that goes with it.
         left: What is left to feel where friction is most, at the safe gain [N m].
         from_ring_down: Whether the damping of the rope comes from a ring-down; else it was stated.
+        integral: K_i on the integral of that torque, as stated [1/s].
     """
 
     safe: float
@@ -70,6 +71,7 @@ class Gain(Part):
     decided_share: float
     left: Interval
     from_ring_down: bool = False
+    integral: float = 0.0
 
 
 @dataclass(frozen=True, repr=False)

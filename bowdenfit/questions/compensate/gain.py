@@ -12,6 +12,7 @@ from bowdenfit.results.record import Record
 
 _PLANT = ("motor.inertia", "motor.damping", "joint.inertia", "joint.damping", "rope.damping", "controller.sample_time")
 NEEDED = (*_PLANT, "motor.friction")
+INTEGRAL = "controller.integral_gain"
 HAND = ("hand.inertia", "hand.damping", "hand.stiffness")
 _DRAWS, _LOOKED_AT = 300, 3  # draws, and bends among them
 _NAMES = {
@@ -39,14 +40,15 @@ def gain_of(fit: Record, device: Device, loop: LoopDraws, felt: np.ndarray, risk
     n = len(loop.stiffness)
     has_hand = device.states(*HAND)
     stated = device.needed("the gain of the active law", *NEEDED, *(HAND if has_hand else ()))
+    integral = device.known(INTEGRAL)[INTEGRAL].value if device.states(INTEGRAL) else 0.0
     known = drawn(stated, n, fit.provenance.seed)
     at = np.unique(np.linspace(0, n - 1, min(n, _DRAWS)).round().astype(int))
     bends = np.unique(np.linspace(0, len(loop.bends) - 1, _LOOKED_AT).round().astype(int))
     some = {name: values[at] for name, values in known.items()}
     stiffness = loop.stiffness[np.ix_(at, bends)]
-    free = _linear(some, stiffness, held=False)
+    free = _linear(some, stiffness, integral, held=False)
     stable = stable_gain(free).reshape(stiffness.shape)
-    with_hand = stable_gain(_linear(some, stiffness, held=True)).reshape(stiffness.shape) if has_hand else stable
+    with_hand = stable_gain(_linear(some, stiffness, integral, held=True)).reshape(stiffness.shape) if has_hand else stable
     least = np.minimum(stable, with_hand).min(axis=1)
     passive = passive_gain(free, stable.ravel()).reshape(stiffness.shape).min(axis=1)
     safe = float(np.quantile(least, risk, method="lower"))
@@ -55,17 +57,17 @@ def gain_of(fit: Record, device: Device, loop: LoopDraws, felt: np.ndarray, risk
     first = max(shares, key=lambda name: shares[name])
     return Gain(
         safe, Interval.of(least), float(np.quantile(passive, risk, method="lower")), has_hand, _NAMES[first], shares[first],
-        Interval.of(felt / (1 + safe)), bool(stated["rope.damping"].draws),
+        Interval.of(felt / (1 + safe)), bool(stated["rope.damping"].draws), integral,
     )  # fmt: skip
 
 
-def _linear(known: dict[str, np.ndarray], stiffness: np.ndarray, held: bool) -> Linear:
+def _linear(known: dict[str, np.ndarray], stiffness: np.ndarray, integral: float, held: bool) -> Linear:
     """The device of every draw and bend while its rope slides, with or without the hand."""
     each = {name: np.repeat(values, stiffness.shape[1]) for name, values in known.items()}
     inertia, damping, hand = (each[name] if held else 0.0 for name in HAND)
     return Linear(
         stiffness.ravel(), each["rope.damping"], each["motor.inertia"], each["joint.inertia"] + inertia, each["motor.damping"],
-        each["joint.damping"] + damping, np.broadcast_to(hand, stiffness.size), each["controller.sample_time"],
+        each["joint.damping"] + damping, np.broadcast_to(hand, stiffness.size), each["controller.sample_time"], integral,
     )  # fmt: skip
 
 

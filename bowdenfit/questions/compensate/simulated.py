@@ -84,6 +84,7 @@ class Devices:
         noise: Of the torque sensor [N m].
         fed_forward: F_cst there [N m].
         gain: K_f.
+        active_zone: Speed below which it acts; infinite for always [rad/s].
         control: What the controller is besides.
         wrap_angle: Of the bend [deg].
         seed: Of the noise.
@@ -96,6 +97,7 @@ class Devices:
     noise: float
     fed_forward: float | None
     gain: float | None
+    active_zone: float
     control: Controller
     wrap_angle: float
     seed: int
@@ -115,7 +117,7 @@ def moved(devices: Devices, middle: int) -> tuple[tuple[Law, ...], float]:
     if devices.fed_forward is not None:
         laws[KARNOPP] = replace(devices.control, coulomb=devices.fed_forward)
     if devices.gain is not None:
-        laws[ACTIVE] = replace(devices.control, gain=devices.gain, active_zone=np.inf)
+        laws[ACTIVE] = replace(devices.control, gain=devices.gain, active_zone=devices.active_zone)
     found = []
     for name, control in laws.items():
         runs = simulate(

@@ -13,11 +13,12 @@ from bowdenfit.device.plant import Plant
 from bowdenfit.device.transmission import Transmission
 from bowdenfit.questions.bends.loop_draws import LoopDraws
 from bowdenfit.questions.compensate.answer import Compensation
-from bowdenfit.questions.compensate.gain import HAND, NEEDED
+from bowdenfit.questions.compensate.gain import HAND, INTEGRAL, NEEDED
 from bowdenfit.questions.compensate.simulated import Devices, Simulated, goes_on, moved
 from bowdenfit.results.record import Record
 
 DRAWS = 400
+ACTIVE_ZONE = "controller.active_zone"
 SET = ("motor.largest_torque", "controller.filter_time", "controller.dead_zone", "controller.torque_noise")
 _LEAST_PRELOAD = 1e-6  # N m, of a loop that bending has made slack
 
@@ -51,8 +52,10 @@ def simulated(
     at = np.unique(np.linspace(0, n - 1, min(n, draws)).round().astype(int))
     known = {name: values[at] for name, values in drawn(stated, n, fit.provenance.seed).items()}
     sample = stated["controller.sample_time"].value
+    chosen_to = {key: known.value for key, known in device.known(INTEGRAL, ACTIVE_ZONE).items()}
     control = Controller(
-        0.0, stated["controller.dead_zone"].value, 0.0, 0.0, 0.0, 0.0, device.count, stated["controller.filter_time"].value,
+        0.0, stated["controller.dead_zone"].value, float(device.controller.linear_dead_zone), 0.0,
+        chosen_to.get(INTEGRAL, 0.0), 0.0, device.count, stated["controller.filter_time"].value,
         stated["motor.largest_torque"].value,
     )  # fmt: skip
     most = int(np.argmax([bend.friction.median for bend in answer.by_bend]))
@@ -62,7 +65,7 @@ def simulated(
         Devices(
             _plant(loop, known, at, np.full(len(at), most)), Hand(known["hand.stiffness"], known["hand.damping"]),
             known["hand.inertia"], sample, stated["controller.torque_noise"].value, None if chosen is None else chosen.torque,
-            None if answer.gain is None else answer.gain.safe, control, answer.by_bend[most].wrap_angle, fit.provenance.seed,
+            None if answer.gain is None else answer.gain.safe, chosen_to.get(ACTIVE_ZONE, np.inf), control, answer.by_bend[most].wrap_angle, fit.provenance.seed,
         ),
         middle,
     )  # fmt: skip

@@ -79,17 +79,31 @@ def _fed_back(found: Compensation) -> Iterator[str]:
     if gain.safe <= 0:
         yield (
             "No gain on the measured torque is safe: some devices that fit what is known oscillate with the least of them. "
-            f"What decides is {gain.decided_by}; {_measure(gain)}, and damp the rope."
+            f"What decides is {gain.decided_by}; {_measure(gain)}, and damp the rope{_or_integrate_less(gain)}."
         )
         return
     most = "10000 or more" if gain.safe >= 9999 else f"at most {gain.safe:.2g}"
+    beside, fades = "", ""
+    if gain.integral:
+        beside = f" beside {gain.integral:.3g} 1/s times its integral"
+        fades = f", which fades by two thirds in {(1 + gain.safe) / gain.integral:.2g} s of motion one way"
     yield (
-        f"Feed back {most} times the torque measured at the joint: with at most {percent(found.risk, 0)} probability it then "
+        f"Feed back {most} times the torque measured at the joint{beside}: with at most {percent(found.risk, 0)} probability it then "
         f"oscillates, {'hands off or on' if gain.with_hand else 'hands off'}. That leaves {newton_metres(gain.left.median)} to "
-        f"feel. Up to {gain.passive:.2g} no hand can make it oscillate. The largest gain is {gain.stable.q05:.2g} to "
+        f"feel{fades}. {_no_hand(gain)} The largest gain is {gain.stable.q05:.2g} to "
         f"{gain.stable.q95:.2g} (90 % interval); {percent(gain.decided_share, 0)} of that goes with {gain.decided_by}: "
         f"{_measure(gain)}."
     )
+
+
+def _no_hand(gain: Gain) -> str:
+    if gain.passive <= 0:
+        return "Some hand can make it oscillate at any gain."
+    return f"Up to {gain.passive:.2g} no hand can make it oscillate."
+
+
+def _or_integrate_less(gain: Gain) -> str:
+    return f", or integrate less than {gain.integral:.3g} 1/s" if gain.integral else ""
 
 
 def _measure(gain: Gain) -> str:

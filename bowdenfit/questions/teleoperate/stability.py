@@ -7,6 +7,7 @@ import numpy as np
 from bowdenfit.description.device import ENCODER, Device, asked_for
 from bowdenfit.device.coupling import Gains, Pair, contact_radius, felt_stiffness, free_torque, is_stable
 from bowdenfit.device.known import drawn
+from bowdenfit.errors import DescriptionError
 from bowdenfit.inference.interval import Interval
 from bowdenfit.questions.bends.loop_draws import LoopDraws, loop_draws, range_of_bends
 from bowdenfit.questions.teleoperate.answer import Scheme, Teleoperation
@@ -24,6 +25,7 @@ _COUPLING = (
     "coupling.master_stiffness", "coupling.master_damping", "coupling.slave_stiffness", "coupling.slave_damping",
     "coupling.torque_to_master", "coupling.torque_to_slave", "coupling.local_gain",
 )  # fmt: skip
+_SCALES, _ROUNDING = ("coupling.position_to_slave", "coupling.position_to_master"), 1e-3
 NEEDED = (
     *_PAIR, "wall.damping", "controller.sample_time", "controller.filter_time", "motor.friction", "slave.friction",
     "wall.stiffness", "motor.largest_torque", "slave.largest_torque", *_COUPLING, "coupling.delay",
@@ -54,7 +56,7 @@ def teleoperation_of(fit: Record, device: Device, bends: Bends, probability: flo
     known = {name: values[at] for name, values in drawn(stated, n, fit.provenance.seed).items()}
     bend = np.random.default_rng([fit.provenance.seed, 43]).integers(len(angles), size=len(at))
     stiffness = loop.stiffness[at, bend]
-    gains = _gains({key: stated[key].value for key in _COUPLING})
+    gains = _gains({key: stated[key].value for key in _COUPLING}, _scales(device))
     delay = round(stated["coupling.delay"].value / stated["controller.sample_time"].value)
     most = int(np.argmax(np.median(loop.friction, axis=0)))
     felt = {"rope": loop.friction[at, most], "motor": known["motor.friction"], "slave": known["slave.friction"]}
@@ -71,9 +73,24 @@ def teleoperation_of(fit: Record, device: Device, bends: Bends, probability: flo
     )  # fmt: skip
 
 
-def _gains(stated: Mapping[str, float]) -> Gains:
+def _gains(stated: Mapping[str, float], scales: tuple[float, float]) -> Gains:
     k_m, d_m, k_s, d_s, c_2, c_3, k_f = (stated[key] for key in _COUPLING)
-    return Gains(k_m, d_m, k_s, d_s, c_2, c_3, k_f)
+    return Gains(k_m, d_m, k_s, d_s, c_2, c_3, k_f, False, *scales)
+
+
+def _scales(device: Device) -> tuple[float, float]:
+    """C_1 and C_4; 1 where nothing is said, and one from the other."""
+    known = device.known(*_SCALES)
+    to_slave, to_master = (known[key].value if key in known else None for key in _SCALES)
+    if to_slave is None or to_master is None:
+        to_slave = to_slave or (1 / to_master if to_master else 1.0)
+        return to_slave, to_master or 1 / to_slave
+    if abs(to_slave * to_master - 1) > _ROUNDING:
+        raise DescriptionError(
+            f"device.toml, {_SCALES[1]}: {to_master:g} is not 1 over {_SCALES[0]}, {to_slave:g}: in free motion the two sides "
+            f"would pull each other to zero, or away from it; write {1 / to_slave:.6g}, or leave one of the two out."
+        )
+    return to_slave, to_master
 
 
 def _refuse_missing(device: Device, loop: LoopDraws) -> None:

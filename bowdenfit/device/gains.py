@@ -119,7 +119,7 @@ def passive_gain(device: Linear, stable: np.ndarray) -> np.ndarray:
         device: The device, without a hand.
         stable: Of `stable_gain`; no gain above that is passive.
     """
-    k, c, j_m, j_j, b_m, b_j, _, sample, k_i = (part[:, None] for part in device.arrays())
+    k, c, j_m, _, b_m, b_j, _, sample, k_i = (part[:, None] for part in device.arrays())
     s = 1j * np.geomspace(1e-3, 1.0, _FREQUENCIES) * np.pi / sample
     rope, motor = k + c * s, j_m * s**2 + b_m * s
     given, fed_back = rope / s, rope / motor * np.exp(-1.5 * sample * s)

@@ -14,9 +14,11 @@ J_M, J_J, B_M, B_J, B_C = 7e-4, 1.5e-3, 1e-3, 2e-3, 0.02
 STEP, SECONDS = 2e-4, 2.0
 TIME = np.arange(round(SECONDS / STEP)) * STEP
 TORQUE = 0.45 * np.sin(2 * np.pi * TIME / 0.8) + 0.1 * np.sin(2 * np.pi * TIME / 0.13)
-BODY = """<body><joint name="{name}" type="hinge" axis="0 0 1" damping="{damping}" frictionloss="{friction}" stiffness="{spring}"/>
+BODY = """<body>
+<joint name="{name}" type="hinge" axis="0 0 1" damping="{damping}" frictionloss="{friction}" stiffness="{spring}"/>
 <inertial pos="0 0 0" mass="1" diaginertia="1 1 {inertia}"/></body>"""
-TENDON = '<fixed stiffness="{stiffness}" damping="{damping}"><joint joint="{one}" coef="1"/><joint joint="{other}" coef="-1"/></fixed>'
+TENDON = """<fixed stiffness="{stiffness}" damping="{damping}">
+<joint joint="{one}" coef="1"/><joint joint="{other}" coef="-1"/></fixed>"""
 
 
 def in_mujoco(friction):

@@ -133,7 +133,7 @@ def test_what_a_controller_does_besides_is_read_and_counts(fit, found, tmp_path)
 def test_scales_of_positions_belong_together(fit, tmp_path):
     scaled = "[coupling]\nposition_to_slave = { value = 0.5, unit = \"1\" }\n#"
     apart = scaled.replace("#", 'position_to_master = { value = 1, unit = "1" }\n#')
-    with pytest.raises(DescriptionError, match="1 is not 1 over coupling.position_to_slave, 0.5: .* write 2"):
+    with pytest.raises(DescriptionError, match=r"1 is not 1 over coupling.position_to_slave, 0.5: .* write 2"):
         bf.teleoperate(fit, device(tmp_path, "[coupling] ", apart), wrap_angle="90deg")
     found = bf.teleoperate(fit, device(tmp_path, "[coupling] ", scaled), wrap_angle="90deg")
     assert found.stated.stiffness.median < 40

@@ -1,4 +1,4 @@
-"""The share that is chosen at 5 % moves 5 % of cables by itself in a mounting that nobody measured: with fits, not with models."""
+"""The share chosen at 5 % moves 5 % of fitted cables by itself, in a mounting of each that nobody measured."""
 
 from dataclasses import replace
 

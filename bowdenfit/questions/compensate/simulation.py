@@ -65,7 +65,8 @@ def simulated(
         Devices(
             _plant(loop, known, at, np.full(len(at), most)), Hand(known["hand.stiffness"], known["hand.damping"]),
             known["hand.inertia"], sample, stated["controller.torque_noise"].value, None if chosen is None else chosen.torque,
-            None if answer.gain is None else answer.gain.safe, chosen_to.get(ACTIVE_ZONE, np.inf), control, answer.by_bend[most].wrap_angle, fit.provenance.seed,
+            None if answer.gain is None else answer.gain.safe, chosen_to.get(ACTIVE_ZONE, np.inf), control,
+            answer.by_bend[most].wrap_angle, fit.provenance.seed,
         ),
         middle,
     )  # fmt: skip

@@ -88,9 +88,9 @@ def _fed_back(found: Compensation) -> Iterator[str]:
         beside = f" beside {gain.integral:.3g} 1/s times its integral"
         fades = f", which fades by two thirds in {(1 + gain.safe) / gain.integral:.2g} s of motion one way"
     yield (
-        f"Feed back {most} times the torque measured at the joint{beside}: with at most {percent(found.risk, 0)} probability it then "
-        f"oscillates, {'hands off or on' if gain.with_hand else 'hands off'}. That leaves {newton_metres(gain.left.median)} to "
-        f"feel{fades}. {_no_hand(gain)} The largest gain is {gain.stable.q05:.2g} to "
+        f"Feed back {most} times the torque measured at the joint{beside}: with at most {percent(found.risk, 0)} probability "
+        f"it then oscillates, {'hands off or on' if gain.with_hand else 'hands off'}. That leaves "
+        f"{newton_metres(gain.left.median)} to feel{fades}. {_no_hand(gain)} The largest gain is {gain.stable.q05:.2g} to "
         f"{gain.stable.q95:.2g} (90 % interval); {percent(gain.decided_share, 0)} of that goes with {gain.decided_by}: "
         f"{_measure(gain)}."
     )

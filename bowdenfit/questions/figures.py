@@ -18,6 +18,7 @@ from bowdenfit.questions.bends import (
     motor_force_figure,
     preload_figure,
     preload_window_figure,
+    ring_down_figure,
     stretch_figure,
 )
 from bowdenfit.questions.check import checks_figure
@@ -52,6 +53,7 @@ _FILES = (  # first what was measured beside the model, then what follows, then 
     stretch_figure,
     preload_figure,
     loops_figure,
+    ring_down_figure,
     recordings_figure,
     wrap_angles_figure,
     efficiency_figure,

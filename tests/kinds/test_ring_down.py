@@ -2,12 +2,15 @@
 
 import numpy as np
 import pytest
+from figure_words import faults
 
 import bowdenfit as bf
 from bowdenfit.dataset import load_dataset
 from bowdenfit.errors import DatasetError
+from bowdenfit.kinds.ringdown import RINGDOWN
 from bowdenfit.kinds.ringdown.table import RingDownTable
 from bowdenfit.physics.ring_down import ring_down
+from bowdenfit.questions.bends import ring_down_figure
 
 J, K, B, F = 1e-3, 20.0, 4e-3, 0.08
 NAMES = {"ring_inertia": J, "ring_stiffness": K, "rope_damping": B, "ring_friction": F}
@@ -107,3 +110,21 @@ def test_torque_tells_the_same_as_angle(tmp_path):
     for name, truth in NAMES.items():
         found = fit.parameter(name)
         assert abs(found.mean - truth) < 4 * found.sd and found.sd < 0.1 * truth, name
+
+
+def test_a_released_joint_is_drawn_as_it_was_read_and_fitted(tmp_path):
+    stated = INERTIA.replace("sd = 2e-5, ", "")
+    fit = bf.fit(folder_of(tmp_path, [(0.0, swung(noise=2e-4)), (1e-3, swung(1e-3, noise=2e-4, seed=1))], stated), seed=1,
+                 mcmc=False)  # fmt: skip
+    first, second = ring_down_figure.data(fit)
+    assert (first.label, second.label) == ("Run 1", "Run 2, 0.001 kg m² added")
+    assert np.std(first.points - first.points_fitted) < np.rad2deg(4e-4)
+    np.testing.assert_allclose(np.interp(first.points_time, first.time, first.reading[0]), first.points_fitted, atol=0.3)
+    assert ring_down_figure.caption((first, second)).startswith("Angle against the time since the release of the joint, 2 runs")
+    assert faults(ring_down_figure.draw((first, second))) == []
+
+
+def test_files_of_a_released_joint_are_offered_where_no_description_says_what_they_hold():
+    asked = RINGDOWN.asked
+    assert [each.quantity.name for each in asked.required] == ["time", "angle"]
+    assert not asked.is_guessed, "time and angle are in many a file"

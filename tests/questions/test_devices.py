@@ -244,6 +244,35 @@ def test_the_verb_prints_and_writes_what_the_library_answers(fit, run, tmp_path)
     assert run("compensate", tmp_path / "fit")[0] == 2
 
 
+NO_SD = 'damping = { value = 0.02, unit = "N*m*s/rad", sd = 0.004 }\nmounting'
+BAD = {
+    "no loop": ("ROPE", RANGE, None, "pull-pull loop"),
+    "beyond its bends": ("LOOP", "45deg:270deg", None, "leaves the wrap angles measured, 0 to 180 deg"),
+    "nothing tells tau": ("LOOP", RANGE, ("mounting_scatter", "# mounting_scatter"), "cannot tell how the next one will differ"),
+    "no sd": ("LOOP", RANGE, (NO_SD, NO_SD.replace(", sd = 0.004", "")), "has no sd, and the answer is a probability"),
+    "no unit": ("LOOP", RANGE, (NO_SD, NO_SD.replace(', unit = "N*m*s/rad"', "")), "the unit is missing"),
+    "another unit": ("LOOP", RANGE, (NO_SD, NO_SD.replace("N*m*s/rad", "N*s/m")), "does not measure an angular damping"),
+    "a key that is missing": ("LOOP", RANGE, ("filter_time", "# filter_time"), "write filter_time = "),
+}  # fmt: skip
+
+
+@pytest.mark.parametrize("fault", BAD)
+@pytest.mark.parametrize("verb", ["compensate", "teleoperate"])
+def test_bad_input_ends_in_a_sentence_and_writes_nothing(fit, run, tmp_path, verb, fault):
+    cable, bends, change, says = BAD[fault]
+    folder = DATA.parent / "fits" / "published" / "on-body-exoskeleton"
+    if cable == "LOOP":
+        folder = tmp_path / "fit"
+        fit.save(folder)
+    path = DEVICE if change is None else device(tmp_path, *change)
+    named = ["--device", path, "--simulate"] if verb == "compensate" else [path]
+    code, out, err = run(verb, folder, *named, "--wrap-angle", bends, "--output", tmp_path / "answer")
+    assert (code, out) == (2, "")
+    assert says in " ".join(err.split())
+    assert "Traceback" not in err
+    assert not (tmp_path / "answer").exists()
+
+
 @pytest.fixture(scope="module")
 def remote(fit):
     return bf.teleoperate(fit, DEVICE, wrap_angle=RANGE)
@@ -310,6 +339,9 @@ def test_gains_that_diverge_are_said_as_such_with_the_limit_that_was_crossed(fit
     assert diverging.stated.hardest == 0
     assert np.all(np.isfinite(diverging.contact.hand_torque))
     assert "no wall without bouncing" in text
+    bf.teleoperate(fit, tmp_path / "device.toml", wrap_angle="90deg", output=tmp_path / "answer")
+    page = json.loads((tmp_path / "answer" / "teleoperation.json").read_text(), parse_constant=pytest.fail)
+    assert page["schemes"][0]["hardest"] == 0
 
 
 def test_teleoperation_that_cannot_be_answered_is_refused(fit, tmp_path):

@@ -1,9 +1,12 @@
 """Ring-down: the joint is released against the rope, and swings until damping and friction have stopped it."""
 
+from bowdenfit.files.columns import Quantity
+from bowdenfit.kinds.asked import Asked, Wanted
 from bowdenfit.kinds.kind import Kind
 from bowdenfit.kinds.readings import Readings
 from bowdenfit.kinds.ringdown.table import RingDownSettings, RingDownTable, read_ring_down
 from bowdenfit.kinds.ringdown.words import check, describe, implausible, page
+from bowdenfit.kinds.rows import RUN
 from bowdenfit.words import counted
 
 RINGDOWN = Kind(
@@ -23,5 +26,14 @@ RINGDOWN = Kind(
     ),
     implausible=implausible,
     page=page,
+    asked=Asked(
+        "the angle of a released joint, or the torque in its rope, against time",
+        (
+            Wanted(Quantity("time", "time"), "the time"),
+            Wanted(Quantity("angle", "angle"), "the angle of the joint", (Quantity("torque", "torque"),)),
+            RUN,
+        ),
+        is_guessed=False,
+    ),
     count=lambda table: f"{counted(len(table.time), 'reading')} of a ring-down",
 )

@@ -248,7 +248,7 @@ NO_SD = 'damping = { value = 0.02, unit = "N*m*s/rad", sd = 0.004 }\nmounting'
 BAD = {
     "no loop": ("ROPE", RANGE, None, "pull-pull loop"),
     "beyond its bends": ("LOOP", "45deg:270deg", None, "leaves the wrap angles measured, 0 to 180 deg"),
-    "nothing tells tau": ("LOOP", RANGE, ("mounting_scatter", "# mounting_scatter"), "cannot tell how the next one will differ"),
+    "nothing tells tau": ("LOOP", RANGE, ("mounting_scatter", "# mounting_scatter"), "cannot tell how the next one"),
     "no sd": ("LOOP", RANGE, (NO_SD, NO_SD.replace(", sd = 0.004", "")), "has no sd, and the answer is a probability"),
     "no unit": ("LOOP", RANGE, (NO_SD, NO_SD.replace(', unit = "N*m*s/rad"', "")), "the unit is missing"),
     "another unit": ("LOOP", RANGE, (NO_SD, NO_SD.replace("N*m*s/rad", "N*s/m")), "does not measure an angular damping"),

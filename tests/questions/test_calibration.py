@@ -1,7 +1,10 @@
 """Simulation-based calibration: tables drawn anew, ranks, verdicts, and wrong likelihoods that it must catch."""
 
 import json
+import pickle
+from concurrent.futures import ProcessPoolExecutor
 from dataclasses import replace
+from multiprocessing import get_context
 
 import jax
 import jax.numpy as jnp
@@ -33,6 +36,7 @@ from bowdenfit.questions.calibrate.acceptable_tables import refusal
 from bowdenfit.questions.calibrate.answer import Calibration, Quantity
 from bowdenfit.questions.calibrate.figures import draw_calibration
 from bowdenfit.questions.calibrate.findings import findings
+from bowdenfit.questions.calibrate.pieces import Asked, pieces_of, replicated
 from bowdenfit.questions.calibrate.refit import Laboratory
 from bowdenfit.questions.calibrate.replication import RankedTruth, Replication
 from bowdenfit.questions.calibrate.sections import calibration_page
@@ -429,8 +433,18 @@ def test_a_replication_depends_on_its_number_alone():
     plan = Plan(dataset, dataset, 3)
     bench = Workbench(plan)
     _, second, _ = bench.replications(range(3))
-    (alone,) = Workbench(plan, bench.laboratory).replications([1])
-    assert replace(alone, seconds=0.0) == replace(second, seconds=0.0)
+    (piece,) = pickle.loads(pickle.dumps(pieces_of(Asked(plan), [1], workers=2)))
+    for (alone,) in (Workbench(plan, bench.laboratory).replications([1]), replicated(piece)):
+        assert replace(alone, seconds=0.0) == replace(second, seconds=0.0)
+
+
+def test_work_is_cut_so_that_all_replications_are_done_once():
+    dataset = data_set("yarn-on-cylinder")
+    numbers = list(range(3, 203))
+    for workers, largest in ((1, 128), (2, 25), (50, 16)):
+        pieces = pieces_of(Asked(Plan(dataset, dataset, 3)), numbers, workers)
+        assert [number for piece in pieces for number in piece.numbers] == numbers
+        assert max(len(piece.numbers) for piece in pieces) == largest
 
 
 def test_the_command_line_calibrates_resumes_and_says_when_too_few_replications_are_there(run, tmp_path):
@@ -497,10 +511,12 @@ def test_a_table_that_only_the_assumption_names_is_refused(run, tmp_path):
 
 
 @pytest.mark.slow
-def test_two_cores_give_the_replications_that_one_gives():
+def test_two_cores_and_two_processes_give_the_replications_that_one_gives():
     """The same ranks to the last digit."""
     from bowdenfit import calibrate
 
     data = ROOT / "datasets" / "yarn-on-cylinder"
     one, two = (calibrate(data, replications=40, workers=workers, seed=1) for workers in (1, 2))
-    assert [q.ranks for q in one.quantities] == [q.ranks for q in two.quantities]
+    with ProcessPoolExecutor(2, get_context("spawn")) as executor:
+        others = calibrate(data, replications=40, workers=2, seed=1, engine=executor)
+    assert [q.ranks for q in one.quantities] == [q.ranks for q in two.quantities] == [q.ranks for q in others.quantities]

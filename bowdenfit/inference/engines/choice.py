@@ -1,5 +1,6 @@
 """The engine that is asked for: local, dask://HOST:PORT, slurm, or any executor."""
 
+import shutil
 from collections.abc import Callable, Iterator
 from concurrent.futures import Executor, ProcessPoolExecutor
 from contextlib import contextmanager
@@ -16,7 +17,8 @@ from bowdenfit.words import shown
 
 ENGINES = "local, dask://HOST:PORT or slurm"
 OF_A_JOB = 4096  # data sets of a job of Slurm at the most; each job loads and compiles all over again
-JOBS = 16  # of Slurm at a time, if nothing else is said
+JOBS = "jobs"  # folder in which Slurm's jobs write
+_AT_A_TIME = 16  # jobs of Slurm, if nothing else is said
 _ANSWERS_WITHIN, _WORKERS_WITHIN = 10, 60  # seconds
 _MINUTES = 240  # of a job of Slurm; SBATCH_TIMELIMIT says otherwise
 
@@ -55,7 +57,9 @@ def open_engine(
     elif engine == "slurm":
         if folder is None:
             raise UsageError("--engine slurm needs a folder that all its nodes see; name it with --output.")
-        found = Engine(partial(slurm, folder, workers or JOBS), workers or JOBS, "slurm", OF_A_JOB)
+        if shutil.which("srun") is None:
+            raise _no_slurm()
+        found = Engine(partial(slurm, folder, workers or _AT_A_TIME), workers or _AT_A_TIME, "slurm", OF_A_JOB)
     else:
         raise UsageError(f"there is no engine {shown(engine)}; known here: {ENGINES}.")
     try:
@@ -116,15 +120,19 @@ def slurm(folder: Path, jobs: int, cluster: str = "slurm") -> Executor:
     try:
         inner = submitit.AutoExecutor(folder.resolve(), cluster=cluster)
     except RuntimeError:
-        raise UsageError(
-            "there is no Slurm here (no srun and sbatch); run this on a login node of the cluster, or leave --engine out."
-        ) from None
+        raise _no_slurm() from None
     inner.update_parameters(timeout_min=_MINUTES, name="bowdenfit")
 
     def submit(function: Callable[..., Any], *arguments: Any) -> Any:
         return inner.submit(function, *arguments).result()
 
     return in_threads(submit, jobs)
+
+
+def _no_slurm() -> UsageError:
+    return UsageError(
+        "there is no Slurm here (no srun and sbatch); run this on a login node of the cluster, or leave --engine out."
+    )
 
 
 def _not_installed(library: str) -> UsageError:

@@ -2,8 +2,9 @@
 
 import json
 import secrets
+import shutil
 from collections.abc import Callable, Sequence
-from dataclasses import replace
+from concurrent.futures import Executor
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any, Unpack
 
@@ -15,7 +16,9 @@ from bowdenfit.verb import LARGEST_SEED, Argument, Option, Output, Reply, Verb, 
 
 if TYPE_CHECKING:
     from bowdenfit.dataset import Dataset
+    from bowdenfit.inference.engines.engine import Engine
     from bowdenfit.questions.calibrate.answer import Calibration
+    from bowdenfit.questions.calibrate.pieces import Asked
     from bowdenfit.questions.calibrate.replication import Replication
     from bowdenfit.questions.calibrate.workbench import Plan
 
@@ -27,7 +30,8 @@ def calibrate(
     dataset: Annotated["str | Path | Dataset", Argument("DATASET")],
     *,
     replications: Annotated[int, Option(("-n",), least=2)] = 200,
-    workers: Annotated[int | None, Option(("-j",), least=1, default="all")] = None,
+    engine: Annotated["str | Executor", Option(metavar="ENGINE")] = "local",
+    workers: Annotated[int | None, Option(("-j",), least=1, default="all cores; 16 jobs of Slurm")] = None,
     output: Annotated[Output, Option(("-o",), default="fits/calibration/NAME OF DATASET")] = None,
     assume: Annotated[Sequence[str], Option(metavar="KEY=VALUE")] = (),
     truth: Annotated[str | Path | None, Option(metavar="FILE")] = None,
@@ -48,7 +52,8 @@ def calibrate(
     Args:
         dataset: See `bowdenfit.read`; its keywords are taken too.
         replications: How many.
-        workers: Cores that are used.
+        engine: local (this process), dask://HOST:PORT or slurm; or any `concurrent.futures.Executor`.
+        workers: Cores that are used, or pieces of work at a time elsewhere.
         output: Results folder.
         assume: Fit with this setting changed, while simulating without: what a wrong assumption costs; may be repeated.
         truth: True values that do not come from the priors: a TOML file with a number or a range for each parameter, such as
@@ -69,7 +74,9 @@ def calibrate(
     import jax
 
     import bowdenfit.questions.calibrate.words  # noqa: F401  (what the answer says of itself)
+    from bowdenfit.inference.engines.choice import JOBS, open_engine
     from bowdenfit.questions.calibrate.findings import findings
+    from bowdenfit.questions.calibrate.pieces import Asked
     from bowdenfit.questions.calibrate.quantities import quantities_of
     from bowdenfit.questions.calibrate.store import open_replications
     from bowdenfit.results.folder import reserved
@@ -79,7 +86,11 @@ def calibrate(
     with reserved(folder):
         done = {} if folder is None else open_replications(folder, _fingerprint(plan, assume), resume, force)
         with watched(WATCH, progress) as show:
-            _replicate(plan, done, replications, workers, folder, show)
+            asked = Asked(plan, (workers or 0) if engine == "local" else 0)
+            with open_engine(engine, workers, folder and folder / JOBS) as opened:
+                _replicate(opened, asked, done, replications, folder, show)
+        if folder is not None:
+            shutil.rmtree(folder / JOBS, ignore_errors=True)
         found = findings(tuple(done.values()), quantities, assumed=tuple(assume), **_told(plan))
         _write(found, folder)
     return found
@@ -131,26 +142,25 @@ def _stated_and_assumed(
 
 
 def _replicate(
-    plan: "Plan",
+    opened: "Engine[Any, list[Replication]]",
+    asked: "Asked",
     done: "dict[int, Replication]",
     replications: int,
-    workers: int | None,
     folder: Path | None,
     progress: Report | None,
 ) -> None:
     """Do what is not done yet, and keep each as it ends."""
-    from bowdenfit.questions.calibrate.refit import RANKS, Laboratory
+    from bowdenfit.questions.calibrate.pieces import pieces_of, replicated
     from bowdenfit.questions.calibrate.store import keep
-    from bowdenfit.questions.calibrate.workbench import Workbench
 
     missing = [number for number in range(replications) if number not in done]
-    bench = Workbench(plan, Laboratory(replace(RANKS, threads=workers or 0)))
-    for each in bench.replications(missing):
-        done[each.number] = each
-        if folder is not None:
-            keep(folder, each)
-        if progress is not None:
-            progress(len(done), max(replications, len(done)))
+    for piece in opened.results(replicated, pieces_of(asked, missing, opened.workers)):
+        for each in piece:
+            done[each.number] = each
+            if folder is not None:
+                keep(folder, each)
+            if progress is not None:
+                progress(len(done), max(replications, len(done)))
 
 
 def _seed(folder: Path | None, seed: int | None, resume: bool) -> int:

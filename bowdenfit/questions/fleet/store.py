@@ -12,12 +12,13 @@ import numpy as np
 
 from bowdenfit.errors import StoreError
 from bowdenfit.inference.batch.pieces import PieceFit
+from bowdenfit.inference.engines.choice import JOBS
 from bowdenfit.inputs import or_damaged
 from bowdenfit.results.arrays import read_arrays, write_arrays
 from bowdenfit.results.fleet_folder import FLEET_DRAWS, FLEET_PAGE, FleetDraws, read_fleet_draws
 from bowdenfit.results.folder import SUMMARY_TEXT, folder_to_write, read_page, refuse_no_seed, write_text
 
-KEPT, BEGUN, JOBS = "kept", "begun.json", "jobs"  # folder of pieces, what they were made for, and what Slurm writes
+KEPT, BEGUN = "kept", "begun.json"  # folder of pieces, and what they were made for
 _FITS = "fits"
 _WHAT = {"seed": "the seed", "versions": "a version of bowdenfit or of a library"}
 SEPARATOR = "\n"  # between reasons in fleet.nc

@@ -72,16 +72,15 @@ def fleet(
     with reserved(place), watched(WATCH, progress) as show:
         import jax
 
-        from bowdenfit.inference.engines.choice import open_engine
+        from bowdenfit.inference.engines.choice import JOBS, open_engine
         from bowdenfit.questions.fleet.fitting import gathered
-        from bowdenfit.questions.fleet.store import JOBS
 
         store, seed = _store(place, seed, resume)
         prepare()
         with jax.enable_x64(True):
             cases, broken = _read(Path(folder), inspections, reading)
-            fits = store.open(resume, force) if store else {}
             with open_engine(engine, workers, place and place / JOBS, in_background, prepare) as opened:
+                fits = store.open(resume, force) if store else {}
                 _fit(opened, cases, seed, store, fits, show)
             answer, drawn = gathered(Path(folder).resolve().name, cases, fits, broken, seed)
         if store is not None:

@@ -160,6 +160,8 @@ def how_to_read(found: Pool) -> str:
     dry = "dry " if any(each.name == "lubrication" for each in found.effects) else ""
     warm = f"at {found.reference_temperature:g} °C " if any(each.name == "per_degree" for each in found.effects) else ""
     state = f", when new {dry}{warm}".rstrip() if found.wear is not None else ""
+    if len(found.cables) == 1:
+        return f"Typical: the middle of what is likely{state} after this cable alone, median and 90 % interval."
     return (
         f"Typical: the middle of the population{state}, median and 90 % interval. Between cables: the standard deviation of "
         "one cable from another. A new cable lies in the last interval nine times in ten."

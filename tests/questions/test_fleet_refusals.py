@@ -1,0 +1,147 @@
+"""What is wrong with a fleet, or with those who are to fit it, is a sentence, and what is done is kept."""
+
+import errno
+import shutil
+from concurrent.futures import ThreadPoolExecutor
+from pathlib import Path
+
+import pytest
+
+import bowdenfit as bf
+from bowdenfit.inference.engines.engine import Engine, EngineError
+from bowdenfit.inference.versions import versions
+from bowdenfit.questions.fleet.cases import read_cases
+from bowdenfit.questions.fleet.inspections import read_inspections
+from bowdenfit.questions.fleet.store import KEPT, FleetStore
+from bowdenfit.results.fleet_folder import FLEET_DRAWS, FLEET_TABLE
+
+FLEET = Path(__file__).parents[2] / "datasets" / "synthetic-fleet"
+HEADING, *ROWS = (FLEET / FLEET_TABLE).read_text().splitlines()
+
+
+@pytest.fixture
+def fleet(tmp_path):
+    """Writes a fleet with the rows that are given."""
+
+    def write(*rows):
+        folder = tmp_path / "fleet"
+        shutil.copytree(FLEET / "readings", folder / "readings")
+        shutil.copy(FLEET / "fleet.toml", folder)
+        (folder / FLEET_TABLE).write_text("\n".join([HEADING, *rows]) + "\n")
+        return folder
+
+    return write
+
+
+@pytest.mark.parametrize(
+    ("rows", "said"),
+    [
+        ((ROWS[0], ROWS[1], ROWS[0]), "cable-01 after 0 cycles stands twice: fleet.csv, row 2 and fleet.csv, row 4"),
+        ((ROWS[1], ROWS[0]), "cycles run backwards: fleet.csv, row 3 (cable-01: 0 after 25000 in row 2)"),
+        ((ROWS[0].replace(",0,", ",-5,"),), "-5' cycles cannot be"),
+        ((ROWS[0].replace("yes", "perhaps"),), "does not say whether the cable was lubricated"),
+        ((ROWS[0].replace("28.6", "900"),), "is no temperature"),
+        ((ROWS[0].replace("readings/", "gone/"),), "none of 1 inspections can be fitted"),
+    ],
+)
+def test_a_wrong_table_is_refused_and_nothing_is_written(refuse, fleet, tmp_path, rows, said):
+    assert said in refuse("fleet", fleet(*rows), "-o", tmp_path / "results")
+
+
+@pytest.mark.parametrize(
+    ("engine", "code", "said"),
+    [
+        ("dask://127.0.0.1:9", 1, "does not answer"),
+        ("slurm", 2, "there is no Slurm here"),
+        ("ray", 2, "there is no engine 'ray'"),
+    ],
+)
+def test_an_engine_that_cannot_be_had_is_a_sentence_and_nothing_is_written(run, fleet, tmp_path, monkeypatch, engine, code, said):
+    monkeypatch.setenv("PATH", str(tmp_path))  # no Slurm on any machine
+    results = tmp_path / "results"
+    found, _, error = run("fleet", fleet(ROWS[0]), "-o", results, "--engine", engine)
+    assert found == code and said in " ".join(error.split()) and "Traceback" not in error
+    assert not results.exists()
+
+
+def test_broken_inspections_are_named_and_the_others_go_on(fleet):
+    """A file that is missing, one that is no table, one that is copied, and one with a description of its own."""
+    other = fleet(ROWS[0], *ROWS[3:5], ROWS[6].replace("cable-03-0", "cable-01-0"), "own,0,20,no,own")
+    (other / "readings" / "cable-02-0.csv").unlink()
+    (other / "readings" / "cable-02-25000.csv").write_bytes(b"\x00\xff\x13 no table")
+    own = other / "own"
+    (own / "readings").mkdir(parents=True)
+    text = (FLEET / "fleet.toml").read_text().replace("mu_edge", "mu_ring").replace("forces.csv", "readings/cable-04-0.csv")
+    (own / "cable.toml").write_text(text)
+    shutil.copy(FLEET / "readings" / "cable-04-0.csv", own / "readings")
+    found = list(read_cases(other, read_inspections(other), {}))
+    broken = {each.inspection: each.why for each in found if hasattr(each, "why")}
+    assert set(broken) == {"cable-02 after 0 cycles", "cable-02 after 25000 cycles", "cable-03 after 0 cycles"}
+    assert "has the readings of cable-01 after 0 cycles to the last digit" in broken["cable-03 after 0 cycles"]
+    fitted = [each for each in found if not hasattr(each, "why")]
+    assert [each.inspection.cable for each in fitted] == ["cable-01", "own"]
+    assert len({each.shaped.key for each in fitted}) == 2
+
+
+class Dying(ThreadPoolExecutor):
+    """Loses the first so many pieces, as where workers die."""
+
+    def __init__(self, lost):
+        super().__init__(1)
+        self.lost = lost
+
+    def submit(self, function, /, *arguments, **named):
+        self.lost -= 1
+        return super().submit(function, *arguments, **named) if self.lost < 0 else super().submit(_die)
+
+
+def _die():
+    raise ConnectionError("the worker is gone")
+
+
+@pytest.mark.parametrize("lost", [0, 1, 2])
+def test_work_of_a_worker_that_dies_is_done_again(lost):
+    with Dying(lost) as executor:
+        assert sorted(Engine(lambda: executor, 1, "here").results(abs, [-1, -2, -3])) == [1, 2, 3]
+
+
+def test_work_that_kills_every_worker_is_a_sentence():
+    with Dying(1000) as executor, pytest.raises(EngineError, match="lost 3 times at the same work"):
+        list(Engine(lambda: executor, 1, "here").results(abs, [-1]))
+
+
+def test_a_worker_with_other_versions_is_refused(fleet, monkeypatch):
+    """The work says with which versions it was made."""
+    here = versions()
+    monkeypatch.setattr("bowdenfit.questions.fleet.fitting.versions", lambda: here | {"jax": "0.0.1"})
+    with pytest.raises(bf.UsageError, match=r"a worker has other versions: jax .* \(here 0\.0\.1\)"):
+        bf.fleet(fleet(ROWS[0]), seed=1)
+
+
+def test_a_full_disk_is_a_sentence_and_what_was_kept_goes_on(run, fleet, tmp_path, monkeypatch):
+    folder, results = fleet(*ROWS[:20]), tmp_path / "results"
+    begin = ("fleet", folder, "-o", results, "--seed", 7)
+    kept, keep = list[int](), FleetStore.keep
+
+    def full(store, fits):
+        if kept:
+            raise OSError(errno.ENOSPC, "No space left on device")
+        kept.append(len(fits))
+        keep(store, fits)
+
+    with monkeypatch.context() as disk:
+        disk.setattr(FleetStore, "keep", full)
+        code, _, error = run(*begin)
+    assert code == 1 and "No space left" in error and "Traceback" not in error
+    assert len(list((results / KEPT).glob("*.npz"))) == 1 and not (results / FLEET_DRAWS).exists()
+    code, _, error = run(*begin)
+    assert code == 2 and "go on with --resume" in " ".join(error.split())
+    code, out, _ = run(*begin, "--resume")
+    assert code == 0 and "every fit may be" in " ".join(out.split())
+
+
+def test_a_fleet_begun_with_other_versions_is_not_gone_on_with(run, fleet, tmp_path, monkeypatch):
+    folder, results = fleet(ROWS[0]), tmp_path / "results"
+    FleetStore(results, {"seed": 7, "versions": {"jax": "0.0.1"}}).open(False, False)
+    code, _, error = run("fleet", folder, "-o", results, "--resume")
+    assert code == 2 and "a version of bowdenfit or of a library changed" in " ".join(error.split())

@@ -56,7 +56,7 @@ def test_a_wrong_table_is_refused_and_nothing_is_written(refuse, fleet, tmp_path
         ("ray", 2, "there is no engine 'ray'"),
     ],
 )
-def test_an_engine_that_cannot_be_had_is_a_sentence_and_nothing_is_written(run, fleet, tmp_path, monkeypatch, engine, code, said):
+def test_an_engine_that_cannot_be_had_leaves_nothing_behind(run, fleet, tmp_path, monkeypatch, engine, code, said):
     monkeypatch.setenv("PATH", str(tmp_path))  # no Slurm on any machine
     results = tmp_path / "results"
     found, _, error = run("fleet", fleet(ROWS[0]), "-o", results, "--engine", engine)

@@ -16,6 +16,7 @@ from bowdenfit.plots.layout import (
     label_across,
     panels,
     room_for_labels,
+    text_width,
 )
 from bowdenfit.plots.style import MEDIUM, SMALL, WIDE
 
@@ -26,7 +27,6 @@ if TYPE_CHECKING:
 MOST = 8  # recordings in a figure
 LEAST_WIDTH = 1.2  # in, of a panel
 ALIKE = 4.0  # ranges share an axis if all of them together are so many times the shortest at most
-CHARACTER = 0.064  # in, width of one in a title
 LEGEND_MARK = 4.0  # pt
 LONG = 60.0  # ratio of the ends of a logarithmic axis from which it has numbers at powers of ten only
 MARK_GRID = (160, 60)  # across and up a panel, marks of a kind that it can show
@@ -84,7 +84,7 @@ def recording_panels(
     figure, flat = panels(heights, columns, TITLE, (across, down), page, sharex=share_x, sharey=share_y)
     flat = drop_unused(flat, len(names))
     for axes, name in zip(flat, names, strict=True):
-        axes.set_title(short(name, int(inner / CHARACTER)), fontsize=SMALL)
+        axes.set_title(short_title(name, inner), fontsize=SMALL)
     return figure, flat, columns
 
 
@@ -118,6 +118,15 @@ def panels_with_limits(
 def short(name: str, longest: int) -> str:
     """The end of a name, which tells recordings of one folder apart."""
     return name if len(name) <= longest else "\N{HORIZONTAL ELLIPSIS}" + name[1 - longest :]
+
+
+def short_title(name: str, room: float) -> str:
+    """The end of a name that is no wider than the room [in], from the beginning of a word on where there is one."""
+    if text_width(name) <= room:
+        return name
+    longest = next((n for n in range(len(name) - 1, 1, -1) if text_width(short(name, n)) <= room), 1)
+    cut = short(name, longest)
+    return f"\N{HORIZONTAL ELLIPSIS} {cut.partition(' ')[2]}" if " " in cut else cut
 
 
 def label_outer(flat: list[Axes], columns: int, x_label: str, y_label: str) -> None:

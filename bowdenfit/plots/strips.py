@@ -21,7 +21,7 @@ from bowdenfit.plots.layout import (
     room_for_labels,
     squeeze,
 )
-from bowdenfit.plots.panels import CHARACTER, LEAST_WIDTH, alike, finite, set_limits, short
+from bowdenfit.plots.panels import LEAST_WIDTH, alike, finite, set_limits, short_title
 from bowdenfit.plots.style import GRAY, MEDIUM, SMALL, WIDE
 
 if TYPE_CHECKING:
@@ -99,11 +99,14 @@ def place_names(main: Axes, strip: Axes, far: float | None = None) -> None:
     Args:
         main: The panel.
         strip: Its strip.
-        far: From the axes to the names [in]; beside the wider numbers of the two if omitted.
+        far: From the axes to the names [in]; beside the wider numbers of the two, and on the page, if omitted.
     """
     figure = main.figure
     assert figure is not None  # a panel is on a page
-    far = max(_NUMBERS, number_width(main), number_width(strip)) + _PAD if far is None else far
+    if far is None:
+        far = max(_NUMBERS, number_width(main), number_width(strip)) + _PAD
+        margin = main.get_position().x0 * figure.get_size_inches()[0]  # type: ignore[union-attr]
+        squeeze(figure, margin, max(margin, far + _TWO_LINES))  # type: ignore[arg-type]
     width = figure.get_size_inches()[0] * main.get_position().width  # type: ignore[union-attr]
     for axes in (main, strip):
         axes.yaxis.set_label_coords(-far / width, 0.5)
@@ -147,7 +150,7 @@ def panels_with_strips(
         first = made.mains[0] if made.mains else None
         sharing = {"sharex": first if share_x else None, "sharey": first if share_y else None}
         made.mains.append(axes_at(figure, left, bottom + STRIP + GAP, inner, main, **sharing))
-        made.mains[-1].set_title(short(name, int(inner / CHARACTER)), fontsize=SMALL)
+        made.mains[-1].set_title(short_title(name, inner), fontsize=SMALL)
         sharing = {"sharex": made.mains[-1], "sharey": made.strips[0] if made.strips else None}
         made.strips.append(axes_at(figure, left, bottom, inner, STRIP, **sharing))
         inside = i % columns > 0

@@ -5,7 +5,7 @@ import dataclasses
 import matplotlib as mpl
 import numpy as np
 import pytest
-from figure_words import check_words, words
+from figure_words import assert_readable, check_words, words
 from kept_data import assert_kept
 
 from bowdenfit.plots.bands import evenly
@@ -376,6 +376,13 @@ def test_preload_shows_curve_band_and_readings_from_zero():
     assert -0.1 * high < low < 0
     bare = dataclasses.replace(curve, points_wrap_angle=np.zeros(0), points_preload=np.zeros(0))
     assert "Reading" not in labels_of(drawn("preload", {"preload": bare}))
+
+
+@pytest.mark.parametrize("scale", [0.005, 1.0, 200.0])
+def test_a_preload_of_any_size_keeps_its_words_on_the_page(scale):
+    curve = glove()["preload"]
+    other = dataclasses.replace(curve, preload=scale * curve.preload, points_preload=scale * curve.points_preload)
+    assert_readable({"preload": other}, "Glove")
 
 
 def test_each_efficiency_has_the_capstan_equation_dashed_in_its_color():

@@ -13,6 +13,8 @@ from matplotlib.figure import Figure
 
 import bowdenfit as bf
 from bowdenfit.cable.friction import FRICTION_OPTIONS
+from bowdenfit.plots.layout import text_width
+from bowdenfit.plots.panels import short_title
 from bowdenfit.questions.figures import caption_of, figures_of
 
 DATA = Path(__file__).parents[2] / "datasets"
@@ -59,6 +61,14 @@ def test_figures_of_every_friction_model_can_be_read(friction, tmp_path):
 def test_figures_of_the_synthetic_bench_can_be_read():
     fit = bf.fit(DATA / "synthetic-bench", mcmc=False)
     assert_readable(dict(figures_of(fit)), fit.name)
+
+
+def test_a_name_that_is_too_long_for_a_panel_begins_with_a_word():
+    long = "upper sheath between the hip plate and the first clamp of the thigh cuff"
+    shown = short_title(long, 1.9)
+    assert shown == "\N{HORIZONTAL ELLIPSIS} and the first clamp of the thigh cuff" and text_width(shown) <= 1.9
+    assert short_title("squeezed sheath", 1.9) == "squeezed sheath"
+    assert short_title("x" * 200, 1.9).startswith("\N{HORIZONTAL ELLIPSIS}x") and text_width(short_title("x" * 200, 1.9)) <= 1.9
 
 
 def test_no_friction_model_is_left_out():

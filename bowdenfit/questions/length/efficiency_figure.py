@@ -206,7 +206,7 @@ def _optimum(axes: Axes, data: AlongRoute, optimum: OptimalLength) -> None:
     if optimum.at_edge > LEAST_AT_EDGE:
         left = bool(optimum.length.median > np.mean(data.route_range))
         axes.text(
-            0.03 if left else 0.97, 0.9, f"at an end of the range with {percent(optimum.at_edge)} probability",
+            0.03 if left else 0.97, 0.9, f"at an end of the range with {percent(round(optimum.at_edge, 3))} probability",
             transform=axes.transAxes, ha="left" if left else "right", va="top", fontsize=SMALL,
         )  # fmt: skip
 

@@ -256,14 +256,18 @@ BAD = {
 }  # fmt: skip
 
 
+@pytest.fixture(scope="module")
+def saved(fit, tmp_path_factory):
+    folder = tmp_path_factory.mktemp("saved") / "fit"
+    fit.save(folder)
+    return folder
+
+
 @pytest.mark.parametrize("fault", BAD)
 @pytest.mark.parametrize("verb", ["compensate", "teleoperate"])
-def test_bad_input_ends_in_a_sentence_and_writes_nothing(fit, run, tmp_path, verb, fault):
+def test_bad_input_ends_in_a_sentence_and_writes_nothing(saved, run, tmp_path, verb, fault):
     cable, bends, change, says = BAD[fault]
-    folder = DATA.parent / "fits" / "published" / "on-body-exoskeleton"
-    if cable == "LOOP":
-        folder = tmp_path / "fit"
-        fit.save(folder)
+    folder = saved if cable == "LOOP" else DATA.parent / "fits" / "published" / "on-body-exoskeleton"
     path = DEVICE if change is None else device(tmp_path, *change)
     named = ["--device", path, "--simulate"] if verb == "compensate" else [path]
     code, out, err = run(verb, folder, *named, "--wrap-angle", bends, "--output", tmp_path / "answer")

@@ -37,7 +37,7 @@ prior = { lognormal = { median = 0.08, log_sd = 0.4 } }
 [prior.sigma_ringdown]
 fixed = 0.001
 [prior.tau]
-fixed = 1
+fixed = 0.01
 [friction.mu]
 fixed = 0.1
 """

@@ -24,7 +24,7 @@ wrap_angle = { column = "wrap_angle" }
 [friction.mu]
 prior = { lognormal = { median = 0.13, log_sd = 0.25 } }
 [prior.tau]
-prior = { uniform = { low = 0.4, high = 2.0 } }
+prior = { uniform = { low = 0.004, high = 0.02 } }
 [preload]
 value = { value = 17.5, unit = "N", sd = 0.3 }
 [tables]

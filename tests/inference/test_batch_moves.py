@@ -95,7 +95,10 @@ def test_values_are_those_of_the_chart():
         np.testing.assert_allclose(of_w, -volume, rtol=1e-9)
 
 
-@pytest.mark.parametrize("name", ["on-body-exoskeleton", "synthetic-haptic-loop", "synthetic-bench"])
+@pytest.mark.parametrize(
+    "name",
+    ["on-body-exoskeleton", *(pytest.param(n, marks=pytest.mark.slow) for n in ("synthetic-haptic-loop", "synthetic-bench"))],
+)
 def test_coefficients_given_everything_else_have_a_way_back_and_the_volume_of_their_derivatives(name):
     with jax.enable_x64(True):
         posterior = LogDensity(build_model(load_dataset(DATA / name)))

@@ -89,7 +89,10 @@ def estimates_of(tables, design, truth, seeds=SEEDS):
     return found, data
 
 
-@pytest.mark.parametrize("case", CASES)
+USUAL = ("a single load", "one wrap angle", "a loop that is always slack")
+
+
+@pytest.mark.parametrize("case", [c if c in USUAL else pytest.param(c, marks=pytest.mark.slow) for c in CASES])
 def test_what_the_data_cannot_tell_is_not_identified_and_no_error_bar_is_too_small(case):
     tables, design, truth, untold, warning = CASES[case]
     found, data = estimates_of(tables, design, truth)

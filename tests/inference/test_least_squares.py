@@ -117,7 +117,11 @@ def _check_standard_errors(tables: tuple[str, ...], n: int, low: float, high: fl
         assert abs(np.mean(values[name][identified]) - TRUTH[name]) < (4.5 / np.sqrt(n) + 0.1) * scatter, name
 
 
-@pytest.mark.parametrize("tables", [("angles", "efficiencies"), ("angles", "forces")], ids=lambda x: x[1])
+@pytest.mark.parametrize(
+    "tables",
+    [("angles", "efficiencies"), pytest.param(("angles", "forces"), marks=pytest.mark.slow)],
+    ids=["efficiencies", "forces"],
+)
 def test_standard_errors_are_what_many_experiments_scatter_by(tables):
     """150 experiments: stated over true error is known to 7 %, and is 1.0 to 1.1; outside 0.8 to 1.4 once in 5000 seeds."""
     _check_standard_errors(tables, 150, 0.8, 1.4)

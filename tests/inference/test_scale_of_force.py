@@ -119,14 +119,17 @@ def write_loop(path: Path) -> None:
     np.savetxt(path, rows, "%.6f", ",", header="time_s,input_force_N,output_force_N", comments="")
 
 
-@pytest.mark.parametrize("case", CASES)
+USUAL = ("efficiencies", "forces with drag", "stretch, preload and loop", "sliding recordings", "force against displacement")
+
+
+@pytest.mark.parametrize("case", [c if c in USUAL else pytest.param(c, marks=pytest.mark.slow) for c in CASES])
 def test_every_force_times_a_factor_changes_the_log_density_by_a_constant(case, tmp_path):
     name, settings = CASES[case]
     densities, values = {}, {}
     for factor in FACTORS:
         model = build_model(strong(tmp_path, name, settings, factor))
         density, z = LogDensity(model), POINTS[:, : model.space.size]
-        found = np.array([float(density.log_density(point, density.data)) for point in z])
+        found = np.asarray(jax.jit(jax.vmap(density.log_density, in_axes=(0, None)))(z, density.data))
         assert np.all(np.isfinite(found))
         densities[factor], values[factor] = found, jax.vmap(model.space.vector)(z)
         power = np.array([("N" in p.unit.split("/")[0].split()) for p in model.space.free], dtype=float)

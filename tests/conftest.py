@@ -11,8 +11,8 @@ import pytest
 
 ROOT = Path(__file__).parent.parent
 PROGRAMS = "JAX_COMPILATION_CACHE_DIR"
-# Tests compile many thousand small programs once, over which XLA's newer fusion emitters take half as long again. Other versions
-# of XLA end the process where they do not know a flag.
+# Tests compile many thousand small programs once, over which the newer fusion emitters of XLA take half as long again. Others
+# of its versions end the process where they do not know a flag.
 FLAGS = {"0.10.2": "--xla_cpu_use_fusion_emitters=false"}
 
 

@@ -15,6 +15,7 @@ import pytest
 import bowdenfit as bf
 from bowdenfit.inference.log_density import LogDensity
 from bowdenfit.model import build_model
+from bowdenfit.questions.summary.verdict import NOT_DESCRIBED
 
 DATASETS = Path(__file__).parents[2] / "datasets"
 FACTORS = (2.0**-7, 2.0**7)  # powers of 2, which lose no digits
@@ -138,3 +139,32 @@ def test_every_force_times_a_factor_changes_the_log_density_by_a_constant(case, 
     weak, other = densities.values()
     tolerance = (1e-6 if "recordings" in case or case == "offsets" else 1e-10) * max(np.max(np.abs(weak)), 1.0)
     np.testing.assert_allclose(other - weak, (other - weak)[0], rtol=0, atol=tolerance)
+
+
+FAULTS = {
+    "healthy": (lambda row: row, set()),
+    "a drag that the model lacks": (lambda row: [*row[:4], row[4] - 0.05 * 50.0], {NOT_DESCRIBED}),
+    "return a tenth rougher": (lambda row: [*row[:4], row[4] * (1.1 if row[2] == "return" else 1.0)], {NOT_DESCRIBED}),
+}
+
+
+def spoiled(folder: Path, fault, factor: float) -> Path:
+    """The synthetic bench with every force times a factor, after what a fault makes of its readings."""
+    shutil.copytree(DATASETS / "synthetic-bench", folder)
+    head, *lines = (folder / "forces.csv").read_text().splitlines()
+    rows = (fault([*cells[:3], float(cells[3]), float(cells[4])]) for cells in (line.split(",") for line in lines))
+    text = [",".join([*row[:3], repr(row[3] * factor), repr(row[4] * factor)]) for row in rows]
+    (folder / "forces.csv").write_text("\n".join([head, *text]) + "\n")
+    return folder
+
+
+@pytest.mark.parametrize("name", FAULTS)
+def test_the_verdict_does_not_depend_on_how_strong_a_bench_is(name, tmp_path):
+    """What is wrong, which sentences say it (but for their numbers), and the coefficients; by least squares."""
+    fault, expected = FAULTS[name]
+    fits = [bf.fit(spoiled(tmp_path / f"{f:g}", fault, f), mcmc=False, seed=1) for f in (1.0, *FACTORS)]
+    said = [{kind: re.sub(r"[\d.]+( [kmM]?N)?", "_", " ".join(s)) for kind, s in f.verdict().troubles.items()} for f in fits]
+    assert set(said[0]) == expected, said[0]
+    assert said[1] == said[0] and said[2] == said[0]
+    mu = [[f.least_squares.estimates[n].value for n in ("mu_sheath", "mu_squeezed", "mu_edge")] for f in fits]
+    np.testing.assert_allclose(mu[1:], [mu[0]] * 2, rtol=1e-5)

@@ -31,9 +31,9 @@ ringdown = { file = "ringdown.csv", inertia = { value = 1.0e-3, sd = 2e-5, unit 
 [prior.ring_stiffness]
 prior = { lognormal = { median = 20, log_sd = 0.2 } }
 [prior.rope_damping]
-prior = { lognormal = { median = 0.01, log_sd = 0.5 } }
+prior = { lognormal = { median = 0.006, log_sd = 0.4 } }
 [prior.ring_friction]
-prior = { lognormal = { median = 0.08, log_sd = 0.4 } }
+prior = { lognormal = { median = 0.05, log_sd = 0.3 } }
 [prior.sigma_ringdown]
 fixed = 0.001
 [prior.tau]
@@ -47,7 +47,7 @@ def swung(cables, seed):
     """True values, and angles at every row: a bar in small steps, released up to a few milliseconds before the first row."""
     draw = np.random.default_rng(seed)
     inertia = 1e-3 + 2e-5 * draw.standard_normal(cables)
-    medians, sds = np.array([20.0, 0.01, 0.08]), np.array([0.2, 0.5, 0.4])
+    medians, sds = np.array([20.0, 0.006, 0.05]), np.array([0.2, 0.4, 0.3])
     stiffness, damping, friction = (medians * np.exp(sds * draw.standard_normal((cables, 3)))).T
     amplitude, late = 0.2 + 0.01 * draw.standard_normal(cables), np.abs(1e-3 * draw.standard_normal(cables))
     at, speed, seen = amplitude.copy(), np.zeros(cables), []

@@ -41,24 +41,8 @@ def watch_verb(folder: Path | None, watch: Watch) -> Iterator[Report]:
     go_on = f"What was done so far is kept in {folder}: with room, run the same command with --resume."
     if kept is not None:
         say_if_aborted(kept, go_on)
-    asked = threading.Event()
-
-    def stop(_: int, frame: FrameType | None) -> None:
-        asked.set()
-        if not is_loading(frame):
-            raise KeyboardInterrupt
-        call_soon(stop)
-
-    printed = sys.unraisablehook
-
-    def lost(what: "sys.UnraisableHookArgs") -> None:
-        if not issubclass(what.exc_type, KeyboardInterrupt):
-            printed(what)
-
-    sys.unraisablehook = lost
-    if signal.getsignal(signal.SIGINT) is not signal.SIG_IGN:
-        signal.signal(signal.SIGINT, stop)
-    signal.signal(signal.SIGTERM, stop)
+    asked, printed = threading.Event(), sys.unraisablehook
+    _listen(asked)
     try:
         with _bar(watch) as show:
 
@@ -84,6 +68,27 @@ def watch_verb(folder: Path | None, watch: Watch) -> Iterator[Report]:
         raise
     finally:
         sys.unraisablehook = printed
+
+
+def _listen(asked: threading.Event) -> None:
+    """Sets the event where the user or the system stops the program, and stops it where nothing is being loaded."""
+
+    def stop(_: int, frame: FrameType | None) -> None:
+        asked.set()
+        if not is_loading(frame):
+            raise KeyboardInterrupt
+        call_soon(stop)
+
+    printed = sys.unraisablehook
+
+    def lost(what: "sys.UnraisableHookArgs") -> None:
+        if not issubclass(what.exc_type, KeyboardInterrupt):
+            printed(what)
+
+    sys.unraisablehook = lost
+    if signal.getsignal(signal.SIGINT) is not signal.SIG_IGN:
+        signal.signal(signal.SIGINT, stop)
+    signal.signal(signal.SIGTERM, stop)
 
 
 @contextmanager

@@ -23,6 +23,7 @@ from bowdenfit.cli.keywords import keywords_of
 from bowdenfit.kinds.settings import parse_description
 from bowdenfit.questions.calibrate.truths import read_truths
 from bowdenfit.questions.fleet.inspections import read_inspections
+from bowdenfit.questions.metabolic.study import read_study
 from bowdenfit.reading import Reading
 
 QUICK = [f"--set=sampler.{key}" for key in ("n_walkers=64", "max_steps=400", "target_ess=100", "target_r_hat=1.2")]
@@ -143,6 +144,9 @@ def test_every_description_is_understood(block, tmp_path):
     if block.text.startswith("# truths.toml"):
         (tmp_path / "truths.toml").write_text(block.text, encoding="utf-8")
         assert read_truths(tmp_path / "truths.toml") == said
+    elif "persons" in said:
+        (tmp_path / "metabolic.toml").write_text(block.text, encoding="utf-8")
+        assert read_study(tmp_path)[0].persons == said["persons"]
     else:
         tables = {} if "tables" in said else {"tables": TABLES}
         assert parse_description({**CABLE, **tables, **said}).to_json()

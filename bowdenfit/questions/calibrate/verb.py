@@ -16,9 +16,7 @@ from bowdenfit.verb import LARGEST_SEED, Argument, Option, Output, Reply, Verb, 
 
 if TYPE_CHECKING:
     from bowdenfit.dataset import Dataset
-    from bowdenfit.inference.engines.engine import Engine
     from bowdenfit.questions.calibrate.answer import Calibration
-    from bowdenfit.questions.calibrate.pieces import Asked
     from bowdenfit.questions.calibrate.replication import Replication
     from bowdenfit.questions.calibrate.workbench import Plan
 
@@ -71,29 +69,29 @@ def calibrate(
     refuse_too_little()
     folder = _folder(output, resume)
     plan = _plan(_stated_and_assumed(dataset, reading, assume), _seed(folder, seed, resume), truth)
-    import jax
 
     import bowdenfit.questions.calibrate.words  # noqa: F401  (what the answer says of itself)
-    from bowdenfit.inference.engines.choice import JOBS, open_engine
     from bowdenfit.questions.calibrate.findings import findings
-    from bowdenfit.questions.calibrate.pieces import Asked
-    from bowdenfit.questions.calibrate.quantities import quantities_of
     from bowdenfit.questions.calibrate.store import open_replications
     from bowdenfit.results.folder import reserved
 
-    with jax.enable_x64(True):
-        quantities = quantities_of(plan)
+    quantities = _quantities(plan)
     with reserved(folder):
         done = {} if folder is None else open_replications(folder, _fingerprint(plan, assume), resume, force)
         with watched(WATCH, progress) as show:
-            asked = Asked(plan, (workers or 0) if engine == "local" else 0)
-            with open_engine(engine, workers, folder and folder / JOBS) as opened:
-                _replicate(opened, asked, done, replications, folder, show)
-        if folder is not None:
-            shutil.rmtree(folder / JOBS, ignore_errors=True)
+            _replicate(engine, workers, plan, done, replications, folder, show)
         found = findings(tuple(done.values()), quantities, assumed=tuple(assume), **_told(plan))
         _write(found, folder)
     return found
+
+
+def _quantities(plan: "Plan") -> Any:
+    import jax
+
+    from bowdenfit.questions.calibrate.quantities import quantities_of
+
+    with jax.enable_x64(True):
+        return quantities_of(plan)
 
 
 def _told(plan: "Plan") -> dict[str, Any]:
@@ -142,25 +140,31 @@ def _stated_and_assumed(
 
 
 def _replicate(
-    opened: "Engine[Any, list[Replication]]",
-    asked: "Asked",
+    engine: "str | Executor",
+    workers: int | None,
+    plan: "Plan",
     done: "dict[int, Replication]",
     replications: int,
     folder: Path | None,
     progress: Report | None,
 ) -> None:
     """Do what is not done yet, and keep each as it ends."""
-    from bowdenfit.questions.calibrate.pieces import pieces_of, replicated
+    from bowdenfit.inference.engines.choice import JOBS, open_engine
+    from bowdenfit.questions.calibrate.pieces import Asked, pieces_of, replicated
     from bowdenfit.questions.calibrate.store import keep
 
+    asked = Asked(plan, (workers or 0) if engine == "local" else 0)
     missing = [number for number in range(replications) if number not in done]
-    for piece in opened.results(replicated, pieces_of(asked, missing, opened.workers)):
-        for each in piece:
-            done[each.number] = each
-            if folder is not None:
-                keep(folder, each)
-            if progress is not None:
-                progress(len(done), max(replications, len(done)))
+    with open_engine(engine, workers, folder and folder / JOBS) as opened:
+        for piece in opened.results(replicated, pieces_of(asked, missing, opened.workers)):
+            for each in piece:
+                done[each.number] = each
+                if folder is not None:
+                    keep(folder, each)
+                if progress is not None:
+                    progress(len(done), max(replications, len(done)))
+    if folder is not None:
+        shutil.rmtree(folder / JOBS, ignore_errors=True)
 
 
 def _seed(folder: Path | None, seed: int | None, resume: bool) -> int:

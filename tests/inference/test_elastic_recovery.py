@@ -266,7 +266,9 @@ def mixture(tables: tuple[str, ...]) -> Dataset:
     return simulate(description, design, values, jax.random.key(7))
 
 
-@pytest.mark.parametrize("tables", MIXTURES, ids="+".join)
+@pytest.mark.parametrize(
+    "tables", [m if i % 4 == 2 else pytest.param(m, marks=pytest.mark.slow) for i, m in enumerate(MIXTURES)], ids="+".join
+)
 def test_any_mixture_of_tables_makes_one_posterior_that_is_the_sum_of_its_parts(tables):
     """Each table's part is that of a model built for it alone (with the angles, where there are curves)."""
     dataset = mixture(tables)

@@ -134,7 +134,7 @@ def alarms_again(judge, what, count):
     return int(np.sum([any(d.worth_saying for d in judge.of(data)) for data in made]))
 
 
-@pytest.mark.parametrize("what", AGAIN)
+@pytest.mark.parametrize("what", ["recordings", pytest.param("loop and stretch", marks=pytest.mark.slow)])
 def test_healthy_recordings_loops_and_stretch_raise_no_alarm(judge, what):
     """More than one of eight does in 3 of 10 000 runs of this test with other seeds."""
     assert alarms_again(judge, what, 8) <= 1

@@ -50,7 +50,7 @@ def test_padded_data_have_the_log_density_of_the_data_themselves(case):
         assert padded == pytest.approx(value, rel=1e-12)
 
 
-@pytest.mark.parametrize("case", ["angles too small to detect", "a slack rope"])
+@pytest.mark.parametrize("case", ["angles too small to detect", pytest.param("a slack rope", marks=pytest.mark.slow)])
 def test_readings_that_are_not_there_leave_the_gradient_as_it_is(case):
     posterior, places = longer(case)
     gradient = jax.jit(jax.grad(posterior.log_density))

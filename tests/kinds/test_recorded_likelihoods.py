@@ -403,8 +403,14 @@ TRUTHS = {
 }
 
 
-@pytest.mark.parametrize("likelihood", ["runs", "whole"])
-@pytest.mark.parametrize("options", TRUTHS)
+@pytest.mark.parametrize(
+    ("options", "likelihood"),
+    [
+        *((options, "runs") for options in TRUTHS),
+        ("drag", "whole"),
+        *(pytest.param(options, "whole", marks=pytest.mark.slow) for options in TRUTHS if options != "drag"),
+    ],
+)
 def test_least_squares_of_faultless_recordings_returns_what_they_were_made_with(options, likelihood):
     """To the last digits, but for the bins of the load, and turns between two samples where friction depends on speed."""
     truth = TRUTHS[options]

@@ -61,7 +61,8 @@ _STARTS = {  # the longer start before the shorter one
     b"%PDF-": Content("a PDF document", (), "give the recording itself"),
     b"version https://git-lfs": Content("a Git LFS pointer without the data", (), "run 'git lfs pull' first"),
 }
-_ZIP = Content("a ZIP archive", (".xlsx", ".xlsm"), _UNPACK)
+_ZIP = Content("a ZIP archive", (".xlsx", ".xlsm"), _UNPACK)  # what is left of a workbook, perhaps
+_NO_WORKBOOK = Content("a ZIP archive", (), _UNPACK)
 _WORKBOOK = Content("an Excel workbook", (".xlsx", ".xlsm"))
 _OPEN_DOCUMENT = Content("an OpenDocument spreadsheet", (), "open it in LibreOffice and save it as .xlsx")
 _PAGE = Content("a web page", (), "download the recording itself, or export it as CSV")
@@ -94,7 +95,9 @@ def _archive(path: Path) -> Content:
     # Encrypted, packed in an unheard-of way, damaged, another name inside than in the list: zipfile raises anything.
     except Exception:
         return _ZIP
-    return _WORKBOOK if "xl/workbook.xml" in names else _ZIP
+    if "xl/workbook.xml" in names:
+        return _WORKBOOK
+    return _ZIP if "[Content_Types].xml" in names else _NO_WORKBOOK
 
 
 def _markup(head: bytes) -> Content:

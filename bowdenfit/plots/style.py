@@ -4,8 +4,11 @@ This room and the figure files load matplotlib only once they draw, so that what
 """
 
 import functools
+import logging
 import math
-from collections.abc import Callable, Iterable
+import warnings
+from collections.abc import Callable, Iterable, Iterator
+from contextlib import contextmanager
 from typing import Any, ParamSpec, TypeVar
 
 Arguments, Result = ParamSpec("Arguments"), TypeVar("Result")
@@ -72,10 +75,27 @@ def in_paper_style(function: Callable[Arguments, Result]) -> Callable[Arguments,
 
         if all(mpl.rcParams[name] == value for name, value in SETTINGS.items()):
             return function(*args, **kwargs)  # called by another such function; a context takes 3 ms
-        with mpl.rc_context(SETTINGS):
+        with mpl.rc_context(SETTINGS), _boxes_without_words():
             return function(*args, **kwargs)
 
     return styled
+
+
+@contextmanager
+def _boxes_without_words() -> Iterator[None]:
+    """Letters that the font lacks are boxes in a figure; matplotlib says so of each, in each format, in words of its own."""
+    log = logging.getLogger("matplotlib.mathtext")  # where letters behind a symbol are placed
+    log.addFilter(_is_of_no_letter)
+    try:
+        with warnings.catch_warnings():
+            warnings.filterwarnings("ignore", message=r"Glyph \d+ .* missing from")
+            yield
+    finally:
+        log.removeFilter(_is_of_no_letter)
+
+
+def _is_of_no_letter(said: logging.LogRecord) -> bool:
+    return "does not have a glyph" not in str(said.msg)
 
 
 def mapped_color(colors: str, place: float) -> Any:

@@ -3,6 +3,7 @@
 import csv
 import json
 import shutil
+import warnings
 
 import numpy as np
 import pytest
@@ -14,6 +15,8 @@ from bowdenfit.cli import bowdenfit
 from bowdenfit.display import csv_text
 from bowdenfit.errors import DiskError
 from bowdenfit.parameters.symbols import symbol_of
+from bowdenfit.plots.layout import empty_page
+from bowdenfit.plots.write import write_all
 from bowdenfit.results.netcdf import read_groups, write_groups
 from bowdenfit.words import printable
 
@@ -48,6 +51,16 @@ def called(on_body, place, name):
         text.replace('"mu1"', f'"{quoted}"').replace("[friction.mu1]", f'[friction."{quoted}"]')
     )
     return folder
+
+
+def test_letters_that_the_font_lacks_are_drawn_without_a_word_of_the_library(tmp_path, caplog):
+    figure = empty_page(3.0, 2.0)
+    figure.text(0.1, 0.1, symbol_of(r"\mu", "\u65e5\u672c"))
+    figure.text(0.1, 0.5, "\u65e5")
+    with warnings.catch_warnings():
+        warnings.simplefilter("error")
+        written = write_all(figure, tmp_path, "letters")
+    assert len(written) == 3 and caplog.text == ""
 
 
 def test_every_printable_letter_can_be_set_behind_a_symbol():

@@ -147,7 +147,7 @@ def mcap(path: Path) -> None:
 def logger_pro(path: Path) -> None:
     """Logger Pro's XML."""
     columns = "".join(
-        f"<DataColumn><DataObjectName>{name}</DataObjectName><ColumnUnits>N</ColumnUnits><ColumnCells>"
+        f"<DataColumn><DataObjectName>{name}</DataObjectName><ColumnUnits>{name[-1]}</ColumnUnits><ColumnCells>"
         + "\n".join(f"{value:.4f}" for value in values)
         + "</ColumnCells></DataColumn>"
         for name, values in FORCES.items()

@@ -49,7 +49,8 @@ def test_stepped_from_outside_it_takes_the_steps_of_optimistix_s_own_loop(name, 
     alone = _of_itself(given, given.starts[0], 1000)
     assert alone.result == optx.RESULTS.successful
     assert abs(int(alone.stats["num_steps"]) - len(calls)) <= 3  # rounding may put off the end
-    np.testing.assert_array_less(np.abs(found.x - alone.value), 1e-5 * given.standard_deviation)  # as rounding ends them
+    # Both end where the sum of squares changes by 1e-14 of itself, and so within some 5e-7 standard errors of the minimum.
+    np.testing.assert_array_less(np.abs(found.x - alone.value), 1e-6 * given.standard_deviation)
 
 
 def test_without_enough_steps_it_does_not_claim_an_end():

@@ -12,8 +12,8 @@ from typing import NoReturn
 import click
 
 from bowdenfit.cli.commands import command
+from bowdenfit.cli.deadline import INTERRUPTED, answered_in_time
 from bowdenfit.cli.interrupts import listening, was_asked
-from bowdenfit.cli.progress import INTERRUPTED
 from bowdenfit.cli.starting import completion, init
 from bowdenfit.cli.supervised import is_limited, supervise
 from bowdenfit.cli.terminal import NoReaderError, say, say_interrupted
@@ -63,7 +63,7 @@ def _run() -> None:
 def main() -> None:
     """Run the command line; every error the user can cause is a sentence and an exit code."""
     try:
-        with listening():
+        with listening(), answered_in_time():
             code = bowdenfit.main(standalone_mode=False) or 0
             if was_asked():  # while the last was loaded
                 raise KeyboardInterrupt

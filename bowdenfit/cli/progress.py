@@ -11,6 +11,7 @@ from typing import Any, TypeAlias
 
 import click
 
+from bowdenfit.cli.deadline import INTERRUPTED, answer, keeping
 from bowdenfit.cli.interrupts import call_soon, is_loading
 from bowdenfit.cli.supervised import say_if_aborted
 from bowdenfit.cli.terminal import say_interrupted
@@ -18,7 +19,6 @@ from bowdenfit.errors import DiskError, MemoryShortageError, system_error
 from bowdenfit.inference.engines.memory import refuse_too_little
 from bowdenfit.verb import Watch
 
-INTERRUPTED = 130
 Report: TypeAlias = Callable[..., None]
 
 
@@ -42,9 +42,10 @@ def watch_verb(folder: Path | None, watch: Watch) -> Iterator[Report]:
     if kept is not None:
         say_if_aborted(kept, go_on)
     asked, printed = threading.Event(), sys.unraisablehook
+    how = f"{watch.remark} {folder}: run the same command with --resume"
     _listen(asked)
     try:
-        with _bar(watch) as show:
+        with keeping(lambda: how if kept is not None and kept.exists() else ""), _bar(watch) as show:
 
             def report(*progress: Any) -> None:
                 if asked.is_set():
@@ -59,7 +60,8 @@ def watch_verb(folder: Path | None, watch: Watch) -> Iterator[Report]:
         shortage = error if isinstance(error, DiskError) else system_error(error)
         is_kept = kept is not None and kept.exists()
         if is_kept and wanted:
-            say_interrupted(f"{watch.remark} {folder}: run the same command with --resume")
+            answer()
+            say_interrupted(how)
             raise click.exceptions.Exit(INTERRUPTED) from None
         if is_kept and isinstance(shortage, DiskError | MemoryShortageError):
             raise type(shortage)(f"{shortage} {go_on}") from None

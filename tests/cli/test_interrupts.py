@@ -75,6 +75,13 @@ def loads(*_, **__):
     except KeyboardInterrupt:
         raise RuntimeError("an error of a library's own")
 """
+DEAF = """
+import ctypes, threading
+def loads(*_, **__):
+    lock, mutex = ctypes.CDLL(None).pthread_mutex_lock, ctypes.create_string_buffer(64)
+    threading.Timer(0.2, os.kill, (os.getpid(), signal.SIGINT)).start()
+    lock(mutex), lock(mutex)  # as while something is compiled, Python gets no step in the main thread
+"""
 STUCK = """
 class Finder:
     def find_spec(self, name, *_):
@@ -87,7 +94,9 @@ def loads(*_, **__):
 
 
 @pytest.mark.parametrize(
-    "library", [SWALLOWED, TURNED, STUCK], ids=["swallows it", "turns it into an error", "hangs while it is loaded"]
+    "library",
+    [SWALLOWED, TURNED, STUCK, DEAF],
+    ids=["swallows it", "turns it into an error", "hangs while it is loaded", "hears nothing"],
 )
 def test_an_interrupt_that_a_library_swallows_is_heard_all_the_same(library, on_body):
     code = INTERRUPT_IN_A_LIBRARY.format(library=library, folder=str(on_body))

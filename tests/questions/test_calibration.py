@@ -42,7 +42,7 @@ from bowdenfit.questions.calibrate.replication import RankedTruth, Replication
 from bowdenfit.questions.calibrate.sections import calibration_page
 from bowdenfit.questions.calibrate.store import keep, open_replications
 from bowdenfit.questions.calibrate.uniformity import UniformRanks, holm
-from bowdenfit.questions.calibrate.words import calibration_text
+from bowdenfit.questions.calibrate.words import calibration_text, details_text
 from bowdenfit.questions.calibrate.workbench import Plan, Workbench
 from bowdenfit.questions.simulate.simulation import empty_tables, simulated_again, with_readings
 from bowdenfit.questions.writing import write_page
@@ -456,7 +456,9 @@ def test_the_command_line_calibrates_resumes_and_says_when_too_few_replications_
     assert f"Wrote {folder}." in err
     written = {path.relative_to(folder).as_posix() for path in folder.rglob("*.*")}
     figures = {f"figures/{name}.{e}" for name in ("ranks", "coverage", "sharpness") for e in ("png", "svg", "pdf")}
-    assert written == {"calibration.json", "figures/captions.txt", "summary.txt", "replications.jsonl", "report.html"} | figures
+    texts = {"summary.txt", "details.txt", "figures/captions.txt", "calibration.json", "replications.jsonl", "report.html"}
+    assert written == texts | figures
+    assert (folder / "details.txt").read_text().startswith((folder / "summary.txt").read_text())
     code, _, err = run(*begin, "-n", 2)
     assert code == 2
     assert "--resume" in err
@@ -476,6 +478,10 @@ def test_the_page_of_a_calibration_opens_without_a_fault(tmp_path):
         assert reader.faults() == []
         assert reader.page.locator("main svg").count() == 3
         assert "CALIBRATED: for this description and these tables" in reader.page.locator("main").inner_text()
+        (mu,) = found.quantities
+        cells = reader.page.locator("details tbody td").all_text_contents()
+        assert cells == [f"{mu.p_value:.3f}", f"{mu.corrected:.3f}", f"{mu.shrinkage:.2f}"]
+        assert all(cell in details_text(found) for cell in cells)
         assert reader.sheets() <= 6
 
 

@@ -42,8 +42,11 @@ def fit_batch(
     programs = programs or BatchPrograms(posterior, settings or BatchSettings())
     numbered = list(zip(range(len(data)), data, seeds, strict=True))
     threads = programs.settings.threads or len(os.sched_getaffinity(0))
-    with ThreadPoolExecutor(threads) as pool:
+    pool = ThreadPoolExecutor(threads)
+    try:
         groups = [_fit_group(programs, pool, numbered[i : i + _GROUP]) for i in range(0, len(numbered), _GROUP)]
+    finally:  # an interrupt, or an error of one chunk, waits for none of the others
+        pool.shutdown(wait=False, cancel_futures=True)
     return [fit for group in groups for fit in group]
 
 

@@ -148,7 +148,8 @@ class Calibration(Display):
     def _table(self) -> Rows:
         rows = [
             {"quantity": q.name} | {f"held_{100 * c.probability:.0f}": c.rate for c in q.coverage}
-            | {"bias": q.bias, "bias_error": q.bias_error, "p_value": q.p_value, "fault": q.fault}
+            | {"bias": q.bias, "bias_error": q.bias_error, "p_value": q.p_value, "corrected": q.corrected}
+            | {"shrinkage": q.shrinkage, "fault": q.fault}
             for q in self.quantities
         ]  # fmt: skip
         return rows, {name: "1" for row in rows for name, value in row.items() if isinstance(value, float)}

@@ -4,9 +4,12 @@ from bowdenfit.pages.section import Page, Picture, Table, prose
 from bowdenfit.questions.calibrate.answer import Calibration
 from bowdenfit.questions.calibrate.figures import figures_of_calibration
 from bowdenfit.questions.calibrate.words import (
+    EVIDENCE_HEADS,
     HEADS,
     account_sentences,
+    evidence_rows,
     how_to_read,
+    how_to_read_evidence,
     rows,
     verdict_sentences,
     what_was_done,
@@ -23,11 +26,15 @@ def calibration_page(found: Calibration) -> Page:
     """
     first, *others = verdict_sentences(found)
     table = [Table(HEADS, tuple(rows(found)))] if found.quantities else []
+    evidence = Table(EVIDENCE_HEADS, tuple(evidence_rows(found)), how_to_read_evidence(found))
     sections = (
         prose("The answer", [*others, what_was_done(found)], headline=first),
-        prose("Quantity by quantity", [how_to_read(found)] if table else [], table, pictures=_pictures(found)),
+        prose(
+            "Quantity by quantity", [how_to_read(found)] if table else [], table,
+            folded=[("What the verdict on each rests on", evidence)], pictures=_pictures(found),
+        ),
         prose("What was left out", account_sentences(found)),
-    )
+    )  # fmt: skip
     return Page(found.name, "Calibration by bowdenfit", sections)
 
 

@@ -10,8 +10,10 @@ from bowdenfit.errors import StoreError
 from bowdenfit.inputs import or_damaged
 from bowdenfit.questions.calibrate.replication import Replication
 from bowdenfit.results.folder import (
+    DETAILS_TEXT,
     FIGURES,
     REPLICATIONS,
+    REPORT,
     SUMMARY_TEXT,
     folder_to_write,
     read_text,
@@ -54,7 +56,7 @@ def open_replications(
 
 def _clear(folder: Path) -> None:
     """Remove what an earlier calibration wrote, and nothing else."""
-    for name in (CALIBRATION, SUMMARY_TEXT, REPLICATIONS):
+    for name in (CALIBRATION, SUMMARY_TEXT, DETAILS_TEXT, REPORT, REPLICATIONS):
         (folder / name).unlink(missing_ok=True)
     if (folder / FIGURES).is_dir():
         shutil.rmtree(folder / FIGURES)

@@ -191,19 +191,20 @@ def _fingerprint(plan: "Plan", assumptions: Sequence[str]) -> dict[str, Any]:
 
 
 def _write(found: "Calibration", folder: Path | None) -> None:
-    """Summary, figures, report, and calibration.json last; nothing without a folder."""
+    """Summary, details, figures, report, and calibration.json last; nothing without a folder."""
     if folder is None:
         return
     from bowdenfit.questions.calibrate.figures import draw_calibration
     from bowdenfit.questions.calibrate.sections import calibration_page
     from bowdenfit.questions.calibrate.store import CALIBRATION
-    from bowdenfit.questions.calibrate.words import calibration_text
+    from bowdenfit.questions.calibrate.words import calibration_text, details_text
     from bowdenfit.questions.writing import write_page
-    from bowdenfit.results.folder import FIGURES, REPORT, SUMMARY_TEXT, folder_to_write, write_text
+    from bowdenfit.results.folder import DETAILS_TEXT, FIGURES, REPORT, SUMMARY_TEXT, folder_to_write, write_text
     from bowdenfit.results.plain import plain
 
     with folder_to_write(folder):
         write_text(folder / SUMMARY_TEXT, calibration_text(found))
+        write_text(folder / DETAILS_TEXT, details_text(found))
         draw_calibration(found, folder / FIGURES)
         write_page(calibration_page(found), folder / FIGURES, folder / REPORT)
         write_text(folder / CALIBRATION, json.dumps(plain(found), indent=1, allow_nan=False) + "\n")

@@ -1,10 +1,13 @@
 """What `bowdenfit calibrate` prints."""
 
+import math
+
 from bowdenfit.display import text_of
 from bowdenfit.questions.calibrate.answer import FEWEST, LEVEL, MOST_UNCONVERGED, Calibration, Checked
 from bowdenfit.words import counted, filled, listed, percent, table
 
 HEADS = ("quantity", "50 % held", "90 % held", "bias", "")
+EVIDENCE_HEADS = ("quantity", "p of ranks", "corrected", "shrinkage")
 _NAMED = 8  # unconverged replications that are named
 
 
@@ -18,6 +21,14 @@ def calibration_text(found: Calibration) -> str:
         "\n".join(filled(line) for line in account_sentences(found)),
     ]
     return "\n\n".join(block for block in blocks if block) + "\n"
+
+
+def details_text(found: Calibration) -> str:
+    """All of a calibration (`details.txt`): what is printed, then what the verdict on each quantity rests on."""
+    if not found.quantities:
+        return calibration_text(found)
+    evidence = f"{table(EVIDENCE_HEADS, evidence_rows(found))}\n\n{filled(how_to_read_evidence(found))}"
+    return f"{calibration_text(found)}\n{evidence}\n"
 
 
 def what_was_done(found: Calibration) -> str:
@@ -76,6 +87,26 @@ def how_to_read(found: Calibration) -> str:
     else:
         note += "Whether truths lie evenly within what the fits say is judged too. "
     return note + "Bias: estimate less truth, in standard deviations of the estimate."
+
+
+def evidence_rows(found: Calibration) -> list[tuple[str, ...]]:
+    """Every quantity, under `EVIDENCE_HEADS`."""
+    return [
+        (
+            q.name, f"{q.p_value:.3f}", f"{q.corrected:.3f}" if q.judged_by else "",
+            "" if math.isnan(q.shrinkage) else f"{q.shrinkage:.2f}",
+        )
+        for q in found.quantities
+    ]  # fmt: skip
+
+
+def how_to_read_evidence(found: Calibration) -> str:
+    """What stands under `EVIDENCE_HEADS`."""
+    judged = "not judged, because truths are not of the prior" if found.truths else f"below {LEVEL} counts as wrong"
+    return (
+        f"p of ranks: chance of ranks of the truth this far from uniform; corrected (Holm) for the number of quantities, {judged}. "
+        "Shrinkage: 0 where the data say nothing beyond the prior, 1 where they say all."
+    )
 
 
 def _row(q: Checked) -> tuple[str, ...]:

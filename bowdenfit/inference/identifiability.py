@@ -17,6 +17,7 @@ from typing import ClassVar
 import numpy as np
 
 from bowdenfit.display import Part
+from bowdenfit.words import significant
 
 OWN = 0.25  # share of the prior variance below which a parameter may be known by itself: half the prior's sd
 RESTS_ON_PRIOR = 0.8  # share above which the prior alone speaks
@@ -90,7 +91,7 @@ class Combination:
     def words(self) -> str:
         """Such as "mu2 + 0.8 mu1"."""
         lead, *others = self.weights
-        factors = {name: "" if abs(w) == 1 else f"{abs(w):.2g} " for name, w in self.weights.items()}
+        factors = {name: "" if abs(w) == 1 else f"{significant(abs(w), 2)} " for name, w in self.weights.items()}
         return " ".join([lead, *(f"{'-' if self.weights[n] < 0 else '+'} {factors[n]}{n}" for n in others)])
 
 

@@ -25,6 +25,7 @@ from bowdenfit.inference.other_minima import PINS, fitting_as_well, range_of_min
 from bowdenfit.inference.profiles import Basin, limits
 from bowdenfit.parameters.priors import HalfCauchy, LogNormal, Uniform
 from bowdenfit.parameters.space import Parameter
+from bowdenfit.words import significant
 
 UNDETERMINED = "the measurements do not determine it"
 _SUSPECT = -2.0  # below this z an estimate may be on its way to the lower end, above its negative to the upper
@@ -267,7 +268,7 @@ def _estimates(
             # A positive quantity that may as well be 0 or twice as large is none that was measured.
             estimates[p.name] = Estimate(np.nan, np.nan, False, UNDETERMINED)
         elif (ends := range_of_minima(value, sd, others)) is not None:
-            remark = f"values from {ends[0]:.3g} to {ends[1]:.3g} fit about as well"
+            remark = f"values from {significant(ends[0])} to {significant(ends[1])} fit about as well"
             estimates[p.name] = Estimate(np.nan, np.nan, False, remark, *limit)
         else:
             estimates[p.name] = Estimate(value, sd, True, "", *limit)
@@ -278,7 +279,7 @@ def _at_bound(value: float, limit: tuple[float, float], at_upper_end: bool) -> s
     """What is known of a parameter whose sum of squares falls all the way to an end of its range."""
     lower, upper = limit
     if at_upper_end:
-        least = "" if np.isnan(lower) else f"; at least {lower:.3g}"
-        return f"no minimum inside its range: runs to its upper end, {value:.3g}{least}"
-    most = "" if np.isnan(upper) else "; nothing limits it above" if np.isinf(upper) else f"; at most {upper:.3g}"
-    return f"no finite minimum: runs to its lower end, {value:.3g}{most}"
+        least = "" if np.isnan(lower) else f"; at least {significant(lower)}"
+        return f"no minimum inside its range: runs to its upper end, {significant(value)}{least}"
+    most = "" if np.isnan(upper) else "; nothing limits it above" if np.isinf(upper) else f"; at most {significant(upper)}"
+    return f"no finite minimum: runs to its lower end, {significant(value)}{most}"

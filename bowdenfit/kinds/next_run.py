@@ -30,6 +30,7 @@ from bowdenfit.kinds.row_angles import row_angles
 from bowdenfit.kinds.rows import OwnAngles
 from bowdenfit.recordings.recording import Recordings
 from bowdenfit.types import Vector
+from bowdenfit.words import significant
 
 _MOST = 12  # forces of each stroke; more readings of a run are joined, and count for more
 _LOADS = 3  # at which all readings of a run could be taken
@@ -184,7 +185,8 @@ def _usual(at: Situation) -> str:
     run = typical_run(at.measurements)
     assert run is not None
     low, high = run.input_force.min(), run.input_force.max()
-    loads = f"{low:.3g} to {high:.3g} N" if high > _SPREAD * low else f"{np.mean(run.input_force):.3g} N"
+    near = significant(float(np.mean(run.input_force)))
+    loads = f"{significant(low)} to {significant(high)} N" if high > _SPREAD * low else f"{near} N"
     ways = " and ".join(STROKE_WORDS[way] for way in (1, -1) if np.any(run.stroke == way))
     count = round(float(np.sum(run.worth)))
     return f"{count:,} {'reading' if count == 1 else 'readings'} at {loads}, {ways}"

@@ -1,12 +1,17 @@
 """Tables on the way out: as the headings and rows of a file, and as a range in words."""
 
+import math
+from collections.abc import Iterable
+
 import numpy as np
 
 from bowdenfit.description import Description
+from bowdenfit.words import significant
 
 Page = tuple[list[str], list[list[str]]]
 """Headings and rows."""
 
+_DIGITS = 5
 STROKE_NAMES = {1: "pull", -1: "return"}
 
 
@@ -20,7 +25,16 @@ def route_cells(route: float, description: Description) -> list[str]:
     return [f"{route:g}"] if description.route else []
 
 
+def fixed(values: Iterable[float], decimals: int) -> list[str]:
+    """Cells of a column: so many decimals, and more where its largest value would else have fewer than five digits."""
+    column = np.array(list(values), dtype=float)
+    largest = float(np.max(np.abs(column[np.isfinite(column)]), initial=0.0))
+    enough = _DIGITS - 1 - math.floor(math.log10(largest)) if largest else 0
+    return [f"{value:.{max(decimals, enough)}f}" for value in column]
+
+
 def in_words(values: np.ndarray, unit: str) -> str:
     """The range of values, or their one value."""
     low, high = float(values.min()), float(values.max())
-    return f"{low:.4g} {unit}" if low == high else f"{low:.4g} to {high:.4g} {unit}"
+    least, most = significant(low, 4), significant(high, 4)
+    return f"{least} {unit}" if low == high else f"{least} to {most} {unit}"

@@ -15,6 +15,7 @@ from bowdenfit.kinds.runs import RunsTerm, run_sums, with_cells
 from bowdenfit.kinds.sliding_rows import SlidingRows
 from bowdenfit.kinds.term import Term
 from bowdenfit.types import Labels
+from bowdenfit.words import significant
 
 LeaveOut = Literal["run", "load", "reading"]
 _MOST_LOADS = 8  # of a stroke of a run, into which its readings are parted
@@ -87,7 +88,7 @@ def _parts(term: RunsTerm, rows: SlidingRows, unit: LeaveOut) -> tuple[Labels, t
     part = part.ravel()
     load = np.bincount(part, rows.input_force) / np.bincount(part)
     strokes = ("return", "pull")
-    names = [f"{term.labels[r]}, {strokes[s]} at {f:.4g} N" for (r, s, _), f in zip(keys, load, strict=True)]
+    names = [f"{term.labels[r]}, {strokes[s]} at {significant(f, 4)} N" for (r, s, _), f in zip(keys, load, strict=True)]
     return part, tuple(names)
 
 

@@ -1,6 +1,7 @@
 """Sizes of what was measured, which default priors of quantities with a unit are in proportion to."""
-
 from dataclasses import dataclass
+
+from bowdenfit.words import significant
 
 
 @dataclass(frozen=True)
@@ -19,8 +20,8 @@ class Scale:
 
     def __str__(self) -> str:
         """Such as "the median load, 39.1 N"."""
-        return f"the {self.name}, {self.value:.3g} {self.unit}"
+        return f"the {self.name}, {significant(self.value)} {self.unit}"
 
     def share(self, part: float) -> str:
         """Such as "5 % of the median load, 39.1 N"."""
-        return f"{100 * part:.3g} % of {self}"
+        return f"{significant(100 * part)} % of {self}"

@@ -8,7 +8,7 @@ import numpy as np
 from bowdenfit.display import Display, Rows
 from bowdenfit.inference.interval import Interval
 from bowdenfit.results.choices import Choice, Window
-from bowdenfit.words import decimals, filled, percent, table
+from bowdenfit.words import decimals, filled, percent, significant, table
 
 _WORTH_SAYING = 0.005  # probability of an optimum at an end of the range
 
@@ -84,7 +84,7 @@ class OptimalLength(Display):
 
     def sentences(self) -> list[str]:
         """How sure it is, and what would do as well."""
-        at = "" if self.at_input_force is None else f", at an input force of {self.at_input_force:.3g} N"
+        at = "" if self.at_input_force is None else f", at an input force of {significant(self.at_input_force)} N"
         length, eta = self.length, self.efficiency.times(100)
         digits, of_force = decimals(length.q95 - length.q05), decimals(eta.q95 - eta.q05)
         said = [

@@ -9,6 +9,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from figure_words import assert_readable
 from one_page import faults
 from scipy import stats
 
@@ -16,6 +17,7 @@ import bowdenfit
 from bowdenfit.dataset import Dataset
 from bowdenfit.front_desk import Fit
 from bowdenfit.kinds.forces.table import ForceTable
+from bowdenfit.questions.figures import figures_of
 from bowdenfit.questions.summary.brief_words import summary_text
 
 FOLDER = Path(__file__).parents[2] / "datasets" / "yarn-on-cylinder"
@@ -51,6 +53,12 @@ def test_the_summary_is_one_page_that_says_whether_a_trial_is_off(fit):
     assert faults(page) == []
     assert ("None of 21 readings is off." in page) == (not fit.checks.outliers)
     assert ("Next: look at how run 225 deg trial 1 was measured" in page) == bool(fit.checks.outliers)
+
+
+def test_its_figures_can_be_read(fit):
+    shown = dict(figures_of(fit))
+    assert {"forces", "residuals", "coefficients", "pairs", "traces", "checks"} <= set(shown)
+    assert_readable(shown, fit.name)
 
 
 def through_origin(x: np.ndarray, y: np.ndarray) -> tuple[float, float, float]:

@@ -8,6 +8,7 @@ from spoiling import copied, spoil
 import bowdenfit as bf
 from bowdenfit.kinds.displacement.table import DisplacementTable
 from bowdenfit.kinds.displacement.turns import in_order
+from bowdenfit.kinds.pages import fixed, in_words
 from bowdenfit.questions.check.data_set_words import check_text
 
 NAMES = ("cable.toml", "displacement.csv")
@@ -193,3 +194,10 @@ def test_turns_are_remembered_and_forgotten_once_they_are_passed():
     assert motion.first.sum() == 4
     jitter = in_order(np.array([0, 10, 20.05, 20, 20.06, 30, 20], dtype=float), np.zeros(7, dtype=int))
     assert jitter.turns.at.tolist() == [0, 30]
+
+
+def test_forces_of_any_size_are_written_with_their_digits():
+    """Files of `simulate`, and the rows that `check` shows."""
+    assert fixed([12.3456, 2.0], 3) == ["12.346", "2.000"]
+    assert fixed([0.0, 2.5242e-5, np.nan], 4) == ["0.000000000", "0.000025242", "nan"]
+    assert in_words(np.array([9079.0, 226412.0]), "N") == "9079 to 226400 N"

@@ -14,7 +14,7 @@ from bowdenfit.kinds.displacement.chosen import early
 from bowdenfit.kinds.displacement.table import DisplacementSettings, DisplacementTable
 from bowdenfit.kinds.displacement.turns import in_order
 from bowdenfit.kinds.measurements import Measurements
-from bowdenfit.kinds.pages import Page, in_words, route_cells, route_heading
+from bowdenfit.kinds.pages import Page, fixed, in_words, route_cells, route_heading
 from bowdenfit.kinds.plausibility import within_factor
 from bowdenfit.kinds.rows import OwnAngles, RowOrigin
 
@@ -92,14 +92,15 @@ def implausible(real: DisplacementTable, made: DisplacementTable) -> str:
 def page(table: DisplacementTable, description: Description) -> Page:
     """Headings and rows of its file."""
     names = table.own.names
+    displacements, forces = fixed(table.displacement, 4), fixed(table.force, 4)
     rows = [
         [
             *route_cells(table.route[i], description),
             *("" if np.isnan(angle) else f"{angle:.6g}" for angle in np.rad2deg(table.own.angle[i])),
             table.run_names[table.run[i]],
             *(["pull" if table.motion.stroke[i] > 0 else "return"] if table.sliding else []),
-            f"{table.displacement[i]:.4f}",
-            f"{table.force[i]:.4f}",
+            displacements[i],
+            forces[i],
         ]
         for i in range(len(table.run))
     ]

@@ -10,10 +10,10 @@ from bowdenfit.errors import nearest
 from bowdenfit.kinds.design import Design, Stroke, radians, signs
 from bowdenfit.kinds.forces.table import ForceTable
 from bowdenfit.kinds.measurements import Measurements
-from bowdenfit.kinds.pages import STROKE_NAMES, Page, route_cells, route_heading
+from bowdenfit.kinds.pages import STROKE_NAMES, Page, fixed, route_cells, route_heading
 from bowdenfit.kinds.plausibility import SCATTER, beyond, parts
 from bowdenfit.kinds.rows import OwnAngles, RowOrigin
-from bowdenfit.words import counted, listed
+from bowdenfit.words import counted, listed, significant
 
 
 def count(table: ForceTable) -> str:
@@ -31,7 +31,7 @@ def describe(table: ForceTable, description: Description) -> list[str]:
     )
     low, high = table.input_force.min(), table.input_force.max()
     weights = ", of hung weights without noise" if description.sensors.noise_ratio == 0 else ""
-    return [f"{files}: {count(table)} ({counts}), input {low:.4g} to {high:.4g} N{weights}"]
+    return [f"{files}: {count(table)} ({counts}), input {significant(low, 4)} to {significant(high, 4)} N{weights}"]
 
 
 def warnings(table: ForceTable, description: Description, measurements: Measurements) -> list[str]:
@@ -69,14 +69,15 @@ def page(table: ForceTable, description: Description) -> Page:
     """Headings and rows of its file."""
     measured = np.isfinite(table.own.angle).any(axis=0)
     angles = np.rad2deg(table.own.angle[:, measured])
+    inputs, outputs = fixed(table.input_force, 3), fixed(table.output_force, 3)
     rows = [
         [
             *route_cells(table.route[i], description),
             *("" if np.isnan(angle) else f"{angle:.6g}" for angle in angles[i]),
             table.run_names[table.run[i]],
             STROKE_NAMES[int(table.stroke[i])],
-            f"{table.input_force[i]:.3f}",
-            f"{table.output_force[i]:.3f}",
+            inputs[i],
+            outputs[i],
         ]
         for i in range(len(table.run))
     ]

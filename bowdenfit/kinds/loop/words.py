@@ -9,7 +9,7 @@ from bowdenfit.description.values import Frozen
 from bowdenfit.kinds.design import Design, Stroke, radians, signs
 from bowdenfit.kinds.loop.table import LoopTable
 from bowdenfit.kinds.measurements import Measurements
-from bowdenfit.kinds.pages import STROKE_NAMES, Page, in_words
+from bowdenfit.kinds.pages import STROKE_NAMES, Page, fixed, in_words
 from bowdenfit.kinds.plausibility import HIGHEST, LOWEST
 from bowdenfit.kinds.preload.table import PreloadTable
 from bowdenfit.kinds.rows import OwnAngles, RowOrigin
@@ -71,12 +71,13 @@ def page(table: LoopTable, description: Description) -> Page:
     cable, names = description.cable, table.own.names
     radii = [radius.to("length") / 1000 for radius in (cable.input_pulley_radius, cable.output_pulley_radius) if radius]
     what, (first, second), digits = ("force_N", (1.0, 1.0), 3) if len(radii) < 2 else ("torque_N_m", radii, 5)
+    inputs, outputs = fixed(first * table.input_force, digits), fixed(second * table.output_force, digits)
     rows = [
         [
             *(f"{angle:.6g}" for angle in np.rad2deg(table.own.angle[i])),
             STROKE_NAMES[int(table.stroke[i])],
-            f"{first * table.input_force[i]:.{digits}f}",
-            f"{second * table.output_force[i]:.{digits}f}",
+            inputs[i],
+            outputs[i],
         ]
         for i in range(len(table.stroke))
     ]

@@ -6,7 +6,7 @@ from bowdenfit.description import Description, Finite
 from bowdenfit.description.values import Frozen
 from bowdenfit.kinds.design import Design, radians
 from bowdenfit.kinds.measurements import Measurements
-from bowdenfit.kinds.pages import Page, in_words
+from bowdenfit.kinds.pages import Page, fixed, in_words
 from bowdenfit.kinds.plausibility import within_factor
 from bowdenfit.kinds.preload.table import PreloadTable
 from bowdenfit.kinds.rows import RowOrigin
@@ -61,8 +61,8 @@ def implausible(real: PreloadTable, made: PreloadTable) -> str:
 def page(table: PreloadTable, description: Description) -> Page:
     """Headings and rows of its file."""
     del description
-    columns = zip(np.rad2deg(table.wrap_angle), table.preload, strict=True)
-    return ["wrap_angle_deg", "preload_N"], [[f"{angle:.6g}", f"{preload:.3f}"] for angle, preload in columns]
+    columns = zip(np.rad2deg(table.wrap_angle), fixed(table.preload, 3), strict=True)
+    return ["wrap_angle_deg", "preload_N"], [[f"{angle:.6g}", preload] for angle, preload in columns]
 
 
 class _Rows(Frozen):

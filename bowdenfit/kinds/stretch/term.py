@@ -29,6 +29,7 @@ from bowdenfit.kinds.term import LOAD, WRAP_ANGLE, Circumstances, TermKind
 from bowdenfit.parameters.priors import HalfCauchy, LogNormal, Normal
 from bowdenfit.parameters.scale import Scale
 from bowdenfit.parameters.space import Parameter
+from bowdenfit.words import significant
 
 STRETCH_NOISE = "sigma_L"
 
@@ -47,7 +48,7 @@ def stretch_term(cable: Cable, table: StretchTable, _: AngleTable | None = None)
     }
     branch = np.where(table.unloading, ", unloading", "")
     labels = tuple(
-        f"{load:.4g} N at {np.rad2deg(angle):.4g} deg{way}"
+        f"{significant(load, 4)} N at {np.rad2deg(angle):.4g} deg{way}"
         for load, angle, way in zip(table.load, table.wrap_angle, branch, strict=True)
     )
     return ElasticTerm(cable, data, labels, "stretch", "mm", STRETCH_NOISE, _stretch)

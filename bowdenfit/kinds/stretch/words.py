@@ -8,12 +8,12 @@ from bowdenfit.description import Description, Finite
 from bowdenfit.description.values import Frozen
 from bowdenfit.kinds.design import Design, radians
 from bowdenfit.kinds.measurements import Measurements
-from bowdenfit.kinds.pages import Page, in_words
+from bowdenfit.kinds.pages import Page, fixed, in_words
 from bowdenfit.kinds.plausibility import parts, within_factor
 from bowdenfit.kinds.preload.table import PreloadTable
 from bowdenfit.kinds.rows import RowOrigin
 from bowdenfit.kinds.stretch.table import StretchTable
-from bowdenfit.words import counted
+from bowdenfit.words import counted, significant
 
 _LOW = 1 / 3  # share of the highest load above which a lowest load is not low
 _STIFFNESSES = (0.1, 1e5)  # N/mm; a meter of thin cord and of crane rope
@@ -53,8 +53,8 @@ def warnings_of(rows: StretchTable, description: Description, measurements: Meas
     more, given = float(np.ptp(loads)), float(np.ptp(rows.stretch))
     if more > 0 and not _STIFFNESSES[0] * given < more < _STIFFNESSES[1] * given:
         warnings.append(
-            f"the rope of {file} gives {given:.3g} mm under {more:.3g} N more, as hardly any rope does; the usual cause is a "
-            "unit: check those of stretch and load."
+            f"the rope of {file} gives {significant(given)} mm under {significant(more)} N more, as hardly any rope does; the "
+            "usual cause is a unit: check those of stretch and load."
         )
     falling = _falling(rows)
     if falling:
@@ -108,8 +108,8 @@ def page(table: StretchTable, description: Description) -> Page:
     """Headings and rows of its file."""
     del description
     branch = np.where(table.unloading, "unload", "load")
-    columns = zip(np.rad2deg(table.wrap_angle), branch, table.load, table.stretch, strict=True)
-    rows = [[f"{angle:.6g}", way, f"{load:g}", f"{stretch:.4f}"] for angle, way, load, stretch in columns]
+    columns = zip(np.rad2deg(table.wrap_angle), branch, table.load, fixed(table.stretch, 4), strict=True)
+    rows = [[f"{angle:.6g}", way, f"{load:g}", stretch] for angle, way, load, stretch in columns]
     return ["wrap_angle_deg", "branch", "load_N", "stretch_mm"], rows
 
 

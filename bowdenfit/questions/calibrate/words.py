@@ -4,7 +4,7 @@ import math
 
 from bowdenfit.display import text_of
 from bowdenfit.questions.calibrate.answer import FEWEST, LEVEL, MOST_UNCONVERGED, Calibration, Checked
-from bowdenfit.words import counted, filled, listed, percent, table
+from bowdenfit.words import counted, filled, listed, percent, significant, table
 
 HEADS = ("quantity", "50 % held", "90 % held", "bias", "")
 EVIDENCE_HEADS = ("quantity", "p of ranks", "corrected", "shrinkage")
@@ -104,8 +104,8 @@ def how_to_read_evidence(found: Calibration) -> str:
     """What stands under `EVIDENCE_HEADS`."""
     judged = "not judged, because truths are not of the prior" if found.truths else f"below {LEVEL} counts as wrong"
     return (
-        f"p of ranks: chance of ranks of the truth this far from uniform; corrected (Holm) for the number of quantities, {judged}. "
-        "Shrinkage: 0 where the data say nothing beyond the prior, 1 where they say all."
+        "p of ranks: chance of ranks of the truth this far from uniform; corrected (Holm) for the number of quantities, "
+        f"{judged}. Shrinkage: 0 where the data say nothing beyond the prior, 1 where they say all."
     )
 
 
@@ -136,7 +136,7 @@ def _unranked(numbers: list[int]) -> str:
 
 def account_sentences(found: Calibration) -> list[str]:
     """How long it took, what was left out, and why."""
-    lines = [f"A replication took {found.seconds:.2g} s (median)."]
+    lines = [f"A replication took {significant(found.seconds, 2)} s (median)."]
     if found.engines:
         words = {
             "laplace": "a normal approximation, corrected",

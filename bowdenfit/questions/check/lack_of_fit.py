@@ -12,7 +12,7 @@ from bowdenfit.kinds.places import RUN
 from bowdenfit.kinds.term import GROUP, LOAD
 from bowdenfit.questions.check.answer import Checks, checks_of
 from bowdenfit.results.record import Record, once
-from bowdenfit.words import few, listed
+from bowdenfit.words import few, listed, significant
 
 _FEW = 3  # departures that are said
 _INTERVAL = 0.9
@@ -66,7 +66,7 @@ def _called(column: str) -> str:
 
 def _much(excess: float) -> str:
     """'12 % larger'"""
-    return f"{100 * abs(excess):.2g} % {'larger' if excess >= 0 else 'smaller'}"
+    return f"{significant(100 * abs(excess), 2)} % {'larger' if excess >= 0 else 'smaller'}"
 
 
 def _odds(chance: float) -> str:

@@ -1,7 +1,7 @@
 """What the priors alone hold possible, in words: which readings lie outside, and what the usual cause is."""
 
 from bowdenfit.questions.check.prior_predictive import PriorPredictive, PriorTable
-from bowdenfit.words import few, filled
+from bowdenfit.words import few, filled, significant
 
 WORTH_WARNING = (
     0.2  # share of a table's readings outside the central 99 %: that many are in at most 1 of 20 good data sets
@@ -47,5 +47,5 @@ def _which(table: PriorTable, outside: list[int]) -> str:
 
 def _values(table: PriorTable, i: int) -> str:
     low, high = table.quantiles[0][i], table.quantiles[-1][i]
-    read = f"{table.reading[i]:.3g}, " if table.reading[i] == table.reading[i] else ""
-    return f" [{read}priors {low:.3g} to {high:.3g}]"
+    read = f"{significant(table.reading[i])}, " if table.reading[i] == table.reading[i] else ""
+    return f" [{read}priors {significant(low)} to {significant(high)}]"

@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING, Any, ClassVar
 
 from bowdenfit.display import Display, Named, Rows
 from bowdenfit.inference.identifiability import Combination, Knowledge, Known
-from bowdenfit.words import decimals, listed
+from bowdenfit.words import decimals, listed, significant
 
 if TYPE_CHECKING:
     from bowdenfit.inference.profiles import Profile
@@ -94,5 +94,5 @@ def say_what_is_determined(found: Knowledge, measured: bool, opening: str = "") 
 def how_well(known: Known | Combination) -> str:
     """How well a quantity is known: in percent where it is clear of zero, else in its unit."""
     if abs(known.value) > 2 * known.sd:
-        return f"to {100 * known.sd / abs(known.value):.2g} %"
+        return f"to {significant(100 * known.sd / abs(known.value), 2)} %"
     return f"to ± {known.sd:.{decimals(known.sd)}f}"

@@ -7,6 +7,7 @@ from typing import ClassVar
 import numpy as np
 
 from bowdenfit.results.record import Record
+from bowdenfit.words import significant
 
 _ROLES = {"friction", "friction_model", "sensor", "angle", "elastic"}
 _CLOSE = 0.9  # correlation beyond which two parameters are said to be confounded
@@ -41,7 +42,7 @@ class Confounded:
     def combination(self) -> str:
         """The combination in symbols."""
         sign = "+" if self.factor >= 0 else "-"
-        return f"{self.first} {sign} {abs(self.factor):.3g} {self.second}"
+        return f"{self.first} {sign} {significant(abs(self.factor))} {self.second}"
 
     def sentence(self) -> str:
         """What to say of it."""
@@ -49,7 +50,7 @@ class Confounded:
         return (
             f"The measurements hardly tell {self.first} and {self.second} apart (correlation {self.correlation:+.2f}); what "
             f"they do determine is {self.combination} = {self.mean:.{digits}f} ± {self.sd:.{digits}f}, while {self.first} "
-            f"alone is known to ± {self.first_sd:.2g}."
+            f"alone is known to ± {significant(self.first_sd, 2)}."
         )
 
 

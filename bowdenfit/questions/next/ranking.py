@@ -27,6 +27,7 @@ from bowdenfit.questions.next.simulated_readings import simulated_readings
 from bowdenfit.questions.next.target import Answer, answer_of
 from bowdenfit.questions.next.variance_reduction import Explained, error_of_difference, explained_share, mean_and_spread
 from bowdenfit.results.record import OPTIMAL_EFFICIENCY, OPTIMAL_LENGTH, Record
+from bowdenfit.words import significant
 
 REPEATS = (1, 2, 4, 8, 16, 32)
 STEPS, MOST_IN_PLAN = 3, 24  # measurements in a plan, and candidates that it chooses from
@@ -79,7 +80,7 @@ def _stop(fit: Record, answer: Answer) -> str:
         best = fit.optimal_length()
         return f"You may stop: {best.good_enough[0].lower()}{best.good_enough[1:]}" if best.is_settled else best.not_settled
     unit = f" {answer.unit}" if answer.unit else ""
-    return f"You may stop if it is enough to know {answer.words} to ± {answer.sd:.2g}{unit}."
+    return f"You may stop if it is enough to know {answer.words} to ± {significant(answer.sd, 2)}{unit}."
 
 
 def _readings(fit: Record, chosen: Sequence[Candidate], repeats: int) -> list[np.ndarray]:

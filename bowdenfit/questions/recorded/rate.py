@@ -10,6 +10,7 @@ from bowdenfit.inference.interval import Interval
 from bowdenfit.kinds import each_table
 from bowdenfit.recordings.recording import Recordings
 from bowdenfit.results.record import Record, once
+from bowdenfit.words import significant
 
 _SURE = 0.99  # probability from which a dependence on speed is called one
 SHOWN_SPEED = {"rad/s": ("r/min", 30 / np.pi), "mm/s": ("mm/s", 1.0), "": ("", 1.0)}
@@ -47,7 +48,7 @@ class RateEffect:
         )
         where = f" {self.place}" if self.place else ""
         return (
-            f"Efficiency{where} at {self.fast:.3g} {self.unit} less that at {self.slow:.3g} {self.unit}: "
+            f"Efficiency{where} at {significant(self.fast)} {self.unit} less that at {significant(self.slow)} {self.unit}: "
             f"{100 * self.difference.median:+.2f} points (90 % interval {low:+.2f} to {high:+.2f}), {verdict}."
         )
 

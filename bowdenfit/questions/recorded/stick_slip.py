@@ -12,7 +12,7 @@ from bowdenfit.inference.draws import for_each_draw
 from bowdenfit.physics.friction import rate_slope
 from bowdenfit.questions.recorded.rate import SHOWN_SPEED, typical_speeds
 from bowdenfit.results.record import Record, once
-from bowdenfit.words import percent
+from bowdenfit.words import percent, significant
 
 _SHOWN = 5  # speeds
 
@@ -34,7 +34,7 @@ class StickSlip:
     def sentence(self) -> str:
         """'Probability that friction falls with speed, ...: 84 % at 3 r/min, 2 % at 60 r/min.'"""
         shown = dict.fromkeys((0, len(self.speeds) - 1))
-        each = ", ".join(f"{percent(self.probabilities[i], 0)} at {self.speeds[i]:.3g} {self.unit}" for i in shown)
+        each = ", ".join(f"{percent(self.probabilities[i], 0)} at {significant(self.speeds[i])} {self.unit}" for i in shown)
         return f"Probability that friction falls with speed, so that a compliant drive sticks and slips: {each}."
 
 

@@ -31,7 +31,7 @@ from bowdenfit.plots.style import (
     in_paper_style,
     rounded_texts,
 )
-from bowdenfit.words import counted
+from bowdenfit.words import counted, significant
 
 if TYPE_CHECKING:
     from bowdenfit.plots.layout import Axes, Figure
@@ -134,7 +134,7 @@ def _least_squares(axes: Axes, parameter: Coefficient, shown: tuple[float, float
         )  # fmt: skip
         return
     unit = "" if parameter.unit == "1" else f" {parameter.unit}"
-    note = f"off the axis, {value:.3g}{unit}" if np.isfinite(value) else "not identified"
+    note = f"off the axis, {significant(value)}{unit}" if np.isfinite(value) else "not identified"
     axes.text(
         0.98, 0.98, f"{LEAST_SQUARES}: {note}", transform=axes.transAxes, ha="right", va="top", fontsize=SMALL,
         color=VERMILLION,

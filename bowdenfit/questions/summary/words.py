@@ -32,7 +32,7 @@ from bowdenfit.questions.summary.verdict import (
 )
 from bowdenfit.recordings.recording import Recordings
 from bowdenfit.results.record import Record
-from bowdenfit.words import filled, listed, percent, table
+from bowdenfit.words import filled, listed, percent, significant, table
 
 _UNLIMITED = 2000.0  # an angle in degrees or a length in mm beyond which a curve coefficient is no longer a finding
 _RESTS_ON_PRIOR = 0.2  # contraction below which a parameter is said to rest on its prior alone
@@ -215,7 +215,7 @@ def _friction_model(fit: Record) -> str:
         )
     if friction.depends_on_rate:
         unit, scale = SHOWN_SPEED[conditions.velocity_unit]
-        speed = f"{scale * conditions.reference_speed:.3g} {unit}"
+        speed = f"{significant(scale * conditions.reference_speed)} {unit}"
         lines.append(
             f"Coefficients and efficiencies are stated for a speed of {speed}, because friction may depend on speed."
         )
@@ -241,7 +241,7 @@ def _measured(fit: Record, page: dict[str, Any]) -> str:
         rows.append(
             [
                 what + row["label"],
-                *([f"{row['input_force_N']:.3g} N"] if of_load else []),
+                *([f"{significant(row['input_force_N'])} N"] if of_load else []),
                 percent(row['measured'], 2),
                 percent(row['predicted'], 2),
                 *interval,

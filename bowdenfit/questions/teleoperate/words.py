@@ -4,7 +4,7 @@ from collections.abc import Iterator
 
 from bowdenfit.display import text_of
 from bowdenfit.questions.teleoperate.answer import Scheme, Teleoperation
-from bowdenfit.words import filled, percent, table
+from bowdenfit.words import filled, percent, significant, table
 
 
 @text_of.register(Teleoperation)
@@ -38,8 +38,8 @@ def _walls(found: Teleoperation) -> Iterator[str]:
         yield f"Through this cable a hand feels no wall without bouncing with {sure} probability, {_range(found)}; {at}."
     else:
         yield (
-            f"Through this cable a hand feels walls of up to {hardest:.3g} N*m/rad without bouncing with at least {sure} "
-            f"probability, {_range(found)}; {at}."
+            f"Through this cable a hand feels walls of up to {significant(hardest)} N*m/rad without bouncing with at least "
+            f"{sure} probability, {_range(found)}; {at}."
         )
 
 
@@ -51,8 +51,9 @@ def _felt(found: Teleoperation) -> Iterator[str]:
         return
     stiffness = stated.stiffness
     yield (
-        f"The hand feels {free}, and of the wall {stiffness.median:.3g} N*m/rad ({stiffness.q05:.3g} to {stiffness.q95:.3g}) "
-        "while both sides of the loop are taut. Walls are judged as if there were no dry friction, which only calms."
+        f"The hand feels {free}, and of the wall {significant(stiffness.median)} N*m/rad "
+        f"({significant(stiffness.q05)} to {significant(stiffness.q95)}) while both sides of the loop are taut. "
+        "Walls are judged as if there were no dry friction, which only calms."
     )
 
 
@@ -85,7 +86,7 @@ def _table(found: Teleoperation) -> str:
 
 
 def _stiffness(scheme: Scheme) -> str:
-    return "-" if scheme.stiffness is None else f"{scheme.stiffness.median:.3g}"
+    return "-" if scheme.stiffness is None else significant(scheme.stiffness.median)
 
 
 def _hardest(found: Teleoperation, scheme: Scheme) -> str:
@@ -94,5 +95,5 @@ def _hardest(found: Teleoperation, scheme: Scheme) -> str:
         if scheme.hardest is None
         else "none"
         if scheme.hardest <= 0
-        else f"{scheme.hardest:.3g}"
+        else significant(scheme.hardest)
     )

@@ -8,7 +8,7 @@ import json
 import os
 import shutil
 import tempfile
-from collections.abc import Iterator, Mapping
+from collections.abc import Collection, Iterable, Iterator, Mapping
 from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
@@ -86,7 +86,40 @@ def filled_when_whole(folder: Path, last: str = "") -> Iterator[Path]:
 
 def is_empty(folder: Path) -> bool:
     """Whether nothing lies in a folder, or nothing but what is left of writing that was ended."""
-    return all(path.name.startswith(".") and path.name.endswith(_PARTIAL) for path in folder.iterdir())
+    return all(_is_partial(path) for path in folder.iterdir())
+
+
+def is_left_of(folder: Path, names: Collection[str]) -> bool:
+    """Whether nothing lies in a folder but what a run of some kind writes, whole or not, and notes (*.md).
+
+    Args:
+        folder: The folder, which may be missing.
+        names: Of the files and folders that such a run writes.
+    """
+    inside = folder.iterdir() if folder.is_dir() else ()
+    return all(path.name in names or path.suffix == ".md" or _is_partial(path) for path in inside)
+
+
+def remove_what_is_left(folder: Path, files: Iterable[str], folders: Iterable[str]) -> None:
+    """Remove what a run of some kind wrote, whole or not, and nothing else.
+
+    Args:
+        folder: The folder, which nobody writes into meanwhile; it may be missing.
+        files: Of such a run by name, first the one that says that it has finished.
+        folders: Of such a run by name.
+    """
+    for name in files:
+        (folder / name).unlink(missing_ok=True)
+    partial = [path for path in folder.iterdir() if _is_partial(path)] if folder.is_dir() else []
+    for path in (*(folder / name for name in folders), *partial):
+        if path.is_dir() and not path.is_symlink():
+            shutil.rmtree(path)
+        elif _is_partial(path):
+            path.unlink()
+
+
+def _is_partial(path: Path) -> bool:
+    return path.name.startswith(".") and path.name.endswith(_PARTIAL)
 
 
 def _umask() -> int:
@@ -189,7 +222,7 @@ def refuse_to_overwrite(folder: Path, force: bool) -> None:
         there = "holds an interrupted fit; go on with --resume, or start over with --force."
     elif not folder.exists():
         return
-    elif not folder.is_dir() or any(not _is_ours(path) for path in folder.iterdir()):
+    elif not folder.is_dir() or not is_left_of(folder, {*_WRITTEN, FIGURES}):
         raise StoreError(f"{folder} exists and is no results folder; name another with --output.")
     elif any(path.suffix != ".md" for path in folder.iterdir()):
         there = "holds what is left of a fit that was ended; add --force to replace it, or name another with --output."
@@ -197,12 +230,6 @@ def refuse_to_overwrite(folder: Path, force: bool) -> None:
         return
     if not force:
         raise StoreError(f"{folder} {there}")
-
-
-def _is_ours(path: Path) -> bool:
-    """Whether a fit writes what lies in a results folder, or people write it there (*.md)."""
-    name = path.name.removeprefix(".").removesuffix(_PARTIAL)
-    return path.suffix == ".md" or name in {*_WRITTEN, FIGURES}
 
 
 @contextmanager
@@ -243,11 +270,7 @@ def _lock(held: int, folder: Path) -> None:
 
 def clear(folder: Path) -> None:
     """Remove what an earlier fit wrote, and nothing else; the mark of a finished fit goes first."""
-    for name in _WRITTEN:
-        (folder / name).unlink(missing_ok=True)
-        (folder / f".{name}{_PARTIAL}").unlink(missing_ok=True)
-    if (folder / FIGURES).is_dir():
-        shutil.rmtree(folder / FIGURES)
+    remove_what_is_left(folder, _WRITTEN, [FIGURES])
 
 
 def start_checkpoint(path: Path, fingerprint: Mapping[str, Any]) -> None:

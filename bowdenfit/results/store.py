@@ -56,6 +56,7 @@ def save(
     if not force and (folder / FIT).exists():
         raise StoreError(f"{folder} holds a finished fit already; add --force (force=True) to replace it.")
     with folder_to_write(folder):
+        (folder / FIT).unlink(missing_ok=True)  # of another posterior.nc
         if fit.sampled is None:
             (folder / POSTERIOR).unlink(missing_ok=True)
         else:

@@ -11,7 +11,7 @@ from concurrent.futures import ThreadPoolExecutor
 import numpy as np
 import pytest
 import scipy.io
-from recorded_files import WRITERS
+from recorded_files import WRITERS, channels_of
 
 import bowdenfit as bf
 from bowdenfit.files import read_channels
@@ -184,9 +184,7 @@ def test_readers_that_have_nothing_to_do_hold_no_output_of_ours(tmp_path):
 @pytest.mark.parametrize("name", [name for name in WRITERS if name != "zip.xlsx"])
 def test_what_the_fuzzer_spoils_is_read_unspoilt(tmp_path, name):
     WRITERS[name](tmp_path / name)
-    topics = [f"{end}_force=/{end}_force_N.data:N" for end in ("input", "output")]
-    channels = topics if name.endswith((".bag", ".db3", ".mcap")) else []
-    assert bf.read(tmp_path / name, wrap_angle=(180, "deg"), channels=channels).measurements
+    assert bf.read(tmp_path / name, wrap_angle=(180, "deg"), channels=channels_of(name)).measurements
 
 
 def test_an_archive_is_called_one(tmp_path):

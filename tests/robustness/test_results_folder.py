@@ -11,6 +11,9 @@ import pytest
 import bowdenfit as bf
 from bowdenfit.errors import DiskError
 from bowdenfit.inference.checkpoint import append, fingerprint_of, heading, records
+from bowdenfit.questions.calibrate.store import open_replications
+from bowdenfit.questions.fleet.store import FleetStore
+from bowdenfit.results import store
 from bowdenfit.results.folder import folder_to_write, refuse_unwritable, reserved, write_text
 
 YARN = Path(__file__).resolve().parents[2] / "datasets" / "yarn-on-cylinder"
@@ -96,6 +99,62 @@ def test_what_is_left_of_an_ended_fit_is_replaced_with_force(on_body, tmp_path):
         bf.fit(on_body, output=tmp_path / "fit", mcmc=False, figures=False)
     bf.fit(on_body, output=tmp_path / "fit", mcmc=False, figures=False, force=True)
     assert not (tmp_path / "fit" / ".posterior.nc.partial").exists()
+
+
+def opened_calibration(folder, force):
+    open_replications(folder, {"seed": 3}, resume=False, force=force)
+
+
+def opened_fleet(folder, force):
+    FleetStore(folder, {"seed": 3, "versions": {}}).open(resume=False, force=force)
+
+
+LEFT = {
+    opened_calibration: ("figures", "report.html", "summary.txt", "calibration.json", "jobs"),
+    opened_fleet: ("fleet.nc", "fleet.json", "summary.txt", "kept", "jobs"),
+}
+
+
+@pytest.mark.parametrize(("begin", "name"), [(begin, name) for begin, names in LEFT.items() for name in names])
+def test_what_is_left_of_an_ended_calibration_or_fleet_is_replaced_with_force(tmp_path, begin, name):
+    left = tmp_path / "made" / name
+    (left / "inside" if "." not in name else left.parent).mkdir(parents=True)
+    (left / "inside" / "x" if left.is_dir() else left).write_text("half")
+    with pytest.raises(bf.StoreError, match="--force"):
+        begin(tmp_path / "made", False)
+    begin(tmp_path / "made", True)
+    assert not (left / "inside").exists() and not left.is_file()
+
+
+@pytest.mark.parametrize("begin", LEFT)
+def test_temporary_names_that_an_ended_run_left_are_in_nobody_s_way(tmp_path, begin):
+    (tmp_path / "made" / ".made.x.partial").mkdir(parents=True)
+    for name in (".replications.jsonl.partial", ".begun.json.partial", ".made.x.partial/fleet.nc", "notes.md"):
+        (tmp_path / "made" / name).write_text("half")
+    begin(tmp_path / "made", False)
+    assert not list((tmp_path / "made").glob(".*")) and (tmp_path / "made" / "notes.md").exists()
+
+
+@pytest.mark.parametrize("begin", LEFT)
+def test_what_a_person_put_into_a_folder_is_replaced_by_nothing(tmp_path, begin):
+    (tmp_path / "made").mkdir()
+    (tmp_path / "made" / "mine.csv").write_text("x")
+    for force in (False, True):
+        with pytest.raises(bf.StoreError, match="exists and holds no"):
+            begin(tmp_path / "made", force)
+    assert [path.name for path in (tmp_path / "made").iterdir()] == ["mine.csv"]
+
+
+def test_a_fit_that_is_written_again_counts_as_finished_only_when_all_of_it_is(on_body, tmp_path, monkeypatch):
+    found = bf.fit(on_body, output=tmp_path / "fit", mcmc=False, figures=False, seed=3)
+
+    def full(*_):
+        raise OSError(28, "No space left on device")
+
+    monkeypatch.setattr(store, "keep", full)
+    with pytest.raises(DiskError):
+        store.save(found, found.summary(), tmp_path / "fit", force=True)
+    assert not (tmp_path / "fit" / "fit.json").exists()
 
 
 @pytest.mark.parametrize("place", ["file/x", "link", "link/x", "n" * 300, "/dev/null/x", "pipe/x/y"])

@@ -15,7 +15,7 @@ from pathlib import Path
 
 from byte_mangling import mangled
 from mangling import DESCRIPTIONS, ODD_CELLS, ODD_VALUES, TABLES
-from recorded_files import WRITERS
+from recorded_files import WRITERS, channels_of
 
 import bowdenfit as bf
 
@@ -24,6 +24,7 @@ DATASETS = sorted(path for path in ROOT.iterdir() if (path / "cable.toml").exist
 LONGEST = 900  # characters of a sentence
 LONGEST_LIST = 4000  # characters of what is wrong, a line each
 SLOWEST = 20.0  # seconds of CPU
+TEXTS = {".csv": "utf-8", ".cmbl": "utf-8", ".txt": "utf-16"}  # encodings of kinds of files that are text
 
 
 class Wrong(AssertionError):
@@ -121,8 +122,15 @@ def read_mangled_file(place: Path, valid: dict[str, bytes], name: str, number: i
         name: Of the kind of file.
         number: Of the case.
     """
-    (place / name).write_bytes(mangled(random.Random(f"{name} {number}"), valid[name]))
-    return meet(f"{name} {number}", lambda: bf.read(place / name, wrap_angle=(180, "deg")), name, Path(name).stem)
+    chance = random.Random(f"{name} {number}")
+    encoding = TEXTS.get(Path(name).suffix)
+    if encoding and chance.random() < 0.8:  # damage makes most texts no text, which is soon refused
+        text = chance.choice(TABLES)(chance, valid[name].decode(encoding)) or "\n"
+        (place / name).write_bytes(text.encode(encoding, errors="surrogatepass"))
+    else:
+        (place / name).write_bytes(mangled(chance, valid[name]))
+    known = {"wrap_angle": (180, "deg"), "channels": channels_of(name)}
+    return meet(f"{name} {number}", lambda: bf.read(place / name, **known), name, Path(name).stem)
 
 
 SETTINGS = (

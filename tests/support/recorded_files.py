@@ -179,3 +179,13 @@ WRITERS: dict[str, Callable[[Path], None]] = {
     "a.tdms": tdms, "a.mf4": mdf, "a.xlsx": workbook, "a.parquet": parquet, "a.bag": bag1, "a.db3": db3, "a.mcap": mcap,
     "a.cmbl": logger_pro, "a.csv": table, "german.txt": german_table, "zip.xlsx": archive,
 }  # fmt: skip
+
+
+def channels_of(name: str) -> list[str]:
+    """What has to be said of a file to read it: which topics of a bag are the forces.
+
+    Args:
+        name: Of `WRITERS`.
+    """
+    topics = [f"{end}_force=/{end}_force_N.data:N" for end in ("input", "output")]
+    return topics if name.endswith((".bag", ".db3", ".mcap")) else []

@@ -1,12 +1,12 @@
 """The results folder of a calibration: one line a replication, written as it ends, so that nothing is lost."""
 
 import json
-import shutil
 from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
 from bowdenfit.errors import StoreError
+from bowdenfit.inference.engines.choice import JOBS
 from bowdenfit.inputs import or_damaged
 from bowdenfit.questions.calibrate.replication import Replication
 from bowdenfit.results.folder import (
@@ -16,13 +16,16 @@ from bowdenfit.results.folder import (
     REPORT,
     SUMMARY_TEXT,
     folder_to_write,
+    is_left_of,
     read_text,
     refuse_no_seed,
+    remove_what_is_left,
     write_text,
 )
 from bowdenfit.results.plain import rebuilt, stored
 
 CALIBRATION = "calibration.json"
+_FILES, _FOLDERS = (CALIBRATION, SUMMARY_TEXT, DETAILS_TEXT, REPORT, REPLICATIONS), (FIGURES, JOBS)  # all that is written
 _WHAT = {"description": "the description", "sha256": "an input file", "seed": "the seed", "assumed": "what is assumed"}
 _WHAT |= {"truths": "what is stated of the truth"}
 
@@ -46,20 +49,17 @@ def open_replications(
         return _read_replications(path, fingerprint)
     if path.exists() and not force:
         raise StoreError(f"{folder} holds a calibration already; go on with --resume, or start over with --force.")
-    if folder.exists() and not path.exists() and any(folder.iterdir()):
+    if not is_left_of(folder, {*_FILES, *_FOLDERS}):
         raise StoreError(f"{folder} exists and holds no calibration; name another with --output.")
-    _clear(folder)
+    if not (force or path.exists() or is_left_of(folder, ())):
+        raise StoreError(
+            f"{folder} holds what is left of a calibration that was ended; add --force to replace it, or name another with "
+            "--output."
+        )
     with folder_to_write(folder):
+        remove_what_is_left(folder, _FILES, _FOLDERS)
         write_text(path, json.dumps(dict(fingerprint)) + "\n")
     return {}
-
-
-def _clear(folder: Path) -> None:
-    """Remove what an earlier calibration wrote, and nothing else."""
-    for name in (CALIBRATION, SUMMARY_TEXT, DETAILS_TEXT, REPORT, REPLICATIONS):
-        (folder / name).unlink(missing_ok=True)
-    if (folder / FIGURES).is_dir():
-        shutil.rmtree(folder / FIGURES)
 
 
 def seed_of(folder: Path) -> int:

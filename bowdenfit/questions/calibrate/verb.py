@@ -203,6 +203,7 @@ def _write(found: "Calibration", folder: Path | None) -> None:
     from bowdenfit.results.plain import plain
 
     with folder_to_write(folder):
+        (folder / CALIBRATION).unlink(missing_ok=True)  # of fewer replications
         write_text(folder / SUMMARY_TEXT, calibration_text(found))
         write_text(folder / DETAILS_TEXT, details_text(found))
         draw_calibration(found, folder / FIGURES)

@@ -16,9 +16,18 @@ from bowdenfit.inference.engines.choice import JOBS
 from bowdenfit.inputs import or_damaged
 from bowdenfit.results.arrays import read_arrays, write_arrays
 from bowdenfit.results.fleet_folder import FLEET_DRAWS, FLEET_PAGE, FleetDraws, read_fleet_draws
-from bowdenfit.results.folder import SUMMARY_TEXT, folder_to_write, read_page, refuse_no_seed, write_text
+from bowdenfit.results.folder import (
+    SUMMARY_TEXT,
+    folder_to_write,
+    is_left_of,
+    read_page,
+    refuse_no_seed,
+    remove_what_is_left,
+    write_text,
+)
 
 KEPT, BEGUN = "kept", "begun.json"  # folder of pieces, and what they were made for
+_FILES, _FOLDERS = (FLEET_PAGE, FLEET_DRAWS, SUMMARY_TEXT), (KEPT, JOBS)  # all that is written
 _FITS = "fits"
 _WHAT = {"seed": "the seed", "versions": "a version of bowdenfit or of a library"}
 SEPARATOR = "\n"  # between reasons in fleet.nc
@@ -53,12 +62,15 @@ class FleetStore:
             return before | self._of_pieces()
         if (finished.exists() or kept.exists()) and not force:
             raise StoreError(f"{self.folder} holds a fleet already; go on with --resume, or start over with --force.")
-        if self.folder.exists() and not (finished.exists() or kept.exists()) and any(self.folder.iterdir()):
+        if not is_left_of(self.folder, {*_FILES, *_FOLDERS}):
             raise StoreError(f"{self.folder} exists and holds no fleet; name another with --output.")
+        if not (force or is_left_of(self.folder, ())):
+            raise StoreError(
+                f"{self.folder} holds what is left of a fleet that was ended; add --force to replace it, or name another with "
+                "--output."
+            )
         with folder_to_write(self.folder):
-            for name in (FLEET_PAGE, FLEET_DRAWS, SUMMARY_TEXT):
-                (self.folder / name).unlink(missing_ok=True)
-            self._remove_pieces()
+            remove_what_is_left(self.folder, _FILES, _FOLDERS)
             self._begin()
         return {}
 

@@ -1,17 +1,22 @@
 """What may be opened at all: regular files of a size that fits what they are, found by patterns that end."""
 
 import errno
+import math
 import os
 import re
 import stat
 import tomllib
+import zipfile
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from bowdenfit.errors import BowdenfitError, DatasetError, DescriptionError
 from bowdenfit.words import shown
+
+if TYPE_CHECKING:
+    from numpy.lib.npyio import NpzFile
 
 _LARGEST_TOML = 4_000_000  # bytes; a description has some thousand
 _MOST_DOTS = 300  # of a key, or a sentence
@@ -67,6 +72,27 @@ def or_damaged(error: BowdenfitError) -> Iterator[None]:
         if isinstance(stumbled, OSError) and stumbled.errno is not None and stumbled.filename is not None:
             raise
         raise error from stumbled
+
+
+def refuse_packed(archive: "NpzFile") -> None:
+    """Refuse arrays that ask for more than they bring: what is written here is never packed, and as long as it says.
+
+    Args:
+        archive: Arrays that NumPy has opened.
+
+    Raises:
+        ValueError: One is packed, or says that it is larger than what is there.
+    """
+    from numpy.lib import format as npy
+
+    headers = {(1, 0): npy.read_array_header_1_0, (2, 0): npy.read_array_header_2_0}
+    for entry in archive.zip.infolist() if archive.zip is not None else ():
+        if entry.compress_type != zipfile.ZIP_STORED:
+            raise ValueError(f"{entry.filename} is packed")
+        with archive.zip.open(entry) as stream:  # of a member that is longer than the file nothing is read
+            shape, _, kind = headers[npy.read_magic(stream)](stream)
+        if math.prod(shape) * kind.itemsize > entry.file_size:
+            raise ValueError(f"{entry.filename} says that it is larger than it is")
 
 
 def read_toml_file(path: Path, remedy: str = "") -> tuple[str, dict[str, Any]]:

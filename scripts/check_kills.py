@@ -48,7 +48,7 @@ HEAR = (
     "import os, resource as r, signal, sys; signal.signal(signal.SIGINT, signal.SIG_DFL); "
     "r.setrlimit(r.RLIMIT_DATA, (int(sys.argv[1]),) * 2); os.execv(sys.argv[2], sys.argv[2:])"
 )
-LITTLE, MUCH = 800e6, 1300e6  # bytes, between which a fit has too little or enough
+LITTLE, MUCH = 850e6, 1100e6  # bytes, between which a fit has too little or enough
 INSPECTIONS = 18  # of the fleet
 AT_ONCE = 0.05  # s behind the beginning of a phase
 OURS = ("Interrupted", "Error: ", "Warning: ", "Wrote ")  # that what is said begins with
@@ -183,7 +183,10 @@ class Watched:
     def end(self) -> tuple[str, str]:
         """What it prints; waits for it, and ends it where its output stays open."""
         try:
-            return self.process.communicate(timeout=60)
+            said = self.process.communicate(timeout=60)
+            if self.process.returncode in {0, 3} and len(self.began) == len(PHASES):
+                self.began.append(time.monotonic())  # which ends the last
+            return said
         except subprocess.TimeoutExpired:
             os.killpg(self.process.pid, signal.SIGKILL)
             return "", "its output stayed open for 60 s"
@@ -197,8 +200,7 @@ def run_whole(job: Job, folder: Path) -> Known:
     run = Watched(job, folder)
     run.wait(WRITE, float("inf"))
     run.end()
-    began = [*run.began, time.monotonic()]
-    known.seconds = [end - start for start, end in pairwise(began)]
+    known.seconds = [end - start for start, end in pairwise(run.began)]
     return known
 
 
@@ -250,12 +252,12 @@ def strike(blow: Blow, known: Known, folder: Path) -> None:
     job, run = blow.job, Watched(blow.job, folder, blow.memory)
     lives = run.wait(blow.phase, float("inf") if blow.starved else blow.at)
     if lives:
-        blow.struck = len(run.began) - 1
+        blow.struck = min(len(run.began), len(PHASES)) - 1
         run.process.send_signal(blow.sent) if blow.sent else end_one(run.process.pid, int(blow.at * 1000))
     _, err = run.end()
     code, finished = run.process.returncode, (folder / job.done).exists()
     if blow.starved:
-        blow.struck = None if code in {0, 3} else len(run.began) - 1
+        blow.struck = None if code in {0, 3} else min(len(run.began), len(PHASES)) - 1
         known.enough = min(known.enough, blow.memory) if code in {0, 3} else known.enough
     known.learn(run.began)
     blow.said = f"{code} {' '.join(err.split())[-90:]!r}"

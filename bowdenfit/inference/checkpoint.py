@@ -17,7 +17,7 @@ from zlib import crc32
 import numpy as np
 
 from bowdenfit.errors import StoreError, disk_error
-from bowdenfit.inputs import or_damaged, refuse_special
+from bowdenfit.inputs import or_damaged, refuse_packed, refuse_special
 
 _MARK = b"bowdenfit checkpoint 1\n"
 _HEAD = struct.Struct("<QI")  # length and checksum of a record
@@ -116,4 +116,5 @@ def _whole(file: BinaryIO) -> Iterator[Record]:
         if len(content) < length or crc32(content) != checksum:
             return
         with np.load(io.BytesIO(content)) as arrays:
+            refuse_packed(arrays)
             yield dict(arrays)

@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 
 from bowdenfit.errors import StoreError
-from bowdenfit.inputs import refuse_special
+from bowdenfit.inputs import refuse_packed, refuse_special
 from bowdenfit.results.folder import replace_when_whole
 from bowdenfit.results.plain import rebuilt, stored
 
@@ -44,6 +44,7 @@ def read_arrays(path: Path, kinds: Mapping[str, Any]) -> dict[str, Any]:
     """
     refuse_special(path, StoreError)
     with path.open("rb") as opened, np.load(opened) as file:  # what is opened here is closed where it is no archive
+        refuse_packed(file)
 
         def take(data: Any) -> Any:
             if isinstance(data, list):

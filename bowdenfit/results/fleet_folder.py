@@ -5,7 +5,7 @@ import json
 from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -14,6 +14,9 @@ from bowdenfit.inputs import or_damaged, refuse_special
 from bowdenfit.results.folder import read_page, replace_when_whole
 from bowdenfit.results.kept import checksum
 from bowdenfit.types import Vector
+
+if TYPE_CHECKING:
+    import h5py
 
 FLEET_TABLE, FLEET_DESCRIPTION = "fleet.csv", "fleet.toml"  # of the measurements: its inspections, and what all have in common
 COLUMNS = ("cable", "cycles", "temperature_degC", "lubricated", "file")
@@ -105,7 +108,7 @@ def read_fleet_draws(folder: Path) -> FleetDraws:
     damaged = StoreError(f"{path} is damaged; fit the fleet again, or restore the folder from a copy.")
     _refuse_changed(folder, damaged)
     with or_damaged(damaged), h5py.File(path) as file:
-        group, stats = file[_POSTERIOR], file["sample_stats"]
+        group, stats = (_members(file, name) for name in (_POSTERIOR, "sample_stats"))
         fixed = {"cable", "cable_name", "chain", "draw", *_METADATA}
         values = {name: np.ascontiguousarray(group[name][0].T) for name in group if name not in fixed}
         attributes = {name: {k: v for k, v in group[name].attrs.items() if isinstance(v, str)} for name in values}
@@ -114,6 +117,13 @@ def read_fleet_draws(folder: Path) -> FleetDraws:
         known = {name: np.asarray(stats[name][()]) for name in stats if name not in fixed}
         about = json.loads(file.attrs["fleet"])
     return FleetDraws(labels, names, cycles, temperature, lubricated, values, known, attributes, about)
+
+
+def _members(file: "h5py.File", group: str) -> "dict[str, h5py.Dataset]":
+    from bowdenfit.results.netcdf import own_member
+
+    inside = own_member(file, group)
+    return {name: own_member(inside, name) for name in inside}
 
 
 def _refuse_changed(folder: Path, damaged: StoreError) -> None:

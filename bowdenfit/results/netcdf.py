@@ -91,15 +91,36 @@ def read_groups(path: Path) -> Groups:
 
     refuse_special(path, StoreError)
     with h5py.File(path) as file:
+        groups = {name: own_member(file, name) for name in _members(file)}
         return {
-            group: {
-                unquote(key): _array(file[group][key])
-                for key in _members(file[group])
-                if not _is_label(file[group][key])
-            }
-            for group in _members(file)
-            if isinstance(file[group], h5py.Group)
+            name: {unquote(key): _array(found) for key in _members(group) if not _is_label(found := own_member(group, key))}
+            for name, group in groups.items()
+            if isinstance(group, h5py.Group)
         }
+
+
+def own_member(group: "h5py.Group", name: str) -> Any:
+    """What lies in a group under a name: in this very file, and no larger than that, since nothing is packed in it.
+
+    Args:
+        group: Of an open file.
+        name: The name.
+
+    Raises:
+        ValueError: It lies elsewhere, or says that it is larger than the file.
+        KeyError: Nothing has that name.
+    """
+    import h5py
+
+    if not isinstance(group.get(name, getlink=True), h5py.HardLink):
+        raise ValueError(f"{name} lies in another file or place")
+    member = group[name]
+    if isinstance(member, h5py.Dataset):
+        if member.external or member.is_virtual:
+            raise ValueError(f"{name} lies in other files")
+        if member.nbytes > group.file.id.get_filesize():
+            raise ValueError(f"{name} says that it is larger than its file")
+    return member
 
 
 def _members(group: "h5py.Group") -> list[str]:
@@ -119,6 +140,4 @@ def _is_label(member: "h5py.Dataset") -> bool:
 
 
 def _array(member: "h5py.Dataset") -> np.ndarray:
-    if member.external or member.is_virtual:
-        raise ValueError("its draws lie in other files")
     return np.asarray(member[()], dtype=bool if member.attrs.get("dtype") == "bool" else None)

@@ -66,7 +66,7 @@ def test_draws_lie_in_their_file_and_are_no_larger(tmp_path, way):
     assert list(read_groups(path)["posterior"]) == ["mu", "tau"]
     with h5py.File(path, "a") as file:
         way(file["posterior"], "mu", path)
-    with pytest.raises(ValueError, match="lies in|larger than its file"):  # of which loading a fit makes a sentence
+    with pytest.raises(ValueError, match=r"lies in|larger than its file"):  # of which loading a fit makes a sentence
         read_groups(path)
 
 

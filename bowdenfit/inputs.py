@@ -86,10 +86,12 @@ def refuse_packed(archive: "NpzFile") -> None:
     from numpy.lib import format as npy
 
     headers = {(1, 0): npy.read_array_header_1_0, (2, 0): npy.read_array_header_2_0}
-    for entry in archive.zip.infolist() if archive.zip is not None else ():
+    zipped = archive.zip
+    assert zipped is not None  # it is open
+    for entry in zipped.infolist():
         if entry.compress_type != zipfile.ZIP_STORED:
             raise ValueError(f"{entry.filename} is packed")
-        with archive.zip.open(entry) as stream:  # of a member that is longer than the file nothing is read
+        with zipped.open(entry) as stream:  # of a member that is longer than the file nothing is read
             shape, _, kind = headers[npy.read_magic(stream)](stream)
         if math.prod(shape) * kind.itemsize > entry.file_size:
             raise ValueError(f"{entry.filename} says that it is larger than it is")

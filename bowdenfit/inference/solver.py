@@ -20,7 +20,7 @@ Evaluate = Callable[[np.ndarray], tuple[np.ndarray, np.ndarray]]
 # Relative change of parameters and of the sum of squares at which a method stops, and part of the residuals along the
 # tangent plane at which the polish does: as far as rounding allows, or enough for the sum of squares.
 _PRECISE, _QUICK = (1e-14, 1e-13), (1e-9, 1e-5)
-_MOST_EVALUATIONS = 1000
+_MOST_EVALUATIONS, _MOST_QUICK = 1000, 150
 _MOST_POLISHING = 30
 _STRAIGHT = (
     0.3  # part of a step's effect by which residuals may depart from their tangent plane; at a kink they do by more
@@ -60,8 +60,9 @@ def minimize(evaluate: Evaluate, start: np.ndarray, quick: bool = False) -> Mini
     found = _polish(evaluate, _descend(evaluate, first, quick, _RADIUS), quick)
     if found.succeeded and _gauss_newton(found)[1] <= _SMOOTH * np.linalg.norm(found.residuals):
         return found
-    # It has stopped short: at a kink of the residuals, or in a long bend.
-    others = [_polish(evaluate, _descend(evaluate, at, quick, _BOLD_RADIUS), quick) for at in (first, found)]
+    # It has stopped short: at a kink of the residuals, or in a long bend. One that ran out of evaluations goes on.
+    again = (found,) if quick and not found.succeeded else (first, found)
+    others = [_polish(evaluate, _descend(evaluate, at, quick, _BOLD_RADIUS), quick) for at in again]
     return min([found, *others], key=lambda m: (not m.succeeded, m.sum_of_squares))
 
 
@@ -96,7 +97,7 @@ def _descend(evaluate: Evaluate, at: Minimum, quick: bool, radius: float) -> Min
     advance, state = stepper(*at.jacobian.shape)
     best, x = replace(at, succeeded=False), at.x
     with np.errstate(over="ignore", invalid="ignore"):  # a step may go where nothing can be computed, and is taken back
-        for count in range(_MOST_EVALUATIONS):
+        for count in range(_MOST_QUICK if quick else _MOST_EVALUATIONS):
             x, state, trial, done = advance(settings, count == 0, x, state, at.residuals, at.jacobian)
             best = at if np.array_equal(x, at.x) else best
             if done:

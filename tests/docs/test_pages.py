@@ -29,13 +29,23 @@ MOST_TEXT = 2000  # characters of one output
 
 @pytest.fixture(scope="module")
 def built(tmp_path_factory) -> Path:
+    """The documentation, whose notebooks are shown and not run."""
+    return _built(tmp_path_factory, "-D", "nb_execution_mode=off")
+
+
+@pytest.fixture(scope="module")
+def built_anew(tmp_path_factory) -> Path:
     """The documentation as a reader has it."""
+    return _built(tmp_path_factory)
+
+
+def _built(tmp_path_factory, *settings: str) -> Path:
     place = tmp_path_factory.mktemp("documentation") / "html"
     nowhere = dict.fromkeys(("http_proxy", "https_proxy", "HTTP_PROXY", "HTTPS_PROXY"), "http://127.0.0.1:9")
     variables = {**os.environ, **nowhere, "PYTHONPATH": str(ROOT), "JUPYTER_PLATFORM_DIRS": "1"}
     variables.setdefault("JAX_COMPILATION_CACHE_DIR", str(place.parent / "compiled"))  # two notebooks make the same fit
     variables.setdefault("JAX_PERSISTENT_CACHE_MIN_COMPILE_TIME_SECS", "0.1")
-    command = [sys.executable, "-m", "sphinx", "-W", "--keep-going", "-q", "-b", "html", ROOT / "docs", place]
+    command = [sys.executable, "-m", "sphinx", "-W", "--keep-going", "-q", *settings, "-b", "html", ROOT / "docs", place]
     done = subprocess.run(command, env=variables, capture_output=True, text=True, check=False)
     assert done.returncode == 0, done.stderr
     return place
@@ -104,8 +114,9 @@ def test_formulas_are_shown_by_the_browser_itself(pages):
     assert theory.formulas > 50
 
 
-def test_notebooks_say_something_in_every_output_and_never_too_much(built):
-    notebooks = sorted((built.parent / "jupyter_execute").rglob("*.ipynb"))
+@pytest.mark.slow
+def test_notebooks_say_something_in_every_output_and_never_too_much(built_anew):
+    notebooks = sorted((built_anew.parent / "jupyter_execute").rglob("*.ipynb"))
     assert [path.stem for path in notebooks] == ["first-fit", "recordings-or-loops", "what-to-measure-next"]
     for path in notebooks:
         cells = json.loads(path.read_text(encoding="utf-8"))["cells"]

@@ -33,7 +33,7 @@ ACCURATE = BatchSettings(
 )
 
 
-@pytest.fixture(scope="module", params=[ON_BODY, YARN])
+@pytest.fixture(scope="module", params=[pytest.param(ON_BODY, marks=pytest.mark.slow), YARN])
 def programs(request):
     """One data set some of whose cables need ensembles, and one whose weighted draws are good enough."""
     return BatchPrograms(LogDensity(build_model(load_dataset(DATA / request.param))), QUICK)

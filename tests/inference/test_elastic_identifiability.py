@@ -83,7 +83,7 @@ def estimates_of(tables, design, truth, seeds=SEEDS):
         data, values = measured(cable_with(tables), seed, design=design_of(**design), **(TRUTH | truth))
         posterior = LogDensity(build_model(data))
         objective = objective or make_objective(posterior)
-        estimates = least_squares(posterior, objective, maximum_posterior(posterior, objective).z).estimates
+        estimates = least_squares(posterior, objective, maximum_posterior(posterior, objective).z, intervals=False).estimates
         true = {p.name: values[p.name] * p.shown_scale for p in posterior.model.space.free}
         found.append({name: (estimate, true[name]) for name, estimate in estimates.items()})
     return found, data

@@ -9,6 +9,7 @@ from one_page import faults
 
 import bowdenfit as bf
 
+QUICK = ("sampler.n_walkers=128", "sampler.target_ess=300", "sampler.target_r_hat=1.05", "sampler.max_steps=4000")
 TRUE = {"new": 0.1, "old": 0.14}
 
 
@@ -32,7 +33,7 @@ def fitted(tmp_path_factory):
     path = tmp_path_factory.mktemp("groups")
     dataset = _folder(path / "data")
     for model in ("by-group", "capstan"):
-        bf.fit(dataset, friction=model, seed=1, output=path / model, figures=False)
+        bf.fit(dataset, friction=model, seed=1, output=path / model, figures=False, settings=QUICK)
     return path
 
 
@@ -71,7 +72,7 @@ def test_compare_tells_whether_groups_differ(fitted, accept):
 def test_groups_that_do_not_differ_are_not_said_to(tmp_path):
     """The same readings in both groups: either sign is as probable, and shared coefficients describe them."""
     dataset = _folder(tmp_path / "alike", mountings=5, true={"new": 0.12, "old": 0.12}, alike=True)
-    found = bf.fit(dataset, friction="by-group", seed=1).groups.contrast("new", "old")
+    found = bf.fit(dataset, friction="by-group", seed=1, settings=QUICK).groups.contrast("new", "old")
     assert found.probability < 0.55 and abs(found.difference.median) < 0.1 * found.difference.sd
     assert bf.fit(dataset, seed=1, mcmc=False).verdict().trusted
 
@@ -79,5 +80,5 @@ def test_groups_that_do_not_differ_are_not_said_to(tmp_path):
 def test_one_mounting_of_each_group_is_warned_of_and_leaves_them_alike(tmp_path, accept):
     dataset = _folder(tmp_path / "once", mountings=1)
     assert "new and old: measured in one mounting of the cable each" in accept("check", dataset, "--friction", "by-group")
-    known = bf.fit(dataset, friction="by-group", seed=1).groups.contrast("new", "old")
+    known = bf.fit(dataset, friction="by-group", seed=1, settings=QUICK).groups.contrast("new", "old")
     assert known.difference.sd > 0.01  # a mounting's scatter, whose prior alone speaks, over 180 deg

@@ -14,6 +14,7 @@ from bowdenfit.questions.recorded.lost_force import lost_force
 LOSS = -np.log(0.75)
 HIDDEN = 2.2
 LOADS = (5.0, 10.0, 20.0, 40.0)
+QUICK = ("sampler.n_walkers=128", "sampler.target_ess=300", "sampler.target_r_hat=1.05", "sampler.max_steps=4000")
 SMALL = "[sampler]\nn_walkers = 32\nmax_steps = 1500\ntarget_ess = 100\ntarget_r_hat = 1.05\n"
 
 
@@ -32,7 +33,7 @@ def drag(tmp_path_factory):
         scatter=0.005,
     )
     write(folder / "cable", rows, BENDS, more=SMALL)
-    fit = bf.fit(folder / "cable", friction="drag", output=folder / "fit", figures=False, seed=1)
+    fit = bf.fit(folder / "cable", friction="drag", output=folder / "fit", figures=False, seed=1, settings=QUICK)
     return fit, folder / "fit"
 
 

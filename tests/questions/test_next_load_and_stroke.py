@@ -11,12 +11,14 @@ from bowdenfit.questions.next.candidates import name_of, words_of
 from bowdenfit.questions.next.ranking import next_measurement
 from bowdenfit.questions.next.words import next_measurement_text
 
+QUICK = ("sampler.n_walkers=128", "sampler.target_ess=300", "sampler.target_r_hat=1.05", "sampler.max_steps=4000")
+
 
 @pytest.fixture(scope="module")
 def fit(tmp_path_factory):
     """A rope with a hidden tension, which is told by what comes out at low loads."""
     rows = pull(np.random.default_rng(1), [180.0] * 4, [0.4] * 4, (4, 16, 64), drag=2.0, noise=(0.05, 0.05), scatter=0.02)
-    return bf.fit(write(tmp_path_factory.mktemp("drag"), rows), friction="drag", seed=1)
+    return bf.fit(write(tmp_path_factory.mktemp("drag"), rows), friction="drag", seed=1, settings=QUICK)
 
 
 def test_a_hidden_tension_is_told_by_the_lowest_load(fit):

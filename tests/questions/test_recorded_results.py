@@ -175,6 +175,7 @@ def test_the_sentence_on_speed_says_no_more_than_the_interval(q05, q95, probabil
     assert words in effect.sentence()
 
 
+@pytest.mark.slow
 def test_compare_answers_whether_speed_matters_on_the_command_line(plain, with_rate, tmp_path):
     from click.testing import CliRunner
 

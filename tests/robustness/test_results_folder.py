@@ -52,31 +52,38 @@ def test_a_flipped_bit_ends_a_checkpoint_before_its_record(checkpoint):
     assert [int(r["place"]) for r in records(checkpoint, SHAPES)] == [0, 1, 2]
 
 
+def _fit(on_body: Path, place: Path, compiled: Path, *before: str, more: tuple[str, ...] = ()):
+    """A fit in a process of its own, which keeps what is compiled where it is told."""
+    fit = ["-m", "bowdenfit.cli", "fit", str(on_body), "-o", str(place), "--seed", "3", "--no-figures"]
+    command = [*before, sys.executable, *fit, *(f"--set={setting}" for setting in QUICK), *more]
+    # Python takes half a file of byte code for a whole one.
+    environment = os.environ | {"JAX_COMPILATION_CACHE_DIR": str(compiled), "PYTHONDONTWRITEBYTECODE": "1"}
+    return subprocess.run(command, env=environment, capture_output=True, text=True, check=False, timeout=240)
+
+
+@pytest.fixture(scope="module")
+def whole(on_body, tmp_path_factory) -> tuple[bf.Fit, Path]:
+    """A fit that nothing stopped, and all that it compiled: a limit of size cuts that off too."""
+    place = tmp_path_factory.mktemp("whole")
+    done = _fit(on_body, place / "fit", place / "compiled")
+    assert done.returncode in {0, 3}, done.stderr
+    return bf.load(place / "fit"), place / "compiled"
+
+
 @pytest.mark.parametrize("limit", [20_000, 400_000])
-def test_a_fit_that_may_not_write_more_keeps_what_it_sampled_and_is_resumed(on_body, tmp_path, limit):
+def test_a_fit_that_may_not_write_more_keeps_what_it_sampled_and_is_resumed(on_body, whole, tmp_path, limit):
     """A limit of the file's size stands for a full disk."""
-    fit = ["-m", "bowdenfit.cli", "fit", str(on_body), "-o", str(tmp_path / "fit"), "--seed", "3", "--no-figures"]
-    command = [sys.executable, *fit, *(f"--set={setting}" for setting in QUICK)]
+    uninterrupted, compiled = whole
     limit_size = "r.setrlimit(r.RLIMIT_FSIZE, (int(sys.argv[1]),) * 2)"
     limited = f"import os, resource as r, sys; {limit_size}; os.execv(sys.argv[2], sys.argv[2:])"
-
-    def run(*before, after=()):
-        # What is compiled is cut off too, so it stays here; Python takes half a file of byte code for a whole one.
-        own = {"XDG_CACHE_HOME": str(tmp_path / "cache"), "JAX_COMPILATION_CACHE_DIR": ""}
-        environment = os.environ | own | {"PYTHONDONTWRITEBYTECODE": "1"}
-        return subprocess.run(
-            [*before, *command, *after], env=environment, capture_output=True, text=True, check=False, timeout=240
-        )
-
-    full = run(sys.executable, "-c", limited, str(limit))
+    full = _fit(on_body, tmp_path / "fit", compiled, sys.executable, "-c", limited, str(limit))
     assert full.returncode == 1, full.stderr
     assert "File too large" in full.stderr
     assert "--resume" in full.stderr
     assert len(full.stderr.splitlines()) == 1
-    resumed = run(after=["--resume"])
+    resumed = _fit(on_body, tmp_path / "fit", compiled, more=("--resume",))
     assert resumed.returncode in {0, 3}, resumed.stderr
-    whole = bf.fit(on_body, seed=3, settings=QUICK)
-    np.testing.assert_array_equal(bf.load(tmp_path / "fit").posterior.z, whole.posterior.z)
+    np.testing.assert_array_equal(bf.load(tmp_path / "fit").posterior.z, uninterrupted.posterior.z)
 
 
 def test_a_disk_without_room_is_no_mistake_of_the_user(tmp_path):

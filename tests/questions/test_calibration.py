@@ -19,6 +19,7 @@ from spoiling import copied
 from bowdenfit.dataset import Dataset, load_dataset
 from bowdenfit.description import Description, SamplerSettings
 from bowdenfit.errors import DatasetError, StoreError
+from bowdenfit.holm import holm
 from bowdenfit.inference.batch.programs import BatchSettings
 from bowdenfit.inference.compilation import compile_program
 from bowdenfit.kinds import KINDS
@@ -41,7 +42,7 @@ from bowdenfit.questions.calibrate.refit import Laboratory
 from bowdenfit.questions.calibrate.replication import RankedTruth, Replication
 from bowdenfit.questions.calibrate.sections import calibration_page
 from bowdenfit.questions.calibrate.store import keep, open_replications
-from bowdenfit.questions.calibrate.uniformity import UniformRanks, holm
+from bowdenfit.questions.calibrate.uniformity import UniformRanks
 from bowdenfit.questions.calibrate.words import calibration_text, details_text
 from bowdenfit.questions.calibrate.workbench import Plan, Workbench
 from bowdenfit.questions.simulate.simulation import empty_tables, simulated_again, with_readings
@@ -263,7 +264,7 @@ def test_ranks_heaped_in_the_middle_or_at_an_end_are_not_uniform():
 
 def test_holm_s_correction_is_the_textbook_s():
     assert holm([0.01, 0.04, 0.03, 0.005]) == pytest.approx([0.03, 0.06, 0.06, 0.02])
-    assert holm([0.6, 0.9]) == [1.0, 1.0]
+    assert holm([0.6, 0.9]).tolist() == [1.0, 1.0]
 
 
 def replications(n: int, sd: float = 1.0, shift: float = 0.0, seed: int = 0, bad: int = 0) -> list[Replication]:

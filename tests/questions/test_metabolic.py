@@ -13,7 +13,7 @@ from bowdenfit.questions.metabolic.contradictions import contradictions, rounded
 from bowdenfit.questions.metabolic.paired import (
     brockway,
     half_width,
-    holm,
+    least_found,
     persons_needed,
     power,
     probability_below,
@@ -49,11 +49,15 @@ def test_power_is_that_of_simulated_studies():
     assert abs(power(0.8, 6) - found) < 4 * np.sqrt(found * (1 - found) / 20_000)
     needed = persons_needed(0.5)
     assert power(0.5, needed) >= 0.8 > power(0.5, needed - 1)
-    assert persons_needed(1e-4) is None
+    assert persons_needed(1e-4) is None and persons_needed(0.0) is None and persons_needed(50.0) == 2
+    for effect in (0.01, 0.1, 1.0, 3.0):
+        needed = persons_needed(effect)
+        assert power(effect, needed) >= 0.8 > power(effect, needed - 1)
+    for persons in (2, 5, 1000):
+        assert power(least_found(persons), persons) == pytest.approx(0.8)
 
 
-def test_holms_procedure_and_brockways_equation_are_the_literatures():
-    assert holm([0.01, 0.04, 0.03, 0.005]) == pytest.approx([0.03, 0.06, 0.06, 0.02])
+def test_brockways_equation_is_the_literatures():
     assert brockway(1000.0, 800.0) == pytest.approx((16.58 * 1000 + 4.51 * 800) / 60)  # J/ml
     assert brockway(60.0, 0.0, 0.01) == pytest.approx(16.58 - 5.90 * 0.01 * 1000 / 60)
 

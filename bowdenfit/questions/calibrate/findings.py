@@ -5,10 +5,11 @@ from collections.abc import Mapping, Sequence
 
 import numpy as np
 
+from bowdenfit.holm import holm
 from bowdenfit.questions.calibrate.answer import INTERVALS, LEVEL, Calibration, Checked, Coverage, Quantity
 from bowdenfit.questions.calibrate.power import power_of
 from bowdenfit.questions.calibrate.replication import Replication
-from bowdenfit.questions.calibrate.uniformity import UniformRanks, holm
+from bowdenfit.questions.calibrate.uniformity import UniformRanks
 
 
 def findings(
@@ -61,7 +62,7 @@ def _check_all(
     p_values = [UniformRanks(len(ranked)).p_value(r) for r in ranks]
     return tuple(
         _check_quantity(q, known[q].symbol, r, (p, c), n_judged, judged_by[q], ranked)
-        for q, r, p, c in zip(known, ranks, p_values, holm(p_values), strict=True)
+        for q, r, p, c in zip(known, ranks, p_values, holm(p_values).tolist(), strict=True)
     )
 
 

@@ -1,6 +1,5 @@
 """Are ranks uniform? Simultaneous bands of their distribution function, and p values that go with them."""
 
-from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cached_property
 
@@ -67,16 +66,3 @@ class UniformRanks:
         ends = (stats.binom.ppf(tail, self.n, self.places) / self.n for tail in (gamma / 2, 1 - gamma / 2))
         low, high = ends
         return low, high
-
-
-def holm(p_values: Sequence[float]) -> list[float]:
-    """P values corrected for their number, so that the smallest is below alpha by chance with probability alpha at most.
-
-    References:
-        Holm 1979, "A simple sequentially rejective multiple test procedure" (Scandinavian Journal of Statistics 6).
-    """
-    order = np.argsort(p_values)
-    steps = np.arange(len(p_values), 0, -1) * np.asarray(p_values)[order]
-    corrected = np.empty(len(p_values))
-    corrected[order] = np.minimum(np.maximum.accumulate(steps), 1.0)
-    return corrected.tolist()

@@ -9,11 +9,11 @@ import numpy as np
 
 from bowdenfit.display import Display, Part, Rows
 from bowdenfit.errors import DatasetError
+from bowdenfit.holm import holm
 from bowdenfit.questions.metabolic.contradictions import contradictions
 from bowdenfit.questions.metabolic.paired import (
     LEVEL,
     half_width,
-    holm,
     least_found,
     persons_needed,
     power,
@@ -106,7 +106,7 @@ def answered(study: Study, costs: Costs | None) -> Metabolic:
     if not pairs:
         raise DatasetError("no two conditions can be compared; a pair needs two persons, or means and a p that were printed.")
     adjusted = holm([two_sided(mean / error, n) for _, _, n, mean, error, _ in pairs])
-    found = tuple(_compared(*pair, p) for pair, p in zip(pairs, adjusted, strict=True))
+    found = tuple(_compared(*pair, p) for pair, p in zip(pairs, adjusted.tolist(), strict=True))
     return Metabolic(study.name, study.source, found, tuple(contradictions(study)), study.order, costs is not None)
 
 

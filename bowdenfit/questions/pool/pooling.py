@@ -4,6 +4,7 @@ from collections.abc import Mapping
 
 import numpy as np
 
+from bowdenfit.holm import holm
 from bowdenfit.inference.interval import Interval
 from bowdenfit.inference.population.model import REFERENCE_TEMPERATURE
 from bowdenfit.inference.population.sampling import PopulationDraws, draw_population
@@ -12,7 +13,7 @@ from bowdenfit.questions.pool.curves import curves_of
 from bowdenfit.questions.pool.inspected import Given, given
 from bowdenfit.questions.pool.life import cycles_until, life_of
 from bowdenfit.questions.pool.next import next_inspections
-from bowdenfit.questions.pool.unlike import FALSE_ALARM, chances, departures, far_off, holm, mixed
+from bowdenfit.questions.pool.unlike import FALSE_ALARM, chances, departures, far_off, mixed
 from bowdenfit.results.fleet_folder import FleetDraws
 
 _FAR = 2.0  # spreads from the middle from which a number is named as what is off

@@ -12,21 +12,23 @@ the likelihood of the cable in question. Whether cables are of one kind is the t
 Darling for a normal distribution.
 
 References:
-    Gelman, Meng and Stern 1996, "Posterior predictive assessment" (Statistica Sinica 6); Holm 1979, "A simple sequentially
-    rejective multiple test procedure" (Scandinavian Journal of Statistics 6); Stephens 1986, in D'Agostino and Stephens,
-    "Goodness-of-fit techniques", table 4.9, for the distribution of the statistic with estimated mean and variance.
+    Gelman, Meng and Stern 1996, "Posterior predictive assessment" (Statistica Sinica 6); Stephens 1986, in D'Agostino and
+    Stephens, "Goodness-of-fit techniques", table 4.9, for the distribution of the statistic with estimated mean and variance.
 """
 
 import numpy as np
+from scipy.special import chdtrc, gammaln, log_ndtr, ndtr
 
+from bowdenfit.holm import holm
 from bowdenfit.inference.population.model import Inspected
 from bowdenfit.inference.population.sampling import PopulationDraws
 from bowdenfit.inference.psis import smooth_weights
 
 FALSE_ALARM, OF_KINDS = 0.05, 0.01  # of fleets in which all cables are alike: of naming any, and of seeing two kinds
 _POPULATIONS = 1000  # draws of the population
-_REPEATS, _MORE = 20, 500  # cables drawn from each: of any, and where few of them were as far off
-_SMALL = 0.01  # probability, of which the smallest of many cables are to be told apart
+_REPEATS = 20  # stretches of the errors for each
+_OFTENER = 4.0  # times fewer degrees of freedom, by which large stretches are drawn oftener
+_LEAST_SQUARE = 1e-200  # that divides without overflow
 _RANK = 1e-9
 _FEWEST_TO_LEAVE_OUT, _FAR = 5, 3.5  # cables, and typical deviations from the median
 _NORMAL_DEVIATION = 0.6745  # median deviation of a normal distribution in standard deviations
@@ -53,8 +55,9 @@ def far_off(inspected: Inspected, drawn: PopulationDraws) -> tuple[int, ...]:
 def chances(inspected: Inspected, drawn: PopulationDraws, seed: int, without: tuple[int, ...] = ()) -> np.ndarray:
     """Probability that a cable of this population is as far from the others as each is, (cable,).
 
-    Among a thousand cables only a probability of a few millionths names one, so that small ones are found again from half a
-    million repetitions.
+    Among ten thousand cables only a probability of a few millionths names one, which no counting of simulated cables would
+    find. Given a draw of the population, and by how much the errors of each inspection are stretched, all that is compared is
+    normal: so its tails are exact, and only these two are drawn.
 
     Args:
         inspected: What is known.
@@ -65,12 +68,7 @@ def chances(inspected: Inspected, drawn: PopulationDraws, seed: int, without: tu
     generator = np.random.default_rng([seed, 7])
     which = np.linspace(0, len(drawn.mean) - 1, _POPULATIONS).round().astype(int)
     core = drawn.mean[which], drawn.spread[which], drawn.effects[which]
-
-    def of(cable: int, repeats: int) -> float:
-        return _chance(inspected, cable, *core, generator, cable not in without, repeats)
-
-    found = [of(cable, _REPEATS) for cable in range(inspected.cables)]
-    return np.array([of(cable, _MORE) if chance < _SMALL else chance for cable, chance in enumerate(found)])
+    return np.array([_chance(inspected, i, *core, generator, i not in without) for i in range(inspected.cables)])
 
 
 def _chance(
@@ -81,7 +79,6 @@ def _chance(
     effects: np.ndarray,
     generator: np.random.Generator,
     is_in: bool,
-    repeats: int,
 ) -> float:
     """Of one cable, which may be in the population or not."""
     rows = np.flatnonzero(inspected.cable == cable)
@@ -91,7 +88,7 @@ def _chance(
     for place, row in enumerate(rows):
         inside = slice(place * count, (place + 1) * count)
         scale[inside, inside] = inspected.summaries.scale[row]
-    scale = scale[np.ix_(known, known)]
+    scale, of_row = scale[np.ix_(known, known)], np.repeat(np.arange(len(rows)), count)[known]
     shift = np.zeros((len(mean), len(known)))
     if inspected.effects:
         columns = np.stack(list(inspected.effects.values()), axis=1)[rows]
@@ -101,59 +98,47 @@ def _chance(
     distance = np.sum(np.linalg.solve(root, away[:, :, None])[..., 0] ** 2, axis=1)
     size = np.log(np.diagonal(root, axis1=1, axis2=2)).sum(axis=1)
     log = distance / 2 + size if is_in else np.zeros(len(mean))
-    weights = np.exp(smooth_weights(log)[0])  # of the population without this cable
-    noise = _noise(inspected, rows, scale, known, generator, len(mean) * repeats)
-    found = [_within(away.mean(axis=0), noise, scale, design)]
+    stretch, weights = _stretches(inspected.summaries.freedom[rows], len(mean), generator)
+    weights = weights * np.exp(smooth_weights(log)[0])[:, None]  # of the population without this cable
+    beyond = [_within(away, stretch[..., of_row], scale, design, generator)]
     precision = np.linalg.inv(scale)
     for k in np.flatnonzero((design != 0).any(axis=0)):
         others = np.arange(design.shape[1]) != k
         loose = np.median(spread, axis=0) ** -2 * others  # as far as its own inspections do not tell the others
         gain = np.linalg.solve(design.T @ precision @ design + np.diag(loose), design.T @ precision)[k]
-        blur = gain @ design - ~others  # of what the others of this cable are
-        own = noise @ gain
-        seen = away @ gain
-        drawn = generator.standard_normal((len(mean), repeats, mean.shape[1])) * spread[:, None]
-        repeated = drawn[:, :, k] + drawn @ blur + generator.choice(own, drawn.shape[:2])
-        beyond = np.sum(np.abs(repeated) >= np.abs(seen)[:, None], axis=1)
-        found.append(float((1 / repeats / len(mean) + weights @ beyond / repeats) / weights.sum()))
+        own = np.bincount(of_row, gain * (scale @ gain), len(rows))
+        variance = (spread**2 @ (gain @ design) ** 2)[:, None] + stretch @ own
+        beyond.append(2 * ndtr(-np.abs(away @ gain)[:, None] / np.sqrt(variance)))
+    found = [float(np.sum(weights * each) / weights.sum()) for each in beyond]
     return min(1.0, len(found) * min(found))
 
 
-def _noise(
-    inspected: Inspected,
-    rows: np.ndarray,
-    scale: np.ndarray,
-    known: np.ndarray,
-    generator: np.random.Generator,
-    repeats: int,
+def _stretches(freedom: np.ndarray, populations: int, generator: np.random.Generator) -> tuple[np.ndarray, np.ndarray]:
+    """By how much the variance of each inspection's errors is stretched, (population, repeat, inspection), and their weights.
+
+    Large stretches are drawn oftener than they come, of one inspection at a time, as one large error makes a rare sum.
+    """
+    which = generator.integers(len(freedom) + 1, size=(populations, _REPEATS, 1))
+    fewer = freedom / _OFTENER
+    squares = generator.chisquare(np.where(which == np.arange(len(freedom)), fewer, freedom))
+    squares = np.maximum(squares, _LEAST_SQUARE)
+    log = (fewer - freedom) / 2 * np.log(squares / 2) + gammaln(freedom / 2) - gammaln(fewer / 2)
+    return freedom / squares, (len(freedom) + 1) / (1 + np.exp(log).sum(axis=2))
+
+
+def _within(
+    away: np.ndarray, stretch: np.ndarray, scale: np.ndarray, design: np.ndarray, generator: np.random.Generator
 ) -> np.ndarray:
-    """Errors of the inspections of a cable, (repeat, number)."""
-    freedom = inspected.summaries.freedom[rows]
-    found = generator.standard_normal((repeats, len(scale))) @ np.linalg.cholesky(scale).T
-    stretch = np.sqrt(freedom / generator.chisquare(freedom, (repeats, len(rows))))
-    stretched: np.ndarray = found * np.repeat(stretch, inspected.coefficients, axis=1)[:, known]
-    return stretched
-
-
-def _within(away: np.ndarray, noise: np.ndarray, scale: np.ndarray, design: np.ndarray) -> float:
-    """Probability that inspections of a cable disagree as much with each other, or with straight wear; 1 where they cannot."""
+    """Probabilities that inspections of a cable disagree as much among each other, or with a line; 1 where they cannot."""
     root = np.linalg.inv(np.linalg.cholesky(scale))
     left, sizes, _ = np.linalg.svd(root @ design)
     free = left[:, np.sum(sizes > _RANK * sizes.max()) :]
     if not free.shape[1]:
-        return 1.0
-    seen, repeated = np.sum((free.T @ root @ away) ** 2), np.sum((noise @ root.T @ free) ** 2, axis=1)
-    return float((1 + np.sum(repeated >= seen)) / (1 + len(repeated)))
-
-
-def holm(chances: np.ndarray) -> np.ndarray:
-    """Probabilities, each that of any as small among so many, by Holm's procedure.
-
-    Args:
-        chances: By themselves.
-    """
-    order, found = np.argsort(chances), np.empty(len(chances))
-    found[order] = np.minimum(np.maximum.accumulate(chances[order] * np.arange(len(chances), 0, -1)), 1.0)
+        return np.ones(stretch.shape[:2])
+    seen = np.sum((away @ root.T @ free) ** 2, axis=1)
+    way = generator.standard_normal((*stretch.shape[:2], free.shape[1]))
+    way /= np.linalg.norm(way, axis=2, keepdims=True)
+    found: np.ndarray = chdtrc(free.shape[1], seen[:, None] / np.sum(stretch * (way @ free.T) ** 2, axis=2))
     return found
 
 
@@ -202,8 +187,6 @@ def anderson_darling(values: np.ndarray) -> float:
     Args:
         values: At least eight.
     """
-    from scipy.special import log_ndtr
-
     n = len(values)
     z = np.sort((values - values.mean()) / values.std(ddof=1))
     i = np.arange(1, n + 1)

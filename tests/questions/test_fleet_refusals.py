@@ -2,12 +2,13 @@
 
 import errno
 import shutil
-from concurrent.futures import ThreadPoolExecutor
+from concurrent.futures import Future, ThreadPoolExecutor
 from pathlib import Path
 
 import pytest
 
 import bowdenfit as bf
+from bowdenfit.inference.engines import choice, engine
 from bowdenfit.inference.engines.engine import Engine, EngineError
 from bowdenfit.inference.versions import versions
 from bowdenfit.questions.fleet.cases import read_cases
@@ -108,6 +109,46 @@ def test_work_of_a_worker_that_dies_is_done_again(lost):
 def test_work_that_kills_every_worker_is_a_sentence():
     with Dying(1000) as executor, pytest.raises(EngineError, match="lost 3 times at the same work"):
         list(Engine(lambda: executor, 1, "here").results(abs, [-1]))
+
+
+class Waiting(ThreadPoolExecutor):
+    """Takes work and does none, as a cluster whose last worker is gone."""
+
+    def submit(self, function, /, *arguments, **named):
+        return Future()
+
+
+class Gone(ThreadPoolExecutor):
+    """Takes no work, as a client whose scheduler is gone."""
+
+    def submit(self, function, /, *arguments, **named):
+        raise ConnectionError("Client is closed")
+
+
+def refuse_nobody():
+    raise EngineError("nobody is left")
+
+
+def test_a_cluster_in_which_nobody_is_left_is_not_waited_for(monkeypatch):
+    monkeypatch.setattr(engine, "_PATIENCE", 0.01)
+    with Waiting(1) as executor, pytest.raises(EngineError, match="nobody is left"):
+        list(Engine(lambda: executor, 1, "here", check=refuse_nobody).results(abs, [-1, -2]))
+
+
+def test_a_cluster_that_takes_no_more_work_is_a_sentence():
+    with Gone(1) as executor, pytest.raises(EngineError, match=r"no more work \(ConnectionError: Client is closed\)"):
+        list(Engine(lambda: executor, 1, "here").results(abs, [-1]))
+
+
+@pytest.mark.slow
+def test_a_scheduler_without_workers_is_a_sentence(monkeypatch):
+    from distributed import LocalCluster
+
+    monkeypatch.setattr(choice, "_WORKERS_WITHIN", 1)
+    with LocalCluster(n_workers=0, host="127.0.0.1", dashboard_address=None) as cluster:
+        address = cluster.scheduler_address.replace("tcp://", "dask://")
+        with pytest.raises(EngineError, match=r"has no worker; start some"), choice.open_engine(address):
+            pass
 
 
 def test_a_worker_with_other_versions_is_refused(fleet, monkeypatch):

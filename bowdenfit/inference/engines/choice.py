@@ -51,8 +51,10 @@ def open_engine(
     if engine == "local":
         found = _local((workers or cores()) if may_start_processes else 1, prepare)
     elif engine.startswith("dask://"):
-        with _dask_client(engine.removeprefix("dask://")) as (client, count):
-            yield Engine(lambda: client.get_executor(pure=False), count, engine)
+        address = engine.removeprefix("dask://")
+        with _dask_client(address) as (client, count):
+            check = partial(_refuse_no_workers, client, address)
+            yield Engine(lambda: client.get_executor(pure=False), count, engine, check=check)
         return
     elif engine == "slurm":
         if folder is None:
@@ -90,15 +92,30 @@ def _dask_client(address: str) -> Iterator[tuple[Any, int]]:
             "write the address that it prints behind tcp:// as --engine dask://HOST:PORT."
         ) from None
     try:
-        try:
-            client.wait_for_workers(1, timeout=_WORKERS_WITHIN)
-        except TimeoutError:
-            raise EngineError(
-                f"the scheduler at {shown(address)} has no worker; start some with `dask worker tcp://{address}`."
-            ) from None
+        _refuse_no_workers(client, address)
         yield client, max(sum(client.nthreads().values()), 1)
     finally:
         client.close()
+
+
+def _refuse_no_workers(client: Any, address: str) -> None:
+    """Wait for a worker, but not for ever.
+
+    Raises:
+        EngineError: There is none, or the scheduler is gone.
+    """
+    try:
+        client.wait_for_workers(1, timeout=_WORKERS_WITHIN)
+    except TimeoutError:
+        raise EngineError(
+            f"the scheduler at {shown(address)} has no worker; start some with `dask worker tcp://{address}`. What is done is "
+            "kept where there is a results folder, and goes on with --resume."
+        ) from None
+    except Exception as error:  # of whatever kind: a client whose scheduler is gone says so in several ways
+        raise EngineError(
+            f"the scheduler at {shown(address)} is gone ({type(error).__name__}); start it and its workers again. What is done "
+            "is kept where there is a results folder, and goes on with --resume."
+        ) from None
 
 
 def slurm(folder: Path, jobs: int, cluster: str = "slurm") -> Executor:

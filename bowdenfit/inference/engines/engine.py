@@ -24,6 +24,7 @@ Work = TypeVar("Work")
 Result = TypeVar("Result")
 Outcome: TypeAlias = tuple[Exception | None, Any]
 _AHEAD = 2  # pieces that a worker is given at once, so that it need not wait for the next
+_PATIENCE = 30.0  # seconds without a piece done, until is looked whether anybody is left
 _TIMES = 3  # that a piece is tried when workers die of it
 _WORTH_PROCESSES = 5.0  # compilations that the work must last for each process, before more processes pay
 
@@ -41,6 +42,7 @@ class Engine(Generic[Work, Result]):
         workers: How many pieces are done at a time.
         name: In words.
         most: Data sets of a piece; few, so that little is lost when it is interrupted, or many where starting costs much.
+        check: Called where nothing was done for a while; raises if nothing can be.
         begun: The executor in use.
     """
 
@@ -48,6 +50,7 @@ class Engine(Generic[Work, Result]):
     workers: int
     name: str
     most: int = 128
+    check: Callable[[], None] = lambda: None
     begun: Executor | None = field(default=None, init=False)
 
     def results(self, function: Callable[[Work], Result], pieces: Sequence[Work]) -> Iterator[Result]:
@@ -68,17 +71,23 @@ class Engine(Generic[Work, Result]):
                 while left and len(running) < _AHEAD * self.workers:
                     running[self._submit(function, left[-1][0])] = left[-1]
                     left.pop()
-                done, _ = wait(running, return_when=FIRST_COMPLETED)
+                done, _ = wait(running, _PATIENCE, FIRST_COMPLETED)
+                if not done:
+                    self.check()
                 for future in done:
                     piece, tried = running.pop(future)
                     try:
                         refused, result = future.result()
                     except (Exception, CancelledError) as error:  # of the engine: what the function raises is in the outcome
+                        self.check()
                         left.append((piece, self._counted(tried, error)))
                         continue
                     if refused is not None:
                         raise refused
                     yield result
+        except EngineError:
+            running.clear()  # nobody is left who could be told to stop
+            raise
         finally:
             for future in running:
                 future.cancel()
@@ -92,6 +101,10 @@ class Engine(Generic[Work, Result]):
             self.close()
             self.begun = self.executor()
             return self.begun.submit(attempt, function, piece)
+        except Exception as error:
+            self.check()
+            why = f"{type(error).__name__}: {error}"
+            raise EngineError(f"{self.name} takes no more work ({why}); start it again, and go on with --resume.") from None
 
     def _counted(self, tried: int, error: Exception) -> int:
         """How often a piece will have been tried, if it may be tried again."""

@@ -124,7 +124,7 @@ def in_short(value: Any) -> str:
     """A value in a few words."""
     if isinstance(value, float):
         return f"{value:.4g}"
-    if hasattr(value, "shape"):
+    if hasattr(value, "shape") and not isinstance(value, str):  # a string of NumPy's has one
         return f"array of {' x '.join(map(str, value.shape)) or 'one number'}"
     if isinstance(value, Sequence | Mapping) and not isinstance(value, str):
         return f"{len(value)} in all" if len(value) > _FEW else ", ".join(map(in_short, value))

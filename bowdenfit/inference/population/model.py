@@ -9,6 +9,7 @@ Every inspection keeps its own scatter and noise, which single fits have integra
 which each is nearly standard normal given its population, whether its data say much or little, so that there is no funnel.
 """
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cached_property
 from typing import Any
@@ -130,6 +131,18 @@ class PopulationDensity:
         k = range(self.coefficients)
         wear = ("wear", "wear_spread") if self.wears else ()
         return (*(f"mean_{i}" for i in k), *(f"spread_{i}" for i in k), *wear, *self.effects)
+
+    def in_words(self, called: Sequence[str]) -> tuple[str, ...]:
+        """What describes the population in words, in the order of z.
+
+        Args:
+            called: Names of the coefficients; their numbers, from 1, where there are none.
+        """
+        every = called or [f"coefficient {i + 1}" for i in range(self.coefficients)]
+        wear = ("the wear", "the difference of wear between cables") if self.wears else ()
+        effects = {"lubrication": "the effect of lubrication", "per_degree": "the effect of temperature"}
+        middles, spreads = ([f"{what} of {name}" for name in every] for what in ("the typical value", "the spread"))
+        return (*middles, *spreads, *wear, *(effects[name] for name in self.effects))
 
     @property
     def size(self) -> int:

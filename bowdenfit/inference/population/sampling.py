@@ -1,6 +1,6 @@
 """Drawing a population and its cables together, with NUTS, until the population is known well enough."""
 
-from collections.abc import Collection
+from collections.abc import Collection, Sequence
 from dataclasses import dataclass
 from functools import lru_cache
 from typing import Any
@@ -16,6 +16,7 @@ from bowdenfit.inference.population.model import Inspected, PopulationDensity
 from bowdenfit.words import percent
 
 _SETTINGS = SamplerSettings(n_chains=4, target_acceptance=0.8, target_ess=400, target_r_hat=1.02)
+_FEW, _CAREFUL = 5, 0.95  # cables, of fewer than which hardly anything is known of their spread; what then is accepted
 _FIRST, _MORE, _MOST = 20, 10, 100  # blocks after warm-up at the first look, until the next, and at all
 _AT_ONCE = _SETTINGS.n_chains * BLOCK  # draws whose values are computed together
 _MOST_DIVERGENT = 0.001  # share of trajectories
@@ -41,13 +42,16 @@ class PopulationDraws:
     n_effective: float
 
 
-def draw_population(inspected: Inspected, seed: int, without: Collection[int] = ()) -> PopulationDraws:
+def draw_population(
+    inspected: Inspected, seed: int, without: Collection[int] = (), called: Sequence[str] = ()
+) -> PopulationDraws:
     """Draw a population and its cables.
 
     Args:
         inspected: What is known of all inspections.
         seed: Of everything random.
         without: Cables whose inspections are not looked at, by number.
+        called: Names of the coefficients, for reasons not to trust the draws.
     """
     wears = inspected.cycles is not None
     density = PopulationDensity(inspected.coefficients, wears, tuple(inspected.effects), inspected.cables)
@@ -66,7 +70,7 @@ def draw_population(inspected: Inspected, seed: int, without: Collection[int] = 
             blocks.append({name: np.asarray(value) for name, value in done.items()})
         z = np.concatenate([block["z"] for block in blocks[WARM_UP:]]).transpose(1, 0, 2)
         divergent = np.mean([block["diverging"] for block in blocks[WARM_UP:]])
-        reasons, worth = _shortfalls(z[:, :, : len(density.names)], density.names, float(divergent))
+        reasons, worth = _shortfalls(z[:, :, : len(density.names)], density.in_words(called), float(divergent))
         if not reasons or target >= WARM_UP + _MOST:
             break
         target += _MORE
@@ -98,7 +102,8 @@ def _shortfalls(z: np.ndarray, names: tuple[str, ...], divergent: float) -> tupl
 def _compiled(density: PopulationDensity, shapes: tuple[tuple[str, tuple[int, ...]], ...]) -> tuple[Any, Any]:
     """What draws, and what gives the values of draws; the same for all fleets of one shape."""
     data = {name: jax.ShapeDtypeStruct(shape, np.float64) for name, shape in shapes}
-    program = block_program(density.log_density, (density.size,), data, _SETTINGS, fine=False)
+    settings = _SETTINGS.model_copy(update={"target_acceptance": _CAREFUL}) if density.cables < _FEW else _SETTINGS
+    program = block_program(density.log_density, (density.size,), data, settings, fine=False)
 
     def values(z: jax.Array, data: dict[str, Any]) -> tuple[jax.Array, ...]:
         found = density.population(z, data)

@@ -29,7 +29,7 @@ def pooled(drawn: FleetDraws, asked: Asked | None, seed: int) -> Pool:
         seed: Of everything random.
     """
     known = given(drawn)
-    population = draw_population(known.inspected, seed)
+    population = draw_population(known.inspected, seed, called=known.coefficients)
     count, alone = len(known.coefficients), len(known.cables) == 1
     generator = np.random.default_rng([seed, 13])
     new = population.mean + population.spread * generator.standard_normal(population.mean.shape)

@@ -197,12 +197,12 @@ class Bench:
         return self.command(tree, asked, f"{at.name}_cache", at)
 
     def cables(self) -> tuple[Row, str]:
-        """Numbers of simple cables in one process; the row of the largest number, and what is printed of all."""
+        """Whole fleets of simple cables; the row of the largest number, cold, and what is printed of all."""
         say(CABLES)
         environment = {"PYTHONPATH": search_path(), "JAX_COMPILATION_CACHE_DIR": ""}
         run = measured([str(ROOT / "scripts" / "benchmark_batch.py")], environment)
         last = run.output.splitlines()[-1].split()
-        return Row(CABLES, [replace(run, seconds=float(last[1]), cpu=0.0)], []), run.output
+        return Row(CABLES, [replace(run, seconds=float(last[1]), cpu=float(last[2]))], []), run.output
 
     def row(self, name: str, arguments: Sequence[str], cold: bool = False, writes: bool = False) -> Row:
         """One command."""

@@ -12,6 +12,7 @@ from concurrent.futures import Future, ThreadPoolExecutor
 from contextlib import contextmanager, suppress
 from dataclasses import dataclass, field
 from importlib import import_module
+from itertools import cycle
 from multiprocessing import connection, get_context
 from typing import Any, TypeAlias
 
@@ -80,13 +81,16 @@ class InAnotherProcess(Assistant):
         copy: Whether it begins as a copy of this one, or anew.
         settings: Called in it first.
         draws: Whether it will draw figures.
+        others: Ends of pipes to other processes, which a copy has too and is not to hold open.
     """
 
-    def __init__(self, copy: bool, settings: Callable[[], None], draws: bool) -> None:
+    def __init__(
+        self, copy: bool, settings: Callable[[], None], draws: bool, others: "tuple[Connection, ...]" = ()
+    ) -> None:
         self.thread, self.draws = ThreadPoolExecutor(1), draws
         context: Any = get_context("fork" if copy else "spawn")
         self.ours, theirs = context.Pipe()
-        passed = (theirs, self.ours if copy else None, settings)
+        passed = (theirs, (self.ours, *others) if copy else (), settings)
         self.process = context.Process(target=_serve, args=passed, daemon=True)
         self.process.start()
         theirs.close()
@@ -126,6 +130,41 @@ class InAnotherProcess(Assistant):
         self.process.kill()
         self.process.join()
         self.ours.close()
+        self.thread.shutdown()
+
+
+class InTwoProcesses(Assistant):
+    """Generators in one copy of this process, functions in that and another one by turns.
+
+    The second has nothing to do before the first is through with its generator: then it loads what figures need.
+    """
+
+    def __init__(self, settings: Callable[[], None]) -> None:
+        self.first = InAnotherProcess(True, settings, True)
+        self.second = InAnotherProcess(True, settings, True, (self.first.ours,))
+        self.turns = cycle((self.second, self.first))
+
+    def begin(self, stages: Callable[..., Iterator[Any]], *arguments: Any, answers: int) -> Answers:
+        """See `Assistant`."""
+        return self.first.begin(stages, *arguments, answers=answers)
+
+    def submit(self, function: Callable[..., Any], *arguments: Any) -> "Future[Any]":
+        """See `Assistant`."""
+        return next(self.turns).submit(function, *arguments)
+
+    def prepare_to_draw(self) -> None:
+        """See `Assistant`."""
+        self.first.submit(os.getpid).add_done_callback(lambda _: self._second_prepares())
+        self.first.prepare_to_draw()
+
+    def _second_prepares(self) -> None:
+        with suppress(RuntimeError):  # all has ended
+            self.second.prepare_to_draw()
+
+    def end(self) -> None:
+        """End both."""
+        for process in (self.first, self.second):
+            process.end()
 
 
 @contextmanager
@@ -149,12 +188,12 @@ def assistant(in_background: bool, settings: Callable[[], None], draws: bool) ->
         with helper.thread:
             yield helper
         return
-    other = InAnotherProcess(copy, settings, draws)
+    two = copy and draws and (os.cpu_count() or 1) > 1
+    other = InTwoProcesses(settings) if two else InAnotherProcess(copy, settings, draws)
     try:
         yield other
     finally:
         other.end()
-        other.thread.shutdown()
 
 
 def _deliver(source: Iterable[Any], futures: Answers) -> None:
@@ -168,12 +207,12 @@ def _deliver(source: Iterable[Any], futures: Answers) -> None:
                 future.set_exception(error)
 
 
-def _serve(requests: "Connection", theirs: "Connection | None", settings: Callable[[], None]) -> None:
+def _serve(requests: "Connection", theirs: "tuple[Connection, ...]", settings: Callable[[], None]) -> None:
     """Do one job after the other until the process that asks for them ends; an interrupt is for that one to handle."""
     signal.signal(signal.SIGINT, signal.SIG_IGN)
     signal.signal(signal.SIGTERM, signal.SIG_DFL)
-    if theirs is not None:
-        theirs.close()
+    for end in theirs:
+        end.close()
     end_with_parent()
     import jax
 

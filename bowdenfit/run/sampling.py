@@ -62,7 +62,7 @@ def sampling_programs(density: Density, seed: int, beside: Executor) -> Programs
             programs[name] = walker_programs(density, settings.n_ensembles * settings.n_walkers // 2)
         else:
             programs[name] = import_module(_MODULES[name]).make_program(density, settings)
-    optimum = for_each_draw(optimum_of(model), model.space.size) if model.description.route else None
+    optimum = for_each_draw(optimum_of(model), model.space.size, beside=beside) if model.description.route else None
     return Programs(programs, optimum, replicator(density, seed, beside), _asked_later(model, beside))
 
 

@@ -63,21 +63,29 @@ def write_results(found: "Fit", folder: Path, figures: bool, helper: Assistant) 
             write_text(folder / name, printable(words(found)))
         except Exception as error:
             failed[name] = error
-    try:  # behind the figures, whose files it takes
-        drawn[REPORT] = helper.submit(write_page, report_page(found, data), folder / FIGURES, folder / REPORT)
+    try:
+        page = report_page(found, data)
+        failed |= _failed(drawn)
+        helper.submit(write_page, page, folder / FIGURES, folder / REPORT).result()  # behind the figures, whose files it takes
     except Exception as error:
-        failed[REPORT] = error
-    for name, figure in drawn.items():
-        try:
-            figure.result()
-        except Exception as error:
-            failed[name] = error
+        failed |= _failed(drawn) | {REPORT: error}
     try:
         if data:
             write_figure_captions({name: data[name] for name in data.keys() - failed}, folder / FIGURES, found.name)
     except Exception as error:
         failed["captions"] = error
     return _what_is_missing(folder, failed)
+
+
+def _failed(drawn: dict[str, "Future[Any]"]) -> dict[str, Exception]:
+    """What went wrong with figures, once all are drawn."""
+    failed = dict[str, Exception]()
+    for name, figure in drawn.items():
+        try:
+            figure.result()
+        except Exception as error:
+            failed[name] = error
+    return failed
 
 
 def _what_is_missing(folder: Path, failed: dict[str, Exception]) -> tuple[str, ...]:

@@ -111,3 +111,27 @@ def test_an_error_arrives_where_the_answer_is_asked_for(make):
     if isinstance(helper, InAnotherProcess):
         helper.end()
     helper.thread.shutdown()
+
+
+BY_TURNS = """
+import os, sys, time
+from bowdenfit.run.helpers import InTwoProcesses
+
+def nothing():
+    pass
+
+helper = InTwoProcesses(nothing)
+pids = {helper.submit(os.getpid).result() for _ in range(4)}
+print(*pids, flush=True)
+END
+"""
+
+
+@needs_linux
+@pytest.mark.parametrize("end", ["helper.end()", "os.kill(os.getpid(), 9)"])
+def test_two_processes_work_by_turns_and_end_with_this_one(end):
+    command = [sys.executable, "-c", BY_TURNS.replace("END", end)]
+    done = subprocess.run(command, capture_output=True, text=True, check=False, timeout=60)
+    pids = done.stdout.split()
+    assert len(pids) == 2, done.stderr
+    assert all(has_ended(pid) for pid in pids)

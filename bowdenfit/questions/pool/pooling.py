@@ -1,10 +1,10 @@
 """A fleet's cables looked at together: from draws of single fits to the answer."""
 
 from collections.abc import Mapping
+from functools import partial
 
 import numpy as np
 
-from bowdenfit.holm import holm
 from bowdenfit.inference.interval import Interval
 from bowdenfit.inference.population.model import REFERENCE_TEMPERATURE
 from bowdenfit.inference.population.sampling import PopulationDraws, draw_population
@@ -13,7 +13,7 @@ from bowdenfit.questions.pool.curves import curves_of
 from bowdenfit.questions.pool.inspected import Given, given
 from bowdenfit.questions.pool.life import cycles_until, life_of
 from bowdenfit.questions.pool.next import next_inspections
-from bowdenfit.questions.pool.unlike import FALSE_ALARM, chances, departures, far_off, mixed
+from bowdenfit.questions.pool.unlike import FALSE_ALARM, departures, judged, mixed
 from bowdenfit.results.fleet_folder import FleetDraws
 
 _FAR = 2.0  # spreads from the middle from which a number is named as what is off
@@ -78,10 +78,10 @@ def _cables(known: Given, population: PopulationDraws, asked: Asked | None, seed
     """What is known of each cable."""
     inspected, count = known.inspected, len(known.coefficients)
     alone = len(known.cables) == 1
-    without = far_off(inspected, population)
-    core = draw_population(inspected, seed, without) if without else population
-    by_chance = np.ones(1) if alone else chances(inspected, core, seed, without)
-    adjusted, away = holm(by_chance), departures(population, core)
+    core, adjusted = population, np.ones(1)
+    if not alone:
+        core, adjusted = judged(inspected, population, partial(draw_population, inspected, seed), seed)
+    away = departures(population, core)
     worth = _worth(known, population)
     found = []
     for i, name in enumerate(known.cables):

@@ -7,14 +7,17 @@ foretells of it, as far as its own inspections tell it:
 
 and its inspections with each other, so that wear that is not straight and an inspection that disagrees are seen too. The least
 of these probabilities, times their number, is the cable's. Cables that are far off by median and median deviation, which
-several of them cannot hide behind, are left out of the population; for the others its draws are weighted by one over
-the likelihood of the cable in question. Whether cables are of one kind is the test of Anderson and
+several of them cannot hide behind, are left out of the population if they are unlike it; for the others its draws are
+weighted by one over the likelihood of the cable in question. Whether cables are of one kind is the test of Anderson and
 Darling for a normal distribution.
 
 References:
-    Gelman, Meng and Stern 1996, "Posterior predictive assessment" (Statistica Sinica 6); Stephens 1986, in D'Agostino and
-    Stephens, "Goodness-of-fit techniques", table 4.9, for the distribution of the statistic with estimated mean and variance.
+    Gelman, Meng and Stern 1996, "Posterior predictive assessment" (Statistica Sinica 6); Rosner 1983, "Percentage points for
+    a generalized ESD many-outlier procedure" (Technometrics 25); Stephens 1986, in D'Agostino and Stephens, "Goodness-of-fit
+    techniques", table 4.9, for the distribution of the statistic with estimated mean and variance.
 """
+
+from collections.abc import Callable
 
 import numpy as np
 from scipy.special import chdtrc, gammaln, log_ndtr, ndtr
@@ -50,6 +53,31 @@ def far_off(inspected: Inspected, drawn: PopulationDraws) -> tuple[int, ...]:
     worst = (away / np.maximum(typical, np.finfo(float).tiny)).max(axis=1)
     most = np.argsort(-worst)[: inspected.cables // 3]
     return tuple(int(i) for i in sorted(most) if worst[i] > _FAR)
+
+
+def judged(
+    inspected: Inspected, drawn: PopulationDraws, draw: Callable[[tuple[int, ...]], PopulationDraws], seed: int
+) -> tuple[PopulationDraws, np.ndarray]:
+    """The population without cables that are unlike it, and the chance of each cable among so many, (cable,).
+
+    Those that are far off are left out together, so that they cannot hide behind each other; who is then not unlike the others
+    is taken in again, because a population without its own ends makes the next of them look rare (the least of several
+    suspects decides on how many there are: Rosner 1983).
+
+    Args:
+        inspected: What is known.
+        drawn: The population of all.
+        draw: Draws the population without some cables.
+        seed: Of everything random.
+    """
+    without = far_off(inspected, drawn)
+    while True:
+        core = draw(without) if without else drawn
+        adjusted = holm(chances(inspected, core, seed, without))
+        left = tuple(i for i in without if adjusted[i] < FALSE_ALARM)
+        if left == without:
+            return core, adjusted
+        without = left
 
 
 def chances(inspected: Inspected, drawn: PopulationDraws, seed: int, without: tuple[int, ...] = ()) -> np.ndarray:

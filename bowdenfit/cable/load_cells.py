@@ -7,9 +7,10 @@ import jax.numpy as jnp
 from jax import Array
 from jaxtyping import Float
 
-RUN_SCATTER = "tau"
+from bowdenfit.description.shares import GAIN_ERROR as GAIN_ERROR
+from bowdenfit.description.shares import RUN_SCATTER as RUN_SCATTER
+
 FORCE_NOISE = "sigma_F"
-GAIN_ERROR = "gain_error"
 BLOCK_NOISE = "sigma_block"
 DELAY_ERROR = "delay_error"
 INPUT_OFFSET, OUTPUT_OFFSET = "input_offset", "output_offset"

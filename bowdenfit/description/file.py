@@ -9,6 +9,7 @@ from pydantic import ValidationError
 
 from bowdenfit.description import Description, ParameterSetting, QuantityValue, Route
 from bowdenfit.description.elastic import check_elastic
+from bowdenfit.description.shares import check_shares
 from bowdenfit.description.wrong_keys import wrong_keys
 from bowdenfit.errors import DatasetError, DescriptionError, Faults
 from bowdenfit.inputs import read_toml_file
@@ -74,6 +75,7 @@ def validate(raw: Mapping[str, Any], model: type[Description], file: str) -> Des
         _check_route(description.route, file)
     with faults.noted(place=("prior",)):
         check_elastic(description.preload, description.prior, file)
+        check_shares(description.prior, file)
     faults.refuse()
     return description
 

@@ -16,7 +16,7 @@ from bowdenfit.model import Model, build_model
 # The rank of a truth among any number of independent draws is exactly uniform: 200 only say it less finely than 400. Tails of
 # noise scales mix slowest, so their posteriors are given many steps before they are given up.
 RANKS = BatchSettings(
-    SamplerSettings(n_ensembles=2, n_walkers=64, max_steps=12000, target_ess=200, target_r_hat=1.03),
+    SamplerSettings(n_ensembles=2, n_walkers=64, max_steps=24000, target_ess=200, target_r_hat=1.03),
     target_sd_error=float("inf"),
     nuts=False,
 )

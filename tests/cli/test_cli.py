@@ -314,7 +314,7 @@ def test_a_whole_fit_in_a_process_of_its_own_and_an_interrupt(on_body, tmp_path)
     assert "Traceback" not in err
     assert [p.name for p in (tmp_path / "fit").iterdir()] == ["chain.checkpoint"]
     resumed = [*command, "--resume", *(f"--set={key}" for key in QUICK)]
-    found = subprocess.run(resumed, cwd=ROOT, env=environment, capture_output=True, text=True, check=False, timeout=300)
+    found = subprocess.run(resumed, cwd=ROOT, capture_output=True, text=True, check=False, timeout=300)
     assert found.returncode == 0, found.stderr
     names = {p.name for p in (tmp_path / "fit").iterdir()}
     known = {"fit.json", "summary.json", "summary.txt", "details.txt", "report.html", "answers.json", "figures.npz"}

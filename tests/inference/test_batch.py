@@ -75,6 +75,7 @@ def test_a_data_set_that_cannot_be_computed_says_so_and_hurts_no_other(programs)
         np.testing.assert_array_equal(fits[i].z, alone[i].z)
 
 
+@pytest.mark.slow
 def test_small_scatters_are_drawn_as_often_as_quadrature_says():
     """Three rows for three coefficients: the smaller the scatter between mountings, the narrower their ridge, without end.
 

@@ -239,6 +239,7 @@ def test_a_stretch_table_leaves_the_density_of_the_other_parameters_as_it_was(st
     assert {name for name, i in index.items() if slope[i] == 0} == set(names)
 
 
+@pytest.mark.slow
 def test_a_stretch_table_leaves_the_coefficients_of_the_other_tables_as_they_were(laboratory, stretched_on_body):
     """Least squares: to 1e-9; unless the rope is said to slide with one of them while it is stretched."""
     alone, joined = stretched_on_body

@@ -13,6 +13,8 @@ from bowdenfit.kinds.settings import parse_description
 from bowdenfit.questions.identify.verb import identify
 
 PRIOR_SD = 0.7
+QUICK = ("sampler.n_walkers=128", "sampler.target_ess=300", "sampler.target_r_hat=1.05", "sampler.max_steps=3000")
+SET = [f"--set={setting}" for setting in QUICK]
 TWO_CONTACTS = """
 name = "Two turns"
 [[contact]]
@@ -97,7 +99,7 @@ def test_the_judgment_before_sampling_agrees_with_the_fit(on_body):
     """
     scatter = "prior.tau.prior.half_normal.sd=0.02"
     before = identify(on_body, settings=[scatter]).groups["friction"]
-    found = bf.fit(on_body, seed=3, settings=[scatter, "sampler.n_walkers=64", "sampler.max_steps=1500"])
+    found = bf.fit(on_body, seed=3, settings=[scatter, *QUICK])
     after = identify(found).groups["friction"]
     for p, q in zip(before.parameters, after.parameters, strict=True):
         assert p.sd == pytest.approx(q.sd, rel=0.33), p.name
@@ -116,7 +118,7 @@ def two_turns(tmp_path_factory):
 
 
 def test_coefficients_that_cannot_be_told_apart_are_not_trusted(two_turns, tmp_path, run):
-    code, out, _ = run("fit", two_turns, "-o", tmp_path / "fit", "--seed", 1, "--no-figures")
+    code, out, _ = run("fit", two_turns, "-o", tmp_path / "fit", "--seed", 1, "--no-figures", *SET)
     assert code == 3
     said = " ".join(out.split())
     assert "DO NOT USE THESE NUMBERS: the measurements do not tell every coefficient" in said
@@ -132,7 +134,7 @@ def test_coefficients_that_cannot_be_told_apart_are_not_trusted(two_turns, tmp_p
 
 def test_a_coefficient_measured_separately_makes_the_other_known(two_turns, tmp_path, run):
     stated = "friction.mu_b.measured={value=0.15,sd=0.01}"
-    code, out, _ = run("fit", two_turns, "-o", tmp_path / "fit", "--seed", 1, "--no-figures", "--set", stated)
+    code, out, _ = run("fit", two_turns, "-o", tmp_path / "fit", "--seed", 1, "--no-figures", "--set", stated, *SET)
     assert code == 0, out
     assert "You can trust this" in out
 

@@ -3,7 +3,7 @@
 import math
 import re
 import textwrap
-from collections.abc import Collection, Iterable, Sequence
+from collections.abc import Collection, Iterable, Mapping, Sequence
 from itertools import zip_longest
 
 _LARGE = 1e7  # from which on powers of ten are easier to read than zeros
@@ -100,6 +100,15 @@ def filled(text: str, indent: str = "", hangs: bool = False) -> str:
 def kept_narrow(line: str, indent: str = "") -> str:
     """A line as it is where it fits into a terminal, else filled; so that a row of a narrow table stays one."""
     return (indent + line).rstrip() if len(line) <= WIDTH else filled(line, indent, hangs=True)
+
+
+def legend(meanings: Mapping[str, str]) -> str:
+    """What names stand for, a line each; empty where nothing is said of any.
+
+    Args:
+        meanings: In words, by name.
+    """
+    return "\n".join(filled(f"{name}: {words}", hangs=True) for name, words in meanings.items() if words)
 
 
 def table(heads: Sequence[str], rows: Sequence[Sequence[str]], left: Collection[str] = ("prior", "unit")) -> str:

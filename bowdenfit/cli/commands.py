@@ -2,6 +2,7 @@
 
 import inspect
 import json
+import os
 from collections.abc import Collection
 from dataclasses import replace
 from pathlib import Path
@@ -116,13 +117,18 @@ def _page(reply: Reply) -> str:
 
 
 def _loaded(results: Path | tuple[Path, ...]) -> "Fit | dict[str, Fit]":
-    """The fit of a results folder; of several, by their own names, or by their paths where two have the same name."""
+    """The fit of a results folder; of several, by their own names, or from where their paths part where two have the same."""
     from bowdenfit.front_desk import load
 
     if isinstance(results, Path):
         return load(results)
     names = [folder.name for folder in results]
-    return {folder.name if names.count(folder.name) == 1 else str(folder): load(folder) for folder in results}
+    paths = [folder.resolve() for folder in results]
+    above = Path(os.path.commonpath(paths)) if len(set(paths)) > 1 else Path(paths[0].anchor)
+    return {
+        name if names.count(name) == 1 or path == above else str(path.relative_to(above)): load(folder)
+        for name, path, folder in zip(names, paths, results, strict=True)
+    }
 
 
 def _name_of(dataset: Path) -> str:

@@ -23,10 +23,12 @@ class Quantity:
     Args:
         symbol: Its symbol in figures.
         is_answer: Whether it is what a fit is made for, a coefficient or the optimum, and no noise scale or the like.
+        meaning: What it is, in words.
     """
 
     symbol: str
     is_answer: bool = True
+    meaning: str = ""
 
 
 @dataclass(frozen=True)
@@ -67,6 +69,7 @@ class Checked:
             are not of the prior.
         judged_by: "ranks and coverage", or "coverage" where truths are not of the prior; empty where the verdict does not
             look at it.
+        meaning: What it is, in words.
     """
 
     name: str
@@ -79,6 +82,7 @@ class Checked:
     bias_error: float
     shrinkage: float
     judged_by: str = "ranks and coverage"
+    meaning: str = ""
 
     JSON: ClassVar = (..., "is_calibrated", "fault")
 

@@ -2,6 +2,7 @@
 
 from collections import Counter
 from collections.abc import Mapping, Sequence
+from dataclasses import replace
 
 import numpy as np
 
@@ -61,7 +62,7 @@ def _check_all(
     ranks = [np.array([r.ranked[q].rank for r in ranked]) for q in known]
     p_values = [UniformRanks(len(ranked)).p_value(r) for r in ranks]
     return tuple(
-        _check_quantity(q, known[q].symbol, r, (p, c), n_judged, judged_by[q], ranked)
+        replace(_check_quantity(q, known[q].symbol, r, (p, c), n_judged, judged_by[q], ranked), meaning=known[q].meaning)
         for q, r, p, c in zip(known, ranks, p_values, holm(p_values).tolist(), strict=True)
     )
 

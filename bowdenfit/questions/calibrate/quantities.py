@@ -29,8 +29,11 @@ def quantities_of(plan: Plan) -> dict[str, Quantity]:
         raise UsageError(
             "every parameter of the description is fixed, so there is nothing to calibrate; leave one free."
         )
-    quantities = {p.name: Quantity(p.symbol, p.role == "friction") for p in space.free}
-    return quantities | {OPTIMAL_LENGTH: Quantity(r"$l^*$"), OPTIMAL_EFFICIENCY: Quantity(r"$\eta^*$")}
+    quantities = {p.name: Quantity(p.symbol, p.role == "friction", p.meaning) for p in space.free}
+    return quantities | {
+        OPTIMAL_LENGTH: Quantity(r"$l^*$", meaning="best length"),
+        OPTIMAL_EFFICIENCY: Quantity(r"$\eta^*$", meaning="efficiency at the best length"),
+    }
 
 
 def _kinds(dataset: Dataset) -> list[str]:

@@ -4,7 +4,7 @@ import math
 
 from bowdenfit.display import text_of
 from bowdenfit.questions.calibrate.answer import FEWEST, LEVEL, MOST_UNCONVERGED, Calibration, Checked
-from bowdenfit.words import counted, filled, listed, percent, significant, table
+from bowdenfit.words import counted, filled, legend, listed, percent, significant, table
 
 HEADS = ("quantity", "50 % held", "90 % held", "bias", "")
 EVIDENCE_HEADS = ("quantity", "p of ranks", "corrected", "shrinkage")
@@ -18,6 +18,7 @@ def calibration_text(found: Calibration) -> str:
         "\n".join(filled(line) for line in verdict_sentences(found)),
         filled(what_was_done(found)),
         f"{table(HEADS, rows(found))}\n\n{filled(how_to_read(found))}" if found.quantities else "",
+        legend({q.name: q.meaning for q in found.quantities}),
         "\n".join(filled(line) for line in account_sentences(found)),
     ]
     return "\n\n".join(block for block in blocks if block) + "\n"

@@ -35,11 +35,13 @@ class ComparedParameter:
         symbol: For figures.
         unit: "1" where there is none.
         by_fit: Its value and uncertainty in each fit that has it.
+        meaning: What it is, in words.
     """
 
     symbol: str
     unit: str
     by_fit: dict[str, Interval]
+    meaning: str = ""
 
 
 @dataclass(frozen=True, repr=False)
@@ -289,6 +291,6 @@ def _parameters(fits: Mapping[str, Record]) -> dict[str, ComparedParameter]:
     for name, fit in fits.items():
         for p in fit.model.space.free:
             if p.role in _SHOWN_ROLES and fit.sampled is not None:
-                row = rows.setdefault(p.name, ComparedParameter(p.symbol, p.unit, {}))
+                row = rows.setdefault(p.name, ComparedParameter(p.symbol, p.unit, {}, p.meaning))
                 row.by_fit[name] = Interval.of(np.asarray(fit.posterior.values[p.name]))
     return rows

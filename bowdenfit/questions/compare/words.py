@@ -1,6 +1,7 @@
 """What `bowdenfit compare` prints."""
 
 from collections import Counter
+from collections.abc import Sequence
 
 import numpy as np
 
@@ -8,10 +9,11 @@ from bowdenfit.display import text_of
 from bowdenfit.inference.comparison import SMALL
 from bowdenfit.inference.interval import Interval
 from bowdenfit.questions.compare.answer import Comparison
-from bowdenfit.words import counted, filled, give_or_take, listed, narrow_table
+from bowdenfit.words import counted, filled, give_or_take, legend, listed, narrow_table
 
 _DOMINATES = 0.5  # share of a difference from which one reading is named
 _FEW = 20  # readings treated one by one that are named
+_LONGEST_HEAD = 30  # characters of the name of a fit over a column
 Cells = tuple[tuple[str, ...], list[tuple[str, ...]]]  # heads and rows
 HOW_WELL, WHAT_CHANGES = "How well each predicts a reading left out", "What changes, mean ± sd"
 _SHORT = {"importance sampling": "-", "moment matching": "moved", "refit": "fitted again", "rough": "rough"}
@@ -26,6 +28,7 @@ def comparison_text(found: Comparison) -> str:
         "\n".join(filled(line) for line in basis_sentences(found)),
         treated_text(found),
         f"{WHAT_CHANGES}\n" + narrow_table(*parameter_cells(found)),
+        legend({name: row.meaning for name, row in found.parameters.items()}),
         "\n".join(filled(line) for line in speed_sentences(found)),
     ]
     return "\n\n".join(block for block in blocks if block) + "\n"
@@ -153,7 +156,7 @@ def treated_text(found: Comparison) -> str:
         lines.append(f"That concerns {len(which)} of {len(found.readings)} readings.")
         return "\n".join(filled(line) for line in lines)
     rows = [(_named(found.readings[i]), *(_SHORT[ways[name][i]] for name in names)) for i in which]
-    return "\n".join([*(filled(line) for line in lines), narrow_table(("reading", *names), rows)])
+    return "\n".join([*(filled(line) for line in lines), narrow_table(("reading", *short_names(names)), rows)])
 
 
 def parameter_cells(found: Comparison) -> Cells:
@@ -167,7 +170,15 @@ def parameter_cells(found: Comparison) -> Cells:
         if len(found.optimal_length) == len(names)
         else []
     )
-    return ("parameter", *names), rows
+    return ("parameter", *short_names(names)), rows
+
+
+def short_names(names: Sequence[str]) -> list[str]:
+    """Names of fits that find room as headings: of long ones the end, or their number where that is not theirs alone."""
+    short = [name if len(name) <= _LONGEST_HEAD else f"...{name[3 - _LONGEST_HEAD :]}" for name in names]
+    if len(set(short)) == len(names):
+        return short
+    return [name if len(name) <= _LONGEST_HEAD else f"fit {i + 1} above" for i, name in enumerate(names)]
 
 
 def _head(name: str, unit: str) -> str:

@@ -36,6 +36,7 @@ class Identifiability(Display):
         groups: Knowledge by group of `GROUPS`, as far as there are such parameters.
         profiles: How the sum of squares of the readings rises with each friction coefficient, the others fitted again.
         units: Of the parameters.
+        meanings: What they are, in words.
     """
 
     name: str
@@ -44,6 +45,7 @@ class Identifiability(Display):
     groups: dict[str, Knowledge]
     profiles: "tuple[Profile, ...]" = ()
     units: Mapping[str, str] = field(default_factory=dict)
+    meanings: Mapping[str, str] = field(default_factory=dict)
 
     JSON: ClassVar = ("name", "basis", "sentences", "groups", ("profiles", "rises"))
 
@@ -52,7 +54,7 @@ class Identifiability(Display):
         friction, elastic = (self.groups.get(group) for group in ("friction", "elastic"))
         said = [say_what_is_determined(friction, self.measured)] if friction else []
         if elastic is not None:
-            said.append(say_what_is_determined(elastic, self.measured, "Of stretch and preload they determine"))
+            said.append(say_what_is_determined(elastic, self.measured, "Of how the cable gives they determine"))
         if friction is not None and (friction.undetermined or friction.determined):
             said.append(_REMEDY)
         return said

@@ -35,7 +35,7 @@ def identifiability(fit: Record) -> Identifiability:
     with jax.enable_x64(True):
         _, prior_sd = _linear(fit.model, slope_program(fit), np.median(drawn.flat_z, axis=0))
     groups = _groups(fit.model, np.mean(values, axis=0), spread, prior_sd)
-    return Identifiability(fit.name, DRAWS, True, groups, units=fit.posterior.units)
+    return Identifiability(fit.name, DRAWS, True, groups, units=fit.posterior.units, meanings=_meanings(fit.model))
 
 
 def of_maximum(
@@ -55,7 +55,12 @@ def of_maximum(
         value, slope = _linear(model, compile_slopes(model), start.z)
     groups = _groups(model, value, covariance * np.outer(slope, slope), slope)
     units = {p.name: p.unit for p in model.space.free}
-    return Identifiability(model.description.name, basis, measured, groups, profiles, units)
+    return Identifiability(model.description.name, basis, measured, groups, profiles, units, _meanings(model))
+
+
+def _meanings(model: Model) -> dict[str, str]:
+    """What each parameter is, in words."""
+    return {p.name: p.meaning for p in model.space.free}
 
 
 def _with_tails(model: Model, covariance: np.ndarray) -> np.ndarray:

@@ -160,7 +160,8 @@ def _kept(answers: Mapping[str, Any], asked: Mapping[str, Any]) -> Reply | None:
 
     page = answers["identify"]
     groups = rebuilt(dict[str, Knowledge], page["groups"])
-    return Reply(identifiability_text(Identifiability(page["name"], page["basis"], page["measured"], groups)))
+    words = {"units": page["units"], "meanings": page["meanings"]}
+    return Reply(identifiability_text(Identifiability(page["name"], page["basis"], page["measured"], groups, **words)))
 
 
 VERB = Verb(

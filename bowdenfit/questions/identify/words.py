@@ -1,9 +1,11 @@
 """What `bowdenfit identify` prints."""
 
+from collections.abc import Mapping
+
 from bowdenfit.display import text_of
 from bowdenfit.inference.identifiability import OWN, RESTS_ON_PRIOR, Combination, Knowledge, Known
 from bowdenfit.questions.identify.answer import CURVES, Identifiability
-from bowdenfit.words import decimals, filled, narrow_table, percent
+from bowdenfit.words import decimals, filled, legend, narrow_table, percent
 
 _HARD = 1000.0  # condition number beyond which parameters are hardly told apart
 _ALIKE = 0.9  # correlation beyond which two of them are
@@ -15,9 +17,11 @@ def identifiability_text(found: Identifiability) -> str:
     first, *others = found.sentences() or ["There is nothing to determine."]
     blocks = ["\n".join(filled(sentence) for sentence in [f"{found.name}: {first[0].lower()}{first[1:]}", *others])]
     for name, group in found.groups.items():
-        blocks.append(_parameters(name, group))
+        blocks.append(_parameters(name, group, found.units))
         if name != CURVES:
             blocks.append(_directions(group))
+    named = {p.name for group in found.groups.values() for p in group.parameters}
+    blocks.append(legend({name: what for name, what in found.meanings.items() if name in named}))
     blocks.append(
         filled(
             f"Judged at {found.basis}. ± is one standard deviation, now and before anything was measured; told by: who settles "
@@ -27,10 +31,13 @@ def identifiability_text(found: Identifiability) -> str:
     return "\n\n".join(block for block in blocks if block) + "\n"
 
 
-def _parameters(name: str, group: Knowledge) -> str:
-    heads = ("", "value", "known to", "before", "told by")
-    rows = [(p.name, *_numbers(p), _informed(p.share)) for p in group.parameters]
-    said = f"{name[0].upper() + name[1:]}, one by one\n" + narrow_table(heads, rows, left=("told by",))
+def _parameters(name: str, group: Knowledge, units: Mapping[str, str]) -> str:
+    heads: tuple[str, ...] = ("", "value", "known to", "before", "unit", "told by")
+    unit = {p.name: units.get(p.name, "1") for p in group.parameters}
+    rows = [(p.name, *_numbers(p), "" if unit[p.name] == "1" else unit[p.name], _informed(p.share)) for p in group.parameters]
+    if set(unit.values()) <= {"1"}:
+        heads, rows = (*heads[:4], *heads[5:]), [(*row[:4], *row[5:]) for row in rows]
+    said = f"{name[0].upper() + name[1:]}, one by one\n" + narrow_table(heads, rows, left=("unit", "told by"))
     alike = [sorted((p.name, p.most_alike)) for p in group.parameters if abs(p.correlation) > _ALIKE]
     pairs = [f"{first} and {second}" for first, second in dict.fromkeys(map(tuple, alike))]
     if len(group.parameters) > 1 and not group.collinearity < _HARD:

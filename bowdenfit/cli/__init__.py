@@ -7,7 +7,7 @@ import sys
 import warnings
 from contextlib import suppress
 from pathlib import Path
-from typing import NoReturn
+from typing import Any, NoReturn
 
 import click
 
@@ -108,7 +108,17 @@ def _end_interrupted() -> NoReturn:
     sys.exit(INTERRUPTED)
 
 
-@click.group(context_settings={"help_option_names": ["-h", "--help"], "max_content_width": 110})
+class _Program(click.Group):
+    """All verbs; of an interrupt click says nothing, which would be an empty line before ours."""
+
+    def invoke(self, ctx: click.Context) -> Any:
+        try:
+            return super().invoke(ctx)
+        except KeyboardInterrupt:
+            raise click.Abort from None
+
+
+@click.group(cls=_Program, context_settings={"help_option_names": ["-h", "--help"], "max_content_width": 110})
 @click.version_option(package_name="bowdenfit", prog_name="bowdenfit")
 def bowdenfit() -> None:
     """Friction coefficients of a Bowden cable from bench measurements, with honest uncertainty, and the cable length that

@@ -17,7 +17,7 @@ from contextlib import contextmanager
 from bowdenfit.cli.terminal import say_interrupted
 
 INTERRUPTED = 130
-_PATIENCE = 1.5  # s
+_PATIENCE = 1.0  # s
 _END = b"\0"  # no signal
 _speaking = threading.Lock()
 _answered: list[bool] = []

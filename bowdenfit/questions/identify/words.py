@@ -17,7 +17,8 @@ def identifiability_text(found: Identifiability) -> str:
     first, *others = found.sentences() or ["There is nothing to determine."]
     blocks = ["\n".join(filled(sentence) for sentence in [f"{found.name}: {first[0].lower()}{first[1:]}", *others])]
     for name, group in found.groups.items():
-        blocks.append(_parameters(name, group, found.units))
+        units = found.units if name != CURVES else {}  # of which numbers on a logarithmic scale have none that people know
+        blocks.append(_parameters(name, group, units))
         if name != CURVES:
             blocks.append(_directions(group))
     named = {p.name for group in found.groups.values() for p in group.parameters}

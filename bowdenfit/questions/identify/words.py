@@ -35,7 +35,9 @@ def identifiability_text(found: Identifiability) -> str:
 def _parameters(name: str, group: Knowledge, units: Mapping[str, str]) -> str:
     heads: tuple[str, ...] = ("", "value", "known to", "before", "unit", "told by")
     unit = {p.name: units.get(p.name, "1") for p in group.parameters}
-    rows = [(p.name, *_numbers(p), "" if unit[p.name] == "1" else unit[p.name], _informed(p.share)) for p in group.parameters]
+    rows: list[tuple[str, ...]] = [
+        (p.name, *_numbers(p), "" if unit[p.name] == "1" else unit[p.name], _informed(p.share)) for p in group.parameters
+    ]
     if set(unit.values()) <= {"1"}:
         heads, rows = (*heads[:4], *heads[5:]), [(*row[:4], *row[5:]) for row in rows]
     said = f"{name[0].upper() + name[1:]}, one by one\n" + narrow_table(heads, rows, left=("unit", "told by"))

@@ -16,6 +16,7 @@ from bowdenfit.questions.pool.next import next_inspections
 from bowdenfit.questions.pool.unlike import FALSE_ALARM, departures, judged, mixed
 from bowdenfit.results.fleet_folder import FleetDraws
 
+_NEW = 25  # new cables of each draw of the population, so that which are drawn does not matter to the early ones
 _FAR = 2.0  # spreads from the middle from which a number is named as what is off
 _WEAR = "wear"
 
@@ -32,7 +33,8 @@ def pooled(drawn: FleetDraws, asked: Asked | None, seed: int) -> Pool:
     population = draw_population(known.inspected, seed, called=known.coefficients)
     count, alone = len(known.coefficients), len(known.cables) == 1
     generator = np.random.default_rng([seed, 13])
-    new = population.mean + population.spread * generator.standard_normal(population.mean.shape)
+    mean, spread = (np.repeat(each, _NEW, axis=0) for each in (population.mean, population.spread))
+    new = mean + spread * generator.standard_normal(mean.shape)
     wears = known.inspected.cycles is not None
     asked = asked if wears else None
     names = (*known.coefficients, *((_WEAR,) if wears else ()))

@@ -24,6 +24,7 @@ import argparse
 import json
 import os
 import random
+import re
 import resource
 import shutil
 import signal
@@ -51,7 +52,7 @@ HEAR = (
 LITTLE, MUCH = 850e6, 1100e6  # bytes, between which a fit has too little or enough
 INSPECTIONS = 18  # of the fleet
 AT_ONCE = 0.05  # s behind the beginning of a phase
-OURS = ("Interrupted", "Error: ", "Warning: ", "Wrote ")  # that what is said begins with
+OURS = re.compile(r"Interrupted|Error: |Warning: |Wrote |\S+ holds the whole fit, but ")  # how what is said begins
 
 
 @dataclass(frozen=True)
@@ -282,7 +283,7 @@ def broken(blow: Blow, code: int, err: str, finished: bool, session: int, folder
         return f"exit code {code}"
     if blow.starved and not finished and (code != 1 or not err.startswith("Error: ") or len(lines) > 1):
         return f"exit code {code}, and said {err[:300]!r}"
-    if not early and not all(line.startswith(OURS) for line in lines if line):
+    if not early and not all(OURS.match(line) for line in lines if line):
         return f"said {err[:300]!r}"
     if "--resume" in err and not (folder / blow.job.kept).exists():
         return "--resume is promised, and nothing is kept"

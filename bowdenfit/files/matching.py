@@ -3,6 +3,7 @@
 import re
 from collections.abc import Collection, Sequence
 from dataclasses import dataclass
+from functools import lru_cache
 
 from bowdenfit.files.headings import split_brackets
 from bowdenfit.files.spellings import spelled
@@ -99,6 +100,7 @@ def _suffix(heading: str, name: str) -> str | None:
     return candidate if is_unit(candidate) else None
 
 
+@lru_cache(maxsize=1024)  # of each heading it is asked for every quantity
 def plain_name(heading: str) -> str:
     """Heading in lower case with underscores for anything between words."""
     return re.sub(r"[\W_]+", "_", heading.lower()).strip("_")

@@ -146,6 +146,24 @@ def folder_to_write(folder: Path) -> Iterator[Path]:
         raise disk_error(folder, error) from None
 
 
+@contextmanager
+def file_to_write(path: Path) -> Iterator[Path]:
+    """A temporary name for a file in a folder that is made if missing; it becomes the file if nothing went wrong.
+
+    Args:
+        path: The file.
+
+    Raises:
+        StoreError: It cannot be written.
+    """
+    try:
+        path.parent.mkdir(parents=True, exist_ok=True)
+        with replace_when_whole(path) as temporary:
+            yield temporary
+    except OSError as error:
+        raise disk_error(path, error) from None
+
+
 def write_text(path: Path, text: str) -> None:
     """Write a text file whole."""
     with replace_when_whole(path) as temporary:

@@ -8,6 +8,7 @@ import time
 import zipfile
 from concurrent.futures import ThreadPoolExecutor
 
+import h5py
 import numpy as np
 import pytest
 import scipy.io
@@ -116,6 +117,42 @@ def test_small_files_that_ask_for_much_are_refused_in_time(tmp_path, name):
         read_channels(path)
     assert time.monotonic() - start < 60
     assert len(str(refused.value)) < 500
+
+
+def far_column(path):
+    """A workbook with a cell in a column that no workbook has."""
+    sheet(path, [b"<row r='1'><c r='ZZZZZZ1'><v>1</v></c></row>"])
+
+
+def never_written(path):
+    """Channels of gigabytes of which nothing was ever written, in two kilobytes."""
+    with h5py.File(path, "w") as file:
+        for name in ("time_s", "input_force_N", "output_force_N"):
+            file.create_dataset(name, shape=(4_000_000_000,), chunks=(1 << 20,), dtype="f8")
+
+
+def deep(path):
+    """Groups in groups in groups."""
+    with h5py.File(path, "w") as file:
+        file.create_group("/".join("g" * 500))
+
+
+def entities(path):
+    """A name that unfolds to gigabytes."""
+    declared = "".join(f'<!ENTITY a{i} "{f"&a{i - 1};" * 10}">' for i in range(1, 12))
+    path.write_text(f'<?xml version="1.0"?><!DOCTYPE x [<!ENTITY a0 "ha">{declared}]><Document>&a11;</Document>')
+
+
+UNFOLDING = {"column.xlsx": far_column, "never.h5": never_written, "deep.h5": deep, "entities.cmbl": entities}
+
+
+@pytest.mark.parametrize("name", UNFOLDING)
+def test_files_that_unfold_or_lead_nowhere_are_refused_at_once(tmp_path, name):
+    UNFOLDING[name](tmp_path / name)
+    start = time.process_time()
+    with pytest.raises(bf.DatasetError, match=name) as refused:
+        read_channels(tmp_path / name)
+    assert time.process_time() - start < 5 and len(str(refused.value)) < 500
 
 
 @pytest.mark.parametrize("name", ["far.xlsx"])

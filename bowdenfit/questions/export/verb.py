@@ -51,7 +51,7 @@ def export(
     from bowdenfit.questions.export.words import identifier
     from bowdenfit.questions.export.writers import WRITERS, Asked
     from bowdenfit.questions.summary.verdict import verdict
-    from bowdenfit.results.folder import folder_to_write, replace_when_whole
+    from bowdenfit.results.folder import file_to_write
 
     path = Path(identifier(found.name) + _ENDINGS[to] if output is None else output)
     if path.exists() and not (force and path.is_file()):
@@ -62,7 +62,7 @@ def export(
     judged = verdict(found)
     tables = transmission(found, points, draws, " and ".join(judged.troubles))
     written = WRITERS[to](Asked(found, tables, path, place_of(found, tables.places, to, at), compensation))
-    with folder_to_write(path.parent), replace_when_whole(path) as temporary:
+    with file_to_write(path) as temporary:
         temporary.write_bytes(written.content)
     return Exported(path, to, tuple(tables.sentences), judged.trusted, written.remarks)
 

@@ -36,7 +36,7 @@ def report(
     from bowdenfit.questions.next.ranking import next_measurement
     from bowdenfit.questions.report.sections import report_page
     from bowdenfit.questions.writing import write_page
-    from bowdenfit.results.folder import REPORT, folder_to_write
+    from bowdenfit.results.folder import REPORT, file_to_write
     from bowdenfit.results.store import load
 
     kept = dict[str, Any]()
@@ -48,10 +48,11 @@ def report(
     ranking = next_measurement(found) if ranked else None
     figures, path = kept or dict(figures_of(found)), Path(output)
     path = path / REPORT if path.is_dir() else path
-    with folder_to_write(path.parent), TemporaryDirectory() as drawn:
+    with file_to_write(path) as temporary, TemporaryDirectory() as drawn:
         for name, data in figures.items():
             draw_figure(name, data, Path(drawn), ("svg",), found.name)
-        return write_page(report_page(found, figures, ranking), Path(drawn), path)
+        write_page(report_page(found, figures, ranking), Path(drawn), temporary)
+    return path
 
 
 def _reply(path: Path, _: Mapping[str, Any]) -> Reply:

@@ -12,17 +12,37 @@ import pytest
 import bowdenfit as bf
 from bowdenfit.inference.engines.choice import slurm
 from bowdenfit.questions.fleet.store import KEPT
+from bowdenfit.questions.simulate.fleet import read_fleet_plan, simulate_fleet, write_fleet
 from bowdenfit.results.fleet_folder import FLEET_DRAWS
 
-FLEET = Path(__file__).parents[2] / "datasets" / "synthetic-fleet"
+BENCH = Path(__file__).parents[2] / "datasets" / "synthetic-fleet" / "bench.toml"
 SEED = 7
+MORE = {  # a contact that hardly any run tells from the others
+    "[tables]": '[[contact]]\nname = "clamp"\nfriction = "mu_clamp"\nwrap_angle = { column = "clamp_angle" }\n\n[tables]',
+    "mu_edge = 0.15": "mu_edge = 0.15\nmu_clamp = 0.12",
+    "own_angles = {": "own_angles = { clamp_angle = [30, 80, 30, 60, 90, 20],",
+    "cables = 40\ncycles = [0, 25000, 50000]": "cables = 96\ncycles = [0]",
+}
 
 
 @pytest.fixture(scope="module")
-def whole(tmp_path_factory) -> bytes:
-    """The file of the whole fleet, fitted in this process; one of its inspections is drawn by ensembles."""
+def fleet(tmp_path_factory) -> Path:
+    """A fleet of cables with three coefficients, of which a few go on from weighted draws to walkers."""
+    folder, text = tmp_path_factory.mktemp("fleet"), BENCH.read_text()
+    for before, after in MORE.items():
+        assert before in text
+        text = text.replace(before, after)
+    (folder / "bench.toml").write_text(text)
+    plan = read_fleet_plan(folder / "bench.toml")
+    write_fleet(plan, *simulate_fleet(plan, 5), folder / "fleet")
+    return folder / "fleet"
+
+
+@pytest.fixture(scope="module")
+def whole(fleet, tmp_path_factory) -> bytes:
+    """The file of the whole fleet, fitted in this process."""
     folder = tmp_path_factory.mktemp("whole") / "results"
-    assert set(bf.fleet(FLEET, output=folder, seed=SEED).engines) == {"laplace", "ensembles"}
+    assert set(bf.fleet(fleet, output=folder, seed=SEED).engines) == {"laplace", "ensembles"}
     return (folder / FLEET_DRAWS).read_bytes()
 
 
@@ -40,21 +60,21 @@ def by_dask(cluster) -> str:
 
 
 @pytest.mark.slow
-def test_a_dask_cluster_writes_the_same_file(whole, cluster, tmp_path):
-    bf.fleet(FLEET, output=tmp_path, seed=SEED, engine=by_dask(cluster))
+def test_a_dask_cluster_writes_the_same_file(whole, fleet, cluster, tmp_path):
+    bf.fleet(fleet, output=tmp_path, seed=SEED, engine=by_dask(cluster))
     assert (tmp_path / FLEET_DRAWS).read_bytes() == whole
 
 
 @pytest.mark.slow
-def test_jobs_as_slurm_has_them_write_the_same_file(whole, tmp_path):
+def test_jobs_as_slurm_has_them_write_the_same_file(whole, fleet, tmp_path):
     with slurm(tmp_path / "jobs", 2, "local") as executor:
-        bf.fleet(FLEET, output=tmp_path / "results", seed=SEED, engine=executor, workers=2)
+        bf.fleet(fleet, output=tmp_path / "results", seed=SEED, engine=executor, workers=2)
     assert (tmp_path / "results" / FLEET_DRAWS).read_bytes() == whole
 
 
 @pytest.mark.slow
 @pytest.mark.parametrize("after", [1, 3])
-def test_a_dask_worker_that_is_killed_in_the_middle_changes_nothing(whole, cluster, tmp_path, after):
+def test_a_dask_worker_that_is_killed_in_the_middle_changes_nothing(whole, fleet, cluster, tmp_path, after):
     """Both are killed, so that one of them was at work."""
     from distributed import Client
 
@@ -69,16 +89,16 @@ def test_a_dask_worker_that_is_killed_in_the_middle_changes_nothing(whole, clust
             for process in killed:
                 os.kill(process, signal.SIGKILL)
 
-    bf.fleet(FLEET, output=tmp_path, seed=SEED, engine=by_dask(cluster), progress=kill)
+    bf.fleet(fleet, output=tmp_path, seed=SEED, engine=by_dask(cluster), progress=kill)
     assert len(killed) == 2
     assert (tmp_path / FLEET_DRAWS).read_bytes() == whole
 
 
 @pytest.mark.slow
 @pytest.mark.parametrize("engine", ["local", "dask"])
-def test_a_client_that_is_killed_goes_on_and_writes_the_same_file(whole, tmp_path, engine, request):
+def test_a_client_that_is_killed_goes_on_and_writes_the_same_file(whole, fleet, tmp_path, engine, request):
     where = by_dask(request.getfixturevalue("cluster")) if engine == "dask" else engine
-    words = [sys.executable, "-m", "bowdenfit", "fleet", FLEET, "-o", tmp_path / "results", "--engine", where]
+    words = [sys.executable, "-m", "bowdenfit", "fleet", fleet, "-o", tmp_path / "results", "--engine", where]
     pieces = tmp_path / "results" / KEPT
     with subprocess.Popen([*words, "--seed", str(SEED)], stderr=subprocess.DEVNULL) as client:
         while client.poll() is None and not list(pieces.glob("*.npz")):

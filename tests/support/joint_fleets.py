@@ -1,75 +1,112 @@
-"""A fleet in one density, every reading of every cable with its population: the check on draws that are pooled afterwards."""
+"""A fleet in one density, every reading of every cable with its population: the check on draws that are pooled afterwards.
 
+Population, priors and coordinates are written out here, and NumPyro samples: nothing is shared with `bowdenfit pool` but what
+its draws came from, the likelihood of one inspection's readings.
+"""
+
+from dataclasses import dataclass
 from pathlib import Path
 
 import jax
 import jax.numpy as jnp
 import numpy as np
+from numpyro.infer import MCMC, NUTS
 
-from bowdenfit.inference.nuts import BLOCK, WARM_UP, before, block_program
-from bowdenfit.inference.population.model import PopulationDensity
-from bowdenfit.inference.population.sampling import _SETTINGS
 from bowdenfit.questions.fleet.cases import read_cases
 from bowdenfit.questions.fleet.inspections import read_inspections
-from bowdenfit.questions.pool.inspected import Given
+
+SPREAD, WEAR, WEAR_SPREAD, OIL, DEGREE = 0.5, 1.0, 0.3, 1.0, 0.05  # scales of the priors, as the model is written down
+WARM_UP, CHAINS = 400, 4
 
 
-def joint_draws(folder: Path, given: Given, blocks: int, seed: int):
-    """Draws of population and cables by NUTS on all readings at once: mean, spread, effects, cables.
-
-    The coordinates of cables are those of the pooled ones, which decide nothing: their volume is in the density. Scatter and
-    noise of each inspection are drawn too, under the priors of single fits.
+@dataclass(frozen=True)
+class Joint:
+    """Draws of population and cables, (chain, draw, ...).
 
     Args:
-        folder: Of the fleet's measurements.
-        given: What is pooled of it.
-        blocks: Of 50 steps of four chains, after warm-up.
+        mean, spread: Of log coefficients and, last, of wear.
+        effects: Of lubrication and of a degree.
+        cables: Log coefficients of each cable when new, and its wear.
+        divergent: How many trajectories were.
+    """
+
+    mean: np.ndarray
+    spread: np.ndarray
+    effects: np.ndarray
+    cables: np.ndarray
+    divergent: int
+
+    @property
+    def population(self) -> np.ndarray:
+        """Numbers of the population, (chain, draw, number)."""
+        return np.concatenate([self.mean, self.spread, self.effects], axis=2)
+
+
+def joint_draws(
+    folder: Path, labels: tuple[str, ...], names: tuple[str, ...], about: np.ndarray, draws: int, seed: int
+) -> Joint:
+    """Draws of population and cables by NUTS on all readings at once; scatter and noise of each inspection are drawn too.
+
+    Args:
+        folder: Of the fleet's measurements; every inspection says its cycles, temperature and lubrication.
+        labels: Of its inspections, those of a cable together.
+        names: Of the coefficients.
+        about: Where cables are thought to be, (draw, cable, number): the unit in which steps are taken, and where they begin.
+        draws: Of each of four chains.
         seed: Of everything random.
     """
-    cases = {case.inspection.label: case for case in read_cases(folder, read_inspections(folder), {})}
-    cases = [cases[label] for label in given.labels]
-    posterior = cases[0].shaped.posterior
+    read = {case.inspection.label: case for case in read_cases(folder, read_inspections(folder), {})}
+    cases = [read[label] for label in labels]
+    posterior, inspections = cases[0].shaped.posterior, [case.inspection for case in cases]
     free = posterior.model.space.free
-    places = np.array([[p.name for p in free].index(name) for name in given.coefficients])
+    places = np.array([[p.name for p in free].index(name) for name in names])
     others = np.setdiff1d(np.arange(len(free)), places)
-    medians = np.array([np.log(float(free[i].prior.median)) for i in places])
-    sds = np.array([float(free[i].prior.log_sd) for i in places])
-    inspected = given.inspected
-    density = PopulationDensity(
-        inspected.coefficients, inspected.cycles is not None, tuple(inspected.effects), inspected.cables
-    )
-    place = np.array([np.sum(inspected.cable[:j] == i) for j, i in enumerate(inspected.cable)])
-    data = {
-        "population": inspected.data,
-        "readings": jax.tree.map(lambda *leaves: np.stack(leaves), *(case.shaped.data for case in cases)),
+    median = np.log([float(free[i].prior.median) for i in places])
+    sd = np.array([float(free[i].prior.log_sd) for i in places])
+    cables = list(dict.fromkeys(each.cable for each in inspections))
+    cable = np.array([cables.index(each.cable) for each in inspections])
+    cycles = np.array([each.cycles for each in inspections])
+    circumstances = np.array([[float(each.lubricated), each.temperature - 20.0] for each in inspections])
+    readings = jax.tree.map(lambda *leaves: jnp.stack(leaves), *(case.shaped.data for case in cases))
+    worn, n, k = cycles / cycles.max(), len(cables), len(names)
+    center = about.mean(axis=0)
+    root = np.linalg.cholesky(np.einsum("dia,dib->iab", about - center, about - center) / len(about))
+
+    def values_of(z):
+        """Population and cables; these in units of their own, which are constants and so change no density."""
+        cables = center + jnp.einsum("iab,ib->ia", root, z["cables"])
+        return z["mean"], jnp.exp(z["log_spread"]), z["effects"], cables
+
+    def minus_log_density(z):
+        mean, spread, effects, cables = values_of(z)
+        minus = jnp.sum(((mean[:k] - median) / sd) ** 2) / 2 + (mean[k] / WEAR) ** 2 / 2
+        scales = jnp.array([SPREAD] * k + [WEAR_SPREAD])
+        minus += jnp.sum((spread / scales) ** 2 / 2 - z["log_spread"])
+        minus += jnp.sum((effects / jnp.array([OIL, DEGREE])) ** 2) / 2
+        minus += jnp.sum(((cables - mean) / spread) ** 2) / 2 + n * jnp.sum(z["log_spread"])
+        minus += jnp.sum(z["rest"] ** 2) / 2
+        at = cables[cable, :k] + (cables[cable, k] * worn + circumstances @ effects)[:, None]
+        single = jnp.zeros((len(cases), len(free))).at[:, places].set((at - median) / sd).at[:, others].set(z["rest"])
+        terms = jax.vmap(posterior.log_likelihoods)(single, readings)
+        total = minus - sum(jnp.sum(term) for term in terms.values())
+        return jnp.where(jnp.isnan(total), jnp.inf, total)
+
+    generator = np.random.default_rng(seed)
+
+    def start(*shape):
+        return jnp.array(0.2 * generator.standard_normal((CHAINS, *shape)))
+
+    z = {
+        "mean": jnp.array([*median, 0.0]) + start(k + 1),
+        "log_spread": np.log(0.2) + start(k + 1),
+        "effects": 0.1 * start(2),
+        "cables": start(n, k + 1),
+        "rest": start(len(cases), len(others)),
     }
-    size = density.size + len(cases) * len(others)
-
-    def log_density(z, data):
-        inner, rest = z[: density.size], z[density.size :].reshape(len(cases), len(others))
-        found = density.population(inner, data["population"])
-        values, volume = density.cables_of(inner, data["population"], found)
-        logs = density.log_coefficients(values, found, data["population"])[inspected.cable, place]
-        own = (logs - medians) / sds
-        single = jnp.zeros((len(cases), len(free))).at[:, places].set(own).at[:, others].set(rest)
-        of_readings = jax.vmap(posterior.log_density)(single, data["readings"]) + jnp.sum(own**2, axis=1) / 2
-        away = (values - found["mean"]) / found["spread"]
-        of_cables = jnp.sum(volume) - jnp.sum(away**2) / 2 - density.cables * jnp.sum(jnp.log(found["spread"]))
-        return jnp.sum(of_readings) + of_cables - jnp.sum(inner[: len(density.names)] ** 2) / 2
-
-    shapes = jax.tree.map(lambda leaf: jax.ShapeDtypeStruct(np.shape(leaf), np.asarray(leaf).dtype), data)
-    program = block_program(log_density, (size,), shapes, _SETTINGS, fine=False)
-    start = 0.3 * np.random.default_rng(seed).standard_normal((_SETTINGS.n_chains, size))
-    done: list = []
-    for number in range(WARM_UP + blocks):
-        z, tuning, mass = before(done, start, np.ones(size))
-        step = program(np.uint32(seed), np.uint32(number), z, tuning, np.bool_(number < WARM_UP), mass, data)
-        done.append({name: np.asarray(value) for name, value in step.items()})
-    z = np.concatenate([block["z"] for block in done[WARM_UP:]]).transpose(1, 0, 2)
-
-    def values_of(one):
-        found = density.population(one, inspected.data)
-        return found["mean"], found["spread"], found["effects"], density.cables_of(one, inspected.data, found)[0]
-
-    assert z.shape[1] == blocks * BLOCK
-    return z, jax.jit(jax.vmap(values_of))(z[:, :, : density.size].reshape(-1, density.size))
+    kernel = NUTS(potential_fn=minus_log_density, target_accept_prob=0.85)
+    chains = MCMC(
+        kernel, num_warmup=WARM_UP, num_samples=draws, num_chains=CHAINS, chain_method="vectorized", progress_bar=False
+    )
+    chains.run(jax.random.key(seed), init_params=z, extra_fields=("diverging",))
+    found = jax.jit(jax.vmap(jax.vmap(values_of)))(chains.get_samples(group_by_chain=True))
+    return Joint(*map(np.asarray, found), int(chains.get_extra_fields()["diverging"].sum()))

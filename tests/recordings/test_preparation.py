@@ -25,6 +25,7 @@ from bowdenfit.recordings.preparation.rests import Rests, play_rows
 from bowdenfit.recordings.preparation.segments import Segments
 from bowdenfit.recordings.preparation.tare import tare_of
 from bowdenfit.recordings.recording import RawRecording
+from bowdenfit.recordings.strokes import find_strokes
 
 EXPONENT, DELAY, RANGE = 0.24, 0.02, 500.0
 
@@ -516,3 +517,38 @@ def test_the_likely_input_is_smoothed_and_pooled_as_scipy_does(blocks):
     level = np.tile([0.0, 1.0, 0.0, -1.0], blocks)[:blocks] + 1e-3 * force  # much noise, none of it beyond what may change
     smooth = likely_input_file._smooth(level, 100.0)
     np.testing.assert_allclose(smooth, savgol_filter(level, 7, 2), atol=1e-12)
+
+
+def up_and_down(seconds_long: int, period: int = 4, rate: int = 50, more: float = 0.0) -> RawRecording:
+    """A rope pulled and let go again and again in equal cycles, on which the output follows by dry friction.
+
+    Args:
+        seconds_long: How long [s].
+        period: Of a cycle [s].
+        rate: Samples a second.
+        more: Amplitude of a hum of 20 Hz in both channels [N].
+    """
+    force = 20 + 60 * np.abs(np.arange(period * rate) / (period * rate) * 2 - 1)
+    output = np.exp(play(np.log(np.tile(force, 2)), EXPONENT)[0])[-len(force) :]
+    n, noise = seconds_long // period, np.random.default_rng(1)
+    clock = np.arange(n * len(force)) / rate
+    pulled, given = (
+        np.tile(f, n) + 0.2 * noise.standard_normal(len(clock)) + more * np.sin(40 * np.pi * clock) for f in (force, output)
+    )
+    return RawRecording("up and down", "long.csv", clock, pulled, clock, given)
+
+
+@pytest.mark.parametrize(("seconds_long", "more"), [(40, 0.0), (400, 0.0), (1200, 0.0), (1200, 2.0)])
+def test_equal_cycles_are_as_wide_however_many_there_are(seconds_long, more):
+    """Below the frequency of many equal cycles there is nothing but noise, which was taken for the end of their band."""
+    blocks, account = prepare(up_and_down(seconds_long, more=more), ON)
+    assert account.block <= 4 / 11
+    assert find_strokes(blocks, "long.csv", "up and down").exponent == pytest.approx(EXPONENT, rel=0.03)
+
+
+def test_a_recording_whose_blocks_would_hold_pulling_and_returning_is_refused():
+    with pytest.raises(DatasetError) as refused:
+        prepare(up_and_down(2000), ON)
+    assert "lasts 2,000 s, too long for forces that go up and down every 4 s" in " ".join(str(refused.value).split())
+    assert "recordings of at most 1,4" in str(refused.value)
+    assert prepare(up_and_down(2000), Preparation(delay="none", block=seconds(0.2)))[1].block == pytest.approx(0.2)

@@ -10,8 +10,8 @@ import numpy as np
 
 from bowdenfit.description import Preparation, QuantityValue
 from bowdenfit.errors import DatasetError
-from bowdenfit.recordings.preparation.bandwidth import bandwidth_of
-from bowdenfit.recordings.preparation.blocks import CommonClock, average, block_samples
+from bowdenfit.recordings.preparation.bandwidth import bandwidth_of, main_frequency
+from bowdenfit.recordings.preparation.blocks import CommonClock, average, block_samples, refuse_too_long
 from bowdenfit.recordings.preparation.checks import check, check_sign
 from bowdenfit.recordings.preparation.clock import GOOD, KINDS, NO_OVERLAP, QUIET, Sampled, read_at, spread, step_of
 from bowdenfit.recordings.preparation.delay import Delay, estimate_delay
@@ -99,8 +99,9 @@ def average_recording(found: Inspected, one_for_all: tuple[float, float] | None 
     _require_some_good(raw, common)
     filled = [_filled(force, common.fault == GOOD) for force in (common.input_force, common.output_force)]
     bandwidth = bandwidth_of(filled[0], filled[1], 1 / common.step, raw.loop)
+    main = main_frequency(filled[0], filled[1], 1 / common.step)
     noise = _noise(cleaned.input, bandwidth), _noise(cleaned.output, bandwidth)
-    samples = _samples_of_block(raw.loop, common, cleaned, settings, bandwidth, noise)
+    samples = _samples_of_block(found, common, bandwidth, main, noise)
     blocks, counts = average(common, samples)
     account = Account(
         counts=counts,
@@ -208,13 +209,15 @@ def _noise(channel: Sampled, bandwidth: float) -> float:
 
 
 def _samples_of_block(
-    loop: bool, common: CommonClock, cleaned: _Cleaned, settings: Preparation, bandwidth: float, noise: tuple[float, float]
+    found: Inspected, common: CommonClock, bandwidth: float, main: float, noise: tuple[float, float]
 ) -> int:
     """Samples of a block of the common clock, 0 for no blocks; a slower channel counts with fewer samples."""
+    raw, cleaned, settings = found.raw, found.cleaned, found.settings
     if settings.block == "auto":
         thinned = [step_of(channel.time) / common.step for channel in (cleaned.input, cleaned.output)]
         each = noise[0] * math.sqrt(thinned[0]), noise[1] * math.sqrt(thinned[1])
-        return block_samples(common, bandwidth, each, loop)
+        refuse_too_long(raw.file, raw.name, common, main)
+        return block_samples(common, bandwidth, main, each, raw.loop)
     block = _stated_block(settings)
     return max(1, round(block / common.step)) if block > 0 else 0
 

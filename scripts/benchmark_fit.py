@@ -65,6 +65,7 @@ READS: dict[str, tuple[str, ...]] = {  # FIT stands for a finished fit of the on
     "check": ("check", DATASET),
     "--help": ("--help",),
 }
+NOT_PAIRED = ("plot one",)  # older commands draw all figures
 PLAIN = {"blackjax": "plain_blackjax.py", "emcee and NumPy": "plain_emcee.py", "NumPyro": "plain_numpyro.py"}
 CALIBRATE, MANY, FEW = "calibrate, 200", 200, (2, 6)
 CABLES = "1000 cables"
@@ -206,10 +207,11 @@ class Bench:
 
     def row(self, name: str, arguments: Sequence[str], cold: bool = False, writes: bool = False) -> Row:
         """One command."""
-        sides: list[list[Run]] = [[] for _ in self.trees]
+        trees = self.trees[:1] if name in NOT_PAIRED else self.trees
+        sides: list[list[Run]] = [[] for _ in trees]
         for i in range(self.repeats):
             say(f"{name}, {i + 1} of {self.repeats}")
-            for number, (tree, runs) in enumerate(zip(self.trees, sides, strict=True)):
+            for number, (tree, runs) in enumerate(zip(trees, sides, strict=True)):
                 given = [str(self.finished(tree)) if part == "FIT" else part for part in arguments]
                 at = self.folder / f"{name}_{number}_{i}".replace(",", "").replace(" ", "_")
                 cache = f"{at.name}_cache" if cold else "unmeasured"

@@ -19,7 +19,7 @@ def check_shares(prior: Mapping[str, ParameterSetting], file: str) -> None:
     Raises:
         DescriptionError: One is, or is expected to be.
     """
-    for name in _OF_WHAT.keys() & prior.keys():
+    for name in (name for name in _OF_WHAT if name in prior):
         key, size = _size(prior[name])
         if size >= _MOST:
             raise DescriptionError(

@@ -1,4 +1,5 @@
 """Sizes of what was measured, which default priors of quantities with a unit are in proportion to."""
+
 from dataclasses import dataclass
 
 from bowdenfit.words import significant

@@ -17,7 +17,7 @@ from multiprocessing import connection, get_context
 from typing import Any, TypeAlias
 
 from bowdenfit.errors import BowdenfitError
-from bowdenfit.inference.engines.processes import end_with_parent
+from bowdenfit.inference.engines.processes import cores, end_with_parent
 
 COMPUTING = ("jax", "bowdenfit.run.fitting")  # what this process and the other both need
 DRAWING = (
@@ -188,7 +188,7 @@ def assistant(in_background: bool, settings: Callable[[], None], draws: bool) ->
         with helper.thread:
             yield helper
         return
-    two = copy and draws and (os.cpu_count() or 1) > 1
+    two = copy and draws and cores() > 1
     other = InTwoProcesses(settings) if two else InAnotherProcess(copy, settings, draws)
     try:
         yield other

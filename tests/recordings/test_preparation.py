@@ -15,7 +15,7 @@ from bowdenfit.errors import DatasetError
 from bowdenfit.questions.simulate.bench import BenchFriction, BenchSettings, Faults, MotorProfile, simulate_recording
 from bowdenfit.recordings.preparation import likely_input as likely_input_file
 from bowdenfit.recordings.preparation import prepare
-from bowdenfit.recordings.preparation.bandwidth import bandwidth_of
+from bowdenfit.recordings.preparation.bandwidth import bandwidth_of, main_frequency
 from bowdenfit.recordings.preparation.clock import DROPOUT, GOOD, SATURATED, SPIKE, Sampled, read_at, spread
 from bowdenfit.recordings.preparation.delay import COMMON_ERROR, _touched, estimate_delay
 from bowdenfit.recordings.preparation.flags import flag, frozen, resolution, saturation, spikes
@@ -458,7 +458,7 @@ def test_noise_that_a_filter_smoothed_does_not_raise_the_bandwidth():
         f + np.convolve(generator.normal(0, 2, len(f) + 19), np.full(20, 0.05), mode="valid")
         for f in (clean.input_force, clean.output_force)
     ]
-    assert bandwidth_of(noisy[0], noisy[1], 1000.0) < 30
+    assert bandwidth_of(noisy[0], noisy[1], 1000.0, main_frequency(noisy[0], noisy[1], 1000.0)) < 30
 
 
 # --- noise

@@ -98,8 +98,8 @@ def average_recording(found: Inspected, one_for_all: tuple[float, float] | None 
     common = _together(raw, cleaned, settings, delay.value) if delay.value else found.together
     _require_some_good(raw, common)
     filled = [_filled(force, common.fault == GOOD) for force in (common.input_force, common.output_force)]
-    bandwidth = bandwidth_of(filled[0], filled[1], 1 / common.step, raw.loop)
     main = main_frequency(filled[0], filled[1], 1 / common.step)
+    bandwidth = bandwidth_of(filled[0], filled[1], 1 / common.step, main, raw.loop)
     noise = _noise(cleaned.input, bandwidth), _noise(cleaned.output, bandwidth)
     samples = _samples_of_block(found, common, bandwidth, main, noise)
     blocks, counts = average(common, samples)

@@ -13,7 +13,7 @@ _NOISE_TO_SIGNAL = 1.0
 _COHERENT = 1 / (1 + _NOISE_TO_SIGNAL) ** 2
 
 
-def bandwidth_of(input_force: Vector, output_force: Vector, rate: float, loop: bool = False) -> float:
+def bandwidth_of(input_force: Vector, output_force: Vector, rate: float, main: float, loop: bool = False) -> float:
     """Frequency up to which the forces move together [Hz].
 
     The lower of two estimates, each a signal-to-noise ratio of 1. The first is where the spectra have come down to twice
@@ -28,9 +28,9 @@ def bandwidth_of(input_force: Vector, output_force: Vector, rate: float, loop: b
         input_force: Input force at equal steps, gaps filled [N].
         output_force: Output force on the same clock [N].
         rate: Samples a second [1/s].
+        main: Frequency at which they move most [Hz], by `main_frequency`.
         loop: Whether the forces are of a pull-pull loop.
     """
-    main = main_frequency(input_force, output_force, rate)
     segment = _segment(len(input_force))
     if main > 0:
         segment = min(segment, max(int(_PERIODS * rate / main), _SHORTEST_SEGMENT))

@@ -32,9 +32,9 @@ def log_density(x: jax.Array) -> jax.Array:
     total = -0.5 * jnp.sum(((x[:3] - center) / width) ** 2)  # the Jacobian cancels the density's 1 / mu
     total -= 0.5 * jnp.sum(((curves[:, 0] - levels) / onbody.LEVEL_SD) ** 2)
     total -= 0.5 * jnp.sum((curves[:, 1] / onbody.SLOPE_SD) ** 2)
-    total -= 0.5 * jnp.sum((curves[:, 2] / onbody.CURVATURE_SD) ** 2)
-    total -= 0.5 * (sigma / onbody.ANGLE_NOISE) ** 2 + 0.5 * (tau / onbody.SCATTER) ** 2
-    total += x[5] + x[8] + x[9] + x[10]
+    total += jnp.sum(0.5 * x[jnp.array([5, 8])] - jnp.log1p(curves[:, 2]))  # half-Cauchy roots, whose Jacobian is half of c's
+    total -= jnp.log1p((sigma / onbody.ANGLE_NOISE) ** 2) + jnp.log1p((tau / onbody.SCATTER) ** 2)
+    total += x[9] + x[10]
     angles = []
     for k, curve in enumerate(DATA["curves"]):
         a, b, c = curves[k]

@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
+from bowdenfit.cli.explained import Explained
 from bowdenfit.cli.interrupts import was_asked
 from bowdenfit.cli.keywords import Keyword, keywords_of
 from bowdenfit.cli.progress import watch_verb
@@ -39,7 +40,7 @@ def command(verb: Verb) -> click.Command:
         return _run(verb, keywords, given, "json" if as_json else "csv" if as_csv else "")
 
     name = verb.name or verb.function.__name__
-    return click.Command(name, callback=run, params=parameters, help=inspect.cleandoc(verb.text), short_help=verb.short)
+    return Explained(name, callback=run, params=parameters, help=verb.text, short_help=verb.short)
 
 
 def _run(verb: Verb, keywords: tuple[Keyword, ...], given: dict[str, Any], form: str) -> int:

@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING
 
 import click
 
+from bowdenfit.cli.explained import Explained
 from bowdenfit.cli.terminal import say
 from bowdenfit.errors import BowdenfitError, UsageError
 from bowdenfit.words import filled, printable
@@ -18,9 +19,22 @@ if TYPE_CHECKING:
 FOLDER = "my-cable"
 _MOST_FILES = 12  # that are proposed
 _LONGEST_NAME = 80  # of a cable
+_INIT = """Write a new data set to FOLDER, ready for `bowdenfit check` and `bowdenfit fit`.
+
+    In a terminal it asks for the files that you measured, and for what they do not say: which contacts there are, where their
+    wrap angles come from, what the columns are, and their units. With --from it asks only for what these files do not say, and
+    where nobody can be asked it refuses what is not said. Without files and without a terminal it writes a template to fill in.
+
+    \b
+    init my-cable                          questions, from the first to the command that fits
+    init my-cable --from forces.csv        of this file, or of several
+    init --example on-body-exoskeleton     a data set to try
+    """
 
 
-@click.command(short_help="Start a data set: by questions, from files, from an example, or with a template.")
+@click.command(
+    cls=Explained, help=_INIT, short_help="Start a data set: by questions, from files, from an example, or with a template."
+)
 @click.argument("folder", required=False, type=click.Path(path_type=Path))
 @click.argument("more", nargs=-1, type=click.Path(path_type=Path), metavar="")
 @click.option("--from", "files", multiple=True, type=click.Path(path_type=Path), metavar="FILE [FILE ...]",
@@ -28,17 +42,7 @@ _LONGEST_NAME = 80  # of a cable
 @click.option("--example", is_flag=False, flag_value="", metavar="[NAME]",
               help="Write a data set that comes with bowdenfit; without a name, list them.")  # fmt: skip
 def init(folder: Path | None, more: tuple[Path, ...], files: tuple[Path, ...], example: str | None) -> None:
-    r"""Write a new data set to FOLDER, ready for `bowdenfit check` and `bowdenfit fit`.
-
-    In a terminal it asks for the files that you measured, and for what they do not say: which contacts there are, where their
-    wrap angles come from, what the columns are, and their units. With --from it asks only for what these files do not say, and
-    where nobody can be asked it refuses what is not said. Without files and without a terminal it writes a template to fill in.
-
-    \b
-    bowdenfit init my-cable                                     questions, from the first to the command that fits
-    bowdenfit init my-cable --from angles.csv forces.csv        of these files
-    bowdenfit init --example on-body-exoskeleton                a data set to try
-    """
+    """Write a new data set."""
     from bowdenfit.cli.dialog import Terminal, has_person
     from bowdenfit.questions.start.folder import refuse_existing, write_template
     from bowdenfit.questions.start.question import Nobody

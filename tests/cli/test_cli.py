@@ -62,6 +62,7 @@ def test_every_verb_explains_itself(run, verb):
     code, out, _ = run(verb, "--help")
     assert code == 0
     assert len(out.splitlines()) > 5
+    assert not [line for line in out.splitlines() if len(line) > 80 or "\\" in line]
 
 
 def test_init_writes_a_template_once(run, tmp_path):

@@ -161,7 +161,7 @@ def compare(
             once a reading is left out.
     """
     if len(fits) < 2:
-        raise UsageError("a comparison needs at least two fits; name their results folders.")
+        raise UsageError("a comparison needs at least two fits; name their results folders, two different ones.")
     drawn = {name: _draws_of(name, fit) for name, fit in fits.items()}
     unit, few, parts = _parts_to_leave_out(fits, leave_out)
     common = _common(fits, parts)

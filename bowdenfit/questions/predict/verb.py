@@ -31,7 +31,9 @@ def predict(
     stroke: Annotated[Stroke, Option()] = "pull",
     output_force: Annotated[Quantity | None, Option(metavar="FORCE", example="100N")] = None,
     *,
-    quantity: Annotated[Asked | None, Option(default="efficiency, or what --input-force and --output-force ask for")] = None,
+    quantity: Annotated[
+        Asked | None, Option(metavar="QUANTITY", default="efficiency, or what --input-force and --output-force ask for")
+    ] = None,
     wrap_angles: Annotated[Sequence[Quantity], Option(("--wrap-angle",), "90deg", "ANGLE")] = (),
     preload: Annotated[Quantity | None, Option(metavar="FORCE", example="20N")] = None,
     friction_limit: Annotated[Quantity | None, Option(metavar="TORQUE", example="50N*mm")] = None,

@@ -218,14 +218,12 @@ def _serve(requests: "Connection", theirs: "tuple[Connection, ...]", settings: C
 
     jax.config.update("jax_platforms", "cpu")
     settings()
-    with jax.enable_x64(True):
+    with jax.enable_x64(True), suppress(EOFError, ConnectionError):  # that process has ended, perhaps with a reply unread
         while True:
-            try:
-                function, arguments = requests.recv()
-            except EOFError:
-                os._exit(0)
+            function, arguments = requests.recv()
             for reply in _replies(function, arguments):
                 requests.send(reply)
+    os._exit(0)
 
 
 def _replies(function: Callable[..., Any], arguments: tuple[Any, ...]) -> Iterator[tuple[Any, Any] | None]:

@@ -92,6 +92,34 @@ def test_a_process_that_is_ended_from_outside_is_a_sentence():
     assert "memory ran out" in done.stdout
 
 
+HUNG_UP = """
+import time
+from multiprocessing import get_context
+from bowdenfit.run.helpers import _serve
+
+def nothing():
+    pass
+
+context = get_context("fork")
+ours, theirs = context.Pipe()
+process = context.Process(target=_serve, args=(theirs, (ours,), nothing))
+process.start()
+theirs.close()
+ours.send((abs, (-3,)))
+while not ours.poll(0.05):
+    pass
+ours.close()  # with the reply unread, as by a process that is killed
+process.join(20)
+print(process.exitcode)
+"""
+
+
+@needs_linux
+def test_a_process_whose_replies_nobody_reads_any_more_ends_without_a_word():
+    done = subprocess.run([sys.executable, "-c", HUNG_UP], capture_output=True, text=True, check=True, timeout=60)
+    assert (done.stdout, done.stderr) == ("0\n", "")
+
+
 def fails():
     yield 1
     raise BowdenfitError("what was seen")

@@ -1,8 +1,10 @@
 """Recordings in the files that acquisition programs write: one entry that finds the reader by ending and by content."""
 
 from collections.abc import Callable
+from dataclasses import replace
 from importlib import import_module
 from pathlib import Path
+from weakref import WeakValueDictionary
 
 from bowdenfit.errors import DatasetError
 from bowdenfit.files.channels import ChannelFile
@@ -22,13 +24,15 @@ FORMATS: dict[str, str | Callable[[Path], ChannelFile]] = {
 }
 """Who reads files with an ending: a function, or a module whose `read` is imported with the first such file."""
 
+_KEPT: WeakValueDictionary[tuple[Path, int, int, int], ChannelFile] = WeakValueDictionary()
+
 
 def read_channels(path: Path) -> ChannelFile:
     """Read all numeric channels of a recording, whatever program wrote it.
 
     The ending chooses the reader; the first bytes are looked at first, so that a file with the wrong ending is refused
-    with what it really is. Libraries are imported only for the kind of file at hand, and those that read binary files in a
-    process of their own, with limits of memory and time.
+    with what it really is. A file whose channels somebody still holds is not read again. Libraries are imported only for the
+    kind of file at hand, and those that read binary files in a process of their own, with limits of memory and time.
 
     Args:
         path: A file, or the folder of a ROS 2 bag.
@@ -37,6 +41,18 @@ def read_channels(path: Path) -> ChannelFile:
         DatasetError: The file is missing, empty, unreadable, damaged, too large, not what its ending says, or of no
             kind that can be read; or its library is not installed.
     """
+    found = path.stat() if path.is_file() else None
+    which = (path.resolve(), found.st_mtime_ns, found.st_size, found.st_ino) if found else None
+    known = _KEPT.get(which) if which else None
+    if known is None:
+        known = _read_anew(path)
+        if which:
+            _KEPT[which] = known
+    return replace(known, path=path) if known.path != path else known
+
+
+def _read_anew(path: Path) -> ChannelFile:
+    """The channels of a file that is not in memory."""
     ending = ".bag" if is_ros2_folder(path) else _checked_ending(path)
     if str(FORMATS[ending]).startswith(f"{__name__}.") and ending not in TEXT:
         from bowdenfit.files.apart import read_apart

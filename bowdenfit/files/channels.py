@@ -6,6 +6,7 @@ from pathlib import Path
 
 import numpy as np
 
+from bowdenfit.files.pieces import sample
 from bowdenfit.files.row_account import RowAccount
 from bowdenfit.types import Vector
 
@@ -34,7 +35,7 @@ class Channel:
         """Samples a second, by the median step of the clock; NaN without one."""
         if self.time is None or len(self.time) < 2:
             return float("nan")
-        step = float(np.median(np.diff(self.time)))
+        step = float(np.median(np.diff(sample(self.time))))
         return 1 / step if step > 0 else float("nan")
 
 

@@ -10,6 +10,7 @@ import numpy as np
 from bowdenfit.errors import DatasetError
 from bowdenfit.files.channels import Channel
 from bowdenfit.files.libraries import load
+from bowdenfit.files.pieces import last_set, rises
 from bowdenfit.types import Vector
 from bowdenfit.units import conversion_factor
 
@@ -67,10 +68,10 @@ def is_clock(channel: Channel) -> bool:
     a unit of time must also never run backwards.
     """
     factor = _time_factor(channel.unit)
-    rises = len(channel.values) > 1 and bool(np.all(channel.values[1:] >= channel.values[:-1]))
-    if names_time(channel.name) and (rises or not _TENSION.fullmatch(channel.name)):
+    forward = len(channel.values) > 1 and rises(channel.values)
+    if names_time(channel.name) and (forward or not _TENSION.fullmatch(channel.name)):
         return not channel.unit or factor is not None
-    return factor is not None and rises
+    return factor is not None and forward
 
 
 def names_time(heading: str) -> bool:
@@ -153,8 +154,7 @@ def _from_first(seconds: Vector) -> Vector:
 
 def _filled(values: Vector) -> int:
     """Number of samples up to the last that is none of the blank ones."""
-    present = np.flatnonzero(~np.isnan(values))
-    return int(present[-1]) + 1 if len(present) else 0
+    return last_set(~np.isnan(values), len(values)) + 1
 
 
 def _time_factor(unit: str) -> float | None:

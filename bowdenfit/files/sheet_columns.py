@@ -75,14 +75,19 @@ def columns_of(sheet: SheetRows) -> SheetColumns:
     columns: list[Vector | None] = [None] * len(kinds)
     before = sheet.before or {}
     for i, values in (cells.numbers | cells.dates).items():
-        found = np.array(values[:stop], dtype=object if i in cells.dates else float)[kept]
-        whole = np.concatenate([*before.pop(i, ()), found])
+        pieces = before.pop(i, [])
+        kind = pieces[0].dtype if pieces else float
+        found = np.array(values[:stop], dtype=object if i in cells.dates else kind)[kept]
+        whole = np.concatenate([*pieces, found])
+        pieces.clear()
         if i in cells.dates:
             columns[i] = seconds_of_dates(whole, f"{sheet.place}, column {shown(sheet.layout.name(i))}")
         else:
             whole[~np.isfinite(whole)] = np.nan
             columns[i] = whole
-    return SheetColumns(columns, _remarks(sheet, cells.letters, left_out, beside, stop), left_out, beside, len(cells.letters))
+    return SheetColumns(
+        columns, _remarks(sheet, cells.letters, left_out, beside, stop), left_out, beside, len(cells.letters)
+    )
 
 
 def _left_out(sheet: SheetRows, cells: SheetCells, stop: int) -> dict[int, tuple[str, str]]:

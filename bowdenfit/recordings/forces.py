@@ -7,6 +7,7 @@ import numpy as np
 from bowdenfit.description.pulleys import Pulleys
 from bowdenfit.errors import DatasetError
 from bowdenfit.files.channels import Channel, ChannelFile
+from bowdenfit.files.pieces import same
 from bowdenfit.recordings.named_channels import RATE, TORQUES, WANTED, converted, find_channel, stated_unit
 from bowdenfit.recordings.recording import RawRecording
 from bowdenfit.units import INTERNAL_UNITS, ColumnSource, speed_dimension
@@ -47,6 +48,8 @@ def to_recording(
         for q in ("input_force", "output_force")
     }
     clocks = {q: _clock(file, found[q], found.get("time"), sources.get("time")) for q in found if q != "time"}
+    known = {len(clock): clock for clock in clocks.values()}
+    clocks = {q: known[len(clock)] if same(known[len(clock)], clock) else clock for q, clock in clocks.items()}
     for quantity, values in forces.items():
         _same_length(file, found[quantity], values, clocks[quantity])
     velocity, unit = _velocity(file, found.get("velocity"), sources.get("velocity"))
@@ -67,7 +70,11 @@ def to_recording(
 
 
 def _torques(
-    file: ChannelFile, found: Mapping[str, Channel], sources: Mapping[str, ColumnSource], pulleys: Pulleys, is_loop: bool
+    file: ChannelFile,
+    found: Mapping[str, Channel],
+    sources: Mapping[str, ColumnSource],
+    pulleys: Pulleys,
+    is_loop: bool,
 ) -> dict[str, Channel]:
     """Channels of torque in the place of forces, by the force that each becomes."""
     torques = {}
@@ -99,7 +106,7 @@ def _from_torque(
 
 def _check_distinct(file: ChannelFile, one: Channel, other: Channel) -> None:
     """Refuse one channel, or a copy of it, in the place of both forces."""
-    if not np.array_equal(one.values, other.values, equal_nan=True):
+    if not same(one.values, other.values):
         return
     what = "the same channel" if one is other else f"copies of each other, {shown(other.name)} having the same numbers"
     raise DatasetError(

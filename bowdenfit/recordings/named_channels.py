@@ -10,6 +10,7 @@ from bowdenfit.errors import DatasetError, nearest
 from bowdenfit.files.channels import Channel, ChannelFile
 from bowdenfit.files.matching import Quantity, candidates, meanings
 from bowdenfit.files.naming import parse_sources
+from bowdenfit.files.pieces import sample
 from bowdenfit.units import ChannelSource, ColumnSource, conversion_factor
 from bowdenfit.words import quoted, shown
 
@@ -123,9 +124,14 @@ def converted(
     """Values of a channel in the internal unit."""
     sign, unit = stated_unit(file, channel, quantity, source)
     try:
-        return _of_counts(channel, source) * (sign * conversion_factor(unit, dimension))
+        return _times(_of_counts(channel, source), sign * conversion_factor(unit, dimension))
     except DatasetError as error:
         raise DatasetError(f"{file.path.name}, channel {shown(channel.name)}: {error}.") from None
+
+
+def _times(values: np.ndarray, factor: float) -> np.ndarray:
+    """Values in another unit; the same array in the same."""
+    return values if factor == 1 else values * factor
 
 
 def _of_counts(channel: Channel, source: ColumnSource | None) -> np.ndarray:
@@ -163,7 +169,8 @@ def steady_value(
         values = _of_counts(channel, source) * convert(unit)
     except DatasetError as error:
         raise DatasetError(f"{file.path.name}, channel {shown(channel.name)}: {error}.") from None
-    finite = values[np.isfinite(values)]
+    some = sample(values)
+    finite = some[np.isfinite(some)]
     if not len(finite):
         raise DatasetError(f"{file.path.name}: the channel {shown(channel.name)} has no number in it; name another.")
     low, middle, high = np.quantile(finite, (0.02, 0.5, 0.98))

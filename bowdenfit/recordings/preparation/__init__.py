@@ -10,6 +10,7 @@ import numpy as np
 
 from bowdenfit.description import Preparation, QuantityValue
 from bowdenfit.errors import DatasetError
+from bowdenfit.files import pieces
 from bowdenfit.recordings.preparation.bandwidth import bandwidth_of, main_frequency
 from bowdenfit.recordings.preparation.blocks import CommonClock, average, block_samples, refuse_too_long
 from bowdenfit.recordings.preparation.checks import check, check_sign
@@ -19,7 +20,7 @@ from bowdenfit.recordings.preparation.flags import flag
 from bowdenfit.recordings.preparation.noise import noise_about_trend
 from bowdenfit.recordings.preparation.tare import tare_of
 from bowdenfit.recordings.recording import Account, Blocks, Flagged, RawRecording
-from bowdenfit.types import Flags, Vector
+from bowdenfit.types import Vector
 
 _SHOWN_FLAGS = 300
 _USUAL_BLOCK = 0.05
@@ -97,7 +98,8 @@ def average_recording(found: Inspected, one_for_all: tuple[float, float] | None 
     delay = found.delay if one_for_all is None else Delay(*one_for_all, found.delay.exponent)
     common = _together(raw, cleaned, settings, delay.value) if delay.value else found.together
     _require_some_good(raw, common)
-    filled = [_filled(force, common.fault == GOOD) for force in (common.input_force, common.output_force)]
+    good = common.fault == GOOD
+    filled = [pieces.Filled(force, good) for force in (common.input_force, common.output_force)]
     main = main_frequency(filled[0], filled[1], 1 / common.step)
     bandwidth = bandwidth_of(filled[0], filled[1], 1 / common.step, main, raw.loop)
     noise = _noise(cleaned.input, bandwidth), _noise(cleaned.output, bandwidth)
@@ -129,7 +131,9 @@ def _clean(raw: RawRecording, settings: Preparation) -> _Cleaned:
     found = [flag(times[one], forces[one], times[two], forces[two], settings) for one, two in pairs]
     names = "input_force", "output_force"
     tares = [_tare(raw.file, name, channel, settings) for name, (channel, _) in zip(names, found, strict=True)]
-    channels = [replace(c, force=c.force - tare) for (c, _), (tare, _) in zip(found, tares, strict=True)]
+    channels = [
+        replace(c, force=c.force - tare if tare else c.force) for (c, _), (tare, _) in zip(found, tares, strict=True)
+    ]
     for name, channel in zip(names, channels, strict=True):
         if not raw.loop:
             check_sign(raw.file, name, channel.force)
@@ -150,25 +154,33 @@ def _tare(file: str, name: str, channel: Sampled, settings: Preparation) -> tupl
 
 def _together(raw: RawRecording, cleaned: _Cleaned, settings: Preparation, delay: float) -> CommonClock:
     """Both channels on the clock of the one with more samples, the output shifted back by the delay."""
-    output = replace(cleaned.output, time=cleaned.output.time - delay)
-    time = cleaned.input.time if len(cleaned.input.time) >= len(output.time) else output.time
-    input_force, input_fault = read_at(cleaned.input, time)
-    output_force, output_fault = read_at(output, time)
+    if len(cleaned.input.time) >= len(cleaned.output.time):
+        time = cleaned.input.time
+        (input_force, input_fault), (output_force, output_fault) = (
+            read_at(cleaned.input, time),
+            read_at(cleaned.output, time, delay),
+        )
+    else:
+        time = cleaned.output.time - delay if delay else cleaned.output.time
+        (input_force, input_fault), (output_force, output_fault) = (
+            read_at(cleaned.input, time),
+            (cleaned.output.force, cleaned.output.fault),
+        )
     fault = np.maximum(input_fault, output_fault)
     if settings.tare == "interval" and settings.quiet is not None:
         quiet = (time >= settings.quiet[0]) & (time <= settings.quiet[1])
-        fault = np.where(quiet & (fault != NO_OVERLAP), QUIET, fault)
+        fault[quiet & (fault != NO_OVERLAP)] = QUIET
     return CommonClock(time, step_of(time), input_force, output_force, _velocity(raw, time), fault)
 
 
 def _velocity(raw: RawRecording, time: Vector) -> Vector:
     there = np.isfinite(raw.velocity)
     if there.sum() < 2:
-        return np.full(len(time), np.nan)
+        return np.broadcast_to(np.nan, len(time))
     clock = spread(raw.velocity_time)
-    if len(clock) == len(time) and there.all() and np.array_equal(clock, time):
+    if there.all() and pieces.same(clock, time):
         return raw.velocity
-    return np.interp(time, clock[there], raw.velocity[there], left=np.nan, right=np.nan)
+    return pieces.interpolated(time, clock, raw.velocity, there, outside=np.nan)
 
 
 def _delay(loop: bool, common: CommonClock, settings: Preparation) -> Delay:
@@ -189,23 +201,17 @@ def _stated_block(settings: Preparation) -> float:
 
 def _require_some_good(raw: RawRecording, common: CommonClock) -> None:
     if not np.any(common.fault == GOOD):
-        most = KINDS[int(np.argmax(np.bincount(common.fault, minlength=len(KINDS))))]
+        most = KINDS[int(np.argmax([np.count_nonzero(common.fault == kind) for kind, _ in enumerate(KINDS)]))]
         raise DatasetError(
             f"{raw.file}: none of the {len(common.time)} samples of {raw.name} is left, most of them for {most}. Look at "
             "the recording, or switch off the step of the preparation that leaves them out."
         )
 
 
-def _filled(force: Vector, good: Flags) -> Vector:
-    """A force with straight lines over the samples that are not good, for spectra."""
-    where = np.flatnonzero(good)
-    return force if len(where) == len(force) else np.interp(np.arange(len(force)), where, force[where])
-
-
 def _noise(channel: Sampled, bandwidth: float) -> float:
     """Standard deviation of a single sample, from the channel on its own clock [N]."""
     stretch = max(4, round(1 / (2 * bandwidth * step_of(channel.time))))
-    return noise_about_trend(_filled(channel.force, channel.fault == GOOD), stretch)
+    return noise_about_trend(pieces.Filled(channel.force, channel.fault == GOOD), stretch)
 
 
 def _samples_of_block(
@@ -237,7 +243,8 @@ def _remarks(cleaned: _Cleaned, delay: Delay, counts: dict[str, int]) -> list[st
     remarks = [delay.remark] if delay.remark else []
     for name, channel in (("input_force", cleaned.input), ("output_force", cleaned.output)):
         if channel.gap.any():
-            length = float(np.diff(channel.time)[channel.gap[:-1]].sum())
+            before = np.flatnonzero(channel.gap)
+            length = float((channel.time[before + 1] - channel.time[before]).sum())
             remarks.append(f"The clock of {name} has {int(channel.gap.sum())} gaps, {length:.3g} s together.")
     if counts["saturated"]:
         remarks.append(

@@ -1,11 +1,20 @@
 """Up to which frequency the forces move together, above which the load cells show only noise."""
 
+from collections.abc import Iterator
+
 import numpy as np
 
-from bowdenfit.types import Vector
+from bowdenfit.files import pieces
+from bowdenfit.files.pieces import Series
+from bowdenfit.recordings.preparation.shapes import OtherVector
 
 _LONGEST_SEGMENT = 8192
-_PERIODS = 4  # of the main motion in a segment, at the most: more of them show equal cycles as lines with nothing in between
+_MOST_OF_MOTION = (
+    1 << 17
+)  # samples that the main motion is looked for in: else segments would be shorter than its period
+_PERIODS = (
+    4  # of the main motion in a segment, at the most: more of them show equal cycles as lines with nothing in between
+)
 _SHORTEST_SEGMENT = 64
 _CLEAR = 10  # times the floor: the highest of some thousand frequencies of noise is three times as high
 _BINS_PER_OCTAVE = 2
@@ -13,7 +22,7 @@ _NOISE_TO_SIGNAL = 1.0
 _COHERENT = 1 / (1 + _NOISE_TO_SIGNAL) ** 2
 
 
-def bandwidth_of(input_force: Vector, output_force: Vector, rate: float, main: float, loop: bool = False) -> float:
+def bandwidth_of(input_force: Series, output_force: Series, rate: float, main: float, loop: bool = False) -> float:
     """Frequency up to which the forces move together [Hz].
 
     The lower of two estimates, each a signal-to-noise ratio of 1. The first is where the spectra have come down to twice
@@ -34,10 +43,8 @@ def bandwidth_of(input_force: Vector, output_force: Vector, rate: float, main: f
     segment = _segment(len(input_force))
     if main > 0:
         segment = min(segment, max(int(_PERIODS * rate / main), _SHORTEST_SEGMENT))
-    x, y = (_transforms(force, segment) for force in (input_force, output_force))
-    frequency = np.arange(2, x.shape[1]) * rate / segment
-    powers = [np.mean(np.abs(z) ** 2, axis=0)[2:] for z in (x, y)]
-    cross = np.mean(np.conj(x) * y, axis=0)[2:]
+    *powers, cross = (z[2:] for z in _spectra(input_force, output_force, segment))
+    frequency = np.arange(2, len(cross) + 2) * rate / segment
     octave = np.floor(_BINS_PER_OCTAVE * np.log2(frequency / frequency[0]) + 1e-9).astype(int)
     bins = np.unique(octave)
     starts = np.searchsorted(octave, bins)
@@ -51,7 +58,7 @@ def bandwidth_of(input_force: Vector, output_force: Vector, rate: float, main: f
     return min(over, float(upper[coherent[-1]]), rate / 2) if len(coherent) else over
 
 
-def main_frequency(input_force: Vector, output_force: Vector, rate: float) -> float:
+def main_frequency(input_force: Series, output_force: Series, rate: float) -> float:
     """Frequency at which the forces move most [Hz]; 0 where they hardly move more than their noise does.
 
     Power counts by the root of its frequency: a drift three times as large as cycles a hundred times as fast is not taken for
@@ -62,24 +69,52 @@ def main_frequency(input_force: Vector, output_force: Vector, rate: float) -> fl
         output_force: See `bandwidth_of`.
         rate: See `bandwidth_of`.
     """
-    segment = _segment(len(input_force))
-    spectra = [np.abs(_transforms(force, segment)[:, 1:]) ** 2 for force in (input_force, output_force)]
-    frequency = np.arange(1, spectra[0].shape[1] + 1) * rate / segment
-    power = np.mean(spectra[0] + spectra[1], axis=0)
+    joined = -(-len(input_force) // _MOST_OF_MOTION)
+    slow_in, slow_out = (_joined(force, joined) for force in (input_force, output_force))
+    segment, rate = _segment(len(slow_in)), rate / joined
+    of_input, of_output, _ = _spectra(slow_in, slow_out, segment)
+    power = (of_input + of_output)[1:]
+    frequency = np.arange(1, len(power) + 1) * rate / segment
     most = int(np.argmax(power * np.sqrt(frequency)))
     return float(frequency[most]) if power[most] > _CLEAR * np.median(power[frequency > rate / 4]) else 0.0
+
+
+def _joined(values: Series, samples: int) -> OtherVector:
+    """Means of so many samples each, as a channel would have that is so much slower."""
+    if samples == 1:
+        return values[: len(values)]
+    whole, at_once = len(values) // samples, max(pieces.PIECE // samples, 1)
+    starts = range(0, whole, at_once)
+    parts = (values[slice(start * samples, min(start + at_once, whole) * samples)] for start in starts)
+    return np.concatenate([np.asarray(part, dtype=float).reshape(-1, samples).mean(axis=1) for part in parts])
 
 
 def _segment(samples: int) -> int:
     return min(_LONGEST_SEGMENT, max(samples // 8, 16))
 
 
-def _transforms(values: Vector, segment: int) -> np.ndarray:
-    """Spectra of half-overlapping Hann segments, for Welch's mean periodograms."""
-    centered = values - np.mean(values)
-    segments = np.lib.stride_tricks.sliding_window_view(centered, segment)[:: segment // 2]
+def _spectra(input_force: Series, output_force: Series, segment: int) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Welch's mean periodograms of the input, of the output, and across, from half-overlapping Hann segments."""
+    bins, count = segment // 2 + 1, 0
+    sums = np.zeros(bins), np.zeros(bins), np.zeros(bins, dtype=complex)
+    for x, y in zip(*(_transforms(force, segment) for force in (input_force, output_force)), strict=True):
+        for total, power in zip(sums, (np.abs(x) ** 2, np.abs(y) ** 2, np.conj(x) * y), strict=True):
+            total += np.sum(power, axis=0)
+        count += len(x)
+    return sums[0] / count, sums[1] / count, sums[2] / count
+
+
+def _transforms(values: Series, segment: int) -> Iterator[np.ndarray]:
+    """Spectra of all segments, so many at once as fill a piece."""
+    samples, hop = len(values), segment // 2
+    mean = sum(float(np.sum(values[part], dtype=float)) for part in pieces.parts(samples)) / samples
     window = np.hanning(segment + 1)[:-1]
-    return np.fft.rfft(segments * window, axis=1)
+    at_once, all_of_them = max((pieces.PIECE - segment) // hop + 1, 1), (samples - segment) // hop + 1
+    for first in range(0, all_of_them, at_once):
+        last = min(first + at_once, all_of_them) - 1
+        centered = values[slice(first * hop, last * hop + segment)] - mean
+        segments = np.lib.stride_tricks.sliding_window_view(centered, segment)[::hop]
+        yield np.fft.rfft(segments * window, axis=1)
 
 
 def _first_below(

@@ -5,8 +5,9 @@ from dataclasses import dataclass
 import numpy as np
 
 from bowdenfit.errors import DatasetError
+from bowdenfit.files import pieces
 from bowdenfit.recordings.preparation.clock import DROPOUT, GOOD, KINDS, SATURATED
-from bowdenfit.recordings.preparation.shapes import ChosenFlags, ChosenVector, Places
+from bowdenfit.recordings.preparation.shapes import ChosenVector, Places
 from bowdenfit.recordings.recording import Blocks
 from bowdenfit.types import Flags, Labels, Vector
 
@@ -35,6 +36,13 @@ class CommonClock:
     output_force: Vector
     velocity: Vector
     fault: Labels
+
+    def part(self, some: slice) -> "CommonClock":
+        """A piece of it, in double precision."""
+        pulled, given, velocity = (
+            pieces.numbers(each, some) for each in (self.input_force, self.output_force, self.velocity)
+        )
+        return CommonClock(self.time[some], self.step, pulled, given, velocity, self.fault[some])
 
 
 def block_samples(
@@ -90,10 +98,12 @@ def _span(common: CommonClock) -> float:
 
 def _quiet_enough(common: CommonClock, noise: tuple[float, float], loop: bool) -> int:
     """Samples over which the noise of how far the forces are apart comes down to a tenth of half the friction band."""
-    good = (common.fault == GOOD) & (loop | ((common.input_force > 0) & (common.output_force > 0)))
+    evenly = slice(None, None, -(-len(common.time) // pieces.PLENTY))
+    pulled, given = (pieces.numbers(force, evenly) for force in (common.input_force, common.output_force))
+    good = (common.fault[evenly] == GOOD) & (loop | ((pulled > 0) & (given > 0)))
     if not good.any():
         return 1
-    pulled, given = common.input_force[good], common.output_force[good]
+    pulled, given = pulled[good], given[good]
     apart = pulled - given if loop else np.log(pulled / given)
     single = float(np.hypot(*noise) if loop else np.median(np.hypot(noise[0] / pulled, noise[1] / given)))
     low, high = np.quantile(apart, (0.1, 0.9))
@@ -111,32 +121,52 @@ def average(common: CommonClock, samples: int) -> tuple[Blocks, dict[str, int]]:
         common: Both channels.
         samples: Samples of a block; 0 to leave every sample by itself.
     """
-    size = max(samples, 1)
-    place = np.floor((common.time - common.time[0]) / (size * common.step) + 0.5 / size).astype(int)
-    place = np.arange(len(place)) if samples == 0 else place
-    fault = _swept(common.fault, place)
-    kept = _means(common, place, fault == GOOD)
-    lost = _means(common, place, (common.fault == SATURATED) & _saturated_blocks(fault, place)[place])
-    order = np.argsort(np.append(kept[0], lost[0]), kind="stable")
-    joined = [np.append(a, b)[order] for a, b in zip(kept, lost, strict=True)]
-    middle = common.time[0] + common.step * ((joined[0] + 0.5) * size - 0.5)
-    time = common.time[joined[0]] if samples == 0 else middle
-    saturated = np.append(np.zeros(len(kept[0]), dtype=bool), np.ones(len(lost[0]), dtype=bool))[order]
-    counts = dict(zip(KINDS, np.bincount(fault, minlength=len(KINDS)).tolist(), strict=True))
-    return Blocks(time, joined[1], joined[2], joined[3], joined[4], saturated), counts
+    kept, lost, counts, start = [], [], np.zeros(len(KINDS), dtype=int), 0
+    while start < len(common.time):
+        place, stop = _whole_blocks(common, start, samples)
+        part = common.part(slice(start, stop))
+        fault = _swept(part.fault, place)
+        kept.append(_means(part, place, fault == GOOD))
+        lost.append(_means(part, place, (part.fault == SATURATED) & _saturated_blocks(fault, place)))
+        counts += np.bincount(fault, minlength=len(KINDS))
+        start = stop
+    joined = [np.concatenate(each) for each in zip(*kept, *lost, strict=True)]
+    order = np.argsort(joined[0], kind="stable")
+    place, pulled, given, velocity, count = (column[order] for column in joined)
+    middle = common.time[0] + common.step * ((place + 0.5) * max(samples, 1) - 0.5)
+    saturated = (np.arange(len(order)) >= sum(len(each[0]) for each in kept))[order]
+    time = common.time[place] if samples == 0 else middle
+    blocks = Blocks(time, pulled, given, velocity, count, saturated)
+    return blocks, dict(zip(KINDS, counts.tolist(), strict=True))
 
 
-def _saturated_blocks(fault: Labels, place: Labels) -> ChosenFlags:
-    """Whether more than half of the readings of each block are at the end of the range."""
-    readings = np.bincount(place, weights=fault < DROPOUT)
-    return 2 * np.bincount(place, weights=fault == SATURATED, minlength=len(readings)) > readings
+def _whole_blocks(common: CommonClock, start: int, samples: int) -> tuple[Places, int]:
+    """The block of each sample from one on, as far as whole blocks go in a piece, and where they end."""
+    length = pieces.PIECE
+    while True:
+        stop = min(start + length, len(common.time))
+        if samples == 0:
+            return np.arange(start, stop), stop
+        since = common.time[start:stop] - common.time[0]
+        place = np.floor(since / (samples * common.step) + 0.5 / samples).astype(int)
+        whole = int(np.searchsorted(place, place[-1])) if stop < len(common.time) else len(place)
+        if whole:
+            return place[:whole], start + whole
+        length *= 2
+
+
+def _saturated_blocks(fault: Labels, place: Labels) -> Flags:
+    """Which samples are in blocks more than half of whose readings are at the end of the range."""
+    block = place - place[0]
+    readings = np.bincount(block, weights=fault < DROPOUT)
+    return (2 * np.bincount(block, weights=fault == SATURATED, minlength=len(readings)) > readings)[block]
 
 
 def _swept(fault: Labels, place: Labels) -> Labels:
     """Faults with the good samples of saturated blocks counted as saturated."""
     if not np.any(fault == SATURATED):
         return fault
-    return np.where((fault == GOOD) & _saturated_blocks(fault, place)[place], SATURATED, fault)
+    return np.where((fault == GOOD) & _saturated_blocks(fault, place), SATURATED, fault)
 
 
 def _means(

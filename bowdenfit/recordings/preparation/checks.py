@@ -3,6 +3,7 @@
 import numpy as np
 
 from bowdenfit.errors import DatasetError
+from bowdenfit.files.pieces import numbers, parts, sample
 from bowdenfit.recordings.preparation.shapes import OtherVector
 from bowdenfit.recordings.recording import RawRecording
 from bowdenfit.types import Vector
@@ -53,13 +54,17 @@ def check_sign(file: str, name: str, force: Vector) -> None:
     Raises:
         DatasetError: More than half of the readings above a fifth of the largest are negative.
     """
-    finite = force[np.isfinite(force)]
-    loaded = finite[np.abs(finite) > 0.2 * np.max(np.abs(finite))]
-    negative = float(np.mean(loaded < 0))
+    low, high = _range(force)
+    largest, loaded, below = max(abs(low), abs(high)), 0, 0
+    for part in parts(len(force)):
+        some = numbers(force, part)
+        under_load = some[np.isfinite(some) & (np.abs(some) > 0.2 * largest)]
+        loaded, below = loaded + len(under_load), below + int(np.count_nonzero(under_load < 0))
+    negative = below / max(loaded, 1)
     if negative > 0.5:
         raise DatasetError(
             f"{file}: {100 * negative:.0f} % of the readings of {name} under load are negative, down to "
-            f"{finite.min():.4g} N, but a rope can only pull; the usual cause is the sign convention of the load cell. "
+            f"{low:.4g} N, but a rope can only pull; the usual cause is the sign convention of the load cell. "
             f"Turn the sign by mapping the channel with a minus before its unit, such as --channel {name}=NAME:-N."
         )
 
@@ -79,15 +84,17 @@ def _check_lengths(file: str, name: str, time: OtherVector, values: Vector) -> N
 
 
 def _check_clock(file: str, name: str, time: Vector) -> None:
-    missing = np.flatnonzero(~np.isfinite(time))
-    if len(missing):
+    missing = next(
+        (p.start + int(np.argmin(ok)) for p in parts(len(time)) if not (ok := np.isfinite(time[p])).all()), None
+    )
+    if missing is not None:
         raise DatasetError(
-            f"{file}: the time of {name} is missing at sample {missing[0] + 1}; every sample needs a time. "
+            f"{file}: the time of {name} is missing at sample {missing + 1}; every sample needs a time. "
             "Delete that row, or export the recording again."
         )
-    backwards = np.flatnonzero(np.diff(time) < 0)
-    if len(backwards):
-        at = int(backwards[0])
+    steps = ((p.start, np.diff(time[p.start : p.stop + 1]) < 0) for p in parts(len(time)))
+    at = next((start + int(np.argmax(back)) for start, back in steps if back.any()), None)
+    if at is not None:
         raise DatasetError(
             f"{file}: the time of {name} runs backwards at sample {at + 2}, from {time[at]:.10g} s to "
             f"{time[at + 1]:.10g} s; the usual cause is two recordings in one file. Split the file there."
@@ -107,14 +114,14 @@ def _check_clock(file: str, name: str, time: Vector) -> None:
 
 
 def _check_forces(file: str, name: str, force: Vector) -> None:
-    finite = force[np.isfinite(force)]
-    low, high = float(finite.min()), float(finite.max())
+    low, high = _range(force)
     if low == high:
         raise DatasetError(
             f"{file}: {name} reads {low:.6g} N in every sample; the usual cause is a load cell that was dead or "
             "unplugged, or another channel than meant. Map the right channel, or leave the recording out."
         )
-    typical = float(np.median(np.abs(finite)))
+    some = sample(force)
+    typical = float(np.median(np.abs(some[np.isfinite(some)]))) if np.isfinite(some).any() else max(-low, high)
     if typical > LARGEST_FORCE:
         raise DatasetError(
             f"{file}: {name} reads {typical:.4g} N in its middle, far more than a Bowden cable bears; the usual cause is "
@@ -144,4 +151,12 @@ def _repeated(name: str, time: Vector) -> str:
 
 
 def _share_repeated(time: Vector) -> float:
-    return float(np.mean(np.diff(time) == 0)) if len(time) > 1 else 0.0
+    repeated = sum(int(np.count_nonzero(np.diff(time[p.start : p.stop + 1]) == 0)) for p in parts(len(time)))
+    return repeated / (len(time) - 1) if len(time) > 1 else 0.0
+
+
+def _range(force: Vector) -> tuple[float, float]:
+    """The lowest and the highest reading [N]."""
+    pieces = (numbers(force, part) for part in parts(len(force)))
+    ends = [(float(np.min(some)), float(np.max(some))) for piece in pieces if len(some := piece[np.isfinite(piece)])]
+    return min(low for low, _ in ends), max(high for _, high in ends)

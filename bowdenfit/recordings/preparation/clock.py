@@ -4,6 +4,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from bowdenfit.files.pieces import parts, rises, same, sample
+from bowdenfit.recordings.preparation.shapes import OtherLabels, OtherVector
 from bowdenfit.types import Flags, Labels, Vector
 
 GAP_STEPS = 5
@@ -30,48 +32,77 @@ class Sampled:
 
 def step_of(time: Vector) -> float:
     """Time between samples [s]: the mean step, gaps left out."""
-    steps = np.diff(time)
-    return float(np.mean(steps[steps <= GAP_STEPS * np.median(steps)]))
+    longest = GAP_STEPS * np.median(np.diff(sample(time)))
+    total, count = 0.0, 0
+    for part in parts(len(time) - 1):
+        steps = np.diff(time[part.start : part.stop + 1])
+        usual = steps[steps <= longest]
+        total, count = total + float(np.sum(usual)), count + len(usual)
+    return total / count
 
 
 def gaps_of(time: Vector) -> Flags:
     """Whether the clock jumps by more than five steps after each sample; never after the last."""
-    return np.append(np.diff(time) > GAP_STEPS * step_of(time), False)
+    longest, gaps = GAP_STEPS * step_of(time), np.zeros(len(time), dtype=bool)
+    for part in parts(len(time) - 1):
+        gaps[part] = np.diff(time[part.start : part.stop + 1]) > longest
+    return gaps
 
 
 def spread(time: Vector) -> Vector:
     """The clock with repeated times spread evenly up to the next different time, so that it increases strictly [s]."""
-    first = np.append(True, np.diff(time) > 0)
-    if first.all():
+    if rises(time, strictly=True):
         return time
-    starts = np.flatnonzero(first)
-    last_step = float(np.median(np.diff(time[starts]) / np.diff(starts)))
-    ends = np.append(starts, len(time))
-    return np.interp(
-        np.arange(len(time)), ends, np.append(time[starts], time[-1] + last_step * (ends[-1] - starts[-1]))
-    )
+    spread_out = np.empty(len(time))
+    for part in parts(len(time)):
+        begin = int(np.searchsorted(time, time[part.start], side="left"))
+        end = int(np.searchsorted(time, time[part.stop - 1], side="right"))
+        times = time[begin : end + 1]
+        starts = np.flatnonzero(np.append(True, np.diff(times) > 0))
+        times = times[starts]
+        if end == len(time):
+            starts, times = (
+                np.append(starts, end - begin),
+                np.append(times, times[-1] + _last_step(time, starts[-1] + begin)),
+            )
+        spread_out[part] = np.interp(np.arange(part.start, part.stop) - begin, starts, times)
+    return spread_out
 
 
-def read_at(channel: Sampled, time: Vector) -> tuple[Vector, Labels]:
+def _last_step(time: Vector, last: int) -> float:
+    """How long the last of repeated times lasts, which begins at a sample: as its samples do elsewhere."""
+    some = sample(time)
+    starts = np.flatnonzero(np.append(True, np.diff(some) > 0))
+    return float(np.median(np.diff(some[starts]) / np.diff(starts))) * (len(time) - last)
+
+
+def read_at(channel: Sampled, time: OtherVector, late: float = 0.0) -> tuple[OtherVector, OtherLabels]:
     """Readings of a channel at other times by linear interpolation, and the worst fault of the samples they come from.
 
     Args:
         channel: The channel.
         time: Times wanted, increasing [s].
+        late: How much later than it should the channel reads [s].
 
     Returns:
         Readings [N], and faults: `NO_OVERLAP` where the channel was not sampled, `DROPOUT` inside its gaps.
     """
-    if len(time) == len(channel.time) and np.array_equal(time, channel.time):
+    if late == 0 and same(time, channel.time):
         return channel.force, channel.fault
     tolerance = 1e-9 * step_of(channel.time)
+    force, fault = np.empty(len(time), dtype=channel.force.dtype), np.empty(len(time), dtype=channel.fault.dtype)
+    for part in parts(len(time)):
+        force[part], fault[part] = _read_piece(channel, time[part] + late, tolerance)
+    return force, fault
+
+
+def _read_piece(channel: Sampled, time: OtherVector, tolerance: float) -> tuple[OtherVector, OtherLabels]:
     before = np.clip(np.searchsorted(channel.time, time + tolerance, side="right") - 1, 0, len(channel.time) - 2)
     share = (time - channel.time[before]) / (channel.time[before + 1] - channel.time[before])
     share = np.where(np.abs(share - np.round(share)) < 1e-9, np.round(share), share)
     left, right = share < 1, share > 0
-    force = (
-        np.where(left, channel.force[before], 0) * (1 - share) + np.where(right, channel.force[before + 1], 0) * share
-    )
+    at_left, at_right = (np.asarray(channel.force[at], dtype=float) for at in (before, before + 1))
+    force = np.where(left, at_left, 0) * (1 - share) + np.where(right, at_right, 0) * share
     fault = np.maximum(np.where(left, channel.fault[before], GOOD), np.where(right, channel.fault[before + 1], GOOD))
     fault = np.maximum(fault, np.where(left & right & channel.gap[before], DROPOUT, GOOD))
     outside = (share < 0) | (share > 1)

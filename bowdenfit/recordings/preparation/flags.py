@@ -6,6 +6,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from bowdenfit.description import Preparation
+from bowdenfit.files.pieces import first_set, interpolated, last_set, parts, same, sample
 from bowdenfit.recordings.preparation.clock import DROPOUT, GOOD, SATURATED, SPIKE, Sampled, gaps_of, step_of
 from bowdenfit.recordings.preparation.delay import RANGE
 from bowdenfit.recordings.preparation.noise import noise_of, quantum_of
@@ -22,27 +23,44 @@ _CLOSED = 1
 
 @dataclass(frozen=True)
 class Runs:
-    """Stretches of equal successive values.
+    """Long stretches of equal successive values: of `_SHORTEST_RUN` samples or more.
 
     Args:
         start: Index of the first sample of each.
         length: Samples of each.
         value: Its value.
+        typical: Length of the stretches, long or short, that half of all samples lie in, or in shorter ones.
     """
 
     start: Labels
     length: Labels
     value: Vector
+    typical: int
 
     def covered(self, chosen: ChosenFlags, samples: int) -> Flags:
         """Samples that lie in the chosen stretches."""
         return _from_to(self.start[chosen], self.start[chosen] + self.length[chosen], samples)
 
 
-def runs_of(values: Vector) -> Runs:
+def runs_of(values: OtherVector) -> Runs:
     """Split into stretches of equal successive values; each missing value is a stretch of its own."""
-    starts = np.flatnonzero(np.append(True, values[1:] != values[:-1]))
-    return Runs(starts, np.diff(np.append(starts, len(values))), values[starts])
+    begun, counts = 0, dict[int, int]()
+    starts, lengths = [np.zeros(0, dtype=int)], [np.zeros(0, dtype=int)]
+    for part in parts(len(values)):
+        some = values[part.start : part.stop + 1]
+        ends = part.start + 1 + np.flatnonzero(some[1:] != some[:-1])
+        ends = np.append(ends, len(values)) if part.stop == len(values) else ends
+        first = np.append(begun, ends[:-1])[: len(ends)]
+        length = ends - first
+        for each, count in zip(*np.unique(length, return_counts=True), strict=True):
+            counts[int(each)] = counts.get(int(each), 0) + int(count)
+        starts.append(first[length >= _SHORTEST_RUN])
+        lengths.append(length[length >= _SHORTEST_RUN])
+        begun = int(ends[-1]) if len(ends) else begun
+    start, kinds = np.concatenate(starts), sorted(counts)
+    covered = np.cumsum([counts[each] * each for each in kinds])
+    typical = kinds[int(np.searchsorted(covered, len(values) / 2))]
+    return Runs(start, np.concatenate(lengths), np.asarray(values[start], dtype=float), typical)
 
 
 def flag(
@@ -63,14 +81,14 @@ def flag(
         The channel with its faults, and the ends of the range that were taken [N].
     """
     finite = np.isfinite(force)
-    there = np.isfinite(other_force)
-    other = np.interp(time, other_time[there], other_force[there])
-    other_noise = resolution(other_force[there])
+    other = _beside(time, other_time, other_force)
+    some = sample(other_force)
+    other_noise = resolution(some[np.isfinite(some)])
     off = spikes(force)
     lag = round(RANGE / step_of(time))
     limits = settings.limits.newtons if settings.limits else None
-    ends, at_end = saturation(np.where(off, np.nan, force), other, other_noise, limits, lag)
-    fault = np.full(len(force), GOOD)
+    ends, at_end = saturation(_without(force, off), other, other_noise, limits, lag)
+    fault = np.full(len(force), GOOD, dtype=np.int8)
     if settings.saturation != "kept":
         fault[at_end] = SATURATED
     if settings.spikes:
@@ -79,7 +97,18 @@ def flag(
         fault[frozen(force, other, other_noise) & ~at_end] = DROPOUT
     fault[~finite] = DROPOUT
     gap = gaps_of(time) if settings.dropouts else np.zeros(len(time), dtype=bool)
-    return Sampled(time, np.where(finite, force, np.nan), fault, gap), ends
+    return Sampled(time, _without(force, ~finite), fault, gap), ends
+
+
+def _beside(time: Vector, other_time: OtherVector, other_force: OtherVector) -> Vector:
+    """The force of the other channel at the times of one."""
+    there = np.isfinite(other_force)
+    return other_force if there.all() and same(time, other_time) else interpolated(time, other_time, other_force, there)
+
+
+def _without(force: Vector, off: Flags) -> Vector:
+    """A force with nothing in the place of some samples."""
+    return np.where(off, np.array(np.nan, dtype=force.dtype), force) if off.any() else force
 
 
 def resolution(force: Vector) -> float:
@@ -95,9 +124,7 @@ def frozen(force: Vector, other: Vector, other_resolution: float) -> Flags:
     stands still at a reversal looks the same. Repeats that the whole channel has, as after a slower converter, are no fault.
     """
     runs = runs_of(force)
-    moved = _range_over(other, runs) > other_resolution
-    too_long = runs.length >= _longest_by_chance(force, runs)
-    return runs.covered(moved & too_long, len(force))
+    return runs.covered(_long_while_moving(force, other, other_resolution, runs), len(force))
 
 
 def saturation(
@@ -109,23 +136,19 @@ def saturation(
     channel where it is held for longer than noise allows, or where the largest is held while the other force goes on
     rising by more than its resolution, which no cable does; not within the first `lag` samples, in which it may only be later.
     """
-    finite = force[np.isfinite(force)]
     if limits is not None:
-        step = min(quantum_of(finite), 1e-3 * (limits[1] - limits[0]))
+        step = min(quantum_of(_sampled(force)), 1e-3 * (limits[1] - limits[0]))
         ends = limits
     else:
-        step, ends = 0.0, _clipped_at(force, finite, other, other_resolution, lag)
+        step, ends = 0.0, _clipped_at(force, other, other_resolution, lag)
     at_end = (force <= ends[0] + step) | (force >= ends[1] - step)
     return ends, _closed(at_end) if limits is None else at_end
 
 
-def _clipped_at(
-    force: Vector, finite: OtherVector, other: Vector, other_resolution: float, lag: int
-) -> tuple[float, float]:
+def _clipped_at(force: Vector, other: Vector, other_resolution: float, lag: int) -> tuple[float, float]:
     runs = runs_of(force)
-    by_chance = _longest_by_chance(force, runs)
-    long = (runs.length >= by_chance) & (_range_over(other, runs) > other_resolution)
-    low, high = float(finite.min()), float(finite.max())
+    long = _long_while_moving(force, other, other_resolution, runs)
+    low, high = _range_of(force)
     clipped_low = np.any(long & (runs.value == low))
     clipped_high = np.any(long & (runs.value == high)) or _rises_at(high, other, runs, lag) > other_resolution
     return (low if clipped_low else -math.inf, high if clipped_high else math.inf)
@@ -133,19 +156,34 @@ def _clipped_at(
 
 def _longest_by_chance(force: Vector, runs: Runs) -> float:
     """Repeats that noise makes less than once in a million recordings; infinite for a channel without enough noise."""
-    finite = force[np.isfinite(force)]
+    finite = _sampled(force)
     noise, step = noise_of(finite), quantum_of(finite)
     if noise < 0.3 * step or noise == 0:
         return math.inf
     same = math.erf(step / (2 * math.sqrt(2) * noise))
     chance = math.log(_CHANCE / len(force)) / math.log(same) if 0 < same < 1 else 0.0
-    samples = np.bincount(runs.length) * np.arange(runs.length.max() + 1)
-    typical = int(np.searchsorted(np.cumsum(samples), len(force) / 2))
-    return max(float(_SHORTEST_RUN), chance, 5.0 * typical)
+    return max(float(_SHORTEST_RUN), chance, 5.0 * runs.typical)
 
 
-def _range_over(other: Vector, runs: Runs) -> ChosenVector:
-    return np.maximum.reduceat(other, runs.start) - np.minimum.reduceat(other, runs.start)
+def _sampled(force: Vector) -> ChosenVector:
+    """Plenty of the readings of a channel."""
+    some = sample(force)
+    return some[np.isfinite(some)]
+
+
+def _long_while_moving(force: Vector, other: Vector, other_resolution: float, runs: Runs) -> ChosenFlags:
+    """Which of the runs are longer than chance makes them, while the other force changes by more than its resolution."""
+    chosen = runs.length >= _longest_by_chance(force, runs)
+    for i in np.flatnonzero(chosen).tolist():
+        inside = other[runs.start[i] : runs.start[i] + runs.length[i]]
+        chosen[i] = float(inside.max()) - float(inside.min()) > other_resolution
+    return chosen
+
+
+def _range_of(force: Vector) -> tuple[float, float]:
+    """Lowest and highest reading."""
+    there = np.isfinite(force)
+    return float(np.min(force, where=there, initial=np.inf)), float(np.max(force, where=there, initial=-np.inf))
 
 
 def _rises_at(value: float, other: Vector, runs: Runs, lag: int) -> float:
@@ -166,8 +204,10 @@ def _closed(flags: Flags) -> Flags:
 
 def _from_to(start: Places, end: Places, samples: int) -> Flags:
     """Samples from any start up to its end."""
-    edges = np.bincount(start, minlength=samples + 1) - np.bincount(end, minlength=samples + 1)
-    return np.cumsum(edges[:-1]) > 0
+    edges = np.zeros(samples + 1, dtype=np.int8)
+    edges[start] += 1  # neither any start nor any end is there twice
+    edges[end] -= 1
+    return np.cumsum(edges[:-1], dtype=np.int8) > 0
 
 
 def spikes(force: Vector) -> Flags:
@@ -176,17 +216,33 @@ def spikes(force: Vector) -> Flags:
     Quick motion is no spike: the distance allowed grows with the typical step between the neighbors, and more than three
     successive samples are left alone.
     """
-    where = np.flatnonzero(np.isfinite(force))
-    values = force[where]
-    flags = np.zeros(len(force), dtype=bool)
-    if len(values) > 2 * _HALF_WINDOW:
-        flags[where[_spikes_in(values)]] = True
+    there, flags = np.isfinite(force), np.zeros(len(force), dtype=bool)
+    if np.count_nonzero(there) <= 2 * _HALF_WINDOW:
+        return flags
+    values, (low, high) = _sampled(force), _range_of(force)
+    within = values[(values > low) & (values < high)]  # clipped stretches would hide the noise
+    noise = math.hypot(noise_of(within), quantum_of(values) / math.sqrt(12))
+    for part in parts(len(force)):
+        start, stop = _with_neighbors(there, part)
+        where = start + np.flatnonzero(there[start:stop])
+        found = (
+            where[_spikes_in(np.asarray(force[where], dtype=float), noise)]
+            if len(where) > 2 * _HALF_WINDOW
+            else where[:0]
+        )
+        flags[found[(found >= part.start) & (found < part.stop)]] = True
     return flags
 
 
-def _spikes_in(values: Vector) -> Places:
-    within = values[(values > values.min()) & (values < values.max())]  # clipped stretches would hide the noise
-    noise = math.hypot(noise_of(within), quantum_of(values) / math.sqrt(12))
+def _with_neighbors(there: Flags, part: slice) -> tuple[int, int]:
+    """A piece, and so many good samples on both sides that its spikes are those of the whole."""
+    start, stop = part.start, part.stop
+    for _ in range(2 * _HALF_WINDOW + 2 * _LONGEST_SPIKE):
+        start, stop = max(last_set(there, start), 0), min(first_set(there, stop) + 1, len(there))
+    return start, stop
+
+
+def _spikes_in(values: Vector, noise: float) -> Places:
     padded = np.pad(values, _HALF_WINDOW, mode="reflect")
     beside = (padded[: -2 * _HALF_WINDOW] + padded[2 * _HALF_WINDOW :]) / 2
     suspects = np.flatnonzero(np.abs(values - beside) > _SPIKE_SDS / 2 * noise)

@@ -2,6 +2,7 @@
 
 import numpy as np
 
+from bowdenfit.files.pieces import PLENTY, Series, sample
 from bowdenfit.types import Vector
 
 _TO_SD = 1.4826
@@ -29,7 +30,7 @@ def quantum_of(values: Vector) -> float:
     return float(np.partition(steps, len(steps) // 100)[len(steps) // 100])
 
 
-def noise_about_trend(values: Vector, samples: int) -> float:
+def noise_about_trend(values: Series, samples: int) -> float:
     """Standard deviation of a single sample about straight lines through stretches of `samples` [unit of the values].
 
     The median over the stretches, so that those with a turn of the motion do not count. Unlike `noise_of` it sees the
@@ -37,9 +38,12 @@ def noise_about_trend(values: Vector, samples: int) -> float:
     """
     stretches = len(values) // samples
     if samples < 4 or stretches < 5:
-        return noise_of(values)
+        return noise_of(sample(values))
     step = max(1, len(values) // _MOST_TRENDS)
-    rows = values[: stretches * samples].reshape(stretches, samples)[::step]
+    if len(values) <= PLENTY:
+        rows = values[: stretches * samples].reshape(stretches, samples)[::step]
+    else:
+        rows = np.stack([values[i * samples : (i + 1) * samples] for i in range(0, stretches, step)])
     place = np.arange(samples) - (samples - 1) / 2
     centered = rows - rows.mean(axis=1, keepdims=True)
     slope = centered @ place / (place @ place)

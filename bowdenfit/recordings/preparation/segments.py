@@ -4,13 +4,15 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from bowdenfit.files import pieces
 from bowdenfit.recordings.preparation.noise import noise_of
-from bowdenfit.recordings.preparation.shapes import Places
+from bowdenfit.recordings.preparation.shapes import ChosenVector, Places
 from bowdenfit.types import Flags, Labels, Matrix, Vector
 
 _STEP = 0.005
 _SEGMENT = 8.0
 _MOST_POINTS = 5_000
+_FEWEST_ROWS = 16
 _WIDTH = 0.012
 _LIGHT = np.array([1.0, 6.0, 15.0, 20.0, 15.0, 6.0, 1.0]) / 64
 
@@ -40,21 +42,60 @@ def segments_of(time: Vector, input_force: Vector, output_force: Vector, good: F
     rate = (len(time) - 1) / span
     step = max(round(_STEP * rate), 1) / rate
     points = int(span / step)
-    usable = good & (input_force > 0) & (output_force > 0)
-    if points < 20 or usable.sum() < 20:
+    if points < 20:
         return None
-    place = np.minimum(((time - time[0]) / step).astype(int), points - 1)
-    count = np.bincount(place[usable], minlength=points)
-    sums = [np.bincount(place[usable], f[usable], minlength=points) for f in (input_force, output_force)]
-    forces = [_filled(total, count) for total in sums]
+    length = min(max(round(_SEGMENT / step), 20), points)
+    count, *sums = _sums(time, (input_force, output_force), good, step, points, length)
+    if count.sum() < 20:
+        return None
+    points, forces = len(count), [_filled(total, count) for total in sums]
     x, y = (np.log(force) for force in forces)
     weights, jitters = _weight(forces[0], forces[1], count), _jitter(forces[0], step)
     columns = _smooth(x, step), _smooth(y, step), weights, jitters
-    length = min(max(round(_SEGMENT / step), 20), points)
     rows = points // length
     x, y, weight, jitter = (v[: rows * length].reshape(rows, length) for v in columns)
     chosen = _liveliest(x, max(1, _MOST_POINTS // length))
     return Segments(step, x[chosen], y[chosen], weight[chosen], jitter[chosen])
+
+
+def _sums(
+    time: Vector, forces: tuple[Vector, Vector], good: Flags, step: float, points: int, length: int
+) -> tuple[Places, ChosenVector, ChosenVector]:
+    """Number of good readings above zero at each point of the coarse clock, and sums of both forces.
+
+    Of a recording with very many points, those of stretches evenly from all of it.
+
+    Args:
+        time: Common clock [s].
+        forces: Input and output force [N].
+        good: Samples that may be used.
+        step: Time between points [s].
+        points: Number of all of them.
+        length: Points of a stretch.
+    """
+    looked_at = max(pieces.PLENTY // length, _FEWEST_ROWS)
+    rows, every = points // length, points <= looked_at * length
+    stretches = [(0, points)]
+    if not every:
+        stretches = [(row * length, length) for row in np.linspace(0, rows - 1, looked_at).astype(int).tolist()]
+    found: list[tuple[np.ndarray, ...]] = []
+    for begin, wide in stretches:
+        ends = (
+            [0, len(time)]
+            if every
+            else np.searchsorted(time, time[0] + step * np.array([begin, begin + wide])).tolist()
+        )
+        sums = np.zeros(wide, dtype=int), np.zeros(wide), np.zeros(wide)
+        for part in pieces.parts(ends[1] - ends[0]):
+            some = slice(ends[0] + part.start, ends[0] + part.stop)
+            x, y = (pieces.numbers(force, some) for force in forces)
+            usable = good[some] & (x > 0) & (y > 0)
+            place = np.clip(((time[some] - time[0]) / step).astype(int) - begin, 0, wide - 1)[usable]
+            for total, weights in zip(sums, (None, x[usable], y[usable]), strict=True):
+                total += np.bincount(place, weights, minlength=wide)
+        found.append(sums)
+    count, of_input, of_output = (np.concatenate(each) for each in zip(*found, strict=True))
+    return count, of_input, of_output
 
 
 def _filled(total: Vector, count: Labels) -> Vector:

@@ -6,6 +6,7 @@ import numpy as np
 from jaxtyping import Bool, Float, Int
 
 OtherVector: TypeAlias = Float[np.ndarray, " other"]
+OtherLabels: TypeAlias = Int[np.ndarray, " other"]
 ChosenVector: TypeAlias = Float[np.ndarray, " chosen"]
 ChosenFlags: TypeAlias = Bool[np.ndarray, " chosen"]
 Places: TypeAlias = Int[np.ndarray, " chosen"]

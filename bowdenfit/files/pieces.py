@@ -1,0 +1,131 @@
+"""Long series a piece at a time, so that working with a recording takes hardly more memory than keeping it.
+
+`PIECE` changes no result beyond rounding. What more than `PLENTY` samples say of noise and the like, that many say as well:
+they are taken in stretches, evenly from all of the series.
+"""
+
+from collections.abc import Iterator
+from typing import TypeAlias
+
+import numpy as np
+from jaxtyping import Float
+
+from bowdenfit.types import Flags, Vector
+
+PIECE = 1 << 20  # samples at once
+PLENTY = 1 << 20  # samples that tell a scale
+_STRETCHES = 256
+
+
+class Filled:
+    """A series with straight lines over the samples that are not good, worked out where it is looked at."""
+
+    def __init__(self, values: Vector, good: Flags) -> None:
+        """Keep the series, and which of its samples are good."""
+        self._values, self._good = values, good
+
+    def __len__(self) -> int:
+        """Number of samples."""
+        return len(self._values)
+
+    def __getitem__(self, part: slice) -> Float[np.ndarray, " some"]:
+        """Some of it, in double precision."""
+        start, stop, _ = part.indices(len(self))
+        some, good = numbers(self._values, slice(start, stop)), self._good[start:stop]
+        if good.all():
+            return some
+        first, behind = max(last_set(self._good, start), 0), min(first_set(self._good, stop) + 1, len(self))
+        where = first + np.flatnonzero(self._good[first:behind])
+        return np.interp(np.arange(start, stop), where, np.asarray(self._values[where], dtype=float))
+
+
+Series: TypeAlias = Float[np.ndarray, " all"] | Filled
+"""Samples, in memory or worked out where they are looked at."""
+
+
+def parts(samples: int) -> Iterator[slice]:
+    """Pieces of a series, one after the other."""
+    return (slice(start, min(start + PIECE, samples)) for start in range(0, samples, PIECE))
+
+
+def numbers(values: Series, part: slice) -> Float[np.ndarray, " some"]:
+    """Some of a series in double precision."""
+    return np.asarray(values[part], dtype=float)
+
+
+def sample(values: Series) -> Float[np.ndarray, " some"]:
+    """A series, or stretches of it that are plenty to tell its noise, in double precision."""
+    if len(values) <= PLENTY:
+        return numbers(values, slice(0, len(values)))
+    length = PLENTY // _STRETCHES
+    starts = np.linspace(0, len(values) - length, _STRETCHES).astype(int)
+    return np.concatenate([numbers(values, slice(start, start + length)) for start in starts])
+
+
+def rises(values: Float[np.ndarray, " all"], strictly: bool = False) -> bool:
+    """Whether a series never falls, or rises with every sample."""
+    for part in parts(len(values)):
+        some = values[part.start : part.stop + 1]
+        if not np.all(some[1:] > some[:-1] if strictly else some[1:] >= some[:-1]):
+            return False
+    return True
+
+
+def same(one: Float[np.ndarray, " one"], other: Float[np.ndarray, " other"]) -> bool:
+    """Whether two series have the same numbers, and miss the same."""
+    if one is other:
+        return True
+    return len(one) == len(other) and all(
+        np.array_equal(one[part], other[part], equal_nan=True) for part in parts(len(one))
+    )
+
+
+def last_set(flags: Flags, stop: int) -> int:
+    """Place of the last flag before `stop` that is set; -1 if none is."""
+    width = 64
+    while stop > 0:
+        start = max(stop - width, 0)
+        found = np.flatnonzero(flags[start:stop])
+        if len(found):
+            return start + int(found[-1])
+        stop, width = start, PIECE
+    return -1
+
+
+def first_set(flags: Flags, start: int) -> int:
+    """Place of the first flag from `start` on that is set; their number if none is."""
+    width = 64
+    while start < len(flags):
+        found = np.flatnonzero(flags[start : start + width])
+        if len(found):
+            return start + int(found[0])
+        start, width = start + width, PIECE
+    return len(flags)
+
+
+def interpolated(
+    time: Float[np.ndarray, " wanted"],
+    at: Vector,
+    values: Vector,
+    there: Flags,
+    outside: float | None = None,
+) -> Float[np.ndarray, " wanted"]:
+    """Straight lines between the samples that are there, as precise as these are kept.
+
+    Args:
+        time: Times wanted, rising.
+        at: Times of the samples, rising.
+        values: The samples.
+        there: Which of them are there; at least one.
+        outside: What stands before the first and behind the last of them; these themselves if omitted.
+    """
+    found = np.empty(len(time), dtype=values.dtype)
+    for part in parts(len(time)):
+        wanted = time[part]
+        first = max(last_set(there, int(np.searchsorted(at, wanted[0], side="right"))), 0)
+        stop = min(first_set(there, int(np.searchsorted(at, wanted[-1], side="left"))) + 1, len(at))
+        near = there[first:stop]
+        found[part] = np.interp(
+            wanted, at[first:stop][near], numbers(values, slice(first, stop))[near], outside, outside
+        )
+    return found

@@ -228,3 +228,16 @@ def test_an_archive_is_called_one(tmp_path):
     WRITERS["zip.xlsx"](tmp_path / "zip.xlsx")
     with pytest.raises(bf.DatasetError, match=r"zip\.xlsx is not a \.xlsx file but a ZIP archive; unpack it"):
         read_channels(tmp_path / "zip.xlsx")
+
+
+def test_what_is_said_of_a_file_is_short_however_many_channels_it_has_and_however_they_are_called(run, tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    with h5py.File("wide.h5", "w") as file:
+        for name in ("time_s", "input_force_N", "output_force_N", "n" * 5000, *(f"s{i}" for i in range(1000))):
+            file[name] = np.arange(80.0)
+        file["s0"].attrs["unit"] = "u" * 50_000
+    code, out, err = run("check", "wide.h5")
+    assert (code, err) == (0, "")
+    assert "... and 904 more channels." in out
+    assert len(out.splitlines()) < 400
+    assert max(map(len, out.splitlines())) <= 80

@@ -12,6 +12,8 @@ from bowdenfit.recordings.recording import Recordings
 from bowdenfit.words import filled, narrow_table
 
 _NAMED = 8  # channels whose first and last sample are said
+_LISTED = 100  # channels that are listed
+_LONGEST = 60  # characters of a name or unit
 _HEADS = ("channel", "unit", "samples", "rate", "length", "lowest", "highest", "clock")
 
 
@@ -30,13 +32,14 @@ def channels_text(
     what = RECORDINGS.alone(recordings) if recordings is not None else "a recording"
     n = len(file.channels)
     title = f"{file.path.name}: {what}, because {why} ({file.kind}, {n} channel{'s' if n != 1 else ''})."
-    rows = [_row(channel) for channel in file.channels]
+    rows = [_row(channel) for channel in file.channels[:_LISTED]]
     keep = [i for i, _ in enumerate(_HEADS) if i in (0, 1, 2, 5, 6) or any(row[i] for row in rows)]
     listing = narrow_table(
         [_HEADS[i] for i in keep], [[row[i] for i in keep] for row in rows], left=("channel", "unit", "clock")
     )
+    more = [f"... and {n - _LISTED} more channels."] if n > _LISTED else []
     notes = [filled(f"Note: {remark}") for remark in file.remarks]
-    lines = [filled(title), "", listing, "", *_ends(file), *(account_words(file.account) if file.account else []), *notes]
+    lines = [filled(title), "", listing, *more, "", *_ends(file), *(account_words(file.account) if file.account else []), *notes]
     if recordings is not None:
         lines += ["", *recordings_text(recordings)]
         lines += [
@@ -52,7 +55,7 @@ def _ends(file: ChannelFile) -> list[str]:
     """The first and the last sample of every channel."""
     said = []
     for which, i in (("First", 0), ("Last", -1)):
-        values = [f"{channel.name} {channel.values[i]:.5g}" for channel in file.channels[:_NAMED]]
+        values = [f"{_in_short(channel.name)} {channel.values[i]:.5g}" for channel in file.channels[:_NAMED]]
         more = [f"{len(file.channels) - _NAMED} more"] if len(file.channels) > _NAMED else []
         said.append(filled(f"{which} sample{'s' if more else ''}: {', '.join([*values, *more])}."))
     return said
@@ -67,4 +70,9 @@ def _row(channel: Channel) -> tuple[str, ...]:
     length = ""
     if channel.time is not None and len(channel.time) > 1:
         length = f"{np.nanmax(channel.time) - np.nanmin(channel.time):.4g} s"
-    return channel.name, channel.unit or "?", samples, rate, length, low, high, channel.clock
+    return _in_short(channel.name), _in_short(channel.unit) or "?", samples, rate, length, low, high, _in_short(channel.clock)
+
+
+def _in_short(text: str) -> str:
+    """A text without the middle, where it is long."""
+    return text if len(text) <= _LONGEST else f"{text[: _LONGEST // 2]}...{text[-_LONGEST // 2 + 3 :]}"

@@ -8,7 +8,7 @@ from weakref import WeakValueDictionary
 
 from bowdenfit.errors import DatasetError
 from bowdenfit.files.channels import ChannelFile
-from bowdenfit.files.contents import TEXT, UNKNOWN, Content, recognize
+from bowdenfit.files.contents import PLAIN_TEXT, TEXT, UNKNOWN, Content, recognize
 from bowdenfit.files.text_file import first_bytes
 
 FORMATS: dict[str, str | Callable[[Path], ChannelFile]] = {
@@ -53,7 +53,7 @@ def read_channels(path: Path) -> ChannelFile:
 
 def _read_anew(path: Path) -> ChannelFile:
     """The channels of a file that is not in memory."""
-    ending = ".bag" if is_ros2_folder(path) else _checked_ending(path)
+    ending = ".bag" if is_ros2_folder(path) else checked_ending(path)
     if str(FORMATS[ending]).startswith(f"{__name__}.") and ending not in TEXT:
         from bowdenfit.files.apart import read_apart
 
@@ -63,7 +63,7 @@ def _read_anew(path: Path) -> ChannelFile:
 
 def read_here(path: Path) -> ChannelFile:
     """The same, in this process."""
-    reader = FORMATS[".bag" if is_ros2_folder(path) else _checked_ending(path)]
+    reader = FORMATS[".bag" if is_ros2_folder(path) else checked_ending(path)]
     result: ChannelFile = import_module(reader).read(path) if isinstance(reader, str) else reader(path)
     return result
 
@@ -73,8 +73,12 @@ def is_ros2_folder(path: Path) -> bool:
     return path.is_dir() and (path / "metadata.yaml").is_file()
 
 
-def _checked_ending(path: Path) -> str:
-    """The ending of a file that is what it says."""
+def checked_ending(path: Path) -> str:
+    """The ending of a file that is what it says.
+
+    Raises:
+        DatasetError: Its first bytes say something else.
+    """
     content = recognize(path, first_bytes(path, 4096))
     ending = path.suffix.lower()
     if ending not in FORMATS or not content.suits(ending):
@@ -85,7 +89,7 @@ def _checked_ending(path: Path) -> str:
 def _refusal(path: Path, content: Content) -> DatasetError:
     """What a file really is, where its ending says something else or nothing."""
     ending, known = path.suffix, path.suffix.lower() in FORMATS
-    if content is not UNKNOWN:
+    if content is not UNKNOWN and (known or content is not PLAIN_TEXT):
         what = f"not a {ending} file but {content.what}" if known else content.what
         return DatasetError(f"{path.name} is {what}; {content.advice}.")
     if known:

@@ -61,6 +61,7 @@ _STARTS = {  # the longer start before the shorter one
     b"%PDF-": Content("a PDF document", (), "give the recording itself"),
     b"version https://git-lfs": Content("a Git LFS pointer without the data", (), "run 'git lfs pull' first"),
 }
+PLAIN_TEXT = Content("text", TEXT)
 _ZIP = Content("a ZIP archive", (".xlsx", ".xlsm"), _UNPACK)  # what is left of a workbook, perhaps
 _NO_WORKBOOK = Content("a ZIP archive", (), _UNPACK)
 _WORKBOOK = Content("an Excel workbook", (".xlsx", ".xlsm"))
@@ -105,4 +106,15 @@ def _markup(head: bytes) -> Content:
     text = head.removeprefix(b"\xef\xbb\xbf").lstrip().lower()
     if text.startswith((b"<!doctype html", b"<html")):
         return _PAGE
-    return _XML if text.startswith((b"<?xml", b"<document")) else UNKNOWN
+    if text.startswith((b"<?xml", b"<document")):
+        return _XML
+    return PLAIN_TEXT if head and not any(byte < 9 for byte in head) and _is_utf8(head) else UNKNOWN
+
+
+def _is_utf8(head: bytes) -> bool:
+    """Whether bytes are text; a letter may be cut in two at their end."""
+    try:
+        head.decode()
+    except UnicodeDecodeError as error:
+        return error.start > len(head) - 4
+    return True

@@ -7,7 +7,7 @@ from pathlib import Path
 from bowdenfit.errors import DatasetError, Faults
 from bowdenfit.files.apart import LIMITS
 from bowdenfit.files.cells import Cell, Decimals, is_plain_number
-from bowdenfit.files.contents import UNKNOWN, recognize
+from bowdenfit.files.contents import PLAIN_TEXT, UNKNOWN, recognize
 from bowdenfit.files.csv_rows import SEPARATORS, CsvRecord, declared_separator, records, too_many_cells
 from bowdenfit.files.row_account import BLANK, COMMENT, RowAccount, account_of
 from bowdenfit.files.table_parts import TableParts, parts_of
@@ -72,7 +72,7 @@ def read_csv(path: Path, most: int | None = None) -> RawTable:
         _refuse_large(path)
     name, data = path.name, first_bytes(path, -1 if most is None else _FIRST_BYTES)
     content = recognize(path, data[:4096])
-    if content is not UNKNOWN:
+    if content not in (UNKNOWN, PLAIN_TEXT):
         raise DatasetError(f"{name} is {content.what}, not a CSV file; save the table as CSV and name that file.")
     _, every = first_lines(data, name, whole=most is None, most=most)
     if most is not None and len(every) > 1 and not every[-1].ended:

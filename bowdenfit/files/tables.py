@@ -21,7 +21,9 @@ def read_table(path: Path, most: int | None = None) -> RawTable:
     refuse_special(path)
     if path.suffix.lower() not in WORKBOOKS:
         return read_csv(path, most)
+    from bowdenfit.files import checked_ending
     from bowdenfit.files.apart import call_apart
 
+    checked_ending(path)
     table: RawTable = call_apart(path, "bowdenfit.files.workbook_table:read_workbook", most)
     return table

@@ -289,7 +289,7 @@ FILES = [
     (".mat", ".mat", 0.5, ["run.mat", "cut off or damaged", "copy it again"]),
     (".parquet", ".parquet", 0.5, ["run.parquet", "cut off or damaged", "copy it again"]),
     (".mat", ".csv", 1.0, ["run.mat"]),
-    (".xlsx", ".csv", 1.0, ["run.xlsx", "does not start as a .xlsx file does", "CSV"]),
+    (".xlsx", ".csv", 1.0, ["run.xlsx", "is not a .xlsx file but text", "rename it to .csv"]),
     (".parquet", ".mat", 1.0, ["run.parquet", "is not a .parquet file but"]),
     (".csv", ".zip", 1.0, ["run.csv"]),
     (".csv", ".csv", 0.0, ["run.csv is empty"]),

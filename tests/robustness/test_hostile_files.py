@@ -1,6 +1,7 @@
 """Small files that ask for much: each ends within bounds, in a sentence that names it."""
 
 import os
+import shutil
 import struct
 import subprocess
 import sys
@@ -241,3 +242,12 @@ def test_what_is_said_of_a_file_is_short_however_many_channels_it_has_and_howeve
     assert "... and 904 more channels." in out
     assert len(out.splitlines()) < 400
     assert max(map(len, out.splitlines())) <= 80
+
+
+def test_a_table_that_is_not_what_its_ending_says_is_called_what_it_is(run, on_body, tmp_path):
+    folder = shutil.copytree(on_body, tmp_path / "cable")
+    (folder / "angles.csv").rename(folder / "angles.xlsx")
+    told = (folder / "cable.toml").read_text().replace("angles.csv", "angles.xlsx")
+    (folder / "cable.toml").write_text(told)
+    code, _, err = run("check", folder)
+    assert (code, err) == (2, "Error: angles.xlsx is not a .xlsx file but text; rename it to .csv.\n")

@@ -38,8 +38,9 @@ def channels_text(
         [_HEADS[i] for i in keep], [[row[i] for i in keep] for row in rows], left=("channel", "unit", "clock")
     )
     more = [f"... and {n - _LISTED} more channels."] if n > _LISTED else []
+    account = account_words(file.account) if file.account else []
     notes = [filled(f"Note: {remark}") for remark in file.remarks]
-    lines = [filled(title), "", listing, *more, "", *_ends(file), *(account_words(file.account) if file.account else []), *notes]
+    lines = [filled(title), "", listing, *more, "", *_ends(file), *account, *notes]
     if recordings is not None:
         lines += ["", *recordings_text(recordings)]
         lines += [

@@ -22,6 +22,7 @@ _ELSEWHERE = (  # what is not kept
     "input_force", "output_force", "wrap_angles", "preload", "friction_limit", "spring", "contact", "gait", "gait_column",
 )  # fmt: skip
 AT_LENGTHS = ("efficiency", "output-force", "input-force")  # all others are asked at wrap angles
+_QUANTITY = Option(metavar="QUANTITY", default="efficiency, or what --input-force and --output-force ask for")
 
 
 def predict(
@@ -31,9 +32,7 @@ def predict(
     stroke: Annotated[Stroke, Option()] = "pull",
     output_force: Annotated[Quantity | None, Option(metavar="FORCE", example="100N")] = None,
     *,
-    quantity: Annotated[
-        Asked | None, Option(metavar="QUANTITY", default="efficiency, or what --input-force and --output-force ask for")
-    ] = None,
+    quantity: Annotated[Asked | None, _QUANTITY] = None,
     wrap_angles: Annotated[Sequence[Quantity], Option(("--wrap-angle",), "90deg", "ANGLE")] = (),
     preload: Annotated[Quantity | None, Option(metavar="FORCE", example="20N")] = None,
     friction_limit: Annotated[Quantity | None, Option(metavar="TORQUE", example="50N*mm")] = None,

@@ -384,6 +384,19 @@ def test_a_far_least_squares_estimate_is_written_not_drawn():
     assert [t.get_text() for t in axes.texts] == ["Least squares: off the axis, 5"]
 
 
+@pytest.mark.parametrize("force", [1e-6, 1e-7, 1e6])
+def test_densities_of_very_small_and_very_large_quantities_have_short_numbers(force):
+    (small,) = (coefficient("drag", "$D$", 1.2 * force, 0.3 * force, "N"),)
+    figure = drawn("coefficients", {"coefficients": (small, *paper_data()["coefficients"][:2])})
+    check_words(figure, "coefficients")
+    (axes, *_) = figure.axes
+    numbers = [text for text in axes.get_yticklabels() if text.get_text()]
+    assert all(len(text.get_text()) < 7 for text in numbers)
+    left = axes.yaxis.label.get_window_extent()
+    assert not any(text.get_window_extent().overlaps(left) for text in numbers)
+    assert not axes.yaxis.get_offset_text().get_text()
+
+
 def fit_of_nine():
     """As much of a fit of nine coefficients as the pair plot asks for."""
     draws = {f"mu{i}": np.random.default_rng(i).uniform(0.1, 0.2, (WALKERS, DRAWS)) for i in range(9)}

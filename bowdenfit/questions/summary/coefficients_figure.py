@@ -39,6 +39,7 @@ if TYPE_CHECKING:
 
 HEADING = "Coefficients"
 ROLES = ("friction", "friction_model", "angle", "sensor")
+_SHORT = (1e-3, 1e5)  # numbers between these are written out
 MOST_COLUMNS, LEAST_WIDTH = 3, 1.4  # panels in a row, and width of one [in]
 
 
@@ -111,8 +112,17 @@ def _panel(axes: Axes, parameter: Coefficient) -> None:
     _least_squares(axes, parameter, shown, 0.08 * posterior.max())
     axes.set(xlim=shown, ylim=(0, 1.2 * posterior.max()))
     label_across(axes, axis_label(parameter.symbol, parameter.unit))
+    axes.yaxis.set_major_formatter(lambda value, _: _in_few_letters(value))
     axes.set_ylabel("Density" if parameter.unit == "1" else f"Density (1/{parameter.unit})")
     axes.set_title(_title(parameter))
+
+
+def _in_few_letters(value: float) -> str:
+    """A number as it is, or as a power of ten where that is shorter: 4e5."""
+    if value == 0 or _SHORT[0] <= abs(value) < _SHORT[1]:
+        return f"{value:.6g}".replace("-", "\N{MINUS SIGN}")
+    digits, power = f"{value:.3e}".split("e")
+    return f"{digits.rstrip('0').rstrip('.')}e{int(power)}".replace("-", "\N{MINUS SIGN}")
 
 
 def _axis(parameter: Coefficient) -> tuple[float, float]:

@@ -99,6 +99,12 @@ class Table:
     left: tuple[int, ...] = (0,)
 
 
+def meanings_table(meanings: Mapping[str, str]) -> Table:
+    """What names stand for, of those that need it."""
+    named = tuple((name, meaning) for name, meaning in meanings.items() if meaning and meaning != name)
+    return Table(("name", "what it is"), named, left=(0, 1))
+
+
 def prose(
     title: str,
     sentences: Iterable[str],

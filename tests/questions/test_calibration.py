@@ -472,7 +472,8 @@ def test_the_command_line_calibrates_resumes_and_says_when_too_few_replications_
 
 
 def test_the_page_of_a_calibration_opens_without_a_fault(tmp_path):
-    found = replace(findings(replications(50), {"mu": Quantity(r"$\mu$")}), name="</title><script>alert(1)</script>")
+    quantity = Quantity(r"$\mu$", meaning="friction of the sheath")
+    found = replace(findings(replications(50), {"mu": quantity}), name="</title><script>alert(1)</script>")
     draw_calibration(found, tmp_path)
     path = write_page(calibration_page(found), tmp_path, tmp_path / "report.html")
     with browser() as chromium, opened(chromium, path, width=390) as reader:
@@ -481,8 +482,8 @@ def test_the_page_of_a_calibration_opens_without_a_fault(tmp_path):
         assert "CALIBRATED: for this description and these tables" in reader.page.locator("main").inner_text()
         (mu,) = found.quantities
         cells = reader.page.locator("details tbody td").all_text_contents()
-        assert cells == [f"{mu.p_value:.3f}", f"{mu.corrected:.3f}", f"{mu.shrinkage:.2f}"]
-        assert all(cell in details_text(found) for cell in cells)
+        assert cells == ["friction of the sheath", f"{mu.p_value:.3f}", f"{mu.corrected:.3f}", f"{mu.shrinkage:.2f}"]
+        assert all(cell in details_text(found) for cell in cells[1:])
         assert reader.sheets() <= 6
 
 

@@ -1,6 +1,6 @@
 """A comparison as a page: which fit predicts best, how well each does, and what changes between them."""
 
-from bowdenfit.pages.section import Page, Picture, Table, prose
+from bowdenfit.pages.section import Page, Picture, Table, meanings_table, prose
 from bowdenfit.questions.compare.answer import Comparison
 from bowdenfit.questions.compare.comparison_figure import HEADING, caption
 from bowdenfit.questions.compare.words import (
@@ -34,6 +34,11 @@ def comparison_page(found: Comparison) -> Page:
             folded=[("Readings on which a fit leans", treated_text(found))],
             pictures=(Picture("comparison", HEADING, caption(found)),),
         ),
-        prose("What changes", speed_sentences(found), [Table(names, tuple(values), WHAT_CHANGES)]),
+        prose(
+            "What changes",
+            speed_sentences(found),
+            [Table(names, tuple(values), WHAT_CHANGES)],
+            folded=[("What the names stand for", meanings_table({n: row.meaning for n, row in found.parameters.items()}))],
+        ),
     )
     return Page(listed(list(found.differences)), "Comparison by bowdenfit", sections)

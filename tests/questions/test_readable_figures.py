@@ -17,6 +17,7 @@ from bowdenfit.plots.layout import text_width
 from bowdenfit.plots.panels import short_title
 from bowdenfit.questions.figures import caption_of, figures_of
 
+QUICK = ("sampler.n_walkers=64", "sampler.target_ess=200", "sampler.target_r_hat=1.1", "sampler.max_steps=2000")
 DATA = Path(__file__).parents[2] / "datasets"
 LONG = "cotton yarn, waxed and run in for a week, batch {}"
 HEAD = "run,group,wrap_angle_deg,stroke,input_force_N,output_force_N,velocity [mm/s]"
@@ -49,9 +50,10 @@ def table(folder, name, bends, mountings, scale, strokes):
     return folder
 
 
+@pytest.mark.parametrize("mcmc", [False, pytest.param(True, marks=pytest.mark.slow)])
 @pytest.mark.parametrize("friction", TABLES)
-def test_figures_of_every_friction_model_can_be_read(friction, tmp_path):
-    fit = bf.fit(table(tmp_path, *TABLES[friction]), friction=friction, mcmc=False)
+def test_figures_of_every_friction_model_can_be_read(friction, mcmc, tmp_path):
+    fit = bf.fit(table(tmp_path, *TABLES[friction]), friction=friction, mcmc=mcmc, seed=1, settings=QUICK if mcmc else ())
     shown = dict(figures_of(fit))
     assert {"forces", "residuals"} <= set(shown)
     assert all(" n = " in caption_of(name, data) for name, data in shown.items())

@@ -120,11 +120,18 @@ def _axes(sheet: PanelSheet, quantities: list[SampledQuantity], panels: list[Pan
         sheet.ticks_left(panel)
         sheet.ticks_below(panel, numbers=last, whole=True)
         middle = panel.bottom + PANEL / 2
-        label = wrapped(quantity.label, ROW - 0.04)
+        label = _in_two_lines(quantity.label)
         sheet.text(panel.left - 0.5, middle, label, ha="center", va="center", rotation=90, fontsize=SMALL)
         if last:
             middle = panel.left + panel.width / 2
             sheet.text(middle, panel.bottom - 0.27, across, ha="center", va="center", fontsize=SMALL)
+
+
+def _in_two_lines(label: str) -> str:
+    """A name beside a panel; of one that takes more lines the first and the last, which tells groups apart."""
+    first, *others = wrapped(label, ROW - 0.04).split("\n")
+    between = "\N{HORIZONTAL ELLIPSIS} " if len(others) > 1 else ""
+    return "\n".join([first, *(between + last for last in others[-1:])])
 
 
 def _key(chains: bool) -> str:

@@ -7,8 +7,9 @@ foretells of it, as far as its own inspections tell it:
 
 and its inspections with each other, so that wear that is not straight and an inspection that disagrees are seen too. The least
 of these probabilities, times their number, is the cable's. Cables that are far off by median and median deviation, which
-several of them cannot hide behind, are left out of the population if they are unlike it; for the others its draws are
-weighted by one over the likelihood of the cable in question. Whether cables are of one kind is the test of Anderson and
+several of them cannot hide behind, and any other that may be named are left out of the population and compared with it drawn
+without them; for the others its draws are weighted by one over the likelihood of the cable in question, which is enough to see
+that they are not at its end. Whether cables are of one kind is the test of Anderson and
 Darling for a normal distribution.
 
 References:
@@ -60,9 +61,10 @@ def judged(
 ) -> tuple[PopulationDraws, np.ndarray]:
     """The population without cables that are unlike it, and the chance of each cable among so many, (cable,).
 
-    Those that are far off are left out together, so that they cannot hide behind each other; who is then not unlike the others
-    is taken in again, because a population without its own ends makes the next of them look rare (the least of several
-    suspects decides on how many there are: Rosner 1983).
+    Whoever may be named is left out first: draws of a population that has a cable in it say hardly anything of one without it
+    where that cable is at its end, however they are weighted. All of them are left out together, so that they cannot hide
+    behind each other; who is then not unlike the others is taken in again, because a population without its own ends makes the
+    next of them look rare (the least of several suspects decides on how many there are: Rosner 1983).
 
     Args:
         inspected: What is known.
@@ -70,14 +72,31 @@ def judged(
         draw: Draws the population without some cables.
         seed: Of everything random.
     """
-    without = far_off(inspected, drawn)
-    while True:
-        core = draw(without) if without else drawn
-        adjusted = holm(chances(inspected, core, seed, without))
-        left = tuple(i for i in without if adjusted[i] < FALSE_ALARM)
+    core, adjusted = drawn, holm(chances(inspected, drawn, seed))
+    without = _suspects(adjusted, far_off(inspected, drawn))
+    taken_in: dict[int, float] = {}
+    while without:
+        core = draw(without)
+        found = holm(chances(inspected, core, seed, without))
+        taken_in |= {i: float(found[i]) for i in without if found[i] >= FALSE_ALARM}
+        others = np.where(np.isin(np.arange(len(found)), list(taken_in)), 1.0, found)
+        left = _suspects(others, tuple(i for i in without if i not in taken_in))
         if left == without:
-            return core, adjusted
+            adjusted = found
+            break
         without = left
+    else:
+        core = drawn
+    for i, chance in taken_in.items():
+        adjusted[i] = max(adjusted[i], chance)
+    return core, adjusted
+
+
+def _suspects(adjusted: np.ndarray, far: tuple[int, ...]) -> tuple[int, ...]:
+    """Who may be unlike the rest, by number: at most a third of the cables, or one."""
+    likely = {*far, *np.flatnonzero(adjusted < FALSE_ALARM)}
+    worst = sorted(likely, key=lambda i: (i not in far, adjusted[i]))[: max(len(adjusted) // 3, 1)]
+    return tuple(sorted(int(i) for i in worst))
 
 
 def chances(inspected: Inspected, drawn: PopulationDraws, seed: int, without: tuple[int, ...] = ()) -> np.ndarray:

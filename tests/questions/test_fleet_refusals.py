@@ -183,6 +183,10 @@ def test_a_full_disk_is_a_sentence_and_what_was_kept_goes_on(run, fleet, tmp_pat
 
 def test_a_fleet_begun_with_other_versions_is_not_gone_on_with(run, fleet, tmp_path, monkeypatch):
     folder, results = fleet(ROWS[0]), tmp_path / "results"
-    FleetStore(results, {"seed": 7, "versions": {"jax": "0.0.1"}}).open(False, False)
+    FleetStore(results, {"seed": 7, "versions": versions() | {"jax": "0.0.1"}}).open(False, False)
     code, _, error = run("fleet", folder, "-o", results, "--resume")
-    assert code == 2 and "a version of bowdenfit or of a library changed" in " ".join(error.split())
+    said = f"a version of bowdenfit or of a library changed since (jax from '0.0.1' to {versions()['jax']!r})"
+    assert code == 2 and said in " ".join(error.split())
+    FleetStore(results, {"seed": 7, "versions": versions()}).open(False, True)
+    code, _, error = run("fleet", folder, "-o", results, "--resume", "--seed", 8)
+    assert code == 2 and "because the seed changed since from 7 to 8; undo the change" in " ".join(error.split())

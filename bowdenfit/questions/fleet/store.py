@@ -25,6 +25,7 @@ from bowdenfit.results.folder import (
     remove_what_is_left,
     write_text,
 )
+from bowdenfit.words import few, shown
 
 KEPT, BEGUN = "kept", "begun.json"  # folder of pieces, and what they were made for
 _FILES, _FOLDERS = (FLEET_PAGE, FLEET_DRAWS, SUMMARY_TEXT), (KEPT, JOBS)  # all that is written
@@ -82,9 +83,10 @@ class FleetStore:
         before = begun_before(self.folder)
         changed = [name for name in _WHAT if before.get(name) != json.loads(json.dumps(self.begun[name]))]
         if changed:
+            what = _changes(before.get(changed[0]), self.begun[changed[0]])
             raise StoreError(
-                f"{self.folder} cannot be resumed because {_WHAT[changed[0]]} changed since; undo the change, or start over "
-                "with --force."
+                f"{self.folder} cannot be resumed because {_WHAT[changed[0]]} changed since{what}; undo the change, or start "
+                "over with --force."
             )
         with folder_to_write(self.folder):
             self._begin()
@@ -141,6 +143,19 @@ class FleetStore:
         for name in (KEPT, JOBS):
             if (self.folder / name).is_dir():
                 shutil.rmtree(self.folder / name, ignore_errors=True)
+
+
+def _changes(before: Any, now: Any) -> str:
+    """From what to what, in words; empty where what was begun does not say it."""
+    if not (isinstance(before, Mapping) and isinstance(now, Mapping)):
+        return f" from {shown(before)} to {shown(now)}" if isinstance(before, int) else ""
+    names = [name for name in (*now, *before) if before.get(name) != now.get(name)]
+    each = [f"{name} from {_one(before.get(name))} to {_one(now.get(name))}" for name in dict.fromkeys(names)]
+    return f" ({few(each)})"
+
+
+def _one(version: Any) -> str:
+    return "none" if version is None else shown(version)
 
 
 def begun_before(folder: Path) -> dict[str, Any]:

@@ -37,9 +37,12 @@ def headline(found: Pool) -> str:
         if math.isinf(found.new.median):
             return f"{who}more likely than not a new cable never falls below {until}; {early}."
         return f"{who}a new cable falls below {until} after {_cycles(found.new.median)}; {early}."
-    if found.wear is not None:
-        way = "grows" if found.wear.share.median >= 0 else "falls"
-        return f"{who}friction {way} by {_share(found.wear.share)} in {_cycles(found.reference_cycles)}."
+    wear = found.wear.share if found.wear is not None else None
+    if len(found.cables) == 1:  # of which the middle of a population tells little
+        wear = found.cables[0].wear
+    if wear is not None:
+        way = "grows" if wear.median >= 0 else "falls"
+        return f"{who}friction {way} by {_share(wear)} in {_cycles(found.reference_cycles)}."
     name, first = next(iter(found.typical.items()))
     value = f"{first.median:.{decimals(first.sd)}f} (90 % interval {_range(first)})"
     return f"{who}{name} is {value} in the middle of {_many(found)}."
@@ -61,9 +64,10 @@ def life_sentences(found: Pool) -> list[str]:
         likely = [(each, life) for each, life in lives if (life.fails or 0) > 0.5]
         worst = sorted(lives, key=lambda pair: pair[1].median)
         named = listed([f"{each.cable} ({_life(life)})" for each, life in worst[:3]])
+        who = f"the first are {named}" if len(worst) > 1 else f"it lasts {_life(worst[0][1])}"
         lines.append(
             f"Before {count}, {len(likely)} of {_many(found)} fall below {percent(asked.efficiency, 0)} more likely than not; "
-            f"the first are {named}."
+            f"{who}."
         )
         if found.new is not None:
             lines.append(f"A new one does so with probability {_probability(found.new.fails)}.")

@@ -38,7 +38,7 @@ def pool(drawn, asked=None, seed=1):
 @pytest.fixture(scope="module")
 def fleet():
     """A fleet whose third cable has five times the friction and whose eighth wears five spreads quicker, and its truth."""
-    return fleet_draws(3, shifts={2: 1.6}, wears={7: 0.6})
+    return fleet_draws(3, shifts={2: 1.6}, wears={7: 0.6}, draws=2048)
 
 
 @pytest.fixture(scope="module")

@@ -19,6 +19,7 @@ import numpy as np
 from jax import Array
 from jaxtyping import Float
 
+from bowdenfit.inference.population.readings import Readings
 from bowdenfit.inference.population.summaries import Summaries
 from bowdenfit.parameters.priors import HalfNormal, Normal, Prior
 
@@ -59,9 +60,14 @@ class Inspected:
         return int(self.known.shape[1])
 
     @cached_property
+    def places(self) -> np.ndarray:
+        """Number of the cable, and place among its inspections, of every inspection, (inspection, 2)."""
+        return np.array([(i, np.sum(self.cable[:j] == i)) for j, i in enumerate(self.cable)])
+
+    @cached_property
     def data(self) -> dict[str, Any]:
         """Arrays that the density is computed from, (cable, inspection, ...)."""
-        place = np.array([np.sum(self.cable[:j] == i) for j, i in enumerate(self.cable)])
+        place = self.places[:, 1]
         shape = self.cables, int(place.max()) + 1
 
         def spread(values: np.ndarray, empty: float = 0.0) -> np.ndarray:
@@ -84,6 +90,16 @@ class Inspected:
             "precision": spread(moved).sum(axis=1), "toward": spread(toward).sum(axis=1),
             "by_effect": spread(by_effect).sum(axis=1), "prior_mean": self.prior_mean, "prior_sd": self.prior_sd,
         }  # fmt: skip
+
+    def data_with(self, readings: Sequence[Readings]) -> dict[str, Any]:
+        """The same with readings of some inspections in place of what single fits say of them.
+
+        Coordinates stay those that single fits suggest.
+        """
+        root = self.data["root"].copy()
+        for part in readings:
+            root[tuple(self.places[list(part.rows)].T)] = 0.0
+        return self.data | {"root": root, "readings": tuple(part.given(self.places) for part in readings)}
 
     @property
     def design(self) -> np.ndarray:
@@ -113,12 +129,14 @@ class PopulationDensity:
         wears: Whether there is wear to be told.
         effects: Names of what else friction may depend on.
         cables: How many.
+        readings: Inspections whose readings themselves are in it.
     """
 
     coefficients: int
     wears: bool
     effects: tuple[str, ...]
     cables: int
+    readings: tuple[Readings, ...] = ()
 
     @property
     def each(self) -> int:
@@ -145,9 +163,14 @@ class PopulationDensity:
         return (*middles, *spreads, *wear, *(effects[name] for name in self.effects))
 
     @property
+    def _of_fleet(self) -> int:
+        """Numbers of the population and of all cables, which come first in z."""
+        return len(self.names) + self.cables * self.each
+
+    @property
     def size(self) -> int:
         """Of z."""
-        return len(self.names) + self.cables * self.each
+        return self._of_fleet + sum(part.size for part in self.readings)
 
     def population(self, z: Float[Array, " size"], data: dict[str, Any]) -> dict[str, Array]:
         """What describes the population: means, spreads and effects, (cable's number,) and (effect,)."""
@@ -165,7 +188,7 @@ class PopulationDensity:
         self, z: Float[Array, " size"], data: dict[str, Any], found: dict[str, Array]
     ) -> tuple[Float[Array, "cable each"], Float[Array, " cable"]]:
         """Log coefficients when new and wear of every cable, and the log of the volume that z is stretched by."""
-        inner = z[len(self.names) :].reshape(self.cables, self.each)
+        inner = z[len(self.names) : self._of_fleet].reshape(self.cables, self.each)
         weight = found["spread"] ** -2
         toward = data["toward"] - data["by_effect"] @ found["effects"] + weight * found["mean"]
         rows = _cholesky([[data["precision"][:, i, j] + (weight[i] if i == j else 0.0) for j in range(i + 1)]
@@ -186,7 +209,12 @@ class PopulationDensity:
         away = (values - found["mean"]) / found["spread"]
         of_cables = jnp.sum(volume) - jnp.sum(away**2) / 2 - self.cables * jnp.sum(jnp.log(found["spread"]))
         before = -jnp.sum(z[: len(self.names)] ** 2) / 2
-        return before + of_cables + jnp.sum(log_likelihood(self.log_coefficients(values, found, data), data))
+        at, begin = self.log_coefficients(values, found, data), self._of_fleet
+        total = before + of_cables + jnp.sum(log_likelihood(at, data))
+        for part, given in zip(self.readings, data.get("readings", ()), strict=True):
+            total = total + part.log_density(at, z[begin : begin + part.size], given)
+            begin += part.size
+        return total
 
     def log_coefficients(
         self, values: Float[Array, "cable each"], found: dict[str, Array], data: dict[str, Any]

@@ -13,6 +13,7 @@ from bowdenfit.inference.compilation import compile_program
 from bowdenfit.inference.diagnostics import diagnose, shortfalls
 from bowdenfit.inference.nuts import BLOCK, WARM_UP, before, block_program
 from bowdenfit.inference.population.model import Inspected, PopulationDensity
+from bowdenfit.inference.population.readings import Readings, without_those
 from bowdenfit.words import percent
 
 _SETTINGS = SamplerSettings(n_chains=4, target_acceptance=0.8, target_ess=400, target_r_hat=1.02)
@@ -43,7 +44,11 @@ class PopulationDraws:
 
 
 def draw_population(
-    inspected: Inspected, seed: int, without: Collection[int] = (), called: Sequence[str] = ()
+    inspected: Inspected,
+    seed: int,
+    without: Collection[int] = (),
+    called: Sequence[str] = (),
+    readings: tuple[Readings, ...] = (),
 ) -> PopulationDraws:
     """Draw a population and its cables.
 
@@ -52,12 +57,13 @@ def draw_population(
         seed: Of everything random.
         without: Cables whose inspections are not looked at, by number.
         called: Names of the coefficients, for reasons not to trust the draws.
+        readings: Inspections whose readings themselves are looked at, in place of what single fits say of them.
     """
     wears = inspected.cycles is not None
-    density = PopulationDensity(inspected.coefficients, wears, tuple(inspected.effects), inspected.cables)
-    data = _blind(inspected.data, without)
-    shapes = tuple((name, np.shape(value)) for name, value in data.items())
-    program, values_of = _compiled(density, shapes)
+    density = PopulationDensity(inspected.coefficients, wears, tuple(inspected.effects), inspected.cables, readings)
+    data = _blind(inspected.data_with(readings), without)
+    leaves, tree = jax.tree.flatten(data)
+    program, values_of = _compiled(density, tree, tuple((np.shape(leaf), np.asarray(leaf).dtype) for leaf in leaves))
     generator = np.random.default_rng([seed, 5])
     start = 0.3 * generator.standard_normal((_SETTINGS.n_chains, density.size))
     blocks: list[dict[str, np.ndarray]] = []
@@ -86,6 +92,7 @@ def _blind(data: dict[str, Any], cables: Collection[int]) -> dict[str, Any]:
     for name in ("root", "precision", "toward", "by_effect") if cables else ():
         found[name] = data[name].copy()
         found[name][list(cables)] = 0.0
+    found["readings"] = tuple(without_those(each, list(cables)) for each in data["readings"])
     return found
 
 
@@ -99,9 +106,9 @@ def _shortfalls(z: np.ndarray, names: tuple[str, ...], divergent: float) -> tupl
 
 
 @lru_cache(maxsize=16)
-def _compiled(density: PopulationDensity, shapes: tuple[tuple[str, tuple[int, ...]], ...]) -> tuple[Any, Any]:
+def _compiled(density: PopulationDensity, tree: Any, shapes: tuple[tuple[tuple[int, ...], Any], ...]) -> tuple[Any, Any]:
     """What draws, and what gives the values of draws; the same for all fleets of one shape."""
-    data = {name: jax.ShapeDtypeStruct(shape, np.float64) for name, shape in shapes}
+    data = jax.tree.unflatten(tree, [jax.ShapeDtypeStruct(shape, kind) for shape, kind in shapes])
     settings = _SETTINGS.model_copy(update={"target_acceptance": _CAREFUL}) if density.cables < _FEW else _SETTINGS
     program = block_program(density.log_density, (density.size,), data, settings, fine=False)
 

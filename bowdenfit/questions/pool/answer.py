@@ -58,6 +58,7 @@ class PooledCable(Part):
         chance: Probability that a cable of this population is as far from the others; in how many fleets one is.
         unlike: How it differs from the rest, in words; empty if it does not.
         worth: Effective number of its draws by themselves, of the inspection where the population agrees with them least.
+        measured: How many of its inspections were pooled by their readings, because that number is too small.
     """
 
     cable: str
@@ -70,6 +71,7 @@ class PooledCable(Part):
     chance: float
     unlike: str
     worth: float
+    measured: int
 
 
 @dataclass(frozen=True, repr=False)

@@ -15,6 +15,7 @@ from bowdenfit.results.fleet_folder import FleetDraws
 from bowdenfit.words import counted, few, listed
 
 FRICTION = "friction"  # the role of what is pooled
+_OWN_NAME = "own_name"  # of a coefficient in single fits, where some of that name mean something else
 _SMALLEST = 1e-12  # that a coefficient may be drawn as
 
 
@@ -33,6 +34,8 @@ class Given:
         reference_cycles: That wear is stated for.
         left_out: Inspections that are not pooled.
         notes: What is not told and why, a sentence each.
+        inputs: Of the inspections, what they were fitted from.
+        own_names: What the coefficients are called in single fits.
     """
 
     cables: tuple[str, ...]
@@ -45,6 +48,8 @@ class Given:
     reference_cycles: float
     left_out: tuple[LeftOut, ...]
     notes: tuple[str, ...]
+    inputs: tuple[str, ...]
+    own_names: tuple[str, ...]
 
 
 def given(drawn: FleetDraws) -> Given:
@@ -79,7 +84,12 @@ def given(drawn: FleetDraws) -> Given:
     inspected = Inspected(number, worn, effects, known, _summaries(logs, known, mean, sd), mean, sd)
     symbols = {name: about[name].get("symbol", name) for name in values}
     labels = tuple(name for name, keep in zip(drawn.label, kept, strict=True) if keep)
-    return Given(cables, tuple(values), symbols, inspected, logs, labels, cycles, reference, left_out, tuple(notes))
+    own_names = tuple(about[name][_OWN_NAME] for name in values)
+    inputs = drawn.stats.get("input", np.full(len(kept), ""))[kept]
+    return Given(
+        cables, tuple(values), symbols, inspected, logs, labels, cycles, reference, left_out, tuple(notes),
+        tuple(map(_text, inputs)), own_names,
+    )  # fmt: skip
 
 
 def _summaries(logs: np.ndarray, known: np.ndarray, mean: np.ndarray, sd: np.ndarray) -> Summaries:
@@ -113,7 +123,7 @@ def _by_meaning(drawn: FleetDraws, notes: list[str]) -> tuple[dict[str, np.ndarr
             mine = np.array([each == text for each in said])
             called = name if len(every) == 1 else f"{name} ({i + 1})"
             values[called] = np.where(mine[:, None], draws, np.nan)
-            about[called] = drawn.attributes[name]
+            about[called] = {**drawn.attributes[name], _OWN_NAME: name}
         if len(every) > 1:
             meant = listed([f"{name} ({i + 1}) is {text}" for i, text in enumerate(every)])
             notes.append(f"{name} does not mean the same for all cables, so it is pooled by what it means: {meant}.")

@@ -2,6 +2,7 @@
 
 from collections.abc import Mapping
 from functools import partial
+from pathlib import Path
 
 import numpy as np
 
@@ -14,23 +15,30 @@ from bowdenfit.questions.pool.inspected import Given, given
 from bowdenfit.questions.pool.life import cycles_until, life_of
 from bowdenfit.questions.pool.next import next_inspections
 from bowdenfit.questions.pool.unlike import FALSE_ALARM, departures, judged, mixed
+from bowdenfit.questions.pool.worth import LEAST, readings_of, worth
 from bowdenfit.results.fleet_folder import FleetDraws
+from bowdenfit.words import few
 
 _NEW = 25  # new cables of each draw of the population, so that which are drawn does not matter to the early ones
 _FAR = 2.0  # spreads from the middle from which a number is named as what is off
 _WEAR = "wear"
 
 
-def pooled(drawn: FleetDraws, asked: Asked | None, seed: int) -> Pool:
+def pooled(drawn: FleetDraws, asked: Asked | None, seed: int, measurements: Path | None = None) -> Pool:
     """The answer.
 
     Args:
         drawn: Draws of all inspections.
         asked: What life is until; None where it is not asked for.
         seed: Of everything random.
+        measurements: Folder of the fleet's measurements, for inspections of which single fits tell too little.
+
+    Raises:
+        StoreError: Nothing can be pooled, or the measurements are others.
+        DatasetError, DescriptionError, UsageError: There are no such measurements.
     """
     known = given(drawn)
-    population = draw_population(known.inspected, seed, called=known.coefficients)
+    population, each_worth, measured = _drawn(known, seed, measurements)
     count, alone = len(known.coefficients), len(known.cables) == 1
     generator = np.random.default_rng([seed, 13])
     mean, spread = (np.repeat(each, _NEW, axis=0) for each in (population.mean, population.spread))
@@ -40,7 +48,7 @@ def pooled(drawn: FleetDraws, asked: Asked | None, seed: int) -> Pool:
     names = (*known.coefficients, *((_WEAR,) if wears else ()))
     return Pool(
         str(drawn.about.get("name", "")),
-        _cables(known, population, asked, seed),
+        _cables(known, population, each_worth, measured, asked, seed),
         len(known.labels),
         known.left_out,
         {} if alone else _named(known.coefficients, np.exp(new)),
@@ -56,8 +64,34 @@ def pooled(drawn: FleetDraws, asked: Asked | None, seed: int) -> Pool:
         curves_of(known, population, asked, new) if wears else None,
         next_inspections(known, population, asked, seed),
         (*known.notes, *_more_notes(known, drawn)),
-        population.reasons,
+        (*population.reasons, *_poorly_known(known, each_worth, measured)),
         seed,
+    )
+
+
+def _drawn(known: Given, seed: int, measurements: Path | None) -> tuple[PopulationDraws, np.ndarray, tuple[int, ...]]:
+    """The population; how much single fits know of each inspection there; and those whose readings are looked at."""
+    rows: tuple[int, ...] = ()
+    while True:
+        readings = readings_of(known, rows, measurements) if measurements is not None and rows else ()
+        drawn = draw_population(known.inspected, seed, called=known.coefficients, readings=readings)
+        found = worth(known, drawn)
+        more = tuple(int(j) for j in np.flatnonzero(found < LEAST) if j not in rows)
+        if measurements is None or not more:
+            return drawn, found, rows
+        rows = (*rows, *more)
+
+
+def _poorly_known(known: Given, found: np.ndarray, rows: tuple[int, ...]) -> tuple[str, ...]:
+    """Why the answer must not be trusted where single fits know too little; empty where they know enough."""
+    numbers = [j for j in np.flatnonzero(found < LEAST) if j not in rows]
+    if not numbers:
+        return ()
+    cables = list(dict.fromkeys(known.cables[known.inspected.cable[j]] for j in numbers))
+    return (
+        f"what was drawn from the inspections of {few(cables)} by themselves hardly reaches where the other cables put them, "
+        "so that what is said of them may be off by half its uncertainty; name the folder of the fleet's measurements with "
+        "--measurements, and their readings are looked at again",
     )
 
 
@@ -76,7 +110,14 @@ def _life(known: Given, asked: Asked, values: np.ndarray) -> Life:
     return life_of(asked, cycles, known.reference_cycles)
 
 
-def _cables(known: Given, population: PopulationDraws, asked: Asked | None, seed: int) -> tuple[PooledCable, ...]:
+def _cables(
+    known: Given,
+    population: PopulationDraws,
+    each_worth: np.ndarray,
+    measured: tuple[int, ...],
+    asked: Asked | None,
+    seed: int,
+) -> tuple[PooledCable, ...]:
     """What is known of each cable."""
     inspected, count = known.inspected, len(known.coefficients)
     alone = len(known.cables) == 1
@@ -84,7 +125,7 @@ def _cables(known: Given, population: PopulationDraws, asked: Asked | None, seed
     if not alone:
         core, adjusted = judged(inspected, population, partial(draw_population, inspected, seed), seed)
     away = departures(population, core)
-    worth = _worth(known, population)
+    again = np.isin(np.arange(len(inspected.cable)), measured)
     found = []
     for i, name in enumerate(known.cables):
         mine, values = inspected.cable == i, population.cables[:, i]
@@ -101,7 +142,8 @@ def _cables(known: Given, population: PopulationDraws, asked: Asked | None, seed
                 _life(known, asked, values) if asked is not None else None,
                 float(adjusted[i]),
                 words,
-                float(worth[mine].min()),
+                float(each_worth[mine].min()),
+                int(again[mine].sum()),
             )
         )
     return tuple(found)
@@ -121,31 +163,6 @@ def _by_itself(known: Given, population: PopulationDraws, mine: np.ndarray, has:
         for k, name in enumerate(known.coefficients)
         if has[k]
     }
-
-
-def _worth(known: Given, population: PopulationDraws) -> np.ndarray:
-    """Effective number of each inspection's draws where the pooled ones are, (inspection,)."""
-    inspected, count = known.inspected, len(known.coefficients)
-    columns = np.stack([*inspected.effects.values()], axis=1) if inspected.effects else np.zeros((len(inspected.cable), 0))
-    found = np.zeros(len(inspected.cable))
-    for j, cable in enumerate(inspected.cable):
-        has = inspected.known[j]
-        logs = population.cables[:, cable, :count] + (population.effects @ columns[j])[:, None]
-        if inspected.cycles is not None:
-            logs = logs + inspected.cycles[j] * population.cables[:, cable, count:]
-        center, covariance = logs[:, has].mean(axis=0), np.atleast_2d(np.cov(logs[:, has].T))
-        own, scale = inspected.summaries.center[j][has], inspected.summaries.scale[j][np.ix_(has, has)]
-        there = known.logs[j][:, has]
-        log = _squares(there, center, covariance) - (inspected.summaries.freedom[j] + has.sum()) * np.log1p(
-            _squares(there, own, scale) / inspected.summaries.freedom[j]
-        )
-        weights = np.exp((log.min() - log) / 2)
-        found[j] = weights.sum() ** 2 / np.sum(weights**2)
-    return found
-
-
-def _squares(values: np.ndarray, center: np.ndarray, covariance: np.ndarray) -> np.ndarray:
-    return np.sum(np.linalg.solve(np.linalg.cholesky(covariance), (values - center).T) ** 2, axis=0)
 
 
 def _departure(known: Given, away: np.ndarray, has: np.ndarray) -> str:

@@ -24,6 +24,7 @@ def pool(
     until: Annotated[Quantity | None, Option(metavar="EFFICIENCY", example="60%")] = None,
     wrap_angles: Annotated[Sequence[str], Option(("--wrap-angle",), metavar="COEFFICIENT=ANGLE")] = (),
     cycles: Annotated[int | None, Option(least=1)] = None,
+    measurements: Annotated["str | Path | None", Option(metavar="FOLDER")] = None,
     seed: Annotated[int | None, Option(least=0, most=LARGEST_SEED, default="that of the fleet")] = None,
     output: Annotated[Output, Option(("-o",))] = None,
     force: Annotated[bool, Option()] = False,
@@ -35,16 +36,21 @@ def pool(
         until: Efficiency until which a cable serves, such as 60%.
         wrap_angles: Wrap angles at which that holds, one for each friction coefficient, such as mu_sheath=180deg.
         cycles: Before so many cycles the probability of falling below it is said.
+        measurements: Folder that `bowdenfit fleet` fitted; the readings of inspections of which single fits tell too little
+            are looked at again.
         seed: Seed of everything random.
         output: Folder for pool.html, pool.json, pool.txt and the figures; nothing is written without one.
         force: Replace an earlier answer in --output.
 
     Raises:
         UsageError: Life is asked for without what it depends on.
-        StoreError: There is no fleet, or nothing in it can be pooled; or `output` holds something already.
+        StoreError: There is no fleet, or nothing in it can be pooled; or `output` holds something already; or the
+            measurements are not those of the fleet.
+        DatasetError, DescriptionError: The measurements cannot be read.
     """
     import jax
 
+    from bowdenfit.questions.fleet.inspections import read_inspections
     from bowdenfit.questions.pool.pooling import pooled
     from bowdenfit.questions.pool.words import pool_text  # noqa: F401  (how the answer shows itself)
     from bowdenfit.results.fleet_folder import read_fleet_draws
@@ -52,10 +58,12 @@ def pool(
     if output is not None:
         refuse_to_replace(Path(output), force)
     drawn = read_fleet_draws(Path(results))
+    if measurements is not None:
+        read_inspections(Path(measurements))  # so that a wrong name is said before anything is drawn
     asked = asked_of(until, wrap_angles, cycles, [n for n, a in drawn.attributes.items() if a.get("role") == "friction"])
     seed = int(drawn.about.get("seed", 0)) if seed is None else seed
     with jax.enable_x64(True):
-        found = pooled(drawn, asked, seed)
+        found = pooled(drawn, asked, seed, None if measurements is None else Path(measurements))
     if output is not None:
         _write(found, Path(output))
     return found
@@ -166,7 +174,8 @@ VERB = Verb(
     rest, and what to inspect next.
 
     With --until and a --wrap-angle for each coefficient: how many cycles each cable and a new one last, and with --cycles the
-    probability of failing before. Exit code 3: must not be trusted.
+    probability of failing before. With --measurements, the folder that was fitted, cables of which single fits tell too little
+    are pooled by their readings; without it they are named. Exit code 3: must not be trusted.
     """,
     csv="Print cables as CSV, a row a quantity.",
 )

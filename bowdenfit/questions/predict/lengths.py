@@ -87,7 +87,7 @@ def in_unit_of(route: Route | None, lengths: Sequence[Length] | None) -> list[fl
         lengths: Numbers, or numbers with their units.
 
     Raises:
-        UsageError: A unit is unknown, or measures something else, or there is no route.
+        UsageError: A unit is unknown, or measures something else, or there is no route, or a length is negative.
     """
     found = []
     for length in lengths or ():
@@ -96,6 +96,12 @@ def in_unit_of(route: Route | None, lengths: Sequence[Length] | None) -> list[fl
             found.append(value * route_conversion_factor(unit, route.unit) if unit and route else value)
         except DatasetError as error:
             raise UsageError(f"LENGTHS, {value:g} {unit}: {error}.") from None
+        if route is not None and found[-1] < 0 <= route.range[0]:
+            named, ends = route.variable.replace("_", " "), f"from {route.range[0]:g} to {route.range[1]:g} {route.unit}"
+            raise UsageError(
+                f"LENGTHS, {value:g} {unit or route.unit}: no {named} is negative where the route goes {ends}; leave out the "
+                "minus."
+            )
         if unit and route is None:
             raise UsageError(f"LENGTHS, {value:g} {unit}: this cable has no route, so there are no lengths to predict at.")
     return found

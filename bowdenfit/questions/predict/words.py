@@ -92,12 +92,17 @@ def _one(row: Row) -> list[str]:
 
 
 def _extremes(rows: Sequence[Row]) -> str:
-    """Where the first quantity is highest and where lowest."""
-    name = _quantities(rows[0])[0]
+    """Where the first quantity is highest and where lowest; of places outside the curves only where all are."""
+    name, inside = _quantities(rows[0])[0], [row for row in rows if row.get("in_range", True)]
     words, unit = _unit(name)
-    high, low = (choose(rows, key=lambda row: row[name]) for choose in (max, min))
-    said = f"{words[0].upper()}{words[1:]}: highest {_known(high, name)[0]} {unit} at {_at(high)}"
-    return f"{said}, lowest {_known(low, name)[0]} {unit} at {_at(low)}. 90 % intervals are in brackets."
+    which = "" if len(inside) == len(rows) else ", inside the curves" if inside else ", all outside the curves"
+    high, low = (choose(inside or rows, key=lambda row: row[name]) for choose in (max, min))
+    said = f"{words[0].upper()}{words[1:]}{which}: "
+    if high is low:
+        said += f"{_known(high, name)[0]} {unit} at {_at(high)}"
+    else:
+        said += f"highest {_known(high, name)[0]} {unit} at {_at(high)}, lowest {_known(low, name)[0]} {unit} at {_at(low)}"
+    return f"{said}. 90 % intervals are in brackets."
 
 
 def _table(rows: Sequence[Row]) -> str:

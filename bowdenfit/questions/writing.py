@@ -46,6 +46,29 @@ def figures_of(folder: str | Path, name: str) -> list[Path]:
     return [Path(folder) / f"{name}.{ending}" for ending in FORMATS]
 
 
+def refuse_to_replace(folder: Path, name: str, what: str, force: bool) -> None:
+    """Stop before anything is computed if an answer would have no place.
+
+    Args:
+        folder: Where it would go.
+        name: Of the answer.
+        what: What it is, in words without an article.
+        force: Whether an earlier one there may be replaced.
+
+    Raises:
+        StoreError: The folder holds something else already, or an earlier answer.
+    """
+    from bowdenfit.errors import StoreError
+    from bowdenfit.results.folder import is_empty
+
+    if not folder.exists() or (folder.is_dir() and is_empty(folder)):
+        return
+    if not (folder / f"{name}.{PAGE}").exists():
+        raise StoreError(f"{folder} exists and holds no {what}; name another with --output.")
+    if not force:
+        raise StoreError(f"{folder} holds a {what} already; add --force to replace it, or name another with --output.")
+
+
 def write_answer(
     folder: str | Path,
     name: str,

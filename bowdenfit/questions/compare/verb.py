@@ -4,8 +4,7 @@ from collections.abc import Callable, Mapping
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any, Literal
 
-from bowdenfit.errors import StoreError
-from bowdenfit.questions.writing import write_answer
+from bowdenfit.questions.writing import refuse_to_replace, write_answer
 from bowdenfit.verb import Argument, Option, Output, Reply, Verb, Watch
 
 if TYPE_CHECKING:
@@ -46,7 +45,7 @@ def compare(
     from bowdenfit.questions.compare.words import comparison_text
 
     if output is not None:
-        refuse_to_replace(Path(output), force)
+        refuse_to_replace(Path(output), NAME, "comparison", force)
     with jax.enable_x64(True), watched(WATCH, progress) as show:
         found = compared(fits, show, leave_out)
     if output is not None:
@@ -54,28 +53,6 @@ def compare(
         cable = names.pop() if len(names) == 1 else ""
         write_answer(output, NAME, found, comparison_text(found), {NAME: comparison_figure}, cable, comparison_page(found))
     return found
-
-
-def refuse_to_replace(folder: Path, force: bool) -> None:
-    """Stop before anything is computed if a comparison would have no place.
-
-    Args:
-        folder: Where it would go.
-        force: Whether an earlier comparison there may be replaced.
-
-    Raises:
-        StoreError: The folder holds something else already, or an earlier comparison.
-    """
-    from bowdenfit.results.folder import is_empty
-
-    if not folder.exists() or (folder.is_dir() and is_empty(folder)):
-        return
-    if not (folder / f"{NAME}.json").exists():
-        raise StoreError(f"{folder} exists and holds no comparison; name another with --output.")
-    if not force:
-        raise StoreError(
-            f"{folder} holds a comparison already; add --force to replace it, or name another with --output."
-        )
 
 
 def _reply(found: "Comparison", asked: dict[str, Any]) -> Reply:

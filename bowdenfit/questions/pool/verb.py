@@ -7,6 +7,7 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
+from bowdenfit.questions.writing import refuse_to_replace
 from bowdenfit.verb import LARGEST_SEED, Argument, Option, Output, Quantity, Reply, Verb
 
 if TYPE_CHECKING:
@@ -56,7 +57,7 @@ def pool(
     from bowdenfit.results.fleet_folder import read_fleet_draws
 
     if output is not None:
-        refuse_to_replace(Path(output), force)
+        refuse_to_replace(Path(output), NAME, "pooled fleet", force)
     drawn = read_fleet_draws(Path(results))
     if measurements is not None:
         read_inspections(Path(measurements))  # so that a wrong name is said before anything is drawn
@@ -67,23 +68,6 @@ def pool(
     if output is not None:
         _write(found, Path(output))
     return found
-
-
-def refuse_to_replace(folder: Path, force: bool) -> None:
-    """Stop before anything is computed if the answer would have no place.
-
-    Raises:
-        StoreError: The folder holds something else already, or an earlier answer.
-    """
-    from bowdenfit.errors import StoreError
-    from bowdenfit.results.folder import is_empty
-
-    if not folder.exists() or (folder.is_dir() and is_empty(folder)):
-        return
-    if not (folder / f"{NAME}.json").exists():
-        raise StoreError(f"{folder} exists and holds no pooled fleet; name another with --output.")
-    if not force:
-        raise StoreError(f"{folder} holds a pooled fleet already; add --force to replace it, or name another with --output.")
 
 
 def _write(found: "Pool", folder: Path) -> None:

@@ -6,7 +6,7 @@ from the output, over the whole rest.
 """
 
 from collections.abc import Iterator
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -15,7 +15,7 @@ from bowdenfit.recordings.preparation.shapes import OtherVector
 from bowdenfit.types import Matrix, Vector
 
 USED = 0.05  # weight of a point that counts
-_MARGIN = 0.050
+_MARGIN = 50 / 12  # of the width of smoothing
 _AWAY = 6.0
 _NEAR = 1.5
 
@@ -55,6 +55,28 @@ def play_rows(x: Matrix, start: Vector, exponent: OtherVector, rests: Rests | No
         np.clip(upper[..., :-reach], low, high, out=high)
         reach *= 2
     return np.clip(start[:, None], lower, upper)
+
+
+def with_drag(segments: Segments, drag: float) -> Segments:
+    """The segments on the scale log(F + drag), on which friction with drag is a constant distance.
+
+    Args:
+        segments: On the scale log F.
+        drag: Force [N].
+    """
+    if drag == 0:
+        return segments
+    x, y = (np.log(np.exp(log_force) + drag) for log_force in (segments.x, segments.y))
+    return replace(segments, x=x, y=y, jitter=segments.jitter * np.exp(segments.x - x))
+
+
+def at_drag(rests: Rests, ratio: float, more: float) -> Rests:
+    """Rests on the scale of more drag [N]."""
+    if more == 0:
+        return rests
+    there = np.isfinite(rests.level)
+    force = np.exp(np.where(there, rests.level, 0.0) + ratio) + more
+    return replace(rests, level=np.where(there, np.log(np.maximum(force, 1e-300)) - ratio, rests.level))
 
 
 def band_of(segments: Segments) -> tuple[float, float]:
@@ -102,7 +124,7 @@ def rests_of(segments: Segments, point: OtherVector) -> Rests:
     seen = shift_rows(segments.y, -delay / segments.step) - ratio
     attached = exponent - side * (segments.x - output) <= _AWAY * segments.jitter
     level, heading = np.where(side > 0, -np.inf, np.inf), np.where(attached, side, 0.0)
-    margin = round(_MARGIN / segments.step)
+    margin = round(_MARGIN * segments.width / segments.step)
     for row, begin, end, after in _half_cycles(side):
         touched = np.flatnonzero(~stands[row, begin:end])
         if not len(touched) or begin + touched[-1] + 2 * margin + 3 > end:

@@ -5,6 +5,8 @@ from dataclasses import dataclass
 import numpy as np
 
 from bowdenfit.files import pieces
+from bowdenfit.recordings.preparation.bandwidth import main_frequency
+from bowdenfit.recordings.preparation.likely_input import likely_input
 from bowdenfit.recordings.preparation.noise import noise_of
 from bowdenfit.recordings.preparation.shapes import ChosenVector, Places
 from bowdenfit.types import Flags, Labels, Matrix, Vector
@@ -13,6 +15,8 @@ _STEP = 0.005
 _SEGMENT = 8.0
 _MOST_POINTS = 5_000
 _FEWEST_ROWS = 16
+_CYCLES = 3  # in a segment, at least
+_FEWEST_POINTS = 500
 _WIDTH = 0.012
 _LIGHT = np.array([1.0, 6.0, 15.0, 20.0, 15.0, 6.0, 1.0]) / 64
 
@@ -27,6 +31,7 @@ class Segments:
         y: log output force, smoothed alike [1].
         weight: Inverse relative variance of each point, 0 where it must not be used.
         jitter: Standard deviation of x by noise [1].
+        width: Of the Gaussian that both are smoothed with [s].
     """
 
     step: float
@@ -34,6 +39,7 @@ class Segments:
     y: Matrix
     weight: Matrix
     jitter: Matrix
+    width: float = _WIDTH
 
 
 def segments_of(time: Vector, input_force: Vector, output_force: Vector, good: Flags) -> Segments | None:
@@ -48,14 +54,19 @@ def segments_of(time: Vector, input_force: Vector, output_force: Vector, good: F
     count, *sums = _sums(time, (input_force, output_force), good, step, points, length)
     if count.sum() < 20:
         return None
+    coarser = _coarser([_filled(total, count) for total in sums], step)
+    whole = len(count) // coarser * coarser
+    count, *sums = (each[:whole].reshape(-1, coarser).sum(axis=1) for each in (count, *sums))
+    step, length, width = coarser * step, max(min(length, len(count)), 1), coarser * _WIDTH
     points, forces = len(count), [_filled(total, count) for total in sums]
     x, y = (np.log(force) for force in forces)
-    weights, jitters = _weight(forces[0], forces[1], count), _jitter(forces[0], step)
-    columns = _smooth(x, step), _smooth(y, step), weights, jitters
+    weights, jitters = _weight(forces[0], forces[1], count), _jitter(forces[0], step, width)
+    columns = _smooth(x, step, width), _smooth(y, step, width), weights, jitters, forces[0]
     rows = points // length
-    x, y, weight, jitter = (v[: rows * length].reshape(rows, length) for v in columns)
+    x, y, weight, jitter, pulled = (v[: rows * length].reshape(rows, length) for v in columns)
     chosen = _liveliest(x, max(1, _MOST_POINTS // length))
-    return Segments(step, x[chosen], y[chosen], weight[chosen], jitter[chosen])
+    moved = np.stack([_smooth(np.log(likely_input(force)), step, width) for force in pulled[chosen]])
+    return Segments(step, moved, y[chosen], weight[chosen], jitter[chosen], width)
 
 
 def _sums(
@@ -103,11 +114,16 @@ def _filled(total: Vector, count: Labels) -> Vector:
     return np.interp(np.arange(len(count)), where, total[where] / count[where])
 
 
-def _smooth(values: Vector, step: float) -> Vector:
+def _coarser(forces: list[Vector], step: float) -> int:
+    """How many points to join, for a segment to hold some cycles: noise averages out over longer parts of slower ones."""
+    main = main_frequency(forces[0], forces[1], 1 / step)
+    return min(max(1, round(_CYCLES / (main * _SEGMENT))), max(1, len(forces[0]) // _FEWEST_POINTS)) if main > 0 else 1
+
+
+def _smooth(values: Vector, step: float, width: float) -> Vector:
     """Convolved with a Gaussian of a few coarse steps, so that the play operator does not follow every peak of the noise."""
-    width = _WIDTH / step
-    reach = int(np.ceil(3 * width))
-    kernel = np.exp(-0.5 * (np.arange(-reach, reach + 1) / width) ** 2)
+    reach = int(np.ceil(3 * width / step))
+    kernel = np.exp(-0.5 * (np.arange(-reach, reach + 1) * step / width) ** 2)
     return _convolved(values, kernel / kernel.sum())
 
 
@@ -123,9 +139,9 @@ def _weight(input_force: Vector, output_force: Vector, count: Labels) -> Vector:
     return np.where(count > 0, np.min(variance) / variance, 0.0)
 
 
-def _jitter(force: Vector, step: float) -> Vector:
+def _jitter(force: Vector, step: float, width: float) -> Vector:
     """Relative standard deviation of the force after smoothing, for noise that was white before."""
-    points = max(2 * np.sqrt(np.pi) * _WIDTH / step, 1.0)
+    points = max(2 * np.sqrt(np.pi) * width / step, 1.0)
     return max(noise_of(force) / np.sqrt(points), 1e-4 * float(force.max())) / force
 
 

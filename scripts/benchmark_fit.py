@@ -8,12 +8,12 @@ several minutes, measures everything in one go, and prints one table. Every numb
 `--record` puts the table at the head of docs/benchmarks.md, with the machine, the date and the commit.
 
 Whole processes: wall time from start to exit, imports, compilation, figures and files included; the time that processors
-spent on the process and those it starts, which says something on a busy machine too; and the peak of their resident
-memory, shared pages counted in each. "load" is how many processes wanted to compute on the machine, from the lowest to the
-highest; where it is above the number of cores by more than one or two, wall times say little. No program is kept from
-before ("cold"), but for "cache filled"; byte code is kept. With `--against`, another checkout does the same in turns, and
-each pair gives a ratio; the lowest and the highest of them stand beside their median. Commands on a finished fit read the
-one that their own checkout wrote.
+spent on the process and those it starts, which says something on a busy machine too; and the peak of their resident memory
+together, pages that several of them share counted once. "load" is how many processes wanted to compute on the machine,
+from the lowest to the highest; where it is above the number of cores by more than one or two, wall times say little. No
+program is kept from before ("cold"), but for "cache filled"; byte code is kept. With `--against`, another checkout does
+the same in turns, and each pair gives a ratio; the lowest and the highest of them stand beside their median. Commands on a
+finished fit read the one that their own checkout wrote.
 
 "calibrate, 200": 200 replications of the on-body data. Of the other checkout as few are run as are needed for the time of
 one more (FEW), and the rest is reckoned as if each took as long. "1000 cables": scripts/benchmark_batch.py says of what.

@@ -67,7 +67,7 @@ def measured(
         seconds = time.monotonic() - started
         process.returncode = os.waitstatus_to_exitcode(status)
         kernel = usage.ru_maxrss / (1024**2 if sys.platform == "darwin" else 1024)
-        memory = max(watch.stop(), kernel)
+        memory = watch.stop() or kernel
         written = [_read(file) for file in (output, errors)]
     if process.returncode == NOT_TRUSTED and results is not None:
         print("Warning: a fit did not converge; its times mean little.", file=sys.stderr)
@@ -82,7 +82,7 @@ def _read(file) -> str:
 
 
 class MemoryWatch:
-    """Largest sum of the resident memory of a process and all those it starts, looked at every 20 ms (Linux only)."""
+    """Largest memory of a process and all those it starts, looked at every 50 ms (Linux only)."""
 
     def __init__(self, pid: int) -> None:
         self.peak, self.ended = 0.0, threading.Event()
@@ -96,17 +96,17 @@ class MemoryWatch:
         return self.peak
 
     def _watch(self, pid: int) -> None:
-        while not self.ended.wait(0.02):
+        while not self.ended.wait(0.05):
             self.peak = max(self.peak, sum(resident(p) for p in family(pid)))
 
 
 def resident(pid: int) -> float:
-    """Resident memory of a process [MiB]; 0 if it is gone."""
+    """Resident memory of a process [MiB], what it shares with others divided among them; 0 if it is gone."""
     try:
-        pages = int(Path(f"/proc/{pid}/statm").read_text(encoding="ascii").split()[1])
-    except (OSError, IndexError):
+        lines = Path(f"/proc/{pid}/smaps_rollup").read_text(encoding="ascii").splitlines()
+    except OSError:
         return 0.0
-    return pages * os.sysconf("SC_PAGE_SIZE") / 1024**2
+    return next((int(line.split()[1]) for line in lines if line.startswith("Pss:")), 0) / 1024
 
 
 def family(pid: int) -> Iterator[int]:

@@ -3,6 +3,7 @@
 
 from collections.abc import Sequence
 
+from bowdenfit.cable.load_cells import DELAY_ERROR
 from bowdenfit.cable.registry import CURVES
 from bowdenfit.description import BY_GROUP
 from bowdenfit.inference.departure import FALSE_ALARM, Departure
@@ -10,12 +11,14 @@ from bowdenfit.kinds import readings_called
 from bowdenfit.kinds.inside_runs import ORDER, SPEED, STROKE
 from bowdenfit.kinds.places import RUN
 from bowdenfit.kinds.term import GROUP, LOAD
+from bowdenfit.parameters.priors import Normal
 from bowdenfit.questions.check.answer import Checks, checks_of
 from bowdenfit.results.record import Record, once
 from bowdenfit.words import few, listed, significant
 
 _FEW = 3  # departures that are said
 _INTERVAL = 0.9
+_FAR_LATE = 6.0  # standard errors of a delay, which are right to a third
 
 
 @once
@@ -28,7 +31,29 @@ def say_what_is_not_described(fit: Record) -> tuple[str, ...]:
     found = checks_of(fit)
     sentences = tuple(_sentence(fit, each) for each in list(told.values())[:_FEW])
     noise = fit.dataset.description.noise
-    return sentences + _far_out(fit, noise) + (_scatter(found, noise) if found else ())
+    return sentences + _late(fit) + _far_out(fit, noise) + (_scatter(found, noise) if found else ())
+
+
+def _late(fit: Record) -> tuple[str, ...]:
+    """A delay of the output channel that sliding wants far from where the reversals put it.
+
+    Friction and delay are told apart by how fast the force changes, and so is much that is neither.
+    """
+    late = next((p for p in fit.model.space.free if p.name == DELAY_ERROR), None)
+    if late is None or not isinstance(late.prior, Normal):
+        return ()
+    by_least_squares = fit.sampled is None
+    off = fit.least_squares.estimates[late.name].value if by_least_squares else fit.parameter(late.name).median
+    sds = abs(off) / late.shown_scale / float(late.prior.sd)
+    if sds < _FAR_LATE:
+        return ()
+    return (
+        f"While the rope slides, the output seems {abs(off):.2g} ms {'later' if off > 0 else 'earlier'} than it was taken to "
+        f"be, {sds:.0f} standard errors of that: something else changes the loss with how fast the force changes, such as "
+        "noise of a cell that stays alike for long, a filter, or friction that depends on speed. State the delay if it is "
+        'known (delay = { value = 10, unit = "ms" } under prepare in cable.toml), record with less noise, or compare with '
+        "--friction rate-dependent.",
+    )
 
 
 def _far_out(fit: Record, noise: str) -> tuple[str, ...]:

@@ -17,6 +17,7 @@ from bowdenfit.kinds.rows import OwnAngles, RowOrigin, provenance_of, read_own_a
 from bowdenfit.types import Vector
 from bowdenfit.words import counted, percent
 
+_FRACTION = 0.01  # as a percentage it is as likely a fraction
 _SDS = 4.5  # stated standard deviations above 1, which one healthy row of 300,000 exceeds
 
 
@@ -66,7 +67,21 @@ def read_efficiencies(source: Source) -> Found[EfficiencyTable]:
         read_own_angles(table, found, contacts),
         provenance_of(table),
     )
-    return Found(rows, {path.name: path}, accounts=(table.account,))
+    return Found(rows, {path.name: path}, _fractions(column, rows), (table.account,))
+
+
+def _fractions(column: Column, table: EfficiencyTable) -> tuple[str, ...]:
+    """What is to be said of efficiencies in percent that look like fractions: the verdict of a fit, but sooner and by name."""
+    small = np.flatnonzero(table.efficiency <= _FRACTION)
+    if not len(small) or not any(_in_percent(cell, column) for cell in column.cells):
+        return ()
+    first = int(small[0])
+    few = counted(len(small), "efficiency is", "efficiencies are")
+    which = "every efficiency is" if len(small) == len(table.efficiency) else few
+    return (
+        f"{table.origin.place(first)}: {which} at most 1 %; the usual cause is a fraction under a heading that says "
+        "percent: call the column efficiency, or write percentages.",
+    )
 
 
 def _ratio(cell: Cell, column: Column) -> float:

@@ -81,6 +81,15 @@ def test_a_cable_that_is_unlike_few_others_is_found(monkeypatch):
     assert sum(int(np.argmin(chances)) == 0 for chances in found) >= 8
 
 
+def test_what_is_off_is_what_its_own_inspections_say(monkeypatch):
+    """Of a cable inspected once, ten spreads off, which draws of the population pull to the others: its errors have tails."""
+    monkeypatch.setattr(unlike, "_POPULATIONS", 250)
+    fleet = like_cables([5, 0], 20, inspections=1, freedom=3.0, shift=2.0)
+    (core,) = gibbs([fleet], [(0,)], 5, 600)
+    number, off = unlike.departure(fleet, core, 0, 1)
+    assert number in (0, 1) and 6 < off < 15
+
+
 @pytest.mark.slow
 def test_the_sampler_of_fleets_agrees_with_another():
     """Means within 0.15 standard deviations, these within 15 %: of 13 numbers with 600 effective draws each."""

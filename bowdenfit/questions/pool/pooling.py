@@ -1,6 +1,5 @@
 """A fleet's cables looked at together: from draws of single fits to the answer."""
 
-from collections.abc import Mapping
 from functools import partial
 from pathlib import Path
 
@@ -14,13 +13,12 @@ from bowdenfit.questions.pool.curves import curves_of
 from bowdenfit.questions.pool.inspected import Given, given
 from bowdenfit.questions.pool.life import cycles_until, life_of
 from bowdenfit.questions.pool.next import next_inspections
-from bowdenfit.questions.pool.unlike import FALSE_ALARM, departures, judged, mixed
+from bowdenfit.questions.pool.unlike import FALSE_ALARM, departure, judged, mixed
 from bowdenfit.questions.pool.worth import LEAST, readings_of, worth
 from bowdenfit.results.fleet_folder import FleetDraws
 from bowdenfit.words import few
 
 _NEW = 25  # new cables of each draw of the population, so that which are drawn does not matter to the early ones
-_FAR = 2.0  # spreads from the middle from which a number is named as what is off
 _WEAR = "wear"
 
 
@@ -124,13 +122,12 @@ def _cables(
     core, adjusted = population, np.ones(1)
     if not alone:
         core, adjusted = judged(inspected, population, partial(draw_population, inspected, seed), seed)
-    away = departures(population, core)
     again = np.isin(np.arange(len(inspected.cable)), measured)
     found = []
     for i, name in enumerate(known.cables):
         mine, values = inspected.cable == i, population.cables[:, i]
         has = inspected.known[mine].any(axis=0)
-        words = _departure(known, away[i], has) if adjusted[i] < FALSE_ALARM and not alone else ""
+        words = _departure(known, departure(inspected, core, i, seed)) if adjusted[i] < FALSE_ALARM and not alone else ""
         found.append(
             PooledCable(
                 name,
@@ -165,16 +162,13 @@ def _by_itself(known: Given, population: PopulationDraws, mine: np.ndarray, has:
     }
 
 
-def _departure(known: Given, away: np.ndarray, has: np.ndarray) -> str:
-    """What is off with a cable that is unlike the rest."""
-    named: Mapping[str, float] = {
-        name: float(away[k]) for k, name in enumerate((*known.coefficients, _WEAR)[: len(away)]) if name == _WEAR or has[k]
-    }
-    name = max(named, key=lambda each: abs(named[each]))
-    if abs(named[name]) < _FAR:
+def _departure(known: Given, found: tuple[int, float] | None) -> str:
+    """What is off with a cable that is unlike the rest, by its own inspections."""
+    if found is None:
         return "its inspections do not lie on one line of wear, or one of them disagrees with the others"
-    way = "above" if named[name] > 0 else "below"
-    return f"{name} lies {abs(named[name]):.1f} times the usual spread {way} that of the others"
+    number, off = found
+    name, way = (*known.coefficients, _WEAR)[number], "above" if off > 0 else "below"
+    return f"{name} lies {abs(off):.1f} times the usual spread {way} that of the others"
 
 
 def _more_notes(known: Given, drawn: FleetDraws) -> list[str]:

@@ -34,6 +34,7 @@ _REPEATS = 20  # stretches of the errors for each
 _OFTENER = 4.0  # times fewer degrees of freedom, by which large stretches are drawn oftener
 _LEAST_SQUARE = 1e-200  # that divides without overflow
 _RANK = 1e-9
+_TOGETHER = -1  # in place of the number of a cable: its inspections, with each other and with a line
 _FEWEST_TO_LEAVE_OUT, _FAR = 5, 3.5  # cables, and typical deviations from the median
 _NORMAL_DEVIATION = 0.6745  # median deviation of a normal distribution in standard deviations
 _FEWEST = 8  # cables of which can be said whether they are of one kind
@@ -112,22 +113,50 @@ def chances(inspected: Inspected, drawn: PopulationDraws, seed: int, without: tu
         seed: Of everything random.
         without: Cables that the population was drawn without.
     """
-    generator = np.random.default_rng([seed, 7])
+    generator, core = np.random.default_rng([seed, 7]), _some(drawn)
+    every = range(inspected.cables)
+    return np.array([_chance(inspected, i, *core, generator=generator, is_in=i not in without) for i in every])
+
+
+def _some(drawn: PopulationDraws) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     which = np.linspace(0, len(drawn.mean) - 1, _POPULATIONS).round().astype(int)
-    core = drawn.mean[which], drawn.spread[which], drawn.effects[which]
-    return np.array([_chance(inspected, i, *core, generator, i not in without) for i in range(inspected.cables)])
+    return drawn.mean[which], drawn.spread[which], drawn.effects[which]
 
 
-def _chance(
+def departure(inspected: Inspected, core: PopulationDraws, cable: int, seed: int) -> tuple[int, float] | None:
+    """The number in which a cable is unlike the rest by its own inspections, and by how many spreads.
+
+    None where it is rather its inspections that are unlike each other.
+
+    Args:
+        inspected: What is known.
+        core: The population without it.
+        cable: Its number.
+        seed: Of everything random.
+    """
+    generator = np.random.default_rng([seed, 17, cable])
+    chance, off = _compared(inspected, cable, *_some(core), generator=generator, is_in=False)
+    least = min(chance, key=lambda each: chance[each])
+    return None if least == _TOGETHER else (least, off[least])
+
+
+def _chance(inspected: Inspected, cable: int, *population: np.ndarray, generator: np.random.Generator, is_in: bool) -> float:
+    """Of one cable, which may be in the population or not."""
+    found, _ = _compared(inspected, cable, *population, generator=generator, is_in=is_in)
+    return min(1.0, len(found) * min(found.values()))
+
+
+def _compared(
     inspected: Inspected,
     cable: int,
     mean: np.ndarray,
     spread: np.ndarray,
     effects: np.ndarray,
+    *,
     generator: np.random.Generator,
     is_in: bool,
-) -> float:
-    """Of one cable, which may be in the population or not."""
+) -> tuple[dict[int, float], dict[int, float]]:
+    """Chance of each number of a cable, and of its inspections together as number -1; how many spreads each number is off."""
     rows = np.flatnonzero(inspected.cable == cable)
     known = inspected.known[rows].ravel()
     design = inspected.design[rows].reshape(known.size, -1)[known]
@@ -147,7 +176,7 @@ def _chance(
     log = distance / 2 + size if is_in else np.zeros(len(mean))
     stretch, weights = _stretches(inspected.summaries.freedom[rows], len(mean), generator)
     weights = weights * np.exp(smooth_weights(log)[0])[:, None]  # of the population without this cable
-    beyond = [_within(away, stretch[..., of_row], scale, design, generator)]
+    beyond, off = {_TOGETHER: _within(away, stretch[..., of_row], scale, design, generator)}, {}
     precision = np.linalg.inv(scale)
     for k in np.flatnonzero((design != 0).any(axis=0)):
         others = np.arange(design.shape[1]) != k
@@ -155,9 +184,9 @@ def _chance(
         gain = np.linalg.solve(design.T @ precision @ design + np.diag(loose), design.T @ precision)[k]
         own = np.bincount(of_row, gain * (scale @ gain), len(rows))
         variance = (spread**2 @ (gain @ design) ** 2)[:, None] + stretch @ own
-        beyond.append(2 * ndtr(-np.abs(away @ gain)[:, None] / np.sqrt(variance)))
-    found = [float(np.sum(weights * each) / weights.sum()) for each in beyond]
-    return min(1.0, len(found) * min(found))
+        beyond[int(k)] = 2 * ndtr(-np.abs(away @ gain)[:, None] / np.sqrt(variance))
+        off[int(k)] = float(np.median(away @ gain / spread[:, k]))
+    return {k: float(np.sum(weights * each) / weights.sum()) for k, each in beyond.items()}, off
 
 
 def _stretches(freedom: np.ndarray, populations: int, generator: np.random.Generator) -> tuple[np.ndarray, np.ndarray]:
@@ -186,17 +215,6 @@ def _within(
     way = generator.standard_normal((*stretch.shape[:2], free.shape[1]))
     way /= np.linalg.norm(way, axis=2, keepdims=True)
     found: np.ndarray = chdtrc(free.shape[1], seen[:, None] / np.sum(stretch * (way @ free.T) ** 2, axis=2))
-    return found
-
-
-def departures(drawn: PopulationDraws, core: PopulationDraws) -> np.ndarray:
-    """Of each cable from the middle of a population, in its spreads between cables, (cable, number).
-
-    Args:
-        drawn: All cables.
-        core: The population without those that are far off.
-    """
-    found: np.ndarray = (np.median(drawn.cables, axis=0) - np.median(core.mean, axis=0)) / np.median(core.spread, axis=0)
     return found
 
 

@@ -8,6 +8,8 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import TypeVar
 
+from bowdenfit.words import printable
+
 Value = TypeVar("Value")
 Given = TypeVar("Given")
 
@@ -29,6 +31,10 @@ class BowdenfitError(Exception):
     alike: Hashable = None
     row: int = 0
     place: tuple[str | int, ...] = ()
+
+    def __str__(self) -> str:
+        """What a library's user reads too: names of files in it steer no terminal, and break no line."""
+        return printable(super().__str__())
 
 
 class DatasetError(BowdenfitError):

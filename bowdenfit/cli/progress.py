@@ -20,6 +20,8 @@ from bowdenfit.inference.engines.memory import refuse_too_little
 from bowdenfit.verb import Watch
 
 Report: TypeAlias = Callable[..., None]
+# The interrupt, with all that ran: compiled code may be at work on arrays that would be freed with it, before the process ends.
+_held: list[BaseException] = []
 
 
 @contextmanager
@@ -62,6 +64,7 @@ def watch_verb(folder: Path | None, watch: Watch) -> Iterator[Report]:
         if is_kept and wanted:
             answer()
             say_interrupted(how)
+            _held[:] = [error]
             raise click.exceptions.Exit(INTERRUPTED) from None
         if is_kept and isinstance(shortage, DiskError | MemoryShortageError):
             raise type(shortage)(f"{shortage} {go_on}") from None

@@ -1,6 +1,7 @@
 """The command line as people use it: verbs, output, exit codes."""
 
 import contextlib
+import gc
 import json
 import os
 import re
@@ -8,6 +9,7 @@ import signal
 import subprocess
 import sys
 import time
+import weakref
 from pathlib import Path
 
 import click
@@ -292,6 +294,27 @@ def test_an_interrupt_that_the_garbage_collector_swallows_is_not_lost(tmp_path):
         for number, handler in before.items():
             signal.signal(number, handler)
     assert stopped.value.exit_code == 130
+
+
+def test_what_an_interrupted_calculation_worked_on_is_there_until_the_process_ends(tmp_path):
+    """Compiled code may be at it still: it was freed under its hands, and the process ended by a segmentation fault."""
+    (tmp_path / "chain.checkpoint").touch()
+    before = {number: signal.getsignal(number) for number in (signal.SIGINT, signal.SIGTERM)}
+    alive: list[weakref.ref] = []
+
+    def calculation():
+        arrays = set(np.zeros(3))
+        alive.append(weakref.ref(arrays))
+        raise KeyboardInterrupt
+
+    try:
+        with pytest.raises(click.exceptions.Exit), watch_verb(tmp_path, FIT.watch):
+            calculation()
+    finally:
+        for number, handler in before.items():
+            signal.signal(number, handler)
+    gc.collect()
+    assert alive[0]() is not None
 
 
 def test_a_whole_fit_in_a_process_of_its_own_and_an_interrupt(on_body, tmp_path):

@@ -147,3 +147,10 @@ def test_output_that_nobody_reads_is_no_failure(output, code, said):
 def test_a_refusal_that_nobody_reads_is_one_all_the_same(output):
     done = subprocess.run(["bash", "-c", f"{sys.executable} -m bowdenfit check /nowhere {output}"], check=False, timeout=60)
     assert done.returncode == 2
+
+
+def test_names_of_files_in_a_refusal_break_no_line_and_steer_no_terminal(tmp_path):
+    with pytest.raises(bf.BowdenfitError) as refused:
+        bf.read(tmp_path / "51\u2028mm\x1b[31m.csv")
+    assert "51\\u2028mm\\x1b[31m.csv" in str(refused.value)
+    assert all(letter.isprintable() for letter in str(refused.value))

@@ -1,5 +1,7 @@
 """Cables of a fleet together: population, wear, life, who is unlike the rest, and what is refused."""
 
+import csv
+import io
 import json
 from dataclasses import replace
 
@@ -64,6 +66,28 @@ def test_cables_unlike_the_rest_are_named_and_no_others(found):
     assert "wear lies" in found.cable("cable-08").unlike
 
 
+def test_cables_unlike_the_rest_are_said_by_their_own_inspections(fleet, found):
+    """Of one line through both coefficients, by least squares: within half a standard deviation, as errors have heavy tails."""
+    for i, name in ((2, "cable-03"), (7, "cable-08")):
+        odd, rows = found.cable(name), slice(3 * i, 3 * i + 3)
+        seen = [np.median(np.log(each[rows]), axis=1) + 0.2 * fleet[0].lubricated[rows] for each in fleet[0].values.values()]
+        design = np.column_stack([np.repeat(np.eye(2), 3, axis=0), np.tile(fleet[0].cycles[rows] / REFERENCE, 2)])
+        weight = np.repeat([2.0, 1.0], 3)  # errors of the second are twice as large
+        line, *_ = np.linalg.lstsq(design * weight[:, None], np.concatenate(seen) * weight, rcond=None)
+        assert odd.pooled == () and found.cable("cable-01").pooled == ("mu_0", "mu_1", "wear")
+        for interval, value in zip((*odd.coefficients.values(), odd.wear), (*np.exp(line[:2]), np.expm1(line[2])), strict=True):
+            assert abs(interval.median - value) < 0.5 * interval.sd
+    assert all(each.median < 0.4 for each in found.spreads.values())  # of the others; 0.5 with the one that is five times off
+    text = " ".join(pool_text(found).split())
+    assert "They are shown by their own inspections alone" in text and "said without them" in text
+    assert "Only the wear" not in text
+    cables = tuple(replace(each, pooled=("wear",)) if each.cable == "cable-03" else each for each in found.cables)
+    assert "Only the wear of cable-03 is that of the others" in " ".join(pool_text(replace(found, cables=cables)).split())
+    rows = csv.DictReader(io.StringIO(found.to_csv()))
+    said = {row["cable"]: row["pooled"] for row in rows if row["quantity"] == "wear"}
+    assert (said["cable-01"], said["cable-03"]) == ("yes", "no")
+
+
 def test_cables_that_are_all_alike_or_all_unlike_are_said_to_be(found):
     assert "all cables are alike" not in pool_text(found) and "All cables are unlike" not in pool_text(found)
     no_spread = {name: replace(each, q05=0.001, q95=0.02) for name, each in found.spreads.items()}
@@ -72,7 +96,7 @@ def test_cables_that_are_all_alike_or_all_unlike_are_said_to_be(found):
     known = {**no_spread, "wear": found.spreads["wear"]}
     assert "all cables are alike" not in pool_text(replace(found, spreads=known))
     wide = replace(found.coefficients["mu_1"], q05=0.02, q95=0.2)
-    apart = replace(found, coefficients=found.coefficients | {"mu_1": wide}, mixed={})
+    apart = replace(found, coefficients={"mu_0": wide, "mu_1": wide}, mixed={})
     assert "All cables are unlike" not in pool_text(apart)
     nobody = tuple(replace(each, unlike="") for each in found.cables)
     assert "All cables are unlike in mu_0 (" in " ".join(pool_text(replace(apart, cables=nobody)).split())

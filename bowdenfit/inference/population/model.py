@@ -76,7 +76,7 @@ class Inspected:
             return found
 
         s, counts = self.summaries, self.known.sum(axis=1)
-        root = _roots(s.scale, self.known)
+        root = roots(s.scale, self.known)
         information = np.einsum("jab,jac->jbc", root, root) * ((s.freedom + counts) / (s.freedom + counts + 2))[:, None, None]
         design = self.design
         moved = np.einsum("jkd,jkl,jle->jde", design, information, design)
@@ -111,8 +111,13 @@ class Inspected:
         return np.concatenate([found, worn], axis=2)
 
 
-def _roots(scale: np.ndarray, known: np.ndarray) -> np.ndarray:
-    """Matrices W with |W x|^2 = x' scale^-1 x in what is known, and nothing of what is not."""
+def roots(scale: np.ndarray, known: np.ndarray) -> np.ndarray:
+    """Matrices W with |W x|^2 = x' scale^-1 x in what is known, and nothing of what is not, (inspection, row, coefficient).
+
+    Args:
+        scale: Scale matrices, (inspection, coefficient, coefficient).
+        known: Whether an inspection has a coefficient, (inspection, coefficient).
+    """
     found = np.zeros_like(scale)
     for j, mine in enumerate(known):
         inside = np.ix_(mine, mine)

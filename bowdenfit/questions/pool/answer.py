@@ -45,7 +45,7 @@ class Life(Part):
 
 @dataclass(frozen=True, repr=False)
 class PooledCable(Part):
-    """A cable, drawn toward the population as far as its data allow.
+    """A cable, drawn toward the population as far as its data allow, or by its own inspections alone if it is unlike the rest.
 
     Args:
         cable: Its name.
@@ -57,7 +57,9 @@ class PooledCable(Part):
         life: See `Life`; None where it is not asked for.
         chance: Probability that a cable of this population is as far from the others; in how many fleets one is.
         unlike: How it differs from the rest, in words; empty if it does not.
-        worth: Effective number of its draws by themselves, of the inspection where the population agrees with them least.
+        pooled: Names of what the population was looked at for: all that a cable like the rest has, and of one that is unlike
+            them none but "wear", and that only where its own inspections do not tell it.
+        worth: Effective number of its draws by themselves, of the inspection where what is said of it agrees with them least.
         measured: How many of its inspections were pooled by their readings, because that number is too small.
     """
 
@@ -70,6 +72,7 @@ class PooledCable(Part):
     life: Life | None
     chance: float
     unlike: str
+    pooled: tuple[str, ...]
     worth: float
     measured: int
 
@@ -151,7 +154,8 @@ class Pool(Display):
         cables: In the order of the fleet.
         inspections: How many are pooled.
         left_out: Those that are not.
-        coefficients: Of a new cable of this population, dry and at the reference temperature; its scatter is in it.
+        coefficients: Of a new cable of this population, dry and at the reference temperature; its scatter is in it. Cables that
+            are unlike the rest are not in the population.
         typical: Of the middle of the population, by name.
         spreads: Standard deviation of log coefficients between cables, by name, and of the wear under "wear".
         wear: In the reference cycles, of the middle of the population; None where it cannot be told.
@@ -218,6 +222,8 @@ class Pool(Display):
             of_cable: dict[str, Interval] = dict(each.coefficients) | ({"wear": each.wear} if each.wear else {})
             life = each.life
             fails = {"life_cycles": life.median if life else None, "fails": life.fails if life else None}
-            rows += [{"quantity": name, "cable": each.cable, **vars(interval), **fails} for name, interval in of_cable.items()]
+            for name, interval in of_cable.items():
+                pooled = {"pooled": "yes" if name in each.pooled else "no"}
+                rows.append({"quantity": name, "cable": each.cable, **vars(interval), **fails, **pooled})
         names = (*self.typical, *(("wear",) if self.wear else ()))
         return rows, dict.fromkeys(names, "1")

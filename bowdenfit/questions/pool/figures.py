@@ -68,7 +68,7 @@ def captions(found: Pool) -> dict[str, str]:
         "pooled-coefficients": (
             "Each cable by itself from its first inspection (open), and drawn toward the others as far as its own inspections "
             "leave it open (filled, with 90 % interval); gray: where nine of ten new cables lie. n = "
-            f"{len(found.cables)} cables; red ones are unlike the rest."
+            f"{len(found.cables)} cables; red ones are unlike the rest, and by their own inspections alone."
         ),
         "pooled-wear": (
             f"{'Efficiency' if asked else 'Friction over that of the new cable'} of each cable (thin) and of a new one (thick, "

@@ -1,13 +1,15 @@
 """A fleet's cables looked at together: from draws of single fits to the answer."""
 
+from dataclasses import dataclass, replace
 from functools import partial
 from pathlib import Path
 
 import numpy as np
 
 from bowdenfit.inference.interval import Interval
-from bowdenfit.inference.population.model import REFERENCE_TEMPERATURE
+from bowdenfit.inference.population.model import REFERENCE_TEMPERATURE, Inspected
 from bowdenfit.inference.population.sampling import PopulationDraws, draw_population
+from bowdenfit.inference.population.unpooled import unpooled
 from bowdenfit.questions.pool.answer import Asked, Effect, Life, Pool, PooledCable
 from bowdenfit.questions.pool.curves import curves_of
 from bowdenfit.questions.pool.inspected import Given, given
@@ -20,6 +22,29 @@ from bowdenfit.words import few
 
 _NEW = 25  # new cables of each draw of the population, so that which are drawn does not matter to the early ones
 _WEAR = "wear"
+
+
+@dataclass(frozen=True)
+class _Looked:
+    """What a look at all cables gave.
+
+    Args:
+        every: The population of all cables.
+        shown: The population without cables that are unlike the rest, and these by their own inspections alone.
+        chance: Probability that a cable of this population is as far from the others, (cable,).
+        unlike: How it differs from the rest by the number of each that does, in words.
+        told: Those of them whose own inspections tell their wear.
+        worth: How much single fits know of each inspection where it is said to be, (inspection,).
+        rows: Inspections of which the readings were looked at.
+    """
+
+    every: PopulationDraws
+    shown: PopulationDraws
+    chance: np.ndarray
+    unlike: dict[int, str]
+    told: tuple[int, ...]
+    worth: np.ndarray
+    rows: tuple[int, ...]
 
 
 def pooled(drawn: FleetDraws, asked: Asked | None, seed: int, measurements: Path | None = None) -> Pool:
@@ -36,7 +61,8 @@ def pooled(drawn: FleetDraws, asked: Asked | None, seed: int, measurements: Path
         DatasetError, DescriptionError, UsageError: There are no such measurements.
     """
     known = given(drawn)
-    population, each_worth, measured = _drawn(known, seed, measurements)
+    looked = _looked(known, seed, measurements)
+    population = looked.shown
     count, alone = len(known.coefficients), len(known.cables) == 1
     generator = np.random.default_rng([seed, 13])
     mean, spread = (np.repeat(each, _NEW, axis=0) for each in (population.mean, population.spread))
@@ -46,7 +72,7 @@ def pooled(drawn: FleetDraws, asked: Asked | None, seed: int, measurements: Path
     names = (*known.coefficients, *((_WEAR,) if wears else ()))
     return Pool(
         str(drawn.about.get("name", "")),
-        _cables(known, population, each_worth, measured, asked, seed),
+        _cables(known, looked, asked),
         len(known.labels),
         known.left_out,
         {} if alone else _named(known.coefficients, np.exp(new)),
@@ -58,39 +84,63 @@ def pooled(drawn: FleetDraws, asked: Asked | None, seed: int, measurements: Path
         REFERENCE_TEMPERATURE,
         asked,
         None if asked is None or alone else _life(known, asked, new),
-        {} if alone else mixed(known.inspected, population, names),
+        {} if alone else mixed(known.inspected, looked.every, names),
         curves_of(known, population, asked, new) if wears else None,
         next_inspections(known, population, asked, seed),
         (*known.notes, *_more_notes(known, drawn)),
-        (*population.reasons, *_poorly_known(known, each_worth, measured)),
+        (*dict.fromkeys((*population.reasons, *looked.every.reasons)), *_poorly_known(known, looked)),
         seed,
     )
 
 
-def _drawn(known: Given, seed: int, measurements: Path | None) -> tuple[PopulationDraws, np.ndarray, tuple[int, ...]]:
-    """The population; how much single fits know of each inspection there; and those whose readings are looked at."""
-    rows: tuple[int, ...] = ()
+def _looked(known: Given, seed: int, measurements: Path | None) -> _Looked:
+    """At all cables, and again with readings of those of which single fits tell too little."""
+    inspected, rows = known.inspected, tuple[int, ...]()
     while True:
         readings = readings_of(known, rows, measurements) if measurements is not None and rows else ()
-        drawn = draw_population(known.inspected, seed, called=known.coefficients, readings=readings)
-        found = worth(known, drawn)
-        more = tuple(int(j) for j in np.flatnonzero(found < LEAST) if j not in rows)
+        draw = partial(draw_population, inspected, seed, called=known.coefficients, readings=readings)
+        every = draw()
+        core, chance = (every, np.ones(1)) if inspected.cables == 1 else judged(inspected, every, draw, seed)
+        named = [int(i) for i in np.flatnonzero(chance < FALSE_ALARM)]
+        shown, told = _with_unpooled(inspected, core, named, seed)
+        found = worth(known, shown)
+        more = tuple(int(j) for j in np.flatnonzero(found < LEAST) if j not in rows and inspected.cable[j] not in named)
         if measurements is None or not more:
-            return drawn, found, rows
+            unlike = {i: _departure(known, departure(inspected, core, i, seed)) for i in named}
+            return _Looked(every, shown, chance, unlike, told, found, rows)
         rows = (*rows, *more)
 
 
-def _poorly_known(known: Given, found: np.ndarray, rows: tuple[int, ...]) -> tuple[str, ...]:
+def _with_unpooled(
+    inspected: Inspected, core: PopulationDraws, named: list[int], seed: int
+) -> tuple[PopulationDraws, tuple[int, ...]]:
+    """Draws with some cables by their own inspections alone, and which of these tell their wear."""
+    cables, told = core.cables.copy(), []
+    for i in named:
+        cables[:, i], tells = unpooled(inspected, core, i, seed)
+        told += [i] * tells
+    return replace(core, cables=cables), tuple(told)
+
+
+def _poorly_known(known: Given, looked: _Looked) -> list[str]:
     """Why the answer must not be trusted where single fits know too little; empty where they know enough."""
-    numbers = [j for j in np.flatnonzero(found < LEAST) if j not in rows]
-    if not numbers:
-        return ()
-    cables = list(dict.fromkeys(known.cables[known.inspected.cable[j]] for j in numbers))
-    return (
-        f"what was drawn from the inspections of {few(cables)} by themselves hardly reaches where the other cables put them, "
-        "so that what is said of them may be off by half its uncertainty; name the folder of the fleet's measurements with "
-        "--measurements, and their readings are looked at again",
-    )
+    of, reasons = known.inspected.cable, []
+    low = [j for j in np.flatnonzero(looked.worth < LEAST) if j not in looked.rows or of[j] in looked.unlike]
+    pulled = [known.cables[of[j]] for j in low if of[j] not in looked.unlike]
+    torn = [known.cables[of[j]] for j in low if of[j] in looked.unlike]
+    if pulled:
+        reasons.append(
+            f"what was drawn from the inspections of {few(list(dict.fromkeys(pulled)))} by themselves hardly reaches where the "
+            "other cables put them, so that what is said of them may be off by half its uncertainty; name the folder of the "
+            "fleet's measurements with --measurements, and their readings are looked at again"
+        )
+    if torn:
+        reasons.append(
+            f"inspections of {few(list(dict.fromkeys(torn)))} contradict each other, so that what is said of it lies where "
+            "hardly one of them puts it; look for a wrong reading, a wrong row of fleet.csv or a cable that was changed, and "
+            "leave that inspection out"
+        )
+    return reasons
 
 
 def _named(names: tuple[str, ...], draws: np.ndarray) -> dict[str, Interval]:
@@ -108,26 +158,16 @@ def _life(known: Given, asked: Asked, values: np.ndarray) -> Life:
     return life_of(asked, cycles, known.reference_cycles)
 
 
-def _cables(
-    known: Given,
-    population: PopulationDraws,
-    each_worth: np.ndarray,
-    measured: tuple[int, ...],
-    asked: Asked | None,
-    seed: int,
-) -> tuple[PooledCable, ...]:
+def _cables(known: Given, looked: _Looked, asked: Asked | None) -> tuple[PooledCable, ...]:
     """What is known of each cable."""
-    inspected, count = known.inspected, len(known.coefficients)
-    alone = len(known.cables) == 1
-    core, adjusted = population, np.ones(1)
-    if not alone:
-        core, adjusted = judged(inspected, population, partial(draw_population, inspected, seed), seed)
-    again = np.isin(np.arange(len(inspected.cable)), measured)
+    inspected, population, count = known.inspected, looked.shown, len(known.coefficients)
+    again = np.isin(np.arange(len(inspected.cable)), looked.rows)
     found = []
     for i, name in enumerate(known.cables):
         mine, values = inspected.cable == i, population.cables[:, i]
         has = inspected.known[mine].any(axis=0)
-        words = _departure(known, departure(inspected, core, i, seed)) if adjusted[i] < FALSE_ALARM and not alone else ""
+        named = [known.coefficients[k] for k in np.flatnonzero(has)]
+        wear = [_WEAR] if inspected.cycles is not None else []
         found.append(
             PooledCable(
                 name,
@@ -135,12 +175,13 @@ def _cables(
                 float(known.cycles[mine].max()),
                 {c: Interval.of(np.exp(values[:, k])) for k, c in enumerate(known.coefficients) if has[k]},
                 _by_itself(known, population, mine, has),
-                Interval.of(np.expm1(values[:, count])) if inspected.cycles is not None else None,
+                Interval.of(np.expm1(values[:, count])) if wear else None,
                 _life(known, asked, values) if asked is not None else None,
-                float(adjusted[i]),
-                words,
-                float(each_worth[mine].min()),
-                int(again[mine].sum()),
+                float(looked.chance[i]),
+                looked.unlike.get(i, ""),
+                tuple(wear if i not in looked.told else []) if i in looked.unlike else (*named, *wear),
+                float(looked.worth[mine].min()),
+                0 if i in looked.unlike else int(again[mine].sum()),
             )
         )
     return tuple(found)

@@ -37,7 +37,10 @@ def pool_page(found: Pool) -> Page:
         prose("What cables have in common", [*effect_sentences(found), how_to_read(found)], [Table(heads, tuple(rows))]),
         prose(
             "Every cable",
-            ["Drawn toward the others as far as its own inspections leave it open, median ± standard deviation."],
+            [
+                "Drawn toward the others as far as its own inspections leave it open, or by its own inspections alone if it is "
+                "unlike the rest; median ± standard deviation."
+            ],
             [Table(cable_heads, tuple(cables))],
             pictures=(pictures["pooled-coefficients"],),
         ),

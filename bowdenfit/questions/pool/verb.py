@@ -155,7 +155,7 @@ VERB = Verb(
 
     Says how friction grows with cycles, what lubrication and temperature do, how much cables differ, and what a new one will be
     like; each cable is drawn toward the others as far as its own inspections leave it open. Names cables that are unlike the
-    rest, and what to inspect next.
+    rest, which are shown by their own inspections alone, and what to inspect next.
 
     With --until and a --wrap-angle for each coefficient: how many cycles each cable and a new one last, and with --cycles the
     probability of failing before. With --measurements, the folder that was fitted, cables of which single fits tell too little

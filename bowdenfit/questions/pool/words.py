@@ -5,7 +5,7 @@ import math
 from bowdenfit.display import text_of
 from bowdenfit.inference.interval import Interval
 from bowdenfit.questions.pool.answer import Effect, Life, Pool, PooledCable
-from bowdenfit.words import counted, decimals, filled, listed, percent, table
+from bowdenfit.words import counted, decimals, few, filled, listed, percent, table
 
 _NAMED, _SHOWN = 5, 12  # unlike cables, and cables in the table
 _SURE = 0.999
@@ -93,6 +93,7 @@ def unlike_sentences(found: Pool) -> list[str]:
     ]
     if len(found.unlike) > _NAMED:
         lines.append(f"So are {counted(len(found.unlike) - _NAMED, 'other')}, in the JSON.")
+    lines += _apart_sentences(found)
     if found.mixed:
         names = listed(list(found.mixed))
         lines.append(
@@ -100,6 +101,21 @@ def unlike_sentences(found: Pool) -> list[str]:
             "makes are pooled. Pool each make by itself, or a new cable is not what is said here."
         )
     return [*(lines or ["No cable is unlike the rest."]), *kind_sentences(found)]
+
+
+def _apart_sentences(found: Pool) -> list[str]:
+    """By what cables that are unlike the rest are shown."""
+    if not found.unlike:
+        return []
+    shown = "It is shown by its" if len(found.unlike) == 1 else "They are shown by their"
+    lines = [
+        f"{shown} own inspections alone, not drawn toward the others; what cables have in common and a new cable are said "
+        f"without {'it' if len(found.unlike) == 1 else 'them'}."
+    ]
+    borrowed = [each.cable for each in found.unlike if each.pooled]
+    if borrowed:
+        lines.append(f"Only the wear of {few(borrowed)} is that of the others, because no own inspections tell it.")
+    return lines
 
 
 def kind_sentences(found: Pool) -> list[str]:

@@ -9,12 +9,8 @@ from bowdenfit.files.pieces import Series
 from bowdenfit.recordings.preparation.shapes import OtherVector
 
 _LONGEST_SEGMENT = 8192
-_MOST_OF_MOTION = (
-    1 << 17
-)  # samples that the main motion is looked for in: else segments would be shorter than its period
-_PERIODS = (
-    4  # of the main motion in a segment, at the most: more of them show equal cycles as lines with nothing in between
-)
+_MOST_OF_MOTION = 1 << 17  # samples that the main motion is looked for in: else segments would be shorter than its period
+_PERIODS = 4  # of the main motion in a segment, at the most: more of them show equal cycles as lines with nothing in between
 _SHORTEST_SEGMENT = 64
 _CLEAR = 10  # times the floor: the highest of some thousand frequencies of noise is three times as high
 _BINS_PER_OCTAVE = 2

@@ -198,7 +198,11 @@ def fits(tmp_path_factory) -> dict[str, bf.Fit]:
     (folder / "efficiencies.csv").write_text("\n".join(["cable_length_mm,efficiency", *rows]))
     return {
         name: bf.fit(
-            folder, settings=[f"contact.0.wrap_angle.curve={name}"], seed=3, output=folder / name, figures=False
+            folder,
+            settings=[f"contact.0.wrap_angle.curve={name}", "sampler.n_walkers=128", "sampler.target_ess=400"],
+            seed=3,
+            output=folder / name,
+            figures=False,
         )
         for name in CURVES
     }

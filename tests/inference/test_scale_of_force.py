@@ -134,7 +134,8 @@ def test_every_force_times_a_factor_changes_the_log_density_by_a_constant(case, 
         assert np.all(np.isfinite(found))
         densities[factor], values[factor] = found, jax.vmap(model.space.vector)(z)
         power = np.array([("N" in p.unit.split("/")[0].split()) for p in model.space.free], dtype=float)
-        np.testing.assert_allclose(values[factor] / factor**power, values[FACTORS[0]] / FACTORS[0] ** power, rtol=1e-12)
+        rounding = 1e-9 if "recordings" in case else 1e-12  # the scale of delay_error comes out of an iteration
+        np.testing.assert_allclose(values[factor] / factor**power, values[FACTORS[0]] / FACTORS[0] ** power, rtol=rounding)
     # How long deviations of a recording stay alike is found by a search, to six digits.
     weak, other = densities.values()
     tolerance = (1e-6 if "recordings" in case or case == "offsets" else 1e-10) * max(np.max(np.abs(weak)), 1.0)

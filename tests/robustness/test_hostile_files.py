@@ -156,6 +156,7 @@ def test_files_that_unfold_or_lead_nowhere_are_refused_at_once(tmp_path, name):
     assert time.process_time() - start < 5 and len(str(refused.value)) < 500
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", ["far.xlsx"])
 def test_a_workbook_is_read_within_the_same_limits_where_it_is_a_table(tmp_path, name):
     HOSTILE[name](tmp_path / name)

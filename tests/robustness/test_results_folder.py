@@ -70,7 +70,7 @@ def whole(on_body, tmp_path_factory) -> tuple[bf.Fit, Path]:
     return bf.load(place / "fit"), place / "compiled"
 
 
-@pytest.mark.parametrize("limit", [20_000, 400_000])
+@pytest.mark.parametrize("limit", [20_000, pytest.param(400_000, marks=pytest.mark.slow)])
 def test_a_fit_that_may_not_write_more_keeps_what_it_sampled_and_is_resumed(on_body, whole, tmp_path, limit):
     """A limit of the file's size stands for a full disk."""
     uninterrupted, compiled = whole

@@ -16,6 +16,7 @@ from bowdenfit.inputs import refuse_special
 from bowdenfit.results.folder import ANSWERS, FIGURE_DATA, FIT, POSTERIOR, read_page, write_text
 
 SCHEMA = 3  # counted up with every change of what one of the questions answers
+CHECKSUM = "crc32"  # of a page, in itself
 _PIECE = 1 << 22  # bytes of a file read at once
 
 
@@ -29,7 +30,7 @@ def keep(folder: Path, answers: Mapping[str, Any], fit_page: str) -> None:
     """
     of = {FIT: crc32(fit_page.encode()), **{name: checksum(folder / name) for name in (POSTERIOR, FIGURE_DATA)}}
     page = {"schema": SCHEMA, "version": _version(), "of": of, "answers": answers}
-    write_text(folder / ANSWERS, json.dumps({"crc32": _own(page), **page}, allow_nan=False) + "\n")
+    write_text(folder / ANSWERS, json.dumps({CHECKSUM: own_checksum(page), **page}, allow_nan=False) + "\n")
 
 
 def kept(folder: Path, *beside: str) -> dict[str, Any]:
@@ -41,14 +42,15 @@ def kept(folder: Path, *beside: str) -> dict[str, Any]:
     """
     try:
         page = read_page(folder / ANSWERS)
-        as_written = page.pop("crc32") == _own(page) and (page["schema"], page["version"]) == (SCHEMA, _version())
+        as_written = page.pop(CHECKSUM) == own_checksum(page) and (page["schema"], page["version"]) == (SCHEMA, _version())
         same = as_written and all(checksum(folder / name) == page["of"][name] for name in (FIT, POSTERIOR, *beside))
         return dict(page["answers"]) if same else {}
     except (StoreError, OSError, ValueError, KeyError, TypeError, AttributeError):
         return {}
 
 
-def _own(page: Mapping[str, Any]) -> int:
+def own_checksum(page: Mapping[str, Any]) -> int:
+    """Of what a page of JSON says, however it is spaced; the page carries it as its `CHECKSUM`, which is no part of it."""
     return crc32(json.dumps(page).encode())
 
 

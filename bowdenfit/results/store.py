@@ -20,12 +20,12 @@ from bowdenfit.kinds.measurements import Measurements
 from bowdenfit.kinds.settings import parse_description
 from bowdenfit.results.arrays import write_arrays
 from bowdenfit.results.folder import CHAIN, FIGURE_DATA, FIT, POSTERIOR, SUMMARY, folder_to_write, read_page, write_text
-from bowdenfit.results.kept import checksum, keep
+from bowdenfit.results.kept import CHECKSUM, checksum, keep, own_checksum
 from bowdenfit.results.netcdf import DERIVED, EXPECTED, Coordinates, Groups, read_groups, write_groups
 from bowdenfit.results.plain import rebuilt, stored
 from bowdenfit.results.record import OPTIMAL_EFFICIENCY, OPTIMAL_LENGTH, Draws, Provenance, Record
 
-SCHEMA = 5
+SCHEMA = 6
 LOG_POSTERIOR, WALKER = "lp", "walker"
 _NOT_DRAWN = ("prior", "observed_data")  # groups of posterior.nc without chains
 # What fit.json keeps of the draws; the draws themselves are in posterior.nc.
@@ -62,9 +62,7 @@ def save(
         else:
             write_groups(folder / POSTERIOR, *posterior_page(fit))
         write_text(folder / SUMMARY, json.dumps(summary, indent=1) + "\n")
-        measurements = json.dumps(_measurements_page(fit.dataset.measurements))  # long, and read by no person
-        known = {"posterior_crc32": checksum(folder / POSTERIOR)}
-        page = f'{json.dumps(_fit_page(fit) | known, indent=1)[:-2]},\n "measurements": {measurements}\n}}\n'
+        page = _fit_text(_fit_page(fit) | {"posterior_crc32": checksum(folder / POSTERIOR)}, fit.dataset.measurements)
         (folder / FIGURE_DATA).unlink(missing_ok=True)
         if figures:
             write_arrays(folder / FIGURE_DATA, figures)
@@ -79,13 +77,13 @@ def load(folder: Path) -> Record:
     """Read a results folder.
 
     Raises:
-        StoreError: It is missing, unfinished, damaged, or of another schema.
+        StoreError: It is missing, unfinished, edited, damaged, or of another schema.
     """
     page = _read_page(folder)
     try:
         dataset = Dataset(parse_description(page["description"]), _measurements(page["measurements"]), page["sha256"])
         squares = rebuilt(LeastSquares, page["least_squares"])
-        as_written = page.get("posterior_crc32") in {None, checksum(folder / POSTERIOR)}
+        as_written = page["posterior_crc32"] == checksum(folder / POSTERIOR)
         if page["posterior"] and (folder / POSTERIOR).exists() and not as_written:
             raise StoreError(f"{folder / POSTERIOR} is not as it was written; fit again, or restore the folder from a copy.")
         posterior = _posterior(folder / POSTERIOR, page["posterior"]) if page["posterior"] else None
@@ -116,6 +114,11 @@ def _read_page(folder: Path) -> dict[str, Any]:
         raise StoreError(
             f"{folder} was written by an older bowdenfit (schema {schema}, where {SCHEMA} is read); fit the data set again."
         )
+    if page.pop(CHECKSUM, None) != own_checksum(page):
+        raise StoreError(
+            f"{folder / FIT} is not as it was written: it was edited, or is damaged; fit again, or restore the folder "
+            "from a copy."
+        )
     return page
 
 
@@ -130,6 +133,13 @@ def _fit_page(fit: Record) -> dict[str, Any]:
         "posterior": _posterior_page(posterior) if posterior else None,
         "provenance": stored(fit.provenance),
     }
+
+
+def _fit_text(page: Mapping[str, Any], measurements: Measurements) -> str:
+    measured = _measurements_page(measurements)
+    known = {**page, CHECKSUM: own_checksum({**page, "measurements": measured})}
+    long = json.dumps(measured)  # on one line, and read by no person
+    return f'{json.dumps(known, indent=1)[:-2]},\n "measurements": {long}\n}}\n'
 
 
 def _measurements_page(measurements: Measurements) -> dict[str, Any]:

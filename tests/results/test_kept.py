@@ -8,6 +8,7 @@ import sys
 
 import numpy as np
 import pytest
+from sealed import edit_sealed
 
 import bowdenfit as bf
 from bowdenfit.questions.figures import FIGURES, figures_of, kept_figures
@@ -217,7 +218,7 @@ def test_an_answer_of_missing_draws_is_refused(results, tmp_path, run):
 
 def test_a_changed_fit_is_answered_anew(results, tmp_path, run):
     copy = shutil.copytree(results, tmp_path / "copy")
-    _edit(copy / "fit.json", '"converged": true,\n  "reasons": []', '"converged": false,\n  "reasons": ["changed"]')
+    edit_sealed(copy / "fit.json", lambda page: page.update(verdict={"converged": False, "reasons": ["changed"]}))
     code, _, err = run("length", copy)
     assert code == 0
     assert err.startswith("Warning: this fit is not converged")

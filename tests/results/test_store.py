@@ -6,6 +6,7 @@ import shutil
 
 import numpy as np
 import pytest
+from sealed import edit_sealed
 
 import bowdenfit as bf
 from bowdenfit.inference.checkpoint import fingerprint_of, heading
@@ -266,8 +267,10 @@ def test_the_checkpoint_carries_what_it_was_started_for(saved):
 def test_a_fit_from_before_a_kind_of_table_existed_is_read(saved, tmp_path):
     fit, folder = saved
     copy = shutil.copytree(folder, tmp_path / "copy")
-    page = json.loads((copy / "fit.json").read_text())
-    absent = next(name for name, table in page["measurements"].items() if table is None)
-    del page["measurements"][absent]
-    (copy / "fit.json").write_text(json.dumps(page))
+
+    def of_before(page):
+        absent = next(name for name, table in page["measurements"].items() if table is None)
+        del page["measurements"][absent]
+
+    edit_sealed(copy / "fit.json", of_before)
     np.testing.assert_array_equal(bf.load(copy).posterior.z, fit.posterior.z)

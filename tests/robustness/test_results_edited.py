@@ -7,9 +7,11 @@ import subprocess
 import sys
 
 import pytest
+from sealed import sealed
 
 import bowdenfit as bf
 from bowdenfit.cli.keywords import read_quantity
+from bowdenfit.results.kept import CHECKSUM
 
 QUICK = ("sampler.n_walkers=32", "sampler.max_steps=200", "sampler.target_ess=100")
 
@@ -22,7 +24,7 @@ def finished(on_body, tmp_path_factory):
 
 
 def other(page, key, value):
-    return json.dumps({**page, key: value})
+    return sealed({**page, key: value})
 
 
 @pytest.mark.parametrize(
@@ -42,6 +44,9 @@ def other(page, key, value):
         lambda page: other(page, "verdict", []),
         lambda page: other(page, "provenance", 5),
         lambda page: other(page, "sha256", None)[:-40],
+        lambda page: json.dumps({**page, "sha256": {}}),
+        lambda page: json.dumps({key: value for key, value in page.items() if key != CHECKSUM}),
+        lambda page: json.dumps(page).replace("0.9", "0.8", 1),
     ],
 )
 def test_an_edited_fit_is_a_sentence(finished, tmp_path, edit):
@@ -51,6 +56,12 @@ def test_an_edited_fit_is_a_sentence(finished, tmp_path, edit):
         bf.load(folder)
     assert "damaged" in str(refused.value) or "another" in str(refused.value)
     assert len(str(refused.value)) < 600
+
+
+def test_a_fit_that_was_only_spaced_otherwise_is_read(finished, tmp_path):
+    folder = shutil.copytree(finished, tmp_path / "fit")
+    (folder / "fit.json").write_text(json.dumps(json.loads((folder / "fit.json").read_text()), indent=3))
+    assert bf.load(folder).summary() == bf.load(finished).summary()
 
 
 def test_draws_of_another_fit_are_refused(finished, on_body, tmp_path):

@@ -27,7 +27,6 @@ from bowdenfit.results.plain import plain
 from bowdenfit.results.record import Draws, Record
 
 SCHEMA = 1
-_LEAST = 1e-9  # efficiency; a fit that was edited or damaged may say none at all
 
 
 class Summary(Display, dict[str, Any]):
@@ -198,6 +197,6 @@ def _measured_efficiencies(fit: Record) -> list[dict[str, Any]]:
                 row["predicted"] = float(fit.least_squares.readings[term.name][i])
             if len(forces):
                 row["input_force_N"] = float(forces[i])
-            row["relative_error"] = row["measured"] / max(row["predicted"], _LEAST) - 1
+            row["relative_error"] = row["measured"] / row["predicted"] - 1
             rows.append(row)
     return rows

@@ -1,0 +1,26 @@
+"""A fit that was edited by somebody who wrote its checksum anew."""
+
+import json
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+from bowdenfit.results.kept import CHECKSUM, own_checksum
+
+
+def sealed(page: dict[str, Any]) -> str:
+    """A page with the checksum of what it says."""
+    said = {key: value for key, value in page.items() if key != CHECKSUM}
+    return json.dumps(said | {CHECKSUM: own_checksum(said)})
+
+
+def edit_sealed(path: Path, change: Callable[[dict[str, Any]], None]) -> None:
+    """Change a page in its place.
+
+    Args:
+        path: The file.
+        change: Changes what it says.
+    """
+    page = json.loads(path.read_text())
+    change(page)
+    path.write_text(sealed(page))

@@ -103,6 +103,18 @@ def test_forces_that_no_rope_with_a_spring_has_are_refused(catheter, refuse, wha
     assert all(part in sentence for part in said), sentence
 
 
+def test_a_run_of_one_reading_is_refused_unless_it_is_said_where_its_displacement_begins(catheter, refuse):
+    """A wrap angle ten times too large made a run of its own, whose zero was 500 mm off, and all was said to be well."""
+    lines = (catheter / CSV).read_text().splitlines()
+    lines[41] = lines[41].replace("180,", "1800,", 1)
+    (catheter / CSV).write_text("\n".join(lines))
+    sentence = refuse("check", catheter)
+    assert all(part in sentence for part in ("row 42 (1800 deg)", "a run of one reading", "slipped digit", "leave the row out"))
+    with (catheter / TOML).open("a") as toml:
+        toml.write("\n[prior.displacement_zero_2]\nfixed = 0.4\n")
+    assert len(bf.read(catheter).measurements.table(DisplacementTable).run_names) == 4
+
+
 def test_a_second_force_is_refused_and_two_names_of_one_column_too(catheter, refuse):
     (catheter / CSV).write_text("wrap_angle_deg,displacement_mm,force_N,output_force_N\n180,1,2,1\n180,2,4,3\n")
     assert "tables.forces" in refuse("check", catheter)

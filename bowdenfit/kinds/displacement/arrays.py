@@ -13,7 +13,7 @@ from bowdenfit.kinds.row_angles import row_angles
 from bowdenfit.kinds.rows import OwnAngles
 from bowdenfit.types import Vector
 
-_ZERO = "displacement_zero"
+ZERO = "displacement_zero"
 
 
 @dataclass(frozen=True)
@@ -69,4 +69,4 @@ def places_of(turns: Turns) -> np.ndarray:
 def zero_names(table: DisplacementTable) -> tuple[str, ...]:
     """Parameters of the displacement without force, one a run."""
     n = len(table.run_names)
-    return (_ZERO,) if n == 1 else tuple(f"{_ZERO}_{i + 1}" for i in range(n))
+    return (ZERO,) if n == 1 else tuple(f"{ZERO}_{i + 1}" for i in range(n))

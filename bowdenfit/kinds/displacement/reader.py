@@ -7,6 +7,7 @@ import numpy as np
 from bowdenfit.errors import DatasetError, together
 from bowdenfit.files.columns import Column, Quantity, find_columns, require
 from bowdenfit.files.csv_table import RawTable, read_csv
+from bowdenfit.kinds.displacement.arrays import ZERO
 from bowdenfit.kinds.displacement.chosen import chosen
 from bowdenfit.kinds.displacement.table import DisplacementTable
 from bowdenfit.kinds.displacement.turns import in_order, sliding
@@ -21,7 +22,7 @@ from bowdenfit.kinds.rows import (
     shared_columns,
 )
 from bowdenfit.types import Labels, Vector
-from bowdenfit.words import listed
+from bowdenfit.words import few, listed
 
 _UNUSED = ("time", "velocity")  # columns that such a table may have and that nothing reads
 _NAMES = {"force": ("force", "input_force"), "displacement": ("displacement", "position")}
@@ -39,7 +40,8 @@ def read_displacement(source: Source) -> Found[DisplacementTable]:
 
     Raises:
         DatasetError: See `read_csv` and `find_columns`; or a force is negative, there is a second force, the force does not
-            follow the displacement, the return takes more force than the pull, or a stop is never reached.
+            follow the displacement, the return takes more force than the pull, a stop is never reached, or a run has one
+            reading and nobody stated where its displacement begins.
     """
     path, route, contacts = source.file, source.description.route, source.description.angle_columns
     settings, table = source.settings, read_csv(path)
@@ -70,6 +72,8 @@ def read_displacement(source: Source) -> Found[DisplacementTable]:
     motion = sliding(stroke, displacement, run) if how == "sliding" and stroke is not None else in_order(displacement, run)
     every, origin = np.ones(len(force), dtype=bool), provenance_of(table)
     rows = DisplacementTable(at, force, displacement, motion, run, names, every, own, origin, how == "sliding")
+    if not any(name.startswith(ZERO) for name in source.description.prior):
+        _check_runs(rows)
     rows, remarks = chosen(rows, settings, "stroke" in found)
     _check_force(rows)
     return Found(rows, {path.name: path}, tuple(remarks), (table.account,))
@@ -119,6 +123,19 @@ def _runs(column: Column | None, route: Vector, own: OwnAngles) -> tuple[Labels,
     ]
     names = tuple(dict.fromkeys(keys))
     return np.array([names.index(key) for key in keys]), names
+
+
+def _check_runs(table: DisplacementTable) -> None:
+    """A run of one reading says nothing, because where its displacement begins is fitted."""
+    n = np.bincount(table.run)
+    alone = np.flatnonzero(n[table.run] == 1).tolist()
+    if alone:
+        which = few([f"{table.origin.place(i)} ({table.run_names[table.run[i]]})" for i in alone])
+        raise DatasetError(
+            f"{which}: a run of one reading, which tells nothing, since where its displacement begins is fitted; the "
+            "usual causes are a slipped digit in its wrap angle, another label than the rows beside it, and angles that "
+            "differ from row to row: write one angle and one label for all rows of a mounting, or leave the row out."
+        )
 
 
 def _check_force(table: DisplacementTable) -> None:

@@ -4,6 +4,7 @@ from dataclasses import dataclass
 
 FALSE_ALARM = 0.003  # chance that a healthy fit is said not to describe its readings
 WORTH_SAYING = 0.02  # of what is read, below which a departure is not worth a verdict
+MOVED = 0.5  # of the way from a coefficient to an end of its 90 % interval, by less than which a drift may move it
 
 
 @dataclass(frozen=True)
@@ -17,8 +18,11 @@ class Departure:
         inside: Whether readings inside runs do; else whole runs, or single readings.
         chance: Probability of as much by chance, times the number of departures that were asked about.
         size: Root mean square of the departure, over that of what is read [1].
-        low, high: Where the lowest third and the highest third of the readings were taken, on average.
+        low, high: Where the lowest third and the highest third of the readings were taken, on average; of a zero that drifts,
+            what it was at the start and at the end of a run, against its middle [N].
         at_low, at_high: How much more than the model says is read there, over what is read [1].
+        moved: Of a zero that drifts, whose size says little: how far it moves the coefficient of friction that it moves most,
+            over half of its 90 % interval; 0 where chance does as much. None of all others.
     """
 
     table: str
@@ -31,11 +35,13 @@ class Departure:
     high: float
     at_low: float
     at_high: float
+    moved: float | None = None
 
     @property
     def worth_saying(self) -> bool:
         """Whether chance does not make it, and it matters."""
-        return self.chance < FALSE_ALARM and self.size > WORTH_SAYING
+        matters = self.size > WORTH_SAYING if self.moved is None else self.moved > MOVED
+        return self.chance < FALSE_ALARM and matters
 
 
 @dataclass(frozen=True)

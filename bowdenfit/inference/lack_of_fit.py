@@ -3,16 +3,19 @@ r"""Do residuals depend on where the readings were taken? Then the model does no
 For each way in which a table could depart from the model (with the load, the stroke, the speed, the order, the place) the
 columns of that departure, less what the parameters can follow, are fitted to the residuals of least squares. Without a
 departure the sum of squares that they take off, over what is left, is F distributed. Where readings are many the same is
-asked with a covariance that does not trust the weights, and the weaker of the two answers counts.
+asked with a covariance that does not trust the weights, and the weaker of the two answers counts. A zero that drifts while a
+recording is made, as s t / F_out, is small beside the loss and moves coefficients all the same, or hardly: it counts by how
+far a fit without it lies from the fit.
 
 References:
     Draper and Smith, Applied Regression Analysis, 3rd ed., Wiley 1998, chapters 2 and 6: lack of fit, extra sums of squares.
     White, A heteroskedasticity-consistent covariance matrix estimator, Econometrica 48 (1980), 817.
 """
 
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import replace
 from functools import cache
+from typing import Any
 
 import jax
 import jax.numpy as jnp
@@ -23,10 +26,11 @@ from bowdenfit.inference.departure import FALSE_ALARM, Departure, FarReading
 from bowdenfit.inference.objective import Solution
 from bowdenfit.inference.profiles import Basin
 from bowdenfit.inference.testable_readings import Readings, System, readings_to_test
-from bowdenfit.kinds.inside_runs import SPEED, STROKE
+from bowdenfit.kinds.inside_runs import ORDER, SPEED, STROKE, ZERO
 from bowdenfit.kinds.term import GROUP, LOAD
 from bowdenfit.model import Model
 
+_FRICTION = ("friction", "friction_model")
 _MANY = 30  # readings from which their own scatter weighs them
 _MOST_LEVELS = 24  # loads that are each asked about
 _OF_CURVE, _OF_PLACE = 4, 2  # degree of the polynomials by which curves, and other readings, may depart
@@ -37,19 +41,51 @@ _FARTHEST = 6.0  # z of a noise scale
 _FOLLOWED = 1e-3  # share of a column that is left where the parameters can follow it
 
 
-def departures(basin: Basin, scale: np.ndarray) -> tuple[tuple[Departure, ...], tuple[FarReading, ...]]:
+def departures(
+    basin: Basin, scale: np.ndarray, reach: Mapping[str, float]
+) -> tuple[tuple[Departure, ...], tuple[FarReading, ...]]:
     """Every departure that was asked about, the least likely by chance first; and single readings that are far out.
 
     Args:
         basin: The minimum of least squares.
         scale: Scatter of every standardized residual about it.
+        reach: Half of the 90 % interval of each parameter that is identified, in its shown unit.
     """
     model = basin.problem.posterior.model
     system = readings_to_test(model, _weighed_by_scatter(basin, model, scale))
     asked = [each for readings in system.readings for each in _departures_of(system, readings)]
     corrected = (replace(each, chance=min(each.chance * len(asked), 1.0)) for each in asked)
-    found = tuple(sorted(corrected, key=lambda each: (each.chance, -each.size)))
+    judged = (_drifting(basin, reach, system, each) if each.against == ZERO else each for each in corrected)
+    found = tuple(sorted(judged, key=lambda each: (each.chance, -each.size)))
     return found, _far_readings(system)
+
+
+def _drifting(basin: Basin, reach: Mapping[str, float], system: System, found: Departure) -> Departure:
+    """By how much a zero drifts, and how much that moves the coefficients: by a fit with the drift taken off the readings."""
+    readings = next(r for r in system.readings if r.table == found.table and r.inside)
+    x, whole = readings.at[ZERO], np.zeros(len(system.residuals))
+    whole[readings.rows] = x / (readings.unit * readings.scatter)
+    rest = whole - system.followed @ (system.followed.T @ whole)
+    drift = float(rest @ system.residuals / (rest @ rest))
+    ends = _ends(readings, readings.at[ORDER], np.ones(len(x), dtype=bool))[2:]
+    said = replace(found, low=-drift, high=drift, at_low=ends[0], at_high=ends[1], moved=0.0)
+    if found.chance >= FALSE_ALARM:
+        return said
+    problem, z = basin.problem, basin.found["z"]
+    terms = zip(problem.posterior.model.terms, problem.posterior.data, strict=True)
+    data = tuple(_without(term, of, x * drift) if term.name == found.table else of for term, of in terms)
+    steady = replace(problem, posterior=replace(problem.posterior, given=data)).solve(z, basin.at_end, z)
+    shift = np.abs(steady["values"] - basin.found["values"])
+    friction = [(i, p) for i, p in enumerate(basin.parameters) if p.role in _FRICTION and reach.get(p.name, 0) > 0]
+    return replace(said, moved=max((float(shift[i]) * p.shown_scale / reach[p.name] for i, p in friction), default=0.0))
+
+
+def _without(term: Any, data: dict[str, Any], more: np.ndarray) -> dict[str, Any]:
+    """Data of runs of which something is taken off each log ratio inside them."""
+    cell, weight = term.inside.cell, term.inside.weight
+    n = len(data["mean"])
+    mean = np.bincount(cell, weight * more, n) / np.maximum(np.bincount(cell, weight, n), 1e-300)
+    return data | {"mean": data["mean"] - mean}
 
 
 def _far_readings(system: System) -> tuple[FarReading, ...]:
@@ -107,7 +143,8 @@ def _departures_of(system: System, readings: Readings) -> Iterator[Departure]:
             if not (mine.any() and np.all(np.isfinite(x[mine])) and np.ptp(x[mine]) > 0):
                 continue
             for columns in _columns(against, x, mine, bool(group)):
-                tested = _tested(system, readings, np.where(mine[:, None], columns, 0.0) * readings.lever[:, None])
+                lever = np.ones(len(x)) if against == ZERO else readings.lever
+                tested = _tested(system, readings, np.where(mine[:, None], columns, 0.0) * lever[:, None])
                 if tested is not None:
                     yield Departure(readings.table, group, against, readings.inside, *tested, *_ends(readings, x, mine))
 
@@ -122,7 +159,7 @@ def _columns(against: str, x: np.ndarray, mine: np.ndarray, of_curve: bool) -> I
             yield (x[:, None] == levels[None, :]).astype(float)
     elif against == SPEED:
         yield np.log(np.maximum(np.where(mine, x, 1.0), np.max(x[mine]) / 1e3))[:, None]
-    elif against == STROKE:
+    elif against in (STROKE, ZERO):
         yield x[:, None].astype(float)
     elif against == GROUP:
         yield (x[:, None] == np.unique(x[mine])[None, :]).astype(float)

@@ -31,6 +31,7 @@ UNDETERMINED = "the measurements do not determine it"
 _SUSPECT = -2.0  # below this z an estimate may be on its way to the lower end, above its negative to the upper
 _FARTHEST = 6.0  # z of a noise scale
 _UNKNOWN = (float("nan"), float("nan"))
+_NORMAL_90 = 1.645  # standard errors to either end of a 90 % interval
 _FAR = 50.0  # standard error in units of the prior's sd beyond which data say nothing of a parameter
 
 
@@ -62,6 +63,12 @@ class Estimate:
     def open(self) -> list[str]:
         """The sides on which nothing limits it."""
         return [side for side in ("lower", "upper") if np.isinf(getattr(self, side))]
+
+    @property
+    def reach(self) -> float:
+        """Half of the 90 % interval; that of a normal distribution where the interval was not computed or has no end."""
+        half = (self.upper - self.lower) / 2
+        return half if np.isfinite(half) else _NORMAL_90 * self.standard_error
 
 
 @dataclass(frozen=True, repr=False)
@@ -186,7 +193,7 @@ def least_squares(
         bool(found["succeeded"]),
         "" if found["succeeded"] else "the solver stopped before it met its tolerance",
         disagreements(terms, space.free, found),
-        *departures(basin, scale),
+        *departures(basin, scale, {name: each.reach for name, each in estimates.items() if each.identified}),
         units={p.name: p.unit for p in space.parameters},
     )
 

@@ -11,7 +11,7 @@ from bowdenfit.kinds.sliding_rows import SlidingRows
 from bowdenfit.kinds.term import LOAD, WRAP_ANGLE
 from bowdenfit.types import Labels, Vector
 
-STROKE, SPEED, ORDER = "Stroke", "Speed", "Order"
+STROKE, SPEED, ORDER, ZERO = "Stroke", "Speed", "Order", "Zero"
 _MOST = 4000  # readings of a table that are looked at one by one; of more, so many neighbors are taken together
 
 
@@ -72,14 +72,20 @@ def inside_runs(cell: Labels, run: Labels, rows: SlidingRows, noise_ratio: float
 
 
 def _places(run: Labels, rows: SlidingRows) -> dict[str, Vector]:
-    """Load, stroke, speed, order inside the run and wrap angle of every reading."""
-    first = np.full(int(run.max()) + 1, len(run))
+    """Load, stroke, speed, order inside the run and wrap angle of every reading; with a clock, what a zero of the output that
+    drifts by a newton from the middle of the run to its end adds to the log ratio.
+    """
+    first, last = np.full(int(run.max()) + 1, len(run)), np.zeros(int(run.max()) + 1, dtype=int)
     np.minimum.at(first, run, np.arange(len(run)))
+    np.maximum.at(last, run, np.arange(len(run)))
     own = np.where(rows.angles["is_own"], rows.angles["own"], 0.0)
-    return {
+    order = (np.arange(len(run)) - first[run]).astype(float)
+    later = 2 * order / np.maximum(last - first, 1)[run] - 1
+    drifting = {ZERO: -rows.stroke * later / rows.output_force} if np.any(rows.drift) else {}
+    return drifting | {
         LOAD: rows.input_force,
         STROKE: rows.stroke.astype(float),
         SPEED: np.abs(rows.velocity),
-        ORDER: (np.arange(len(run)) - first[run]).astype(float),
+        ORDER: order,
         WRAP_ANGLE: np.rad2deg(own.sum(axis=1)),
     }

@@ -8,7 +8,7 @@ from bowdenfit.cable.registry import CURVES
 from bowdenfit.description import BY_GROUP
 from bowdenfit.inference.departure import FALSE_ALARM, Departure
 from bowdenfit.kinds import readings_called
-from bowdenfit.kinds.inside_runs import ORDER, SPEED, STROKE
+from bowdenfit.kinds.inside_runs import ORDER, SPEED, STROKE, ZERO
 from bowdenfit.kinds.places import RUN
 from bowdenfit.kinds.term import GROUP, LOAD
 from bowdenfit.parameters.priors import Normal
@@ -74,6 +74,8 @@ def _far_sentence(names: Sequence[str]) -> str:
 
 def _sentence(fit: Record, found: Departure) -> str:
     """'The model does not describe ...: the loss is 12 % larger ... What to do.'"""
+    if found.against == ZERO:
+        return _drift(found)
     readings = readings_called(found.table)
     what = _called(found.group) if found.group else readings.words
     read = "the loss" if readings.are_efficiencies else "what was read"
@@ -82,6 +84,18 @@ def _sentence(fit: Record, found: Departure) -> str:
     return (
         f"The model does not describe {what}: {where[0]} {read} is {low} than the model says, and {where[1]} {high}; chance "
         f"does as much in {_odds(found.chance)}. {_remedy(fit, found)}"
+    )
+
+
+def _drift(found: Departure) -> str:
+    """Of a zero that drifts."""
+    far = significant(found.moved or 0.0, 2)
+    return (
+        f"The model does not describe {readings_called(found.table).words}: the zero of the output drifts, by about "
+        f"{significant(abs(found.high - found.low), 2)} N from the start of a recording to its end (or that of the input, the "
+        f"other way), which moves a coefficient by {far} of the half width of its interval; chance "
+        f"does as much in {_odds(found.chance)}. Let the load cells warm up and tare before each recording; leave out the part "
+        "in which the zero moves."
     )
 
 

@@ -83,13 +83,18 @@ def on_body() -> Path:
 @pytest.fixture(scope="session")
 def finished(on_body, tmp_path_factory) -> tuple[bf.Fit, Path]:
     """A quick, converged fit of the on-body data, and the folder with all its results; no test changes either."""
-    folder = tmp_path_factory.mktemp("finished") / "fit"
-    return bf.fit(on_body, output=folder, seed=11, settings=QUICK), folder
+    from made_once import made_once, shared_folder
+
+    def make(folder):
+        bf.fit(on_body, output=folder, seed=11, settings=QUICK)
+
+    folder = made_once(shared_folder(tmp_path_factory) / "on-body", make)
+    return bf.load(folder), folder
 
 
 @pytest.fixture(scope="session")
 def quick_fit(finished) -> bf.Fit:
-    """The quick fit, as it was made."""
+    """The quick fit, read back."""
     return finished[0]
 
 
@@ -97,6 +102,33 @@ def quick_fit(finished) -> bf.Fit:
 def quick_results(finished) -> Path:
     """The folder of the quick fit."""
     return finished[1]
+
+
+@pytest.fixture(scope="session")
+def loop_results(on_body, tmp_path_factory) -> Path:
+    """The folder of a quick fit of the synthetic loop, without figures; no test changes it."""
+    from made_once import made_once, shared_folder
+
+    quick = ("sampler.n_walkers=64", "sampler.target_ess=200", "sampler.target_r_hat=1.05", "sampler.max_steps=3000")
+
+    def make(folder):
+        bf.fit(on_body.with_name("synthetic-haptic-loop"), output=folder, seed=3, settings=quick, figures=False)
+
+    return made_once(shared_folder(tmp_path_factory) / "loop", make)
+
+
+@pytest.fixture(scope="session")
+def least_squares_of(tmp_path_factory):
+    """Least squares of a published data set, by its name; no test changes it."""
+    from made_once import least_squares_of
+
+    return least_squares_of(tmp_path_factory)
+
+
+@pytest.fixture(scope="session")
+def on_body_squares(least_squares_of) -> bf.Fit:
+    """Least squares of the on-body data."""
+    return least_squares_of("on-body-exoskeleton")
 
 
 @pytest.fixture(scope="session")

@@ -26,9 +26,9 @@ MISTAKES = {
 
 
 @pytest.fixture(scope="module")
-def clean():
+def clean(least_squares_of):
     """Answers by least squares of the data sets without a mistake, and of the rest none are needed."""
-    return {name: answers(bf.fit(DATASETS / name, mcmc=False)) for name in (ON_BODY, YARN)}
+    return {name: answers(least_squares_of(name)) for name in (ON_BODY, YARN)}
 
 
 @pytest.mark.parametrize(("seed", "name"), MISTAKES)

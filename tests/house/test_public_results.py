@@ -236,8 +236,8 @@ def test_tables_have_the_units_of_what_stands_in_them(fit):
     assert set(fit.efficiency([455, 465]).to_frame()["cable_length_mm"]) == {455.0, 465.0}
 
 
-def test_a_fit_without_draws_says_in_a_sentence_what_it_has_not(on_body):
-    fit = bf.fit(on_body, seed=1, mcmc=False)
+def test_a_fit_without_draws_says_in_a_sentence_what_it_has_not(on_body_squares):
+    fit = on_body_squares
     assert fit.sampled is None
     with pytest.raises(bf.UsageError, match="fit again without --no-mcmc"):
         fit.posterior.values["mu1"]
@@ -246,8 +246,8 @@ def test_a_fit_without_draws_says_in_a_sentence_what_it_has_not(on_body):
     assert "least squares alone" in repr(fit.verdict())
 
 
-def test_stretch_and_preload_have_a_table():
-    fit = bf.fit("datasets/synthetic-haptic-loop", seed=1, mcmc=False)
+def test_stretch_and_preload_have_a_table(least_squares_of):
+    fit = least_squares_of("synthetic-haptic-loop")
     look_at(fit.elastic)
     assert look_inside(fit, "fit") > 100
     look_at(fit.elastic.preload_window((0.0, 3.0)))

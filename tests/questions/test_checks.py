@@ -261,8 +261,8 @@ def test_the_same_fit_gives_the_same_checks_and_so_does_the_saved_one(fit, tmp_p
     assert bf.load(tmp_path / "fit").summary()["checks"] == fit.summary()["checks"]
 
 
-def test_without_draws_there_are_no_checks(on_body):
-    squares = bf.fit(on_body, mcmc=False)
+def test_without_draws_there_are_no_checks(on_body_squares):
+    squares = on_body_squares
     assert squares.checks is None
     assert "checks" not in squares.summary()
     assert checks_text(squares.checks) == ""

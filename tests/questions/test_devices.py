@@ -24,14 +24,12 @@ from bowdenfit.questions.teleoperate.words import teleoperation_text
 
 DATA = Path(__file__).parents[2] / "datasets"
 DEVICE = DATA / "haptic-teleoperation" / "device.toml"
-QUICK = ("sampler.n_walkers=64", "sampler.target_ess=100", "sampler.target_r_hat=1.1", "sampler.max_steps=1000")
 RANGE = "45deg:180deg"
 
 
 @pytest.fixture(scope="module")
-def fit():
-    """A quick fit of the loop."""
-    return bf.fit(DATA / "synthetic-haptic-loop", seed=5, settings=QUICK)
+def fit(loop_results):
+    return bf.load(loop_results)
 
 
 @pytest.fixture(scope="module")
@@ -191,7 +189,7 @@ def test_words_fit_a_page_whatever_is_asked(fit, found):
     assert "slack somewhere from 0 to 90 deg" in compensation_text(answers[-1])
 
 
-def test_what_cannot_be_answered_is_refused(fit, tmp_path, on_body):
+def test_what_cannot_be_answered_is_refused(fit, tmp_path, least_squares_of):
     def refused(error, **asked):
         with pytest.raises(error) as raised:
             bf.compensate(fit, **{"device": DEVICE, "wrap_angle": RANGE} | asked)
@@ -220,10 +218,10 @@ def test_what_cannot_be_answered_is_refused(fit, tmp_path, on_body):
         'damping = { value = 0.02, unit = "N*m*s/rad" }\nmounting',
     )
     assert "rope.damping: 0.02 N*m*s/rad has no sd" in refused(DescriptionError, device=no_sd)
-    squares = bf.fit(DATA / "synthetic-haptic-loop", seed=1, mcmc=False)
+    squares = least_squares_of("synthetic-haptic-loop")
     with pytest.raises(UsageError, match="posterior"):
         bf.compensate(squares, DEVICE)
-    rope = bf.fit(on_body, seed=1, mcmc=False)
+    rope = least_squares_of("on-body-exoskeleton")
     with pytest.raises(UsageError, match="pull-pull loop"):
         compensation_of(rope, read_device(DEVICE), "45deg", None, 0.05)
 

@@ -32,16 +32,12 @@ from bowdenfit.questions.summary.words import full_text
 from bowdenfit.results.optimum import optimum_of
 
 FOLDER = Path(__file__).parents[2] / "datasets" / "synthetic-haptic-loop"
-QUICK = ("sampler.n_walkers=64", "sampler.target_ess=200", "sampler.target_r_hat=1.05", "sampler.max_steps=3000")
 TRUTH = json.loads((FOLDER / "truth.json").read_text())["truth"]
 
 
 @pytest.fixture(scope="module")
-def folder(tmp_path_factory):
-    """The results folder of a quick fit, without figures."""
-    results = tmp_path_factory.mktemp("haptic") / "fit"
-    bf.fit(FOLDER, output=results, seed=3, settings=QUICK, figures=False)
-    return results
+def folder(loop_results):
+    return loop_results
 
 
 @pytest.fixture(scope="module")
@@ -210,8 +206,8 @@ def test_a_wrong_question_is_refused_with_a_sentence(folder, run, arguments, wor
     assert not out
 
 
-def test_a_cable_without_stretch_says_what_it_lacks(on_body):
-    fit = bf.fit(on_body, mcmc=False)
+def test_a_cable_without_stretch_says_what_it_lacks(on_body_squares):
+    fit = on_body_squares
     with pytest.raises(bf.UsageError, match="no posterior"):
         predict(fit, quantity="stiffness", wrap_angles=[(90, "deg")])
     assert "elastic" not in fit.summary()

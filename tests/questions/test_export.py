@@ -121,10 +121,9 @@ def test_a_loop_is_exported_with_its_stiffness_at_the_wrap_angle_asked_for(tmp_p
     assert "--at 100mm" in refuse("export", "fits", "--to", "mujoco", "--force", "--at", "100mm")
 
 
-def test_a_fit_without_draws_is_refused_in_words(on_body, tmp_path):
-    fit = bf.fit(on_body, seed=1, mcmc=False)
+def test_a_fit_without_draws_is_refused_in_words(on_body_squares, tmp_path):
     with pytest.raises(UsageError, match="without MCMC"):
-        bf.export(fit, "c", tmp_path / "bowden.h")
+        bf.export(on_body_squares, "c", tmp_path / "bowden.h")
     assert not (tmp_path / "bowden.h").exists()
 
 

@@ -15,8 +15,8 @@ from bowdenfit.questions.figures import FIGURES, figures_of
 
 
 @pytest.fixture(scope="module")
-def fit(on_body):
-    return bf.fit(on_body, seed=1, mcmc=False)
+def fit(on_body_squares):
+    return on_body_squares
 
 
 def test_the_figures_that_a_fit_has_are_listed_and_no_others(fit):

@@ -6,16 +6,14 @@ import numpy as np
 import pytest
 from figure_words import assert_readable
 
-import bowdenfit as bf
 from bowdenfit.questions.bends.motor_force_figure import data, draw
 
 
 @pytest.fixture(scope="module")
-def shown(on_body):
+def shown(least_squares_of):
     """What the figure of the synthetic catheter shows, by least squares."""
-    fit = bf.fit(on_body.parent / "synthetic-catheter", mcmc=False)
     with jax.enable_x64(True):
-        return data(fit)
+        return data(least_squares_of("synthetic-catheter"))
 
 
 def test_the_loop_of_every_run_goes_through_its_readings(shown):
@@ -44,7 +42,6 @@ def test_residuals_are_forces_less_those_of_the_loop_at_each_reading(shown):
         np.testing.assert_allclose(np.sort(drawn), np.sort(off))
 
 
-def test_other_fits_have_no_such_figure(on_body):
-    fit = bf.fit(on_body, mcmc=False)
+def test_other_fits_have_no_such_figure(on_body_squares):
     with jax.enable_x64(True):
-        assert data(fit) is None
+        assert data(on_body_squares) is None

@@ -14,7 +14,6 @@ from laboratory import Laboratory
 from one_page import faults
 from scipy import stats
 
-import bowdenfit as bf
 from bowdenfit.dataset import Dataset, load_dataset
 from bowdenfit.errors import UsageError
 from bowdenfit.front_desk import Fit
@@ -488,10 +487,9 @@ def test_the_command_refuses_in_a_sentence(folder, run):
     assert "--candidate 'force@470'" in err
 
 
-def test_a_fit_without_a_posterior_is_told_to_sample(on_body, tmp_path):
-    found = bf.fit(on_body, mcmc=False, figures=False)
+def test_a_fit_without_a_posterior_is_told_to_sample(on_body_squares):
     with pytest.raises(UsageError, match="no posterior"):
-        verb.next_measurement(found)
+        verb.next_measurement(on_body_squares)
 
 
 # Against refits ---------------------------------------------------------------------------------------------------

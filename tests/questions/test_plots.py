@@ -17,7 +17,6 @@ from fontTools.ttLib import TTFont
 from kept_data import assert_kept
 from matplotlib.collections import PolyCollection
 
-import bowdenfit as bf
 from bowdenfit.inference.interval import Interval
 from bowdenfit.plots.bands import BAND_QUANTILES, NEW_RUN, Band
 from bowdenfit.plots.densities import BINS, bin_numbers, density, enclosed_share
@@ -215,13 +214,13 @@ def fit(quick_fit):
     return quick_fit
 
 
-def test_only_figures_that_apply_are_drawn(fit, on_body):
+def test_only_figures_that_apply_are_drawn(fit, least_squares_of):
     shown = dict(figures_of(fit))
     assert list(shown) == [*ALL, "checks"]
     assert_readable(shown, fit.name)
-    squares = bf.fit(on_body, mcmc=False)
+    squares = least_squares_of("on-body-exoskeleton")
     assert [name for name, _ in figures_of(squares)] == ["wrap_angles", "efficiency", "residuals"]
-    without = bf.fit(on_body.parent / "yarn-on-cylinder", mcmc=False)
+    without = least_squares_of("yarn-on-cylinder")
     assert [name for name, _ in figures_of(without)] == ["forces", "residuals"]
 
 

@@ -13,13 +13,11 @@ import bowdenfit as bf
 from bowdenfit.cli.keywords import read_quantity
 from bowdenfit.results.kept import CHECKSUM
 
-QUICK = ("sampler.n_walkers=32", "sampler.max_steps=200", "sampler.target_ess=100")
-
 
 @pytest.fixture(scope="module")
-def finished(on_body, tmp_path_factory):
+def whole(quick_fit, tmp_path_factory):
     folder = tmp_path_factory.mktemp("edited") / "fit"
-    bf.fit(on_body, output=folder, seed=3, settings=QUICK, figures=False)
+    quick_fit.save(folder)
     return folder
 
 
@@ -49,8 +47,8 @@ def other(page, key, value):
         lambda page: json.dumps(page).replace("0.9", "0.8", 1),
     ],
 )
-def test_an_edited_fit_is_a_sentence(finished, tmp_path, edit):
-    folder = shutil.copytree(finished, tmp_path / "fit")
+def test_an_edited_fit_is_a_sentence(whole, tmp_path, edit):
+    folder = shutil.copytree(whole, tmp_path / "fit")
     (folder / "fit.json").write_text(edit(json.loads((folder / "fit.json").read_text())))
     with pytest.raises(bf.StoreError) as refused:
         bf.load(folder)
@@ -58,25 +56,24 @@ def test_an_edited_fit_is_a_sentence(finished, tmp_path, edit):
     assert len(str(refused.value)) < 600
 
 
-def test_a_fit_that_was_only_spaced_otherwise_is_read(finished, tmp_path):
-    folder = shutil.copytree(finished, tmp_path / "fit")
+def test_a_fit_that_was_only_spaced_otherwise_is_read(whole, tmp_path):
+    folder = shutil.copytree(whole, tmp_path / "fit")
     (folder / "fit.json").write_text(json.dumps(json.loads((folder / "fit.json").read_text()), indent=3))
-    assert bf.load(folder).summary() == bf.load(finished).summary()
+    assert bf.load(folder).summary() == bf.load(whole).summary()
 
 
-def test_draws_of_another_fit_are_refused(finished, on_body, tmp_path):
-    folder = shutil.copytree(finished, tmp_path / "fit")
-    bf.fit(on_body, output=tmp_path / "other", seed=5, settings=QUICK, figures=False)
-    shutil.copy(tmp_path / "other" / "posterior.nc", folder)
+def test_draws_of_another_fit_are_refused(whole, loop_results, tmp_path):
+    folder = shutil.copytree(whole, tmp_path / "fit")
+    shutil.copy(loop_results / "posterior.nc", folder)
     with pytest.raises(bf.StoreError, match=r"posterior\.nc is not as it was written"):
         bf.load(folder)
 
 
 @pytest.mark.parametrize("length", [float("nan"), float("inf"), (float("nan"), "mm")])
-def test_what_is_no_length_is_refused(finished, length):
+def test_what_is_no_length_is_refused(whole, length):
     with pytest.raises(bf.UsageError, match="is no length"):
-        bf.predict(bf.load(finished), [length])
-    assert len(bf.predict(bf.load(finished), [(455, "mm"), 460])) == 2
+        bf.predict(bf.load(whole), [length])
+    assert len(bf.predict(bf.load(whole), [(455, "mm"), 460])) == 2
 
 
 @pytest.mark.parametrize(

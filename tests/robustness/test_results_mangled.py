@@ -44,9 +44,9 @@ def fleet(tmp_path_factory):
 
 
 @pytest.fixture(scope="module")
-def finished(tmp_path_factory):
+def finished(least_squares_of, tmp_path_factory):
     folder = tmp_path_factory.mktemp("finished") / "fit"
-    bf.fit(YARN, output=folder, seed=3, mcmc=False, figures=False)
+    least_squares_of("yarn-on-cylinder").save(folder)
     return folder
 
 

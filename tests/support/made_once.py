@@ -1,0 +1,44 @@
+"""Fits that many files of tests look at and none changes: made once in a run, whichever of its processes asks first."""
+
+import fcntl
+import os
+from collections.abc import Callable
+from functools import cache
+from pathlib import Path
+
+import pytest
+
+import bowdenfit as bf
+
+DATASETS = Path(__file__).resolve().parents[2] / "datasets"
+
+
+def shared_folder(factory: pytest.TempPathFactory) -> Path:
+    """The temporary folder of the whole run; that of every process lies in it where there are several."""
+    own = factory.getbasetemp()
+    return own.parent if "PYTEST_XDIST_WORKER" in os.environ else own
+
+
+def made_once(place: Path, make: Callable[[Path], object]) -> Path:
+    """A results folder, made by the first process that asks; others wait for it.
+
+    Args:
+        place: The folder.
+        make: Makes a fit there.
+    """
+    with place.with_suffix(".lock").open("w") as lock:
+        fcntl.flock(lock, fcntl.LOCK_EX)
+        if not (place / "fit.json").exists():
+            make(place)
+    return place
+
+
+def least_squares_of(factory: pytest.TempPathFactory) -> Callable[[str], bf.Fit]:
+    """Least squares of a published data set, by its name."""
+
+    @cache
+    def fitted(name: str) -> bf.Fit:
+        place = shared_folder(factory) / f"least-squares-of-{name}"
+        return bf.load(made_once(place, lambda folder: bf.fit(DATASETS / name, seed=1, mcmc=False).save(folder)))
+
+    return fitted

@@ -14,6 +14,7 @@ from bowdenfit.kinds.rows import OwnAngles, RowOrigin
 
 UNKNOWN_SCATTER = "the fit does not know how such readings scatter, because it has no table of them"
 GRID, MOST_ANGLES, MOST_LOADS = 11, 9, 5  # lengths without choices; wrap angles and loads of default candidates
+USUAL_LOAD = 20.0  # N, of examples
 STROKE_WORDS = {1: "pulling", -1: "returning"}
 Simulate = Callable[[Mapping[str, Array], Any, Array], Array]
 
@@ -127,7 +128,6 @@ class CandidateKind:
 
     Args:
         name: As users write it before the @.
-        example: As users write it.
         order: Place among the kinds where none is named.
         needs: Parameters without which such readings cannot be simulated.
         unknown: Why they then cannot, in a sentence.
@@ -148,7 +148,6 @@ class CandidateKind:
     """
 
     name: str
-    example: str
     order: int
     needs: tuple[str, ...]
     unknown: str
@@ -188,6 +187,13 @@ class CandidateKind:
     def why_unknown(self, at: Situation) -> str:
         """Why such readings cannot be simulated; empty where they can."""
         return "" if set(self.needs) <= at.parameters and self.possible(at) else self.unknown
+
+    def example(self, at: Situation) -> Candidate:
+        """One that makes sense of this cable as far as its place goes: halfway along the route, or at right angles."""
+        lengths = at.lengths if self.along_route else []
+        n = {"none": 0, "columns": len(at.columns_without_curve), "total": 1}[self.angles] if not lengths else 0
+        route = lengths[len(lengths) // 2] if lengths else float("nan")
+        return Candidate(self.name, route, (np.pi / 2,) * n, USUAL_LOAD if self.loaded else float("nan"))
 
 
 def one_reading_each(term: Any) -> Simulation:

@@ -229,7 +229,6 @@ FORCE_RUN = CandidateKind(
     name="force",
     noun="force run",
     words=lambda cable: f"a force run{f' of the group {cable.friction.groups[0]}' if cable.friction.groups else ''}",
-    example="force@470 or force@470,20N,pull",
     order=1,
     needs=(RUN_SCATTER,),
     possible=lambda at: typical_run(at.measurements) is not None,

@@ -1,7 +1,9 @@
 """What to measure next: how much a reading tells of an answer, which candidates there are, and what is said of them."""
 
 import json
+import re
 from dataclasses import replace
+from pathlib import Path
 from typing import Any
 
 import jax.numpy as jnp
@@ -312,6 +314,29 @@ def test_elastic_cables_have_stretch_preload_and_loop_readings():
     assert [r.words for r in found.ranked if r.candidate.kind == "loop"] == [
         "the loop's output force at 90 deg under 30 N"
     ]
+
+
+def test_what_is_proposed_where_nothing_is_offered_can_be_asked(on_body):
+    """Of a catheter no displacement can be simulated, but an efficiency at a bend can."""
+    dataset = bf.read(on_body.parent / "synthetic-catheter")
+    fit = pretended(dataset, np.zeros(build_model(dataset).space.size), n=3200)
+    with pytest.raises(UsageError, match=r"\(displacement\) cannot be simulated") as refused:
+        next_measurement(fit)
+    proposed = re.search(r"such as (.*)\.$", str(refused.value))[1].split(" or ")
+    assert proposed == ["efficiency@90deg"]
+    assert [r.name for r in next_measurement(fit, candidates=proposed).ranked] == proposed
+
+
+def test_what_is_not_understood_is_answered_with_a_name_that_is(fit):
+    dataset = bf.read(Path(__file__).parents[2] / "datasets" / "synthetic-haptic-loop")
+    loop = pretended(dataset, np.zeros(build_model(dataset).space.size), n=10)
+    for of, kinds in ((fit, ("angle", "efficiency")), (loop, ("stretch", "preload", "loop"))):
+        for kind in kinds:
+            with pytest.raises(UsageError) as refused:
+                parsed_candidates(of, [f"{kind}@3s"])
+            (name,) = re.findall(rf"{kind}@[^ ]*\d\w*(?=, with units|\.$)", str(refused.value))
+            (candidate,) = parsed_candidates(of, [name])
+            assert name_of(candidate) == name
 
 
 @pytest.mark.parametrize("text", ["angle@450", "efficiency@470", "efficiency@550"])

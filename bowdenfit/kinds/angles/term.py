@@ -169,7 +169,6 @@ ANGLES = TermKind(
         name="angle",
         title="Wrap angles",
         words=lambda cable: "the wrap angles" if len(cable.curves) > 1 else "the wrap angle",
-        example="angle@450",
         order=0,
         needs=(ANGLE_NOISE,),
         possible=lambda at: bool(at.cable.curves),

@@ -140,7 +140,6 @@ EFFICIENCIES = TermKind(
     Remeasurement(drawn_by_term(efficiencies_term, "efficiency", lambda key: jax.random.split(key, 3)[1]), _drawn_table),
     CandidateKind(
         name="efficiency",
-        example="efficiency@470",
         order=2,
         needs=(RUN_SCATTER,),
         unknown=f"{UNKNOWN_SCATTER}; fit with a table of efficiencies or forces.",

@@ -189,7 +189,6 @@ LOOP = TermKind(
         name="loop",
         noun="loop under load",
         words=lambda _: "the loop's output force",
-        example="loop@90deg,30N",
         order=5,
         needs=(FORCE_NOISE, REFERENCE_PRELOAD),
         possible=lambda at: at.cable.is_loop,

@@ -77,7 +77,6 @@ PRELOAD = TermKind(
     Remeasurement(drawn_by_term(_unread, "preload", lambda key: jax.random.split(jax.random.fold_in(key, 3), 3)[1])),
     CandidateKind(
         name="preload",
-        example="preload@90deg",
         order=4,
         needs=(PRELOAD_NOISE,),
         unknown=f"{UNKNOWN_SCATTER}; fit with a table of preload.",

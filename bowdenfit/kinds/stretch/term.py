@@ -105,7 +105,6 @@ STRETCH = TermKind(
     Remeasurement(drawn_by_term(stretch_term, "stretch", lambda key: jax.random.split(jax.random.fold_in(key, 3), 3)[0])),
     CandidateKind(
         name="stretch",
-        example="stretch@90deg,50N",
         order=3,
         needs=(STRETCH_NOISE,),
         unknown=f"{UNKNOWN_SCATTER}; fit with a table of stretch.",

@@ -9,7 +9,7 @@ import numpy as np
 from bowdenfit.errors import DatasetError, UsageError, nearest
 from bowdenfit.kinds.candidate import Candidate, CandidateKind
 from bowdenfit.kinds.terms import candidate_kinds
-from bowdenfit.questions.next.candidates import route_words, situation_of, why_not
+from bowdenfit.questions.next.candidates import example, route_words, situation_of, why_not
 from bowdenfit.results.record import Record
 from bowdenfit.units import conversion_factor, dimension_of, route_conversion_factor
 
@@ -63,10 +63,8 @@ def _with_part(fit: Record, kind: CandidateKind, candidate: Candidate, text: str
             return replace(candidate, angles=(*candidate.angles, value * conversion_factor(unit, "angle")))
     except (ValueError, DatasetError) as error:
         raise UsageError(f"--candidate {text!r}: {error}.") from None
-    raise UsageError(
-        f"--candidate {text!r}: {part!r} says nothing of {kind.phrase}; write it as {kind.example}, with units where it is no "
-        f"{route_words(fit)}."
-    )
+    units = f", with units where it is no {route_words(fit)}" if route is not None and kind.along_route else ""
+    raise UsageError(f"--candidate {text!r}: {part!r} says nothing of {kind.phrase}; write it as {example(fit, kind)}{units}.")
 
 
 def _check_complete(fit: Record, kind: CandidateKind, candidate: Candidate, text: str) -> None:
@@ -88,4 +86,4 @@ def _check_complete(fit: Record, kind: CandidateKind, candidate: Candidate, text
     if not missing and any(not angle >= 0 for angle in candidate.angles):
         missing = "wrap angles without a sign"
     if missing:
-        raise UsageError(f"--candidate {text!r} needs {missing}; write it as, for example, {kind.example}.")
+        raise UsageError(f"--candidate {text!r} needs {missing}; write it as, for example, {example(fit, kind)}.")

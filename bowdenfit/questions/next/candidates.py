@@ -3,12 +3,13 @@
 import numpy as np
 
 from bowdenfit.errors import UsageError
-from bowdenfit.kinds.candidate import STROKE_WORDS, Candidate, Situation
+from bowdenfit.kinds import each_table
+from bowdenfit.kinds.candidate import STROKE_WORDS, Candidate, CandidateKind, Situation
 from bowdenfit.kinds.measurements import Measurements
 from bowdenfit.kinds.terms import candidate_kinds
 from bowdenfit.model import Model
 from bowdenfit.results.record import Record
-from bowdenfit.words import significant
+from bowdenfit.words import listed, significant
 
 
 def situation_of(model: Model, measurements: Measurements) -> Situation:
@@ -24,11 +25,28 @@ def default_candidates(fit: Record) -> tuple[Candidate, ...]:
     """
     found = _offered(fit)
     if not found:
+        names = [kind.name for kind, _ in each_table(fit.dataset.measurements)]
         raise UsageError(
-            "this fit's tables hold nothing whose next reading can be simulated (recordings of a loop and displacements cannot "
-            "be yet); name candidates with --candidate, such as preload@90deg of a loop or force@90deg of a single cable."
+            f"the next reading of this fit's tables ({listed(names)}) cannot be simulated yet; {_instead(fit)}."
         )
     return found
+
+
+def _instead(fit: Record) -> str:
+    """What to ask where the tables offer nothing: readings of other kinds that this fit can simulate, or another verb."""
+    can = [example(fit, kind) for kind in candidate_kinds().values() if not why_not(fit, _example(fit, kind))]
+    if can:
+        return f"name others with --candidate, such as {' or '.join(can)}"
+    return "bowdenfit identify says what is known least, and measuring at other bends tells more of most coefficients"
+
+
+def example(fit: Record, kind: CandidateKind) -> str:
+    """How readings of a kind are named of this cable, such as "efficiency@470" or "stretch@90deg,20N"."""
+    return name_of(_example(fit, kind))
+
+
+def _example(fit: Record, kind: CandidateKind) -> Candidate:
+    return kind.example(situation_of(fit.model, fit.dataset.measurements))
 
 
 def can_be_ranked(fit: Record) -> bool:

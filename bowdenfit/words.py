@@ -71,7 +71,7 @@ def percent(share: float, digits: int = 1, sign: str = "") -> str:
 def give_or_take(value: float, sd: float) -> str:
     """A value with its standard deviation, such as '0.112 ± 0.013'."""
     digits = decimals(sd)
-    return f"{value:.{digits}f} ± {sd:.{digits}f}"
+    return f"{value:z.{digits}f} ± {sd:z.{digits}f}"
 
 
 def in_ascii(text: str) -> str:

@@ -26,7 +26,7 @@ class Interval(Display):
 
     def __str__(self) -> str:
         digits = decimals(self.q95 - self.q05)
-        return f"{self.median:.{digits}f} (90 % interval {self.q05:.{digits}f} to {self.q95:.{digits}f})"
+        return f"{self.median:z.{digits}f} (90 % interval {self.q05:z.{digits}f} to {self.q95:z.{digits}f})"
 
     def _table(self) -> Rows:
         return [vars(self)], {}

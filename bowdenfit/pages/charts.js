@@ -111,12 +111,14 @@
     addKey(chart, series) {
       this.key_.replaceChildren();
       this.values = new Map();
+      const within = {}; // how many bands of a color lie over each other, the widest first
       const entry = (label, one) => {
         if (this.values.has(label)) return;
         const row = make("div", this.key_);
         const name = make("dt", row);
         const mark = make("span", name, { className: `mark ${one.look ?? (one.start === one.stop ? "line" : "span")}` });
         mark.style.color = color(one.color);
+        if (one.look === "low") mark.style.opacity = 1 - (1 - BAND) ** (within[one.color] = (within[one.color] ?? 0) + 1);
         make("span", name, { textContent: label });
         this.values.set(label, make("dd", row));
       };

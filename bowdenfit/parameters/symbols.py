@@ -6,6 +6,8 @@ falls apart in a reader with another.
 
 import re
 
+_GREEK = {"mu": "μ", "sigma": "σ", "tau": "τ", "theta": "θ", "delta": "δ", "Delta": "Δ", "nu": "ν", "Lambda": "Λ"}
+_COMMAND = re.compile(r"\\([a-zA-Z]+) ?")
 _INDEX = re.compile(r"[a-zA-Z0-9]{1,2}")
 
 
@@ -18,3 +20,14 @@ def symbol_of(letter: str, name: str) -> str:
     """
     plain = name.strip("_ ").replace("_", " ") or name
     return rf"${letter}_\mathrm{{{plain}}}$" if _INDEX.fullmatch(plain) else f"${letter}$ " + plain.replace("$", r"\$")
+
+
+def in_letters(symbol: str) -> str:
+    """A symbol as plain text can show it: 'μ1' of '$\\mu_1$'."""
+    formula = r"(?<!\\)\$(.*?)(?<!\\)\$"
+    return re.sub(formula, lambda found: _without_commands(found[1]), symbol).replace(r"\$", "$")
+
+
+def _without_commands(formula: str) -> str:
+    letters = _COMMAND.sub(lambda found: _GREEK.get(found[1], ""), formula)
+    return re.sub(r"[{}_]", "", letters)

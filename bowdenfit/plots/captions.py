@@ -1,5 +1,8 @@
 """Words that captions share: what lines and bands are, and how many of what are drawn."""
 
+from collections.abc import Iterable
+
+from bowdenfit.parameters.symbols import in_letters
 from bowdenfit.words import counted
 
 
@@ -25,3 +28,13 @@ def shown_words(shown: int, every: int, noun: str, several: str = "") -> str:
     """'3 recordings', or '8 of 12 recordings', evenly chosen."""
     counting = counted(every, noun, several)
     return counting if shown >= every else f"{shown} of {counting}, evenly chosen"
+
+
+def symbol_words(symbols: Iterable[tuple[str, str]]) -> str:
+    """What symbols stand for, in a sentence with a space behind it; empty where nothing is said of any.
+
+    Args:
+        symbols: Each in matplotlib's math notation, and what it stands for; those that nothing is said of are left out.
+    """
+    said = "; ".join(f"{in_letters(symbol)}: {what}" for symbol, what in symbols if what)
+    return f"Symbols: {said}. " if said else ""

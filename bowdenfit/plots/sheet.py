@@ -20,6 +20,8 @@ if TYPE_CHECKING:
 TICK = 0.035  # in
 TICK_SIZE = 6  # pt
 NUMBER_SPACE, NUMBER_ROW = 0.075, 0.16  # in, from one number to the next: a character across, and a row up
+LETTER = 0.053  # in, width of a character of a number
+TIGHT = 1.25  # times as many numbers as usual fit where there would be one else
 
 
 @dataclass(frozen=True)
@@ -85,11 +87,9 @@ class PanelSheet:
         places = panel.x(values)
         self._strokes += [np.array([(x, panel.bottom), (x, panel.bottom - TICK)]) for x in places]
         for x, number in zip(places, texts if numbers else (), strict=numbers):
-            first, last = x < panel.left + TICK, x > panel.left + panel.width - TICK  # stay clear of the neighbors' numbers
-            self.text(
-                x + TICK * (int(last) - int(first)), panel.bottom - 1.8 * TICK, number,
-                ha="left" if first else "right" if last else "center", va="top", fontsize=TICK_SIZE,
-            )  # fmt: skip
+            half = LETTER * len(number) / 2 - TICK  # of it that may not stand beyond the panel, clear of the neighbors' numbers
+            middle = np.clip(x, panel.left + half, max(panel.left + panel.width - half, panel.left + half))
+            self.text(middle, panel.bottom - 1.8 * TICK, number, ha="center", va="top", fontsize=TICK_SIZE)
 
     def ticks_left(self, panel: Panel) -> None:
         """Ticks of the left axis, with numbers."""
@@ -118,15 +118,23 @@ def ticks(
     from matplotlib.ticker import MaxNLocator
 
     low, high = limits
+
+    def round_values(most: int) -> tuple[np.ndarray, float]:
+        every = np.asarray(MaxNLocator(most, steps=[1, 2, 4, 5, 10], min_n_ticks=1, integer=whole).tick_values(low, high))
+        return every[(every >= low) & (every <= high)], float(every[1] - every[0])
+
     for most in (4, 3, 2, 1):
-        values = np.asarray(
-            MaxNLocator(most, steps=[1, 2, 4, 5, 10], min_n_ticks=1, integer=whole).tick_values(low, high)
-        )
-        step = float(values[1] - values[0])
-        values = values[(values >= low) & (values <= high)]
+        values, step = round_values(most)
         texts = _texts(values, step)
         if texts and (high - low) / step <= room(texts):
+            if len(texts) > 1:
+                return values, texts
             break
+    for most in (2, 3, 4, 6, 8):  # one number is no scale: the outermost two of a finer step
+        finer, step = round_values(most)
+        outer = _texts(finer[[0, -1]], step) if len(finer) > 1 else []
+        if outer and (high - low) / (finer[-1] - finer[0]) <= TIGHT * room(outer):
+            return finer[[0, -1]], outer
     return values, texts
 
 

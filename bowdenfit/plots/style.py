@@ -118,4 +118,4 @@ def axis_label(symbol: str, unit: str) -> str:
 def rounded_texts(values: Iterable[float], spread: float) -> list[str]:
     """Numbers as text, to two significant digits of their spread."""
     decimals = 3 if not 0 < spread < math.inf else max(0, 1 - math.floor(math.log10(spread)))
-    return [f"{value:.{decimals}f}".replace("-", "\N{MINUS SIGN}") for value in values]
+    return [f"{value:z.{decimals}f}".replace("-", "\N{MINUS SIGN}") for value in values]

@@ -60,7 +60,7 @@ class OptimalLength(Display):
     def action(self) -> str:
         """What to do, or what is best, in one clause: the choice that costs least, or the best length where none is named."""
         choice, length = self.best_choice, self.length
-        value = f"{choice.length:g}" if choice else f"{length.median:.{decimals(length.q95 - length.q05)}f}"
+        value = f"{choice.length:g}" if choice else f"{length.median:z.{decimals(length.q95 - length.q05)}f}"
         is_cut = self.variable == "cable_length"
         if not self.is_settled:
             return f"measure more{' before you cut' if is_cut else ''}; the best guess is {value} {self.unit}"
@@ -88,9 +88,9 @@ class OptimalLength(Display):
         length, eta = self.length, self.efficiency.times(100)
         digits, of_force = decimals(length.q95 - length.q05), decimals(eta.q95 - eta.q05)
         said = [
-            f"The best {self.what} is {length.median:.{digits}f} {self.unit} (90 % interval {length.q05:.{digits}f} to "
-            f"{length.q95:.{digits}f} {self.unit}); {eta.median:.{of_force}f} % of the force arrives there "
-            f"({eta.q05:.{of_force}f} to {eta.q95:.{of_force}f} %){at}."
+            f"The best {self.what} is {length.median:z.{digits}f} {self.unit} (90 % interval {length.q05:z.{digits}f} to "
+            f"{length.q95:z.{digits}f} {self.unit}); {eta.median:z.{of_force}f} % of the force arrives there "
+            f"({eta.q05:z.{of_force}f} to {eta.q95:z.{of_force}f} %){at}."
         ]
         if self.at_edge > _WORTH_SAYING:
             said.append(
@@ -110,7 +110,7 @@ class OptimalLength(Display):
         window = self.window
         digits = decimals(window.stop - window.start)
         return (
-            f"Any {self.what} from {window.start:.{digits}f} to {window.stop:.{digits}f} {self.unit} is good enough: within "
+            f"Any {self.what} from {window.start:z.{digits}f} to {window.stop:z.{digits}f} {self.unit} is good enough: within "
             f"{percent(window.within, 0)} of the best with at least {percent(window.probability, 0)} probability."
         )
 

@@ -246,7 +246,7 @@ def test_no_legend_covers_a_panel_or_a_title(name, case):
     ("name", "shown"),
     [
         ("stretch", {"Load (N)", "Stretch (mm)", "270 deg", "Median, loading", "Median, unloading", "90 % interval"}),
-        ("preload", {"Wrap angle (deg)", "Preload (N)", "Slack (mm)", "Reading", "Slack in more than 50 % of them",
+        ("preload", {"Wrap angle (deg)", "Preload (N)", "Slack (mm)", "Reading", "Slack with more than 50 % probability",
                      "Slack with 5 % to 50 % probability"}),
         ("bending_loss", {"Wrap angle (deg)", "Efficiency (%)", "Friction, at 50 N input force", "coefficient 0.05",
                           "Preload, at 50 N input force", "preload 35 N", "As fitted, preload 22 N",
@@ -342,7 +342,7 @@ def test_slack_is_shaded_by_its_probability_in_both_panels():
     curve = data["preload"]
     for axes in drawn("preload", data).axes:
         ((light, dark),) = spans(axes, "Slack with 5 % to 50 % probability")
-        ((start, stop),) = spans(axes, "Slack in more than 50 % of them")
+        ((start, stop),) = spans(axes, "Slack with more than 50 % probability")
         assert light < dark == pytest.approx(start, abs=0.2) and stop == curve.wrap_angle[-1]
         np.testing.assert_allclose(
             np.interp((light, dark), curve.wrap_angle, curve.slack_probability), (0.05, 0.5), atol=0.01

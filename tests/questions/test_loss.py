@@ -4,7 +4,8 @@ import numpy as np
 import pytest
 
 import bowdenfit as bf
-from bowdenfit.questions.loss.answer import loss_by_contact
+from bowdenfit.inference.interval import Interval
+from bowdenfit.questions.loss.answer import ContactShare, Loss, loss_by_contact
 from bowdenfit.questions.loss.words import loss_text
 
 QUICK = ("sampler.n_walkers=64", "sampler.target_ess=100", "sampler.target_r_hat=1.1", "sampler.max_steps=1000")
@@ -52,3 +53,10 @@ def test_one_contact_has_no_shares(tmp_path):
     assert loss_by_contact(fit) is None
     assert loss_text(fit) == ""
     assert "loss" not in fit.summary()
+
+
+def test_a_sentence_names_four_contacts_and_leaves_none_of_the_loss_out():
+    share = Interval(0.2, 0.01, 0.2, 0.18, 0.22)
+    four, six = (Loss("", tuple(ContactShare(f"contact {i}", share, 0.2) for i in range(n))).sentence() for n in (4, 6))
+    assert four.endswith("20 % at 'contact 1', 20 % at 'contact 2' and 20 % at 'contact 3'.")
+    assert six.endswith("20 % at 'contact 3' and the rest at 2 others.")

@@ -20,7 +20,7 @@ from matplotlib.collections import PolyCollection
 from bowdenfit.inference.interval import Interval
 from bowdenfit.plots.bands import BAND_QUANTILES, NEW_RUN, Band
 from bowdenfit.plots.densities import BINS, bin_numbers, density, enclosed_share
-from bowdenfit.plots.sheet import Panel, PanelSheet, ticks
+from bowdenfit.plots.sheet import NUMBER_SPACE, Panel, PanelSheet, ticks
 from bowdenfit.plots.write import FORMATS, write
 from bowdenfit.questions.figures import FIGURES, draw_figure, figures_of
 from bowdenfit.questions.length.efficiency_figure import AlongRoute, EfficiencyPoints
@@ -399,7 +399,7 @@ def test_densities_of_very_small_and_very_large_quantities_have_short_numbers(fo
 def fit_of_nine():
     """As much of a fit of nine coefficients as the pair plot asks for."""
     draws = {f"mu{i}": np.random.default_rng(i).uniform(0.1, 0.2, (WALKERS, DRAWS)) for i in range(9)}
-    free = [SimpleNamespace(name=name, symbol=f"${name}$", unit="1", role="friction") for name in draws]
+    free = [SimpleNamespace(name=name, symbol=f"${name}$", unit="1", role="friction", meaning="") for name in draws]
     lengths = np.random.default_rng(9).uniform(460.0, 480.0, (WALKERS, DRAWS))
     optimum = {OPTIMAL_LENGTH: lengths, OPTIMAL_EFFICIENCY: np.full(lengths.shape, 0.79) + 1e-4 * lengths}
     route = SimpleNamespace(variable="cable_length", unit="mm", range=RANGE)
@@ -476,6 +476,20 @@ def test_numbers_at_the_edges_of_neighbors_keep_apart():
         sheet.ticks_below(Panel(0.5 + 1.085 * i, 0.5, 1.0, 0.8, shown, (0.0, 1.0)))
     check_words(sheet.finished(), "neighbors")
     assert {"0.02", "0.0"} <= {text for text, _ in words(sheet.figure)}
+
+
+@pytest.mark.parametrize("width", [0.57, 0.7, 0.9])
+def test_an_axis_has_two_numbers_which_make_a_scale(width):
+    """Of axes that begin and end anywhere; numbers of four letters, two of which fit side by side."""
+    generator = np.random.default_rng(1)
+    for i, (low, span) in enumerate(zip(generator.uniform(0.01, 0.3, 200), generator.uniform(0.02, 0.4, 200), strict=True)):
+        values, texts = ticks((low, low + span), lambda texts: width / (NUMBER_SPACE * max(map(len, texts))))
+        assert len(texts) > 1, (low, span)
+        assert [float(text) for text in texts] == pytest.approx(values, abs=1e-9)
+        if i % 25 == 0:
+            sheet = PanelSheet(width + 1.0, 1.5)
+            sheet.ticks_below(Panel(0.5, 0.5, width, 0.8, (low, low + span), (0.0, 1.0)))
+            check_words(sheet.finished(), f"{low} {span}")
 
 
 def test_all_figures_are_written_in_every_format_and_nothing_else(tmp_path):

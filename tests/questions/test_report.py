@@ -109,6 +109,8 @@ def test_a_chart_is_zoomed_into_and_read_with_the_pointer(chromium, routed):
         middle = box["y"] + box["height"] / 2
         reader.page.mouse.move(box["x"] + 0.3 * box["width"], middle)
         assert re.search(r"Median\s*7\d\.\d", chart.locator(".key").inner_text())
+        shades = chart.locator(".key .mark.low").evaluate_all("marks => marks.map(mark => getComputedStyle(mark).opacity)")
+        assert len(shades) == len(set(shades)) > 1, "bands look alike in the key"
         reader.page.mouse.down()
         reader.page.mouse.move(box["x"] + 0.6 * box["width"], middle, steps=5)
         reader.page.mouse.up()

@@ -10,6 +10,10 @@ import pytest
 from one_page import faults
 
 import bowdenfit as bf
+from bowdenfit.inference.interval import Interval
+from bowdenfit.plots.style import rounded_texts
+from bowdenfit.questions.summary import brief_words
+from bowdenfit.questions.summary.answer import Quantity
 from bowdenfit.questions.summary.brief_words import summary_text
 from bowdenfit.questions.summary.verdict import CONTRADICTORY, Verdict, verdict
 from bowdenfit.questions.summary.words import full_text
@@ -43,6 +47,23 @@ def test_the_summary_is_one_page_that_an_engineer_reads_in_a_terminal(fit):
     assert faults(page) == []
     assert page.startswith("On-body knee exoskeleton: cut the cable to 470 mm.\n")
     assert "You can trust this" in page
+
+
+@pytest.mark.parametrize("n", [1, 4])
+def test_what_a_coefficient_is_comes_before_that_no_reading_is_off(fit, monkeypatch, n):
+    """Both where there is room; that all readings agree is said above already."""
+    words = "what this coefficient of the cable is, in more words than one line has"
+    many = [Quantity(f"q{i}", f"{words} {i}", "N", "1.00", "0.50 to 1.50") for i in range(n)]
+    monkeypatch.setattr(brief_words, "quantities", lambda _: many)
+    page = summary_text(fit)
+    assert faults(page) == []
+    assert re.findall(r"line\s+has\s+(\d)", page) == [str(i) for i in range(n)]
+    assert ("None of 26 readings is off." in page) == (n == 1)
+
+
+def test_nothing_is_below_zero_by_rounding_alone():
+    assert str(Interval(0.7, 0.4, 0.7, -0.04, 1.4)) == "0.7 (90 % interval 0.0 to 1.4)"
+    assert rounded_texts((-0.04, 0.7, -1.4), 1.4) == ["0.0", "0.7", "\N{MINUS SIGN}1.4"]
 
 
 def test_a_page_that_nobody_reads_is_found_out(fit):

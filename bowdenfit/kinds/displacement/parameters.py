@@ -31,7 +31,7 @@ def _zeros(table: DisplacementTable, at: Circumstances) -> list[Parameter]:
         span = Scale(float(np.ptp(x)) or float(np.ptp(table.displacement)) or 1.0, "range of displacements", "mm")
         of_run = f", run {table.run_names[run]}" if len(table.run_names) > 1 else ""
         prior, symbol = Normal(float(x.min()), share * span.value), f"$x_{{0{run + 1 if of_run else ''}}}$"
-        meaning = f"displacement at which there is no force{of_run}"
+        meaning = f"displacement without force{of_run}"
         found.append(Parameter(name, symbol, meaning, "elastic", prior, "mm", scaled_by=span.share(share)))
     return found
 

@@ -29,9 +29,10 @@ def describe(table: ForceTable, description: Description) -> list[str]:
         for stroke, name in ((1, "pulling"), (-1, "returning"), (0, "held"))
         if (table.stroke == stroke).any()
     )
-    low, high = table.input_force.min(), table.input_force.max()
+    low, high = (significant(end, 4) for end in (table.input_force.min(), table.input_force.max()))
+    loads = f"{low} to {high} N" if low != high else f"{high} N"
     weights = ", of hung weights without noise" if description.sensors.noise_ratio == 0 else ""
-    return [f"{files}: {count(table)} ({counts}), input {significant(low, 4)} to {significant(high, 4)} N{weights}"]
+    return [f"{files}: {count(table)} ({counts}), input {loads}{weights}"]
 
 
 def warnings(table: ForceTable, description: Description, measurements: Measurements) -> list[str]:

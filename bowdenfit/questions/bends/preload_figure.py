@@ -146,7 +146,7 @@ def _shade_slack(axes: Axes, curve: PreloadCurve) -> None:
     order = np.argsort(curve.wrap_angle)
     share = np.interp(angle, curve.wrap_angle[order], curve.slack_probability[order])
     some = f"Slack with {percent(PERHAPS)} to {percent(RATHER)} probability"
-    most = f"Slack in more than {percent(RATHER)} of them" if len(curve.preload) > 1 else "Slack"
+    most = f"Slack with more than {percent(RATHER)} probability" if len(curve.preload) > 1 else "Slack"
     regions = (((share >= PERHAPS) & (share <= RATHER), LIGHT, some), (share > RATHER, DARK, most))
     for here, color, label in regions if len(curve.preload) > 1 else regions[1:]:
         for start, stop in stretches(here):

@@ -84,5 +84,5 @@ def _with_wider_prior(found: Sequence[Sensitivity]) -> str:
     digits = decimals(s.sd) + 1
     return (
         f"; were the prior of {s.parameter} twice as wide, {_answer(s.quantity)} would be "
-        f"{s.wider:.{digits}f} instead of {s.median:.{digits}f}"
+        f"{s.wider:z.{digits}f} instead of {s.median:z.{digits}f}"
     )

@@ -76,9 +76,9 @@ def _sentence(reading: CheckedReading) -> str:
 def with_unit(reading: CheckedReading, value: float) -> str:
     """A value of a reading's kind with its unit."""
     if readings_called(reading.table).are_efficiencies:
-        return f"{100 * value:.{decimals(100 * reading.sd)}f} %"
+        return f"{100 * value:z.{decimals(100 * reading.sd)}f} %"
     unit = "" if reading.unit == "1" else f" {reading.unit}"
-    return f"{value:.{decimals(reading.sd)}f}{unit}"
+    return f"{value:z.{decimals(reading.sd)}f}{unit}"
 
 
 def _decisive(found: Checks) -> str:

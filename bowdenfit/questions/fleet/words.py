@@ -51,8 +51,8 @@ def _rows(found: Fleet) -> list[tuple[str, ...]]:
     for name, unit in found.units.items():
         low, middle, high, sd = found.middle(name)
         digits = decimals(max(high - low, sd, abs(middle) * 1e-6))
-        shown = [f"{value:.{digits}f}" for value in (middle, low, high)]
-        rows.append((name, "" if unit == "1" else unit, *shown, f"{sd:.{digits}f}"))
+        shown = [f"{value:z.{digits}f}" for value in (middle, low, high)]
+        rows.append((name, "" if unit == "1" else unit, *shown, f"{sd:z.{digits}f}"))
     return rows
 
 

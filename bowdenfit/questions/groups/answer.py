@@ -39,7 +39,7 @@ class Contrast(Display):
     def sentence(self) -> str:
         """'new less old: -0.140, 90 % interval -0.160 to -0.120, different (lower) with probability 0.99'"""
         known, way = self.difference, "lower" if self.difference.median < 0 else "higher"
-        value, low, high = (f"{v:.{decimals(known.sd)}f}" for v in (known.median, known.q05, known.q95))
+        value, low, high = (f"{v:z.{decimals(known.sd)}f}" for v in (known.median, known.q05, known.q95))
         sure = f"above {_SURE}" if self.probability > _SURE else f"{self.probability:.3g}"
         return (
             f"{self.group} less {self.less}: {value}, 90 % interval {low} to {high}, different ({way}) with probability {sure}"

@@ -97,4 +97,4 @@ def how_well(known: Known | Combination) -> str:
     """How well a quantity is known: in percent where it is clear of zero, else in its unit."""
     if abs(known.value) > 2 * known.sd:
         return f"to {significant(100 * known.sd / abs(known.value), 2)} %"
-    return f"to ± {known.sd:.{decimals(known.sd)}f}"
+    return f"to ± {known.sd:z.{decimals(known.sd)}f}"

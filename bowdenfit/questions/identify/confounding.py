@@ -49,7 +49,7 @@ class Confounded:
         digits = int(np.clip(1 - np.floor(np.log10(max(self.sd, 1e-12))), 0, 8))
         return (
             f"The measurements hardly tell {self.first} and {self.second} apart (correlation {self.correlation:+.2f}); what "
-            f"they do determine is {self.combination} = {self.mean:.{digits}f} ± {self.sd:.{digits}f}, while {self.first} "
+            f"they do determine is {self.combination} = {self.mean:z.{digits}f} ± {self.sd:z.{digits}f}, while {self.first} "
             f"alone is known to ± {significant(self.first_sd, 2)}."
         )
 

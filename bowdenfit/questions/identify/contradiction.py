@@ -29,10 +29,10 @@ def contradiction(fit: Record) -> str:
         if d.conflict > _AS_MUCH * worst.conflict
     )
     or_else = f" (or {' or '.join(f'that of {other}' for other in others)})" if others else ""
-    together = f"{worst.together:.{digits}f}{unit}"
+    together = f"{worst.together:z.{digits}f}{unit}"
     return (
         f"The table of {name}{or_else} disagrees with everything else by {worst.sds:.1f} standard deviations: "
-        f"without it {worst.parameter} would be {worst.rest:.{digits}f} ± {worst.rest_sd:.{digits}f}{unit}, with it the fit "
+        f"without it {worst.parameter} would be {worst.rest:z.{digits}f} ± {worst.rest_sd:z.{digits}f}{unit}, with it the fit "
         f"is at {together}. Look at the units and wrap angles of that table and at how it was measured: the numbers below "
         "are a compromise between readings that cannot all be right."
     )

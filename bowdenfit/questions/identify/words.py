@@ -50,7 +50,7 @@ def _parameters(name: str, group: Knowledge, units: Mapping[str, str]) -> str:
 
 def _numbers(p: Known) -> tuple[str, str, str]:
     digits = decimals(p.sd)
-    return f"{p.value:.{digits}f}", f"± {p.sd:.{digits}f}", f"± {p.prior_sd:.{digits}f}"
+    return f"{p.value:z.{digits}f}", f"± {p.sd:z.{digits}f}", f"± {p.prior_sd:z.{digits}f}"
 
 
 def _informed(share: float) -> str:
@@ -70,4 +70,4 @@ def _directions(group: Knowledge) -> str:
 
 def _sum(d: Combination) -> tuple[str, str]:
     digits = decimals(d.sd)
-    return f"{d.value:.{digits}f}", f"± {d.sd:.{digits}f}"
+    return f"{d.value:z.{digits}f}", f"± {d.sd:z.{digits}f}"

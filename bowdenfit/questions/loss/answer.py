@@ -13,10 +13,10 @@ from jaxtyping import Float
 from bowdenfit.inference.interval import Interval
 from bowdenfit.questions.recorded.rate import place_of
 from bowdenfit.results.record import OPTIMAL_LENGTH, Record, once
-from bowdenfit.words import decimals, few, percent
+from bowdenfit.words import counted, decimals, listed, percent
 
 _LONGEST_NAME = 40  # characters of a contact's name in a sentence
-_FEW = 2  # contacts after the first that a sentence names
+_FEW = 3  # contacts after the first that a sentence names
 
 
 @dataclass(frozen=True)
@@ -57,11 +57,13 @@ class Loss:
         """'72 % of the loss sits at the bracket edge (90 % interval 62 to 79 %), 15 % at the squeezed sheath, ...'"""
         first, *others = self.contacts
         low, high = (percent(of, 0) for of in (first.share.q05, first.share.q95))
-        rest = few([f"{percent(c.share.median, 0)} at {c.name!r}" for c in others], _FEW)
+        rest = [f"{percent(c.share.median, 0)} at {c.name!r}" for c in others[:_FEW]]
+        if len(others) > _FEW:
+            rest.append(f"the rest at {counted(len(others) - _FEW, 'other')}")
         where = f"{self.place[0].upper()}{self.place[1:]}, " if self.place else ""
         return (
             f"{where}{percent(first.share.median, 0)} of the loss sits at {first.name!r} "
-            f"(90 % interval {low.removesuffix(' %')} to {high}), {rest}."
+            f"(90 % interval {low.removesuffix(' %')} to {high}), {listed(rest)}."
         )
 
 
@@ -83,7 +85,7 @@ def loss_by_contact(fit: Record) -> Loss | None:
     at, place = place_of(fit)
     if route is not None and (lengths := fit.posterior.optimum.get(OPTIMAL_LENGTH)) is not None:
         best = Interval.of(lengths)
-        at, place = best.median, f"at {best.median:.{decimals(best.q95 - best.q05)}f} {route.unit}"
+        at, place = best.median, f"at {best.median:z.{decimals(best.q95 - best.q05)}f} {route.unit}"
     shares = _shares(fit, at)
     largest = np.argmax(shares, axis=1)
     contacts = [

@@ -141,7 +141,7 @@ def ranking_table(found: NextMeasurement, top: int) -> tuple[list[str], list[lis
     unit = f" ({found.answer.unit})" if found.answer.unit else ""
     digits = _digits(found)
     heads = ["measurement", f"then known to{unit}", "uncertainty less by"]
-    rows = [[r.name, f"± {r.sd:.{digits}f}", percent(1 - r.sd / found.answer.sd)] for r in shown]
+    rows = [[r.name, f"± {r.sd:z.{digits}f}", percent(1 - r.sd / found.answer.sd)] for r in shown]
     if any(r.cost is not None for r in shown):
         heads += ["cost", "variance less by, per cost"]
         rows = [[*row, f"{r.cost:g}", percent(r.worth, 2)] for row, r in zip(rows, shown, strict=True)]

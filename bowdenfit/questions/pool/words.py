@@ -44,7 +44,7 @@ def headline(found: Pool) -> str:
         way = "grows" if wear.median >= 0 else "falls"
         return f"{who}friction {way} by {_share(wear)} in {_cycles(found.reference_cycles)}."
     name, first = next(iter(found.typical.items()))
-    value = f"{first.median:.{decimals(first.sd)}f} (90 % interval {_range(first)})"
+    value = f"{first.median:z.{decimals(first.sd)}f} (90 % interval {_range(first)})"
     return f"{who}{name} is {value} in the middle of {_many(found)}."
 
 
@@ -168,9 +168,9 @@ def population_rows(found: Pool) -> tuple[tuple[str, ...], list[tuple[str, ...]]
     for name, typical in found.typical.items():
         digits, new, spread = decimals(typical.sd), found.coefficients.get(name), found.spreads.get(name)
         rows.append(
-            (name, *(f"{value:.{digits}f}" for value in (typical.median, typical.q05, typical.q95)),
+            (name, *(f"{value:z.{digits}f}" for value in (typical.median, typical.q05, typical.q95)),
              f"{100 * spread.median:.0f} %" if spread else "",
-             f"{new.q05:.{digits}f}" if new else "", f"{new.q95:.{digits}f}" if new else "")
+             f"{new.q05:z.{digits}f}" if new else "", f"{new.q95:z.{digits}f}" if new else "")
         )  # fmt: skip
     return heads, rows
 
@@ -223,8 +223,8 @@ def _short(interval: Interval | None, times: float = 1.0, unit: str = "", bare: 
         return ""
     digits = decimals(times * interval.sd)
     if bare:
-        return f"{times * interval.median:.{digits}f}{unit}"
-    return f"{times * interval.median:.{digits}f} ± {times * interval.sd:.{digits}f}{unit}"
+        return f"{times * interval.median:z.{digits}f}{unit}"
+    return f"{times * interval.median:z.{digits}f} ± {times * interval.sd:z.{digits}f}{unit}"
 
 
 def _way(effect: Effect) -> str:
@@ -238,7 +238,7 @@ def _share(share: Interval, digits: int = 1) -> str:
 
 def _range(interval: Interval) -> str:
     digits = decimals(interval.sd)
-    return f"{interval.q05:.{digits}f} to {interval.q95:.{digits}f}"
+    return f"{interval.q05:z.{digits}f} to {interval.q95:z.{digits}f}"
 
 
 def _life(life: Life) -> str:

@@ -75,7 +75,7 @@ def _known(row: Row, name: str, of: str = "") -> tuple[str, str]:
     if not high > low:
         return f"{value:.4g}", f"{low:.4g} to {high:.4g}"
     digits = decimals(high - low)
-    return f"{value:.{digits}f}", f"{low:.{digits}f} to {high:.{digits}f}"
+    return f"{value:z.{digits}f}", f"{low:z.{digits}f} to {high:z.{digits}f}"
 
 
 def _one(row: Row) -> list[str]:

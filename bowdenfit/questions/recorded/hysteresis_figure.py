@@ -137,8 +137,8 @@ def _words(recording: LoopPanel) -> str:
     low, middle, high = _exponent(recording)
     own, width = recording.own_exponent, high - low
     low_text, middle_text, high_text, own_text = rounded_texts((low, middle, high, own), width or WITHOUT_INTERVAL)
-    lines = [rf"$\Lambda$ here {own_text}"] if np.isfinite(own) else []
-    lines += [rf"$\Lambda$ expected {middle_text}"] + ([f"({low_text} to {high_text})"] if width else [])
+    lines = [f"exponent {own_text}"] if np.isfinite(own) else []
+    lines += [f"expected {middle_text}"] + ([f"({low_text} to {high_text})"] if width else [])
     return "\n".join(lines)
 
 

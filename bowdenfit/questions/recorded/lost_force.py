@@ -54,7 +54,7 @@ class LostForce:
 
     def short(self) -> str:
         """Both medians, for a figure."""
-        lost, hidden = (f"{of.median:.{decimals(of.sd)}f} N" for of in (self.lost, self.hidden_tension))
+        lost, hidden = (f"{of.median:z.{decimals(of.sd)}f} N" for of in (self.lost, self.hidden_tension))
         return f"{lost} lost at any load,\nby {hidden} of hidden tension" if self.at_any_load else f"{hidden} of hidden tension"
 
 
@@ -83,4 +83,4 @@ def lost_force(fit: Record) -> LostForce | None:
 
 def _shown(known: Interval) -> str:
     digits = decimals(known.sd)
-    return f"{known.median:.{digits}f} N (90 % interval {known.q05:.{digits}f} to {known.q95:.{digits}f} N)"
+    return f"{known.median:z.{digits}f} N (90 % interval {known.q05:z.{digits}f} to {known.q95:z.{digits}f} N)"

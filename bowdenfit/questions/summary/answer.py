@@ -89,15 +89,15 @@ def _what(parameter: Parameter) -> str:
 
 def _drawn(known: Interval) -> tuple[str, str]:
     digits = decimals(known.q95 - known.q05)
-    return f"{known.median:.{digits}f}", f"{known.q05:.{digits}f} to {known.q95:.{digits}f}"
+    return f"{known.median:z.{digits}f}", f"{known.q05:z.{digits}f} to {known.q95:z.{digits}f}"
 
 
 def _estimated(estimate: Estimate) -> tuple[str, str]:
     if not estimate.identified:
         return "unknown", "not told"
     digits = decimals(2 * _QUANTILE * estimate.standard_error)
-    interval = f"{estimate.lower:.{digits}f} to {estimate.upper:.{digits}f}"
-    return f"{estimate.value:.{digits}f}", interval if "nan" not in interval and "inf" not in interval else "not known"
+    interval = f"{estimate.lower:z.{digits}f} to {estimate.upper:z.{digits}f}"
+    return f"{estimate.value:z.{digits}f}", interval if "nan" not in interval and "inf" not in interval else "not known"
 
 
 def _coefficients(fit: Record) -> str:

@@ -20,7 +20,7 @@ CAPSTAN, CAPSTAN_DOTS = "Capstan equation", (0, (1, 1.2))
 ALIKE = 1e-3  # of a coefficient, within which it is the same
 FROM_ZERO = 0.6  # lowest over highest coefficient below which the axis begins at 0
 _MOST_BAND = 4  # times as much as the readings may the axis leave for a band, above and below
-_OUTER = (0.02, 0.98)  # quantiles of the readings between which the axis of the coefficient is made
+_OUTER = (0.02, 0.98)  # quantiles of the readings; the axis of the coefficient reaches as far beyond them as they are apart
 
 
 def draw_apparent(axes: Axes, forces: Forces) -> None:
@@ -58,6 +58,13 @@ def _is_level(here: ForcesHere) -> bool:
     return bool(np.ptp(line) < ALIKE * np.max(np.abs(line)))
 
 
+def beyond_the_axis(forces: Forces) -> int:
+    """How many readings are drawn on the edge, because their coefficients lie beyond it."""
+    readings = np.concatenate([here.apparent for here in forces.places])
+    low, high = _coefficient_limits(forces)
+    return int(np.sum((readings < low) | (readings > high)))
+
+
 def _coefficient_limits(forces: Forces) -> tuple[float, float]:
     """From the readings but for a few far ones, and from the laws with their bands; far ones are drawn on the edge."""
     readings = np.concatenate([here.apparent for here in forces.places])
@@ -66,6 +73,8 @@ def _coefficient_limits(forces: Forces) -> tuple[float, float]:
         return 0.0, 1.0
     lines = [value for here in forces.places if here.shown for value in (here.capstan, *middle(here.apparent_law)[0])]
     outer = np.quantile(readings, _OUTER)
+    far = np.ptp(outer)
+    outer = np.clip([readings.min(), readings.max()], outer[0] - far, outer[1] + far)
     low, high = min(*outer, np.nanmedian(lines)), max(*outer, np.nanmedian(lines))
     bands = np.array([here.apparent_law[[0, -1]] for here in forces.places if here.shown])
     reach = max(_MOST_BAND * (high - low), abs(high))

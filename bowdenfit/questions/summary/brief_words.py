@@ -23,8 +23,10 @@ _MORE = "Everything else: bowdenfit summary --full"
 def summary_text(fit: Record) -> str:
     """One page for people: at most `LINES` lines, as a terminal of 80 columns shows them."""
     said, off = _said(fit), _off(fit)
-    rows = LINES - sum(map(len, said)) - len(off) - _BESIDE
-    shown = _quantities(fit, min(max(rows, _LEAST_QUANTITIES), _MOST_QUANTITIES), rows)
+    shown, whole = _quantities(fit, LINES - sum(map(len, said)) - len(off) - _BESIDE)
+    if not whole and verdict(fit).trusted and not readings_off(fit):  # that all readings agree is said above already
+        longer, whole = _quantities(fit, LINES - sum(map(len, said)) - _BESIDE + 1)
+        shown, off = (longer, []) if whole else (shown, off)
     below = [line for block in (shown, off, [_MORE]) for line in (["", *block] if block else [])]
     return "\n".join([*_within(said, LINES - len(below)), *below]) + "\n"
 
@@ -55,24 +57,25 @@ def _said(fit: Record) -> list[list[str]]:
     return [filled(sentence).splitlines() for sentence in sentences if sentence]
 
 
-def _quantities(fit: Record, most: int, lines: int) -> list[str]:
-    """The coefficients in a table of so many rows at most; what they are takes further lines while there is room."""
+def _quantities(fit: Record, lines: int) -> tuple[list[str], bool]:
+    """The coefficients in a table of about so many rows, and whether it says what each is, for which it takes further lines."""
     found = quantities(fit)
-    shown = found[:most]
+    shown = found[: min(max(lines, _LEAST_QUANTITIES), _MOST_QUANTITIES)]
     if not shown:
-        return []
+        return [], True
     wide = max(len(q.interval) for q in shown)
     rows = [(q.name, q.value, f"{q.interval:>{wide}} {q.unit}".rstrip()) for q in shown]
     heads = ("", "value", f"{'90 % interval':>{wide}}")
     printed = table(heads, rows, left=heads[-1:]).splitlines()
     start = max(map(len, printed)) + 2
     more = len(found) - len(shown)
-    made, spare = printed[:2], lines - len(shown) + (more <= 0)
+    made, spare, whole = printed[:2], lines - len(shown) + (more <= 0), True
     for line, q in zip(printed[2:], shown, strict=True):
         meaning = _meaning(q.what, WIDTH - start, spare)
         spare -= len(meaning) - 1
+        whole &= " ".join(meaning) == q.what
         made += [f"{line:<{start}}{meaning[0]}".rstrip(), *(" " * start + further for further in meaning[1:])]
-    return [*made, *([f"and {more} more"] if more > 0 else [])]
+    return [*made, *([f"and {more} more"] if more > 0 else [])], whole
 
 
 def _meaning(what: str, room: int, spare: int) -> list[str]:

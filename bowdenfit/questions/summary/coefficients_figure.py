@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from bowdenfit.plots.captions import symbol_words
 from bowdenfit.plots.densities import GRID_POINTS, density, limits, support
 from bowdenfit.plots.layout import (
     TITLE,
@@ -54,6 +55,7 @@ class Coefficient:
         prior: From the prior.
         least_squares: Estimate; NaN where not identified.
         standard_error: Its standard error.
+        meaning: What it is, in words.
     """
 
     symbol: str
@@ -62,6 +64,7 @@ class Coefficient:
     prior: np.ndarray
     least_squares: float = float("nan")
     standard_error: float = float("nan")
+    meaning: str = ""
 
 
 def data(fit: Record) -> tuple[Coefficient, ...] | None:
@@ -71,8 +74,8 @@ def data(fit: Record) -> tuple[Coefficient, ...] | None:
         return None
     for p in (p for role in ROLES for p in fit.model.space.free if p.role == role):
         estimate = estimates.get(p.name)
-        squares = (estimate.value, estimate.standard_error) if estimate else ()
-        found.append(Coefficient(p.symbol, p.unit, drawn.values[p.name], drawn.prior[p.name], *squares))
+        value, error = (estimate.value, estimate.standard_error) if estimate else (float("nan"), float("nan"))
+        found.append(Coefficient(p.symbol, p.unit, drawn.values[p.name], drawn.prior[p.name], value, error, p.meaning))
     return tuple(found) or None
 
 
@@ -82,6 +85,7 @@ def caption(parameters: tuple[Coefficient, ...]) -> str:
         f"What the measurements say of {counted(len(parameters), 'coefficient')}. Shaded: how plausible each value is, "
         "measurements and priors considered; dashed: by the prior alone; square with bar: the least-squares estimate with its "
         "standard error. Above each panel stand the median and the interval that holds the value with 90 % probability. "
+        f"{symbol_words((p.symbol, p.meaning) for p in parameters)}"
         f"n = {parameters[0].draws.size} sampled values."
     )
 

@@ -20,7 +20,7 @@ from bowdenfit.plots.style import (
     WRAP_ANGLE,
     in_paper_style,
 )
-from bowdenfit.questions.summary.apparent_friction import draw_apparent
+from bowdenfit.questions.summary.apparent_friction import beyond_the_axis, draw_apparent
 from bowdenfit.questions.summary.forces_by_bend import draw_by_bend, limits_of_bends
 from bowdenfit.questions.summary.forces_marks import MARK, RETURN_DASHES, colored_places, draw_readings, where_read
 from bowdenfit.questions.summary.forces_shown import STROKES, Forces, forces_shown
@@ -50,11 +50,13 @@ def caption(forces: Forces) -> str:
     band = "lines: medians, with the intervals that hold them with 90 % probability" if len(forces.places[0].law) > 1 else (
         "lines: least squares"
     )
+    beyond = beyond_the_axis(forces)
+    edge = f"On its edge: {counted(beyond, 'reading')} beyond it. " if beyond else ""
     return (
         f"Output against {'the wrap angle, all about one input force' if forces.by_bend else 'input force'}, a color for each "
         f"bend; {band}. Below: how far each reading is off its line, in percent, "
         "with the band in which nine of ten single readings should lie. Beside: the friction coefficient that each reading by "
-        "itself would have by the capstan equation; where that equation holds it is the same at all loads. "
+        f"itself would have by the capstan equation; where that equation holds it is the same at all loads. {edge}"
         f"n = {counted(n, 'reading')}."
     )
 
@@ -127,7 +129,7 @@ def _main(axes: Axes, forces: Forces) -> None:
     name_band(axes, law)
     draw_readings(axes, forces, "output_force", name=True)
     if not all(here.shown for here in forces.places):
-        axes.plot([], [], ".", color=GRAY, label="Elsewhere")
+        axes.plot([], [], ".", color=GRAY, label="Other bends")
     if forces.count:
         shown = sum(len(here.stroke) for here in forces.places)
         axes.plot([], [], " ", label=f"{shown:,} of {forces.count:,} readings shown")

@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from bowdenfit.plots.captions import symbol_words
 from bowdenfit.plots.densities import BINS, bin_numbers, enclosed_share
 from bowdenfit.plots.layout import EDGE, wrapped
 from bowdenfit.plots.sheet import Panel, PanelSheet
@@ -52,6 +53,7 @@ def caption(data: Pairs) -> str:
         "Every two unknowns against each other, and each alone on the diagonal. Dark and light: the smallest areas that "
         "hold the truth with 68 % and 95 % probability; a long slanted area means that the measurements tell a combination of "
         "the two better than either alone. Dashed: median and 90 % interval. "
+        f"{symbol_words((q.symbol, q.meaning) for q in data.quantities)}"
         f"n = {data.quantities[0].draws.size} sampled values."
     )
 

@@ -64,7 +64,7 @@ def _unit(parameter: Parameter) -> str:
 def _moments(known: Interval) -> tuple[str, str, str]:
     """Median, interval, and mean with standard deviation."""
     median, low, high, mean, sd = (
-        f"{value:.{decimals(known.sd)}f}" for value in (known.median, known.q05, known.q95, known.mean, known.sd)
+        f"{value:z.{decimals(known.sd)}f}" for value in (known.median, known.q05, known.q95, known.mean, known.sd)
     )
     return median, f"{low} to {high}", f"{mean} ± {sd}"
 
@@ -73,7 +73,7 @@ def _with_error(estimate: Estimate) -> str:
     if not estimate.identified:
         return _without_value(estimate)
     digits = _digits(estimate, abs(estimate.value) / 1000)
-    return f"{estimate.value:.{digits}f} ± {estimate.standard_error:.{digits}f}"
+    return f"{estimate.value:z.{digits}f} ± {estimate.standard_error:z.{digits}f}"
 
 
 def _without_value(estimate: Estimate) -> str:
@@ -92,7 +92,7 @@ def _profiled(estimate: Estimate) -> str:
     if not finite:
         return "not limited" if estimate.open else ""
     digits = _digits(estimate, (finite[-1] - finite[0]) / 3 or 1.0)
-    shown = [f"{limit:.{digits}f}" for limit in finite]
+    shown = [f"{limit:z.{digits}f}" for limit in finite]
     if estimate.open:
         return f"{shown[0]} or more" if "upper" in estimate.open else f"{shown[0]} or less"
     return " to ".join(shown)

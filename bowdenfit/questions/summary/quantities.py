@@ -16,11 +16,13 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True)
 class SampledQuantity:
-    """Draws (walkers by draws) of something between bounds, and its symbol with unit."""
+    """Draws (walkers by draws) of something between bounds, its symbol with unit, and the symbol alone with what it means."""
 
     label: str
     draws: np.ndarray
     bounds: tuple[float, float]
+    symbol: str = ""
+    meaning: str = ""
 
     def limits(self, share: float) -> tuple[float, float]:
         """An axis that shows the given share of the draws, within the bounds."""
@@ -39,7 +41,10 @@ def sampled_quantities(fit: Record, roles: tuple[str, ...] = ()) -> list[Sampled
         return []
     free, values = fit.model.space.free, fit.sampled.values
     wanted = [p for role in roles for p in free if p.role == role] if roles else free
-    return [SampledQuantity(axis_label(p.symbol, p.unit), values[p.name], (support(values[p.name]), np.inf)) for p in wanted]
+    return [
+        SampledQuantity(axis_label(p.symbol, p.unit), values[p.name], (support(values[p.name]), np.inf), p.symbol, p.meaning)
+        for p in wanted
+    ]
 
 
 def optimum(fit: Record) -> list[SampledQuantity]:

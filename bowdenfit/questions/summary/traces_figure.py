@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from bowdenfit.plots.captions import symbol_words
 from bowdenfit.plots.layout import EDGE, wrapped
 from bowdenfit.plots.sheet import Panel, PanelSheet
 from bowdenfit.plots.style import SERIES_COLORS, SERIES_LINES, SMALL, WIDE, WIDE_INTERVAL, in_paper_style
@@ -47,7 +48,7 @@ def caption(data: Paths) -> str:
     return (
         "Whether the sampling can be relied on: the path of every unknown through the sampling, a color for each "
         "independent start. They should lie on top of each other and go neither up nor down. Right of each panel: where "
-        f"each spent its time. n = {data.n_ensembles} independent starts, {data.quantities[0].draws.size} sampled values."
+        f"each spent its time. {symbol_words((q.symbol, q.meaning) for q in data.quantities)}n = {data.n_ensembles} independent starts, {data.quantities[0].draws.size} sampled values."
     )
 
 

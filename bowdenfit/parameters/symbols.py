@@ -23,7 +23,7 @@ def symbol_of(letter: str, name: str) -> str:
 
 
 def in_letters(symbol: str) -> str:
-    """A symbol as plain text can show it: 'μ1' of '$\\mu_1$'."""
+    r"""A symbol as plain text can show it: 'μ1' of '$\mu_1$'."""
     formula = r"(?<!\\)\$(.*?)(?<!\\)\$"
     return re.sub(formula, lambda found: _without_commands(found[1]), symbol).replace(r"\$", "$")
 

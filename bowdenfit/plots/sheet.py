@@ -21,7 +21,7 @@ TICK = 0.035  # in
 TICK_SIZE = 6  # pt
 NUMBER_SPACE, NUMBER_ROW = 0.075, 0.16  # in, from one number to the next: a character across, and a row up
 LETTER = 0.053  # in, width of a character of a number
-TIGHT = 1.25  # times as many numbers as usual fit where there would be one else
+LEAST_SPACE = 1.1 * LETTER / NUMBER_SPACE  # of that from one number to the next, where there would be one number else
 
 
 @dataclass(frozen=True)
@@ -83,7 +83,8 @@ class PanelSheet:
 
     def ticks_below(self, panel: Panel, numbers: bool = True, whole: bool = False) -> None:
         """Ticks of the lower axis, with numbers or without, at whole numbers only or not."""
-        values, texts = ticks(panel.x_limits, lambda texts: panel.width / (NUMBER_SPACE * max(map(len, texts))), whole)
+        over, most = TICK / panel.width, panel.width / NUMBER_SPACE
+        values, texts = ticks(panel.x_limits, lambda texts: most / max(map(len, texts)), whole, over)
         places = panel.x(values)
         self._strokes += [np.array([(x, panel.bottom), (x, panel.bottom - TICK)]) for x in places]
         for x, number in zip(places, texts if numbers else (), strict=numbers):
@@ -106,7 +107,7 @@ class PanelSheet:
 
 
 def ticks(
-    limits: tuple[float, float], room: Callable[[list[str]], float], whole: bool = False
+    limits: tuple[float, float], room: Callable[[list[str]], float], whole: bool = False, over: float = 0.0
 ) -> tuple[np.ndarray, list[str]]:
     """As many round values as there is room for, and the same as text.
 
@@ -114,6 +115,7 @@ def ticks(
         limits: Of the axis.
         room: How many of the given texts fit next to each other along the axis.
         whole: Whether only whole numbers make sense.
+        over: How far a number may stand beyond an end, as a share of the axis.
     """
     from matplotlib.ticker import MaxNLocator
 
@@ -132,9 +134,14 @@ def ticks(
             break
     for most in (2, 3, 4, 6, 8):  # one number is no scale: the outermost two of a finer step
         finer, step = round_values(most)
-        outer = _texts(finer[[0, -1]], step) if len(finer) > 1 else []
-        if outer and (high - low) / (finer[-1] - finer[0]) <= TIGHT * room(outer):
-            return finer[[0, -1]], outer
+        if len(finer) < 2:
+            continue
+        outer = finer[[0, -1]]
+        words = _texts(outer, step)
+        share = LEAST_SPACE / room(words)  # of the axis that a number takes
+        first, last = np.clip((outer - low) / (high - low), share / 2 - over, 1 - share / 2 + over)
+        if last - first >= share:
+            return outer, words
     return values, texts
 
 

@@ -3,7 +3,8 @@
 import re
 
 JARGON = (
-    r"\belpd\b", r"\bk\b(?!( rope)?: )", r"\bz\b", r"\bdraws?\b", r"\bwalkers?\b", r"\bensembles?\b", r"\bcondition number\b",
+    r"\belpd\b", r"\bk\b(?!( rope)?: |/k rope: )", r"\bz\b", r"\bdraws?\b", r"\bwalkers?\b", r"\bensembles?\b",
+    r"\bcondition number\b",
     r"\blog rad\b", r"\w*(Normal|Cauchy)\(", r"\bcensored\b", r"\bposterior\b", r"\bR-hat\b", r"\beffective sample\b",
     r"\bs\.e\.", r"\b1 \w+s were\b", r"(?<![\d.,])\b1 (?!times\b|ms\b|is\b|was\b|has\b|does\b|less\b)[a-z]+s\b", r"\+-", r"\d%",
 )  # fmt: skip

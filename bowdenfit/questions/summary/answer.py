@@ -14,6 +14,7 @@ from bowdenfit.questions.groups.answer import groups_of
 from bowdenfit.questions.loss.answer import loss_by_contact
 from bowdenfit.questions.recorded.lost_force import lost_force
 from bowdenfit.questions.recorded.rate import rate_effect
+from bowdenfit.questions.summary.quantities import BETWEEN_MOUNTINGS
 from bowdenfit.results.record import Record
 from bowdenfit.words import decimals, few
 
@@ -72,7 +73,7 @@ def readings_off(fit: Record) -> Sequence[CheckedReading]:
 def _quantity(fit: Record, parameter: Parameter) -> Quantity | None:
     percent = parameter.name == RUN_SCATTER
     unit, scale = ("%", 100.0) if percent else ("" if parameter.unit == "1" else parameter.unit, 1.0)
-    what = "scatter between mountings" if percent else _what(parameter)
+    what = BETWEEN_MOUNTINGS if percent else _what(parameter)
     if parameter.fixed is not None:
         return Quantity(parameter.name, what, unit, f"{parameter.fixed * parameter.shown_scale:.4g}", "as stated")
     if fit.sampled is not None:

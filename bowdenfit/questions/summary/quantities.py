@@ -7,11 +7,14 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from bowdenfit.cable.load_cells import RUN_SCATTER
 from bowdenfit.plots.densities import density, limits, support
 from bowdenfit.plots.style import axis_label
 
 if TYPE_CHECKING:
     from bowdenfit.results.record import Record
+
+BETWEEN_MOUNTINGS = "scatter between mountings"
 
 
 @dataclass(frozen=True)
@@ -41,10 +44,12 @@ def sampled_quantities(fit: Record, roles: tuple[str, ...] = ()) -> list[Sampled
         return []
     free, values = fit.model.space.free, fit.sampled.values
     wanted = [p for role in roles for p in free if p.role == role] if roles else free
-    return [
-        SampledQuantity(axis_label(p.symbol, p.unit), values[p.name], (support(values[p.name]), np.inf), p.symbol, p.meaning)
-        for p in wanted
-    ]
+    found = []
+    for p in wanted:
+        words = BETWEEN_MOUNTINGS if p.name == RUN_SCATTER else p.meaning
+        bounds = support(values[p.name]), np.inf
+        found.append(SampledQuantity(axis_label(p.symbol, p.unit), values[p.name], bounds, p.symbol, words))
+    return found
 
 
 def optimum(fit: Record) -> list[SampledQuantity]:

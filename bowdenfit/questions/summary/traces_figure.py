@@ -48,7 +48,8 @@ def caption(data: Paths) -> str:
     return (
         "Whether the sampling can be relied on: the path of every unknown through the sampling, a color for each "
         "independent start. They should lie on top of each other and go neither up nor down. Right of each panel: where "
-        f"each spent its time. {symbol_words((q.symbol, q.meaning) for q in data.quantities)}n = {data.n_ensembles} independent starts, {data.quantities[0].draws.size} sampled values."
+        f"each spent its time. {symbol_words((q.symbol, q.meaning) for q in data.quantities)}"
+        f"n = {data.n_ensembles} independent starts, {data.quantities[0].draws.size} sampled values."
     )
 
 

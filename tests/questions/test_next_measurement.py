@@ -318,7 +318,7 @@ def test_elastic_cables_have_stretch_preload_and_loop_readings():
 
 def test_what_is_proposed_where_nothing_is_offered_can_be_asked(on_body):
     """Of a catheter no displacement can be simulated, but an efficiency at a bend can."""
-    dataset = bf.read(on_body.parent / "synthetic-catheter")
+    dataset = load_dataset(on_body.parent / "synthetic-catheter")
     fit = pretended(dataset, np.zeros(build_model(dataset).space.size), n=3200)
     with pytest.raises(UsageError, match=r"\(displacement\) cannot be simulated") as refused:
         next_measurement(fit)
@@ -328,7 +328,7 @@ def test_what_is_proposed_where_nothing_is_offered_can_be_asked(on_body):
 
 
 def test_what_is_not_understood_is_answered_with_a_name_that_is(fit):
-    dataset = bf.read(Path(__file__).parents[2] / "datasets" / "synthetic-haptic-loop")
+    dataset = load_dataset(Path(__file__).parents[2] / "datasets" / "synthetic-haptic-loop")
     loop = pretended(dataset, np.zeros(build_model(dataset).space.size), n=10)
     for of, kinds in ((fit, ("angle", "efficiency")), (loop, ("stretch", "preload", "loop"))):
         for kind in kinds:

@@ -64,6 +64,7 @@ def test_cables_unlike_the_rest_are_named_and_no_others(found):
     assert {each.cable for each in found.unlike} == {"cable-03", "cable-08"}
     assert "mu" in found.cable("cable-03").unlike and "above" in found.cable("cable-03").unlike
     assert "wear lies" in found.cable("cable-08").unlike
+    assert found.mixed == {}, "those that are named are no heap of another make"
 
 
 def test_cables_unlike_the_rest_are_said_by_their_own_inspections(fleet, found):

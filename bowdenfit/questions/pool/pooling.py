@@ -84,7 +84,7 @@ def pooled(drawn: FleetDraws, asked: Asked | None, seed: int, measurements: Path
         REFERENCE_TEMPERATURE,
         asked,
         None if asked is None or alone else _life(known, asked, new),
-        {} if alone else mixed(known.inspected, looked.every, names),
+        {} if alone else mixed(known.inspected, looked.shown, names, looked.unlike),
         curves_of(known, population, asked, new) if wears else None,
         next_inspections(known, population, asked, seed),
         (*known.notes, *_more_notes(known, drawn)),

@@ -18,7 +18,7 @@ References:
     techniques", table 4.9, for the distribution of the statistic with estimated mean and variance.
 """
 
-from collections.abc import Callable
+from collections.abc import Callable, Collection
 
 import numpy as np
 from scipy.special import chdtrc, gammaln, log_ndtr, ndtr
@@ -218,20 +218,24 @@ def _within(
     return found
 
 
-def mixed(inspected: Inspected, drawn: PopulationDraws, names: tuple[str, ...]) -> dict[str, float]:
+def mixed(
+    inspected: Inspected, drawn: PopulationDraws, names: tuple[str, ...], without: Collection[int] = ()
+) -> dict[str, float]:
     """Numbers in which cables do not look like one population, with the probability of that by chance in such a fleet.
 
     Args:
         inspected: What is known.
         drawn: Of the population.
         names: Of the numbers of a cable.
+        without: Cables that are said to be unlike the rest, of which the population has none.
     """
+    rest = ~np.isin(np.arange(inspected.cables), list(without))
     data, effects = inspected.data, drawn.effects.mean(axis=0)
     shift = data["by_effect"][:, :, : len(effects)] @ effects
     found: dict[str, float] = {}
     precision = data["precision"]
     for k, name in enumerate(names):
-        known = np.diagonal(precision, axis1=1, axis2=2)[:, k] > 0
+        known = rest & (np.diagonal(precision, axis1=1, axis2=2)[:, k] > 0)
         others = [i for i in range(len(names)) if i != k]
         weight = np.zeros((len(names), len(names)))
         weight[others, others] = 1 / np.mean(drawn.spread[:, others], axis=0) ** 2  # as far as its own data do not tell

@@ -65,9 +65,9 @@ def replicator(posterior: LogDensity, seed: int, beside: Executor | None = None)
     readings: named values, log likelihood of every reading, expected readings, and readings drawn anew.
     """
     model = posterior.model
-    names, key = named_values(model), jax.random.key(seed)
+    names, key = named_values(model), jax.random.key(seed)  # an argument, so that the program is the same for every seed
 
-    def implied(z_and_number: Float[Array, " free_and_one"], data: Any) -> dict[str, Mapping[str, Array]]:
+    def implied(z_and_number: Float[Array, " free_and_one"], data: Any, key: Array) -> dict[str, Mapping[str, Array]]:
         z, number = z_and_number[:-1], z_and_number[-1].astype(jnp.uint32)
         keys = jax.random.split(jax.random.fold_in(key, number), max(len(model.terms), 1))
         values = model.space.constrain(z)
@@ -80,7 +80,7 @@ def replicator(posterior: LogDensity, seed: int, beside: Executor | None = None)
         }
 
     small = sum(np.size(array) for array in jax.tree.leaves(posterior.data)) < _SMALL
-    program = for_each_draw(implied, model.space.size + 1, posterior.data, run_once=small, beside=beside)
+    program = for_each_draw(implied, model.space.size + 1, posterior.data, key, run_once=small, beside=beside)
     return lambda z: program(np.column_stack([z, np.arange(len(z), dtype=float)]))
 
 

@@ -10,6 +10,7 @@ from hypothesis import strategies as st
 from scipy import stats
 
 from bowdenfit.dataset import load_dataset
+from bowdenfit.inference import draws
 from bowdenfit.inference.draws import efficiency_at, for_each_draw, named_values, replicator
 from bowdenfit.inference.log_density import LogDensity
 from bowdenfit.model import Model, build_model
@@ -231,3 +232,17 @@ def test_readings_drawn_anew_are_distributed_as_the_likelihood_says():
         standardized = (scale(replicated) - scale(expected)) / sd
         p += [stats.kstest(column, "norm").pvalue for column in standardized.T]
     assert min(p) * len(p) > 0.001
+
+
+def test_readings_by_another_seed_need_no_other_program(on_body_model, monkeypatch):
+    compiled = []
+
+    def program(function, *shapes, **_):
+        compiled.append(jax.jit(function).lower(*shapes))
+        return compiled[-1].compile()
+
+    monkeypatch.setattr(draws, "compile_program", program)
+    posterior, z = LogDensity(on_body_model), _draws(on_body_model, 2, 1)
+    drawn = [replicator(posterior, seed)(z)["replicated"]["efficiency"] for seed in (3, 4)]
+    assert compiled[0].as_text() == compiled[1].as_text()
+    assert not np.any(drawn[0] == drawn[1])

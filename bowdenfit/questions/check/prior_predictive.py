@@ -91,7 +91,7 @@ def _drawn(model: Model, z: np.ndarray, seed: int) -> dict[str, Any]:
     key, data = jax.random.key(seed), LogDensity(model).data
     route = None if model.description.route is None else jnp.asarray(route_grid(model))
 
-    def implied(z_and_number: Array, data: Any) -> dict[str, Any]:
+    def implied(z_and_number: Array, data: Any, key: Array) -> dict[str, Any]:
         values = model.space.constrain(z_and_number[:-1])
         keys = jax.random.split(jax.random.fold_in(key, z_and_number[-1].astype(jnp.uint32)), max(len(data), 1))
         terms = zip(model.terms, data, keys, strict=False)
@@ -100,7 +100,7 @@ def _drawn(model: Model, z: np.ndarray, seed: int) -> dict[str, Any]:
             {} if route is None else {"efficiency": model.cable.efficiency_at(values, route)}
         )
 
-    program = for_each_draw(implied, model.space.size + 1, data, run_once=True)
+    program = for_each_draw(implied, model.space.size + 1, data, key, run_once=True)
     return program(np.column_stack([z, np.arange(len(z), dtype=float)]))
 
 

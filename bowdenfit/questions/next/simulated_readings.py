@@ -41,7 +41,7 @@ def simulated_readings(
     parts = {name: kinds[name].simulation(at, of_kind) for name, of_kind in wanted.items()}
     data, key = {name: part.data for name, part in parts.items()}, jax.random.key(seed)
 
-    def readings(z_and_number: Array, data: Any) -> dict[str, Array]:
+    def readings(z_and_number: Array, data: Any, key: Array) -> dict[str, Array]:
         values, number = model.space.constrain(z_and_number[:-1]), z_and_number[-1].astype(jnp.uint32)
         keys = jax.random.split(jax.random.fold_in(key, number), (len(parts), repeats))
         return {
@@ -49,7 +49,7 @@ def simulated_readings(
             for i, (name, part) in enumerate(parts.items())
         }
 
-    program = for_each_draw(readings, model.space.size + 1, data, run_once=True)
+    program = for_each_draw(readings, model.space.size + 1, data, key, run_once=True)
     drawn = program(np.column_stack([z, np.arange(len(z), dtype=float)]))
     columns = {name: iter(part.columns) for name, part in parts.items()}
     return [np.maximum(drawn[c.kind][:, :, list(next(columns[c.kind]))], parts[c.kind].lowest) for c in candidates]

@@ -8,8 +8,6 @@ from pathlib import Path
 import pytest
 from one_page import faults, jargon
 
-import bowdenfit as bf
-
 ROOT = Path(__file__).parents[2]
 DATA_SETS = sorted(path.parent for path in (ROOT / "datasets").glob("*/cable.toml"))
 CORPUS = [path for path in sorted((ROOT / "tests" / "files" / "corpus").glob("*.*")) if path.suffix != ".toml"]
@@ -94,16 +92,3 @@ def test_comparisons_and_calibrations_come_as_csv(run, results, tmp_path):
     heads, *rows = csv.reader(io.StringIO(out))
     assert heads[0] == "quantity" and "mu" in {row[0] for row in rows}
     assert not too_wide((tmp_path / "calibration" / "summary.txt").read_text())
-
-
-@pytest.mark.slow
-@pytest.mark.parametrize("folder", DATA_SETS, ids=lambda path: path.name)
-def test_every_verb_keeps_to_the_terminal_on_every_data_set(run, tmp_path, folder):
-    data = bf.read(folder)
-    for name in ("one", "two"):
-        bf.fit(data, output=tmp_path / name, seed=3, figures=False)
-    for verb in ("summary", "identify", "next", *(("length", "predict") if data.description.route else ())):
-        out = run(verb, tmp_path / "one")[1]
-        assert out and not too_wide(out), verb
-    assert not too_wide(run("compare", tmp_path / "one", tmp_path / "two")[1])
-    assert not too_wide(run("calibrate", folder, "-n", 3, "--seed", 1, "-o", tmp_path / "calibration")[1])

@@ -7,13 +7,11 @@ import numpy as np
 
 from bowdenfit.cable.cable import Cable
 from bowdenfit.kinds.angles.table import AngleTable
-from bowdenfit.kinds.displacement.table import DisplacementTable
+from bowdenfit.kinds.displacement.table import ZERO, DisplacementTable
 from bowdenfit.kinds.displacement.turns import Turns
 from bowdenfit.kinds.row_angles import row_angles
 from bowdenfit.kinds.rows import OwnAngles
 from bowdenfit.types import Vector
-
-ZERO = "displacement_zero"
 
 
 @dataclass(frozen=True)

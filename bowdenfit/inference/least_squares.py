@@ -17,6 +17,7 @@ from bowdenfit.display import Display, Rows
 from bowdenfit.errors import ConvergenceError
 from bowdenfit.inference.departure import Departure, FarReading
 from bowdenfit.inference.disagreement import Disagreement, disagreements
+from bowdenfit.inference.interval import NORMAL_90
 from bowdenfit.inference.lack_of_fit import departures
 from bowdenfit.inference.linearized import linearize, scatter_about
 from bowdenfit.inference.log_density import LogDensity
@@ -31,7 +32,6 @@ UNDETERMINED = "the measurements do not determine it"
 _SUSPECT = -2.0  # below this z an estimate may be on its way to the lower end, above its negative to the upper
 _FARTHEST = 6.0  # z of a noise scale
 _UNKNOWN = (float("nan"), float("nan"))
-_NORMAL_90 = 1.645  # standard errors to either end of a 90 % interval
 _FAR = 50.0  # standard error in units of the prior's sd beyond which data say nothing of a parameter
 
 
@@ -68,7 +68,7 @@ class Estimate:
     def reach(self) -> float:
         """Half of the 90 % interval; that of a normal distribution where the interval was not computed or has no end."""
         half = (self.upper - self.lower) / 2
-        return half if np.isfinite(half) else _NORMAL_90 * self.standard_error
+        return half if np.isfinite(half) else NORMAL_90 * self.standard_error
 
 
 @dataclass(frozen=True, repr=False)

@@ -7,6 +7,8 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from bowdenfit.inference.interval import NORMAL_90
+
 if TYPE_CHECKING:
     import jax
 
@@ -16,7 +18,6 @@ if TYPE_CHECKING:
 GRID, BINS = 60, 12  # places of a curve, and points a run that are shown against the load
 CURVES = 4000  # draws of a curve
 Points = tuple[np.ndarray, np.ndarray, np.ndarray, list[str]]  # x, efficiencies, half their intervals, and the run of each
-NORMAL_90 = 1.645  # standard errors to either end of a 90 % interval
 
 
 @dataclass(frozen=True)

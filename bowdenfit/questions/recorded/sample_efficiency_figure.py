@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from bowdenfit.inference.interval import NORMAL_90
 from bowdenfit.plots.bands import evenly, say_of_how_many
 from bowdenfit.plots.captions import shown_words
 from bowdenfit.plots.layout import legend_above
@@ -33,7 +34,6 @@ if TYPE_CHECKING:
 
 HEADING = "Efficiency sample by sample"
 MOST_COLUMNS = 4
-NORMAL_90 = 1.645  # standard errors to either end of a 90 % interval
 EDGE = 0.12  # of the panel's width, right of the samples
 SHARE = 0.998  # of the samples, within the axis
 

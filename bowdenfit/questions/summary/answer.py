@@ -4,7 +4,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 from bowdenfit.cable.load_cells import RUN_SCATTER
-from bowdenfit.inference.interval import Interval
+from bowdenfit.inference.interval import NORMAL_90, Interval
 from bowdenfit.inference.least_squares import Estimate
 from bowdenfit.parameters.space import Parameter
 from bowdenfit.questions.bends.overview import elastic_overview
@@ -21,7 +21,6 @@ from bowdenfit.words import decimals, few
 _ROLES = ("friction", "friction_model", "angle", "elastic")
 _FEW = 3  # coefficients and contrasts that the answer names
 _COEFFICIENT = "friction coefficient"
-_QUANTILE = 1.645  # standard errors to each end of a 90 % interval
 
 
 @dataclass(frozen=True)
@@ -96,7 +95,7 @@ def _drawn(known: Interval) -> tuple[str, str]:
 def _estimated(estimate: Estimate) -> tuple[str, str]:
     if not estimate.identified:
         return "unknown", "not told"
-    digits = decimals(2 * _QUANTILE * estimate.standard_error)
+    digits = decimals(2 * NORMAL_90 * estimate.standard_error)
     interval = f"{estimate.lower:z.{digits}f} to {estimate.upper:z.{digits}f}"
     return f"{estimate.value:z.{digits}f}", interval if "nan" not in interval and "inf" not in interval else "not known"
 

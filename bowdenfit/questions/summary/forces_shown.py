@@ -6,6 +6,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from bowdenfit.inference.interval import NORMAL_90
 from bowdenfit.plots.bands import evenly
 
 if TYPE_CHECKING:
@@ -19,7 +20,6 @@ _BEND = 5.0  # deg within which wrap angles that were read are one bend
 _LEAST_ANGLE = np.deg2rad(1.0)  # below which there is no apparent coefficient to speak of
 _WIDE = 20.0  # ratio of the largest to the smallest load from which axes are logarithmic
 _ONE_LOAD = 1.1  # ratio of the largest to the smallest load up to which they are one
-_WITHIN_90 = 1.645  # standard deviations
 
 
 @dataclass(frozen=True)
@@ -194,4 +194,4 @@ def _spread(fit: "Record", load: np.ndarray, found: Mapping[str, np.ndarray]) ->
     fixed = {p.name: float(p.fixed or 0.0) for p in fit.model.space.fixed}
     tau, noise = ((values | fixed)[name] for name in (RUN_SCATTER, FORCE_NOISE))
     ratio, output = fit.dataset.description.sensors.noise_ratio, np.median(found["law"][:, :, 0], axis=(0, 1))
-    return np.asarray(100 * _WITHIN_90 * np.sqrt(tau**2 + noise**2 * (ratio**2 / load**2 + 1 / output**2)))
+    return np.asarray(100 * NORMAL_90 * np.sqrt(tau**2 + noise**2 * (ratio**2 / load**2 + 1 / output**2)))

@@ -47,7 +47,7 @@ def test_pooled_draws_are_those_of_all_readings_at_once(cables, tmp_path):
         bf.fleet(tmp_path / "fleet", output=tmp_path / "fits", seed=1)
         known = given(read_fleet_draws(tmp_path / "fits"))
         pooled = draw_population(known.inspected, 2)
-        joint = joint_draws(tmp_path / "fleet", known.labels, known.coefficients, pooled.cables, 800, 3)
+        joint = joint_draws(tmp_path / "fleet", known.labels, known.coefficients, pooled, 800, 3)
     every = joint.population.transpose(2, 0, 1)
     worth = [diagnose(np.ascontiguousarray(each), len(each)) for each in every]
     least = min(d.ess_bulk for d in worth)

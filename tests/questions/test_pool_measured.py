@@ -118,7 +118,7 @@ def test_cables_pooled_by_their_readings_are_those_of_all_readings_at_once(tmp_p
         mine = sorted({int(known.inspected.cable[j]) for j in rows})
         assert mine
         ours = draw_population(known.inspected, 2, readings=readings_of(known, list(map(int, rows)), tmp_path / "fleet"))
-        joint = joint_draws(tmp_path / "fleet", known.labels, known.coefficients, ours.cables, 500, 3)
+        joint = joint_draws(tmp_path / "fleet", known.labels, known.coefficients, ours, 500, 3)
     theirs = joint.cables.reshape(-1, *joint.cables.shape[2:])[:, mine]
     cables = ours.cables[:, mine]
     away = (cables.mean(axis=0) - theirs.mean(axis=0)) / theirs.std(axis=0)

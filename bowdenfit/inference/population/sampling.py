@@ -17,7 +17,8 @@ from bowdenfit.inference.population.readings import Readings, without_those
 from bowdenfit.words import percent
 
 _SETTINGS = SamplerSettings(n_chains=4, target_acceptance=0.8, target_ess=400, target_r_hat=1.02)
-_FEW, _CAREFUL = 5, 0.95  # cables, of fewer than which hardly anything is known of their spread; what then is accepted
+_FEW, _CAREFUL = 5, 0.99  # cables, of fewer than which hardly anything is known of their spread; what then is accepted
+_MOST_DENSE = 60  # numbers of whose covariance the first 200 draws of warm-up tell enough
 _FIRST, _MORE, _MOST = 20, 10, 100  # blocks after warm-up at the first look, until the next, and at all
 _AT_ONCE = _SETTINGS.n_chains * BLOCK  # draws whose values are computed together
 _MOST_DIVERGENT = 0.001  # share of trajectories
@@ -70,7 +71,7 @@ def draw_population(
     target = WARM_UP + _FIRST
     while True:
         while len(blocks) < target:
-            z, tuning, mass = before(blocks, start, np.ones(density.size))
+            z, tuning, mass = before(blocks, start, _first_mass(density))
             adapting = np.bool_(len(blocks) < WARM_UP)
             done = program(np.uint32(seed), np.uint32(len(blocks)), z, tuning, adapting, mass, data)
             blocks.append({name: np.asarray(value) for name, value in done.items()})
@@ -84,6 +85,16 @@ def draw_population(
     every = zip(*(values_of(part, data) for part in parts), strict=True)
     mean, spread, effects, cables = (np.concatenate([np.asarray(part) for part in each]) for each in every)
     return PopulationDraws(mean, spread, effects[:, :-1], cables, reasons, worth)
+
+
+def _first_mass(density: PopulationDensity) -> np.ndarray:
+    """The first inverse mass matrix; its diagonal where cables are many.
+
+    Inspections of a few cables leave wear, lubrication and temperature to be told apart by hardly anything but their priors:
+    what is known of them together is known well, and of each alone badly.
+    """
+    dense = density.cables < _FEW and density.size <= _MOST_DENSE
+    return np.eye(density.size) if dense else np.ones(density.size)
 
 
 def _blind(data: dict[str, Any], cables: Collection[int]) -> dict[str, Any]:
@@ -110,7 +121,7 @@ def _compiled(density: PopulationDensity, tree: Any, shapes: tuple[tuple[tuple[i
     """What draws, and what gives the values of draws; the same for all fleets of one shape."""
     data = jax.tree.unflatten(tree, [jax.ShapeDtypeStruct(shape, kind) for shape, kind in shapes])
     settings = _SETTINGS.model_copy(update={"target_acceptance": _CAREFUL}) if density.cables < _FEW else _SETTINGS
-    program = block_program(density.log_density, (density.size,), data, settings, fine=False)
+    program = block_program(density.log_density, _first_mass(density).shape, data, settings, fine=False)
 
     def values(z: jax.Array, data: dict[str, Any]) -> tuple[jax.Array, ...]:
         found = density.population(z, data)

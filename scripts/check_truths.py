@@ -1,6 +1,6 @@
 """Do intervals hold truths that do not come from the priors? On simulated benches unlike each other.
 
-    python scripts/check_truths.py [--replications N] [--seed S] [BENCH ...]
+    python scripts/check_truths.py [--replications N] [--seed S] [--apart] [BENCH ...]
 
 Every bench is a cable on which wrap angles and forces are read, with ranges for what is true: narrow and wide bells,
 mountings that are alike or differ, loads of 1 N and of 10 kN, two mountings and twenty. Nothing is said of the priors, so
@@ -9,29 +9,45 @@ the 50 and 90 % intervals of the coefficients and of the best length hold it; al
 what chance does, though priors that must serve every cable are never exactly those of one bench.
 
 Prints a line for each quantity, with the rates that chance allows.
+
+With `--apart` it says instead what each prior does to them: the same draws, weighted so that a prior gives way to the very
+range that truths are drawn from. With all priors replaced so, rates must be 50 and 90 %, whatever the priors are: what is
+left then is the likelihood's and the sampler's. Replications of which the weights leave too few draws are left out, and those
+that are not are counted.
 """
 
 import argparse
-from dataclasses import dataclass, field
+from collections.abc import Sequence
+from dataclasses import dataclass, field, replace
 from typing import Any
 
 import jax
+import jax.numpy as jnp
 import numpy as np
 
 from bowdenfit.dataset import Dataset
+from bowdenfit.inference.batch.stages import BatchFit
+from bowdenfit.inference.draws import for_each_draw
+from bowdenfit.inference.log_density import LogDensity
 from bowdenfit.kinds.designs import design_of
 from bowdenfit.kinds.settings import parse_description
 from bowdenfit.questions.calibrate.findings import findings
 from bowdenfit.questions.calibrate.quantities import quantities_of
-from bowdenfit.questions.calibrate.refit import Laboratory
-from bowdenfit.questions.calibrate.truths import stated_truths
+from bowdenfit.questions.calibrate.refit import RANKS, Laboratory
+from bowdenfit.questions.calibrate.replication import RankedTruth
+from bowdenfit.questions.calibrate.truths import StatedTruth, stated_truths
 from bowdenfit.questions.calibrate.workbench import Plan, Workbench
 from bowdenfit.questions.simulate.simulation import empty_tables
+from bowdenfit.results.optimum import optimum_of
+from bowdenfit.results.record import OPTIMAL_EFFICIENCY, OPTIMAL_LENGTH
 from bowdenfit.words import table
 
 ROUTE = {"variable": "cable_length", "unit": "mm", "range": [400, 600]}
 LENGTHS = tuple(np.linspace(400.0, 600.0, 15))
 COLUMNS = ("free_angle", "squeezed_angle")
+FEWEST = 30  # effective draws of which a rank is taken
+# More draws than a rank needs, for weights that leave few of them.
+MORE = replace(RANKS, sampler=RANKS.sampler.model_copy(update={"target_ess": 800}), n_kept=8192)
 
 
 @dataclass(frozen=True)
@@ -84,16 +100,59 @@ BENCHES = {
     "loads of 10 kN": Bench(load=1e4),
     "two mountings": Bench(mountings=2, coefficients=1),
     "twenty mountings": Bench(mountings=20),
+    "slippery to sticky": Bench(truth={f"mu{i}": [0.02, 0.6] for i in (1, 2, 3)}),
+    "two mountings that differ": Bench(mountings=2, coefficients=1, truth={"tau": [0.1, 0.3]}),
 }
+REPLACED: dict[str, tuple[str, ...]] = {
+    "none": (),
+    "of coefficients": ("mu",),
+    "of tau": ("tau",),
+    "of other noise": ("sigma",),
+    "of curves": COLUMNS,
+    "of coefficients and tau": ("mu", "tau"),
+    "all": ("",),
+}
+
+
+@dataclass(frozen=True)
+class Keeping(Laboratory):
+    """Keeps what it fitted, in order."""
+
+    found: list[BatchFit] = field(default_factory=list)
+
+    def fits(self, posteriors: Sequence[LogDensity], seeds: Sequence[int]) -> list[BatchFit]:
+        """See `Laboratory`."""
+        done = super().fits(posteriors, seeds)
+        self.found.extend(done)
+        return done
+
+
+@dataclass(frozen=True)
+class Held:
+    """What came of one quantity of one replication with other priors.
+
+    Args:
+        rank: Share of the posterior below the truth.
+        width: Of its 90 % interval.
+    """
+
+    rank: float
+    width: float
+
+
+def plan_of(name: str, bench: Bench, seed: int) -> Plan:
+    """What is replicated."""
+    dataset = bench.dataset()
+    with jax.enable_x64(True):
+        plan = Plan(dataset, dataset, seed)
+        return replace(plan, truths=stated_truths(bench.truths(), Workbench(plan).stated.space, name))
 
 
 def rows_of(name: str, bench: Bench, replications: int, seed: int) -> list[tuple[str, ...]]:
     """What the intervals of one bench held, by quantity."""
-    dataset = bench.dataset()
+    plan = plan_of(name, bench, seed)
     with jax.enable_x64(True):
-        plan = Plan(dataset, dataset, seed)
-        known, space = quantities_of(plan), Workbench(plan).stated.space
-        plan = Plan(dataset, dataset, seed, stated_truths(bench.truths(), space, name))
+        known = quantities_of(plan)
     made = Workbench(plan, Laboratory()).replications(range(replications))
     found = findings(list(made), known, truths=tuple(truth.text for truth in plan.truths), seed=seed)
     return [
@@ -103,21 +162,85 @@ def rows_of(name: str, bench: Bench, replications: int, seed: int) -> list[tuple
     ]  # fmt: skip
 
 
+def apart(name: str, bench: Bench, replications: int, seed: int) -> list[tuple[str, ...]]:
+    """What the intervals of one bench hold with priors replaced by the ranges of truths, by what is replaced and quantity."""
+    plan, laboratory = plan_of(name, bench, seed), Keeping(MORE)
+    workbench = Workbench(plan, laboratory)
+    made = list(workbench.replications(range(replications)))
+    kept = [(each, fit) for each, fit in zip(made, laboratory.found, strict=True) if not each.reasons]
+    space, held = workbench.stated.space, dict[tuple[str, str], list[Held | None]]()
+    with jax.enable_x64(True):
+        optimum = for_each_draw(optimum_of(workbench.stated), space.size)
+        for each, fit in kept:
+            draws = dict(zip((p.name for p in space.free), fit.z.T, strict=True))
+            own = {truth.parameter.name: of_range(truth, draws[truth.parameter.name]) for truth in plan.truths}
+            answers = {n: z for n, z in draws.items() if n.startswith("mu")}
+            answers |= dict(zip((OPTIMAL_LENGTH, OPTIMAL_EFFICIENCY), optimum(fit.z), strict=True))
+            for what, starts in REPLACED.items():
+                log_weight = sum((own[n] for n in own if n.startswith(starts)), start=np.zeros(len(fit.z)))
+                for quantity, values in answers.items():
+                    held.setdefault((what, quantity), []).append(weighted(each.ranked[quantity], values, log_weight))
+    return [
+        (name, what, quantity, *summed(found, held["none", quantity])) for (what, quantity), found in held.items()
+    ]  # fmt: skip
+
+
+def of_range(truth: StatedTruth, z: np.ndarray) -> np.ndarray:
+    """Logarithm of the density of a range over that of a prior, up to a constant, at draws of a parameter's z."""
+    prior, scale = truth.parameter.prior, truth.parameter.shown_scale
+
+    def even(at: jax.Array) -> jax.Array:
+        value = jnp.asarray(prior.constrain(at)) * scale
+        return jnp.log(value) if truth.by_factors else value
+
+    value, slope = (np.asarray(part) for part in jax.vmap(jax.value_and_grad(even))(jnp.asarray(z)))
+    low, high = np.log([truth.low, truth.high]) if truth.by_factors else (truth.low, truth.high)
+    inside = (value >= low) & (value <= high) & (slope > 0)
+    return np.where(inside, np.log(np.where(inside, slope, 1.0)) + z**2 / 2, -np.inf)
+
+
+def weighted(known: RankedTruth, values: np.ndarray, log_weight: np.ndarray) -> Held | None:
+    """Rank of a truth among weighted draws, and the width of their interval; None of too few."""
+    if not np.isfinite(log_weight).any():
+        return None
+    weight = np.exp(log_weight - log_weight.max())
+    weight /= weight.sum()
+    if 1 / np.sum(weight**2) < FEWEST:
+        return None
+    tied, order = values == known.truth, np.argsort(values)
+    # Where an end of the range has probability of its own, the truth keeps the place that was drawn for it.
+    tie = (known.rank - np.mean(values < known.truth)) / np.mean(tied) if tied.any() else 0.0
+    low, high = np.interp([0.05, 0.95], np.cumsum(weight[order]), values[order])
+    return Held(float(weight @ (values < known.truth) + tie * (weight @ tied)), float(high - low))
+
+
+def summed(found: Sequence[Held | None], before: Sequence[Held | None]) -> tuple[str, ...]:
+    """Rates, and how much of the width there was before is left."""
+    both = [(one, other) for one, other in zip(found, before, strict=True) if one is not None and other is not None]
+    apart = np.abs([one.rank - 0.5 for one, _ in both])
+    ratios = [np.log(one.width / other.width) for one, other in both if one.width > 0 and other.width > 0]
+    width = f"{np.exp(np.mean(ratios)):.2f}" if ratios else "-"
+    return f"{np.mean(apart < 0.25):.1%}", f"{np.mean(apart < 0.45):.1%}", width, f"{len(both)}"
+
+
 def main() -> None:
     """Command line."""
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("benches", nargs="*", metavar="BENCH", help=f"of {', '.join(BENCHES)}; all if omitted")
     parser.add_argument("--replications", type=int, default=200)
     parser.add_argument("--seed", type=int, default=1)
+    parser.add_argument("--apart", action="store_true", help="say what each prior does to the rates")
     asked = parser.parse_args()
     unknown = [name for name in asked.benches if name not in BENCHES]
     if unknown:
         parser.error(f"there is no bench {unknown[0]!r}; there are {', '.join(BENCHES)}.")
     rows = []
     for name in asked.benches or BENCHES:
-        rows += rows_of(name, BENCHES[name], asked.replications, asked.seed)
+        rows += (apart if asked.apart else rows_of)(name, BENCHES[name], asked.replications, asked.seed)
         print(f"{name}: done", flush=True)
-    print(table(("bench", "quantity", "50 % held", "90 % held", "bias", "ranked", "fault"), rows))
+    rates = ("50 % held", "90 % held")
+    of_all = ("bench", "priors replaced", "quantity", *rates, "width", "of") if asked.apart else None
+    print(table(of_all or ("bench", "quantity", *rates, "bias", "ranked", "fault"), rows))
 
 
 if __name__ == "__main__":

@@ -24,6 +24,8 @@ from bowdenfit.inputs import read_toml_file
 from bowdenfit.parameters.space import Parameter, ParameterSpace
 from bowdenfit.words import shown
 
+_ENDLESS = 1e300  # where the last quantile of a half-Cauchy, worked out by its logarithm, ends before it overflows
+
 
 @dataclass(frozen=True)
 class StatedTruth:
@@ -101,7 +103,7 @@ def _stated(parameter: Parameter, value: Any, place: str) -> StatedTruth:
     if isinstance(value, list) and not low < high:
         raise UsageError(f"{place}: the range [{low:g}, {high:g}] is upside down or empty; write its lower end first.")
     ends = (float(parameter.prior.constrain(jnp.asarray(z))) * parameter.shown_scale for z in (-jnp.inf, jnp.inf))
-    least, most = ends
+    least, most = (math.inf if end > _ENDLESS else end for end in ends)
     if low < least or high > most:
         outside = low if low < least else high
         raise UsageError(

@@ -101,6 +101,7 @@ BENCHES = {
     "two mountings": Bench(mountings=2, coefficients=1),
     "twenty mountings": Bench(mountings=20),
     "slippery to sticky": Bench(truth={f"mu{i}": [0.02, 0.6] for i in (1, 2, 3)}),
+    "one contact, slippery to sticky": Bench(coefficients=1, truth={"mu1": [0.02, 0.6]}),
     "two mountings that differ": Bench(mountings=2, coefficients=1, truth={"tau": [0.1, 0.3]}),
 }
 REPLACED: dict[str, tuple[str, ...]] = {

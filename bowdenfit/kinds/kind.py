@@ -120,6 +120,7 @@ class Kind(Generic[AnyTable]):
         heading: Over these lines, where they are a section of their own.
         warnings: What a table will not be able to tell, as far as counting shows.
         check: Refuses a table that does not fit the description or the other tables.
+        copies: Which readings were copied from others, in sentences without a first capital or remedy.
         count: How many readings were fitted, in words; empty where its term counts them.
         method: How its readings are described, in a sentence of a paper.
         implausible: Why no bench would hand in simulated readings in place of the measured ones, in a few words; empty if
@@ -151,6 +152,7 @@ class Kind(Generic[AnyTable]):
     heading: str = ""
     warnings: Callable[[AnyTable, Description, Measurements], list[str]] = lambda *_: []
     check: Callable[[AnyTable, Description, Measurements], None] = lambda *_: None
+    copies: Callable[[AnyTable], list[str]] = lambda _: []
     count: Callable[[AnyTable], str] = lambda _: ""
     method: str = ""
     implausible: Callable[[AnyTable, AnyTable], str] = lambda *_: ""

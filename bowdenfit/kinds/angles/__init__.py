@@ -13,6 +13,7 @@ from bowdenfit.kinds.angles.table import (
     warnings_of,
 )
 from bowdenfit.kinds.asked import Asked
+from bowdenfit.kinds.copies import copies, without_runs
 from bowdenfit.kinds.kind import Kind
 from bowdenfit.kinds.readings import Readings
 
@@ -26,6 +27,7 @@ ANGLES = Kind(
     quantities=lambda said, _: [("tables, angles, detection_limit", said.detection_limit, "angle")],
     describe=describe,
     warnings=warnings_of,
+    copies=lambda table: copies(without_runs(table.origin, table.route, table.angle, table.route)),
     method="Wrap angles along the route followed curves, which were fitted with everything else.",
     implausible=implausible,
     page=page,

@@ -4,6 +4,7 @@ import numpy as np
 
 from bowdenfit.files.columns import Quantity
 from bowdenfit.kinds.asked import Asked, Wanted
+from bowdenfit.kinds.copies import Compared, copies
 from bowdenfit.kinds.displacement.reader import read_displacement
 from bowdenfit.kinds.displacement.table import DisplacementSettings, DisplacementTable, contradiction
 from bowdenfit.kinds.displacement.words import (
@@ -19,6 +20,14 @@ from bowdenfit.kinds.kind import Kind, itself
 from bowdenfit.kinds.readings import Readings
 from bowdenfit.kinds.rows import RUN, STROKE
 from bowdenfit.kinds.wrap_angles import check_rows
+from bowdenfit.words import listed
+
+
+def _copies(table: DisplacementTable) -> list[str]:
+    files, names = listed(table.origin.files), tuple(f"run {name}" for name in table.run_names)
+    moved, force = table.displacement[:, None], table.force[:, None]
+    return copies(Compared(files, table.run, names, moved, force, table.displacement, table.run))
+
 
 DISPLACEMENT = Kind(
     name="displacement",
@@ -35,6 +44,7 @@ DISPLACEMENT = Kind(
     check=check_rows,
     describe=describe,
     warnings=warnings_of,
+    copies=_copies,
     method="The force at the motor followed its displacement as the tension of a rubbing rope does, through every turn of the "
     "motor.",
     implausible=implausible,

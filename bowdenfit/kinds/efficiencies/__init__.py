@@ -1,7 +1,10 @@
 """Transmission efficiencies."""
 
+import numpy as np
+
 from bowdenfit.files.columns import Quantity
 from bowdenfit.kinds.asked import Asked, Wanted
+from bowdenfit.kinds.copies import copies, without_runs
 from bowdenfit.kinds.efficiencies.table import (
     EfficiencyDesign,
     EfficiencyTable,
@@ -16,6 +19,13 @@ from bowdenfit.kinds.readings import efficiencies
 from bowdenfit.kinds.wrap_angles import check_rows
 from bowdenfit.words import counted
 
+
+def _copies(table: EfficiencyTable) -> list[str]:
+    places = np.column_stack([table.route, table.own.angle])
+    along = table.route if np.isfinite(table.route).all() else np.nansum(table.own.angle, axis=1)
+    return copies(without_runs(table.origin, places, table.efficiency, along))
+
+
 EFFICIENCIES = Kind(
     name="efficiencies",
     table=EfficiencyTable,
@@ -23,6 +33,7 @@ EFFICIENCIES = Kind(
     read=read_efficiencies,
     check=check_rows,
     describe=describe,
+    copies=_copies,
     alone=lambda table: f"a table of {counted(len(table.efficiency), 'efficiency', 'efficiencies')}",
     method="The logarithm of a measured efficiency was that of the model, give or take the scatter between mountings.",
     implausible=implausible,

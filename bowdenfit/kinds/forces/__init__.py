@@ -5,6 +5,7 @@ import numpy as np
 from bowdenfit.description import Description
 from bowdenfit.files.columns import Quantity
 from bowdenfit.kinds.asked import Asked, Switch, Wanted
+from bowdenfit.kinds.copies import Compared, copies, without_runs
 from bowdenfit.kinds.forces.following import check_following
 from bowdenfit.kinds.forces.gained import check_gains
 from bowdenfit.kinds.forces.loads import alone
@@ -16,6 +17,7 @@ from bowdenfit.kinds.measurements import Measurements
 from bowdenfit.kinds.readings import Readings, efficiencies
 from bowdenfit.kinds.rows import RUN, STROKE
 from bowdenfit.kinds.wrap_angles import check_rows
+from bowdenfit.words import listed
 
 
 def _typical_speeds(table: ForceTable) -> list[float]:
@@ -31,6 +33,22 @@ def _check(table: ForceTable, description: Description, measurements: Measuremen
     check_gains(table, description)
 
 
+def _copies(table: ForceTable) -> list[str]:
+    """Wherever they are said to be read, since a run that is copied is often given another place.
+
+    Runs of one reading are compared by how their losses scatter along the bend, as one table.
+    """
+    forces = np.column_stack([table.input_force, table.output_force])
+    stroke, curve = table.stroke[:, None].astype(float), 3 * table.run + table.stroke
+    different = np.unique(np.column_stack([curve, forces]), axis=0)
+    if len(different) == len(np.unique(curve)) and np.all(forces > 0):
+        place = table.route if np.isfinite(table.route).all() else np.nansum(table.own.angle, axis=1)
+        loss = np.log(table.input_force / table.output_force)
+        return copies(without_runs(table.origin, np.column_stack([stroke, forces]), loss, place, table.stroke))
+    names = tuple(f"run {name}" for name in table.run_names)
+    return copies(Compared(listed(table.origin.files), table.run, names, stroke, forces, table.input_force, curve))
+
+
 FORCES = Kind(
     name="forces",
     table=ForceTable,
@@ -43,6 +61,7 @@ FORCES = Kind(
     check=_check,
     describe=describe,
     warnings=warnings,
+    copies=_copies,
     alone=alone,
     method="All readings of one mounting of the cable shared its error, which was integrated out.",
     implausible=implausible,

@@ -4,6 +4,7 @@ import numpy as np
 
 from bowdenfit.files.columns import Quantity
 from bowdenfit.kinds.asked import Asked, Wanted
+from bowdenfit.kinds.copies import copies, without_runs
 from bowdenfit.kinds.kind import Kind, itself
 from bowdenfit.kinds.loop.table import LoopTable, read_loop
 from bowdenfit.kinds.loop.words import LoopDesign, contradiction, describe, empty, implausible, page, warnings_of
@@ -11,6 +12,14 @@ from bowdenfit.kinds.readings import Readings
 from bowdenfit.kinds.rows import STROKE
 from bowdenfit.kinds.wrap_angles import check_rows
 from bowdenfit.words import counted
+
+
+def _copies(table: LoopTable) -> list[str]:
+    places = np.column_stack([table.route, table.own.angle, table.preload])
+    _, place = np.unique(np.nan_to_num(places, nan=-1.0), axis=0, return_inverse=True)
+    forces = np.column_stack([table.input_force, table.output_force])
+    return copies(without_runs(table.origin, places, forces, table.input_force, 3 * place + table.stroke))
+
 
 LOOP = Kind(
     name="loop",
@@ -21,6 +30,7 @@ LOOP = Kind(
     check=check_rows,
     describe=describe,
     warnings=warnings_of,
+    copies=_copies,
     method="A loop in motion gave F_out = min(F_in - 2 P Lambda, F_in exp(-Lambda)) at its preload P and friction "
     "exponent Lambda.",
     implausible=implausible,

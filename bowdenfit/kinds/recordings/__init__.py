@@ -4,6 +4,7 @@ import numpy as np
 
 from bowdenfit.files.matching import Quantity
 from bowdenfit.kinds.asked import Asked, Wanted
+from bowdenfit.kinds.copies import NO_NOISE
 from bowdenfit.kinds.kind import Kind
 from bowdenfit.kinds.readings import Readings, efficiencies
 from bowdenfit.kinds.recordings.angles import check_angles, recorded_angles
@@ -26,6 +27,18 @@ def _typical_speeds(recordings: Recordings) -> list[float]:
     return [float(np.nanmedian(speeds)) for speeds in used if np.isfinite(speeds).any()]
 
 
+def _copies(recordings: Recordings) -> list[str]:
+    """Recordings of noisy cells whose forces are all the same; the files may have other names and clocks."""
+    known: dict[bytes, str] = {}
+    told = []
+    for each in recordings.each:
+        forces = np.concatenate([each.blocks.input_force, each.blocks.output_force])
+        name = known.setdefault(forces.tobytes(), each.name)
+        if name != each.name and min(each.account.noise) > NO_NOISE * np.abs(forces).max():
+            told.append(f"the recording {each.name} holds the same forces as the recording {name}, to the last digit")
+    return told
+
+
 RECORDINGS = Kind(
     name="recordings",
     table=Recordings,
@@ -39,6 +52,7 @@ RECORDINGS = Kind(
     quantities=quantities_of,
     check=check_angles,
     describe=lambda recordings, _: recordings_text(recordings),
+    copies=_copies,
     alone=alone,
     heading="Recordings",
     method="Recordings were averaged over blocks, phases of sliding were told by a play operator, and all readings of one "

@@ -8,6 +8,7 @@ from bowdenfit.kinds import each_table
 from bowdenfit.kinds.measured_groups import measured_groups
 from bowdenfit.kinds.measurements import Measurements
 from bowdenfit.kinds.stretch.table import StretchTable
+from bowdenfit.questions.check.copied import copied_readings
 from bowdenfit.questions.check.row_words import row_words
 from bowdenfit.words import counted, filled, kept_narrow, listed
 
@@ -63,7 +64,7 @@ def _each(dataset: Dataset, coefficient: str) -> str:
 def warnings_of(dataset: Dataset) -> list[str]:
     """What the measurements will not be able to tell, as far as counting shows."""
     description, measurements = dataset.description, dataset.measurements
-    warnings = []
+    warnings = list(copied_readings(dataset))
     free = [
         n
         for n in description.coefficients

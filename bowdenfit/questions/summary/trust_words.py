@@ -9,6 +9,7 @@ from bowdenfit.questions.next.candidates import can_be_ranked
 from bowdenfit.questions.summary.answer import readings_off
 from bowdenfit.questions.summary.verdict import (
     CONTRADICTORY,
+    COPIED,
     IMPOSSIBLE,
     NOT_CONVERGED,
     NOT_DESCRIBED,
@@ -22,6 +23,7 @@ _WRONG = {
     NOT_CONVERGED: "the computation has not settled",
     CONTRADICTORY: "the measurements contradict each other",
     IMPOSSIBLE: "some of the readings cannot be",
+    COPIED: "some of the readings are copies of others",
     NOT_DESCRIBED: "the model does not describe these readings",
     NOT_IDENTIFIABLE: "the measurements do not tell every coefficient",
 }

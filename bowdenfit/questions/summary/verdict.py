@@ -3,6 +3,7 @@
 from dataclasses import dataclass
 
 from bowdenfit.display import Display, Rows
+from bowdenfit.questions.check.copied import copied_readings
 from bowdenfit.questions.check.impossible import implausible_friction, impossible_efficiencies
 from bowdenfit.questions.check.lack_of_fit import say_what_is_not_described
 from bowdenfit.questions.identify.contradiction import contradiction
@@ -11,6 +12,7 @@ from bowdenfit.results.record import Record, once
 
 NOT_CONVERGED, NOT_IDENTIFIABLE, CONTRADICTORY = "not converged", "not identifiable", "contradictory"
 IMPOSSIBLE, NOT_DESCRIBED = "made of impossible readings", "not a description of its readings"
+COPIED = "made of copied readings"
 
 
 @dataclass(frozen=True, repr=False)
@@ -19,7 +21,7 @@ class Verdict(Display):
 
     Args:
         troubles: What is wrong, by kind: `NOT_CONVERGED`, `NOT_IDENTIFIABLE`, `CONTRADICTORY`, `IMPOSSIBLE`,
-            `NOT_DESCRIBED`; each with sentences.
+            `NOT_DESCRIBED`, `COPIED`; each with sentences.
         sampled: Whether there are draws.
     """
 
@@ -48,6 +50,7 @@ def verdict(fit: Record) -> Verdict:
         NOT_IDENTIFIABLE: _sentences(say_what_is_not_determined(fit)),
         CONTRADICTORY: _sentences(contradiction(fit)),
         IMPOSSIBLE: _sentences(impossible_efficiencies(fit)) + _sentences(implausible_friction(fit)),
+        COPIED: copied_readings(fit.dataset),
         NOT_DESCRIBED: say_what_is_not_described(fit),
     }
     return Verdict({kind: sentences for kind, sentences in troubles.items() if sentences}, fit.sampled is not None)

@@ -23,6 +23,7 @@ from bowdenfit.questions.summary.parameter_words import parameters_text
 from bowdenfit.questions.summary.sampler_words import sampler_sentences, sampler_text
 from bowdenfit.questions.summary.verdict import (
     CONTRADICTORY,
+    COPIED,
     IMPOSSIBLE,
     NOT_CONVERGED,
     NOT_DESCRIBED,
@@ -109,6 +110,7 @@ def _untrusted(found: Verdict) -> str:
         NOT_IDENTIFIABLE: "COEFFICIENTS NOT IDENTIFIABLE",
         CONTRADICTORY: "CONTRADICTORY MEASUREMENTS",
         IMPOSSIBLE: "IMPOSSIBLE READINGS",
+        COPIED: "COPIED READINGS",
         NOT_DESCRIBED: "THE MODEL DOES NOT DESCRIBE THESE READINGS",
     }
     if NOT_CONVERGED in found.troubles:

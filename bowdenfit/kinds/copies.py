@@ -1,0 +1,137 @@
+"""Readings that stand in a table again because they were copied: a table pasted twice, a run saved as another one.
+
+Copies count as measurements, and a copied run as another mounting, so that every interval is too narrow and nothing else shows
+it. That two readings agree to the last digit is common where a display is coarse, so copies are said only where *all* rows of a
+run are those of another, or all rows stand there equally often, and where noise that is larger than the last digit would hardly
+ever do that.
+"""
+
+from collections import Counter, defaultdict
+from dataclasses import dataclass
+from math import gcd
+from typing import Any
+
+import numpy as np
+from jaxtyping import Float
+
+from bowdenfit.kinds.rows import RowOrigin
+from bowdenfit.types import Labels, Matrix, Vector
+from bowdenfit.words import few, listed
+
+CHANCE = 1e-6  # that readings agree which are no copies, below which they are said to be
+_LEAST_FREEDOM = 3  # of the scatter that is compared with the last digit
+_FINE = 3.0  # last digits in the scatter, below which readings are alike because they are rounded alike
+NO_NOISE = 1e-5  # scatter as part of the readings, below which they were computed and not measured
+_DEGREE = 3  # of the polynomial that readings follow
+_MULTIPLES = {2: "twice", 3: "three times", 4: "four times"}
+
+
+@dataclass(frozen=True)
+class Compared:
+    """Readings of a table, as they are compared with each other.
+
+    Args:
+        file: What the table is called.
+        part: Number of the run of each row.
+        names: Every run in words, such as "run 3"; none where the table has no runs.
+        settings: Under what each row was read, a column a quantity; NaN where one is not known.
+        read: What was read, a column a quantity; NaN where nothing was.
+        along: What the readings change smoothly with.
+        curve: Number of the curve on which a row lies: those of one run and stroke.
+    """
+
+    file: str
+    part: Labels
+    names: tuple[str, ...]
+    settings: Float[np.ndarray, "rows settings"]
+    read: Float[np.ndarray, "rows readings"]
+    along: Vector
+    curve: Labels
+
+    @property
+    def rows(self) -> Matrix:
+        """Whatever stands in a row; -1 where nothing is."""
+        return np.nan_to_num(np.column_stack([self.settings, self.read]), nan=-1.0)
+
+
+def without_runs(origin: RowOrigin, settings: np.ndarray, read: np.ndarray, along: Vector, curve: Any = 0) -> Compared:
+    """A table that has no runs; its settings and readings may be one column.
+
+    Args:
+        origin: Where its rows were read.
+        settings, read, along, curve: As of `Compared`; all rows lie on one curve if that is omitted.
+    """
+    n = len(along)
+    none, each = np.zeros(n, dtype=int), np.broadcast_to(np.asarray(curve), n)
+    return Compared(listed(origin.files), none, (), settings.reshape(n, -1), read.reshape(n, -1), along, each)
+
+
+def copies(compared: Compared) -> list[str]:
+    """Which readings are copies of others, in sentences without a first capital or remedy; none where chance may do it."""
+    rows, chances = compared.rows, _chances(compared)
+    parts = {int(k): np.flatnonzero(compared.part == k) for k in np.unique(compared.part)}
+    alike: dict[bytes, list[int]] = defaultdict(list)
+    for k, where in parts.items():
+        alike[_sorted(rows[where]).tobytes()].append(k)
+    told = [
+        f"{few(compared.names[k] for k in same[1:])} of {compared.file} {'holds' if len(same) == 2 else 'hold'} the same "
+        f"{len(parts[same[0]])} readings as {compared.names[same[0]]}, to the last digit"
+        for same in alike.values()
+        if len(same) > 1 and _log_chance(chances, compared.read[parts[same[0]]]) + 2 * np.log(len(parts)) < np.log(CHANCE)
+    ]
+    repeated: dict[int, list[int]] = defaultdict(list)
+    for k, where in parts.items():
+        times = gcd(*Counter(row.tobytes() for row in rows[where]).values())
+        if times > 1:
+            repeated[times].append(k)
+    for times, those in repeated.items():
+        where = np.concatenate([parts[k] for k in those])
+        if (1 - 1 / times) * _log_chance(chances, compared.read[where]) < np.log(CHANCE):
+            whose = f" of {few(compared.names[k] for k in those)}" if len(those) < len(parts) else ""
+            often = _MULTIPLES.get(times, f"{times} times")
+            told.append(f"every reading{whose} in {compared.file} stands there {often}, to the last digit")
+    return told
+
+
+def _sorted(rows: Matrix) -> Matrix:
+    return rows[np.lexsort(rows.T)]
+
+
+def _log_chance(chances: Float[np.ndarray, " columns"], read: Matrix) -> float:
+    """Logarithm of the chance that as many other readings are the same."""
+    return float(np.sum(np.isfinite(read).sum(axis=0) * np.log(chances)))
+
+
+def _chances(compared: Compared) -> Float[np.ndarray, " readings"]:
+    """Chance that two readings of the same agree to the last digit, by column; 1 where that is not known.
+
+    By the last digit q and the scatter s about a smooth curve: the difference of two normal readings falls into a class of
+    width q with a chance of q / (2 sqrt(pi) s), which is an upper bound where their means differ.
+    """
+    found = np.ones(compared.read.shape[1])
+    for c, read in enumerate(compared.read.T):
+        known = np.isfinite(read) & np.isfinite(compared.along)
+        squares = freedom = 0.0
+        for curve in np.unique(compared.curve[known]):
+            here = known & (compared.curve == curve)
+            points = np.unique(np.column_stack([compared.along[here], read[here]]), axis=0)
+            rest, left = _about_a_polynomial(*points.T)
+            squares, freedom = squares + rest, freedom + left
+        values = np.unique(read[known])
+        if freedom < _LEAST_FREEDOM or len(values) < 2:
+            continue
+        scatter = np.sqrt(squares / freedom)
+        last_digit = np.diff(values).min()
+        if scatter > max(_FINE * last_digit, NO_NOISE * np.sqrt(np.mean(values**2))):
+            found[c] = last_digit / (2 * np.sqrt(np.pi) * scatter)
+    return found
+
+
+def _about_a_polynomial(x: Vector, y: Vector) -> tuple[float, float]:
+    """Sum of squares about a polynomial of x, and its degrees of freedom."""
+    places = len(np.unique(x))
+    degree = min(_DEGREE, places - 2) if places > 3 else places - 1
+    width = np.ptp(x)
+    design = np.vander((x - x.min()) / width if width > 0 else np.zeros(len(x)), degree + 1)
+    fit = np.linalg.lstsq(design, y, rcond=None)[0]
+    return float(np.sum((y - design @ fit) ** 2)), float(len(y) - degree - 1)

@@ -27,7 +27,7 @@ from bowdenfit.inference.objective import Solution
 from bowdenfit.inference.profiles import Basin
 from bowdenfit.inference.testable_readings import Readings, System, readings_to_test
 from bowdenfit.kinds.inside_runs import ORDER, SPEED, STROKE, ZERO
-from bowdenfit.kinds.term import GROUP, LOAD
+from bowdenfit.kinds.term import GROUP, LOAD, WRAP_ANGLE
 from bowdenfit.model import Model
 
 _FRICTION = ("friction", "friction_model")
@@ -164,6 +164,8 @@ def _columns(against: str, x: np.ndarray, mine: np.ndarray, of_curve: bool) -> I
     elif against == GROUP:
         yield (x[:, None] == np.unique(x[mine])[None, :]).astype(float)
     else:
+        if against == WRAP_ANGLE:
+            yield np.ones((len(x), 1))  # what is there without any bend: of all departures with the bend the likeliest
         low, high = np.min(x[mine]), np.max(x[mine])
         degree = min(_OF_CURVE if of_curve else _OF_PLACE, len(np.unique(x[mine])) - 1)
         yield np.polynomial.legendre.legvander(np.where(mine, 2 * (x - low) / (high - low) - 1, 0.0), degree)

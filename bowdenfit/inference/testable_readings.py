@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 
 from bowdenfit.kinds.inside_runs import ORDER, STROKE, InsideRuns
-from bowdenfit.kinds.places import Places
+from bowdenfit.kinds.places import RUN, Places
 from bowdenfit.kinds.term import Term
 from bowdenfit.model import Model
 
@@ -187,7 +187,7 @@ def _of_labels(
     unit = np.where(unit > 0, unit, np.nanmedian(unit[unit > 0]) if np.any(unit > 0) else 1.0)
     sign = np.sign(np.nansum((read - said) * residuals))
     reading = np.where(used, read, 0.0)
-    numbers = {label: x[:n] for label, x in places.numbers.items()}
+    numbers = {label: x[:n] for label, x in places.numbers.items() if label != RUN}  # which is their order
     back = {STROKE: places.back[:n].astype(float)}
     return replace(
         untold, unit=sign * unit, reading=reading, lever=np.ones(n), used=used, group=places.group[:n],

@@ -11,11 +11,11 @@ from bowdenfit.display import Part
 from bowdenfit.kinds import kind_of
 from bowdenfit.kinds.inside_runs import STROKE as STROKE
 from bowdenfit.kinds.measurements import Measurements
-from bowdenfit.kinds.term import Term
+from bowdenfit.kinds.term import WRAP_ANGLE, Term
 from bowdenfit.kinds.terms import term_kind
 
 RUN = "Run"
-_ONE_PLACE = 0.02  # of all route values, within which those of a run are one
+_ONE_PLACE = 0.02  # of all route values or wrap angles, within which those of a run are one
 
 
 @dataclass(frozen=True, repr=False)
@@ -45,6 +45,9 @@ def places_of(description: Description, measurements: Measurements, term: Term) 
     """
     n, route = len(term.labels), description.route
     numbers, back = _of_kind(measurements, term)
+    bends = _bends(term)
+    if bends is not None:
+        numbers = {WRAP_ANGLE: bends, **numbers}
     at = route_values(term)
     inside = np.ones(n, dtype=bool)
     if route is not None and at is not None and np.isfinite(at).all():
@@ -63,6 +66,25 @@ def _of_kind(measurements: Measurements, term: Term) -> tuple[Mapping[str, np.nd
     declared = term_kind(term.name)
     nowhere = np.zeros(len(term.labels), dtype=bool)
     return declared.where(table, term), nowhere if declared.back is None else declared.back(table)
+
+
+def _bends(term: Term) -> np.ndarray | None:
+    """Total of the measured wrap angles of each reading or run [deg]; None where curves tell them, or a run has several."""
+    rows = getattr(term, "rows", None)
+    at = term.data if rows is None else rows.angles
+    if "is_own" not in at:
+        return None
+    own, n = np.asarray(at["is_own"]), len(term.labels)
+    curved = [bool(contact.wrap_angle.curve) for contact in term.cable.description.contact]
+    if own.shape[1:] != (len(curved),) or not own.any() or not own[:, curved].all():
+        return None
+    bends = np.rad2deg(np.sum(np.where(own, at["own"], 0.0), axis=1))
+    if rows is not None:
+        each = [bends[rows.run == run] for run in np.unique(rows.run)]
+        if any(np.ptp(of_run) > _ONE_PLACE * np.ptp(bends) for of_run in each):
+            return None
+        bends = np.array([of_run.mean() for of_run in each])
+    return bends if len(bends) == n else None
 
 
 def route_values(term: Term) -> np.ndarray | None:

@@ -21,10 +21,11 @@ from bowdenfit.inference.log_density import LogDensity
 from bowdenfit.inference.objective import make_objective
 from bowdenfit.kinds.inside_runs import ORDER, STROKE
 from bowdenfit.kinds.stretch.table import StretchTable
-from bowdenfit.kinds.term import LOAD
+from bowdenfit.kinds.term import LOAD, WRAP_ANGLE
 from bowdenfit.model import build_model
 
 LOADS = (20, 40, 60, 80, 100, 120)
+BENDS = (135.0, 45.0, 180.0, 90.0, 45.0, 180.0, 90.0, 135.0, 90.0, 180.0, 45.0, 135.0)  # deg, of mountings in no order
 LIMIT = "detection_limit = { value = 5, unit = \"deg\" } }"
 ROUTE = hand_bench.LENGTHS.replace("[440, 540]", "[430, 550]").replace('"angles.csv" }', f'"angles.csv", {LIMIT}')
 ROUTES = {
@@ -96,6 +97,7 @@ HEALTHY = {
     "forces of a newton": {"loads": (0.5, 1, 2, 3), "noise": 0.02},
     "forces of 10 kN": {"loads": (5e3, 1e4, 2e4), "noise": 40.0},
     "three bends": {"places": (90.0, 180.0, 360.0)},
+    "four bends, each mounted three times": {"places": BENDS, "repeats": 1},
 }
 
 
@@ -168,6 +170,19 @@ def test_faults_inside_runs_are_named(tmp_path, judge, fault):
         clear = [d for d in judge(forces(tmp_path, seed, **wrong)) if d.worth_saying]
         assert against in {d.against for d in clear}
         assert all(d.inside for d in clear if d.against == against)
+
+
+def test_a_bend_that_nobody_measured_is_told_by_the_other_bends(tmp_path, judge):
+    """40 deg at the ends of the sheath, which moves mu by a quarter: found in 100 of 100 sets, 20 deg in 74, 10 deg in 12."""
+    for seed in range(3):
+        rows = hand_bench.pull(
+            np.random.default_rng(seed), BENDS, 0.12 * np.deg2rad(np.array(BENDS) + 40.0), LOADS, noise=(0.4, 0.4), scatter=0.01
+        )
+        folder = hand_bench.write(tmp_path / str(seed), rows)
+        clear = [d for d in judge(folder) if d.worth_saying]
+        assert WRAP_ANGLE in {d.against for d in clear}
+    (reason,) = bf.fit(folder, mcmc=False).verdict().reasons[:1]
+    assert "around a wrap angle of" in reason and "a bend that nobody measured" in reason
 
 
 @pytest.mark.parametrize(

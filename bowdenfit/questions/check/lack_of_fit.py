@@ -10,7 +10,7 @@ from bowdenfit.inference.departure import FALSE_ALARM, Departure
 from bowdenfit.kinds import readings_called
 from bowdenfit.kinds.inside_runs import ORDER, SPEED, STROKE, ZERO
 from bowdenfit.kinds.places import RUN
-from bowdenfit.kinds.term import GROUP, LOAD
+from bowdenfit.kinds.term import GROUP, LOAD, WRAP_ANGLE
 from bowdenfit.parameters.priors import Normal
 from bowdenfit.questions.check.answer import Checks, checks_of
 from bowdenfit.results.record import Record, once
@@ -143,6 +143,13 @@ def _remedy(fit: Record, found: Departure) -> str:
         return _other_friction(model, ("stroke-dependent",), "the zero and the gain of both load cells")
     if found.against == GROUP:
         return _other_friction(model, (BY_GROUP,), "what else is not the same in these groups")
+    if found.against == WRAP_ANGLE and losses:
+        return (
+            "Friction alone grows with the bend from nothing: the usual causes are a bend that nobody measured, at the ends of "
+            "the sheath or between them (a [[contact]] of its own), angles that were read from another zero, and load cells "
+            "that differ in gain (state input_gain_error_sd and output_gain_error_sd under [sensors]). A run with the cable "
+            "as straight as it gets tells most."
+        )
     if found.against in (ORDER, RUN):
         return (
             "Something drifted while it was measured: temperature, wear, or the zero of a load cell. Tare before each run, "

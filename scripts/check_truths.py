@@ -219,8 +219,8 @@ def summed(found: Sequence[Held | None], before: Sequence[Held | None]) -> tuple
     """Rates, and how much of the width there was before is left."""
     both = [(one, other) for one, other in zip(found, before, strict=True) if one is not None and other is not None]
     apart = np.abs([one.rank - 0.5 for one, _ in both])
-    ratios = [np.log(one.width / other.width) for one, other in both if one.width > 0 and other.width > 0]
-    width = f"{np.exp(np.mean(ratios)):.2f}" if ratios else "-"
+    of_all = sum(other.width for _, other in both)
+    width = f"{sum(one.width for one, _ in both) / of_all:.2f}" if of_all > 0 else "-"
     return f"{np.mean(apart < 0.25):.1%}", f"{np.mean(apart < 0.45):.1%}", width, f"{len(both)}"
 
 

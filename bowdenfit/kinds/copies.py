@@ -7,6 +7,7 @@ ever do that.
 """
 
 from collections import Counter, defaultdict
+from collections.abc import Mapping
 from dataclasses import dataclass
 from math import gcd
 from typing import Any
@@ -68,22 +69,20 @@ def without_runs(origin: RowOrigin, settings: np.ndarray, read: np.ndarray, alon
 
 def copies(compared: Compared) -> list[str]:
     """Which readings are copies of others, in sentences without a first capital or remedy; none where chance may do it."""
-    rows, chances = compared.rows, _chances(compared)
+    rows = compared.rows
     parts = {int(k): np.flatnonzero(compared.part == k) for k in np.unique(compared.part)}
-    alike: dict[bytes, list[int]] = defaultdict(list)
-    for k, where in parts.items():
-        alike[_sorted(rows[where]).tobytes()].append(k)
-    told = [
-        f"{few(compared.names[k] for k in same[1:])} of {compared.file} {'holds' if len(same) == 2 else 'hold'} the same "
-        f"{len(parts[same[0]])} readings as {compared.names[same[0]]}, to the last digit"
-        for same in alike.values()
-        if len(same) > 1 and _log_chance(chances, compared.read[parts[same[0]]]) + 2 * np.log(len(parts)) < np.log(CHANCE)
-    ]
-    repeated: dict[int, list[int]] = defaultdict(list)
-    for k, where in parts.items():
-        times = gcd(*Counter(row.tobytes() for row in rows[where]).values())
-        if times > 1:
-            repeated[times].append(k)
+    alike, repeated = _alike(rows, parts), _repeated(rows, parts)
+    if not alike and not repeated:
+        return []
+    chances, told = _chances(compared), []
+    for same in alike:
+        first, *others = (compared.names[k] for k in same)
+        one = parts[same[0]]
+        if _log_chance(chances, compared.read[one]) + 2 * np.log(len(parts)) < np.log(CHANCE):
+            hold = "holds" if len(others) == 1 else "hold"
+            told.append(
+                f"{few(others)} of {compared.file} {hold} the same {len(one)} readings as {first}, to the last digit"
+            )
     for times, those in repeated.items():
         where = np.concatenate([parts[k] for k in those])
         if (1 - 1 / times) * _log_chance(chances, compared.read[where]) < np.log(CHANCE):
@@ -93,8 +92,22 @@ def copies(compared: Compared) -> list[str]:
     return told
 
 
-def _sorted(rows: Matrix) -> Matrix:
-    return rows[np.lexsort(rows.T)]
+def _alike(rows: Matrix, parts: Mapping[int, np.ndarray]) -> list[list[int]]:
+    """Runs that hold the same rows, in whatever order, two or more each time."""
+    known: dict[bytes, list[int]] = defaultdict(list)
+    for k, where in parts.items():
+        known[rows[where][np.lexsort(rows[where].T)].tobytes()].append(k)
+    return [same for same in known.values() if len(same) > 1]
+
+
+def _repeated(rows: Matrix, parts: Mapping[int, np.ndarray]) -> dict[int, list[int]]:
+    """Runs in which every row stands equally often, by how often that is, if more than once."""
+    found: dict[int, list[int]] = defaultdict(list)
+    for k, where in parts.items():
+        times = gcd(*Counter(row.tobytes() for row in rows[where]).values())
+        if times > 1:
+            found[times].append(k)
+    return found
 
 
 def _log_chance(chances: Float[np.ndarray, " columns"], read: Matrix) -> float:

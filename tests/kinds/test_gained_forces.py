@@ -38,6 +38,9 @@ MISTAKES = {
     "returns taken for pulls": (_without_strokes, ["add a column stroke"]),
     "output in lbf": (lambda r: replace(r, force_out=LBF * r.force_out), ["unit", "lbf and N", "map the column"]),
     "input in lbf": (lambda r: replace(r, force_in=LBF * r.force_in), ["unit", "lbf and N", "returning"]),
+    "cells of unlike gain": (
+        lambda r: replace(r, force_out=1.22 * r.force_out), ["differ in gain", "the run '1'", "input_gain_error_sd"]
+    ),
     "one run swapped": (lambda r: r.swapped(r.label == "2"), ["24 of 72", "the run '2'", "leave the run out"]),
     "one row a tenth": (lambda r: _tenth(r, 30), ["row 32", "factor of more than two", "typing error"]),
     "one row swapped": (lambda r: r.swapped(np.array([17])), ["row 19", "1 of 72", "typing error", "force_noise"]),

@@ -25,6 +25,7 @@ _ABOUT = 0.3  # of what the rows of one stroke gain, that those of the other los
 _FACTORS = {"lbf and N": 4.4482, "kgf and N": 9.80665, "kN and N": 1000.0}  # that ends of a cable are confused by
 _LEAST, _MOST = 0.15, 1.02  # efficiencies that such a factor must lead back to
 _NO_SWAP = 2.5  # output over input from which a unit is likelier than swapped columns
+_SLIGHT = 0.1  # log of a gain of force up to which load cells may differ
 _TYPED = "a typing error, a cell that slipped by a row, or a wrong stroke; correct the row or leave it out"
 _STROKES = {1: ("pulling", "more"), -1: ("returning", "less")}
 
@@ -168,6 +169,11 @@ def _exception(table: ForceTable, found: Gained, row: int) -> str:
     same = (table.run[found.rows] == table.run[row]) & (found.stroke == table.stroke[row])
     if np.sum(same) > 1 and np.mean(found.excess[same] > 0) > _MOSTLY:
         name = shown(table.run_names[table.run[row]])
+        if np.max(found.log_gain[same]) < _SLIGHT:
+            return (
+                f"load cells that differ in gain, which shows first where the cable bends least, as in the run {name}, or one "
+                "that was not zeroed; state input_gain_error_sd and output_gain_error_sd under [sensors], or correct the run"
+            )
         return (
             f"that columns, strokes or units of the run {name} differ from the others', or that a "
             "load cell was not zeroed; correct it, or leave the run out"

@@ -153,3 +153,14 @@ def test_gain_errors_of_both_cells_add_in_quadrature_and_one_for_both_is_refused
     assert "input_gain_error_sd too" in one
     assert Sensors(input_gain_error_sd=0.003, output_gain_error_sd=0.004).gain_sd == pytest.approx(0.005)
     assert Sensors.model_validate({"gain_error_sd": None}).gain_sd is None  # as older results have stored it
+
+
+@pytest.mark.parametrize(("strokes", "more", "said"), [
+    ((1,), "", "only pulls were read"), ((-1,), "", "only returns were read"), ((1, -1), "", ""),
+    ((1,), "[sensors]\ninput_gain_error_sd = 0.0\noutput_gain_error_sd = 0.0\n", ""),
+])  # fmt: skip
+def test_readings_of_one_stroke_that_cannot_tell_the_gains_of_the_cells_are_warned_of(tmp_path, accept, strokes, more, said):
+    """One percent of gain over the mean loss of 0.31 is 3 % of the coefficient."""
+    out = " ".join(accept("check", write(tmp_path, _bench(strokes=strokes), more=more)).split())
+    assert (said in out) if said else ("look like friction" not in out)
+    assert not said or "by 1 %, coefficients are wrong by 3 %" in out

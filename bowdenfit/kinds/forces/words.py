@@ -13,7 +13,9 @@ from bowdenfit.kinds.measurements import Measurements
 from bowdenfit.kinds.pages import STROKE_NAMES, Page, fixed, route_cells, route_heading
 from bowdenfit.kinds.plausibility import SCATTER, beyond, parts
 from bowdenfit.kinds.rows import OwnAngles, RowOrigin
-from bowdenfit.words import counted, listed, significant
+from bowdenfit.words import counted, listed, percent, significant
+
+_SEEN_LOSS = 0.01  # mean log ratio above which an error of the gains is said as a share of the coefficients
 
 
 def count(table: ForceTable) -> str:
@@ -36,8 +38,29 @@ def describe(table: ForceTable, description: Description) -> list[str]:
 
 
 def warnings(table: ForceTable, description: Description, measurements: Measurements) -> list[str]:
-    """Groups of which there is one mounting, which its coefficient cannot be told from."""
+    """What the readings cannot tell from friction: gains of the load cells, and the mounting of a group that has one."""
     del measurements
+    return _unlike_gains(table, description) + _mounted_once(table, description)
+
+
+def _unlike_gains(table: ForceTable, description: Description) -> list[str]:
+    """Of one stroke alone, where nothing is said of the gains; both strokes tell them from friction."""
+    strokes = np.unique(table.stroke[table.stroke != 0])
+    if len(strokes) != 1 or description.sensors.gain_sd is not None:
+        return []
+    slides = (table.stroke != 0) & (table.input_force > 0) & (table.output_force > 0)
+    loss = abs(float(np.mean(np.log(table.input_force[slides] / table.output_force[slides])))) if slides.any() else 0.0
+    wrong = f", coefficients are wrong by {percent(0.01 / loss, 0)}" if loss > _SEEN_LOSS else ", that counts as friction"
+    read = "pulls" if strokes[0] > 0 else "returns"
+    return [
+        f"only {read} were read, in which load cells that differ in gain look like friction: where they differ by 1 %{wrong}, "
+        "and no interval says so. State input_gain_error_sd and output_gain_error_sd under [sensors] (0 where one cell read "
+        "both ends), or read the other stroke too."
+    ]
+
+
+def _mounted_once(table: ForceTable, description: Description) -> list[str]:
+    """Groups of which there is one mounting, which its coefficient cannot be told from."""
     if not description.by_group:
         return []
     mounted = Counter(name for name, _ in set(zip(table.group, table.run.tolist(), strict=True)))

@@ -1,12 +1,14 @@
 """Drawing a population and its cables together, with NUTS, until the population is known well enough."""
 
 from collections.abc import Collection, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import lru_cache
 from typing import Any
 
 import jax
+import jax.numpy as jnp
 import numpy as np
+from scipy.optimize import minimize
 
 from bowdenfit.description import SamplerSettings
 from bowdenfit.inference.compilation import compile_program
@@ -21,6 +23,8 @@ _FEW, _CAREFUL = 5, 0.99  # cables, of fewer than which hardly anything is known
 _MOST_DENSE = 60  # numbers of whose covariance the first 200 draws of warm-up tell enough
 _FIRST, _MORE, _MOST = 20, 10, 100  # blocks after warm-up at the first look, until the next, and at all
 _AT_ONCE = _SETTINGS.n_chains * BLOCK  # draws whose values are computed together
+_STEP, _DISPERSED = 1e-4, 5.0  # of derivatives; by how much more the starts of the population scatter than those of cables
+_FAR = 1e100  # minus the log density where it cannot be computed
 _MOST_DIVERGENT = 0.001  # share of trajectories
 
 
@@ -62,11 +66,12 @@ def draw_population(
     """
     wears = inspected.cycles is not None
     density = PopulationDensity(inspected.coefficients, wears, tuple(inspected.effects), inspected.cables, readings)
-    data = _blind(inspected.data_with(readings), without)
-    leaves, tree = jax.tree.flatten(data)
-    program, values_of = _compiled(density, tree, tuple((np.shape(leaf), np.asarray(leaf).dtype) for leaf in leaves))
+    about = _about(replace(density, readings=()), _blind(inspected.data_with(()), without))
+    data = _blind(inspected.data_with(readings), without) | {"about": about}
+    program, values_of = _compiled(density, *_shapes(data))
     generator = np.random.default_rng([seed, 5])
     start = 0.3 * generator.standard_normal((_SETTINGS.n_chains, density.size))
+    start[:, : len(density.names)] *= _DISPERSED
     blocks: list[dict[str, np.ndarray]] = []
     target = WARM_UP + _FIRST
     while True:
@@ -77,7 +82,8 @@ def draw_population(
             blocks.append({name: np.asarray(value) for name, value in done.items()})
         z = np.concatenate([block["z"] for block in blocks[WARM_UP:]]).transpose(1, 0, 2)
         divergent = np.mean([block["diverging"] for block in blocks[WARM_UP:]])
-        reasons, worth = _shortfalls(z[:, :, : len(density.names)], density.in_words(called), float(divergent))
+        population = about[0] + z[:, :, : len(density.names)] @ about[1].T
+        reasons, worth = _shortfalls(population, density.in_words(called), float(divergent))
         if not reasons or target >= WARM_UP + _MOST:
             break
         target += _MORE
@@ -116,18 +122,66 @@ def _shortfalls(z: np.ndarray, names: tuple[str, ...], divergent: float) -> tupl
     return reasons, min(min(d.ess_bulk, d.ess_tail) for d in found.values())
 
 
+def _about(density: PopulationDensity, data: dict[str, Any]) -> tuple[np.ndarray, np.ndarray]:
+    """Where the population is in z, and the root of its covariance, as far as it is normal: units in which it is drawn.
+
+    Effects of lubrication and temperature are known together with wear and the middle of all cables, and a hundred times better
+    than their priors say. Coordinates of cables at 0 are their most likely values, so that the density there is that of the
+    population alone, as far as single fits are normal.
+    """
+    size, slopes_of = len(density.names), _slopes(density, *_shapes(data))
+
+    def minus(inner: np.ndarray) -> tuple[float, np.ndarray]:
+        value, slopes = slopes_of(np.append(inner, np.zeros(density.size - size)), data)
+        found = -float(value), -np.asarray(slopes)[:size]
+        return found if np.isfinite(np.append(*found)).all() else (_FAR, np.zeros(size))  # a spread that is none
+
+    center = minimize(minus, np.zeros(size), jac=True, method="BFGS").x
+    steps = _STEP * np.eye(size)
+    precision = np.array([minus(center + step)[1] - minus(center - step)[1] for step in steps]) / (2 * _STEP)
+    sizes, ways = np.linalg.eigh((precision + precision.T) / 2)
+    return center, ways / np.sqrt(np.maximum(sizes, 1.0))  # the prior alone has precision 1
+
+
+def _in_z(units: Any, density: PopulationDensity, data: dict[str, Any]) -> Any:
+    """Where a point in units of the population is in z."""
+    (center, root), size = data["about"], len(density.names)
+    return jnp.concatenate([center + root @ units[:size], units[size:]])
+
+
+def _shapes(data: dict[str, Any]) -> tuple[Any, tuple[tuple[tuple[int, ...], Any], ...]]:
+    """Tree, and shapes and kinds of its leaves."""
+    leaves, tree = jax.tree.flatten(data)
+    return tree, tuple((np.shape(leaf), np.asarray(leaf).dtype) for leaf in leaves)
+
+
+def _like(tree: Any, shapes: tuple[tuple[tuple[int, ...], Any], ...]) -> Any:
+    return jax.tree.unflatten(tree, [jax.ShapeDtypeStruct(shape, kind) for shape, kind in shapes])
+
+
+@lru_cache(maxsize=16)
+def _slopes(density: PopulationDensity, tree: Any, shapes: tuple[tuple[tuple[int, ...], Any], ...]) -> Any:
+    """Log density and its derivatives."""
+    z = jax.ShapeDtypeStruct((density.size,), np.float64)
+    return compile_program(jax.value_and_grad(density.log_density), z, _like(tree, shapes), run_once=True)
+
+
 @lru_cache(maxsize=16)
 def _compiled(density: PopulationDensity, tree: Any, shapes: tuple[tuple[tuple[int, ...], Any], ...]) -> tuple[Any, Any]:
     """What draws, and what gives the values of draws; the same for all fleets of one shape."""
-    data = jax.tree.unflatten(tree, [jax.ShapeDtypeStruct(shape, kind) for shape, kind in shapes])
+    data = _like(tree, shapes)
     settings = _SETTINGS.model_copy(update={"target_acceptance": _CAREFUL}) if density.cables < _FEW else _SETTINGS
-    program = block_program(density.log_density, _first_mass(density).shape, data, settings, fine=False)
 
-    def values(z: jax.Array, data: dict[str, Any]) -> tuple[jax.Array, ...]:
+    def log_density(units: jax.Array, data: dict[str, Any]) -> jax.Array:
+        return density.log_density(_in_z(units, density, data), data)
+
+    program = block_program(log_density, _first_mass(density).shape, data, settings, fine=False)
+
+    def values(units: jax.Array, data: dict[str, Any]) -> tuple[jax.Array, ...]:
+        z = _in_z(units, density, data)
         found = density.population(z, data)
         return found["mean"], found["spread"], found["effects"], density.cables_of(z, data, found)[0]
 
     rows = jax.ShapeDtypeStruct((_AT_ONCE, density.size), np.float64)
     many = compile_program(jax.vmap(values, (0, None)), rows, data, run_once=True)
     return program, many
-

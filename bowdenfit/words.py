@@ -45,10 +45,13 @@ def listed(parts: Sequence[str]) -> str:
     return ", ".join(parts[:-1]) + " and " + parts[-1] if len(parts) > 1 else "".join(parts)
 
 
-def decimals(scale: float) -> int:
-    """Decimals that show a quantity of this uncertainty to two significant digits of it."""
+def decimals(scale: float, value: float = math.nan) -> int:
+    """Decimals that show a quantity of this uncertainty to two significant digits of it.
+
+    Where there is no uncertainty, four, or those that the value has if it has fewer.
+    """
     if not math.isfinite(scale) or scale <= 0:
-        return 4
+        return len(f"{value:.4f}".rstrip("0").partition(".")[2]) if math.isfinite(value) else 4
     return min(max(1 - math.floor(math.log10(scale)), 0), 8)
 
 

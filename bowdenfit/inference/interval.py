@@ -26,8 +26,13 @@ class Interval(Display):
         q05, median, q95 = (float(q) for q in np.quantile(draws, (0.05, 0.5, 0.95)))
         return cls(float(np.mean(draws)), float(np.std(draws)), median, q05, q95)
 
+    @property
+    def digits(self) -> int:
+        """Decimals to which it is said."""
+        return decimals(self.q95 - self.q05, self.median)
+
     def __str__(self) -> str:
-        digits = decimals(self.q95 - self.q05)
+        digits = self.digits
         return f"{self.median:z.{digits}f} (90 % interval {self.q05:z.{digits}f} to {self.q95:z.{digits}f})"
 
     def _table(self) -> Rows:

@@ -60,7 +60,7 @@ class OptimalLength(Display):
     def action(self) -> str:
         """What to do, or what is best, in one clause: the choice that costs least, or the best length where none is named."""
         choice, length = self.best_choice, self.length
-        value = f"{choice.length:g}" if choice else f"{length.median:z.{decimals(length.q95 - length.q05)}f}"
+        value = f"{choice.length:g}" if choice else f"{length.median:z.{length.digits}f}"
         is_cut = self.variable == "cable_length"
         if not self.is_settled:
             return f"measure more{' before you cut' if is_cut else ''}; the best guess is {value} {self.unit}"
@@ -86,7 +86,7 @@ class OptimalLength(Display):
         """How sure it is, and what would do as well."""
         at = "" if self.at_input_force is None else f", at an input force of {significant(self.at_input_force)} N"
         length, eta = self.length, self.efficiency.times(100)
-        digits, of_force = decimals(length.q95 - length.q05), decimals(eta.q95 - eta.q05)
+        digits, of_force = length.digits, eta.digits
         said = [
             f"The best {self.what} is {length.median:z.{digits}f} {self.unit} (90 % interval {length.q05:z.{digits}f} to "
             f"{length.q95:z.{digits}f} {self.unit}); {eta.median:z.{of_force}f} % of the force arrives there "
@@ -108,7 +108,7 @@ class OptimalLength(Display):
     def good_enough(self) -> str:
         """Which lengths will do."""
         window = self.window
-        digits = decimals(window.stop - window.start)
+        digits = decimals(window.stop - window.start, window.start)
         return (
             f"Any {self.what} from {window.start:z.{digits}f} to {window.stop:z.{digits}f} {self.unit} is good enough: within "
             f"{percent(window.within, 0)} of the best with at least {percent(window.probability, 0)} probability."

@@ -5,6 +5,7 @@ import io
 import pytest
 
 from bowdenfit.cli import terminal
+from bowdenfit.inference.interval import Interval
 from bowdenfit.words import WIDTH, filled, in_ascii, significant
 
 
@@ -42,3 +43,11 @@ def test_no_number_loses_its_unit_or_its_error_to_the_next_line(start):
 def test_large_numbers_have_zeros_and_no_powers_of_ten(value, shown):
     assert significant(value) == shown
     assert float(shown) == float(f"{value:.3g}")
+
+
+def test_what_is_certain_is_said_without_zeros_behind_the_point():
+    """The best length is an end of the range in every draw where a bell is cut off there."""
+    certain = Interval(600.0, 0.0, 600.0, 600.0, 600.0)
+    assert str(certain) == "600 (90 % interval 600 to 600)"
+    assert str(Interval(0.25, 0.0, 0.25, 0.25, 0.25)).startswith("0.25 ")
+    assert str(Interval(1.0, 0.02, 1.0, 0.98, 1.02)) == "1.000 (90 % interval 0.980 to 1.020)"

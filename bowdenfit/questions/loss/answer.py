@@ -13,7 +13,7 @@ from jaxtyping import Float
 from bowdenfit.inference.interval import Interval
 from bowdenfit.questions.recorded.rate import place_of
 from bowdenfit.results.record import OPTIMAL_LENGTH, Record, once
-from bowdenfit.words import counted, decimals, listed, percent
+from bowdenfit.words import counted, listed, percent
 
 _LONGEST_NAME = 40  # characters of a contact's name in a sentence
 _FEW = 3  # contacts after the first that a sentence names
@@ -85,7 +85,7 @@ def loss_by_contact(fit: Record) -> Loss | None:
     at, place = place_of(fit)
     if route is not None and (lengths := fit.posterior.optimum.get(OPTIMAL_LENGTH)) is not None:
         best = Interval.of(lengths)
-        at, place = best.median, f"at {best.median:z.{decimals(best.q95 - best.q05)}f} {route.unit}"
+        at, place = best.median, f"at {best.median:z.{best.digits}f} {route.unit}"
     shares = _shares(fit, at)
     largest = np.argmax(shares, axis=1)
     contacts = [

@@ -88,7 +88,7 @@ def _what(parameter: Parameter) -> str:
 
 
 def _drawn(known: Interval) -> tuple[str, str]:
-    digits = decimals(known.q95 - known.q05)
+    digits = known.digits
     return f"{known.median:z.{digits}f}", f"{known.q05:z.{digits}f} to {known.q95:z.{digits}f}"
 
 

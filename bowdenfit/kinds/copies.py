@@ -15,7 +15,7 @@ from typing import Any
 import numpy as np
 from jaxtyping import Float
 
-from bowdenfit.kinds.rows import RowOrigin
+from bowdenfit.kinds.rows import ForceRows, RowOrigin
 from bowdenfit.types import Labels, Matrix, Vector
 from bowdenfit.words import few, listed
 
@@ -65,6 +65,11 @@ def without_runs(origin: RowOrigin, settings: np.ndarray, read: np.ndarray, alon
     n = len(along)
     none, each = np.zeros(n, dtype=int), np.broadcast_to(np.asarray(curve), n)
     return Compared(listed(origin.files), none, (), settings.reshape(n, -1), read.reshape(n, -1), along, each)
+
+
+def places_along(rows: ForceRows) -> Vector:
+    """Where rows were read: on the route, or at which wrap angle where there is none."""
+    return rows.route if np.isfinite(rows.route).all() else np.nansum(rows.own.angle, axis=1)
 
 
 def copies(compared: Compared) -> list[str]:

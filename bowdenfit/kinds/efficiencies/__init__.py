@@ -4,7 +4,7 @@ import numpy as np
 
 from bowdenfit.files.columns import Quantity
 from bowdenfit.kinds.asked import Asked, Wanted
-from bowdenfit.kinds.copies import copies, without_runs
+from bowdenfit.kinds.copies import copies, places_along, without_runs
 from bowdenfit.kinds.efficiencies.table import (
     EfficiencyDesign,
     EfficiencyTable,
@@ -22,8 +22,7 @@ from bowdenfit.words import counted
 
 def _copies(table: EfficiencyTable) -> list[str]:
     places = np.column_stack([table.route, table.own.angle])
-    along = table.route if np.isfinite(table.route).all() else np.nansum(table.own.angle, axis=1)
-    return copies(without_runs(table.origin, places, table.efficiency, along))
+    return copies(without_runs(table.origin, places, table.efficiency, places_along(table)))
 
 
 EFFICIENCIES = Kind(

@@ -5,7 +5,7 @@ import numpy as np
 from bowdenfit.description import Description
 from bowdenfit.files.columns import Quantity
 from bowdenfit.kinds.asked import Asked, Switch, Wanted
-from bowdenfit.kinds.copies import Compared, copies, without_runs
+from bowdenfit.kinds.copies import Compared, copies, places_along, without_runs
 from bowdenfit.kinds.forces.following import check_following
 from bowdenfit.kinds.forces.gained import check_gains
 from bowdenfit.kinds.forces.loads import alone
@@ -42,9 +42,8 @@ def _copies(table: ForceTable) -> list[str]:
     stroke, curve = table.stroke[:, None].astype(float), 3 * table.run + table.stroke
     different = np.unique(np.column_stack([curve, forces]), axis=0)
     if len(different) == len(np.unique(curve)) and np.all(forces > 0):
-        place = table.route if np.isfinite(table.route).all() else np.nansum(table.own.angle, axis=1)
-        loss = np.log(table.input_force / table.output_force)
-        return copies(without_runs(table.origin, np.column_stack([stroke, forces]), loss, place, table.stroke))
+        settings, loss = np.column_stack([stroke, forces]), np.log(table.input_force / table.output_force)
+        return copies(without_runs(table.origin, settings, loss, places_along(table), table.stroke))
     names = tuple(f"run {name}" for name in table.run_names)
     return copies(Compared(listed(table.origin.files), table.run, names, stroke, forces, table.input_force, curve))
 

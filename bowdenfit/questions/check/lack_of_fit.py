@@ -9,7 +9,6 @@ from bowdenfit.description import BY_GROUP
 from bowdenfit.inference.departure import FALSE_ALARM, Departure
 from bowdenfit.kinds import readings_called
 from bowdenfit.kinds.inside_runs import ORDER, SPEED, STROKE, ZERO
-from bowdenfit.kinds.places import RUN
 from bowdenfit.kinds.term import GROUP, LOAD, WRAP_ANGLE
 from bowdenfit.parameters.priors import Normal
 from bowdenfit.questions.check.answer import Checks, checks_of
@@ -122,7 +121,7 @@ def _ends(found: Departure, groups: Sequence[str]) -> tuple[str, str]:
         return f"in the group {low}", f"in the group {high}"
     if found.against == STROKE:
         return ("on the return", "on the pull") if found.inside else ("on the way there", "on the way back")
-    if found.against in (ORDER, RUN):
+    if found.against == ORDER:
         return "in the first third of the readings", "in the last third"
     name, _, unit = found.against.rstrip(")").partition(" (")
     low, high = (f"{float(f'{value:.3g}'):g}{f' {unit}' if unit else ''}" for value in (found.low, found.high))
@@ -150,7 +149,7 @@ def _remedy(fit: Record, found: Departure) -> str:
             "that differ in gain (state input_gain_error_sd and output_gain_error_sd under [sensors]). A run with the cable "
             "as straight as it gets tells most."
         )
-    if found.against in (ORDER, RUN):
+    if found.against == ORDER:
         return (
             "Something drifted while it was measured: temperature, wear, or the zero of a load cell. Tare before each run, "
             "take loads and bends in random order, and leave out the readings from before it settled."

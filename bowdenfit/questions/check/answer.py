@@ -121,7 +121,8 @@ def _sensitivities(fit: Record, posterior: Draws, parameters: dict[str, Paramete
     every = max(1, posterior.z[..., 0].size // _DRAWS)
     names = [p.name for p in space.free if p.role == "friction"]
     quantities = {name: posterior.values[name] for name in names} | posterior.optimum
-    thinned = {name: draws[:, ::every] for name, draws in quantities.items() if np.ptp(draws) > 0}
+    thinned = {name: draws[:, ::every] for name, draws in quantities.items()}
+    thinned = {name: draws for name, draws in thinned.items() if np.ptp(draws) > 0}  # or an end in all of them
     z = {p.name: posterior.z[:, ::every, i] for i, p in enumerate(space.free)}
     values = {name: posterior.values[name][:, ::every] / p.shown_scale for name, p in parameters.items()}
     log_likelihood = sum((np.sum(part, axis=-1) for part in posterior.log_likelihood.values()), np.zeros(()))

@@ -2,11 +2,13 @@
 
 The maxima are those of the log density itself, noise scales included, climbed to from several starts. Posteriors of few
 readings are funnels: where readings scatter more, everything else is wider. So each noise scale is also held aside of its
-maximum, the density maximized over all the rest, and the curvature taken there.
+maximum, the density maximized over all the rest, and the curvature taken there. So is each friction coefficient, below its
+maximum: what readings hardly tell may be nearly nothing, with more scatter, far from where the curvature of the maximum looks.
 """
 
 from collections.abc import Callable
 from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
 
@@ -18,12 +20,14 @@ STARTS = 4  # places that each density is climbed from: the prior medians, and d
 # Standard deviations from its maximum at which each noise scale is held, as many as starts; the highest are where everything
 # else is widest, which decides how well standard deviations are known.
 _ASIDE = (-2.0, 2.0, 4.0, 6.0)
+_BELOW = (-0.5, -1.0, -1.7, -2.5)  # from its maximum, where a coefficient is held; in standard deviations of its prior
+_WIDTH_BELOW = 0.4  # of the draws about these places, in the same
 _MOST_STEPS, _DIFFERENCE = 30, 1e-5
 _FLAT = 0.2  # least curvature that is believed; the prior's is 1
 _LONGEST = 3.0  # step, in standard deviations of the prior
 _TOP = 1e-4  # gain that a step promises at which the top is near enough to draw about it
 _STUCK = 1e8  # damping at which no step gains anything
-_LEAST_SHARE = 0.1  # of each part in the draws, before they are made to sum to 1
+_LEAST_SHARE, _LEAST_BELOW = 0.1, 0.05  # of each part in the draws, before they are made to sum to 1
 
 
 @dataclass(frozen=True)
@@ -33,6 +37,22 @@ class Tops:
     z: np.ndarray
     value: np.ndarray
     curvature: np.ndarray
+
+
+class Aside(NamedTuple):
+    """Places at which one parameter is held.
+
+    Args:
+        unit: 1 for that parameter, 0 for the others.
+        tops: Of all the rest.
+        width: With which it spreads about each place, by cable.
+        least: Least share of each place in the draws.
+    """
+
+    unit: np.ndarray
+    tops: Tops
+    width: np.ndarray
+    least: float
 
 
 def points_of_climb(size: int) -> int:
@@ -91,12 +111,15 @@ def starting_points(size: int, seeds: np.ndarray) -> np.ndarray:
     return np.concatenate([np.zeros((len(seeds), 1, size)), np.stack(others)], axis=1)
 
 
-def mixtures(gradients: Gradients, noise: np.ndarray, seeds: np.ndarray) -> list[Mixture | None]:
+def mixtures(
+    gradients: Gradients, noise: np.ndarray, friction: np.ndarray, seeds: np.ndarray
+) -> list[Mixture | None]:
     """For every cable what its draws are proposed from; None where its density cannot be computed from any start.
 
     Args:
         gradients: See `climb`.
         noise: Which parameters are noise scales.
+        friction: Which are friction coefficients.
         seeds: Of every cable.
     """
     size = len(noise)
@@ -104,11 +127,15 @@ def mixtures(gradients: Gradients, noise: np.ndarray, seeds: np.ndarray) -> list
     best = tops.z[np.arange(len(seeds)), np.argmax(tops.value, axis=1)]
     spread = np.stack([_spread(tops, cable) for cable in range(len(seeds))])
     aside = []
-    for which in np.flatnonzero(noise):
-        unit = np.arange(size) == which
-        starts = best[:, None] + np.array(_ASIDE)[:, None] * spread[:, None] * unit
-        aside.append((unit.astype(float), climb(gradients, starts, np.tile(1.0 - unit, (STARTS, 1)))))
-    found = [_mixture(tops, aside, spread, cable) for cable in range(len(seeds))]
+    for which in np.flatnonzero(noise | friction):
+        if noise[which]:
+            places, width, least = np.array(_ASIDE) * spread[:, which, None], spread[:, which], _LEAST_SHARE
+        else:
+            places, width, least = np.array([_BELOW]), np.full(len(seeds), _WIDTH_BELOW), _LEAST_BELOW
+        unit = (np.arange(size) == which).astype(float)
+        held = climb(gradients, best[:, None] + places[..., None] * unit, np.tile(1.0 - unit, (STARTS, 1)))
+        aside.append(Aside(unit, held, width, least))
+    found = [_mixture(tops, aside, cable) for cable in range(len(seeds))]
     return [mixture if np.isfinite(tops.value[i]).any() else None for i, mixture in enumerate(found)]
 
 
@@ -117,22 +144,21 @@ def _spread(tops: Tops, cable: int) -> np.ndarray:
     return np.linalg.norm(_root(tops.curvature[cable, best]), axis=1)
 
 
-def _mixture(tops: Tops, aside: list[tuple[np.ndarray, Tops]], spread: np.ndarray, cable: int) -> Mixture:
+def _mixture(tops: Tops, aside: list[Aside], cable: int) -> Mixture:
     """The tops of a cable and the places aside of the best, by how much mass is about each."""
-    parts = [(tops.z[cable, i], _root(tops.curvature[cable, i]), tops.value[cable, i]) for i in range(STARTS)]
-    for unit, found in aside:
-        width = float(spread[cable] @ unit)
+    parts = [(tops.z[cable, i], _root(tops.curvature[cable, i]), tops.value[cable, i], _LEAST_SHARE) for i in range(STARTS)]
+    for unit, held, width, least in aside:
         parts += [
-            (found.z[cable, i], _held_root(found.curvature[cable, i], unit, width), found.value[cable, i])
-            for i in range(len(_ASIDE))
+            (held.z[cable, i], _held_root(held.curvature[cable, i], unit, width[cable]), held.value[cable, i], least)
+            for i in range(STARTS)
         ]
-    center, root, value = (np.array(part) for part in zip(*parts, strict=True))
+    center, root, value, least_share = (np.array(part) for part in zip(*parts, strict=True))
     mass = value + np.linalg.slogdet(root)[1]
     usable = np.isfinite(mass)
     if not usable.any():
         return Mixture(center, root, np.full(len(mass), 1 / len(mass)))
     share = np.exp(mass[usable] - mass[usable].max())
-    share = np.maximum(share / share.sum(), _LEAST_SHARE)
+    share = np.maximum(share / share.sum(), least_share[usable])
     return Mixture(center[usable], root[usable], share / share.sum())
 
 

@@ -111,6 +111,11 @@ class BatchPrograms:
         return noise_scales(self.posterior)
 
     @cached_property
+    def friction(self) -> np.ndarray:
+        """Which are friction coefficients."""
+        return np.array([p.role == "friction" for p in self.posterior.model.space.free], dtype=bool)
+
+    @cached_property
     def names(self) -> tuple[str, ...]:
         """Of the parameters, in the order of z."""
         return tuple(p.name for p in self.posterior.model.space.free)

@@ -73,7 +73,7 @@ def weigh(programs: BatchPrograms, parts: list[tuple[int, Any, int]]) -> list[Ca
     """Weighted draws of a chunk of data sets."""
     seeds, data = np.array([seed for *_, seed in parts]), stack([data for _, data, _ in parts], CHUNK)
     padded = np.concatenate([seeds, np.repeat(seeds[-1:], CHUNK - len(seeds))])
-    begun = mixtures(lambda z: programs.gradients(z, data), programs.noise, padded)
+    begun = mixtures(lambda z: programs.gradients(z, data), programs.noise, programs.friction, padded)
     drawing = {
         i: weighted_draws(
             mixture, np.random.default_rng([int(seed), 1]), lambda w: not _by_weights(programs, w).reasons

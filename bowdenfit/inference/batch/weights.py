@@ -18,7 +18,7 @@ from bowdenfit.inference.diagnostics import Diagnostics, too_few
 from bowdenfit.inference.psis import reliable_k, smooth_weights
 
 BLOCK = 2048  # draws of a round
-_LOOKS = (1, 2, 4, 8)  # rounds at which is looked whether draws are enough
+_LOOKS = (1, 2, 4, 8, 16)  # rounds at which is looked whether draws are enough
 _WORTH = 0.1  # effective draws a draw; of fewer, no more are drawn
 _TAILS = (0.05, 0.95)
 

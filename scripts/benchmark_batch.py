@@ -154,7 +154,7 @@ def seconds_alone(posterior: LogDensity) -> float:
     """What emcee's ensembles take for one cable to the targets of a batch, once compiled."""
     settings = SamplerSettings(n_walkers=64, target_ess=TARGETS.target_ess, target_r_hat=TARGETS.target_r_hat)
     objective = make_objective(posterior)
-    programs = walker_programs(posterior, settings.n_ensembles * settings.n_walkers // 2)
+    programs = walker_programs(posterior, settings.proposed(posterior.model.space.size))
     for _ in range(2):
         begin = time.perf_counter()
         sample(Sampling(posterior, maximum_posterior(posterior, objective), settings, 1), programs)

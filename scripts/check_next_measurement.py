@@ -194,7 +194,7 @@ class Bench:
     def _draws(self, posterior: LogDensity, seed: int) -> np.ndarray:
         """Draws of the posterior by bowdenfit's own sampler."""
         objective = self._program(posterior, "objective", make_objective)
-        batch = SAMPLER.n_ensembles * SAMPLER.n_walkers // 2
+        batch = SAMPLER.proposed(posterior.model.space.size)
         programs = self._program(posterior, "walkers", lambda p: walker_programs(p, batch))
         start = maximum_posterior(posterior, objective)
         z = sample(Sampling(posterior, start, SAMPLER, seed), programs).z

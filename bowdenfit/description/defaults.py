@@ -8,6 +8,8 @@ from pydantic import BeforeValidator, Field, model_validator
 from bowdenfit.description.values import Frozen, LogNormalPrior, NonNegative, Positive, QuantityValue
 
 Sampler = Literal["emcee", "nuts", "both"]
+FEWEST_WALKERS = 128  # of an ensemble, where nothing is said of it; twice as many cost twice as much and settle no sooner
+WALKERS_PER_PARAMETER = 4  # so that a distribution can be fitted to half of them
 THIN = 10  # steps of a walker from one state that is stored to the next; draws are those of the second half
 _OR_ZERO = BeforeValidator(lambda said: {"value": 0.0, "unit": "N"} if said == 0 else said)  # 0 needs no unit
 
@@ -82,22 +84,31 @@ class Sensors(Frozen):
 class SamplerSettings(Frozen):
     """How long and how carefully the posterior is sampled, by emcee's ensembles of walkers, by NUTS, or by both.
 
-    `max_steps` is that of each walker or chain, and does not count the warm-up of NUTS.
+    `max_steps` is that of each walker or chain, and does not count the warm-up of NUTS. Walkers of which nothing is said are
+    as many as it takes to fit a distribution to half of them, and enough to draw from at the first look.
     """
 
     method: Sampler = "emcee"
     n_ensembles: Annotated[int, Field(ge=2, le=100)] = 4
-    n_walkers: Annotated[int, Field(ge=16, le=10_000, multiple_of=2)] = 256
+    n_walkers: Annotated[int, Field(ge=16, le=10_000, multiple_of=2)] | None = None
     n_chains: Annotated[int, Field(ge=4, le=1000)] = 16
     target_acceptance: Annotated[float, Field(ge=0.6, lt=1)] = 0.98
     max_steps: Annotated[int, Field(ge=200, le=10_000_000)] = 12000
     target_r_hat: Annotated[float, Field(gt=1)] = 1.01
     target_ess: Annotated[int, Field(ge=100)] = 1000
 
+    def walkers(self, size: int) -> int:
+        """Walkers of each ensemble for so many parameters."""
+        return self.n_walkers or max(FEWEST_WALKERS, WALKERS_PER_PARAMETER * size)
+
+    def proposed(self, size: int) -> int:
+        """Places that are proposed together: half of all walkers."""
+        return self.n_ensembles * self.walkers(size) // 2
+
     @property
     def most_draws(self) -> int:
         """Draws that there can be after `max_steps`, even if none depended on the one before; of two samplers the fewer."""
-        of_walkers = self.n_ensembles * self.n_walkers * self.max_steps // (2 * THIN)
+        of_walkers = self.n_ensembles * self.walkers(0) * self.max_steps // (2 * THIN)
         of_chains = self.n_chains * self.max_steps
         return {"emcee": of_walkers, "nuts": of_chains, "both": min(of_walkers, of_chains)}[self.method]
 

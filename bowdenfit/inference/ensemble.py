@@ -15,7 +15,7 @@ import jax
 import numpy as np
 
 from bowdenfit.description import SamplerSettings
-from bowdenfit.description.defaults import THIN
+from bowdenfit.description.defaults import THIN, WALKERS_PER_PARAMETER
 from bowdenfit.inference.chain import Chain, Progress, Sampling, stuck_walkers, worst
 from bowdenfit.inference.checkpoint import append, damaged_checkpoint, records
 from bowdenfit.inference.coordinates import Coordinates, Places, WalkerPrograms, Z, coordinates_of
@@ -24,7 +24,6 @@ from bowdenfit.inference.proposals import Proposal, differential_evolution, inde
 
 _BLOCK = 10  # stored states between two reports
 _FIRST_LOOK = 60  # stored states before the first look; of five data sets the slowest is there after half of that
-_FITTED = 4  # walkers a parameter that a covariance is fitted to half of
 _OF_RANDOM = {"random_key": (624,), "random_place": (2,), "random_normal": ()}  # shapes of what makes random numbers
 _KEPT_PER_WALKER = 20  # draws at least that are kept of each walker, spread over the second half of its path
 
@@ -90,7 +89,7 @@ def default_moves(size: int, n_walkers: int) -> Moves:
         size: Number of parameters.
         n_walkers: Walkers of an ensemble; a few cannot tell the shape of a t distribution.
     """
-    fitted = independent if n_walkers >= _FITTED * size else differential_evolution
+    fitted = independent if n_walkers >= WALKERS_PER_PARAMETER * size else differential_evolution
     return shares_of_moves(stretch, differential_evolution, fitted)
 
 
@@ -103,7 +102,7 @@ def starting_points(start: MaximumPosterior, settings: SamplerSettings, generato
     """
     root = np.linalg.cholesky(start.covariance)
     centers = generator.standard_normal((settings.n_ensembles, 1, len(start.z)))
-    walkers = generator.standard_normal((settings.n_ensembles, settings.n_walkers, len(start.z)))
+    walkers = generator.standard_normal((settings.n_ensembles, settings.walkers(len(start.z)), len(start.z)))
     return start.z + (centers + walkers) @ root.T
 
 
@@ -121,7 +120,7 @@ def sample(asked: Sampling, programs: WalkerPrograms, moves: Moves | None = None
     half = len(points) // 2
     log_density = _in_halves(programs.log_density, asked.posterior.data, half)
     frames = coordinates_of(asked.posterior, programs, half) if moves is None else [(Z(), 1.0)]
-    moves = moves or default_moves(points.shape[1], settings.n_walkers)
+    moves = moves or default_moves(points.shape[1], settings.walkers(points.shape[1]))
     sweeps = [(Sweep(moves, coordinates, settings.n_ensembles), share) for coordinates, share in frames]
     sampler = emcee.EnsembleSampler(*points.shape, log_density, vectorize=True, backend=backend, moves=sweeps)
     # emcee's wrapper prints a traceback of whatever stops an evaluation, the user's interrupt included.

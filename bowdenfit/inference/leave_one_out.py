@@ -12,6 +12,7 @@ from jax import Array
 from jaxtyping import Float
 
 from bowdenfit.description import SamplerSettings
+from bowdenfit.description.defaults import WALKERS_PER_PARAMETER
 from bowdenfit.inference.chain import Sampling
 from bowdenfit.inference.comparison import How, Prediction, weigh_without_each
 from bowdenfit.inference.compilation import compile_program
@@ -69,7 +70,8 @@ class ReadingsToLeaveOut:
     @property
     def walkers(self) -> int:
         """Walkers of each ensemble of a refit: more than twice as many as there are parameters."""
-        return max(self.settings.n_walkers, 4 * self.posterior.model.space.size)
+        size = self.posterior.model.space.size
+        return max(self.settings.walkers(size), WALKERS_PER_PARAMETER * size)
 
     @property
     def batch(self) -> int:

@@ -49,8 +49,7 @@ class Laboratory:
     def draws(self, posterior: LogDensity, seed: int) -> np.ndarray:
         """Draws of one posterior in z, one a row, by the package's usual sampler."""
         start = maximum_posterior(posterior, self.program(posterior, make_objective))
-        walkers = self.sampler.n_ensembles * self.sampler.n_walkers
-        programs = self.program(posterior, lambda p: walker_programs(p, walkers // 2))
+        programs = self.program(posterior, lambda p: walker_programs(p, self.sampler.proposed(p.model.space.size)))
         asked = Sampling(posterior, start, self.sampler, seed, diagnose=diagnose_few_draws)
         return sample(asked, programs).z.reshape(-1, posterior.model.space.size)
 

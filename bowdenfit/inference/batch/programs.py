@@ -9,6 +9,7 @@ import jax
 import numpy as np
 
 from bowdenfit.description import SamplerSettings
+from bowdenfit.description.defaults import WALKERS_PER_PARAMETER
 from bowdenfit.inference.batch.ensembles import make_round
 from bowdenfit.inference.batch.frames import batch_frames
 from bowdenfit.inference.batch.laplace import points_of_climb
@@ -19,7 +20,6 @@ from bowdenfit.inference.log_density import LogDensity
 from bowdenfit.inference.objective import noise_scales
 from bowdenfit.inference.value_chart import chart_values
 
-FITTED = 4  # walkers a parameter, at the least
 # Data sets that a program takes at once, always as many, so that rounding is the same: to weigh, and to walk, where the last
 # few may go on for long.
 CHUNK, WALKING = 16, 4
@@ -50,7 +50,7 @@ class BatchSettings:
     threads: int = 0
 
     def __post_init__(self) -> None:
-        walkers = self.sampler.n_walkers
+        walkers = self.sampler.walkers(0)
         if walkers & (walkers - 1):
             raise ValueError(f"an ensemble of a batch needs a power of two of walkers, such as 128, and not {walkers}.")
 
@@ -93,8 +93,8 @@ class BatchPrograms:
     @property
     def n_walkers(self) -> int:
         """Of each ensemble: enough for a covariance to be fitted to half of them, doubled until they are."""
-        walkers = self.settings.sampler.n_walkers
-        while walkers < FITTED * self.posterior.model.space.size:
+        walkers = self.settings.sampler.walkers(0)
+        while walkers < WALKERS_PER_PARAMETER * self.posterior.model.space.size:
             walkers *= 2
         return walkers
 

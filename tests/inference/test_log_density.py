@@ -99,7 +99,8 @@ def test_ten_thousand_draws_of_the_prior_give_finite_densities_and_plausible_eff
     """Finite always; plausible along most of the range.
 
     The slope of a log angle is wide open a priori (sd 6 over half the range), so that at the ends of the range nearly
-    half of all draws have so much wrap that nothing passes; in the middle one in ten has, and at the best length hardly any.
+    half of all draws have so much wrap that nothing passes; in the middle one in seven has, because
+    coefficients may be those of rubber, and at the best length few.
     """
     dataset = load_dataset(on_body) if which == "on-body" else bf.simulate(bench, seed=1)
     posterior = LogDensity(build_model(dataset))
@@ -117,5 +118,5 @@ def test_ten_thousand_draws_of_the_prior_give_finite_densities_and_plausible_eff
     assert np.all((efficiency[0] > 0.3) & (efficiency[0] < 0.95))  # z = 0, the medians of all priors
     drawn = efficiency[1:]
     assert np.mean(drawn.max(axis=1) > 0.05) > 0.96
-    assert np.mean(drawn[:, 10] > 0.05) > 0.9  # in the middle of the range
+    assert np.mean(drawn[:, 10] > 0.05) > 0.84  # in the middle of the range
     assert np.mean(drawn[:, [0, -1]] > 0.05) > 0.5  # at its ends

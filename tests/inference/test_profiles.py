@@ -211,10 +211,10 @@ def test_a_fixed_parameter_and_an_undetermined_one_have_no_interval():
 def test_a_profile_is_a_parabola_of_a_linear_model():
     loss, angle = _rows(1)
     posterior, objective, found = fitted(of_rows(loss, angle))
-    plain = profile(posterior, objective, "mu1", found.z, np.linspace(-1.0, 1.0, 9))
+    plain = profile(posterior, objective, "mu1", found.z, np.linspace(-0.5, 0.5, 9))
     curvature = plain.rise / (plain.values - found.estimates["mu1"].value) ** 2
     np.testing.assert_allclose(curvature, curvature[0], rtol=1e-5)
-    values = [0.12 * np.exp(0.7 * z) for z in np.linspace(-1.0, 1.0, 9)]
+    values = [0.12 * np.exp(1.4 * z) for z in np.linspace(-0.5, 0.5, 9)]
     np.testing.assert_allclose(plain.values, values, rtol=1e-9)
 
 

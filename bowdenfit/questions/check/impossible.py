@@ -2,6 +2,7 @@
 
 import numpy as np
 
+from bowdenfit.description import PriorDefaults
 from bowdenfit.kinds import readings_called
 from bowdenfit.kinds.plausibility import GAIN_ERROR
 from bowdenfit.kinds.term import Term
@@ -10,7 +11,7 @@ from bowdenfit.results.record import Record
 from bowdenfit.words import few, percent
 
 _SDS = 4.5  # of noise above what is possible, which one healthy reading of 300,000 exceeds
-_PRIOR_SDS = 3.0  # of the default prior of friction, beyond which a mistake is likelier than such a rope
+_LEAST, _MOST = 0.015, 1.0  # coefficients outside which a mistake is likelier than such a rope
 
 
 def impossible_efficiencies(fit: Record) -> str:
@@ -39,21 +40,21 @@ def implausible_friction(fit: Record) -> str:
     A coefficient of which something is stated is believed. What is too large counts by its estimate, what is too small by the
     upper end of its 90 % interval, because a contact may rub too little to be seen.
     """
-    found, low, high = [], 0.0, np.inf
+    found, usual = [], PriorDefaults().friction
     for p in fit.model.space.free:
-        if p.role != "friction" or p.name in fit.dataset.description.friction or not isinstance(p.prior, LogNormal):
+        nothing_said = p.prior == LogNormal(usual.median, usual.log_sd) and p.name not in fit.dataset.description.friction
+        if p.role != "friction" or not nothing_said:
             continue
-        low, high = (float(p.prior.median * np.exp(s * _PRIOR_SDS * p.prior.log_sd)) for s in (-1, 1))
         if fit.sampled is None:
             value, upper = fit.least_squares.estimates[p.name].value, fit.least_squares.estimates[p.name].upper
         else:
             value, upper = fit.parameter(p.name).median, fit.parameter(p.name).q95
-        if value > high or upper < low:
+        if value > _MOST or upper < _LEAST:
             found.append(f"{p.name} = {value:.2g}")
     if not found:
         return ""
     return (
-        f"Ropes in sheaths have coefficients of {low:.1g} to {high:.1g}, and these readings say {', '.join(found)}. The "
+        f"Ropes in sheaths have coefficients of {_LEAST:g} to {_MOST:g}, and these readings say {', '.join(found)}. The "
         "usual causes are the unit of the wrap angles (rad for deg), a contact that was left out, and a slipped decimal point "
         'in a reading; if it is right, say so: [friction.NAME] prior = { lognormal = { median = ..., log_sd = ... } }.'
     )

@@ -120,7 +120,7 @@ def test_settings_that_lead_nowhere_are_sentences(on_body, setting):
 @pytest.mark.parametrize(
     ("settings", "says"),
     [
-        (["sampler.target_ess=1e12"], "614,400 draws at most"),
+        (["sampler.target_ess=1e12"], "307,200 draws at most"),
         (["sampler.method=nuts", "sampler.target_ess=200000"], "192,000 draws at most"),
         (["sampler.max_steps=200", "sampler.n_walkers=32", "sampler.target_ess=1281"], "1,280 draws at most"),
         (["sampler.max_steps=1e18"], "max_steps"),

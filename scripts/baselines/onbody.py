@@ -20,7 +20,7 @@ CURVES = ("free_sheath_angle_deg", "squeezed_sheath_angle_deg")
 NAMES = ("mu1", "mu2", "mu3", *(f"{c[:-4]}_{x}" for c in CURVES for x in "abc"), "sigma_theta", "tau")
 TARGET = 1000  # effective draws of every parameter
 
-FRICTION = (np.log(0.12), 0.7)
+FRICTION = (np.log(0.12), 1.4)
 LEVEL_SD, SLOPE_SD = 1.5, 6.0  # the root of the curvature is half-Cauchy about 1
 ANGLE_NOISE, SCATTER = np.deg2rad(3.0), 0.025  # medians of half-Cauchys
 

@@ -227,6 +227,15 @@ def said(fit):
     return " ".join(checks_text(fit.checks).split())
 
 
+def test_a_best_length_that_leaves_the_end_of_the_range_in_a_draw_that_thinning_passes_over_has_no_sensitivity(fit):
+    """Of 10,240 draws every other one is looked at: what is the same in all of these can follow no prior."""
+    at_the_end = np.full_like(fit.posterior.optimum["optimal_length"], 430.0)
+    at_the_end[0, 1] = 431.0
+    optimum = dict(fit.posterior.optimum) | {"optimal_length": at_the_end}
+    checks = checks_of(dataclasses.replace(fit, sampled=dataclasses.replace(fit.posterior, optimum=optimum)))
+    assert [s.quantity for s in checks.sensitivities if s.quantity.startswith("optimal")] == ["optimal_efficiency"]
+
+
 def test_the_on_body_fit_has_no_outlier_and_says_so_of_550_mm(fit):
     page = fit.summary()["checks"]
     (at_550,) = [r for r in page["readings"] if r["label"] == "550 mm"]

@@ -12,14 +12,16 @@ References:
 
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
-from typing import ClassVar
+from typing import TYPE_CHECKING, ClassVar
 
 import numpy as np
 
 from bowdenfit.display import Part
 from bowdenfit.inference.psis import RELIABLE_K, power_weights, smooth_weights
-from bowdenfit.parameters.priors import Prior
-from bowdenfit.parameters.space import Parameter
+
+if TYPE_CHECKING:  # another process works this out, without JAX
+    from bowdenfit.parameters.priors import Prior
+    from bowdenfit.parameters.space import Parameter
 
 SENSITIVE = 0.05  # from which a quantity is said to be sensitive
 FOLLOWS = 1.15  # factor by which a doubled or halved scale changes a width that is said to follow a prior
@@ -113,36 +115,54 @@ class FarOut:
     prior_sds: float
 
 
-def far_out(z: Mapping[str, np.ndarray], parameters: Mapping[str, Parameter]) -> tuple[FarOut, ...]:
+def far_out(z: Mapping[str, np.ndarray], parameters: Mapping[str, "Parameter"]) -> tuple[FarOut, ...]:
     """Parameters beyond 3 standard deviations of their priors, but for those at an end that the prior allows.
 
     Args:
         z: Draws of each parameter in z, by name.
         parameters: The parameters.
     """
-    found = [FarOut(name, _inside(parameters[name].prior, float(np.median(at)))) for name, at in z.items()]
+    found = [FarOut(name, _inside(parameters[name].prior.allowed_ends, float(np.median(at)))) for name, at in z.items()]
     return tuple(sorted((f for f in found if abs(f.prior_sds) > FAR), key=lambda f: -abs(f.prior_sds)))
+
+
+@dataclass(frozen=True)
+class OtherScales:
+    """What other scales of one prior would do to every draw.
+
+    Args:
+        doubled, halved: Log of the prior's density with its scale doubled or halved over its own, up to a constant.
+        allowed_ends: See `Prior`.
+    """
+
+    doubled: np.ndarray
+    halved: np.ndarray
+    allowed_ends: tuple[bool, bool]
+
+
+def other_scales(prior: "Prior", values: np.ndarray) -> OtherScales:
+    """Of draws of a parameter [internal units]."""
+    doubled, halved = (np.asarray(prior.widening(values.ravel(), factor)) for factor in (2.0, 0.5))
+    return OtherScales(doubled, halved, prior.allowed_ends)
 
 
 def sensitivities(
     quantities: Mapping[str, np.ndarray],
     z: Mapping[str, np.ndarray],
-    values: Mapping[str, np.ndarray],
     log_likelihood: np.ndarray,
-    parameters: Mapping[str, Parameter],
+    priors: Mapping[str, OtherScales],
 ) -> tuple[Sensitivity, ...]:
     """How much each quantity depends on the priors and on the readings.
 
     Args:
         quantities: Draws by name, (chain, draw).
         z: Draws of each parameter in z, by name, (chain, draw).
-        values: The same in internal units.
         log_likelihood: Sum over all readings, (chain, draw).
-        parameters: The parameters by name.
+        priors: Of each parameter, by name.
     """
     of_readings = _scaled(log_likelihood)
     of_priors = {name: _scaled(-(values**2) / 2) for name, values in z.items()}
-    weighted = {name: _Weighted.of(parameters[name].prior, at.ravel()) for name, at in values.items()}
+    weighted = {name: _Weighted.of(prior) for name, prior in priors.items()}
     found = []
     for name, draws in quantities.items():
         by_prior = {parameter: sense(draws) for parameter, sense in of_priors.items()}
@@ -159,16 +179,16 @@ def sensitivities(
                 float(plain[1]),
                 float(np.std(flat)),
                 float(_quantiles(flat, order, weighted[most].doubled)[1]),
-                _inside(parameters[most].prior, float(np.mean(z[most]))),
+                _inside(priors[most].allowed_ends, float(np.mean(z[most]))),
                 tuple(w.width(parameter, flat, order, plain) for parameter, w in weighted.items()),
             )
         )
     return tuple(found)
 
 
-def _inside(prior: Prior, z: float) -> float:
+def _inside(allowed_ends: tuple[bool, bool], z: float) -> float:
     """Z, and 0 at an end of the range that the prior allows."""
-    lower, upper = prior.allowed_ends
+    lower, upper = allowed_ends
     return 0.0 if (lower and z < 0) or (upper and z > 0) else z
 
 
@@ -182,9 +202,9 @@ class _Weighted:
     k_halved: float
 
     @classmethod
-    def of(cls, prior: Prior, values: np.ndarray) -> "_Weighted":
-        """By draws of the parameter [internal units]."""
-        (doubled, k_doubled), (halved, k_halved) = (_weights(prior.widening(values, factor)) for factor in (2.0, 0.5))
+    def of(cls, prior: OtherScales) -> "_Weighted":
+        """By what other scales do."""
+        (doubled, k_doubled), (halved, k_halved) = (_weights(ratio) for ratio in (prior.doubled, prior.halved))
         return cls(doubled, halved, k_doubled, k_halved)
 
     def width(self, parameter: str, values: np.ndarray, order: np.ndarray, plain: np.ndarray) -> Width:

@@ -19,7 +19,7 @@ OPTIONS: dict[str, dict[str, Any]] = {
     "svg": {"metadata": {"Date": None}},
     "pdf": {"metadata": {"CreationDate": None}},
 }
-_TYPESETTING = ("GSUB", "GPOS", "GDEF")  # tables of a font that a PDF, whose letters have their places, never looks at
+_TYPESETTING = ("GSUB", "GPOS", "GDEF", "MATH", "kern")  # tables that a PDF, whose letters have their places, never looks at
 
 
 def write_all(figure: Figure, folder: Path, name: str, formats: Sequence[str] = FORMATS) -> list[Path]:
@@ -61,21 +61,26 @@ def save(figure: Figure, target: Path | BinaryIO, ending: str) -> None:
 
 @contextmanager
 def _lean_fonts() -> Iterator[None]:
-    """Fonts go into a PDF without tables for typesetting, which take longer to cut down than all the rest takes to write.
+    """Fonts go into a PDF without tables for typesetting, which take as long to read and cut down as all the rest.
 
-    matplotlib has no setting for that; where fontTools no longer keeps its list here, writing just takes longer.
+    matplotlib has no setting for that; it has fontTools load fonts, which are made lean here as they are loaded.
     """
-    from fontTools.subset import Options
+    from fontTools import subset
 
-    usual = getattr(Options, "_drop_tables_default", None)
-    if usual is None:
-        yield
-        return
-    Options._drop_tables_default = [*usual, *_TYPESETTING]
+    usual = subset.load_font
+
+    def lean(*arguments: Any, **options: Any) -> Any:
+        font = usual(*arguments, **options)
+        for table in _TYPESETTING:
+            if table in font:
+                del font[table]
+        return font
+
+    subset.load_font = lean
     try:
         yield
     finally:
-        Options._drop_tables_default = usual
+        subset.load_font = usual
 
 
 def _show_as_written(figure: Figure) -> None:

@@ -1,6 +1,7 @@
 """The record of a fit: what was fitted to what, the draws, and what follows from them without asking a question."""
 
 from collections.abc import Callable, Iterable
+from concurrent.futures import Future
 from dataclasses import dataclass, field, replace
 from functools import cached_property, wraps
 from typing import Any, TypeVar
@@ -242,12 +243,14 @@ class Record(Display):
 
 
 def once(question: Callable[[Record], Answer]) -> Callable[[Record], Answer]:
-    """A question that is worked out once for each record, which keeps the answer."""
+    """A question that is worked out once for each record, which keeps the answer, or the promise of one from elsewhere."""
 
     @wraps(question)
     def answer(fit: Record) -> Answer:
         if answer not in fit._answers:
             fit._answers[answer] = question(fit)
+        elif isinstance(promised := fit._answers[answer], Future):  # a process that was ended keeps none
+            fit._answers[answer] = question(fit) if promised.exception() else promised.result()
         found: Answer = fit._answers[answer]
         return found
 

@@ -1,22 +1,29 @@
 """From a data set to a finished fit: the stages in their order, and what runs beside them."""
 
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Mapping
 from concurrent.futures import ThreadPoolExecutor
 from datetime import UTC, datetime
+from functools import partial
 from pathlib import Path
 from typing import Any
 
+import numpy as np
+
 from bowdenfit.dataset import Dataset
+from bowdenfit.errors import BowdenfitError
 from bowdenfit.front_desk import Fit
 from bowdenfit.inference.chain import Sampling
+from bowdenfit.inference.diagnostics import Diagnostics, diagnose_all
 from bowdenfit.inference.engines.memory import refuse_shortage
 from bowdenfit.inference.least_squares import least_squares, maximum_posterior
 from bowdenfit.inference.log_density import LogDensity as Density
 from bowdenfit.inference.objective import make_objective
 from bowdenfit.inference.versions import versions
 from bowdenfit.model import build_model
+from bowdenfit.questions.check.answer import checks_findings, evidence_of
+from bowdenfit.questions.check.evidence import work_out
 from bowdenfit.results.record import Provenance
-from bowdenfit.run.helpers import Assistant, Stopwatch, load_beside
+from bowdenfit.run.helpers import Assistant, Stopwatch, load_beside, load_without
 from bowdenfit.run.sampling import LIBRARIES, draws_of, samplers, sampling_programs
 
 
@@ -41,19 +48,35 @@ def run(
     helper.prepare_to_draw()
     settings = data.description.sampler
     # Not blackjax, whose modules import each other in circles: two threads would see half of one.
-    load_beside(*(LIBRARIES[name] for name in samplers(settings.method) if name == "emcee"), "arviz_stats.ecdf_utils")
+    libraries = [LIBRARIES[name] for name in samplers(settings.method) if name == "emcee"]
+    if helper.checks:  # a process of ours, in which only a move of emcee that is not used here would need scipy.stats
+        load_without("scipy.stats", *libraries)
+    else:
+        load_beside(*libraries, "arviz_stats.ecdf_utils")
     compiling = ThreadPoolExecutor(1)
     with watch.stage("compile the posterior"):
         programs = sampling_programs(density, seed, compiling)
     with watch.stage("wait for the start"):
         center = start.result()
     files = begin(), resume
-    asked = Sampling(density, center, settings, seed, programs.quantities, *files, _with_memory(progress))
+    diagnose = partial(_diagnosed, helper)
+    asked = Sampling(density, center, settings, seed, programs.quantities, *files, _with_memory(progress), diagnose)
     posterior, reasons = draws_of(programs, asked, watch)
     squares, beside = estimated.result()
     watch.seconds |= {f"{stage}, beside": seconds for stage, seconds in beside.items()}
     found = Fit(data, squares, posterior, not reasons, reasons, provenance(seed, watch))
     found._answers.update(programs.asked)
+    if helper.checks:
+        found._answers[checks_findings] = helper.check(work_out, evidence_of(found))
+    return found
+
+
+def _diagnosed(helper: Assistant, draws: Mapping[str, np.ndarray], n_ensembles: int) -> dict[str, Diagnostics]:
+    """`diagnose_all`, by a process that is there for it; here where that was ended from outside."""
+    try:
+        found: dict[str, Diagnostics] = helper.check(diagnose_all, draws, n_ensembles).result()
+    except BowdenfitError:
+        found = diagnose_all(draws, n_ensembles)
     return found
 
 

@@ -1,4 +1,4 @@
-"""What works beside a fit: one more process, or a thread where none may be started; and a stopwatch."""
+"""What works beside a fit: one or two more processes, or a thread where none may be started; and a stopwatch."""
 
 import os
 import signal
@@ -9,12 +9,12 @@ import traceback
 from abc import ABC, abstractmethod
 from collections.abc import Callable, Iterable, Iterator
 from concurrent.futures import Future, ThreadPoolExecutor
-from contextlib import contextmanager, suppress
+from contextlib import ExitStack, contextmanager, suppress
 from dataclasses import dataclass, field
 from importlib import import_module
-from itertools import cycle
 from multiprocessing import connection, get_context
-from typing import Any, TypeAlias
+from queue import SimpleQueue
+from typing import Any, ClassVar, TypeAlias
 
 from bowdenfit.errors import BowdenfitError
 from bowdenfit.inference.engines.processes import cores, end_with_parent
@@ -29,12 +29,19 @@ DRAWING = (
     "bowdenfit.pages.page",
     "jinja2",
 )
+CHECKING = ("bowdenfit.questions.check.evidence", "arviz_stats.ecdf_utils")
 Answers = tuple["Future[Any]", ...]
 Connection: TypeAlias = "connection.Connection[Any, Any]"
 
 
 class Assistant(ABC):
-    """Does jobs beside the fit, one after the other."""
+    """Does jobs beside the fit, one after the other.
+
+    Attributes:
+        checks: Whether another process diagnoses and checks draws, so that this one need not load what that takes.
+    """
+
+    checks: ClassVar = False
 
     @abstractmethod
     def begin(self, stages: Callable[..., Iterator[Any]], *arguments: Any, answers: int) -> Answers:
@@ -42,7 +49,13 @@ class Assistant(ABC):
 
     @abstractmethod
     def submit(self, function: Callable[..., Any], *arguments: Any) -> "Future[Any]":
-        """What a function gives."""
+        """What a function gives, which needs no JAX."""
+
+    def check(self, function: Callable[..., Any], *arguments: Any) -> "Future[Any]":
+        """The same, of a function of draws: at once, where no other process is there for it."""
+        done: Future[Any] = Future()
+        done.set_result(function(*arguments))
+        return done
 
     def prepare_to_draw(self) -> None:  # noqa: B027  (here figures load what they need)
         """Load what figures need, after what was asked for so far."""
@@ -69,9 +82,7 @@ class InThisProcess(Assistant):
 
     def submit(self, function: Callable[..., Any], *arguments: Any) -> "Future[Any]":
         """See `Assistant`."""
-        done: Future[Any] = Future()
-        done.set_result(function(*arguments))
-        return done
+        return self.check(function, *arguments)
 
 
 class InAnotherProcess(Assistant):
@@ -79,18 +90,24 @@ class InAnotherProcess(Assistant):
 
     Args:
         copy: Whether it begins as a copy of this one, or anew.
-        settings: Called in it first.
+        settings: Called in it first, if it computes.
         draws: Whether it will draw figures.
         others: Ends of pipes to other processes, which a copy has too and is not to hold open.
+        computes: Whether jobs may need JAX; if not, what drawing needs is loaded at once.
     """
 
     def __init__(
-        self, copy: bool, settings: Callable[[], None], draws: bool, others: "tuple[Connection, ...]" = ()
+        self,
+        copy: bool,
+        settings: Callable[[], None],
+        draws: bool,
+        others: "tuple[Connection, ...]" = (),
+        computes: bool = True,
     ) -> None:
         self.thread, self.draws = ThreadPoolExecutor(1), draws
         context: Any = get_context("fork" if copy else "spawn")
         self.ours, theirs = context.Pipe()
-        passed = (theirs, (self.ours, *others) if copy else (), settings)
+        passed = (theirs, (self.ours, *others) if copy else (), settings if computes else None)
         self.process = context.Process(target=_serve, args=passed, daemon=True)
         self.process.start()
         theirs.close()
@@ -134,37 +151,58 @@ class InAnotherProcess(Assistant):
 
 
 class InTwoProcesses(Assistant):
-    """Generators in one copy of this process, functions in that and another one by turns.
+    """Generators in one copy of this process; functions in that and another one, in whichever is free.
 
-    The second has nothing to do before the first is through with its generator: then it loads what figures need.
+    The other is a copy of this process before it loads JAX, and loads meanwhile what drawing needs. What checking needs waits
+    until the generator is through, since this process compiles as long as that, and there may be two cores.
     """
 
+    checks = True
+
     def __init__(self, settings: Callable[[], None]) -> None:
-        self.first = InAnotherProcess(True, settings, True)
-        self.second = InAnotherProcess(True, settings, True, (self.first.ours,))
-        self.turns = cycle((self.second, self.first))
+        self.second = InAnotherProcess(True, settings, True, computes=False)
+        load(*COMPUTING)
+        settings()
+        self.first = InAnotherProcess(True, settings, True, (self.second.ours,))
+        self.free = SimpleQueue[InAnotherProcess]()
+        self.free.put(self.second)
+        self.threads = ThreadPoolExecutor(2)
 
     def begin(self, stages: Callable[..., Iterator[Any]], *arguments: Any, answers: int) -> Answers:
         """See `Assistant`."""
-        return self.first.begin(stages, *arguments, answers=answers)
+        found = self.first.begin(stages, *arguments, answers=answers)
+        found[-1].add_done_callback(lambda _: self._load_what_checking_needs())
+        return found
+
+    def _load_what_checking_needs(self) -> None:
+        with suppress(RuntimeError):  # all has ended
+            self.second.submit(load, *CHECKING)
 
     def submit(self, function: Callable[..., Any], *arguments: Any) -> "Future[Any]":
         """See `Assistant`."""
-        return next(self.turns).submit(function, *arguments)
+        return self.threads.submit(self._in_one_that_is_free, function, arguments)
+
+    def check(self, function: Callable[..., Any], *arguments: Any) -> "Future[Any]":
+        """See `Assistant`."""
+        return self.second.submit(function, *arguments)
 
     def prepare_to_draw(self) -> None:
         """See `Assistant`."""
-        self.first.submit(os.getpid).add_done_callback(lambda _: self._second_prepares())
         self.first.prepare_to_draw()
+        self.free.put(self.first)
 
-    def _second_prepares(self) -> None:
-        with suppress(RuntimeError):  # all has ended
-            self.second.prepare_to_draw()
+    def _in_one_that_is_free(self, function: Callable[..., Any], arguments: tuple[Any, ...]) -> Any:
+        process = self.free.get()
+        try:
+            return process.submit(function, *arguments).result()
+        finally:
+            self.free.put(process)
 
     def end(self) -> None:
         """End both."""
         for process in (self.first, self.second):
             process.end()
+        self.threads.shutdown(cancel_futures=True)
 
 
 @contextmanager
@@ -181,15 +219,17 @@ def assistant(in_background: bool, settings: Callable[[], None], draws: bool) ->
         draws: Whether figures will be drawn.
     """
     copy = sys.platform == "linux" and "jax" not in sys.modules and threading.active_count() == 1
-    load(*COMPUTING)
-    settings()
-    if not in_background:
-        helper = InThisProcess()
-        with helper.thread:
-            yield helper
-        return
-    two = copy and draws and cores() > 1
-    other = InTwoProcesses(settings) if two else InAnotherProcess(copy, settings, draws)
+    if in_background and copy and draws and cores() > 1:
+        other: InTwoProcesses | InAnotherProcess = InTwoProcesses(settings)
+    else:
+        load(*COMPUTING)
+        settings()
+        if not in_background:
+            helper = InThisProcess()
+            with helper.thread:
+                yield helper
+            return
+        other = InAnotherProcess(copy, settings, draws)
     try:
         yield other
     finally:
@@ -207,18 +247,29 @@ def _deliver(source: Iterable[Any], futures: Answers) -> None:
                 future.set_exception(error)
 
 
-def _serve(requests: "Connection", theirs: "tuple[Connection, ...]", settings: Callable[[], None]) -> None:
-    """Do one job after the other until the process that asks for them ends; an interrupt is for that one to handle."""
+def _serve(requests: "Connection", theirs: "tuple[Connection, ...]", settings: Callable[[], None] | None) -> None:
+    """Do one job after the other until the process that asks for them ends; an interrupt is for that one to handle.
+
+    Args:
+        requests: Where jobs come from.
+        theirs: Ends that are not this process's.
+        settings: See `assistant`; None where no job needs JAX.
+    """
     signal.signal(signal.SIGINT, signal.SIG_IGN)
     signal.signal(signal.SIGTERM, signal.SIG_DFL)
     for end in theirs:
         end.close()
     end_with_parent()
-    import jax
+    with suppress(EOFError, ConnectionError), ExitStack() as held:  # that process has ended, perhaps with a reply unread
+        if settings is None:
+            with suppress(Exception):  # what fails here fails where it is needed
+                load(*DRAWING)
+        else:
+            import jax
 
-    jax.config.update("jax_platforms", "cpu")
-    settings()
-    with jax.enable_x64(True), suppress(EOFError, ConnectionError):  # that process has ended, perhaps with a reply unread
+            jax.config.update("jax_platforms", "cpu")
+            settings()
+            held.enter_context(jax.enable_x64(True))
         while True:
             function, arguments = requests.recv()
             for reply in _replies(function, arguments):
@@ -242,6 +293,17 @@ def load(*modules: str) -> None:
     """Load modules."""
     for name in modules:
         import_module(name)
+
+
+def load_without(missing: str, *modules: str) -> None:
+    """Load modules as where a library is not installed that they can do without; only in a process that is all ours."""
+    if missing in sys.modules:
+        return load(*modules)
+    sys.modules[missing] = None  # type: ignore[assignment]  # as Python has it of what cannot be imported
+    try:
+        load(*modules)
+    finally:
+        del sys.modules[missing]
 
 
 def load_beside(*modules: str) -> None:

@@ -17,7 +17,7 @@ from bowdenfit.inference.compilation import compile_program
 from bowdenfit.inference.diagnostics import Diagnostics
 from bowdenfit.inference.log_density import LogDensity as Density
 from bowdenfit.inference.predictive_checks import place_at_random, predict_without_each, uniformity
-from bowdenfit.inference.prior_sensitivity import SENSITIVE, far_out, sensitivities
+from bowdenfit.inference.prior_sensitivity import SENSITIVE, far_out, other_scales, sensitivities
 from bowdenfit.kinds import KINDS
 from bowdenfit.kinds.angles.table import AngleTable
 from bowdenfit.kinds.stretch.table import StretchTable
@@ -130,7 +130,10 @@ def parameter(name, prior):
     return Parameter(name, "$x$", "a parameter", "friction", prior)
 
 
-STANDARD = {name: parameter(name, Normal(0.0, 1.0)) for name in ("mu", "other")}
+def weighed(quantities, drawn, log_likelihood):
+    """Sensitivities where every prior is a standard normal."""
+    priors = {name: other_scales(Normal(0.0, 1.0), values) for name, values in drawn.items()}
+    return sensitivities(quantities, drawn, log_likelihood, priors)
 
 
 def normal_posterior(reading, sd, seed=0):
@@ -152,7 +155,7 @@ def normal_posterior(reading, sd, seed=0):
 def test_power_scaling_tells_what_decides(reading, sd, expected):
     z, log_likelihood = normal_posterior(reading, sd)
     drawn = {"mu": z, "other": z[::-1] * 0 + normal_posterior(0, 0.1, 1)[0]}
-    (found,) = sensitivities({"mu": 0.1 + 0.01 * z}, drawn, drawn, log_likelihood, STANDARD)
+    (found,) = weighed({"mu": 0.1 + 0.01 * z}, drawn, log_likelihood)
     assert found.diagnosis == expected
     assert found.parameter == "mu"
     assert (found.prior > SENSITIVE) == (expected != "readings decide")
@@ -164,14 +167,14 @@ def test_draws_that_are_alike_or_few_are_weighed_without_a_warning():
     still = np.where(np.arange(32)[:, None] < 8, 4.0, z)
     for draws in (still, -still, z[:2, :6]):
         at_end = np.where(np.arange(draws.size).reshape(draws.shape) % 50 == 0, 1.0, 0.0)
-        (found, edge) = sensitivities({"mu": draws, "edge": at_end}, {"mu": draws}, {"mu": draws}, -(draws**2), STANDARD)
+        (found, edge) = weighed({"mu": draws, "edge": at_end}, {"mu": draws}, -(draws**2))
         assert np.isfinite([found.prior, found.likelihood]).all() and np.isnan(edge.widths[0].doubled)
 
 
 def test_the_median_with_a_wider_prior_is_that_of_another_fit():
     """Conjugate: a prior twice as wide puts the median at reading / (1 + sd^2 / 4); 8000 draws err by 0.01."""
     z, log_likelihood = normal_posterior(2.0, 0.8)
-    (found,) = sensitivities({"mu": z}, {"mu": z}, {"mu": z}, log_likelihood, STANDARD)
+    (found,) = weighed({"mu": z}, {"mu": z}, log_likelihood)
     assert found.median == pytest.approx(2.0 / (1 + 0.8**2), abs=0.03)
     assert found.wider == pytest.approx(2.0 / (1 + 0.8**2 / 4), abs=0.04)
 
@@ -179,7 +182,7 @@ def test_the_median_with_a_wider_prior_is_that_of_another_fit():
 def test_widths_with_the_scale_of_a_prior_doubled_and_halved_are_those_of_other_fits():
     """Conjugate, as above; 8000 draws know a width to 2 %, and the ratio of two from the same draws better."""
     z, log_likelihood = normal_posterior(0.3, 0.8)
-    (found,) = sensitivities({"mu": z}, {"mu": z}, {"mu": z}, log_likelihood, STANDARD)
+    (found,) = weighed({"mu": z}, {"mu": z}, log_likelihood)
     (width,) = found.widths
     assert width.doubled == pytest.approx(np.sqrt((1 + 0.8**-2) / (1 / 4 + 0.8**-2)), rel=0.03)
     assert width.halved == pytest.approx(np.sqrt((1 + 0.8**-2) / (4 + 0.8**-2)), rel=0.03)
@@ -189,7 +192,7 @@ def test_widths_with_the_scale_of_a_prior_doubled_and_halved_are_those_of_other_
 def test_a_width_of_which_the_draws_cannot_tell_is_no_number_and_no_all_clear():
     """Draws of the prior itself: twice as wide a normal would need weights without a variance."""
     z, log_likelihood = normal_posterior(0.0, 30.0)
-    (found,) = sensitivities({"mu": z}, {"mu": z}, {"mu": z}, log_likelihood, STANDARD)
+    (found,) = weighed({"mu": z}, {"mu": z}, log_likelihood)
     (width,) = found.widths
     assert np.isnan(width.doubled) == (width.k_doubled > 0.7)
     assert width.halved == pytest.approx(0.5, rel=0.05)

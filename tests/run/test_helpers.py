@@ -5,11 +5,14 @@ import signal
 import subprocess
 import sys
 import time
+from concurrent.futures import Future
 from pathlib import Path
+from types import SimpleNamespace
 
 import pytest
 
 from bowdenfit.errors import BowdenfitError
+from bowdenfit.results.record import once
 from bowdenfit.run.helpers import InAnotherProcess, InThisProcess
 
 # A copy is made only of a process in which nothing runs, so each of these is one of its own.
@@ -141,25 +144,93 @@ def test_an_error_arrives_where_the_answer_is_asked_for(make):
     helper.thread.shutdown()
 
 
-BY_TURNS = """
+IN_WHICHEVER_IS_FREE = """
 import os, sys, time
 from bowdenfit.run.helpers import InTwoProcesses
 
 def nothing():
     pass
 
+def begun():
+    yield os.getpid()
+
+def slow():
+    time.sleep(1)
+    return os.getpid()
+
+def has_jax():
+    return os.getpid(), "jax" in sys.modules
+
 helper = InTwoProcesses(nothing)
-pids = {helper.submit(os.getpid).result() for _ in range(4)}
+(computing,) = helper.begin(begun, answers=1)
+helper.prepare_to_draw()
+pids = {job.result() for job in [helper.submit(slow), helper.submit(slow)]}
+checking, jax_there = helper.check(has_jax).result()
 print(*pids, flush=True)
+print({computing.result(), checking} == pids, jax_there, flush=True)
 END
 """
 
 
 @needs_linux
 @pytest.mark.parametrize("end", ["helper.end()", "os.kill(os.getpid(), 9)"])
-def test_two_processes_work_by_turns_and_end_with_this_one(end):
-    command = [sys.executable, "-c", BY_TURNS.replace("END", end)]
+def test_two_processes_work_at_once_check_without_jax_and_end_with_this_one(end):
+    command = [sys.executable, "-c", IN_WHICHEVER_IS_FREE.replace("END", end)]
     done = subprocess.run(command, capture_output=True, text=True, check=False, timeout=60)
-    pids = done.stdout.split()
-    assert len(pids) == 2, done.stderr
-    assert all(has_ended(pid) for pid in pids)
+    pids, said = done.stdout.splitlines()
+    assert len(pids.split()) == 2, done.stderr
+    assert said == "True False"
+    assert all(has_ended(pid) for pid in pids.split())
+
+
+CHECKS_ELSEWHERE = """
+import os, signal, sys
+import numpy as np
+from bowdenfit.inference.diagnostics import diagnose_all
+from bowdenfit.run.fitting import _diagnosed
+from bowdenfit.run.helpers import InTwoProcesses
+
+def nothing():
+    pass
+
+draws = {"mu": np.random.default_rng(0).standard_normal((8, 50))}
+helper = InTwoProcesses(nothing)
+elsewhere = _diagnosed(helper, draws, 4)
+assert "arviz_stats" not in sys.modules
+os.kill(helper.second.process.pid, signal.SIGKILL)
+print(elsewhere == _diagnosed(helper, draws, 4) == diagnose_all(draws, 4))
+helper.end()
+"""
+
+
+@needs_linux
+def test_draws_are_diagnosed_alike_elsewhere_and_here_where_that_process_was_ended():
+    done = subprocess.run([sys.executable, "-c", CHECKS_ELSEWHERE], capture_output=True, text=True, check=False, timeout=120)
+    assert done.stdout == "True\n", done.stderr
+
+
+def test_a_library_is_hidden_only_while_others_are_loaded():
+    seen = "import sys; from bowdenfit.run.helpers import load_without; load_without('scipy.stats', 'emcee'); "
+    seen += "print('scipy.stats' in sys.modules); import scipy.stats, emcee; print(emcee.EnsembleSampler.__name__)"
+    done = subprocess.run([sys.executable, "-c", seen], capture_output=True, text=True, check=True, timeout=60)
+    assert done.stdout.split() == ["False", "EnsembleSampler"]
+
+
+def test_an_answer_that_was_promised_is_taken_and_worked_out_where_the_promise_was_broken(fit_of_nothing):
+    kept, broken = Future(), Future()
+    kept.set_result("from elsewhere")
+    broken.set_exception(BowdenfitError("ended"))
+    for promise, answer in ((kept, "from elsewhere"), (broken, "from here")):
+        fit_of_nothing._answers[question] = promise
+        assert question(fit_of_nothing) == answer
+        assert fit_of_nothing._answers[question] == answer
+
+
+@once
+def question(fit):
+    return "from here"
+
+
+@pytest.fixture
+def fit_of_nothing():
+    return SimpleNamespace(_answers={})

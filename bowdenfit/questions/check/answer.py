@@ -7,18 +7,15 @@ from typing import ClassVar
 import numpy as np
 
 from bowdenfit.display import Display, Rows, Several
-from bowdenfit.inference.predictive_checks import place_at_random, predict_without_each, uniformity
-from bowdenfit.inference.prior_sensitivity import FarOut, Sensitivity, far_out, sensitivities
+from bowdenfit.inference.prior_sensitivity import FarOut, Sensitivity, far_out, other_scales
 from bowdenfit.kinds.places import places_of
 from bowdenfit.kinds.term import Term
-from bowdenfit.parameters.space import Parameter
+from bowdenfit.questions.check.evidence import Evidence, Findings, TableDraws, TableWithoutEach, work_out
 from bowdenfit.questions.check.table_checks import FALSE_ALARM, CheckedReading, TableChecks
-from bowdenfit.results.record import Draws, Record, once
+from bowdenfit.results.record import Record, once
 
-_LEAST_READINGS = 8  # of a table, below which its distribution cannot be judged
 _FEW_LEFT = 4  # readings beyond the coefficients, up to which their scatter is hardly known
 _DRAWS = 5000  # that sensitivity to the priors is worked out from
-_STREAM = 5  # of the fit's random numbers
 
 
 @dataclass(frozen=True, repr=False)
@@ -70,13 +67,46 @@ def checks_of(fit: Record) -> Checks | None:
     """All checks of a fit; None without draws."""
     if fit.sampled is None:
         return None
-    terms = [t for t in fit.model.terms if t.labels and t.residual_blocks[0][1] > 0]
-    generator = np.random.default_rng([fit.provenance.seed, _STREAM])
-    tables = tuple(_table(fit, fit.posterior, term, 1 - FALSE_ALARM / len(terms), generator) for term in terms)
+    found = checks_findings(fit)
+    tables = tuple(_table(fit, *each) for each in zip(_tables(fit), found.tables, strict=True))
     parameters = {p.name: p for p in fit.model.space.free}
     z = {name: fit.posterior.z[..., i] for name, i in fit.model.space.index.items()}
-    found = _sensitivities(fit, fit.posterior, parameters)
-    return Checks(tables, found, far_out(z, parameters), _told_by_few(fit))
+    return Checks(tables, found.sensitivities, far_out(z, parameters), _told_by_few(fit))
+
+
+@once
+def checks_findings(fit: Record) -> Findings:
+    """What takes time of the checks of a fit with draws; `work_out` of `evidence_of` gives the same in another process."""
+    return work_out(evidence_of(fit))
+
+
+def evidence_of(fit: Record) -> Evidence:
+    """What checks of a fit with draws are worked out from."""
+    terms, posterior, space = _tables(fit), fit.posterior, fit.model.space
+    every = max(1, posterior.z[..., 0].size // _DRAWS)
+    asked = {p.name: posterior.values[p.name] for p in space.free if p.role == "friction"} | posterior.optimum
+    log_likelihood = sum((np.sum(part, axis=-1) for part in posterior.log_likelihood.values()), np.zeros(()))
+    return Evidence(
+        [_draws_of(fit, term) for term in terms],
+        posterior.n_effective,
+        1 - FALSE_ALARM / max(len(terms), 1),
+        fit.provenance.seed,
+        {name: draws[:, ::every] for name, draws in asked.items()},
+        {p.name: posterior.z[:, ::every, i] for i, p in enumerate(space.free)},
+        log_likelihood[:, ::every],
+        {p.name: other_scales(p.prior, posterior.values[p.name][:, ::every] / p.shown_scale) for p in space.free},
+    )
+
+
+def _tables(fit: Record) -> list[Term]:
+    """Terms whose readings are checked."""
+    return [t for t in fit.model.terms if t.labels and t.residual_blocks[0][1] > 0]
+
+
+def _draws_of(fit: Record, term: Term) -> TableDraws:
+    parts = (part[term.name] for part in (fit.posterior.log_likelihood, fit.posterior.replicated))
+    log_likelihood, replicated = (part.reshape(-1, len(term.labels)) for part in parts)
+    return TableDraws(log_likelihood, replicated, *readings_of(term))
 
 
 def _told_by_few(fit: Record) -> dict[str, tuple[int, int]]:
@@ -89,19 +119,12 @@ def _told_by_few(fit: Record) -> dict[str, tuple[int, int]]:
     return {n: (readings[n], coefficients) for n in noise if 0 < readings.get(n, 0) <= coefficients + _FEW_LEFT}
 
 
-def _table(
-    fit: Record, posterior: Draws, term: Term, probability: float, generator: np.random.Generator
-) -> TableChecks:
-    n = len(term.labels)
-    log_likelihood, replicated = (
-        part[term.name].reshape(-1, n) for part in (posterior.log_likelihood, posterior.replicated)
-    )
+def _table(fit: Record, term: Term, found: TableWithoutEach) -> TableChecks:
     reading, at_most = readings_of(term)
-    predicted = predict_without_each(log_likelihood, replicated, reading, at_most, posterior.n_effective)
-    placed = place_at_random(predicted, generator)
-    uniform = uniformity(placed, probability) if n >= _LEAST_READINGS else None
     places = places_of(fit.dataset.description, fit.dataset.measurements, term)
-    return TableChecks(term.name, term.unit, term.labels, reading, at_most, predicted, places, placed, uniform)
+    return TableChecks(
+        term.name, term.unit, term.labels, reading, at_most, found.predicted, places, found.placed, found.uniform
+    )
 
 
 def readings_of(term: Term) -> tuple[np.ndarray, np.ndarray]:
@@ -113,17 +136,3 @@ def readings_of(term: Term) -> tuple[np.ndarray, np.ndarray]:
     if bounds:
         at_most[len(at_most) - bounds :] = True
     return reading, at_most
-
-
-def _sensitivities(fit: Record, posterior: Draws, parameters: dict[str, Parameter]) -> tuple[Sensitivity, ...]:
-    """Of the free friction coefficients and the design answers."""
-    space = fit.model.space
-    every = max(1, posterior.z[..., 0].size // _DRAWS)
-    names = [p.name for p in space.free if p.role == "friction"]
-    quantities = {name: posterior.values[name] for name in names} | posterior.optimum
-    thinned = {name: draws[:, ::every] for name, draws in quantities.items()}
-    thinned = {name: draws for name, draws in thinned.items() if np.ptp(draws) > 0}  # or an end in all of them
-    z = {p.name: posterior.z[:, ::every, i] for i, p in enumerate(space.free)}
-    values = {name: posterior.values[name][:, ::every] / p.shown_scale for name, p in parameters.items()}
-    log_likelihood = sum((np.sum(part, axis=-1) for part in posterior.log_likelihood.values()), np.zeros(()))
-    return sensitivities(thinned, z, values, log_likelihood[:, ::every], parameters) if thinned else ()

@@ -188,12 +188,12 @@ def _scatter(found: Checks, noise: str) -> tuple[str, ...]:
 
     With Student noise a few readings may lie anywhere, which is what it is for.
     """
-    from scipy.stats import binom
+    from scipy.special import bdtrc
 
     sentences = []
     for table in found.tables:
         outside = table.measured - table.in_interval
-        if binom.sf(outside - 1, table.measured, 1 - _INTERVAL) * len(found.tables) < FALSE_ALARM:
+        if outside and bdtrc(outside - 1, table.measured, 1 - _INTERVAL) * len(found.tables) < FALSE_ALARM:
             sentences.append(
                 f"The model does not describe {readings_called(table.table).words}: {outside} of {table.measured} lie outside "
                 "their 90 % intervals. The usual causes are a unit or a column that is not what its heading says, labels of "

@@ -73,7 +73,7 @@ def compile_along_route(model: Model, beside: Executor | None = None) -> OfDraws
         return {"curves": curves(z_and_mounting[:-1]), **of_choices}
 
     with jax.enable_x64(True):
-        return for_each_draw(implied, model.space.size + 1, beside=beside)
+        return for_each_draw(implied, model.space.size + 1, run_once=True, beside=beside)
 
 
 def route_draws(model: Model, program: OfDraws, z: np.ndarray, mounting: np.ndarray) -> RouteDraws:

@@ -1,4 +1,4 @@
-"""What works beside a fit: one or two more processes, or a thread where none may be started; and a stopwatch."""
+"""What works beside a fit: other processes, or a thread where none may be started; and a stopwatch."""
 
 import os
 import signal
@@ -19,7 +19,8 @@ from typing import Any, ClassVar, TypeAlias
 from bowdenfit.errors import BowdenfitError
 from bowdenfit.inference.engines.processes import cores, end_with_parent
 
-COMPUTING = ("jax", "bowdenfit.run.fitting")  # what this process and the other both need
+# What this process and a copy of it both need; linear algebra compiled by JAX takes its addresses from SciPy.
+COMPUTING = ("jax", "bowdenfit.run.fitting", "scipy.linalg", "scipy.special")
 DRAWING = (
     "matplotlib.figure",
     "matplotlib.backends.backend_agg",
@@ -90,24 +91,24 @@ class InAnotherProcess(Assistant):
 
     Args:
         copy: Whether it begins as a copy of this one, or anew.
-        settings: Called in it first, if it computes.
+        settings: Called in it first; None where no job will need JAX, and what drawing needs is loaded at once.
         draws: Whether it will draw figures.
         others: Ends of pipes to other processes, which a copy has too and is not to hold open.
-        computes: Whether jobs may need JAX; if not, what drawing needs is loaded at once.
+        twin: Where a copy of it, once it has loaded what drawing needs, gets its jobs from; none is made without it.
     """
 
     def __init__(
         self,
         copy: bool,
-        settings: Callable[[], None],
+        settings: Callable[[], None] | None,
         draws: bool,
         others: "tuple[Connection, ...]" = (),
-        computes: bool = True,
+        twin: "Connection | None" = None,
     ) -> None:
         self.thread, self.draws = ThreadPoolExecutor(1), draws
         context: Any = get_context("fork" if copy else "spawn")
         self.ours, theirs = context.Pipe()
-        passed = (theirs, (self.ours, *others) if copy else (), settings if computes else None)
+        passed = (theirs, (self.ours, *others) if copy else (), settings, twin)
         self.process = context.Process(target=_serve, args=passed, daemon=True)
         self.process.start()
         theirs.close()
@@ -150,33 +151,56 @@ class InAnotherProcess(Assistant):
         self.thread.shutdown()
 
 
-class InTwoProcesses(Assistant):
-    """Generators in one copy of this process; functions in that and another one, in whichever is free.
+class Twin(InAnotherProcess):
+    """A copy that a process which draws makes of itself; it ends with that one."""
 
-    The other is a copy of this process before it loads JAX, and loads meanwhile what drawing needs. What checking needs waits
-    until the generator is through, since this process compiles as long as that, and there may be two cores.
+    def __init__(self) -> None:
+        self.thread, self.draws = ThreadPoolExecutor(1), True
+        self.ours, self.theirs = get_context("fork").Pipe()
+
+    def end(self) -> None:
+        """Ask nothing more of it."""
+        self.ours.close()
+        self.thread.shutdown()
+
+
+class InOtherProcesses(Assistant):
+    """Generators in a copy of this process; functions in one without JAX and its twin, in whichever is free.
+
+    Those two begin before this process loads JAX, and load meanwhile what drawing needs. What checking needs waits until the
+    generator is through, since this process compiles as long as that, and there may be two cores.
+
+    Args:
+        settings: See `assistant`.
+        computes: Whether a generator will be begun.
     """
 
     checks = True
 
-    def __init__(self, settings: Callable[[], None]) -> None:
-        self.second = InAnotherProcess(True, settings, True, computes=False)
+    def __init__(self, settings: Callable[[], None], computes: bool) -> None:
+        self.twin = Twin()
+        self.drawing = InAnotherProcess(True, None, True, (self.twin.ours,), self.twin.theirs)
+        self.twin.theirs.close()
         load(*COMPUTING)
         settings()
-        self.first = InAnotherProcess(True, settings, True, (self.second.ours,))
+        ends = self.drawing.ours, self.twin.ours
+        self.computing = InAnotherProcess(True, settings, False, ends) if computes else None
         self.free = SimpleQueue[InAnotherProcess]()
-        self.free.put(self.second)
+        for process in (self.drawing, self.twin):
+            self.free.put(process)
         self.threads = ThreadPoolExecutor(2)
 
     def begin(self, stages: Callable[..., Iterator[Any]], *arguments: Any, answers: int) -> Answers:
         """See `Assistant`."""
-        found = self.first.begin(stages, *arguments, answers=answers)
+        assert self.computing is not None  # as was asked for
+        found = self.computing.begin(stages, *arguments, answers=answers)
+        self.computing.submit(os._exit, 0)  # which gives its memory back
         found[-1].add_done_callback(lambda _: self._load_what_checking_needs())
         return found
 
     def _load_what_checking_needs(self) -> None:
         with suppress(RuntimeError):  # all has ended
-            self.second.submit(load, *CHECKING)
+            self.drawing.submit(load, *CHECKING)
 
     def submit(self, function: Callable[..., Any], *arguments: Any) -> "Future[Any]":
         """See `Assistant`."""
@@ -184,12 +208,7 @@ class InTwoProcesses(Assistant):
 
     def check(self, function: Callable[..., Any], *arguments: Any) -> "Future[Any]":
         """See `Assistant`."""
-        return self.second.submit(function, *arguments)
-
-    def prepare_to_draw(self) -> None:
-        """See `Assistant`."""
-        self.first.prepare_to_draw()
-        self.free.put(self.first)
+        return self.drawing.submit(function, *arguments)
 
     def _in_one_that_is_free(self, function: Callable[..., Any], arguments: tuple[Any, ...]) -> Any:
         process = self.free.get()
@@ -199,15 +218,18 @@ class InTwoProcesses(Assistant):
             self.free.put(process)
 
     def end(self) -> None:
-        """End both."""
-        for process in (self.first, self.second):
-            process.end()
+        """End all."""
+        for process in (self.computing, self.drawing, self.twin):
+            if process is not None:
+                process.end()
         self.threads.shutdown(cancel_futures=True)
 
 
 @contextmanager
-def assistant(in_background: bool, settings: Callable[[], None], draws: bool) -> Iterator[Assistant]:
-    """An assistant in a process of its own, or in this one.
+def assistant(
+    in_background: bool, settings: Callable[[], None], draws: bool, computes: bool = True
+) -> Iterator[Assistant]:
+    """An assistant in processes of its own, or in this one.
 
     A copy of this process has all its libraries and starts at once, but may be made only while nothing runs in it besides.
     A new process imports the main module again, so only a program that guards its start may ask for one: the command line
@@ -217,10 +239,11 @@ def assistant(in_background: bool, settings: Callable[[], None], draws: bool) ->
         in_background: Whether another process may be started.
         settings: Called first, in every process that computes.
         draws: Whether figures will be drawn.
+        computes: Whether it will be given a generator.
     """
     copy = sys.platform == "linux" and "jax" not in sys.modules and threading.active_count() == 1
     if in_background and copy and draws and cores() > 1:
-        other: InTwoProcesses | InAnotherProcess = InTwoProcesses(settings)
+        other: InOtherProcesses | InAnotherProcess = InOtherProcesses(settings, computes)
     else:
         load(*COMPUTING)
         settings()
@@ -247,13 +270,18 @@ def _deliver(source: Iterable[Any], futures: Answers) -> None:
                 future.set_exception(error)
 
 
-def _serve(requests: "Connection", theirs: "tuple[Connection, ...]", settings: Callable[[], None] | None) -> None:
+def _serve(
+    requests: "Connection",
+    theirs: "tuple[Connection, ...]",
+    settings: Callable[[], None] | None,
+    twin: "Connection | None" = None,
+) -> None:
     """Do one job after the other until the process that asks for them ends; an interrupt is for that one to handle.
 
     Args:
         requests: Where jobs come from.
         theirs: Ends that are not this process's.
-        settings: See `assistant`; None where no job needs JAX.
+        settings, twin: See `InAnotherProcess`.
     """
     signal.signal(signal.SIGINT, signal.SIG_IGN)
     signal.signal(signal.SIGTERM, signal.SIG_DFL)
@@ -264,6 +292,8 @@ def _serve(requests: "Connection", theirs: "tuple[Connection, ...]", settings: C
         if settings is None:
             with suppress(Exception):  # what fails here fails where it is needed
                 load(*DRAWING)
+            if twin is not None:
+                requests = _one_of_two(requests, twin)
         else:
             import jax
 
@@ -275,6 +305,16 @@ def _serve(requests: "Connection", theirs: "tuple[Connection, ...]", settings: C
             for reply in _replies(function, arguments):
                 requests.send(reply)
     os._exit(0)
+
+
+def _one_of_two(requests: "Connection", twin: "Connection") -> "Connection":
+    """Where this process gets its jobs from, or the copy of it that is made here."""
+    if os.fork():
+        twin.close()
+        return requests
+    end_with_parent()
+    requests.close()
+    return twin
 
 
 def _replies(function: Callable[..., Any], arguments: tuple[Any, ...]) -> Iterator[tuple[Any, Any] | None]:

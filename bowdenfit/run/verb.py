@@ -72,7 +72,7 @@ def fit(
     with ExitStack() as held:
         held.enter_context(reserved(folder))
         seed = choose_seed(folder, data, mcmc, seed, resume, force)
-        helper = held.enter_context(assistant(in_background and (mcmc or drawing), settings, drawing))
+        helper = held.enter_context(assistant(in_background and (mcmc or drawing), settings, drawing, mcmc))
         show = held.enter_context(watched(WATCH, progress)) if mcmc else None
         import jax
 

@@ -1,5 +1,6 @@
 """The process that works beside a fit: answers and errors come back, and it never outlives the fit."""
 
+import ast
 import os
 import signal
 import subprocess
@@ -146,41 +147,36 @@ def test_an_error_arrives_where_the_answer_is_asked_for(make):
 
 IN_WHICHEVER_IS_FREE = """
 import os, sys, time
-from bowdenfit.run.helpers import InTwoProcesses
+from bowdenfit.run.helpers import InOtherProcesses
 
 def nothing():
     pass
 
 def begun():
-    yield os.getpid()
+    yield os.getpid(), "jax" in sys.modules
 
 def slow():
     time.sleep(1)
-    return os.getpid()
-
-def has_jax():
     return os.getpid(), "jax" in sys.modules
 
-helper = InTwoProcesses(nothing)
-(computing,) = helper.begin(begun, answers=1)
-helper.prepare_to_draw()
-pids = {job.result() for job in [helper.submit(slow), helper.submit(slow)]}
-checking, jax_there = helper.check(has_jax).result()
-print(*pids, flush=True)
-print({computing.result(), checking} == pids, jax_there, flush=True)
+helper = InOtherProcesses(nothing, True)
+jobs = [helper.submit(slow), helper.submit(slow), helper.check(slow), *helper.begin(begun, answers=1)]
+answers = [job.result() for job in jobs]
+print(*answers, sep=chr(10), flush=True)
 END
 """
 
 
 @needs_linux
 @pytest.mark.parametrize("end", ["helper.end()", "os.kill(os.getpid(), 9)"])
-def test_two_processes_work_at_once_check_without_jax_and_end_with_this_one(end):
+def test_two_processes_work_at_once_without_jax_beside_one_with_it_and_all_end_with_this_one(end):
     command = [sys.executable, "-c", IN_WHICHEVER_IS_FREE.replace("END", end)]
     done = subprocess.run(command, capture_output=True, text=True, check=False, timeout=60)
-    pids, said = done.stdout.splitlines()
-    assert len(pids.split()) == 2, done.stderr
-    assert said == "True False"
-    assert all(has_ended(pid) for pid in pids.split())
+    first, second, checking, computing = (ast.literal_eval(line) for line in done.stdout.splitlines())
+    assert [jax_there for _, jax_there in (first, second, checking, computing)] == [False, False, False, True], done.stderr
+    assert len({first[0], second[0], computing[0]}) == 3
+    assert checking[0] in {first[0], second[0]}
+    assert all(has_ended(pid) for pid, _ in (first, second, computing))
 
 
 CHECKS_ELSEWHERE = """
@@ -188,16 +184,16 @@ import os, signal, sys
 import numpy as np
 from bowdenfit.inference.diagnostics import diagnose_all
 from bowdenfit.run.fitting import _diagnosed
-from bowdenfit.run.helpers import InTwoProcesses
+from bowdenfit.run.helpers import InOtherProcesses
 
 def nothing():
     pass
 
 draws = {"mu": np.random.default_rng(0).standard_normal((8, 50))}
-helper = InTwoProcesses(nothing)
+helper = InOtherProcesses(nothing, False)
 elsewhere = _diagnosed(helper, draws, 4)
 assert "arviz_stats" not in sys.modules
-os.kill(helper.second.process.pid, signal.SIGKILL)
+os.kill(helper.drawing.process.pid, signal.SIGKILL)
 print(elsewhere == _diagnosed(helper, draws, 4) == diagnose_all(draws, 4))
 helper.end()
 """

@@ -10,6 +10,7 @@ import os
 from collections.abc import Callable, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import replace
+from functools import partial
 from typing import Any
 
 import jax
@@ -75,7 +76,7 @@ def _fit_group(
         _ = programs.ensembles
         for _ in range(walking[0].rounds, target):
             walking = in_chunks(walk, walking, WALKING)
-        done |= {case.number: case for case in in_chunks(look, walking)}
+        done |= {case.number: case for case in in_chunks(partial(look, last=target == limit), walking)}
         target = min(target + max(target // 3, 1), limit)
     for case in done.values():
         if programs.settings.nuts and len(case.fit.z) and case.fit.reasons:

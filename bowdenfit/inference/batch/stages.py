@@ -146,12 +146,18 @@ def _evened(programs: BatchPrograms, weighted: Weighted) -> np.ndarray:
     return evened(weighted.log_weights, _SPREAD * programs.settings.sampler.n_ensembles * programs.n_walkers)
 
 
-def look(programs: BatchPrograms, cases: list[Case]) -> list[Case]:
-    """What the draws of the second half of the walkers' paths say."""
-    return [replace(case, fit=_by_ensembles(programs, case)) for case in cases]
+def look(programs: BatchPrograms, cases: list[Case], last: bool) -> list[Case]:
+    """What the draws of the second half of the walkers' paths say.
+
+    Args:
+        programs: What is compiled.
+        cases: Of a chunk.
+        last: Whether no walkers go on; else diagnostics end with the first parameter that asks for more.
+    """
+    return [replace(case, fit=_by_ensembles(programs, case, last)) for case in cases]
 
 
-def _by_ensembles(programs: BatchPrograms, case: Case) -> BatchFit:
+def _by_ensembles(programs: BatchPrograms, case: Case, last: bool) -> BatchFit:
     sampler, stored = programs.settings.sampler, case.rounds * STORED
     second = case.path[-(stored // 2) :]
     strict = bool(np.isfinite(programs.settings.target_sd_error))
@@ -159,9 +165,14 @@ def _by_ensembles(programs: BatchPrograms, case: Case) -> BatchFit:
     kept = np.unique(np.linspace(0, len(second) - 1, per_walker).round().astype(int))
     z = second[kept].transpose(1, 2, 0, 3).reshape(-1, len(kept), len(programs.names))
     draws = {name: z[..., i] for i, name in enumerate(programs.names)}
-    diagnostics = diagnose_few_draws(draws, sampler.n_ensembles)
-    short = shortfalls(diagnostics, sampler.target_r_hat, sampler.target_ess)
-    reasons = (*short, *remembered(diagnostics, FORGETS * len(z)), *stuck_walkers(z))
+    diagnostics, reasons = dict[str, Diagnostics](), stuck_walkers(z)
+    asked_before = [*case.fit.diagnostics][-1:]  # for more
+    for name in dict.fromkeys((*asked_before, *programs.names)):
+        if reasons and not last:
+            break
+        found = diagnose_few_draws({name: draws[name]}, sampler.n_ensembles)
+        short = shortfalls(found, sampler.target_r_hat, sampler.target_ess)
+        reasons, diagnostics = (*reasons, *short, *remembered(found, FORGETS * len(z))), diagnostics | found
     if strict and not reasons:
         reasons = uncertain_sds(sd_errors(draws), programs.settings.target_sd_error)
     steps = case.rounds * STEPS

@@ -19,7 +19,8 @@ OPTIONS: dict[str, dict[str, Any]] = {
     "svg": {"metadata": {"Date": None}},
     "pdf": {"metadata": {"CreationDate": None}},
 }
-_TYPESETTING = ("GSUB", "GPOS", "GDEF", "MATH", "kern")  # tables that a PDF, whose letters have their places, never looks at
+# Tables of a TrueType font that a PDF uses whose letters are named by number; ISO 32000-1, table 126.
+_OF_PDF = {"head", "hhea", "loca", "maxp", "cvt ", "prep", "glyf", "hmtx", "fpgm"}
 
 
 def write_all(figure: Figure, folder: Path, name: str, formats: Sequence[str] = FORMATS) -> list[Path]:
@@ -61,7 +62,7 @@ def save(figure: Figure, target: Path | BinaryIO, ending: str) -> None:
 
 @contextmanager
 def _lean_fonts() -> Iterator[None]:
-    """Fonts go into a PDF without tables for typesetting, which take as long to read and cut down as all the rest.
+    """TrueType fonts go into a PDF without tables that it never looks at, which take longer to read than all that it uses.
 
     matplotlib has no setting for that; it has fontTools load fonts, which are made lean here as they are loaded.
     """
@@ -71,9 +72,8 @@ def _lean_fonts() -> Iterator[None]:
 
     def lean(*arguments: Any, **options: Any) -> Any:
         font = usual(*arguments, **options)
-        for table in _TYPESETTING:
-            if table in font:
-                del font[table]
+        for table in set(font.reader.keys()) - _OF_PDF if "glyf" in font else ():
+            del font[table]
         return font
 
     subset.load_font = lean

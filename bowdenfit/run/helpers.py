@@ -308,8 +308,12 @@ def _serve(
 
 
 def _one_of_two(requests: "Connection", twin: "Connection") -> "Connection":
-    """Where this process gets its jobs from, or the copy of it that is made here."""
-    if os.fork():
+    """Where this process gets its jobs from, or the copy of it that is made here, where there may be one more."""
+    try:
+        original = os.fork() > 0
+    except OSError:
+        original = True
+    if original:
         twin.close()
         return requests
     end_with_parent()

@@ -61,15 +61,19 @@ def start_of(path: Path, data: bytes) -> Sheet:
         raise DatasetError(
             f"{path.name} has no rows of numbers in columns; export the recording as CSV with one column for each signal."
         )
-    layout, separator, decimal = max(
-        found, key=lambda reading: (reading[0].named and reading[0].fits, reading[0].score)
-    )
+    layout, separator, decimal = max(found, key=lambda reading: _worth(reading[0]))
     below = rows[separator][layout.start :]
     above = [line for line in lines if line.start < below[0].start]
     layout = _fitting(path, layout, below, separator, above)
     over = tuple(rows[separator][i].row for i in layout.over)
     others = {line.row: _why_above(line) for line in every if line.start < below[0].start and line.row not in over}
     return Sheet(encoding, separator, decimal, below[0].start, layout, tuple(line.text for line in above), over, others)
+
+
+def _worth(layout: Layout) -> tuple[bool, bool, int]:
+    """How much speaks for a reading: headings in words that have room for all columns, any such, and numbers."""
+    named = layout.named and layout.fits
+    return named and not layout.by_numbers, named, layout.score
 
 
 def _why_above(line: Line) -> tuple[str, str]:

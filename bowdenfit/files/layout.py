@@ -33,6 +33,7 @@ class Layout:
         score: How much speaks for this reading of the sheet: the number of cells that are numbers.
         given: Number of cells in the row of headings.
         over: Positions of the rows of headings and units.
+        by_numbers: Whether the headings are a row of numbers, which may be data.
     """
 
     start: int
@@ -42,6 +43,7 @@ class Layout:
     score: int
     given: int = 0
     over: tuple[int, ...] = ()
+    by_numbers: bool = False
 
     @property
     def room(self) -> int:
@@ -82,7 +84,8 @@ def layout_of(rows: Rows, decimal: str) -> Layout | None:
     start = _below_headings(rows, kinds, start)
     width = max(len(row) for row in rows[start:stop])
     header, units, over = _header_rows(rows, start, stop)
-    if not header and _is_numeric_heading(rows[start:stop], kinds[start:stop], decimal):
+    by_numbers = not header and _is_numeric_heading(rows[start:stop], kinds[start:stop], decimal)
+    if by_numbers:
         header, over, start = [rows[start]], [start], start + 1
     columns = tuple(_kind_of_column(kinds[start:stop], i) for i in range(width))
     rising = [_rises(rows[start:stop], i, decimal) for i in range(width)]
@@ -98,6 +101,7 @@ def layout_of(rows: Rows, decimal: str) -> Layout | None:
         score,
         max(map(len, header)),
         tuple(over),
+        by_numbers,
     )
 
 

@@ -1,5 +1,6 @@
 """What the summary says is wrong, the verdict says too."""
 
+import re
 import shutil
 from dataclasses import replace
 
@@ -109,7 +110,7 @@ def test_a_reading_far_out_is_a_trouble_unless_the_noise_may_have_such(on_body, 
     normal, student = (bf.fit(slipped, noise=noise, seed=1, settings=QUICK) for noise in ("normal", "student"))
     assert "free_sheath_angle at 480 mm: so far out" in " ".join(normal.verdict().reasons)
     page = summary_text(normal)
-    assert faults(page) == [] and "Off: 1 of 26 readings" in page and "82.0 deg" in page
+    assert faults(page) == [] and "Off: 1 of 26 readings" in page and re.search(r"82(\.0)? deg", page)
     assert student.verdict().trusted
     assert student.parameter("mu3").q05 > normal.parameter("mu3").q05 + 0.02
 

@@ -1,5 +1,6 @@
 """What a batch of data sets is fitted with: settings, and programs compiled once for all data of one shape."""
 
+import os
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
 from functools import cached_property
@@ -21,8 +22,8 @@ from bowdenfit.inference.objective import noise_scales
 from bowdenfit.inference.value_chart import chart_values
 
 # Data sets that a program takes at once, always as many, so that rounding is the same: to weigh, and to walk, where the last
-# few may go on for long.
-CHUNK, WALKING = 16, 4
+# of all goes on alone, and fewer than two at once take longer each.
+CHUNK, WALKING = 16, 2
 
 
 @dataclass(frozen=True)
@@ -89,6 +90,11 @@ class BatchPrograms:
         frames = batch_frames(chart_values(self.posterior.model.space), Conditional(self.posterior))
         data = stack([self.posterior.data], WALKING)
         return make_round(self.posterior, frames, self.settings.sampler.n_ensembles, self.n_walkers, data)
+
+    @property
+    def threads(self) -> int:
+        """How many chunks at once."""
+        return self.settings.threads or len(os.sched_getaffinity(0))
 
     @property
     def n_walkers(self) -> int:

@@ -29,11 +29,11 @@ from bowdenfit.description import SamplerSettings
 from bowdenfit.inference.batch.fitting import fit_batch
 from bowdenfit.inference.batch.programs import BatchPrograms
 from bowdenfit.inference.chain import Sampling
-from bowdenfit.inference.coordinates import walker_programs
 from bowdenfit.inference.ensemble import sample
 from bowdenfit.inference.least_squares import maximum_posterior
 from bowdenfit.inference.log_density import LogDensity
 from bowdenfit.inference.objective import make_objective
+from bowdenfit.inference.walkers import walker_programs
 from bowdenfit.kinds.designs import design_of
 from bowdenfit.kinds.settings import parse_description
 from bowdenfit.model import build_model
@@ -154,7 +154,7 @@ def seconds_alone(posterior: LogDensity) -> float:
     """What emcee's ensembles take for one cable to the targets of a batch, once compiled."""
     settings = SamplerSettings(n_walkers=64, target_ess=TARGETS.target_ess, target_r_hat=TARGETS.target_r_hat)
     objective = make_objective(posterior)
-    programs = walker_programs(posterior, settings.proposed(posterior.model.space.size))
+    programs = walker_programs(posterior, settings)
     for _ in range(2):
         begin = time.perf_counter()
         sample(Sampling(posterior, maximum_posterior(posterior, objective), settings, 1), programs)

@@ -32,12 +32,12 @@ from bowdenfit.dataset import Dataset
 from bowdenfit.description import Description, SamplerSettings
 from bowdenfit.inference.chain import Sampling
 from bowdenfit.inference.compilation import compile_program
-from bowdenfit.inference.coordinates import walker_programs
 from bowdenfit.inference.draws import curves_of, for_each_draw, named_values
 from bowdenfit.inference.ensemble import sample
 from bowdenfit.inference.least_squares import maximum_posterior
 from bowdenfit.inference.log_density import LogDensity
 from bowdenfit.inference.objective import make_objective
+from bowdenfit.inference.walkers import walker_programs
 from bowdenfit.kinds.angles.table import AngleTable
 from bowdenfit.kinds.candidate import Candidate
 from bowdenfit.kinds.designs import design_of
@@ -194,8 +194,7 @@ class Bench:
     def _draws(self, posterior: LogDensity, seed: int) -> np.ndarray:
         """Draws of the posterior by bowdenfit's own sampler."""
         objective = self._program(posterior, "objective", make_objective)
-        batch = SAMPLER.proposed(posterior.model.space.size)
-        programs = self._program(posterior, "walkers", lambda p: walker_programs(p, batch))
+        programs = self._program(posterior, "walkers", lambda p: walker_programs(p, SAMPLER))
         start = maximum_posterior(posterior, objective)
         z = sample(Sampling(posterior, start, SAMPLER, seed), programs).z
         return z.reshape(-1, posterior.model.space.size)

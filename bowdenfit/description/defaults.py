@@ -101,10 +101,6 @@ class SamplerSettings(Frozen):
         """Walkers of each ensemble for so many parameters."""
         return self.n_walkers or max(FEWEST_WALKERS, WALKERS_PER_PARAMETER * size)
 
-    def proposed(self, size: int) -> int:
-        """Places that are proposed together: half of all walkers."""
-        return self.n_ensembles * self.walkers(size) // 2
-
     @property
     def most_draws(self) -> int:
         """Draws that there can be after `max_steps`, even if none depended on the one before; of two samplers the fewer."""

@@ -18,7 +18,6 @@ import jax.numpy as jnp
 import numpy as np
 from jax import Array
 
-from bowdenfit.inference.compilation import compile_program
 from bowdenfit.inference.log_density import LogDensity
 from bowdenfit.parameters.space import ParameterSpace
 
@@ -63,30 +62,16 @@ class Conditional:
         """Whether readings say anything of coefficients."""
         return len(self.which) > 0 and len(self._rubbing) > 0
 
-    def to_w(self, z: Array, data: Any) -> Array:
-        """W of one z."""
-        return z.at[self.which].set(self._along(z[self.which], self._ridge(z, data)))
+    def to_w(self, z: Array, data: Any) -> tuple[Array, Array]:
+        """W of one z, and log of the volume in z of a unit of w there."""
+        ridge, own = self._ridge(z, data), z[self.which]
+        return z.at[self.which].set(self._along(own, ridge)), -self._log_volume(own, ridge)
 
     def from_w(self, w: Array, data: Any) -> tuple[Array, Array]:
-        """Z of one w, and log of the volume of a unit of w there; NaN where a coefficient cannot be what w says."""
+        """Z of one w, and log of the volume in z of a unit of w there; NaN where a coefficient cannot be what w says."""
         ridge = self._ridge(w, data)
         z = self._back(w[self.which], ridge)
         return w.at[self.which].set(z), -self._log_volume(z, ridge)
-
-    def both_ways(self, point: Array, data: Any) -> tuple[tuple[Array, Array], tuple[Array, Array]]:
-        """Of one point, taken for z: w, and log of the volume of a unit of z; taken for w: z, and the same.
-
-        The ridge is where everything but the coefficients says, which z and w have in common.
-        """
-        ridge, own = self._ridge(point, data), point[self.which]
-        w, z = self._along(own, ridge), self._back(own, ridge)
-        to_w = point.at[self.which].set(w), self._log_volume(own, ridge)
-        return to_w, (point.at[self.which].set(z), self._log_volume(z, ridge))
-
-    def program(self, batch: int) -> Callable[..., Any]:
-        """`both_ways` of a batch of points and data, compiled."""
-        shape = jax.ShapeDtypeStruct((batch, self.posterior.model.space.size), jnp.float64)
-        return compile_program(jax.vmap(self.both_ways, (0, None)), shape, self.posterior.data)
 
     def _along(self, z: Array, ridge: "_Ridge") -> Array:
         return ridge.root.T @ (self._coefficients.vector(z) - ridge.center)

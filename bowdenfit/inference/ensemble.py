@@ -3,9 +3,11 @@
 Moves: emcee's stretch and differential evolution, and draws from a distribution fitted to the other walkers; a quarter of them
 in z, a quarter in the values of the parameters, half where friction coefficients follow everything else. Not `DESnookerMove`:
 the one in emcee 3.1.6 does not sample the density it is given, and every ensemble agrees on the wrong answer.
+
+emcee keeps the states and the random numbers; from one state to the next it makes one move, which is `THIN` steps of all
+ensembles in one compiled program. Step by step four fifths of the time was Python's.
 """
 
-from collections.abc import Callable, Sequence
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
@@ -15,82 +17,42 @@ import jax
 import numpy as np
 
 from bowdenfit.description import SamplerSettings
-from bowdenfit.description.defaults import THIN, WALKERS_PER_PARAMETER
+from bowdenfit.description.defaults import THIN
 from bowdenfit.inference.chain import Chain, Progress, Sampling, stuck_walkers, worst
 from bowdenfit.inference.checkpoint import append, damaged_checkpoint, records
-from bowdenfit.inference.coordinates import Coordinates, Places, WalkerPrograms, Z, coordinates_of
 from bowdenfit.inference.least_squares import MaximumPosterior
-from bowdenfit.inference.proposals import Proposal, differential_evolution, independent, shares_of_moves, stretch
+from bowdenfit.inference.walkers import WalkerPrograms
 
 _BLOCK = 10  # stored states between two reports
 _FIRST_LOOK = 60  # stored states before the first look; of five data sets the slowest is there after half of that
 _OF_RANDOM = {"random_key": (624,), "random_place": (2,), "random_normal": ()}  # shapes of what makes random numbers
 _KEPT_PER_WALKER = 20  # draws at least that are kept of each walker, spread over the second half of its path
 
-Moves = Sequence[tuple[Proposal, float]]
-
 
 class Sweep(emcee.moves.Move):
-    """Some steps of independent ensembles side by side, in one kind of coordinates: proposals stay within an ensemble.
+    """Some steps of independent ensembles side by side: proposals stay within an ensemble.
 
     At each step one of the moves is made. Each ensemble is split in two at random; the walkers of one half are proposed
-    places by those of the other half of their ensemble. All ensembles' proposals are one array, evaluated in one call, which
-    is why this is several times quicker than one sampler after the other.
+    places by those of the other half of their ensemble.
 
     Args:
-        moves: Where to, and how often.
-        coordinates: In which coordinates.
+        programs: What is compiled.
+        data: Of the density.
         n_ensembles: Number of ensembles; walkers are ordered by ensemble.
     """
 
-    def __init__(self, moves: Moves, coordinates: Coordinates, n_ensembles: int) -> None:
+    def __init__(self, programs: WalkerPrograms, data: Any, n_ensembles: int) -> None:
         super().__init__()
-        self.coordinates, self.n_ensembles = coordinates, n_ensembles
-        self.proposals = [proposal for proposal, _ in moves]
-        self.shares = np.array([share for _, share in moves])
+        self.programs, self.data, self.n_ensembles = programs, jax.device_put(data), n_ensembles
 
     def propose(self, model: Any, state: emcee.State) -> tuple[emcee.State, np.ndarray]:
         """`THIN` steps of every walker, and the share that was accepted."""
-        at, accepted = self.coordinates.from_z(state.coords), np.zeros(len(state.coords))
-        for which in model.random.choice(len(self.proposals), size=THIN, p=self.shares):
-            for half in self._halves(model.random, len(state.coords)):
-                accepted[self._move(self.proposals[which], half, model, state, at)] += 1
-        return state, accepted / THIN
-
-    def _halves(self, random: np.random.RandomState, n: int) -> Sequence[tuple[np.ndarray, np.ndarray]]:
-        """Positions of those that move and those that rest, (ensemble, walker); twice."""
-        walkers = n // self.n_ensembles
-        order = np.argsort(random.rand(self.n_ensembles, walkers), axis=1)
-        order += walkers * np.arange(self.n_ensembles)[:, None]
-        return (order[:, ::2], order[:, 1::2]), (order[:, 1::2], order[:, ::2])
-
-    def _move(
-        self, proposal: Proposal, half: tuple[np.ndarray, np.ndarray], model: Any, state: emcee.State, at: Places
-    ) -> np.ndarray:
-        """Move one half, in z and in the coordinates; positions of those that were moved."""
-        (moving, resting), (w, volume) = half, at
-        proposed, factors = proposal(w[moving], w[resting], model.random)
-        new, which = proposed.reshape(-1, w.shape[1]), moving.ravel()
-        z, new_volume = self.coordinates.to_z(new)
-        log_density = model.log_prob_fn(z)  # ours gives an array; emcee would go through it number by number
-        with np.errstate(invalid="ignore"):  # out of reach of the coordinates the volume may be infinite as the density is
-            gain = factors.ravel() + volume[which] - new_volume + log_density - state.log_prob[which]
-        better = np.isfinite(new_volume) & (gain > np.log(model.random.uniform(size=len(which))))
-        taken = which[better]
-        state.coords[taken], state.log_prob[taken] = z[better], log_density[better]
-        w[taken], volume[taken] = new[better], new_volume[better]
-        return taken
-
-
-def default_moves(size: int, n_walkers: int) -> Moves:
-    """What the walkers do; see `shares_of_moves`.
-
-    Args:
-        size: Number of parameters.
-        n_walkers: Walkers of an ensemble; a few cannot tell the shape of a t distribution.
-    """
-    fitted = independent if n_walkers >= WALKERS_PER_PARAMETER * size else differential_evolution
-    return shares_of_moves(stretch, differential_evolution, fitted)
+        z = state.coords.reshape(self.n_ensembles, -1, state.coords.shape[-1])
+        chosen, values = self.programs.choose(model.random, z.shape), state.log_prob.reshape(z.shape[:2])
+        z, values, accepted = (np.asarray(part) for part in self.programs.sweep(chosen, z, values, self.data))
+        # As arrays of our own: what JAX gives cannot be written to, and emcee's other moves may come next.
+        state.coords[:], state.log_prob[:] = z.reshape(state.coords.shape), values.ravel()
+        return state, accepted.ravel() / THIN
 
 
 def starting_points(start: MaximumPosterior, settings: SamplerSettings, generator: np.random.Generator) -> np.ndarray:
@@ -106,23 +68,24 @@ def starting_points(start: MaximumPosterior, settings: SamplerSettings, generato
     return start.z + (centers + walkers) @ root.T
 
 
-def sample(asked: Sampling, programs: WalkerPrograms, moves: Moves | None = None) -> Chain:
+def sample(asked: Sampling, programs: WalkerPrograms, data: Any = None) -> Chain:
     """Sample by ensembles of walkers.
 
     Args:
         asked: What of, how long, and so on.
-        programs: Compiled for batches of half of all walkers.
-        moves: Proposals and their shares, to be made in z alone; `default_moves`, in all coordinates, if omitted.
+        programs: What is compiled for it.
+        data: Of the density; those of the posterior if omitted.
     """
     settings, start, seed = asked.settings, asked.start, asked.seed
+    data = asked.posterior.data if data is None else data
     points = starting_points(start, settings, np.random.default_rng([seed, 0])).reshape(-1, len(start.z))
     backend = Checkpointed(points.shape, asked.checkpoint, asked.resume)
-    half = len(points) // 2
-    log_density = _in_halves(programs.log_density, asked.posterior.data, half)
-    frames = coordinates_of(asked.posterior, programs, half) if moves is None else [(Z(), 1.0)]
-    moves = moves or default_moves(points.shape[1], settings.walkers(points.shape[1]))
-    sweeps = [(Sweep(moves, coordinates, settings.n_ensembles), share) for coordinates, share in frames]
-    sampler = emcee.EnsembleSampler(*points.shape, log_density, vectorize=True, backend=backend, moves=sweeps)
+    moves = Sweep(programs, data, settings.n_ensembles)
+
+    def log_density(z: np.ndarray) -> np.ndarray:
+        return np.array(programs.log_density(z, moves.data))
+
+    sampler = emcee.EnsembleSampler(*points.shape, log_density, vectorize=True, backend=backend, moves=moves)
     # emcee's wrapper prints a traceback of whatever stops an evaluation, the user's interrupt included.
     sampler.log_prob_fn = log_density
     generator = np.random.RandomState(np.random.MT19937(np.random.SeedSequence([seed, 1])))
@@ -191,12 +154,6 @@ class Checkpointed(emcee.backends.Backend):
                 {"z": state.coords, "log_density": state.log_prob, "accepted": np.asarray(accepted), "random_key": key,
                  "random_place": np.asarray([place, has_normal]), "random_normal": np.asarray(normal)},
             )  # fmt: skip
-
-
-def _in_halves(program: Callable[..., Any], data: Any, half: int) -> Callable[[np.ndarray], np.ndarray]:
-    """Log density in batches of half of all walkers, so that one compiled shape serves the start and every step."""
-    on_device = jax.device_put(data)
-    return lambda z: np.concatenate([program(part, on_device) for part in z.reshape(-1, half, z.shape[1])])
 
 
 def _summarized(asked: Sampling, backend: emcee.backends.Backend) -> Chain:

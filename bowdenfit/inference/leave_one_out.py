@@ -16,18 +16,20 @@ from bowdenfit.description.defaults import WALKERS_PER_PARAMETER
 from bowdenfit.inference.chain import Sampling
 from bowdenfit.inference.comparison import How, Prediction, weigh_without_each
 from bowdenfit.inference.compilation import compile_program
-from bowdenfit.inference.coordinates import WalkerPrograms
+from bowdenfit.inference.coordinates import frames_without_ridge
 from bowdenfit.inference.diagnostics import Diagnostics, diagnose_all
 from bowdenfit.inference.draws import in_batches
 from bowdenfit.inference.least_squares import MaximumPosterior
 from bowdenfit.inference.log_density import LogDensity
 from bowdenfit.inference.moment_matching import match_moments
 from bowdenfit.inference.psis import reliable_k, smooth_weights
+from bowdenfit.inference.walkers import WalkerPrograms, compiled_walkers
 from bowdenfit.kinds.run_parts import RunParts
 
 # A refit is asked for one number, to a few hundredths: fewer walkers than for the answers of a fit.
 REFIT = SamplerSettings(n_ensembles=4, n_walkers=64, max_steps=4000, target_r_hat=1.02, target_ess=400)
 _RATIO = "likelihood"
+_ROWS = 128  # that a compiled program takes at once
 _LARGEST_ERROR = 0.3  # Monte Carlo error of a log density beyond which it is called rough
 
 
@@ -68,47 +70,43 @@ class ReadingsToLeaveOut:
         return sum((jnp.sum(part) for part in found.values()), jnp.zeros(())), jnp.concatenate(each)
 
     @property
-    def walkers(self) -> int:
-        """Walkers of each ensemble of a refit: more than twice as many as there are parameters."""
+    def refits(self) -> SamplerSettings:
+        """Settings, with more than twice as many walkers as there are parameters."""
         size = self.posterior.model.space.size
-        return max(self.settings.walkers(size), WALKERS_PER_PARAMETER * size)
+        walkers = max(self.settings.walkers(size), WALKERS_PER_PARAMETER * size)
+        return self.settings.model_copy(update={"n_walkers": walkers})
 
-    @property
-    def batch(self) -> int:
-        """Rows that the compiled program takes at once: what the sampler asks for at every step."""
-        return self.settings.n_ensembles * self.walkers // 2
+    def _density(
+        self, z: Float[Array, " free"], given: tuple[Any, Any, Float[Array, " readings"]]
+    ) -> tuple[Float[Array, ""], Float[Array, " readings"]]:
+        """Log density of what is counted, and log likelihood of every reading."""
+        data, without, counts = given
+        everything, each = self._each(z, data, without)
+        total = everything - jnp.sum(jnp.where(counts > 0, 0.0, each)) - 0.5 * jnp.sum(z**2)
+        return jnp.where(jnp.isnan(total), -jnp.inf, total), each
 
     @cached_property
     def _program(self) -> Callable[..., Any]:
-        def density(
-            z: Float[Array, " free"], data: Any, without: Any, counts: Float[Array, " readings"]
-        ) -> tuple[Float[Array, ""], Float[Array, " readings"]]:
-            everything, each = self._each(z, data, without)
-            total = everything - jnp.sum(jnp.where(counts > 0, 0.0, each)) - 0.5 * jnp.sum(z**2)
-            return jnp.where(jnp.isnan(total), -jnp.inf, total), each
+        shape = jax.ShapeDtypeStruct((_ROWS, self.posterior.model.space.size), jnp.float64)
+        return compile_program(jax.vmap(self._density, (0, None)), shape, self.without(None))
 
-        shape = jax.ShapeDtypeStruct((self.batch, self.posterior.model.space.size), jnp.float64)
-        counts = jax.ShapeDtypeStruct((len(self.names),), jnp.float64)
-        over_rows = jax.vmap(density, in_axes=(0, None, None, None))
-        return compile_program(over_rows, shape, self.posterior.data, self._without_parts, counts)
+    @cached_property
+    def programs(self) -> WalkerPrograms:
+        """Of fits without any of the readings."""
+        space = self.posterior.model.space
+        given, frames = self.without(None), frames_without_ridge(space)
+        return compiled_walkers(lambda z, given: self._density(z, given)[0], given, space.size, self.refits, frames)
 
-    @property
-    def _without_parts(self) -> dict[str, Any]:
-        return {name: parts.data for name, parts in self.parts.items()}
-
-    def _counts(self, without: int | None) -> np.ndarray:
-        return np.array([float(i != without) for i in range(len(self.names))])
+    def without(self, reading: int | None) -> tuple[Any, Any, np.ndarray]:
+        """Data of the density without a reading, or with all."""
+        counts = np.array([float(i != reading) for i in range(len(self.names))])
+        return self.posterior.data, {name: parts.data for name, parts in self.parts.items()}, counts
 
     def evaluate(self, z: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """Log posterior density, up to a constant, and log likelihood of every reading, at any number of z (rows)."""
-        given = (self.posterior.data, self._without_parts, self._counts(None))
-        density, each = in_batches(lambda part: self._program(part, *given), self.batch, z)
+        everything = self.without(None)
+        density, each = in_batches(lambda part: self._program(part, everything), _ROWS, z)
         return density, each
-
-    def without(self, reading: int) -> Callable[[np.ndarray, Any], Any]:
-        """Log posterior density without a reading, for batches, as the sampler calls it."""
-        counts = self._counts(reading)
-        return lambda z, data: self._program(z, data, self._without_parts, counts)[0]
 
 
 @dataclass(frozen=True)
@@ -158,10 +156,9 @@ class LeavingOut:
         def likelihood(z: np.ndarray) -> dict[str, np.ndarray]:
             return {_RATIO: np.exp(readings.evaluate(z)[1][:, reading] - top)}
 
-        settings = readings.settings.model_copy(update={"n_walkers": readings.walkers})
         own_seed = int(np.random.SeedSequence([self.seed, reading]).generate_state(1)[0])
-        asked = Sampling(readings.posterior, start, settings, own_seed, likelihood, diagnose=_without_drift)
-        chain = sample(asked, WalkerPrograms(readings.without(reading)))
+        asked = Sampling(readings.posterior, start, readings.refits, own_seed, likelihood, diagnose=_without_drift)
+        chain = sample(asked, readings.programs, readings.without(reading))
         mean = float(chain.quantities[_RATIO].mean())
         error = chain.diagnostics[_RATIO].mcse_mean / mean if mean > 0 else float("nan")
         return top + float(np.log(mean)) if mean > 0 else -np.inf, error, not chain.reasons and error < _LARGEST_ERROR

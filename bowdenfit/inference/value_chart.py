@@ -5,11 +5,12 @@ are bent in z are straight in values, and a step along one stays on it. Noise sc
 """
 
 from dataclasses import dataclass
-from functools import cached_property, lru_cache
+from functools import cached_property, lru_cache, partial
 
 import jax
 import jax.numpy as jnp
 import numpy as np
+from jax import Array
 
 from bowdenfit.inference.compilation import compile_program
 from bowdenfit.parameters.space import ParameterSpace
@@ -45,23 +46,26 @@ class Chart:
         """Log of the coordinate per z between nodes."""
         return np.log(self.rises / _WIDTH)
 
-    def from_z(self, z: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        """Coordinates of z (last axis: parameters), and log of the volume of a unit of z there."""
-        along, found = (z[..., self.which] - NODES[0]) / _WIDTH, z.copy()
-        node = np.clip(along, 0, len(NODES) - 2).astype(int)
-        place = node * len(self.which) + np.arange(len(self.which))
-        found[..., self.which] = self.values.take(place) + (along - node) * self.rises.take(place)
-        return found, self.log_slopes.take(place).sum(axis=-1)
+    def from_z(self, z: Array) -> tuple[Array, Array]:
+        """Coordinates of z (last axis: parameters), and log of the volume in z of a unit of them there."""
+        along = (z[..., self.which] - NODES[0]) / _WIDTH
+        node = jnp.clip(along, 0, len(NODES) - 2).astype(int)
+        found = z.at[..., self.which].set(_taken(self.values, node) + (along - node) * _taken(self.rises, node))
+        return found, -_taken(self.log_slopes, node).sum(axis=-1)
 
-    def to_z(self, found: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        """Z of coordinates, and log of the volume of a unit of z there."""
-        z, volume = found.copy(), np.zeros(found.shape[:-1])
-        for column, parameter in enumerate(self.which):
-            at, values, rises = found[..., parameter], self.values[:, column], self.rises[:, column]
-            node = values[1:-1].searchsorted(at, side="right")
-            z[..., parameter] = NODES[0] + _WIDTH * (node + (at - values[node]) / rises[node])
-            volume += self.log_slopes[node, column]
-        return z, volume
+    def to_z(self, found: Array) -> tuple[Array, Array]:
+        """Z of coordinates (walker, parameter), and log of the volume in z of a unit of them there."""
+        at, inner = found[:, self.which], jnp.asarray(self.values[1:-1])
+        search = jax.vmap(partial(jnp.searchsorted, side="right"), in_axes=1, out_axes=1)
+        node = search(inner, at)
+        along = node + (at - _taken(self.values, node)) / _taken(self.rises, node)
+        z = found.at[:, self.which].set(NODES[0] + _WIDTH * along)
+        return z, -_taken(self.log_slopes, node).sum(axis=-1)
+
+
+def _taken(table: np.ndarray, node: Array) -> Array:
+    """Of each column of a table the rows of its nodes."""
+    return jnp.take(jnp.asarray(table), node * table.shape[1] + jnp.arange(table.shape[1]), mode="clip")
 
 
 @lru_cache(maxsize=8)

@@ -10,10 +10,10 @@ import jax
 import numpy as np
 
 from bowdenfit.inference.chain import Chain, Sampling
-from bowdenfit.inference.coordinates import walker_programs
 from bowdenfit.inference.draws import for_each_draw, replicator
 from bowdenfit.inference.log_density import LogDensity as Density
 from bowdenfit.inference.samplers import NAMES, Drawn, compare_samplers
+from bowdenfit.inference.walkers import walker_programs
 from bowdenfit.model import Model
 from bowdenfit.questions.identify.judgment import compile_slopes, slope_program
 from bowdenfit.results.optimum import optimum_of
@@ -59,7 +59,7 @@ def sampling_programs(density: Density, seed: int, beside: Executor) -> Programs
     model, settings, programs = density.model, density.model.description.sampler, dict[str, Any]()
     for name in samplers(settings.method):
         if name == "emcee":
-            programs[name] = walker_programs(density, settings.proposed(model.space.size))
+            programs[name] = walker_programs(density, settings, beside=beside)
         else:
             programs[name] = import_module(_MODULES[name]).make_program(density, settings)
     optimum = for_each_draw(optimum_of(model), model.space.size, beside=beside) if model.description.route else None

@@ -73,7 +73,7 @@ def density_costs(data: Dataset) -> Costs:
         start = time.perf_counter()
         density = LogDensity(build_model(data))
         settings, size = data.description.sampler, density.model.space.size
-        batch = settings.proposed(size)
+        batch = settings.n_ensembles * settings.walkers(size) // 2
         many = jnp.asarray(0.1 * np.random.default_rng(SEED).standard_normal((batch, size)))
         arrays = jax.device_put(density.data)
         value = jax.jit(density.log_density).lower(many[0], arrays).compile()

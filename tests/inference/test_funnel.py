@@ -10,15 +10,17 @@ import jax.numpy as jnp
 import numpy as np
 import pytest
 from scipy import stats
-from test_proposals import LEVELS, PROPOSALS, run_side_by_side
+from test_proposals import LEVELS, PROPOSALS, run_side_by_side, without_its_volume
 
 from bowdenfit.description import SamplerSettings
 from bowdenfit.inference.chain import Sampling
 from bowdenfit.inference.conditional import Conditional
-from bowdenfit.inference.coordinates import Ridge, walker_programs
-from bowdenfit.inference.ensemble import default_moves, sample
+from bowdenfit.inference.coordinates import in_ridge
+from bowdenfit.inference.ensemble import sample
 from bowdenfit.inference.least_squares import MaximumPosterior
 from bowdenfit.inference.log_density import LogDensity
+from bowdenfit.inference.moves import default_moves
+from bowdenfit.inference.walkers import walker_programs
 from bowdenfit.parameters.priors import LogNormal, Normal
 from bowdenfit.parameters.space import Parameter, ParameterSpace
 
@@ -48,11 +50,6 @@ def posterior() -> LogDensity:
     coefficients = [Parameter(f"mu{i}", "", "", "friction", Normal(0.0, 1.0)) for i in range(COUNT)]
     tau = Parameter("tau", "", "", "noise", LogNormal(MEDIAN, LOG_SD))
     return LogDensity(SimpleNamespace(space=ParameterSpace((*coefficients, tau)), terms=(Readings(),)))
-
-
-@pytest.fixture(scope="module")
-def programs(posterior):
-    return walker_programs(posterior, ENSEMBLES * WALKERS // 2)
 
 
 def quantile_of_tau(share: np.ndarray) -> np.ndarray:
@@ -94,65 +91,49 @@ def p_value(states: np.ndarray) -> float:
     return float(min(1.0, stats.ttest_1samp(of_ensembles, expected, axis=0).pvalue.min() * len(expected)))
 
 
-def moved_along_the_ridge(posterior, programs, moves, ridge=Ridge) -> np.ndarray:
+def moved_along_the_ridge(posterior, moves, change=lambda frame: frame) -> np.ndarray:
     """States of walkers that start in the posterior and move in these coordinates alone."""
-    half = ENSEMBLES * WALKERS // 2
-
-    def log_density(z):
-        parts = z.reshape(-1, half, z.shape[1])
-        return np.concatenate([programs.log_density(part, posterior.data) for part in parts])
-
-    frames = ((ridge(programs.ridge, half, posterior.data), 1.0),)
-    return run_side_by_side(moves, log_density, draw(3), 1200, 3, frames)[30:]
+    frames, data = ((change(in_ridge(Conditional(posterior))), 1.0),), posterior.data
+    return run_side_by_side(moves, posterior.log_density, draw(3), 1200, 3, frames, data)[30:]
 
 
 @pytest.mark.parametrize("name", PROPOSALS)
-def test_every_move_along_the_ridge_leaves_the_funnel_as_it_is(name, posterior, programs):
+def test_every_move_along_the_ridge_leaves_the_funnel_as_it_is(name, posterior):
     """Alone, from starts in the funnel; p < 0.001 by chance once in a thousand seeds."""
-    assert p_value(moved_along_the_ridge(posterior, programs, [(PROPOSALS[name], 1.0)])) > 0.001
-
-
-class WithoutItsVolume(Ridge):
-    """As if a unit along the ridge were as wide everywhere."""
-
-    def from_z(self, z):
-        return super().from_z(z)[0], np.zeros(len(z))
-
-    def to_z(self, w):
-        return super().to_z(w)[0], np.zeros(len(w))
+    assert p_value(moved_along_the_ridge(posterior, [(PROPOSALS[name], 1.0)])) > 0.001
 
 
 @pytest.mark.filterwarnings("ignore:Precision loss")
-def test_the_same_test_sees_that_the_width_of_the_ridge_is_not_counted(posterior, programs):
+def test_the_same_test_sees_that_the_width_of_the_ridge_is_not_counted(posterior):
     """The negative control of the test above."""
     moves = default_moves(COUNT + 1, WALKERS)
-    assert p_value(moved_along_the_ridge(posterior, programs, moves, WithoutItsVolume)) < 1e-4
+    assert p_value(moved_along_the_ridge(posterior, moves, without_its_volume)) < 1e-4
 
 
-def sampled(posterior, programs, moves=None) -> np.ndarray:
+def sampled(posterior, moves=None) -> np.ndarray:
     """Draws of the shortest path that is trusted, from the starts of a fit, (draw, ensemble, walker, parameter)."""
     start = MaximumPosterior(np.append(np.linalg.solve(ANGLES, READ), 0.0), np.diag([0.01, 0.01, 0.01, 1.0]))
-    z = sample(Sampling(posterior, start, SETTINGS, 1), programs, moves).z
+    z = sample(Sampling(posterior, start, SETTINGS, 1), walker_programs(posterior, SETTINGS, moves)).z
     return z.reshape(ENSEMBLES, WALKERS, -1, COUNT + 1).transpose(2, 0, 1, 3)
 
 
-def test_walkers_of_a_single_fit_reach_the_narrow_end_of_a_funnel(posterior, programs):
+def test_walkers_of_a_single_fit_reach_the_narrow_end_of_a_funnel(posterior):
     """p < 0.001 by chance once in a thousand seeds."""
-    assert p_value(sampled(posterior, programs)) > 0.001
+    assert p_value(sampled(posterior)) > 0.001
 
 
 @pytest.mark.filterwarnings("ignore:Precision loss")
-def test_walkers_that_move_in_z_alone_do_not_reach_it(posterior, programs):
+def test_walkers_that_move_in_z_alone_do_not_reach_it(posterior):
     """The negative control: without the ridge hardly any walker is where one in a hundred should be."""
-    z = sampled(posterior, programs, default_moves(COUNT + 1, WALKERS))
+    z = sampled(posterior, default_moves(COUNT + 1, WALKERS))
     assert np.mean(z[..., -1] < quantile_of_tau(0.01)) < 0.002
     assert p_value(z) < 1e-4
 
 
-def test_the_way_along_the_ridge_and_back_are_one_program_s_and_inverse(posterior):
-    conditional = Conditional(posterior)
-    z = draw(1)[0]
-    (w, volume), _ = conditional.program(WALKERS)(z, posterior.data)
-    _, (back, same) = conditional.program(WALKERS)(np.asarray(w), posterior.data)
+def test_the_way_along_the_ridge_and_back_are_inverse(posterior):
+    to_w, from_w = in_ridge(Conditional(posterior))
+    z = jnp.asarray(draw(1)[0])
+    w, volume = to_w(z, posterior.data)
+    back, same = from_w(w, posterior.data)
     np.testing.assert_allclose(back, z, rtol=1e-9, atol=1e-9)
     np.testing.assert_allclose(same, volume, rtol=1e-9)

@@ -15,12 +15,12 @@ from snooker import snooker_mixture
 import bowdenfit as bf
 from bowdenfit.description import SamplerSettings
 from bowdenfit.inference.chain import Chain, Sampling, stuck_walkers
-from bowdenfit.inference.coordinates import walker_programs
 from bowdenfit.inference.draws import for_each_draw, named_values
 from bowdenfit.inference.ensemble import sample
 from bowdenfit.inference.least_squares import maximum_posterior
 from bowdenfit.inference.log_density import LogDensity
 from bowdenfit.inference.objective import make_objective
+from bowdenfit.inference.walkers import walker_programs
 from bowdenfit.model import build_model
 from bowdenfit.results.optimum import optimum_of
 from bowdenfit.results.store import posterior_page
@@ -78,7 +78,7 @@ class Bench:
         names, optimum = named_values(posterior.model), optimum_of(posterior.model)
         self.posterior = posterior
         self._implied = for_each_draw(lambda z: (names(z), optimum(z)), posterior.model.space.size)
-        self._programs = cache(lambda batch: walker_programs(posterior, batch))
+        self._programs = cache(lambda settings: walker_programs(posterior, settings))
 
     @cached_property
     def _start(self):
@@ -94,8 +94,8 @@ class Bench:
         return by_name | {"optimal_length": length, "optimal_efficiency": efficiency}
 
     def sample(self, settings: SamplerSettings, seed: int, moves=None) -> Chain:
-        programs = self._programs(settings.proposed(self.posterior.model.space.size))
-        return sample(Sampling(self.posterior, self._start, settings, seed), programs, moves)
+        programs = self._programs(settings) if moves is None else walker_programs(self.posterior, settings, moves)
+        return sample(Sampling(self.posterior, self._start, settings, seed), programs)
 
 
 @pytest.fixture(scope="module")

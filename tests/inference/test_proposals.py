@@ -3,30 +3,44 @@
 from functools import partial
 
 import emcee
+import jax
+import jax.numpy as jnp
 import numpy as np
 import pytest
 from emcee.moves.de import _get_nondiagonal_pairs
 from scipy import stats
 from snooker import snooker
 
+from bowdenfit.description import SamplerSettings
 from bowdenfit.description.defaults import THIN
-from bowdenfit.inference.coordinates import Z
-from bowdenfit.inference.ensemble import Sweep, default_moves
-from bowdenfit.inference.proposals import differential_evolution, independent, stretch
+from bowdenfit.inference.coordinates import IN_Z as Z
+from bowdenfit.inference.coordinates import Frame, in_values
+from bowdenfit.inference.ensemble import Sweep
+from bowdenfit.inference.moves import default_moves, differential_evolution, independent, numbers_of_move, stretch
 from bowdenfit.inference.value_chart import NODES, Chart
+from bowdenfit.inference.walkers import compiled_walkers
 
 DEGREES_OF_FREEDOM, DIMENSIONS = 4, 5
 _ROOT = np.linalg.cholesky(np.array([[2.0 ** (-abs(i - j)) for j in range(DIMENSIONS)] for i in range(DIMENSIONS)]))
 ROOT = _ROOT * np.array([0.1, 1.0, 1.0, 3.0, 10.0])[:, None]  # correlated, and of unlike scales
+INVERSE = np.linalg.inv(ROOT)
 
 
 # Two coordinates are bent, as those of positive quantities are; walkers leave the nodes on both sides.
 CHART = Chart(DIMENSIONS, np.array([1, 4]), np.stack([np.exp(0.5 * NODES), np.sinh(NODES)], axis=1))
-MOVES, IN_Z, IN_BOTH = default_moves(DIMENSIONS, 64), ((Z(), 1.0),), ((Z(), 0.5), (CHART, 0.5))
+IN_Z, IN_VALUES = ((Z, 1.0),), ((in_values(CHART), 1.0),)
+IN_BOTH = ((Z, 0.5), (in_values(CHART), 0.5))
+MOVES = default_moves(DIMENSIONS, 64)
 
 
-def log_t(x: np.ndarray) -> np.ndarray:
-    """Multivariate t, heavy-tailed as the posteriors of few measurements are."""
+def log_t(x, data=None):
+    """Multivariate t, heavy-tailed as the posteriors of few measurements are, of one place."""
+    standardized = INVERSE @ x
+    return -(DEGREES_OF_FREEDOM + DIMENSIONS) / 2 * jnp.log1p(jnp.sum(standardized**2) / DEGREES_OF_FREEDOM)
+
+
+def log_t_of_rows(x: np.ndarray) -> np.ndarray:
+    """The same of many, by NumPy."""
     standardized = np.linalg.solve(ROOT, x.T)
     return -(DEGREES_OF_FREEDOM + DIMENSIONS) / 2 * np.log1p(np.sum(standardized**2, axis=0) / DEGREES_OF_FREEDOM)
 
@@ -36,13 +50,16 @@ def draw_t(generator: np.random.Generator, n: int) -> np.ndarray:
     return (generator.standard_normal((n, DIMENSIONS)) @ ROOT.T) * mixing[:, None]
 
 
-def run_side_by_side(moves, log_density, start: np.ndarray, steps: int, seed: int, frames=IN_BOTH) -> np.ndarray:
+def run_side_by_side(moves, log_density, start: np.ndarray, steps: int, seed: int, frames=IN_BOTH, data=None) -> np.ndarray:
     """States after every sweep, (state, ensemble, walker, dimension)."""
     ensembles, walkers, dimensions = start.shape
-    sweeps = [(Sweep(moves, coordinates, ensembles), share) for coordinates, share in frames]
-    flat = start.reshape(-1, dimensions)
-    sampler = emcee.EnsembleSampler(*flat.shape, log_density, vectorize=True, moves=sweeps)
-    return _run(sampler, flat, steps // THIN, seed).reshape(-1, ensembles, walkers, dimensions)
+    settings = SamplerSettings.model_construct(n_ensembles=ensembles, n_walkers=walkers)  # one ensemble too
+    with jax.enable_x64(True):
+        programs = compiled_walkers(log_density, data, dimensions, settings, frames, moves)
+        sweep, flat = Sweep(programs, data, ensembles), start.reshape(-1, dimensions)
+        density = lambda z: np.array(programs.log_density(z, sweep.data))  # noqa: E731
+        sampler = emcee.EnsembleSampler(*flat.shape, density, vectorize=True, moves=sweep)
+        return _run(sampler, flat, steps // THIN, seed).reshape(-1, ensembles, walkers, dimensions)
 
 
 def _run(sampler: emcee.EnsembleSampler, start: np.ndarray, states: int, seed: int, thin: int = 1) -> np.ndarray:
@@ -103,7 +120,7 @@ PROPOSALS = {
     "independent": independent,
 }
 ALONE = {name: (proposal, IN_Z) for name, proposal in PROPOSALS.items()}
-ALONE |= {f"{name} in values": (proposal, ((CHART, 1.0),)) for name, proposal in PROPOSALS.items()}
+ALONE |= {f"{name} in values": (proposal, IN_VALUES) for name, proposal in PROPOSALS.items()}
 
 
 @pytest.mark.parametrize("name", ALONE)
@@ -115,7 +132,7 @@ def test_every_move_leaves_a_heavy_tailed_target_as_it_is(name):
 
 def without_its_factor(proposal):
     """The same places, as if the proposal were symmetrical."""
-    return lambda *args: (proposal(*args)[0], np.zeros(args[0].shape[:2]))
+    return lambda *args: (proposal(*args)[0], jnp.zeros(len(args[1])))
 
 
 @pytest.mark.filterwarnings("ignore:Precision loss")  # all ensembles without any tails
@@ -125,19 +142,18 @@ def test_the_same_test_sees_that_a_factor_is_missing(name):
     assert p_value(below_quantiles(sampled_t([(without_its_factor(PROPOSALS[name]), 1.0)], seed=3)[30:])) < 1e-4
 
 
-class WithoutItsVolume:
-    """The coordinates of the chart, as if a unit were as large everywhere."""
+def without_its_volume(frame: Frame) -> Frame:
+    """The same places, as if a unit were as large everywhere."""
+    return Frame(*(partial(_first_and_zeros, way) for way in frame))
 
-    def from_z(self, z):
-        return CHART.from_z(z)[0], np.zeros(len(z))
 
-    def to_z(self, w):
-        return CHART.to_z(w)[0], np.zeros(len(w))
+def _first_and_zeros(way, places, data):
+    return way(places, data)[0], jnp.zeros(len(places))
 
 
 @pytest.mark.filterwarnings("ignore:Precision loss")
 def test_the_same_test_sees_that_the_volume_of_coordinates_is_missing_in_a_single_fit():
-    frames = ((WithoutItsVolume(), 1.0),)
+    frames = ((without_its_volume(in_values(CHART)), 1.0),)
     moves = [(differential_evolution, 1.0)]
     assert p_value(below_quantiles(sampled_t(moves, seed=3, frames=frames)[30:])) < 1e-4
 
@@ -153,37 +169,68 @@ class Told:
 
 
 @pytest.fixture
-def halves() -> np.ndarray:
-    """Moving and resting walkers, (half, ensemble, walker, dimension)."""
-    return np.random.default_rng(1).standard_normal((2, 3, 8, DIMENSIONS))
+def told() -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Uniform numbers, moving and resting walkers, (walker, number or dimension)."""
+    random = np.random.default_rng(1)
+    return random.uniform(size=(9, numbers_of_move(DIMENSIONS))), *random.standard_normal((2, 9, DIMENSIONS))
 
 
-def test_stretch_moves_of_all_ensembles_are_emcee_s_own_given_the_same_random_numbers(halves):
-    moving, resting = halves
-    proposed, factors = stretch(moving, resting, np.random.RandomState(2))
-    again = np.random.RandomState(2)
-    rand, randint = again.rand(3, 8), again.randint(8, size=(3, 8))
-    for e in range(3):
-        told = Told(rand=rand[e], randint=randint[e])
-        expected = emcee.moves.StretchMove().get_proposal(moving[e], [resting[e]], told)
-        np.testing.assert_array_equal(proposed[e], expected[0])
-        np.testing.assert_array_equal(factors[e], expected[1])
+def proposed(move, told):
+    with jax.enable_x64(True):
+        return tuple(np.asarray(part) for part in move(*map(jnp.asarray, told)))
+
+
+def test_stretch_moves_are_emcee_s_own_given_the_same_random_numbers(told):
+    uniform, moving, resting = told
+    random = Told(rand=uniform[:, 0], randint=(9 * uniform[:, 1]).astype(int))
+    places, factors = emcee.moves.StretchMove().get_proposal(moving, [resting], random)
+    found = proposed(stretch, told)
+    np.testing.assert_allclose(found[0], places, rtol=1e-12, atol=1e-12)
+    np.testing.assert_allclose(found[1], factors, rtol=1e-12)
 
 
 @pytest.mark.parametrize("gamma", [None, 1.0])
-def test_differential_evolution_of_all_ensembles_is_emcee_s_own_given_the_same_random_numbers(halves, gamma):
-    moving, resting = halves
+def test_differential_evolution_is_emcee_s_own_given_the_same_random_numbers(told, gamma):
+    uniform, moving, resting = told
     theirs = emcee.moves.DEMove(gamma0=gamma)
-    theirs.setup(moving[0])
-    proposed, factors = differential_evolution(moving, resting, np.random.RandomState(2), gamma)
-    again = np.random.RandomState(2)
-    first, further, randn = again.randint(8, size=(3, 8)), again.randint(1, 8, size=(3, 8)), again.randn(3, 8, 1)
-    pairs = [tuple(pair) for pair in _get_nondiagonal_pairs(8)]
-    for e in range(3):
-        choice = [pairs.index((one, (one + more) % 8)) for one, more in zip(first[e], further[e], strict=True)]
-        expected = theirs.get_proposal(moving[e], [resting[e]], Told(choice=choice, randn=randn[e]))
-        np.testing.assert_array_equal(proposed[e], expected[0])
-        np.testing.assert_array_equal(factors[e], expected[1])
+    theirs.setup(moving)
+    pairs = [tuple(pair) for pair in _get_nondiagonal_pairs(9)]
+    first, further = (9 * uniform[:, 0]).astype(int), 1 + (8 * uniform[:, 1]).astype(int)
+    choice = [pairs.index((one, (one + more) % 9)) for one, more in zip(first, further, strict=True)]
+    random = Told(choice=choice, randn=2 * uniform[:, 2:3] - 1)
+    places, factors = theirs.get_proposal(moving, [resting], random)
+    found = proposed(partial(differential_evolution, gamma=gamma), told)
+    np.testing.assert_allclose(found[0], places, rtol=1e-12, atol=1e-12)
+    np.testing.assert_array_equal(found[1], factors)
+
+
+class ToldOneByOne:
+    """What emcee's snooker move asks for, walker by walker: three integers and an order."""
+
+    def __init__(self, uniform):
+        self.integers = iter((3 * uniform[:, :3]).astype(int).ravel())
+        self.orders = iter(np.argsort(uniform[:, 3:6], axis=1))
+
+    def randint(self, _):
+        return next(self.integers)
+
+    def shuffle(self, rows):
+        rows[:] = rows[next(self.orders)]
+
+
+def test_the_snooker_move_of_controls_is_emcee_s_own_given_the_same_random_numbers(told):
+    uniform, moving, resting = told
+    expected = emcee.moves.DESnookerMove().get_proposal(moving, np.array_split(resting, 3), ToldOneByOne(uniform))
+    for found, known in zip(proposed(snooker, told), expected, strict=True):
+        np.testing.assert_allclose(found, known, rtol=1e-12, atol=1e-12)
+
+
+def test_draws_from_a_fitted_distribution_have_the_factors_of_their_places(told):
+    """The t distribution's density at both, with the mean and covariance of the resting walkers."""
+    uniform, moving, resting = told
+    places, factors = proposed(independent, told)
+    fitted = stats.multivariate_t(resting.mean(axis=0), np.cov(resting.T), df=5)
+    np.testing.assert_allclose(factors, fitted.logpdf(moving) - fitted.logpdf(places), rtol=1e-6, atol=1e-6)
 
 
 EMCEE_MOVES = {
@@ -201,7 +248,7 @@ def test_side_by_side_with_one_ensemble_is_distributed_as_emcee_s_own_sampler(mo
     for seed in range(8):
         start = draw_t(np.random.default_rng(seed), walkers)
         alone = run_side_by_side([(PROPOSALS[move], 1.0)], log_t, start[None], steps, seed, IN_Z)
-        sampler = emcee.EnsembleSampler(walkers, DIMENSIONS, log_t, vectorize=True, moves=EMCEE_MOVES[move])
+        sampler = emcee.EnsembleSampler(walkers, DIMENSIONS, log_t_of_rows, vectorize=True, moves=EMCEE_MOVES[move])
         others = _run(sampler, start, steps // THIN, seed + 100, THIN)[:, None]
         for name, states in (("side by side", alone), ("emcee", others)):
             shares[name].append(below_quantiles(states)[0])
@@ -211,10 +258,10 @@ def test_side_by_side_with_one_ensemble_is_distributed_as_emcee_s_own_sampler(mo
 
 # Ensembles --------------------------------------------------------------------------------------------------------
 
-def log_two_modes(x: np.ndarray) -> np.ndarray:
+def log_two_modes(x, _):
     """Two standard normals, 40 apart in every dimension."""
-    left, right = (-0.5 * np.sum((x - center) ** 2, axis=1) for center in (-20.0, 20.0))
-    return np.logaddexp(left, right)
+    left, right = (-0.5 * jnp.sum((x - center) ** 2) for center in (-20.0, 20.0))
+    return jnp.logaddexp(left, right)
 
 
 def test_ensembles_never_mix():

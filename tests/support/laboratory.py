@@ -12,11 +12,11 @@ from bowdenfit.description import Description, SamplerSettings
 from bowdenfit.inference.batch.diagnostics import diagnose_few_draws
 from bowdenfit.inference.batch.programs import BatchSettings
 from bowdenfit.inference.chain import Sampling
-from bowdenfit.inference.coordinates import walker_programs
 from bowdenfit.inference.ensemble import sample
 from bowdenfit.inference.least_squares import LeastSquares, least_squares, maximum_posterior
 from bowdenfit.inference.log_density import LogDensity
 from bowdenfit.inference.objective import make_objective
+from bowdenfit.inference.walkers import walker_programs
 from bowdenfit.kinds.design import Design
 from bowdenfit.model import build_model
 from bowdenfit.questions.calibrate.refit import Laboratory as Fits
@@ -49,7 +49,7 @@ class Laboratory:
     def draws(self, posterior: LogDensity, seed: int) -> np.ndarray:
         """Draws of one posterior in z, one a row, by the package's usual sampler."""
         start = maximum_posterior(posterior, self.program(posterior, make_objective))
-        programs = self.program(posterior, lambda p: walker_programs(p, self.sampler.proposed(p.model.space.size)))
+        programs = self.program(posterior, lambda p: walker_programs(p, self.sampler))
         asked = Sampling(posterior, start, self.sampler, seed, diagnose=diagnose_few_draws)
         return sample(asked, programs).z.reshape(-1, posterior.model.space.size)
 

@@ -1,17 +1,24 @@
 """The move that samples the wrong distribution, for controls that must fail."""
 
-import emcee
+import jax.numpy as jnp
 import numpy as np
 
-from bowdenfit.inference.proposals import differential_evolution
+from bowdenfit.inference.moves import differential_evolution
 
 
-def snooker(moving: np.ndarray, resting: np.ndarray, random: np.random.RandomState) -> tuple[np.ndarray, np.ndarray]:
-    """Emcee's snooker move, ensemble by ensemble; it wants the resting walkers in three sets."""
-    move = emcee.moves.DESnookerMove()
-    each = [move.get_proposal(s, np.array_split(c, 3), random) for s, c in zip(moving, resting, strict=True)]
-    places, factors = zip(*each, strict=True)
-    return np.stack(places), np.stack(factors)
+def snooker(uniform, moving, resting):
+    """`DESnookerMove` as emcee 3.1.6 has it: shifts are divided by the root of a distance, as if it were its square."""
+    sets = jnp.array_split(resting, 3)
+    chosen = jnp.stack([each[(uniform[:, i] * len(each)).astype(int)] for i, each in enumerate(sets)], axis=1)
+    order = jnp.argsort(uniform[:, 3:6], axis=1)
+    z, *others = jnp.moveaxis(jnp.take_along_axis(chosen, order[..., None], axis=1), 1, 0)
+    delta = moving - z
+    norm = jnp.linalg.norm(delta, axis=1, keepdims=True)
+    u = delta / jnp.sqrt(norm)
+    one, other = (jnp.sum(u * each, axis=1, keepdims=True) for each in others)
+    places = moving + u * 1.7 * (one - other)
+    further = jnp.log(jnp.linalg.norm(places - z, axis=1)) - jnp.log(norm[:, 0])
+    return places, 0.5 * (np.shape(moving)[1] - 1.0) * further
 
 
 def snooker_mixture():

@@ -12,14 +12,12 @@ import numpy as np
 from bowdenfit.description import SamplerSettings
 from bowdenfit.description.defaults import WALKERS_PER_PARAMETER
 from bowdenfit.inference.batch.ensembles import make_round
-from bowdenfit.inference.batch.frames import batch_frames
 from bowdenfit.inference.batch.laplace import points_of_climb
 from bowdenfit.inference.batch.weights import BLOCK
 from bowdenfit.inference.compilation import compile_program
-from bowdenfit.inference.conditional import Conditional
+from bowdenfit.inference.coordinates import frames_of
 from bowdenfit.inference.log_density import LogDensity
 from bowdenfit.inference.objective import noise_scales
-from bowdenfit.inference.value_chart import chart_values
 
 # Data sets that a program takes at once, always as many, so that rounding is the same: to weigh, and to walk, where the last
 # of all goes on alone, and fewer than two at once take longer each.
@@ -87,9 +85,8 @@ class BatchPrograms:
     @cached_property
     def ensembles(self) -> Callable[..., Any]:
         """A round of all walkers."""
-        frames = batch_frames(chart_values(self.posterior.model.space), Conditional(self.posterior))
         data = stack([self.posterior.data], WALKING)
-        return make_round(self.posterior, frames, self.settings.sampler.n_ensembles, self.n_walkers, data)
+        return make_round(self.posterior, frames_of(self.posterior), self.settings.sampler.n_ensembles, self.n_walkers, data)
 
     @property
     def threads(self) -> int:

@@ -1,4 +1,4 @@
-"""How walkers of a batch are moved: the proposals of `proposals`, in JAX.
+"""How walkers are moved: emcee's stretch and differential evolution, and draws from a distribution fitted to other walkers.
 
 A move takes numbers drawn uniformly between 0 and 1, `numbers_of_move` for each walker, and the two halves of one ensemble,
 the one that moves and the one that rests, (walker, parameter). It gives places for the moving half, and the log of what the
@@ -11,12 +11,18 @@ References:
 """
 
 from collections.abc import Callable, Sequence
+from functools import partial
 
 import jax
 import jax.numpy as jnp
 from jax import Array
 
-from bowdenfit.inference.proposals import FREEDOM, GAMMA_SPREAD, JITTER, WIDEST_STRETCH, shares_of_moves
+from bowdenfit.description.defaults import WALKERS_PER_PARAMETER
+
+WIDEST_STRETCH = 2.0
+GAMMA_SPREAD = 1e-5
+FREEDOM = 5  # degrees of freedom of the t distribution: tails wider than a posterior's in z, and still a good fit; odd
+JITTER = 1e-10  # of each variance; keeps the covariance of walkers on a narrow ridge positive
 
 Move = Callable[[Array, Array, Array], tuple[Array, Array]]
 Moves = Sequence[tuple[Move, float]]
@@ -28,7 +34,7 @@ def numbers_of_move(size: int) -> int:
 
 
 def stretch(uniform: Array, moving: Array, resting: Array) -> tuple[Array, Array]:
-    """Places on the line through a resting walker."""
+    """Places on the line through a resting walker; `emcee.moves.StretchMove` (equation 7 of Goodman and Weare)."""
     factor = ((WIDEST_STRETCH - 1) * uniform[:, 0] + 1) ** 2 / WIDEST_STRETCH
     anchor = resting[_whole_number(uniform[:, 1], len(resting))]
     return anchor - (anchor - moving) * factor[:, None], (moving.shape[1] - 1) * jnp.log(factor)
@@ -37,7 +43,14 @@ def stretch(uniform: Array, moving: Array, resting: Array) -> tuple[Array, Array
 def differential_evolution(
     uniform: Array, moving: Array, resting: Array, gamma: float | None = None
 ) -> tuple[Array, Array]:
-    """Places shifted by the difference of two resting walkers, times 2.38 / sqrt(2 parameters) or gamma."""
+    """Places shifted by the difference of two resting walkers; `emcee.moves.DEMove` (section 2 of Nelson and others).
+
+    Args:
+        uniform: See above.
+        moving: Half that moves.
+        resting: Half that rests.
+        gamma: What the difference is multiplied by; 2.38 / sqrt(2 parameters) if omitted.
+    """
     (n, size), count = moving.shape, len(resting)
     first = _whole_number(uniform[:, 0], count)
     second = (first + 1 + _whole_number(uniform[:, 1], count - 1)) % count  # any but the first
@@ -47,7 +60,10 @@ def differential_evolution(
 
 
 def independent(uniform: Array, moving: Array, resting: Array) -> tuple[Array, Array]:
-    """Places drawn from a t distribution fitted to the resting half."""
+    """Places drawn from a t distribution fitted to the resting half, as `emcee.moves.KDEMove` draws from a kernel density.
+
+    It brings walkers in from far outside in tens of steps, and forgets where they were where the posterior is about normal.
+    """
     size = moving.shape[1]
     normal = 2**0.5 * jax.lax.erf_inv(2 * uniform - 1)
     drawn = normal[:, :size] * jnp.sqrt(FREEDOM / jnp.sum(normal[:, size:] ** 2, axis=1, keepdims=True))
@@ -68,4 +84,24 @@ def _log_t(standardized: Array) -> Array:
     return -(FREEDOM + standardized.shape[-1]) / 2 * jnp.log1p(jnp.sum(standardized**2, axis=-1) / FREEDOM)
 
 
-MOVES: Moves = shares_of_moves(stretch, differential_evolution, independent)
+def shares_of_moves(fitted: Move = independent) -> Moves:
+    """The moves of an ensemble, and how often each is made, by measurement on every data set here.
+
+    Draws from a fitted t distribution find the bulk, and mix best where the posterior is about normal; differential evolution
+    does along bent ridges, stretch moves do in narrow ends; gamma 1 jumps between modes.
+
+    Args:
+        fitted: What draws from a distribution fitted to the resting walkers.
+    """
+    jumps = partial(differential_evolution, gamma=1.0)
+    return (stretch, 0.1), (differential_evolution, 0.35), (jumps, 0.05), (fitted, 0.5)
+
+
+def default_moves(size: int, n_walkers: int) -> Moves:
+    """What walkers do: see `shares_of_moves`.
+
+    Args:
+        size: Number of parameters.
+        n_walkers: Walkers of an ensemble; a few cannot tell the shape of a t distribution.
+    """
+    return shares_of_moves(independent if n_walkers >= WALKERS_PER_PARAMETER * size else differential_evolution)

@@ -1,0 +1,91 @@
+"""What is compiled for the walkers of one posterior; apart from what emcee makes of it, which takes long to load."""
+
+from collections.abc import Callable
+from concurrent.futures import Executor
+from typing import Any, NamedTuple
+
+import jax
+import jax.numpy as jnp
+import numpy as np
+from jax import Array
+
+from bowdenfit.description import SamplerSettings
+from bowdenfit.description.defaults import THIN
+from bowdenfit.inference.compilation import compile_program
+from bowdenfit.inference.coordinates import IN_Z, Frames, frames_of
+from bowdenfit.inference.log_density import LogDensity
+from bowdenfit.inference.moves import Moves, default_moves
+from bowdenfit.inference.sweep import Chosen, numbers_of_walker, walker_sweep
+
+
+class WalkerPrograms(NamedTuple):
+    """What walkers run.
+
+    Args:
+        log_density: Of z of all walkers (rows) and data.
+        sweep: `walker_sweep` of `THIN` steps.
+        moves: Share of each.
+        frames: Share of each of the coordinates.
+    """
+
+    log_density: Callable[..., Any]
+    sweep: Callable[..., Any]
+    moves: tuple[float, ...]
+    frames: tuple[float, ...]
+
+    def choose(self, random: np.random.RandomState, shape: tuple[int, int, int]) -> Chosen:
+        """What is drawn at random for a sweep of walkers, (ensemble, walker, parameter)."""
+        ensembles, walkers, size = shape
+        return Chosen(
+            np.asarray(random.choice(len(self.frames), p=self.frames), dtype=np.int32),
+            random.choice(len(self.moves), size=THIN, p=self.moves).astype(np.int32),
+            np.argsort(random.rand(THIN, ensembles, walkers), axis=-1).astype(np.int32),
+            random.randint(2**32, size=(THIN, 2, ensembles, walkers // 2, numbers_of_walker(size)), dtype=np.uint32),
+        )
+
+
+def walker_programs(
+    posterior: LogDensity, settings: SamplerSettings, moves: Moves | None = None, beside: Executor | None = None
+) -> WalkerPrograms:
+    """The programs of one posterior.
+
+    Args:
+        posterior: The posterior; what is compiled serves others with data of the same shapes.
+        settings: How many walkers.
+        moves: What they do, in z alone; `default_moves`, in all coordinates, if omitted.
+        beside: See `compile_program`.
+    """
+    frames = frames_of(posterior) if moves is None else ((IN_Z, 1.0),)
+    size, data = posterior.model.space.size, posterior.data
+    return compiled_walkers(posterior.log_density, data, size, settings, frames, moves, beside)
+
+
+def compiled_walkers(
+    log_density: Callable[[Array, Any], Array],
+    data: Any,
+    size: int,
+    settings: SamplerSettings,
+    frames: Frames,
+    moves: Moves | None = None,
+    beside: Executor | None = None,
+) -> WalkerPrograms:
+    """The programs of any density.
+
+    Args:
+        log_density: Of one z and data.
+        data: Data of the shapes that it is compiled for.
+        size: Number of parameters.
+        settings: How many walkers.
+        frames: The coordinates.
+        moves: `default_moves` if omitted.
+        beside: See `compile_program`.
+    """
+    shape = settings.n_ensembles, settings.walkers(size), size
+    moves = moves or default_moves(size, shape[1])
+    z, values = (jax.ShapeDtypeStruct(axes, jnp.float64) for axes in (shape, shape[:2]))
+    rows = jax.ShapeDtypeStruct((shape[0] * shape[1], size), jnp.float64)
+    of_start = compile_program(jax.vmap(log_density, (0, None)), rows, data, run_once=True, beside=beside)
+    shares = [tuple(share for _, share in each) for each in (moves, frames)]
+    found = WalkerPrograms(of_start, lambda *_: None, *shares)
+    chosen = found.choose(np.random.RandomState(0), shape)
+    return found._replace(sweep=compile_program(walker_sweep(log_density, moves, frames), chosen, z, values, data))

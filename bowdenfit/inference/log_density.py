@@ -4,12 +4,10 @@ from dataclasses import dataclass
 from functools import cached_property
 from typing import Any
 
-import jax
 import jax.numpy as jnp
 from jax import Array
 from jaxtyping import Float
 
-from bowdenfit.inference.compilation import compile_program
 from bowdenfit.model import Model
 
 
@@ -68,9 +66,3 @@ class LogDensity:
         """Standardized residuals by term; half their sum of squares is minus log likelihood, up to a constant."""
         values = self.values(z, data)
         return {t.name: t.residuals(values, d) for t, d in zip(self.model.terms, data, strict=False)}
-
-    def batched_log_density(self, batch: int) -> Any:
-        """Compiled log density of a batch of z; of one shape only, so that it is compiled once."""
-        function = jax.vmap(self.log_density, in_axes=(0, None))
-        shape = jax.ShapeDtypeStruct((batch, self.model.space.size), jnp.float64)
-        return compile_program(function, shape, self.data)

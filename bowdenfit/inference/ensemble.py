@@ -50,7 +50,7 @@ class Sweep(emcee.moves.Move):
         z = state.coords.reshape(self.n_ensembles, -1, state.coords.shape[-1])
         chosen, values = self.programs.choose(model.random, z.shape), state.log_prob.reshape(z.shape[:2])
         z, values, accepted = (np.asarray(part) for part in self.programs.sweep(chosen, z, values, self.data))
-        # As arrays of our own: what JAX gives cannot be written to, and emcee's other moves may come next.
+        # Into the state's own arrays: those of JAX are for reading.
         state.coords[:], state.log_prob[:] = z.reshape(state.coords.shape), values.ravel()
         return state, accepted.ravel() / THIN
 

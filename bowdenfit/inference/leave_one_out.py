@@ -102,10 +102,15 @@ class ReadingsToLeaveOut:
         counts = np.array([float(i != reading) for i in range(len(self.names))])
         return self.posterior.data, {name: parts.data for name, parts in self.parts.items()}, counts
 
-    def evaluate(self, z: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        """Log posterior density, up to a constant, and log likelihood of every reading, at any number of z (rows)."""
-        everything = self.without(None)
-        density, each = in_batches(lambda part: self._program(part, everything), _ROWS, z)
+    def evaluate(self, z: np.ndarray, without: int | None = None) -> tuple[np.ndarray, np.ndarray]:
+        """Log posterior density, up to a constant, and log likelihood of every reading, at any number of z (rows).
+
+        Args:
+            z: Where.
+            without: Position of a reading that the density leaves out; none if omitted.
+        """
+        given = self.without(without)
+        density, each = in_batches(lambda part: self._program(part, given), _ROWS, z)
         return density, each
 
 

@@ -46,7 +46,6 @@ class Places(NamedTuple):
     volume: Array
 
 
-
 def numbers_of_walker(size: int) -> int:
     """How many uniform numbers a step of a walker of so many parameters needs."""
     return 1 + numbers_of_move(size)
@@ -69,7 +68,8 @@ def walker_sweep(log_density: Callable[[Array, Any], Array], moves: Moves, frame
         def places_of(w: Array) -> Places:
             z, volume = jax.lax.switch(chosen.frame, from_w, w.reshape(-1, w.shape[-1]), data)
             values = jax.vmap(lambda one: log_density(one, data))(z)
-            values = jnp.where(jnp.isnan(values + volume), -jnp.inf, values)
+            known = jnp.isfinite(volume) & ~jnp.isnan(values)  # out of reach of the coordinates both may be infinite
+            values, volume = jnp.where(known, values, -jnp.inf), jnp.where(known, volume, 0.0)
             return Places(w, *(part.reshape(*w.shape[:-1], *part.shape[1:]) for part in (z, values, volume)))
 
         def move_half(carried: Any, turn: Any) -> Any:

@@ -52,10 +52,10 @@ def frames_of(posterior: LogDensity) -> Frames:
     Args:
         posterior: The posterior.
     """
-    conditional, ((z, _), (values, _)) = Conditional(posterior), frames_without_ridge(posterior.model.space)
+    conditional, without = Conditional(posterior), frames_without_ridge(posterior.model.space)
     if not conditional.is_told:
-        return (z, 0.5), (values, 0.5)
-    return (z, 0.25), (values, 0.25), (in_ridge(conditional), 0.5)
+        return without
+    return *((frame, share / 2) for frame, share in without), (in_ridge(conditional), 0.5)
 
 
 def frames_without_ridge(space: ParameterSpace) -> Frames:

@@ -5,7 +5,7 @@ in z, a quarter in the values of the parameters, half where friction coefficient
 the one in emcee 3.1.6 does not sample the density it is given, and every ensemble agrees on the wrong answer.
 
 emcee keeps the states and the random numbers; from one state to the next it makes one move, which is `THIN` steps of all
-ensembles in one compiled program. Step by step four fifths of the time was Python's.
+ensembles in one compiled program. Step by step more than half of the time was Python's.
 """
 
 from dataclasses import replace
@@ -48,7 +48,7 @@ class Sweep(emcee.moves.Move):
     def propose(self, model: Any, state: emcee.State) -> tuple[emcee.State, np.ndarray]:
         """`THIN` steps of every walker, and the share that was accepted."""
         z = state.coords.reshape(self.n_ensembles, -1, state.coords.shape[-1])
-        chosen, values = self.programs.choose(model.random, z.shape), state.log_prob.reshape(z.shape[:2])
+        chosen, values = self.programs.shares.choose(model.random, z.shape), state.log_prob.reshape(z.shape[:2])
         z, values, accepted = (np.asarray(part) for part in self.programs.sweep(chosen, z, values, self.data))
         # Into the state's own arrays: those of JAX are for reading.
         state.coords[:], state.log_prob[:] = z.reshape(state.coords.shape), values.ravel()

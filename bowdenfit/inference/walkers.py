@@ -18,18 +18,14 @@ from bowdenfit.inference.moves import Moves, default_moves
 from bowdenfit.inference.sweep import Chosen, numbers_of_walker, walker_sweep
 
 
-class WalkerPrograms(NamedTuple):
-    """What walkers run.
+class Shares(NamedTuple):
+    """How often what is done.
 
     Args:
-        log_density: Of z of all walkers (rows) and data.
-        sweep: `walker_sweep` of `THIN` steps.
         moves: Share of each.
         frames: Share of each of the coordinates.
     """
 
-    log_density: Callable[..., Any]
-    sweep: Callable[..., Any]
     moves: tuple[float, ...]
     frames: tuple[float, ...]
 
@@ -42,6 +38,20 @@ class WalkerPrograms(NamedTuple):
             np.argsort(random.rand(THIN, ensembles, walkers), axis=-1).astype(np.int32),
             random.randint(2**32, size=(THIN, 2, ensembles, walkers // 2, numbers_of_walker(size)), dtype=np.uint32),
         )
+
+
+class WalkerPrograms(NamedTuple):
+    """What walkers run.
+
+    Args:
+        log_density: Of z of all walkers (rows) and data.
+        sweep: `walker_sweep` of `THIN` steps.
+        shares: Of its moves and coordinates.
+    """
+
+    log_density: Callable[..., Any]
+    sweep: Callable[..., Any]
+    shares: Shares
 
 
 def walker_programs(
@@ -85,7 +95,7 @@ def compiled_walkers(
     z, values = (jax.ShapeDtypeStruct(axes, jnp.float64) for axes in (shape, shape[:2]))
     rows = jax.ShapeDtypeStruct((shape[0] * shape[1], size), jnp.float64)
     of_start = compile_program(jax.vmap(log_density, (0, None)), rows, data, run_once=True, beside=beside)
-    shares = [tuple(share for _, share in each) for each in (moves, frames)]
-    found = WalkerPrograms(of_start, lambda *_: None, *shares)
-    chosen = found.choose(np.random.RandomState(0), shape)
-    return found._replace(sweep=compile_program(walker_sweep(log_density, moves, frames), chosen, z, values, data))
+    shares = Shares(*(tuple(share for _, share in each) for each in (moves, frames)))
+    chosen = shares.choose(np.random.RandomState(0), shape)  # any, for its shapes
+    sweep = compile_program(walker_sweep(log_density, moves, frames), chosen, z, values, data)
+    return WalkerPrograms(of_start, sweep, shares)

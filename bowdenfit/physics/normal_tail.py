@@ -17,8 +17,8 @@ def log_normal_cdf(x: Float[Array, "*batch"]) -> Float[Array, "*batch"]:
        + \log\left(1 - \frac{1}{x^2} + \frac{3}{x^4} - \frac{15}{x^6} + \frac{105}{x^8}\right)
        \quad \text{as } x \to -\infty
 
-    One logarithm is taken, of whichever of these holds: JAX's own `log_ndtr` takes three times as long, and has the
-    derivative :math:`\exp(\log\phi - \log\Phi)`, in which two numbers of size x^2/2 cancel: below x = -1e6 few of its
+    One logarithm is taken, of whichever of these holds: JAX's own `log_ndtr` takes twice as long or more, and has
+    the derivative :math:`\exp(\log\phi - \log\Phi)`, in which two numbers of size x^2/2 cancel: below x = -1e6 few of its
     digits are right, below -1e8 none.
 
     Args:

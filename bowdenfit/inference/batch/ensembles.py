@@ -14,7 +14,7 @@ from jax import Array
 
 from bowdenfit.description.defaults import THIN
 from bowdenfit.inference.compilation import compile_program
-from bowdenfit.inference.coordinates import Frames
+from bowdenfit.inference.coordinates import Frames, frames_of
 from bowdenfit.inference.log_density import LogDensity
 from bowdenfit.inference.moves import Moves, shares_of_moves
 from bowdenfit.inference.sweep import Chosen, numbers_of_walker, to_uniform, walker_sweep
@@ -24,20 +24,17 @@ STEPS = STORED * THIN
 _STREAM = 1
 
 
-def make_round(
-    posterior: LogDensity, frames: Frames, n_ensembles: int, n_walkers: int, data: Any
-) -> Callable[..., Any]:
+def make_round(posterior: LogDensity, n_ensembles: int, n_walkers: int, data: Any) -> Callable[..., Any]:
     """Compiled: a round of every cable, from seeds, the number of the round, z and log densities by ensemble and walker.
 
     Args:
         posterior: The posterior.
-        frames: Coordinates that walkers move in.
         n_ensembles: Independent ensembles of each cable.
         n_walkers: Of each ensemble; a power of two.
         data: Data of as many cables as a round takes, along a new first axis.
     """
     cables, size = len(jax.tree.leaves(data)[0]), posterior.model.space.size
-    of_cable = walker_round(posterior.log_density, shares_of_moves(), frames)
+    of_cable = walker_round(posterior.log_density, shares_of_moves(), frames_of(posterior))
     seeds, number = jax.ShapeDtypeStruct((cables,), jnp.uint32), jax.ShapeDtypeStruct((), jnp.uint32)
     shapes = [jax.ShapeDtypeStruct((cables, n_ensembles, n_walkers, *more), jnp.float64) for more in ((size,), ())]
     return compile_program(jax.vmap(of_cable, (0, None, 0, 0, 0)), seeds, number, *shapes, data)

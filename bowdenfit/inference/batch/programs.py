@@ -15,7 +15,6 @@ from bowdenfit.inference.batch.ensembles import make_round
 from bowdenfit.inference.batch.laplace import points_of_climb
 from bowdenfit.inference.batch.weights import BLOCK
 from bowdenfit.inference.compilation import compile_program
-from bowdenfit.inference.coordinates import frames_of
 from bowdenfit.inference.log_density import LogDensity
 from bowdenfit.inference.objective import noise_scales
 
@@ -86,7 +85,7 @@ class BatchPrograms:
     def ensembles(self) -> Callable[..., Any]:
         """A round of all walkers."""
         data = stack([self.posterior.data], WALKING)
-        return make_round(self.posterior, frames_of(self.posterior), self.settings.sampler.n_ensembles, self.n_walkers, data)
+        return make_round(self.posterior, self.settings.sampler.n_ensembles, self.n_walkers, data)
 
     @property
     def threads(self) -> int:

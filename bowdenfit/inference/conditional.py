@@ -62,16 +62,18 @@ class Conditional:
         """Whether readings say anything of coefficients."""
         return len(self.which) > 0 and len(self._rubbing) > 0
 
-    def to_w(self, z: Array, data: Any) -> tuple[Array, Array]:
-        """W of one z, and log of the volume in z of a unit of w there."""
-        ridge, own = self._ridge(z, data), z[self.which]
-        return z.at[self.which].set(self._along(own, ridge)), -self._log_volume(own, ridge)
+    def at(self, given: Array, is_z: Array, data: Any) -> tuple[Array, Array, Array]:
+        """W and z, and log of the volume in z of a unit of w there, of one of the two; NaN where w has no z.
 
-    def from_w(self, w: Array, data: Any) -> tuple[Array, Array]:
-        """Z of one w, and log of the volume in z of a unit of w there; NaN where a coefficient cannot be what w says."""
-        ridge = self._ridge(w, data)
-        z = self._back(w[self.which], ridge)
-        return w.at[self.which].set(z), -self._log_volume(z, ridge)
+        Args:
+            given: One z or one w.
+            is_z: Whether it is z.
+            data: Of the posterior.
+        """
+        ridge, own = self._ridge(given, data), given[self.which]
+        z = jnp.where(is_z, own, self._back(own, ridge))
+        w = jnp.where(is_z, self._along(own, ridge), own)
+        return given.at[self.which].set(w), given.at[self.which].set(z), -self._log_volume(z, ridge)
 
     def _along(self, z: Array, ridge: "_Ridge") -> Array:
         return ridge.root.T @ (self._coefficients.vector(z) - ridge.center)

@@ -4,7 +4,7 @@ Any one-to-one map leaves what is sampled as it is, because the volume in z of a
 """
 
 from collections.abc import Callable, Sequence
-from typing import Any, NamedTuple
+from typing import Any
 
 import jax
 import jax.numpy as jnp
@@ -16,49 +16,50 @@ from bowdenfit.inference.value_chart import Chart, chart_values
 from bowdenfit.parameters.space import ParameterSpace
 
 
-class Frame(NamedTuple):
-    """Coordinates.
-
-    Args:
-        to_w: W of z and data, (walker, parameter), and log of the volume in z of a unit of w there.
-        from_w: Z of w and data, and the same; NaN where there is no z.
-    """
-
-    to_w: Callable[[Array, Any], tuple[Array, Array]]
-    from_w: Callable[[Array, Any], tuple[Array, Array]]
-
-
+# W and z of walkers (rows), and log of the volume in z of a unit of w there: of either of them, of which it is said whether it
+# is z, and of data. NaN where w has no z.
+Frame = Callable[[Array, Array, Any], tuple[Array, Array, Array]]
 Frames = Sequence[tuple[Frame, float]]  # each with its share of all steps
 
-IN_Z = Frame(*[lambda z, _: (z, jnp.zeros(len(z)))] * 2)
+
+def in_z(given: Array, is_z: Array, data: Any) -> tuple[Array, Array, Array]:
+    """Z itself."""
+    del is_z, data
+    return given, given, jnp.zeros(len(given))
 
 
 def in_values(chart: Chart) -> Frame:
     """Values of the parameters, as `Chart` has them."""
-    return Frame(lambda z, _: chart.from_z(z), lambda w, _: chart.to_z(w))
+    return lambda given, is_z, _: chart.at(given, is_z)
 
 
 def in_ridge(conditional: Conditional) -> Frame:
     """Coefficients given everything else, in units of their ridge."""
-    return Frame(jax.vmap(conditional.to_w, (0, None)), jax.vmap(conditional.from_w, (0, None)))
+    return jax.vmap(conditional.at, (0, None, None))
 
 
 def frames_of(posterior: LogDensity) -> Frames:
     """In what walkers move, and how often.
 
-    By measurement on simulated on-body data, whose scatter between mountings mixes five times as fast for the ridge. Half of
-    all is done in values where there is no friction coefficient that readings tell of.
+    By measurement: with the ridge, scatter between mountings mixes five times as fast on simulated on-body data. Values beside
+    it give up to 1.7 times as many effective draws as z and values in turns do, and nowhere fewer; the ridge alone, or with
+    the others in values, loses tails of curves.
 
     Args:
         posterior: The posterior.
     """
-    conditional, without = Conditional(posterior), frames_without_ridge(posterior.model.space)
+    conditional, space = Conditional(posterior), posterior.model.space
     if not conditional.is_told:
-        return without
-    return *((frame, share / 2) for frame, share in without), (in_ridge(conditional), 0.5)
+        return frames_without_ridge(space)
+    return (in_values_of(space), 0.5), (in_ridge(conditional), 0.5)
 
 
 def frames_without_ridge(space: ParameterSpace) -> Frames:
     """Z and values, for densities that are no model's alone."""
+    return (in_z, 0.5), (in_values_of(space), 0.5)
+
+
+def in_values_of(space: ParameterSpace) -> Frame:
+    """Values of the parameters, or z where those are all linear in it."""
     chart = chart_values(space)
-    return (IN_Z, 0.5), (in_values(chart) if len(chart.which) else IN_Z, 0.5)
+    return in_values(chart) if len(chart.which) else in_z

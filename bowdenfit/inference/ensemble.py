@@ -32,8 +32,8 @@ _KEPT_PER_WALKER = 20  # draws at least that are kept of each walker, spread ove
 class Sweep(emcee.moves.Move):
     """Some steps of independent ensembles side by side: proposals stay within an ensemble.
 
-    At each step one of the moves is made. Each ensemble is split in two at random; the walkers of one half are proposed
-    places by those of the other half of their ensemble.
+    Each ensemble is split in two at random. At each step one of the moves is made: the walkers of one half are proposed places
+    by those of the other half of their ensemble, and then the other way round.
 
     Args:
         programs: What is compiled.
@@ -47,12 +47,14 @@ class Sweep(emcee.moves.Move):
 
     def propose(self, model: Any, state: emcee.State) -> tuple[emcee.State, np.ndarray]:
         """`THIN` steps of every walker, and the share that was accepted."""
-        z = state.coords.reshape(self.n_ensembles, -1, state.coords.shape[-1])
-        chosen, values = self.programs.shares.choose(model.random, z.shape), state.log_prob.reshape(z.shape[:2])
-        z, values, accepted = (np.asarray(part) for part in self.programs.sweep(chosen, z, values, self.data))
+        n_walkers = len(state.coords) // self.n_ensembles
+        order = np.argsort(model.random.rand(self.n_ensembles, n_walkers), axis=1)
+        order += n_walkers * np.arange(self.n_ensembles)[:, None]
+        z, accepted = state.coords[order], np.zeros(len(state.coords))
+        chosen = self.programs.shares.choose(model.random, z.shape)
         # Into the state's own arrays: those of JAX are for reading.
-        state.coords[:], state.log_prob[:] = z.reshape(state.coords.shape), values.ravel()
-        return state, accepted.ravel() / THIN
+        state.coords[order], state.log_prob[order], accepted[order] = self.programs.sweep(chosen, z, self.data)
+        return state, accepted / THIN
 
 
 def starting_points(start: MaximumPosterior, settings: SamplerSettings, generator: np.random.Generator) -> np.ndarray:
@@ -66,6 +68,11 @@ def starting_points(start: MaximumPosterior, settings: SamplerSettings, generato
     centers = generator.standard_normal((settings.n_ensembles, 1, len(start.z)))
     walkers = generator.standard_normal((settings.n_ensembles, settings.walkers(len(start.z)), len(start.z)))
     return start.z + (centers + walkers) @ root.T
+
+
+def start_of(points: np.ndarray, generator: np.random.RandomState) -> emcee.State:
+    """A state of emcee that walkers begin with; a sweep finds the log densities itself."""
+    return emcee.State(points, log_prob=np.zeros(len(points)), random_state=generator.get_state())
 
 
 def sample(asked: Sampling, programs: WalkerPrograms, data: Any = None) -> Chain:
@@ -82,14 +89,9 @@ def sample(asked: Sampling, programs: WalkerPrograms, data: Any = None) -> Chain
     backend = Checkpointed(points.shape, asked.checkpoint, asked.resume)
     moves = Sweep(programs, data, settings.n_ensembles)
 
-    def log_density(z: np.ndarray) -> np.ndarray:
-        return np.array(programs.log_density(z, moves.data))
-
-    sampler = emcee.EnsembleSampler(*points.shape, log_density, vectorize=True, backend=backend, moves=moves)
-    # emcee's wrapper prints a traceback of whatever stops an evaluation, the user's interrupt included.
-    sampler.log_prob_fn = log_density
+    sampler = emcee.EnsembleSampler(*points.shape, asked.posterior.log_density, backend=backend, moves=moves)
     generator = np.random.RandomState(np.random.MT19937(np.random.SeedSequence([seed, 1])))
-    state = None if backend.iteration else emcee.State(points, random_state=generator.get_state())
+    state = None if backend.iteration else start_of(points, generator)
     limit = max(settings.max_steps // THIN, 2)
     target = _FIRST_LOOK
     while target < int(backend.iteration):  # the looks of a sampling that nothing interrupted

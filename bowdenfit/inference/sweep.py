@@ -1,8 +1,6 @@
 """Some steps of ensembles of walkers in one program: moves, densities, what is accepted. Random numbers come from outside."""
 
 from collections.abc import Callable
-from functools import partial
-from operator import itemgetter
 from typing import Any, NamedTuple
 
 import jax
@@ -20,30 +18,12 @@ class Chosen(NamedTuple):
     Args:
         frame: Number of the coordinates that walkers move in.
         kinds: Number of the move of each step.
-        order: Of the walkers of every ensemble at each step, (step, ensemble, walker); its halves move one after the other.
         bits: (step, half, ensemble, walker, `numbers_of_walker`), as unsigned integers.
     """
 
     frame: Array | np.ndarray
     kinds: Array | np.ndarray
-    order: Array | np.ndarray
     bits: Array | np.ndarray
-
-
-class Places(NamedTuple):
-    """Of walkers.
-
-    Args:
-        w: In the coordinates that they move in.
-        z: In z.
-        value: Log density in z.
-        volume: Log of the volume in z of a unit of w.
-    """
-
-    w: Array
-    z: Array
-    value: Array
-    volume: Array
 
 
 def numbers_of_walker(size: int) -> int:
@@ -52,52 +32,51 @@ def numbers_of_walker(size: int) -> int:
 
 
 def walker_sweep(log_density: Callable[[Array, Any], Array], moves: Moves, frames: Frames) -> Callable[..., Any]:
-    """Steps of all walkers, of what is `Chosen`, z and log densities by ensemble and walker, and data.
+    """Steps of all walkers, of what is `Chosen`, z by ensemble and walker, and data.
 
-    They give z and log densities after them, and how many proposals of every walker were accepted.
+    They give z and log densities after them, and how many proposals of every walker were accepted. The halves of each ensemble
+    move in turns, so that walkers should be put in another order from one sweep to the next.
 
     Args:
         log_density: Of one z and data.
         moves: What the walkers do.
         frames: In which coordinates.
     """
-    proposals = [jax.vmap(move) for move, _ in moves]
-    to_w, from_w = ([frame[way] for frame, _ in frames] for way in (0, 1))
+    proposals, coordinates = [jax.vmap(move) for move, _ in moves], [frame for frame, _ in frames]
 
-    def sweep(chosen: Chosen, z: Array, values: Array, data: Any) -> tuple[Array, Array, Array]:
-        def places_of(w: Array) -> Places:
-            z, volume = jax.lax.switch(chosen.frame, from_w, w.reshape(-1, w.shape[-1]), data)
-            values = jax.vmap(lambda one: log_density(one, data))(z)
-            known = jnp.isfinite(volume) & ~jnp.isnan(values)  # out of reach of the coordinates both may be infinite
-            values, volume = jnp.where(known, values, -jnp.inf), jnp.where(known, volume, 0.0)
-            return Places(w, *(part.reshape(*w.shape[:-1], *part.shape[1:]) for part in (z, values, volume)))
-
-        def move_half(carried: Any, turn: Any) -> Any:
-            (places, accepted), (which, kind, uniform) = carried, turn
-            moving, resting = (jax.tree.map(itemgetter(i), places) for i in (which, 1 - which))
-            proposed, factors = jax.lax.switch(kind, proposals, uniform[..., 1:], moving.w, resting.w)
-            new = places_of(proposed)
-            gain = factors + new.value + new.volume - moving.value - moving.volume
-            better = gain > jnp.log(uniform[..., 0])
-            moved = jax.tree.map(lambda new, old: jnp.where(_like(better, new), new, old), new, moving)
-            places = jax.tree.map(lambda part, half: part.at[which].set(half), places, moved)
-            return (places, accepted.at[which].add(better)), None
-
-        def step(carried: Any, chosen: Any) -> Any:
-            kind, order, uniform = chosen
-            carried, walker = jax.tree.map(partial(_shuffle, order=order), carried)
-            turns = jnp.arange(2), jnp.stack([kind, kind]), uniform
-            carried, _ = jax.lax.scan(move_half, jax.tree.map(_by_half, carried), turns)
-            return (jax.tree.map(_whole, carried), walker), None
-
+    def sweep(chosen: Chosen, z: Array, data: Any) -> tuple[Array, Array, Array]:
         n_ensembles, n_walkers, size = z.shape
-        w, volume = jax.lax.switch(chosen.frame, to_w, z.reshape(-1, size), data)
-        begin = Places(w.reshape(z.shape), z, values, volume.reshape(values.shape)), jnp.zeros(values.shape, int)
-        walkers = jnp.tile(jnp.arange(n_walkers), (n_ensembles, 1))
-        ended, _ = jax.lax.scan(step, (begin, walkers), (chosen.kinds, chosen.order, to_uniform(chosen.bits)))
-        (places, accepted), walker = ended
-        own = jnp.argsort(walker, axis=1)  # every walker in its own row again
-        return _shuffle(places.z, own), _shuffle(places.value, own), _shuffle(accepted, own)
+        # Of a walker: where it is in the coordinates that it moves in, and in z; log density in those coordinates, and in z; and
+        # how often it moved. In one array, since each operation takes its time to compile.
+        where_w, where_z, rest = slice(size), slice(size, 2 * size), slice(2 * size, None)
+
+        def walkers_at(given: Array, is_z: Array) -> Array:
+            w, z, volume = jax.lax.switch(chosen.frame, coordinates, given.reshape(-1, size), is_z, data)
+            values = jax.vmap(lambda one: log_density(one, data))(z)
+            values, known = jnp.where(jnp.isnan(values), -jnp.inf, values), jnp.isfinite(volume)
+            # Out of reach of the coordinates is nothing to go to, and who is there already stays.
+            out_of_reach = jnp.where(is_z & (values > -jnp.inf), jnp.inf, -jnp.inf)
+            value_in_w = jnp.where(known, values + jnp.where(known, volume, 0.0), out_of_reach)
+            numbers = jnp.stack([value_in_w, values, jnp.zeros_like(values)], axis=1)
+            return jnp.concatenate([w, z, numbers], axis=1).reshape(*given.shape[:-1], -1)
+
+        def half_step(carried: tuple[Array, Array], turn: tuple[Array, Array, Array]) -> Any:
+            (moving, resting), (is_begin, kind, uniform) = carried, turn
+            w, factors = jax.lax.switch(kind, proposals, uniform[..., 1:], moving[..., where_w], resting[..., where_w])
+            there = walkers_at(jnp.where(is_begin, moving[..., where_z], w), is_begin)
+            better = factors + there[..., -3] - moving[..., -3] > jnp.log(uniform[..., 0])
+            moved = jnp.where(better[..., None], there.at[..., -1].set(moving[..., -1] + 1), moving)
+            return (resting, jnp.where(is_begin, there, moved)), None
+
+        # In its first two turns each half finds its own places, with nothing known of them but z.
+        begin = jnp.concatenate([z, z, jnp.zeros((n_ensembles, n_walkers, 3))], axis=2)
+        halves = begin[:, : n_walkers // 2], begin[:, n_walkers // 2 :]
+        uniform = to_uniform(chosen.bits).reshape(-1, *chosen.bits.shape[2:])
+        is_begin = jnp.arange(2 + len(uniform)) < 2
+        turns = is_begin, jnp.repeat(jnp.pad(chosen.kinds, (1, 0)), 2), jnp.concatenate([uniform[:2], uniform])
+        ended = jnp.concatenate(jax.lax.scan(half_step, halves, turns)[0], axis=1)
+        _, values, accepted = jnp.moveaxis(ended[..., rest], -1, 0)
+        return ended[..., where_z], values, accepted
 
     return sweep
 
@@ -105,22 +84,3 @@ def walker_sweep(log_density: Callable[[Array, Any], Array], moves: Moves, frame
 def to_uniform(bits: Array | np.ndarray) -> Array:
     """Numbers between 0 and 1, neither of them, of unsigned integers."""
     return (jnp.asarray(bits) + 0.5) / 2.0**32
-
-
-def _shuffle(part: Array, order: Array) -> Array:
-    return jax.vmap(lambda walkers, of: walkers[of])(part, order.astype(jnp.int32))
-
-
-def _like(chosen: Array, part: Array) -> Array:
-    """With as many axes."""
-    return chosen.reshape(*chosen.shape, *[1] * (part.ndim - chosen.ndim))
-
-
-def _by_half(part: Array) -> Array:
-    """(half, ensemble, walker, ...) of (ensemble, walker, ...)."""
-    half = part.shape[1] // 2
-    return jnp.stack([part[:, :half], part[:, half:]])
-
-
-def _whole(part: Array) -> Array:
-    return jnp.concatenate([part[0], part[1]], axis=1)

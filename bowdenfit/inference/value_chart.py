@@ -46,21 +46,22 @@ class Chart:
         """Log of the coordinate per z between nodes."""
         return np.log(self.rises / _WIDTH)
 
-    def from_z(self, z: Array) -> tuple[Array, Array]:
-        """Coordinates of z (last axis: parameters), and log of the volume in z of a unit of them there."""
-        along = (z[..., self.which] - NODES[0]) / _WIDTH
-        node = jnp.clip(along, 0, len(NODES) - 2).astype(int)
-        found = z.at[..., self.which].set(_taken(self.values, node) + (along - node) * _taken(self.rises, node))
-        return found, -_taken(self.log_slopes, node).sum(axis=-1)
+    def at(self, given: Array, is_z: Array) -> tuple[Array, Array, Array]:
+        """Coordinates and z, and log of the volume in z of a unit of the coordinates there, of one of the two.
 
-    def to_z(self, found: Array) -> tuple[Array, Array]:
-        """Z of coordinates (walker, parameter), and log of the volume in z of a unit of them there."""
-        at, inner = found[:, self.which], jnp.asarray(self.values[1:-1])
+        Args:
+            given: Z or coordinates, (walker, parameter).
+            is_z: Whether it is z.
+        """
+        own = given[:, self.which]
         search = jax.vmap(partial(jnp.searchsorted, side="right"), in_axes=1, out_axes=1)
-        node = search(inner, at)
-        along = node + (at - _taken(self.values, node)) / _taken(self.rises, node)
-        z = found.at[:, self.which].set(NODES[0] + _WIDTH * along)
-        return z, -_taken(self.log_slopes, node).sum(axis=-1)
+        along = (own - NODES[0]) / _WIDTH
+        node = jnp.where(is_z, jnp.clip(along, 0, len(NODES) - 2).astype(int), search(jnp.asarray(self.values[1:-1]), own))
+        value, rise = _taken(self.values, node), _taken(self.rises, node)
+        found = jnp.where(is_z, value + (along - node) * rise, own)
+        z = jnp.where(is_z, own, NODES[0] + _WIDTH * (node + (own - value) / rise))
+        volume = -_taken(self.log_slopes, node).sum(axis=1)
+        return given.at[:, self.which].set(found), given.at[:, self.which].set(z), volume
 
 
 def _taken(table: np.ndarray, node: Array) -> Array:

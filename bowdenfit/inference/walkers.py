@@ -1,7 +1,6 @@
 """What is compiled for the walkers of one posterior; apart from what emcee makes of it, which takes long to load."""
 
 from collections.abc import Callable
-from concurrent.futures import Executor
 from typing import Any, NamedTuple
 
 import jax
@@ -12,7 +11,7 @@ from jax import Array
 from bowdenfit.description import SamplerSettings
 from bowdenfit.description.defaults import THIN
 from bowdenfit.inference.compilation import compile_program
-from bowdenfit.inference.coordinates import IN_Z, Frames, frames_of
+from bowdenfit.inference.coordinates import in_z, Frames, frames_of
 from bowdenfit.inference.log_density import LogDensity
 from bowdenfit.inference.moves import Moves, default_moves
 from bowdenfit.inference.sweep import Chosen, numbers_of_walker, walker_sweep
@@ -35,7 +34,6 @@ class Shares(NamedTuple):
         return Chosen(
             np.asarray(random.choice(len(self.frames), p=self.frames), dtype=np.int32),
             random.choice(len(self.moves), size=THIN, p=self.moves).astype(np.int32),
-            np.argsort(random.rand(THIN, ensembles, walkers), axis=-1).astype(np.int32),
             random.randint(2**32, size=(THIN, 2, ensembles, walkers // 2, numbers_of_walker(size)), dtype=np.uint32),
         )
 
@@ -44,30 +42,24 @@ class WalkerPrograms(NamedTuple):
     """What walkers run.
 
     Args:
-        log_density: Of z of all walkers (rows) and data.
         sweep: `walker_sweep` of `THIN` steps.
         shares: Of its moves and coordinates.
     """
 
-    log_density: Callable[..., Any]
     sweep: Callable[..., Any]
     shares: Shares
 
 
-def walker_programs(
-    posterior: LogDensity, settings: SamplerSettings, moves: Moves | None = None, beside: Executor | None = None
-) -> WalkerPrograms:
+def walker_programs(posterior: LogDensity, settings: SamplerSettings, moves: Moves | None = None) -> WalkerPrograms:
     """The programs of one posterior.
 
     Args:
         posterior: The posterior; what is compiled serves others with data of the same shapes.
         settings: How many walkers.
         moves: What they do, in z alone; `default_moves`, in all coordinates, if omitted.
-        beside: See `compile_program`.
     """
-    frames = frames_of(posterior) if moves is None else ((IN_Z, 1.0),)
-    size, data = posterior.model.space.size, posterior.data
-    return compiled_walkers(posterior.log_density, data, size, settings, frames, moves, beside)
+    frames = frames_of(posterior) if moves is None else ((in_z, 1.0),)
+    return compiled_walkers(posterior.log_density, posterior.data, posterior.model.space.size, settings, frames, moves)
 
 
 def compiled_walkers(
@@ -77,7 +69,6 @@ def compiled_walkers(
     settings: SamplerSettings,
     frames: Frames,
     moves: Moves | None = None,
-    beside: Executor | None = None,
 ) -> WalkerPrograms:
     """The programs of any density.
 
@@ -88,14 +79,10 @@ def compiled_walkers(
         settings: How many walkers.
         frames: The coordinates.
         moves: `default_moves` if omitted.
-        beside: See `compile_program`.
     """
     shape = settings.n_ensembles, settings.walkers(size), size
     moves = moves or default_moves(size, shape[1])
-    z, values = (jax.ShapeDtypeStruct(axes, jnp.float64) for axes in (shape, shape[:2]))
-    rows = jax.ShapeDtypeStruct((shape[0] * shape[1], size), jnp.float64)
-    of_start = compile_program(jax.vmap(log_density, (0, None)), rows, data, run_once=True, beside=beside)
     shares = Shares(*(tuple(share for _, share in each) for each in (moves, frames)))
     chosen = shares.choose(np.random.RandomState(0), shape)  # any, for its shapes
-    sweep = compile_program(walker_sweep(log_density, moves, frames), chosen, z, values, data)
-    return WalkerPrograms(of_start, sweep, shares)
+    sweep = walker_sweep(log_density, moves, frames)
+    return WalkerPrograms(compile_program(sweep, chosen, jax.ShapeDtypeStruct(shape, jnp.float64), data), shares)

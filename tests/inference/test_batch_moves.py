@@ -37,10 +37,9 @@ def states(moves, seed: int, rounds: int, width: float = 1.0, frames=IN_Z) -> np
     with jax.enable_x64(True):
         start = width * draw_t(np.random.default_rng(seed), ENSEMBLES * WALKERS).reshape(ENSEMBLES, WALKERS, -1)
         z, found, numbers = start, [], np.zeros((), np.uint32)
-        values = jax.vmap(jax.vmap(lambda x: log_t(x, None)))(z)
-        one_round = compile_program(walker_round(log_t, moves, frames), numbers, numbers, z, values, None)
+        one_round = compile_program(walker_round(log_t, moves, frames), numbers, numbers, z, None)
         for number in range(rounds):
-            path, values = one_round(np.uint32(seed), np.uint32(number), z, values, None)
+            path = one_round(np.uint32(seed), np.uint32(number), z, None)
             z, found = path[-1], [*found, np.asarray(path)]
     return np.concatenate(found)
 
@@ -76,9 +75,10 @@ def test_coefficients_given_everything_else_have_a_way_back_and_the_volume_of_th
         posterior = LogDensity(build_model(load_dataset(DATA / name)))
         given_others, data = Conditional(posterior), posterior.data
         z = jnp.asarray(np.random.default_rng(1).standard_normal((20, posterior.model.space.size)))
-        w, of_z = jax.jit(jax.vmap(lambda one: given_others.to_w(one, data)))(z)
-        back, volume = jax.jit(jax.vmap(lambda one: given_others.from_w(one, data)))(w)
+        both_of = jax.jit(jax.vmap(given_others.at, (0, None, None)))
+        w, _, of_z = both_of(z, True, data)
+        _, back, volume = both_of(w, False, data)
         np.testing.assert_allclose(back, z, rtol=1e-6, atol=1e-6)
         np.testing.assert_allclose(of_z, volume, rtol=1e-6, atol=1e-6)
-        slopes = jax.jit(jax.vmap(jax.jacfwd(lambda one: given_others.from_w(one, data)[0])))(w)
+        slopes = jax.jit(jax.vmap(jax.jacfwd(lambda one: given_others.at(one, False, data)[1])))(w)
         np.testing.assert_allclose(volume, np.linalg.slogdet(slopes)[1], rtol=1e-6, atol=1e-6)

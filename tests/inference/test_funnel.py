@@ -131,9 +131,10 @@ def test_walkers_that_move_in_z_alone_do_not_reach_it(posterior):
 
 
 def test_the_way_along_the_ridge_and_back_are_inverse(posterior):
-    to_w, from_w = in_ridge(Conditional(posterior))
-    z = jnp.asarray(draw(1)[0])
-    w, volume = to_w(z, posterior.data)
-    back, same = from_w(w, posterior.data)
+    frame, z = in_ridge(Conditional(posterior)), jnp.asarray(draw(1)[0])
+    w, given, volume = frame(z, True, posterior.data)
+    kept, back, same = frame(w, False, posterior.data)
+    np.testing.assert_array_equal(given, z)
+    np.testing.assert_array_equal(kept, w)
     np.testing.assert_allclose(back, z, rtol=1e-9, atol=1e-9)
     np.testing.assert_allclose(same, volume, rtol=1e-9)

@@ -13,9 +13,8 @@ from snooker import snooker
 
 from bowdenfit.description import SamplerSettings
 from bowdenfit.description.defaults import THIN
-from bowdenfit.inference.coordinates import IN_Z as Z
-from bowdenfit.inference.coordinates import Frame, in_values
-from bowdenfit.inference.ensemble import Sweep
+from bowdenfit.inference.coordinates import Frame, in_values, in_z
+from bowdenfit.inference.ensemble import Sweep, start_of
 from bowdenfit.inference.moves import default_moves, differential_evolution, independent, numbers_of_move, stretch
 from bowdenfit.inference.value_chart import NODES, Chart
 from bowdenfit.inference.walkers import compiled_walkers
@@ -28,8 +27,8 @@ INVERSE = np.linalg.inv(ROOT)
 
 # Two coordinates are bent, as those of positive quantities are; walkers leave the nodes on both sides.
 CHART = Chart(DIMENSIONS, np.array([1, 4]), np.stack([np.exp(0.5 * NODES), np.sinh(NODES)], axis=1))
-IN_Z, IN_VALUES = ((Z, 1.0),), ((in_values(CHART), 1.0),)
-IN_BOTH = ((Z, 0.5), (in_values(CHART), 0.5))
+IN_Z, IN_VALUES = ((in_z, 1.0),), ((in_values(CHART), 1.0),)
+IN_BOTH = ((in_z, 0.5), (in_values(CHART), 0.5))
 MOVES = default_moves(DIMENSIONS, 64)
 
 
@@ -57,15 +56,9 @@ def run_side_by_side(moves, log_density, start: np.ndarray, steps: int, seed: in
     with jax.enable_x64(True):
         programs = compiled_walkers(log_density, data, dimensions, settings, frames, moves)
         sweep, flat = Sweep(programs, data, ensembles), start.reshape(-1, dimensions)
-        density = lambda z: np.array(programs.log_density(z, sweep.data))  # noqa: E731
-        sampler = emcee.EnsembleSampler(*flat.shape, density, vectorize=True, moves=sweep)
-        return _run(sampler, flat, steps // THIN, seed).reshape(-1, ensembles, walkers, dimensions)
-
-
-def _run(sampler: emcee.EnsembleSampler, start: np.ndarray, states: int, seed: int, thin: int = 1) -> np.ndarray:
-    state = emcee.State(start, random_state=np.random.RandomState(seed).get_state())
-    sampler.run_mcmc(state, states, thin_by=thin, skip_initial_state_check=True)
-    return sampler.get_chain()
+        sampler = emcee.EnsembleSampler(*flat.shape, log_density, moves=sweep)
+        sampler.run_mcmc(start_of(flat, np.random.RandomState(seed)), steps // THIN, skip_initial_state_check=True)
+        return sampler.get_chain().reshape(-1, ensembles, walkers, dimensions)
 
 
 LEVELS = np.array([0.01, 0.05, 0.25, 0.5, 0.75, 0.95, 0.99])
@@ -144,11 +137,7 @@ def test_the_same_test_sees_that_a_factor_is_missing(name):
 
 def without_its_volume(frame: Frame) -> Frame:
     """The same places, as if a unit were as large everywhere."""
-    return Frame(*(partial(_first_and_zeros, way) for way in frame))
-
-
-def _first_and_zeros(way, places, data):
-    return way(places, data)[0], jnp.zeros(len(places))
+    return lambda places, is_z, data: (*frame(places, is_z, data)[:2], jnp.zeros(len(places)))
 
 
 @pytest.mark.filterwarnings("ignore:Precision loss")
@@ -249,11 +238,48 @@ def test_side_by_side_with_one_ensemble_is_distributed_as_emcee_s_own_sampler(mo
         start = draw_t(np.random.default_rng(seed), walkers)
         alone = run_side_by_side([(PROPOSALS[move], 1.0)], log_t, start[None], steps, seed, IN_Z)
         sampler = emcee.EnsembleSampler(walkers, DIMENSIONS, log_t_of_rows, vectorize=True, moves=EMCEE_MOVES[move])
-        others = _run(sampler, start, steps // THIN, seed + 100, THIN)[:, None]
+        state = emcee.State(start, random_state=np.random.RandomState(seed + 100).get_state())
+        sampler.run_mcmc(state, steps // THIN, thin_by=THIN, skip_initial_state_check=True)
+        others = sampler.get_chain()[:, None]
         for name, states in (("side by side", alone), ("emcee", others)):
             shares[name].append(below_quantiles(states)[0])
     p = stats.ttest_ind(*shares.values(), axis=0, equal_var=False).pvalue
     assert np.nanmin(p) * p.size > 0.001
+
+
+# The ends of coordinates and densities -------------------------------------------------------------------------------
+
+
+def starts_on_both_sides() -> np.ndarray:
+    """Of one ensemble, with every second walker below 0 in the first dimension."""
+    start = np.random.default_rng(5).standard_normal((1, 32, DIMENSIONS))
+    start[0, :, 0] = np.abs(start[0, :, 0]) * np.where(np.arange(32) % 2, -1, 1)
+    return start
+
+
+def normal_above_zero(x, _):
+    """A standard normal where the first dimension is positive, nothing elsewhere."""
+    return jnp.where(x[0] > 0, -0.5 * jnp.sum(x**2), jnp.nan)
+
+
+def test_walkers_that_start_where_the_density_cannot_be_computed_come_in_and_none_leaves():
+    states = run_side_by_side(MOVES, normal_above_zero, starts_on_both_sides(), 400, 1)
+    assert np.all(states[-1, ..., 0] > 0)
+
+
+def without_coordinates_below_zero(given, is_z, data):
+    w, z, volume = in_z(given, is_z, data)
+    return w, z, jnp.where(z[:, 0] > 0, volume, jnp.nan)
+
+
+def test_walkers_beyond_the_reach_of_coordinates_stay_and_no_others_go_there():
+    """The density is positive there, so that leaving without a way back would draw it too seldom."""
+    start, frames = starts_on_both_sides(), ((without_coordinates_below_zero, 1.0),)
+    states = run_side_by_side(MOVES, lambda x, _: -0.5 * jnp.sum(x**2), start, 400, 1, frames)[:, 0]
+    beyond = start[0, :, 0] < 0
+    np.testing.assert_array_equal(states[:, beyond], np.broadcast_to(start[0, beyond], states[:, beyond].shape))
+    assert np.all(states[:, ~beyond, 0] > 0)
+    assert np.all(np.any(states[-1, ~beyond] != start[0, ~beyond], axis=-1))
 
 
 # Ensembles --------------------------------------------------------------------------------------------------------

@@ -14,11 +14,13 @@ CHART = Chart(DIMENSIONS, np.array([1, 4]), np.stack([np.exp(0.5 * NODES), np.si
 def test_a_chart_leads_back_and_knows_its_slopes():
     """Between the nodes and far beyond them."""
     z = jnp.asarray(5 * np.random.default_rng(4).standard_normal((21, DIMENSIONS)))
-    found, volume = CHART.from_z(z)
-    back, same = CHART.to_z(found)
+    found, given, volume = CHART.at(z, jnp.asarray(True))
+    kept_as_given, back, same = CHART.at(found, jnp.asarray(False))
+    np.testing.assert_array_equal(given, z)
+    np.testing.assert_array_equal(kept_as_given, found)
     np.testing.assert_allclose(back, z, rtol=1e-9)
     np.testing.assert_array_equal(same, volume)
-    further = CHART.from_z(z + 1e-7)[0]
+    further = CHART.at(z + 1e-7, jnp.asarray(True))[0]
     np.testing.assert_allclose(np.log((further - found) / 1e-7).sum(axis=-1), -volume, atol=1e-4)
     kept = [i for i in range(DIMENSIONS) if i not in CHART.which]
     np.testing.assert_array_equal(found[..., kept], z[..., kept])
@@ -32,4 +34,4 @@ def test_coefficients_and_curvatures_are_charted_and_noise_scales_are_not(on_bod
     assert charted == {"mu1", "mu2", "mu3", "free_sheath_angle_c", "squeezed_sheath_angle_c"}
     z = jnp.repeat(NODES[100:140:10, None], space.size, axis=1)
     values = np.stack([np.asarray(p.prior.constrain(z[:, i])) for i, p in enumerate(space.free)], axis=1)
-    np.testing.assert_allclose(chart.from_z(z)[0][:, chart.which], values[:, chart.which], rtol=1e-9)
+    np.testing.assert_allclose(chart.at(z, jnp.asarray(True))[0][:, chart.which], values[:, chart.which], rtol=1e-9)

@@ -25,7 +25,7 @@ _STREAM = 1
 
 
 def make_round(posterior: LogDensity, n_ensembles: int, n_walkers: int, data: Any) -> Callable[..., Any]:
-    """Compiled: a round of every cable, from seeds, the number of the round, z and log densities by ensemble and walker.
+    """Compiled: a round of every cable, from seeds, the number of the round, and z by ensemble and walker.
 
     Args:
         posterior: The posterior.
@@ -36,12 +36,12 @@ def make_round(posterior: LogDensity, n_ensembles: int, n_walkers: int, data: An
     cables, size = len(jax.tree.leaves(data)[0]), posterior.model.space.size
     of_cable = walker_round(posterior.log_density, shares_of_moves(), frames_of(posterior))
     seeds, number = jax.ShapeDtypeStruct((cables,), jnp.uint32), jax.ShapeDtypeStruct((), jnp.uint32)
-    shapes = [jax.ShapeDtypeStruct((cables, n_ensembles, n_walkers, *more), jnp.float64) for more in ((size,), ())]
-    return compile_program(jax.vmap(of_cable, (0, None, 0, 0, 0)), seeds, number, *shapes, data)
+    z = jax.ShapeDtypeStruct((cables, n_ensembles, n_walkers, size), jnp.float64)
+    return compile_program(jax.vmap(of_cable, (0, None, 0, 0)), seeds, number, z, data)
 
 
 def walker_round(log_density: Callable[[Array, Any], Array], moves: Moves, frames: Frames) -> Callable[..., Any]:
-    """A round of one cable, of seed, number of the round, z, log densities there and data: stored z, last log densities.
+    """Stored z of a round of one cable, of seed, number of the round, z and data.
 
     Args:
         log_density: Of one z and data.
@@ -51,22 +51,21 @@ def walker_round(log_density: Callable[[Array, Any], Array], moves: Moves, frame
     sweep = walker_sweep(log_density, moves, frames)
     ends = [jnp.asarray(np.cumsum([share for _, share in each])[:-1]) for each in (moves, frames)]
 
-    def of_cable(seed: Array, number: Array, z: Array, values: Array, data: Any) -> Any:
+    def of_cable(seed: Array, number: Array, z: Array, data: Any) -> Array:
         n_ensembles, n_walkers, size = z.shape
 
-        def stored(carried: Any, chosen: Any) -> Any:
-            keys, kinds, frame = chosen
-            order = _order(_bits(keys[0], (THIN, 2, n_ensembles, 1)), n_walkers)
+        def stored(z: Array, drawn: Any) -> tuple[Array, Array]:
+            keys, kinds, frame = drawn
+            order = jnp.arange(n_ensembles)[:, None], _order(_bits(keys[0], (2, n_ensembles, 1)), n_walkers)
             bits = _bits(keys[1], (THIN, 2, n_ensembles, n_walkers // 2, numbers_of_walker(size)))
-            z, values, _ = sweep(Chosen(frame, kinds, order, bits), *carried, data)
-            return (z, values), z
+            z = z.at[order].set(sweep(Chosen(frame, kinds, bits), z[order], data)[0])
+            return z, z
 
         own, of_all = (jax.random.fold_in(jax.random.fold_in(jax.random.key(s), _STREAM), number) for s in (seed, 0))
         drawn = to_uniform(_bits(of_all, (STORED, THIN + 1)))
         chosen = zip(ends, (drawn[:, 1:], drawn[:, 0]), strict=True)
         kinds, frame = (jnp.searchsorted(end, number, side="right") for end, number in chosen)
-        (_, values), path = jax.lax.scan(stored, (z, values), (jax.random.split(own, (STORED, 2)), kinds, frame))
-        return path, values
+        return jax.lax.scan(stored, z, (jax.random.split(own, (STORED, 2)), kinds, frame))[1]
 
     return of_cable
 
@@ -77,5 +76,6 @@ def _bits(key: Array, shape: tuple[int, ...]) -> Array:
 
 
 def _order(bits: Array, n_walkers: int) -> Array:
-    """Orders of the walkers of every ensemble at random, by step; their halves move one after the other."""
-    return ((2 * bits[:, 0] + 1) * jnp.arange(n_walkers, dtype=jnp.uint32) + bits[:, 1]) % n_walkers
+    """An order of the walkers of every ensemble at random; their halves move one after the other."""
+    order = ((2 * bits[0] + 1) * jnp.arange(n_walkers, dtype=jnp.uint32) + bits[1]) % n_walkers
+    return order.astype(jnp.int32)

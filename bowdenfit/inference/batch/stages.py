@@ -55,7 +55,7 @@ class Case:
         weighted: Its weighted draws; None where nothing can be computed.
         fit: What is known so far.
         rounds: How many its walkers have gone.
-        walkers: Where they are, (ensemble, walker, parameter), with their log densities.
+        walkers: Where they are, (ensemble, walker, parameter).
         path: Their stored states of late, (state, ensemble, walker, parameter).
     """
 
@@ -65,7 +65,7 @@ class Case:
     weighted: Weighted | None
     fit: BatchFit
     rounds: int = 0
-    walkers: tuple[np.ndarray, np.ndarray] = (np.zeros(0), np.zeros(0))
+    walkers: np.ndarray = field(default_factory=lambda: np.zeros((0, 0, 0)))
     path: np.ndarray = field(default_factory=lambda: np.zeros((0, 0, 0, 0)))
 
 
@@ -113,17 +113,16 @@ def walk(programs: BatchPrograms, cases: list[Case]) -> list[Case]:
     begun = [case if case.rounds else _on_the_way(programs, case) for case in cases]
     padded = [*begun, *[begun[-1]] * (WALKING - len(begun))]
     seeds, number = np.array([case.seed for case in padded], dtype=np.uint32), np.uint32(begun[0].rounds)
-    z, log_density = (np.stack([case.walkers[i] for case in padded]) for i in (0, 1))
-    answer = programs.ensembles(seeds, number, z, log_density, stack([case.data for case in padded], WALKING))
-    path, log_density = (np.asarray(part) for part in answer)
-    return [_further(case, path[i], log_density[i]) for i, case in enumerate(begun)]
+    z, data = np.stack([case.walkers for case in padded]), stack([case.data for case in padded], WALKING)
+    paths = np.asarray(programs.ensembles(seeds, number, z, data))
+    return [_further(case, path) for case, path in zip(begun, paths, strict=False)]
 
 
-def _further(case: Case, path: np.ndarray, log_density: np.ndarray) -> Case:
+def _further(case: Case, path: np.ndarray) -> Case:
     """A round further; of the path no more is kept than its second half can be asked for."""
     rounds, whole = case.rounds + 1, np.concatenate([case.path, path]) if case.rounds else path
     late = whole[-(rounds + 1) // 2 * len(path) :]
-    return replace(case, rounds=rounds, walkers=(path[-1], log_density), path=late)
+    return replace(case, rounds=rounds, walkers=path[-1], path=late)
 
 
 def _on_the_way(programs: BatchPrograms, case: Case) -> Case:
@@ -137,8 +136,7 @@ def _on_the_way(programs: BatchPrograms, case: Case) -> Case:
     # The largest of weights times exponential numbers are a sample without replacement.
     chosen = np.argsort(log_weights + generator.gumbel(size=len(log_weights)))[-shape[0] * shape[1] :]
     chosen = generator.permutation(chosen)
-    log_density = case.weighted.log_density[chosen].reshape(shape)
-    return replace(case, walkers=(case.weighted.z[chosen].reshape(*shape, -1), log_density))
+    return replace(case, walkers=case.weighted.z[chosen].reshape(*shape, -1))
 
 
 def _evened(programs: BatchPrograms, weighted: Weighted) -> np.ndarray:

@@ -41,25 +41,20 @@ def in_ridge(conditional: Conditional) -> Frame:
 def frames_of(posterior: LogDensity) -> Frames:
     """In what walkers move, and how often.
 
-    By measurement: with the ridge, scatter between mountings mixes five times as fast on simulated on-body data. Values beside
-    it give up to 1.7 times as many effective draws as z and values in turns do, and nowhere fewer; the ridge alone, or with
-    the others in values, loses tails of curves.
+    By measurement on simulated on-body data, whose scatter between mountings mixes five times as fast for the ridge. Half of
+    all is done in values where there is no friction coefficient that readings tell of. Without z walkers that start far out
+    stay there: with values and the ridge alone three of 24 on-body fits took 6000 to 11,000 steps instead of 600 to 1400.
 
     Args:
         posterior: The posterior.
     """
-    conditional, space = Conditional(posterior), posterior.model.space
+    conditional, without = Conditional(posterior), frames_without_ridge(posterior.model.space)
     if not conditional.is_told:
-        return frames_without_ridge(space)
-    return (in_values_of(space), 0.5), (in_ridge(conditional), 0.5)
+        return without
+    return *((frame, share / 2) for frame, share in without), (in_ridge(conditional), 0.5)
 
 
 def frames_without_ridge(space: ParameterSpace) -> Frames:
     """Z and values, for densities that are no model's alone."""
-    return (in_z, 0.5), (in_values_of(space), 0.5)
-
-
-def in_values_of(space: ParameterSpace) -> Frame:
-    """Values of the parameters, or z where those are all linear in it."""
     chart = chart_values(space)
-    return in_values(chart) if len(chart.which) else in_z
+    return (in_z, 0.5), (in_values(chart) if len(chart.which) else in_z, 0.5)

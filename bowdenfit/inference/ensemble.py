@@ -4,10 +4,12 @@ Moves: emcee's stretch and differential evolution, and draws from a distribution
 in z, a quarter in the values of the parameters, half where friction coefficients follow everything else. Not `DESnookerMove`:
 the one in emcee 3.1.6 does not sample the density it is given, and every ensemble agrees on the wrong answer.
 
-emcee keeps the states and the random numbers; from one state to the next it makes one move, which is `THIN` steps of all
-ensembles in one compiled program. Step by step more than half of the time was Python's.
+emcee keeps the states and the random numbers; from one state to the next it makes one move, which is `THIN` steps of every
+ensemble in one compiled program. Step by step more than half of the time was Python's. Each core moves ensembles of its own,
+because one program for all of them used two cores in turns rather than at once.
 """
 
+from concurrent.futures import ThreadPoolExecutor
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
@@ -20,7 +22,9 @@ from bowdenfit.description import SamplerSettings
 from bowdenfit.description.defaults import THIN
 from bowdenfit.inference.chain import Chain, Progress, Sampling, stuck_walkers, worst
 from bowdenfit.inference.checkpoint import append, damaged_checkpoint, records
+from bowdenfit.inference.engines.processes import cores
 from bowdenfit.inference.least_squares import MaximumPosterior
+from bowdenfit.inference.sweep import Chosen
 from bowdenfit.inference.walkers import WalkerPrograms
 
 _BLOCK = 10  # stored states between two reports
@@ -44,17 +48,23 @@ class Sweep(emcee.moves.Move):
     def __init__(self, programs: WalkerPrograms, data: Any, n_ensembles: int) -> None:
         super().__init__()
         self.programs, self.data, self.n_ensembles = programs, jax.device_put(data), n_ensembles
+        self.threads = ThreadPoolExecutor(min(cores(), n_ensembles))
 
     def propose(self, model: Any, state: emcee.State) -> tuple[emcee.State, np.ndarray]:
         """`THIN` steps of every walker, and the share that was accepted."""
-        n_walkers = len(state.coords) // self.n_ensembles
-        order = np.argsort(model.random.rand(self.n_ensembles, n_walkers), axis=1)
-        order += n_walkers * np.arange(self.n_ensembles)[:, None]
-        z, accepted = state.coords[order], np.zeros(len(state.coords))
-        chosen = self.programs.shares.choose(model.random, z.shape)
-        # Into the state's own arrays: those of JAX are for reading.
-        state.coords[order], state.log_prob[order], accepted[order] = self.programs.sweep(chosen, z, self.data)
+        walkers, accepted = np.arange(len(state.coords)).reshape(self.n_ensembles, -1), np.zeros(len(state.coords))
+        begun = []
+        for ensemble in walkers:
+            order = model.random.permutation(ensemble)
+            chosen = self.programs.shares.choose(model.random, state.coords[order].shape)
+            begun.append((order, self.threads.submit(self._moved, chosen, state.coords[order])))
+        for order, moved in begun:  # into the state's own arrays: those of JAX are for reading
+            state.coords[order], state.log_prob[order], accepted[order] = moved.result()
         return state, accepted / THIN
+
+    def _moved(self, chosen: Chosen, z: np.ndarray) -> Any:
+        with jax.enable_x64(True):  # the setting is each thread's own
+            return jax.block_until_ready(self.programs.sweep(chosen, z, self.data))
 
 
 def starting_points(start: MaximumPosterior, settings: SamplerSettings, generator: np.random.Generator) -> np.ndarray:

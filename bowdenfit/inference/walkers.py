@@ -28,18 +28,18 @@ class Shares(NamedTuple):
     moves: tuple[float, ...]
     frames: tuple[float, ...]
 
-    def choose(self, random: np.random.RandomState, shape: tuple[int, int, int]) -> Chosen:
-        """What is drawn at random for a sweep of walkers, (ensemble, walker, parameter)."""
-        ensembles, walkers, size = shape
+    def choose(self, random: np.random.RandomState, shape: tuple[int, int]) -> Chosen:
+        """What is drawn at random for a sweep of walkers, (walker, parameter)."""
+        walkers, size = shape
         return Chosen(
             np.asarray(random.choice(len(self.frames), p=self.frames), dtype=np.int32),
             random.choice(len(self.moves), size=THIN, p=self.moves).astype(np.int32),
-            random.randint(2**32, size=(THIN, 2, ensembles, walkers // 2, numbers_of_walker(size)), dtype=np.uint32),
+            random.randint(2**32, size=(THIN, 2, walkers // 2, numbers_of_walker(size)), dtype=np.uint32),
         )
 
 
 class WalkerPrograms(NamedTuple):
-    """What walkers run.
+    """What walkers of an ensemble run.
 
     Args:
         sweep: `walker_sweep` of `THIN` steps.
@@ -80,8 +80,8 @@ def compiled_walkers(
         frames: The coordinates.
         moves: `default_moves` if omitted.
     """
-    shape = settings.n_ensembles, settings.walkers(size), size
-    moves = moves or default_moves(size, shape[1])
+    shape = settings.walkers(size), size
+    moves = moves or default_moves(size, shape[0])
     shares = Shares(*(tuple(share for _, share in each) for each in (moves, frames)))
     chosen = shares.choose(np.random.RandomState(0), shape)  # any, for its shapes
     sweep = walker_sweep(log_density, moves, frames)

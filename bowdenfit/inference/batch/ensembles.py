@@ -51,14 +51,19 @@ def walker_round(log_density: Callable[[Array, Any], Array], moves: Moves, frame
     sweep = walker_sweep(log_density, moves, frames)
     ends = [jnp.asarray(np.cumsum([share for _, share in each])[:-1]) for each in (moves, frames)]
 
+    def of_ensemble(bits: Array, order: Array, kinds: Array, frame: Array, z: Array, data: Any) -> Array:
+        return z.at[order].set(sweep(Chosen(frame, kinds, bits), z[order], data)[0])
+
+    of_ensembles = jax.vmap(of_ensemble, (0, 0, None, None, 0, None))
+
     def of_cable(seed: Array, number: Array, z: Array, data: Any) -> Array:
         n_ensembles, n_walkers, size = z.shape
 
         def stored(z: Array, drawn: Any) -> tuple[Array, Array]:
-            keys, kinds, frame = drawn
-            order = jnp.arange(n_ensembles)[:, None], _order(_bits(keys[0], (2, n_ensembles, 1)), n_walkers)
-            bits = _bits(keys[1], (THIN, 2, n_ensembles, n_walkers // 2, numbers_of_walker(size)))
-            z = z.at[order].set(sweep(Chosen(frame, kinds, bits), z[order], data)[0])
+            keys, *chosen = drawn
+            order = _order(_bits(keys[0], (2, n_ensembles, 1)), n_walkers)
+            bits = _bits(keys[1], (n_ensembles, THIN, 2, n_walkers // 2, numbers_of_walker(size)))
+            z = of_ensembles(bits, order, *chosen, z, data)
             return z, z
 
         own, of_all = (jax.random.fold_in(jax.random.fold_in(jax.random.key(s), _STREAM), number) for s in (seed, 0))

@@ -15,7 +15,6 @@ from bowdenfit.inference.log_density import LogDensity
 from bowdenfit.inference.value_chart import Chart, chart_values
 from bowdenfit.parameters.space import ParameterSpace
 
-
 # W and z of walkers (rows), and log of the volume in z of a unit of w there: of either of them, of which it is said whether it
 # is z, and of data. NaN where w has no z.
 Frame = Callable[[Array, Array, Any], tuple[Array, Array, Array]]

@@ -46,8 +46,8 @@ def walker_sweep(log_density: Callable[[Array, Any], Array], moves: Moves, frame
 
     def sweep(chosen: Chosen, z: Array, data: Any) -> tuple[Array, Array, Array]:
         n_walkers, size = z.shape
-        # Of a walker: where it is in the coordinates that it moves in, and in z; log density in those coordinates, and in z; and
-        # how often it moved. In one array, since each operation takes its time to compile.
+        # Of a walker: where it is in the coordinates that it moves in, and in z; its log density in those, and in z; and how
+        # often it moved. In one array, since each operation takes its time to compile.
         where_w, where_z, rest = slice(size), slice(size, 2 * size), slice(2 * size, None)
 
         def walkers_at(given: Array, is_z: Array) -> Array:

@@ -1,6 +1,7 @@
 """What is compiled for the walkers of one posterior; apart from what emcee makes of it, which takes long to load."""
 
 from collections.abc import Callable
+from concurrent.futures import Executor
 from typing import Any, NamedTuple
 
 import jax
@@ -11,7 +12,7 @@ from jax import Array
 from bowdenfit.description import SamplerSettings
 from bowdenfit.description.defaults import THIN
 from bowdenfit.inference.compilation import compile_program
-from bowdenfit.inference.coordinates import in_z, Frames, frames_of
+from bowdenfit.inference.coordinates import Frames, frames_of, in_z
 from bowdenfit.inference.log_density import LogDensity
 from bowdenfit.inference.moves import Moves, default_moves
 from bowdenfit.inference.sweep import Chosen, numbers_of_walker, walker_sweep
@@ -50,16 +51,20 @@ class WalkerPrograms(NamedTuple):
     shares: Shares
 
 
-def walker_programs(posterior: LogDensity, settings: SamplerSettings, moves: Moves | None = None) -> WalkerPrograms:
+def walker_programs(
+    posterior: LogDensity, settings: SamplerSettings, moves: Moves | None = None, beside: Executor | None = None
+) -> WalkerPrograms:
     """The programs of one posterior.
 
     Args:
         posterior: The posterior; what is compiled serves others with data of the same shapes.
         settings: How many walkers.
         moves: What they do, in z alone; `default_moves`, in all coordinates, if omitted.
+        beside: See `compile_program`.
     """
     frames = frames_of(posterior) if moves is None else ((in_z, 1.0),)
-    return compiled_walkers(posterior.log_density, posterior.data, posterior.model.space.size, settings, frames, moves)
+    size, data = posterior.model.space.size, posterior.data
+    return compiled_walkers(posterior.log_density, data, size, settings, frames, moves, beside)
 
 
 def compiled_walkers(
@@ -69,6 +74,7 @@ def compiled_walkers(
     settings: SamplerSettings,
     frames: Frames,
     moves: Moves | None = None,
+    beside: Executor | None = None,
 ) -> WalkerPrograms:
     """The programs of any density.
 
@@ -79,10 +85,11 @@ def compiled_walkers(
         settings: How many walkers.
         frames: The coordinates.
         moves: `default_moves` if omitted.
+        beside: See `compile_program`.
     """
     shape = settings.walkers(size), size
     moves = moves or default_moves(size, shape[0])
     shares = Shares(*(tuple(share for _, share in each) for each in (moves, frames)))
     chosen = shares.choose(np.random.RandomState(0), shape)  # any, for its shapes
-    sweep = walker_sweep(log_density, moves, frames)
-    return WalkerPrograms(compile_program(sweep, chosen, jax.ShapeDtypeStruct(shape, jnp.float64), data), shares)
+    sweep, z = walker_sweep(log_density, moves, frames), jax.ShapeDtypeStruct(shape, jnp.float64)
+    return WalkerPrograms(compile_program(sweep, chosen, z, data, beside=beside), shares)

@@ -59,7 +59,7 @@ def sampling_programs(density: Density, seed: int, beside: Executor) -> Programs
     model, settings, programs = density.model, density.model.description.sampler, dict[str, Any]()
     for name in samplers(settings.method):
         if name == "emcee":
-            programs[name] = walker_programs(density, settings)
+            programs[name] = walker_programs(density, settings, beside=beside)
         else:
             programs[name] = import_module(_MODULES[name]).make_program(density, settings)
     optimum = for_each_draw(optimum_of(model), model.space.size, beside=beside) if model.description.route else None

@@ -167,8 +167,7 @@ class Twin(InAnotherProcess):
 class InOtherProcesses(Assistant):
     """Generators in a copy of this process; functions in one without JAX and its twin, in whichever is free.
 
-    Those two begin before this process loads JAX, and load meanwhile what drawing needs. What checking needs waits until the
-    generator is through, since this process compiles as long as that, and there may be two cores.
+    Those two begin before this process loads JAX, and load meanwhile what drawing needs, and one of them what checking needs.
 
     Args:
         settings: See `assistant`.
@@ -195,12 +194,7 @@ class InOtherProcesses(Assistant):
         assert self.computing is not None  # as was asked for
         found = self.computing.begin(stages, *arguments, answers=answers)
         self.computing.submit(os._exit, 0)  # which gives its memory back
-        found[-1].add_done_callback(lambda _: self._load_what_checking_needs())
         return found
-
-    def _load_what_checking_needs(self) -> None:
-        with suppress(RuntimeError):  # all has ended
-            self.drawing.submit(load, *CHECKING)
 
     def submit(self, function: Callable[..., Any], *arguments: Any) -> "Future[Any]":
         """See `Assistant`."""
@@ -315,6 +309,10 @@ def _one_of_two(requests: "Connection", twin: "Connection") -> "Connection":
         original = True
     if original:
         twin.close()
+        with suppress(Exception):  # as above
+            # The first look at draws waits for no more than this, and it needs arrays alone.
+            load_without("xarray", "arviz_stats.base")
+            load(*CHECKING)
         return requests
     end_with_parent()
     requests.close()

@@ -22,6 +22,7 @@ from bowdenfit.description import SamplerSettings
 from bowdenfit.description.defaults import THIN
 from bowdenfit.inference.chain import Chain, Progress, Sampling, stuck_walkers, worst
 from bowdenfit.inference.checkpoint import append, damaged_checkpoint, records
+from bowdenfit.inference.engines.memory import ENSEMBLES_AT_ONCE
 from bowdenfit.inference.engines.processes import cores
 from bowdenfit.inference.least_squares import MaximumPosterior
 from bowdenfit.inference.sweep import Chosen
@@ -48,7 +49,7 @@ class Sweep(emcee.moves.Move):
     def __init__(self, programs: WalkerPrograms, data: Any, n_ensembles: int) -> None:
         super().__init__()
         self.programs, self.data, self.n_ensembles = programs, jax.device_put(data), n_ensembles
-        self.threads = ThreadPoolExecutor(min(cores(), n_ensembles))
+        self.threads = ThreadPoolExecutor(min(cores(), n_ensembles, ENSEMBLES_AT_ONCE))
 
     def propose(self, model: Any, state: emcee.State) -> tuple[emcee.State, np.ndarray]:
         """`THIN` steps of every walker, and the share that was accepted."""

@@ -60,10 +60,10 @@ def walker_round(log_density: Callable[[Array, Any], Array], moves: Moves, frame
         n_ensembles, n_walkers, size = z.shape
 
         def stored(z: Array, drawn: Any) -> tuple[Array, Array]:
-            keys, *chosen = drawn
+            keys, kinds, frame = drawn
             order = _order(_bits(keys[0], (2, n_ensembles, 1)), n_walkers)
             bits = _bits(keys[1], (n_ensembles, THIN, 2, n_walkers // 2, numbers_of_walker(size)))
-            z = of_ensembles(bits, order, *chosen, z, data)
+            z = of_ensembles(bits, order, kinds, frame, z, data)
             return z, z
 
         own, of_all = (jax.random.fold_in(jax.random.fold_in(jax.random.key(s), _STREAM), number) for s in (seed, 0))

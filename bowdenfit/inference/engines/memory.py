@@ -18,7 +18,8 @@ from bowdenfit.inference.engines.processes import cores
 
 AT_ONCE = 64 << 20  # bytes; what compiling a program, or a block of sampling, takes at a time
 _BUFFER = 32 << 20  # bytes; one of OpenBLAS
-_OF_PYTHON = 3  # threads at most that call one
+ENSEMBLES_AT_ONCE = 4  # threads at most that move ensembles of walkers
+_OF_PYTHON = 3  # threads at most that call one besides
 _NEEDED = 576 << 20  # bytes; a small fit by NUTS takes so much beside what is loaded by then and these buffers
 _ADDRESSES, _ADDRESSES_PER_CORE = 1500 << 20, 150 << 20  # bytes; of threads and their heaps most is never used
 # Modules that bring one, and whether threads of XLA call it too.
@@ -54,7 +55,7 @@ def refuse_too_little() -> None:
     Raises:
         MemoryShortageError: The system refuses that much.
     """
-    refuse_shortage(_NEEDED + (2 * _OF_PYTHON + cores()) * _BUFFER)
+    refuse_shortage(_NEEDED + (2 * _OF_PYTHON + _of_programs()) * _BUFFER)
     refuse_shortage(_ADDRESSES + cores() * _ADDRESSES_PER_CORE, addresses=True)
 
 
@@ -80,7 +81,12 @@ def _take_buffers_of(name: str) -> None:
         library = CDLL(import_module(name).__file__)
         take, give = library.blas_memory_alloc, library.blas_memory_free
         take.argtypes, take.restype, give.argtypes, give.restype = [c_int], c_void_p, [c_void_p], None
-        _take(take, give, _OF_PYTHON + _MODULES[name] * cores())
+        _take(take, give, _OF_PYTHON + _MODULES[name] * _of_programs())
+
+
+def _of_programs() -> int:
+    """Threads that run what is compiled: of XLA, and those that move ensembles."""
+    return cores() + min(cores(), ENSEMBLES_AT_ONCE)
 
 
 def _take(take: Callable[[int], int | None], give: Callable[[int], None], count: int) -> None:

@@ -62,7 +62,7 @@ class Reply:
         page: Gives the answer for programs, asked only for `--json`.
         csv: Gives it as CSV, asked only for `--csv`.
         notes: Lines beside the answer, on standard error.
-        exit_code: 0, or 3 for an answer that must not be trusted.
+        exit_code: 0; 3 for an answer that must not be trusted, 2 for what is said of input that cannot be used.
     """
 
     text: str

@@ -253,3 +253,30 @@ def test_one_force_and_a_position_are_a_table_of_their_own_with_or_without_a_clo
         assert "taken for a spring whose stiffness is fitted" in text and "bowdenfit fit" in text
     path.write_text(path.read_text().replace("Motor force (N)", "Motor force (N)").replace("time_s", "output_force_N"))
     assert "one force and a displacement" not in run("check", path)[1]
+
+
+def test_what_the_command_could_not_fit_ends_with_2_and_says_so(run, tmp_path):
+    output, load = trials()
+    more_out_than_in = write(tmp_path, ("Fin (N)", "Fout (N)"), (load, output), "swapped.csv")
+    without_unit = write(tmp_path, ("Fin (N)", "Fout"), (load, output), "both.csv")
+    above_one = write(tmp_path, ("cable_length_mm", "efficiency_percent"), ((440, 470), (77, 177)), "above.csv")
+    both = ("does not say its unit", "are swapped")
+    for path, said in ((more_out_than_in, ("are swapped",)), (without_unit, both), (above_one, ("is above 1",))):
+        code, out, _ = run("check", path)
+        assert code == 2 and "To fit it once that is mended:" in out
+        assert all(words in " ".join(out.split()) for words in said), out
+        (words,) = command(out)
+        assert run(*words, "--no-mcmc", "--output", tmp_path / "fit")[0] == 2
+
+
+def test_what_the_command_mends_ends_with_0(run, tmp_path):
+    output, load = trials()
+    code, out, _ = run("check", write(tmp_path, ("Fin (N)", "Fout"), (output, load)))
+    assert code == 0 and "\nTo fit it:\n" in out
+
+
+def test_a_recording_that_cannot_be_used_ends_with_2(run, tmp_path):
+    time, force, output = recorded()
+    path = write(tmp_path, ("Time (s)", "Fin (N)", "Fout (N)"), (time, force, np.full(len(time), 3.0)))
+    code, out, _ = run("check", path)
+    assert code == 2 and "To fit it once that is mended:" in out, out

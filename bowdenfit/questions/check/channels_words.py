@@ -18,7 +18,12 @@ _HEADS = ("channel", "unit", "samples", "rate", "length", "lowest", "highest", "
 
 
 def channels_text(
-    file: ChannelFile, why: str, command: FitCommand, recordings: Recordings | None = None, why_not: str = ""
+    file: ChannelFile,
+    why: str,
+    command: FitCommand,
+    recordings: Recordings | None = None,
+    why_not: str = "",
+    usable: bool = True,
 ) -> str:
     """The channels of a file, one a line, and what the file is as a recording.
 
@@ -28,6 +33,7 @@ def channels_text(
         command: What fits it.
         recordings: The file as a recording, where its channels say which is which.
         why_not: What keeps it from being one, in a sentence.
+        usable: Whether the command can fit it as it stands.
     """
     what = RECORDINGS.alone(recordings) if recordings is not None else "a recording"
     n = len(file.channels)
@@ -49,7 +55,7 @@ def channels_text(
     elif why_not:
         lines += ["", *map(filled, f"As a recording it cannot be used yet: {why_not}".splitlines())]
     several = "Several recordings of one cable go into a cable.toml (bowdenfit init)."
-    return "\n".join([*lines, "", *command_words([command]), several]) + "\n"
+    return "\n".join([*lines, "", *command_words([command], usable), several]) + "\n"
 
 
 def _ends(file: ChannelFile) -> list[str]:

@@ -24,6 +24,7 @@ def table_text(
     data: Dataset | None,
     why_not: str,
     named: Mapping[str, str],
+    usable: bool = True,
 ) -> str:
     """What a table is, and how to fit it.
 
@@ -34,6 +35,7 @@ def table_text(
         data: The data set that it makes; None if it makes none yet.
         why_not: What keeps it from that, in a sentence.
         named: Quantities whose columns the user has named, by heading.
+        usable: Whether the command can fit it as it stands.
     """
     title = f"{raw.file}: {_what(raw, data)}, because {found.why}."
     if found.other:
@@ -46,14 +48,19 @@ def table_text(
         lines += [filled(f"Note: {remark}") for remark in data.measurements.remarks if remark not in raw.lines.remarks]
     if why_not:
         lines += ["", *map(filled, f"As it stands it cannot be fitted: {why_not}".splitlines())]
-    return "\n".join([*lines, "", *command_words(commands)]) + "\n"
+    return "\n".join([*lines, "", *command_words(commands, usable)]) + "\n"
 
 
-def command_words(commands: Sequence[FitCommand]) -> list[str]:
-    """The command on a line of its own, so that it can be pasted, and what it takes for granted."""
-    lines = []
+def command_words(commands: Sequence[FitCommand], usable: bool = True) -> list[str]:
+    """The command on a line of its own, so that it can be pasted, and what it takes for granted.
+
+    Args:
+        commands: What fits a file; two where it could be either of two kinds.
+        usable: Whether it can be fitted as it stands.
+    """
+    lines, when = list[str](), "" if usable else " once that is mended"
     for what, command in zip(("a table", "a recording") if len(commands) > 1 else ("",), commands, strict=True):
-        lines += [f"To fit it as {what}:" if what else "To fit it:", on_lines(command.text)]
+        lines += [f"To fit it{f' as {what}' if what else ''}{when}:", on_lines(command.text)]
         granted = listed([f"that {each}" for each in command.provided])
         lines += [filled(f"This takes for granted {granted}; change what is not so.")] if granted else []
     return lines

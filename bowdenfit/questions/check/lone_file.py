@@ -3,6 +3,7 @@
 import shlex
 from collections.abc import Callable, Sequence
 from dataclasses import replace
+from itertools import pairwise
 from pathlib import Path
 from typing import cast
 
@@ -33,8 +34,8 @@ _CHOICES = ("noise", "friction", "geometry", "undetected")
 _ANY_ANGLE = (180.0, "deg")  # what the command says as well
 
 
-def lone_file_text(path: Path, reading: Reading, check: Callable[..., Dataset]) -> str:
-    """What a file alone is, and the command that fits it.
+def lone_file_text(path: Path, reading: Reading, check: Callable[..., Dataset]) -> tuple[str, bool]:
+    """What a file alone is, and the command that fits it; and whether that can, or the file is to be mended first.
 
     Args:
         path: The file.
@@ -51,12 +52,19 @@ def lone_file_text(path: Path, reading: Reading, check: Callable[..., Dataset]) 
     raw = read_table(path)
     headings = {source.name: quantity.rpartition(".")[2] for quantity, source in named.items()}
     if found.other:
-        return table_text(raw, found, either(path, raw, found), None, "", headings)
+        return table_text(raw, found, either(path, raw, found), None, "", headings), True
     command = table_command(path, raw, found.kind, named)
     own = has_own_angles(path, found.kind, tuple(named), stated=False)
     asked = any(reading.values()) and not command.names_more
-    data, why_not = _as_data_set(path, cast(Reading, {**reading, "wrap_angle": None if own else _ANY_ANGLE}), check, asked)
-    return table_text(raw, found, [_with_settings(command, reading)], data, why_not, headings)
+    angle = None if own else _ANY_ANGLE
+    data, why_not = _as_data_set(path, cast(Reading, {**reading, "wrap_angle": angle}), check, asked)
+    still = why_not
+    if why_not and command.names_more:
+        words = shlex.split(command.text)
+        columns = tuple(word for option, word in pairwise(words) if option == "--column")
+        _, still = _as_data_set(path, cast(Reading, {**reading, "wrap_angle": angle, "columns": columns}), check, False)
+        why_not += f"\n{still}" if still not in why_not else ""
+    return table_text(raw, found, [_with_settings(command, reading)], data, why_not, headings, not still), not still
 
 
 def _as_data_set(
@@ -82,9 +90,11 @@ def _with_settings(command: FitCommand, reading: Reading) -> FitCommand:
     return replace(command, text=" ".join([command.text, *stated]))
 
 
-def _recording_text(path: Path, found: FileKind, channels: Sequence[str]) -> str:
+def _recording_text(path: Path, found: FileKind, channels: Sequence[str]) -> tuple[str, bool]:
     file, recordings, why_not = channels_of(path, channels)
-    return channels_text(file, found.why, _command(path, file, channels), recordings, why_not)
+    command = _command(path, file, channels)
+    usable = not why_not or (not channels and "--channel" in command.text)
+    return channels_text(file, found.why, command, recordings, why_not, usable), usable
 
 
 def _command(path: Path, file: ChannelFile, channels: Sequence[str]) -> FitCommand:

@@ -3,6 +3,7 @@
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Unpack
 
+from bowdenfit.errors import DatasetError
 from bowdenfit.reading import Reading, read
 from bowdenfit.verb import Argument, Option, Reply, Verb, with_named_keywords
 
@@ -101,7 +102,8 @@ def describe(
         from bowdenfit.questions.check.lone_file import lone_file_text
 
         with limits_times(reading.get("reading_limit") or 1):
-            return Reply(lone_file_text(dataset, reading, check))
+            text, usable = lone_file_text(dataset, reading, check)
+        return Reply(text, exit_code=0 if usable else DatasetError.exit_code)
     found = check(dataset, **reading)
     text = check_text(found)
     if prior_predictive is not None:

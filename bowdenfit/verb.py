@@ -13,6 +13,7 @@ from typing import Annotated, Any, ForwardRef, Literal, TypeAlias, TypeVar, get_
 Quantity: TypeAlias = tuple[float, str]  # a number and its unit
 Length: TypeAlias = float | Quantity  # a number of the route's unit, or with its own
 LARGEST_SEED = 2**31 - 1
+NOT_TRUSTED = 3  # exit code
 Function = TypeVar("Function", bound=Callable[..., Any])
 
 
@@ -104,7 +105,7 @@ class Verb:
         results: Folder in which results go unless `output` names another.
         watch: How it is interrupted; None if it is quick.
         behind: Keywords that the command line adds.
-        warns: Whether a fit that is not to be trusted is said beside the answer.
+        warns: Whether a fit that is not to be trusted is said beside the answer, which then ends with `NOT_TRUSTED`.
         kept: The reply by what a fit has answered before, and the keywords; None where they ask for something else. A
             reply without a page is for people only.
     """

@@ -16,7 +16,7 @@ from bowdenfit.cli.keywords import Keyword, keywords_of
 from bowdenfit.cli.progress import watch_verb
 from bowdenfit.cli.terminal import say
 from bowdenfit.errors import UsageError
-from bowdenfit.verb import Argument, Reply, Verb
+from bowdenfit.verb import NOT_TRUSTED, Argument, Reply, Verb
 
 if TYPE_CHECKING:
     from bowdenfit.front_desk import Fit
@@ -105,9 +105,9 @@ def _troubles(fit: Any, results: Path) -> Collection[str]:
 
 
 def _with_warning(reply: Reply, troubles: Collection[str], results: Path) -> Reply:
-    """A reply that says beside the answer where a fit is not to be trusted."""
+    """A reply that says beside the answer, and by its exit code, where a fit is not to be trusted."""
     said = f"Warning: this fit is {' and '.join(troubles)}; see bowdenfit summary {results}."
-    return replace(reply, notes=(*reply.notes, said)) if troubles else reply
+    return replace(reply, notes=(*reply.notes, said), exit_code=reply.exit_code or NOT_TRUSTED) if troubles else reply
 
 
 def _page(reply: Reply) -> str:

@@ -12,7 +12,7 @@ from bowdenfit.inference.engines.processes import settings_of_process
 from bowdenfit.questions.summary.verb import reply
 from bowdenfit.reading import Reading, read, refuse_unknown
 from bowdenfit.results.folder import CHAIN
-from bowdenfit.verb import LARGEST_SEED, Argument, Option, Output, Reply, Verb, Watch
+from bowdenfit.verb import LARGEST_SEED, NOT_TRUSTED, Argument, Option, Output, Reply, Verb, Watch
 from bowdenfit.words import percent
 
 if TYPE_CHECKING:
@@ -20,7 +20,6 @@ if TYPE_CHECKING:
     from bowdenfit.front_desk import Fit
     from bowdenfit.inference.chain import Progress
 
-NOT_TRUSTED = 3
 
 
 def fit(

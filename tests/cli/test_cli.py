@@ -228,7 +228,10 @@ def test_a_fit_that_has_not_converged_exits_with_3_and_says_why(run, on_body, tm
     assert "DO NOT USE THESE NUMBERS: the computation has not settled" in " ".join(out.split())
     assert "should be worth at least 300" in run("summary", tmp_path / "fit", "--full")[1]
     assert (tmp_path / "fit" / "fit.json").exists()
-    assert run("length", tmp_path / "fit")[2].startswith("Warning")
+    for asked in (("summary",), ("length",), ("predict",), ("predict", "455"), ("next", "--top", "1")):
+        code, _, err = run(asked[0], tmp_path / "fit", *asked[1:])
+        assert code == 3
+        assert err.startswith("Warning: this fit is not converged") or asked == ("summary",)  # whose first line it is
 
 
 def test_a_missing_results_folder_is_a_sentence(run, tmp_path):

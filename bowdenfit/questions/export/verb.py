@@ -4,7 +4,7 @@ from collections.abc import Mapping
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any, Literal
 
-from bowdenfit.verb import Argument, Option, Output, Quantity, Reply, Verb
+from bowdenfit.verb import NOT_TRUSTED, Argument, Option, Output, Quantity, Reply, Verb
 
 if TYPE_CHECKING:
     from bowdenfit.questions.export.answer import Exported
@@ -12,7 +12,6 @@ if TYPE_CHECKING:
 
 Target = Literal["c", "fmu", "mujoco", "matlab", "yaml", "csv"]
 _ENDINGS: Mapping[str, str] = {"c": ".h", "csv": ".csv", "fmu": ".fmu", "matlab": ".m", "mujoco": ".xml", "yaml": ".yaml"}
-_NOT_TRUSTED = 3
 
 
 def export(
@@ -79,7 +78,7 @@ def _compensation(found: "Record", to: str, device: Path) -> dict[str, Any]:
 
 
 def _reply(answer: "Exported", _: Mapping[str, Any]) -> Reply:
-    return Reply(f"{answer}\n", lambda: answer, exit_code=0 if answer.trusted else _NOT_TRUSTED)
+    return Reply(f"{answer}\n", lambda: answer, exit_code=0 if answer.trusted else NOT_TRUSTED)
 
 
 VERB = Verb(

@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING, Annotated, Any, Unpack
 from bowdenfit.inference.engines.memory import refuse_too_little
 from bowdenfit.inference.engines.processes import settings_of_process
 from bowdenfit.reading import Reading, refuse_unknown
-from bowdenfit.verb import LARGEST_SEED, Argument, Option, Output, Reply, Verb, Watch
+from bowdenfit.verb import LARGEST_SEED, NOT_TRUSTED, Argument, Option, Output, Reply, Verb, Watch
 
 if TYPE_CHECKING:
     from bowdenfit.inference.batch.pieces import PieceFit
@@ -23,7 +23,6 @@ if TYPE_CHECKING:
     from bowdenfit.questions.fleet.store import FleetStore
     from bowdenfit.results.fleet_folder import FleetDraws
 
-NOT_TRUSTED = 3
 Report = Callable[[int, int, float], None]
 
 

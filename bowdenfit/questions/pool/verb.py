@@ -8,13 +8,12 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
 from bowdenfit.questions.writing import refuse_to_replace
-from bowdenfit.verb import LARGEST_SEED, Argument, Option, Output, Quantity, Reply, Verb
+from bowdenfit.verb import LARGEST_SEED, NOT_TRUSTED, Argument, Option, Output, Quantity, Reply, Verb
 
 if TYPE_CHECKING:
     from bowdenfit.questions.pool.answer import Asked, Pool
 
 NAME = "pool"
-NOT_TRUSTED = 3
 _NAMED = re.compile(r"(?P<name>[^=]+)=\s*(?P<value>\d+\.?\d*|\.\d+)\s*(?P<unit>[A-Za-z°][\w°]*)")
 _MOST_TURNS = 100
 

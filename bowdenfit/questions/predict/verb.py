@@ -204,5 +204,6 @@ VERB = Verb(
     lengths, wrap angles and loads measured, and where nothing of the force is left: a rope pulls or is slack, at 0 N.
     """,
     csv="Print as CSV, with mean, sd and quantiles.",
+    warns=True,
     kept=_kept,
 )

@@ -4,7 +4,7 @@ from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
-from bowdenfit.verb import Argument, Option, Output, Quantity, Reply, Verb
+from bowdenfit.verb import NOT_TRUSTED, Argument, Option, Output, Quantity, Reply, Verb
 
 if TYPE_CHECKING:
     from bowdenfit.questions.writing import Files
@@ -39,12 +39,14 @@ def reply(found: "tuple[str, Any] | Record", asked: Mapping[str, Any]) -> Reply:
     """What is printed of a fit."""
     if isinstance(found, tuple):
         text, page = found
-        return Reply(text, lambda: page)
+        return Reply(text, lambda: page, exit_code=0 if page["verdict"]["trusted"] else NOT_TRUSTED)
     from bowdenfit.questions.summary.brief_words import summary_text
     from bowdenfit.questions.summary.page import summarize
+    from bowdenfit.questions.summary.verdict import verdict
     from bowdenfit.questions.summary.words import full_text
 
-    return Reply(full_text(found) if asked.get("full") else summary_text(found), lambda: summarize(found))
+    text = full_text(found) if asked.get("full") else summary_text(found)
+    return Reply(text, lambda: summarize(found), exit_code=0 if verdict(found).trusted else NOT_TRUSTED)
 
 
 def plot(

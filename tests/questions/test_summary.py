@@ -33,7 +33,9 @@ def masked(text: str) -> str:
     text = re.sub(r"Seed .*", "Seed", text, flags=re.S)
     text = re.sub(r"The fit leans on .*?if in doubt\.", "The fit leans on ...", text, flags=re.S)  # the last ones vary
     text = re.sub(r"in doubt,.*?narrow\s+it\.", "in doubt, ...", text, flags=re.S)
-    text = re.sub(r"(Widths also follow) the priors? of .*?\.", r"\1 ...", text, flags=re.S)  # those of quick draws vary too
+    # Which prior leads, and which follow, varies with quick draws too.
+    widths = r"(The prior of) \w+ (sets widths).*?(Widths also follow)\s+the\s+priors?\s+of\s.*?\."
+    text = re.sub(widths, r"\1 ... \2 ... \3 ...", text, flags=re.S)
     text = re.sub(r"[-+]?\d+(\.\d+)?(e[-+]?\d+)?", "#", text)
     return re.sub(r"-{3,}", "---", re.sub(r"[ ]{2,}", "  ", text)).strip() + "\n"
 

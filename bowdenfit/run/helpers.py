@@ -188,6 +188,8 @@ class InOtherProcesses(Assistant):
         for process in (self.drawing, self.twin):
             self.free.put(process)
         self.threads = ThreadPoolExecutor(2)
+        if computes:  # draws will be judged
+            self.drawing.submit(load_what_checking_needs)
 
     def begin(self, stages: Callable[..., Iterator[Any]], *arguments: Any, answers: int) -> Answers:
         """See `Assistant`."""
@@ -309,10 +311,6 @@ def _one_of_two(requests: "Connection", twin: "Connection") -> "Connection":
         original = True
     if original:
         twin.close()
-        with suppress(Exception):  # as above
-            # The first look at draws waits for no more than this, and it needs arrays alone.
-            load_without("xarray", "arviz_stats.base")
-            load(*CHECKING)
         return requests
     end_with_parent()
     requests.close()
@@ -346,6 +344,13 @@ def load_without(missing: str, *modules: str) -> None:
         load(*modules)
     finally:
         del sys.modules[missing]
+
+
+def load_what_checking_needs() -> None:
+    """Load what judges draws: first what the first look at them waits for, which needs arrays alone."""
+    with suppress(Exception):  # what fails here fails where it is needed
+        load_without("xarray", "arviz_stats.base")
+        load(*CHECKING)
 
 
 def load_beside(*modules: str) -> None:

@@ -106,6 +106,7 @@ class Verb:
         watch: How it is interrupted; None if it is quick.
         behind: Keywords that the command line adds.
         warns: Whether a fit that is not to be trusted is said beside the answer, which then ends with `NOT_TRUSTED`.
+        explains: A trouble of a fit that the answer is about, so that it is right in spite of it.
         kept: The reply by what a fit has answered before, and the keywords; None where they ask for something else. A
             reply without a page is for people only.
     """
@@ -121,6 +122,7 @@ class Verb:
     watch: Watch | None = None
     behind: Mapping[str, Any] = field(default_factory=dict)
     warns: bool = False
+    explains: str = ""
     kept: Callable[[Mapping[str, Any], Mapping[str, Any]], Reply | None] | None = None
 
     def __post_init__(self) -> None:

@@ -46,9 +46,14 @@ def command(verb: Verb) -> click.Command:
 def _run(verb: Verb, keywords: tuple[Keyword, ...], given: dict[str, Any], form: str) -> int:
     """Ask, and print the reply for people, or as "json" or "csv"."""
     asked = {keyword.name: keyword.value(given[keyword.name]) for keyword in keywords}
-    reply = _kept(verb, asked)
+    source = given[keywords[0].name] if keywords else None
+    answers = _kept(source) if isinstance(source, Path) and (verb.kept or verb.warns) else {}
+    reply = _read_back(verb, answers, asked)
     if reply is None or (form == "json" and reply.page is None) or (form == "csv" and reply.csv is None):
         reply = _answer(verb, keywords, given, asked)
+    if verb.warns and isinstance(source, Path):
+        troubles = answers["troubles"] if "troubles" in answers else _troubles(asked[keywords[0].name], source)
+        reply = _with_warning(reply, [trouble for trouble in troubles if trouble != verb.explains], source)
     if was_asked():  # while the last was loaded
         raise KeyboardInterrupt
     say(_page(reply) if form == "json" else reply.csv() if form == "csv" and reply.csv else reply.text, nl=False)
@@ -57,19 +62,19 @@ def _run(verb: Verb, keywords: tuple[Keyword, ...], given: dict[str, Any], form:
     return reply.exit_code
 
 
-def _kept(verb: Verb, asked: dict[str, Any]) -> Reply | None:
-    """The reply where a fit has answered just this before."""
-    source = next(iter(asked.values()), None)
-    if verb.kept is None or not isinstance(source, Path):
-        return None
+def _kept(source: Path) -> dict[str, Any]:
+    """What the fit of a results folder has answered before."""
     from bowdenfit.results.kept import kept
 
-    answers = kept(source)
+    return kept(source)
+
+
+def _read_back(verb: Verb, answers: dict[str, Any], asked: dict[str, Any]) -> Reply | None:
+    """The reply where a fit has answered just this before."""
     try:
-        reply = verb.kept(answers, asked) if answers else None
+        return verb.kept(answers, asked) if verb.kept and answers else None
     except (LookupError, TypeError, ValueError, AttributeError):  # kept when the answer had another shape
         return None
-    return _with_warning(reply, answers["troubles"], source) if reply and verb.warns else reply
 
 
 def _answer(verb: Verb, keywords: tuple[Keyword, ...], given: dict[str, Any], asked: dict[str, Any]) -> Reply:
@@ -91,17 +96,21 @@ def _answer(verb: Verb, keywords: tuple[Keyword, ...], given: dict[str, Any], as
     else:
         with watch_verb(asked["output"], verb.watch) as progress:
             answer = verb.function(**asked, **behind, progress=progress)
-    reply = verb.reply(answer, asked)
-    return _with_warning(reply, _troubles(asked[found], given[found]), given[found]) if verb.warns and found else reply
+    return verb.reply(answer, asked)
 
 
-def _troubles(fit: Any, results: Path) -> Collection[str]:
-    """Why a fit is not to be trusted: as its folder has kept it, else worked out."""
-    from bowdenfit.results.kept import kept
+def _troubles(found: Any, source: Path) -> Collection[str]:
+    """Why a fit is not to be trusted, worked out; nothing where the source is no fit.
 
-    answers = kept(results) if isinstance(results, Path) else None
-    known: Collection[str] = answers["troubles"] if answers and "troubles" in answers else fit.verdict().troubles
-    return known
+    Args:
+        found: The fit, where it has been loaded.
+        source: Its results folder, or what else a verb may be asked of.
+    """
+    from bowdenfit.results.folder import FIT
+
+    if found is source and (source / FIT).exists():
+        found = _loaded(source)
+    return () if isinstance(found, Path) else tuple(found.verdict().troubles)
 
 
 def _with_warning(reply: Reply, troubles: Collection[str], results: Path) -> Reply:

@@ -228,9 +228,11 @@ def test_a_fit_that_has_not_converged_exits_with_3_and_says_why(run, on_body, tm
     assert "DO NOT USE THESE NUMBERS: the computation has not settled" in " ".join(out.split())
     assert "should be worth at least 300" in run("summary", tmp_path / "fit", "--full")[1]
     assert (tmp_path / "fit" / "fit.json").exists()
-    for asked in (("summary",), ("length",), ("predict",), ("predict", "455"), ("next", "--top", "1")):
+    drawn = ("plot", "--figure", "efficiency", "--format", "svg")
+    reads = (("summary",), ("length",), ("predict",), ("predict", "455"), ("next", "--top", "1"), ("identify",))
+    for asked in (*reads, ("report",), (*drawn, "--output", tmp_path / "drawn")):
         code, _, err = run(asked[0], tmp_path / "fit", *asked[1:])
-        assert code == 3
+        assert code == 3, asked
         assert err.startswith("Warning: this fit is not converged") or asked == ("summary",)  # whose first line it is
 
 

@@ -24,7 +24,9 @@ from bowdenfit.questions.compare import comparison_figure
 from bowdenfit.questions.compare.answer import Comparison
 from bowdenfit.questions.compare.common_readings import CommonReadings, Omitted, common_readings
 from bowdenfit.questions.compare.sections import comparison_page
+from bowdenfit.questions.compare.verb import VERB
 from bowdenfit.questions.compare.words import comparison_text
+from bowdenfit.questions.summary.verdict import NOT_CONVERGED, NOT_DESCRIBED
 from bowdenfit.questions.writing import write_answer
 
 QUICK = ("sampler.n_walkers=64", "sampler.target_ess=200", "sampler.target_r_hat=1.05", "sampler.max_steps=3000")
@@ -228,6 +230,26 @@ def test_the_sentence_says_what_is_preferred_and_what_that_rests_on():
     rough = words([2.0, 2.1, 1.9, 2.0, 2.1, 2.0], ("rough", "refit", *("importance sampling",) * 4))
     assert "For 2 readings the fit without it did not converge" in rough
     assert "efficiency 410 mm fitted again fitted again" in rough
+
+
+def test_a_fit_that_is_not_to_be_trusted_is_named_and_decides_the_exit_code():
+    found = by_hand([2.0, 2.1, 1.9, 2.0, 2.1, 2.0])
+    assert found.trusted
+    assert VERB.reply(found, {"output": None}).exit_code == 0
+
+    def replied(**troubles):
+        reply = VERB.reply(replace(found, troubles=troubles), {"output": None})
+        return reply.exit_code, " ".join(reply.text.split())
+
+    code, text = replied(good=(NOT_DESCRIBED,))
+    assert code == 3
+    assert "good is not to be trusted: it is not a description of its readings. To predict best of these" in text
+    code, text = replied(poor=(NOT_DESCRIBED,))  # which is why it predicts worse
+    assert code == 0
+    assert "poor is not to be trusted" in text
+    code, text = replied(poor=(NOT_CONVERGED, NOT_DESCRIBED))
+    assert code == 3
+    assert "Scores rest on its draws; fit it again with --resume before you compare." in text
 
 
 def test_the_page_of_a_comparison_opens_without_a_fault(tmp_path):

@@ -1,7 +1,7 @@
 """Several fits of the same measurements side by side."""
 
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import Any, ClassVar
 
 import numpy as np
@@ -19,6 +19,7 @@ from bowdenfit.kinds.run_parts import LeaveOut, RunParts, has_rows, run_parts
 from bowdenfit.kinds.terms import measured_kinds, term_kind
 from bowdenfit.questions.compare.common_readings import CommonReadings, Omitted, common_readings
 from bowdenfit.questions.recorded.rate import RateEffect, rate_effect
+from bowdenfit.questions.summary.verdict import NOT_CONVERGED, verdict
 from bowdenfit.results.record import Draws, Record
 from bowdenfit.words import listed
 
@@ -59,6 +60,7 @@ class Comparison(Display):
         rate_effects: Of the fits in which friction may depend on speed.
         left_out: What was left out at a time: a whole run, its readings at one load, or one of them.
         few_runs: Number of runs, where so few are left out in parts unasked; 0 else.
+        troubles: Why fits are not to be trusted, by fit; those that are to be have none.
     """
 
     differences: dict[str, Difference]
@@ -71,6 +73,7 @@ class Comparison(Display):
     rate_effects: dict[str, RateEffect]
     left_out: LeaveOut = "run"
     few_runs: int = 0
+    troubles: dict[str, tuple[str, ...]] = field(default_factory=dict)
 
     JSON: ClassVar = (
         "fits",
@@ -80,12 +83,18 @@ class Comparison(Display):
         ("optimal_length", "optimal_lengths"),
         ("rate_effect", "rate_effects"),
         "left_out",
+        "trusted",
     )
 
     @property
     def best(self) -> str:
         """The fit that predicts best."""
         return next(iter(self.differences))
+
+    @property
+    def trusted(self) -> bool:
+        """Whether the fit that predicts best is to be trusted, and the draws of all have settled, which scores rest on."""
+        return not self.troubles.get(self.best) and not any(NOT_CONVERGED in said for said in self.troubles.values())
 
     @property
     def readings(self) -> tuple[tuple[str, str], ...]:
@@ -119,6 +128,7 @@ class Comparison(Display):
                 "stacking_weight": self.weights[name],
                 "unreliable_readings": d.unreliable,
                 "verdict": "best" if name == self.best else self.verdict(name),
+                "troubles": listed(self.troubles.get(name, ())),
             }
             for name, d in self.differences.items()
         )
@@ -186,6 +196,7 @@ def compare(
         {name: effect for name, fit in ordered.items() if (effect := rate_effect(fit)) is not None},
         unit,
         few,
+        {name: tuple(found.troubles) for name, fit in ordered.items() if (found := verdict(fit)).troubles},
     )
 
 

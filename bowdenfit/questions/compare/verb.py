@@ -5,7 +5,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any, Literal
 
 from bowdenfit.questions.writing import refuse_to_replace, write_answer
-from bowdenfit.verb import Argument, Option, Output, Reply, Verb, Watch
+from bowdenfit.verb import NOT_TRUSTED, Argument, Option, Output, Reply, Verb, Watch
 
 if TYPE_CHECKING:
     from bowdenfit.questions.compare.answer import Comparison
@@ -59,7 +59,8 @@ def _reply(found: "Comparison", asked: dict[str, Any]) -> Reply:
     from bowdenfit.questions.compare.words import comparison_text
 
     notes = (f"Wrote {asked['output']}.",) if asked["output"] else ()
-    return Reply(comparison_text(found), lambda: found, notes, csv=found.to_csv)
+    exit_code = 0 if found.trusted else NOT_TRUSTED
+    return Reply(comparison_text(found), lambda: found, notes, exit_code, csv=found.to_csv)
 
 
 def _show(bar: Any, sentence: str) -> None:

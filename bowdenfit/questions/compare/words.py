@@ -9,6 +9,7 @@ from bowdenfit.display import text_of
 from bowdenfit.inference.comparison import SMALL
 from bowdenfit.inference.interval import Interval
 from bowdenfit.questions.compare.answer import Comparison
+from bowdenfit.questions.summary.verdict import NOT_CONVERGED
 from bowdenfit.words import counted, filled, give_or_take, legend, listed, narrow_table
 
 _DOMINATES = 0.5  # share of a difference from which one reading is named
@@ -63,7 +64,15 @@ def verdict_sentences(found: Comparison) -> list[str]:
             f"The data cannot tell {best} from {listed(alike)}: {noun} within what chance gives ({size}). Prefer the "
             "simpler one."
         )
-    return lines
+    return lines + [_not_trusted(found, name) for name in found.differences if name in found.troubles]
+
+
+def _not_trusted(found: Comparison, name: str) -> str:
+    """That a fit is not to be trusted, and what this makes of the comparison."""
+    said = f"{name} is not to be trusted: it is {listed(found.troubles[name])}."
+    if NOT_CONVERGED in found.troubles[name]:
+        return f"{said} Scores rest on its draws; fit it again with --resume before you compare."
+    return f"{said} To predict best of these is not to be right." if name == found.best else said
 
 
 def _preferred(found: Comparison, name: str) -> str:

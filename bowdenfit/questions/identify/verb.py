@@ -17,6 +17,7 @@ if TYPE_CHECKING:
     from bowdenfit.results.record import Record
 
 NAME = "identifiability"
+NOT_IDENTIFIABLE = "not identifiable"  # what a fit is whose measurements do not tell every coefficient
 _REACH, _PINS = 4.0, 21  # standard deviations on both sides that profiles cover, and values in them
 
 
@@ -174,5 +175,7 @@ VERB = Verb(
     measure at, such as datasets/synthetic-bench/bench.toml); a data set; or the results folder of a fit.
     """,
     csv="Print the parameters as CSV, one a row.",
+    warns=True,
+    explains=NOT_IDENTIFIABLE,
     kept=_kept,
 )

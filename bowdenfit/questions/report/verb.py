@@ -69,4 +69,5 @@ VERB = Verb(
     It asks no other computer for anything, and can be mailed, printed and read in light and dark.
     """,
     json="",
+    warns=True,
 )

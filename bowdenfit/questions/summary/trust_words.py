@@ -5,6 +5,7 @@ from bowdenfit.questions.check.answer import checks_of
 from bowdenfit.questions.check.table_checks import CheckedReading
 from bowdenfit.questions.identify.confounding import confounded_pairs
 from bowdenfit.questions.identify.judgment import identifiability
+from bowdenfit.questions.identify.verb import NOT_IDENTIFIABLE
 from bowdenfit.questions.next.candidates import can_be_ranked
 from bowdenfit.questions.summary.answer import readings_off
 from bowdenfit.questions.summary.verdict import (
@@ -13,7 +14,6 @@ from bowdenfit.questions.summary.verdict import (
     IMPOSSIBLE,
     NOT_CONVERGED,
     NOT_DESCRIBED,
-    NOT_IDENTIFIABLE,
     Verdict,
 )
 from bowdenfit.results.record import Record

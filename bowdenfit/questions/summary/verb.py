@@ -55,7 +55,7 @@ def plot(
     *,
     figures: Annotated[Sequence[str], Option(("--figure",), metavar="NAME")] = (),
     width: Annotated[Quantity | None, Option(example="3.5in", metavar="LENGTH")] = None,
-    formats: Annotated[Sequence[str], Option(("--format",), metavar="ENDING", default="png and svg")] = (),
+    formats: Annotated[Sequence[str], Option(("--format",), metavar="ENDING", default="png, svg and pdf")] = (),
 ) -> "Files":
     """Draw the figures of a fit into a folder, and write what each shows, in words, to captions.txt beside them.
 
@@ -140,4 +140,5 @@ PLOT_VERB = Verb(
     "Draw the figures of a fit again.",
     "Draw the figures of a finished fit again, for the page of a paper too: --width 3.5in --format pdf.",
     json="",
+    warns=True,
 )

@@ -8,9 +8,10 @@ from bowdenfit.questions.check.impossible import implausible_friction, impossibl
 from bowdenfit.questions.check.lack_of_fit import say_what_is_not_described
 from bowdenfit.questions.identify.contradiction import contradiction
 from bowdenfit.questions.identify.judgment import say_what_is_not_determined
+from bowdenfit.questions.identify.verb import NOT_IDENTIFIABLE
 from bowdenfit.results.record import Record, once
 
-NOT_CONVERGED, NOT_IDENTIFIABLE, CONTRADICTORY = "not converged", "not identifiable", "contradictory"
+NOT_CONVERGED, CONTRADICTORY = "not converged", "contradictory"
 IMPOSSIBLE, NOT_DESCRIBED = "made of impossible readings", "not a description of its readings"
 COPIED = "made of copied readings"
 

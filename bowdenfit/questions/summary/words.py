@@ -14,6 +14,7 @@ from bowdenfit.questions.groups.words import groups_text
 from bowdenfit.questions.identify.answer import say_what_is_determined
 from bowdenfit.questions.identify.confounding import confounded_pairs
 from bowdenfit.questions.identify.judgment import identifiability
+from bowdenfit.questions.identify.verb import NOT_IDENTIFIABLE
 from bowdenfit.questions.loss.words import loss_text
 from bowdenfit.questions.recorded.lost_force import lost_force
 from bowdenfit.questions.recorded.rate import SHOWN_SPEED, rate_effect
@@ -27,7 +28,6 @@ from bowdenfit.questions.summary.verdict import (
     IMPOSSIBLE,
     NOT_CONVERGED,
     NOT_DESCRIBED,
-    NOT_IDENTIFIABLE,
     Verdict,
     verdict,
 )

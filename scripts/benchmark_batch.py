@@ -169,7 +169,7 @@ def time_programs(numbers: list[int]) -> None:
         for number in numbers:
             programs = BatchPrograms(posteriors[0], SETTINGS)
             begin = time.perf_counter()
-            _ = programs.gradients, programs.densities, programs.ensembles
+            _ = programs.gradients, programs.places, programs.ensembles
             compiled = time.perf_counter()
             cpu, data = time.process_time(), [posteriors[i % len(posteriors)].data for i in range(number)]
             fits = fit_batch(posteriors[0], data, range(number), programs=programs)

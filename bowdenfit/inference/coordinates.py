@@ -21,6 +21,12 @@ Frame = Callable[[Array, Array, Any], tuple[Array, Array, Array]]
 Frames = Sequence[tuple[Frame, float]]  # each with its share of all steps
 
 
+def z_alone(given: Array, is_z: Array, data: Any) -> tuple[Array, Array, Array]:
+    """Of one point: z itself."""
+    del is_z, data
+    return given, given, jnp.zeros(())
+
+
 def in_z(given: Array, is_z: Array, data: Any) -> tuple[Array, Array, Array]:
     """Z itself."""
     del is_z, data

@@ -27,7 +27,7 @@ QUICK = BatchSettings(
     nuts=False,
 )
 ACCURATE = BatchSettings(
-    SamplerSettings(n_ensembles=2, n_walkers=64, max_steps=80_000, target_ess=3000, target_r_hat=1.02),
+    SamplerSettings(n_ensembles=2, n_walkers=64, max_steps=160_000, target_ess=3000, target_r_hat=1.02),
     n_kept=4096,
     nuts=False,
 )

@@ -27,7 +27,7 @@ MORE = {  # a contact that hardly any run tells from the others
 
 @pytest.fixture(scope="module")
 def fleet(tmp_path_factory) -> Path:
-    """A fleet of cables with three coefficients, of which a few go on from weighted draws to walkers."""
+    """A fleet of cables with three coefficients."""
     folder, text = tmp_path_factory.mktemp("fleet"), BENCH.read_text()
     for before, after in MORE.items():
         assert before in text
@@ -42,7 +42,7 @@ def fleet(tmp_path_factory) -> Path:
 def whole(fleet, tmp_path_factory) -> bytes:
     """The file of the whole fleet, fitted in this process."""
     folder = tmp_path_factory.mktemp("whole") / "results"
-    assert set(bf.fleet(fleet, output=folder, seed=SEED).engines) == {"laplace", "ensembles"}
+    bf.fleet(fleet, output=folder, seed=SEED)
     return (folder / FLEET_DRAWS).read_bytes()
 
 

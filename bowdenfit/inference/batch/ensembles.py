@@ -1,4 +1,4 @@
-"""Ensembles of walkers of many posteriors in one program, some steps at a time.
+"""Ensembles of walkers of any of many posteriors in one program, some steps at a time.
 
 What a posterior's walkers do depends on its own seed, data and starts alone. Which move is made at which step, and in which
 coordinates, is drawn once for all of them, so that no other need be computed.
@@ -24,20 +24,18 @@ STEPS = STORED * THIN
 _STREAM = 1
 
 
-def make_round(posterior: LogDensity, n_ensembles: int, n_walkers: int, data: Any) -> Callable[..., Any]:
-    """Compiled: a round of every cable, from seeds, the number of the round, and z by ensemble and walker.
+def make_round(posterior: LogDensity, n_ensembles: int, n_walkers: int) -> Callable[..., Any]:
+    """Compiled: a round, from a seed, the number of the round, z by ensemble and walker, and data.
 
     Args:
         posterior: The posterior.
-        n_ensembles: Independent ensembles of each cable.
+        n_ensembles: Independent ensembles.
         n_walkers: Of each ensemble; a power of two.
-        data: Data of as many cables as a round takes, along a new first axis.
     """
-    cables, size = len(jax.tree.leaves(data)[0]), posterior.model.space.size
     of_cable = walker_round(posterior.log_density, shares_of_moves(), frames_of(posterior))
-    seeds, number = jax.ShapeDtypeStruct((cables,), jnp.uint32), jax.ShapeDtypeStruct((), jnp.uint32)
-    z = jax.ShapeDtypeStruct((cables, n_ensembles, n_walkers, size), jnp.float64)
-    return compile_program(jax.vmap(of_cable, (0, None, 0, 0)), seeds, number, z, data)
+    seed = number = jax.ShapeDtypeStruct((), jnp.uint32)
+    z = jax.ShapeDtypeStruct((n_ensembles, n_walkers, posterior.model.space.size), jnp.float64)
+    return compile_program(of_cable, seed, number, z, posterior.data)
 
 
 def walker_round(log_density: Callable[[Array, Any], Array], moves: Moves, frames: Frames) -> Callable[..., Any]:

@@ -12,7 +12,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from bowdenfit.inference.batch.mixture import Mixture
+from bowdenfit.inference.batch.mixture import Students
 
 Gradients = Callable[[np.ndarray], tuple[np.ndarray, np.ndarray]]
 
@@ -111,10 +111,10 @@ def starting_points(size: int, seeds: np.ndarray) -> np.ndarray:
     return np.concatenate([np.zeros((len(seeds), 1, size)), np.stack(others)], axis=1)
 
 
-def mixtures(
+def about_maxima(
     gradients: Gradients, noise: np.ndarray, friction: np.ndarray, seeds: np.ndarray
-) -> list[Mixture | None]:
-    """For every cable what its draws are proposed from; None where its density cannot be computed from any start.
+) -> list[Students | None]:
+    """For every cable what its draws are proposed from first; None where its density cannot be computed from any start.
 
     Args:
         gradients: See `climb`.
@@ -135,8 +135,8 @@ def mixtures(
         unit = (np.arange(size) == which).astype(float)
         held = climb(gradients, best[:, None] + places[..., None] * unit, np.tile(1.0 - unit, (STARTS, 1)))
         aside.append(Aside(unit, held, width, least))
-    found = [_mixture(tops, aside, cable) for cable in range(len(seeds))]
-    return [mixture if np.isfinite(tops.value[i]).any() else None for i, mixture in enumerate(found)]
+    computed = np.isfinite(tops.value).any(axis=1)
+    return [_mixture(tops, aside, cable) if computed[cable] else None for cable in range(len(seeds))]
 
 
 def _spread(tops: Tops, cable: int) -> np.ndarray:
@@ -144,7 +144,7 @@ def _spread(tops: Tops, cable: int) -> np.ndarray:
     return np.linalg.norm(_root(tops.curvature[cable, best]), axis=1)
 
 
-def _mixture(tops: Tops, aside: list[Aside], cable: int) -> Mixture:
+def _mixture(tops: Tops, aside: list[Aside], cable: int) -> Students:
     """The tops of a cable and the places aside of the best, by how much mass is about each."""
     parts = [(tops.z[cable, i], _root(tops.curvature[cable, i]), tops.value[cable, i], _LEAST_SHARE) for i in range(STARTS)]
     for unit, held, width, least in aside:
@@ -155,11 +155,9 @@ def _mixture(tops: Tops, aside: list[Aside], cable: int) -> Mixture:
     center, root, value, least_share = (np.array(part) for part in zip(*parts, strict=True))
     mass = value + np.linalg.slogdet(root)[1]
     usable = np.isfinite(mass)
-    if not usable.any():
-        return Mixture(center, root, np.full(len(mass), 1 / len(mass)))
-    share = np.exp(mass[usable] - mass[usable].max())
-    share = np.maximum(share / share.sum(), least_share[usable])
-    return Mixture(center[usable], root[usable], share / share.sum())
+    share = np.exp(mass - mass[usable].max())
+    share = np.where(usable, np.maximum(share / share.sum(), least_share), 0.0)
+    return Students(center, root, share / share.sum())
 
 
 def _root(curvature: np.ndarray) -> np.ndarray:

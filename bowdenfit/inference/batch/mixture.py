@@ -1,8 +1,8 @@
-"""Mixtures of Student-t's to draw from.
+"""Mixtures of Student-t's: to draw from, and to move to where draws are.
 
 References:
-    Owen and Zhou 2000, "Safe and effective importance sampling" (Journal of the American Statistical Association 95), for the
-    draws from the prior, which bound the weights.
+    Peel and McLachlan 2000, "Robust mixture modelling using the t distribution" (Statistics and Computing 10), for the steps
+    that move a mixture.
 """
 
 from dataclasses import dataclass
@@ -12,17 +12,19 @@ from math import lgamma
 import numpy as np
 
 _FREEDOM = 5  # of the Student-t's
-_PRIOR_SHARE = 0.05  # of the draws that the prior has
+_STEPS = 4  # in which a mixture is moved
+_LEAST_SHARE = 1e-3  # of a part that draws have left
+_OF_ALL = 0.5  # of the covariance of all draws, which is what a part has that few draws are near
 
 
 @dataclass(frozen=True)
-class Mixture:
-    """Student-t's and the prior, a standard normal.
+class Students:
+    """Student-t's.
 
     Args:
         center: Of every part, (part, parameter).
         root: A root R of its scale matrix R R^T.
-        share: Of the draws that are not the prior's.
+        share: Of the draws.
     """
 
     center: np.ndarray
@@ -34,30 +36,95 @@ class Mixture:
         return np.linalg.inv(self.root)
 
     def draw(self, generator: np.random.Generator, count: int) -> np.ndarray:
-        """So many z, one a row."""
-        ends = np.cumsum(self.share) * (1 - _PRIOR_SHARE)
-        part = np.searchsorted(ends, (np.arange(count) + generator.uniform()) / count)  # each part gets its share
-        z = generator.standard_normal((count, self.center.shape[1]))
+        """So many, one a row; each part gets its share, and parts follow each other."""
+        part = np.searchsorted(np.cumsum(self.share), (np.arange(count) + generator.uniform()) / count)
+        part = np.minimum(part, len(self.share) - 1)
+        rows = generator.standard_normal((count, self.center.shape[1]))
         wide = np.sqrt(_FREEDOM / generator.chisquare(_FREEDOM, count))
         for i in range(len(self.share)):
             here = part == i
-            z[here] = self.center[i] + wide[here, None] * (z[here] @ self.root[i].T)
-        return z
+            rows[here] = self.center[i] + wide[here, None] * (rows[here] @ self.root[i].T)
+        return rows
 
-    def log_density(self, z: np.ndarray) -> np.ndarray:
+    def log_density(self, rows: np.ndarray) -> np.ndarray:
         """Of every row."""
-        of_parts = self._parts(z)
-        of_prior = np.log(_PRIOR_SHARE) - 0.5 * (np.einsum("ni,ni->n", z, z) + z.shape[1] * np.log(2 * np.pi))
-        top = of_parts.max(axis=1)
-        within = np.log(np.sum(np.exp(of_parts - top[:, None]), axis=1)) + top
-        return np.logaddexp(within + np.log1p(-_PRIOR_SHARE), of_prior)
+        return _log_sum(self._of_parts(self._squares(rows)))
 
-    def _parts(self, z: np.ndarray) -> np.ndarray:
-        """Log of share times density of every part, (row, part)."""
+    def _squares(self, rows: np.ndarray) -> np.ndarray:
+        """Distance from every part in its own units, squared, (row, part)."""
         count, size = self.center.shape
         flat = self._inverse.reshape(-1, size)
-        apart = (z @ flat.T - np.einsum("kij,kj->ki", self._inverse, self.center).ravel()).reshape(len(z), count, size)
-        squares = np.einsum("nki,nki->nk", apart, apart)
+        apart = (rows @ flat.T - np.einsum("kij,kj->ki", self._inverse, self.center).ravel()).reshape(-1, count, size)
+        return np.einsum("nki,nki->nk", apart, apart)
+
+    def _of_parts(self, squares: np.ndarray) -> np.ndarray:
+        """Log of share times density of every part, (row, part)."""
+        size = self.center.shape[1]
         constant = lgamma((_FREEDOM + size) / 2) - lgamma(_FREEDOM / 2) - size / 2 * np.log(_FREEDOM * np.pi)
         of_part = np.log(self.share) + constant - np.linalg.slogdet(self.root)[1]
         return of_part - (_FREEDOM + size) / 2 * np.log1p(squares / _FREEDOM)
+
+    def moved(self, rows: np.ndarray) -> "Students":
+        """The mixture that is likelier to have given draws, some steps of expectation and maximization away.
+
+        Args:
+            rows: Draws, one a row.
+        """
+        found, of_all, (count, size) = self, covariance(rows), rows.shape
+        for _ in range(_STEPS):
+            squares = found._squares(rows)
+            logs = found._of_parts(squares)
+            of_part = np.exp(logs - _log_sum(logs)[:, None]) / count
+            pulled = of_part * (_FREEDOM + size) / (_FREEDOM + squares)
+            share = np.maximum(of_part.sum(axis=0), np.finfo(float).tiny)
+            near = share > _LEAST_SHARE
+            middle = pulled.T @ rows / np.maximum(pulled.sum(axis=0), np.finfo(float).tiny)[:, None]
+            center = np.where(near[:, None], middle, found.center)
+            few = size / (share**2 / np.maximum(np.sum(of_part**2, axis=0), np.finfo(float).tiny) + size)
+            few = np.where(near, few, 1.0)[:, None, None]
+            apart = [rows - at for at in center]
+            scale = np.stack([(each * pull[:, None]).T @ each for each, pull in zip(apart, pulled.T, strict=True)])
+            scale = (1 - few) * scale / share[:, None, None] + few * _OF_ALL * of_all
+            share = np.maximum(share, _LEAST_SHARE)
+            found = Students(center, np.linalg.cholesky(scale), share / share.sum())
+        return found
+
+    def with_wide(self, rows: np.ndarray, times: float, share: float) -> "Students":
+        """The same with one more part, about all of many draws.
+
+        Args:
+            rows: Draws, one a row.
+            times: How much wider than they.
+            share: Of the draws.
+        """
+        root = times * np.linalg.cholesky(covariance(rows))
+        return Students(
+            np.concatenate([self.center, rows.mean(axis=0, keepdims=True)]),
+            np.concatenate([self.root, root[None]]),
+            np.append((1 - share) * self.share, share),
+        )
+
+
+def students_among(rows: np.ndarray, parts: int) -> Students:
+    """Student-t's about some of many draws, to be moved.
+
+    Args:
+        rows: Draws, one a row.
+        parts: How many.
+    """
+    some = ((np.arange(parts) + 0.5) / parts * len(rows)).astype(int)
+    root = np.linalg.cholesky(_OF_ALL * covariance(rows))
+    return Students(rows[some], np.stack([root] * parts), np.full(parts, 1 / parts))
+
+
+def covariance(rows: np.ndarray) -> np.ndarray:
+    """Of draws, with a little more in each direction, so that it always has a root."""
+    found = np.cov(rows.T).reshape(rows.shape[1], -1)
+    return found + (1e-9 * np.trace(found) / len(found) + np.finfo(float).tiny) * np.eye(len(found))
+
+
+def _log_sum(logs: np.ndarray) -> np.ndarray:
+    """Logarithm of the sum of each row's exponentials; minus infinity where all are 0."""
+    top = np.maximum(logs.max(axis=1), np.finfo(float).min)
+    with np.errstate(divide="ignore"):
+        return np.asarray(np.log(np.sum(np.exp(logs - top[:, None]), axis=1)) + top)

@@ -4,23 +4,27 @@ import os
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
 from functools import cached_property
+from threading import Lock
 from typing import Any
 
 import jax
+import jax.numpy as jnp
 import numpy as np
+from jax import Array
 
 from bowdenfit.description import SamplerSettings
 from bowdenfit.description.defaults import WALKERS_PER_PARAMETER
 from bowdenfit.inference.batch.ensembles import make_round
 from bowdenfit.inference.batch.laplace import points_of_climb
+from bowdenfit.inference.batch.proposals import Places
 from bowdenfit.inference.batch.weights import BLOCK
 from bowdenfit.inference.compilation import compile_program
+from bowdenfit.inference.conditional import Conditional
+from bowdenfit.inference.coordinates import z_alone
 from bowdenfit.inference.log_density import LogDensity
 from bowdenfit.inference.objective import noise_scales
 
-# Data sets that a program takes at once, always as many, so that rounding is the same: to weigh, and to walk, where the last
-# of all goes on alone, and fewer than two at once take longer each.
-CHUNK, WALKING = 16, 2
+CHUNK = 16  # data sets that climb at once, always as many, so that rounding is the same
 
 
 @dataclass(frozen=True)
@@ -34,7 +38,7 @@ class BatchSettings:
             Long tails need many more draws for it than for a mean or a rank.
         n_kept: Draws of equal weight that are made of weighted ones.
         nuts: Whether NUTS takes what the ensembles leave.
-        threads: How many chunks at once; as many as there are cores if omitted.
+        threads: How many data sets at once; one more than there are cores if omitted, for while one is not computing.
     """
 
     sampler: SamplerSettings = field(
@@ -60,37 +64,46 @@ class BatchPrograms:
     Args:
         posterior: Its model is that of all data sets.
         settings: How carefully they are fitted.
+        compiling: Held by the thread that compiles what all need.
     """
 
     posterior: LogDensity
     settings: BatchSettings
-
-    def _of_points(self, function: Callable[..., Any], count: int) -> Callable[..., Any]:
-        """Compiled: what a function of z and data gives at so many points of each data set."""
-        shape = jax.ShapeDtypeStruct((CHUNK, count, self.posterior.model.space.size), np.dtype(float))
-        return compile_program(jax.vmap(jax.vmap(function, (0, None))), shape, stack([self.posterior.data], CHUNK))
+    compiling: Lock = field(default_factory=Lock, repr=False, compare=False)
 
     @cached_property
     def gradients(self) -> Callable[..., Any]:
         """Log density and gradient, for climbing."""
-        points = points_of_climb(self.posterior.model.space.size)
-        return self._of_points(jax.value_and_grad(self.posterior.log_density), points)
+        size, gradient = self.posterior.model.space.size, jax.value_and_grad(self.posterior.log_density)
+        shape = jax.ShapeDtypeStruct((CHUNK, points_of_climb(size), size), np.dtype(float))
+        return compile_program(jax.vmap(jax.vmap(gradient, (0, None))), shape, stack([self.posterior.data], CHUNK))
 
     @cached_property
-    def densities(self) -> Callable[..., Any]:
-        """Log density of a block of draws."""
-        return self._of_points(self.posterior.log_density, BLOCK)
+    def places(self) -> Callable[..., Any]:
+        """`Places` of a block of points of one data set, of each of which it is said whether it is a z."""
+        conditional, posterior = Conditional(self.posterior), self.posterior
+        straight = conditional.at if conditional.is_told else z_alone
+
+        def places(given: Array, is_z: Array, data: Any) -> Places:
+            w, z, log_volume = straight(given, is_z, data)
+            log_density, has_z = posterior.log_density(z, data), jnp.isfinite(z).all()
+            has_w, known = jnp.isfinite(w).all() & jnp.isfinite(log_volume), has_z & jnp.isfinite(log_density)
+            z, w = jnp.where(has_z, z, 0.0), jnp.where(has_w, w, 0.0)
+            return Places(w, z, jnp.where(has_w, log_volume, jnp.inf), jnp.where(known, log_density, -jnp.inf))
+
+        rows = jax.ShapeDtypeStruct((BLOCK, posterior.model.space.size), np.dtype(float))
+        is_z = jax.ShapeDtypeStruct((BLOCK,), np.dtype(bool))
+        return compile_program(jax.vmap(places, (0, 0, None)), rows, is_z, posterior.data)
 
     @cached_property
     def ensembles(self) -> Callable[..., Any]:
         """A round of all walkers."""
-        data = stack([self.posterior.data], WALKING)
-        return make_round(self.posterior, self.settings.sampler.n_ensembles, self.n_walkers, data)
+        return make_round(self.posterior, self.settings.sampler.n_ensembles, self.n_walkers)
 
     @property
     def threads(self) -> int:
-        """How many chunks at once."""
-        return self.settings.threads or len(os.sched_getaffinity(0))
+        """How many data sets at once."""
+        return self.settings.threads or len(os.sched_getaffinity(0)) + 1
 
     @property
     def n_walkers(self) -> int:

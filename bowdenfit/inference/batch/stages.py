@@ -1,21 +1,26 @@
-"""The stages of a batch: weighted draws, a round of walkers and what their paths say, NUTS; each for a chunk of data sets."""
+"""The stages of one data set of a batch: weighted draws, and walkers whose paths are looked at from time to time; then NUTS."""
 
-from dataclasses import dataclass, field, replace
-from typing import Any
+from collections.abc import Callable
+from concurrent.futures import CancelledError
+from dataclasses import dataclass, replace
+from typing import Any, NamedTuple
 
 import numpy as np
 
 from bowdenfit.inference.batch.diagnostics import diagnose_few_draws, remembered, sd_errors, uncertain_sds
 from bowdenfit.inference.batch.ensembles import STEPS, STORED
-from bowdenfit.inference.batch.laplace import mixtures
-from bowdenfit.inference.batch.programs import CHUNK, WALKING, BatchPrograms, stack
-from bowdenfit.inference.batch.weights import BLOCK, Weighted, evened, resample, weighted_draws
+from bowdenfit.inference.batch.laplace import about_maxima
+from bowdenfit.inference.batch.mixture import Students
+from bowdenfit.inference.batch.programs import CHUNK, BatchPrograms, stack
+from bowdenfit.inference.batch.proposals import AboutMaxima, Places
+from bowdenfit.inference.batch.weights import Target, Weighted, evened, resample
 from bowdenfit.inference.chain import Sampling, stuck_walkers
 from bowdenfit.inference.diagnostics import Diagnostics, shortfalls
 from bowdenfit.inference.least_squares import MaximumPosterior
 
+_FIRST_LOOK = 3  # rounds of walkers before the first look
 _KEPT_PER_WALKER, _KEPT_PER_WALKER_FOR_SDS = 20, 100
-FORGETS = 3  # effective draws that each walker makes by itself, so that where it started is forgotten
+FORGETS = 2  # effective draws that each walker makes by itself, so that where it started is forgotten
 _SPREAD = 2  # effective draws for every walker that the starts of ensembles are drawn from, at the least
 _UNKNOWN = (
     "the model cannot be computed at the prior medians or anywhere near; the usual cause is a prior or a fixed value that is "
@@ -44,55 +49,64 @@ class BatchFit:
     steps: int = 0
 
 
-@dataclass(frozen=True)
-class Case:
-    """One data set on its way.
+class Begun(NamedTuple):
+    """A data set.
 
     Args:
-        number: Its place in the batch.
         data: Its data.
         seed: Its seed.
-        weighted: Its weighted draws; None where nothing can be computed.
-        fit: What is known so far.
-        rounds: How many its walkers have gone.
-        walkers: Where they are, (ensemble, walker, parameter).
-        path: Their stored states of late, (state, ensemble, walker, parameter).
+        first: What is drawn from first; None where nothing can be computed.
     """
 
-    number: int
     data: Any
     seed: int
-    weighted: Weighted | None
+    first: Students | None
+
+
+class Ended(NamedTuple):
+    """What weighted draws and walkers made of a data set.
+
+    Args:
+        begun: The data set.
+        fit: What came of it.
+        start: Where NUTS may start; None where draws are good, or nothing can be computed.
+    """
+
+    begun: Begun
     fit: BatchFit
-    rounds: int = 0
-    walkers: np.ndarray = field(default_factory=lambda: np.zeros((0, 0, 0)))
-    path: np.ndarray = field(default_factory=lambda: np.zeros((0, 0, 0, 0)))
+    start: MaximumPosterior | None
 
 
-def weigh(programs: BatchPrograms, parts: list[tuple[int, Any, int]]) -> list[Case]:
-    """Weighted draws of a chunk of data sets."""
-    seeds, data = np.array([seed for *_, seed in parts]), stack([data for _, data, _ in parts], CHUNK)
+def climb(programs: BatchPrograms, parts: list[tuple[Any, int]]) -> list[Begun]:
+    """What draws of a chunk of data sets with their seeds are proposed from first."""
+    seeds, data = np.array([seed for _, seed in parts]), stack([data for data, _ in parts], CHUNK)
     padded = np.concatenate([seeds, np.repeat(seeds[-1:], CHUNK - len(seeds))])
-    begun = mixtures(lambda z: programs.gradients(z, data), programs.noise, programs.friction, padded)
-    drawing = {
-        i: weighted_draws(
-            mixture, np.random.default_rng([int(seed), 1]), lambda w: not _by_weights(programs, w).reasons
-        )
-        for i, (mixture, seed) in enumerate(zip(begun, seeds, strict=False))
-        if mixture is not None
-    }
-    z, weighted = np.zeros((CHUNK, BLOCK, len(programs.names))), dict[int, Weighted]()
-    wanted = {i: next(one) for i, one in drawing.items()}
-    while wanted:
-        for i, rows in wanted.items():
-            z[i] = rows
-        log_density, asked, wanted = np.asarray(programs.densities(z, data)), list(wanted), {}
-        for i in asked:
-            try:
-                wanted[i] = drawing[i].send(log_density[i])
-            except StopIteration as end:
-                weighted[i] = end.value
-    return [Case(*part, weighted.get(i), _by_weights(programs, weighted.get(i))) for i, part in enumerate(parts)]
+    found = about_maxima(lambda z: programs.gradients(z, data), programs.noise, programs.friction, padded)
+    return [Begun(*part, first) for part, first in zip(parts, found, strict=False)]
+
+
+def draw(programs: BatchPrograms, begun: Begun, stopped: Callable[[], bool]) -> Ended:
+    """Weighted draws of a data set or, where these are not enough, those of walkers.
+
+    Raises:
+        CancelledError: It is stopped.
+    """
+    data, seed, first = begun
+    if first is None:
+        return Ended(begun, _by_weights(programs, None), None)
+    target = Target(
+        lambda given, is_z: Places(*map(np.asarray, programs.places(given, is_z, data))),
+        programs.friction,
+        lambda found: found.is_reliable and not _by_weights(programs, found).reasons,
+    )
+    weighted = target.weighted(AboutMaxima(first), np.random.default_rng([seed, 1]))
+    fit = _by_weights(programs, weighted)
+    if not (fit.reasons and len(fit.z)):
+        return Ended(begun, fit, None)
+    fit = _walked(programs, begun, weighted, stopped)
+    weights = np.exp(_evened(programs, weighted))
+    covariance = np.cov(weighted.z.T, aweights=weights).reshape(weighted.z.shape[1], -1)
+    return Ended(begun, fit, MaximumPosterior(weights @ weighted.z, covariance) if fit.reasons else None)
 
 
 def _by_weights(programs: BatchPrograms, weighted: Weighted | None) -> BatchFit:
@@ -108,35 +122,35 @@ def _by_weights(programs: BatchPrograms, weighted: Weighted | None) -> BatchFit:
     return BatchFit(weighted.z[kept], "laplace", weighted.pareto_k, diagnostics, reasons)
 
 
-def walk(programs: BatchPrograms, cases: list[Case]) -> list[Case]:
-    """A round of the walkers of a chunk of data sets, which have gone as many."""
-    begun = [case if case.rounds else _on_the_way(programs, case) for case in cases]
-    padded = [*begun, *[begun[-1]] * (WALKING - len(begun))]
-    seeds, number = np.array([case.seed for case in padded], dtype=np.uint32), np.uint32(begun[0].rounds)
-    z, data = np.stack([case.walkers for case in padded]), stack([case.data for case in padded], WALKING)
-    paths = np.asarray(programs.ensembles(seeds, number, z, data))
-    return [_further(case, path) for case, path in zip(begun, paths, strict=False)]
+def _walked(programs: BatchPrograms, begun: Begun, weighted: Weighted, stopped: Callable[[], bool]) -> BatchFit:
+    """What the second half of the walkers' paths says, looked at until it is enough or they have gone as far as they may."""
+    limit = max(programs.settings.sampler.max_steps // STEPS, _FIRST_LOOK)
+    with programs.compiling:  # by the first that needs it
+        walk = programs.ensembles
+    walkers, path, diagnostics = _starts(programs, weighted, begun.seed), list[np.ndarray](), dict[str, Diagnostics]()
+    rounds, target = 0, _FIRST_LOOK
+    while True:
+        for number in range(rounds, target):
+            if stopped():
+                raise CancelledError
+            path.append(np.asarray(walk(np.uint32(begun.seed), np.uint32(number), walkers, begun.data)))
+            walkers = path[-1][-1]
+        rounds, path = target, path[-(target + 1) // 2 :]  # no more than the second half can be asked for
+        late = np.concatenate(path)[-(rounds * STORED // 2) :]
+        fit = _by_ensembles(programs, late, [*diagnostics][-1:], last=rounds == limit)
+        fit, diagnostics = replace(fit, pareto_k=weighted.pareto_k, steps=rounds * STEPS), fit.diagnostics
+        if not fit.reasons or rounds == limit:
+            return fit
+        target = min(rounds + max(rounds // 3, 1), limit)
 
 
-def _further(case: Case, path: np.ndarray) -> Case:
-    """A round further; of the path no more is kept than its second half can be asked for."""
-    rounds, whole = case.rounds + 1, np.concatenate([case.path, path]) if case.rounds else path
-    late = whole[-(rounds + 1) // 2 * len(path) :]
-    return replace(case, rounds=rounds, walkers=path[-1], path=late)
-
-
-def _on_the_way(programs: BatchPrograms, case: Case) -> Case:
-    """Walkers at different ones of the weighted draws."""
-    assert case.weighted is not None  # nothing walks where nothing can be computed
-    shape, generator = (
-        (programs.settings.sampler.n_ensembles, programs.n_walkers),
-        np.random.default_rng([case.seed, 2]),
-    )
-    log_weights = _evened(programs, case.weighted)
+def _starts(programs: BatchPrograms, weighted: Weighted, seed: int) -> np.ndarray:
+    """Different ones of the weighted draws, (ensemble, walker, parameter)."""
+    n_ensembles, generator = programs.settings.sampler.n_ensembles, np.random.default_rng([seed, 2])
+    log_weights = _evened(programs, weighted)
     # The largest of weights times exponential numbers are a sample without replacement.
-    chosen = np.argsort(log_weights + generator.gumbel(size=len(log_weights)))[-shape[0] * shape[1] :]
-    chosen = generator.permutation(chosen)
-    return replace(case, walkers=case.weighted.z[chosen].reshape(*shape, -1))
+    chosen = np.argsort(log_weights + generator.gumbel(size=len(log_weights)))[-n_ensembles * programs.n_walkers :]
+    return weighted.z[generator.permutation(chosen)].reshape(n_ensembles, programs.n_walkers, -1)
 
 
 def _evened(programs: BatchPrograms, weighted: Weighted) -> np.ndarray:
@@ -144,27 +158,22 @@ def _evened(programs: BatchPrograms, weighted: Weighted) -> np.ndarray:
     return evened(weighted.log_weights, _SPREAD * programs.settings.sampler.n_ensembles * programs.n_walkers)
 
 
-def look(programs: BatchPrograms, cases: list[Case], last: bool) -> list[Case]:
-    """What the draws of the second half of the walkers' paths say.
+def _by_ensembles(programs: BatchPrograms, late: np.ndarray, asked_before: list[str], last: bool) -> BatchFit:
+    """What states of walkers say, (state, ensemble, walker, parameter).
 
     Args:
         programs: What is compiled.
-        cases: Of a chunk.
+        late: The states.
+        asked_before: What asked for more at the last look.
         last: Whether no walkers go on; else diagnostics end with the first parameter that asks for more.
     """
-    return [replace(case, fit=_by_ensembles(programs, case, last)) for case in cases]
-
-
-def _by_ensembles(programs: BatchPrograms, case: Case, last: bool) -> BatchFit:
-    sampler, stored = programs.settings.sampler, case.rounds * STORED
-    second = case.path[-(stored // 2) :]
+    sampler = programs.settings.sampler
     strict = bool(np.isfinite(programs.settings.target_sd_error))
     per_walker = _KEPT_PER_WALKER_FOR_SDS if strict else _KEPT_PER_WALKER
-    kept = np.unique(np.linspace(0, len(second) - 1, per_walker).round().astype(int))
-    z = second[kept].transpose(1, 2, 0, 3).reshape(-1, len(kept), len(programs.names))
+    kept = np.unique(np.linspace(0, len(late) - 1, per_walker).round().astype(int))
+    z = late[kept].transpose(1, 2, 0, 3).reshape(-1, len(kept), len(programs.names))
     draws = {name: z[..., i] for i, name in enumerate(programs.names)}
     diagnostics, reasons = dict[str, Diagnostics](), stuck_walkers(z)
-    asked_before = [*case.fit.diagnostics][-1:]  # for more
     for name in dict.fromkeys((*asked_before, *programs.names)):
         if reasons and not last:
             break
@@ -173,21 +182,17 @@ def _by_ensembles(programs: BatchPrograms, case: Case, last: bool) -> BatchFit:
         reasons, diagnostics = (*reasons, *short, *remembered(found, FORGETS * len(z))), diagnostics | found
     if strict and not reasons:
         reasons = uncertain_sds(sd_errors(draws), programs.settings.target_sd_error)
-    steps = case.rounds * STEPS
-    return BatchFit(z.reshape(-1, z.shape[-1]), "ensembles", case.fit.pareto_k, diagnostics, reasons, steps)
+    return BatchFit(z.reshape(-1, z.shape[-1]), "ensembles", float("inf"), diagnostics, reasons)
 
 
-def by_nuts(programs: BatchPrograms, case: Case) -> BatchFit:
-    """What NUTS makes of it, started from the weighted draws."""
+def by_nuts(programs: BatchPrograms, ended: Ended, start: MaximumPosterior) -> BatchFit:
+    """What NUTS makes of it."""
     from bowdenfit.inference.nuts import sample
 
-    assert case.weighted is not None  # nor is there anything to start from
-    weights, rows = np.exp(_evened(programs, case.weighted)), case.weighted.z
-    start = MaximumPosterior(weights @ rows, np.cov(rows.T, aweights=weights).reshape(rows.shape[1], -1))
-    posterior = replace(programs.posterior, given=case.data)
-    asked = Sampling(posterior, start, programs.settings.sampler, case.seed, diagnose=diagnose_few_draws)
+    posterior = replace(programs.posterior, given=ended.begun.data)
+    asked = Sampling(posterior, start, programs.settings.sampler, ended.begun.seed, diagnose=diagnose_few_draws)
     chain = sample(asked, programs.nuts)
     draws = {name: chain.z[..., i] for i, name in enumerate(programs.names)}
     reasons = chain.reasons or uncertain_sds(sd_errors(draws), programs.settings.target_sd_error)
     z = chain.z.reshape(-1, chain.z.shape[-1])
-    return BatchFit(z, "nuts", case.fit.pareto_k, chain.diagnostics, reasons, chain.steps)
+    return BatchFit(z, "nuts", ended.fit.pareto_k, chain.diagnostics, reasons, chain.steps)

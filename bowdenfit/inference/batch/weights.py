@@ -1,25 +1,30 @@
-"""Importance sampling of one posterior, from a mixture about its maxima: enough draws, or few and no more.
+"""Importance sampling of one posterior, first from about its maxima, then from where the draws before have been.
 
-Where the first draws are worth little, more of them cost more than walkers do, and moving the mixture after its weights leaves
-Pareto k as high in ten parameters with bent ridges; they still say where walkers may start.
+The draws that count are those of one proposal, which does not change meanwhile; those before say only where to draw. Where none
+of them are good enough, the last still say where walkers may start: of bent posteriors of ten parameters, it takes more draws
+to be good enough than walkers take steps, but few to find where the mass is.
 
 References:
     Vehtari, Simpson, Gelman, Yao and Gabry 2024, "Pareto smoothed importance sampling" (JMLR 25), for when to trust it.
 """
 
-from collections.abc import Callable, Generator, Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
 
-from bowdenfit.inference.batch.mixture import Mixture
+from bowdenfit.inference.batch.proposals import AboutMaxima, Places, Proposal, learnt
 from bowdenfit.inference.diagnostics import Diagnostics, too_few
 from bowdenfit.inference.psis import reliable_k, smooth_weights
 
-BLOCK = 2048  # draws of a round
-_LOOKS = (1, 2, 4, 8, 16)  # rounds at which is looked whether draws are enough
+BLOCK = 2048  # draws at once
+_PROPOSALS = 3
+_MOST = 16  # blocks, from a proposal whose draws are good and not yet enough
 _WORTH = 0.1  # effective draws a draw; of fewer, no more are drawn
+_LEARN_FROM = 60  # effective draws at the least that say where to draw next; weights are made as even as that takes
+# Times as many effective draws as are asked for: what heavy weights have not been drawn makes intervals narrow.
+_SURER = 2
 _TAILS = (0.05, 0.95)
 
 
@@ -28,11 +33,12 @@ class Weighted:
     """Weighted draws.
 
     Args:
-        z: One a row.
-        log_density: Of the posterior.
+        w, z: One a row, in two coordinates; see `Places`.
+        log_density: Of the posterior; minus infinity where there is no z, or no density.
         log_proposed: Of what they were drawn from.
     """
 
+    w: np.ndarray
     z: np.ndarray
     log_density: np.ndarray
     log_proposed: np.ndarray
@@ -50,6 +56,15 @@ class Weighted:
     def pareto_k(self) -> float:
         """Of the weights."""
         return self._smooth[1]
+
+    @property
+    def is_reliable(self) -> bool:
+        """Whether the weights can be trusted."""
+        return self.pareto_k <= reliable_k(len(self.z))
+
+    def with_more(self, other: "Weighted") -> "Weighted":
+        """These and more from the same proposal."""
+        return Weighted(*(np.concatenate([own, more]) for own, more in zip(*map(_fields, (self, other)), strict=True)))
 
     def diagnose(self, names: tuple[str, ...]) -> dict[str, Diagnostics]:
         """Diagnostics by parameter; weighted draws have no R-hat and no drift (section 3.2.3 for the errors)."""
@@ -76,38 +91,74 @@ class Weighted:
 
     def shortfalls(self, diagnostics: Mapping[str, Diagnostics], target_ess: int) -> tuple[str, ...]:
         """What keeps the draws from being trusted, in words; empty if nothing does."""
-        most, reasons = reliable_k(len(self.z)), []
-        if not self.pareto_k <= most:
+        reasons = []
+        if not self.is_reliable:
             reasons.append(
-                f"the approximation that was corrected is too coarse, {self.pareto_k:.2f} where {most:.2f} is the most"
+                f"the weights of the draws are too uneven, Pareto k {self.pareto_k:.2f} where "
+                f"{reliable_k(len(self.z)):.2f} is the most"
             )
         for name, d in diagnostics.items():
             low = min(d.ess_bulk, d.ess_tail)
-            if not low >= target_ess:
-                reasons.append(too_few(name, low, target_ess))
+            if not low >= _SURER * target_ess:
+                reasons.append(too_few(name, low, _SURER * target_ess))
         return tuple(reasons)
 
 
-def weighted_draws(
-    mixture: Mixture, generator: np.random.Generator, enough: Callable[[Weighted], bool]
-) -> Generator[np.ndarray, np.ndarray, Weighted]:
-    """Weighted draws of a posterior; yields z (rows) and is sent their log densities.
+def _fields(of: Weighted) -> tuple[np.ndarray, ...]:
+    return of.w, of.z, of.log_density, of.log_proposed
+
+
+@dataclass(frozen=True)
+class Target:
+    """What is to be drawn.
 
     Args:
-        mixture: What is drawn from.
-        generator: Of everything random here.
+        evaluate: Of `BLOCK` points, of each of which it is said whether it is a z.
+        friction: Which parameters are friction coefficients.
         enough: Whether draws are enough.
     """
-    z, log_density, log_proposed = np.zeros((0, mixture.center.shape[1])), np.zeros(0), np.zeros(0)
-    for look in _LOOKS:
-        while len(z) < look * BLOCK:
-            more = mixture.draw(generator, BLOCK)
-            z, log_density = np.concatenate([z, more]), np.concatenate([log_density, (yield more)])
-            log_proposed = np.concatenate([log_proposed, mixture.log_density(more)])
-        weighted = Weighted(z, log_density, log_proposed)
-        if effective_draws(weighted.log_weights) < _WORTH * len(z) or enough(weighted):
-            break
-    return weighted
+
+    evaluate: Callable[[np.ndarray, np.ndarray], Places]
+    friction: np.ndarray
+    enough: Callable[[Weighted], bool]
+
+    def weighted(self, first: AboutMaxima, generator: np.random.Generator) -> Weighted:
+        """Draws that are enough, or those of the last proposal.
+
+        Args:
+            first: What is drawn from first.
+            generator: Of everything random here.
+        """
+        proposal: Proposal = first
+        found = self._from_one(proposal, generator)
+        for _ in range(_PROPOSALS - 1):
+            if self.enough(found):
+                break
+            chosen = resample(np.exp(evened(found.log_weights, _LEARN_FROM)), BLOCK, 0.5)
+            proposal = learnt(proposal, found.w[chosen], self.friction)
+            found = self._from_one(proposal, generator)
+        return found
+
+    def _from_one(self, proposal: Proposal, generator: np.random.Generator) -> Weighted:
+        """A block, and more as long as that may be enough."""
+        found = self._drawn(proposal, generator, 1)
+        while _promises(found) and not self.enough(found):
+            found = found.with_more(self._drawn(proposal, generator, len(found.z) // BLOCK))
+        return found
+
+    def _drawn(self, proposal: Proposal, generator: np.random.Generator, blocks: int) -> Weighted:
+        drawn = []
+        for _ in range(blocks):
+            at = self.evaluate(*proposal.draw(generator, BLOCK))
+            log_proposed = proposal.log_density(at)
+            known = np.isfinite(at.log_density) & np.isfinite(log_proposed)
+            drawn.append((at.w, at.z, np.where(known, at.log_density, -np.inf), np.where(known, log_proposed, 0.0)))
+        return Weighted(*(np.concatenate(each) for each in zip(*drawn, strict=True)))
+
+
+def _promises(found: Weighted) -> bool:
+    """Whether more draws from the same proposal may be enough."""
+    return len(found.z) < _MOST * BLOCK and effective_draws(found.log_weights) >= _WORTH * len(found.z)
 
 
 def effective_draws(log_weights: np.ndarray) -> float:

@@ -1,7 +1,7 @@
 """Fits of many data sets of one model: those of one shape together, with programs that serve the next as well."""
 
 from collections.abc import Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import astuple, dataclass, field, replace
 
 import jax
 
@@ -52,7 +52,8 @@ class Laboratory:
 def _kind(posterior: LogDensity) -> str:
     """Cable, parameters and shapes of the data: what programs are compiled for."""
     shapes = jax.tree.map(lambda array: (array.shape, str(array.dtype)), posterior.padded)
-    return f"{shapes} {posterior.model.space} {posterior.model.description.to_json()}"
+    parameters = [(type(each.prior).__name__, *astuple(each)) for each in posterior.model.space.parameters]
+    return f"{shapes} {parameters} {posterior.model.description.to_json()}"
 
 
 def with_parameters_of(model: Model, dataset: Dataset) -> Model:

@@ -140,7 +140,7 @@ def account_sentences(found: Calibration) -> list[str]:
     lines = [f"A replication took {significant(found.seconds, 2)} s (median)."]
     if found.engines:
         words = {
-            "laplace": "a normal approximation, corrected",
+            "laplace": "importance sampling",
             "ensembles": "full sampling",
             "nuts": "sampling by gradients",
         }

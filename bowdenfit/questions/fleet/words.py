@@ -7,7 +7,7 @@ from bowdenfit.questions.fleet.answer import Fleet
 from bowdenfit.words import counted, decimals, filled, give_or_take, listed, table
 
 _NAMED = 12  # broken or untrusted inspections that are named
-_ENGINES = {"laplace": "a normal approximation, corrected", "ensembles": "full sampling", "nuts": "sampling by gradients"}
+_ENGINES = {"laplace": "importance sampling", "ensembles": "full sampling", "nuts": "sampling by gradients"}
 _HEADS = ("quantity", "unit", "middle", "from", "to", "± of one")
 
 

@@ -13,7 +13,7 @@ from bowdenfit.files.matching import Quantity, candidates
 from bowdenfit.files.naming import naming
 from bowdenfit.files.spellings import spelled
 from bowdenfit.files.tables import read_table
-from bowdenfit.kinds.single_file import HEAD, FileKind, file_kind
+from bowdenfit.kinds.single_file import BESIDE_FORCES, FORCES, HEAD, FileKind, file_kind
 from bowdenfit.kinds.stated_angle import stated_angle
 from bowdenfit.kinds.unnamed_ends import HeadedColumn, columns_of, name_ends
 from bowdenfit.units import ColumnSource
@@ -52,7 +52,9 @@ def table_command(
     headings = list(zip(table.header, table.units, strict=True))
     options, provided = list[str](), list[str]()
     if kind == "forces":
-        options, provided = name_ends(columns_of(table), "--column", stated, always)
+        numbers, others = columns_of(table), _of_others(headings)
+        words, could_be = _of_words(headings, numbers), [each for each in numbers if each.name not in others]
+        options, provided = name_ends(could_be, "--column", {**words, **stated}, always)
     angle, of_angle = ([], []) if WRAP_ANGLE.name in stated else _wrap_angle(headings, path)
     found = _command(path, [*angle, *_named(stated, "--column"), *options], [*of_angle, *provided])
     return replace(found, names_more=bool(options) and not any(option.endswith("=NAME") for option in options))
@@ -129,6 +131,19 @@ def has_own_angles(path: Path, kind: str, named: Sequence[str], stated: bool) ->
         what = f"has a column of wrap angles, {shown(table.header[columns[0].position])}" if columns else "is to have one"
         raise DatasetError(f"{path.name} {what}, and --wrap-angle states one angle for all rows; leave one of the two out.")
     return True
+
+
+def _of_words(headings: Sequence[tuple[str, str]], numbers: Sequence[HeadedColumn]) -> dict[str, ColumnSource]:
+    """Forces whose columns say what they are and hold no numbers, so that no other column is to be taken for them."""
+    known = {each.name for each in numbers}
+    found = {name: [headings[each.position][0] for each in columns] for name, columns in candidates(headings, FORCES).items()}
+    return {name: ColumnSource(name=named[0]) for name, named in found.items() if named and not known.intersection(named)}
+
+
+def _of_others(headings: Sequence[tuple[str, str]]) -> set[str]:
+    """Columns that say themselves that they are something other than a force, such as the label of a run."""
+    found = candidates(headings, BESIDE_FORCES)
+    return {headings[columns[0].position][0] for columns in found.values() if len(columns) == 1}
 
 
 def _split(heading: str, unit: str) -> tuple[str, str]:

@@ -28,8 +28,7 @@ _SLOW = 1.0  # seconds between rows beyond which a person may have written them
 _UNEVEN = 3.0  # largest step of a clock over its smallest
 _SMOOTH = 0.02  # mean square of the steps of a force over twice its variance: white noise has 1
 FORCES = (Quantity("input_force", "force"), Quantity("output_force", "force"))
-COLUMNS = (
-    *FORCES,
+BESIDE_FORCES = (
     *(Quantity(name, "text") for name in ("run", "stroke", "group")),
     Quantity("efficiency", "ratio"),
     Quantity("velocity", "speed"),
@@ -37,6 +36,7 @@ COLUMNS = (
     Quantity("wrap_angle_sd", "angle"),
     Quantity("efficiency_sd", "ratio"),
 )
+COLUMNS = (*FORCES, *BESIDE_FORCES)
 """What a table without a description may have."""
 _ONE_FORCE = (Quantity("force", "force"), *FORCES)
 _POSITION = (Quantity("displacement", "length"), Quantity("position", "length"))

@@ -269,6 +269,23 @@ def test_what_the_command_could_not_fit_ends_with_2_and_says_so(run, tmp_path):
         assert run(*words, "--no-mcmc", "--output", tmp_path / "fit")[0] == 2
 
 
+@pytest.mark.parametrize("rows", [1, 4])
+def test_no_other_column_is_taken_for_a_force_whose_column_holds_words(run, tmp_path, rows):
+    """The label of a run was."""
+    path = tmp_path / "words.csv"
+    path.write_text("run,input force [N],output force [N]\n" + "".join(f"{i},{50 + i},low\n" for i in range(rows)))
+    code, out, _ = run("check", path)
+    assert code == 2 and "'low' is not a number" in out
+    assert "output_force=" not in out, out
+
+
+def test_the_label_of_a_run_is_not_taken_for_a_force(run, tmp_path):
+    path = tmp_path / "words.csv"
+    path.write_text("run,in,out\n1,50,low\n2,60,high\n")
+    code, out, _ = run("check", path)
+    assert code == 2 and "--column output_force=NAME" in out, out
+
+
 def test_what_the_command_mends_ends_with_0(run, tmp_path):
     output, load = trials()
     code, out, _ = run("check", write(tmp_path, ("Fin (N)", "Fout"), (output, load)))

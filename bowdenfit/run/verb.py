@@ -21,7 +21,6 @@ if TYPE_CHECKING:
     from bowdenfit.inference.chain import Progress
 
 
-
 def fit(
     dataset: Annotated["str | Path | Dataset", Argument("DATASET")],
     *,

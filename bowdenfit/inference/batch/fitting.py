@@ -1,9 +1,9 @@
 """Many data sets of one shape, fitted with the same programs: each by the least engine whose own checks it passes.
 
-First importance sampling, from a mixture about the maxima of the posterior and then from where those draws are, where the
-Pareto k of the weights and the effective number of draws decide; then ensembles of walkers, started from the last of those
-draws, in rounds until they agree; then NUTS. What comes of a data set depends on its own data and seed alone, not on what else
-is fitted.
+First importance sampling from a mixture about the maxima of the posterior, where the Pareto k of the weights and the effective
+number of draws decide, given up where the first draws are worth little; then ensembles of walkers, started from draws of a
+mixture that is learnt from those, in rounds until they agree; then NUTS. What comes of a data set depends on its own data and
+seed alone, not on what else is fitted.
 """
 
 from collections.abc import Callable, Sequence
@@ -41,8 +41,9 @@ def fit_batch(
     programs = programs or BatchPrograms(posterior, settings or BatchSettings())
     parts, pool, stop = list(zip(data, seeds, strict=True)), ThreadPoolExecutor(programs.threads), Event()
     try:
-        compiled = [pool.submit(_in_64_bits, attrgetter(name), programs) for name in ("gradients", "places")]
-        _ = programs.noise, programs.friction, programs.names, [one.result() for one in compiled]
+        needed = ("gradients", "places", "noise", "friction", "names")  # by all, so before any
+        for one in [pool.submit(_in_64_bits, attrgetter(name), programs) for name in needed]:
+            one.result()
         chunks = [pool.submit(_in_64_bits, partial(climb, programs), chunk) for chunk in _chunks(parts, CHUNK)]
         drawing = partial(_in_64_bits, partial(draw, programs, stopped=stop.is_set))
         every = [pool.submit(drawing, begun) for chunk in chunks for begun in chunk.result()]

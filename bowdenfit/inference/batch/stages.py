@@ -99,14 +99,20 @@ def draw(programs: BatchPrograms, begun: Begun, stopped: Callable[[], bool]) -> 
         programs.friction,
         lambda found: found.is_reliable and not _by_weights(programs, found).reasons,
     )
-    weighted = target.weighted(AboutMaxima(first), np.random.default_rng([seed, 1]))
+    proposal, generator = AboutMaxima(first), np.random.default_rng([seed, 1])
+    weighted = target.weighted(proposal, generator)
     fit = _by_weights(programs, weighted)
     if not (fit.reasons and len(fit.z)):
         return Ended(begun, fit, None)
-    fit = _walked(programs, begun, weighted, stopped)
-    weights = np.exp(_evened(programs, weighted))
-    covariance = np.cov(weighted.z.T, aweights=weights).reshape(weighted.z.shape[1], -1)
-    return Ended(begun, fit, MaximumPosterior(weights @ weighted.z, covariance) if fit.reasons else None)
+    near = target.nearer(weighted, proposal, generator)
+    fit = replace(_walked(programs, begun, near, stopped), pareto_k=fit.pareto_k)
+    return Ended(begun, fit, _start_of(programs, near) if fit.reasons else None)
+
+
+def _start_of(programs: BatchPrograms, near: Weighted) -> MaximumPosterior:
+    """Where NUTS may start."""
+    weights = np.exp(_evened(programs, near))
+    return MaximumPosterior(weights @ near.z, np.cov(near.z.T, aweights=weights).reshape(near.z.shape[1], -1))
 
 
 def _by_weights(programs: BatchPrograms, weighted: Weighted | None) -> BatchFit:
@@ -122,12 +128,12 @@ def _by_weights(programs: BatchPrograms, weighted: Weighted | None) -> BatchFit:
     return BatchFit(weighted.z[kept], "laplace", weighted.pareto_k, diagnostics, reasons)
 
 
-def _walked(programs: BatchPrograms, begun: Begun, weighted: Weighted, stopped: Callable[[], bool]) -> BatchFit:
+def _walked(programs: BatchPrograms, begun: Begun, near: Weighted, stopped: Callable[[], bool]) -> BatchFit:
     """What the second half of the walkers' paths says, looked at until it is enough or they have gone as far as they may."""
     limit = max(programs.settings.sampler.max_steps // STEPS, _FIRST_LOOK)
     with programs.compiling:  # by the first that needs it
         walk = programs.ensembles
-    walkers, path, diagnostics = _starts(programs, weighted, begun.seed), list[np.ndarray](), dict[str, Diagnostics]()
+    walkers, path, diagnostics = _starts(programs, near, begun.seed), list[np.ndarray](), dict[str, Diagnostics]()
     rounds, target = 0, _FIRST_LOOK
     while True:
         for number in range(rounds, target):
@@ -138,19 +144,19 @@ def _walked(programs: BatchPrograms, begun: Begun, weighted: Weighted, stopped: 
         rounds, path = target, path[-(target + 1) // 2 :]  # no more than the second half can be asked for
         late = np.concatenate(path)[-(rounds * STORED // 2) :]
         fit = _by_ensembles(programs, late, [*diagnostics][-1:], last=rounds == limit)
-        fit, diagnostics = replace(fit, pareto_k=weighted.pareto_k, steps=rounds * STEPS), fit.diagnostics
+        fit, diagnostics = replace(fit, steps=rounds * STEPS), fit.diagnostics
         if not fit.reasons or rounds == limit:
             return fit
         target = min(rounds + max(rounds // 3, 1), limit)
 
 
-def _starts(programs: BatchPrograms, weighted: Weighted, seed: int) -> np.ndarray:
-    """Different ones of the weighted draws, (ensemble, walker, parameter)."""
+def _starts(programs: BatchPrograms, near: Weighted, seed: int) -> np.ndarray:
+    """Different ones of weighted draws, (ensemble, walker, parameter)."""
     n_ensembles, generator = programs.settings.sampler.n_ensembles, np.random.default_rng([seed, 2])
-    log_weights = _evened(programs, weighted)
+    log_weights = _evened(programs, near)
     # The largest of weights times exponential numbers are a sample without replacement.
     chosen = np.argsort(log_weights + generator.gumbel(size=len(log_weights)))[-n_ensembles * programs.n_walkers :]
-    return weighted.z[generator.permutation(chosen)].reshape(n_ensembles, programs.n_walkers, -1)
+    return near.z[generator.permutation(chosen)].reshape(n_ensembles, programs.n_walkers, -1)
 
 
 def _evened(programs: BatchPrograms, weighted: Weighted) -> np.ndarray:

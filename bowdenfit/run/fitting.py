@@ -23,7 +23,8 @@ from bowdenfit.model import build_model
 from bowdenfit.questions.check.answer import checks_findings, evidence_of
 from bowdenfit.questions.check.evidence import work_out
 from bowdenfit.results.record import Provenance
-from bowdenfit.run.helpers import Assistant, Stopwatch, load_beside, load_without
+from bowdenfit.run.helpers import Assistant, Stopwatch
+from bowdenfit.run.loading import load, load_beside
 from bowdenfit.run.sampling import LIBRARIES, draws_of, samplers, sampling_programs
 
 
@@ -50,7 +51,7 @@ def run(
     # Not blackjax, whose modules import each other in circles: two threads would see half of one.
     libraries = [LIBRARIES[name] for name in samplers(settings.method) if name == "emcee"]
     if helper.checks:  # a process of ours, in which only a move of emcee that is not used here would need scipy.stats
-        load_without("scipy.stats", *libraries)
+        load(*libraries, later=("scipy.stats",))
     else:
         load_beside(*libraries, "arviz_stats.ecdf_utils")
     compiling = ThreadPoolExecutor(1)

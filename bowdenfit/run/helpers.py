@@ -11,26 +11,14 @@ from collections.abc import Callable, Iterable, Iterator
 from concurrent.futures import Future, ThreadPoolExecutor
 from contextlib import ExitStack, contextmanager, suppress
 from dataclasses import dataclass, field
-from importlib import import_module
 from multiprocessing import connection, get_context
 from queue import SimpleQueue
 from typing import Any, ClassVar, TypeAlias
 
 from bowdenfit.errors import BowdenfitError
 from bowdenfit.inference.engines.processes import cores, end_with_parent
+from bowdenfit.run.loading import load_what_checking_needs, load_what_computing_needs, load_what_drawing_needs
 
-# What this process and a copy of it both need; linear algebra compiled by JAX takes its addresses from SciPy.
-COMPUTING = ("jax", "bowdenfit.run.fitting", "scipy.linalg", "scipy.special")
-DRAWING = (
-    "matplotlib.figure",
-    "matplotlib.backends.backend_agg",
-    "matplotlib.backends.backend_svg",
-    "matplotlib.backends.backend_pdf",
-    "bowdenfit.questions.figures",
-    "bowdenfit.pages.page",
-    "jinja2",
-)
-CHECKING = ("bowdenfit.questions.check.evidence", "arviz_stats.ecdf_utils")
 Answers = tuple["Future[Any]", ...]
 Connection: TypeAlias = "connection.Connection[Any, Any]"
 
@@ -126,7 +114,7 @@ class InAnotherProcess(Assistant):
     def prepare_to_draw(self) -> None:
         """See `Assistant`."""
         if self.draws:
-            self.submit(load, *DRAWING)
+            self.submit(load_what_drawing_needs)
 
     def _asked(self, function: Callable[..., Any], arguments: tuple[Any, ...]) -> Iterator[Any]:
         try:
@@ -180,7 +168,7 @@ class InOtherProcesses(Assistant):
         self.twin = Twin()
         self.drawing = InAnotherProcess(True, None, True, (self.twin.ours,), self.twin.theirs)
         self.twin.theirs.close()
-        load(*COMPUTING)
+        load_what_computing_needs()
         settings()
         ends = self.drawing.ours, self.twin.ours
         self.computing = InAnotherProcess(True, settings, False, ends) if computes else None
@@ -241,7 +229,7 @@ def assistant(
     if in_background and copy and draws and cores() > 1:
         other: InOtherProcesses | InAnotherProcess = InOtherProcesses(settings, computes)
     else:
-        load(*COMPUTING)
+        load_what_computing_needs()
         settings()
         if not in_background:
             helper = InThisProcess()
@@ -287,7 +275,7 @@ def _serve(
     with suppress(EOFError, ConnectionError), ExitStack() as held:  # that process has ended, perhaps with a reply unread
         if settings is None:
             with suppress(Exception):  # what fails here fails where it is needed
-                load(*DRAWING)
+                load_what_drawing_needs()
             if twin is not None:
                 requests = _one_of_two(requests, twin)
         else:
@@ -327,40 +315,6 @@ def _replies(function: Callable[..., Any], arguments: tuple[Any, ...]) -> Iterat
         error.add_note(traceback.format_exc())
         yield error, None
     yield None
-
-
-def load(*modules: str) -> None:
-    """Load modules."""
-    for name in modules:
-        import_module(name)
-
-
-def load_without(missing: str, *modules: str) -> None:
-    """Load modules as where a library is not installed that they can do without; only in a process that is all ours."""
-    if missing in sys.modules:
-        return load(*modules)
-    sys.modules[missing] = None  # type: ignore[assignment]  # as Python has it of what cannot be imported
-    try:
-        load(*modules)
-    finally:
-        del sys.modules[missing]
-
-
-def load_what_checking_needs() -> None:
-    """Load what judges draws: first what the first look at them waits for, which needs arrays alone."""
-    with suppress(Exception):  # what fails here fails where it is needed
-        load_without("xarray", "arviz_stats.base")
-        load(*CHECKING)
-
-
-def load_beside(*modules: str) -> None:
-    """Load modules in a thread, which gets its time while XLA compiles; what fails there fails where they are needed."""
-
-    def quietly() -> None:
-        with suppress(Exception):
-            load(*modules)
-
-    threading.Thread(target=quietly).start()
 
 
 @dataclass

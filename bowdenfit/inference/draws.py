@@ -29,15 +29,31 @@ def for_each_draw(
     return lambda z: in_batches(lambda part: program(part, *data), BATCH, z)
 
 
-def in_batches(program: Function, batch: int, z: np.ndarray) -> Any:
-    """What a program compiled for so many rows gives for any number of them."""
-    parts = []
-    for start in range(0, len(z), batch):
-        part = z[start : start + batch]
-        padded = np.concatenate([part, np.repeat(part[-1:], batch - len(part), axis=0)])
-        parts.append(jax.tree.map(np.asarray, program(padded)))
+def for_each_value(function: Function, values: Mapping[str, np.ndarray], *data: Any) -> Any:
+    """`function` of named values (and of data that are the same for all), of many draws.
+
+    Compiled without what leads from z to values, which often is most of it.
+
+    Args:
+        function: Of named values [internal units].
+        values: Of all draws, by name.
+        data: What else it takes.
+    """
+    over_rows = jax.vmap(function, in_axes=(0, *(None for _ in data)))
+    rows = {name: jax.ShapeDtypeStruct((BATCH,), float) for name in values}
+    program = compile_program(over_rows, rows, *data, run_once=True)
+    return in_batches(lambda part: program(part, *data), BATCH, dict(values))
+
+
+def in_batches(program: Function, batch: int, rows: Any) -> Any:
+    """What a program compiled for so many rows, of one array or of several, gives for any number of them."""
+    parts, count = [], len(jax.tree.leaves(rows)[0])
+    for start in range(0, count, batch):
+        padded = np.minimum(np.arange(start, start + batch), count - 1)
+        part = jax.tree.map(lambda each, padded=padded: each[padded], rows)
+        parts.append(jax.tree.map(np.asarray, program(part)))
     whole = jax.tree.map(lambda *x: np.concatenate(x), *parts)
-    return jax.tree.map(lambda x: x[: len(z)], whole)
+    return jax.tree.map(lambda x: x[:count], whole)
 
 
 def named_values(model: Model) -> Callable[[Float[Array, " free"]], dict[str, Array]]:
@@ -65,10 +81,11 @@ def replicator(posterior: LogDensity, seed: int, beside: Executor | None = None)
     readings: named values, log likelihood of every reading, expected readings, and readings drawn anew.
     """
     model = posterior.model
-    names, key = named_values(model), jax.random.key(seed)  # an argument, so that the program is the same for every seed
+    names, bits = named_values(model), key_bits(seed)  # an argument, so that the program is the same for every seed
 
-    def implied(z_and_number: Float[Array, " free_and_one"], data: Any, key: Array) -> dict[str, Mapping[str, Array]]:
+    def implied(z_and_number: Float[Array, " free_and_one"], data: Any, bits: Array) -> dict[str, Mapping[str, Array]]:
         z, number = z_and_number[:-1], z_and_number[-1].astype(jnp.uint32)
+        key = jax.random.wrap_key_data(bits, impl="threefry2x32")
         keys = jax.random.split(jax.random.fold_in(key, number), max(len(model.terms), 1))
         values = model.space.constrain(z)
         terms = list(zip(model.terms, data, keys, strict=False))
@@ -80,8 +97,13 @@ def replicator(posterior: LogDensity, seed: int, beside: Executor | None = None)
         }
 
     small = sum(np.size(array) for array in jax.tree.leaves(posterior.data)) < _SMALL
-    program = for_each_draw(implied, model.space.size + 1, posterior.data, key, run_once=small, beside=beside)
+    program = for_each_draw(implied, model.space.size + 1, posterior.data, bits, run_once=small, beside=beside)
     return lambda z: program(np.column_stack([z, np.arange(len(z), dtype=float)]))
+
+
+def key_bits(seed: int) -> np.ndarray:
+    """What `jax.random.key` makes of a seed, without a program of its own."""
+    return np.array([seed >> 32, seed & 0xFFFFFFFF], dtype=np.uint32)
 
 
 def curves_of(model: Model, route: np.ndarray) -> Callable[[Float[Array, " free"]], dict[str, Array]]:

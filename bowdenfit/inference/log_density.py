@@ -4,6 +4,7 @@ from dataclasses import dataclass
 from functools import cached_property
 from typing import Any
 
+import jax
 import jax.numpy as jnp
 from jax import Array
 from jaxtyping import Float
@@ -27,7 +28,7 @@ class LogDensity:
     given: Any = None
 
     def __post_init__(self) -> None:
-        if jnp.zeros(()).dtype != jnp.float64:
+        if jax.dtypes.canonicalize_dtype(float) != jnp.float64:
             raise RuntimeError(
                 "bowdenfit computes with 64-bit floats, but JAX is set to 32; the usual cause is calling its inner "
                 "functions directly: wrap the call in `with jax.enable_x64(True):`, or use bowdenfit.fit, which does."

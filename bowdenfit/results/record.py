@@ -12,6 +12,7 @@ import numpy as np
 from bowdenfit.dataset import Dataset
 from bowdenfit.display import Display, Rows
 from bowdenfit.errors import UsageError
+from bowdenfit.inference.compilation import compile_program
 from bowdenfit.inference.diagnostics import Diagnostics, Trajectories
 from bowdenfit.inference.draws import OfDraws, derived_units, efficiency_at
 from bowdenfit.inference.interval import Interval
@@ -255,6 +256,21 @@ def once(question: Callable[[Record], Answer]) -> Callable[[Record], Answer]:
         return found
 
     return answer
+
+
+@once
+def values_of(fit: Record) -> dict[str, np.ndarray]:
+    """Named values of all parameters [internal units] of every draw, or of least squares alone."""
+    space = fit.model.space
+    if fit.sampled is None:
+        with jax.enable_x64(True):
+            vector = compile_program(space.vector, jax.ShapeDtypeStruct((space.size,), float), run_once=True)
+            found = np.asarray(vector(fit.least_squares.z))[None]
+        free = {p.name: found[:, i] for i, p in enumerate(space.free)}
+    else:
+        free = {p.name: fit.sampled.values[p.name].ravel() / p.shown_scale for p in space.free}
+    n = 1 if fit.sampled is None else len(fit.sampled.flat_z)
+    return free | {p.name: np.full(n, p.fixed) for p in space.fixed}
 
 
 @once

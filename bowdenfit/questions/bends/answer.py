@@ -12,14 +12,14 @@ import numpy as np
 from bowdenfit.cable.elasticity import PRELOAD
 from bowdenfit.display import Display, Rows
 from bowdenfit.errors import UsageError
-from bowdenfit.inference.draws import for_each_draw
+from bowdenfit.inference.draws import for_each_value
 from bowdenfit.inference.interval import Interval
 from bowdenfit.kinds import each_table
 from bowdenfit.physics.loop import dynamic_range
 from bowdenfit.physics.stretch import with_springs
 from bowdenfit.questions.bends.equations import Bent, bending_contact, knows_preload, knows_stretch
 from bowdenfit.questions.bends.preload_window import TAUT, PreloadAnswer
-from bowdenfit.results.record import Record, once
+from bowdenfit.results.record import Record, once, values_of
 
 _BENDS = 25  # wrap angles at which a range of bends is looked at
 _SHOWN = 5  # wrap angles of a summary
@@ -69,12 +69,8 @@ class Elastic(Display):
 
     def over(self, function: Callable[..., Any], *data: Any) -> Any:
         """A function of named values (and of data that are the same for all), for every draw, or for least squares alone."""
-        space, posterior = self.fit.model.space, self.fit.sampled
-        z = self.fit.least_squares.z[None] if posterior is None else posterior.flat_z
         with jax.enable_x64(True):
-            return for_each_draw(
-                lambda one, *same: function(space.constrain(one), *same), space.size, *data, run_once=True
-            )(z)
+            return for_each_value(function, values_of(self.fit), *data)
 
     @cached_property
     def measured_bends(self) -> np.ndarray:

@@ -76,7 +76,6 @@ def data(fit: Record) -> BendingLoss | None:
     """What is shown; None of a cable that is no loop with preload, or was measured at no bend."""
     import jax.numpy as jnp
 
-    from bowdenfit.physics.friction import transmission_efficiency
     from bowdenfit.physics.loop import loop_output_force
     from bowdenfit.questions.bends.answer import elastic_answers, typical_preload
     from bowdenfit.questions.bends.curves import (
@@ -113,7 +112,7 @@ def data(fit: Record) -> BendingLoss | None:
     draws = of_draws(fit, curves)
     lines = {name: np.median(drawn, axis=0) for name, drawn in draws.items()}
     coefficient = lines["exponent"][-1] / angles[-1]
-    capstan = np.asarray(transmission_efficiency(jnp.asarray(lines["exponent"])))
+    capstan = np.exp(-lines["exponent"])  # of a rope without preload
     return BendingLoss(
         np.rad2deg(angles),
         force,

@@ -11,10 +11,10 @@ import numpy as np
 from jax import Array
 
 from bowdenfit.errors import UsageError
-from bowdenfit.inference.draws import BATCH, for_each_draw
+from bowdenfit.inference.draws import BATCH, for_each_value
 from bowdenfit.questions.bends.answer import elastic_answers
 from bowdenfit.questions.bends.equations import knows_preload
-from bowdenfit.results.record import Record
+from bowdenfit.results.record import Record, values_of
 
 QUANTILES = (0.05, 0.5, 0.95)
 POINTS = 61  # of a line
@@ -23,21 +23,19 @@ _LEAST_BEND = 0.1  # rad; a figure against the wrap angle needs a range
 Values = Mapping[str, Array]
 
 
-def of_draws(fit: Record, curves: Callable[[Values], dict[str, Any]]) -> dict[str, np.ndarray]:
+def of_draws(fit: Record, curves: Callable[..., dict[str, Any]], *data: Any) -> dict[str, np.ndarray]:
     """Curves of one draw, for some of the draws (rows), or for least squares alone.
 
     Args:
         fit: The fit.
-        curves: Function of the values of one draw.
+        curves: Function of the values of one draw, and of data that are the same for all.
+        data: These.
     """
-    space, posterior = fit.model.space, fit.sampled
-    z = fit.least_squares.z[None]
-    if posterior is not None:
-        z = posterior.flat_z[np.linspace(0, len(posterior.flat_z) - 1, BATCH).astype(int)]
+    values = values_of(fit)
+    n = len(next(iter(values.values())))
+    some = np.linspace(0, n - 1, BATCH).astype(int) if n > 1 else np.zeros(1, dtype=int)
     with jax.enable_x64(True):
-        found: dict[str, np.ndarray] = for_each_draw(
-            lambda one: curves(space.constrain(one)), space.size, run_once=True
-        )(z)
+        found: dict[str, np.ndarray] = for_each_value(curves, {name: drawn[some] for name, drawn in values.items()}, *data)
     return found
 
 

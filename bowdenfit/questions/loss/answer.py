@@ -10,9 +10,10 @@ import numpy as np
 from jax import Array
 from jaxtyping import Float
 
+from bowdenfit.inference.draws import for_each_value
 from bowdenfit.inference.interval import Interval
 from bowdenfit.questions.recorded.rate import place_of
-from bowdenfit.results.record import OPTIMAL_LENGTH, Record, once
+from bowdenfit.results.record import OPTIMAL_LENGTH, Record, once, values_of
 from bowdenfit.words import counted, listed, percent
 
 _LONGEST_NAME = 40  # characters of a contact's name in a sentence
@@ -96,15 +97,13 @@ def loss_by_contact(fit: Record) -> Loss | None:
 
 def _shares(fit: Record, at: float) -> np.ndarray:
     """Share of each contact (columns) in each draw (rows) at a value of the route variable."""
-    cable, z = fit.model.cable, fit.posterior.flat_z
-    drawn = {p.name: fit.posterior.values[p.name].ravel() / p.shown_scale for p in fit.model.space.free}
-    fixed = {p.name: np.full(len(z), p.fixed) for p in fit.model.space.fixed}
+    cable = fit.model.cable
 
-    def exponents(values: dict[str, Array], route: Float[Array, " draws"]) -> Array:
+    def exponents(values: dict[str, Array], route: Float[Array, " one"]) -> Array:
         angles = cable.wrap_angles(values, route)
-        return jnp.stack([law.exponent(values, angles[:, k]) for k, law in enumerate(cable.laws)], axis=-1)
+        return jnp.stack([law.exponent(values, angles[:, k])[0] for k, law in enumerate(cable.laws)])
 
     with jax.enable_x64(True):
-        found = np.asarray(jax.jit(exponents)(drawn | fixed, np.full(len(z), at)))
+        found = np.asarray(for_each_value(exponents, values_of(fit), np.array([at])))
     total = np.sum(found, axis=1, keepdims=True)
     return np.where(total > 0, found / np.where(total > 0, total, 1.0), 1 / len(cable.laws))

@@ -143,21 +143,21 @@ def _of_draws(
     cable, friction = fit.model.cable, fit.model.cable.friction
     arrays = row_angles(cable.description, table, fit.dataset.measurements.table(AngleTable)).data
     arrays |= {"group": group_numbers(friction.groups, table.group, len(table.run))}
-    least, velocity = friction.conditions.least_force, jnp.asarray(table.velocity)
+    least, velocity = friction.conditions.least_force, table.velocity
 
     def output(values: Mapping[str, Any], which: np.ndarray, force: Any, stroke: Any) -> tuple[Any, Any]:
         data = {name: jnp.asarray(array[which]) for name, array in arrays.items()}
         angles, _ = resolve_angles(cable, values, data)
-        exponent = cable.friction_exponent(values, angles, data["group"]) * friction.rate(values, velocity[which])
+        exponent = cable.friction_exponent(values, angles, data["group"]) * friction.rate(values, jnp.asarray(velocity[which]))
         cells, more = LoadCells.of(values), (...,) + (None,) * (jnp.ndim(force) - 1)
         read = friction.output_force(values, cells.true_input(force, least), exponent[more], stroke)
         return cells.shown_output(read, least), jnp.sum(angles, axis=-1)
 
-    strokes = jnp.asarray(STROKES, dtype=float)[None, :, None]
-    grid = jnp.broadcast_to(jnp.asarray(load), (len(first), len(STROKES), len(load)))
+    strokes = np.array(STROKES, dtype=float)[None, :, None]
+    grid = np.broadcast_to(load, (len(first), len(STROKES), len(load)))
 
     def curves(values: Mapping[str, Any]) -> dict[str, Any]:
-        law, angle = output(values, first, grid, strokes)
+        law, angle = output(values, first, jnp.asarray(grid), jnp.asarray(strokes))
         at_rows, bend = output(values, rows, jnp.asarray(table.input_force[rows]), jnp.asarray(table.stroke[rows]))
         apparent = strokes * jnp.log(grid / law) / jnp.maximum(angle, _LEAST_ANGLE)[:, None, None]
         return {"law": law, "apparent": apparent, "rows": at_rows, "bend": bend}

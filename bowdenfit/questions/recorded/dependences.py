@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass, field
 from typing import TYPE_CHECKING
 
@@ -128,14 +129,13 @@ def _curves(
     import jax
     import jax.numpy as jnp
 
+    from bowdenfit.inference.draws import for_each_value
     from bowdenfit.questions.recorded.traces import QUANTILES, some_draws
 
     model, friction = fit.model, fit.model.cable.friction
-    where = jnp.asarray([at])
 
-    def efficiency(z: jax.Array) -> tuple[jax.Array, jax.Array]:
-        values = model.space.constrain(z)
-        exponent = model.cable.exponent_at(values, where)[0]
+    def efficiency(values: Mapping[str, jax.Array]) -> tuple[jax.Array, jax.Array]:
+        exponent = model.cable.exponent_at(values, jnp.array([at]))[0]
         reference = friction.efficiency(values, exponent)
         if forces is not None:
             x = jnp.asarray(forces)
@@ -145,11 +145,11 @@ def _curves(
         return friction.output_force(values, x, shift, jnp.ones(())) / x, reference
 
     with jax.enable_x64(True):
-        curves, reference = jax.jit(jax.vmap(efficiency))(jnp.asarray(some_draws(fit, CURVES)))
-    constant = float(np.median(np.asarray(reference)))
+        curves, reference = for_each_value(efficiency, some_draws(fit, CURVES))
+    constant = float(np.median(reference))
     if fit.sampled is None:
-        return np.asarray(curves)[:1], constant, np.zeros((0, len(curves[0])))
+        return curves[:1], constant, np.zeros((0, len(curves[0])))
     mounting = fit.mounting()[np.linspace(0, len(fit.mounting()) - 1, CURVES).astype(int)]
-    mounted = np.asarray(curves) * np.exp(-mounting[:, None])
+    mounted = curves * np.exp(-mounting[:, None])
     new_run = np.quantile(mounted, (QUANTILES[0], QUANTILES[-1]), axis=0)
-    return np.quantile(np.asarray(curves), QUANTILES, axis=0), constant, new_run
+    return np.quantile(curves, QUANTILES, axis=0), constant, new_run

@@ -41,21 +41,21 @@ class Follower:
 
     def __init__(self, model: Model, recordings: Recordings, angles: AngleTable | None) -> None:
         self._data = _arrays(model, recordings, angles)
-        z = jax.ShapeDtypeStruct((DRAWS, model.space.size), jnp.float64)
+        values = {p.name: jax.ShapeDtypeStruct((DRAWS,), jnp.float64) for p in model.space.parameters}
         mounting = jax.ShapeDtypeStruct((DRAWS, len(recordings.each)), jnp.float64)
         function = jax.vmap(_followed(model), in_axes=(0, 0, None))
-        self._program: Callable[..., Any] = compile_program(function, z, mounting, self._data)
+        self._program: Callable[..., Any] = compile_program(function, values, mounting, self._data)
 
     def __call__(
-        self, z: Float[np.ndarray, "draws free"], mounting: Float[np.ndarray, "draws recordings"]
+        self, values: Mapping[str, np.ndarray], mounting: Float[np.ndarray, "draws recordings"]
     ) -> tuple[np.ndarray, np.ndarray]:
         """Output force [N] of each draw, block and recording, and friction exponent [1] of each draw and recording.
 
         Args:
-            z: `DRAWS` draws.
+            values: Named values [internal units] of `DRAWS` draws.
             mounting: Effect of the mounting on the friction exponent of each recording [1].
         """
-        force, exponent = self._program(z, mounting, self._data)
+        force, exponent = self._program(values, mounting, self._data)
         return np.asarray(force), np.asarray(exponent)
 
 
@@ -74,11 +74,10 @@ def _arrays(model: Model, recordings: Recordings, angles: AngleTable | None) -> 
     return rows | held | {"likely_force": likely, "drift": beside(rates, "constant")}
 
 
-def _followed(model: Model) -> Callable[[Array, Array, Mapping[str, Any]], tuple[Array, Array]]:
-    """Function of one z, of mounting effects and of the blocks."""
+def _followed(model: Model) -> Callable[[Mapping[str, Array], Array, Mapping[str, Any]], tuple[Array, Array]]:
+    """Function of one draw's values, of mounting effects and of the blocks."""
 
-    def follow(z: Array, mounting: Array, data: Mapping[str, Any]) -> tuple[Array, Array]:
-        values = model.space.constrain(z)
+    def follow(values: Mapping[str, Array], mounting: Array, data: Mapping[str, Any]) -> tuple[Array, Array]:
         drive = drive_of(model.cable, values, resolve_angles(model.cable, values, data)[0], data["velocity"])
         cells, least = LoadCells.of(values), drive.least_force
         start = drive.scaled(cells.true_output(data["output_force"][0], least))

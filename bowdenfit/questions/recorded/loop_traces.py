@@ -1,16 +1,19 @@
 """Recordings of a pull-pull loop as points of its output against its input force."""
 
+from collections.abc import Mapping
+
 import jax
 import jax.numpy as jnp
 import numpy as np
 
+from bowdenfit.inference.draws import for_each_value
 from bowdenfit.kinds.angles.table import AngleTable
 from bowdenfit.kinds.recordings.angles import recorded_angles
 from bowdenfit.kinds.resolve_angles import resolve_angles
 from bowdenfit.kinds.row_angles import row_angles
 from bowdenfit.questions.recorded.equations import blocks_shown
 from bowdenfit.recordings.recording import Recording, Recordings
-from bowdenfit.results.record import Record
+from bowdenfit.results.record import Record, values_of
 
 _ALIKE = np.deg2rad(0.05)  # wrap angles that differ by less are shown as one
 
@@ -38,12 +41,16 @@ def loop_points(fit: Record, contact: int | None = None) -> np.ndarray:
 
 def _angles(fit: Record, recordings: Recordings) -> np.ndarray:
     """Wrap angles of each recording in each contact [rad], by the middle of the draws where curves give them."""
-    cable, space, angles = fit.model.cable, fit.model.space, fit.dataset.measurements.table(AngleTable)
+    cable, angles = fit.model.cable, fit.dataset.measurements.table(AngleTable)
     measured = row_angles(cable.description, recorded_angles(recordings), angles).data
-    z = fit.least_squares.z if fit.sampled is None else np.median(fit.posterior.flat_z, axis=0)
+    middle = {name: np.median(drawn, keepdims=True) for name, drawn in values_of(fit).items()}
+
+    def angles_of(values: Mapping[str, jax.Array]) -> jax.Array:
+        return resolve_angles(cable, values, {name: jnp.asarray(array) for name, array in measured.items()})[0]
+
     with jax.enable_x64(True):
-        rows = {name: jnp.asarray(array) for name, array in measured.items()}
-        return np.asarray(resolve_angles(cable, space.constrain(jnp.asarray(z)), rows)[0])
+        found: np.ndarray = for_each_value(angles_of, middle)[0]
+    return found
 
 
 def _points(angle: float, recording: Recording) -> np.ndarray:

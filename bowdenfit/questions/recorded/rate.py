@@ -1,15 +1,17 @@
 """Whether efficiency depends on speed, where the fit lets it: the difference between two speeds, draw by draw."""
 
+from collections.abc import Mapping
 from dataclasses import dataclass
 
 import jax
 import jax.numpy as jnp
 import numpy as np
 
+from bowdenfit.inference.draws import for_each_value
 from bowdenfit.inference.interval import Interval
 from bowdenfit.kinds import each_table
 from bowdenfit.recordings.recording import Recordings
-from bowdenfit.results.record import Record, once
+from bowdenfit.results.record import Record, once, values_of
 from bowdenfit.words import significant
 
 _SURE = 0.99  # probability from which a dependence on speed is called one
@@ -87,13 +89,13 @@ def place_of(fit: Record) -> tuple[float, str]:
 
 def _differences(fit: Record, at: float, slow: float, fast: float) -> np.ndarray:
     model, friction = fit.model, fit.model.cable.friction
-    force = jnp.asarray(friction.conditions.reference_force)
 
-    def difference(z: jax.Array) -> jax.Array:
-        values = model.space.constrain(z)
+    def difference(values: Mapping[str, jax.Array]) -> jax.Array:
+        force = jnp.asarray(friction.conditions.reference_force)
         exponent = model.cable.exponent_at(values, jnp.asarray([at]))[0]
         shifts = exponent * friction.rate(values, jnp.asarray([slow, fast]))
         output = friction.output_force(values, force, shifts, jnp.ones(())) / force
         return output[1] - output[0]
 
-    return np.asarray(jax.jit(jax.vmap(difference))(jnp.asarray(fit.posterior.flat_z)))
+    found: np.ndarray = for_each_value(difference, values_of(fit))
+    return found

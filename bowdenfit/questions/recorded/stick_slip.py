@@ -3,15 +3,14 @@
 from dataclasses import dataclass
 
 import jax
-import jax.numpy as jnp
 import numpy as np
 from jaxtyping import Array, Float
 
 from bowdenfit.cable.friction import STRIBECK, STRIBECK_SPEED, VISCOUS
-from bowdenfit.inference.draws import for_each_draw
+from bowdenfit.inference.draws import for_each_value
 from bowdenfit.physics.friction import rate_slope
 from bowdenfit.questions.recorded.rate import SHOWN_SPEED, typical_speeds
-from bowdenfit.results.record import Record, once
+from bowdenfit.results.record import Record, once, values_of
 from bowdenfit.words import percent, significant
 
 _SHOWN = 5  # speeds
@@ -58,13 +57,10 @@ def slopes(fit: Record, speeds: np.ndarray) -> np.ndarray:
         fit: A fit whose friction depends on the rate.
         speeds: In the internal unit of its velocities.
     """
-    space = fit.model.space
 
-    def slope(z: Float[Array, " parameters"], at: Float[Array, " speeds"]) -> Float[Array, " speeds"]:
-        values = space.constrain(z)
+    def slope(values: dict[str, Array], at: Float[Array, " speeds"]) -> Float[Array, " speeds"]:
         return rate_slope(at, *(values[name] for name in (STRIBECK, STRIBECK_SPEED, VISCOUS)))
 
     with jax.enable_x64(True):
-        program = for_each_draw(slope, space.size, jnp.asarray(speeds, dtype=float), run_once=True)
-        found: np.ndarray = program(fit.posterior.flat_z)
+        found: np.ndarray = for_each_value(slope, values_of(fit), np.asarray(speeds, dtype=float))
     return found

@@ -10,7 +10,7 @@ from bowdenfit.cable.noise import noise_law
 from bowdenfit.kinds.angles.table import AngleTable
 from bowdenfit.questions.recorded.equations import DRAWS, Follower, blocks_shown
 from bowdenfit.recordings.recording import Recording, Recordings
-from bowdenfit.results.record import Record, once
+from bowdenfit.results.record import Record, once, values_of
 
 QUANTILES = (0.05, 0.5, 0.95)
 _REACH = 0.1  # mounting effects of a run that are looked at, either way
@@ -86,33 +86,30 @@ def traces(fit: Record) -> tuple[Trace, ...]:
     return tuple(found)
 
 
-def some_draws(fit: Record, n: int = DRAWS) -> np.ndarray:
-    """So many draws of the posterior, or as many times least squares."""
-    if fit.sampled is None:
-        return np.repeat(fit.least_squares.z[None], n, axis=0)
-    flat = fit.posterior.flat_z
-    return flat[np.linspace(0, len(flat) - 1, n).astype(int)]
+def some_draws(fit: Record, n: int = DRAWS) -> dict[str, np.ndarray]:
+    """Named values [internal units] of so many draws of the posterior, or as many times least squares."""
+    return {name: drawn[np.linspace(0, len(drawn) - 1, n).astype(int)] for name, drawn in values_of(fit).items()}
 
 
 def _predicted(fit: Record, recordings: Recordings, follower: Follower) -> tuple[np.ndarray, np.ndarray]:
     """Quantiles of the output force with a new mounting, and of the friction exponent without."""
-    z, n = some_draws(fit), len(recordings.each)
+    values, n = some_draws(fit), len(recordings.each)
     if fit.sampled is None:
-        force, exponent = follower(z, np.zeros((DRAWS, n)))
+        force, exponent = follower(values, np.zeros((DRAWS, n)))
         return force[:1], exponent[:1]
     tau = fit.posterior.values[RUN_SCATTER].ravel() if RUN_SCATTER in fit.posterior.values else np.zeros(1)
     scatter = tau[np.linspace(0, len(tau) - 1, DRAWS).astype(int)]
     law, generator = noise_law(fit.dataset.description), np.random.default_rng([fit.provenance.seed, 4])
     mounting = scatter[:, None] * law.draw_with(generator, (DRAWS, n))
-    force, exponent = follower(z, mounting)
+    force, exponent = follower(values, mounting)
     return np.quantile(force, QUANTILES, axis=0), np.quantile(exponent, QUANTILES, axis=0)
 
 
 def _fitted(fit: Record, recordings: Recordings, follower: Follower) -> np.ndarray:
     """Output force with the mounting effect of each run that suits its recordings best, by looking at many."""
-    center = np.median(some_draws(fit), axis=0)
+    center = {name: np.full(DRAWS, np.median(drawn)) for name, drawn in some_draws(fit).items()}
     grid = np.linspace(-_REACH, _REACH, DRAWS)
-    force, _ = follower(np.repeat(center[None], DRAWS, axis=0), np.repeat(grid[:, None], len(recordings.each), axis=1))
+    force, _ = follower(center, np.repeat(grid[:, None], len(recordings.each), axis=1))
     columns = []
     for i, recording in enumerate(recordings.each):
         shown = blocks_shown(len(recording.blocks.time))

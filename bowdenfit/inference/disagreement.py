@@ -22,6 +22,7 @@ from typing import Any
 import numpy as np
 
 from bowdenfit.inference.linearized import scatter_about
+from bowdenfit.inference.prior_numbers import value_at
 from bowdenfit.kinds.term import Term
 from bowdenfit.parameters.space import Parameter
 
@@ -129,7 +130,7 @@ def _disagreement(
     p = parameters[farthest]
 
     def shown(at: float) -> float:
-        return float(np.asarray(p.prior.constrain(np.array([at])))[0]) * p.shown_scale
+        return value_at(p.prior, at) * p.shown_scale
 
     z_rest, sd = best[farthest] - move[farthest], np.sqrt(rest[farthest, farthest])
     spread = abs(shown(z_rest + sd) - shown(z_rest - sd)) / 2

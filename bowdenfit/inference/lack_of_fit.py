@@ -12,18 +12,15 @@ References:
     White, A heteroskedasticity-consistent covariance matrix estimator, Econometrica 48 (1980), 817.
 """
 
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import replace
-from functools import cache
 from typing import Any
 
-import jax
-import jax.numpy as jnp
 import numpy as np
-from jax import Array
 
 from bowdenfit.inference.departure import FALSE_ALARM, Departure, FarReading
 from bowdenfit.inference.objective import Solution
+from bowdenfit.inference.prior_numbers import z_at
 from bowdenfit.inference.profiles import Basin
 from bowdenfit.inference.testable_readings import Readings, System, readings_to_test
 from bowdenfit.kinds.inside_runs import ORDER, SPEED, STROKE, ZERO
@@ -122,17 +119,10 @@ def _weighed_by_scatter(basin: Basin, model: Model, scale: np.ndarray) -> Soluti
                 at = index[name]
                 value = np.clip(scale[start], *_BELIEVED) * found["values"][at]
                 prior = model.space.free[at].prior
-                z = _unconstrained(type(prior))(vars(prior), jnp.asarray(value))
-                pin[at] = np.clip(float(z), -_FARTHEST, _FARTHEST)
+                pin[at] = np.clip(z_at(prior, value), -_FARTHEST, _FARTHEST)
             start += count
     again = problem.solve(found["z"], basin.at_end, pin)
     return again if again["succeeded"] and np.all(np.isfinite(again["jacobian"])) else found
-
-
-@cache
-def _unconstrained(kind: type) -> Callable[..., Array]:
-    """Compiled: z of a value, for all priors of a kind."""
-    return jax.jit(lambda prior, value: kind(**prior).unconstrain(value))
 
 
 def _departures_of(system: System, readings: Readings) -> Iterator[Departure]:

@@ -10,7 +10,6 @@ from dataclasses import dataclass, replace
 from itertools import product
 from typing import ClassVar
 
-import jax.numpy as jnp
 import numpy as np
 
 from bowdenfit.display import Display, Rows
@@ -23,6 +22,7 @@ from bowdenfit.inference.linearized import linearize, scatter_about
 from bowdenfit.inference.log_density import LogDensity
 from bowdenfit.inference.objective import LOWER_END, Objective, Problem, Solution, may_end, sum_of_squares
 from bowdenfit.inference.other_minima import PINS, fitting_as_well, range_of_minima
+from bowdenfit.inference.prior_numbers import z_at
 from bowdenfit.inference.profiles import Basin, limits
 from bowdenfit.parameters.priors import HalfCauchy, LogNormal, Uniform
 from bowdenfit.parameters.space import Parameter
@@ -147,7 +147,7 @@ def maximum_posterior(posterior: LogDensity, objective: Objective) -> MaximumPos
 def _starts(parameter: Parameter) -> tuple[float, ...]:
     if np.isnan(parameter.first_look):
         return parameter.starts
-    look = float(parameter.prior.unconstrain(jnp.asarray(parameter.first_look)))
+    look = z_at(parameter.prior, parameter.first_look)
     return (*parameter.starts, float(np.clip(look, -_FARTHEST, _FARTHEST)))
 
 
@@ -235,7 +235,7 @@ def _weighed(basin: Basin) -> Basin:
     noise_z = np.zeros(space.size)
     for name in weighed:
         at = space.index[name]
-        noise_z[at] = np.clip(float(space.free[at].prior.unconstrain(jnp.asarray(told[name]))), -_FARTHEST, _FARTHEST)
+        noise_z[at] = np.clip(z_at(space.free[at].prior, float(told[name])), -_FARTHEST, _FARTHEST)
     return _minimum(replace(problem, noise_z=noise_z), basin.found["z"])
 
 

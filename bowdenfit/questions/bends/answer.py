@@ -14,6 +14,7 @@ from bowdenfit.display import Display, Rows
 from bowdenfit.errors import UsageError
 from bowdenfit.inference.draws import for_each_value
 from bowdenfit.inference.interval import Interval
+from bowdenfit.inference.prior_numbers import value_at
 from bowdenfit.kinds import each_table
 from bowdenfit.physics.loop import dynamic_range
 from bowdenfit.physics.stretch import with_springs
@@ -348,4 +349,4 @@ def typical_preload(fit: Record) -> float:
     if np.isfinite(estimate):
         return float(estimate)
     prior = next(p.prior for p in fit.model.space.free if p.name == PRELOAD)
-    return float(np.asarray(prior.constrain(np.zeros(1)))[0])
+    return value_at(prior, 0.0)

@@ -16,10 +16,10 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-import jax.numpy as jnp
 import numpy as np
 
 from bowdenfit.errors import DescriptionError, UsageError, nearest
+from bowdenfit.inference.prior_numbers import value_at, z_at
 from bowdenfit.inputs import read_toml_file
 from bowdenfit.parameters.space import Parameter, ParameterSpace
 from bowdenfit.words import shown
@@ -57,7 +57,7 @@ class StatedTruth:
         value = self.low + share * (self.high - self.low)
         if self.by_factors:
             value = self.low * (self.high / self.low) ** share
-        return float(self.parameter.prior.unconstrain(jnp.asarray(value / self.parameter.shown_scale)))
+        return z_at(self.parameter.prior, value / self.parameter.shown_scale)
 
 
 def read_truths(path: Path) -> dict[str, Any]:
@@ -102,7 +102,7 @@ def _stated(parameter: Parameter, value: Any, place: str) -> StatedTruth:
     low, high = (float(number) for number in numbers)
     if isinstance(value, list) and not low < high:
         raise UsageError(f"{place}: the range [{low:g}, {high:g}] is upside down or empty; write its lower end first.")
-    ends = (float(parameter.prior.constrain(jnp.asarray(z))) * parameter.shown_scale for z in (-jnp.inf, jnp.inf))
+    ends = (value_at(parameter.prior, z) * parameter.shown_scale for z in (-np.inf, np.inf))
     least, most = (math.inf if end > _ENDLESS else end for end in ends)
     if low < least or high > most:
         outside = low if low < least else high

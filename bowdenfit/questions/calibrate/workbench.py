@@ -16,6 +16,7 @@ from bowdenfit.inference.batch.stages import BatchFit
 from bowdenfit.inference.compilation import compile_program
 from bowdenfit.inference.draws import for_each_draw
 from bowdenfit.inference.log_density import LogDensity
+from bowdenfit.inference.prior_numbers import z_at
 from bowdenfit.kinds.drawn_readings import Readings, drawn_readings, drawn_tables, slipped
 from bowdenfit.kinds.measurements import Measurements
 from bowdenfit.model import Model, build_model
@@ -194,11 +195,7 @@ class Workbench:
         truth = dict(zip((p.name for p in stated.free), z_true, strict=True))
         if assumed != stated:
             values = stated.constrain(jnp.asarray(z_true))
-            truth = {
-                p.name: float(p.prior.unconstrain(jnp.asarray(values[p.name])))
-                for p in assumed.free
-                if p.name in values
-            }
+            truth = {p.name: z_at(p.prior, float(values[p.name])) for p in assumed.free if p.name in values}
         return {
             name: rank_truth(float(value), z[:, assumed.index[name]])
             for name, value in truth.items()

@@ -10,6 +10,7 @@ from bowdenfit.inference.compilation import compile_program
 from bowdenfit.inference.draws import OfDraws
 from bowdenfit.inference.identifiability import RESTS_ON_PRIOR, Combination, Knowledge, knowledge
 from bowdenfit.inference.least_squares import UNDETERMINED, MaximumPosterior
+from bowdenfit.inference.prior_numbers import value_at
 from bowdenfit.inference.profiles import Profile
 from bowdenfit.model import Model
 from bowdenfit.questions.identify.answer import GROUPS, Identifiability, how_well
@@ -150,8 +151,9 @@ def _nothing_or_anything(fit: Record, name: str) -> bool:
     A contact that hardly rubs is one of which more is excluded; that contradictory readings do so is as likely.
     """
     estimate, parameter = fit.least_squares.estimates[name], fit.model.space.free[fit.model.space.index[name]]
-    usual = float(parameter.prior.constrain(jnp.zeros(1))[0]) * parameter.shown_scale
-    return estimate.at_bound and not estimate.upper < usual
+    if not estimate.at_bound:
+        return False
+    return not estimate.upper < value_at(parameter.prior, 0.0) * parameter.shown_scale
 
 
 def _in_words(lost: list[str], known: Combination | None, how_much: str = "") -> str:

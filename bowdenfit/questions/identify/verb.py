@@ -125,6 +125,7 @@ def _of_plan(path: Path) -> "Identifiability":
     from bowdenfit.dataset import Dataset
     from bowdenfit.inference.information import information_at
     from bowdenfit.inference.log_density import LogDensity
+    from bowdenfit.inference.prior_numbers import value_at
     from bowdenfit.model import build_model
     from bowdenfit.questions.identify.judgment import of_maximum
     from bowdenfit.questions.simulate.simulation import empty_tables, simulate, true_values
@@ -133,7 +134,7 @@ def _of_plan(path: Path) -> "Identifiability":
     plan = read_bench(path)
     tables = empty_tables(plan.description, plan.design)
     space = build_model(Dataset(plan.description, tables, {})).space
-    medians = {p.name: float(np.asarray(p.prior.constrain(np.zeros(1)))[0]) * p.shown_scale for p in space.free}
+    medians = {p.name: value_at(p.prior, 0.0) * p.shown_scale for p in space.free}
     values = true_values(plan.description, tables, medians | dict(plan.truth), jax.random.key(0))
     data = simulate(plan.description, plan.design, values, jax.random.key(0), noise=False)
     posterior = LogDensity(build_model(data))

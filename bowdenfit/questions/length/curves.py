@@ -1,7 +1,6 @@
 """Efficiency and wrap angles along the route with their uncertainty."""
 
 import jax
-import jax.numpy as jnp
 import numpy as np
 
 from bowdenfit.inference.compilation import compile_program
@@ -24,6 +23,6 @@ def along_route(fit: Record) -> dict[str, Band]:
         return {name: Band(grid, np.quantile(d[::every], BAND_QUANTILES, axis=0)) for name, d in draws.items()}
     grid = route_grid(fit.model)
     with jax.enable_x64(True):
-        z = jnp.asarray(fit.least_squares.z)
+        z = np.asarray(fit.least_squares.z)
         lines = compile_program(curves_of(fit.model, grid), z, run_once=True)(z)
     return {name: Band(grid, np.asarray(line)[None]) for name, line in lines.items()}

@@ -1,0 +1,34 @@
+"""Single numbers through a prior, by one program for all priors of a kind; op by op each would be several."""
+
+from collections.abc import Callable
+from dataclasses import fields
+from functools import cache
+from typing import Any
+
+import jax
+import jax.numpy as jnp
+
+from bowdenfit.inference.compilation import compile_program
+from bowdenfit.parameters.priors import Prior
+
+
+def value_at(prior: Prior, z: float) -> float:
+    """`Prior.constrain` of one number."""
+    return _through(prior, "constrain", z)
+
+
+def z_at(prior: Prior, value: float) -> float:
+    """`Prior.unconstrain` of one number."""
+    return _through(prior, "unconstrain", value)
+
+
+def _through(prior: Prior, way: str, number: float) -> float:
+    with jax.enable_x64(True):
+        return float(_program(type(prior), way)({name: float(each) for name, each in vars(prior).items()}, float(number)))
+
+
+@cache
+def _program(kind: Any, way: str) -> Callable[..., Any]:
+    number = jax.ShapeDtypeStruct((), jnp.float64)
+    prior = {field.name: number for field in fields(kind)}
+    return compile_program(lambda prior, x: getattr(kind(**prior), way)(x), prior, number, run_once=True)

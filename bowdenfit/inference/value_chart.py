@@ -46,6 +46,13 @@ class Chart:
         """Log of the coordinate per z between nodes."""
         return np.log(self.rises / _WIDTH)
 
+    def _between(self, node: Array) -> Array:
+        """Coordinate at nodes, its rise to the next, and the log of the slope, of each parameter; one look for all three."""
+        table = np.stack([self.values[:-1], self.rises, self.log_slopes], axis=-1).reshape(-1, 3)
+        columns = len(self.which)
+        found = jnp.take(jnp.asarray(table), node * columns + jnp.arange(columns), axis=0, mode="clip")
+        return jnp.moveaxis(found, -1, 0)
+
     def at(self, given: Array, is_z: Array) -> tuple[Array, Array, Array]:
         """Coordinates and z, and log of the volume in z of a unit of the coordinates there, of one of the two.
 
@@ -54,19 +61,13 @@ class Chart:
             is_z: Whether it is z.
         """
         own = given[:, self.which]
-        search = jax.vmap(partial(jnp.searchsorted, side="right"), in_axes=1, out_axes=1)
+        search = jax.vmap(partial(jnp.searchsorted, side="right", method="compare_all"), in_axes=1, out_axes=1)
         along = (own - NODES[0]) / _WIDTH
         node = jnp.where(is_z, jnp.clip(along, 0, len(NODES) - 2).astype(int), search(jnp.asarray(self.values[1:-1]), own))
-        value, rise = _taken(self.values, node), _taken(self.rises, node)
+        value, rise, log_slope = self._between(node)
         found = jnp.where(is_z, value + (along - node) * rise, own)
         z = jnp.where(is_z, own, NODES[0] + _WIDTH * (node + (own - value) / rise))
-        volume = -_taken(self.log_slopes, node).sum(axis=1)
-        return given.at[:, self.which].set(found), given.at[:, self.which].set(z), volume
-
-
-def _taken(table: np.ndarray, node: Array) -> Array:
-    """Of each column of a table the rows of its nodes."""
-    return jnp.take(jnp.asarray(table), node * table.shape[1] + jnp.arange(table.shape[1]), mode="clip")
+        return given.at[:, self.which].set(found), given.at[:, self.which].set(z), -log_slope.sum(axis=1)
 
 
 @lru_cache(maxsize=8)

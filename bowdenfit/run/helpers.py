@@ -83,6 +83,7 @@ class InAnotherProcess(Assistant):
         draws: Whether it will draw figures.
         others: Ends of pipes to other processes, which a copy has too and is not to hold open.
         twin: Where a copy of it, once it has loaded what drawing needs, gets its jobs from; none is made without it.
+        checks: Whether it loads what judges draws, once that copy is made.
     """
 
     def __init__(
@@ -92,11 +93,12 @@ class InAnotherProcess(Assistant):
         draws: bool,
         others: "tuple[Connection, ...]" = (),
         twin: "Connection | None" = None,
+        checks: bool = False,
     ) -> None:
         self.thread, self.draws = ThreadPoolExecutor(1), draws
         context: Any = get_context("fork" if copy else "spawn")
         self.ours, theirs = context.Pipe()
-        passed = (theirs, (self.ours, *others) if copy else (), settings, twin)
+        passed = (theirs, (self.ours, *others) if copy else (), settings, twin, checks)
         self.process = context.Process(target=_serve, args=passed, daemon=True)
         self.process.start()
         theirs.close()
@@ -152,32 +154,45 @@ class Twin(InAnotherProcess):
         self.thread.shutdown()
 
 
-class InOtherProcesses(Assistant):
-    """Generators in a copy of this process; functions in one without JAX and its twin, in whichever is free.
-
-    Those two begin before this process loads JAX, and load meanwhile what drawing needs, and one of them what checking needs.
+class Drawers:
+    """Two processes without JAX that draw, the first of which judges draws too; begun before this process loads JAX.
 
     Args:
+        checks: Whether there will be draws to judge.
+    """
+
+    def __init__(self, checks: bool) -> None:
+        self.second = Twin()
+        self.first = InAnotherProcess(True, None, True, (self.second.ours,), self.second.theirs, checks)
+        self.second.theirs.close()
+
+    def end(self) -> None:
+        """End both."""
+        for process in (self.first, self.second):
+            process.end()
+
+
+class InOtherProcesses(Assistant):
+    """Generators in a copy of this process; functions in whichever of the drawing processes is free.
+
+    Args:
+        drawers: Those.
         settings: See `assistant`.
         computes: Whether a generator will be begun.
     """
 
     checks = True
 
-    def __init__(self, settings: Callable[[], None], computes: bool) -> None:
-        self.twin = Twin()
-        self.drawing = InAnotherProcess(True, None, True, (self.twin.ours,), self.twin.theirs)
-        self.twin.theirs.close()
+    def __init__(self, drawers: Drawers, settings: Callable[[], None], computes: bool) -> None:
+        self.drawers, alone = drawers, threading.active_count() == 1
         load_what_computing_needs()
         settings()
-        ends = self.drawing.ours, self.twin.ours
-        self.computing = InAnotherProcess(True, settings, False, ends) if computes else None
+        ends = drawers.first.ours, drawers.second.ours
+        self.computing = InAnotherProcess(alone, settings, False, ends) if computes else None
         self.free = SimpleQueue[InAnotherProcess]()
-        for process in (self.drawing, self.twin):
+        for process in (drawers.first, drawers.second):
             self.free.put(process)
         self.threads = ThreadPoolExecutor(2)
-        if computes:  # draws will be judged
-            self.drawing.submit(load_what_checking_needs)
 
     def begin(self, stages: Callable[..., Iterator[Any]], *arguments: Any, answers: int) -> Answers:
         """See `Assistant`."""
@@ -192,7 +207,7 @@ class InOtherProcesses(Assistant):
 
     def check(self, function: Callable[..., Any], *arguments: Any) -> "Future[Any]":
         """See `Assistant`."""
-        return self.drawing.submit(function, *arguments)
+        return self.drawers.first.submit(function, *arguments)
 
     def _in_one_that_is_free(self, function: Callable[..., Any], arguments: tuple[Any, ...]) -> Any:
         process = self.free.get()
@@ -202,32 +217,52 @@ class InOtherProcesses(Assistant):
             self.free.put(process)
 
     def end(self) -> None:
-        """End all."""
-        for process in (self.computing, self.drawing, self.twin):
-            if process is not None:
-                process.end()
+        """End all but those that draw."""
+        if self.computing is not None:
+            self.computing.end()
         self.threads.shutdown(cancel_futures=True)
 
 
 @contextmanager
+def drawers(in_background: bool, draws: bool, checks: bool) -> Iterator[Drawers | None]:
+    """The processes that draw, which load what that needs while this one reads; None where there are to be none.
+
+    A copy of this process has all its libraries and starts at once, but may be made only while nothing runs in it besides.
+
+    Args:
+        in_background: Whether other processes may be started.
+        draws: Whether figures will be drawn.
+        checks: See `Drawers`.
+    """
+    if not (in_background and draws and cores() > 1 and _may_be_copied()):
+        yield None
+        return
+    begun = Drawers(checks)
+    try:
+        yield begun
+    finally:
+        begun.end()
+
+
+@contextmanager
 def assistant(
-    in_background: bool, settings: Callable[[], None], draws: bool, computes: bool = True
+    drawing: Drawers | None, in_background: bool, settings: Callable[[], None], draws: bool, computes: bool = True
 ) -> Iterator[Assistant]:
     """An assistant in processes of its own, or in this one.
 
-    A copy of this process has all its libraries and starts at once, but may be made only while nothing runs in it besides.
     A new process imports the main module again, so only a program that guards its start may ask for one: the command line
     does, the library does not unless told to.
 
     Args:
+        drawing: Of `drawers`.
         in_background: Whether another process may be started.
         settings: Called first, in every process that computes.
         draws: Whether figures will be drawn.
         computes: Whether it will be given a generator.
     """
-    copy = sys.platform == "linux" and "jax" not in sys.modules and threading.active_count() == 1
-    if in_background and copy and draws and cores() > 1:
-        other: InOtherProcesses | InAnotherProcess = InOtherProcesses(settings, computes)
+    copy = _may_be_copied()
+    if drawing is not None:
+        other: InOtherProcesses | InAnotherProcess = InOtherProcesses(drawing, settings, computes)
     else:
         load_what_computing_needs()
         settings()
@@ -241,6 +276,10 @@ def assistant(
         yield other
     finally:
         other.end()
+
+
+def _may_be_copied() -> bool:
+    return sys.platform == "linux" and "jax" not in sys.modules and threading.active_count() == 1
 
 
 def _deliver(source: Iterable[Any], futures: Answers) -> None:
@@ -259,13 +298,14 @@ def _serve(
     theirs: "tuple[Connection, ...]",
     settings: Callable[[], None] | None,
     twin: "Connection | None" = None,
+    checks: bool = False,
 ) -> None:
     """Do one job after the other until the process that asks for them ends; an interrupt is for that one to handle.
 
     Args:
         requests: Where jobs come from.
         theirs: Ends that are not this process's.
-        settings, twin: See `InAnotherProcess`.
+        settings, twin, checks: See `InAnotherProcess`.
     """
     signal.signal(signal.SIGINT, signal.SIG_IGN)
     signal.signal(signal.SIGTERM, signal.SIG_DFL)
@@ -276,8 +316,11 @@ def _serve(
         if settings is None:
             with suppress(Exception):  # what fails here fails where it is needed
                 load_what_drawing_needs()
+            own = requests
             if twin is not None:
                 requests = _one_of_two(requests, twin)
+            if checks and requests is own:
+                load_what_checking_needs()
         else:
             import jax
 

@@ -59,18 +59,20 @@ def fit(
     """
     from bowdenfit.notebook import watched
     from bowdenfit.results.folder import reserved
-    from bowdenfit.run.helpers import assistant
+    from bowdenfit.run.helpers import assistant, drawers
     from bowdenfit.run.storing import choose_seed, start_checkpointing, with_sampler, write_results
 
     refuse_unknown(fit, reading)
     refuse_too_little()
     folder = Path(output) if output is not None else None
-    data = with_sampler(read(dataset, **reading), sampler)
     drawing, settings = figures and folder is not None, settings_of_process(remember_compilations)
     with ExitStack() as held:
+        drawn_by = held.enter_context(drawers(in_background, drawing, mcmc))
+        data = with_sampler(read(dataset, **reading), sampler)
         held.enter_context(reserved(folder))
         seed = choose_seed(folder, data, mcmc, seed, resume, force)
-        helper = held.enter_context(assistant(in_background and (mcmc or drawing), settings, drawing, mcmc))
+        beside = in_background and (mcmc or drawing)
+        helper = held.enter_context(assistant(drawn_by, beside, settings, drawing, mcmc))
         show = held.enter_context(watched(WATCH, progress)) if mcmc else None
         import jax
 

@@ -147,7 +147,7 @@ def test_an_error_arrives_where_the_answer_is_asked_for(make):
 
 IN_WHICHEVER_IS_FREE = """
 import os, sys, time
-from bowdenfit.run.helpers import InOtherProcesses
+from bowdenfit.run.helpers import Drawers, InOtherProcesses
 
 def nothing():
     pass
@@ -159,7 +159,8 @@ def slow():
     time.sleep(1)
     return os.getpid(), "jax" in sys.modules
 
-helper = InOtherProcesses(nothing, True)
+drawers = Drawers(True)
+helper = InOtherProcesses(drawers, nothing, True)
 jobs = [helper.submit(slow), helper.submit(slow), helper.check(slow), *helper.begin(begun, answers=1)]
 answers = [job.result() for job in jobs]
 print(*answers, sep=chr(10), flush=True)
@@ -168,7 +169,7 @@ END
 
 
 @needs_linux
-@pytest.mark.parametrize("end", ["helper.end()", "os.kill(os.getpid(), 9)"])
+@pytest.mark.parametrize("end", ["helper.end(); drawers.end()", "os.kill(os.getpid(), 9)"])
 def test_two_processes_work_at_once_without_jax_beside_one_with_it_and_all_end_with_this_one(end):
     command = [sys.executable, "-c", IN_WHICHEVER_IS_FREE.replace("END", end)]
     done = subprocess.run(command, capture_output=True, text=True, check=False, timeout=60)
@@ -184,18 +185,20 @@ import os, signal, sys
 import numpy as np
 from bowdenfit.inference.diagnostics import diagnose_all
 from bowdenfit.run.fitting import _diagnosed
-from bowdenfit.run.helpers import InOtherProcesses
+from bowdenfit.run.helpers import Drawers, InOtherProcesses
 
 def nothing():
     pass
 
 draws = {"mu": np.random.default_rng(0).standard_normal((8, 50))}
-helper = InOtherProcesses(nothing, False)
+drawers = Drawers(False)
+helper = InOtherProcesses(drawers, nothing, False)
 elsewhere = _diagnosed(helper, draws, 4)
 assert "arviz_stats" not in sys.modules
-os.kill(helper.drawing.process.pid, signal.SIGKILL)
+os.kill(drawers.first.process.pid, signal.SIGKILL)
 print(elsewhere == _diagnosed(helper, draws, 4) == diagnose_all(draws, 4))
 helper.end()
+drawers.end()
 """
 
 

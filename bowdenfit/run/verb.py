@@ -71,8 +71,7 @@ def fit(
         data = with_sampler(read(dataset, **reading), sampler)
         held.enter_context(reserved(folder))
         seed = choose_seed(folder, data, mcmc, seed, resume, force)
-        beside = in_background and (mcmc or drawing)
-        helper = held.enter_context(assistant(drawn_by, beside, settings, drawing, mcmc))
+        helper = held.enter_context(assistant(drawn_by, in_background and (mcmc or drawing), settings, drawing, mcmc))
         show = held.enter_context(watched(WATCH, progress)) if mcmc else None
         import jax
 

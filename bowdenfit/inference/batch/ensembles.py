@@ -35,7 +35,7 @@ def make_round(posterior: LogDensity, n_ensembles: int, n_walkers: int) -> Calla
     of_cable = walker_round(posterior.log_density, shares_of_moves(), frames_of(posterior))
     seed = number = jax.ShapeDtypeStruct((), jnp.uint32)
     z = jax.ShapeDtypeStruct((n_ensembles, n_walkers, posterior.model.space.size), jnp.float64)
-    return compile_program(of_cable, seed, number, z, posterior.data)
+    return compile_program(of_cable, seed, number, z, posterior.data, run_often=True)
 
 
 def walker_round(log_density: Callable[[Array, Any], Array], moves: Moves, frames: Frames) -> Callable[..., Any]:

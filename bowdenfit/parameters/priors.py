@@ -155,9 +155,10 @@ class HalfCauchy:
     def constrain(self, z: Float[Numbers, "*any"]) -> Float[Numbers, "*any"]:
         """Quantile of the half-Cauchy from the nearer tail, by one error function: it is most of what a small model costs."""
         distance = jnp.where(z < 0, -z, z)
-        value = self.scale * jnp.where(z < 0, _tangent(distance), jnp.exp(-_log_tangent(distance)))
-        plain = not isinstance(self.power, Array) and bool(np.all(self.power == 1.0))
-        return value if plain else value**self.power
+        value = self.scale * jnp.where(z < 0, _tangent(distance), _cotangent(distance))
+        if isinstance(self.power, Array) or not np.all(np.isin(self.power, (1.0, 2.0))):
+            return value**self.power
+        return value if np.all(np.equal(self.power, 1.0)) else value * jnp.where(np.equal(self.power, 2.0), value, 1.0)
 
     def unconstrain(self, value: Float[Numbers, "*any"]) -> Float[Numbers, "*any"]:
         """Standard normal quantile of the half-Cauchy distribution function."""
@@ -244,23 +245,30 @@ class TruncatedNormal:
 
 
 def _tangent(distance: Float[Numbers, "*any"]) -> Float[Numbers, "*any"]:
-    """The standard half-Cauchy's quantile at minus a distance of z from 0."""
-    return jnp.tan(jnp.pi / 4 * erfc(distance * (0.5 * np.sqrt(2.0))))
+    r"""The standard half-Cauchy's quantile at minus a distance of z from 0: a tangent of at most pi / 4.
+
+    By the ninth convergent of Lambert's continued fraction, :math:`\tan x = x / (1 - x^2 / (3 - x^2 / (5 - \dots)))`, which
+    leaves out less than 1e-18 of it there; a library's tangent takes twenty times as long as its exponential.
+    """
+    x = jnp.pi / 4 * erfc(distance * (0.5 * np.sqrt(2.0)))
+    q = x * x
+    above = 34459425 + q * (-4729725 + q * (135135 + q * (-990 + q)))
+    return x * above / (34459425 + q * (-16216200 + q * (945945 + q * (-13860 + q * 45))))
 
 
 @jax.custom_jvp
-def _log_tangent(distance: Float[Numbers, "*any"]) -> Float[Numbers, "*any"]:
-    """Its logarithm, whose derivative stays finite where that of the quantile's inverse does not."""
-    return jnp.log(jnp.maximum(_tangent(distance), np.finfo(float).tiny))
+def _cotangent(distance: Float[Numbers, "*any"]) -> Float[Numbers, "*any"]:
+    """One over it, whose derivative is told by that of the logarithm and so stays finite where its own parts do not."""
+    return 1 / jnp.maximum(_tangent(distance), np.finfo(float).tiny)
 
 
-@_log_tangent.defjvp
-def _log_tangent_and_slope(at: tuple[Array], change: tuple[Array]) -> tuple[Numbers, Array]:
+@_cotangent.defjvp
+def _cotangent_and_slope(at: tuple[Array], change: tuple[Array]) -> tuple[Numbers, Array]:
     (distance,), (along,) = at, change
-    both_tails = erfc(distance * (0.5 * np.sqrt(2.0)))
+    both_tails, value = erfc(distance * (0.5 * np.sqrt(2.0))), _cotangent(distance)
     density, known = np.sqrt(np.pi / 2) * jnp.exp(-(distance**2) / 2), both_tails > 0
     slope = density / jnp.sin(jnp.pi / 2 * jnp.where(known, both_tails, 1.0))
-    return _log_tangent(distance), -jnp.where(known, slope, distance) * along
+    return value, value * (jnp.where(known, slope, distance) * along)
 
 
 def _split(z: Float[Numbers, "*any"]) -> tuple[Float[Numbers, "*any"], Float[Numbers, "*any"]]:

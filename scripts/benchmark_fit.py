@@ -12,7 +12,8 @@ spent on the process and those it starts, which says something on a busy machine
 together, pages that several of them share counted once. "load" is how many processes wanted to compute on the machine,
 from the lowest to the highest; where it is above the number of cores by more than one or two, wall times say little. No
 program is kept from before ("cold"), but for "cache filled"; byte code is kept. With `--against`, another checkout does
-the same in turns, and each pair gives a ratio; the lowest and the highest of them stand beside their median. Commands on a
+the same in turns, with the same seed, another one each turn, because how many steps a seed takes is chance; each pair gives
+a ratio, and the lowest and the highest of them stand beside their median. Commands on a
 finished fit read the one that their own checkout wrote.
 
 "calibrate, 200": 200 replications of the on-body data. Of the other checkout as few are run as are needed for the time of
@@ -174,9 +175,9 @@ class Bench:
             self.command(tree, ["fit", DATASET, "--seed", "1"], "unmeasured", self.finished(tree))
         for name, arguments in FITS.items():
             if self.asked(name):
-                yield self.row(name, ["fit", *arguments, "--seed", "1"], cold=True)
+                yield self.row(name, ["fit", *arguments, "--seed", "SEED"], cold=True)
         if self.asked(filled):
-            yield self.row(filled, ["fit", DATASET, "--seed", "1"], writes=True)
+            yield self.row(filled, ["fit", DATASET, "--seed", "SEED"], writes=True)
         for name, arguments in reads.items():
             yield self.row(name, arguments)
 
@@ -212,7 +213,8 @@ class Bench:
         for i in range(self.repeats):
             say(f"{name}, {i + 1} of {self.repeats}")
             for number, (tree, runs) in enumerate(zip(trees, sides, strict=True)):
-                given = [str(self.finished(tree)) if part == "FIT" else part for part in arguments]
+                stands = {"FIT": str(self.finished(tree)), "SEED": str(i + 1)}
+                given = [stands.get(part, part) for part in arguments]
                 at = self.folder / f"{name}_{number}_{i}".replace(",", "").replace(" ", "_")
                 cache = f"{at.name}_cache" if cold else "unmeasured"
                 runs.append(self.command(tree, given, cache, at if cold or writes else None))

@@ -16,6 +16,7 @@ from queue import SimpleQueue
 from typing import Any, ClassVar, TypeAlias
 
 from bowdenfit.errors import BowdenfitError
+from bowdenfit.inference.engines.memory import refuse_too_little
 from bowdenfit.inference.engines.processes import cores, end_with_parent
 from bowdenfit.run.loading import load_what_checking_needs, load_what_computing_needs, load_what_drawing_needs
 
@@ -233,7 +234,11 @@ def drawers(in_background: bool, draws: bool, checks: bool) -> Iterator[Drawers 
         in_background: Whether other processes may be started.
         draws: Whether figures will be drawn.
         checks: See `Drawers`.
+
+    Raises:
+        MemoryShortageError: There is too little memory for any fit.
     """
+    refuse_too_little()
     if not (in_background and draws and cores() > 1 and _may_be_copied()):
         yield None
         return

@@ -7,7 +7,6 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any, Literal, Unpack
 from warnings import warn
 
-from bowdenfit.inference.engines.memory import refuse_too_little
 from bowdenfit.inference.engines.processes import settings_of_process
 from bowdenfit.questions.summary.verb import reply
 from bowdenfit.reading import Reading, read, refuse_unknown
@@ -63,7 +62,6 @@ def fit(
     from bowdenfit.run.storing import choose_seed, start_checkpointing, with_sampler, write_results
 
     refuse_unknown(fit, reading)
-    refuse_too_little()
     folder = Path(output) if output is not None else None
     drawing, settings = figures and folder is not None, settings_of_process(remember_compilations)
     with ExitStack() as held:

@@ -50,7 +50,7 @@ def run(
     settings = data.description.sampler
     # Not blackjax, whose modules import each other in circles: two threads would see half of one.
     libraries = [LIBRARIES[name] for name in samplers(settings.method) if name == "emcee"]
-    if helper.checks:  # a process of ours, in which only a move of emcee that is not used here would need scipy.stats
+    if helper.checks:  # a process that is all ours, in which only a move of emcee that is not used would need scipy.stats
         load(*libraries, later=("scipy.stats",))
     else:
         load_beside(*libraries, "arviz_stats.ecdf_utils")

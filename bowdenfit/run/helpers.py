@@ -186,7 +186,7 @@ class InOtherProcesses(Assistant):
 
     def __init__(self, drawers: Drawers, settings: Callable[[], None], computes: bool) -> None:
         self.drawers, alone = drawers, threading.active_count() == 1
-        load_what_computing_needs()
+        load_what_computing_needs(True)
         settings()
         ends = drawers.first.ours, drawers.second.ours
         self.computing = InAnotherProcess(alone, settings, False, ends) if computes else None
@@ -269,7 +269,7 @@ def assistant(
     if drawing is not None:
         other: InOtherProcesses | InAnotherProcess = InOtherProcesses(drawing, settings, computes)
     else:
-        load_what_computing_needs()
+        load_what_computing_needs(in_background)
         settings()
         if not in_background:
             helper = InThisProcess()

@@ -74,10 +74,14 @@ def _missing(name: str) -> Iterator[None]:
         del sys.modules[name]
 
 
-def load_what_computing_needs() -> None:
-    """Load what this process and copies of it need."""
+def load_what_computing_needs(is_ours: bool) -> None:
+    """Load what this process and copies of it need.
+
+    Args:
+        is_ours: Whether nothing else runs in this process, so that nobody sees what is postponed.
+    """
     load("numpy")
-    load(*_COMPUTING, later=_OF_SCIPY)
+    load(*_COMPUTING, later=_OF_SCIPY if is_ours else ())
 
 
 def load_what_drawing_needs() -> None:

@@ -263,7 +263,7 @@ def _cotangent(distance: Float[Numbers, "*any"]) -> Float[Numbers, "*any"]:
 
 
 @_cotangent.defjvp
-def _cotangent_and_slope(at: tuple[Array], change: tuple[Array]) -> tuple[Numbers, Array]:
+def _cotangent_and_slope(at: tuple[Array], change: tuple[Array]) -> tuple[Numbers, Numbers]:
     (distance,), (along,) = at, change
     both_tails, value = erfc(distance * (0.5 * np.sqrt(2.0))), _cotangent(distance)
     density, known = np.sqrt(np.pi / 2) * jnp.exp(-(distance**2) / 2), both_tails > 0

@@ -273,6 +273,11 @@ def values_of(fit: Record) -> dict[str, np.ndarray]:
     return free | {p.name: np.full(n, p.fixed) for p in space.fixed}
 
 
+def some_values(fit: Record, n: int) -> dict[str, np.ndarray]:
+    """The same of so many draws, evenly chosen, or as many times of least squares."""
+    return {name: drawn[np.linspace(0, len(drawn) - 1, n).astype(int)] for name, drawn in values_of(fit).items()}
+
+
 @once
 def along_route_program(fit: Record) -> OfDraws:
     """See `compile_along_route`."""

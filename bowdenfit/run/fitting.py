@@ -23,9 +23,10 @@ from bowdenfit.model import build_model
 from bowdenfit.questions.check.answer import checks_findings, evidence_of
 from bowdenfit.questions.check.evidence import work_out
 from bowdenfit.results.record import Provenance
-from bowdenfit.run.helpers import Assistant, Stopwatch
+from bowdenfit.run.helpers import Assistant
 from bowdenfit.run.loading import load, load_beside
 from bowdenfit.run.sampling import LIBRARIES, draws_of, samplers, sampling_programs
+from bowdenfit.run.stopwatch import Stopwatch
 
 
 def run(

@@ -1,16 +1,14 @@
-"""What works beside a fit: other processes, or a thread where none may be started; and a stopwatch."""
+"""What works beside a fit: other processes, or a thread where none may be started."""
 
 import os
 import signal
 import sys
 import threading
-import time
 import traceback
 from abc import ABC, abstractmethod
 from collections.abc import Callable, Iterable, Iterator
 from concurrent.futures import Future, ThreadPoolExecutor
 from contextlib import ExitStack, contextmanager, suppress
-from dataclasses import dataclass, field
 from multiprocessing import connection, get_context
 from queue import SimpleQueue
 from typing import Any, ClassVar, TypeAlias
@@ -363,19 +361,3 @@ def _replies(function: Callable[..., Any], arguments: tuple[Any, ...]) -> Iterat
         error.add_note(traceback.format_exc())
         yield error, None
     yield None
-
-
-@dataclass
-class Stopwatch:
-    """Seconds spent in each stage of a fit."""
-
-    seconds: dict[str, float] = field(default_factory=dict)
-
-    @contextmanager
-    def stage(self, name: str) -> Iterator[None]:
-        """Time what runs inside."""
-        start = time.perf_counter()
-        try:
-            yield
-        finally:
-            self.seconds[name] = self.seconds.get(name, 0.0) + time.perf_counter() - start

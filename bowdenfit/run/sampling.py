@@ -19,7 +19,7 @@ from bowdenfit.questions.identify.judgment import compile_slopes, slope_program
 from bowdenfit.results.optimum import optimum_of
 from bowdenfit.results.record import OPTIMAL_EFFICIENCY, OPTIMAL_LENGTH, Draws, along_route_program
 from bowdenfit.results.route_draws import compile_along_route
-from bowdenfit.run.helpers import Stopwatch
+from bowdenfit.run.stopwatch import Stopwatch
 
 PRIOR_DRAWS = 4096
 LIBRARIES = {"emcee": "emcee", "nuts": "blackjax"}

@@ -14,7 +14,7 @@ from bowdenfit.errors import UsageError
 from bowdenfit.inference.draws import BATCH, for_each_value
 from bowdenfit.questions.bends.answer import elastic_answers
 from bowdenfit.questions.bends.equations import knows_preload
-from bowdenfit.results.record import Record, values_of
+from bowdenfit.results.record import Record, some_values
 
 QUANTILES = (0.05, 0.5, 0.95)
 POINTS = 61  # of a line
@@ -23,19 +23,16 @@ _LEAST_BEND = 0.1  # rad; a figure against the wrap angle needs a range
 Values = Mapping[str, Array]
 
 
-def of_draws(fit: Record, curves: Callable[..., dict[str, Any]], *data: Any) -> dict[str, np.ndarray]:
+def of_draws(fit: Record, curves: Callable[[Values], dict[str, Any]]) -> dict[str, np.ndarray]:
     """Curves of one draw, for some of the draws (rows), or for least squares alone.
 
     Args:
         fit: The fit.
-        curves: Function of the values of one draw, and of data that are the same for all.
-        data: These.
+        curves: Function of the values of one draw.
     """
-    values = values_of(fit)
-    n = len(next(iter(values.values())))
-    some = np.linspace(0, n - 1, BATCH).astype(int) if n > 1 else np.zeros(1, dtype=int)
+    values = some_values(fit, 1 if fit.sampled is None else BATCH)
     with jax.enable_x64(True):
-        found: dict[str, np.ndarray] = for_each_value(curves, {name: drawn[some] for name, drawn in values.items()}, *data)
+        found: dict[str, np.ndarray] = for_each_value(curves, values)
     return found
 
 

@@ -63,15 +63,37 @@ def diagnose(draws: ChainDraws, n_ensembles: int) -> Diagnostics:
         return Diagnostics(1.0, float(draws.size), float(draws.size), 0.0, 0.0)
     superchains = np.repeat(np.arange(n_ensembles), len(draws) // n_ensembles)
     chains, axes = as_chains(draws, n_ensembles), {"chain_axis": 0, "draw_axis": 1}
+    scores = normal_scores(draws), normal_scores(np.abs(draws - np.median(draws)))  # of the middle and of the tails
     with warnings.catch_warnings():
         warnings.simplefilter("ignore", RuntimeWarning)  # ties of an optimum at the edge divide by zero inside
         return Diagnostics(
-            float(array_stats.rhat_nested(draws, superchain_ids=superchains, method="rank", **axes)),
-            float(array_stats.ess(chains, method="bulk", **axes)),
+            max(float(array_stats.rhat_nested(s, superchain_ids=superchains, method="split", **axes)) for s in scores),
+            float(array_stats.ess(as_chains(scores[0], n_ensembles), method="mean", **axes)),
             float(array_stats.ess(chains, method="tail", prob=(0.05, 0.95), **axes)),
             float(array_stats.mcse(chains, method="mean", **axes)),
             _drift(draws),
         )
+
+
+def normal_scores(draws: np.ndarray) -> np.ndarray:
+    """Normal quantiles of the ranks of draws, those of equal draws at the middle of theirs.
+
+    ArviZ takes the same where it is asked for rank-normalized draws, but ranks them by all of `scipy.stats`, which takes half a
+    second to load and twice as long to run.
+
+    References:
+        Vehtari et al. 2021, equation 14, with Blom's offset of 3/8.
+    """
+    from scipy.special import ndtri
+
+    flat = draws.ravel()
+    order = np.argsort(flat)
+    ordered = flat[order]
+    first = np.flatnonzero(np.concatenate([[True], ordered[1:] != ordered[:-1]]))
+    equal = np.diff(first, append=flat.size)
+    ranks = np.empty(flat.size)
+    ranks[order] = np.repeat(first + (equal + 1) / 2, equal)
+    return ndtri((ranks - 3 / 8) / (flat.size + 1 / 4)).reshape(draws.shape)
 
 
 def as_chains(draws: np.ndarray, n_ensembles: int) -> np.ndarray:

@@ -11,6 +11,14 @@ from typing import Any
 # What this process and a copy of it both need; linear algebra compiled by JAX takes its addresses from SciPy.
 _COMPUTING = ("jax", "bowdenfit.run.fitting", "scipy.linalg", "scipy.special")
 _OF_SCIPY = ("numpy.f2py", "numpy.testing")  # what it takes along with all else that NumPy has
+_OF_ARVIZ = (  # what its diagnostics of arrays do without
+    "scipy.interpolate",
+    "scipy.optimize",
+    "scipy.signal",
+    "scipy.signal.windows",
+    "scipy.sparse",
+    "scipy.stats",
+)
 _DRAWING = (
     "matplotlib.figure",
     "matplotlib.backends.backend_agg",
@@ -93,9 +101,8 @@ def load_what_checking_needs() -> None:
     """Load what judges draws, which needs arrays alone: in a process that is all ours, and does nothing else meanwhile."""
     with suppress(Exception):  # what fails here fails where it is needed
         load("numpy")
-        load("scipy.stats", later=_OF_SCIPY)
         with _missing("xarray"):
-            load("arviz_stats.base", later=("scipy.signal", "scipy.signal.windows"))
+            load("arviz_stats.base", later=(*_OF_SCIPY, *_OF_ARVIZ))
         load("bowdenfit.questions.check.evidence", "arviz_stats.ecdf_utils", later=("xarray", "arviz_base"))
 
 

@@ -5,7 +5,7 @@ import pytest
 from arviz_stats.base import array_stats
 from one_page import jargon
 
-from bowdenfit.inference.diagnostics import Diagnostics, diagnose, shortfalls
+from bowdenfit.inference.diagnostics import Diagnostics, as_chains, diagnose, shortfalls
 
 ENSEMBLES, WALKERS = 4, 256
 
@@ -34,6 +34,19 @@ def test_walkers_taken_for_chains_would_pass_for_more_than_they_are():
     """So the test above can fail."""
     z, worth = paths(0.3, 20, 1)
     assert array_stats.ess(z, method="bulk", chain_axis=0, draw_axis=1) > 1.2 * worth
+
+
+def kinked(z):
+    """Draws of which many are equal, as of an optimum at an end."""
+    return np.minimum(np.round(z, 1), 0.5)
+
+
+@pytest.mark.parametrize("change", [np.asarray, kinked, np.exp], ids=["normal", "with ties", "skewed"])
+def test_rank_normalized_diagnostics_are_those_of_arviz(change):
+    draws, axes = change(paths(0.5, 20, 1)[0]), {"chain_axis": 0, "draw_axis": 1}
+    found, ensembles = diagnose(draws, ENSEMBLES), np.repeat(np.arange(ENSEMBLES), WALKERS)
+    assert found.r_hat == array_stats.rhat_nested(draws, superchain_ids=ensembles, method="rank", **axes)
+    assert found.ess_bulk == array_stats.ess(as_chains(draws, ENSEMBLES), method="bulk", **axes)
 
 
 def test_what_keeps_draws_from_being_trusted_is_said_in_plain_words():

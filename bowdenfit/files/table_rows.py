@@ -2,6 +2,7 @@
 
 import re
 from collections.abc import Sequence
+from functools import lru_cache
 
 from bowdenfit.files.cells import BLANK, is_plain_number
 from bowdenfit.files.csv_rows import CsvRecord
@@ -9,6 +10,8 @@ from bowdenfit.files.headings import is_units_row
 
 _TOGETHER = re.compile(r"\d\s*[,;|\t ]\s*[-+]?\d")
 
+
+@lru_cache(1 << 14)  # it is asked of every cell again and again, and many cells hold the same
 def is_measured(text: str) -> bool:
     """Whether a cell holds what a table measures: a number, a percentage, or a limit such as <10."""
     return is_plain_number(text.strip().rstrip("%").lstrip("<≤="))

@@ -33,9 +33,10 @@ IN_WORDS = {"log rad": "log angle"}  # units that few would understand
 EFFICIENCY, WRAP_ANGLE = "Efficiency (%)", "Wrap angle (deg)"
 WIDE_INTERVAL, NARROW_INTERVAL, MEDIAN, LEAST_SQUARES = "90 % interval", "50 % interval", "Median", "Least squares"
 
+FAMILIES = ["DejaVu Sans", "Bitstream Vera Sans", "Verdana", "Arial"]  # in SVG; here always the first
 SETTINGS: dict[Any, Any] = {
     "font.family": ["sans-serif"],
-    "font.sans-serif": ["DejaVu Sans", "Bitstream Vera Sans", "Verdana", "Arial"],  # in SVG; here always the first
+    "font.sans-serif": FAMILIES,
     "mathtext.fontset": "dejavusans",
     "font.size": 8,
     "axes.titlesize": 8,

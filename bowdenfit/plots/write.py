@@ -3,11 +3,12 @@
 from __future__ import annotations
 
 import os
-from collections.abc import Iterator, Sequence
-from contextlib import contextmanager, nullcontext
+from collections.abc import Sequence
+from contextlib import nullcontext
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, BinaryIO
 
+from bowdenfit.plots.fonts import lean_fonts
 from bowdenfit.plots.style import DOTS_PER_INCH, in_paper_style
 
 if TYPE_CHECKING:
@@ -19,8 +20,6 @@ OPTIONS: dict[str, dict[str, Any]] = {
     "svg": {"metadata": {"Date": None}},
     "pdf": {"metadata": {"CreationDate": None}},
 }
-# Tables of a TrueType font that a PDF uses whose letters are named by number; ISO 32000-1, table 126.
-_OF_PDF = {"head", "hhea", "loca", "maxp", "cvt ", "prep", "glyf", "hmtx", "fpgm"}
 
 
 def write_all(figure: Figure, folder: Path, name: str, formats: Sequence[str] = FORMATS) -> list[Path]:
@@ -52,35 +51,12 @@ def save(figure: Figure, target: Path | BinaryIO, ending: str) -> None:
         ending: Format.
     """
     options: dict[str, Any] = {"format": ending, "dpi": DOTS_PER_INCH, **OPTIONS.get(ending, {})}
-    with _lean_fonts() if ending == "pdf" else nullcontext():
+    with lean_fonts() if ending == "pdf" else nullcontext():
         try:
             figure.savefig(target, **options)
         except ValueError:  # a name that someone chose has dollar signs in it, and no formula between them
             _show_as_written(figure)
             figure.savefig(target, **options)
-
-
-@contextmanager
-def _lean_fonts() -> Iterator[None]:
-    """TrueType fonts go into a PDF without tables that it never looks at, which take longer to read than all that it uses.
-
-    matplotlib has no setting for that; it has fontTools load fonts, which are made lean here as they are loaded.
-    """
-    from fontTools import subset
-
-    usual = subset.load_font
-
-    def lean(*arguments: Any, **options: Any) -> Any:
-        font = usual(*arguments, **options)
-        for table in set(font.reader.keys()) - _OF_PDF if "glyf" in font else ():
-            del font[table]
-        return font
-
-    subset.load_font = lean
-    try:
-        yield
-    finally:
-        subset.load_font = usual
 
 
 def _show_as_written(figure: Figure) -> None:

@@ -94,7 +94,10 @@ def load_what_computing_needs(is_ours: bool) -> None:
 
 def load_what_drawing_needs() -> None:
     """Load what figures and pages need."""
+    from bowdenfit.plots.fonts import take_fonts_apart
+
     load(*_DRAWING)
+    take_fonts_apart()
 
 
 def load_what_checking_needs() -> None:

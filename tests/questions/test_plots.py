@@ -13,11 +13,13 @@ import matplotlib as mpl
 import numpy as np
 import pytest
 from figure_words import assert_readable, check_words, words
+from fontTools import subset
 from fontTools.ttLib import TTFont
 from kept_data import assert_kept
 from matplotlib.collections import PolyCollection
 
 from bowdenfit.inference.interval import Interval
+from bowdenfit.plots import fonts
 from bowdenfit.plots.bands import BAND_QUANTILES, NEW_RUN, Band
 from bowdenfit.plots.densities import BINS, bin_numbers, density, enclosed_share
 from bowdenfit.plots.sheet import NUMBER_SPACE, Panel, PanelSheet, ticks
@@ -528,6 +530,23 @@ def test_a_pdf_has_letters_that_can_be_searched_and_nothing_for_typesetting(tmp_
     needed = {"head", "hhea", "loca", "maxp", "glyf", "hmtx"}  # ISO 32000-1, table 126
     assert all(needed <= set(font.keys()) <= needed | {"cvt ", "prep", "fpgm", "GlyphOrder"} for font in fonts)
     assert any(b"beginbfchar" in stream or b"beginbfrange" in stream for stream in streams)  # from glyphs to letters
+
+
+def test_a_pdf_is_the_same_whatever_letters_were_written_before(tmp_path, monkeypatch):
+    named = [(data, name) for data in paper_data().items() for name in ("plain", "Łódź λ é ∑ ﬁ")]
+
+    def pages(folder):
+        for i, ((figure, data), name) in enumerate(named):
+            draw_figure(figure, data, tmp_path / folder / str(i), ("pdf",), name)
+        return [path.read_bytes() for path in sorted((tmp_path / folder).rglob("*.pdf"))]
+
+    opened, load = [], subset.load_font
+    monkeypatch.setattr(subset, "load_font", lambda file, *rest, **more: opened.append(file) or load(file, *rest, **more))
+    monkeypatch.setattr(fonts, "_taken_apart", {})
+    from_few, of_files = pages("few"), [file for file in opened if isinstance(file, str)]
+    assert len(of_files) <= 2 * len(set(of_files))  # once, and once more for the odd letters
+    monkeypatch.setattr(fonts, "_of_few", lambda usual, file, glyphs: usual(file, glyphs))
+    assert from_few == pages("whole")
 
 
 def test_a_failed_write_leaves_the_old_file_and_no_temporary_one(tmp_path):

@@ -22,7 +22,7 @@ from bowdenfit.verbs import VERBS
 
 _NEW_LINE = re.compile(r"[\r\n](?!- )")  # in the name of a file: our own sentences have new lines before "- " alone
 _NO_READER = 141  # exit code, as shells have it of a process whose output nobody reads on
-_MADE = 50_000  # objects made before Python looks for garbage: most stay, and each look goes through all of them
+_MADE = 500_000  # objects made before Python looks for garbage: most of them stay, and a look goes through all of them
 
 
 def start() -> None:

@@ -5,9 +5,8 @@ needs, which takes half of the time of a PDF; here that is done once, and figure
 """
 
 from collections.abc import Callable, Collection, Iterator, Set
-from contextlib import AbstractContextManager, contextmanager
+from contextlib import AbstractContextManager, contextmanager, nullcontext
 from functools import partial
-from inspect import signature
 from io import BytesIO
 from typing import Any, NamedTuple
 
@@ -17,7 +16,7 @@ from bowdenfit.plots.style import FAMILIES
 _OF_PDF = {"head", "hhea", "loca", "maxp", "cvt ", "prep", "glyf", "hmtx", "fpgm"}
 # What figures are written with: Latin and Greek, dashes, superscripts, signs of mathematics, and ligatures.
 _USUAL = (*range(0x20, 0x180), *range(0x370, 0x400), *range(0x2010, 0x2090), 0x2192, 0x2212, 0x2248, *range(0xFB00, 0xFB07))
-
+_KNOWN = (3, 11)  # version of matplotlib whose private function, which changes with versions, is stood in for
 _USED: tuple[dict[str, Any], ...] = {}, {"weight": "bold"}, {"style": "oblique"}  # of words, headings and symbols
 
 Subset = Callable[[Any, set[int]], AbstractContextManager[Any]]
@@ -50,29 +49,39 @@ def lean_fonts() -> Iterator[None]:
     from fontTools import subset
     from matplotlib.backends import _backend_pdf_ps as fonts
 
-    load, usual = subset.load_font, fonts.get_glyphs_subset
-    subset.load_font = partial(_lean, load)
-    if _asks_for_glyphs(usual):
-        fonts.get_glyphs_subset = partial(_of_few, usual)
+    of_few = _in_place_of(fonts, "get_glyphs_subset", _of_few) if _is_known() else nullcontext()
+    with _in_place_of(subset, "load_font", _lean), of_few:
+        yield
+
+
+@contextmanager
+def _in_place_of(module: Any, name: str, function: Callable[..., Any]) -> Iterator[None]:
+    """A function stands in for one of a module, which it is given first."""
+    usual = getattr(module, name)
+    setattr(module, name, partial(function, usual))
     try:
         yield
     finally:
-        subset.load_font, fonts.get_glyphs_subset = load, usual
+        setattr(module, name, usual)
 
 
 def take_fonts_apart() -> None:
     """Do beforehand what the first figure would wait for."""
+    if not _is_known():
+        return
     from matplotlib.backends._backend_pdf_ps import get_glyphs_subset
     from matplotlib.font_manager import FontProperties, findfont
 
     with lean_fonts():
-        for kind in _USED if _asks_for_glyphs(get_glyphs_subset) else ():
+        for kind in _USED:
             _take_apart(get_glyphs_subset, findfont(FontProperties(family=FAMILIES, **kind)))
 
 
-def _asks_for_glyphs(usual: Callable[..., Any]) -> bool:
-    """Whether this matplotlib asks for glyphs by number, as it does from 3.11 on; before, it asked for letters."""
-    return "glyphs" in signature(usual).parameters
+def _is_known() -> bool:
+    """Whether this matplotlib asks for glyphs in the way that is stood in for here; any other is left to its own."""
+    import matplotlib as mpl
+
+    return mpl.__version_info__[:2] == _KNOWN
 
 
 def _lean(load: Callable[..., Any], *arguments: Any, **options: Any) -> Any:
@@ -100,9 +109,11 @@ def _of_few(usual: Subset, file: Any, glyphs: Collection[int]) -> Iterator[Any]:
 
 def _take_apart(usual: Subset, file: Any, asked: Collection[int] = ()) -> None:
     """Keep the few glyphs of a file that are asked for, were asked for, or may be."""
+    from matplotlib.backends._backend_pdf_ps import font_as_file
+
     with usual(file, {*asked, *_places(file), *_usual_glyphs(file)}) as found:
         if "glyf" in found.font:
-            _taken_apart[file] = _Few(_bytes_of(found.font), found.glyph_index_map)
+            _taken_apart[file] = _Few(font_as_file(found.font).getvalue(), found.glyph_index_map)
 
 
 def _places(file: Any) -> Set[int]:
@@ -114,9 +125,3 @@ def _usual_glyphs(file: Any) -> set[int]:
 
     letters = get_font(file).get_charmap()
     return {letters[code] for code in _USUAL if code in letters}
-
-
-def _bytes_of(font: Any) -> bytes:
-    written = BytesIO()
-    font.save(written, reorderTables=False)
-    return written.getvalue()

@@ -22,7 +22,6 @@ COMPILED = Taken(5.0, 5.0)
         pytest.param([COMPILED, Taken(1.0, 1.5), Taken(1.0, 1.5)], 60, 2, True, id="threads use three quarters, for long"),
         pytest.param([COMPILED, Taken(1.0, 1.5), Taken(1.0, 1.5)], 40, 16, True, id="many cores are idle"),
         pytest.param([COMPILED, COMPILED, Taken(1.0, 1.0)], 30, 2, False, id="something compiled in the second"),
-        pytest.param([COMPILED, Taken(1.0, 1.0)], 1000, 2, False, id="too early to tell"),
         pytest.param([Taken(1.0, 1.0)] * 3, 7, 2, False, id="nothing to compile, yet to load"),
         pytest.param([Taken(0.0, 0.0)] * 3, 1000, 2, False, id="nothing to do"),
     ],

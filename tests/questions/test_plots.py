@@ -549,6 +549,14 @@ def test_a_pdf_is_the_same_whatever_letters_were_written_before(tmp_path, monkey
     assert from_few == pages("whole")
 
 
+def test_a_matplotlib_that_is_not_known_writes_pdfs_in_its_own_way(tmp_path, monkeypatch):
+    monkeypatch.setattr(mpl, "__version_info__", (3, 99))
+    monkeypatch.setattr(fonts, "_of_few", None)
+    monkeypatch.setattr(fonts, "_take_apart", None)
+    fonts.take_fonts_apart()
+    assert draw_figure("coefficients", paper_data()["coefficients"], tmp_path, ("pdf",))
+
+
 def test_a_failed_write_leaves_the_old_file_and_no_temporary_one(tmp_path):
     path = tmp_path / "coefficients.nonsense"
     path.write_text("old")

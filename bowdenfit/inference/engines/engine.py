@@ -27,7 +27,7 @@ _AHEAD = 2  # pieces that a worker is given at once, so that it need not wait fo
 _PATIENCE = 30.0  # seconds without a piece done, until is looked whether anybody is left
 _TIMES = 3  # that a piece is tried when workers die of it
 _WORTH_PROCESSES = 2.0  # times what it takes to begin them that more processes must save, before they are begun
-_SEEN = 3  # pieces, before that is decided: the first compiles, and the second may compile what the first did not need
+_SEEN = 3  # pieces by which that is decided: the first compiles, and the second may compile what the first did not need
 _LOADING = 2.0  # seconds until a new process has loaded what it computes with
 
 
@@ -162,11 +162,12 @@ def processes_pay(taken: Sequence[Taken], left: int, workers: int) -> bool:
     processes can save is what cores are idle meanwhile. The quickest piece shows what one takes, the others what was compiled.
 
     Args:
-        taken: What pieces took so far.
+        taken: What the first pieces took.
         left: Pieces to do.
         workers: Processes there would be, each with a core.
     """
-    if len(taken) < _SEEN or (quickest := min(taken)).seconds <= 0.0:
+    quickest = min(taken)
+    if quickest.seconds <= 0.0:
         return False
     beginning = sum(piece.seconds - quickest.seconds for piece in taken) + _LOADING
     idle = max(1.0 - quickest.computed / (quickest.seconds * workers), 0.0)
@@ -188,7 +189,7 @@ class HereOrInProcesses(Engine[Work, Result]):
         """See `Engine`."""
         taken = list[Taken]()
         for number, piece in enumerate(pieces):
-            if self.workers > 1 and processes_pay(taken, len(pieces) - number, self.workers):
+            if self.workers > 1 and len(taken) == _SEEN and processes_pay(taken, len(pieces) - number, self.workers):
                 yield from super().results(function, pieces[number:])
                 return
             begin, computed = time.perf_counter(), time.process_time()

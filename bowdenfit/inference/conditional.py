@@ -19,6 +19,7 @@ import numpy as np
 from jax import Array
 
 from bowdenfit.inference.log_density import LogDensity
+from bowdenfit.parameters.places import put, taken
 from bowdenfit.parameters.space import ParameterSpace
 
 
@@ -70,10 +71,10 @@ class Conditional:
             is_z: Whether it is z.
             data: Of the posterior.
         """
-        ridge, own = self._ridge(given, data), given[self.which]
+        ridge, own = self._ridge(given, data), taken(given, self.which)
         z = jnp.where(is_z, own, self._back(own, ridge))
         w = jnp.where(is_z, self._along(own, ridge), own)
-        return given.at[self.which].set(w), given.at[self.which].set(z), -self._log_volume(z, ridge)
+        return put(given, self.which, w), put(given, self.which, z), -self._log_volume(z, ridge)
 
     def _along(self, z: Array, ridge: "_Ridge") -> Array:
         return ridge.root.T @ (self._coefficients.vector(z) - ridge.center)
@@ -91,7 +92,7 @@ class Conditional:
         model, own = self.posterior.model, self._coefficients
         low, middle, high = jax.vmap(own.vector)(jnp.tile(jnp.array([[-1.0], [0.0], [1.0]]), own.size))
         precision = (2 / (high - low)) ** 2
-        others = self.posterior.values(z.at[self.which].set(0.0), data)
+        others = self.posterior.values(put(z, self.which, jnp.zeros(own.size)), data)
 
         def residuals(coefficients: Array) -> Array:
             values = others | {p.name: coefficients[i] for i, p in enumerate(own.free)}

@@ -1,5 +1,6 @@
 """The posterior density of a model in the coordinates z, where every prior is a standard normal."""
 
+from collections.abc import Mapping
 from dataclasses import dataclass
 from functools import cached_property
 from typing import Any
@@ -65,5 +66,8 @@ class LogDensity:
 
     def residuals(self, z: Float[Array, " free"], data: Any) -> dict[str, Array]:
         """Standardized residuals by term; half their sum of squares is minus log likelihood, up to a constant."""
-        values = self.values(z, data)
+        return self.residuals_at(self.values(z, data), data)
+
+    def residuals_at(self, values: Mapping[str, Array], data: Any) -> dict[str, Array]:
+        """The same at named values of all parameters [internal units]."""
         return {t.name: t.residuals(values, d) for t, d in zip(self.model.terms, data, strict=False)}

@@ -63,19 +63,23 @@ def _program(posterior: LogDensity) -> Callable[..., Solution]:
     """Everything that one z gives."""
     space = posterior.model.space
 
-    def residuals(z: Array, weight: Array, data: Any) -> tuple[Array, dict[str, Array]]:
-        by_term = posterior.residuals(z, data)
-        stacked = jnp.concatenate([*by_term.values(), weight * z])
-        return stacked, by_term | {"": stacked}
-
     def evaluated(z: Array, weight: Array, data: Any) -> Solution:
-        jacobian, by_term = jax.jacfwd(residuals, has_aux=True)(z, weight, data)
+        # A value depends on its own z alone. So priors are differentiated once, and not again along every z.
         values, slope = jax.jvp(space.vector, (z,), (jnp.ones_like(z),))
-        named = space.constrain(z)
-        terms = zip(posterior.model.terms, data, strict=True)
+
+        def residuals(values: Array) -> tuple[Array, dict[str, Array]]:
+            by_term = posterior.residuals_at(space.named(values), data)
+            return jnp.concatenate(list(by_term.values())), by_term
+
+        def along(direction: Array) -> tuple[Array, Array, dict[str, Array]]:
+            return jax.jvp(residuals, (values,), (direction,), has_aux=True)
+
+        read, by_z, by_term = jax.vmap(along, out_axes=(None, 1, None))(jnp.diag(slope))
+        jacobian = jnp.concatenate([by_z, jnp.diag(weight)])
+        named, terms = space.named(values), zip(posterior.model.terms, data, strict=True)
         readings = {term.name: term.expected(named, d) for term, d in terms}
         found = {"z": z, "values": values, "slope": slope, "readings": readings, "jacobian": jacobian}
-        return found | {"stacked": by_term.pop(""), "residuals": by_term}
+        return found | {"stacked": jnp.concatenate([read, weight * z]), "residuals": by_term}
 
     return evaluated
 

@@ -110,11 +110,12 @@ class HalfNormal:
     allowed_ends: ClassVar = True, False
 
     def constrain(self, z: Float[Numbers, "*any"]) -> Float[Numbers, "*any"]:
-        """Upper half of a normal: through erf below the median and through the survival function above it."""
-        below, above = _split(z)
-        low = jnp.sqrt(2.0) * erfinv(ndtr(below))
-        high = -ndtri(ndtr(-above) / 2)
-        return self.sd * jnp.where(z < 0, low, high)
+        """Upper half of a normal, by one error function: from below as it rises, from above by what is left."""
+        is_low = z < 0
+        tail = erfc(jnp.where(is_low, -z, z) * (0.5 * np.sqrt(2.0))) / 2  # Phi(-|z|)
+        low = np.sqrt(2.0) * erfinv(jnp.where(is_low, tail, 0.5))
+        high = -ndtri(jnp.where(is_low, 0.5, tail) / 2)
+        return self.sd * jnp.where(is_low, low, high)
 
     def unconstrain(self, value: Float[Numbers, "*any"]) -> Float[Numbers, "*any"]:
         """Standard normal quantile of 2 Phi(value / sd) - 1."""

@@ -5,6 +5,7 @@ from dataclasses import dataclass, fields
 from functools import cached_property
 from typing import Any, Literal
 
+import jax
 import jax.numpy as jnp
 import numpy as np
 from jax import Array
@@ -12,6 +13,7 @@ from jaxtyping import Float
 
 from bowdenfit.display import Part, Several
 from bowdenfit.errors import DescriptionError
+from bowdenfit.parameters.places import taken
 from bowdenfit.parameters.priors import Prior
 
 Role = Literal["friction", "friction_model", "curve", "angle", "noise", "sensor", "elastic"]
@@ -117,19 +119,25 @@ class ParameterSpace(Part):
         """Values of the free parameters [internal units] at z."""
         if not self._groups:
             return z
-        return jnp.concatenate([prior.constrain(z[where]) for where, prior in self._groups])[self._order]
+        by_group = jnp.concatenate([prior.constrain(taken(z, where)) for where, prior in self._groups])
+        # Without a barrier XLA works a quantile out again wherever a value is used, and compiles it as often.
+        values: Array = jax.lax.optimization_barrier(taken(by_group, self._order))
+        return values
 
     def z_of(self, vector: Float[Array, " free"]) -> Float[Array, " free"]:
         """Z at values of the free parameters [internal units], the inverse of `vector`; NaN at what one cannot be."""
         if not self._groups:
             return vector
-        return jnp.concatenate([prior.unconstrain(vector[where]) for where, prior in self._groups])[self._order]
+        return taken(jnp.concatenate([prior.unconstrain(taken(vector, where)) for where, prior in self._groups]), self._order)
 
     def constrain(self, z: Float[Array, " free"]) -> dict[str, Array]:
         """Named values of all parameters, fixed ones included [internal units], at z."""
-        vector = self.vector(z)
+        return self.named(self.vector(z))
+
+    def named(self, vector: Float[Array, " free"]) -> dict[str, Array]:
+        """Named values of all parameters, fixed ones included, of those of the free ones [internal units]."""
         values = {p.name: vector[i] for i, p in enumerate(self.free)}
-        return values | {p.name: jnp.asarray(p.fixed, dtype=z.dtype) for p in self.fixed}
+        return values | {p.name: jnp.asarray(p.fixed, dtype=vector.dtype) for p in self.fixed}
 
     def unconstrain(self, values: Mapping[str, Any]) -> Float[Array, " free"]:
         """Z at named values [internal units]."""

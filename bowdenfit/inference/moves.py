@@ -1,8 +1,8 @@
 """How walkers are moved: emcee's stretch and differential evolution, and draws from a distribution fitted to other walkers.
 
-A move takes numbers drawn uniformly between 0 and 1, `numbers_of_move` for each walker, and the two halves of one ensemble,
-the one that moves and the one that rests, (walker, parameter). It gives places for the moving half, and the log of what the
-ratio of densities there is to be multiplied by. That numbers come from outside keeps random generators, slow to compile, out.
+A move takes `Numbers` drawn at random and the two halves of one ensemble, the one that moves and the one that rests, (walker,
+parameter). It gives places for the moving half, and the log of what the ratio of densities there is to be multiplied by. That
+numbers come from outside keeps random generators, slow to compile, out.
 
 References:
     Goodman and Weare 2010, "Ensemble samplers with affine invariance" (Communications in Applied Mathematics and
@@ -12,6 +12,7 @@ References:
 
 from collections.abc import Callable, Sequence
 from functools import partial
+from typing import NamedTuple
 
 import jax
 import jax.numpy as jnp
@@ -24,34 +25,52 @@ GAMMA_SPREAD = 1e-5
 FREEDOM = 5  # degrees of freedom of the t distribution: tails wider than a posterior's in z, and still a good fit; odd
 JITTER = 1e-10  # of each variance; keeps the covariance of walkers on a narrow ridge positive
 
-Move = Callable[[Array, Array, Array], tuple[Array, Array]]
+
+class Numbers(NamedTuple):
+    """What is drawn at random for a move, (walker, `numbers_of_move`).
+
+    Args:
+        uniform: Between 0 and 1.
+        normal: Quantiles of the standard normal there, not independent of the former; a move takes either.
+    """
+
+    uniform: Array
+    normal: Array
+
+
+Move = Callable[[Numbers, Array, Array], tuple[Array, Array]]
 Moves = Sequence[tuple[Move, float]]
 
 
 def numbers_of_move(size: int) -> int:
-    """How many uniform numbers a walker of so many parameters needs for any move."""
+    """How many numbers a walker of so many parameters needs for any move."""
     return size + FREEDOM
 
 
-def stretch(uniform: Array, moving: Array, resting: Array) -> tuple[Array, Array]:
+def numbers_at(uniform: Array) -> Numbers:
+    """Of uniform numbers; for all steps at once, since XLA would work a quantile out again wherever a move uses it."""
+    return Numbers(uniform, 2**0.5 * jax.lax.erf_inv(2 * uniform - 1))
+
+
+def stretch(numbers: Numbers, moving: Array, resting: Array) -> tuple[Array, Array]:
     """Places on the line through a resting walker; `emcee.moves.StretchMove` (equation 7 of Goodman and Weare)."""
-    factor = ((WIDEST_STRETCH - 1) * uniform[:, 0] + 1) ** 2 / WIDEST_STRETCH
-    anchor = resting[_whole_number(uniform[:, 1], len(resting))]
+    factor = ((WIDEST_STRETCH - 1) * numbers.uniform[:, 0] + 1) ** 2 / WIDEST_STRETCH
+    anchor = resting[_whole_number(numbers.uniform[:, 1], len(resting))]
     return anchor - (anchor - moving) * factor[:, None], (moving.shape[1] - 1) * jnp.log(factor)
 
 
 def differential_evolution(
-    uniform: Array, moving: Array, resting: Array, gamma: float | None = None
+    numbers: Numbers, moving: Array, resting: Array, gamma: float | None = None
 ) -> tuple[Array, Array]:
     """Places shifted by the difference of two resting walkers; `emcee.moves.DEMove` (section 2 of Nelson and others).
 
     Args:
-        uniform: See above.
+        numbers: See above.
         moving: Half that moves.
         resting: Half that rests.
         gamma: What the difference is multiplied by; 2.38 / sqrt(2 parameters) if omitted.
     """
-    (n, size), count = moving.shape, len(resting)
+    (n, size), count, uniform = moving.shape, len(resting), numbers.uniform
     first = _whole_number(uniform[:, 0], count)
     second = (first + 1 + _whole_number(uniform[:, 1], count - 1)) % count  # any but the first
     gamma = 2.38 / (2 * size) ** 0.5 if gamma is None else gamma
@@ -59,13 +78,12 @@ def differential_evolution(
     return moving + spread * (resting[second] - resting[first]), jnp.zeros(n)
 
 
-def independent(uniform: Array, moving: Array, resting: Array) -> tuple[Array, Array]:
+def independent(numbers: Numbers, moving: Array, resting: Array) -> tuple[Array, Array]:
     """Places drawn from a t distribution fitted to the resting half, as `emcee.moves.KDEMove` draws from a kernel density.
 
     It brings walkers in from far outside in tens of steps, and forgets where they were where the posterior is about normal.
     """
-    size = moving.shape[1]
-    normal = 2**0.5 * jax.lax.erf_inv(2 * uniform - 1)
+    size, normal = moving.shape[1], numbers.normal
     drawn = normal[:, :size] * jnp.sqrt(FREEDOM / jnp.sum(normal[:, size:] ** 2, axis=1, keepdims=True))
     mean = resting.mean(axis=0)
     covariance = (resting - mean).T @ (resting - mean) / (len(resting) - 1)

@@ -9,7 +9,7 @@ import numpy as np
 from jax import Array
 
 from bowdenfit.inference.coordinates import Frames
-from bowdenfit.inference.moves import Moves, numbers_of_move
+from bowdenfit.inference.moves import Moves, Numbers, numbers_at, numbers_of_move
 
 
 class Chosen(NamedTuple):
@@ -60,11 +60,11 @@ def walker_sweep(log_density: Callable[[Array, Any], Array], moves: Moves, frame
             numbers = jnp.stack([value_in_w, values, jnp.zeros_like(values)], axis=1)
             return jnp.concatenate([w, z, numbers], axis=1)
 
-        def half_step(carried: tuple[Array, Array], turn: tuple[Array, Array, Array]) -> Any:
-            (moving, resting), (is_begin, kind, uniform) = carried, turn
-            w, factors = jax.lax.switch(kind, proposals, uniform[:, 1:], moving[:, where_w], resting[:, where_w])
+        def half_step(carried: tuple[Array, Array], turn: tuple[Array, Array, Array, Numbers]) -> Any:
+            (moving, resting), (is_begin, kind, chance, numbers) = carried, turn
+            w, factors = jax.lax.switch(kind, proposals, numbers, moving[:, where_w], resting[:, where_w])
             there = walkers_at(jnp.where(is_begin, moving[:, where_z], w), is_begin)
-            better = factors + there[:, -3] - moving[:, -3] > jnp.log(uniform[:, 0])
+            better = factors + there[:, -3] - moving[:, -3] > jnp.log(chance)
             moved = jnp.where(better[:, None], there.at[:, -1].set(moving[:, -1] + 1), moving)
             return (resting, jnp.where(is_begin, there, moved)), None
 
@@ -72,8 +72,9 @@ def walker_sweep(log_density: Callable[[Array, Any], Array], moves: Moves, frame
         begin = jnp.concatenate([z, z, jnp.zeros((n_walkers, 3))], axis=1)
         halves = begin[: n_walkers // 2], begin[n_walkers // 2 :]
         uniform = to_uniform(chosen.bits).reshape(-1, *chosen.bits.shape[2:])
-        is_begin = jnp.arange(2 + len(uniform)) < 2
-        turns = is_begin, jnp.repeat(jnp.pad(chosen.kinds, (1, 0)), 2), jnp.concatenate([uniform[:2], uniform])
+        is_begin, uniform = jnp.arange(2 + len(uniform)) < 2, jnp.concatenate([uniform[:2], uniform])
+        kinds = jnp.repeat(jnp.pad(chosen.kinds, (1, 0)), 2)
+        turns = is_begin, kinds, uniform[..., 0], numbers_at(uniform[..., 1:])
         ended = jnp.concatenate(jax.lax.scan(half_step, halves, turns)[0])
         _, values, accepted = ended[:, rest].T
         return ended[:, where_z], values, accepted

@@ -15,7 +15,14 @@ from bowdenfit.description import SamplerSettings
 from bowdenfit.description.defaults import THIN
 from bowdenfit.inference.coordinates import Frame, in_values, in_z
 from bowdenfit.inference.ensemble import Sweep, start_of
-from bowdenfit.inference.moves import default_moves, differential_evolution, independent, numbers_of_move, stretch
+from bowdenfit.inference.moves import (
+    default_moves,
+    differential_evolution,
+    independent,
+    numbers_at,
+    numbers_of_move,
+    stretch,
+)
 from bowdenfit.inference.value_chart import NODES, Chart
 from bowdenfit.inference.walkers import compiled_walkers
 
@@ -166,7 +173,8 @@ def told() -> tuple[np.ndarray, np.ndarray, np.ndarray]:
 
 def proposed(move, told):
     with jax.enable_x64(True):
-        return tuple(np.asarray(part) for part in move(*map(jnp.asarray, told)))
+        uniform, moving, resting = map(jnp.asarray, told)
+        return tuple(np.asarray(part) for part in move(numbers_at(uniform), moving, resting))
 
 
 def test_stretch_moves_are_emcee_s_own_given_the_same_random_numbers(told):

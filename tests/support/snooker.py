@@ -6,9 +6,9 @@ import numpy as np
 from bowdenfit.inference.moves import differential_evolution
 
 
-def snooker(uniform, moving, resting):
+def snooker(numbers, moving, resting):
     """`DESnookerMove` as emcee 3.1.6 has it: shifts are divided by the root of a distance, as if it were its square."""
-    sets = jnp.array_split(resting, 3)
+    sets, uniform = jnp.array_split(resting, 3), numbers.uniform
     chosen = jnp.stack([each[(uniform[:, i] * len(each)).astype(int)] for i, each in enumerate(sets)], axis=1)
     order = jnp.argsort(uniform[:, 3:6], axis=1)
     z, *others = jnp.moveaxis(jnp.take_along_axis(chosen, order[..., None], axis=1), 1, 0)

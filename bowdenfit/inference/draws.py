@@ -58,15 +58,15 @@ def in_batches(program: Function, batch: int, rows: Any) -> Any:
 
 def named_values(model: Model) -> Callable[[Float[Array, " free"]], dict[str, Array]]:
     """Function of z: free parameters and derived curve coefficients by name, in the units they are shown in."""
+    return lambda z: shown_values(model, model.space.constrain(z))
 
-    def values_of(z: Float[Array, " free"]) -> dict[str, Array]:
-        values = model.space.constrain(z)
-        shown = {p.name: values[p.name] * p.shown_scale for p in model.space.free}
-        for curve in model.cable.curves.values():
-            shown |= curve.derived(values)
-        return shown
 
-    return values_of
+def shown_values(model: Model, values: Mapping[str, Array]) -> dict[str, Array]:
+    """Free parameters and derived curve coefficients by name, in the units they are shown in, of values in internal ones."""
+    shown = {p.name: values[p.name] * p.shown_scale for p in model.space.free}
+    for curve in model.cable.curves.values():
+        shown |= curve.derived(values)
+    return shown
 
 
 def derived_units(model: Model) -> dict[str, tuple[str, str]]:
@@ -81,16 +81,16 @@ def replicator(posterior: LogDensity, seed: int, beside: Executor | None = None)
     readings: named values, log likelihood of every reading, expected readings, and readings drawn anew.
     """
     model = posterior.model
-    names, bits = named_values(model), key_bits(seed)  # an argument, so that the program is the same for every seed
+    bits = key_bits(seed)  # an argument, so that the program is the same for every seed
 
     def implied(z_and_number: Float[Array, " free_and_one"], data: Any, bits: Array) -> dict[str, Mapping[str, Array]]:
-        z, number = z_and_number[:-1], z_and_number[-1].astype(jnp.uint32)
+        number = z_and_number[-1].astype(jnp.uint32)
         key = jax.random.wrap_key_data(bits, impl="threefry2x32")
         keys = jax.random.split(jax.random.fold_in(key, number), max(len(model.terms), 1))
-        values = model.space.constrain(z)
+        values = model.space.constrain(z_and_number[:-1])
         terms = list(zip(model.terms, data, keys, strict=False))
         return {
-            "values": names(z),
+            "values": shown_values(model, values),
             "log_likelihood": {t.name: t.log_likelihood(values, d) for t, d, _ in terms},
             "expected": {t.name: t.expected(values, d) for t, d, _ in terms},
             "replicated": {t.name: t.simulate(values, d, key) for t, d, key in terms},
@@ -108,14 +108,14 @@ def key_bits(seed: int) -> np.ndarray:
 
 def curves_of(model: Model, route: np.ndarray) -> Callable[[Float[Array, " free"]], dict[str, Array]]:
     """Function of z: wrap angle of every curved contact [deg] and the efficiency [1] at route values."""
+    return lambda z: curves_at(model, model.space.constrain(z), route)
+
+
+def curves_at(model: Model, values: Mapping[str, Array], route: np.ndarray) -> dict[str, Array]:
+    """The same of named values of all parameters [internal units]."""
     at = jnp.asarray(route, dtype=float)
-
-    def implied(z: Float[Array, " free"]) -> dict[str, Array]:
-        values = model.space.constrain(z)
-        angles = {name: jnp.rad2deg(curve.wrap_angle(values, at)) for name, curve in model.cable.curves.items()}
-        return angles | {"efficiency": model.cable.efficiency_at(values, at)}
-
-    return implied
+    angles = {name: jnp.rad2deg(curve.wrap_angle(values, at)) for name, curve in model.cable.curves.items()}
+    return angles | {"efficiency": model.cable.efficiency_at(values, at)}
 
 
 def output_force_at(

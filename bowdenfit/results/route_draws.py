@@ -14,7 +14,7 @@ from bowdenfit.cable.load_cells import RUN_SCATTER
 from bowdenfit.cable.noise import noise_law
 from bowdenfit.description import Description, Route
 from bowdenfit.display import Display, Rows
-from bowdenfit.inference.draws import OfDraws, curves_of, for_each_draw
+from bowdenfit.inference.draws import OfDraws, curves_at, for_each_draw
 from bowdenfit.inference.interval import Interval
 from bowdenfit.model import Model
 from bowdenfit.results.choices import at_edge, best_window, rank_choices
@@ -61,7 +61,7 @@ def compile_along_route(model: Model, beside: Executor | None = None) -> OfDraws
     route, grid = model.description.route, route_grid(model)
     assert route is not None  # callers ask only where there is a route
     at, force = np.asarray(route.choices, dtype=float), model.cable.friction.conditions.reference_force
-    curves = curves_of(model, np.concatenate([grid, at]))
+    along = np.concatenate([grid, at])
 
     def pulled(values: dict[str, Array], effect: Array) -> Array:
         return model.cable.output_force_at(values, jnp.asarray(at), jnp.asarray(float(force)), jnp.ones(()), effect)
@@ -70,7 +70,7 @@ def compile_along_route(model: Model, beside: Executor | None = None) -> OfDraws
         values = model.space.constrain(z_and_mounting[:-1])
         effects = {"mean": jnp.zeros(()), "mounted": z_and_mounting[-1]}
         of_choices = {name: pulled(values, effect) for name, effect in effects.items()} if len(at) else {}
-        return {"curves": curves(z_and_mounting[:-1]), **of_choices}
+        return {"curves": curves_at(model, values, along), **of_choices}
 
     with jax.enable_x64(True):
         return for_each_draw(implied, model.space.size + 1, run_once=True, beside=beside)

@@ -15,7 +15,7 @@ from bowdenfit.inference.log_density import LogDensity as Density
 from bowdenfit.inference.samplers import NAMES, Drawn, compare_samplers
 from bowdenfit.inference.walkers import walker_programs
 from bowdenfit.model import Model
-from bowdenfit.questions.identify.judgment import compile_slopes, slope_program
+from bowdenfit.questions.identify.judgment import values_program
 from bowdenfit.results.optimum import optimum_of
 from bowdenfit.results.record import OPTIMAL_EFFICIENCY, OPTIMAL_LENGTH, Draws, along_route_program
 from bowdenfit.results.route_draws import compile_along_route
@@ -63,15 +63,11 @@ def sampling_programs(density: Density, seed: int, beside: Executor) -> Programs
         else:
             programs[name] = import_module(_MODULES[name]).make_program(density, settings)
     optimum = for_each_draw(optimum_of(model), model.space.size, beside=beside) if model.description.route else None
-    return Programs(programs, optimum, replicator(density, seed, beside), _asked_later(model, beside))
-
-
-def _asked_later(model: Model, beside: Executor) -> dict[Callable[..., Any], Any]:
-    """What the questions of every fit need, being compiled."""
-    asked: dict[Callable[..., Any], Any] = {slope_program: compile_slopes(model, beside)}
+    implied = replicator(density, seed, beside)
+    asked: dict[Callable[..., Any], Any] = {values_program: lambda z: implied(z)["values"]}
     if model.description.route is not None:
         asked[along_route_program] = compile_along_route(model, beside)
-    return asked
+    return Programs(programs, optimum, implied, asked)
 
 
 def draws_of(programs: Programs, asked: Sampling, watch: Stopwatch) -> tuple[Draws, tuple[str, ...]]:

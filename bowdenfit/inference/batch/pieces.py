@@ -16,7 +16,7 @@ from bowdenfit.inference.batch.programs import BatchPrograms, BatchSettings
 from bowdenfit.inference.batch.shapes import shaped
 from bowdenfit.inference.batch.stages import BatchFit
 from bowdenfit.inference.compilation import compile_program
-from bowdenfit.inference.draws import derived_units
+from bowdenfit.inference.draws import derived_units, shown_values
 from bowdenfit.inference.versions import refuse_other_versions
 
 DRAWS = 2048  # of each data set, of equal weight
@@ -103,12 +103,9 @@ def _compiled(example: Example, settings: BatchSettings) -> tuple[BatchPrograms,
     model = posterior.model
 
     def shown(z: Array, data: Any) -> Array:
-        values = posterior.values(z, data)
-        found = [values[p.name] * p.shown_scale for p in model.space.free]
-        derived: dict[str, Array] = {}
-        for curve in model.cable.curves.values():
-            derived |= curve.derived(values)
-        return jnp.stack([*found, *(derived[name] for name in derived_units(model))])
+        found = shown_values(model, posterior.values(z, data))
+        names = [*(p.name for p in model.space.free), *derived_units(model)]
+        return jnp.stack([found[name] for name in names])
 
     rows = jax.ShapeDtypeStruct((DRAWS, model.space.size), jnp.float64)
     return BatchPrograms(posterior, settings), compile_program(jax.vmap(shown, (0, None), 1), rows, posterior.data)

@@ -25,6 +25,7 @@ import optimistix as optx
 from jax import Array
 
 from bowdenfit.inference.compilation import compile_program
+from bowdenfit.kinds.padding import rounded_up
 
 _SINGULAR = 1e-13  # of scaled singular values; a direction below it takes no step
 _LOST = 1e100  # stands for a residual that cannot be computed, so that no step goes there
@@ -159,8 +160,20 @@ def stepper(rows: int, columns: int) -> tuple[Callable[..., Any], list[np.ndarra
 
     A step takes what the solver does, whether it is the first, the accepted parameters, the state, and residuals
     and Jacobian where the step before has asked for them; it gives the accepted parameters, the state, where to evaluate
-    next, and whether this is the end.
+    next, and whether this is the end. Rows of zeros, which change nothing, let one program serve many tables.
     """
+    (program, state), more = _compiled(rounded_up(rows), columns), rounded_up(rows) - rows
+    none, flat = np.zeros(more), np.zeros((more, columns))
+
+    def step(settings: Any, first: Any, y: Any, state: Any, residuals: np.ndarray, jacobian: np.ndarray) -> Any:
+        return program(settings, first, y, state, np.concatenate([residuals, none]), np.concatenate([jacobian, flat]))
+
+    return step, state
+
+
+@cache
+def _compiled(rows: int, columns: int) -> tuple[Callable[..., Any], list[np.ndarray]]:
+    """The same of so many rows."""
     number, *arrays = (jax.ShapeDtypeStruct(shape, jnp.float64) for shape in ((), (columns,), (rows,), (rows, columns)))
     flag, settings = jax.ShapeDtypeStruct((), jnp.bool_), (number, number, number)
     state = jax.eval_shape(lambda *given: _leaves(_ready(*given)[2]), settings, *arrays)

@@ -14,6 +14,7 @@ import click
 from bowdenfit.cli.commands import command
 from bowdenfit.cli.deadline import INTERRUPTED, answered_in_time
 from bowdenfit.cli.interrupts import listening, was_asked
+from bowdenfit.cli.lean_matplotlib import load_without_manual
 from bowdenfit.cli.starting import completion, init
 from bowdenfit.cli.supervised import is_limited, supervise
 from bowdenfit.cli.terminal import NoReaderError, say, say_interrupted
@@ -29,6 +30,7 @@ def start() -> None:
     """The program: `main`, and an end at once; to take apart what was loaded takes Python 0.3 s."""
     gc.set_threshold(_MADE)
     os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")  # it takes 32 MiB a thread when loaded, and waits for ever if it may not
+    load_without_manual()
     os.environ.setdefault("TF_CPP_MIN_LOG_LEVEL", "3")  # XLA says on stderr where a busy machine compiles slowly
     if not (sys.warnoptions or os.environ.get("BOWDENFIT_DEBUG")):
         warnings.simplefilter("ignore")  # of libraries, in words of their own; what matters is said in ours

@@ -67,6 +67,11 @@ SETTINGS: dict[Any, Any] = {
 }
 
 
+def load_matplotlib() -> None:
+    """Load what every figure needs; they do it otherwise."""
+    import matplotlib.figure  # noqa: F401
+
+
 def in_paper_style(function: Callable[Arguments, Result]) -> Callable[Arguments, Result]:
     """Run a function under the settings of this file; matplotlib's own are back afterwards."""
 

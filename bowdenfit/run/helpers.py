@@ -2,7 +2,6 @@
 
 import os
 import signal
-import sys
 import threading
 import traceback
 from abc import ABC, abstractmethod
@@ -15,7 +14,7 @@ from typing import Any, ClassVar, TypeAlias
 
 from bowdenfit.errors import BowdenfitError
 from bowdenfit.inference.engines.memory import refuse_too_little
-from bowdenfit.inference.engines.processes import cores, end_with_parent
+from bowdenfit.inference.engines.processes import cores, end_with_parent, may_be_copied
 from bowdenfit.run.loading import load_what_checking_needs, load_what_computing_needs, load_what_drawing_needs
 
 Answers = tuple["Future[Any]", ...]
@@ -237,7 +236,7 @@ def drawers(in_background: bool, draws: bool, checks: bool) -> Iterator[Drawers 
         MemoryShortageError: There is too little memory for any fit.
     """
     refuse_too_little()
-    if not (in_background and draws and cores() > 1 and _may_be_copied()):
+    if not (in_background and draws and cores() > 1 and may_be_copied()):
         yield None
         return
     begun = Drawers(checks)
@@ -263,7 +262,7 @@ def assistant(
         draws: Whether figures will be drawn.
         computes: Whether it will be given a generator.
     """
-    copy = _may_be_copied()
+    copy = may_be_copied()
     if drawing is not None:
         other: InOtherProcesses | InAnotherProcess = InOtherProcesses(drawing, settings, computes)
     else:
@@ -279,10 +278,6 @@ def assistant(
         yield other
     finally:
         other.end()
-
-
-def _may_be_copied() -> bool:
-    return sys.platform == "linux" and "jax" not in sys.modules and threading.active_count() == 1
 
 
 def _deliver(source: Iterable[Any], futures: Answers) -> None:

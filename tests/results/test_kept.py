@@ -5,6 +5,7 @@ import json
 import shutil
 import subprocess
 import sys
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -101,6 +102,18 @@ def test_a_figure_is_drawn_again_without_a_model(results, tmp_path):
     assert sorted(tmp_path.iterdir()) == [tmp_path / "captions.txt", *drawn]
     for path in drawn:
         assert path.read_bytes() == (results / "figures" / path.name).read_bytes()
+
+
+def test_the_program_draws_the_figures_that_the_library_does(results, tmp_path):
+    """Although it loads a leaner matplotlib, and writes PDFs in a copy of itself."""
+    command = [sys.executable, "-m", "bowdenfit", "plot", results, "-o", tmp_path]
+    done = subprocess.run(command, capture_output=True, text=True, check=True)
+    files = sorted(path.name for path in (results / "figures").iterdir())
+    assert len(files) > 15
+    assert sorted(path.name for path in tmp_path.iterdir()) == files
+    assert sorted(Path(line).name for line in done.stdout.splitlines()) == files
+    for name in files:
+        assert (tmp_path / name).read_bytes() == (results / "figures" / name).read_bytes(), name
 
 
 @pytest.mark.parametrize(

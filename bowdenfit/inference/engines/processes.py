@@ -2,13 +2,59 @@
 
 import os
 import signal
+import sys
 import threading
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
 
 
 def cores() -> int:
     """That this process may use."""
     return len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
+
+
+def may_be_copied() -> bool:
+    """Whether a copy of this process would work: of one that runs several threads only one is copied."""
+    return sys.platform == "linux" and "jax" not in sys.modules and threading.active_count() == 1
+
+
+@contextmanager
+def meanwhile(function: Callable[[], object], in_background: bool) -> Iterator[None]:
+    """A copy of this process calls a function while this one goes on; where that cannot be or fails, this one does then.
+
+    Args:
+        function: What it writes to files is all that is left of it.
+        in_background: Whether there may be another process.
+    """
+    copy = _copy_that_calls(function) if in_background and cores() > 1 and may_be_copied() else None
+    try:
+        yield
+        failed = copy is None or os.waitpid(copy, 0)[1] != 0
+        copy = None
+    finally:
+        if copy is not None:
+            os.kill(copy, signal.SIGKILL)
+            os.waitpid(copy, 0)
+    if failed:
+        function()
+
+
+def _copy_that_calls(function: Callable[[], object]) -> int | None:
+    """The number of a process that ends with 0 where the function does not fail; None where none can be made."""
+    try:
+        number = os.fork()
+    except OSError:
+        return None
+    if number:
+        return number
+    try:
+        signal.set_wakeup_fd(-1)
+        signal.signal(signal.SIGINT, signal.SIG_IGN)
+        signal.signal(signal.SIGTERM, signal.SIG_DFL)
+        function()
+    except BaseException:
+        os._exit(1)
+    os._exit(0)
 
 
 def start_worker(prepare: Callable[[], None]) -> None:

@@ -1,6 +1,7 @@
 """The summary of a fit, and its figures."""
 
 from collections.abc import Mapping, Sequence
+from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
@@ -56,6 +57,7 @@ def plot(
     figures: Annotated[Sequence[str], Option(("--figure",), metavar="NAME")] = (),
     width: Annotated[Quantity | None, Option(example="3.5in", metavar="LENGTH")] = None,
     formats: Annotated[Sequence[str], Option(("--format",), metavar="ENDING", default="png, svg and pdf")] = (),
+    in_background: bool = False,
 ) -> "Files":
     """Draw the figures of a fit into a folder, and write what each shows, in words, to captions.txt beside them.
 
@@ -65,6 +67,7 @@ def plot(
         figures: Draw only this figure, such as efficiency; may be repeated.
         width: Width of the page, such as 3.5in or 88mm for a column of a paper; words keep their size.
         formats: Write this format alone: png, svg or pdf; may be repeated.
+        in_background: Write PDFs in another process where that is quicker.
 
     Returns:
         The files written.
@@ -75,6 +78,8 @@ def plot(
         StoreError: The results folder is missing or damaged, or the other cannot be written.
     """
     from bowdenfit.errors import UsageError
+    from bowdenfit.inference.engines.processes import meanwhile
+    from bowdenfit.plots.style import load_matplotlib
     from bowdenfit.questions.figure_files import bring_captions
     from bowdenfit.questions.figures import draw_figure, page_width, write_figure_captions
     from bowdenfit.questions.writing import Files
@@ -88,9 +93,18 @@ def plot(
     shown, cable = _shown(found, figures)
     with filled_when_whole(Path(output)) as place:
         bring_captions(Path(output), place)
-        files = [path for name, data in shown.items() for path in draw_figure(name, data, place, endings, cable, page)]
-        files.append(write_figure_captions(shown, place, cable))
-    return Files(Path(output) / path.name for path in files)
+
+        def draw(chosen: Sequence[str]) -> None:
+            for name, data in shown.items() if chosen else ():
+                draw_figure(name, data, place, chosen, cable, page)
+
+        apart, here = ([ending for ending in endings if (ending == "pdf") is is_pdf] for is_pdf in (True, False))
+        load_matplotlib()
+        with meanwhile(partial(draw, apart), in_background and bool(apart) and bool(here)):
+            draw(here)
+        captions = write_figure_captions(shown, place, cable)
+    names = [f"{name}.{ending}" for name in shown for ending in endings]
+    return Files(Path(output) / name for name in (*names, captions.name))
 
 
 def _formats(named: Sequence[str]) -> Sequence[str]:
@@ -140,5 +154,6 @@ PLOT_VERB = Verb(
     "Draw the figures of a fit again.",
     "Draw the figures of a finished fit again, for the page of a paper too: --width 3.5in --format pdf.",
     json="",
+    behind={"in_background": True},
     warns=True,
 )

@@ -110,7 +110,7 @@ class HalfNormal:
     allowed_ends: ClassVar = True, False
 
     def constrain(self, z: Float[Numbers, "*any"]) -> Float[Numbers, "*any"]:
-        """Upper half of a normal, by one error function: from below as it rises, from above by what is left."""
+        """Upper half of a normal from its nearer end, by one error function."""
         is_low = z < 0
         tail = erfc(jnp.where(is_low, -z, z) * (0.5 * np.sqrt(2.0))) / 2  # Phi(-|z|)
         low = np.sqrt(2.0) * erfinv(jnp.where(is_low, tail, 0.5))

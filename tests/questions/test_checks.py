@@ -290,9 +290,9 @@ def changed(dataset, table, column, row, by):
 
 
 def test_an_angle_misread_by_ten_sds_is_the_one_that_is_named(on_body):
-    right = bf.read(on_body, settings=QUICK)
+    right = bf.read(on_body)  # few draws name now and then another angle as well
     row = int(np.flatnonzero(right.measurements.table(AngleTable).route == 490.0)[0])
-    found = bf.fit(changed(right, "angles", "angle", (row, 0), np.deg2rad(21.0)), seed=1, settings=QUICK).checks
+    found = bf.fit(changed(right, "angles", "angle", (row, 0), np.deg2rad(21.0)), seed=1).checks
     assert [reading.label for reading in found.outliers] == ["free_sheath_angle at 490 mm"]
     text = " ".join(checks_text(found).split())
     assert "Outlier: free_sheath_angle at 490 mm: measured 61.0 deg, expected" in text

@@ -327,7 +327,8 @@ def test_efficiencies_without_sd_need_a_run_effect(on_body):
 def geometries(on_body, tmp_path_factory):
     folder = tmp_path_factory.mktemp("geometries")
     for geometry in ("continuous", "published"):
-        bf.fit(on_body, output=folder / geometry, seed=2, settings=QUICK, figures=False, geometry=geometry)
+        settings = (*QUICK[:-1], "sampler.max_steps=20000")  # one fit in twenty takes more than 4000
+        bf.fit(on_body, output=folder / geometry, seed=2, settings=settings, figures=False, geometry=geometry)
     return folder
 
 

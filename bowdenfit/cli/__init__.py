@@ -30,8 +30,8 @@ def start() -> None:
     """The program: `main`, and an end at once; to take apart what was loaded takes Python 0.3 s."""
     gc.set_threshold(_MADE)
     os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")  # it takes 32 MiB a thread when loaded, and waits for ever if it may not
-    load_without_manual()
     os.environ.setdefault("TF_CPP_MIN_LOG_LEVEL", "3")  # XLA says on stderr where a busy machine compiles slowly
+    load_without_manual()
     if not (sys.warnoptions or os.environ.get("BOWDENFIT_DEBUG")):
         warnings.simplefilter("ignore")  # of libraries, in words of their own; what matters is said in ours
     _open_what_is_closed()

@@ -1,6 +1,6 @@
 """matplotlib as this program loads it: without the manual of its artists' properties, which nobody reads here.
 
-While it is loaded, matplotlib asks each of its two hundred kinds of artist for all properties, and writes signature and
+While it is loaded, matplotlib asks each of its hundred kinds of artist for all properties, and writes signature and
 documentation of `set` from them. That takes half of the time that loading it takes, and changes no figure.
 """
 

@@ -14,7 +14,7 @@ from typing import Any, ClassVar, TypeAlias
 
 from bowdenfit.errors import BowdenfitError
 from bowdenfit.inference.engines.memory import refuse_too_little
-from bowdenfit.inference.engines.processes import cores, end_with_parent, may_be_copied
+from bowdenfit.inference.engines.processes import end_with_parent, has_room_beside, may_be_copied
 from bowdenfit.run.loading import load_what_checking_needs, load_what_computing_needs, load_what_drawing_needs
 
 Answers = tuple["Future[Any]", ...]
@@ -236,7 +236,7 @@ def drawers(in_background: bool, draws: bool, checks: bool) -> Iterator[Drawers 
         MemoryShortageError: There is too little memory for any fit.
     """
     refuse_too_little()
-    if not (in_background and draws and cores() > 1 and may_be_copied()):
+    if not (in_background and draws and has_room_beside()):
         yield None
         return
     begun = Drawers(checks)

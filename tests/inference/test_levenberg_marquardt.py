@@ -140,12 +140,10 @@ def test_the_search_goes_where_the_sum_of_squares_falls_as_predicted_and_back_wh
     assert float(lost) <= float(shorter) < 1.0
 
 
-def test_tables_that_differ_by_a_few_rows_are_stepped_by_one_program_to_the_same_minimum():
-    given = problem("misra1a")
-    (_, evaluate), more = _counted(given.evaluate()), rounded_up(33) - 33
-    before = levenberg_marquardt._compiled.cache_info().misses
-    for rows in (33, 33 + more):
-        levenberg_marquardt.stepper(rows, 2)
-    assert more and levenberg_marquardt._compiled.cache_info().misses <= before + 1
-    found = minimize(evaluate, given.starts[0])
-    assert digits_alike(found.x, given.certified) > 8
+def test_tables_that_differ_by_a_few_rows_are_stepped_by_one_program():
+    """The certified minima above are those of such tables: the 33 rows of mgh17 are stepped as 40."""
+    rows, before = 33, levenberg_marquardt._compiled.cache_info().misses
+    assert rounded_up(rows) == 40
+    for count in range(rows, 41):
+        levenberg_marquardt.stepper(count, 2)
+    assert levenberg_marquardt._compiled.cache_info().misses <= before + 1

@@ -14,9 +14,8 @@ BEGIN = """
 import os, sys, time
 from pathlib import Path
 from bowdenfit.inference.engines import processes
-from bowdenfit.inference.engines.processes import meanwhile
+from bowdenfit.inference.engines.processes import has_room_beside, meanwhile
 
-processes.cores = lambda: 2
 ours, place = os.getpid(), Path(sys.argv[1])
 
 def leave(*more):
@@ -38,7 +37,7 @@ def both():
     while not (place / "go").exists():
         time.sleep(0.01)
 
-with meanwhile(both, True):
+with meanwhile(both):
     while not (place / "by").exists():
         time.sleep(0.01)
     (place / "go").touch()
@@ -49,14 +48,21 @@ print("ended")
 
 
 @pytest.mark.parametrize(
-    ("there", "in_background"),
-    [("", False), ("processes.cores = lambda: 1", True), ("sys.modules['jax'] = None", True)],
-    ids=["not asked for", "one core", "JAX has threads"],
+    ("there", "room"),
+    [("", True), ("processes.cores = lambda: 1", False), ("sys.modules['jax'] = None", False)],
+    ids=["two cores", "one core", "JAX has threads"],
 )
-def test_without_a_copy_it_is_done_afterwards(tmp_path, there, in_background):
-    code = f"""
-{there}
-with meanwhile(leave, {in_background}):
+def test_a_copy_is_made_only_where_it_would_work_on_a_core_of_its_own(tmp_path, there, room):
+    assert ran(f"processes.cores = lambda: 2\n{there}\nprint(has_room_beside())", tmp_path).stdout == f"{room}\n"
+
+
+def test_where_there_may_be_no_more_processes_it_is_done_afterwards(tmp_path):
+    code = """
+def refuse():
+    raise BlockingIOError("Resource temporarily unavailable")
+
+os.fork = refuse
+with meanwhile(leave):
     assert not (place / "by").exists()
 """
     done = ran(code, tmp_path)
@@ -70,7 +76,7 @@ def fail():
     raise ValueError("no room")
 
 try:
-    with meanwhile(fail, True):
+    with meanwhile(fail):
         pass
 except ValueError as error:
     print(error)
@@ -86,7 +92,7 @@ def wait():
     time.sleep(60)
 
 try:
-    with meanwhile(wait, True):
+    with meanwhile(wait):
         while not (place / "number").exists() or not (place / "number").read_text():
             time.sleep(0.01)
         raise KeyboardInterrupt

@@ -5,7 +5,7 @@ import signal
 import sys
 import threading
 from collections.abc import Callable, Iterator
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 
 
 def cores() -> int:
@@ -18,46 +18,45 @@ def may_be_copied() -> bool:
     return sys.platform == "linux" and "jax" not in sys.modules and threading.active_count() == 1
 
 
+def has_room_beside() -> bool:
+    """Whether a copy of this process would work, and on a core of its own."""
+    return cores() > 1 and may_be_copied()
+
+
 @contextmanager
-def meanwhile(function: Callable[[], object], in_background: bool) -> Iterator[None]:
-    """A copy of this process calls a function while this one goes on; where that cannot be or fails, this one does then.
+def meanwhile(function: Callable[[], object]) -> Iterator[None]:
+    """A copy of this process calls a function while this one goes on; what it fails at is done here afterwards.
 
     Args:
         function: What it writes to files is all that is left of it.
-        in_background: Whether there may be another process.
     """
-    copy = _copy_that_calls(function) if in_background and cores() > 1 and may_be_copied() else None
+    from multiprocessing import get_context
+
+    copy = get_context("fork").Process(target=_work, args=(function,), daemon=True)
+    with suppress(OSError):  # there may be no more processes
+        copy.start()
     try:
         yield
-        failed = copy is None or os.waitpid(copy, 0)[1] != 0
-        copy = None
+        if copy.pid:
+            copy.join()
+        done = copy.exitcode == 0
     finally:
-        if copy is not None:
-            os.kill(copy, signal.SIGKILL)
-            os.waitpid(copy, 0)
-    if failed:
+        if copy.pid:
+            copy.kill()
+            copy.join()
+    if not done:
         function()
 
 
-def _copy_that_calls(function: Callable[[], object]) -> int | None:
-    """The number of a process that ends with 0 where the function does not fail; None where none can be made."""
+def _work(function: Callable[[], object]) -> None:
+    """Of a copy: silent, since whoever made it says what goes wrong."""
     try:
-        number = os.fork()
-    except OSError:
-        return None
-    if number:
-        return number
-    try:
-        signal.set_wakeup_fd(-1)
-        signal.signal(signal.SIGINT, signal.SIG_IGN)
-        signal.signal(signal.SIGTERM, signal.SIG_DFL)
-        function()
+        start_worker(function)
     except BaseException:
         os._exit(1)
-    os._exit(0)
 
 
-def start_worker(prepare: Callable[[], None]) -> None:
+def start_worker(prepare: Callable[[], object]) -> None:
     """What a new process does first.
 
     Args:

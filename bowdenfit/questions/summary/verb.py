@@ -78,7 +78,7 @@ def plot(
         StoreError: The results folder is missing or damaged, or the other cannot be written.
     """
     from bowdenfit.errors import UsageError
-    from bowdenfit.inference.engines.processes import meanwhile
+    from bowdenfit.inference.engines.processes import has_room_beside, meanwhile
     from bowdenfit.plots.style import load_matplotlib
     from bowdenfit.questions.figure_files import bring_captions
     from bowdenfit.questions.figures import draw_figure, page_width, write_figure_captions
@@ -95,13 +95,16 @@ def plot(
         bring_captions(Path(output), place)
 
         def draw(chosen: Sequence[str]) -> None:
-            for name, data in shown.items() if chosen else ():
+            for name, data in shown.items():
                 draw_figure(name, data, place, chosen, cable, page)
 
-        apart, here = ([ending for ending in endings if (ending == "pdf") is is_pdf] for is_pdf in (True, False))
-        load_matplotlib()
-        with meanwhile(partial(draw, apart), in_background and bool(apart) and bool(here)):
-            draw(here)
+        others = [ending for ending in endings if ending != "pdf"]
+        if in_background and others and len(others) < len(endings) and has_room_beside():
+            load_matplotlib()  # once for both
+            with meanwhile(partial(draw, ["pdf"])):
+                draw(others)
+        else:
+            draw(endings)
         captions = write_figure_captions(shown, place, cable)
     names = [f"{name}.{ending}" for name in shown for ending in endings]
     return Files(Path(output) / name for name in (*names, captions.name))

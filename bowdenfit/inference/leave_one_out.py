@@ -13,7 +13,7 @@ from jaxtyping import Float
 
 from bowdenfit.description import SamplerSettings
 from bowdenfit.description.defaults import WALKERS_PER_PARAMETER
-from bowdenfit.inference.chain import Sampling
+from bowdenfit.inference.chain import Chain, Sampling
 from bowdenfit.inference.comparison import How, Prediction, weigh_without_each
 from bowdenfit.inference.compilation import compile_program
 from bowdenfit.inference.coordinates import frames_without_ridge
@@ -150,23 +150,34 @@ class LeavingOut:
 
     def refit_without(self, reading: int) -> tuple[float, float, bool]:
         """Expected log density of a reading by a fit without it, its Monte Carlo error, and whether that fit converged."""
+        top = float(np.max(self.readings.evaluate(self.z)[1][:, reading]))
+
+        def likelihood(z: np.ndarray) -> dict[str, np.ndarray]:
+            return {_RATIO: np.exp(self.readings.evaluate(z)[1][:, reading] - top)}
+
+        chain = self.chain_without(reading, likelihood)
+        mean = float(chain.quantities[_RATIO].mean())
+        error = chain.diagnostics[_RATIO].mcse_mean / mean if mean > 0 else float("nan")
+        return top + float(np.log(mean)) if mean > 0 else -np.inf, error, not chain.reasons and error < _LARGEST_ERROR
+
+    def chain_without(
+        self, reading: int, quantities: Callable[[np.ndarray], Mapping[str, np.ndarray]] = lambda _: {}
+    ) -> Chain:
+        """Draws of a fit without a reading.
+
+        Args:
+            reading: Its position.
+            quantities: Of many z, which must converge too.
+        """
         from bowdenfit.inference.ensemble import sample
 
         readings = self.readings
         each = readings.evaluate(self.z)[1][:, reading]
         weights = np.exp(smooth_weights(-each, self.share)[0])
         start = MaximumPosterior(weights @ self.z, np.atleast_2d(np.cov(self.z.T)))
-        top = float(np.max(each))
-
-        def likelihood(z: np.ndarray) -> dict[str, np.ndarray]:
-            return {_RATIO: np.exp(readings.evaluate(z)[1][:, reading] - top)}
-
         own_seed = int(np.random.SeedSequence([self.seed, reading]).generate_state(1)[0])
-        asked = Sampling(readings.posterior, start, readings.refits, own_seed, likelihood, diagnose=_without_drift)
-        chain = sample(asked, readings.programs, readings.without(reading))
-        mean = float(chain.quantities[_RATIO].mean())
-        error = chain.diagnostics[_RATIO].mcse_mean / mean if mean > 0 else float("nan")
-        return top + float(np.log(mean)) if mean > 0 else -np.inf, error, not chain.reasons and error < _LARGEST_ERROR
+        asked = Sampling(readings.posterior, start, readings.refits, own_seed, quantities, diagnose=_without_drift)
+        return sample(asked, readings.programs, readings.without(reading))
 
 
 def leave_one_out(

@@ -2,7 +2,7 @@
 
 The draws are weighted by the inverse of the reading's own likelihood (Pareto-smoothed), so nothing is fitted again. Where
 the Pareto k of a reading is large, the weights cannot take out all that the reading did: its deviation is then rather
-understated.
+understated, and differs from seed to seed; draws of a fit without it tell.
 
 References:
     Vehtari, Gelman and Gabry, Practical Bayesian model evaluation using leave-one-out cross-validation and WAIC,
@@ -11,7 +11,7 @@ References:
     evaluation and multiple sample comparison, Statistics and Computing 32 (2022), 32.
 """
 
-from dataclasses import dataclass
+from dataclasses import dataclass, fields
 
 import numpy as np
 
@@ -66,15 +66,31 @@ def predict_without_each(
     for likelihood, drawn, reading, bound in zip(log_likelihood.T, replicated.T, observed, at_most, strict=True):
         log_weights, k = smooth_weights(-likelihood, share)
         weights = np.exp(log_weights - log_weights.max())[::every]
-        within = np.clip(np.nan_to_num(drawn[::every], nan=_FARTHEST), -_FARTHEST, _FARTHEST)
-        rows.append((*_place(within, weights / weights.sum(), float(reading), bool(bound)), k))
-    return LeftOut(*np.array(rows).reshape(-1, 9).T)
+        rows.append((*_place(drawn[::every], weights / weights.sum(), float(reading), bool(bound)), k))
+    return LeftOut(*np.array(rows).reshape(-1, len(fields(LeftOut))).T)
+
+
+def predict_by_refit(found: LeftOut, place: int, drawn: np.ndarray, reading: float, at_most: bool) -> LeftOut:
+    """The predictions with one from a fit without its reading; how far the fit with it leans on it stays.
+
+    Args:
+        found: The predictions of a table.
+        place: Which of its readings is meant.
+        drawn: The reading drawn anew, by draws of the fit without it.
+        reading, at_most: See `predict_without_each`.
+    """
+    row = (*_place(drawn, np.full(len(drawn), 1 / len(drawn)), reading, at_most), found.pareto_k[place])
+    changed = {field.name: np.array(getattr(found, field.name)) for field in fields(LeftOut)}
+    for column, value in zip(changed.values(), row, strict=True):
+        column[place] = value
+    return LeftOut(**changed)
 
 
 def _place(drawn: np.ndarray, weights: np.ndarray, reading: float, at_most: bool) -> tuple[float, ...]:
     """The fields of `LeftOut` of one reading, but for its Pareto k."""
-    order = np.argsort(drawn)
-    x, w = drawn[order], weights[order]
+    within = np.clip(np.nan_to_num(drawn, nan=_FARTHEST), -_FARTHEST, _FARTHEST)
+    order = np.argsort(within)
+    x, w = within[order], weights[order]
     mean = float(w @ x)
     sd = float(np.sqrt(w @ (x - mean) ** 2))
     rank = np.cumsum(w) - w / 2

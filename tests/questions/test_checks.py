@@ -15,6 +15,7 @@ from scipy import stats
 import bowdenfit as bf
 from bowdenfit.inference.compilation import compile_program
 from bowdenfit.inference.diagnostics import Diagnostics
+from bowdenfit.inference.draws import shown_values
 from bowdenfit.inference.log_density import LogDensity as Density
 from bowdenfit.inference.predictive_checks import place_at_random, predict_without_each, uniformity
 from bowdenfit.inference.prior_sensitivity import SENSITIVE, far_out, other_scales, sensitivities
@@ -290,10 +291,13 @@ def changed(dataset, table, column, row, by):
 
 
 def test_an_angle_misread_by_ten_sds_is_the_one_that_is_named(on_body):
-    right = bf.read(on_body)  # few draws name now and then another angle as well
+    """Weights put it 3.9 to 9.5 sds from its prediction, by the seed, a fit without it 8.8 to 9.2 (eight seeds)."""
+    right = bf.read(on_body, settings=QUICK)
     row = int(np.flatnonzero(right.measurements.table(AngleTable).route == 490.0)[0])
-    found = bf.fit(changed(right, "angles", "angle", (row, 0), np.deg2rad(21.0)), seed=1).checks
-    assert [reading.label for reading in found.outliers] == ["free_sheath_angle at 490 mm"]
+    found = bf.fit(changed(right, "angles", "angle", (row, 0), np.deg2rad(21.0)), seed=1, settings=QUICK).checks
+    (far,) = found.outliers
+    assert far.label == "free_sheath_angle at 490 mm"
+    assert 8.5 < far.z < 9.5 and far.decisive
     text = " ".join(checks_text(found).split())
     assert "Outlier: free_sheath_angle at 490 mm: measured 61.0 deg, expected" in text
     figure = checks_figure.draw(checked_tables(found))
@@ -404,10 +408,8 @@ class Checked:
         numbered = np.column_stack([z, np.arange(len(z), dtype=float)]).reshape(-1, ROWS, z.shape[1] + 1)
         parts = [jax.tree.map(np.asarray, self.programs[kind](part, density.data)) for part in numbered]
         drawn = jax.tree.map(lambda *each: np.stack(each), *parts)
-        names = [p.name for p in density.model.space.free]
-        values = dict(zip(names, np.moveaxis(z.reshape(-1, ROWS, z.shape[1]), -1, 0), strict=True))
         posterior = Draws(
-            z.reshape(-1, ROWS, z.shape[1]), values, {}, drawn["log_likelihood"], {}, drawn["replicated"], {},
+            z.reshape(-1, ROWS, z.shape[1]), drawn["values"], {}, drawn["log_likelihood"], {}, drawn["replicated"], {},
             {"z": Diagnostics(1.0, 500.0, 500.0, 0.0, 0.0)}, 1, 1, 0.5,
         )  # fmt: skip
         return checks_of(Record(dataset, None, posterior, True, (), Provenance(seed, {})))
@@ -419,6 +421,7 @@ class Checked:
             keys = jax.random.split(jax.random.fold_in(jax.random.key(0), z_and_number[-1].astype("uint32")), len(data))
             terms = list(zip(model.terms, data, keys, strict=True))
             return {
+                "values": shown_values(model, values),
                 "log_likelihood": {t.name: t.log_likelihood(values, d) for t, d, _ in terms},
                 "replicated": {t.name: t.simulate(values, d, key) for t, d, key in terms},
             }

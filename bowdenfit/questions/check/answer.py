@@ -11,6 +11,7 @@ from bowdenfit.inference.prior_sensitivity import FarOut, Sensitivity, far_out, 
 from bowdenfit.kinds.places import places_of
 from bowdenfit.kinds.term import Term
 from bowdenfit.questions.check.evidence import Evidence, Findings, TableDraws, TableWithoutEach, work_out
+from bowdenfit.questions.check.suspects import refit_suspects
 from bowdenfit.questions.check.table_checks import FALSE_ALARM, CheckedReading, TableChecks
 from bowdenfit.results.record import Record, once
 
@@ -68,7 +69,7 @@ def checks_of(fit: Record) -> Checks | None:
     if fit.sampled is None:
         return None
     found = checks_findings(fit)
-    tables = tuple(_table(fit, *each) for each in zip(_tables(fit), found.tables, strict=True))
+    tables = refit_suspects(fit, [_table(fit, *each) for each in zip(_tables(fit), found.tables, strict=True)])
     parameters = {p.name: p for p in fit.model.space.free}
     z = {name: fit.posterior.z[..., i] for name, i in fit.model.space.index.items()}
     return Checks(tables, found.sensitivities, far_out(z, parameters), _told_by_few(fit))
@@ -123,8 +124,9 @@ def _table(fit: Record, term: Term, found: TableWithoutEach) -> TableChecks:
     reading, at_most = readings_of(term)
     places = places_of(fit.dataset.description, fit.dataset.measurements, term)
     return TableChecks(
-        term.name, term.unit, term.labels, reading, at_most, found.predicted, places, found.placed, found.uniform
-    )
+        term.name, term.unit, term.labels, reading, at_most, found.predicted, places, found.placed, found.uniform,
+        np.zeros(len(reading), dtype=bool),
+    )  # fmt: skip
 
 
 def readings_of(term: Term) -> tuple[np.ndarray, np.ndarray]:

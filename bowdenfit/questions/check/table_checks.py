@@ -79,6 +79,7 @@ class TableChecks(Part):
         places: Where each was taken.
         probability: Where each lies in its prediction, uniform between 0 and 1 if all is right.
         uniformity: Whether these are uniform; None of few readings.
+        refitted: Which readings a fit without them predicts.
     """
 
     table: str
@@ -90,6 +91,7 @@ class TableChecks(Part):
     places: Places
     probability: np.ndarray
     uniformity: Uniformity | None
+    refitted: np.ndarray
 
     JSON: ClassVar = ("table", ("readings", "measured"), "in_interval", "bounds", "uniform", "fault")
 
@@ -100,7 +102,7 @@ class TableChecks(Part):
 
     @property
     def decisive(self) -> np.ndarray:
-        """Whether the weights that leave a reading out cannot be trusted, because the fit leans on it."""
+        """Whether the fit leans on a reading so much that weights cannot leave it out."""
         return ~(self.predicted.pareto_k <= RELIABLE_K)
 
     @property
@@ -115,7 +117,8 @@ class TableChecks(Part):
 
         freedom = max(self.measured - 2, _LEAST_FREEDOM)
         t = np.abs(np.nan_to_num(self.z_score)) * np.sqrt(freedom / (freedom - 2))  # z is in sds of the prediction
-        return np.where(self.decisive, np.minimum(2 * stdtr(freedom, -t), self.predicted.tail), self.predicted.tail)
+        failed = self.decisive & ~self.refitted
+        return np.where(failed, np.minimum(2 * stdtr(freedom, -t), self.predicted.tail), self.predicted.tail)
 
     def readings(self, among: int) -> list[CheckedReading]:
         """One by one.

@@ -1,0 +1,58 @@
+"""Readings that may be outliers of a fit that leans on them, each predicted by a fit without it.
+
+Importance weights cannot take out what such a reading did to the draws: how far out they put it differs from seed to seed. A
+fit takes seconds, so that only those that look suspicious by their weights are left out in this way.
+"""
+
+from collections.abc import Sequence
+from dataclasses import replace
+
+import jax
+import numpy as np
+
+from bowdenfit.inference.draws import OfDraws, replicator
+from bowdenfit.inference.leave_one_out import LeavingOut, ReadingsToLeaveOut
+from bowdenfit.inference.log_density import LogDensity
+from bowdenfit.inference.predictive_checks import predict_by_refit
+from bowdenfit.questions.check.table_checks import TableChecks
+from bowdenfit.results.record import Record
+
+_SUSPICIOUS = 0.1  # chance that weights call one reading of a healthy fit so, ten times that of an outlier
+
+
+def refit_suspects(fit: Record, tables: Sequence[TableChecks]) -> tuple[TableChecks, ...]:
+    """Checks of all tables, with suspicious readings that the fit leans on predicted by fits without them.
+
+    What weights say of a reading stays where the fit without it does not converge.
+
+    Args:
+        fit: A fit with draws.
+        tables: As importance weights predict them.
+    """
+    among = sum(len(table.labels) for table in tables)
+    suspects = [np.flatnonzero(table.decisive & (table.chance * among < _SUSPICIOUS)) for table in tables]
+    if not any(map(len, suspects)):
+        return tuple(tables)
+    with jax.enable_x64(True):
+        density, drawn = LogDensity(fit.model), fit.posterior
+        share = min(drawn.n_effective / len(drawn.flat_z), 1.0)
+        leaving_out = LeavingOut(ReadingsToLeaveOut(density), drawn.flat_z, share, fit.provenance.seed)
+        implied = replicator(density, fit.provenance.seed)
+        return tuple(_refitted(leaving_out, implied, *each) for each in zip(tables, suspects, strict=True))
+
+
+def _refitted(leaving_out: LeavingOut, implied: OfDraws, table: TableChecks, suspects: np.ndarray) -> TableChecks:
+    """The table with suspects predicted by fits without them."""
+    first = leaving_out.readings.names.index((table.table, table.labels[0]))
+    for place in map(int, suspects):
+        chain = leaving_out.chain_without(first + place)
+        if chain.reasons:
+            continue
+        replicated = implied(chain.z.reshape(-1, chain.z.shape[-1]))["replicated"][table.table][:, place]
+        reading, at_most = float(table.reading[place]), bool(table.at_most[place])
+        predicted = predict_by_refit(table.predicted, place, replicated, reading, at_most)
+        probability, refitted = table.probability.copy(), table.refitted.copy()
+        probability[place] = np.clip(probability[place], predicted.below[place], predicted.up_to[place])
+        refitted[place] = True
+        table = replace(table, predicted=predicted, probability=probability, refitted=refitted)
+    return table

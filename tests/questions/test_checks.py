@@ -2,6 +2,7 @@
 
 import dataclasses
 import re
+from types import SimpleNamespace
 
 import cables
 import elastic_cables
@@ -30,6 +31,7 @@ from bowdenfit.questions.check import checks_figure, prior_figure
 from bowdenfit.questions.check.answer import checks_of
 from bowdenfit.questions.check.checks_figure import CheckedTable, checked_tables
 from bowdenfit.questions.check.prior_predictive import prior_predictive
+from bowdenfit.questions.check.suspects import suspects_of
 from bowdenfit.questions.check.words import checks_text
 from bowdenfit.results.record import Draws, Provenance, Record
 
@@ -303,6 +305,18 @@ def test_an_angle_misread_by_ten_sds_is_the_one_that_is_named(on_body):
     figure = checks_figure.draw(checked_tables(found))
     check_words(figure, "an outlier")
     assert "free_sheath_angle at 490 mm" in {text.get_text() for axes in figure.axes for text in axes.texts}
+
+
+def test_fits_without_a_reading_are_made_of_the_three_farthest_that_the_fit_leans_on():
+    """Of 100 readings, weights call one of a healthy fit so far out in one fit of ten where its chance is 0.001."""
+    chance, decisive = np.full(60, 0.5), np.ones(60, dtype=bool)
+    chance[[3, 7, 11]], decisive[11] = (9e-4, 1.1e-3, 1e-9), False
+    first = SimpleNamespace(chance=chance, decisive=decisive)
+    second = SimpleNamespace(chance=np.full(40, 0.5), decisive=np.ones(40, dtype=bool))
+    assert suspects_of([]) == []
+    assert suspects_of([first, second]) == [(0, 3)]
+    second.chance[[1, 5, 9]] = 1e-5, 1e-7, 1e-4
+    assert suspects_of([first, second]) == [(1, 5), (1, 1), (1, 9)]
 
 
 @pytest.fixture(scope="module")

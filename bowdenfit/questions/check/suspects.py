@@ -18,6 +18,7 @@ from bowdenfit.questions.check.table_checks import TableChecks
 from bowdenfit.results.record import Record
 
 _SUSPICIOUS = 0.1  # chance that weights call one reading of a healthy fit so, ten times that of an outlier
+_MOST = 3  # fits; where more readings are so far out, what is wrong is not one of them
 
 
 def refit_suspects(fit: Record, tables: Sequence[TableChecks]) -> tuple[TableChecks, ...]:
@@ -29,30 +30,41 @@ def refit_suspects(fit: Record, tables: Sequence[TableChecks]) -> tuple[TableChe
         fit: A fit with draws.
         tables: As importance weights predict them.
     """
-    among = sum(len(table.labels) for table in tables)
-    suspects = [np.flatnonzero(table.decisive & (table.chance * among < _SUSPICIOUS)) for table in tables]
-    if not any(map(len, suspects)):
+    suspects = suspects_of(tables)
+    if not suspects:
         return tuple(tables)
+    found = list(tables)
     with jax.enable_x64(True):
         density, drawn = LogDensity(fit.model), fit.posterior
         share = min(drawn.n_effective / len(drawn.flat_z), 1.0)
         leaving_out = LeavingOut(ReadingsToLeaveOut(density), drawn.flat_z, share, fit.provenance.seed)
         implied = replicator(density, fit.provenance.seed)
-        return tuple(_refitted(leaving_out, implied, *each) for each in zip(tables, suspects, strict=True))
+        for at, place in suspects:
+            found[at] = _refitted(leaving_out, implied, found[at], place)
+    return tuple(found)
 
 
-def _refitted(leaving_out: LeavingOut, implied: OfDraws, table: TableChecks, suspects: np.ndarray) -> TableChecks:
-    """The table with suspects predicted by fits without them."""
-    first = leaving_out.readings.names.index((table.table, table.labels[0]))
-    for place in map(int, suspects):
-        chain = leaving_out.chain_without(first + place)
-        if chain.reasons:
-            continue
-        replicated = implied(chain.z.reshape(-1, chain.z.shape[-1]))["replicated"][table.table][:, place]
-        reading, at_most = float(table.reading[place]), bool(table.at_most[place])
-        predicted = predict_by_refit(table.predicted, place, replicated, reading, at_most)
-        probability, refitted = table.probability.copy(), table.refitted.copy()
-        probability[place] = np.clip(probability[place], predicted.below[place], predicted.up_to[place])
-        refitted[place] = True
-        table = replace(table, predicted=predicted, probability=probability, refitted=refitted)
-    return table
+def suspects_of(tables: Sequence[TableChecks]) -> list[tuple[int, int]]:
+    """Positions of the table and in it of every suspicious reading that the fit leans on, the farthest out first."""
+    among = sum(len(table.chance) for table in tables)
+    chances = {
+        (at, place): chance
+        for at, table in enumerate(tables)
+        for place, (chance, decisive) in enumerate(zip(table.chance, table.decisive, strict=True))
+        if decisive and chance * among < _SUSPICIOUS
+    }
+    return sorted(chances, key=lambda suspect: chances[suspect])[:_MOST]
+
+
+def _refitted(leaving_out: LeavingOut, implied: OfDraws, table: TableChecks, place: int) -> TableChecks:
+    """The table with one of its readings predicted by a fit without it."""
+    chain = leaving_out.chain_without(leaving_out.readings.names.index((table.table, table.labels[0])) + place)
+    if chain.reasons:
+        return table
+    replicated = implied(chain.z.reshape(-1, chain.z.shape[-1]))["replicated"][table.table][:, place]
+    reading, at_most = float(table.reading[place]), bool(table.at_most[place])
+    predicted = predict_by_refit(table.predicted, place, replicated, reading, at_most)
+    probability, refitted = table.probability.copy(), table.refitted.copy()
+    probability[place] = np.clip(probability[place], predicted.below[place], predicted.up_to[place])
+    refitted[place] = True
+    return replace(table, predicted=predicted, probability=probability, refitted=refitted)

@@ -33,6 +33,7 @@ from bowdenfit.questions.check.checks_figure import CheckedTable, checked_tables
 from bowdenfit.questions.check.prior_predictive import prior_predictive
 from bowdenfit.questions.check.suspects import suspects_of
 from bowdenfit.questions.check.words import checks_text
+from bowdenfit.questions.summary import methods_section
 from bowdenfit.results.record import Draws, Provenance, Record
 
 DRAWS = 8000
@@ -296,7 +297,10 @@ def test_an_angle_misread_by_ten_sds_is_the_one_that_is_named(on_body):
     """Weights put it 3.9 to 9.5 sds from its prediction, by the seed, a fit without it 8.8 to 9.2 (eight seeds)."""
     right = bf.read(on_body, settings=QUICK)
     row = int(np.flatnonzero(right.measurements.table(AngleTable).route == 490.0)[0])
-    found = bf.fit(changed(right, "angles", "angle", (row, 0), np.deg2rad(21.0)), seed=1, settings=QUICK).checks
+    fit = bf.fit(changed(right, "angles", "angle", (row, 0), np.deg2rad(21.0)), seed=1, settings=QUICK)
+    found = fit.checks
+    methods = methods_section.section(fit).context["paragraphs"][0]
+    assert re.search(r"importance sampling \[\d+\], 1 of them against that of a fit without it\.", methods)
     (far,) = found.outliers
     assert far.label == "free_sheath_angle at 490 mm"
     assert 8.5 < far.z < 9.5 and far.decisive

@@ -3,8 +3,11 @@
 import re
 from pathlib import Path
 
+import numpy as np
+
 from bowdenfit.kinds import each_table
 from bowdenfit.pages.section import Section
+from bowdenfit.questions.check.answer import checks_of
 from bowdenfit.questions.summary.sampler_words import sampler_text
 from bowdenfit.questions.summary.verdict import verdict
 from bowdenfit.questions.summary.words import counts_in_words
@@ -83,10 +86,17 @@ def _inference(fit: Record) -> str:
         f"The joint posterior of {fit.model.space.size} parameters was sampled with {_sampler(fit.posterior)}.",
         _convergence(fit, fit.posterior),
         "Values are medians with central 90 % intervals. Each reading was held against its prediction from all the others by "
-        "Pareto-smoothed importance sampling [left-out].",
+        f"Pareto-smoothed importance sampling [left-out]{_refitted(fit)}.",
         f"{squares}, served as a comparison. Diagnostics were computed with ArviZ [arviz]. All random numbers follow from the "
         f"seed {fit.provenance.seed}.",
     ])  # fmt: skip
+
+
+def _refitted(fit: Record) -> str:
+    """What more was done for readings of which the weights cannot tell."""
+    found = checks_of(fit)
+    n = sum(int(np.sum(table.refitted)) for table in found.tables) if found else 0
+    return f", {n} of them against that of a fit without it" if n else ""
 
 
 def _sampler(drawn: Draws) -> str:

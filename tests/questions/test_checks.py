@@ -312,6 +312,22 @@ def test_an_angle_misread_by_ten_sds_is_the_one_that_is_named(on_body):
     assert "free_sheath_angle at 490 mm" in {text.get_text() for axes in figure.axes for text in axes.texts}
 
 
+@pytest.mark.parametrize("scale", [0.05, 200.0], ids=["1 to 2.5 N", "4 to 10 kN"])
+def test_a_run_read_a_quarter_too_low_among_four_is_an_outlier(scale, tmp_path):
+    """Of so few, weights put it 2.3 or 2.9 sds low, at a chance of 1 in 100, and the fit ended as if all were well."""
+    rng, lines = np.random.default_rng(4 + int(scale)), ["run,wrap_angle_deg,input_force_N,output_force_N"]
+    for run, angle in enumerate((60.0, 120.0, 180.0, 240.0)):
+        ratio = np.exp(-0.12 * np.deg2rad(angle) + 0.01 * rng.standard_normal()) * (0.75 if run == 1 else 1.0)
+        for force in (20.0, 30.0, 40.0, 50.0):
+            read = force + 0.1 * rng.standard_normal(), ratio * force + 0.1 * rng.standard_normal()
+            lines.append(f"{run},{angle:g},{scale * read[0]:.6g},{scale * read[1]:.6g}")
+    (tmp_path / "forces.csv").write_text("\n".join(lines) + "\n")
+    fit = bf.fit(tmp_path / "forces.csv", seed=1, settings=QUICK)
+    (far,) = fit.checks.outliers
+    assert far.label == "1" and far.z < -5
+    assert not fit.verdict().trusted
+
+
 def test_fits_without_a_reading_are_made_of_the_three_farthest_that_the_fit_leans_on():
     """Of 100 readings, weights call one of a healthy fit so far out in one fit of ten where its chance is 0.001."""
     chance, decisive = np.full(60, 0.5), np.ones(60, dtype=bool)

@@ -121,12 +121,14 @@ class LeavingOut:
     Args:
         readings: The readings.
         z: The draws, one a row.
+        each: Log likelihood of every reading at every draw, (draw, reading).
         share: Effective draws a draw.
         seed: Seed of the refits.
     """
 
     readings: ReadingsToLeaveOut
     z: np.ndarray
+    each: np.ndarray
     share: float
     seed: int
 
@@ -150,7 +152,7 @@ class LeavingOut:
 
     def refit_without(self, reading: int) -> tuple[float, float, bool]:
         """Expected log density of a reading by a fit without it, its Monte Carlo error, and whether that fit converged."""
-        top = float(np.max(self.readings.evaluate(self.z)[1][:, reading]))
+        top = float(np.max(self.each[:, reading]))
 
         def likelihood(z: np.ndarray) -> dict[str, np.ndarray]:
             return {_RATIO: np.exp(self.readings.evaluate(z)[1][:, reading] - top)}
@@ -172,8 +174,7 @@ class LeavingOut:
         from bowdenfit.inference.ensemble import sample
 
         readings = self.readings
-        each = readings.evaluate(self.z)[1][:, reading]
-        weights = np.exp(smooth_weights(-each, self.share)[0])
+        weights = np.exp(smooth_weights(-self.each[:, reading], self.share)[0])
         start = MaximumPosterior(weights @ self.z, np.atleast_2d(np.cov(self.z.T)))
         own_seed = int(np.random.SeedSequence([self.seed, reading]).generate_state(1)[0])
         asked = Sampling(readings.posterior, start, readings.refits, own_seed, quantities, diagnose=_without_drift)
@@ -209,7 +210,7 @@ def leave_one_out(
         each = np.concatenate([log_likelihood[term.name] for term in readings.posterior.model.terms], axis=-1)
     chosen = list(range(each.shape[-1])) if wanted is None else list(wanted)
     flat, limit = z.reshape(-1, z.shape[-1]), reliable_k(z.shape[0] * z.shape[1])
-    leaving_out = LeavingOut(readings, flat, min(n_effective / len(flat), 1.0), seed)
+    leaving_out = LeavingOut(readings, flat, each.reshape(len(flat), -1), min(n_effective / len(flat), 1.0), seed)
     quick = weigh_without_each({"": each[..., chosen]}, n_effective)
     elpd, error = quick.elpd.copy(), quick.error.copy()
     how: list[How] = ["importance sampling"] * len(chosen)

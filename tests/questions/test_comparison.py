@@ -87,6 +87,10 @@ def readings(outlier):
     return ReadingsToLeaveOut(outlier)
 
 
+def leaving_out(readings, z, share=1.0, seed=5):
+    return LeavingOut(readings, z, readings.evaluate(z)[1], share, seed)
+
+
 def test_leave_one_out_with_fall_backs_is_what_integrals_give(readings, drawn, exact):
     """Fails by chance for one seed in 2000: eight readings within four standard errors, and 0.005 for the grid."""
     _, each = readings.evaluate(drawn.reshape(-1, 2))
@@ -102,7 +106,7 @@ def test_leave_one_out_with_fall_backs_is_what_integrals_give(readings, drawn, e
 def test_a_fit_without_a_reading_gives_its_exact_density(readings, drawn, exact):
     """Fails by chance for one seed in 15 000: two readings within four standard errors, and 0.005 for the grid."""
     for i in (0, 7):
-        elpd, error, settled = LeavingOut(readings, drawn.reshape(-1, 2), 1.0, 5).refit_without(i)
+        elpd, error, settled = leaving_out(readings, drawn.reshape(-1, 2)).refit_without(i)
         assert settled
         assert 0 < error < 0.1
         assert elpd == pytest.approx(exact[i], abs=4 * error + 0.005)
@@ -116,7 +120,7 @@ def test_draws_of_a_fit_without_a_reading_are_those_of_its_posterior(readings, d
     probability /= probability.sum()
     mean = probability @ z
     sd = np.sqrt(probability @ (z - mean) ** 2)
-    chain = LeavingOut(readings, drawn.reshape(-1, 2), 1.0, 5).chain_without(7)
+    chain = leaving_out(readings, drawn.reshape(-1, 2)).chain_without(7)
     found = chain.z.reshape(-1, 2)
     for i, name in enumerate(p.name for p in readings.posterior.model.space.free):
         error = chain.diagnostics[name].mcse_mean
@@ -127,7 +131,7 @@ def test_draws_of_a_fit_without_a_reading_are_those_of_its_posterior(readings, d
 
 def test_a_refit_that_is_stopped_too_early_is_called_rough(outlier, drawn):
     hasty = ReadingsToLeaveOut(outlier, REFIT.model_copy(update={"max_steps": 200}))
-    _, _, settled = LeavingOut(hasty, drawn.reshape(-1, 2), 1.0, 5).refit_without(7)
+    _, _, settled = leaving_out(hasty, drawn.reshape(-1, 2)).refit_without(7)
     assert not settled
     assert Prediction(np.zeros(2), np.array([0.9, 0.9]), how=("rough", "refit")).unreliable == 1
 
@@ -434,8 +438,9 @@ def test_every_reading_of_the_on_body_data_is_predicted_as_by_a_fit_without_it(o
     effective = min(d.ess_bulk for d in fit.posterior.diagnostics.values())
     found = leave_one_out(readings, fit.posterior.z, fit.posterior.log_likelihood, effective, 1)
     assert found.unreliable == 0
+    all_readings = leaving_out(readings, fit.posterior.flat_z, 0.15, 9)
     for i in range(len(found.readings)):
-        elpd, error, settled = LeavingOut(readings, fit.posterior.flat_z, 0.15, 9).refit_without(i)
+        elpd, error, settled = all_readings.refit_without(i)
         assert settled, found.readings[i]
         heavy = 0.25 if found.pareto_k[i] > 0.5 else 0.0
         assert abs(elpd - found.elpd[i]) < 5 * np.hypot(error, found.error[i]) + heavy, found.readings[i]

@@ -35,9 +35,10 @@ def refit_suspects(fit: Record, tables: Sequence[TableChecks]) -> tuple[TableChe
         return tuple(tables)
     found = list(tables)
     with jax.enable_x64(True):
-        density, drawn = LogDensity(fit.model), fit.posterior
-        share = min(drawn.n_effective / len(drawn.flat_z), 1.0)
-        leaving_out = LeavingOut(ReadingsToLeaveOut(density), drawn.flat_z, share, fit.provenance.seed)
+        density, drawn, z = LogDensity(fit.model), fit.posterior, fit.posterior.flat_z
+        each = np.concatenate([drawn.log_likelihood[term.name] for term in fit.model.terms], axis=-1).reshape(len(z), -1)
+        share = min(drawn.n_effective / len(z), 1.0)
+        leaving_out = LeavingOut(ReadingsToLeaveOut(density), z, each, share, fit.provenance.seed)
         implied = replicator(density, fit.provenance.seed)
         for at, place in suspects:
             found[at] = _refitted(leaving_out, implied, found[at], place)

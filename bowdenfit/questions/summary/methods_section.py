@@ -3,8 +3,6 @@
 import re
 from pathlib import Path
 
-import numpy as np
-
 from bowdenfit.kinds import each_table
 from bowdenfit.pages.section import Section
 from bowdenfit.questions.check.answer import checks_of
@@ -95,7 +93,7 @@ def _inference(fit: Record) -> str:
 def _refitted(fit: Record) -> str:
     """What more was done for readings of which the weights cannot tell."""
     found = checks_of(fit)
-    n = sum(int(np.sum(table.refitted)) for table in found.tables) if found else 0
+    n = sum(int(table.refitted.sum()) for table in found.tables) if found else 0
     return f", {n} of them against that of a fit without it" if n else ""
 
 

@@ -23,6 +23,7 @@ from bowdenfit.description.defaults import THIN
 from bowdenfit.inference.chain import Chain, Progress, Sampling, stuck_walkers, worst
 from bowdenfit.inference.checkpoint import append, damaged_checkpoint, records
 from bowdenfit.inference.engines.memory import ENSEMBLES_AT_ONCE
+from bowdenfit.inference.engines.one_thread import linear_algebra_in_one_thread
 from bowdenfit.inference.engines.processes import cores
 from bowdenfit.inference.least_squares import MaximumPosterior
 from bowdenfit.inference.sweep import Chosen
@@ -86,6 +87,7 @@ def start_of(points: np.ndarray, generator: np.random.RandomState) -> emcee.Stat
     return emcee.State(points, log_prob=np.zeros(len(points)), random_state=generator.get_state())
 
 
+@linear_algebra_in_one_thread()
 def sample(asked: Sampling, programs: WalkerPrograms, data: Any = None) -> Chain:
     """Sample by ensembles of walkers.
 

@@ -17,11 +17,13 @@ import jax
 
 from bowdenfit.inference.batch.programs import CHUNK, BatchPrograms, BatchSettings
 from bowdenfit.inference.batch.stages import BatchFit, by_nuts, climb, draw
+from bowdenfit.inference.engines.one_thread import linear_algebra_in_one_thread
 from bowdenfit.inference.log_density import LogDensity
 
 Given, Found = TypeVar("Given"), TypeVar("Found")
 
 
+@linear_algebra_in_one_thread()
 def fit_batch(
     posterior: LogDensity,
     data: Sequence[Any],

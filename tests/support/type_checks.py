@@ -26,9 +26,15 @@ _CONFIGURATION = BeartypeConf(
 
 
 def check(function: Any) -> Any:
-    """The function, checked at every call: jaxtyping's shapes and Python's types."""
+    """The function, checked at every call: jaxtyping's shapes and Python's types.
+
+    Jaxtyping has two functions checked for each, one before the call, of the parameters, which returns `Any`; and one after
+    it, of the parameters once more and of what was returned. Of that only the latter is looked at.
+    """
     if not isinstance(function, type):
-        function.__annotations__ = {name: _of_either(hint) for name, hint in function.__annotations__.items()}
+        hints = function.__annotations__
+        looked_at = hints if hints.get("return", Any) is Any else {"return": hints["return"]}
+        function.__annotations__ = {name: _of_either(hint) for name, hint in looked_at.items()}
     return beartype(function, conf=_CONFIGURATION)
 
 

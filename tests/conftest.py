@@ -31,6 +31,7 @@ def keep_what_is_compiled() -> str | None:
         os.environ.pop("PYTHONDONTWRITEBYTECODE", None)  # none after -B
     if version("jaxlib") in FLAGS:
         os.environ.setdefault("XLA_FLAGS", FLAGS[version("jaxlib")])
+    os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")  # as the command line has it; workers have no cores to spare
     if PROGRAMS in os.environ:
         return None
     os.environ[PROGRAMS] = tempfile.mkdtemp(prefix="bowdenfit-programs-")
@@ -153,14 +154,16 @@ def bench() -> Path:
 
 
 @pytest.fixture
-def run(monkeypatch, capsys):
-    """Run the command line in this process: exit code, standard output, standard error."""
+def run(monkeypatch, capsys, request):
+    """Run the command line in this process: exit code, standard output, standard error; a failed test shows them all."""
 
     def call(*arguments):
         monkeypatch.setattr(sys, "argv", ["bowdenfit", *map(str, arguments)])
         with pytest.raises(SystemExit) as stop:
             cli.main()
         printed = capsys.readouterr()
+        said = f"{printed.out}{printed.err}Exit code {stop.value.code}."
+        request.node.add_report_section("call", " ".join(sys.argv), said)
         return stop.value.code, printed.out, printed.err
 
     return call

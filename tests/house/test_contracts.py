@@ -51,6 +51,25 @@ def test_imports_load_nothing_heavy(code, heavy):
     assert not heavy & set(found.stdout.split())
 
 
+@pytest.mark.parametrize(
+    "code",
+    [
+        "bf.simulate('datasets/synthetic-bench/bench.toml', seed=1)",
+        "bf.simulate('datasets/synthetic-haptic-loop/bench.toml', seed=1)",
+        "bf.identify('datasets/synthetic-haptic-loop/bench.toml')",
+    ],
+)
+def test_what_is_asked_of_a_plan_once_is_compiled_as_a_few_programs(code):
+    """Not operation by operation, of which there are more than a hundred and each is a program of its own."""
+    counting = (
+        "import jax, bowdenfit as bf; names = []\n"
+        "jax.monitoring.register_event_duration_secs_listener(lambda name, *_, **__: names.append(name))\n"
+        f"{code}\nprint(sum('backend_compile' in name for name in names))"
+    )
+    found = subprocess.run([sys.executable, "-c", counting], cwd=ROOT, capture_output=True, text=True, check=True)
+    assert 3 <= int(found.stdout) <= 30
+
+
 def test_every_figure_file_of_a_fit_is_listed():
     files = (ROOT / "bowdenfit" / "questions").glob("*/*_figure.py")
     of_fits = {path.stem.removesuffix("_figure") for path in files if "\ndef data(fit:" in path.read_text(encoding="utf-8")}

@@ -123,6 +123,7 @@ def _of_plan(path: Path) -> "Identifiability":
     import numpy as np
 
     from bowdenfit.dataset import Dataset
+    from bowdenfit.inference.compilation import compile_program
     from bowdenfit.inference.information import information_at
     from bowdenfit.inference.log_density import LogDensity
     from bowdenfit.inference.prior_numbers import value_at
@@ -135,12 +136,13 @@ def _of_plan(path: Path) -> "Identifiability":
     tables = empty_tables(plan.description, plan.design)
     space = build_model(Dataset(plan.description, tables, {})).space
     medians = {p.name: value_at(p.prior, 0.0) * p.shown_scale for p in space.free}
-    values = true_values(plan.description, tables, medians | dict(plan.truth), jax.random.key(0))
-    data = simulate(plan.description, plan.design, values, jax.random.key(0), noise=False)
+    values = true_values(plan.description, tables, medians | dict(plan.truth), jax.random.key(0), once=True)
+    data = simulate(plan.description, plan.design, values, jax.random.key(0), noise=False, once=True)
     posterior = LogDensity(build_model(data))
     assumed = "[truth]" if plan.truth else "the medians of the priors"
     basis = f"the plan, for a cable with the values of {assumed}; nothing has been measured"
-    at = information_at(posterior, np.asarray(posterior.model.space.unconstrain(values)))
+    z = compile_program(posterior.model.space.unconstrain, values, run_once=True)(values)
+    at = information_at(posterior, np.asarray(z))
     return of_maximum(posterior.model, at, basis, False)
 
 

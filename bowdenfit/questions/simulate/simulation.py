@@ -4,8 +4,9 @@
 Both draw readings as the likelihood takes them to scatter, so that a posterior can be asked to hold the truth.
 """
 
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import replace
+from typing import Any
 
 import jax
 import jax.numpy as jnp
@@ -14,12 +15,13 @@ import numpy as np
 from bowdenfit.dataset import Dataset
 from bowdenfit.description import Description
 from bowdenfit.errors import UsageError
+from bowdenfit.inference.compilation import compile_program
 from bowdenfit.kinds import KINDS
 from bowdenfit.kinds.angles.bench import drawn_angles
 from bowdenfit.kinds.angles.table import AngleTable
 from bowdenfit.kinds.bench import Truth
 from bowdenfit.kinds.design import Design
-from bowdenfit.kinds.drawn_readings import drawn_readings, with_drawn_readings
+from bowdenfit.kinds.drawn_readings import Readings, drawn_readings, with_drawn_readings
 from bowdenfit.kinds.measurements import Measurements
 from bowdenfit.model import build_model
 
@@ -37,9 +39,16 @@ def empty_tables(description: Description, design: Design) -> Measurements:
 
 
 def true_values(
-    description: Description, tables: Measurements, truth: Mapping[str, float], key: jax.Array
+    description: Description, tables: Measurements, truth: Mapping[str, float], key: jax.Array, once: bool = False
 ) -> dict[str, float]:
     """True value of every parameter [internal units]: as given in shown units, else drawn from its prior.
+
+    Args:
+        description: The cable.
+        tables: Of the shape of what is measured.
+        truth: What is given.
+        key: Random key.
+        once: See `simulate`.
 
     Raises:
         UsageError: A name in `truth` is no parameter.
@@ -49,14 +58,23 @@ def true_values(
     if unknown:
         known = ", ".join(p.name for p in space.parameters)
         raise UsageError(f"{unknown[0]!r} is no parameter of this cable; its parameters are {known}.")
-    drawn = np.asarray(space.vector(jax.random.normal(key, (space.size,)))) if space.size else np.zeros(0)
+
+    def draw(key: jax.Array) -> jax.Array:
+        return space.vector(jax.random.normal(key, (space.size,)))
+
+    drawn = np.asarray(_worked_out(draw, key, once=once)) if space.size else np.zeros(0)
     values = {p.name: float(v) for p, v in zip(space.free, drawn, strict=True)}
     values |= {p.name: float(p.fixed or 0.0) for p in space.fixed}
     return values | {p.name: truth[p.name] / p.shown_scale for p in space.parameters if p.name in truth}
 
 
 def simulate(
-    description: Description, design: Design, values: Mapping[str, float], key: jax.Array, noise: bool = True
+    description: Description,
+    design: Design,
+    values: Mapping[str, float],
+    key: jax.Array,
+    noise: bool = True,
+    once: bool = False,
 ) -> Dataset:
     """Tables as a bench would give them.
 
@@ -66,13 +84,21 @@ def simulate(
         values: True value of every parameter [internal units].
         key: Random key.
         noise: Whether readings scatter; without noise every reading is what the model expects.
+        once: Whether this design is measured just once, so that one program of its own is compiled in a third of the time of
+            some hundred small ones, which would serve again.
     """
     dataset = Dataset(description, empty_tables(description, design), {})
-    return simulated_again(dataset, values, key, noise=noise, beyond_curves=True)
+    return simulated_again(dataset, values, key, noise=noise, beyond_curves=True, once=once)
 
 
 def simulated_again(
-    dataset: Dataset, values: Mapping[str, float], key: jax.Array, *, noise: bool = True, beyond_curves: bool = False
+    dataset: Dataset,
+    values: Mapping[str, float],
+    key: jax.Array,
+    *,
+    noise: bool = True,
+    beyond_curves: bool = False,
+    once: bool = False,
 ) -> Dataset:
     """The same tables, with readings drawn anew at known coefficients.
 
@@ -86,6 +112,7 @@ def simulated_again(
         noise: Whether readings scatter.
         beyond_curves: Whether angles outside the range of the curves are drawn too, from the curves; else they are kept, as
             the rows' own wrap angles are.
+        once: See `simulate`.
 
     Raises:
         DatasetError: A table cannot be drawn anew, or the recordings drawn have no strokes that could be found.
@@ -94,11 +121,26 @@ def simulated_again(
     cable, scale = build_model(dataset).cable, 1.0 if noise else 0.0
     angles, beyond = dataset.measurements.table(AngleTable), {}
     if beyond_curves and angles is not None:
-        beyond = {"angles": drawn_angles(angles, Truth(cable, angles, named, key, scale), everywhere=True)}
+        own = angles
+
+        def draw(named: Mapping[str, jax.Array], key: jax.Array) -> dict[str, jax.Array]:
+            return drawn_angles(own, Truth(cable, own, named, key, scale), everywhere=True)
+
+        beyond = {"angles": _worked_out(draw, named, key, once=once)}
         angle, limit = (np.asarray(beyond["angles"][name]) for name in ("angle", "limit"))
         tables = dataset.measurements.with_tables(replace(angles, angle=angle, limit=limit))
         dataset = replace(dataset, measurements=tables)
-    return with_readings(dataset, drawn_readings(cable, dataset.measurements, named, key, scale) | beyond)
+    tables = dataset.measurements
+
+    def readings(named: Mapping[str, jax.Array], key: jax.Array) -> Readings:
+        return drawn_readings(cable, tables, named, key, scale)
+
+    return with_readings(dataset, _worked_out(readings, named, key, once=once) | beyond)
+
+
+def _worked_out(function: Callable[..., Any], *arguments: Any, once: bool) -> Any:
+    """What a function of arrays gives, as one program where it is asked for once."""
+    return (compile_program(function, *arguments, run_once=True) if once else function)(*arguments)
 
 
 def with_readings(dataset: Dataset, readings: Mapping[str, Mapping[str, jax.Array]]) -> Dataset:

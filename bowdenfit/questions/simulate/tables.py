@@ -84,10 +84,10 @@ def make(bench: BenchPlan, key: jax.Array, noise: bool) -> tuple[Dataset, dict[s
 
     of_truth, of_readings = jax.random.split(key)
     tables = empty_tables(bench.description, bench.design)
-    values = true_values(bench.description, tables, bench.truth, of_truth)
+    values = true_values(bench.description, tables, bench.truth, of_truth, once=True)
     space = build_model(Dataset(bench.description, tables, {})).space
     shown = {p.name: values[p.name] * p.shown_scale for p in space.parameters}
-    return simulate(bench.description, bench.design, values, of_readings, noise), shown
+    return simulate(bench.description, bench.design, values, of_readings, noise, once=True), shown
 
 
 def write(bench: BenchPlan, dataset: Dataset, truth: Mapping[str, float], folder: Path, seed: int) -> None:

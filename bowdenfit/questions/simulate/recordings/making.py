@@ -63,7 +63,7 @@ def make_recordings(plan: RecordingsPlan, seed: int, noise: bool = True) -> Made
     design = design_without_recordings(plan.description, plan.angles)
     tables, given = empty_tables(plan.description, design), dict(plan.truth)
     force_noise = given.pop(FORCE_NOISE, abs(of_noise.standard_normal()) * _CELL_NOISE)
-    values = true_values(plan.description, tables, given, of_truth)
+    values = true_values(plan.description, tables, given, of_truth, once=True)
     model = build_model(Dataset(plan.description, tables, {}))
     truth = {p.name: values[p.name] * p.shown_scale for p in model.space.parameters} | {FORCE_NOISE: float(force_noise)}
     named = {name: jnp.asarray(value, dtype=float) for name, value in values.items()}
@@ -80,7 +80,7 @@ def make_recordings(plan: RecordingsPlan, seed: int, noise: bool = True) -> Made
         simulated = simulate_recording(exponent, one.friction, one.profile, one.bench, one.faults, generator, effect)
         wrap = dict(zip(contacts, map(float, angles[i]), strict=True))
         each.append(MadeRecording(one, simulated, exponent, effect, wrap))
-    dataset = simulate(plan.description, design, values, of_readings, noise) if plan.angles else None
+    dataset = simulate(plan.description, design, values, of_readings, noise, once=True) if plan.angles else None
     table = dataset.measurements.table(AngleTable) if dataset else None
     made = () if table is None else (_with_measured(table, plan, values[ANGLE_NOISE] * noise, of_angles),)
     return MadeRecordings(plan, seed, {**truth, **_common_truth(each)}, Measurements(made), tuple(each))

@@ -7,17 +7,32 @@ twice as long to sample on two idle cores, and 3.6 times with another fit beside
 import os
 from collections.abc import Iterator
 from contextlib import contextmanager
+from threading import Lock
+from typing import Any
 
 _ASKED = "OPENBLAS_NUM_THREADS"
+_changing = Lock()
+_wanted: list[Any] = []  # the limit that is set, once for each that wants it
 
 
 @contextmanager
 def linear_algebra_in_one_thread() -> Iterator[None]:
-    """Meanwhile NumPy, SciPy and what is compiled call it so, in the whole process; afterwards as before."""
+    """Meanwhile NumPy, SciPy and what is compiled call it so, in the whole process.
+
+    Afterwards it is as before; of several at a time the first sets the limit and the last takes it away.
+    """
     if os.environ.get(_ASKED) == "1":  # as the command line has it, from the start
         yield
         return
+    import scipy.linalg.cython_lapack  # noqa: F401  (what compiled programs call, which has to be there to be told)
     from threadpoolctl import threadpool_limits
 
-    with threadpool_limits(1, user_api="blas"):
+    with _changing:
+        _wanted.append(_wanted[0] if _wanted else threadpool_limits(1, user_api="blas"))
+    try:
         yield
+    finally:
+        with _changing:
+            limit = _wanted.pop()
+            if not _wanted:
+                limit.restore_original_limits()

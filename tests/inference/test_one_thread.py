@@ -46,8 +46,8 @@ def test_while_a_batch_is_fitted(on_body_squares):
         seen.update(threads())
         yield 1
 
-    settings = BatchSettings(nuts=False, target_sd_error=1.0)
-    fit_batch(LogDensity(on_body_squares.model), [LogDensity(on_body_squares.model).data], seeds(), settings)
+    posterior = LogDensity(on_body_squares.model)
+    fit_batch(posterior, [posterior.data], seeds(), BatchSettings(nuts=False, target_sd_error=1.0))
     assert seen == {1}
     assert threads() == {2}
 

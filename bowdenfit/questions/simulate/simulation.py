@@ -62,7 +62,8 @@ def true_values(
     def draw(key: jax.Array) -> jax.Array:
         return space.vector(jax.random.normal(key, (space.size,)))
 
-    drawn = np.asarray(_worked_out(draw, key, once=once)) if space.size else np.zeros(0)
+    is_asked = any(p.name not in truth for p in space.free)
+    drawn = np.asarray(_worked_out(draw, key, once=once)) if is_asked else np.zeros(space.size)
     values = {p.name: float(v) for p, v in zip(space.free, drawn, strict=True)}
     values |= {p.name: float(p.fixed or 0.0) for p in space.fixed}
     return values | {p.name: truth[p.name] / p.shown_scale for p in space.parameters if p.name in truth}
@@ -128,8 +129,8 @@ def simulated_again(
 
         beyond = {"angles": _worked_out(draw, named, key, once=once)}
         angle, limit = (np.asarray(beyond["angles"][name]) for name in ("angle", "limit"))
-        tables = dataset.measurements.with_tables(replace(angles, angle=angle, limit=limit))
-        dataset = replace(dataset, measurements=tables)
+        measured = dataset.measurements.with_tables(replace(angles, angle=angle, limit=limit))
+        dataset = replace(dataset, measurements=measured)
     tables = dataset.measurements
 
     def readings(named: Mapping[str, jax.Array], key: jax.Array) -> Readings:

@@ -24,6 +24,7 @@ from bowdenfit.inference.objective import LOWER_END, Objective, Problem, Solutio
 from bowdenfit.inference.other_minima import PINS, fitting_as_well, range_of_minima
 from bowdenfit.inference.prior_numbers import z_at
 from bowdenfit.inference.profiles import Basin, limits
+from bowdenfit.inference.solver import ROUGH
 from bowdenfit.parameters.priors import HalfCauchy, LogNormal, Uniform
 from bowdenfit.parameters.space import Parameter
 from bowdenfit.words import significant
@@ -250,7 +251,7 @@ def _pinned_elsewhere(problem: Problem, start: np.ndarray) -> list[Solution]:
     parameters = problem.posterior.model.space.free
     roles = ["friction", "elastic"] if any(p.role == "elastic" for p in parameters) else []
     each = [np.arange(len(start)) == i for i, p in enumerate(parameters) if p.role in roles]
-    return [problem.solve(start, this, np.where(this, z, 0.0), quick=True) for this, z in product(each, PINS)]
+    return [problem.solve(start, this, np.where(this, z, 0.0), ROUGH) for this, z in product(each, PINS)]
 
 
 def _estimates(

@@ -13,7 +13,7 @@ from jax import Array
 
 from bowdenfit.inference.compilation import compile_program
 from bowdenfit.inference.log_density import LogDensity
-from bowdenfit.inference.solver import minimize, prepare
+from bowdenfit.inference.solver import PRECISE, Precision, minimize, prepare
 from bowdenfit.parameters.priors import HalfCauchy, HalfNormal, LogNormal, TruncatedNormal, Uniform
 from bowdenfit.parameters.space import Parameter
 
@@ -21,6 +21,7 @@ Solution = dict[str, Any]
 Objective = Callable[..., Solution]
 
 _TIE = 1e-6  # weight of z that keeps what no reading tells from wandering off, and moves nothing else
+_KEPT = 4  # evaluations, the last of which is mostly where a solve ends
 LOWER_END = -38.0  # z at which a quantile reaches the lower end of its support in double precision
 
 
@@ -28,7 +29,7 @@ def make_objective(posterior: LogDensity) -> Objective:
     """One compiled program for every solve: which parameters are pinned and whether priors count are arguments.
 
     The objective takes the z to start from, which parameters are pinned and where, the weight of each z as a residual of
-    its own (1 with the priors, 0 without), the data, and whether to be quick. It gives z, values and their slope by z,
+    its own (1 with the priors, 0 without), the data, and with which precision. It gives z, values and their slope by z,
     residuals and expected readings by term, all residuals with those of the priors stacked, the Jacobian of the residuals
     (zero for pinned parameters; `sensitivity` has theirs too), and whether the solver succeeded.
     """
@@ -41,16 +42,23 @@ def make_objective(posterior: LogDensity) -> Objective:
         program = compile_program(evaluated, vector, vector, posterior.data, run_once=True)
 
     def objective(
-        start: np.ndarray, pinned: np.ndarray, pin: np.ndarray, weight: np.ndarray, data: Any, quick: bool = False
+        start: np.ndarray, pinned: np.ndarray, pin: np.ndarray, weight: np.ndarray, data: Any, precision: Precision
     ) -> Solution:
+        latest: dict[bytes, Solution] = {}
+
         def everything(z: np.ndarray) -> Solution:
-            return program(np.where(pinned, pin, z), weight, data)
+            there = np.where(pinned, pin, z)
+            if there.tobytes() not in latest:
+                if len(latest) == _KEPT:
+                    del latest[next(iter(latest))]
+                latest[there.tobytes()] = program(there, weight, data)
+            return latest[there.tobytes()]
 
         def evaluate(z: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
             found = everything(z)
             return np.asarray(found["stacked"]), np.where(pinned, 0.0, found["jacobian"])
 
-        minimum = minimize(evaluate, np.where(pinned, pin, start), quick)
+        minimum = minimize(evaluate, np.where(pinned, pin, start), precision)
         found = jax.tree.map(np.asarray, everything(minimum.x))
         sensitivity = found["jacobian"][: -space.size]
         jacobian = np.where(pinned, 0.0, sensitivity)
@@ -106,18 +114,26 @@ class Problem:
         return noise_scales(self.posterior)
 
     @cached_property
+    def weight(self) -> np.ndarray:
+        """Of each z as a residual of its own."""
+        return np.where(self.noise, 0.0, 1.0 if self.with_priors else _TIE)
+
+    @cached_property
     def data(self) -> Any:
         """The posterior's data where the compiled program wants them; putting them there costs as much as some evaluations."""
         return jax.device_put(self.posterior.data)
 
     def solve(
-        self, start: np.ndarray, pinned: np.ndarray | bool = False, pin: np.ndarray | None = None, quick: bool = False
+        self,
+        start: np.ndarray,
+        pinned: np.ndarray | bool = False,
+        pin: np.ndarray | None = None,
+        precision: Precision = PRECISE,
     ) -> Solution:
         """The minimum with further parameters pinned; without priors z weighs so little that it only breaks ties."""
-        weight = np.where(self.noise, 0.0, 1.0 if self.with_priors else _TIE)
         pin = np.zeros(len(start)) if pin is None else pin
         at = np.where(self.noise & (pin == 0), self.noise_z, pin)
-        return self.objective(start, self.noise | pinned, at, weight, self.data, quick)
+        return self.objective(start, self.noise | pinned, at, self.weight, self.data, precision)
 
 
 def sum_of_squares(found: Solution) -> float:

@@ -28,6 +28,7 @@ from bowdenfit.display import Part
 from bowdenfit.inference.linearized import blocks, linearize
 from bowdenfit.inference.log_density import LogDensity
 from bowdenfit.inference.objective import LOWER_END, Objective, Problem, Solution, may_end
+from bowdenfit.inference.solver import QUICK, gauss_newton
 from bowdenfit.parameters.priors import Uniform
 from bowdenfit.parameters.space import Parameter
 
@@ -37,6 +38,8 @@ _ALWAYS = ("friction", "friction_model")  # roles whose intervals are worth thei
 _SMALL = 20_000  # entries of the Jacobian up to which every parameter's interval is
 _INSIDE = 2.0  # size of z a little inside the range of a parameter that is at an end of it
 _PRECISION = 3e-4  # of a limit, in the steps that lead to it
+_FAR = 1.0  # step of another parameter that is not foretold [z]
+_BEYOND = 1.5  # how far the second step goes, in parts of the way that is left by the first
 _MOST_STEPS = 50
 _LEAST_STEP, _MOST_STEP, _LONGEST_STEP = 1e-6, 1.0, 8.0  # first step from the minimum, and all others [z]
 
@@ -76,20 +79,37 @@ class Basin:
         """The free parameters."""
         return self.problem.posterior.model.space.free
 
-    def moved(self, index: int, z: float, start: np.ndarray) -> Solution:
-        """The minimum with one parameter pinned at z; others leave the end of their range where that is better."""
-        this = np.arange(len(start)) == index
+    def moved(self, index: int, z: float, near: Solution) -> Solution:
+        """The minimum with one parameter pinned at z; others leave the end of their range where that is better.
+
+        Args:
+            index: Of the parameter.
+            z: Where it is pinned.
+            near: The minimum with it pinned elsewhere, or free.
+        """
+        this = np.arange(len(near["z"])) == index
         ended = self.at_end & ~this
         pin = np.where(this, z, self.found["z"])
-        found = self._solved(start, this | ended, pin)
+        found = self._solved(self._toward(near, this, z), this | ended, pin)
         side = np.sign(self.found["z"])
         inside = np.where(ended, side * _INSIDE, found["z"])
         if not ended.any() or not np.any(ended & (side * self._gradient(inside) > 0)):
             return found
         return min(found, self._solved(inside, this, pin), key=_total)
 
+    def _toward(self, near: Solution, this: np.ndarray, z: float) -> np.ndarray:
+        """Where the others follow it to in a straight line; where they are, if that is far, since few lines stay straight."""
+        others = ~(self.problem.noise | self.at_end | this)
+        jacobian = np.concatenate([near["sensitivity"], np.diag(self.problem.weight)])
+        residuals = near["stacked"] + jacobian @ np.where(this, z - near["z"], 0.0)
+        if not (np.all(np.isfinite(jacobian)) and np.all(np.isfinite(residuals))):
+            return near["z"]
+        step = np.zeros(len(this))
+        step[others] = gauss_newton(jacobian[:, others], residuals)
+        return near["z"] + step if np.all(np.abs(step) <= _FAR) else near["z"]
+
     def _solved(self, start: np.ndarray, pinned: np.ndarray | bool, pin: np.ndarray) -> Solution:
-        return self.problem.solve(start, pinned, pin, quick=True)
+        return self.problem.solve(start, pinned, pin, QUICK)
 
     def _gradient(self, z: np.ndarray) -> np.ndarray:
         """Of half the sum of squares."""
@@ -101,16 +121,18 @@ class Basin:
 
         Each solve starts from the nearest one on the way from the minimum: one from beyond may lie in another valley.
         """
-        known, lowest = [self.found["z"]], _total(self.found)
+        known, lowest = [self.found], _total(self.found)
         center = float(self.found["z"][index])
 
         @cache
         def at(z: float) -> float:
-            way = [other for other in known if abs(other[index] - center) <= abs(z - center)]
-            found = self.moved(index, z, min(way, key=lambda other: abs(other[index] - z)))
+            if z == center:
+                return 0.0
+            way = [other for other in known if abs(other["z"][index] - center) <= abs(z - center)]
+            found = self.moved(index, z, min(way, key=lambda other: abs(other["z"][index] - z)))
             if not np.isfinite(_total(found)):
                 return float("nan")
-            known.append(found["z"])
+            known.append(found)
             return _total(found) - lowest
 
         return at
@@ -173,7 +195,7 @@ def _spread(basin: Basin, scale: np.ndarray, index: int) -> tuple[float, float, 
     """
     found, terms = basin.found, basin.problem.posterior.model.terms
     if basin.at_end[index]:  # where z has no influence; a little inside its range
-        found = basin.moved(index, float(np.copysign(_INSIDE, basin.found["z"][index])), basin.found["z"])
+        found = basin.moved(index, float(np.copysign(_INSIDE, basin.found["z"][index])), basin.found)
     columns = np.flatnonzero(~basin.problem.noise & ~basin.at_end | (np.arange(len(basin.at_end)) == index))
     about = linearize(found["sensitivity"][:, columns])
     place = int(np.searchsorted(columns, index))
@@ -215,33 +237,49 @@ def interval(
 def _limit(above: Callable[[float], float], center: float, step: float) -> float:
     """Where a function that is negative at the center first becomes positive, going by growing steps.
 
-    Where it is not a number short of there, the interval is the wider one.
+    About a good minimum it is nearly straight. So the second step goes a little farther than a straight line would have to,
+    and no farther than the usual one. Where it is not a number short of there, the interval is the wider one.
     """
     def known(z: float) -> float:
         return float(np.nan_to_num(above(z), nan=-1.0))
 
-    inside, end = center, np.copysign(FARTHEST, step)
+    inside, ahead, end, least = center, step, np.copysign(FARTHEST, step), above(center)
     for _ in range(_MOST_STEPS):
-        outside = float(np.clip(inside + step, -FARTHEST, FARTHEST))
+        outside = float(np.clip(inside + ahead, -FARTHEST, FARTHEST))
         reached = above(outside)
-        if reached >= 0:
-            return _crossing(known, inside, outside, _PRECISION * abs(step)) if reached > 0 else outside
+        if abs(reached) <= _PRECISION * abs(least):
+            return outside
+        if reached > 0:
+            return _crossing(known, inside, outside, _PRECISION * abs(ahead), _PRECISION * abs(least))
         if np.isnan(reached):
-            step /= 4
+            step = ahead = ahead / 4
         else:
-            inside, step = outside, float(np.clip(2 * step, -_LONGEST_STEP, _LONGEST_STEP))
+            straight = abs(_BEYOND * ahead * reached / (reached - least)) if inside == center and reached > least else np.inf
+            step = float(np.clip(2 * step, -_LONGEST_STEP, _LONGEST_STEP)) if ahead == step else step
+            inside, ahead = outside, float(np.copysign(min(abs(step), straight), step))
         if inside == end or abs(step) < _LEAST_STEP:
             break
     return float(np.copysign(np.inf, step))
 
 
-def _crossing(above: Callable[[float], float], inside: float, outside: float, tolerance: float) -> float:
+def _crossing(
+    above: Callable[[float], float], inside: float, outside: float, tolerance: float, close: float = 0.0
+) -> float:
     """Where a function goes through zero between two points at which it has either sign.
 
     By inverse interpolation through the last three points where that is safe, else halfway (Chandrupatla, Advances in
-    Engineering Software 28 (1997), 145); SciPy has it too, but takes a quarter of a second to load.
+    Engineering Software 28 (1997), 145), but for the first point, which is on the straight line; SciPy has it too, but takes a
+    quarter of a second to load.
+
+    Args:
+        above: The function.
+        inside, outside: The points.
+        tolerance: How near a point has to be.
+        close: Size of the function that is as good as zero.
     """
-    (last, found), (other, opposite), part = (outside, above(outside)), (inside, above(inside)), 0.5
+    (last, found), (other, opposite) = (outside, above(outside)), (inside, above(inside))
+    part, least = found / (found - opposite), tolerance / 2 / abs(inside - outside)
+    part = min(max(part, least), 1 - least)
     while True:
         at = last + part * (other - last)
         value = above(at)
@@ -250,7 +288,7 @@ def _crossing(above: Callable[[float], float], inside: float, outside: float, to
             before, was, other, opposite = other, opposite, last, found
         last, found = at, value
         least = tolerance / 2 / abs(other - last)
-        if found == 0 or least > 0.5:
+        if abs(found) <= close or least > 0.5:
             return last if abs(found) < abs(opposite) else other
         place, height = (last - other) / (before - other), (found - opposite) / (was - opposite)
         part = 0.5

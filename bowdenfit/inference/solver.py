@@ -12,15 +12,12 @@ References:
 
 from collections.abc import Callable
 from dataclasses import dataclass, replace
+from typing import NamedTuple
 
 import numpy as np
 
 Evaluate = Callable[[np.ndarray], tuple[np.ndarray, np.ndarray]]
 
-# Relative change of parameters and of the sum of squares at which a method stops, and part of the residuals along the
-# tangent plane at which the polish does: as far as rounding allows, or enough for the sum of squares.
-_PRECISE, _QUICK = (1e-14, 1e-13), (1e-9, 1e-5)
-_MOST_EVALUATIONS, _MOST_QUICK = 1000, 150
 _MOST_POLISHING = 30
 _STRAIGHT = (
     0.3  # part of a step's effect by which residuals may depart from their tangent plane; at a kink they do by more
@@ -29,6 +26,29 @@ _SMOOTH = 1e-3  # part of the residuals along the tangent plane above which a po
 _SHRINKS = 0.8  # factor by which each step of the polish must shorten what is left of the gradient
 _SINGULAR = 1e-13  # of scaled singular values; a direction below it takes no step
 _RADIUS, _BOLD_RADIUS = 0.3, 100.0  # of the first step, as part of the length of the scaled parameters
+
+
+class Precision(NamedTuple):
+    """Where the solver ends.
+
+    Args:
+        change: Relative change of parameters and of the sum of squares that is none.
+        gradient: Part of the residuals along the tangent plane that is none; its square is what the sum of squares may yet fall
+            by.
+        evaluations: After how many it gives up.
+    """
+
+    change: float
+    gradient: float
+    evaluations: int
+
+
+PRECISE = Precision(1e-14, 1e-13, 1000)
+"""As far as rounding allows."""
+QUICK = Precision(1e-9, 1e-4, 150)
+"""Eight digits of the sum of squares."""
+ROUGH = Precision(1e-5, 1e-3, 150)
+"""Five digits."""
 
 
 @dataclass(frozen=True)
@@ -46,23 +66,25 @@ class Minimum:
         return float(self.residuals @ self.residuals)
 
 
-def minimize(evaluate: Evaluate, start: np.ndarray, quick: bool = False) -> Minimum:
+def minimize(evaluate: Evaluate, start: np.ndarray, precision: Precision = PRECISE) -> Minimum:
     """Least squares from a start.
 
     Args:
         evaluate: Residuals, at least as many as parameters, and their Jacobian.
         start: Parameters to start from.
-        quick: Whether eight digits of the sum of squares are enough, instead of all that rounding leaves.
+        precision: Of the sum of squares.
     """
     first = Minimum(start, *evaluate(start), not len(start))
     if not len(start) or not np.all(np.isfinite(first.residuals)):
         return first
-    found = _polish(evaluate, _descend(evaluate, first, quick, _RADIUS), quick)
-    if found.succeeded and _gauss_newton(found)[1] <= _SMOOTH * np.linalg.norm(found.residuals):
+    if not np.any(first.jacobian):  # nothing moves the residuals
+        return replace(first, succeeded=True)
+    found = _polish(evaluate, _descend(evaluate, first, precision, _RADIUS), precision)
+    if found.succeeded and _left(found)[1] <= _SMOOTH * np.linalg.norm(found.residuals):
         return found
     # It has stopped short: at a kink of the residuals, or in a long bend. One that ran out of evaluations goes on.
-    again = (found,) if quick and not found.succeeded else (first, found)
-    others = [_polish(evaluate, _descend(evaluate, at, quick, _BOLD_RADIUS), quick) for at in again]
+    again = (found,) if precision != PRECISE and not found.succeeded else (first, found)
+    others = [_polish(evaluate, _descend(evaluate, at, precision, _BOLD_RADIUS), precision) for at in again]
     return min([found, *others], key=lambda m: (not m.succeeded, m.sum_of_squares))
 
 
@@ -89,15 +111,22 @@ def orthogonal(jacobian: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     return q, np.linalg.inv(r) / size[:, None]
 
 
-def _descend(evaluate: Evaluate, at: Minimum, quick: bool, radius: float) -> Minimum:
+def gauss_newton(jacobian: np.ndarray, residuals: np.ndarray) -> np.ndarray:
+    """The undamped step: to the minimum where residuals are linear, and none in a direction that they do not tell."""
+    size = np.linalg.norm(jacobian, axis=0)
+    size = np.where(size > 0, size, np.inf)
+    return -np.linalg.lstsq(jacobian / size, residuals, _SINGULAR)[0] / size
+
+
+def _descend(evaluate: Evaluate, at: Minimum, precision: Precision, radius: float) -> Minimum:
     """Where Levenberg-Marquardt from a point ends."""
     from bowdenfit.inference.levenberg_marquardt import stepper
 
-    settings = (*(_QUICK if quick else _PRECISE), radius)
+    settings = precision.change, precision.gradient, radius
     advance, state = stepper(*at.jacobian.shape)
     best, x = replace(at, succeeded=False), at.x
     with np.errstate(over="ignore", invalid="ignore"):  # a step may go where nothing can be computed, and is taken back
-        for count in range(_MOST_QUICK if quick else _MOST_EVALUATIONS):
+        for count in range(precision.evaluations):
             x, state, trial, done = advance(settings, count == 0, x, state, at.residuals, at.jacobian)
             best = at if np.array_equal(x, at.x) else best
             if done:
@@ -106,17 +135,18 @@ def _descend(evaluate: Evaluate, at: Minimum, quick: bool, radius: float) -> Min
     return best
 
 
-def _polish(evaluate: Evaluate, found: Minimum, quick: bool) -> Minimum:
+def _polish(evaluate: Evaluate, found: Minimum, precision: Precision) -> Minimum:
     """Gauss-Newton steps from where a method stopped, as long as each shortens what is left of the gradient."""
-    exact, (step, left) = (_QUICK if quick else _PRECISE)[1], _gauss_newton(found)
+    step, left = _left(found)
     for _ in range(_MOST_POLISHING):
-        if left <= exact * np.linalg.norm(found.residuals) or np.any(np.abs(step) > np.maximum(np.abs(found.x), 1.0)):
+        flat = left <= precision.gradient * np.linalg.norm(found.residuals)
+        if flat or np.any(np.abs(step) > np.maximum(np.abs(found.x), 1.0)):
             break
         x = found.x + step
         trial = Minimum(x, *evaluate(x), found.succeeded)
         if not np.all(np.isfinite(trial.residuals)) or not np.all(np.isfinite(trial.jacobian)):
             break
-        next_step, next_left = _gauss_newton(trial)
+        next_step, next_left = _left(trial)
         bent = np.linalg.norm(trial.residuals - found.residuals - found.jacobian @ step)
         if next_left > _SHRINKS * left or bent > _STRAIGHT * left:
             break
@@ -124,10 +154,8 @@ def _polish(evaluate: Evaluate, found: Minimum, quick: bool) -> Minimum:
     return found
 
 
-def _gauss_newton(found: Minimum) -> tuple[np.ndarray, float]:
+def _left(found: Minimum) -> tuple[np.ndarray, float]:
     """The undamped step, and the length of the residuals along the tangent plane, which it would take off."""
     jacobian = np.where(np.isfinite(found.jacobian), found.jacobian, 0.0)
-    size = np.linalg.norm(jacobian, axis=0)
-    size = np.where(size > 0, size, np.inf)
-    step = -np.linalg.lstsq(jacobian / size, found.residuals, _SINGULAR)[0] / size
+    step = gauss_newton(jacobian, found.residuals)
     return step, float(np.linalg.norm(jacobian @ step))

@@ -274,21 +274,21 @@ def test_the_solver_leaves_what_has_no_parameters_alone():
     assert found.succeeded and found.sum_of_squares == 25.0
 
 
-def test_a_quick_solve_has_eight_digits_of_the_sum_of_squares_with_fewer_evaluations():
+@pytest.mark.parametrize(("precision", "digits"), [(solver.QUICK, 8), (solver.ROUGH, 5)])
+def test_a_quick_solve_has_its_digits_of_the_sum_of_squares_with_fewer_evaluations(precision, digits):
     x, rng = np.linspace(0.0, 2.0, 30), np.random.default_rng(1)
     y = 3.0 * np.exp(0.7 * x) + 0.2 * rng.standard_normal(30)
     counts, sums = [], []
-    for quick in (False, True):
+    for asked in (solver.PRECISE, precision):
         calls = []
         evaluate = _exponential(x, y)
-        found = minimize(lambda p, kept=calls, f=evaluate: kept.append(p) or f(p), np.array([1.0, 0.0]), quick)
+        found = minimize(lambda p, kept=calls, f=evaluate: kept.append(p) or f(p), np.array([1.0, 0.0]), asked)
         counts.append(len(calls))
         sums.append(found.sum_of_squares)
-    assert sums[1] == pytest.approx(sums[0], rel=1e-8)
+    assert sums[1] == pytest.approx(sums[0], rel=10.0**-digits)
     assert counts[1] < counts[0]
 
 
-def test_the_solver_says_when_it_did_not_get_there(monkeypatch):
-    monkeypatch.setattr(solver, "_MOST_EVALUATIONS", 2)
-    x = np.linspace(0.0, 2.0, 9)
-    assert not minimize(_exponential(x, 3.0 * np.exp(5.0 * x)), np.array([1.0, -3.0])).succeeded
+def test_the_solver_says_when_it_did_not_get_there():
+    x, two = np.linspace(0.0, 2.0, 9), solver.PRECISE._replace(evaluations=2)
+    assert not minimize(_exponential(x, 3.0 * np.exp(5.0 * x)), np.array([1.0, -3.0]), two).succeeded

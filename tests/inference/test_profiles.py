@@ -158,6 +158,32 @@ def test_where_the_model_cannot_be_computed_short_of_the_limit_the_interval_is_t
     assert stats.norm.ppf(0.95) < high <= 1.71
 
 
+def test_a_limit_just_beyond_a_step_or_far_beyond_a_flat_stretch_is_found():
+    """A first step that falls short by any little must not leave steps too small to get on with."""
+    quantile = stats.norm.ppf(0.95)
+    for short in 10.0 ** -np.arange(1, 14):
+        _, high = interval(lambda z, s=short: z**2 * (1 - s) ** 2, 0.0, 1.0, 1.0, 1e9)
+        assert high == pytest.approx(quantile / (1 - short), rel=1e-3)
+        flat = (quantile * (1 - short)) ** 2  # where it stays from the first step to 20, and then rises
+        _, high = interval(lambda z, f=flat: max(min(z**2, f), (z - 20.0) ** 3), 0.0, 1.0, 1.0, 1e9)
+        near = quantile if short < 3e-4 else 20.0 + quantile ** (2 / 3)  # within the precision of a limit, or not
+        assert near - 0.01 < high < 20.0 + quantile ** (2 / 3) + 0.01
+
+
+@pytest.mark.parametrize(("bend", "most"), [(0.0, 2), (0.02, 6), (0.1, 8)])
+def test_an_interval_takes_few_solves(bend, most):
+    """One a side where the rise is a parabola and the error is that of it, four where it is about one."""
+    asked, quantile = set(), stats.norm.ppf(0.95)
+
+    def rise(z):
+        asked.add(z)
+        return (z / 0.1) ** 2 * (1 + bend * z / 0.1)
+
+    low, high = interval(rise, 0.0, 0.1, 1.0, 1e9)
+    assert [rise(low), rise(high)] == pytest.approx([quantile**2] * 2, rel=1e-3)
+    assert len(asked - {0.0, low, high}) + 2 <= most
+
+
 def test_an_interval_that_reaches_zero_is_cut_off_there():
     angle = np.deg2rad(np.linspace(20.0, 160.0, 8))[:, None]
     loss = 0.006 * angle[:, 0] + 0.02 * np.array([1, -1, 1, 1, -1, -1, 1, -1])

@@ -278,7 +278,7 @@ def _crossing(
         close: Size of the function that is as good as zero.
     """
     (last, found), (other, opposite) = (outside, above(outside)), (inside, above(inside))
-    part, least = found / (found - opposite), tolerance / 2 / abs(inside - outside)
+    part, least = found / (found - opposite), min(tolerance / 2 / abs(inside - outside), 0.5)
     part = min(max(part, least), 1 - least)
     while True:
         at = last + part * (other - last)

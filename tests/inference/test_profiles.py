@@ -289,3 +289,9 @@ def test_a_limit_is_found_to_its_tolerance_between_any_two_points_and_on_plateau
             found = _crossing(lambda x, p=power, r=at: np.copysign(abs(abs(x) - r) ** p, abs(x) - r), 0.0, -1.0, 1e-3)
             assert found == pytest.approx(-at, abs=1e-3)
             assert _crossing(lambda x, r=at: 1e150 if x > r else -1.0, 0.0, 1.0, 1e-3) == pytest.approx(at, abs=1e-3)
+
+
+def test_a_limit_is_looked_for_between_its_points_even_where_these_are_nearer_than_the_tolerance():
+    asked = []
+    found = _crossing(lambda x: asked.append(x) or x - 37.99995, 37.9999, 38.0, 1e-2)
+    assert all(37.9999 <= x <= 38.0 for x in (found, *asked))

@@ -3,7 +3,7 @@
 from collections.abc import Callable
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
-from functools import cached_property
+from functools import cached_property, lru_cache
 from typing import Any
 
 import jax
@@ -44,15 +44,12 @@ def make_objective(posterior: LogDensity) -> Objective:
     def objective(
         start: np.ndarray, pinned: np.ndarray, pin: np.ndarray, weight: np.ndarray, data: Any, precision: Precision
     ) -> Solution:
-        latest: dict[bytes, Solution] = {}
+        @lru_cache(_KEPT)
+        def kept(z: bytes) -> Solution:
+            return program(np.frombuffer(z), weight, data)
 
         def everything(z: np.ndarray) -> Solution:
-            there = np.where(pinned, pin, z)
-            if there.tobytes() not in latest:
-                if len(latest) == _KEPT:
-                    del latest[next(iter(latest))]
-                latest[there.tobytes()] = program(there, weight, data)
-            return latest[there.tobytes()]
+            return kept(np.where(pinned, pin, z).tobytes())
 
         def evaluate(z: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
             found = everything(z)

@@ -243,14 +243,16 @@ def _limit(above: Callable[[float], float], center: float, step: float) -> float
     def known(z: float) -> float:
         return float(np.nan_to_num(above(z), nan=-1.0))
 
-    inside, ahead, end, least = center, step, np.copysign(FARTHEST, step), above(center)
+    inside, ahead, end = center, step, np.copysign(FARTHEST, step)
+    least = above(center)
+    close = _PRECISION * abs(least)
     for _ in range(_MOST_STEPS):
         outside = float(np.clip(inside + ahead, -FARTHEST, FARTHEST))
         reached = above(outside)
-        if abs(reached) <= _PRECISION * abs(least):
+        if abs(reached) <= close:
             return outside
         if reached > 0:
-            return _crossing(known, inside, outside, _PRECISION * abs(ahead), _PRECISION * abs(least))
+            return _crossing(known, inside, outside, _PRECISION * abs(ahead), close)
         if np.isnan(reached):
             step = ahead = ahead / 4
         else:

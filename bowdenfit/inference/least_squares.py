@@ -6,7 +6,7 @@ posterior at the noise scales' prior medians.
 """
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from itertools import product
 from typing import ClassVar
 
@@ -18,22 +18,20 @@ from bowdenfit.inference.departure import Departure, FarReading
 from bowdenfit.inference.disagreement import Disagreement, disagreements
 from bowdenfit.inference.interval import NORMAL_90
 from bowdenfit.inference.lack_of_fit import departures
-from bowdenfit.inference.linearized import linearize, scatter_about
 from bowdenfit.inference.log_density import LogDensity
-from bowdenfit.inference.objective import LOWER_END, Objective, Problem, Solution, may_end, sum_of_squares
+from bowdenfit.inference.minimum import FoundMinimum, lowest_minimum
+from bowdenfit.inference.objective import Objective, Problem, Solution, sum_of_squares
 from bowdenfit.inference.other_minima import PINS, fitting_as_well, range_of_minima
 from bowdenfit.inference.prior_numbers import z_at
-from bowdenfit.inference.profiles import Basin, limits
+from bowdenfit.inference.profiles import UNKNOWN, Limits
 from bowdenfit.inference.solver import ROUGH
-from bowdenfit.parameters.priors import HalfCauchy, LogNormal, Uniform
+from bowdenfit.parameters.priors import LogNormal
 from bowdenfit.parameters.space import Parameter
 from bowdenfit.words import significant
 
 UNDETERMINED = "the measurements do not determine it"
-_SUSPECT = -2.0  # below this z an estimate may be on its way to the lower end, above its negative to the upper
+KINKED = "on the way to the ends of its interval the solver is stuck at kinks of the sum of squares"
 _FARTHEST = 6.0  # z of a noise scale
-_UNKNOWN = (float("nan"), float("nan"))
-_FAR = 50.0  # standard error in units of the prior's sd beyond which data say nothing of a parameter
 
 
 @dataclass(frozen=True)
@@ -44,7 +42,7 @@ class Estimate:
         value: Estimate; NaN where not identified.
         standard_error: From the Jacobian; NaN where not identified.
         identified: Whether the data determine it.
-        remark: Why not, or that it is fixed; empty otherwise.
+        remark: Why not, that it is fixed, or why it has no interval; empty otherwise.
         lower, upper: 90 % interval by the profile of the sum of squares, cut off at the ends of the parameter's range;
             infinite where nothing limits it, NaN where it was not computed.
         at_bound: Whether the sum of squares falls all the way to the lower end of its range.
@@ -172,78 +170,39 @@ def least_squares(
         start: z to start from.
         intervals: Whether to compute the profile intervals, which take some twenty solves a parameter.
     """
-    basin = _weighed(_minimum(Problem(posterior, objective), start))
-    found, space, terms = basin.found, posterior.model.space, posterior.model.terms
-    active = np.flatnonzero(~basin.problem.noise & ~basin.at_end)
-    about = linearize(found["jacobian"][:, active])
-    scale, residual_sd = scatter_about(terms, found["residuals"], about.leverage)
-    rivals = fitting_as_well(found, _pinned_elsewhere(basin.problem, start), scale, about.readings.shape[1])
-    error, determined = np.full(space.size, np.nan), basin.at_end.copy()
-    error[active] = np.linalg.norm(about.moves(scale), axis=1)
-    determined[active] = about.determined & (np.abs(found["z"][active]) <= _FAR) & (about.unit_error <= _FAR)
-    estimates = _estimates(basin, error, determined, rivals, limits(basin, scale, determined) if intervals else {})
+    at, profiled = lowest_minimum(Problem(posterior, objective), start, intervals)
+    basin, found, space, terms = at.basin, at.basin.found, posterior.model.space, posterior.model.terms
+    others = _pinned_elsewhere(basin.problem, start)
+    rivals = fitting_as_well(found, others, at.scale, at.about.readings.shape[1])
+    estimates = _estimates(at, rivals, profiled.of)
+    message = _stopped(found, profiled)
     shown = {p.name: v * p.shown_scale for p, v in zip(space.free, found["values"], strict=True)}
     shown |= {p.name: (p.fixed or 0.0) * p.shown_scale for p in space.fixed}
     return LeastSquares(
         estimates | {p.name: Estimate(shown[p.name], np.nan, True, "fixed") for p in space.fixed},
-        {t.name: residual_sd[t.name] * float(shown[t.noise]) for t in terms},
+        {t.name: at.residual_sd[t.name] * float(shown[t.noise]) for t in terms},
         found["readings"],
-        about.condition_number,
+        at.about.condition_number,
         sum_of_squares(found),
         found["z"],
-        bool(found["succeeded"]),
-        "" if found["succeeded"] else "the solver stopped before it met its tolerance",
+        not message,
+        message,
         disagreements(terms, space.free, found),
-        *departures(basin, scale, {name: each.reach for name, each in estimates.items() if each.identified}),
+        *departures(basin, at.scale, {name: each.reach for name, each in estimates.items() if each.identified}),
         units={p.name: p.unit for p in space.parameters},
     )
 
 
-def _minimum(problem: Problem, start: np.ndarray) -> Basin:
-    """The minimum without priors, and which parameters have run to an end of their range there."""
-    parameters, n = problem.posterior.model.space.free, len(start)
-    pin, at_end, found = np.zeros(n), np.zeros(n, dtype=bool), problem.solve(start)
-    for i in np.flatnonzero(_suspect(parameters, found["z"]) & ~problem.noise):
-        this, end = np.arange(n) == i, np.copysign(LOWER_END, found["z"][i])
-        # A step can leap over the minimum into the flat tail of the map from z; only what ends there from the middle too
-        # has its minimum there.
-        again = problem.solve(np.where(this, 0.0, found["z"]), at_end, pin)
-        found = min(found, again, key=sum_of_squares)
-        if not _suspect(parameters, found["z"])[i]:
-            continue
-        trial_pin = np.where(this, end, pin)
-        trial = problem.solve(found["z"], at_end | this, trial_pin)
-        if sum_of_squares(trial) <= sum_of_squares(found) * (1 + 1e-7) + 1e-14:
-            at_end, pin, found = at_end | this, trial_pin, trial
-    return Basin(problem, found, at_end)
-
-
-def _weighed(basin: Basin) -> Basin:
-    """The minimum with the noise scales that single readings of a run each tell; the same where there are no such runs.
-
-    Their prior medians say how much more readings scatter at low loads than at high ones, which nothing else corrects.
-    """
-    problem, space = basin.problem, basin.problem.posterior.model.space
-    values = dict(zip((p.name for p in space.free), basin.found["values"], strict=True))
-    values |= {p.name: np.asarray(p.fixed) for p in space.fixed}
-    told: dict[str, float] = {}
-    for term in problem.posterior.model.terms:
-        if hasattr(term, "scatter_of_single_readings"):
-            told |= term.scatter_of_single_readings(values)
-    weighed = [name for name in told if name in space.index and isinstance(space.free[space.index[name]].prior, HalfCauchy)]
-    if not weighed or len(weighed) < len(told):
-        return basin
-    noise_z = np.zeros(space.size)
-    for name in weighed:
-        at = space.index[name]
-        noise_z[at] = np.clip(z_at(space.free[at].prior, float(told[name])), -_FARTHEST, _FARTHEST)
-    return _minimum(replace(problem, noise_z=noise_z), basin.found["z"])
-
-
-def _suspect(parameters: tuple[Parameter, ...], z: np.ndarray) -> np.ndarray:
-    """Which parameters may be on their way to an end of their range."""
-    limited = np.array([isinstance(p.prior, Uniform) for p in parameters], dtype=bool)
-    return (may_end(parameters) & (z < _SUSPECT)) | (limited & (z > -_SUSPECT))
+def _stopped(found: Solution, profiled: Limits) -> str:
+    """Why the solver has found no minimum; empty where it has."""
+    if not found["succeeded"]:
+        return "the solver stopped before it met its tolerance"
+    if profiled.stuck:
+        return (
+            "the solver is stuck at a kink of the sum of squares, which may be far lower elsewhere; fit without --no-mcmc: "
+            "sampling gets past kinks"
+        )
+    return "" if profiled.lower is None else "every minimum that was found led to a lower one; fit without --no-mcmc"
 
 
 def _pinned_elsewhere(problem: Problem, start: np.ndarray) -> list[Solution]:
@@ -255,18 +214,15 @@ def _pinned_elsewhere(problem: Problem, start: np.ndarray) -> list[Solution]:
 
 
 def _estimates(
-    basin: Basin,
-    error: np.ndarray,
-    determined: np.ndarray,
-    rivals: Sequence[Solution],
-    profiled: Mapping[str, tuple[float, float]],
+    at: FoundMinimum, rivals: Sequence[Solution], profiled: Mapping[str, tuple[float, float]]
 ) -> dict[str, Estimate]:
     """Estimates of the free parameters but for noise scales, from their standard errors in z and their limits."""
+    basin, error, determined = at.basin, at.error, at.determined
     found, estimates = basin.found, {}
     for i, p in enumerate(basin.parameters):
         if basin.problem.noise[i]:
             continue
-        value, limit = float(found["values"][i] * p.shown_scale), profiled.get(p.name, _UNKNOWN)
+        value, limit = float(found["values"][i] * p.shown_scale), profiled.get(p.name, UNKNOWN)
         sd = float(abs(found["slope"][i] * error[i]) * p.shown_scale)
         others = [float(r["values"][i]) * p.shown_scale for r in rivals]
         if basin.at_end[i]:
@@ -279,7 +235,8 @@ def _estimates(
             remark = f"values from {significant(ends[0])} to {significant(ends[1])} fit about as well"
             estimates[p.name] = Estimate(np.nan, np.nan, False, remark, *limit)
         else:
-            estimates[p.name] = Estimate(value, sd, True, "", *limit)
+            kinked = p.name in profiled and np.isnan(limit[0])
+            estimates[p.name] = Estimate(value, sd, True, KINKED if kinked else "", *limit)
     return estimates
 
 

@@ -31,7 +31,8 @@ def make_objective(posterior: LogDensity) -> Objective:
     The objective takes the z to start from, which parameters are pinned and where, the weight of each z as a residual of
     its own (1 with the priors, 0 without), the data, and with which precision. It gives z, values and their slope by z,
     residuals and expected readings by term, all residuals with those of the priors stacked, the Jacobian of the residuals
-    (zero for pinned parameters; `sensitivity` has theirs too), and whether the solver succeeded.
+    (zero for pinned parameters; `sensitivity` has theirs too), whether the solver succeeded, and by how much the tangent plane
+    says that the sum of squares would yet fall.
     """
     space = posterior.model.space
     vector = jax.ShapeDtypeStruct((space.size,), jnp.float64)
@@ -59,7 +60,8 @@ def make_objective(posterior: LogDensity) -> Objective:
         found = jax.tree.map(np.asarray, everything(minimum.x))
         sensitivity = found["jacobian"][: -space.size]
         jacobian = np.where(pinned, 0.0, sensitivity)
-        return found | {"jacobian": jacobian, "sensitivity": sensitivity, "succeeded": minimum.succeeded}
+        said = {"succeeded": minimum.succeeded, "fall": minimum.fall}
+        return found | {"jacobian": jacobian, "sensitivity": sensitivity} | said
 
     return objective
 

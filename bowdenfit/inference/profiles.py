@@ -18,30 +18,28 @@ References:
     Satterthwaite, An approximate distribution of estimates of variance components, Biometrics Bulletin 2 (1946), 110.
 """
 
-from collections.abc import Callable, Sequence
-from dataclasses import dataclass
-from functools import cache
+from collections.abc import Sequence
+from dataclasses import dataclass, field
 
 import numpy as np
 
 from bowdenfit.display import Part
 from bowdenfit.inference.linearized import blocks, linearize
 from bowdenfit.inference.log_density import LogDensity
-from bowdenfit.inference.objective import LOWER_END, Objective, Problem, Solution, may_end
+from bowdenfit.inference.objective import Objective, Problem, Solution, may_end
+from bowdenfit.inference.profile_limits import FARTHEST, interval, quantile
 from bowdenfit.inference.solver import QUICK, gauss_newton
 from bowdenfit.parameters.priors import Uniform
 from bowdenfit.parameters.space import Parameter
 
-PROBABILITY = 0.9
-FARTHEST = -LOWER_END
+UNKNOWN = (float("nan"), float("nan"))
+_STUCK = 0.05  # part of what limits a parameter by which the sum of squares yet falls where the solver is stuck
+_ROUNDING = 1e-12  # of a sum of squares, which all of it is without scatter
 _ALWAYS = ("friction", "friction_model")  # roles whose intervals are worth their time in large problems
 _SMALL = 20_000  # entries of the Jacobian up to which every parameter's interval is
 _INSIDE = 2.0  # size of z a little inside the range of a parameter that is at an end of it
-_PRECISION = 3e-4  # of a limit, in the steps that lead to it
 _FAR = 1.0  # step of another parameter that is not foretold [z]
-_BEYOND = 1.5  # how far the second step goes, in parts of the way that is left by the first
-_MOST_STEPS = 50
-_LEAST_STEP, _MOST_STEP, _LONGEST_STEP = 1e-6, 1.0, 8.0  # first step from the minimum, and all others [z]
+_LOWER = 0.01  # the same by which another minimum is a lower one
 
 
 @dataclass(frozen=True, repr=False)
@@ -95,7 +93,7 @@ class Basin:
         inside = np.where(ended, side * _INSIDE, found["z"])
         if not ended.any() or not np.any(ended & (side * self._gradient(inside) > 0)):
             return found
-        return min(found, self._solved(inside, this, pin), key=_total)
+        return min(found, self._solved(inside, this, pin), key=total)
 
     def _toward(self, near: Solution, this: np.ndarray, z: float) -> np.ndarray:
         """Where the others follow it to in a straight line; where they are, if that is far, since few lines stay straight."""
@@ -116,27 +114,6 @@ class Basin:
         there = self._solved(z, True, z)
         return there["stacked"][: -len(z)] @ there["sensitivity"]
 
-    def rise(self, index: int) -> Callable[[float], float]:
-        """By how much the sum of squares is larger where z of a parameter is pinned; not a number where it has none.
-
-        Each solve starts from the nearest one on the way from the minimum: one from beyond may lie in another valley.
-        """
-        known, lowest = [self.found], _total(self.found)
-        center = float(self.found["z"][index])
-
-        @cache
-        def at(z: float) -> float:
-            if z == center:
-                return 0.0
-            way = [other for other in known if abs(other["z"][index] - center) <= abs(z - center)]
-            found = self.moved(index, z, min(way, key=lambda other: abs(other["z"][index] - z)))
-            if not np.isfinite(_total(found)):
-                return float("nan")
-            known.append(found)
-            return _total(found) - lowest
-
-        return at
-
     def value(self, index: int, z: float) -> float:
         """Value of a parameter at z, in its shown unit; infinite where its range has no end."""
         parameter = self.parameters[index]
@@ -147,6 +124,45 @@ class Basin:
         at = np.clip(np.full(len(self.parameters), z), -FARTHEST, FARTHEST)
         values = self._solved(at, True, at)["values"]
         return float(values[index]) * parameter.shown_scale
+
+
+class Rise:
+    """By how much the sum of squares is larger where z of a parameter is pinned; not a number where it has none.
+
+    Each solve starts from the nearest one on the way from the minimum: one from beyond may lie in another valley.
+
+    Args:
+        basin: The minimum.
+        index: Of the parameter.
+    """
+
+    def __init__(self, basin: Basin, index: int) -> None:
+        self._basin, self._index = basin, index
+        self._known = {float(basin.found["z"][index]): basin.found}
+        self._center, self._least = float(basin.found["z"][index]), total(basin.found)
+
+    def __call__(self, z: float) -> float:
+        """The rise at z."""
+        if z not in self._known:
+            way = [at for at in self._known if abs(at - self._center) <= abs(z - self._center) and self._told(at)]
+            self._known[z] = self._basin.moved(self._index, z, self._known[min(way, key=lambda at: abs(at - z))])
+        return total(self._known[z]) - self._least if self._told(z) else float("nan")
+
+    def _told(self, z: float) -> bool:
+        return bool(np.isfinite(total(self._known[z])))
+
+    @property
+    def lowest(self) -> Solution:
+        """Where the sum of squares was the least."""
+        return min((found for at, found in self._known.items() if self._told(at)), key=total)
+
+    @property
+    def most_fall(self) -> float:
+        """How far the sum of squares may lie above its least, by the steepest place at which the solver ended.
+
+        At a kink of the residuals it ends where their tangent plane says that much is to be gained.
+        """
+        return max(found["fall"] for at, found in self._known.items() if self._told(at))
 
 
 def profile(
@@ -170,22 +186,48 @@ def profile(
     problem, index = Problem(posterior, objective, with_priors), posterior.model.space.index[name]
     found = problem.solve(start)
     basin = Basin(problem, found, np.zeros_like(problem.noise))
-    rise = basin.rise(index)
+    rise = Rise(basin, index)
     pins = [float(pin) for pin in np.sort(z)]
     rises = {pin: rise(pin) for pin in sorted(pins, key=lambda pin: abs(pin - found["z"][index]))}  # outward
     return Profile(name, np.array([basin.value(index, pin) for pin in pins]), np.array([rises[pin] for pin in pins]))
 
 
-def limits(basin: Basin, scale: np.ndarray, determined: np.ndarray) -> dict[str, tuple[float, float]]:
-    """90 % intervals of determined parameters, in shown units, by the scatter of each residual about the minimum."""
-    found, cheap = {}, basin.found["jacobian"].size <= _SMALL
+@dataclass(frozen=True)
+class Limits:
+    """The 90 % intervals about a minimum.
+
+    Args:
+        of: By name, in shown units; not numbers where the solver was stuck on the way.
+        stuck: Whether it was at the minimum.
+        lower: Where the sum of squares was the least, if that is lower than the minimum.
+    """
+
+    of: dict[str, tuple[float, float]] = field(default_factory=dict)
+    stuck: bool = False
+    lower: Solution | None = None
+
+
+def limits(basin: Basin, scale: np.ndarray, determined: np.ndarray) -> Limits:
+    """90 % intervals of determined parameters, by the scatter of each residual about the minimum."""
+    found, stuck, lowest, least_level = {}, False, basin.found, np.inf
+    cheap = basin.found["jacobian"].size <= _SMALL
     for i, p in enumerate(basin.parameters):
         if determined[i] and not basin.problem.noise[i] and (cheap or p.role in _ALWAYS):
             error, ratio, freedom = _spread(basin, scale, i)
             if ratio > 0:
-                ends = interval(basin.rise(i), float(basin.found["z"][i]), error, ratio, freedom)
-                found[p.name] = basin.value(i, ends[0]), basin.value(i, ends[1])
-    return found
+                rise, level = Rise(basin, i), ratio * quantile(freedom) ** 2
+                ends = interval(rise, float(basin.found["z"][i]), error, ratio, freedom)
+                of_this = basin.value(i, ends[0]), basin.value(i, ends[1])
+                found[p.name] = UNKNOWN if is_stuck(rise.most_fall, level) else of_this
+                stuck |= is_stuck(basin.found["fall"], level)
+                lowest, least_level = min(lowest, rise.lowest, key=total), min(level, least_level)
+    lower = total(lowest) < total(basin.found) - _LOWER * least_level
+    return Limits(found, stuck, lowest if lower else None)
+
+
+def is_stuck(fall: float, level: float) -> bool:
+    """Whether a sum of squares that yet falls so far says little of where it has risen by a level."""
+    return bool(fall > max(_STUCK * level, _ROUNDING))
 
 
 def _spread(basin: Basin, scale: np.ndarray, index: int) -> tuple[float, float, float]:
@@ -210,96 +252,6 @@ def _spread(basin: Basin, scale: np.ndarray, index: int) -> tuple[float, float, 
     return float(np.sqrt(variance)), variance / float(about.unit_error[place]) ** 2, freedom_of(*np.array(parts).T)
 
 
-def interval(
-    rise: Callable[[float], float], center: float, error: float, ratio: float, freedom: float
-) -> tuple[float, float]:
-    """Limits of the 90 % interval, as z; infinite where the sum of squares never rises enough.
-
-    Args:
-        rise: By how much the sum of squares is larger at a z.
-        center: z of the minimum.
-        error: Standard error of z there; the first step is taken from it.
-        ratio: V/C, variance of the parameter over what readings of unit scatter would give it.
-        freedom: Degrees of freedom.
-    """
-    from scipy.special import stdtrit
-
-    quantile = float(stdtrit(freedom, (1 + PROBABILITY) / 2))
-
-    def above(z: float) -> float:
-        risen = rise(z)
-        return np.sqrt(max(risen, 0.0) / ratio) - quantile if np.isfinite(risen) else float("nan")
-
-    step = float(np.clip(quantile * error, _LEAST_STEP, _MOST_STEP))
-    return _limit(above, center, -step), _limit(above, center, step)
-
-
-def _limit(above: Callable[[float], float], center: float, step: float) -> float:
-    """Where a function that is negative at the center first becomes positive, going by growing steps.
-
-    About a good minimum it is nearly straight. So the second step goes a little farther than a straight line would have to,
-    and no farther than the usual one. Where it is not a number short of there, the interval is the wider one.
-    """
-    def known(z: float) -> float:
-        return float(np.nan_to_num(above(z), nan=-1.0))
-
-    inside, ahead, end = center, step, np.copysign(FARTHEST, step)
-    least = above(center)
-    close = _PRECISION * abs(least)
-    for _ in range(_MOST_STEPS):
-        outside = float(np.clip(inside + ahead, -FARTHEST, FARTHEST))
-        reached = above(outside)
-        if abs(reached) <= close:
-            return outside
-        if reached > 0:
-            return _crossing(known, inside, outside, _PRECISION * abs(ahead), close)
-        if np.isnan(reached):
-            step = ahead = ahead / 4
-        else:
-            straight = abs(_BEYOND * ahead * reached / (reached - least)) if inside == center and reached > least else np.inf
-            step = float(np.clip(2 * step, -_LONGEST_STEP, _LONGEST_STEP)) if ahead == step else step
-            inside, ahead = outside, float(np.copysign(min(abs(step), straight), step))
-        if inside == end or abs(step) < _LEAST_STEP:
-            break
-    return float(np.copysign(np.inf, step))
-
-
-def _crossing(
-    above: Callable[[float], float], inside: float, outside: float, tolerance: float, close: float = 0.0
-) -> float:
-    """Where a function goes through zero between two points at which it has either sign.
-
-    By inverse interpolation through the last three points where that is safe, else halfway (Chandrupatla, Advances in
-    Engineering Software 28 (1997), 145), but for the first point, which is on the straight line; SciPy has it too, but takes a
-    quarter of a second to load.
-
-    Args:
-        above: The function.
-        inside, outside: The points.
-        tolerance: How near a point has to be.
-        close: Size of the function that is as good as zero.
-    """
-    (last, found), (other, opposite) = (outside, above(outside)), (inside, above(inside))
-    part, least = found / (found - opposite), min(tolerance / 2 / abs(inside - outside), 0.5)
-    part = min(max(part, least), 1 - least)
-    while True:
-        at = last + part * (other - last)
-        value = above(at)
-        before, was = last, found
-        if (value > 0) != (found > 0):
-            before, was, other, opposite = other, opposite, last, found
-        last, found = at, value
-        least = tolerance / 2 / abs(other - last)
-        if abs(found) <= close or least > 0.5:
-            return last if abs(found) < abs(opposite) else other
-        place, height = (last - other) / (before - other), (found - opposite) / (was - opposite)
-        part = 0.5
-        if height * height < place and (1 - height) * (1 - height) < 1 - place:
-            part = found / (opposite - found) * was / (opposite - was)
-            part += (before - last) / (other - last) * found / (was - found) * opposite / (was - opposite)
-        part = min(max(part, least), 1 - least)
-
-
 def freedom_of(parts: np.ndarray, freedom: np.ndarray) -> float:
     """Satterthwaite's degrees of freedom of a variance; at least 1.
 
@@ -311,6 +263,6 @@ def freedom_of(parts: np.ndarray, freedom: np.ndarray) -> float:
     return float(np.clip(1 / max(float(np.sum(share**2 / freedom)), 1e-9), 1.0, 1e9))
 
 
-def _total(found: Solution) -> float:
+def total(found: Solution) -> float:
     """Sum of squares of everything that counts, priors too where they do."""
     return float(found["stacked"] @ found["stacked"])

@@ -65,6 +65,11 @@ class Minimum:
         """Sum of squares of the residuals."""
         return float(self.residuals @ self.residuals)
 
+    @property
+    def fall(self) -> float:
+        """By how much the sum of squares would yet fall if residuals were straight: nothing at a minimum, but at kinks."""
+        return _left(self)[1] ** 2 if np.all(np.isfinite(self.residuals)) else float("inf")
+
 
 def minimize(evaluate: Evaluate, start: np.ndarray, precision: Precision = PRECISE) -> Minimum:
     """Least squares from a start.

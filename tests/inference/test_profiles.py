@@ -15,7 +15,8 @@ from bowdenfit.inference.compilation import compile_program
 from bowdenfit.inference.least_squares import LeastSquares, least_squares, maximum_posterior
 from bowdenfit.inference.log_density import LogDensity
 from bowdenfit.inference.objective import Objective, make_objective
-from bowdenfit.inference.profiles import _crossing, freedom_of, interval, profile
+from bowdenfit.inference.profile_limits import _crossing, interval
+from bowdenfit.inference.profiles import freedom_of, profile
 from bowdenfit.inference.solver import minimize, orthogonal
 from bowdenfit.model import build_model
 

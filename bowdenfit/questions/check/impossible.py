@@ -46,7 +46,8 @@ def implausible_friction(fit: Record) -> str:
         if p.role != "friction" or not nothing_said:
             continue
         if fit.sampled is None:
-            value, upper = fit.least_squares.estimates[p.name].value, fit.least_squares.estimates[p.name].upper
+            estimate = fit.least_squares.estimates[p.name]
+            value, upper = estimate.value, estimate.value + estimate.reach if np.isnan(estimate.upper) else estimate.upper
         else:
             value, upper = fit.parameter(p.name).median, fit.parameter(p.name).q95
         if value > _MOST or upper < _LEAST:

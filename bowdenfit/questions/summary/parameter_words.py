@@ -3,7 +3,7 @@
 from math import isfinite
 
 from bowdenfit.inference.interval import Interval
-from bowdenfit.inference.least_squares import Estimate
+from bowdenfit.inference.least_squares import KINKED, Estimate
 from bowdenfit.parameters.space import Parameter
 from bowdenfit.results.record import Record
 from bowdenfit.words import decimals, filled, listed, table
@@ -29,6 +29,10 @@ def parameters_text(fit: Record) -> str:
     condition = fit.least_squares.condition_number
     number = f"{condition:.3g}" if isfinite(condition) else "infinite"
     notes.append(f"Condition number of the least-squares problem: {number}.")
+    kinked = [] if drawn else [name for name, estimate in estimates.items() if estimate.remark == KINKED]
+    if kinked:
+        why = f"{KINKED}. Sampling gets past kinks: fit without --no-mcmc."
+        notes.append(filled(f"No profile interval of {listed(kinked)}: {why}"))
     wide = [] if drawn else [name for name, estimate in estimates.items() if _is_wide(estimate)]
     if wide:
         notes.append(

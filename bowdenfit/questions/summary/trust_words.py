@@ -33,6 +33,15 @@ _ALONE = (
     "two of them exchanged, may go unseen; fit again without --no-mcmc for the full answer."
 )
 
+_MOVING = (
+    "The numbers still move, and may be far off. Let it go on with the same command and --resume; if that does not end it, "
+    "state what you know of the coefficients in cable.toml."
+)
+_NO_MINIMUM = (
+    "Least squares have found no minimum that can be trusted, and the numbers may be far off. Fit again without --no-mcmc: "
+    "sampling needs none."
+)
+
 
 def verdict_text(found: Verdict) -> str:
     """Whether a fit may be trusted, and if not, why."""
@@ -50,10 +59,7 @@ def reasons(found: Verdict) -> list[str]:
     """Why not, without what only says how the computation went."""
     said = [sentence for kind in _WRONG if kind != NOT_CONVERGED for sentence in found.troubles.get(kind, ())]
     if NOT_CONVERGED in found.troubles:
-        said.append(
-            "The numbers still move, and may be far off. Let it go on with the same command "
-            "and --resume; if that does not end it, state what you know of the coefficients in cable.toml."
-        )
+        said.append(_MOVING if found.sampled else _NO_MINIMUM)
     return said
 
 

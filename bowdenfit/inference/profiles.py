@@ -37,6 +37,7 @@ _STUCK = 0.05  # part of what limits a parameter by which the sum of squares yet
 _ROUNDING = 1e-12  # of a sum of squares, which all of it is without scatter
 _ALWAYS = ("friction", "friction_model")  # roles whose intervals are worth their time in large problems
 _SMALL = 20_000  # entries of the Jacobian up to which every parameter's interval is
+_AT_END = 6.0  # size of z so near to the end of a range that the others, fitted to its end, need not follow
 _INSIDE = 2.0  # size of z a little inside the range of a parameter that is at an end of it
 _FAR = 1.0  # step of another parameter that is not foretold [z]
 _LOWER = 0.01  # the same by which another minimum is a lower one
@@ -90,10 +91,9 @@ class Basin:
         pin = np.where(this, z, self.found["z"])
         found = self._solved(self._toward(near, this, z), this | ended, pin)
         side = np.sign(self.found["z"])
-        inside = np.where(ended, side * _INSIDE, found["z"])
-        if not ended.any() or not np.any(ended & (side * self._gradient(inside) > 0)):
+        if not ended.any() or not np.any(ended & (side * self._gradient(np.where(ended, side * _AT_END, found["z"])) > 0)):
             return found
-        return min(found, self._solved(inside, this, pin), key=total)
+        return min(found, self._solved(np.where(ended, side * _INSIDE, found["z"]), this, pin), key=total)
 
     def _toward(self, near: Solution, this: np.ndarray, z: float) -> np.ndarray:
         """Where the others follow it to in a straight line; where they are, if that is far, since few lines stay straight."""

@@ -13,6 +13,7 @@ from bowdenfit.model import Model
 
 _LEAST_FREEDOM = 0.5  # degrees of freedom below which the scatter of readings is not known
 _SINGULAR = 1e-8
+_NOTHING_LEFT = 1e-300  # efficiency to which rounding takes absurd coefficients
 _LEAST_SCATTER = 1e-5  # in units of what is expected: readings that agree better were not measured
 
 
@@ -181,7 +182,7 @@ def _of_labels(
         return untold
     read, said = observed[:n], np.asarray(expected)[:n]
     if term.unit == "1":
-        read, said = -np.log(read), -np.log(said)
+        read, said = -np.log(read), -np.log(np.maximum(said, _NOTHING_LEFT))
     used = np.isfinite(read) & (np.abs(residuals) > _SINGULAR)
     unit = np.abs(np.divide(read - said, residuals, out=np.full(n, np.nan), where=used))
     unit = np.where(unit > 0, unit, np.nanmedian(unit[unit > 0]) if np.any(unit > 0) else 1.0)

@@ -217,6 +217,29 @@ def test_a_coefficient_at_its_bound_has_an_upper_limit_and_says_so():
     assert estimate.upper == pytest.approx(optimize.brentq(lambda mu: least(mu) - level, 0.0, 1.0), rel=0.1)
 
 
+@pytest.mark.parametrize("seed", [0, 2, 11])
+def test_beside_a_coefficient_at_its_bound_limits_are_those_of_non_negative_least_squares(seed):
+    """It leaves its bound where another is moved, and the limits of the others lie far from where they are with it there."""
+    rng = np.random.default_rng(seed)
+    angle = np.deg2rad(rng.uniform(20.0, 160.0, (12, 3)))
+    angle[:, 0] = (angle[:, 0] + angle[:, 1]) / 2
+    angle[:, 2] = angle[:, 1] + np.deg2rad(rng.uniform(-8.0, 8.0, 12))
+    loss = angle @ np.array([0.15, 0.01, 0.1]) + 0.01 * rng.standard_normal(12)
+    estimates = fitted(of_rows(loss, angle))[2].estimates
+    mu, rest = optimize.nnls(angle, loss)
+    assert mu[1] == 0.0 and estimates["mu2"].at_bound
+    level = rest**2 * (1 + stats.t.ppf(0.95, 10) ** 2 / 10)
+    for k in (0, 2):
+        others = np.delete(angle, k, axis=1)
+
+        def above(pin, k=k, others=others):
+            return optimize.nnls(others, loss - pin * angle[:, k])[1] ** 2 - level
+
+        estimate, limits = estimates[f"mu{k + 1}"], [optimize.brentq(above, mu[k], end) for end in (0.0, 1.0)]
+        assert estimate.value == pytest.approx(mu[k], rel=1e-6)
+        assert (estimate.lower, estimate.upper) == pytest.approx(limits, abs=2e-3 * estimate.standard_error)
+
+
 def test_data_without_scatter_give_no_interval_wider_than_rounding():
     loss, angle = _rows(2)
     _, _, found = fitted(of_rows(angle @ np.array([0.15, 0.1]), angle))

@@ -221,7 +221,7 @@ def limits(basin: Basin, scale: np.ndarray, determined: np.ndarray) -> Limits:
                 found[p.name] = UNKNOWN if is_stuck(rise.most_fall, level) else of_this
                 stuck |= is_stuck(basin.found["fall"], level)
                 lowest, least_level = min(lowest, rise.lowest, key=total), min(level, least_level)
-    lower = total(lowest) < total(basin.found) - _LOWER * least_level
+    lower = total(lowest) < total(basin.found) - max(_LOWER * least_level, _ROUNDING)
     return Limits(found, stuck, lowest if lower else None)
 
 

@@ -243,6 +243,7 @@ def test_beside_a_coefficient_at_its_bound_limits_are_those_of_non_negative_leas
 def test_data_without_scatter_give_no_interval_wider_than_rounding():
     loss, angle = _rows(2)
     _, _, found = fitted(of_rows(angle @ np.array([0.15, 0.1]), angle))
+    assert found.converged  # rounding leads nowhere
     estimate = found.estimates["mu1"]
     assert estimate.lower == pytest.approx(0.15, rel=1e-6) and estimate.upper == pytest.approx(0.15, rel=1e-6)
 

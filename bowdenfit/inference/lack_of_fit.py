@@ -20,7 +20,7 @@ import numpy as np
 
 from bowdenfit.inference.departure import FALSE_ALARM, Departure, FarReading
 from bowdenfit.inference.objective import Solution
-from bowdenfit.inference.prior_numbers import z_at
+from bowdenfit.inference.prior_numbers import near_z
 from bowdenfit.inference.profiles import Basin
 from bowdenfit.inference.testable_readings import Readings, System, readings_to_test
 from bowdenfit.kinds.inside_runs import ORDER, SPEED, STROKE, ZERO
@@ -34,7 +34,6 @@ _OF_CURVE, _OF_PLACE = 4, 2  # degree of the polynomials by which curves, and ot
 _LEAST_FREEDOM = 2.0
 _LEAST_TO_STAND_OUT = 5.0  # degrees of freedom from which one reading can be told from the scatter of the others
 _BELIEVED = (1e-3, 1e3)  # scatter in units of what a prior expects
-_FARTHEST = 6.0  # z of a noise scale
 _FOLLOWED = 1e-3  # share of a column that is left where the parameters can follow it
 
 
@@ -119,7 +118,7 @@ def _weighed_by_scatter(basin: Basin, model: Model, scale: np.ndarray) -> Soluti
                 at = index[name]
                 value = np.clip(scale[start], *_BELIEVED) * found["values"][at]
                 prior = model.space.free[at].prior
-                pin[at] = np.clip(z_at(prior, value), -_FARTHEST, _FARTHEST)
+                pin[at] = near_z(prior, value)
             start += count
     again = problem.solve(found["z"], basin.at_end, pin)
     return again if again["succeeded"] and np.all(np.isfinite(again["jacobian"])) else found

@@ -20,9 +20,9 @@ from bowdenfit.inference.interval import NORMAL_90
 from bowdenfit.inference.lack_of_fit import departures
 from bowdenfit.inference.log_density import LogDensity
 from bowdenfit.inference.minimum import FoundMinimum, lowest_minimum
-from bowdenfit.inference.objective import Objective, Problem, Solution, sum_of_squares
+from bowdenfit.inference.objective import Objective, Problem, Solution, sum_of_squares, total
 from bowdenfit.inference.other_minima import PINS, fitting_as_well, range_of_minima
-from bowdenfit.inference.prior_numbers import z_at
+from bowdenfit.inference.prior_numbers import near_z
 from bowdenfit.inference.profiles import UNKNOWN, Limits
 from bowdenfit.inference.solver import ROUGH
 from bowdenfit.parameters.priors import LogNormal
@@ -30,8 +30,7 @@ from bowdenfit.parameters.space import Parameter
 from bowdenfit.words import significant
 
 UNDETERMINED = "the measurements do not determine it"
-KINKED = "on the way to the ends of its interval the solver is stuck at kinks of the sum of squares"
-_FARTHEST = 6.0  # z of a noise scale
+KINKED = "no profile interval, since the solver is stuck at kinks of the sum of squares on the way to its ends"
 
 
 @dataclass(frozen=True)
@@ -146,13 +145,12 @@ def maximum_posterior(posterior: LogDensity, objective: Objective) -> MaximumPos
 def _starts(parameter: Parameter) -> tuple[float, ...]:
     if np.isnan(parameter.first_look):
         return parameter.starts
-    look = z_at(parameter.prior, parameter.first_look)
-    return (*parameter.starts, float(np.clip(look, -_FARTHEST, _FARTHEST)))
+    return (*parameter.starts, near_z(parameter.prior, parameter.first_look))
 
 
 def _squares_with_priors(found: Solution) -> float:
-    total = float(np.sum(found["stacked"] ** 2))
-    return total if np.isfinite(total) else float("inf")
+    squares = total(found)
+    return squares if np.isfinite(squares) else float("inf")
 
 
 def least_squares(
@@ -199,10 +197,9 @@ def _stopped(found: Solution, profiled: Limits) -> str:
         return "the solver stopped before it met its tolerance"
     if profiled.stuck:
         return (
-            "the solver is stuck at a kink of the sum of squares, which may be far lower elsewhere; fit without --no-mcmc: "
-            "sampling gets past kinks"
+            "the solver is stuck at a kink of the sum of squares, which may be far lower elsewhere; sampling gets past kinks"
         )
-    return "" if profiled.lower is None else "every minimum that was found led to a lower one; fit without --no-mcmc"
+    return "" if profiled.lower is None else "every minimum that was found led to a lower one; sampling needs none"
 
 
 def _pinned_elsewhere(problem: Problem, start: np.ndarray) -> list[Solution]:

@@ -10,14 +10,13 @@ import numpy as np
 
 from bowdenfit.inference.interval import NORMAL_90
 from bowdenfit.inference.linearized import Linearized, linearize, scatter_about
-from bowdenfit.inference.objective import LOWER_END, Problem, may_end, sum_of_squares
-from bowdenfit.inference.prior_numbers import z_at
-from bowdenfit.inference.profiles import Basin, Limits, is_stuck, limits, total
+from bowdenfit.inference.objective import LOWER_END, Problem, may_end, sum_of_squares, total
+from bowdenfit.inference.prior_numbers import near_z
+from bowdenfit.inference.profiles import Basin, Limits, is_stuck, limits
 from bowdenfit.parameters.priors import HalfCauchy, Uniform
 from bowdenfit.parameters.space import Parameter
 
 _SUSPECT = -2.0  # below this z an estimate may be on its way to the lower end, above its negative to the upper
-_FARTHEST = 6.0  # z of a noise scale
 _FAR = 50.0  # standard error in units of the prior's sd beyond which data say nothing of a parameter
 _FOLLOWED = 3  # times that a profile is followed to a lower minimum
 _PLACES = 12  # from which the solver starts again where it is stuck
@@ -48,7 +47,7 @@ class FoundMinimum:
 
     @property
     def is_stuck(self) -> bool:
-        """Whether the sum of squares would yet fall by a part of what limits a parameter."""
+        """Whether another start is worth its time: the table that scatters least would limit a parameter by not much more."""
         return is_stuck(self.basin.found["fall"], (NORMAL_90 * float(np.min(self.scale, initial=1.0))) ** 2)
 
 
@@ -72,13 +71,12 @@ def _found(problem: Problem, start: np.ndarray) -> FoundMinimum:
     if not at.is_stuck:
         return at
     draw, first, active, moves = np.random.default_rng(0), at.basin.found["z"], at.active, at.about.moves(at.scale)
+    lowest = at.basin.found
     for _ in range(_PLACES):
         place = first.copy()
         place[active] += np.clip(moves @ draw.standard_normal(moves.shape[1]), -_FARTHEST_PLACE, _FARTHEST_PLACE)
-        other = at.basin.problem.solve(place, at.basin.at_end, first)
-        if total(other) < total(at.basin.found):
-            at = _described(replace(at.basin, found=other))
-    return at
+        lowest = min(lowest, at.basin.problem.solve(place, at.basin.at_end, first), key=total)
+    return _described(replace(at.basin, found=lowest))
 
 
 def _described(basin: Basin) -> FoundMinimum:
@@ -129,7 +127,7 @@ def _weighed(basin: Basin) -> Basin:
     noise_z = np.zeros(space.size)
     for name in weighed:
         at = space.index[name]
-        noise_z[at] = np.clip(z_at(space.free[at].prior, float(told[name])), -_FARTHEST, _FARTHEST)
+        noise_z[at] = near_z(space.free[at].prior, float(told[name]))
     return _minimum(replace(problem, noise_z=noise_z), basin.found["z"])
 
 

@@ -140,6 +140,11 @@ def sum_of_squares(found: Solution) -> float:
     return float(sum(np.sum(r**2) for r in found["residuals"].values()))
 
 
+def total(found: Solution) -> float:
+    """Sum of squares of everything that counts, priors too where they do."""
+    return float(found["stacked"] @ found["stacked"])
+
+
 def noise_scales(posterior: LogDensity) -> np.ndarray:
     """Which free parameters are noise scales."""
     return np.array([p.role == "noise" for p in posterior.model.space.free], dtype=bool)

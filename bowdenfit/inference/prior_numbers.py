@@ -7,9 +7,12 @@ from typing import Any
 
 import jax
 import jax.numpy as jnp
+import numpy as np
 
 from bowdenfit.inference.compilation import compile_program
 from bowdenfit.parameters.priors import Prior
+
+_FARTHEST = 6.0
 
 
 def value_at(prior: Prior, z: float) -> float:
@@ -20,6 +23,11 @@ def value_at(prior: Prior, z: float) -> float:
 def z_at(prior: Prior, value: float) -> float:
     """`Prior.unconstrain` of one number."""
     return _through(prior, "unconstrain", value)
+
+
+def near_z(prior: Prior, value: float) -> float:
+    """The same, no farther out than a solve may start from or a noise scale be pinned at."""
+    return float(np.clip(z_at(prior, value), -_FARTHEST, _FARTHEST))
 
 
 def _through(prior: Prior, way: str, number: float) -> float:

@@ -26,7 +26,7 @@ import numpy as np
 from bowdenfit.display import Part
 from bowdenfit.inference.linearized import blocks, linearize
 from bowdenfit.inference.log_density import LogDensity
-from bowdenfit.inference.objective import Objective, Problem, Solution, may_end
+from bowdenfit.inference.objective import Objective, Problem, Solution, may_end, total
 from bowdenfit.inference.profile_limits import FARTHEST, interval, quantile
 from bowdenfit.inference.solver import QUICK, gauss_newton
 from bowdenfit.parameters.priors import Uniform
@@ -209,7 +209,7 @@ class Limits:
 
 def limits(basin: Basin, scale: np.ndarray, determined: np.ndarray) -> Limits:
     """90 % intervals of determined parameters, by the scatter of each residual about the minimum."""
-    found, stuck, lowest, least_level = {}, False, basin.found, np.inf
+    found, lowest, least_level = {}, basin.found, np.inf
     cheap = basin.found["jacobian"].size <= _SMALL
     for i, p in enumerate(basin.parameters):
         if determined[i] and not basin.problem.noise[i] and (cheap or p.role in _ALWAYS):
@@ -219,10 +219,9 @@ def limits(basin: Basin, scale: np.ndarray, determined: np.ndarray) -> Limits:
                 ends = interval(rise, float(basin.found["z"][i]), error, ratio, freedom)
                 of_this = basin.value(i, ends[0]), basin.value(i, ends[1])
                 found[p.name] = UNKNOWN if is_stuck(rise.most_fall, level) else of_this
-                stuck |= is_stuck(basin.found["fall"], level)
                 lowest, least_level = min(lowest, rise.lowest, key=total), min(level, least_level)
     lower = total(lowest) < total(basin.found) - max(_LOWER * least_level, _ROUNDING)
-    return Limits(found, stuck, lowest if lower else None)
+    return Limits(found, is_stuck(basin.found["fall"], least_level), lowest if lower else None)
 
 
 def is_stuck(fall: float, level: float) -> bool:
@@ -261,8 +260,3 @@ def freedom_of(parts: np.ndarray, freedom: np.ndarray) -> float:
     """
     share = parts / max(float(np.sum(parts)), 1e-300)
     return float(np.clip(1 / max(float(np.sum(share**2 / freedom)), 1e-9), 1.0, 1e9))
-
-
-def total(found: Solution) -> float:
-    """Sum of squares of everything that counts, priors too where they do."""
-    return float(found["stacked"] @ found["stacked"])

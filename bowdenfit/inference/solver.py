@@ -12,6 +12,7 @@ References:
 
 from collections.abc import Callable
 from dataclasses import dataclass, replace
+from functools import cached_property
 from typing import NamedTuple
 
 import numpy as np
@@ -65,7 +66,7 @@ class Minimum:
         """Sum of squares of the residuals."""
         return float(self.residuals @ self.residuals)
 
-    @property
+    @cached_property
     def fall(self) -> float:
         """By how much the sum of squares would yet fall if residuals were straight: nothing at a minimum, but at kinks."""
         return _left(self)[1] ** 2 if np.all(np.isfinite(self.residuals)) else float("inf")
@@ -85,7 +86,7 @@ def minimize(evaluate: Evaluate, start: np.ndarray, precision: Precision = PRECI
     if not np.any(first.jacobian):  # nothing moves the residuals
         return replace(first, succeeded=True)
     found = _polish(evaluate, _descend(evaluate, first, precision, _RADIUS), precision)
-    if found.succeeded and _left(found)[1] <= _SMOOTH * np.linalg.norm(found.residuals):
+    if found.succeeded and found.fall <= _SMOOTH**2 * found.sum_of_squares:
         return found
     # It has stopped short: at a kink of the residuals, or in a long bend. One that ran out of evaluations goes on.
     again = (found,) if precision != PRECISE and not found.succeeded else (first, found)

@@ -31,8 +31,8 @@ def parameters_text(fit: Record) -> str:
     notes.append(f"Condition number of the least-squares problem: {number}.")
     kinked = [] if drawn else [name for name, estimate in estimates.items() if estimate.remark == KINKED]
     if kinked:
-        why = f"{KINKED}. Sampling gets past kinks: fit without --no-mcmc."
-        notes.append(filled(f"No profile interval of {listed(kinked)}: {why}"))
+        why = f"{'have' if kinked[1:] else 'has'} {KINKED}. Sampling gets past kinks: fit without --no-mcmc."
+        notes.append(filled(f"{listed(kinked)} {why}"))
     wide = [] if drawn else [name for name, estimate in estimates.items() if _is_wide(estimate)]
     if wide:
         notes.append(

@@ -32,7 +32,6 @@ _ALONE = (
     "Nothing speaks against these numbers, but they are least squares alone{}. A mistake in a single reading, such as "
     "two of them exchanged, may go unseen; fit again without --no-mcmc for the full answer."
 )
-
 _MOVING = (
     "The numbers still move, and may be far off. Let it go on with the same command and --resume; if that does not end it, "
     "state what you know of the coefficients in cable.toml."

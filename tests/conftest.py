@@ -57,7 +57,7 @@ jax.config.update("jax_enable_x64", True)
 jax.config.update("jax_numpy_dtype_promotion", "standard")
 gc.set_threshold(50_000)  # what is traced makes many small objects, over which searches for cycles took a twentieth of the time
 
-QUICK = ("sampler.n_walkers=128", "sampler.target_ess=300", "sampler.target_r_hat=1.05", "sampler.max_steps=4000")
+QUICK = ("sampler.n_walkers=64", "sampler.target_ess=300", "sampler.target_r_hat=1.05", "sampler.max_steps=4000")
 MOST_MEMORY = 3 * 2**30  # bytes of a process, beyond which it drops what it has compiled
 
 

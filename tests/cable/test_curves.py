@@ -199,7 +199,7 @@ def fits(tmp_path_factory) -> dict[str, bf.Fit]:
     return {
         name: bf.fit(
             folder,
-            settings=[f"contact.0.wrap_angle.curve={name}", "sampler.n_walkers=128", "sampler.target_ess=400"],
+            settings=[f"contact.0.wrap_angle.curve={name}", "sampler.n_walkers=64", "sampler.target_ess=400"],
             seed=3,
             output=folder / name,
             figures=False,

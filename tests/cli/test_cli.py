@@ -22,7 +22,7 @@ from bowdenfit.inference.chain import Progress
 from bowdenfit.verbs import FIT
 
 ROOT = Path(__file__).parents[2]
-QUICK = ("sampler.n_walkers=128", "sampler.target_ess=200", "sampler.target_r_hat=1.05", "sampler.max_steps=4000")
+QUICK = ("sampler.n_walkers=64", "sampler.target_ess=200", "sampler.target_r_hat=1.05", "sampler.max_steps=4000")
 VERBS = (
     "init",
     "check",

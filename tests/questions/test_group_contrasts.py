@@ -9,7 +9,7 @@ from one_page import faults
 
 import bowdenfit as bf
 
-QUICK = ("sampler.n_walkers=128", "sampler.target_ess=300", "sampler.target_r_hat=1.05", "sampler.max_steps=4000")
+QUICK = ("sampler.n_walkers=64", "sampler.target_ess=300", "sampler.target_r_hat=1.05", "sampler.max_steps=4000")
 TRUE = {"new": 0.1, "old": 0.14}
 
 

@@ -14,7 +14,7 @@ from bowdenfit.questions.recorded.lost_force import lost_force
 LOSS = -np.log(0.75)
 HIDDEN = 2.2
 LOADS = (5.0, 10.0, 20.0, 40.0)
-QUICK = ("sampler.n_walkers=128", "sampler.target_ess=300", "sampler.target_r_hat=1.05", "sampler.max_steps=4000")
+QUICK = ("sampler.n_walkers=64", "sampler.target_ess=300", "sampler.target_r_hat=1.05", "sampler.max_steps=4000")
 SMALL = "[sampler]\nn_walkers = 32\nmax_steps = 1500\ntarget_ess = 100\ntarget_r_hat = 1.05\n"
 
 

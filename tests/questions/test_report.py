@@ -14,7 +14,7 @@ from bowdenfit.questions.writing import write_page
 from bowdenfit.results.folder import REPORT
 
 DATASETS = Path(__file__).parents[2] / "datasets"
-QUICK = ("sampler.n_walkers=128", "sampler.target_ess=200", "sampler.target_r_hat=1.05", "sampler.max_steps=4000")
+QUICK = ("sampler.n_walkers=64", "sampler.target_ess=200", "sampler.target_r_hat=1.05", "sampler.max_steps=4000")
 SHEETS = 6
 CHART = "#figure-{} .chart"
 HOSTILE = """</title><script>alert(1)</script><img src=x onerror=alert(2)>"' ]]> &lt; {{7*7}}"""

@@ -19,7 +19,7 @@ from bowdenfit.questions.summary.verdict import CONTRADICTORY, Verdict, verdict
 from bowdenfit.questions.summary.words import full_text
 
 GOLDEN = Path(__file__).parent / "golden"
-QUICK = ("sampler.n_walkers=128", "sampler.target_ess=200", "sampler.target_r_hat=1.05", "sampler.max_steps=3000")
+QUICK = ("sampler.n_walkers=64", "sampler.target_ess=200", "sampler.target_r_hat=1.05", "sampler.max_steps=3000")
 
 
 @pytest.fixture(scope="module")

@@ -18,7 +18,7 @@ from bowdenfit.questions.summary.brief_words import summary_text
 from bowdenfit.questions.summary.verdict import IMPOSSIBLE, NOT_CONVERGED, NOT_DESCRIBED, NOT_IDENTIFIABLE
 from bowdenfit.questions.summary.words import full_text
 
-QUICK = ("sampler.n_walkers=128", "sampler.target_ess=400", "sampler.target_r_hat=1.03", "sampler.max_steps=4000")
+QUICK = ("sampler.n_walkers=64", "sampler.target_ess=400", "sampler.target_r_hat=1.03", "sampler.max_steps=4000")
 HALF_TURN = """
 schema = 1
 name = "bench"
@@ -112,6 +112,9 @@ def test_a_reading_far_out_is_a_trouble_unless_the_noise_may_have_such(on_body, 
     page = summary_text(normal)
     assert faults(page) == [] and "Off: 1 of 26 readings" in page and re.search(r"82(\.0)? deg", page)
     assert student.verdict().trusted
+    assert student.verdict().off == ("free_sheath_angle at 480 mm",)
+    for text in (summary_text(student), repr(student.verdict())):
+        assert "agree with the model and with each other, but for free_sheath_angle at 480 mm: it" in " ".join(text.split())
     assert student.parameter("mu3").q05 > normal.parameter("mu3").q05 + 0.02
 
 

@@ -15,9 +15,10 @@ from bowdenfit.questions.summary.verdict import (
     NOT_CONVERGED,
     NOT_DESCRIBED,
     Verdict,
+    verdict,
 )
 from bowdenfit.results.record import Record
-from bowdenfit.words import filled, listed
+from bowdenfit.words import few, filled, listed
 
 _WRONG = {
     NOT_CONVERGED: "the computation has not settled",
@@ -28,6 +29,10 @@ _WRONG = {
     NOT_IDENTIFIABLE: "the measurements do not tell every coefficient",
 }
 _SETTLED = "You can trust this: the computation has settled, and the readings agree with the model and with each other."
+_BUT_FOR = (
+    "The computation has settled, and the readings agree with the model and with each other, but for {}: {} farther off than "
+    "chance puts any in one fit of a hundred. You can trust this once you know why."
+)
 _ALONE = (
     "Nothing speaks against these numbers, but they are least squares alone{}. A mistake in a single reading, such as "
     "two of them exchanged, may go unseen; fit again without --no-mcmc for the full answer."
@@ -44,7 +49,7 @@ _NO_MINIMUM = (
 
 def verdict_text(found: Verdict) -> str:
     """Whether a fit may be trusted, and if not, why."""
-    said = [warning(found), *reasons(found)] if found.troubles else [_SETTLED if found.sampled else _ALONE.format("")]
+    said = [warning(found), *reasons(found)] if found.troubles else [_settled(found) if found.sampled else _ALONE.format("")]
     return "\n".join(filled(sentence) for sentence in said)
 
 
@@ -67,7 +72,12 @@ def trust(fit: Record) -> list[str]:
     if fit.sampled is None:
         best = ", without a best length" if fit.dataset.description.route is not None else ""
         return [_ALONE.format(best)]
-    return [_SETTLED] + [sentence for sentence in (_resting(fit), _alike(fit), _prior_against(fit)) if sentence]
+    return [_settled(verdict(fit))] + [sentence for sentence in (_resting(fit), _alike(fit), _prior_against(fit)) if sentence]
+
+
+def _settled(found: Verdict) -> str:
+    """Of a fit that may be trusted, and what lies far off all the same."""
+    return _BUT_FOR.format(few(found.off), "it lies" if len(found.off) == 1 else "they lie") if found.off else _SETTLED
 
 
 def next_step(fit: Record) -> str:

@@ -3,6 +3,8 @@
 from dataclasses import dataclass
 
 from bowdenfit.display import Display, Rows
+from bowdenfit.kinds import readings_called
+from bowdenfit.questions.check.answer import checks_of
 from bowdenfit.questions.check.copied import copied_readings
 from bowdenfit.questions.check.impossible import implausible_friction, impossible_efficiencies
 from bowdenfit.questions.check.lack_of_fit import say_what_is_not_described
@@ -24,10 +26,12 @@ class Verdict(Display):
         troubles: What is wrong, by kind: `NOT_CONVERGED`, `NOT_IDENTIFIABLE`, `CONTRADICTORY`, `IMPOSSIBLE`,
             `NOT_DESCRIBED`, `COPIED`; each with sentences.
         sampled: Whether there are draws.
+        off: Readings that lie farther from what all the others say than chance puts one in a hundred fits, in words.
     """
 
     troubles: dict[str, tuple[str, ...]]
     sampled: bool = True
+    off: tuple[str, ...] = ()
 
     @property
     def trusted(self) -> bool:
@@ -54,7 +58,9 @@ def verdict(fit: Record) -> Verdict:
         COPIED: copied_readings(fit.dataset),
         NOT_DESCRIBED: say_what_is_not_described(fit),
     }
-    return Verdict({kind: sentences for kind, sentences in troubles.items() if sentences}, fit.sampled is not None)
+    found = checks_of(fit)
+    off = tuple(readings_called(each.table).one.format(each.label) for each in found.outliers) if found else ()
+    return Verdict({kind: sentences for kind, sentences in troubles.items() if sentences}, fit.sampled is not None, off)
 
 
 def _sentences(sentence: str) -> tuple[str, ...]:

@@ -175,6 +175,9 @@ def test_the_interval_of_a_plateau_that_angles_do_not_reach_follows_the_valley_o
 # What results say -------------------------------------------------------------------------------------------------
 
 
+QUICK = ("sampler.n_walkers=64", "sampler.target_ess=300", "sampler.target_r_hat=1.05", "sampler.max_steps=4000")
+
+
 @pytest.fixture(scope="module")
 def fits(tmp_path_factory) -> dict[str, bf.Fit]:
     """A bell-shaped route fitted by every family, sampled briefly, by --set alone."""
@@ -199,7 +202,7 @@ def fits(tmp_path_factory) -> dict[str, bf.Fit]:
     return {
         name: bf.fit(
             folder,
-            settings=[f"contact.0.wrap_angle.curve={name}", "sampler.n_walkers=64", "sampler.target_ess=400"],
+            settings=[f"contact.0.wrap_angle.curve={name}", *QUICK],
             seed=3,
             output=folder / name,
             figures=False,

@@ -1,7 +1,9 @@
 """Cables as tables, made up for tests of what is exported, and what the package's own equations say of them."""
 
+from collections.abc import Sequence
 from dataclasses import replace
 
+import jax
 import jax.numpy as jnp
 import numpy as np
 
@@ -68,11 +70,17 @@ def _there(found: Transmission, asked: dict[str, np.ndarray], stroke: np.ndarray
             mine = (asked["level"] == k) & (stroke == sign)
             exponent[mine] = np.interp(at[mine], places, level.exponent[row])
             taut[mine] = np.interp(at[mine], places, level.taut_loss)
-            if found.of_rate:
-                speeds = jnp.asarray(asked["speed"][mine]), jnp.asarray(found.reference_speed)
-                here, reference = (np.asarray(rate_factor(v, *map(jnp.asarray, level.rate))) for v in speeds)
-                exponent[mine] *= here / reference
+    if found.of_rate:
+        rate = [_of_levels(found, asked, [level.rate[i] for level in found.levels]) for i in range(3)]
+        reference = jnp.asarray(found.reference_speed)
+        ratio = jax.vmap(lambda speed, *rate: rate_factor(speed, *rate) / rate_factor(reference, *rate))
+        exponent *= np.asarray(ratio(jnp.asarray(asked["speed"]), *rate))
     return exponent, taut
+
+
+def _of_levels(found: Transmission, asked: dict[str, np.ndarray], numbers: Sequence[float]) -> jax.Array:
+    """The number of each question's level."""
+    return jnp.asarray(np.array(numbers)[asked["level"]])
 
 
 def of_equations(found: Transmission, asked: dict[str, np.ndarray], *, inverse: bool = False) -> np.ndarray:
@@ -83,13 +91,15 @@ def of_equations(found: Transmission, asked: dict[str, np.ndarray], *, inverse: 
         function = loop_input_force if inverse else loop_output_force
         return np.asarray(function(force, taut / (2 * exponent), exponent, stroke))
     sign = -stroke if inverse else stroke
-    answers = np.zeros(len(force))
-    for k, level in enumerate(found.levels):
-        mine = asked["level"] == k
-        scale = jnp.asarray(level.load_exponent), jnp.asarray(level.drag), found.reference_force
-        g = force_scale(jnp.asarray(force[mine]), *scale) - sign[mine] * exponent[mine]
-        answers[mine] = np.asarray(force_from_scale(g, *scale))
-    return np.maximum(answers, 0.0)
+    numbers = ([getattr(level, name) for level in found.levels] for name in ("load_exponent", "drag"))
+
+    def shifted(force: jax.Array, shift: jax.Array, *scale: jax.Array) -> jax.Array:
+        g = force_scale(force, *scale, found.reference_force) - shift
+        return force_from_scale(g, *scale, found.reference_force)
+
+    scales = (_of_levels(found, asked, of_levels) for of_levels in numbers)
+    answers = jax.jit(jax.vmap(shifted))(jnp.asarray(force), jnp.asarray(sign * exponent), *scales)
+    return np.maximum(np.asarray(answers), 0.0)
 
 
 def followed(found: Transmission, level: int, place: float, speed: float, force: np.ndarray) -> np.ndarray:

@@ -112,10 +112,26 @@ def test_a_reading_far_out_is_a_trouble_unless_the_noise_may_have_such(on_body, 
     page = summary_text(normal)
     assert faults(page) == [] and "Off: 1 of 26 readings" in page and re.search(r"82(\.0)? deg", page)
     assert student.verdict().trusted
-    assert student.verdict().off == ("free_sheath_angle at 480 mm",)
+    assert student.verdict().doubts == ("free_sheath_angle at 480 mm lies far from what the others say",)
     for text in (summary_text(student), repr(student.verdict())):
-        assert "agree with the model and with each other, but for free_sheath_angle at 480 mm: it" in " ".join(text.split())
+        assert "against the model, but free_sheath_angle at 480 mm lies far from" in " ".join(text.split())
+        assert "the readings agree with the model" not in " ".join(text.split())
     assert student.parameter("mu3").q05 > normal.parameter("mu3").q05 + 0.02
+
+
+@pytest.mark.parametrize(("stated", "said"), [(0.03, True), (0.003, False)])
+def test_readings_that_scatter_far_less_than_was_stated_are_not_said_to_agree(stated, said, tmp_path):
+    """Sixteen efficiencies that scatter by 0.3 %, and a standard deviation of 3 % or 0.3 % beside each."""
+    rng, rows = np.random.default_rng(1), ["wrap_angle_deg,efficiency,efficiency_sd"]
+    for angle in 30 + 15 * np.arange(16):
+        rows.append(f"{angle},{np.exp(-0.12 * np.deg2rad(angle) + 0.003 * rng.standard_normal()):.5f},{stated}")
+    (tmp_path / "efficiencies.csv").write_text("\n".join(rows) + "\n")
+    fit = bf.fit(tmp_path / "efficiencies.csv", seed=1, settings=QUICK)
+    text = " ".join(summary_text(fit).split())
+    assert fit.verdict().trusted
+    assert ("but the readings of efficiencies scatter less than the fit says" in text) == said
+    assert ("Next: look at what is stated of the noise" in text) == said
+    assert ("the readings agree with the model" in text) != said
 
 
 def test_least_squares_that_runs_to_no_friction_at_all_is_no_fit_to_trust(on_body, on_body_squares, tmp_path):

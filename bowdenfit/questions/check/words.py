@@ -41,10 +41,19 @@ def _name(reading: CheckedReading) -> str:
     return readings_called(reading.table).one.format(reading.label)
 
 
+def scattering(found: Checks) -> list[str]:
+    """Tables whose readings scatter otherwise than predicted, and how.
+
+    Args:
+        found: The checks.
+    """
+    return [f"the readings of {readings_called(t.table).words} {t.fault}" for t in found.tables if t.fault]
+
+
 def _scatter(found: Checks) -> str:
     """How many readings their intervals hold, and which tables scatter otherwise than predicted."""
     n, held = (sum(getattr(t, key) for t in found.tables) for key in ("measured", "in_interval"))
-    faults = [f"the readings of {readings_called(t.table).words} {t.fault}" for t in found.tables if t.fault]
+    faults = scattering(found)
     few = f" Of so few, chance leaves none inside in one fit of {_FEW_CHANCE}." if held == 0 and n <= _FEW else ""
     start = f"The 90 % intervals of these predictions hold {held} of {n} readings.{few}"
     if not faults:

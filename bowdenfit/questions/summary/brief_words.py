@@ -24,7 +24,7 @@ def summary_text(fit: Record) -> str:
     """One page for people: at most `LINES` lines, as a terminal of 80 columns shows them."""
     said, off = _said(fit), _off(fit)
     shown, whole = _quantities(fit, LINES - sum(map(len, said)) - len(off) - _BESIDE)
-    if not whole and verdict(fit).trusted and not readings_off(fit):  # that all readings agree is said above already
+    if not whole and verdict(fit).trusted and not verdict(fit).doubts:  # that all readings agree is said above already
         longer, whole = _quantities(fit, LINES - sum(map(len, said)) - _BESIDE + 1)
         shown, off = (longer, []) if whole else (shown, off)
     below = [line for block in (shown, off, [_MORE]) for line in (["", *block] if block else [])]

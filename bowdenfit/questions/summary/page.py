@@ -60,7 +60,9 @@ def summarize(fit: Record) -> dict[str, Any]:
         "schema": SCHEMA,
         "name": fit.name,
         "geometry": fit.dataset.description.geometry,
-        "verdict": {"converged": fit.converged, "trusted": found.trusted, "reasons": list(found.reasons)},
+        "verdict": {
+            "converged": fit.converged, "trusted": found.trusted, "reasons": list(found.reasons), "doubts": list(found.doubts),
+        },
         "parameters": {p.name: _parameter(fit, p.name) for p in fit.model.space.parameters},
         "curves": {name: _curve_coefficient(fit, name) for name in curve_coefficients(fit)},
         "least_squares": {

@@ -3,6 +3,7 @@
 from bowdenfit.kinds import readings_called
 from bowdenfit.questions.check.answer import checks_of
 from bowdenfit.questions.check.table_checks import CheckedReading
+from bowdenfit.questions.check.words import scattering
 from bowdenfit.questions.identify.confounding import confounded_pairs
 from bowdenfit.questions.identify.judgment import identifiability
 from bowdenfit.questions.identify.verb import NOT_IDENTIFIABLE
@@ -18,7 +19,7 @@ from bowdenfit.questions.summary.verdict import (
     verdict,
 )
 from bowdenfit.results.record import Record
-from bowdenfit.words import few, filled, listed
+from bowdenfit.words import filled, listed
 
 _WRONG = {
     NOT_CONVERGED: "the computation has not settled",
@@ -29,9 +30,9 @@ _WRONG = {
     NOT_IDENTIFIABLE: "the measurements do not tell every coefficient",
 }
 _SETTLED = "You can trust this: the computation has settled, and the readings agree with the model and with each other."
-_BUT_FOR = (
-    "The computation has settled, and the readings agree with the model and with each other, but for {}: {} farther off than "
-    "chance puts any in one fit of a hundred. You can trust this once you know why."
+_IN_DOUBT = (
+    "The computation has settled, and nothing speaks clearly against the model, but {}, by more than chance does in one fit of "
+    "a hundred. You can trust this once you know why."
 )
 _ALONE = (
     "Nothing speaks against these numbers, but they are least squares alone{}. A mistake in a single reading, such as "
@@ -76,8 +77,8 @@ def trust(fit: Record) -> list[str]:
 
 
 def _settled(found: Verdict) -> str:
-    """Of a fit that may be trusted, and what lies far off all the same."""
-    return _BUT_FOR.format(few(found.off), "it lies" if len(found.off) == 1 else "they lie") if found.off else _SETTLED
+    """Of a fit that may be trusted, and what speaks a little against it."""
+    return _IN_DOUBT.format(listed(found.doubts)) if found.doubts else _SETTLED
 
 
 def next_step(fit: Record) -> str:
@@ -87,6 +88,8 @@ def next_step(fit: Record) -> str:
         return ""
     if off:
         return f"Next: look at how {_named(off[0])} was measured and written down: it is far off (see below)."
+    if scattering(found):
+        return "Next: look at what is stated of the noise of these readings; checks.png shows where each of them lies."
     again = f"; in doubt, measure {_named(found.decisive[0])} again, on which the answer leans most" if found.decisive else ""
     if fit.dataset.description.route is not None and fit.optimal_length().is_settled:
         return f"Next: nothing needs to be measured{again}. bowdenfit next says what would narrow it."

@@ -8,10 +8,12 @@ from bowdenfit.questions.check.answer import checks_of
 from bowdenfit.questions.check.copied import copied_readings
 from bowdenfit.questions.check.impossible import implausible_friction, impossible_efficiencies
 from bowdenfit.questions.check.lack_of_fit import say_what_is_not_described
+from bowdenfit.questions.check.words import scattering
 from bowdenfit.questions.identify.contradiction import contradiction
 from bowdenfit.questions.identify.judgment import say_what_is_not_determined
 from bowdenfit.questions.identify.verb import NOT_IDENTIFIABLE
 from bowdenfit.results.record import Record, once
+from bowdenfit.words import few
 
 NOT_CONVERGED, CONTRADICTORY = "not converged", "contradictory"
 IMPOSSIBLE, NOT_DESCRIBED = "made of impossible readings", "not a description of its readings"
@@ -26,12 +28,12 @@ class Verdict(Display):
         troubles: What is wrong, by kind: `NOT_CONVERGED`, `NOT_IDENTIFIABLE`, `CONTRADICTORY`, `IMPOSSIBLE`,
             `NOT_DESCRIBED`, `COPIED`; each with sentences.
         sampled: Whether there are draws.
-        off: Readings that lie farther from what all the others say than chance puts one in a hundred fits, in words.
+        doubts: What chance does in one fit of a hundred or less, and is not enough to distrust it; clauses without a stop.
     """
 
     troubles: dict[str, tuple[str, ...]]
     sampled: bool = True
-    off: tuple[str, ...] = ()
+    doubts: tuple[str, ...] = ()
 
     @property
     def trusted(self) -> bool:
@@ -58,9 +60,18 @@ def verdict(fit: Record) -> Verdict:
         COPIED: copied_readings(fit.dataset),
         NOT_DESCRIBED: say_what_is_not_described(fit),
     }
+    said = {kind: sentences for kind, sentences in troubles.items() if sentences}
+    return Verdict(said, fit.sampled is not None, _doubts(fit))
+
+
+def _doubts(fit: Record) -> tuple[str, ...]:
+    """Readings that lie far off, and tables that scatter otherwise than the fit says."""
     found = checks_of(fit)
-    off = tuple(readings_called(each.table).one.format(each.label) for each in found.outliers) if found else ()
-    return Verdict({kind: sentences for kind, sentences in troubles.items() if sentences}, fit.sampled is not None, off)
+    if found is None:
+        return ()
+    off = [readings_called(each.table).one.format(each.label) for each in found.outliers]
+    far = [f"{few(off)} {'lies' if len(off) == 1 else 'lie'} far from what the others say"] if off else []
+    return (*far, *scattering(found))
 
 
 def _sentences(sentence: str) -> tuple[str, ...]:

@@ -5,7 +5,7 @@ import pytest
 from arviz_stats.base import array_stats
 from one_page import jargon
 
-from bowdenfit.inference.diagnostics import Diagnostics, as_chains, diagnose, shortfalls
+from bowdenfit.inference.diagnostics import MAXIMUM_DRIFT, Diagnostics, as_chains, diagnose, shortfalls
 
 ENSEMBLES, WALKERS = 4, 256
 
@@ -47,6 +47,36 @@ def test_rank_normalized_diagnostics_are_those_of_arviz(change):
     found, ensembles = diagnose(draws, ENSEMBLES), np.repeat(np.arange(ENSEMBLES), WALKERS)
     assert found.r_hat == array_stats.rhat_nested(draws, superchain_ids=ensembles, method="rank", **axes)
     assert found.ess_bulk == array_stats.ess(as_chains(draws, ENSEMBLES), method="bulk", **axes)
+
+
+HALF = 14  # of the draws of each of fifty walkers
+DRIFTS = {
+    "none": (lambda z: z, 0.0, 0.22),
+    "a shift": (lambda z: z + 0.16 * (np.arange(2 * HALF) >= HALF), 0.88, 1.0),
+    "a narrower half": (lambda z: z * np.where(np.arange(2 * HALF) < HALF, 1.15, 1.0), 0.88, 1.0),
+    "three walkers that come in from far out": (
+        lambda z: z * np.where((np.arange(50)[:, None] < 3) & (np.arange(2 * HALF) < HALF), 4.0, 1.0), 0.85, 1.0,
+    ),
+}  # fmt: skip
+
+
+@pytest.mark.parametrize("drift", DRIFTS)
+def test_a_drift_is_told_from_chance(drift):
+    """Shares of 300 quantities of 1400 draws; 0.16, 0.93, 0.93 and 0.90 of many more, so that 300 err by 0.02 (one sd).
+
+    Medians and quantiles of as many draws saw 0.31 where there was none, and 0.88, 0.94 and 0.57.
+    """
+    change, least, most = DRIFTS[drift]
+    generator = np.random.default_rng(7)
+    found = [diagnose(change(generator.standard_normal((50, 2 * HALF))), 2).drift for _ in range(300)]
+    assert least <= np.mean(np.array(found) > MAXIMUM_DRIFT) <= most
+
+
+def test_one_draw_elsewhere_of_an_optimum_at_an_end_is_no_drift():
+    draws = np.full((50, 2 * HALF), 430.0)
+    draws[3, 2] = 431.0
+    assert diagnose(draws, 2).drift == 0
+    assert diagnose(np.where(np.arange(2 * HALF) < HALF, 430.0, draws + 1.0), 2).drift == 1
 
 
 def test_what_keeps_draws_from_being_trusted_is_said_in_plain_words():

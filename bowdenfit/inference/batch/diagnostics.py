@@ -14,9 +14,9 @@ _ENOUGH = 1000.0  # effective draws
 def diagnose_few_draws(draws: Mapping[str, np.ndarray], n_ensembles: int) -> dict[str, Diagnostics]:
     """Diagnostics of a few hundred effective draws.
 
-    Two halves of n effective draws differ by 2.5 / sqrt(n) of their spread by chance alone, which at a thousand is all that
-    `MAXIMUM_DRIFT` allows; here twice what chance does is allowed, with no more than a thousand: else those that had to go on
-    for one reason would be judged more strictly for another.
+    Two halves of n effective draws differ by 2 / sqrt(n) of their spread by chance alone. `MAXIMUM_DRIFT` is 2.5 / sqrt(n) at a
+    thousand; here twice that is allowed, with no more than a thousand: else those that had to go on for one reason would be
+    judged more strictly for another.
     """
     found = diagnose_all(draws, n_ensembles)
     by_chance = {name: 2.5 / np.sqrt(np.clip(min(d.ess_bulk, d.ess_tail), 1.0, _ENOUGH)) for name, d in found.items()}

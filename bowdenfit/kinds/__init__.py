@@ -41,3 +41,8 @@ def readings_called(name: str) -> Readings:
     return next(
         (one for one in (kind.readings if kind else ()) if one.name == name), Readings(name, name, name, "{}", name)
     )
+
+
+def reading_called(name: str, label: str) -> str:
+    """What one of the readings of this name is called."""
+    return readings_called(name).one.format(label)

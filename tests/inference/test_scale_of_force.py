@@ -6,14 +6,14 @@ quantities with a unit of force are the same times the factor.
 
 import re
 import shutil
+from functools import partial
 from pathlib import Path
 
-import jax
 import numpy as np
 import pytest
+from densities import over_rows
 
 import bowdenfit as bf
-from bowdenfit.inference.compilation import compile_program
 from bowdenfit.inference.log_density import LogDensity
 from bowdenfit.model import build_model
 from bowdenfit.questions.summary.verdict import NOT_DESCRIBED
@@ -124,11 +124,9 @@ def write_loop(path: Path) -> None:
 USUAL = ("efficiencies", "forces with drag", "stretch, preload and loop", "sliding recordings", "force against displacement")
 
 
-def _evaluated(density: LogDensity, z: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Log densities and values of the parameters at several z (rows)."""
-    both = jax.vmap(lambda z, data: (density.log_density(z, data), density.model.space.vector(z)), in_axes=(0, None))
-    found, values = compile_program(both, z, density.data, run_once=True)(z, density.data)
-    return np.asarray(found), np.asarray(values)
+def density_and_values(density: LogDensity, z, data):
+    """Log density and values of the parameters at one z."""
+    return density.log_density(z, data), density.model.space.vector(z)
 
 
 @pytest.mark.parametrize("case", [c if c in USUAL else pytest.param(c, marks=pytest.mark.slow) for c in CASES])
@@ -138,9 +136,8 @@ def test_every_force_times_a_factor_changes_the_log_density_by_a_constant(case, 
     for factor in FACTORS:
         model = build_model(strong(tmp_path, name, settings, factor))
         density, z = LogDensity(model), POINTS[:, : model.space.size]
-        found, values[factor] = _evaluated(density, z)
-        assert np.all(np.isfinite(found))
-        densities[factor] = found
+        densities[factor], values[factor] = over_rows(partial(density_and_values, density), z, density.data)
+        assert np.all(np.isfinite(densities[factor]))
         power = np.array([("N" in p.unit.split("/")[0].split()) for p in model.space.free], dtype=float)
         rounding = 1e-9 if "recordings" in case else 1e-12  # the scale of delay_error comes out of an iteration
         np.testing.assert_allclose(values[factor] / factor**power, values[FACTORS[0]] / FACTORS[0] ** power, rtol=rounding)

@@ -19,8 +19,8 @@ def diagnose_few_draws(draws: Mapping[str, np.ndarray], n_ensembles: int) -> dic
     judged more strictly for another.
     """
     found = diagnose_all(draws, n_ensembles)
-    by_chance = {name: 2.5 / np.sqrt(np.clip(min(d.ess_bulk, d.ess_tail), 1.0, _ENOUGH)) for name, d in found.items()}
-    return {name: replace(d, drift=float(d.drift / by_chance[name]) / 2 * MAXIMUM_DRIFT) for name, d in found.items()}
+    allowed = {name: 2.5 / np.sqrt(np.clip(min(d.ess_bulk, d.ess_tail), 1.0, _ENOUGH)) for name, d in found.items()}
+    return {name: replace(d, drift=float(d.drift / allowed[name]) / 2 * MAXIMUM_DRIFT) for name, d in found.items()}
 
 
 def remembered(diagnostics: Mapping[str, Diagnostics], least: int) -> tuple[str, ...]:

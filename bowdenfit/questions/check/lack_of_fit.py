@@ -7,7 +7,7 @@ from bowdenfit.cable.load_cells import DELAY_ERROR
 from bowdenfit.cable.registry import CURVES
 from bowdenfit.description import BY_GROUP
 from bowdenfit.inference.departure import FALSE_ALARM, Departure
-from bowdenfit.kinds import readings_called
+from bowdenfit.kinds import reading_called, readings_called
 from bowdenfit.kinds.inside_runs import ORDER, SPEED, STROKE, ZERO
 from bowdenfit.kinds.term import GROUP, LOAD, WRAP_ANGLE
 from bowdenfit.parameters.priors import Normal
@@ -60,7 +60,7 @@ def _far_out(fit: Record, noise: str) -> tuple[str, ...]:
     far = fit.least_squares.far_readings
     if not far or fit.sampled is not None or noise == "student":
         return ()
-    return (_far_sentence([readings_called(each.table).one.format(each.label) for each in far]),)
+    return (_far_sentence([reading_called(each.table, each.label) for each in far]),)
 
 
 def _far_sentence(names: Sequence[str]) -> str:
@@ -202,5 +202,5 @@ def _scatter(found: Checks, noise: str) -> tuple[str, ...]:
     among = len(found.readings)
     far = [r for r in found.outliers if r.chance * among < FALSE_ALARM]
     if far and noise == "normal":
-        sentences.append(_far_sentence([readings_called(r.table).one.format(r.label) for r in far]))
+        sentences.append(_far_sentence([reading_called(r.table, r.label) for r in far]))
     return tuple(sentences)

@@ -2,7 +2,7 @@
 
 from math import isfinite
 
-from bowdenfit.kinds import readings_called
+from bowdenfit.kinds import reading_called, readings_called
 from bowdenfit.questions.check.answer import Checks
 from bowdenfit.questions.check.sensitivity_words import priors_text
 from bowdenfit.questions.check.table_checks import CheckedReading
@@ -38,7 +38,7 @@ def checks_page(found: Checks) -> str:
 
 def _name(reading: CheckedReading) -> str:
     """A reading in words."""
-    return readings_called(reading.table).one.format(reading.label)
+    return reading_called(reading.table, reading.label)
 
 
 def scattering(found: Checks) -> list[str]:

@@ -3,7 +3,7 @@
 import textwrap
 from collections.abc import Sequence
 
-from bowdenfit.kinds import readings_called
+from bowdenfit.kinds import reading_called
 from bowdenfit.questions.check.table_checks import CheckedReading
 from bowdenfit.questions.check.words import with_unit
 from bowdenfit.questions.summary.answer import answer, checked_readings, quantities, readings_off
@@ -107,7 +107,7 @@ def none_is_off(every: Sequence[CheckedReading]) -> str:
 
 def reading_row(reading: CheckedReading) -> tuple[str, str, str, str]:
     """A reading beside what all the others say of it, under `READING_HEADS`."""
-    name = readings_called(reading.table).one.format(reading.label)
+    name = reading_called(reading.table, reading.label)
     measured, expected, low, high = (
         with_unit(reading, value) for value in (reading.reading, reading.expected, reading.q05, reading.q95)
     )

@@ -1,6 +1,6 @@
 """Whether a fit may be trusted and why not, and what to do next, in sentences without terms of statistics."""
 
-from bowdenfit.kinds import readings_called
+from bowdenfit.kinds import reading_called
 from bowdenfit.questions.check.answer import checks_of
 from bowdenfit.questions.check.table_checks import CheckedReading
 from bowdenfit.questions.check.words import scattering
@@ -99,7 +99,7 @@ def next_step(fit: Record) -> str:
 
 
 def _named(reading: CheckedReading) -> str:
-    return readings_called(reading.table).one.format(reading.label)
+    return reading_called(reading.table, reading.label)
 
 
 def _resting(fit: Record) -> str:

@@ -3,7 +3,7 @@
 from dataclasses import dataclass
 
 from bowdenfit.display import Display, Rows
-from bowdenfit.kinds import readings_called
+from bowdenfit.kinds import reading_called
 from bowdenfit.questions.check.answer import checks_of
 from bowdenfit.questions.check.copied import copied_readings
 from bowdenfit.questions.check.impossible import implausible_friction, impossible_efficiencies
@@ -69,7 +69,7 @@ def _doubts(fit: Record) -> tuple[str, ...]:
     found = checks_of(fit)
     if found is None:
         return ()
-    off = [readings_called(each.table).one.format(each.label) for each in found.outliers]
+    off = [reading_called(each.table, each.label) for each in found.outliers]
     far = [f"{few(off)} {'lies' if len(off) == 1 else 'lie'} far from what the others say"] if off else []
     return (*far, *scattering(found))
 

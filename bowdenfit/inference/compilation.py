@@ -11,11 +11,14 @@ import jax.numpy as jnp
 from bowdenfit.inference.engines.memory import refuse_shortage, take_buffers
 
 # Measured on two cores: whole vectors of 512 bits run in 0.85 to 1 of the time and compile no longer. XLA's newer fusion
-# emitters take twice as long to compile the small elementwise functions here, which then run in 0.65 to 1 of the time.
+# emitters take twice as long to compile the small elementwise functions here, which then run in 0.65 to 1 of the time. YNNPACK,
+# which it hands products and sums to, takes longer to call than these small ones to work out: without it walkers move in 0.73
+# to 1 of the time.
 _OPTIONS: dict[str, Any] = {
     "xla_cpu_use_fusion_emitters": False,
     "xla_cpu_parallel_codegen_split_count": 2,
     "xla_cpu_prefer_vector_width": 512,
+    "xla_cpu_experimental_ynn_fusion_type": "",
 }
 _RUN_ONCE: dict[str, Any] = _OPTIONS | {"xla_backend_optimization_level": 0}
 _RUN_OFTEN: dict[str, Any] = _OPTIONS | {"xla_cpu_use_fusion_emitters": True}

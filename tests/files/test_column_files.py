@@ -20,6 +20,7 @@ from bowdenfit.files import columns_csv, excel, outcome, parquet, read_channels
 from bowdenfit.files.channels import Channel
 from bowdenfit.files.clocks import with_clocks
 
+OF_LABORATORIES = sorted(p for p in (Path(__file__).parent / "corpus").iterdir() if p.suffix in {".csv", ".tsv", ".txt"})
 TIME = [0.0, 0.01, 0.02, 0.03, 0.04]
 INPUT = [6.61, 6.72, 6.63, 6.54, 6.65]
 OUTPUT = [5.1, 5.2, 5.35, 5.4, 5.5]
@@ -100,6 +101,7 @@ def as_if_long(monkeypatch):
         return columns
 
     monkeypatch.setattr(columns_csv, "_LAST_BYTES", 30)
+    monkeypatch.setattr(columns_csv, "_FEW_BYTES", 0)
     monkeypatch.setattr(columns_csv, "_long", watched)
     return widths
 
@@ -108,6 +110,44 @@ def as_if_long(monkeypatch):
 def test_usual_habits_do_not_need_the_slow_way(habit, tmp_path, as_if_long):
     check(read_text(tmp_path, HABITS[habit]))
     assert as_if_long[0] >= 3
+
+
+@pytest.fixture
+def both_ways(monkeypatch):
+    """Read all but the last lines both as those of short files and as those of long ones, and return what each gave."""
+    found, few = [], columns_csv._few
+
+    def watched(*arguments):
+        found.append((few(*arguments), columns_csv._long(*arguments)))
+        return found[-1][0]
+
+    monkeypatch.setattr(columns_csv, "_LAST_BYTES", 30)
+    monkeypatch.setattr(columns_csv, "_few", watched)
+    return found
+
+
+def check_alike(few, long):
+    assert (few is None) == (long is None)
+    for column in few or ():
+        np.testing.assert_array_equal(few[column], long[column], strict=True)
+
+
+@pytest.mark.parametrize("habit", HABITS)
+def test_few_rows_are_read_as_many_are(habit, tmp_path, both_ways):
+    check(read_text(tmp_path, HABITS[habit]))
+    ((few, long),) = both_ways
+    check_alike(few, long)
+    assert (few is None) == (habit == SLOW_HABIT)
+
+
+@pytest.mark.parametrize("path", OF_LABORATORIES, ids=lambda path: path.name)
+def test_few_rows_of_a_laboratory_are_read_as_many_are(path, both_ways):
+    try:
+        columns_csv.read(path)
+    except DatasetError:  # it is no recording
+        return
+    for few, long in both_ways:
+        check_alike(few, long)
 
 
 def test_a_comment_between_the_rows_of_a_long_file_is_read_the_slow_way(tmp_path, as_if_long):
@@ -420,7 +460,8 @@ def test_damaged_workbooks_and_those_without_numbers_are_refused(tmp_path):
 @pytest.mark.parametrize(("module", "reader"), [("openpyxl", excel), ("pyarrow", parquet), ("pandas", columns_csv)])
 def test_a_missing_library_is_named_with_how_to_install_it(module, reader, tmp_path, monkeypatch):
     monkeypatch.setitem(sys.modules, module, None)
-    monkeypatch.setattr(columns_csv, "_LAST_BYTES", 30)
+    for limit in ("_LAST_BYTES", "_FEW_BYTES"):
+        monkeypatch.setattr(columns_csv, limit, 1)
     (tmp_path / "run").write_text(HABITS["plain"])
     with pytest.raises(DatasetError, match=rf"needs {module}, which is not installed.*bowdenfit\[lab\]"):
         reader.read(tmp_path / "run")

@@ -108,8 +108,10 @@ def test_what_stands_below_the_data_is_left_out_of_text_and_workbooks_alike(tmp_
         assert "ows 7 to 8 were left out" in " ".join(file.remarks)
 
 
-def test_short_recordings_and_tables_are_read_without_pandas(tmp_path):
-    (tmp_path / "run.csv").write_text(text_of(",", "."))
+@pytest.mark.parametrize("more", [0, 1000])
+def test_short_recordings_and_tables_are_read_without_pandas(more, tmp_path):
+    text = text_of(",", ".")
+    (tmp_path / "run.csv").write_text(text + f"{text.splitlines()[-1]}\n" * more)
     code = (
         "import sys; from pathlib import Path; from bowdenfit.files import read_channels; "
         "from bowdenfit.files.csv_table import read_csv; path = Path(sys.argv[1]); read_csv(path); read_channels(path); "

@@ -62,7 +62,7 @@ class Chart:
             is_z: Whether it is z.
         """
         own = taken(given, self.which)
-        search = jax.vmap(partial(jnp.searchsorted, side="right", method="compare_all"), in_axes=1, out_axes=1)
+        search = jax.vmap(partial(jnp.searchsorted, side="right", method="scan"), in_axes=1, out_axes=1)
         along = (own - NODES[0]) / _WIDTH
         node = jnp.where(is_z, jnp.clip(along, 0, len(NODES) - 2).astype(int), search(jnp.asarray(self.values[1:-1]), own))
         value, rise, log_slope = self._between(node)

@@ -22,7 +22,7 @@ from bowdenfit.questions.bends import (
     stretch_figure,
 )
 from bowdenfit.questions.check import checks_figure
-from bowdenfit.questions.figure_files import titled, write_captions
+from bowdenfit.questions.figure_files import titled
 from bowdenfit.questions.length import efficiency_figure, wrap_angles_figure
 from bowdenfit.questions.recorded import (
     autocorrelation_figure,
@@ -173,13 +173,11 @@ def draw_figure(
     return write_all(figure_of(name, data, cable, width), folder, name, formats)
 
 
-def write_figure_captions(shown: Mapping[str, Any], folder: Path, cable: str) -> Path:
-    """Write the captions of some figures, a paragraph each, beside those of the others in the folder.
+def captions_of(shown: Mapping[str, Any], cable: str) -> dict[str, str]:
+    """Title and caption of each figure, by name.
 
     Args:
         shown: Data of the figures, by name.
-        folder: Where the figures are.
         cable: Name of the cable.
     """
-    said = {name: f"{title_of(name, cable)}. {caption_of(name, data)}" for name, data in shown.items()}
-    return write_captions(said, folder, FIGURES)
+    return {name: f"{title_of(name, cable)}. {caption_of(name, shown[name])}" for name in FIGURES if name in shown}

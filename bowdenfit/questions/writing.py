@@ -95,7 +95,8 @@ def write_answer(
     Raises:
         StoreError: The folder cannot be written.
     """
-    from bowdenfit.questions.figure_files import bring_captions, write_figure
+    from bowdenfit.questions.figure_files import write_figure
+    from bowdenfit.results.captions import bring_captions
     from bowdenfit.results.folder import filled_when_whole, write_text
     from bowdenfit.results.plain import plain
 

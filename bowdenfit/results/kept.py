@@ -15,7 +15,7 @@ from bowdenfit.errors import StoreError
 from bowdenfit.inputs import refuse_special
 from bowdenfit.results.folder import ANSWERS, FIGURE_DATA, FIT, POSTERIOR, read_page, write_text
 
-SCHEMA = 3  # counted up with every change of what one of the questions answers
+SCHEMA = 3  # counted up with every change of what one of the questions answers, and of how figures look
 CHECKSUM = "crc32"  # of a page, in itself
 _PIECE = 1 << 22  # bytes of a file read at once
 
@@ -29,7 +29,17 @@ def keep(folder: Path, answers: Mapping[str, Any], fit_page: str) -> None:
         fit_page: Text that fit.json will be.
     """
     of = {FIT: crc32(fit_page.encode()), **{name: checksum(folder / name) for name in (POSTERIOR, FIGURE_DATA)}}
-    page = {"schema": SCHEMA, "version": _version(), "of": of, "answers": answers}
+    _write(folder, {"schema": SCHEMA, "version": version_of("bowdenfit"), "of": of, "answers": answers})
+
+
+def keep_too(folder: Path, question: str, answer: Any) -> None:
+    """Add one answer to those that are kept, which are as they were written."""
+    page = read_page(folder / ANSWERS)
+    del page[CHECKSUM]
+    _write(folder, page | {"answers": page["answers"] | {question: answer}})
+
+
+def _write(folder: Path, page: Mapping[str, Any]) -> None:
     write_text(folder / ANSWERS, json.dumps({CHECKSUM: own_checksum(page), **page}, allow_nan=False) + "\n")
 
 
@@ -42,7 +52,8 @@ def kept(folder: Path, *beside: str) -> dict[str, Any]:
     """
     try:
         page = read_page(folder / ANSWERS)
-        as_written = page.pop(CHECKSUM) == own_checksum(page) and (page["schema"], page["version"]) == (SCHEMA, _version())
+        of_this = (page["schema"], page["version"]) == (SCHEMA, version_of("bowdenfit"))
+        as_written = page.pop(CHECKSUM) == own_checksum(page) and of_this
         same = as_written and all(checksum(folder / name) == page["of"][name] for name in (FIT, POSTERIOR, *beside))
         return dict(page["answers"]) if same else {}
     except (StoreError, OSError, ValueError, KeyError, TypeError, AttributeError):
@@ -66,8 +77,9 @@ def checksum(path: Path) -> int | None:
     return checksum
 
 
-def _version() -> str:
+def version_of(package: str) -> str:
+    """Which version of a package is installed; empty where that is not known."""
     try:
-        return version("bowdenfit")
+        return version(package)
     except PackageNotFoundError:
         return ""

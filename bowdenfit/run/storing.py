@@ -36,13 +36,15 @@ def write_results(found: "Fit", folder: Path, figures: bool, helper: Assistant) 
         StoreError: The fit itself, or for want of room what belongs to it, could not be written.
     """
     from bowdenfit.plots.write import FORMATS
-    from bowdenfit.questions.figures import AT_ONCE, draw_figure, figures_of, write_figure_captions
+    from bowdenfit.questions.figures import AT_ONCE, captions_of, draw_figure, figures_of
     from bowdenfit.questions.figures import FIGURES as FIGURE_NAMES
     from bowdenfit.questions.kept import answers_of
     from bowdenfit.questions.report.sections import report_page
     from bowdenfit.questions.summary.brief_words import summary_text
     from bowdenfit.questions.summary.words import full_text
     from bowdenfit.questions.writing import write_page
+    from bowdenfit.results.captions import write_captions
+    from bowdenfit.results.drawn import keep_drawn
     from bowdenfit.results.folder import DETAILS_TEXT, FIGURES, REPORT, SUMMARY_TEXT, write_text
     from bowdenfit.results.store import save
 
@@ -71,7 +73,10 @@ def write_results(found: "Fit", folder: Path, figures: bool, helper: Assistant) 
         failed |= _failed(drawn) | {REPORT: error}
     try:
         if data:
-            write_figure_captions({name: data[name] for name in data.keys() - failed}, folder / FIGURES, found.name)
+            captions = captions_of({name: data[name] for name in data.keys() - failed}, found.name)
+            write_captions(captions, folder / FIGURES)
+            if failed.keys().isdisjoint(FIGURE_NAMES):
+                keep_drawn(folder, captions)
     except Exception as error:
         failed["captions"] = error
     return _what_is_missing(folder, failed)

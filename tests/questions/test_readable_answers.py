@@ -19,12 +19,13 @@ from bowdenfit.questions.calibrate.replication import RankedTruth, Replication
 from bowdenfit.questions.check import prior_figure
 from bowdenfit.questions.check.prior_predictive import prior_predictive
 from bowdenfit.questions.compare.answer import ComparedParameter, Comparison
-from bowdenfit.questions.figure_files import CAPTIONS, write_figure
+from bowdenfit.questions.figure_files import write_figure
 from bowdenfit.questions.figures import FIGURES
 from bowdenfit.questions.identify.answer import Identifiability
 from bowdenfit.questions.next.answer import NextMeasurement, Ranked
 from bowdenfit.questions.next.candidates import can_be_ranked
 from bowdenfit.questions.next.target import Answer
+from bowdenfit.results.captions import CAPTIONS
 
 ROOT = Path(__file__).parents[2]
 SETS = sorted(path.parent for path in (ROOT / "datasets").glob("*/cable.toml"))

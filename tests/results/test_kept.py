@@ -12,10 +12,13 @@ import pytest
 from sealed import edit_sealed
 
 import bowdenfit as bf
+from bowdenfit.questions import figures
 from bowdenfit.questions.figures import FIGURES, figures_of, kept_figures
 from bowdenfit.questions.length.verb import VERB as LENGTH
 from bowdenfit.questions.predict.verb import VERB as PREDICT
+from bowdenfit.results import drawn
 from bowdenfit.results.folder import ANSWERS, FIGURE_DATA
+from bowdenfit.results.folder import FIGURES as FIGURES_FOLDER
 from bowdenfit.results.kept import SCHEMA, keep, kept
 from bowdenfit.results.plain import stored
 
@@ -64,6 +67,14 @@ def bare(results, tmp_path_factory):
     return copy
 
 
+@pytest.fixture(scope="module")
+def undrawn(results, tmp_path_factory):
+    """The same folder without its figures."""
+    copy = shutil.copytree(results, tmp_path_factory.mktemp("undrawn") / "fit")
+    shutil.rmtree(copy / FIGURES_FOLDER)
+    return copy
+
+
 def without(heavy, *arguments):
     """The command line in a process of its own, in which some libraries cannot be imported."""
     command = [sys.executable, "-c", REFUSING, ",".join(sorted(heavy)), *map(str, arguments)]
@@ -95,8 +106,8 @@ def test_help_loads_no_arrays_and_reading_tables_neither_jax_nor_pint(on_body):
     assert (done.returncode, done.stderr) == (0, "")
 
 
-def test_a_figure_is_drawn_again_without_a_model(results, tmp_path):
-    done = without(HEAVY - {"matplotlib"}, "plot", results, "--figure", "efficiency", "-o", tmp_path)
+def test_a_figure_is_drawn_again_without_a_model(results, undrawn, tmp_path):
+    done = without(HEAVY - {"matplotlib"}, "plot", undrawn, "--figure", "efficiency", "-o", tmp_path)
     assert (done.returncode, done.stderr) == (0, "")
     drawn = [tmp_path / name for name in ("efficiency.pdf", "efficiency.png", "efficiency.svg")]
     assert sorted(tmp_path.iterdir()) == [tmp_path / "captions.txt", *drawn]
@@ -104,9 +115,9 @@ def test_a_figure_is_drawn_again_without_a_model(results, tmp_path):
         assert path.read_bytes() == (results / "figures" / path.name).read_bytes()
 
 
-def test_the_program_draws_the_figures_that_the_library_does(results, tmp_path):
+def test_the_program_draws_the_figures_that_the_library_does(results, undrawn, tmp_path):
     """Although it loads a leaner matplotlib, and writes PDFs in a copy of itself."""
-    command = [sys.executable, "-m", "bowdenfit", "plot", results, "-o", tmp_path]
+    command = [sys.executable, "-m", "bowdenfit", "plot", undrawn, "-o", tmp_path]
     done = subprocess.run(command, capture_output=True, text=True, check=True)
     files = sorted(path.name for path in (results / "figures").iterdir())
     assert len(files) > 15
@@ -114,6 +125,67 @@ def test_the_program_draws_the_figures_that_the_library_does(results, tmp_path):
     assert sorted(Path(line).name for line in done.stdout.splitlines()) == files
     for name in files:
         assert (tmp_path / name).read_bytes() == (results / "figures" / name).read_bytes(), name
+
+
+@pytest.mark.parametrize("chosen", [(), ("--figure", "pairs", "--figure", "wrap_angles", "--format", "svg", "--format", "png")])
+def test_figures_that_the_fit_drew_are_copied(results, undrawn, run, tmp_path, chosen):
+    done = without(HEAVY | {"numpy"}, "plot", results, "-o", tmp_path / "copied", *chosen)
+    assert (done.returncode, done.stderr) == (0, "")
+    code, said, _ = run("plot", undrawn, "-o", tmp_path / "drawn", *chosen)
+    assert (code, said) == (0, done.stdout.replace("copied", "drawn"))
+    names = sorted(path.name for path in (tmp_path / "drawn").iterdir())
+    assert sorted(path.name for path in (tmp_path / "copied").iterdir()) == names
+    for name in names:
+        assert (tmp_path / "copied" / name).read_bytes() == (tmp_path / "drawn" / name).read_bytes(), name
+
+
+def edit_drawing(folder, monkeypatch):
+    path = folder / FIGURES_FOLDER / "efficiency.svg"
+    path.write_bytes(path.read_bytes().replace(b"Efficiency", b"efficiency"))
+
+
+def edit_fit(folder, monkeypatch):
+    (folder / "fit.json").write_text((folder / "fit.json").read_text() + "\n")
+
+
+def update_matplotlib(folder, monkeypatch):
+    monkeypatch.setattr(drawn, "version_of", lambda _: "99.0")
+
+
+def leave_unnamed(folder, monkeypatch):
+    def change(page):
+        del page["answers"]["drawn"]["files"]["efficiency.svg"]
+
+    edit_sealed(folder / ANSWERS, change)
+
+
+@pytest.mark.parametrize("change", [edit_drawing, edit_fit, update_matplotlib, leave_unnamed, None])
+def test_a_figure_is_drawn_anew_where_it_is_not_as_the_fit_drew_it(results, tmp_path, monkeypatch, change):
+    copy = shutil.copytree(results, tmp_path / "copy")
+    if change is not None:
+        change(copy, monkeypatch)
+    drawing = []
+    monkeypatch.setattr(figures, "draw_figure", lambda name, *_: drawing.append(name))
+    bf.plot(copy, tmp_path / "drawn", figures=["efficiency"], formats=["svg"])
+    assert drawing == ([] if change is None else ["efficiency"])
+    bf.plot(copy, tmp_path / "wide", figures=["pairs"], width=(5, "in"))
+    assert drawing[-1] == "pairs"
+
+
+def test_figures_of_a_fit_that_could_not_draw_one_are_drawn_anew(on_body, tmp_path, monkeypatch):
+    write = figures.write_all
+
+    def failing(figure, folder, name, formats):
+        if name == "residuals":
+            raise RuntimeError("no")
+        return write(figure, folder, name, formats)
+
+    monkeypatch.setattr(figures, "write_all", failing)
+    with pytest.warns(UserWarning, match="figure residuals could not be drawn"):
+        bf.fit(on_body, output=tmp_path / "fit", mcmc=False, seed=1)
+    assert "efficiency.png" in {path.name for path in (tmp_path / "fit" / FIGURES_FOLDER).iterdir()}
+    monkeypatch.undo()
+    assert "residuals" in {path.stem for path in bf.plot(tmp_path / "fit", tmp_path / "drawn", formats=["svg"])}
 
 
 @pytest.mark.parametrize(

@@ -68,7 +68,8 @@ def show_priors(dataset: "Dataset", folder: str | Path, seed: int = 0) -> "Prior
 
     from bowdenfit.questions.check import prior_figure
     from bowdenfit.questions.check.prior_predictive import prior_predictive
-    from bowdenfit.questions.figure_files import bring_captions, write_figure
+    from bowdenfit.questions.figure_files import write_figure
+    from bowdenfit.results.captions import bring_captions
     from bowdenfit.results.folder import filled_when_whole
 
     with jax.enable_x64(True):

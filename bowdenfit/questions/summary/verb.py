@@ -1,6 +1,7 @@
 """The summary of a fit, and its figures."""
 
-from collections.abc import Mapping, Sequence
+import shutil
+from collections.abc import Callable, Mapping, Sequence
 from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
@@ -10,6 +11,9 @@ from bowdenfit.verb import NOT_TRUSTED, Argument, Option, Output, Quantity, Repl
 if TYPE_CHECKING:
     from bowdenfit.questions.writing import Files
     from bowdenfit.results.record import Record
+
+# Captions of figures, the order of all that a folder may hold, and what brings their files into a folder in some formats.
+_Asked = tuple[dict[str, str], Sequence[str], Callable[[Path, Sequence[str]], None]]
 
 
 def summary(
@@ -78,36 +82,72 @@ def plot(
         StoreError: The results folder is missing or damaged, or the other cannot be written.
     """
     from bowdenfit.errors import UsageError
-    from bowdenfit.inference.engines.processes import has_room_beside, meanwhile
-    from bowdenfit.plots.style import load_matplotlib
-    from bowdenfit.questions.figure_files import bring_captions
-    from bowdenfit.questions.figures import draw_figure, page_width, write_figure_captions
     from bowdenfit.questions.writing import Files
+    from bowdenfit.results.captions import bring_captions, write_captions
     from bowdenfit.results.folder import FIGURES, filled_when_whole
 
     if isinstance(found, str | Path):
         output = output or Path(found) / FIGURES
     if output is None:
         raise UsageError("a fit by itself has no folder; name one for the figures.")
-    endings, page = _formats(formats), page_width(width)
-    shown, cable = _shown(found, figures)
+    endings = _formats(formats)
+    there = _there(found, figures, endings) if width is None else None
+    captions, order, bring = there or _anew(found, figures, width, in_background)
     with filled_when_whole(Path(output)) as place:
         bring_captions(Path(output), place)
+        bring(place, endings)
+        said = write_captions(captions, place, order)
+    names = [f"{name}.{ending}" for name in captions for ending in endings]
+    return Files(Path(output) / name for name in (*names, said.name))
 
-        def draw(chosen: Sequence[str]) -> None:
-            for name, data in shown.items():
-                draw_figure(name, data, place, chosen, cable, page)
 
-        others = [ending for ending in endings if ending != "pdf"]
-        if in_background and others and len(others) < len(endings) and has_room_beside():
-            load_matplotlib()  # once for both
-            with meanwhile(partial(draw, ["pdf"])):
-                draw(others)
-        else:
-            draw(endings)
-        captions = write_figure_captions(shown, place, cable)
-    names = [f"{name}.{ending}" for name in shown for ending in endings]
-    return Files(Path(output) / name for name in (*names, captions.name))
+def _there(found: "Record | str | Path", names: Sequence[str], endings: Sequence[str]) -> "_Asked | None":
+    """Figures that the fit has drawn already, to be copied."""
+    from bowdenfit.results.drawn import drawn_before
+    from bowdenfit.results.folder import FIGURES
+
+    captions = drawn_before(Path(found), names, endings) if isinstance(found, str | Path) else None
+    if captions is None or not isinstance(found, str | Path):
+        return None
+    chosen = {name: text for name, text in captions.items() if name in names or not names}
+    return chosen, tuple(captions), partial(_copy, Path(found) / FIGURES, tuple(chosen))
+
+
+def _copy(there: Path, names: Sequence[str], place: Path, endings: Sequence[str]) -> None:
+    for name in names:
+        for ending in endings:
+            shutil.copyfile(there / f"{name}.{ending}", place / f"{name}.{ending}")
+
+
+def _anew(
+    found: "Record | str | Path", names: Sequence[str], width: Quantity | None, in_background: bool
+) -> "_Asked":
+    """Figures to be drawn."""
+    from bowdenfit.questions.figures import FIGURES, captions_of, page_width
+
+    page = page_width(width)
+    shown, cable = _shown(found, names)
+    return captions_of(shown, cable), tuple(FIGURES), partial(_draw, shown, cable, page, in_background)
+
+
+def _draw(
+    shown: Mapping[str, Any], cable: str, page: float | None, in_background: bool, place: Path, endings: Sequence[str]
+) -> None:
+    from bowdenfit.inference.engines.processes import has_room_beside, meanwhile
+    from bowdenfit.plots.style import load_matplotlib
+    from bowdenfit.questions.figures import draw_figure
+
+    def draw(chosen: Sequence[str]) -> None:
+        for name, data in shown.items():
+            draw_figure(name, data, place, chosen, cable, page)
+
+    others = [ending for ending in endings if ending != "pdf"]
+    if in_background and others and len(others) < len(endings) and has_room_beside():
+        load_matplotlib()  # once for both
+        with meanwhile(partial(draw, ["pdf"])):
+            draw(others)
+    else:
+        draw(endings)
 
 
 def _formats(named: Sequence[str]) -> Sequence[str]:

@@ -173,6 +173,7 @@ def test_the_report_says_what_the_summary_says(routed):
     fit = bf.load(routed)
     assert fit.optimal_length().headline in text
     assert "You can trust this" in text
+    assert '<div class="verdict">' in text
     for name, digest in fit.dataset.sha256.items():
         assert name in text
         assert digest in text
@@ -183,6 +184,7 @@ def test_the_report_says_what_the_summary_says(routed):
 def test_least_squares_alone_say_so_to_those_who_cite_them(recorded):
     text = (recorded / REPORT).read_text(encoding="utf-8").replace("\u00a0", " ")
     assert "Values are those of least squares" in text
+    assert '<div class="verdict doubtful">' in text
     assert "No posterior was sampled." in text
     assert "Foreman-Mackey" not in text
 

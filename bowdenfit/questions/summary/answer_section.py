@@ -18,6 +18,7 @@ def section(fit: Record) -> Section:
         choices = (Table(best.heads, tuple(best.rows), "Lengths that can be bought"),) if best.choices else ()
     context = {
         "trusted": found.trusted,
+        "doubtful": bool(found.doubts) or not found.sampled,
         "first": first,
         "others": others,
         "warning": warning(found),

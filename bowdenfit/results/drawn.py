@@ -4,6 +4,7 @@ from collections.abc import Collection, Mapping
 from pathlib import Path
 from typing import Any
 
+from bowdenfit.errors import StoreError
 from bowdenfit.results.folder import FIGURES
 from bowdenfit.results.kept import checksum, keep_too, kept, version_of
 
@@ -34,5 +35,8 @@ def drawn_before(folder: Path, names: Collection[str], endings: Collection[str])
         return None
     captions: dict[str, str] = page["captions"]
     files = [f"{name}.{ending}" for name in names or captions for ending in endings]
-    same = all(file in page["files"] and page["files"][file] == checksum(folder / FIGURES / file) for file in files)
+    try:
+        same = all(page["files"][file] == checksum(folder / FIGURES / file) for file in files)
+    except (KeyError, StoreError, OSError):  # a figure that it has not, or something else that lies there
+        return None
     return captions if same else None

@@ -144,6 +144,11 @@ def edit_drawing(folder, monkeypatch):
     path.write_bytes(path.read_bytes().replace(b"Efficiency", b"efficiency"))
 
 
+def put_a_folder_there(folder, monkeypatch):
+    (folder / FIGURES_FOLDER / "efficiency.svg").unlink()
+    (folder / FIGURES_FOLDER / "efficiency.svg").mkdir()
+
+
 def edit_fit(folder, monkeypatch):
     (folder / "fit.json").write_text((folder / "fit.json").read_text() + "\n")
 
@@ -159,7 +164,7 @@ def leave_unnamed(folder, monkeypatch):
     edit_sealed(folder / ANSWERS, change)
 
 
-@pytest.mark.parametrize("change", [edit_drawing, edit_fit, update_matplotlib, leave_unnamed, None])
+@pytest.mark.parametrize("change", [edit_drawing, put_a_folder_there, edit_fit, update_matplotlib, leave_unnamed, None])
 def test_a_figure_is_drawn_anew_where_it_is_not_as_the_fit_drew_it(results, tmp_path, monkeypatch, change):
     copy = shutil.copytree(results, tmp_path / "copy")
     if change is not None:

@@ -90,6 +90,21 @@ def bounded_memory():
         jax.clear_caches()
 
 
+@pytest.fixture(scope="session", autouse=True)
+def options_for_many_cables():
+    """Walkers of a batch are compiled as everything else is: over the few cables of a test no slower compiler pays.
+
+    Yields:
+        The options with which they are compiled for many.
+    """
+    from bowdenfit.inference import compilation
+
+    with pytest.MonkeyPatch.context() as patched:
+        options = compilation._RUN_OFTEN
+        patched.setattr(compilation, "_RUN_OFTEN", compilation._OPTIONS)
+        yield options
+
+
 @pytest.fixture(scope="session")
 def on_body() -> Path:
     """The data set of the on-body exoskeleton paper."""

@@ -11,6 +11,7 @@ from rows import of_rows
 import bowdenfit as bf
 from bowdenfit.dataset import load_dataset
 from bowdenfit.description import SamplerSettings
+from bowdenfit.inference import compilation
 from bowdenfit.inference.batch.fitting import fit_batch
 from bowdenfit.inference.batch.programs import BatchPrograms, BatchSettings
 from bowdenfit.inference.log_density import LogDensity
@@ -31,6 +32,14 @@ ACCURATE = BatchSettings(
     n_kept=4096,
     nuts=False,
 )
+
+
+@pytest.fixture(scope="module", autouse=True)
+def compiled_as_for_many(options_for_many_cables):
+    """Here the programs are those of long calibrations."""
+    with pytest.MonkeyPatch.context() as patched:
+        patched.setattr(compilation, "_RUN_OFTEN", options_for_many_cables)
+        yield
 
 
 @pytest.fixture(scope="module", params=[pytest.param(ON_BODY, marks=pytest.mark.slow), YARN])

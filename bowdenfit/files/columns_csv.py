@@ -73,7 +73,8 @@ def read(path: Path) -> ChannelFile:
     if stop <= sheet.start:
         raise DatasetError(f"{path.name} breaks off before its first whole row of numbers; copy or export it again.")
     split = last[0].start if last else stop
-    plain = (_few if split - sheet.start < _FEW_BYTES else _long)(path, sheet, split) if split > sheet.start else {}
+    read_plain = _few if split - sheet.start < _FEW_BYTES else _long
+    plain = read_plain(path, sheet, split) if split > sheet.start else {}
     quick = (sheet.start, 0) if not plain else (split, sum(map(len, next(iter(plain.values())))))
     found = columns_of(_rows(path, sheet, sheet.start if plain is None else split, stop, plain))
     channels, left_out = channels_of(sheet.layout, found.values)

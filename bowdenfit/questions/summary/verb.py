@@ -91,7 +91,7 @@ def plot(
     if output is None:
         raise UsageError("a fit by itself has no folder; name one for the figures.")
     endings = _formats(formats)
-    there = _there(found, figures, endings) if width is None else None
+    there = _there(Path(found), figures, endings) if isinstance(found, str | Path) and width is None else None
     captions, order, bring = there or _anew(found, figures, width, in_background)
     with filled_when_whole(Path(output)) as place:
         bring_captions(Path(output), place)
@@ -101,16 +101,16 @@ def plot(
     return Files(Path(output) / name for name in (*names, said.name))
 
 
-def _there(found: "Record | str | Path", names: Sequence[str], endings: Sequence[str]) -> "_Asked | None":
+def _there(results: Path, names: Sequence[str], endings: Sequence[str]) -> "_Asked | None":
     """Figures that the fit has drawn already, to be copied."""
     from bowdenfit.results.drawn import drawn_before
     from bowdenfit.results.folder import FIGURES
 
-    captions = drawn_before(Path(found), names, endings) if isinstance(found, str | Path) else None
-    if captions is None or not isinstance(found, str | Path):
+    captions = drawn_before(results, names, endings)
+    if captions is None:
         return None
     chosen = {name: text for name, text in captions.items() if name in names or not names}
-    return chosen, tuple(captions), partial(_copy, Path(found) / FIGURES, tuple(chosen))
+    return chosen, tuple(captions), partial(_copy, results / FIGURES, tuple(chosen))
 
 
 def _copy(there: Path, names: Sequence[str], place: Path, endings: Sequence[str]) -> None:

@@ -77,7 +77,7 @@ class InAnotherProcess(Assistant):
 
     Args:
         copy: Whether it begins as a copy of this one, or anew.
-        settings: Called in it first; None where no job will need JAX, and what drawing needs is loaded at once.
+        settings: Called in it first; None where no job will need JAX, and what drawing needs is loaded at once if it draws.
         draws: Whether it will draw figures.
         others: Ends of pipes to other processes, which a copy has too and is not to hold open.
         twin: Where a copy of it, once it has loaded what drawing needs, gets its jobs from; none is made without it.
@@ -96,7 +96,7 @@ class InAnotherProcess(Assistant):
         self.thread, self.draws = ThreadPoolExecutor(1), draws
         context: Any = get_context("fork" if copy else "spawn")
         self.ours, theirs = context.Pipe()
-        passed = (theirs, (self.ours, *others) if copy else (), settings, twin, checks)
+        passed = (theirs, (self.ours, *others) if copy else (), settings, draws, twin, checks)
         self.process = context.Process(target=_serve, args=passed, daemon=True)
         self.process.start()
         theirs.close()
@@ -152,45 +152,50 @@ class Twin(InAnotherProcess):
         self.thread.shutdown()
 
 
-class Drawers:
-    """Two processes without JAX that draw, the first of which judges draws too; begun before this process loads JAX.
+class LightProcesses:
+    """Processes without JAX, begun before this one loads it: the first judges draws, and two draw figures if any are drawn.
 
     Args:
+        draws: Whether figures will be drawn.
         checks: Whether there will be draws to judge.
     """
 
-    def __init__(self, checks: bool) -> None:
-        self.second = Twin()
-        self.first = InAnotherProcess(True, None, True, (self.second.ours,), self.second.theirs, checks)
-        self.second.theirs.close()
+    def __init__(self, draws: bool, checks: bool) -> None:
+        twin = Twin() if draws else None
+        ends = (None, ()) if twin is None else (twin.theirs, (twin.ours,))
+        self.first = InAnotherProcess(True, None, draws, ends[1], ends[0], checks)
+        self.all: tuple[InAnotherProcess, ...] = (self.first,)
+        if twin is not None:
+            twin.theirs.close()
+            self.all = self.first, twin
 
     def end(self) -> None:
-        """End both."""
-        for process in (self.first, self.second):
+        """End all of them."""
+        for process in self.all:
             process.end()
 
 
 class InOtherProcesses(Assistant):
-    """Generators in a copy of this process; functions in whichever of the drawing processes is free.
+    """Generators in a copy of this process; functions in whichever of the light processes is free.
 
     Args:
-        drawers: Those.
+        light: Those.
         settings: See `assistant`.
         computes: Whether a generator will be begun.
     """
 
     checks = True
 
-    def __init__(self, drawers: Drawers, settings: Callable[[], None], computes: bool) -> None:
-        self.drawers, alone = drawers, threading.active_count() == 1
+    def __init__(self, light: LightProcesses, settings: Callable[[], None], computes: bool) -> None:
+        self.light, alone = light, threading.active_count() == 1
         load_what_computing_needs(True)
         settings()
-        ends = drawers.first.ours, drawers.second.ours
+        ends = tuple(process.ours for process in light.all)
         self.computing = InAnotherProcess(alone, settings, False, ends) if computes else None
         self.free = SimpleQueue[InAnotherProcess]()
-        for process in (drawers.first, drawers.second):
+        for process in light.all:
             self.free.put(process)
-        self.threads = ThreadPoolExecutor(2)
+        self.threads = ThreadPoolExecutor(len(light.all))
 
     def begin(self, stages: Callable[..., Iterator[Any]], *arguments: Any, answers: int) -> Answers:
         """See `Assistant`."""
@@ -205,7 +210,7 @@ class InOtherProcesses(Assistant):
 
     def check(self, function: Callable[..., Any], *arguments: Any) -> "Future[Any]":
         """See `Assistant`."""
-        return self.drawers.first.submit(function, *arguments)
+        return self.light.first.submit(function, *arguments)
 
     def _in_one_that_is_free(self, function: Callable[..., Any], arguments: tuple[Any, ...]) -> Any:
         process = self.free.get()
@@ -215,31 +220,30 @@ class InOtherProcesses(Assistant):
             self.free.put(process)
 
     def end(self) -> None:
-        """End all but those that draw."""
+        """End all but the light ones."""
         if self.computing is not None:
             self.computing.end()
         self.threads.shutdown(cancel_futures=True)
 
 
 @contextmanager
-def drawers(in_background: bool, draws: bool, checks: bool) -> Iterator[Drawers | None]:
-    """The processes that draw, which load what that needs while this one reads; None where there are to be none.
+def light_processes(in_background: bool, draws: bool, checks: bool) -> Iterator[LightProcesses | None]:
+    """Processes without JAX, which load what they need while this one reads; None where there are to be none.
 
     A copy of this process has all its libraries and starts at once, but may be made only while nothing runs in it besides.
 
     Args:
         in_background: Whether other processes may be started.
-        draws: Whether figures will be drawn.
-        checks: See `Drawers`.
+        draws, checks: See `LightProcesses`.
 
     Raises:
         MemoryShortageError: There is too little memory for any fit.
     """
     refuse_too_little()
-    if not (in_background and draws and has_room_beside()):
+    if not (in_background and (draws or checks) and has_room_beside()):
         yield None
         return
-    begun = Drawers(checks)
+    begun = LightProcesses(draws, checks)
     try:
         yield begun
     finally:
@@ -248,7 +252,7 @@ def drawers(in_background: bool, draws: bool, checks: bool) -> Iterator[Drawers 
 
 @contextmanager
 def assistant(
-    drawing: Drawers | None, in_background: bool, settings: Callable[[], None], draws: bool, computes: bool = True
+    light: LightProcesses | None, in_background: bool, settings: Callable[[], None], draws: bool, computes: bool = True
 ) -> Iterator[Assistant]:
     """An assistant in processes of its own, or in this one.
 
@@ -256,15 +260,15 @@ def assistant(
     does, the library does not unless told to.
 
     Args:
-        drawing: Of `drawers`.
+        light: Of `light_processes`.
         in_background: Whether another process may be started.
         settings: Called first, in every process that computes.
         draws: Whether figures will be drawn.
         computes: Whether it will be given a generator.
     """
     copy = may_be_copied()
-    if drawing is not None:
-        other: InOtherProcesses | InAnotherProcess = InOtherProcesses(drawing, settings, computes)
+    if light is not None:
+        other: InOtherProcesses | InAnotherProcess = InOtherProcesses(light, settings, computes)
     else:
         load_what_computing_needs(in_background)
         settings()
@@ -295,6 +299,7 @@ def _serve(
     requests: "Connection",
     theirs: "tuple[Connection, ...]",
     settings: Callable[[], None] | None,
+    draws: bool,
     twin: "Connection | None" = None,
     checks: bool = False,
 ) -> None:
@@ -303,7 +308,7 @@ def _serve(
     Args:
         requests: Where jobs come from.
         theirs: Ends that are not this process's.
-        settings, twin, checks: See `InAnotherProcess`.
+        settings, draws, twin, checks: See `InAnotherProcess`.
     """
     signal.signal(signal.SIGINT, signal.SIG_IGN)
     signal.signal(signal.SIGTERM, signal.SIG_DFL)
@@ -312,8 +317,9 @@ def _serve(
     end_with_parent()
     with suppress(EOFError, ConnectionError), ExitStack() as held:  # that process has ended, perhaps with a reply unread
         if settings is None:
-            with suppress(Exception):  # what fails here fails where it is needed
-                load_what_drawing_needs()
+            if draws:
+                with suppress(Exception):  # what fails here fails where it is needed
+                    load_what_drawing_needs()
             own = requests
             if twin is not None:
                 requests = _one_of_two(requests, twin)

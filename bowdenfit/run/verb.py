@@ -58,18 +58,18 @@ def fit(
     """
     from bowdenfit.notebook import watched
     from bowdenfit.results.folder import reserved
-    from bowdenfit.run.helpers import assistant, drawers
+    from bowdenfit.run.helpers import assistant, light_processes
     from bowdenfit.run.storing import choose_seed, start_checkpointing, with_sampler, write_results
 
     refuse_unknown(fit, reading)
     folder = Path(output) if output is not None else None
     drawing, settings = figures and folder is not None, settings_of_process(remember_compilations)
     with ExitStack() as held:
-        drawn_by = held.enter_context(drawers(in_background, drawing, mcmc))
+        light = held.enter_context(light_processes(in_background, drawing, mcmc))
         data = with_sampler(read(dataset, **reading), sampler)
         held.enter_context(reserved(folder))
         seed = choose_seed(folder, data, mcmc, seed, resume, force)
-        helper = held.enter_context(assistant(drawn_by, in_background and (mcmc or drawing), settings, drawing, mcmc))
+        helper = held.enter_context(assistant(light, in_background and (mcmc or drawing), settings, drawing, mcmc))
         show = held.enter_context(watched(WATCH, progress)) if mcmc else None
         import jax
 

@@ -11,6 +11,7 @@ from pathlib import Path
 from types import SimpleNamespace
 
 import pytest
+from conftest import QUICK
 
 from bowdenfit.errors import BowdenfitError
 from bowdenfit.results.record import once
@@ -106,7 +107,7 @@ def nothing():
 
 context = get_context("fork")
 ours, theirs = context.Pipe()
-process = context.Process(target=_serve, args=(theirs, (ours,), nothing))
+process = context.Process(target=_serve, args=(theirs, (ours,), nothing, False))
 process.start()
 theirs.close()
 ours.send((abs, (-3,)))
@@ -147,7 +148,7 @@ def test_an_error_arrives_where_the_answer_is_asked_for(make):
 
 IN_WHICHEVER_IS_FREE = """
 import os, sys, time
-from bowdenfit.run.helpers import Drawers, InOtherProcesses
+from bowdenfit.run.helpers import InOtherProcesses, LightProcesses
 
 def nothing():
     pass
@@ -159,8 +160,8 @@ def slow():
     time.sleep(1)
     return os.getpid(), "jax" in sys.modules
 
-drawers = Drawers(True)
-helper = InOtherProcesses(drawers, nothing, True)
+light = LightProcesses(True, True)
+helper = InOtherProcesses(light, nothing, True)
 jobs = [helper.submit(slow), helper.submit(slow), helper.check(slow), *helper.begin(begun, answers=1)]
 answers = [job.result() for job in jobs]
 print(*answers, sep=chr(10), flush=True)
@@ -169,7 +170,7 @@ END
 
 
 @needs_linux
-@pytest.mark.parametrize("end", ["helper.end(); drawers.end()", "os.kill(os.getpid(), 9)"])
+@pytest.mark.parametrize("end", ["helper.end(); light.end()", "os.kill(os.getpid(), 9)"])
 def test_two_processes_work_at_once_without_jax_beside_one_with_it_and_all_end_with_this_one(end):
     command = [sys.executable, "-c", IN_WHICHEVER_IS_FREE.replace("END", end)]
     done = subprocess.run(command, capture_output=True, text=True, check=False, timeout=60)
@@ -185,20 +186,24 @@ import os, signal, sys
 import numpy as np
 from bowdenfit.inference.diagnostics import diagnose_all
 from bowdenfit.run.fitting import _diagnosed
-from bowdenfit.run.helpers import Drawers, InOtherProcesses
+from bowdenfit.run.helpers import InOtherProcesses, LightProcesses
 
 def nothing():
     pass
 
+def is_loaded(name):
+    return name in sys.modules
+
 draws = {"mu": np.random.default_rng(0).standard_normal((8, 50))}
-drawers = Drawers(False)
-helper = InOtherProcesses(drawers, nothing, False)
+light = LightProcesses(False, True)
+helper = InOtherProcesses(light, nothing, False)
 elsewhere = _diagnosed(helper, draws, 4)
 assert "arviz_stats" not in sys.modules
-os.kill(drawers.first.process.pid, signal.SIGKILL)
+assert not helper.submit(is_loaded, "matplotlib").result()  # nothing is to be drawn
+os.kill(light.first.process.pid, signal.SIGKILL)
 print(elsewhere == _diagnosed(helper, draws, 4) == diagnose_all(draws, 4))
 helper.end()
-drawers.end()
+light.end()
 """
 
 
@@ -206,6 +211,26 @@ drawers.end()
 def test_draws_are_diagnosed_alike_elsewhere_and_here_where_that_process_was_ended():
     done = subprocess.run([sys.executable, "-c", CHECKS_ELSEWHERE], capture_output=True, text=True, check=False, timeout=120)
     assert done.stdout == "True\n", done.stderr
+
+
+IN_BACKGROUND = """
+import sys
+import numpy as np
+import bowdenfit as bf
+
+fit = bf.fit(sys.argv[1], seed=11, settings=sys.argv[3:], in_background=True)
+assert "arviz_stats" not in sys.modules
+other = bf.load(sys.argv[2])
+print(all(np.array_equal(fit.posterior.values[name], values) for name, values in other.posterior.values.items()))
+print(fit.verdict() == other.verdict())
+"""
+
+
+@needs_linux
+def test_a_program_that_lets_other_processes_work_gets_the_same_fit(on_body, quick_results):
+    command = [sys.executable, "-c", IN_BACKGROUND, str(on_body), str(quick_results), *QUICK]
+    done = subprocess.run(command, capture_output=True, text=True, check=False, timeout=120)
+    assert (done.stdout, done.stderr) == ("True\nTrue\n", "")
 
 
 POSTPONED = """

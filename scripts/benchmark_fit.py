@@ -67,6 +67,8 @@ READS: dict[str, tuple[str, ...]] = {  # FIT stands for a finished fit of the on
     "check": ("check", DATASET),
     "--help": ("--help",),
 }
+FILLED = "fit, cache filled"
+GROUPS = ("plain", "many", "counts")
 NOT_PAIRED = ("plot one", "plot one anew")  # older commands draw all figures
 PLAIN = {"blackjax": "plain_blackjax.py", "emcee and NumPy": "plain_emcee.py", "NumPyro": "plain_numpyro.py"}
 CALIBRATE, MANY, FEW = "calibrate, 200", 200, (2, 6)
@@ -171,17 +173,17 @@ class Bench:
 
     def rows(self) -> Iterator[Row]:
         """All commands, cold or not, in turns."""
-        filled, reads = "fit, cache filled", {name: words for name, words in READS.items() if self.asked(name)}
         for tree in self.trees:  # this keeps byte code for all that follow
             say("a fit to read")
             self.command(tree, ["fit", DATASET, "--seed", "1"], "unmeasured", self.finished(tree))
         for name, arguments in FITS.items():
             if self.asked(name):
                 yield self.row(name, ["fit", *arguments, "--seed", "SEED"], cold=True)
-        if self.asked(filled):
-            yield self.row(filled, ["fit", DATASET, "--seed", "SEED"], writes=True)
-        for name, arguments in reads.items():
-            yield self.row(name, arguments)
+        if self.asked(FILLED):
+            yield self.row(FILLED, ["fit", DATASET, "--seed", "SEED"], writes=True)
+        for name, arguments in READS.items():
+            if self.asked(name):
+                yield self.row(name, arguments)
 
     def calibrations(self) -> Row:
         """Many replications here; of the other checkout few, from which as many are reckoned."""
@@ -302,7 +304,10 @@ def main() -> None:
         "--against", type=Path, metavar="TREE", help="another checkout, whose runs are paired with ours"
     )
     parser.add_argument("--record", action="store_true", help="keep the table in docs/benchmarks.md")
-    parser.add_argument("--only", nargs="+", default=(), metavar="NAME", help="rows, or plain, many, counts [default: all]")
+    names = [*FITS, FILLED, *READS, *GROUPS]
+    parser.add_argument(
+        "--only", nargs="+", default=(), choices=names, metavar="NAME", help="rows, or plain, many, counts [default: all]"
+    )
     asked = parser.parse_args()
     other = asked.against and asked.against.resolve()
     with tempfile.TemporaryDirectory() as folder:

@@ -64,6 +64,7 @@ SETTINGS: dict[Any, Any] = {
     "svg.fonttype": "none",
     "svg.hashsalt": "bowdenfit",
     "pdf.fonttype": 42,  # letters as letters
+    "text.hinting": "no_hinting",  # as far apart in PNG as in SVG and PDF; to fit letters to dots takes a sixth of a PNG
 }
 
 

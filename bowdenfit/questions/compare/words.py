@@ -116,11 +116,12 @@ def basis_sentences(found: Comparison) -> list[str]:
     counts = Counter(name for name, _ in found.readings)
     parts = "" if found.left_out == "run" else "parts "
     what = listed([f"{n} {parts}of {name.replace('_', ' ')}" for name, n in counts.items()])
-    n = len(found.readings)
+    n, alike = len(found.readings), any(found.verdict(name) == "open" for name in list(found.differences)[1:])
     lines = [
         f"Compared on {counted(n, 'reading')}, each left out and predicted by the others: {what}. The score says how "
         "probable the readings were: 2.3 less is ten times less probable. The "
-        "weights make the mixture of the models that predicts best."
+        "weights make the mixture of the models that predicts best"
+        + ("; where the data cannot tell, they follow chance, and even 0 rules no model out." if alike else ".")
     ]
     if found.left_out != "run":
         what = "the readings at one load" if found.left_out == "load" else "one reading"

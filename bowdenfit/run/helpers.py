@@ -161,13 +161,15 @@ class LightProcesses:
     """
 
     def __init__(self, draws: bool, checks: bool) -> None:
-        twin = Twin() if draws else None
-        ends = (None, ()) if twin is None else (twin.theirs, (twin.ours,))
-        self.first = InAnotherProcess(True, None, draws, ends[1], ends[0], checks)
-        self.all: tuple[InAnotherProcess, ...] = (self.first,)
-        if twin is not None:
-            twin.theirs.close()
-            self.all = self.first, twin
+        self.all: tuple[InAnotherProcess, ...]
+        if not draws:
+            self.first = InAnotherProcess(True, None, False, checks=checks)
+            self.all = (self.first,)
+            return
+        twin = Twin()
+        self.first = InAnotherProcess(True, None, True, (twin.ours,), twin.theirs, checks)
+        twin.theirs.close()
+        self.all = self.first, twin
 
     def end(self) -> None:
         """End all of them."""

@@ -60,15 +60,14 @@ def run(
         programs = sampling_programs(density, seed, compiling)
     with watch.stage("wait for the start"):
         center = start.result()
-    files = begin(), resume
-    diagnose = partial(_diagnosed, helper)
-    asked = Sampling(density, center, settings, seed, programs.quantities, *files, _with_memory(progress), diagnose)
+    checkpoint, report, diagnose = begin(), _with_memory(progress), partial(_diagnosed, helper)
+    asked = Sampling(density, center, settings, seed, programs.quantities, checkpoint, resume, report, diagnose)
     posterior, reasons = draws_of(programs, asked, watch)
     squares, beside = estimated.result()
     watch.seconds |= {f"{stage}, beside": seconds for stage, seconds in beside.items()}
     found = Fit(data, squares, posterior, not reasons, reasons, provenance(seed, watch))
     found._answers.update(programs.asked)
-    if helper.checks and files[0] is not None:  # what is written waits for it
+    if helper.checks and checkpoint is not None:  # what is written waits for it
         found._answers[checks_findings] = helper.check(work_out, evidence_of(found))
     return found
 

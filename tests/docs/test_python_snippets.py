@@ -22,7 +22,7 @@ MOST_TEXT = 2000  # characters of one output
 PAGES = sorted([ROOT / "README.md", *(ROOT / "docs").glob("*.md"), *(ROOT / "docs" / "notebooks").glob("*.md")])
 CELL = re.compile(r"^```(?:python|\{code-cell\}[^\n]*)\n(.*?)^```", re.MULTILINE | re.DOTALL)
 IN_A_KERNEL = (ROOT / "README.md", ROOT / "docs" / "library.md")
-PROGRAMS = (ROOT / "docs" / "fleets.md",)
+PROGRAMS = {ROOT / "docs" / "fleets.md": "cable-01", ROOT / "docs" / "library.md": "You can trust this"}  # and what they print
 CALIBRATING = """
 from bowdenfit.notebook import watched
 from bowdenfit.questions.calibrate.verb import WATCH
@@ -47,7 +47,8 @@ def run_in_a_kernel(cells, monkeypatch, tmp_path):
 
 
 def test_cells_of_the_pages_run_in_a_kernel_and_print_little(monkeypatch, tmp_path):
-    shown = [statement for page in IN_A_KERNEL for cell in CELLS[page] for statement in statements(cell)]
+    cells = [cell for page in IN_A_KERNEL for cell in CELLS[page] if not is_program(cell)]
+    shown = [statement for cell in cells for statement in statements(cell)]
     notebook = run_in_a_kernel([*shown, "fit.summary()", CALIBRATING], monkeypatch, tmp_path)
     by_cell = {cell.source: cell.outputs for cell in notebook.cells}
     for source, outputs in by_cell.items():
@@ -64,23 +65,31 @@ def test_cells_of_the_pages_run_in_a_kernel_and_print_little(monkeypatch, tmp_pa
     assert page.startswith("<p><b>On-body knee exoskeleton: cut the cable to 470 mm.</b></p>")
 
 
+def is_program(cell):
+    """Whether a cell stands in a file of its own, whose helpers import it again."""
+    return '__name__ == "__main__"' in cell
+
+
 def test_every_page_with_python_has_it_run():
     with_python = {page for page, cells in CELLS.items() if cells}
     assert with_python == {*IN_A_KERNEL, *PROGRAMS, *(ROOT / "docs" / "notebooks").glob("*.md")}  # these when pages are built
+    assert {page for page, cells in CELLS.items() if any(map(is_program, cells))} == PROGRAMS.keys()
+    assert all(page in IN_A_KERNEL or all(map(is_program, CELLS[page])) for page in PROGRAMS)
 
 
 @pytest.mark.parametrize("page", PROGRAMS, ids=lambda page: page.stem)
 def test_programs_of_the_pages_run_by_themselves(page, tmp_path):
     """Programs whose helpers import them again cannot be run in a kernel; of the fleet they get two inspections."""
+    (tmp_path / "datasets").symlink_to(ROOT / "datasets")
     fleet = shutil.copytree(ROOT / "datasets" / "synthetic-fleet", tmp_path / "synthetic-fleet") / "fleet.csv"
     fleet.write_text("".join(fleet.read_text().splitlines(keepends=True)[:3]))
-    for i, cell in enumerate(CELLS[page]):
+    for i, cell in enumerate(filter(is_program, CELLS[page])):
         (tmp_path / f"program_{i}.py").write_text(cell, encoding="utf-8")
         command = [sys.executable, f"program_{i}.py"]
         variables = {**os.environ, "PYTHONPATH": str(ROOT)}
         done = subprocess.run(command, cwd=tmp_path, env=variables, capture_output=True, text=True, check=False, timeout=300)
         assert done.returncode == 0, done.stderr
-        assert "cable-01" in done.stdout and 0 < len(done.stdout) <= MOST_TEXT
+        assert PROGRAMS[page] in done.stdout and len(done.stdout) <= MOST_TEXT
 
 
 def statements(cell):
@@ -91,8 +100,10 @@ def statements(cell):
 
 def test_snippets_have_no_error_of_types_and_a_misspelt_keyword_is_one(tmp_path):
     for page, cells in CELLS.items():
-        if cells:
-            (tmp_path / f"{page.stem.replace('-', '_')}.py").write_text("\n".join(cells), encoding="utf-8")
+        files = ["\n".join(cell for cell in cells if not is_program(cell)), *filter(is_program, cells)]
+        for i, text in enumerate(files):
+            if text:
+                (tmp_path / f"{page.stem.replace('-', '_')}_{i}.py").write_text(text, encoding="utf-8")
     (tmp_path / "misspelt.py").write_text('import bowdenfit as bf\n\nbf.fit("bench", sede=1)\n', encoding="utf-8")
     (tmp_path / "no_such_name.py").write_text('import bowdenfit as bf\n\nbf.fitt("bench")\n', encoding="utf-8")
     settings = {"typeCheckingMode": "strict", "extraPaths": [str(ROOT)], "reportUnusedExpression": False}  # as notebooks have

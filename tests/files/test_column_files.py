@@ -18,6 +18,8 @@ from bowdenfit.files.channels import Channel
 from bowdenfit.files.clocks import with_clocks
 
 OF_LABORATORIES = sorted(p for p in (Path(__file__).parent / "corpus").iterdir() if p.suffix in {".csv", ".tsv", ".txt"})
+
+
 def rows_of(separator=",", decimal=".", end="\n"):
     return end.join(
         separator.join(f"{value}".replace(".", decimal) for value in row)

@@ -116,12 +116,12 @@ def basis_sentences(found: Comparison) -> list[str]:
     counts = Counter(name for name, _ in found.readings)
     parts = "" if found.left_out == "run" else "parts "
     what = listed([f"{n} {parts}of {name.replace('_', ' ')}" for name, n in counts.items()])
-    n, alike = len(found.readings), any(found.verdict(name) == "open" for name in list(found.differences)[1:])
+    n, verdicts = len(found.readings), {found.verdict(name) for name in list(found.differences)[1:]}
     lines = [
         f"Compared on {counted(n, 'reading')}, each left out and predicted by the others: {what}. The score says how "
         "probable the readings were: 2.3 less is ten times less probable. The "
         "weights make the mixture of the models that predicts best"
-        + ("; where the data cannot tell, they follow chance, and even 0 rules no model out." if alike else ".")
+        + ("; where the data cannot tell, they follow chance, and even 0 rules no model out." if "open" in verdicts else ".")
     ]
     if found.left_out != "run":
         what = "the readings at one load" if found.left_out == "load" else "one reading"
@@ -136,13 +136,9 @@ def basis_sentences(found: Comparison) -> list[str]:
             "A run of forces counts as one reading, because its samples share one mounting: it is left out as a whole."
         )
     lines += [part.sentence() for part in found.omitted]
-    if n < SMALL and any(found.verdict(name) != "open" for name in list(found.differences)[1:]) and not _says_so(found):
+    if n < SMALL and verdicts - {"open"} and "leaning" not in verdicts:  # of which it is said already
         lines.append(f"With {n} readings the standard errors tend to be too small.")
     return lines
-
-
-def _says_so(found: Comparison) -> bool:
-    return any(found.verdict(name) == "leaning" for name in list(found.differences)[1:])
 
 
 def treated_text(found: Comparison) -> str:

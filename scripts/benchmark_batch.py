@@ -21,6 +21,7 @@ import sys
 import tempfile
 import time
 from collections import Counter
+from itertools import count
 from pathlib import Path
 
 import jax
@@ -37,6 +38,7 @@ from bowdenfit.inference.walkers import walker_programs
 from bowdenfit.kinds.designs import design_of
 from bowdenfit.kinds.settings import parse_description
 from bowdenfit.model import build_model
+from bowdenfit.questions.calibrate.acceptable_tables import refusal
 from bowdenfit.questions.fleet.fitting import SETTINGS
 from bowdenfit.questions.simulate.fleet import read_fleet_plan, simulate_fleet, write_fleet
 from bowdenfit.questions.simulate.simulation import empty_tables, simulate, true_values
@@ -131,7 +133,7 @@ def time_commands(numbers: list[int]) -> None:
 
 
 def cables(number: int) -> list[LogDensity]:
-    """Posteriors of cables whose coefficients are drawn from their priors."""
+    """Posteriors of cables whose coefficients are drawn from their priors, again where no bench would hand in what they give."""
     description = parse_description(
         {
             "name": "simple cable",
@@ -142,12 +144,15 @@ def cables(number: int) -> list[LogDensity]:
     own = {f"{name}_angle": column for name, column in zip(CONTACTS, zip(*ANGLES, strict=True), strict=True)}
     design = design_of(runs=(0.0,) * len(ANGLES), input_forces=FORCES, strokes=STROKES, own_angles=own)
     tables = empty_tables(description, design)
-    found = []
-    for seed in range(number):
+    found: list[LogDensity] = []
+    for seed in count():
         of_truth, of_readings = jax.random.split(jax.random.key(seed))
         values = true_values(description, tables, {"tau": 0.01, "sigma_F": 0.4}, of_truth)
-        found.append(LogDensity(build_model(simulate(description, design, values, of_readings))))
-    return found
+        made = simulate(description, design, values, of_readings)
+        if not refusal(made, made):
+            found.append(LogDensity(build_model(made)))
+        if len(found) == number:
+            return found
 
 
 def seconds_alone(posterior: LogDensity) -> float:

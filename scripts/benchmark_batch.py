@@ -133,7 +133,7 @@ def time_commands(numbers: list[int]) -> None:
 
 
 def cables(number: int) -> list[LogDensity]:
-    """Posteriors of cables whose coefficients are drawn from their priors, again where no bench would hand in what they give."""
+    """Posteriors of cables whose coefficients are drawn from their priors, again where no bench would hand in the readings."""
     description = parse_description(
         {
             "name": "simple cable",
@@ -145,14 +145,15 @@ def cables(number: int) -> list[LogDensity]:
     design = design_of(runs=(0.0,) * len(ANGLES), input_forces=FORCES, strokes=STROKES, own_angles=own)
     tables = empty_tables(description, design)
     found: list[LogDensity] = []
-    for seed in count():
+    seeds = count()
+    while len(found) < number:
+        seed = next(seeds)
         of_truth, of_readings = jax.random.split(jax.random.key(seed))
         values = true_values(description, tables, {"tau": 0.01, "sigma_F": 0.4}, of_truth)
         made = simulate(description, design, values, of_readings)
         if not refusal(made, made):
             found.append(LogDensity(build_model(made)))
-        if len(found) == number:
-            return found
+    return found
 
 
 def seconds_alone(posterior: LogDensity) -> float:

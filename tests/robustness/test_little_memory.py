@@ -125,13 +125,23 @@ def test_a_fit_that_runs_out_of_memory_while_it_samples_is_kept(tmp_path, monkey
     assert resumed.posterior.z.tobytes() == whole.posterior.z.tobytes()
 
 
-def test_the_command_line_lets_linear_algebra_take_no_memory_for_threads():
+def _settings(names: str, **environment: str) -> str:
+    """What the command line makes of variables that are not set, or set so, before it loads what computes."""
     program = (
         "import os, sys; from bowdenfit import cli; sys.argv = ['bowdenfit', '--version']; "
-        "os._exit = lambda code: print(os.environ['OPENBLAS_NUM_THREADS'], 'numpy' in sys.modules); cli.start()"
+        f"os._exit = lambda code: print(*map(os.environ.get, {names.split()}), 'numpy' in sys.modules); cli.start()"
     )
-    environment = {name: value for name, value in os.environ.items() if name != "OPENBLAS_NUM_THREADS"}
+    others = {name: value for name, value in os.environ.items() if name not in names.split()}
     done = subprocess.run(
-        [sys.executable, "-c", program], env=environment, capture_output=True, text=True, check=False, timeout=60
+        [sys.executable, "-c", program], env=others | environment, capture_output=True, text=True, check=False, timeout=60
     )
-    assert done.stdout.splitlines()[-1] == "1 False"
+    return done.stdout.splitlines()[-1]
+
+
+def test_the_command_line_lets_linear_algebra_take_no_memory_for_threads():
+    assert _settings("OPENBLAS_NUM_THREADS") == "1 False"
+
+
+def test_the_command_line_leaves_a_gpu_alone_unless_it_is_asked_for():
+    assert _settings("JAX_PLATFORMS") == "cpu False"
+    assert _settings("JAX_PLATFORMS", JAX_PLATFORMS="cuda,cpu") == "cuda,cpu False"

@@ -19,7 +19,14 @@ from bowdenfit.inference.diagnostics import Diagnostics
 from bowdenfit.inference.draws import shown_values
 from bowdenfit.inference.log_density import LogDensity as Density
 from bowdenfit.inference.predictive_checks import place_at_random, predict_without_each, uniformity
-from bowdenfit.inference.prior_sensitivity import SENSITIVE, far_out, other_scales, sensitivities
+from bowdenfit.inference.prior_sensitivity import (
+    SENSITIVE,
+    Sensitivity,
+    Width,
+    far_out,
+    other_scales,
+    sensitivities,
+)
 from bowdenfit.kinds import KINDS
 from bowdenfit.kinds.angles.table import AngleTable
 from bowdenfit.kinds.stretch.table import StretchTable
@@ -29,12 +36,14 @@ from bowdenfit.parameters.priors import HalfCauchy, HalfNormal, LogNormal, Norma
 from bowdenfit.parameters.space import Parameter
 from bowdenfit.questions.check import answer as check_answer
 from bowdenfit.questions.check import checks_figure, prior_figure
-from bowdenfit.questions.check.answer import checks_of
+from bowdenfit.questions.check.answer import Checks, checks_of
 from bowdenfit.questions.check.checks_figure import CheckedTable, checked_tables
 from bowdenfit.questions.check.prior_predictive import prior_predictive
+from bowdenfit.questions.check.sensitivity_words import priors_text
 from bowdenfit.questions.check.suspects import suspects_of
 from bowdenfit.questions.check.words import checks_text
 from bowdenfit.questions.summary import methods_section
+from bowdenfit.questions.summary.trust_words import next_step
 from bowdenfit.results.record import Draws, Provenance, Record
 
 DRAWS = 8000
@@ -194,6 +203,18 @@ def test_widths_with_the_scale_of_a_prior_doubled_and_halved_are_those_of_other_
     assert max(width.k_doubled, width.k_halved) < 0.7
 
 
+def test_a_prior_that_too_few_readings_leave_to_set_widths_is_told_first():
+    widths = (Width("mu2", 1.4, 0.7, 0.1, 0.1), Width("tau", 1.38, 0.71, 0.1, 0.1), Width("mu1", 1.1, 0.9, 0.1, 0.1))
+    sensitivity = Sensitivity("mu2", "mu2", 0.01, 0.1, 0.1, 0.03, 0.1, 0.0, widths)
+    told = [priors_text(Checks((), (sensitivity,), (), by)) for by in ({"tau": (4, 3)}, {})]
+    assert told == [
+        "The prior of tau sets widths, because 4 readings tell 3 coefficients too: the 90 % interval of mu2 would be 1.38 "
+        "times as wide with twice its scale and 0.71 times as wide with half of it. Widths also follow the prior of mu2.",
+        "The prior of mu2 sets widths: the 90 % interval of mu2 would be 1.40 times as wide with twice its scale and 0.70 "
+        "times as wide with half of it. Widths also follow the prior of tau.",
+    ]
+
+
 def test_a_width_of_which_the_draws_cannot_tell_is_no_number_and_no_all_clear():
     """Draws of the prior itself: twice as wide a normal would need weights without a variance."""
     z, log_likelihood = normal_posterior(0.0, 30.0)
@@ -259,6 +280,14 @@ def test_the_on_body_fit_has_no_outlier_and_says_so_of_550_mm(fit):
     assert "No reading is an outlier." in text
     assert re.search(r"Outside the range of the curves: efficiency at 550 mm: measured 67.8 %, expected 6[6-9]\.", text)
     assert len(checks_text(fit.checks)) <= 12 * 100  # a quarter of it says what priors do to widths
+
+
+def test_in_doubt_what_the_fit_leans_on_is_to_be_measured_again(fit):
+    leant_on = [reading.label for reading in fit.checks.readings if reading.pareto_k > 0.7]
+    said = next_step(fit)
+    shown = [label for label in leant_on if label in said]
+    assert "in doubt, measure again what the fit leans on: " in said and len(shown) == min(2, len(leant_on)) > 0
+    assert (f" and {len(leant_on) - 2} more." in said) == (len(leant_on) > 2)
 
 
 def test_every_reading_has_a_row_and_undetected_angles_are_bounds(fit):

@@ -37,15 +37,15 @@ def _contradictions(found: Checks) -> str:
 
 
 def _widths(found: Checks) -> list[str]:
-    """Priors that widths follow, the strongest first, and those of which the draws cannot tell."""
+    """Priors that widths follow, first where too few readings are the reason, and those of which the draws cannot tell."""
     held: dict[str, list[tuple[str, Width]]] = {}
     for s in found.sensitivities:
         for width in s.followed:
             held.setdefault(width.parameter, []).append((_answer(s.quantity), width))
-    strongest = sorted(held, key=lambda name: -max(width.size for _, width in held[name]))
-    said = [_follows(name, held[name], found) for name in strongest[:1]]
-    if strongest[1:]:
-        said.append(f"Widths also follow the prior{'s' if len(strongest) > 2 else ''} of {listed(strongest[1:])}.")
+    names = sorted(held, key=lambda name: (name not in found.told_by, -max(width.size for _, width in held[name])))
+    said = [_follows(name, held[name], found) for name in names[:1]]
+    if names[1:]:
+        said.append(f"Widths also follow the prior{'s' if len(names) > 2 else ''} of {listed(names[1:])}.")
     untold = list(dict.fromkeys(name for s in found.sensitivities for name in s.untold))
     if untold:
         said.append(f"The draws cannot tell how widths follow the prior of {listed(untold)} (k above 0.7).")

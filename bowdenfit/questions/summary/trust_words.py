@@ -19,7 +19,7 @@ from bowdenfit.questions.summary.verdict import (
     verdict,
 )
 from bowdenfit.results.record import Record
-from bowdenfit.words import filled, listed
+from bowdenfit.words import few, filled, listed
 
 _WRONG = {
     NOT_CONVERGED: "the computation has not settled",
@@ -90,7 +90,8 @@ def next_step(fit: Record) -> str:
         return f"Next: look at how {_named(off[0])} was measured and written down: it is far off (see below)."
     if scattering(found):
         return "Next: look at what is stated of the noise of these readings; checks.png shows where each of them lies."
-    again = f"; in doubt, measure {_named(found.decisive[0])} again, on which the answer leans most" if found.decisive else ""
+    leant_on = few(map(_named, found.decisive), most=2)  # how far on each differs from one seed to the next
+    again = f"; in doubt, measure again what the fit leans on: {leant_on}" if leant_on else ""
     if fit.dataset.description.route is not None and fit.optimal_length().is_settled:
         return f"Next: nothing needs to be measured{again}. bowdenfit next says what would narrow it."
     if not can_be_ranked(fit):

@@ -34,10 +34,16 @@ def quoted(names: tuple[str, ...], most: int = 12) -> str:
 
 
 def few(names: Iterable[str], most: int = 3) -> str:
-    """Names with commas between them and a last "and"; of many the first, and how many more there are."""
+    """Names with commas between them and a last "and"; of many the first, and how many more there are.
+
+    Between names that have commas themselves there are semicolons.
+    """
     every = list(names)
     rest = [f"{len(every) - most} more"] if len(every) > most else []
-    return listed([*every[:most], *rest])
+    parts = [*every[:most], *rest]
+    if len(parts) > 1 and any("," in name for name in parts):
+        return "; ".join(parts[:-1]) + "; and " + parts[-1]
+    return listed(parts)
 
 
 def listed(parts: Sequence[str]) -> str:

@@ -6,7 +6,7 @@ import pytest
 
 from bowdenfit.cli import terminal
 from bowdenfit.inference.interval import Interval
-from bowdenfit.words import WIDTH, filled, in_ascii, significant
+from bowdenfit.words import WIDTH, few, filled, in_ascii, significant
 
 
 @pytest.mark.parametrize(
@@ -51,3 +51,9 @@ def test_what_is_certain_is_said_without_zeros_behind_the_point():
     assert str(certain) == "600 (90 % interval 600 to 600)"
     assert str(Interval(0.25, 0.0, 0.25, 0.25, 0.25)).startswith("0.25 ")
     assert str(Interval(1.0, 0.02, 1.0, 0.98, 1.02)) == "1.000 (90 % interval 0.980 to 1.020)"
+
+
+def test_names_with_commas_are_listed_with_semicolons():
+    assert few(["a", "b", "c", "d"], most=2) == "a, b and 2 more"
+    assert few(["550 mm, 20 r/min", "b", "c", "d"], most=2) == "550 mm, 20 r/min; b; and 2 more"
+    assert few(["550 mm, 20 r/min"]) == "550 mm, 20 r/min"

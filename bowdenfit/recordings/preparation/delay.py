@@ -236,7 +236,7 @@ def _linearized(
     change, wide, points = 0.01 * exponent, 4.0, delay / segments.step
     exponents = np.array([exponent, exponent + change, exponent - change])
     outputs = play_rows(segments.x, starts(segments, ratio), exponents, rests)
-    model, more, less = (shift_rows(output, points) for output in outputs)
+    model, more, less = shift_rows(outputs, points)
     later, earlier = (shift_rows(outputs[0], points + shift) for shift in (wide, -wide))
     slopes = [(more - less) / (2 * change), np.ones_like(model), (later - earlier) / (2 * wide * segments.step)]
     if len(begun):
@@ -248,7 +248,7 @@ def _linearized(
     if rests is not None:
         rested = (rests.heading != 0) & (outputs[0] == rests.level)
         stands, side = stands | rested, np.where(rested, -rests.heading, side)
-    levels = [shift_rows((stands & (side == s)).astype(float), points) for s in (1, -1)]
+    levels = shift_rows(np.stack([stands & (side == s) for s in (1, -1)]).astype(float), points)
     used = weight > 0
     columns = np.stack([(c * weight)[used] for c in (segments.y - model - ratio, *slopes, *levels)], axis=1)
     known = 1 + len(slopes)

@@ -51,10 +51,15 @@ def play_rows(x: Matrix, start: Vector, exponent: OtherVector, rests: Rests | No
     reach = 1
     while reach < x.shape[1]:
         low, high = lower[..., reach:].copy(), upper[..., reach:]
-        np.clip(lower[..., :-reach], low, high, out=lower[..., reach:])
-        np.clip(upper[..., :-reach], low, high, out=high)
+        _between(lower[..., :-reach], low, high, out=lower[..., reach:])
+        _between(upper[..., :-reach], low, high, out=high)
         reach *= 2
     return np.clip(start[:, None], lower, upper)
+
+
+def _between(x: np.ndarray, low: np.ndarray, high: np.ndarray, out: np.ndarray) -> None:
+    """The same as `np.clip`, which takes longer to call than these few numbers to compare."""
+    np.minimum(np.maximum(x, low), high, out=out)
 
 
 def with_drag(segments: Segments, drag: float) -> Segments:
@@ -90,13 +95,14 @@ def starts(segments: Segments, ratio: float) -> Vector:
     return np.mean(segments.y[:, :3], axis=1) - ratio
 
 
-def shift_rows(y: Matrix, points: float) -> Matrix:
+def shift_rows(y: np.ndarray, points: float) -> np.ndarray:
     """Each row later by a number of points, with straight lines between them; the ends are held."""
     whole = int(np.floor(points))
     share = points - whole
-    place = np.arange(y.shape[1]) - whole
-    last = y.shape[1] - 1
-    return (1 - share) * y[:, np.clip(place, 0, last)] + share * y[:, np.clip(place - 1, 0, last)]
+    place = np.arange(y.shape[-1]) - whole
+    last = y.shape[-1] - 1
+    at, before = (np.minimum(np.maximum(each, 0), last) for each in (place, place - 1))
+    return (1 - share) * y[..., at] + share * y[..., before]
 
 
 def sides(segments: Segments, output: Matrix, exponent: float) -> tuple[np.ndarray, np.ndarray]:

@@ -148,9 +148,11 @@ install_packages() {
         uv pip install ${quiet:+"$quiet"} --python "$environment/bin/python" \
             -c constraints.txt -b constraints.txt -e "$what" >&2 </dev/null
     else
-        # Older versions of pip pin the build with the first variable, newer ones with the second.
+        # Older versions of pip pin the build with the first variable, newer ones with the second. Half of the time would be
+        # spent on the byte code of modules that are never loaded; the others get it once they are.
         PIP_CONSTRAINT=constraints.txt PIP_BUILD_CONSTRAINT=constraints.txt \
-            "$environment/bin/python" -m pip install ${quiet:+"$quiet" "$quiet"} --no-input --disable-pip-version-check \
+            "$environment/bin/python" -m pip install ${quiet:+"$quiet" "$quiet"} --no-compile \
+            --no-input --disable-pip-version-check \
             -e "$what" >&2 </dev/null
     fi
 }

@@ -18,8 +18,9 @@ from bowdenfit.cli.lean_matplotlib import load_without_manual
 from bowdenfit.cli.starting import completion, init
 from bowdenfit.cli.supervised import is_limited, supervise
 from bowdenfit.cli.terminal import NoReaderError, say, say_interrupted
-from bowdenfit.errors import BowdenfitError, system_error
+from bowdenfit.errors import BowdenfitError, UsageError, system_error
 from bowdenfit.verbs import VERBS
+from bowdenfit.words import shown
 
 _NEW_LINE = re.compile(r"[\r\n](?!- )")  # in the name of a file: our own sentences have new lines before "- " alone
 _NO_READER = 141  # exit code, as shells have it of a process whose output nobody reads on
@@ -91,6 +92,9 @@ def main() -> None:
         if os.environ.get("BOWDENFIT_DEBUG"):
             raise
         error.__traceback__ = None  # what they hold may be all the memory there is
+        if absent := _absent_device():
+            _complain(f"Error: {absent}")
+            sys.exit(UsageError.exit_code)
         ours = (
             f"something went wrong inside bowdenfit ({type(error).__name__}: {error}). This is our fault: please "
             "report it with what BOWDENFIT_DEBUG=1 prints when you run the command again."
@@ -98,6 +102,21 @@ def main() -> None:
         refused = system_error(error)
         _complain(f"Error: {refused or ours}")
         sys.exit(refused.exit_code if refused else 1)
+
+
+def _absent_device() -> str:
+    """That JAX does not have what its variable asks for, which it says in many ways; empty where it has."""
+    asked, jax = os.environ.get("JAX_PLATFORMS", "cpu"), sys.modules.get("jax")
+    if asked in {"", "cpu"} or jax is None:
+        return ""
+    try:
+        jax.devices()
+    except Exception:
+        return (
+            f"JAX_PLATFORMS asks for {shown(asked)}, which JAX cannot use here; the usual cause is that JAX was installed for "
+            "the processor alone. Unset the variable to compute on the processor, which is quicker for a fit."
+        )
+    return ""
 
 
 def _complain(text: str) -> None:

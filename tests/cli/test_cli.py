@@ -284,6 +284,15 @@ def test_an_internal_error_is_a_sentence_with_a_request(run, monkeypatch, on_bod
     assert "Traceback" not in err
 
 
+def test_a_device_that_jax_does_not_have_is_a_sentence(bench):
+    command = [sys.executable, "-m", "bowdenfit", "identify", str(bench)]
+    asked = os.environ | {"JAX_PLATFORMS": "abacus"}
+    done = subprocess.run(command, cwd=ROOT, env=asked, capture_output=True, text=True, check=False, timeout=60)
+    assert (done.returncode, done.stdout) == (2, "")
+    assert done.stderr.startswith("Error: JAX_PLATFORMS asks for 'abacus', which JAX cannot use here;")
+    assert "Unset the variable" in done.stderr and "our fault" not in done.stderr
+
+
 def test_an_interrupt_that_the_garbage_collector_swallows_is_not_lost(tmp_path):
     """Python drops exceptions of weak-reference callbacks, and an interrupt may arrive in one."""
     (tmp_path / "chain.checkpoint").touch()

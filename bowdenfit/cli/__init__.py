@@ -18,12 +18,14 @@ from bowdenfit.cli.lean_matplotlib import load_without_manual
 from bowdenfit.cli.starting import completion, init
 from bowdenfit.cli.supervised import is_limited, supervise
 from bowdenfit.cli.terminal import NoReaderError, say, say_interrupted
-from bowdenfit.errors import BowdenfitError, UsageError, system_error
+from bowdenfit.errors import BowdenfitError, system_error
 from bowdenfit.verbs import VERBS
-from bowdenfit.words import shown
+from bowdenfit.words import few
 
 _NEW_LINE = re.compile(r"[\r\n](?!- )")  # in the name of a file: our own sentences have new lines before "- " alone
 _NO_READER = 141  # exit code, as shells have it of a process whose output nobody reads on
+_OF_LIBRARIES = ("JAX_", "XLA_", "MPL", "OMP_")  # what the variables begin with that tell them what to do
+_HARMLESS = {("JAX_PLATFORMS", "cpu"), ("OMP_NUM_THREADS", "1")}
 _MADE = 500_000  # objects made before Python looks for garbage: most of them stay, and a look goes through all of them
 
 
@@ -92,31 +94,24 @@ def main() -> None:
         if os.environ.get("BOWDENFIT_DEBUG"):
             raise
         error.__traceback__ = None  # what they hold may be all the memory there is
-        if absent := _absent_device():
-            _complain(f"Error: {absent}")
-            sys.exit(UsageError.exit_code)
-        ours = (
-            f"something went wrong inside bowdenfit ({type(error).__name__}: {error}). This is our fault: please "
-            "report it with what BOWDENFIT_DEBUG=1 prints when you run the command again."
-        )
+        what = f"{type(error).__name__}: {error}".removesuffix(": ")
+        ours = f"something went wrong inside bowdenfit ({what}). {_whose_fault()}"
         refused = system_error(error)
         _complain(f"Error: {refused or ours}")
         sys.exit(refused.exit_code if refused else 1)
 
 
-def _absent_device() -> str:
-    """That JAX does not have what its variable asks for, which it says in many ways; empty where it has."""
-    asked, jax = os.environ.get("JAX_PLATFORMS", "cpu"), sys.modules.get("jax")
-    if asked in {"", "cpu"} or jax is None:
-        return ""
-    try:
-        jax.devices()
-    except Exception:
-        return (
-            f"JAX_PLATFORMS asks for {shown(asked)}, which JAX cannot use here; the usual cause is that JAX was installed for "
-            "the processor alone. Unset the variable to compute on the processor, which is quicker for a fit."
-        )
-    return ""
+def _whose_fault() -> str:
+    """What to do about an error that nothing foresaw; what tells libraries what to do, such as a device, may be behind it."""
+    report = "please report it with what BOWDENFIT_DEBUG=1 prints when you run the command again."
+    every = [name for name, value in os.environ.items() if name.startswith(_OF_LIBRARIES) and (name, value) not in _HARMLESS]
+    if not every:
+        return f"This is our fault: {report}"
+    them = "it" if len(every) == 1 else "them"
+    return (
+        f"{few(every)} in the environment may be the cause: unset {them}, and run the command again. If that does not help, "
+        f"this is our fault: {report}"
+    )
 
 
 def _complain(text: str) -> None:

@@ -39,7 +39,7 @@ from bowdenfit.questions.check import checks_figure, prior_figure
 from bowdenfit.questions.check.answer import Checks, checks_of
 from bowdenfit.questions.check.checks_figure import CheckedTable, checked_tables
 from bowdenfit.questions.check.prior_predictive import prior_predictive
-from bowdenfit.questions.check.sensitivity_words import priors_text
+from bowdenfit.questions.check.sensitivity_words import assumed_widths, priors_text
 from bowdenfit.questions.check.suspects import suspects_of
 from bowdenfit.questions.check.words import checks_text
 from bowdenfit.questions.summary import methods_section
@@ -213,6 +213,15 @@ def test_a_prior_that_too_few_readings_leave_to_set_widths_is_told_first():
         "The prior of mu2 sets widths: the 90 % interval of mu2 would be 1.40 times as wide with twice its scale and 0.70 "
         "times as wide with half of it. Widths also follow the prior of tau.",
     ]
+
+
+def test_few_readings_that_leave_widths_to_a_prior_are_told_where_widths_follow_it():
+    def said(doubled, told_by):
+        widths = (Width("tau", doubled, 0.95, 0.1, 0.1),)
+        return assumed_widths(Checks((), (Sensitivity("mu", "mu", 0.01, 0.1, 0.1, 0.03, 0.1, 0.0, widths),), (), told_by))
+
+    assert said(1.5, {"tau": (2, 1)}) == "Widths rest on what was assumed of tau: 2 readings tell 1 coefficient too."
+    assert said(1.1, {"tau": (2, 1)}) == said(1.5, {}) == ""
 
 
 def test_a_width_of_which_the_draws_cannot_tell_is_no_number_and_no_all_clear():

@@ -5,7 +5,7 @@ from math import isfinite
 
 from bowdenfit.inference.prior_sensitivity import Sensitivity, Width
 from bowdenfit.questions.check.answer import Checks
-from bowdenfit.words import decimals, listed
+from bowdenfit.words import counted, decimals, listed
 
 _ANSWERS = {"optimal_length": "the best length", "optimal_efficiency": "the efficiency there"}
 
@@ -21,6 +21,20 @@ def priors_text(found: Checks) -> str:
         answers = " and the design answer" if any(s.quantity in _ANSWERS for s in every) else ""
         said.append(f"Priors hardly count for the coefficients{answers}, nor for the widths of their intervals.")
     return " ".join(part for part in said if part)
+
+
+def assumed_widths(found: Checks) -> str:
+    """That widths of intervals follow the prior of a noise scale that too few readings tell; empty where they do not."""
+    names = [name for name in found.told_by if any(w.parameter == name for s in found.sensitivities for w in s.followed)]
+    if not names:
+        return ""
+    return f"Widths rest on what was assumed of {listed(names)}: {_few_readings(found, names[0])}."
+
+
+def _few_readings(found: Checks, noise: str) -> str:
+    """'4 readings tell 3 coefficients too'"""
+    readings, coefficients = found.told_by[noise]
+    return f"{counted(readings, 'reading')} tell{'s' * (readings == 1)} {counted(coefficients, 'coefficient')} too"
 
 
 def _contradictions(found: Checks) -> str:
@@ -57,10 +71,7 @@ def _follows(parameter: str, held: list[tuple[str, Width]], found: Checks) -> st
     name, width = max(held, key=lambda each: each[1].size)
     others = [other for other, _ in held if other != name]
     more = f"; less so {listed(others)}" if others else ""
-    why = ""
-    if parameter in found.told_by:
-        readings, coefficients = found.told_by[parameter]
-        why = f", because {readings} readings tell {coefficients} coefficients too"
+    why = f", because {_few_readings(found, parameter)}" if parameter in found.told_by else ""
     ratios = (("twice its scale", width.doubled), ("half of it", width.halved))
     changes = listed([f"{ratio:.2f} times as wide with {what}" for what, ratio in ratios if isfinite(ratio)])
     return f"The prior of {parameter} sets widths{why}: the 90 % interval of {name} would be {changes}{more}."

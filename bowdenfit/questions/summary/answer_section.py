@@ -4,7 +4,7 @@ from pathlib import Path
 
 from bowdenfit.pages.section import Section, Table
 from bowdenfit.questions.summary.answer import answer
-from bowdenfit.questions.summary.trust_words import reasons, trust, warning
+from bowdenfit.questions.summary.trust_words import assumed, reasons, trust, warning
 from bowdenfit.questions.summary.verdict import verdict
 from bowdenfit.results.record import Record
 
@@ -22,7 +22,7 @@ def section(fit: Record) -> Section:
         "first": first,
         "others": others,
         "warning": warning(found),
-        "why": trust(fit) if found.trusted else reasons(found),
+        "why": [each for each in (*trust(fit), assumed(fit)) if each] if found.trusted else reasons(found),
         "choices": choices,
     }
     return Section("The answer", Path(__file__).with_name("answer.html"), context)

@@ -7,7 +7,7 @@ from bowdenfit.kinds import reading_called
 from bowdenfit.questions.check.table_checks import CheckedReading
 from bowdenfit.questions.check.words import with_unit
 from bowdenfit.questions.summary.answer import answer, checked_readings, quantities, readings_off
-from bowdenfit.questions.summary.trust_words import next_step, reasons, trust, warning
+from bowdenfit.questions.summary.trust_words import assumed, next_step, reasons, trust, warning
 from bowdenfit.questions.summary.verdict import verdict
 from bowdenfit.results.record import Record
 from bowdenfit.words import WIDTH, counted, filled, table
@@ -28,6 +28,9 @@ def summary_text(fit: Record) -> str:
         longer, whole = _quantities(fit, LINES - sum(map(len, said)) - _BESIDE + 1)
         shown, off = (longer, []) if whole else (shown, off)
     below = [line for block in (shown, off, [_MORE]) for line in (["", *block] if block else [])]
+    further = filled(assumed(fit)).splitlines() if verdict(fit).trusted else []
+    if further and sum(map(len, said)) + len(further) + len(below) <= LINES:
+        said.insert(-1, further)
     return "\n".join([*_within(said, LINES - len(below)), *below]) + "\n"
 
 

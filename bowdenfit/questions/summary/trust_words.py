@@ -2,6 +2,7 @@
 
 from bowdenfit.kinds import reading_called
 from bowdenfit.questions.check.answer import checks_of
+from bowdenfit.questions.check.sensitivity_words import assumed_widths
 from bowdenfit.questions.check.table_checks import CheckedReading
 from bowdenfit.questions.check.words import scattering
 from bowdenfit.questions.identify.confounding import confounded_pairs
@@ -101,6 +102,12 @@ def next_step(fit: Record) -> str:
 
 def _named(reading: CheckedReading) -> str:
     return reading_called(reading.table, reading.label)
+
+
+def assumed(fit: Record) -> str:
+    """That few readings leave it to a prior how wide intervals are; empty where they do not."""
+    found = checks_of(fit)
+    return assumed_widths(found) if found else ""
 
 
 def _resting(fit: Record) -> str:

@@ -220,7 +220,7 @@ def test_few_readings_that_leave_widths_to_a_prior_are_told_where_widths_follow_
         widths = (Width("tau", doubled, 0.95, 0.1, 0.1),)
         return assumed_widths(Checks((), (Sensitivity("mu", "mu", 0.01, 0.1, 0.1, 0.03, 0.1, 0.0, widths),), (), told_by))
 
-    assert said(1.5, {"tau": (2, 1)}) == "Widths rest on what was assumed of tau: 2 readings tell 1 coefficient too."
+    assert said(1.5, {"tau": (2, 1)}) == "Interval widths rest on what was assumed of tau: 2 readings, 1 coefficient."
     assert said(1.1, {"tau": (2, 1)}) == said(1.5, {}) == ""
 
 

@@ -28,7 +28,9 @@ def assumed_widths(found: Checks) -> str:
     names = [name for name in found.told_by if any(w.parameter == name for s in found.sensitivities for w in s.followed)]
     if not names:
         return ""
-    return f"Widths rest on what was assumed of {listed(names)}: {_few_readings(found, names[0])}."
+    readings, coefficients = found.told_by[names[0]]
+    few = f"{counted(readings, 'reading')}, {counted(coefficients, 'coefficient')}"
+    return f"Interval widths rest on what was assumed of {listed(names)}: {few}."
 
 
 def _few_readings(found: Checks, noise: str) -> str:

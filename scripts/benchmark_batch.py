@@ -13,6 +13,7 @@ compiled.
 """
 
 import argparse
+import itertools
 import json
 import os
 import resource
@@ -21,7 +22,6 @@ import sys
 import tempfile
 import time
 from collections import Counter
-from itertools import count
 from pathlib import Path
 
 import jax
@@ -145,7 +145,7 @@ def cables(number: int) -> list[LogDensity]:
     design = design_of(runs=(0.0,) * len(ANGLES), input_forces=FORCES, strokes=STROKES, own_angles=own)
     tables = empty_tables(description, design)
     found: list[LogDensity] = []
-    seeds = count()
+    seeds = itertools.count()
     while len(found) < number:
         seed = next(seeds)
         of_truth, of_readings = jax.random.split(jax.random.key(seed))

@@ -33,7 +33,7 @@ def start() -> None:
     """The program: `main`, and an end at once; to take apart what was loaded takes Python 0.3 s."""
     gc.set_threshold(_MADE)
     os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")  # it takes 32 MiB a thread when loaded, and waits for ever if it may not
-    os.environ.setdefault("JAX_PLATFORMS", "cpu")  # a GPU takes 1.6 to 1.9 times as long for a fit, and most of its memory
+    os.environ.setdefault("JAX_PLATFORMS", "cpu")  # a GPU takes 1.5 to 1.9 times as long for a fit, and most of its memory
     os.environ.setdefault("TF_CPP_MIN_LOG_LEVEL", "3")  # XLA says on stderr where a busy machine compiles slowly
     load_without_manual()
     if not (sys.warnoptions or os.environ.get("BOWDENFIT_DEBUG")):

@@ -43,6 +43,7 @@ VERBS = (
     "simulate",
     "completion",
 )
+OF_LIBRARIES = ("JAX_", "XLA_", "MPL", "OMP_")  # what variables begin with that tell libraries what to do
 
 
 @pytest.fixture(scope="module")
@@ -278,7 +279,7 @@ def test_a_table_alone_needs_its_wrap_angle(run, tmp_path):
 
 def test_an_internal_error_is_a_sentence_with_a_request(run, monkeypatch, on_body):
     monkeypatch.setattr("bowdenfit.questions.check.verb.check", lambda *_, **__: 1 / 0)
-    for name in [name for name in os.environ if name.startswith(("JAX_", "XLA_", "MPL", "OMP_"))]:
+    for name in [name for name in os.environ if name.startswith(OF_LIBRARIES)]:
         monkeypatch.delenv(name)
     code, _, err = run("check", on_body)
     assert code == 1
@@ -289,7 +290,7 @@ def test_an_internal_error_is_a_sentence_with_a_request(run, monkeypatch, on_bod
 @pytest.mark.parametrize(("setting", "value"), [("JAX_PLATFORMS", "abacus"), ("JAX_DISABLE_JIT", "1")])
 def test_a_setting_of_a_library_that_it_cannot_work_with_is_named(bench, setting, value):
     command = [sys.executable, "-m", "bowdenfit", "identify", str(bench)]
-    usual = {name: text for name, text in os.environ.items() if not name.startswith(("JAX_", "XLA_", "MPL", "OMP_"))}
+    usual = {name: text for name, text in os.environ.items() if not name.startswith(OF_LIBRARIES)}
     asked = usual | {"OMP_NUM_THREADS": "1", setting: value}
     done = subprocess.run(command, cwd=ROOT, env=asked, capture_output=True, text=True, check=False, timeout=60)
     assert (done.returncode, done.stdout) == (1, "")

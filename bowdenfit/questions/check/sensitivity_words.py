@@ -28,15 +28,13 @@ def assumed_widths(found: Checks) -> str:
     names = [name for name in found.told_by if any(w.parameter == name for s in found.sensitivities for w in s.followed)]
     if not names:
         return ""
-    readings, coefficients = found.told_by[names[0]]
-    few = f"{counted(readings, 'reading')}, {counted(coefficients, 'coefficient')}"
-    return f"Interval widths rest on what was assumed of {listed(names)}: {few}."
+    return f"Interval widths rest on what was assumed of {listed(names)}: {', '.join(_told_by(found, names[0]))}."
 
 
-def _few_readings(found: Checks, noise: str) -> str:
-    """'4 readings tell 3 coefficients too'"""
+def _told_by(found: Checks, noise: str) -> tuple[str, str]:
+    """'4 readings' and '3 coefficients', of a noise scale that few readings tell."""
     readings, coefficients = found.told_by[noise]
-    return f"{counted(readings, 'reading')} tell{'s' * (readings == 1)} {counted(coefficients, 'coefficient')} too"
+    return counted(readings, "reading"), counted(coefficients, "coefficient")
 
 
 def _contradictions(found: Checks) -> str:
@@ -73,7 +71,7 @@ def _follows(parameter: str, held: list[tuple[str, Width]], found: Checks) -> st
     name, width = max(held, key=lambda each: each[1].size)
     others = [other for other, _ in held if other != name]
     more = f"; less so {listed(others)}" if others else ""
-    why = f", because {_few_readings(found, parameter)}" if parameter in found.told_by else ""
+    why = ", because {} tell {} too".format(*_told_by(found, parameter)) if parameter in found.told_by else ""
     ratios = (("twice its scale", width.doubled), ("half of it", width.halved))
     changes = listed([f"{ratio:.2f} times as wide with {what}" for what, ratio in ratios if isfinite(ratio)])
     return f"The prior of {parameter} sets widths{why}: the 90 % interval of {name} would be {changes}{more}."

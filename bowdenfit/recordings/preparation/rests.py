@@ -57,9 +57,9 @@ def play_rows(x: Matrix, start: Vector, exponent: OtherVector, rests: Rests | No
     return np.clip(start[:, None], lower, upper)
 
 
-def _between(x: np.ndarray, low: np.ndarray, high: np.ndarray, out: np.ndarray) -> None:
+def _between(x: np.ndarray, low: np.ndarray | int, high: np.ndarray | int, out: np.ndarray | None = None) -> np.ndarray:
     """The same as `np.clip`, which takes longer to call than these few numbers to compare."""
-    np.minimum(np.maximum(x, low), high, out=out)
+    return np.minimum(np.maximum(x, low), high, out=out)
 
 
 def with_drag(segments: Segments, drag: float) -> Segments:
@@ -101,8 +101,7 @@ def shift_rows(y: np.ndarray, points: float) -> np.ndarray:
     share = points - whole
     place = np.arange(y.shape[-1]) - whole
     last = y.shape[-1] - 1
-    at, before = (np.minimum(np.maximum(each, 0), last) for each in (place, place - 1))
-    return (1 - share) * y[..., at] + share * y[..., before]
+    return (1 - share) * y[..., _between(place, 0, last)] + share * y[..., _between(place - 1, 0, last)]
 
 
 def sides(segments: Segments, output: Matrix, exponent: float) -> tuple[np.ndarray, np.ndarray]:

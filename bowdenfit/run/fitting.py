@@ -22,6 +22,7 @@ from bowdenfit.inference.versions import versions
 from bowdenfit.model import build_model
 from bowdenfit.questions.check.answer import checks_findings, evidence_of
 from bowdenfit.questions.check.evidence import work_out
+from bowdenfit.questions.check.suspects import judge_of
 from bowdenfit.results.record import Provenance
 from bowdenfit.run.helpers import Assistant
 from bowdenfit.run.loading import load, load_beside
@@ -68,7 +69,7 @@ def run(
     found = Fit(data, squares, posterior, not reasons, reasons, provenance(seed, watch))
     found._answers.update(programs.asked)
     if helper.checks and checkpoint is not None:  # what is written waits for it
-        found._answers[checks_findings] = helper.check(work_out, evidence_of(found))
+        found._answers.update({checks_findings: helper.check(work_out, evidence_of(found)), judge_of: diagnose})
     return found
 
 

@@ -15,6 +15,7 @@ from bowdenfit.inference.log_density import LogDensity as Density
 from bowdenfit.inference.samplers import NAMES, Drawn, compare_samplers
 from bowdenfit.inference.walkers import walker_programs
 from bowdenfit.model import Model
+from bowdenfit.questions.check.suspects import implied_program
 from bowdenfit.questions.identify.judgment import values_program
 from bowdenfit.results.optimum import optimum_of
 from bowdenfit.results.record import OPTIMAL_EFFICIENCY, OPTIMAL_LENGTH, Draws, along_route_program
@@ -64,7 +65,7 @@ def sampling_programs(density: Density, seed: int, beside: Executor) -> Programs
             programs[name] = import_module(_MODULES[name]).make_program(density, settings)
     optimum = for_each_draw(optimum_of(model), model.space.size, beside=beside) if model.description.route else None
     implied = replicator(density, seed, beside)
-    asked: dict[Callable[..., Any], Any] = {values_program: lambda z: implied(z)["values"]}
+    asked: dict[Callable[..., Any], Any] = {values_program: lambda z: implied(z)["values"], implied_program: implied}
     if model.description.route is not None:
         asked[along_route_program] = compile_along_route(model, beside)
     return Programs(programs, optimum, implied, asked)

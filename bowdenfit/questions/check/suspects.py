@@ -10,12 +10,13 @@ from dataclasses import replace
 import jax
 import numpy as np
 
+from bowdenfit.inference.diagnostics import Diagnose, diagnose_all
 from bowdenfit.inference.draws import OfDraws, replicator
 from bowdenfit.inference.leave_one_out import LeavingOut, ReadingsToLeaveOut
 from bowdenfit.inference.log_density import LogDensity
 from bowdenfit.inference.predictive_checks import predict_by_refit
 from bowdenfit.questions.check.table_checks import TableChecks
-from bowdenfit.results.record import Record
+from bowdenfit.results.record import Record, once
 
 _SUSPICIOUS = 0.1  # chance that weights call one reading of a healthy fit so, ten times that of an outlier
 _MOST = 3  # fits; where more readings are so far out, what is wrong is not one of them
@@ -38,11 +39,24 @@ def refit_suspects(fit: Record, tables: Sequence[TableChecks]) -> tuple[TableChe
         density, drawn, z = LogDensity(fit.model), fit.posterior, fit.posterior.flat_z
         each = np.concatenate([drawn.log_likelihood[term.name] for term in fit.model.terms], axis=-1).reshape(len(z), -1)
         share = min(drawn.n_effective / len(z), 1.0)
-        leaving_out = LeavingOut(ReadingsToLeaveOut(density), z, each, share, fit.provenance.seed)
-        implied = replicator(density, fit.provenance.seed)
+        leaving_out = LeavingOut(ReadingsToLeaveOut(density), z, each, share, fit.provenance.seed, judge_of(fit))
         for at, place in suspects:
-            found[at] = _refitted(leaving_out, implied, found[at], place)
+            found[at] = _refitted(leaving_out, implied_program(fit), found[at], place)
     return tuple(found)
+
+
+@once
+def judge_of(_: Record) -> Diagnose:
+    """What judges draws of a fit without a reading; another process does while a fit is written, so that this one need not load
+    what that takes.
+    """
+    return diagnose_all
+
+
+@once
+def implied_program(fit: Record) -> OfDraws:
+    """What many z imply for every reading; a fit that samples has it already."""
+    return replicator(LogDensity(fit.model), fit.provenance.seed)
 
 
 def suspects_of(tables: Sequence[TableChecks]) -> list[tuple[int, int]]:

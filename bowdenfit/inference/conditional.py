@@ -22,6 +22,8 @@ from bowdenfit.inference.log_density import LogDensity
 from bowdenfit.parameters.places import put, taken
 from bowdenfit.parameters.space import ParameterSpace
 
+_TELL_A_SCATTER = 4  # readings more than coefficients
+
 
 @dataclass(frozen=True)
 class Conditional:
@@ -62,6 +64,19 @@ class Conditional:
     def is_told(self) -> bool:
         """Whether readings say anything of coefficients."""
         return len(self.which) > 0 and len(self._rubbing) > 0
+
+    @property
+    def is_narrow(self) -> bool:
+        """Whether the ridge may be so narrow somewhere that walkers hardly find there without these coordinates.
+
+        It may where few readings tell a scatter, and where a coefficient goes with an angle of which only a guess is known. By
+        simulated funnels whose scatter has a known density: with two readings more than coefficients, walkers without these
+        coordinates put 0.5 to 1 of 100 draws below its 1 % quantile; with three 0.85 to 1.1; with four and more 0.9 to 1.1,
+        which is chance.
+        """
+        model = self.posterior.model
+        each = [varying for term in model.terms for _, varying in term.residual_blocks if varying]
+        return any(p.role == "angle" for p in model.space.free) or min(each, default=0) < len(self.which) + _TELL_A_SCATTER
 
     def at(self, given: Array, is_z: Array, data: Any) -> tuple[Array, Array, Array]:
         """W and z, and log of the volume in z of a unit of w there, of one of the two; NaN where w has no z.

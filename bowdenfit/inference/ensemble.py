@@ -1,8 +1,9 @@
 """Sampling with emcee: several independent ensembles of walkers, started apart, run until they agree.
 
 Moves: emcee's stretch and differential evolution, and draws from a distribution fitted to the other walkers; a quarter of them
-in z, a quarter in the values of the parameters, half where friction coefficients follow everything else. Not `DESnookerMove`:
-the one in emcee 3.1.6 does not sample the density it is given, and every ensemble agrees on the wrong answer.
+in z, a quarter in the values of the parameters, half where friction coefficients follow everything else, which are left out
+where they hardly help. Not `DESnookerMove`: the one in emcee 3.1.6 does not sample the density it is given, and every ensemble
+agrees on the wrong answer.
 
 emcee keeps the states and the random numbers; from one state to the next it makes one move, which is `THIN` steps of every
 ensemble in one compiled program. Step by step more than half of the time was Python's. Each core moves ensembles of its own,
@@ -31,6 +32,7 @@ from bowdenfit.inference.walkers import WalkerPrograms
 
 _BLOCK = 10  # stored states between two reports
 _FIRST_LOOK = 60  # stored states before the first look; of five data sets the slowest is there after half of that
+_PATIENCE = 2 * _FIRST_LOOK  # stored states after which walkers that have not settled run `WalkerPrograms.later`
 _OF_RANDOM = {"random_key": (624,), "random_place": (2,), "random_normal": ()}  # shapes of what makes random numbers
 _KEPT_PER_WALKER = 20  # draws at least that are kept of each walker, spread over the second half of its path
 
@@ -45,17 +47,20 @@ class Sweep(emcee.moves.Move):
         programs: What is compiled.
         data: Of the density.
         n_ensembles: Number of ensembles; walkers are ordered by ensemble.
+        stored: States stored so far.
     """
 
-    def __init__(self, programs: WalkerPrograms, data: Any, n_ensembles: int) -> None:
+    def __init__(self, programs: WalkerPrograms, data: Any, n_ensembles: int, stored: int = 0) -> None:
         super().__init__()
-        self.programs, self.data, self.n_ensembles = programs, jax.device_put(data), n_ensembles
+        self.programs, self.data, self.n_ensembles, self.stored = programs, jax.device_put(data), n_ensembles, stored
         self.threads = ThreadPoolExecutor(min(cores(), n_ensembles, ENSEMBLES_AT_ONCE))
 
     def propose(self, model: Any, state: emcee.State) -> tuple[emcee.State, np.ndarray]:
         """`THIN` steps of every walker, and the share that was accepted."""
         walkers, accepted = np.arange(len(state.coords)).reshape(self.n_ensembles, -1), np.zeros(len(state.coords))
-        begun = []
+        if self.programs.later is not None and self.stored >= _PATIENCE:
+            self.programs = self.programs.later()
+        self.stored, begun = self.stored + 1, []
         for ensemble in walkers:
             order = model.random.permutation(ensemble)
             chosen = self.programs.shares.choose(model.random, state.coords[order].shape)
@@ -100,7 +105,7 @@ def sample(asked: Sampling, programs: WalkerPrograms, data: Any = None) -> Chain
     data = asked.posterior.data if data is None else data
     points = starting_points(start, settings, np.random.default_rng([seed, 0])).reshape(-1, len(start.z))
     backend = Checkpointed(points.shape, asked.checkpoint, asked.resume)
-    moves = Sweep(programs, data, settings.n_ensembles)
+    moves = Sweep(programs, data, settings.n_ensembles, int(backend.iteration))
 
     sampler = emcee.EnsembleSampler(*points.shape, asked.posterior.log_density, backend=backend, moves=moves)
     generator = np.random.RandomState(np.random.MT19937(np.random.SeedSequence([seed, 1])))

@@ -2,6 +2,7 @@
 
 from collections.abc import Callable
 from concurrent.futures import Executor
+from functools import cache
 from typing import Any, NamedTuple
 
 import jax
@@ -12,7 +13,8 @@ from jax import Array
 from bowdenfit.description import SamplerSettings
 from bowdenfit.description.defaults import THIN
 from bowdenfit.inference.compilation import compile_program
-from bowdenfit.inference.coordinates import Frames, frames_of, in_z
+from bowdenfit.inference.conditional import Conditional
+from bowdenfit.inference.coordinates import Frames, frames_of, frames_without_ridge, in_z
 from bowdenfit.inference.log_density import LogDensity
 from bowdenfit.inference.moves import Moves, default_moves
 from bowdenfit.inference.sweep import Chosen, numbers_of_walker, walker_sweep
@@ -45,10 +47,12 @@ class WalkerPrograms(NamedTuple):
     Args:
         sweep: `walker_sweep` of `THIN` steps.
         shares: Of its moves and coordinates.
+        later: What walkers run that have not settled in the usual time, compiled then; None where that is the same.
     """
 
     sweep: Callable[..., Any]
     shares: Shares
+    later: "Callable[[], WalkerPrograms] | None" = None
 
 
 def walker_programs(
@@ -56,15 +60,21 @@ def walker_programs(
 ) -> WalkerPrograms:
     """The programs of one posterior.
 
+    Where its ridge is wide, walkers do without it at first, because it takes half of the time to compile and to run: loops,
+    benches and recordings settle in as many steps. What has not settled in the usual time has it, whatever the reason.
+
     Args:
         posterior: The posterior; what is compiled serves others with data of the same shapes.
         settings: How many walkers.
         moves: What they do, in z alone; `default_moves`, in all coordinates, if omitted.
         beside: See `compile_program`.
     """
-    frames = frames_of(posterior) if moves is None else ((in_z, 1.0),)
-    size, data = posterior.model.space.size, posterior.data
-    return compiled_walkers(posterior.log_density, data, size, settings, frames, moves, beside)
+    space, is_narrow = posterior.model.space, Conditional(posterior).is_narrow
+    of_what = posterior.log_density, posterior.data, space.size, settings
+    if moves is not None:
+        return compiled_walkers(*of_what, ((in_z, 1.0),), moves, beside)
+    first = compiled_walkers(*of_what, frames_of(posterior) if is_narrow else frames_without_ridge(space), beside=beside)
+    return first if is_narrow else first._replace(later=cache(lambda: compiled_walkers(*of_what, frames_of(posterior))))
 
 
 def compiled_walkers(

@@ -130,7 +130,7 @@ def test_draws_of_a_fit_without_a_reading_are_those_of_its_posterior(readings, d
 
 
 def test_truncated_weights_find_the_middle_of_the_other_density():
-    """Draws of N(0, 1) weighted for N(1, 0.9^2): none of 2000 seeds is off by 0.15; then ratios alike, and one far above the rest."""
+    """Draws of N(0, 1) weighted for N(1, 0.9^2): none of 2000 seeds is off by 0.15; then ratios alike, and one far off."""
     z = np.random.default_rng(3).standard_normal(4000)
     weights = truncated_weights(0.5 * z**2 - 0.5 * ((z - 1) / 0.9) ** 2 + 900.0)
     assert weights.sum() == pytest.approx(1.0)

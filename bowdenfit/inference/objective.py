@@ -36,11 +36,10 @@ def make_objective(posterior: LogDensity) -> Objective:
     """
     space = posterior.model.space
     vector = jax.ShapeDtypeStruct((space.size,), jnp.float64)
-    evaluated = _program(posterior)
-    shape = jax.eval_shape(evaluated, vector, vector, posterior.data)["jacobian"].shape
+    rows = sum(count for term in posterior.model.terms for count, _ in term.residual_blocks)
     with ThreadPoolExecutor(1) as thread:
-        thread.submit(prepare, *shape)
-        program = compile_program(evaluated, vector, vector, posterior.data, run_once=True)
+        thread.submit(prepare, rows + space.size, space.size)
+        program = compile_program(_program(posterior), vector, vector, posterior.data, run_once=True)
 
     def objective(
         start: np.ndarray, pinned: np.ndarray, pin: np.ndarray, weight: np.ndarray, data: Any, precision: Precision

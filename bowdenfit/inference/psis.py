@@ -52,12 +52,13 @@ def truncated_weights(log_ratio: np.ndarray) -> np.ndarray:
     """Weights of sum 1, the largest cut off at the square root of the number of draws times their mean (Ionides 2008).
 
     They say nothing of how far they can be trusted, and do not need ArviZ, which takes a second to load: enough to tell
-    where sampling of the other density should begin.
+    where sampling of the other density should begin. Ratios that cannot be computed have no weight.
 
     Args:
-        log_ratio: Log importance ratio of every draw, up to a constant; none of them infinite.
+        log_ratio: Log importance ratio of every draw, up to a constant.
     """
-    weights = np.exp(log_ratio - np.max(log_ratio))
+    ratios = np.where(np.isfinite(log_ratio), log_ratio, -np.inf)
+    weights = np.exp(ratios - np.max(ratios))
     cut = np.minimum(weights, np.mean(weights) * np.sqrt(len(weights)))
     return np.asarray(cut / np.sum(cut))
 

@@ -69,12 +69,15 @@ def walker_programs(
         moves: What they do, in z alone; `default_moves`, in all coordinates, if omitted.
         beside: See `compile_program`.
     """
-    space, is_narrow = posterior.model.space, Conditional(posterior).is_narrow
+    space, conditional = posterior.model.space, Conditional(posterior)
     of_what = posterior.log_density, posterior.data, space.size, settings
     if moves is not None:
         return compiled_walkers(*of_what, ((in_z, 1.0),), moves, beside)
-    first = compiled_walkers(*of_what, frames_of(posterior) if is_narrow else frames_without_ridge(space), beside=beside)
-    return first if is_narrow else first._replace(later=cache(lambda: compiled_walkers(*of_what, frames_of(posterior))))
+    if conditional.is_narrow:
+        return compiled_walkers(*of_what, frames_of(posterior), beside=beside)
+    first = compiled_walkers(*of_what, frames_without_ridge(space), beside=beside)
+    later = cache(lambda: compiled_walkers(*of_what, frames_of(posterior)) if conditional.is_told else first)
+    return first._replace(later=later)
 
 
 def compiled_walkers(

@@ -157,6 +157,12 @@ def test_where_enough_readings_tell_the_scatter_walkers_do_without_the_ridge(wid
     assert wide.p_value(wide.sampled(programs=programs)) > 0.001
 
 
+def test_what_has_no_ridge_is_not_compiled_again(wide, monkeypatch):
+    monkeypatch.setattr(Conditional, "is_told", False)
+    programs = walker_programs(wide.posterior, SETTINGS)
+    assert programs.later().sweep is programs.sweep
+
+
 @pytest.fixture
 def surprised(narrow, monkeypatch):
     """Programs for a funnel that was not expected to be narrow."""

@@ -136,6 +136,7 @@ def test_truncated_weights_find_the_middle_of_the_other_density():
     assert weights.sum() == pytest.approx(1.0)
     assert weights @ z == pytest.approx(1.0, abs=0.15)
     assert truncated_weights(np.full(10, -3.0)) == pytest.approx(np.full(10, 0.1))
+    assert truncated_weights(np.array([0.0, np.nan, np.inf, 0.0])) == pytest.approx([0.5, 0.0, 0.0, 0.5])
     assert truncated_weights(np.append(np.zeros(99), 6.0)).max() < 0.5 < np.exp(6.0) / (99 + np.exp(6.0))
 
 

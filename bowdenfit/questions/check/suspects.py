@@ -47,9 +47,7 @@ def refit_suspects(fit: Record, tables: Sequence[TableChecks]) -> tuple[TableChe
 
 @once
 def judge_of(_: Record) -> Diagnose:
-    """What judges draws of a fit without a reading; another process does while a fit is written, so that this one need not load
-    what that takes.
-    """
+    """What judges draws of a fit without a reading; while a fit is written, a process that has loaded what that takes."""
     return diagnose_all
 
 

@@ -9,12 +9,13 @@ several minutes, measures everything in one go, and prints one table. Every numb
 
 Whole processes: wall time from start to exit, imports, compilation, figures and files included; the time that processors
 spent on the process and those it starts, which says something on a busy machine too; and the peak of their resident memory
-together, pages that several of them share counted once. "load" is how many processes wanted to compute on the machine,
-from the lowest to the highest; where it is above the number of cores by more than one or two, wall times say little. No
-program is kept from before ("cold"), but for "cache filled"; byte code is kept. With `--against`, another checkout does
-the same in turns, with the same seed, another one each turn, because how many steps a seed takes is chance; each pair gives
-a ratio, and the lowest and the highest of them stand beside their median. Commands on a
-finished fit read the one that their own checkout wrote.
+together, pages that several of them share counted once, in one more run with the first seed: watching four processes takes
+a fifth of a core, and made --no-mcmc 0.57 of the time instead of 0.51. "load" is how many processes wanted to compute on
+the machine, from the lowest to the highest; where it is above the number of cores by more than one or two, wall times say
+little. No program is kept from before ("cold"), but for "cache filled"; byte code is kept. With `--against`, another
+checkout does the same in turns, with the same seed, another one each turn, because how many steps a seed takes is chance;
+each pair gives a ratio, and the lowest and the highest of them stand beside their median. Commands on a finished fit read
+the one that their own checkout wrote.
 
 "calibrate, 200": 200 replications of the on-body data. Of the other checkout as few are run as are needed for the time of
 one more (FEW), and the rest is reckoned as if each took as long. "1000 cables": scripts/benchmark_batch.py says of what.
@@ -163,13 +164,15 @@ class Bench:
         """The checkouts."""
         return [ROOT, *([] if self.other is None else [self.other])]
 
-    def command(self, tree: Path, arguments: Sequence[str], cache: str, results: Path | None = None) -> Run:
+    def command(
+        self, tree: Path, arguments: Sequence[str], cache: str, results: Path | None = None, watched: bool = True
+    ) -> Run:
         """Run one bowdenfit command with the compilation cache `cache`."""
         output = ["--output", str(results), "--force"] if results is not None else []
         # matplotlib's list of fonts is no compiled program, so it stays where the cache is emptied.
         environment = {"XDG_CACHE_HOME": str(self.folder / cache), "MPLCONFIGDIR": str(self.folder / "matplotlib")}
         environment |= {"PYTHONPATH": str(tree), "JAX_COMPILATION_CACHE_DIR": ""}
-        return measured(["-m", "bowdenfit.cli", *arguments, *output], environment, results, tree)
+        return measured(["-m", "bowdenfit.cli", *arguments, *output], environment, results, tree, watched)
 
     def rows(self) -> Iterator[Row]:
         """All commands, cold or not, in turns."""
@@ -211,17 +214,22 @@ class Bench:
         return Row(CABLES, [replace(run, seconds=float(last[1]), cpu=float(last[2]))], []), run.output
 
     def row(self, name: str, arguments: Sequence[str], cold: bool = False, writes: bool = False) -> Row:
-        """One command."""
+        """One command: so many times, and once more of which the memory is watched."""
         trees = self.trees[:1] if name in NOT_PAIRED else self.trees
         sides: list[list[Run]] = [[] for _ in trees]
-        for i in range(self.repeats):
-            say(f"{name}, {i + 1} of {self.repeats}")
+        for i in range(self.repeats + 1):
+            watched = i == self.repeats
+            say(f"{name}, {'memory' if watched else f'{i + 1} of {self.repeats}'}")
             for number, (tree, runs) in enumerate(zip(trees, sides, strict=True)):
-                stands = {"FIT": str(self.finished(tree)), "SEED": str(i + 1)}
+                stands = {"FIT": str(self.finished(tree)), "SEED": str(i % self.repeats + 1)}
                 given = [stands.get(part, part) for part in arguments]
                 at = self.folder / f"{name}_{number}_{i}".replace(",", "").replace(" ", "_")
                 cache = f"{at.name}_cache" if cold else "unmeasured"
-                runs.append(self.command(tree, given, cache, at if cold or writes else None))
+                run = self.command(tree, given, cache, at if cold or writes else None, watched)
+                if watched:
+                    runs[:] = [replace(each, memory=run.memory) for each in runs]
+                else:
+                    runs.append(run)
         return Row(name, sides[0], sides[1] if len(sides) > 1 else [])
 
     def finished(self, tree: Path) -> Path:
@@ -236,7 +244,7 @@ def samplers(folder: Path, repeats: int) -> dict[str, list[Sampler]]:
         for name, script in {"bowdenfit": "with_bowdenfit.py", **PLAIN}.items():
             say(f"{name} to 1000, {seed} of {repeats}")
             environment = {"PYTHONPATH": search_path(), "XDG_CACHE_HOME": str(folder / f"cache_{name}_{seed}")}
-            run = measured([str(BASELINES / script), str(seed)], environment)
+            run = measured([str(BASELINES / script), str(seed)], environment, watched=False)
             page = json.loads(run.output)
             sampler = Sampler(page["ready_at"] - run.started, page["ess"], np.array(page["mean"]), np.array(page["sd"]))
             found.setdefault(name, []).append(sampler)

@@ -162,7 +162,7 @@ def test_simulated_devices_do_what_was_foretold(fit, schedule, tmp_path):
     assert karnopp.peak.median == pytest.approx(none.peak.median, rel=0.1), "it sticks where it turns round"
     assert active.felt.median == pytest.approx(seen.gain.left.median, rel=0.05)
     assert seen.simulated.went_on <= 0.05 + 2.6 * np.sqrt(0.05 * 0.95 / 400), "0.5 % of the time by chance"
-    assert seen.simulated.went_on > 0.01
+    assert seen.simulated.went_on > 0.005, "0.010 to 0.055 for twelve fits, 0.036 on average: 2 of 400 once in 15 000 seeds"
     text = compensation_text(seen)
     assert faults_of_page(text) == []
     assert len(text.splitlines()) <= 25

@@ -72,7 +72,7 @@ FILLED = "fit, cache filled"
 GROUPS = ("plain", "many", "counts")
 NOT_PAIRED = ("plot one", "plot one anew")  # older commands draw all figures
 PLAIN = {"blackjax": "plain_blackjax.py", "emcee and NumPy": "plain_emcee.py", "NumPyro": "plain_numpyro.py"}
-CALIBRATE, MANY, FEW = "calibrate, 200", 200, (2, 6)
+CALIBRATE, MANY, FEW = "calibrate, 200", 200, (10, 60)
 CABLES = "1000 cables"
 TARGETS = {  # ratios
     "fit": 0.45,

@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 
 from bowdenfit.description import SamplerSettings
-from bowdenfit.inference.diagnostics import Diagnose, Diagnostics, Trajectories, diagnose_all, shortfalls
+from bowdenfit.inference.diagnostics import Diagnostics, Trajectories, diagnose_all, shortfalls
 from bowdenfit.inference.least_squares import MaximumPosterior
 from bowdenfit.inference.log_density import LogDensity
 
@@ -75,7 +75,7 @@ class Sampling:
     checkpoint: Path | None = None
     resume: bool = False
     report: Callable[[Progress], None] = lambda _: None
-    diagnose: Diagnose = diagnose_all
+    diagnose: Callable[[Mapping[str, np.ndarray], int], dict[str, Diagnostics]] = diagnose_all
 
     def chain_of(self, z: np.ndarray, n_ensembles: int, **of_sampler: Any) -> Chain:
         """Draws (walker, draw, parameter), ordered by ensemble, with derived quantities, diagnostics, and their shortfalls."""

@@ -1,9 +1,8 @@
 """Whether draws can be trusted: R-hat across ensembles, effective sample sizes, and how trajectories went."""
 
 import warnings
-from collections.abc import Callable, Mapping
+from collections.abc import Mapping
 from dataclasses import dataclass
-from typing import TypeAlias
 
 import numpy as np
 
@@ -34,9 +33,6 @@ class Diagnostics:
     ess_tail: float
     mcse_mean: float
     drift: float
-
-
-Diagnose: TypeAlias = Callable[[Mapping[str, ChainDraws], int], dict[str, Diagnostics]]
 
 
 def diagnose_all(draws: Mapping[str, ChainDraws], n_ensembles: int) -> dict[str, Diagnostics]:

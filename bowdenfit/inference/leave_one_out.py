@@ -17,12 +17,12 @@ from bowdenfit.inference.chain import Chain, Sampling
 from bowdenfit.inference.comparison import How, Prediction, weigh_without_each
 from bowdenfit.inference.compilation import compile_program
 from bowdenfit.inference.coordinates import frames_without_ridge
-from bowdenfit.inference.diagnostics import Diagnose, Diagnostics, diagnose_all
+from bowdenfit.inference.diagnostics import Diagnostics, diagnose_all
 from bowdenfit.inference.draws import in_batches
 from bowdenfit.inference.least_squares import MaximumPosterior
 from bowdenfit.inference.log_density import LogDensity
 from bowdenfit.inference.moment_matching import match_moments
-from bowdenfit.inference.psis import reliable_k, truncated_weights
+from bowdenfit.inference.psis import reliable_k, smooth_weights
 from bowdenfit.inference.walkers import WalkerPrograms, compiled_walkers
 from bowdenfit.kinds.run_parts import RunParts
 
@@ -124,7 +124,7 @@ class LeavingOut:
         each: Log likelihood of every reading at every draw, (draw, reading).
         share: Effective draws a draw.
         seed: Seed of the refits.
-        diagnose: What judges their draws.
+        call: Calls functions of draws, such as what judges them, with their arguments.
     """
 
     readings: ReadingsToLeaveOut
@@ -132,7 +132,7 @@ class LeavingOut:
     each: np.ndarray
     share: float
     seed: int
-    diagnose: Diagnose = diagnose_all
+    call: Callable[..., Any] = field(default=lambda function, *arguments: function(*arguments))
 
     def without(self, reading: int, limit: float) -> tuple[float, float, How]:
         """Expected log density of a reading whose importance weights fail, its Monte Carlo error, and how it was found.
@@ -176,10 +176,10 @@ class LeavingOut:
         from bowdenfit.inference.ensemble import sample
 
         readings = self.readings
-        weights = truncated_weights(-self.each[:, reading])
+        weights = np.exp(self.call(smooth_weights, -self.each[:, reading], self.share)[0])
         start = MaximumPosterior(weights @ self.z, np.atleast_2d(np.cov(self.z.T)))
         own_seed = int(np.random.SeedSequence([self.seed, reading]).generate_state(1)[0])
-        diagnose = partial(_without_drift, self.diagnose)
+        diagnose = partial(_without_drift, self.call)
         asked = Sampling(readings.posterior, start, readings.refits, own_seed, quantities, diagnose=diagnose)
         return sample(asked, readings.programs, readings.without(reading))
 
@@ -223,6 +223,8 @@ def leave_one_out(
     return Prediction(elpd, quick.pareto_k, error, tuple(readings.names[i] for i in chosen), tuple(how))
 
 
-def _without_drift(diagnose: Diagnose, draws: Mapping[str, np.ndarray], n_ensembles: int) -> dict[str, Diagnostics]:
+def _without_drift(
+    call: Callable[..., Any], draws: Mapping[str, np.ndarray], n_ensembles: int
+) -> dict[str, Diagnostics]:
     """Diagnostics without drift, which cannot be told from chance with as few effective draws as a refit needs."""
-    return {name: replace(found, drift=0.0) for name, found in diagnose(draws, n_ensembles).items()}
+    return {name: replace(found, drift=0.0) for name, found in call(diagnose_all, draws, n_ensembles).items()}

@@ -2,7 +2,6 @@
 
 References:
     Vehtari, Simpson, Gelman, Yao and Gabry 2024, "Pareto smoothed importance sampling" (JMLR 25).
-    Ionides 2008, "Truncated importance sampling" (Journal of Computational and Graphical Statistics 17).
 """
 
 import warnings
@@ -46,21 +45,6 @@ def smooth_weights(log_ratio: np.ndarray, share: float = 1.0) -> tuple[np.ndarra
     if not (np.isfinite(k) and np.all(np.isfinite(log_weights))):
         return equal, float("inf")
     return np.asarray(log_weights), float(k)
-
-
-def truncated_weights(log_ratio: np.ndarray) -> np.ndarray:
-    """Weights of sum 1, the largest cut off at the square root of the number of draws times their mean (Ionides 2008).
-
-    They say nothing of how far they can be trusted, and do not need ArviZ, which takes a second to load: enough to tell
-    where sampling of the other density should begin. Ratios that cannot be computed have no weight.
-
-    Args:
-        log_ratio: Log importance ratio of every draw, up to a constant.
-    """
-    ratios = np.where(np.isfinite(log_ratio), log_ratio, -np.inf)
-    weights = np.exp(ratios - np.max(ratios))
-    cut = np.minimum(weights, np.mean(weights) * np.sqrt(len(weights)))
-    return np.asarray(cut / np.sum(cut))
 
 
 def weighted_elpd(log_ratio: np.ndarray, log_likelihood: np.ndarray, share: float) -> tuple[float, float, float]:

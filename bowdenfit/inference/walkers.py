@@ -69,14 +69,20 @@ def walker_programs(
         moves: What they do, in z alone; `default_moves`, in all coordinates, if omitted.
         beside: See `compile_program`.
     """
-    space, conditional = posterior.model.space, Conditional(posterior)
+    space = posterior.model.space
     of_what = posterior.log_density, posterior.data, space.size, settings
     if moves is not None:
         return compiled_walkers(*of_what, ((in_z, 1.0),), moves, beside)
-    if conditional.is_narrow:
+    if Conditional(posterior).is_narrow:
         return compiled_walkers(*of_what, frames_of(posterior), beside=beside)
-    first = compiled_walkers(*of_what, frames_without_ridge(space), beside=beside)
-    later = cache(lambda: compiled_walkers(*of_what, frames_of(posterior)) if conditional.is_told else first)
+    plain = frames_without_ridge(space)
+    first = compiled_walkers(*of_what, plain, beside=beside)
+
+    @cache
+    def later() -> WalkerPrograms:
+        frames = frames_of(posterior)
+        return compiled_walkers(*of_what, frames) if len(frames) > len(plain) else first
+
     return first._replace(later=later)
 
 

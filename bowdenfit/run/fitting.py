@@ -1,19 +1,17 @@
 """From a data set to a finished fit: the stages in their order, and what runs beside them."""
 
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Iterator
 from concurrent.futures import ThreadPoolExecutor
 from datetime import UTC, datetime
 from functools import partial
 from pathlib import Path
 from typing import Any
 
-import numpy as np
-
 from bowdenfit.dataset import Dataset
 from bowdenfit.errors import BowdenfitError
 from bowdenfit.front_desk import Fit
 from bowdenfit.inference.chain import Sampling
-from bowdenfit.inference.diagnostics import Diagnostics, diagnose_all
+from bowdenfit.inference.diagnostics import diagnose_all
 from bowdenfit.inference.engines.memory import refuse_shortage
 from bowdenfit.inference.least_squares import least_squares, maximum_posterior
 from bowdenfit.inference.log_density import LogDensity as Density
@@ -22,7 +20,7 @@ from bowdenfit.inference.versions import versions
 from bowdenfit.model import build_model
 from bowdenfit.questions.check.answer import checks_findings, evidence_of
 from bowdenfit.questions.check.evidence import work_out
-from bowdenfit.questions.check.suspects import judge_of
+from bowdenfit.questions.check.suspects import caller_of
 from bowdenfit.results.record import Provenance
 from bowdenfit.run.helpers import Assistant
 from bowdenfit.run.loading import load, load_beside
@@ -61,7 +59,7 @@ def run(
         programs = sampling_programs(density, seed, compiling)
     with watch.stage("wait for the start"):
         center = start.result()
-    checkpoint, report, diagnose = begin(), _with_memory(progress), partial(_diagnosed, helper)
+    checkpoint, report, diagnose = begin(), _with_memory(progress), partial(_called, helper, diagnose_all)
     asked = Sampling(density, center, settings, seed, programs.quantities, checkpoint, resume, report, diagnose)
     posterior, reasons = draws_of(programs, asked, watch)
     squares, beside = estimated.result()
@@ -69,17 +67,17 @@ def run(
     found = Fit(data, squares, posterior, not reasons, reasons, provenance(seed, watch))
     found._answers.update(programs.asked)
     if helper.checks and checkpoint is not None:  # what is written waits for it
-        found._answers.update({checks_findings: helper.check(work_out, evidence_of(found)), judge_of: diagnose})
+        found._answers[checks_findings] = helper.check(work_out, evidence_of(found))
+        found._answers[caller_of] = partial(_called, helper)
     return found
 
 
-def _diagnosed(helper: Assistant, draws: Mapping[str, np.ndarray], n_ensembles: int) -> dict[str, Diagnostics]:
-    """`diagnose_all`, by a process that is there for it; here where that was ended from outside."""
+def _called(helper: Assistant, function: Callable[..., Any], *arguments: Any) -> Any:
+    """What a function of draws gives, by a process that is there for it; here where that was ended from outside."""
     try:
-        found: dict[str, Diagnostics] = helper.check(diagnose_all, draws, n_ensembles).result()
+        return helper.check(function, *arguments).result()
     except BowdenfitError:
-        found = diagnose_all(draws, n_ensembles)
-    return found
+        return function(*arguments)
 
 
 def _with_memory(progress: Callable[..., None] | None) -> Callable[..., None]:

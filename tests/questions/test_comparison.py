@@ -16,7 +16,7 @@ from bowdenfit.inference.comparison import Difference, Prediction, differences, 
 from bowdenfit.inference.leave_one_out import REFIT, LeavingOut, ReadingsToLeaveOut, leave_one_out
 from bowdenfit.inference.log_density import LogDensity
 from bowdenfit.inference.moment_matching import Affine, best_map, match_moments
-from bowdenfit.inference.psis import reliable_k, truncated_weights
+from bowdenfit.inference.psis import reliable_k
 from bowdenfit.kinds.designs import design_of
 from bowdenfit.kinds.efficiencies.table import EfficiencyTable
 from bowdenfit.model import build_model
@@ -127,17 +127,6 @@ def test_draws_of_a_fit_without_a_reading_are_those_of_its_posterior(readings, d
         assert 0 < error < 0.1 * sd[i]
         assert found[:, i].mean() == pytest.approx(mean[i], abs=4 * error)
         assert found[:, i].std() == pytest.approx(sd[i], abs=4 * error)
-
-
-def test_truncated_weights_find_the_middle_of_the_other_density():
-    """Draws of N(0, 1) weighted for N(1, 0.9^2): none of 2000 seeds is off by 0.15; then ratios alike, and one far off."""
-    z = np.random.default_rng(3).standard_normal(4000)
-    weights = truncated_weights(0.5 * z**2 - 0.5 * ((z - 1) / 0.9) ** 2 + 900.0)
-    assert weights.sum() == pytest.approx(1.0)
-    assert weights @ z == pytest.approx(1.0, abs=0.15)
-    assert truncated_weights(np.full(10, -3.0)) == pytest.approx(np.full(10, 0.1))
-    assert truncated_weights(np.array([0.0, np.nan, np.inf, 0.0])) == pytest.approx([0.5, 0.0, 0.0, 0.5])
-    assert truncated_weights(np.append(np.zeros(99), 6.0)).max() < 0.5 < np.exp(6.0) / (99 + np.exp(6.0))
 
 
 def test_a_refit_that_is_stopped_too_early_is_called_rough(outlier, drawn):

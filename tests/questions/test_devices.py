@@ -14,7 +14,7 @@ from bowdenfit.description.device import read_device
 from bowdenfit.device.coulomb import moves_by_itself
 from bowdenfit.errors import DescriptionError, UsageError
 from bowdenfit.questions.bends.loop_draws import loop_draws
-from bowdenfit.questions.compensate import compensation_figure, compensation_traces_figure
+from bowdenfit.questions.compensate import compensation_figure, compensation_traces_figure, simulation
 from bowdenfit.questions.compensate.ranking import compensation_of
 from bowdenfit.questions.compensate.words import compensation_text
 from bowdenfit.questions.teleoperate import teleoperation_figure
@@ -153,6 +153,14 @@ def test_springs_make_the_cable_softer(fit, tmp_path):
 
 
 @pytest.mark.parametrize("schedule", [pytest.param(False, marks=pytest.mark.slow), True])
+def test_of_four_times_as_many_devices_some_go_on_but_no_more_than_may(fit, schedule, monkeypatch):
+    """Of 4000 it is 0.034 to 0.037 for six fits; of 1600 the error is 0.005, and each bound three of it off."""
+    monkeypatch.setattr(simulation, "moved", lambda *_: ((), 0.0))  # which takes most of the time, and tells nothing of it
+    answer, loop = compensation_of(fit, read_device(DEVICE), RANGE, None, 0.05)
+    assert 0.02 < simulation.simulated(fit, read_device(DEVICE), loop, answer, schedule, 1600).went_on <= 0.05
+
+
+@pytest.mark.parametrize("schedule", [pytest.param(False, marks=pytest.mark.slow), True])
 def test_simulated_devices_do_what_was_foretold(fit, schedule, tmp_path):
     seen = bf.compensate(fit, DEVICE, wrap_angle=RANGE, schedule=schedule, simulate=True, output=tmp_path / "answer")
     none, karnopp, active = seen.simulated.laws
@@ -162,7 +170,6 @@ def test_simulated_devices_do_what_was_foretold(fit, schedule, tmp_path):
     assert karnopp.peak.median == pytest.approx(none.peak.median, rel=0.1), "it sticks where it turns round"
     assert active.felt.median == pytest.approx(seen.gain.left.median, rel=0.05)
     assert seen.simulated.went_on <= 0.05 + 2.6 * np.sqrt(0.05 * 0.95 / 400), "0.5 % of the time by chance"
-    assert seen.simulated.went_on > 0.005, "0.010 to 0.055 for twelve fits, 0.036 on average: 2 of 400 once in 15 000 seeds"
     text = compensation_text(seen)
     assert faults_of_page(text) == []
     assert len(text.splitlines()) <= 25

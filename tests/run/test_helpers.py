@@ -185,7 +185,7 @@ CHECKS_ELSEWHERE = """
 import os, signal, sys
 import numpy as np
 from bowdenfit.inference.diagnostics import diagnose_all
-from bowdenfit.run.fitting import _diagnosed
+from bowdenfit.run.fitting import _called
 from bowdenfit.run.helpers import InOtherProcesses, LightProcesses
 
 def nothing():
@@ -197,11 +197,11 @@ def is_loaded(name):
 draws = {"mu": np.random.default_rng(0).standard_normal((8, 50))}
 light = LightProcesses(False, True)
 helper = InOtherProcesses(light, nothing, False)
-elsewhere = _diagnosed(helper, draws, 4)
+elsewhere = _called(helper, diagnose_all, draws, 4)
 assert "arviz_stats" not in sys.modules
 assert not helper.submit(is_loaded, "matplotlib").result()  # nothing is to be drawn
 os.kill(light.first.process.pid, signal.SIGKILL)
-print(elsewhere == _diagnosed(helper, draws, 4) == diagnose_all(draws, 4))
+print(elsewhere == _called(helper, diagnose_all, draws, 4) == diagnose_all(draws, 4))
 helper.end()
 light.end()
 """

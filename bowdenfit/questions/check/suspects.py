@@ -4,13 +4,13 @@ Importance weights cannot take out what such a reading did to the draws: how far
 fit takes seconds, so that only those that look suspicious by their weights are left out in this way.
 """
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import replace
+from typing import Any
 
 import jax
 import numpy as np
 
-from bowdenfit.inference.diagnostics import Diagnose, diagnose_all
 from bowdenfit.inference.draws import OfDraws, replicator
 from bowdenfit.inference.leave_one_out import LeavingOut, ReadingsToLeaveOut
 from bowdenfit.inference.log_density import LogDensity
@@ -39,16 +39,16 @@ def refit_suspects(fit: Record, tables: Sequence[TableChecks]) -> tuple[TableChe
         density, drawn, z = LogDensity(fit.model), fit.posterior, fit.posterior.flat_z
         each = np.concatenate([drawn.log_likelihood[term.name] for term in fit.model.terms], axis=-1).reshape(len(z), -1)
         share = min(drawn.n_effective / len(z), 1.0)
-        leaving_out = LeavingOut(ReadingsToLeaveOut(density), z, each, share, fit.provenance.seed, judge_of(fit))
+        leaving_out = LeavingOut(ReadingsToLeaveOut(density), z, each, share, fit.provenance.seed, caller_of(fit))
         for at, place in suspects:
             found[at] = _refitted(leaving_out, implied_program(fit), found[at], place)
     return tuple(found)
 
 
 @once
-def judge_of(_: Record) -> Diagnose:
-    """What judges draws of a fit without a reading; while a fit is written, a process that has loaded what that takes."""
-    return diagnose_all
+def caller_of(_: Record) -> Callable[..., Any]:
+    """What calls functions of draws; while a fit is written, in a process that has loaded what these take."""
+    return lambda function, *arguments: function(*arguments)
 
 
 @once

@@ -72,11 +72,13 @@ class Conditional:
         It may where few readings tell a scatter, and where a coefficient goes with an angle of which only a guess is known. By
         simulated funnels whose scatter has a known density: with two readings more than coefficients, walkers without these
         coordinates put 0.5 to 1 of 100 draws below its 1 % quantile; with three 0.85 to 1.1; with four and more 0.9 to 1.1,
-        which is chance.
+        which is chance. Readings that are alike to the last digit count once: of a scatter that may be none they tell nothing.
         """
         model = self.posterior.model
         each = [varying for term in model.terms for _, varying in term.residual_blocks if varying]
-        return any(p.role == "angle" for p in model.space.free) or min(each, default=0) < len(self.which) + _TELL_A_SCATTER
+        unlike = [len(np.unique(term.observed())) for term in model.terms]
+        tell = min(each + unlike, default=0)
+        return any(p.role == "angle" for p in model.space.free) or tell < len(self.which) + _TELL_A_SCATTER
 
     def at(self, given: Array, is_z: Array, data: Any) -> tuple[Array, Array, Array]:
         """W and z, and log of the volume in z of a unit of w there, of one of the two; NaN where w has no z.

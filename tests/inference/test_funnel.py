@@ -39,6 +39,9 @@ class Readings:
     def __init__(self, angles, read):
         self.data, self.residual_blocks = {"angles": angles, "read": read}, ((len(read), len(read)),)
 
+    def observed(self):
+        return self.data["read"]
+
     def residuals(self, values, data):
         expected = data["angles"] @ jnp.stack([values[f"mu{i}"] for i in range(COUNT)])
         return (data["read"] - expected) / values["tau"]
@@ -155,6 +158,11 @@ def test_where_enough_readings_tell_the_scatter_walkers_do_without_the_ridge(wid
     programs = walker_programs(wide.posterior, SETTINGS)
     assert len(programs.shares.frames) == 2 and walker_programs(narrow.posterior, SETTINGS).later is None
     assert wide.p_value(wide.sampled(programs=programs)) > 0.001
+
+
+def test_readings_that_are_alike_tell_no_scatter_however_many(wide):
+    assert not Conditional(wide.posterior).is_narrow
+    assert Conditional(Funnel(wide.angles, np.full(len(wide.read), 0.7)).posterior).is_narrow
 
 
 @pytest.fixture(scope="module")

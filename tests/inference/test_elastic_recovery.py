@@ -268,7 +268,7 @@ def mixture(tables: tuple[str, ...]) -> Dataset:
 
 
 @pytest.mark.parametrize(
-    "tables", [m if i % 4 == 2 else pytest.param(m, marks=pytest.mark.slow) for i, m in enumerate(MIXTURES)], ids="+".join
+    "tables", [m if i % 8 == 2 else pytest.param(m, marks=pytest.mark.slow) for i, m in enumerate(MIXTURES)], ids="+".join
 )
 def test_any_mixture_of_tables_makes_one_posterior_that_is_the_sum_of_its_parts(tables):
     """Each table's part is that of a model built for it alone (with the angles, where there are curves)."""

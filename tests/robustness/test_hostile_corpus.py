@@ -59,6 +59,10 @@ def test_files_may_begin_with_lines_of_blanks_of_any_kind(cable, tmp_path, tried
     tried("check", cable, codes=(0, 2), names="efficiencies.csv")
     (tmp_path / "run.csv").write_text(f"{blank}\n" * 20 + TABLE)
     tried("check", tmp_path / "run.csv", "--wrap-angle=180deg", codes=(0, 2), names="run.csv")
+
+
+@pytest.mark.parametrize("blank", BLANKS[::4], ids=ascii)
+def test_files_of_nothing_but_blanks_are_refused(tmp_path, tried, blank):
     (tmp_path / "run.csv").write_text(f"{blank}\n" * 2000)
     tried("check", tmp_path / "run.csv", "--wrap-angle=180deg", names="run.csv")
 

@@ -1,6 +1,6 @@
 """Valid tables, descriptions, options and files mangled at random: each is read, or refused in sentences; never anything else.
 
-By default 2,000 cases; with the marker `slow` 50,000 others.
+By default 1,100 cases; with the marker `slow` 50,000 others.
 """
 
 import resource
@@ -11,7 +11,7 @@ from fuzzing import DATASETS, read_mangled_data_set, read_mangled_file, run_mang
 from fuzzing_folders import FOLDERS, read_mangled_folder
 from recorded_files import WRITERS
 
-OF_TABLES = {"synthetic-recordings": 20, "synthetic-bench": 120, "synthetic-haptic-loop": 120}
+OF_TABLES = {"synthetic-recordings": 12, "synthetic-bench": 70, "synthetic-haptic-loop": 70}
 MOST_MEMORY = 600 << 20  # bytes by which all of them may raise what the process holds
 
 
@@ -49,28 +49,28 @@ def options_of(attempts, place):
 
 @pytest.mark.parametrize("name", [path.name for path in DATASETS])
 def test_mangled_data_sets_are_read_or_refused_in_sentences(tmp_path, name):
-    count = OF_TABLES.get(name, 220)
+    count = OF_TABLES.get(name, 120)
     refused = sum(read_mangled_data_set(tmp_path, name, number).refused for number in range(count))
     assert 0.2 * count < refused < count
 
 
 @pytest.mark.parametrize("name", WRITERS)
 def test_mangled_files_of_every_kind_are_read_or_refused_in_sentences(tmp_path, valid, name):
-    outcomes = [read_mangled_file(tmp_path, valid, name, number) for number in range(45)]
+    outcomes = [read_mangled_file(tmp_path, valid, name, number) for number in range(25)]
     refused = sum(each.refused for each in outcomes)
-    assert refused > 5 and (refused < 45 or name == "zip.xlsx")  # else what is mangled was none of ours to begin with
+    assert refused > 3 and (refused < 25 or name == "zip.xlsx")  # else what is mangled was none of ours to begin with
 
 
 @pytest.mark.parametrize("name", FOLDERS)
 def test_mangled_devices_studies_and_fleets_are_read_or_refused_in_sentences(tmp_path, name):
-    count = 60 if name == "fleet" else 120
+    count = 40 if name == "fleet" else 70
     refused = sum(read_mangled_folder(tmp_path, name, number).refused for number in range(count))
     assert 0.2 * count < refused < count
 
 
 def test_mangled_options_are_taken_or_refused_in_sentences(tmp_path, attempts):
-    outcomes = [run_mangled_options(options_of(attempts, tmp_path), number) for number in range(200)]
-    assert 110 < sum(each.refused for each in outcomes) < 200
+    outcomes = [run_mangled_options(options_of(attempts, tmp_path), number) for number in range(120)]
+    assert 60 < sum(each.refused for each in outcomes) < 120
 
 
 @pytest.mark.slow

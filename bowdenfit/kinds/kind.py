@@ -14,6 +14,7 @@ from bowdenfit.errors import DatasetError
 from bowdenfit.files.row_account import RowAccount
 from bowdenfit.inputs import matching
 from bowdenfit.kinds.asked import Asked
+from bowdenfit.kinds.coarse import Coarse
 from bowdenfit.kinds.design import Design
 from bowdenfit.kinds.measurements import Measurements
 from bowdenfit.kinds.pages import Page
@@ -121,6 +122,7 @@ class Kind(Generic[AnyTable]):
         warnings: What a table will not be able to tell, as far as counting shows.
         check: Refuses a table that does not fit the description or the other tables.
         copies: Which readings were copied from others, in sentences without a first capital or remedy.
+        coarse: What is known of a table whose repeated readings are all alike to the last digit; None of any other.
         count: How many readings were fitted, in words; empty where its term counts them.
         method: How its readings are described, in a sentence of a paper.
         implausible: Why no bench would hand in simulated readings in place of the measured ones, in a few words; empty if
@@ -153,6 +155,7 @@ class Kind(Generic[AnyTable]):
     warnings: Callable[[AnyTable, Description, Measurements], list[str]] = lambda *_: []
     check: Callable[[AnyTable, Description, Measurements], None] = lambda *_: None
     copies: Callable[[AnyTable], list[str]] = lambda _: []
+    coarse: Callable[[AnyTable], Coarse | None] = lambda _: None
     count: Callable[[AnyTable], str] = lambda _: ""
     method: str = ""
     implausible: Callable[[AnyTable, AnyTable], str] = lambda *_: ""

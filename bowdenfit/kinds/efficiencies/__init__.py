@@ -4,6 +4,7 @@ import numpy as np
 
 from bowdenfit.files.columns import Quantity
 from bowdenfit.kinds.asked import Asked, Wanted
+from bowdenfit.kinds.coarse import Coarse, coarse
 from bowdenfit.kinds.copies import copies, places_along, without_runs
 from bowdenfit.kinds.efficiencies.table import (
     EfficiencyDesign,
@@ -17,12 +18,20 @@ from bowdenfit.kinds.efficiencies.table import (
 from bowdenfit.kinds.kind import Kind, itself
 from bowdenfit.kinds.readings import efficiencies
 from bowdenfit.kinds.wrap_angles import check_rows
-from bowdenfit.words import counted
+from bowdenfit.words import counted, listed
 
 
 def _copies(table: EfficiencyTable) -> list[str]:
     places = np.column_stack([table.route, table.own.angle])
     return copies(without_runs(table.origin, places, table.efficiency, places_along(table)))
+
+
+def _coarse(table: EfficiencyTable) -> Coarse | None:
+    """Where no scatter is stated."""
+    if np.any(table.sd > 0):
+        return None
+    places = np.column_stack([table.route, table.own.angle])
+    return coarse(listed(table.origin.files), places, table.efficiency)
 
 
 EFFICIENCIES = Kind(
@@ -33,6 +42,7 @@ EFFICIENCIES = Kind(
     check=check_rows,
     describe=describe,
     copies=_copies,
+    coarse=_coarse,
     alone=lambda table: f"a table of {counted(len(table.efficiency), 'efficiency', 'efficiencies')}",
     method="The logarithm of a measured efficiency was that of the model, give or take the scatter between mountings.",
     implausible=implausible,

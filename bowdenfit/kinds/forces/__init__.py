@@ -5,6 +5,7 @@ import numpy as np
 from bowdenfit.description import Description
 from bowdenfit.files.columns import Quantity
 from bowdenfit.kinds.asked import Asked, Switch, Wanted
+from bowdenfit.kinds.coarse import Coarse, coarse
 from bowdenfit.kinds.copies import Compared, copies, places_along, without_runs
 from bowdenfit.kinds.forces.following import check_following
 from bowdenfit.kinds.forces.gained import check_gains
@@ -48,6 +49,13 @@ def _copies(table: ForceTable) -> list[str]:
     return copies(Compared(listed(table.origin.files), table.run, names, stroke, forces, table.input_force, curve))
 
 
+def _coarse(table: ForceTable) -> Coarse | None:
+    """By the output force; the input force may be set."""
+    stroke = table.stroke.astype(float)
+    settings = np.column_stack([table.route, table.own.angle, stroke, table.input_force])
+    return coarse(listed(table.origin.files), settings, table.output_force, "N")
+
+
 FORCES = Kind(
     name="forces",
     table=ForceTable,
@@ -61,6 +69,7 @@ FORCES = Kind(
     describe=describe,
     warnings=warnings,
     copies=_copies,
+    coarse=_coarse,
     alone=alone,
     method="All readings of one mounting of the cable shared its error, which was integrated out.",
     implausible=implausible,

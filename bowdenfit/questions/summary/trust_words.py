@@ -11,6 +11,7 @@ from bowdenfit.questions.identify.verb import NOT_IDENTIFIABLE
 from bowdenfit.questions.next.candidates import can_be_ranked
 from bowdenfit.questions.summary.answer import readings_off
 from bowdenfit.questions.summary.verdict import (
+    COARSE,
     CONTRADICTORY,
     COPIED,
     IMPOSSIBLE,
@@ -27,6 +28,7 @@ _WRONG = {
     CONTRADICTORY: "the measurements contradict each other",
     IMPOSSIBLE: "some of the readings cannot be",
     COPIED: "some of the readings are copies of others",
+    COARSE: "the readings are too coarse for such intervals",
     NOT_DESCRIBED: "the model does not describe these readings",
     NOT_IDENTIFIABLE: "the measurements do not tell every coefficient",
 }

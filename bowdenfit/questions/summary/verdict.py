@@ -8,6 +8,7 @@ from bowdenfit.questions.check.answer import checks_of
 from bowdenfit.questions.check.copied import copied_readings
 from bowdenfit.questions.check.impossible import implausible_friction, impossible_efficiencies
 from bowdenfit.questions.check.lack_of_fit import say_what_is_not_described
+from bowdenfit.questions.check.too_coarse import too_coarse
 from bowdenfit.questions.check.words import scattering
 from bowdenfit.questions.identify.contradiction import contradiction
 from bowdenfit.questions.identify.judgment import say_what_is_not_determined
@@ -17,7 +18,7 @@ from bowdenfit.words import few
 
 NOT_CONVERGED, CONTRADICTORY = "not converged", "contradictory"
 IMPOSSIBLE, NOT_DESCRIBED = "made of impossible readings", "not a description of its readings"
-COPIED = "made of copied readings"
+COPIED, COARSE = "made of copied readings", "finer than its readings"
 
 
 @dataclass(frozen=True, repr=False)
@@ -26,7 +27,7 @@ class Verdict(Display):
 
     Args:
         troubles: What is wrong, by kind: `NOT_CONVERGED`, `NOT_IDENTIFIABLE`, `CONTRADICTORY`, `IMPOSSIBLE`,
-            `NOT_DESCRIBED`, `COPIED`; each with sentences.
+            `NOT_DESCRIBED`, `COPIED`, `COARSE`; each with sentences.
         sampled: Whether there are draws.
         doubts: What chance does in one fit of a hundred or less, and is not enough to distrust it; clauses without a stop.
     """
@@ -58,6 +59,7 @@ def verdict(fit: Record) -> Verdict:
         CONTRADICTORY: _sentences(contradiction(fit)),
         IMPOSSIBLE: _sentences(impossible_efficiencies(fit)) + _sentences(implausible_friction(fit)),
         COPIED: copied_readings(fit.dataset),
+        COARSE: too_coarse(fit),
         NOT_DESCRIBED: say_what_is_not_described(fit),
     }
     said = {kind: sentences for kind, sentences in troubles.items() if sentences}

@@ -23,6 +23,7 @@ from bowdenfit.questions.summary.page import summarize
 from bowdenfit.questions.summary.parameter_words import parameters_text
 from bowdenfit.questions.summary.sampler_words import sampler_sentences, sampler_text
 from bowdenfit.questions.summary.verdict import (
+    COARSE,
     CONTRADICTORY,
     COPIED,
     IMPOSSIBLE,
@@ -111,6 +112,7 @@ def _untrusted(found: Verdict) -> str:
         CONTRADICTORY: "CONTRADICTORY MEASUREMENTS",
         IMPOSSIBLE: "IMPOSSIBLE READINGS",
         COPIED: "COPIED READINGS",
+        COARSE: "READINGS TOO COARSE",
         NOT_DESCRIBED: "THE MODEL DOES NOT DESCRIBE THESE READINGS",
     }
     if NOT_CONVERGED in found.troubles:

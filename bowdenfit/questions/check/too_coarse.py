@@ -1,0 +1,54 @@
+"""Intervals narrower than the last digit of the readings allows, in sentences for the verdict."""
+
+import numpy as np
+
+from bowdenfit.kinds import each_table, kind_of
+from bowdenfit.kinds.coarse import Coarse
+from bowdenfit.kinds.term import Term
+from bowdenfit.results.record import Record
+from bowdenfit.words import percent
+
+_SHARE = 0.5  # of what the last digit leaves open, below which an interval is too narrow
+
+
+def too_coarse(fit: Record) -> tuple[str, ...]:
+    """Tables whose repeated readings are alike to the last digit, where the fit claims to know more than that digit does.
+
+    The average of independent errors of rounding in so many different readings, spread over the coefficients, is what the fit
+    must leave open of the readings that it expects; without draws nothing is said.
+    """
+    if fit.sampled is None:
+        return ()
+    coefficients = sum(p.role == "friction" for p in fit.model.space.free)
+    told = []
+    for kind, table in each_table(fit.dataset.measurements):
+        found = kind.coarse(table)
+        terms = [term for term in fit.model.terms if kind_of(term.name) is kind and term.name in fit.posterior.expected]
+        if found is None or not terms:
+            continue
+        left_open = found.log_sd * np.sqrt(min(coefficients / found.different, 1.0))
+        if all(_log_sd(fit, term) < _SHARE * left_open for term in terms):
+            told.append(_sentence(found, terms[0]))
+    return tuple(told)
+
+
+def _log_sd(fit: Record, term: Term) -> float:
+    """Standard deviation of the logarithms of what is expected, on average of the readings; infinite of what has none."""
+    expected = fit.posterior.expected[term.name].reshape(-1, len(term.labels))
+    if not np.all(expected > 0):
+        return float("inf")
+    return float(np.sqrt(np.mean(np.var(np.log(expected), axis=0))))
+
+
+def _sentence(found: Coarse, term: Term) -> str:
+    return (
+        f"Whatever was read more than once in {found.file} is alike to the last digit, {found.last_digit}, and does not show "
+        "how much readings scatter. Intervals take it for next to nothing, while the last digit alone leaves a reading open by "
+        f"{percent(np.sqrt(3) * found.log_sd)} up or down. Read one more digit; or keep one of each reading and state how far "
+        f"it may be off: [prior.{term.noise}] fixed = {_off(found, term)} in cable.toml."
+    )
+
+
+def _off(found: Coarse, term: Term) -> str:
+    """What the last digit does, as the scatter of logarithms has it."""
+    return f"{found.log_sd:.2g}" if term.noise == "tau" else "..."

@@ -1,0 +1,90 @@
+"""Tables whose repeated readings are alike to the last digit: an interval that is narrower than that digit is not trusted."""
+
+import numpy as np
+import pytest
+
+import bowdenfit as bf
+from bowdenfit.kinds.coarse import coarse
+from bowdenfit.questions.summary.brief_words import summary_text
+from bowdenfit.questions.summary.verdict import COARSE
+from bowdenfit.questions.summary.words import full_text
+
+QUICK = ("sampler.n_walkers=64", "sampler.target_ess=200", "sampler.target_r_hat=1.05", "sampler.max_steps=2000")
+CABLE = """
+schema = 1
+name = "Ring"
+[[contact]]
+name = "housing"
+friction = "mu"
+wrap_angle = { value = 180, unit = "deg" }
+[tables]
+forces = { file = "forces.csv" }
+"""
+TRUE_MU = 0.118  # 20 N become 13.8 N
+
+
+@pytest.mark.parametrize(
+    ("read", "last_digit"),
+    [
+        ([14.0, 14.0, 14.0, 14.0], "1 N"),
+        ([14.0, 14.0, 14.0], None),  # of so few, chance
+        ([14.0, 14.0, 14.0, 15.0], None),
+        ([0.07, 0.07, 0.07, 0.07], "0.01 N"),
+        ([1200.0, 1200.0, 1200.0, 1200.0], "100 N"),
+        ([3e7, 3e7, 3e7, 3e7], "1e+06 N"),
+        ([62.275, 62.275, 62.275, 62.275], "0.001 N"),
+        ([1 / 3, 1 / 3, 1 / 3, 1 / 3], None),  # computed
+        ([0.0, 0.0, 0.0, 0.0], None),
+        ([-14.0, -14.0, -14.0, -14.0], None),
+    ],
+)
+def test_readings_of_the_same_that_are_alike_tell_their_last_digit(read, last_digit):
+    found = coarse("forces.csv", np.full((len(read), 1), 20.0), np.array(read), "N")
+    assert (found and found.last_digit) == last_digit
+
+
+def test_readings_at_different_settings_need_not_be_alike():
+    """Three of the six were read before; the logarithm of 10 is open by more than that of 20."""
+    settings, read = np.array([[20.0, np.nan]] * 3 + [[40.0, np.nan]] * 3), np.array([10.0] * 3 + [20.0] * 3)
+    found = coarse("forces.csv", settings, read)
+    assert found.different == 2
+    assert found.log_sd == pytest.approx(np.sqrt((1 / 1 + 1 / 4) / 2 / 12))  # the last digit is that of tens
+    settings[1] = 30.0
+    assert coarse("forces.csv", settings[:4], read[:4]) is None
+
+
+def _fit(folder, digits, noise, runs=8):
+    """Of eight mountings at one load, read with some digits behind the point."""
+    (folder / "cable.toml").write_text(CABLE)
+    true = 20 * np.exp(-TRUE_MU * np.pi) * np.exp(noise * np.random.default_rng(5).standard_normal(runs))
+    rows = [f"r{i},pull,20,{force:.{digits}f}" for i, force in enumerate(true)]
+    (folder / "forces.csv").write_text("\n".join(["run,stroke,input_force_N,output_force_N", *rows]) + "\n")
+    return bf.fit(folder, seed=1, settings=QUICK)
+
+
+def test_a_display_of_whole_newtons_that_hides_the_scatter_is_not_trusted(tmp_path):
+    """Read as 14 N eight times: the interval is of no width and far from the truth. One digit more, and it holds it."""
+    hidden = _fit(tmp_path, 0, 0.003)
+    assert not hidden.parameter("mu").q05 < TRUE_MU < hidden.parameter("mu").q95
+    (sentence,) = hidden.verdict().troubles[COARSE]
+    assert sentence.startswith("Whatever was read more than once in forces.csv is alike to the last digit, 1 N,")
+    assert "open by 3.6 % up or down" in sentence and "[prior.tau] fixed = 0.021 in cable.toml" in sentence
+    assert "the readings are too coarse for such intervals" in " ".join(summary_text(hidden).split())
+    assert "READINGS TOO COARSE" in full_text(hidden)
+    shown = _fit(tmp_path, 2, 0.003)
+    assert shown.verdict().trusted
+    assert shown.parameter("mu").q05 < TRUE_MU < shown.parameter("mu").q95
+
+
+def test_scatter_that_is_stated_needs_no_digits(tmp_path):
+    """Of one reading with what its last digit leaves open, and of efficiencies with a standard deviation."""
+    (tmp_path / "cable.toml").write_text(CABLE + "[prior.tau]\nfixed = 0.021\n")
+    (tmp_path / "forces.csv").write_text("run,stroke,input_force_N,output_force_N\nr0,pull,20,14\n")
+    one = bf.fit(tmp_path, seed=1, settings=QUICK)
+    assert COARSE not in one.verdict().troubles
+    assert one.parameter("mu").q05 < TRUE_MU < one.parameter("mu").q95
+    (tmp_path / "efficiencies.csv").write_text("wrap_angle_deg,efficiency,efficiency_sd\n" + "180,0.7,0.03\n" * 6)
+    stated = bf.fit(tmp_path / "efficiencies.csv", seed=1, settings=QUICK)
+    assert COARSE not in stated.verdict().troubles
+    (tmp_path / "efficiencies.csv").write_text("wrap_angle_deg,efficiency\n" + "180,0.7\n" * 6)
+    assert COARSE in bf.fit(tmp_path / "efficiencies.csv", seed=1, settings=QUICK).verdict().troubles

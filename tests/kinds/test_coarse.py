@@ -39,18 +39,18 @@ TRUE_MU = 0.118  # 20 N become 13.8 N
     ],
 )
 def test_readings_of_the_same_that_are_alike_tell_their_last_digit(read, last_digit):
-    found = coarse("forces.csv", np.full((len(read), 1), 20.0), np.array(read), "N")
+    found = coarse("forces.csv", np.full((len(read), 1), 20.0), np.array(read), "sd = {}", "N")
     assert (found and found.last_digit) == last_digit
 
 
 def test_readings_at_different_settings_need_not_be_alike():
     """Three of the six were read before; the logarithm of 10 is open by more than that of 20."""
     settings, read = np.array([[20.0, np.nan]] * 3 + [[40.0, np.nan]] * 3), np.array([10.0] * 3 + [20.0] * 3)
-    found = coarse("forces.csv", settings, read)
+    found = coarse("forces.csv", settings, read, "")
     assert found.different == 2
     assert found.log_sd == pytest.approx(np.sqrt((1 / 1 + 1 / 4) / 2 / 12))  # the last digit is that of tens
     settings[1] = 30.0
-    assert coarse("forces.csv", settings[:4], read[:4]) is None
+    assert coarse("forces.csv", settings[:4], read[:4], "") is None
 
 
 def _fit(folder, digits, noise, runs=8):
@@ -68,7 +68,9 @@ def test_a_display_of_whole_newtons_that_hides_the_scatter_is_not_trusted(tmp_pa
     assert not hidden.parameter("mu").q05 < TRUE_MU < hidden.parameter("mu").q95
     (sentence,) = hidden.verdict().troubles[COARSE]
     assert sentence.startswith("Whatever was read more than once in forces.csv is alike to the last digit, 1 N,")
-    assert "open by 3.6 % up or down" in sentence and "[prior.tau] fixed = 0.021 in cable.toml" in sentence
+    assert (
+        "open by 3.6 % up or down" in sentence and "may be off: [prior.sigma_F] fixed = 0.29 in cable.toml." in sentence
+    )
     assert "the readings are too coarse for such intervals" in " ".join(summary_text(hidden).split())
     assert "READINGS TOO COARSE" in full_text(hidden)
     shown = _fit(tmp_path, 2, 0.003)
@@ -78,7 +80,7 @@ def test_a_display_of_whole_newtons_that_hides_the_scatter_is_not_trusted(tmp_pa
 
 def test_scatter_that_is_stated_needs_no_digits(tmp_path):
     """Of one reading with what its last digit leaves open, and of efficiencies with a standard deviation."""
-    (tmp_path / "cable.toml").write_text(CABLE + "[prior.tau]\nfixed = 0.021\n")
+    (tmp_path / "cable.toml").write_text(CABLE + "[prior.sigma_F]\nfixed = 0.29\n")
     (tmp_path / "forces.csv").write_text("run,stroke,input_force_N,output_force_N\nr0,pull,20,14\n")
     one = bf.fit(tmp_path, seed=1, settings=QUICK)
     assert COARSE not in one.verdict().troubles

@@ -97,8 +97,11 @@ class TableChecks(Part):
 
     @property
     def z_score(self) -> np.ndarray:
-        """Deviations from the predictions in their standard deviations; NaN of a bound."""
-        return np.where(self.at_most, np.nan, (self.reading - self.predicted.mean) / self.predicted.sd)
+        """Deviations from the predictions in their standard deviations; NaN of a bound, 0 where there is none."""
+        deviation = np.asarray(self.reading - self.predicted.mean, dtype=float)
+        with np.errstate(divide="ignore"):
+            z = np.divide(deviation, self.predicted.sd, out=np.zeros_like(deviation), where=deviation != 0)
+        return np.where(self.at_most, np.nan, z)
 
     @property
     def decisive(self) -> np.ndarray:

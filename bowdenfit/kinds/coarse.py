@@ -24,28 +24,25 @@ class Coarse:
     Args:
         file: What the table is called.
         last_digit: Of its readings, with their unit.
-        stated: How it is stated in the data set that the last digit leaves readings open.
+        sd: Standard deviation that it gives a reading, in the same.
         different: Number of readings that do not repeat another.
         log_sd: Standard deviation that the last digit gives the logarithm of a reading, on average of these.
     """
 
     file: str
     last_digit: str
-    stated: str
+    sd: float
     different: int
     log_sd: float
 
 
-def coarse(
-    file: str, settings: Float[np.ndarray, "rows settings"], read: Vector, stated: str, unit: str = ""
-) -> Coarse | None:
+def coarse(file: str, settings: Float[np.ndarray, "rows settings"], read: Vector, unit: str = "") -> Coarse | None:
     """What is known of a table whose repeated readings are all alike; None of any other.
 
     Args:
         file: What the table is called.
         settings: Under what each row was read, but for the mounting; NaN where one is not known.
         read: What was read; readings of 0 and below are not looked at, as their logarithms are not.
-        stated: How the standard deviation of a reading is stated in the data set, with {} for its value.
         unit: Its unit.
     """
     if not np.all(read > 0):
@@ -59,8 +56,7 @@ def coarse(
     if last_digit == 0:
         return None
     log_sd = float(np.sqrt(np.mean((last_digit / different) ** 2) / 12))
-    said = stated.format(f"{last_digit / np.sqrt(12):.2g}")
-    return Coarse(file, f"{last_digit:g} {unit}".strip(), said, len(different), log_sd)
+    return Coarse(file, f"{last_digit:g} {unit}".strip(), last_digit / 12**0.5, len(different), log_sd)
 
 
 def _last_digit(values: Vector) -> float:

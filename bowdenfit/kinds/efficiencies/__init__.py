@@ -31,7 +31,7 @@ def _coarse(table: EfficiencyTable) -> Coarse | None:
     if np.any(table.sd > 0):
         return None
     places = np.column_stack([table.route, table.own.angle])
-    return coarse(listed(table.origin.files), places, table.efficiency, "a column efficiency_sd with {}")
+    return coarse(listed(table.origin.files), places, table.efficiency)
 
 
 EFFICIENCIES = Kind(

@@ -2,7 +2,6 @@
 
 import numpy as np
 
-from bowdenfit.cable.load_cells import FORCE_NOISE
 from bowdenfit.description import Description
 from bowdenfit.files.columns import Quantity
 from bowdenfit.kinds.asked import Asked, Switch, Wanted
@@ -20,8 +19,6 @@ from bowdenfit.kinds.readings import Readings, efficiencies
 from bowdenfit.kinds.rows import RUN, STROKE
 from bowdenfit.kinds.wrap_angles import check_rows
 from bowdenfit.words import listed
-
-_NOISE = f"[prior.{FORCE_NOISE}] fixed = {{}} in cable.toml"
 
 
 def _typical_speeds(table: ForceTable) -> list[float]:
@@ -56,9 +53,7 @@ def _coarse(table: ForceTable) -> Coarse | None:
     """By the output force; the input force may be set."""
     stroke = table.stroke.astype(float)
     settings = np.column_stack([table.route, table.own.angle, stroke, table.input_force])
-    return coarse(
-        listed(table.origin.files), settings, table.output_force, "[prior.sigma_F] fixed = {} in cable.toml", "N"
-    )
+    return coarse(listed(table.origin.files), settings, table.output_force, "N")
 
 
 FORCES = Kind(

@@ -28,7 +28,7 @@ def too_coarse(fit: Record) -> tuple[str, ...]:
             continue
         left_open = found.log_sd * np.sqrt(min(coefficients / found.different, 1.0))
         if all(_log_sd(fit, term) < _SHARE * left_open for term in terms):
-            told.append(_sentence(found))
+            told.append(_sentence(found, terms[0]))
     return tuple(told)
 
 
@@ -40,10 +40,16 @@ def _log_sd(fit: Record, term: Term) -> float:
     return float(np.sqrt(np.mean(np.var(np.log(expected), axis=0))))
 
 
-def _sentence(found: Coarse) -> str:
+def _sentence(found: Coarse, term: Term) -> str:
+    noise = getattr(term, "reading_noise", "")
+    stated = (
+        f"[prior.{noise}] fixed = {found.sd:.2g} in cable.toml"
+        if noise
+        else f"a column efficiency_sd with {found.sd:.2g}"
+    )
     return (
         f"Whatever was read more than once in {found.file} is alike to the last digit, {found.last_digit}, and does not show "
         "how much readings scatter. Intervals take it for next to nothing, while the last digit alone leaves a reading open by "
         f"{percent(np.sqrt(3) * found.log_sd)} up or down. Read one more digit; or keep one of each reading and state how far "
-        f"it may be off: {found.stated}."
+        f"it may be off: {stated}."
     )

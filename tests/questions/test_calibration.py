@@ -353,6 +353,7 @@ def test_another_seed_or_a_folder_of_something_else_is_refused(tmp_path):
     open_replications(tmp_path / "c", FINGERPRINT, resume=False, force=False)
     with pytest.raises(StoreError, match="the seed changed"):
         open_replications(tmp_path / "c", FINGERPRINT | {"seed": 4}, resume=True, force=False)
+    keep(tmp_path / "c", replications(1)[0])
     with pytest.raises(StoreError, match="--resume, or start over with --force"):
         open_replications(tmp_path / "c", FINGERPRINT, resume=False, force=False)
     with pytest.raises(StoreError, match="holds no calibration to resume"):
@@ -365,6 +366,16 @@ def test_another_seed_or_a_folder_of_something_else_is_refused(tmp_path):
     with pytest.raises(StoreError, match="holds no calibration"):
         open_replications(tmp_path / "other", FINGERPRINT, resume=False, force=True)
     assert (tmp_path / "other" / "notes.txt").read_text() == "mine"
+
+
+def test_what_failed_before_its_first_replication_is_begun_anew_without_force(tmp_path):
+    open_replications(tmp_path / "c", FINGERPRINT, resume=False, force=False)
+    (tmp_path / "c" / "jobs").mkdir()
+    assert open_replications(tmp_path / "c", FINGERPRINT | {"seed": 4}, resume=False, force=False) == {}
+    assert json.loads((tmp_path / "c" / "replications.jsonl").read_text())["seed"] == 4
+    (tmp_path / "c" / "calibration.json").write_text("{}")
+    with pytest.raises(StoreError, match="--force"):
+        open_replications(tmp_path / "c", FINGERPRINT, resume=False, force=False)
 
 
 # Whole calibrations ------------------------------------------------------------------------------------------------

@@ -47,11 +47,12 @@ def open_replications(
     path = folder / REPLICATIONS
     if resume:
         return _read_replications(path, fingerprint)
-    if path.exists() and not force:
+    unused = _is_unused(folder)
+    if path.exists() and not (force or unused):
         raise StoreError(f"{folder} holds a calibration already; go on with --resume, or start over with --force.")
     if not is_left_of(folder, {*_FILES, *_FOLDERS}):
         raise StoreError(f"{folder} exists and holds no calibration; name another with --output.")
-    if not (force or path.exists() or is_left_of(folder, ())):
+    if not (force or unused or is_left_of(folder, ())):
         raise StoreError(
             f"{folder} holds what is left of a calibration that was ended; add --force to replace it, or name another with "
             "--output."
@@ -60,6 +61,12 @@ def open_replications(
         remove_what_is_left(folder, _FILES, _FOLDERS)
         write_text(path, json.dumps(dict(fingerprint)) + "\n")
     return {}
+
+
+def _is_unused(folder: Path) -> bool:
+    """Whether a calibration was begun in a folder that failed before its first replication, so that nobody loses anything."""
+    path = folder / REPLICATIONS
+    return is_left_of(folder, (REPLICATIONS, JOBS)) and path.is_file() and path.read_bytes().count(b"\n") == 1
 
 
 def seed_of(folder: Path) -> int:

@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from bowdenfit.plots.style import SMALL, TITLE_SIZE, WIDE
+from bowdenfit.plots.style import SMALL, TITLE_SIZE, VERMILLION, WIDE
 
 if TYPE_CHECKING:
     from matplotlib.artist import Artist
@@ -177,11 +177,19 @@ def _legend_width(widths: Sequence[float], columns: int) -> float:
     return sum(max(part) for part in np.array_split(np.array(widths), columns)) + _APART * SMALL / 72 * columns
 
 
-def title_above(figure: Figure, words: str) -> None:
-    """What the figure is of, on room added above everything else."""
+def title_above(figure: Figure, words: str, mark: str = "") -> None:
+    """What the figure is of, on room added above everything else.
+
+    Args:
+        figure: The page.
+        words: The title.
+        mark: Why nobody should rely on the figure, which stands below the title.
+    """
     width = figure.get_size_inches()[0]
     said = wrapped(words, width - 2 * EDGE, TITLE_SIZE, "bold", _TITLE_ROWS)
-    room = EDGE + _TITLE_ROW * (1 + said.count("\n"))
+    marked = wrapped(mark, width - 2 * EDGE, TITLE_SIZE, "bold").split("\n") if mark else []
+    above = EDGE + _TITLE_ROW * (1 + said.count("\n"))
+    room = above + _TITLE_ROW * len(marked)
     _add_room(figure, room)
     height = figure.get_size_inches()[1]
     for legend in figure.legends:
@@ -190,6 +198,11 @@ def title_above(figure: Figure, words: str) -> None:
         EDGE / width, 1 - EDGE / height, said, ha="left", va="top", fontsize=TITLE_SIZE, fontweight="bold",
         parse_math=False,
     )  # fmt: skip
+    for row, line in enumerate(marked):
+        figure.text(
+            EDGE / width, 1 - (above + _TITLE_ROW * row) / height, line, ha="left", va="top", fontsize=TITLE_SIZE,
+            fontweight="bold", color=VERMILLION, parse_math=False,
+        )  # fmt: skip
 
 
 def label_across(axes: Axes, words: str) -> None:

@@ -5,7 +5,8 @@ from functools import partial
 from typing import TYPE_CHECKING, Any
 
 from bowdenfit.errors import UsageError, nearest
-from bowdenfit.questions.figures import FIGURES, figure_of, figures_of, page_width
+from bowdenfit.questions.figures import FIGURES, figure_of, figures_of, mark_of, page_width
+from bowdenfit.questions.summary.verdict import verdict
 from bowdenfit.results.record import Record
 from bowdenfit.verb import Quantity
 from bowdenfit.words import listed
@@ -45,7 +46,8 @@ class FigureMethods:
             raise NoSuchFigureError(f"there is no figure {name!r}{nearest(name, list(FIGURES))}")
         if self._shown(name) is None:
             raise UsageError(f"this fit has nothing to show in the figure {name!r}; it has {listed(dir(self))}.")
-        return figure_of(name, self._shown(name), self._fit.name, page_width(width))
+        mark = mark_of(verdict(self._fit).troubles)
+        return figure_of(name, self._shown(name), self._fit.name, page_width(width), mark)
 
     def __getattr__(self, name: str) -> "Callable[..., Figure]":
         if name.startswith("_"):

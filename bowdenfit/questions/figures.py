@@ -42,6 +42,7 @@ from bowdenfit.results.arrays import read_arrays
 from bowdenfit.results.folder import FIGURE_DATA
 from bowdenfit.results.kept import kept
 from bowdenfit.verb import Quantity
+from bowdenfit.words import listed
 
 if TYPE_CHECKING:
     from bowdenfit.plots.layout import Figure
@@ -106,7 +107,7 @@ def data_types(names: Iterable[str]) -> dict[str, Any]:
 
 
 @in_paper_style
-def figure_of(name: str, data: Any, cable: str = "", width: float | None = None) -> "Figure":
+def figure_of(name: str, data: Any, cable: str = "", width: float | None = None, mark: str = "") -> "Figure":
     """A figure under its title; loads matplotlib, and no model.
 
     Args:
@@ -114,10 +115,21 @@ def figure_of(name: str, data: Any, cable: str = "", width: float | None = None)
         data: What it shows.
         cable: Name of the cable, for the title.
         width: Of the page [in], on which words stay as large as they are; what suits the figure if omitted.
+        mark: See `mark_of`.
     """
     figure: Figure = FIGURES[name].draw(data, width)
-    title_above(figure, title_of(name, cable))
+    title_above(figure, title_of(name, cable), mark)
     return figure
+
+
+def mark_of(troubles: Iterable[str]) -> str:
+    """What stands on every figure of a fit that is not to be trusted; empty of one that is.
+
+    Args:
+        troubles: Kinds of what is wrong, see `verdict`.
+    """
+    wrong = tuple(troubles)
+    return f"Do not use: this fit is {listed(wrong)}." if wrong else ""
 
 
 def page_width(width: Quantity | None) -> float | None:
@@ -157,7 +169,13 @@ def caption_of(name: str, data: Any) -> str:
 
 
 def draw_figure(
-    name: str, data: Any, folder: Path, formats: Sequence[str] = FORMATS, cable: str = "", width: float | None = None
+    name: str,
+    data: Any,
+    folder: Path,
+    formats: Sequence[str] = FORMATS,
+    cable: str = "",
+    width: float | None = None,
+    mark: str = "",
 ) -> list[Path]:
     """Draw and write one figure.
 
@@ -166,18 +184,19 @@ def draw_figure(
         data: What it shows.
         folder: Where the files go; made if it is missing.
         formats: Endings; the figure is written in every one.
-        cable: See `figure_of`.
-        width: See `figure_of`.
+        cable, width, mark: See `figure_of`.
     """
     folder.mkdir(parents=True, exist_ok=True)
-    return write_all(figure_of(name, data, cable, width), folder, name, formats)
+    return write_all(figure_of(name, data, cable, width, mark), folder, name, formats)
 
 
-def captions_of(shown: Mapping[str, Any], cable: str) -> dict[str, str]:
+def captions_of(shown: Mapping[str, Any], cable: str, mark: str) -> dict[str, str]:
     """Title and caption of each figure, by name.
 
     Args:
         shown: Data of the figures, by name.
         cable: Name of the cable.
+        mark: See `mark_of`.
     """
-    return {name: f"{title_of(name, cable)}. {caption_of(name, shown[name])}" for name in FIGURES if name in shown}
+    of = {name: f"{title_of(name, cable)}. {mark}".rstrip() for name in FIGURES if name in shown}
+    return {name: f"{title} {caption_of(name, shown[name])}" for name, title in of.items()}

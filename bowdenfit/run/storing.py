@@ -1,7 +1,6 @@
 """The results folder of a fit: whether it may be written, the checkpoint, and all files once the fit is done."""
 
 import secrets
-from concurrent.futures import Future
 from dataclasses import replace
 from pathlib import Path
 from textwrap import shorten
@@ -35,30 +34,26 @@ def write_results(found: "Fit", folder: Path, figures: bool, helper: Assistant) 
     Raises:
         StoreError: The fit itself, or for want of room what belongs to it, could not be written.
     """
-    from bowdenfit.plots.write import FORMATS
-    from bowdenfit.questions.figures import AT_ONCE, captions_of, draw_figure, figures_of
     from bowdenfit.questions.figures import FIGURES as FIGURE_NAMES
+    from bowdenfit.questions.figures import captions_of, mark_of
     from bowdenfit.questions.kept import answers_of
     from bowdenfit.questions.report.sections import report_page
     from bowdenfit.questions.summary.brief_words import summary_text
+    from bowdenfit.questions.summary.verdict import verdict
     from bowdenfit.questions.summary.words import full_text
     from bowdenfit.questions.writing import write_page
     from bowdenfit.results.captions import write_captions
     from bowdenfit.results.drawn import keep_drawn
     from bowdenfit.results.folder import DETAILS_TEXT, FIGURES, REPORT, SUMMARY_TEXT, write_text
     from bowdenfit.results.store import save
+    from bowdenfit.run.drawing import Drawing
 
     if found.sampled is None:
         clear(folder)
-    data, drawn, failed = dict[str, Any](), dict[str, Future[Any]](), dict[str, Exception]()
-    for name in dict.fromkeys((*AT_ONCE, *FIGURE_NAMES)) if figures else ():
-        try:
-            data |= dict(figures_of(found, [name]))
-            if name in data:
-                of = name, data[name], folder / FIGURES, FORMATS, found.name
-                drawn[name] = helper.submit(draw_figure, *of)  # meanwhile, the next
-        except Exception as error:  # whatever is wrong with a figure, the fit is to be kept
-            failed[name] = error
+    drawing, failed = Drawing(found, folder / FIGURES, helper), dict[str, Exception]()
+    if figures:
+        drawing.begin()
+    data = drawing.data
     save(found, found.summary(), folder, True, answers_of(found), data)
     for name, words in ((SUMMARY_TEXT, summary_text), (DETAILS_TEXT, full_text)):
         try:
@@ -67,30 +62,20 @@ def write_results(found: "Fit", folder: Path, figures: bool, helper: Assistant) 
             failed[name] = error
     try:
         page = report_page(found, data)
-        failed |= _failed(drawn)
+        failed |= drawing.failed()
         helper.submit(write_page, page, folder / FIGURES, folder / REPORT).result()  # behind the figures, whose files it takes
     except Exception as error:
-        failed |= _failed(drawn) | {REPORT: error}
+        failed |= drawing.failed() | {REPORT: error}
     try:
         if data:
-            captions = captions_of({name: data[name] for name in data.keys() - failed}, found.name)
+            mark = mark_of(verdict(found).troubles)
+            captions = captions_of({name: data[name] for name in data.keys() - failed}, found.name, mark)
             write_captions(captions, folder / FIGURES)
             if failed.keys().isdisjoint(FIGURE_NAMES):
                 keep_drawn(folder, captions)
     except Exception as error:
         failed["captions"] = error
     return _what_is_missing(folder, failed)
-
-
-def _failed(drawn: dict[str, "Future[Any]"]) -> dict[str, Exception]:
-    """What went wrong with figures, once all are drawn."""
-    failed = dict[str, Exception]()
-    for name, figure in drawn.items():
-        try:
-            figure.result()
-        except Exception as error:
-            failed[name] = error
-    return failed
 
 
 def _what_is_missing(folder: Path, failed: dict[str, Exception]) -> tuple[str, ...]:

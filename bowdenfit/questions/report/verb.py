@@ -32,9 +32,10 @@ def report(
         StoreError: The results folder is missing or damaged, or the file cannot be written.
     """
     from bowdenfit.errors import UsageError
-    from bowdenfit.questions.figures import draw_figure, figures_of, kept_figures
+    from bowdenfit.questions.figures import draw_figure, figures_of, kept_figures, mark_of
     from bowdenfit.questions.next.ranking import next_measurement
     from bowdenfit.questions.report.sections import report_page
+    from bowdenfit.questions.summary.verdict import verdict
     from bowdenfit.questions.writing import write_page
     from bowdenfit.results.folder import REPORT, file_to_write
     from bowdenfit.results.store import load
@@ -46,11 +47,11 @@ def report(
     if output is None:
         raise UsageError("a fit by itself has no folder; name a file for the report.")
     ranking = next_measurement(found) if ranked else None
-    figures, path = kept or dict(figures_of(found)), Path(output)
+    figures, path, mark = kept or dict(figures_of(found)), Path(output), mark_of(verdict(found).troubles)
     path = path / REPORT if path.is_dir() else path
     with file_to_write(path) as temporary, TemporaryDirectory() as drawn:
         for name, data in figures.items():
-            draw_figure(name, data, Path(drawn), ("svg",), found.name)
+            draw_figure(name, data, Path(drawn), ("svg",), found.name, mark=mark)
         write_page(report_page(found, figures, ranking), Path(drawn), temporary)
     return path
 

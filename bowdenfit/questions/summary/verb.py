@@ -126,12 +126,16 @@ def _anew(
     from bowdenfit.questions.figures import FIGURES, captions_of, page_width
 
     page = page_width(width)
-    shown, cable = _shown(found, names)
-    return captions_of(shown, cable), tuple(FIGURES), partial(_draw, shown, cable, page, in_background)
+    shown, cable, mark = _shown(found, names)
+    return captions_of(shown, cable, mark), tuple(FIGURES), partial(_draw, shown, (cable, page, mark), in_background)
 
 
 def _draw(
-    shown: Mapping[str, Any], cable: str, page: float | None, in_background: bool, place: Path, endings: Sequence[str]
+    shown: Mapping[str, Any],
+    look: tuple[str, float | None, str],
+    in_background: bool,
+    place: Path,
+    endings: Sequence[str],
 ) -> None:
     from bowdenfit.inference.engines.processes import has_room_beside, meanwhile
     from bowdenfit.plots.style import load_matplotlib
@@ -139,7 +143,7 @@ def _draw(
 
     def draw(chosen: Sequence[str]) -> None:
         for name, data in shown.items():
-            draw_figure(name, data, place, chosen, cable, page)
+            draw_figure(name, data, place, chosen, *look)
 
     others = [ending for ending in endings if ending != "pdf"]
     if in_background and others and len(others) < len(endings) and has_room_beside():
@@ -161,27 +165,30 @@ def _formats(named: Sequence[str]) -> Sequence[str]:
     return tuple(dict.fromkeys(named)) or FORMATS
 
 
-def _shown(found: "Record | str | Path", names: Sequence[str]) -> tuple[dict[str, Any], str]:
-    """Data of all figures of a fit, or of some, and the cable; what it was drawn with before is not worked out again."""
+def _shown(found: "Record | str | Path", names: Sequence[str]) -> tuple[dict[str, Any], str, str]:
+    """Data of all figures of a fit, or of some, the cable and `mark_of`; what is kept of it is not worked out again."""
     from bowdenfit.errors import UsageError, nearest
-    from bowdenfit.questions.figures import FIGURES, figures_of, kept_figures
+    from bowdenfit.questions.figures import FIGURES, figures_of, kept_figures, mark_of
     from bowdenfit.results.folder import FIT, read_page
+    from bowdenfit.results.kept import kept
 
     for name in names:
         if name not in FIGURES:
             raise UsageError(f"there is no figure {name!r}{nearest(name, list(FIGURES))}")
     shown = kept_figures(Path(found), names) if isinstance(found, str | Path) else {}
     if shown and isinstance(found, str | Path):
-        cable = read_page(Path(found) / FIT)["description"]["name"]
+        cable, troubles = read_page(Path(found) / FIT)["description"]["name"], kept(Path(found))["troubles"]
     else:
+        from bowdenfit.questions.summary.verdict import verdict
+
         if isinstance(found, str | Path):
             from bowdenfit.results.store import load
 
             found = load(Path(found))
-        shown, cable = dict(figures_of(found, names)), found.name
+        shown, cable, troubles = dict(figures_of(found, names)), found.name, tuple(verdict(found).troubles)
     if missing := [name for name in names if name not in shown]:
         raise UsageError(f"this fit has nothing to show in the figure {missing[0]!r}; leave it out.")
-    return shown, cable
+    return shown, cable, mark_of(troubles)
 
 
 SUMMARY_VERB = Verb(

@@ -1,0 +1,70 @@
+"""Every figure of a fit that is not to be trusted says so, wherever it is shown; none of a good one does."""
+
+from itertools import pairwise
+
+import pytest
+from matplotlib.text import Text
+
+import bowdenfit as bf
+from bowdenfit.plots.layout import EDGE, empty_page, title_above
+from bowdenfit.questions.figures import mark_of
+
+MARK = "Do not use: this fit is not"
+
+
+@pytest.fixture(scope="module")
+def unfinished(on_body, tmp_path_factory):
+    """A fit that was given too few steps, and its folder."""
+    folder = tmp_path_factory.mktemp("unfinished") / "fit"
+    few = ("sampler.n_walkers=32", "sampler.max_steps=200", "sampler.target_ess=100")
+    return bf.fit(on_body, output=folder, seed=2, settings=few), folder
+
+
+def unmarked(folder):
+    """Drawings of a folder without the mark."""
+    drawn = sorted(folder.glob("*.svg"))
+    assert drawn
+    return [path.stem for path in drawn if MARK not in path.read_text()]
+
+
+def test_all_figures_of_a_refused_fit_and_their_captions_are_marked(unfinished):
+    fit, folder = unfinished
+    assert mark_of(fit.verdict().troubles) == "Do not use: this fit is not converged and not identifiable."
+    assert unmarked(folder / "figures") == []
+    captions = (folder / "figures" / "captions.txt").read_text().split("\n\n")
+    assert all(MARK in " ".join(caption.split()) for caption in captions)
+
+
+@pytest.mark.parametrize("width", [None, (3.5, "in")])
+def test_figures_that_are_drawn_again_are_marked(unfinished, tmp_path, width):
+    bf.plot(unfinished[1], tmp_path / "again", figures=["coefficients", "efficiency"], formats=["svg"], width=width)
+    assert unmarked(tmp_path / "again") == []
+    assert " ".join((tmp_path / "again" / "captions.txt").read_text().split()).count(MARK) == 2
+
+
+def test_figures_of_a_notebook_and_of_the_report_are_marked(unfinished, tmp_path):
+    fit, folder = unfinished
+    assert any(text.get_text().startswith(MARK) for text in fit.plot.pairs().findobj(Text))
+    drawings = len(list((folder / "figures").glob("*.svg")))
+    assert (folder / "report.html").read_text().count(MARK) >= drawings
+    assert bf.report(fit, tmp_path / "report.html").read_text().count(MARK) >= drawings
+
+
+def test_no_figure_of_a_good_fit_is_marked(quick_fit, quick_results):
+    drawn = list((quick_results / "figures").glob("*.svg"))
+    assert drawn and not any("Do not use" in path.read_text() for path in drawn)
+    assert "Do not use" not in (quick_results / "figures" / "captions.txt").read_text()
+    assert not any("Do not use" in text.get_text() for text in quick_fit.plot.pairs().findobj(Text))
+
+
+def test_a_mark_takes_lines_of_its_own_on_a_narrow_page():
+    plain, marked = empty_page(3.0, 2.0), empty_page(3.0, 2.0)
+    title_above(plain, "Coefficients")
+    title_above(marked, "Coefficients", mark_of(["not converged", "contradictory", "made of copied readings"]))
+    taller = marked.get_figheight() - plain.get_figheight()
+    title, *lines = marked.texts
+    assert len(lines) >= 2 and taller == pytest.approx(0.15 * len(lines))
+    boxes = [text.get_window_extent() for text in (title, *lines)]
+    assert all(above.y0 > below.y0 for above, below in pairwise(boxes))
+    assert max(box.x1 for box in boxes) <= marked.bbox.x1 - EDGE * marked.dpi / 2
+    assert mark_of([]) == ""

@@ -29,7 +29,7 @@ def calibrate(
     *,
     replications: Annotated[int, Option(("-n",), least=2)] = 200,
     engine: Annotated["str | Executor", Option(metavar="ENGINE")] = "local",
-    workers: Annotated[int | None, Option(("-j",), least=1, default="all cores; 16 jobs of Slurm")] = None,
+    workers: Annotated[int | None, Option(("-j",), least=1, default="four at most of the cores; 16 jobs of Slurm")] = None,
     output: Annotated[Output, Option(("-o",), default="fits/calibration/NAME OF DATASET")] = None,
     assume: Annotated[Sequence[str], Option(metavar="KEY=VALUE")] = (),
     truth: Annotated[str | Path | None, Option(metavar="FILE")] = None,

@@ -62,7 +62,7 @@ def recovered(folder, seeds):
 
 def test_friction_and_spring_of_a_few_catheters_are_recovered(tmp_path):
     """None held of three happens once in a thousand."""
-    held, errors = recovered(tmp_path, (1, 5, 8))
+    held, errors = recovered(tmp_path, (4, 14, 16))  # of one bend and one motion
     assert min(held.values()) >= 1
     assert np.nanmedian(errors["mu"]) < 0.1 and np.nanmedian(errors["end_spring"]) < 0.05, errors
 

@@ -6,6 +6,7 @@ normal priors of the coefficients everything but tau integrates out in closed fo
 
 from types import SimpleNamespace
 
+import jax
 import jax.numpy as jnp
 import numpy as np
 import pytest
@@ -127,7 +128,10 @@ def moved_along_the_ridge(funnel, moves, change=lambda frame: frame) -> np.ndarr
     return run_side_by_side(moves, posterior.log_density, funnel.draw(3), 1200, 3, frames, posterior.data)[30:]
 
 
-@pytest.mark.parametrize("name", PROPOSALS)
+USUAL = ("independent", "differential evolution")
+
+
+@pytest.mark.parametrize("name", [n if n in USUAL else pytest.param(n, marks=pytest.mark.slow) for n in PROPOSALS])
 def test_every_move_along_the_ridge_leaves_the_funnel_as_it_is(name, narrow):
     """Alone, from starts in the funnel; p < 0.001 by chance once in a thousand seeds."""
     assert narrow.p_value(moved_along_the_ridge(narrow, [(PROPOSALS[name], 1.0)])) > 0.001
@@ -189,9 +193,14 @@ def test_walkers_that_have_not_settled_turn_to_the_ridge(narrow, surprised):
     assert narrow.p_value(narrow.sampled(settings=lasting(2400), programs=surprised)) > 0.001
 
 
+@pytest.fixture(scope="module")
+def whole(narrow, surprised):
+    """Draws of a sampling in one go, a little beyond where it turns to the ridge."""
+    return narrow.sampled(settings=lasting(1300), programs=surprised)
+
+
 @pytest.mark.parametrize("interrupted", [1150, 1250])
-def test_a_sampling_that_is_resumed_turns_to_it_where_one_in_one_go_does(interrupted, narrow, surprised, tmp_path):
-    whole = narrow.sampled(settings=lasting(1300), programs=surprised)
+def test_a_sampling_that_is_resumed_turns_to_it_where_one_in_one_go_does(interrupted, narrow, surprised, whole, tmp_path):
     path = tmp_path / "parts"
     start_checkpoint(path, {})
     narrow.sampled(settings=lasting(interrupted), programs=surprised, checkpoint=path)
@@ -201,7 +210,7 @@ def test_a_sampling_that_is_resumed_turns_to_it_where_one_in_one_go_does(interru
 
 def test_the_way_along_the_ridge_and_back_are_inverse(narrow):
     posterior = narrow.posterior
-    frame, z = in_ridge(Conditional(posterior)), jnp.asarray(narrow.draw(1)[0])
+    frame, z = jax.jit(in_ridge(Conditional(posterior))), jnp.asarray(narrow.draw(1)[0])
     w, given, volume = frame(z, True, posterior.data)
     kept, back, same = frame(w, False, posterior.data)
     np.testing.assert_array_equal(given, z)

@@ -1,6 +1,7 @@
 """Readings of a loop have kinks: what least squares say where the solver gets stuck at them, and that what they give holds."""
 
 import numpy as np
+import pytest
 from elastic_cables import TRUTH, bench, elastic_cable
 
 import bowdenfit as bf
@@ -24,7 +25,7 @@ def loop(tables: tuple[str, ...], seed: int) -> Dataset:
     for name in ("mu", "stiffness", "bedding_stretch", "bedding_load", "preload"):
         truth[name] *= float(np.exp(rng.normal(0, 0.7)))
     truth |= {"sigma_F": float(rng.choice([0.1, 0.5, 2.0])), "sigma_L": float(rng.choice([0.005, 0.05]))}
-    return bench(elastic_cable(tables), truth, seed)[0]
+    return bench(elastic_cable(tables), truth, seed, once=True)[0]
 
 
 def test_where_the_solver_is_stuck_no_interval_is_given_and_the_fit_is_not_trusted():
@@ -67,9 +68,10 @@ def rises(tables: tuple[str, ...], seed: int) -> list[tuple[float, float]]:
     return asked
 
 
-def test_other_starts_find_no_lower_sum_of_squares_at_the_limits_that_are_given():
+@pytest.mark.parametrize("seeds", [(1,), pytest.param((1, 8, 10), marks=pytest.mark.slow)], ids=["a loop", "three"])
+def test_other_starts_find_no_lower_sum_of_squares_at_the_limits_that_are_given(seeds):
     """There a limit lies too near the estimate: 4 of 16 did of these loops while nobody asked whether the solver was stuck."""
-    asked = [each for seed in (1, 8, 10) for each in rises(WITH_PRELOAD, seed)]
+    asked = [each for seed in seeds for each in rises(WITH_PRELOAD, seed)]
     assert asked
     assert all(other > 0.8 * own for own, other in asked), asked
 

@@ -149,10 +149,14 @@ def test_at_most_one_healthy_recording_or_loop_in_a_hundred_raises_an_alarm(judg
     assert alarms_again(judge, what, 500) <= 5
 
 
-def test_chances_of_healthy_benches_are_uniform(tmp_path, judge):
-    """The smallest corrected chance is below 0.2 in at most a fifth of healthy benches, and not never."""
-    smallest = [min(d.chance for d in judge(forces(tmp_path, seed))) for seed in range(60)]
-    assert 3 <= np.sum(np.array(smallest) < 0.2) <= 20
+@pytest.mark.parametrize(("count", "least", "most"), [(30, 1, 12), pytest.param(60, 3, 20, marks=pytest.mark.slow)])
+def test_chances_of_healthy_benches_are_uniform(tmp_path, judge, count, least, most):
+    """The smallest corrected chance is below 0.2 in at most a fifth of healthy benches, and not never.
+
+    At a fifth more than 12 of 30 are in 3 of 1000 runs of this test with other seeds, and none in 1 of 1000.
+    """
+    smallest = [min(d.chance for d in judge(forces(tmp_path, seed))) for seed in range(count)]
+    assert least <= np.sum(np.array(smallest) < 0.2) <= most
 
 
 FAULTS = {
@@ -185,6 +189,12 @@ def test_a_bend_that_nobody_measured_is_told_by_the_other_bends(tmp_path, judge)
     assert "around a wrap angle of" in reason and "a bend that nobody measured" in reason
 
 
+@pytest.fixture(scope="module")
+def stretched():
+    """A rope, and the loop that it is part of."""
+    return elastic_cables.bench(elastic_cables.elastic_cable(), elastic_cables.TRUTH, seed=3, once=True)[0]
+
+
 @pytest.mark.parametrize(
     ("planted", "against"),
     [
@@ -193,13 +203,12 @@ def test_a_bend_that_nobody_measured_is_told_by_the_other_bends(tmp_path, judge)
         (lambda table: 1 + 0.2 * np.linspace(-1, 1, len(table.load)) ** 2, ORDER),
     ],
 )
-def test_stretch_that_the_rope_does_not_have_is_named(judge, planted, against):
-    data = elastic_cables.bench(elastic_cables.elastic_cable(), elastic_cables.TRUTH, seed=3)[0]
-    table = data.measurements.table(StretchTable)
+def test_stretch_that_the_rope_does_not_have_is_named(judge, stretched, planted, against):
+    table = stretched.measurements.table(StretchTable)
     wrong = replace(table, stretch=table.stretch * planted(table))
-    measurements = data.measurements.with_tables(wrong)
-    assert not [d for d in judge.of(data) if d.worth_saying]
-    clear = [d for d in judge.of(replace(data, measurements=measurements)) if d.worth_saying and d.table == "stretch"]
+    measurements = stretched.measurements.with_tables(wrong)
+    assert not [d for d in judge.of(stretched) if d.worth_saying]
+    clear = [d for d in judge.of(replace(stretched, measurements=measurements)) if d.worth_saying and d.table == "stretch"]
     assert against in {d.against for d in clear}
 
 

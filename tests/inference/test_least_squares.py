@@ -1,5 +1,6 @@
 """The least-squares engine: exact on exact data, right about its errors, and plain about what it cannot know."""
 
+from collections.abc import Iterator
 from dataclasses import replace
 from functools import cache
 
@@ -18,8 +19,10 @@ from bowdenfit.inference.log_density import LogDensity
 from bowdenfit.inference.objective import Objective, make_objective
 from bowdenfit.inference.solver import minimize
 from bowdenfit.kinds.angles.table import AngleTable
+from bowdenfit.kinds.drawn_readings import drawn_readings
 from bowdenfit.kinds.efficiencies.table import EfficiencyTable
 from bowdenfit.model import build_model
+from bowdenfit.questions.simulate.simulation import with_readings
 
 
 def fitted(dataset: Dataset) -> tuple[LogDensity, LeastSquares]:
@@ -31,14 +34,14 @@ def fitted(dataset: Dataset) -> tuple[LogDensity, LeastSquares]:
 @cache
 def plain() -> tuple[LogDensity, Objective, LeastSquares]:
     """Three contacts with noise, nothing set by the user."""
-    posterior = LogDensity(build_model(measured(cable(3), seed=1)[0]))
+    posterior = LogDensity(build_model(measured(cable(3), seed=1, once=True)[0]))
     objective = make_objective(posterior)
     return posterior, objective, least_squares(posterior, objective, np.zeros(posterior.model.space.size))
 
 
 @pytest.mark.parametrize(("n_contacts", "tables"), [(2, "forces"), (3, "efficiencies"), (4, "forces"), (5, "forces")])
 def test_data_without_noise_return_the_truth_to_six_digits(n_contacts, tables):
-    dataset, truth = measured(cable(n_contacts, ("angles", tables)), noise=False)
+    dataset, truth = measured(cable(n_contacts, ("angles", tables)), noise=False, once=True)
     posterior, found = fitted(dataset)
     assert found.converged
     estimated = {
@@ -91,13 +94,24 @@ def test_the_solution_does_not_depend_on_the_start():
 # Standard errors --------------------------------------------------------------------------------------------------
 
 
+def _experiments(description, n: int) -> Iterator[Dataset]:
+    """One cable measured again and again, by one program."""
+    dataset, truth = measured(description, noise=False, once=True)
+    one_cable, values = build_model(dataset).cable, {name: jnp.asarray(value) for name, value in truth.items()}
+    draw = jax.jit(lambda key: drawn_readings(one_cable, dataset.measurements, values, key))
+    for seed in range(n):
+        yield with_readings(dataset, draw(jax.random.key(seed)))
+
+
 def _many_fits(description, n: int) -> tuple[dict[str, np.ndarray], dict[str, np.ndarray]]:
     """Estimates and standard errors of many simulated data sets, all by the program compiled for the first."""
-    space = build_model(measured(description, seed=0)[0]).space
-    objective, values, errors = None, {}, {}
-    for seed in range(n):
+    space = objective = None
+    values, errors = {}, {}
+    for dataset in _experiments(description, n):
+        model = build_model(dataset)
         # One space for all: its priors follow the first data set's angles, and without priors that is only a scale.
-        posterior = LogDensity(replace(build_model(measured(description, seed=seed)[0]), space=space))
+        space = space or model.space
+        posterior = LogDensity(replace(model, space=space))
         objective = objective or make_objective(posterior)
         found = least_squares(posterior, objective, np.zeros(space.size), intervals=False)
         for name, estimate in found.estimates.items():
@@ -136,7 +150,7 @@ def test_standard_errors_are_what_many_experiments_scatter_by_to_a_tenth(tables)
 
 def test_readings_and_scatter_are_those_of_the_fit():
     """The scatter of an efficiency table is that of its log efficiencies; of an angle table, that of its angles."""
-    dataset, _ = measured(cable(2, ("angles", "efficiencies")), seed=1)
+    dataset, _ = measured(cable(2, ("angles", "efficiencies")), seed=1, once=True)
     _, found = fitted(dataset)
     angles, efficiencies = dataset.measurements.table(AngleTable), dataset.measurements.table(EfficiencyTable)
     loss = np.log(efficiencies.efficiency / found.readings["efficiency"])
@@ -157,7 +171,7 @@ def _constant(name: str, friction: str, angle: float) -> dict:
 
 def test_two_coefficients_at_constant_angles_are_not_told_apart():
     contacts = [CONTACTS[0], _constant("one edge", "mu_edge", 45), _constant("other edge", "mu_clamp", 70)]
-    _, found = fitted(measured(cable(3, contact=contacts), seed=1)[0])
+    _, found = fitted(measured(cable(3, contact=contacts), seed=1, once=True)[0])
     for name in ("mu_edge", "mu_clamp"):
         assert not found.estimates[name].identified
         assert np.isnan(found.estimates[name].value) and np.isnan(found.estimates[name].standard_error)
@@ -168,7 +182,7 @@ def test_two_coefficients_at_constant_angles_are_not_told_apart():
 
 def test_one_coefficient_at_two_constant_angles_is_identified():
     contacts = [CONTACTS[0], _constant("one edge", "mu_edge", 45), _constant("other edge", "mu_edge", 70)]
-    _, found = fitted(measured(cable(3, contact=contacts), seed=1)[0])
+    _, found = fitted(measured(cable(3, contact=contacts), seed=1, once=True)[0])
     assert all(estimate.identified for estimate in found.estimates.values())
     assert np.isfinite(found.condition_number)
 
@@ -176,8 +190,8 @@ def test_one_coefficient_at_two_constant_angles_is_identified():
 def test_a_gain_error_is_not_told_from_a_constant_angle_by_pulling_alone_but_is_by_both_strokes():
     sensors = {"sensors": {"input_gain_error_sd": 0, "output_gain_error_sd": 0.02}}
     description = cable(3, **sensors)
-    _, pulling = fitted(measured(description, seed=1, design=other_design(strokes=("pull",)))[0])
-    _, both = fitted(measured(description, seed=1)[0])
+    _, pulling = fitted(measured(description, seed=1, design=other_design(strokes=("pull",)), once=True)[0])
+    _, both = fitted(measured(description, seed=1, once=True)[0])
     for name in ("mu_edge", "gain_error"):
         assert not pulling.estimates[name].identified
         assert both.estimates[name].identified
@@ -185,7 +199,7 @@ def test_a_gain_error_is_not_told_from_a_constant_angle_by_pulling_alone_but_is_
 
 def test_a_contact_without_wrap_says_nothing_of_its_coefficient():
     contacts = [CONTACTS[0], CONTACTS[1], _constant("straight", "mu_edge", 0.0)]
-    _, found = fitted(measured(cable(3, contact=contacts), seed=1)[0])
+    _, found = fitted(measured(cable(3, contact=contacts), seed=1, once=True)[0])
     assert not found.estimates["mu_edge"].identified
     assert np.isnan(found.estimates["mu_edge"].value)
     assert found.estimates["mu_free"].identified and found.estimates["mu_squeezed"].identified
@@ -194,7 +208,7 @@ def test_a_contact_without_wrap_says_nothing_of_its_coefficient():
 def test_a_coefficient_that_would_be_negative_is_not_given_a_number():
     weights = {"tau": 0.02, "sigma_theta": 5.0}  # so that efficiencies count enough for the angles not to give way
     prior = {name: {"prior": {"half_normal": {"sd": sd}}} for name, sd in weights.items()}
-    dataset, _ = measured(cable(2, ("angles", "efficiencies"), prior=prior), seed=1, noise=False)
+    dataset, _ = measured(cable(2, ("angles", "efficiencies"), prior=prior), seed=1, noise=False, once=True)
     table = dataset.measurements.table(
         EfficiencyTable
     )  # all loss grows with the free angle, and falls with the squeezed one
@@ -208,7 +222,7 @@ def test_a_coefficient_that_would_be_negative_is_not_given_a_number():
 
 def test_fixed_parameters_keep_their_value_and_have_no_error():
     description = cable(3, friction={"mu_edge": {"fixed": 0.17}}, prior={"sigma_theta": {"fixed": 2.0}})
-    posterior, found = fitted(measured(description, seed=1)[0])
+    posterior, found = fitted(measured(description, seed=1, once=True)[0])
     assert found.estimates["mu_edge"].value == 0.17
     assert np.isnan(found.estimates["mu_edge"].standard_error)
     assert found.estimates["mu_edge"].remark == "fixed"
@@ -221,10 +235,10 @@ def test_a_prior_moves_the_maximum_of_the_posterior_and_not_the_classical_estima
     """Least squares is without priors: another one changes the coordinates and nothing else."""
     _, _, without = plain()
     description = cable(3, friction={"mu_free": {"measured": {"value": 0.2, "sd": 0.005}}})
-    posterior = LogDensity(build_model(measured(description, seed=1)[0]))
+    posterior = LogDensity(build_model(measured(description, seed=1, once=True)[0]))
     objective = make_objective(posterior)
     best = maximum_posterior(posterior, objective)
-    assert float(posterior.model.space.constrain(jnp.asarray(best.z))["mu_free"]) > 0.17
+    assert float(jax.jit(posterior.model.space.constrain)(best.z)["mu_free"]) > 0.17
     assert np.all(np.linalg.eigvalsh(best.covariance) > 0)
     assert np.all(np.diag(best.covariance) <= 1 + 1e-9)  # never wider than the prior
     found = least_squares(posterior, objective, np.zeros(posterior.model.space.size))

@@ -18,12 +18,12 @@ def _models() -> dict[str, Model]:
         "angles": {"file": "a.csv", "detection_limit": {"value": 12, "unit": "deg"}},
         "forces": {"file": "f.csv"},
     }
-    with_efficiencies, _ = measured(cable(3, ("angles", "efficiencies")), 1)
-    with_forces, _ = measured(cable(5, tables=censored), 2)
+    with_efficiencies, _ = measured(cable(3, ("angles", "efficiencies")), 1, once=True)
+    with_forces, _ = measured(cable(5, tables=censored), 2, once=True)
     sensors = {"input_gain_error_sd": 0, "output_gain_error_sd": 0.01}
-    with_gain, _ = measured(cable(3, ("angles", "efficiencies", "forces"), sensors=sensors), 3)
+    with_gain, _ = measured(cable(3, ("angles", "efficiencies", "forces"), sensors=sensors), 3, once=True)
     without_forces = {"angles": censored["angles"], "efficiencies": {"file": "e.csv"}}
-    robust, _ = measured(cable(2, without_forces, noise="student"), 2)
+    robust, _ = measured(cable(2, without_forces, noise="student"), 2, once=True)
     return {
         "efficiencies": build_model(with_efficiencies),
         "forces and undetected angles": build_model(with_forces),

@@ -5,6 +5,7 @@ from dataclasses import replace
 from pathlib import Path
 from types import SimpleNamespace
 
+import jax
 import jax.numpy as jnp
 import numpy as np
 import pytest
@@ -24,7 +25,7 @@ from bowdenfit.questions.summary.words import full_text
 DATA = Path(__file__).parents[2] / "datasets"
 YARN = DATA / "yarn-on-cylinder"
 QUICK = ("sampler.n_chains=8", "sampler.max_steps=300", "sampler.target_ess=100", "sampler.target_r_hat=1.2")
-SETTINGS = SamplerSettings(n_chains=8, max_steps=2000, target_ess=1500, target_r_hat=1.02)
+SETTINGS = SamplerSettings(n_chains=16, max_steps=1000, target_ess=1500, target_r_hat=1.02)
 
 
 # Known targets ----------------------------------------------------------------------------------------------------
@@ -34,27 +35,50 @@ class Stop(Exception):
     """Stands for the user's interrupt."""
 
 
-class Target:
-    """A density known in closed form, in place of a posterior."""
-
-    def __init__(self, size: int, log_density):
-        names = [f"x{i}" for i in range(size)]
-        free = tuple(Parameter(n, n, n, "friction", Normal(0.0, 1.0)) for n in names)
-        self.model = SimpleNamespace(space=SimpleNamespace(free=free, size=size))
-        self.data, self._log_density = (np.zeros(1),), log_density
-
-    def log_density(self, z, data):
-        return self._log_density(z) + data[0][0]
-
-
-def sampled(target: Target, covariance: np.ndarray, seed: int = 1, settings: SamplerSettings = SETTINGS):
-    start = MaximumPosterior(np.zeros(target.model.space.size), covariance)
-    return nuts.sample(Sampling(target, start, settings, seed), nuts.make_program(target, settings))
+SCALES = np.array([0.1, 1.0, 10.0])
+PRECISION = np.linalg.inv((0.9 + 0.1 * np.eye(3)) * np.outer(SCALES, SCALES))
 
 
 def log_funnel(z):
-    """Neal's funnel: the second coordinate's scale is exp of the first."""
-    return -0.5 * z[0] ** 2 - 0.5 * (z[1] * jnp.exp(-z[0])) ** 2 - z[0]
+    """Neal's funnel: the second coordinate's scale is exp of the first; the third is a standard normal beside it."""
+    return -0.5 * z[0] ** 2 - 0.5 * (z[1] * jnp.exp(-z[0])) ** 2 - z[0] - 0.5 * z[2] ** 2
+
+
+def log_normals(z):
+    """Three normals of unlike scales and correlation 0.9."""
+    return -0.5 * z @ jnp.asarray(PRECISION) @ z
+
+
+def log_two_modes(z):
+    """Standard normals about -20 and 20."""
+    return jnp.logaddexp(-0.5 * jnp.sum((z - 20) ** 2), -0.5 * jnp.sum((z + 20) ** 2))
+
+
+KNOWN = (log_funnel, log_normals, log_two_modes)
+
+
+class Target:
+    """A density known in closed form, in place of a posterior; which of them is told by its data, for one program of all."""
+
+    def __init__(self, log_density):
+        names = [f"x{i}" for i in range(3)]
+        free = tuple(Parameter(n, n, n, "friction", Normal(0.0, 1.0)) for n in names)
+        self.model = SimpleNamespace(space=SimpleNamespace(free=free, size=3))
+        self.data = (np.array(KNOWN.index(log_density)),)
+
+    def log_density(self, z, data):
+        return jax.lax.switch(data[0], KNOWN, z)
+
+
+@pytest.fixture(scope="module")
+def program():
+    """What samples every target."""
+    return nuts.make_program(Target(log_normals), SETTINGS)
+
+
+def sampled(log_density, program, covariance: np.ndarray, settings: SamplerSettings = SETTINGS, **options):
+    start = MaximumPosterior(np.zeros(3), covariance)
+    return nuts.sample(Sampling(Target(log_density), start, settings, 1, **options), program)
 
 
 def z_scores(chain, true_means) -> list[float]:
@@ -67,11 +91,9 @@ def z_scores(chain, true_means) -> list[float]:
 
 
 @pytest.fixture(scope="module")
-def funnel():
+def funnel(program):
     """The narrow end is 20 times narrower at -3 than in the middle."""
-    return sampled(
-        Target(2, log_funnel), np.eye(2), settings=replace_settings(n_chains=16, max_steps=4000, target_ess=200_000)
-    )
+    return sampled(log_funnel, program, np.eye(3), replace_settings(max_steps=4000, target_ess=200_000))
 
 
 def replace_settings(**changes) -> SamplerSettings:
@@ -96,36 +118,20 @@ def test_fine_steps_get_through_where_the_others_break_off(funnel):
     assert trajectory_shortfalls(trajectories) == ()
 
 
-SCALES = np.array([0.1, 1.0, 10.0])
-
-
-@pytest.fixture(scope="module")
-def normal():
-    """Three normals of unlike scales and correlation 0.9, and the program that samples them."""
-    precision = np.linalg.inv((0.9 + 0.1 * np.eye(3)) * np.outer(SCALES, SCALES))
-    target = Target(3, lambda z: -0.5 * z @ jnp.asarray(precision) @ z)
-    return SimpleNamespace(target=target, program=nuts.make_program(target, SETTINGS))
-
-
-def test_nuts_reproduces_correlated_normals_of_unlike_scales(normal):
+def test_nuts_reproduces_correlated_normals_of_unlike_scales(program):
     """Started from the wrong covariance; p = 1e-4 by chance."""
-    asked = Sampling(normal.target, MaximumPosterior(np.zeros(3), np.eye(3)), SETTINGS, 1)
-    chain = nuts.sample(asked, normal.program)
+    chain = sampled(log_normals, program, np.eye(3))
     truths = [(lambda z, i=i: z[..., i], 0.0) for i in range(3)]
     truths += [(lambda z, i=i: z[..., i] ** 2, SCALES[i] ** 2) for i in range(3)]
     truths += [(lambda z: z[..., 0] * z[..., 2], 0.9)]
-    assert max(map(abs, z_scores(chain, truths))) < stats.t(7).isf(0.5e-4 / len(truths))
+    assert max(map(abs, z_scores(chain, truths))) < stats.t(15).isf(0.5e-4 / len(truths))
     assert chain.reasons == ()
     assert chain.trajectories.diverged == 0
 
 
-def test_a_density_of_two_modes_far_apart_is_not_called_converged():
+def test_a_density_of_two_modes_far_apart_is_not_called_converged(program):
     """Chains cannot cross; R-hat across them sees it."""
-
-    def log_two_modes(z):
-        return jnp.logaddexp(-0.5 * jnp.sum((z - 20) ** 2), -0.5 * jnp.sum((z + 20) ** 2))
-
-    chain = sampled(Target(2, log_two_modes), 200 * np.eye(2), settings=replace_settings(max_steps=200))
+    chain = sampled(log_two_modes, program, 200 * np.eye(3), replace_settings(max_steps=200))
     assert any(reason.startswith("x0 spreads") for reason in chain.reasons)
 
 
@@ -171,7 +177,7 @@ def saved(tmp_path_factory):
 
 
 @pytest.mark.parametrize("at", [200, 600])
-def test_resumed_chains_equal_those_that_were_never_interrupted(normal, tmp_path, at):
+def test_resumed_chains_equal_those_that_were_never_interrupted(program, tmp_path, at):
     """Interrupted while tuning, and after."""
 
     def stop(progress):
@@ -180,9 +186,7 @@ def test_resumed_chains_equal_those_that_were_never_interrupted(normal, tmp_path
             raise Stop
 
     def run(**options):
-        settings = replace_settings(max_steps=300, target_ess=100)
-        start = MaximumPosterior(np.zeros(3), np.eye(3))
-        return nuts.sample(Sampling(normal.target, start, settings, 1, **options), normal.program)
+        return sampled(log_normals, program, np.eye(3), replace_settings(max_steps=300, target_ess=100), **options)
 
     path = tmp_path / "chain.checkpoint"
     path.write_bytes(heading({}))

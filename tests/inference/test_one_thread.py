@@ -5,7 +5,9 @@ import sys
 from collections.abc import Iterator
 from contextlib import ExitStack
 
+import numpy as np
 import pytest
+from rows import of_rows
 from threadpoolctl import threadpool_info, threadpool_limits
 
 import bowdenfit as bf
@@ -13,6 +15,7 @@ from bowdenfit.inference.batch.fitting import fit_batch
 from bowdenfit.inference.batch.programs import BatchSettings
 from bowdenfit.inference.engines.one_thread import linear_algebra_in_one_thread
 from bowdenfit.inference.log_density import LogDensity
+from bowdenfit.model import build_model
 
 FEW = ("sampler.n_ensembles=2", "sampler.n_walkers=32", "sampler.max_steps=200", "sampler.target_ess=100")
 
@@ -39,14 +42,15 @@ def test_while_walkers_move(on_body):
     assert threads() == {2}
 
 
-def test_while_a_batch_is_fitted(on_body_squares):
+def test_while_a_batch_is_fitted():
     seen = set()
 
     def seeds():
         seen.update(threads())
         yield 1
 
-    posterior = LogDensity(on_body_squares.model)
+    angle = np.deg2rad([[40.0], [80.0], [120.0]])
+    posterior = LogDensity(build_model(of_rows(0.1 * angle[:, 0] + [0.01, -0.02, 0.01], angle)))
     fit_batch(posterior, [posterior.data], seeds(), BatchSettings(nuts=False, target_sd_error=1.0))
     assert seen == {1}
     assert threads() == {2}

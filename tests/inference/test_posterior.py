@@ -78,7 +78,7 @@ class Bench:
         names, optimum = named_values(posterior.model), optimum_of(posterior.model)
         self.posterior = posterior
         self._implied = for_each_draw(lambda z: (names(z), optimum(z)), posterior.model.space.size)
-        self._programs = cache(lambda settings: walker_programs(posterior, settings))
+        self._programs = cache(lambda walkers: walker_programs(posterior, SamplerSettings(n_walkers=walkers)))
 
     @cached_property
     def _start(self):
@@ -94,7 +94,8 @@ class Bench:
         return by_name | {"optimal_length": length, "optimal_efficiency": efficiency}
 
     def sample(self, settings: SamplerSettings, seed: int, moves=None) -> Chain:
-        programs = self._programs(settings) if moves is None else walker_programs(self.posterior, settings, moves)
+        walkers = settings.walkers(self.posterior.model.space.size)
+        programs = self._programs(walkers) if moves is None else walker_programs(self.posterior, settings, moves)
         return sample(Sampling(self.posterior, self._start, settings, seed), programs)
 
 
@@ -237,14 +238,14 @@ def test_the_comparison_fails_when_the_snooker_move_is_put_in(bench, by_nuts):
 
 
 def test_one_seed_gives_the_same_draws_and_another_seed_others(bench):
-    settings = SamplerSettings(n_ensembles=4, n_walkers=64, max_steps=200)
+    settings = SamplerSettings(max_steps=200)
     first, again, other = (bench.sample(settings, seed).z for seed in (1, 1, 2))
     np.testing.assert_array_equal(first, again)
     assert not np.any(first == other)
 
 
 def test_too_few_steps_are_called_not_converged_with_reasons(bench):
-    chain = bench.sample(SamplerSettings(n_ensembles=4, n_walkers=64, max_steps=200), seed=1)
+    chain = bench.sample(SamplerSettings(max_steps=200), seed=1)
     assert chain.steps == 200
     assert "the sampling took 200 steps" in chain.reasons[0]
 

@@ -1,6 +1,6 @@
 """What walkers do: emcee's own proposals given the same random numbers, targets known in closed form, controls that fail."""
 
-from functools import partial
+from functools import cache, partial
 
 import emcee
 import jax
@@ -56,12 +56,21 @@ def draw_t(generator: np.random.Generator, n: int) -> np.ndarray:
     return (generator.standard_normal((n, DIMENSIONS)) @ ROOT.T) * mixing[:, None]
 
 
+def programs_of(log_density, data, walkers: int, dimensions: int, frames, moves):
+    """What is compiled for ensembles of so many walkers."""
+    settings = SamplerSettings.model_construct(n_walkers=walkers)
+    return compiled_walkers(log_density, data, dimensions, settings, frames, moves)
+
+
+compiled_once = cache(programs_of)  # where there are no data, which have no hash
+
+
 def run_side_by_side(moves, log_density, start: np.ndarray, steps: int, seed: int, frames=IN_BOTH, data=None) -> np.ndarray:
     """States after every sweep, (state, ensemble, walker, dimension)."""
     ensembles, walkers, dimensions = start.shape
-    settings = SamplerSettings.model_construct(n_ensembles=ensembles, n_walkers=walkers)  # one ensemble too
     with jax.enable_x64(True):
-        programs = compiled_walkers(log_density, data, dimensions, settings, frames, moves)
+        find = compiled_once if data is None else programs_of
+        programs = find(log_density, data, walkers, dimensions, tuple(frames), tuple(moves))
         sweep, flat = Sweep(programs, data, ensembles), start.reshape(-1, dimensions)
         sampler = emcee.EnsembleSampler(*flat.shape, log_density, moves=sweep)
         sampler.run_mcmc(start_of(flat, np.random.RandomState(seed)), steps // THIN, skip_initial_state_check=True)

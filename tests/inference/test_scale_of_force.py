@@ -164,7 +164,7 @@ def spoiled(folder: Path, fault, factor: float) -> Path:
     return folder
 
 
-@pytest.mark.parametrize("name", FAULTS)
+@pytest.mark.parametrize("name", [n if "rougher" not in n else pytest.param(n, marks=pytest.mark.slow) for n in FAULTS])
 def test_the_verdict_does_not_depend_on_how_strong_a_bench_is(name, tmp_path):
     """What is wrong, which sentences say it (but for their numbers), and the coefficients; by least squares."""
     fault, expected = FAULTS[name]

@@ -40,7 +40,7 @@ def exact_sds(loss: np.ndarray, n: int = 4096) -> np.ndarray:
     of_prior = MU.median * np.exp(MU.log_sd * even[:, :3])
     unit = even[:, 3:] @ root.T
     z, log_weights = [], []
-    for log_tau in np.linspace(np.log(1e-4), np.log(30.0), 120):
+    for log_tau in np.linspace(np.log(1e-4), np.log(30.0), 60):
         tau = np.exp(log_tau)
         mu = np.concatenate([of_prior, middle + tau * unit])
         mu = mu[(mu > 0).all(axis=1)]

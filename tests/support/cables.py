@@ -61,12 +61,12 @@ def cable(n_contacts: int, tables: tuple[str, ...] | dict[str, Any] = ("angles",
 
 
 def measured(
-    description: Description, seed: int = 0, *, design: Design = DESIGN, noise: bool = True, **truth: float
+    description: Description, seed: int = 0, *, design: Design = DESIGN, noise: bool = True, once: bool = False, **truth: float
 ) -> tuple[Dataset, dict[str, float]]:
-    """What a bench reads on a cable, and the true values of its parameters [internal units]."""
+    """What a bench reads on a cable, and the true values of its parameters [internal units]; `once` is that of `simulate`."""
     tables = empty_tables(description, design)
     names = {p.name for p in build_model(Dataset(description, tables, {})).space.parameters}
     of_truth, of_readings = jax.random.split(jax.random.key(seed))
     wanted = {name: value for name, value in (TRUTH | truth).items() if name in names}
-    values = true_values(description, tables, wanted, of_truth)
-    return simulate(description, design, values, of_readings, noise), values
+    values = true_values(description, tables, wanted, of_truth, once)
+    return simulate(description, design, values, of_readings, noise, once), values

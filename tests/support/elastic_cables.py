@@ -64,16 +64,16 @@ def elastic_cable(
 
 
 def bench(
-    description: Description, truth: dict[str, float], seed: int = 0, *, noise: bool = True, design=ELASTIC
+    description: Description, truth: dict[str, float], seed: int = 0, *, noise: bool = True, design=ELASTIC, once: bool = False
 ) -> tuple[Dataset, dict[str, float]]:
     """What a bench reads, and the true values [internal units]; those that are not stated are drawn from their priors.
 
-    Of the stated ones only those count that the cable has and that are not fixed.
+    Of the stated ones only those count that the cable has and that are not fixed. `once` is that of `simulate`.
     """
     of_truth, of_readings = jax.random.split(jax.random.key(seed))
     measured = design_of(**design)
     empty = empty_tables(description, measured)
     free = {p.name for p in build_model(Dataset(description, empty, {})).space.free}
     wanted = {name: value for name, value in truth.items() if name in free}
-    values = true_values(description, empty, wanted, of_truth)
-    return simulate(description, measured, values, of_readings, noise), values
+    values = true_values(description, empty, wanted, of_truth, once)
+    return simulate(description, measured, values, of_readings, noise, once), values

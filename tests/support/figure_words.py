@@ -24,7 +24,11 @@ _WORD = re.compile(r"[^\W\d_]{3,}")
 
 def words(figure):
     """Every visible text of a figure, and its box on the page."""
-    return [(text.get_text(), text.get_window_extent()) for text in _texts(figure)]
+    return _boxes(_texts(figure))
+
+
+def _boxes(texts):
+    return [(text.get_text(), text.get_window_extent()) for text in texts]
 
 
 def _texts(figure):
@@ -44,7 +48,7 @@ def labels_out_of_view(axes):
 
 def check_words(figure, name):
     """No text of a figure overlaps another or leaves the page."""
-    assert not (wrong := [f"{name}: {fault}" for fault in _misplaced(figure)]), wrong
+    assert not (wrong := [f"{name}: {fault}" for fault in _misplaced(figure, words(figure))]), wrong
 
 
 def assert_readable(shown, cable, widths=(None, NARROW)):
@@ -76,18 +80,21 @@ def assert_answer_readable(file, found, cable):
 
 def faults(figure):
     """What is wrong with a figure, in sentences."""
-    found = [*_misplaced(figure), *_alike(figure), *_empty(figure), *_garbled(figure), *_small(figure)]
-    return found + [f"{text!r} has {fault}" for text, _ in words(figure) for fault in jargon(_FORMULA.sub(" ", text))]
+    texts = _texts(figure)
+    boxes = _boxes(texts)
+    found = [*_misplaced(figure, boxes), *_alike(figure), *_empty(figure), *_garbled(texts), *_small(texts)]
+    return found + [f"{text!r} has {fault}" for text, _ in boxes for fault in jargon(_FORMULA.sub(" ", text))]
 
 
-def _misplaced(figure):
+def _misplaced(figure, boxes):
     """Texts off the page, and texts over each other."""
-    boxes, page = words(figure), figure.bbox.padded(1.0)
+    page = figure.bbox.padded(1.0)
     for text, box in boxes:
         if not (page.x0 <= box.x0 and box.x1 <= page.x1 and page.y0 <= box.y0 and box.y1 <= page.y1):
             yield f"{text!r} leaves the page"
-    for (text, box), (other, other_box) in combinations(boxes, 2):
-        if box.padded(-1.0).overlaps(other_box.padded(-1.0)):
+    within = [(text, box.padded(-1.0)) for text, box in boxes]
+    for (text, box), (other, other_box) in combinations(within, 2):
+        if box.overlaps(other_box):
             yield f"{text!r} overlaps {other!r}"
 
 
@@ -145,9 +152,9 @@ def _shows(axes, artist):
     return True
 
 
-def _garbled(figure):
+def _garbled(texts):
     """Names set letter by letter in a formula, and code where a name should be."""
-    for text in _texts(figure):
+    for text in texts:
         said = text.get_text()
         parts = re.split(r"(?<!\\)\$", said) if text.get_parse_math() and is_math_text(said) else [said]
         if any(_WORD.search(_COMMAND.sub(" ", part)) for part in parts[1::2]):
@@ -156,8 +163,8 @@ def _garbled(figure):
             yield f"{said!r} shows code"
 
 
-def _small(figure):
+def _small(texts):
     """Words too small to be read."""
-    for text in _texts(figure):
+    for text in texts:
         if text.get_fontsize() < LEAST:
             yield f"{text.get_text()!r} is {text.get_fontsize():g} pt"

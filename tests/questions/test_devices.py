@@ -33,6 +33,13 @@ def fit(loop_results):
 
 
 @pytest.fixture(scope="module")
+def saved(fit, tmp_path_factory):
+    folder = tmp_path_factory.mktemp("saved") / "fit"
+    fit.save(folder)
+    return folder
+
+
+@pytest.fixture(scope="module")
 def found(fit):
     return bf.compensate(fit, DEVICE, wrap_angle=RANGE)
 
@@ -233,9 +240,8 @@ def test_what_cannot_be_answered_is_refused(fit, tmp_path, least_squares_of):
         compensation_of(rope, read_device(DEVICE), "45deg", None, 0.05)
 
 
-def test_the_verb_prints_and_writes_what_the_library_answers(fit, run, tmp_path):
-    fit.save(tmp_path / "fit")
-    asked = ("compensate", tmp_path / "fit", "--device", DEVICE, "--wrap-angle", RANGE)
+def test_the_verb_prints_and_writes_what_the_library_answers(saved, run, tmp_path):
+    asked = ("compensate", saved, "--device", DEVICE, "--wrap-angle", RANGE)
     code, out, err = run(*asked, "--output", tmp_path / "answer")
     assert code == 0
     assert out.startswith("Feed forward by bend, 0.8")
@@ -246,7 +252,7 @@ def test_the_verb_prints_and_writes_what_the_library_answers(fit, run, tmp_path)
     assert page["fixed"] is None
     assert page["gain"]["safe"] > 0
     assert run(*asked, "--csv")[1].startswith('wrap_angle_deg,"friction_N*m"')
-    assert run("compensate", tmp_path / "fit")[0] == 2
+    assert run("compensate", saved)[0] == 2
 
 
 NO_SD = 'damping = { value = 0.02, unit = "N*m*s/rad", sd = 0.004 }\nmounting'
@@ -259,13 +265,6 @@ BAD = {
     "another unit": ("LOOP", RANGE, (NO_SD, NO_SD.replace("N*m*s/rad", "N*s/m")), "does not measure an angular damping"),
     "a key that is missing": ("LOOP", RANGE, ("filter_time", "# filter_time"), "write filter_time = "),
 }  # fmt: skip
-
-
-@pytest.fixture(scope="module")
-def saved(fit, tmp_path_factory):
-    folder = tmp_path_factory.mktemp("saved") / "fit"
-    fit.save(folder)
-    return folder
 
 
 @pytest.mark.parametrize("fault", BAD)
@@ -322,9 +321,8 @@ def test_a_slave_that_leaves_the_wall_late_bounces():
     assert bounces(time, 0 * time) is None
 
 
-def test_words_and_files_of_teleoperation_can_be_read(fit, run, tmp_path):
-    fit.save(tmp_path / "fit")
-    asked = ("teleoperate", tmp_path / "fit", DEVICE, "--wrap-angle", "180deg")
+def test_words_and_files_of_teleoperation_can_be_read(saved, run, tmp_path):
+    asked = ("teleoperate", saved, DEVICE, "--wrap-angle", "180deg")
     code, out, _ = run(*asked, "--output", tmp_path / "answer")
     assert code == 0
     assert faults_of_page(out) == []

@@ -1,6 +1,7 @@
 """The figures of stretch, preload and loops: what they draw, of how many, and how they are written."""
 
 import dataclasses
+from functools import cache
 
 import matplotlib as mpl
 import numpy as np
@@ -185,8 +186,27 @@ CASES = {
 }
 
 
+@cache
+def data_of(case):
+    return CASES[case]()
+
+
+@cache
+def drawn_case(name, case):
+    """The figure of a case, laid out; no test changes it."""
+    figure = FIGURES[name].draw(data_of(case)[name])
+    figure.draw_without_rendering()
+    return figure
+
+
+@pytest.fixture(scope="module", autouse=True)
+def no_figures_left():
+    yield
+    drawn_case.cache_clear()
+
+
 def drawn(name, case="four angles"):
-    return FIGURES[name].draw((CASES[case]() if isinstance(case, str) else case)[name])
+    return drawn_case(name, case) if isinstance(case, str) else FIGURES[name].draw(case[name])
 
 
 def line(axes, label):
@@ -212,9 +232,8 @@ def spans(axes, label):
 
 @pytest.mark.parametrize("case", CASES)
 def test_no_words_overlap_or_leave_the_page(case):
-    data = CASES[case]()
     for name in NAMES:
-        check_words(drawn(name, data), name)
+        check_words(drawn(name, case), name)
 
 
 @pytest.mark.parametrize("name", NAMES)
@@ -233,7 +252,6 @@ def test_every_axis_is_labeled_or_shares_one_that_is(name, case):
 @pytest.mark.parametrize("case", CASES)
 def test_no_legend_covers_a_panel_or_a_title(name, case):
     figure = drawn(name, case)
-    figure.draw_without_rendering()
     own = [axes.get_legend() for axes in figure.axes if axes.get_legend()]
     for legend in (*figure.legends, *own):
         box = legend.get_window_extent()
@@ -458,7 +476,6 @@ def test_a_slack_load_outside_the_shown_forces_is_left_out():
 @pytest.mark.parametrize("case", CASES)
 def test_the_branches_are_named_clear_of_the_loop(case):
     figure = drawn("loops", case)
-    figure.draw_without_rendering()
     for axes in figure.axes:
         curves = [a for a in axes.get_lines() if a.get_label().startswith(("Forward", "Back", "Read"))]
         for box in (text.get_window_extent() for text in axes.texts):

@@ -184,8 +184,9 @@ def test_the_best_preload_keeps_the_cable_taut_in_95_of_100_draws(force, limit):
     fit = known(elastic_cable(), spread=0.1, n=400)
     window = fit.elastic.preload_window((0.0, np.pi), force, friction=limit)
     bends, lowest, felt = np.linspace(0.0, np.pi, 25), [], []
-    for z in fit.draws().flat_z:
-        v = {name: float(value) for name, value in fit.model.space.constrain(jax.numpy.asarray(z)).items()}
+    values = jax.jit(jax.vmap(fit.model.space.constrain))(fit.draws().flat_z)
+    for drawn in zip(*(np.asarray(value) for value in values.values()), strict=True):
+        v = dict(zip(values, map(float, drawn), strict=True))
         rope = (v["stiffness"], v["bedding_stretch"], v["bedding_load"])
         needed = np.array([force / 2 * share(v["mu"] * bend) for bend in bends])
         shift = v["lengthening"] * (bends - REFERENCE)

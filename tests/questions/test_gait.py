@@ -100,17 +100,15 @@ def test_a_long_gait_is_stood_for_by_its_quantiles(fit, tmp_path):
     assert "3000 wrap angles" in row["note"]
 
 
-def test_the_command_says_the_mean_and_its_ends(fit, swing, run, tmp_path):
-    fit.save(tmp_path / "fit")
-    code, out, _ = run("predict", tmp_path / "fit", "470", "--contact", "bracket edge", "--gait", swing)
+def test_the_command_says_the_mean_and_its_ends(quick_results, swing, run):
+    code, out, _ = run("predict", quick_results, "470", "--contact", "bracket edge", "--gait", swing)
     assert code == 0
     assert out.startswith("Efficiency at 470 mm: 8") and "Least efficiency at 470 mm: 7" in out
     assert max(map(len, out.splitlines())) <= 80
 
 
-def test_bad_gaits_are_refused_in_words(fit, swing, refuse, tmp_path):
-    fit.save(tmp_path / "fit")
-    folder = tmp_path / "fit"
+def test_bad_gaits_are_refused_in_words(fit, quick_results, swing, refuse, tmp_path):
+    folder = quick_results
     assert "there is no such contact" in refuse("predict", folder, "--contact", "braket edge", "--gait", swing)
     assert "name one of the two" in refuse("predict", folder, "--contact", "bracket edge")
     assert "name one of the two" in refuse(

@@ -71,7 +71,7 @@ def test_compare_tells_whether_groups_differ(fitted, accept):
 
 def test_groups_that_do_not_differ_are_not_said_to(tmp_path):
     """The same readings in both groups: either sign is as probable, and shared coefficients describe them."""
-    dataset = _folder(tmp_path / "alike", mountings=5, true={"new": 0.12, "old": 0.12}, alike=True)
+    dataset = _folder(tmp_path / "alike", true={"new": 0.12, "old": 0.12}, alike=True)
     found = bf.fit(dataset, friction="by-group", seed=1, settings=QUICK).groups.contrast("new", "old")
     assert found.probability < 0.55 and abs(found.difference.median) < 0.1 * found.difference.sd
     assert bf.fit(dataset, seed=1, mcmc=False).verdict().trusted

@@ -92,6 +92,7 @@ def test_a_plan_with_more_runs_knows_more(tmp_path):
     assert sds[1] == pytest.approx(sds[0] / 2, rel=0.02)
 
 
+@pytest.mark.slow
 def test_the_judgment_before_sampling_agrees_with_the_fit(on_body):
     """The Fisher information at the maximum against draws: sds within a third (a funnel is not a normal).
 
@@ -133,10 +134,16 @@ def test_coefficients_that_cannot_be_told_apart_are_not_trusted(two_turns, tmp_p
 
 
 def test_a_coefficient_measured_separately_makes_the_other_known(two_turns, tmp_path, run):
+    """Which the judgment before sampling foretells: its sds and those of draws agree within a third."""
     stated = "friction.mu_b.measured={value=0.15,sd=0.01}"
     code, out, _ = run("fit", two_turns, "-o", tmp_path / "fit", "--seed", 1, "--no-figures", "--set", stated, *SET)
     assert code == 0, out
     assert "You can trust this" in out
+    before = identify(two_turns, settings=[stated]).groups["friction"]
+    after = identify(bf.load(tmp_path / "fit")).groups["friction"]
+    for p, q in zip(before.parameters, after.parameters, strict=True):
+        assert p.sd == pytest.approx(q.sd, rel=0.33), p.name
+    assert [p.name for p in before.by_themselves] == [p.name for p in after.by_themselves] == ["mu_a"]  # mu_b is as stated
 
 
 def test_without_sampling_the_same_data_are_not_trusted_either(two_turns, tmp_path, run):
@@ -146,7 +153,7 @@ def test_without_sampling_the_same_data_are_not_trusted_either(two_turns, tmp_pa
 
 
 def test_a_fit_that_has_not_converged_is_not_trusted(on_body, tmp_path, run):
-    settings = ["--set", "sampler.max_steps=200", "--set", "sampler.n_walkers=32"]
+    settings = ["--set", "sampler.max_steps=200", "--set", "sampler.n_walkers=64"]
     code, out, _ = run("fit", on_body, "-o", tmp_path / "fit", "--seed", 1, "--no-figures", *settings)
     assert code == 3
     assert "DO NOT USE THESE NUMBERS: the computation has not settled" in " ".join(out.split())

@@ -36,8 +36,18 @@ def fit(table):
     return bf.fit(table, seed=1, settings=QUICK)
 
 
-@pytest.mark.parametrize("stroke", [1, -1], ids=["pull", "return"])
-@pytest.mark.parametrize("friction", ["capstan", "drag", "load-dependent", "stroke-dependent", "drag+load-dependent"])
+@pytest.mark.parametrize(
+    ("friction", "stroke"),
+    [
+        ("capstan", 1),
+        ("drag", 1),
+        ("load-dependent", 1),
+        ("stroke-dependent", -1),
+        ("drag+load-dependent", -1),
+        *(pytest.param(name, -1, marks=pytest.mark.slow) for name in ("capstan", "drag", "load-dependent")),
+        *(pytest.param(name, 1, marks=pytest.mark.slow) for name in ("stroke-dependent", "drag+load-dependent")),
+    ],
+)
 def test_the_input_force_for_an_output_force_gives_that_output_force(friction, stroke, table):
     model = build_model(read(table, friction=friction))
     z = 0.5 * np.random.default_rng(1).standard_normal((20, model.space.size))

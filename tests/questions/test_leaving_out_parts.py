@@ -19,6 +19,7 @@ from bowdenfit.model import build_model
 from bowdenfit.questions.compare.words import comparison_text
 
 LOADS = (20, 40, 60, 80, 100, 120)
+QUICK = ("sampler.n_walkers=64", "sampler.target_ess=300", "sampler.target_r_hat=1.05", "sampler.max_steps=4000")
 
 
 def bench(folder, runs=1, drag=0.0, seed=1):
@@ -29,8 +30,15 @@ def bench(folder, runs=1, drag=0.0, seed=1):
     return hand_bench.write(folder, rows)
 
 
-@pytest.mark.parametrize("friction", ["capstan", "drag"])
-@pytest.mark.parametrize("unit", ["load", "reading"])
+@pytest.mark.parametrize(
+    ("unit", "friction"),
+    [
+        ("load", "drag"),
+        ("reading", "capstan"),
+        pytest.param("load", "capstan", marks=pytest.mark.slow),
+        pytest.param("reading", "drag", marks=pytest.mark.slow),
+    ],
+)
 def test_leaving_out_a_part_is_the_likelihood_of_the_other_readings(tmp_path, friction, unit):
     """Against the term of a table without those readings, at several places of the posterior."""
     with jax.enable_x64(True):
@@ -68,7 +76,7 @@ def _without(rows, i, unit):
 @pytest.fixture(scope="module")
 def one_run(tmp_path_factory):
     folder = bench(tmp_path_factory.mktemp("one run"), drag=6.0)
-    return {name: bf.fit(folder, friction=name, seed=1) for name in ("capstan", "drag")}
+    return {name: bf.fit(folder, friction=name, seed=1, settings=QUICK) for name in ("capstan", "drag")}
 
 
 def test_with_one_run_its_loads_are_left_out_and_the_right_model_is_preferred(one_run):

@@ -21,16 +21,22 @@ def fit(tmp_path_factory):
     return bf.fit(write(tmp_path_factory.mktemp("drag"), rows), friction="drag", seed=1, settings=QUICK)
 
 
-def test_a_hidden_tension_is_told_by_the_lowest_load(fit):
-    within = next_measurement(fit, "drag").within
+@pytest.fixture(scope="module")
+def advice(fit):
+    """What to measure next for the hidden tension."""
+    return next_measurement(fit, "drag")
+
+
+def test_a_hidden_tension_is_told_by_the_lowest_load(advice):
+    within = advice.within
     assert within.usual.startswith("6 readings at") and within.usual.endswith("64 N, pulling and returning")
     share = {(round(np.nan_to_num(r.candidate.load)), r.candidate.stroke): r.share for r in within.ranked}
     assert set(share) == {(0, 0), *((load, stroke) for load in (4, 16, 64) for stroke in (0, 1, -1))}
     assert share[64, 0] < share[4, 0] and share[64, 0] < share[0, 0]
 
 
-def test_the_advice_says_which_load_and_stroke(fit):
-    said = " ".join(next_measurement_text(next_measurement(fit, "drag"), 5).split())
+def test_the_advice_says_which_load_and_stroke(fit, advice):
+    said = " ".join(next_measurement_text(advice, 5).split())
     assert "That is a run as those made so far: 6 readings at" in said and "pulling and returning" in said and "64 N" in said
     assert bf.next_measurement(fit, "drag", ["force@180deg,4N,pull"]).within is None
 

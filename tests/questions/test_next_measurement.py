@@ -223,33 +223,33 @@ def _quiet(design: Design = DESIGN, **more: Any) -> tuple[Dataset, Model]:
     return dataset, build_model(dataset)
 
 
-def _runs(dataset: Dataset, model: Model, repeats: int = 1, **values: float) -> np.ndarray:
-    """Runs at 500 mm of one cable, repeats by columns."""
+def _runs(dataset: Dataset, model: Model, *values: dict[str, float], repeats: int = 1) -> np.ndarray:
+    """Runs at 500 mm of each cable, repeats by columns."""
     middle = {p.name: float(p.prior.constrain(jnp.zeros(()))) for p in model.space.free}
-    z = np.asarray(model.space.unconstrain(middle | values))[None]
+    z = np.array([model.space.unconstrain(middle | each) for each in values])
     (runs,) = simulated_readings(model, dataset.measurements, [Candidate("force", 500.0)], z, 1, repeats=repeats)
-    return runs[0]
+    return runs
 
 
 def test_a_run_of_both_strokes_tells_the_exponent_free_of_the_gain_error():
     """Noise is made negligible: the gain error is all in the difference of the strokes, and in the mean of a pull alone."""
-    without, both = (_runs(*_quiet(), tau=1e-9, gain_error=g)[0] for g in (1e-9, 0.03))
+    without, both = _runs(*_quiet(), *({"tau": 1e-9, "gain_error": g} for g in (1e-9, 0.03)))[:, 0]
     np.testing.assert_allclose(both - without, [0.0, 0.03], atol=1e-5)
-    (pulled,) = _runs(*_quiet(other_design(strokes=("pull",))), tau=1e-9, gain_error=0.03)
+    ((pulled,),) = _runs(*_quiet(other_design(strokes=("pull",))), {"tau": 1e-9, "gain_error": 0.03})
     np.testing.assert_allclose(pulled, [without[0] + 0.03], atol=1e-5)
 
 
 def test_every_repeat_of_a_run_is_mounted_anew():
     """The scatter of 400 runs is tau: known to 3.5 %, and more than 15 % off in fewer than 1 of 10 000 runs."""
     dataset, model = _quiet()
-    runs = _runs(dataset, model, repeats=400, tau=0.05)
+    (runs,) = _runs(dataset, model, {"tau": 0.05}, repeats=400)
     assert runs[:, 0].std() == pytest.approx(0.05, rel=0.15)
     assert runs[:, 1].std() < 1e-4  # both strokes of a run are of one mounting
 
 
 def test_a_run_where_friction_depends_on_the_load_also_tells_how_it_changes_with_it():
     dataset, model = _quiet(friction_model="drag")
-    (run,) = _runs(dataset, model, drag=2.0)
+    ((run,),) = _runs(dataset, model, {"drag": 2.0})
     assert len(run) == 3  # mean, difference of the strokes, slope with the load
     assert -0.1 < run[2] < -0.001  # drag makes friction look larger at small loads
 

@@ -18,6 +18,7 @@ from bowdenfit.holm import holm
 from bowdenfit.inference.population.model import Inspected
 from bowdenfit.inference.population.sampling import PopulationDraws, draw_population
 from bowdenfit.inference.population.summaries import Summaries
+from bowdenfit.questions.pool import pooling
 from bowdenfit.questions.pool.answer import Asked
 from bowdenfit.questions.pool.figures import captions, figures_of
 from bowdenfit.questions.pool.inspected import given
@@ -46,6 +47,19 @@ def fleet():
 @pytest.fixture(scope="module")
 def found(fleet):
     return pool(fleet[0], ASKED)
+
+
+@pytest.fixture(scope="module")
+def few():
+    """The same fleet with few draws of each inspection."""
+    return fleet_draws(3, shifts={2: 1.6}, wears={7: 0.6}, draws=256)[0]
+
+
+@pytest.fixture(scope="module")
+def population(fleet):
+    """What is known of the fleet, and draws of its population."""
+    known = given(fleet[0])
+    return known, draw_population(known.inspected, 1)
 
 
 def test_the_population_and_every_cable_are_found(fleet, found):
@@ -160,7 +174,7 @@ def weighed(known, drawn, target, outcomes=100):
 
 
 @pytest.mark.parametrize("asked", [None, ASKED], ids=["wear", "failing"])
-def test_what_to_inspect_next_is_what_simulated_inspections_of_every_cable_say(fleet, asked):
+def test_what_to_inspect_next_is_what_simulated_inspections_of_every_cable_say(population, asked):
     """The best by either lies within 5 % of the best of the other, and its uncertainty after it within 5 %."""
 
     def fails(values):
@@ -169,8 +183,7 @@ def test_what_to_inspect_next_is_what_simulated_inspections_of_every_cable_say(f
     def wear(values):
         return values[:, 2]
 
-    known, target = given(fleet[0]), wear if asked is None else fails
-    drawn = draw_population(known.inspected, 1)
+    (known, drawn), target = population, wear if asked is None else fails
     best, *_ = next_inspections(known, drawn, asked, 1)
     before = np.array([target(each).var(ddof=1) for each in drawn.cables.transpose(1, 0, 2)])
     after = weighed(known, drawn, target)
@@ -274,8 +287,8 @@ def test_one_among_ten_thousand_cables_can_be_named():
     assert again == pytest.approx([far, far], rel=0.1) and far > 0
 
 
-def test_what_cannot_be_told_is_said(fleet):
-    drawn = fleet[0]
+def test_what_cannot_be_told_is_said(few):
+    drawn = few
     same = given(replace(drawn, cycles=np.zeros(36)))
     assert same.inspected.cycles is None and "nothing is told of wear" in " ".join(same.notes)
     some = drawn.lubricated.copy()
@@ -293,8 +306,8 @@ def test_what_cannot_be_told_is_said(fleet):
         given(replace(drawn, attributes={name: {"role": "noise"} for name in drawn.values}))
 
 
-def test_coefficients_that_mean_different_things_are_pooled_apart(fleet):
-    drawn = fleet[0]
+def test_coefficients_that_mean_different_things_are_pooled_apart(few):
+    drawn = few
     shape = np.array(["one"] * 18 + ["two"] * 18, dtype=object)
     about = dict(drawn.about) | {"meanings": {"one": {"mu_0": "sheath"}, "two": {"mu_0": "ring"}}}
     apart = given(replace(drawn, stats=drawn.stats | {"shape": shape}, about=about))
@@ -318,8 +331,8 @@ def finished_fleet(folder, drawn):
         (("--until", "60%", "--wrap-angle", "mu_9=90deg"), "there is no coefficient 'mu_9'"),
     ],
 )
-def test_life_without_what_it_depends_on_is_refused(run, fleet, tmp_path, arguments, said):
-    finished_fleet(tmp_path, fleet[0])
+def test_life_without_what_it_depends_on_is_refused(run, few, tmp_path, arguments, said):
+    finished_fleet(tmp_path, few)
     code, _, error = run("pool", tmp_path, *arguments)
     assert code == 2 and said in " ".join(error.split())
 
@@ -347,7 +360,17 @@ def test_draws_that_are_not_as_they_were_written_are_refused(run, fleet, tmp_pat
     assert code == 2 and "unfinished fleet" in " ".join(error.split())
 
 
-def test_the_answer_is_json_and_csv(run, fleet, found, tmp_path):
+@pytest.mark.parametrize("anew", [False, pytest.param(True, marks=pytest.mark.slow)], ids=["as-found", "drawn-anew"])
+def test_the_answer_is_json_and_csv(run, fleet, found, tmp_path, monkeypatch, anew):
+    """The command asks for what was found, of the draws in the file; the slow one draws it anew."""
+
+    def as_found(drawn, asked, seed, measurements):
+        assert asked == replace(ASKED, wrap_angles=pytest.approx(ASKED.wrap_angles)) and (seed, measurements) == (1, None)
+        assert all(np.array_equal(drawn.values[name], draws) for name, draws in fleet[0].values.items())
+        return found
+
+    if not anew:
+        monkeypatch.setattr(pooling, "pooled", as_found)
     finished_fleet(tmp_path, fleet[0])
     angles = ("--until", "60%", "--wrap-angle", f"mu_0={np.pi}rad", "--wrap-angle", "mu_1=0.3rad", "--cycles", 100_000)
     code, out, _ = run("pool", tmp_path, *angles, "--json", "--seed", 1, "-o", tmp_path / "out")

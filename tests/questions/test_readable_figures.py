@@ -4,8 +4,6 @@ Fits of other files ask `assert_readable` too: on-body, haptic loop, recordings 
 by least squares.
 """
 
-from pathlib import Path
-
 import numpy as np
 import pytest
 from figure_words import LEAST, NARROW, assert_readable, faults
@@ -18,7 +16,6 @@ from bowdenfit.plots.panels import short_title
 from bowdenfit.questions.figures import caption_of, figures_of
 
 QUICK = ("sampler.n_walkers=64", "sampler.target_ess=200", "sampler.target_r_hat=1.1", "sampler.max_steps=2000")
-DATA = Path(__file__).parents[2] / "datasets"
 LONG = "cotton yarn, waxed and run in for a week, batch {}"
 HEAD = "run,group,wrap_angle_deg,stroke,input_force_N,output_force_N,velocity [mm/s]"
 # friction model: name of the cable, bends [deg], mountings of each, loads over 100 N, strokes
@@ -60,8 +57,8 @@ def test_figures_of_every_friction_model_can_be_read(friction, mcmc, tmp_path):
     assert_readable(shown, fit.name)
 
 
-def test_figures_of_the_synthetic_bench_can_be_read():
-    fit = bf.fit(DATA / "synthetic-bench", mcmc=False)
+def test_figures_of_the_synthetic_bench_can_be_read(least_squares_of):
+    fit = least_squares_of("synthetic-bench")
     assert_readable(dict(figures_of(fit)), fit.name)
 
 

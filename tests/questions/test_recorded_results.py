@@ -28,6 +28,7 @@ from bowdenfit.questions.summary.words import full_text
 from bowdenfit.recordings.recording import Recordings
 
 QUICK = ("sampler.n_walkers=64", "sampler.target_ess=200", "sampler.target_r_hat=1.05", "sampler.max_steps=2000")
+SHORT = ("sampler.n_walkers=64", "sampler.target_ess=100", "sampler.target_r_hat=1.01", "sampler.max_steps=600")
 
 
 @pytest.fixture(scope="session")
@@ -45,7 +46,7 @@ def plain(recorded, tmp_path_factory):
 @pytest.fixture(scope="session")
 def with_rate(recorded, tmp_path_factory):
     folder = tmp_path_factory.mktemp("recorded") / "rate"
-    return bf.fit(recorded, output=folder, seed=3, settings=QUICK, figures=False, friction="rate-dependent"), folder
+    return bf.fit(recorded, output=folder, seed=3, settings=SHORT, figures=False, friction="rate-dependent"), folder
 
 
 @pytest.fixture(scope="session")
@@ -240,7 +241,7 @@ def pulls_only():
     )
     design = design_of(runs=(400.0,) * 8, input_forces=(20.0, 40.0, 60.0), strokes=("pull",))
     dataset, values = measured(description, 4, design=design)
-    return bf.fit(dataset, seed=2), values
+    return bf.fit(dataset, seed=2, settings=QUICK), values
 
 
 def test_a_gain_error_and_a_constant_angle_are_said_to_be_confounded_with_what_is_known_of_them(pulls_only):
@@ -313,7 +314,7 @@ def test_check_of_a_file_alone_lists_channels_and_what_it_is_as_a_recording(reco
     assert "a table of 21 readings at 1 load" in words
 
 
-def test_recordings_forces_efficiencies_and_angles_are_fitted_together(recorded, on_body, tmp_path):
+def test_recordings_forces_efficiencies_and_angles_are_fitted_together(recorded, plain, on_body, tmp_path):
     import shutil
 
     folder = tmp_path / "together"
@@ -326,7 +327,7 @@ def test_recordings_forces_efficiencies_and_angles_are_fitted_together(recorded,
     tables = 'efficiencies = { file = "efficiencies.csv" }\nforces = { file = "forces.csv" }\n[[recording]]'
     text = (folder / "cable.toml").read_text()
     (folder / "cable.toml").write_text(text.replace("[[recording]]", tables, 1))
-    together, alone = bf.fit(folder, mcmc=False), bf.fit(recorded, mcmc=False)
+    together, (alone, _) = bf.fit(folder, mcmc=False), plain
     assert [t.name for t in together.model.terms] == [
         "wrap_angle",
         "efficiency",

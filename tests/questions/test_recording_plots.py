@@ -1,6 +1,7 @@
 """The figures of force recordings: what they draw, of how many, and how they are written."""
 
 import dataclasses
+from functools import cache
 
 import matplotlib as mpl
 import numpy as np
@@ -153,8 +154,17 @@ CASES = {
 }
 
 
+data_of_case = cache(lambda case: CASES[case]())
+
+
+@cache
+def drawn_case(name, case):
+    """A figure that tests look at, and none changes."""
+    return FIGURES[name].draw(data_of_case(case)[name])
+
+
 def drawn(name, case="four"):
-    return FIGURES[name].draw((CASES[case]() if isinstance(case, str) else case)[name])
+    return drawn_case(name, case) if isinstance(case, str) else FIGURES[name].draw(case[name])
 
 
 def line(axes, label):
@@ -167,9 +177,8 @@ def legend_of(figure):
 
 @pytest.mark.parametrize("case", CASES)
 def test_no_words_overlap_or_leave_the_page(case):
-    data = CASES[case]()
     for name in NAMES:
-        check_words(drawn(name, data), name)
+        check_words(drawn(name, case), name)
 
 
 @pytest.mark.parametrize("name", NAMES)
@@ -210,7 +219,7 @@ def test_some_of_twenty_recordings_are_shown_from_first_to_last(name, count):
 @pytest.mark.parametrize("width", [None, 3.5])
 def test_recordings_take_no_more_room_however_many_they_are(width):
     def room(case):
-        figure = FIGURES["recordings"].draw(CASES[case]()["recordings"], width)
+        figure = FIGURES["recordings"].draw(data_of_case(case)["recordings"], width)
         boxes = [axes.get_position() for axes in figure.axes]
         return figure.get_size_inches()[1] * (max(b.y1 for b in boxes) - min(b.y0 for b in boxes))
 
@@ -423,9 +432,10 @@ def test_recorded_efficiencies_are_drawn_like_those_of_runs():
     assert {"a", "b"} <= {text for text, _ in words(drawn("residuals", {"residuals": Residuals((points,))}))}
 
 
-def test_the_same_data_give_the_same_small_files(tmp_path):
+@pytest.mark.parametrize("case", ["two", pytest.param("twenty, long names", marks=pytest.mark.slow)])
+def test_the_same_data_give_the_same_small_files(case, tmp_path):
     before = dict(mpl.rcParams)
-    data = CASES["twenty, long names"]()
+    data = data_of_case(case)
     for folder in ("first", "second"):
         written = [path for name in NAMES for path in draw_figure(name, data[name], tmp_path / folder)]
     assert [path.name for path in written] == [f"{name}.{ending}" for name in NAMES for ending in ("png", "svg", "pdf")]
@@ -438,4 +448,4 @@ def test_the_same_data_give_the_same_small_files(tmp_path):
 
 @pytest.mark.parametrize("case", CASES)
 def test_data_come_back_from_the_file_in_which_they_are_kept(case, tmp_path):
-    assert_kept(CASES[case](), tmp_path / "figures.npz")
+    assert_kept(data_of_case(case), tmp_path / "figures.npz")

@@ -75,9 +75,9 @@ def test_a_page_that_nobody_reads_is_found_out(fit):
         assert any(fault.lower() in each.lower() for each in found), fault
 
 
-def test_least_squares_alone_say_so_on_one_page():
-    for folder in ("on-body-exoskeleton", "synthetic-bench"):
-        page = summary_text(bf.fit(Path(__file__).parents[2] / "datasets" / folder, seed=1, mcmc=False))
+def test_least_squares_alone_say_so_on_one_page(least_squares_of):
+    for name in ("on-body-exoskeleton", "synthetic-bench"):
+        page = summary_text(least_squares_of(name))
         assert faults(page) == []
         assert "least squares alone" in page
 

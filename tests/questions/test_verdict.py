@@ -77,7 +77,7 @@ def test_efficiencies_above_1_are_no_fit_to_trust(tmp_path, runs, mcmc):
         assert "hold 0 of 5" not in said or NOT_DESCRIBED in fit.verdict().troubles
 
 
-@pytest.mark.parametrize("runs", [1, 2, 5])
+@pytest.mark.parametrize("runs", [1, pytest.param(2, marks=pytest.mark.slow), 5])
 def test_a_healthy_bench_is_trusted(tmp_path, runs):
     fit = bf.fit(_bench(tmp_path, runs, seed=runs), seed=1)
     assert set(fit.verdict().troubles) <= {NOT_CONVERGED}, fit.verdict().reasons  # the chain here is short

@@ -183,6 +183,13 @@ def fit(quick_fit):
     return quick_fit
 
 
+@pytest.fixture(scope="module")
+def answers(fit):
+    """What verbs answer to one who says nothing more, by their names; no test changes it."""
+    verbs = {"identify": bf.identify, "next": bf.next_measurement, "predict": bf.predict}
+    return {"compare": bf.compare({"a": fit, "b": fit}), **{name: verb(fit) for name, verb in verbs.items()}}
+
+
 def test_what_a_fit_gives_is_short_and_begins_with_the_answer(fit):
     seen = {}
     for name, value in answers_of(fit):
@@ -201,27 +208,25 @@ def test_what_a_fit_gives_is_short_and_begins_with_the_answer(fit):
     assert "to_frame" in dir(fit) and "draws" in repr(fit.posterior)
 
 
-def test_what_the_verbs_answer_is_short_and_begins_with_the_answer(fit, on_body, tmp_path):
-    answers = (
-        bf.identify(fit), bf.next_measurement(fit), bf.predict(fit), bf.predict(fit, [455]), bf.compare({"a": fit, "b": fit}),
-        bf.check(on_body), bf.read(on_body), fit.efficiency([455, 465.5]), bf.plot(fit, tmp_path, figures=["efficiency"]),
+def test_what_the_verbs_answer_is_short_and_begins_with_the_answer(fit, answers, on_body, tmp_path):
+    others = (
+        bf.predict(fit, [455]), bf.check(on_body), bf.read(on_body), fit.efficiency([455, 465.5]),
+        bf.plot(fit, tmp_path, figures=["efficiency"]),
     )  # fmt: skip
-    for answer in answers:
+    for answer in (*answers.values(), *others):
         look_at(answer)
     assert bf.check(on_body)._repr_html_().startswith("<h4>On-body knee exoskeleton</h4><p><b>Everything could be read.")
     assert bf.predict(fit, [455])[0]["mean"] == pytest.approx(fit.efficiency(455)[0].mean)
 
 
-def test_all_that_can_be_reached_from_a_result_is_short(fit, on_body):
-    compared = bf.compare({"a": fit, "b": fit})
-    results = {"compare": compared, "identify": bf.identify(fit), "next": bf.next_measurement(fit), "predict": bf.predict(fit)}
-    for name, value in {"fit": fit, "summary": fit.summary(), "optimal_length": fit.optimal_length(), **results}.items():
+def test_all_that_can_be_reached_from_a_result_is_short(fit, answers):
+    for name, value in {"fit": fit, "summary": fit.summary(), "optimal_length": fit.optimal_length(), **answers}.items():
         assert look_inside(value, name) > 3
     assert look_inside(bf.read("datasets/synthetic-recordings"), "read") > 100
-    assert list(compared.predictions["a"].to_frame()["field"])[:2] == ["elpd", "pareto_k"]
+    assert list(answers["compare"].predictions["a"].to_frame()["field"])[:2] == ["elpd", "pareto_k"]
 
 
-def test_tables_have_the_units_of_what_stands_in_them(fit):
+def test_tables_have_the_units_of_what_stands_in_them(fit, answers):
     assert fit.optimal_length().to_frame().attrs["units"]["cable_length"] == "mm"
     drawn = fit.posterior.to_frame()
     np.testing.assert_array_equal(drawn["mu1"], fit.posterior.values["mu1"].ravel())
@@ -231,8 +236,8 @@ def test_tables_have_the_units_of_what_stands_in_them(fit):
     assert fit.least_squares.to_frame().attrs["units"]["sigma_theta"] == "deg"
     predicted = bf.predict(fit, [455], (100, "N")).to_frame()
     assert predicted.attrs["units"].items() >= {"cable_length_mm": "mm", "output_force_N": "N", "q95": "N"}.items()
-    assert bf.next_measurement(fit).to_frame().attrs["units"]["sd"] == "mm"
-    assert bf.identify(fit).to_frame().attrs["units"]["mu1"] == "1"
+    assert answers["next"].to_frame().attrs["units"]["sd"] == "mm"
+    assert answers["identify"].to_frame().attrs["units"]["mu1"] == "1"
     assert set(fit.efficiency([455, 465]).to_frame()["cable_length_mm"]) == {455.0, 465.0}
 
 

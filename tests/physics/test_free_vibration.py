@@ -7,6 +7,7 @@ import numpy as np
 from bowdenfit.physics.ring_down import peaks, ring_down
 
 J, K = 1e-3, 20.0
+RING_DOWN = jax.jit(ring_down, static_argnums=7)
 
 
 def swung(time, amplitude=0.2, b=0.0, friction=0.1, inertia=J, swings=200):
@@ -14,7 +15,7 @@ def swung(time, amplitude=0.2, b=0.0, friction=0.1, inertia=J, swings=200):
         each = np.atleast_1d(inertia).astype(float)
         numbers = map(jnp.asarray, (np.full(len(each), amplitude), each, K, b, friction))
         run = jnp.zeros(len(time), dtype=int)
-        return [np.asarray(x) for x in ring_down(jnp.asarray(time), run, *numbers, swings)]
+        return [np.asarray(x) for x in RING_DOWN(jnp.asarray(time), run, *numbers, swings)]
 
 
 def test_mass_spring_and_dry_friction_lose_twice_the_friction_over_the_stiffness_a_half_swing():

@@ -54,7 +54,13 @@ BLANKS = (" ", "\t", "\u00a0", "\u2003", "\x0b", "\x0c", "\x1c", "\x85", "\u2028
 OTHERS = ("\ufeff", "\u200b", "\0", "#", "%")
 
 
-@pytest.mark.parametrize("blank", [*BLANKS, *OTHERS], ids=ascii)
+def some_slow(values, kept):
+    """Values of which a test takes these by default, and the others where slow tests are run."""
+    each = [(value, value if isinstance(value, tuple) else (value,)) for value in values]
+    return [pytest.param(*parts, marks=() if value in kept else pytest.mark.slow) for value, parts in each]
+
+
+@pytest.mark.parametrize("blank", some_slow((*BLANKS, *OTHERS), (" ", "\u2003", "\x1c", '" "', ",,,", "\0", "#")), ids=ascii)
 def test_files_may_begin_with_lines_of_blanks_of_any_kind(cable, tmp_path, tried, blank):
     replace_in(cable / "efficiencies.csv", "", f"{blank}\n" * 20)
     tried("check", cable, codes=(0, 2), names="efficiencies.csv")
@@ -62,15 +68,16 @@ def test_files_may_begin_with_lines_of_blanks_of_any_kind(cable, tmp_path, tried
     tried("check", tmp_path / "run.csv", "--wrap-angle=180deg", codes=(0, 2), names="run.csv")
 
 
-@pytest.mark.parametrize(
-    "blank", [b if i % 4 == 0 else pytest.param(b, marks=pytest.mark.slow) for i, b in enumerate((*BLANKS, *OTHERS))], ids=ascii
-)
+@pytest.mark.parametrize("blank", some_slow((*BLANKS, *OTHERS), (" ", "\x0b", "\u2028", ";;;", "\u200b")), ids=ascii)
 def test_files_of_nothing_but_blanks_are_refused(tmp_path, tried, blank):
     (tmp_path / "run.csv").write_text(f"{blank}\n" * 2000)
     tried("check", tmp_path / "run.csv", "--wrap-angle=180deg", names="run.csv")
 
 
-@pytest.mark.parametrize("cell", ["x" * 140_000, "1" * 140_000, '"' + "a\n" * 70_000 + '"', '"' + "x" * 140_000])
+CELLS = ("x" * 140_000, "1" * 140_000, '"' + "a\n" * 70_000 + '"', '"' + "x" * 140_000)
+
+
+@pytest.mark.parametrize("cell", some_slow(CELLS, (CELLS[2],)), ids=["letters", "digits", "lines", "open"])
 def test_cells_of_any_length_are_refused_in_a_short_sentence(cable, tmp_path, tried, cell):
     for line in (0, 1, 2):
         text = (cable / "angles.csv").read_text().splitlines()
@@ -92,7 +99,7 @@ NAMES = (
 )  # fmt: skip
 
 
-@pytest.mark.parametrize("name", NAMES)
+@pytest.mark.parametrize("name", some_slow(NAMES, NAMES[::2]))
 def test_files_that_no_data_set_has_are_refused_by_their_names(cable, tried, name):
     (cable / "loop.csv").symlink_to("loop.csv")
     (cable / "folder").mkdir()
@@ -117,15 +124,23 @@ def test_descriptions_that_nobody_would_write_are_refused(cable, tried, what):
         tried("check", cable, "--set", TOML[what])
 
 
-@pytest.mark.parametrize("value", ["0x" + "f" * 5000, "1e308", "-1e300", "nan", "inf", "[]", "{}", "1979-05-27"])
-@pytest.mark.parametrize("key", ["name", "schema", "route.range", "friction.mu1.fixed", "sampler.max_steps"])
+KEYS = ("name", "schema", "route.range", "friction.mu1.fixed", "sampler.max_steps")
+VALUES = ("0x" + "f" * 5000, "1e308", "-1e300", "nan", "inf", "[]", "{}", "1979-05-27")
+PAIRS = [(key, value) for key in KEYS for value in VALUES]
+
+
+@pytest.mark.parametrize(("key", "value"), some_slow(PAIRS, PAIRS[::3]))
 def test_settings_take_no_value_that_is_none(cable, tried, key, value):
     tried("check", cable, "--set", f"{key}={value}", codes=(2,) if value != "1e308" else (0, 2))
 
 
-@pytest.mark.parametrize("ending", ["csv", "txt", "lvm", "toml", "mat", "h5", "xlsx", "parquet", "mf4", "tdms", "bag", "cmbl"])
-@pytest.mark.parametrize("head", [b"", b"MATLAB 5.0", b"PK\x03\x04"])
-def test_files_larger_than_the_memory_are_refused_unread(tmp_path, tried, ending, head):
+HEADS = (b"", b"MATLAB 5.0", b"PK\x03\x04")
+ENDINGS = ("csv", "txt", "lvm", "toml", "mat", "h5", "xlsx", "parquet", "mf4", "tdms", "bag", "cmbl")
+LARGE = [(head, ending) for head in HEADS for ending in ENDINGS]
+
+
+@pytest.mark.parametrize(("head", "ending"), some_slow(LARGE, [*LARGE[:12], *LARGE[16::6]]))
+def test_files_larger_than_the_memory_are_refused_unread(tmp_path, tried, head, ending):
     path = tmp_path / f"large.{ending}"
     with path.open("wb") as file:
         file.write(head)

@@ -148,7 +148,7 @@ def page_width(width: Quantity | None) -> float | None:
     from bowdenfit.units import conversion_factor
 
     value, unit = width
-    inches = value * conversion_factor(unit, "length") / conversion_factor("in", "length")
+    inches = round(value * conversion_factor(unit, "length") / conversion_factor("in", "length"), 9)
     if not NARROWEST <= inches <= WIDEST:
         raise UsageError(
             f"figures cannot be {value:g} {unit} wide; say a width from {NARROWEST:g} in to {WIDEST:g} in, such as 3.5in for a "

@@ -11,7 +11,7 @@ import pytest
 from matplotlib.figure import Figure
 
 import bowdenfit as bf
-from bowdenfit.questions.figures import FIGURES, figures_of
+from bowdenfit.questions.figures import FIGURES, figures_of, page_width
 
 
 @pytest.fixture(scope="module")
@@ -62,3 +62,10 @@ def test_a_figure_chooses_no_backend_and_loads_no_pyplot(on_body):
     )
     found = subprocess.run([sys.executable, "-W", "error", "-c", code], capture_output=True, text=True, check=False)
     assert found.stdout.split() == ["False", "False"], found
+
+
+@pytest.mark.parametrize(("least", "unit"), [(3, "in"), (76.2, "mm"), (7.62, "cm")])
+def test_figures_may_be_as_wide_as_is_said_and_no_narrower(least, unit):
+    assert page_width((least, unit)) == 3.0
+    with pytest.raises(bf.UsageError, match="say a width from 3 in to 20 in"):
+        page_width((0.999 * least, unit))

@@ -3,6 +3,7 @@
 import numpy as np
 import pytest
 from cables import measured
+from slow_cases import some_slow
 
 import bowdenfit as bf
 from bowdenfit.inference.least_squares import least_squares, maximum_posterior
@@ -91,7 +92,7 @@ def estimates_of(tables, design, truth, seeds):
 USUAL = ("a single load", "one wrap angle", "a loop that is always slack")
 
 
-@pytest.mark.parametrize("case", [c if c in USUAL else pytest.param(c, marks=pytest.mark.slow) for c in CASES])
+@pytest.mark.parametrize("case", some_slow(CASES, USUAL))
 @pytest.mark.parametrize("seeds", [(0,), pytest.param((1, 2), marks=pytest.mark.slow)], ids=["a seed", "others"])
 def test_what_the_data_cannot_tell_is_not_identified_and_no_error_bar_is_too_small(case, seeds):
     tables, design, truth, untold, warning = CASES[case]

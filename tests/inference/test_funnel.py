@@ -11,6 +11,7 @@ import jax.numpy as jnp
 import numpy as np
 import pytest
 from scipy import stats
+from slow_cases import some_slow
 from test_proposals import LEVELS, PROPOSALS, run_side_by_side, without_its_volume
 
 from bowdenfit.description import SamplerSettings
@@ -128,10 +129,7 @@ def moved_along_the_ridge(funnel, moves, change=lambda frame: frame) -> np.ndarr
     return run_side_by_side(moves, posterior.log_density, funnel.draw(3), 1200, 3, frames, posterior.data)[30:]
 
 
-USUAL = ("independent", "differential evolution")
-
-
-@pytest.mark.parametrize("name", [n if n in USUAL else pytest.param(n, marks=pytest.mark.slow) for n in PROPOSALS])
+@pytest.mark.parametrize("name", some_slow(PROPOSALS, ("independent", "differential evolution")))
 def test_every_move_along_the_ridge_leaves_the_funnel_as_it_is(name, narrow):
     """Alone, from starts in the funnel; p < 0.001 by chance once in a thousand seeds."""
     assert narrow.p_value(moved_along_the_ridge(narrow, [(PROPOSALS[name], 1.0)])) > 0.001

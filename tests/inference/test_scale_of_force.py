@@ -12,6 +12,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 from densities import over_rows
+from slow_cases import some_slow
 
 import bowdenfit as bf
 from bowdenfit.inference.log_density import LogDensity
@@ -164,7 +165,7 @@ def spoiled(folder: Path, fault, factor: float) -> Path:
     return folder
 
 
-@pytest.mark.parametrize("name", [n if "rougher" not in n else pytest.param(n, marks=pytest.mark.slow) for n in FAULTS])
+@pytest.mark.parametrize("name", some_slow(FAULTS, [name for name in FAULTS if "rougher" not in name]))
 def test_the_verdict_does_not_depend_on_how_strong_a_bench_is(name, tmp_path):
     """What is wrong, which sentences say it (but for their numbers), and the coefficients; by least squares."""
     fault, expected = FAULTS[name]

@@ -1,11 +1,11 @@
 """The figures of stretch, preload and loops: what they draw, of how many, and how they are written."""
 
 import dataclasses
-from functools import cache
 
 import matplotlib as mpl
 import numpy as np
 import pytest
+from drawn_once import DrawnOnce
 from figure_words import assert_readable, check_words, words
 from kept_data import assert_kept
 
@@ -186,27 +186,12 @@ CASES = {
 }
 
 
-@cache
-def data_of(case):
-    return CASES[case]()
-
-
-@cache
-def drawn_case(name, case):
-    """The figure of a case, laid out; no test changes it."""
-    figure = FIGURES[name].draw(data_of(case)[name])
-    figure.draw_without_rendering()
-    return figure
-
-
-@pytest.fixture(scope="module", autouse=True)
-def no_figures_left():
-    yield
-    drawn_case.cache_clear()
+ONCE = DrawnOnce(CASES)
+forget = ONCE.forgotten()
 
 
 def drawn(name, case="four angles"):
-    return drawn_case(name, case) if isinstance(case, str) else FIGURES[name].draw(case[name])
+    return ONCE.figure(name, case) if isinstance(case, str) else FIGURES[name].draw(case[name])
 
 
 def line(axes, label):
@@ -252,6 +237,7 @@ def test_every_axis_is_labeled_or_shares_one_that_is(name, case):
 @pytest.mark.parametrize("case", CASES)
 def test_no_legend_covers_a_panel_or_a_title(name, case):
     figure = drawn(name, case)
+    figure.draw_without_rendering()
     own = [axes.get_legend() for axes in figure.axes if axes.get_legend()]
     for legend in (*figure.legends, *own):
         box = legend.get_window_extent()
@@ -476,6 +462,7 @@ def test_a_slack_load_outside_the_shown_forces_is_left_out():
 @pytest.mark.parametrize("case", CASES)
 def test_the_branches_are_named_clear_of_the_loop(case):
     figure = drawn("loops", case)
+    figure.draw_without_rendering()
     for axes in figure.axes:
         curves = [a for a in axes.get_lines() if a.get_label().startswith(("Forward", "Back", "Read"))]
         for box in (text.get_window_extent() for text in axes.texts):

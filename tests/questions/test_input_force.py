@@ -1,5 +1,6 @@
 """What input force a wanted output force takes: the inverse of every prediction of an output force."""
 
+from itertools import product
 from pathlib import Path
 
 import jax
@@ -8,6 +9,7 @@ import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
+from slow_cases import some_slow
 
 import bowdenfit as bf
 from bowdenfit.errors import UsageError
@@ -38,15 +40,10 @@ def fit(table):
 
 @pytest.mark.parametrize(
     ("friction", "stroke"),
-    [
-        ("capstan", 1),
-        ("drag", 1),
-        ("load-dependent", 1),
-        ("stroke-dependent", -1),
-        ("drag+load-dependent", -1),
-        *(pytest.param(name, -1, marks=pytest.mark.slow) for name in ("capstan", "drag", "load-dependent")),
-        *(pytest.param(name, 1, marks=pytest.mark.slow) for name in ("stroke-dependent", "drag+load-dependent")),
-    ],
+    some_slow(
+        product(("capstan", "drag", "load-dependent", "stroke-dependent", "drag+load-dependent"), (1, -1)),
+        [("capstan", 1), ("drag", 1), ("load-dependent", 1), ("stroke-dependent", -1), ("drag+load-dependent", -1)],
+    ),
 )
 def test_the_input_force_for_an_output_force_gives_that_output_force(friction, stroke, table):
     model = build_model(read(table, friction=friction))

@@ -1,12 +1,15 @@
 """Comparisons of fits with few mountings: parts of a run left out, the effect of its mounting integrated out."""
 
 from dataclasses import replace
+from itertools import product
 
 import hand_bench
 import jax
 import jax.numpy as jnp
 import numpy as np
 import pytest
+from conftest import QUICK
+from slow_cases import some_slow
 
 import bowdenfit as bf
 from bowdenfit.dataset import load_dataset
@@ -19,7 +22,6 @@ from bowdenfit.model import build_model
 from bowdenfit.questions.compare.words import comparison_text
 
 LOADS = (20, 40, 60, 80, 100, 120)
-QUICK = ("sampler.n_walkers=64", "sampler.target_ess=300", "sampler.target_r_hat=1.05", "sampler.max_steps=4000")
 
 
 def bench(folder, runs=1, drag=0.0, seed=1):
@@ -32,12 +34,7 @@ def bench(folder, runs=1, drag=0.0, seed=1):
 
 @pytest.mark.parametrize(
     ("unit", "friction"),
-    [
-        ("load", "drag"),
-        ("reading", "capstan"),
-        pytest.param("load", "capstan", marks=pytest.mark.slow),
-        pytest.param("reading", "drag", marks=pytest.mark.slow),
-    ],
+    some_slow(product(("load", "reading"), ("capstan", "drag")), [("load", "drag"), ("reading", "capstan")]),
 )
 def test_leaving_out_a_part_is_the_likelihood_of_the_other_readings(tmp_path, friction, unit):
     """Against the term of a table without those readings, at several places of the posterior."""

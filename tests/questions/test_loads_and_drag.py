@@ -102,12 +102,13 @@ def test_what_was_measured_says_what_lies_outside():
     assert Measured(None, None, "").notes(None, 5.0) == ["no table says at which loads"]
 
 
-def test_the_figure_of_the_efficiency_says_at_which_force_its_curve_holds(tmp_path, on_body_squares):
+def test_the_figure_of_the_efficiency_says_at_which_force_its_curve_holds(tmp_path):
     lengths = (440.0, 480.0, 520.0, 540.0)
     rows = pull(np.random.default_rng(6), lengths, [0.5, 0.4, 0.3, 0.25], LOADS, noise=(0.05, 0.05), drag=HIDDEN)
     write(tmp_path, rows, LENGTHS.replace("gaussian", "line"), "cable_length_mm")
     angles = "\n".join(f"{at},{180 - (at - 440) * 0.9}" for at in range(440, 541, 10))
     (tmp_path / "angles.csv").write_text(f"cable_length_mm,sheath_angle_deg\n{angles}\n")
-    for fit, says in ((bf.fit(tmp_path, friction="drag", mcmc=False), "curve at 14 N"), (on_body_squares, "")):
-        label = draw(data(fit)).axes[0].get_ylabel()
+    for friction, says in (("drag", "curve at 14 N"), ("capstan", "")):
+        figure = draw(data(bf.fit(tmp_path, friction=friction, mcmc=False)))
+        label = figure.axes[0].get_ylabel()
         assert label.partition("\n")[2] == says, label

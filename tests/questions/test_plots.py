@@ -7,12 +7,12 @@ import re
 import subprocess
 import sys
 import zlib
-from functools import cache
 from types import SimpleNamespace
 
 import matplotlib as mpl
 import numpy as np
 import pytest
+from drawn_once import DrawnOnce
 from figure_words import assert_readable, check_words, words
 from fontTools import subset
 from fontTools.ttLib import TTFont
@@ -204,14 +204,12 @@ CASES = {
 ALL = ["wrap_angles", "efficiency", "residuals", "coefficients", "pairs", "traces"]
 
 
-@cache
-def drawn_case(case):
-    """Figures of a case by name; no test changes them."""
-    return {name: FIGURES[name].draw(each) for name, each in CASES[case]().items()}
+ONCE = DrawnOnce(CASES)
+forget = ONCE.forgotten()
 
 
 def drawn(name, data=None):
-    return drawn_case("on body")[name] if data is None else FIGURES[name].draw(data[name])
+    return ONCE.figure(name, "on body") if data is None else FIGURES[name].draw(data[name])
 
 
 def line(axes, label):
@@ -254,15 +252,14 @@ def test_another_process_reads_what_figures_show_without_a_model_or_matplotlib(f
 
 @pytest.mark.parametrize("case", CASES)
 def test_no_words_overlap_or_leave_the_page(case):
-    for name, figure in drawn_case(case).items():
-        check_words(figure, name)
+    for name in ONCE.data(case):
+        check_words(ONCE.figure(name, case), name)
 
 
 @pytest.mark.parametrize("case", CASES)
 def test_every_axis_says_what_it_shows_or_shares_one_that_does(case):
-    figures = drawn_case(case)
-    for name in figures.keys() - {"pairs", "traces"}:
-        for axes in figures[name].axes:
+    for name in ONCE.data(case).keys() - {"pairs", "traces"}:
+        for axes in ONCE.figure(name, case).axes:
             assert any(other.get_xlabel() for other in axes.get_shared_x_axes().get_siblings(axes))
             lists_rows = name == "residuals"
             assert lists_rows or any(other.get_ylabel() for other in axes.get_shared_y_axes().get_siblings(axes))

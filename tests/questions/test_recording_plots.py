@@ -1,11 +1,11 @@
 """The figures of force recordings: what they draw, of how many, and how they are written."""
 
 import dataclasses
-from functools import cache
 
 import matplotlib as mpl
 import numpy as np
 import pytest
+from drawn_once import DrawnOnce
 from figure_words import check_words, words
 from kept_data import assert_kept
 
@@ -154,17 +154,12 @@ CASES = {
 }
 
 
-data_of_case = cache(lambda case: CASES[case]())
-
-
-@cache
-def drawn_case(name, case):
-    """A figure that tests look at, and none changes."""
-    return FIGURES[name].draw(data_of_case(case)[name])
+ONCE = DrawnOnce(CASES)
+forget = ONCE.forgotten()
 
 
 def drawn(name, case="four"):
-    return drawn_case(name, case) if isinstance(case, str) else FIGURES[name].draw(case[name])
+    return ONCE.figure(name, case) if isinstance(case, str) else FIGURES[name].draw(case[name])
 
 
 def line(axes, label):
@@ -219,7 +214,7 @@ def test_some_of_twenty_recordings_are_shown_from_first_to_last(name, count):
 @pytest.mark.parametrize("width", [None, 3.5])
 def test_recordings_take_no_more_room_however_many_they_are(width):
     def room(case):
-        figure = FIGURES["recordings"].draw(data_of_case(case)["recordings"], width)
+        figure = FIGURES["recordings"].draw(ONCE.data(case)["recordings"], width)
         boxes = [axes.get_position() for axes in figure.axes]
         return figure.get_size_inches()[1] * (max(b.y1 for b in boxes) - min(b.y0 for b in boxes))
 
@@ -435,7 +430,7 @@ def test_recorded_efficiencies_are_drawn_like_those_of_runs():
 @pytest.mark.parametrize("case", ["two", pytest.param("twenty, long names", marks=pytest.mark.slow)])
 def test_the_same_data_give_the_same_small_files(case, tmp_path):
     before = dict(mpl.rcParams)
-    data = data_of_case(case)
+    data = ONCE.data(case)
     for folder in ("first", "second"):
         written = [path for name in NAMES for path in draw_figure(name, data[name], tmp_path / folder)]
     assert [path.name for path in written] == [f"{name}.{ending}" for name in NAMES for ending in ("png", "svg", "pdf")]
@@ -448,4 +443,4 @@ def test_the_same_data_give_the_same_small_files(case, tmp_path):
 
 @pytest.mark.parametrize("case", CASES)
 def test_data_come_back_from_the_file_in_which_they_are_kept(case, tmp_path):
-    assert_kept(data_of_case(case), tmp_path / "figures.npz")
+    assert_kept(ONCE.data(case), tmp_path / "figures.npz")

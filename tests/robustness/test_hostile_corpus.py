@@ -5,6 +5,7 @@ import shutil
 
 import pytest
 from attempts import Attempts
+from slow_cases import some_slow
 
 SECONDS, MEMORY = 10.0, 400 << 20
 TABLE = "time (s),input force (N),output force (N)\n" + "".join(f"{i / 100},{40 + i % 9},{30 + i % 9}\n" for i in range(200))
@@ -52,12 +53,6 @@ def replace_in(path, old, new):
 
 BLANKS = (" ", "\t", "\u00a0", "\u2003", "\x0b", "\x0c", "\x1c", "\x85", "\u2028", '""', '" "', ",,,", ";;;", "|", "'")
 OTHERS = ("\ufeff", "\u200b", "\0", "#", "%")
-
-
-def some_slow(values, kept):
-    """Values of which a test takes these by default, and the others where slow tests are run."""
-    each = [(value, value if isinstance(value, tuple) else (value,)) for value in values]
-    return [pytest.param(*parts, marks=() if value in kept else pytest.mark.slow) for value, parts in each]
 
 
 @pytest.mark.parametrize("blank", some_slow((*BLANKS, *OTHERS), (" ", "\u2003", "\x1c", '" "', ",,,", "\0", "#")), ids=ascii)

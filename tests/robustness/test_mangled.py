@@ -1,6 +1,6 @@
 """Valid tables, descriptions, options and files mangled at random: each is read, or refused in sentences; never anything else.
 
-By default some 600 cases; with the marker `slow` 50,000 others.
+By default some 1,000 cases; with the marker `slow` 50,000 others.
 """
 
 import resource

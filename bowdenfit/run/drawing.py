@@ -24,29 +24,32 @@ class Drawing:
 
     Attributes:
         data: What each figure shows, by its name.
+        mark: See `mark_of`; empty as long as it is not known.
     """
 
     def __init__(self, found: "Fit", folder: Path, helper: Assistant) -> None:
         self.data: dict[str, Any] = {}
+        self.mark = ""
         self._found, self._folder, self._helper = found, folder, helper
         self._drawn: dict[str, Future[Any]] = {}
         self._failed: dict[str, Exception] = {}
 
     def begin(self) -> None:
         """Ask for all of them, first those whose data are there before it is known whether the fit can be trusted."""
-        self._ask(AT_ONCE, "")
-        mark = mark_of(verdict(self._found).troubles)
-        self._ask([name for name in FIGURES if name not in AT_ONCE], mark)
-        if mark:
+        self._ask(AT_ONCE)
+        self.mark = mark_of(verdict(self._found).troubles)
+        self._ask(name for name in FIGURES if name not in AT_ONCE)
+        if self.mark:
             failed = self.failed()  # once these are drawn, so that none is drawn twice at a time
-            self._ask([name for name in AT_ONCE if name not in failed], mark)
+            self._ask(name for name in AT_ONCE if name not in failed)
 
-    def _ask(self, names: Iterable[str], mark: str) -> None:
+    def _ask(self, names: Iterable[str]) -> None:
         for name in names:
             try:
-                self.data.update(() if name in self.data else figures_of(self._found, [name]))
+                if name not in self.data:
+                    self.data |= dict(figures_of(self._found, [name]))
                 if name in self.data:
-                    of = name, self.data[name], self._folder, FORMATS, self._found.name, None, mark
+                    of = name, self.data[name], self._folder, FORMATS, self._found.name, None, self.mark
                     self._drawn[name] = self._helper.submit(draw_figure, *of)  # meanwhile, the next
             except Exception as error:
                 self._failed[name] = error

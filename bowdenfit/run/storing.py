@@ -35,11 +35,10 @@ def write_results(found: "Fit", folder: Path, figures: bool, helper: Assistant) 
         StoreError: The fit itself, or for want of room what belongs to it, could not be written.
     """
     from bowdenfit.questions.figures import FIGURES as FIGURE_NAMES
-    from bowdenfit.questions.figures import captions_of, mark_of
+    from bowdenfit.questions.figures import captions_of
     from bowdenfit.questions.kept import answers_of
     from bowdenfit.questions.report.sections import report_page
     from bowdenfit.questions.summary.brief_words import summary_text
-    from bowdenfit.questions.summary.verdict import verdict
     from bowdenfit.questions.summary.words import full_text
     from bowdenfit.questions.writing import write_page
     from bowdenfit.results.captions import write_captions
@@ -68,8 +67,7 @@ def write_results(found: "Fit", folder: Path, figures: bool, helper: Assistant) 
         failed |= drawing.failed() | {REPORT: error}
     try:
         if data:
-            mark = mark_of(verdict(found).troubles)
-            captions = captions_of({name: data[name] for name in data.keys() - failed}, found.name, mark)
+            captions = captions_of({name: data[name] for name in data.keys() - failed}, found.name, drawing.mark)
             write_captions(captions, folder / FIGURES)
             if failed.keys().isdisjoint(FIGURE_NAMES):
                 keep_drawn(folder, captions)

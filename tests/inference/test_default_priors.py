@@ -215,10 +215,7 @@ BELLS_ONCE = (1.5, 3.0, half_normal(0.5), half_normal(np.deg2rad(5.0)))
     [*((width, SOME[1]) for width in SOME[0]), *(pytest.param(w, MANY[1], marks=pytest.mark.slow) for w in MANY[0])],
 )
 def test_intervals_of_narrow_and_wide_bells_hold(width, n):
-    """90 % of n within 4 standard deviations below: of five quantities of a bell chance fails one in five thousand.
-
-    Of 40 bells, of which so many are whole numbers, it fails one in five hundred.
-    """
+    """90 % of n within 4 standard deviations below: of five quantities chance fails one in 500 of 40, one in 1600 of 400."""
     held = held_of_bells(width, n, BELLS_NOW)
     assert min(held.values()) > 0.9 - 4 * np.sqrt(0.09 / n), held
 

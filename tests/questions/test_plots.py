@@ -366,6 +366,15 @@ def test_an_optimum_at_the_edge_is_said_to_be_there():
     ]
 
 
+@pytest.mark.parametrize("width", [3.0, 3.5, 7.0])
+def test_what_is_said_of_an_edge_stands_beside_the_density(width):
+    figure = FIGURES["efficiency"].draw(at_the_edge()["efficiency"], width)
+    figure.draw_without_rendering()
+    said = [(axes, text) for axes in figure.axes for text in axes.texts if text.get_text().startswith("at an end of")]
+    ((axes, text),) = said
+    assert text.get_window_extent().width <= 0.45 * axes.get_window_extent().width
+
+
 def test_coefficients_show_prior_posterior_and_least_squares():
     data = paper_data()
     axes = drawn("coefficients", data).axes

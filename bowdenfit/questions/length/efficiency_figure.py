@@ -10,7 +10,7 @@ import numpy as np
 from bowdenfit.plots.bands import BAND_QUANTILES, NEW_RUN, Band, draw_band, route_limits, shade_outside
 from bowdenfit.plots.captions import strip_words
 from bowdenfit.plots.densities import GRID_POINTS, density
-from bowdenfit.plots.layout import TITLE, legend_above, panels
+from bowdenfit.plots.layout import TITLE, legend_above, panels, wrapped
 from bowdenfit.plots.strips import STRIP, finish_strips, name_strip, place_names
 from bowdenfit.plots.style import (
     BLACK,
@@ -205,8 +205,10 @@ def _optimum(axes: Axes, data: AlongRoute, optimum: OptimalLength) -> None:
     axes.locator_params(axis="y", nbins=3)
     if optimum.at_edge > LEAST_AT_EDGE:
         left = bool(optimum.length.median > np.mean(data.route_range))
+        said = f"at an end of the range with {percent(round(optimum.at_edge, 3))} probability"
+        room = 0.4 * axes.bbox.width / axes.figure.dpi  # beside the density
         axes.text(
-            0.03 if left else 0.97, 0.9, f"at an end of the range with {percent(round(optimum.at_edge, 3))} probability",
+            0.03 if left else 0.97, 0.9, wrapped(said, room),
             transform=axes.transAxes, ha="left" if left else "right", va="top", fontsize=SMALL,
         )  # fmt: skip
 

@@ -12,6 +12,7 @@ from typing import Annotated, Any, ForwardRef, Literal, TypeAlias, TypeVar, get_
 
 Quantity: TypeAlias = tuple[float, str]  # a number and its unit
 Length: TypeAlias = float | Quantity  # a number of the route's unit, or with its own
+A_DATASET = "my-cable, a folder with a cable.toml, which `bowdenfit init my-cable` begins"
 LARGEST_SEED = 2**31 - 1
 NOT_TRUSTED = 3  # exit code
 Function = TypeVar("Function", bound=Callable[..., Any])
@@ -47,11 +48,13 @@ class Argument:
         name: In capitals in the help.
         many: Whether there may be several.
         results: Whether it is the results folder of a fit, of which the function takes the fit.
+        such_as: An example, and where it comes from; said where nothing is named.
     """
 
     name: str
     many: bool = False
     results: bool = False
+    such_as: str = "fits/my-cable, which `bowdenfit fit my-cable` writes"
 
 
 @dataclass(frozen=True)

@@ -41,9 +41,11 @@ class Keyword:
     def parameter(self) -> click.Parameter:
         """The argument or option of click."""
         if isinstance(self.mark, Argument):
-            kind = str if self._is(Sequence[Length]) else click.Path(path_type=Path)
-            many, metavar = (-1, f"[{self.mark.name}]...") if self.mark.many else (1, self.mark.name)
-            return click.Argument([self.name], type=kind, nargs=many, metavar=metavar)
+            many = -1 if self.mark.many else 1
+            if self._is(Sequence[Length]):  # read later; of none, all are meant
+                return click.Argument([self.name], nargs=many, metavar=f"[{self.mark.name}]...", required=False)
+            metavar = self.mark.name + "..." * self.mark.many
+            return click.Argument([self.name], type=_Named(self.mark), nargs=many, metavar=metavar, required=True)
         shown = self.default is not None and self.default != () and not self._is(bool)
         default = f"  [default: {self.mark.default}]" if self.mark.default else ""
         extra: dict[str, Any] = {"metavar": self.mark.metavar} if self.mark.metavar else {}
@@ -107,6 +109,18 @@ class Keyword:
             if kind is int:
                 return click.IntRange(mark.least, mark.most)
         return bool if self._is(bool) else click.Path(path_type=Path) if self._is(Path) else str
+
+
+class _Named(click.Path):
+    """A path; where none is named, an example is."""
+
+    def __init__(self, mark: Argument) -> None:
+        super().__init__(path_type=Path)
+        self.mark = mark
+
+    def get_missing_message(self, param: click.Parameter, ctx: click.Context | None) -> str:  # noqa: ARG002
+        """What click says behind the name of what is missing."""
+        return f"Name {'some' if self.mark.many else 'one'}, such as {self.mark.such_as}."
 
 
 def keywords_of(function: Callable[..., Any]) -> tuple[Keyword, ...]:

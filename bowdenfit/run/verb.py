@@ -11,7 +11,7 @@ from bowdenfit.inference.engines.processes import settings_of_process
 from bowdenfit.questions.summary.verb import reply
 from bowdenfit.reading import Reading, read, refuse_unknown
 from bowdenfit.results.folder import CHAIN
-from bowdenfit.verb import LARGEST_SEED, NOT_TRUSTED, Argument, Option, Output, Reply, Verb, Watch
+from bowdenfit.verb import A_DATASET, LARGEST_SEED, NOT_TRUSTED, Argument, Option, Output, Reply, Verb, Watch
 from bowdenfit.words import percent
 
 if TYPE_CHECKING:
@@ -21,7 +21,7 @@ if TYPE_CHECKING:
 
 
 def fit(
-    dataset: Annotated["str | Path | Dataset", Argument("DATASET")],
+    dataset: Annotated["str | Path | Dataset", Argument("DATASET", such_as=A_DATASET)],
     *,
     output: Annotated[Output, Option(("-o",), default="fits/NAME OF DATASET")] = None,
     mcmc: Annotated[bool, Option()] = True,

@@ -17,32 +17,15 @@ import numpy as np
 import pytest
 
 import bowdenfit as bf
+from bowdenfit import verbs
 from bowdenfit.cli.progress import watch_verb
 from bowdenfit.inference.chain import Progress
 from bowdenfit.verbs import FIT
 
 ROOT = Path(__file__).parents[2]
 QUICK = ("sampler.n_walkers=64", "sampler.target_ess=200", "sampler.target_r_hat=1.05", "sampler.max_steps=4000")
-VERBS = (
-    "init",
-    "check",
-    "fit",
-    "summary",
-    "predict",
-    "length",
-    "identify",
-    "compare",
-    "compensate",
-    "teleoperate",
-    "next",
-    "export",
-    "calibrate",
-    "fleet",
-    "plot",
-    "report",
-    "simulate",
-    "completion",
-)
+ASKING = tuple(verb.name or verb.function.__name__ for verb in verbs.VERBS)
+VERBS = ("init", *ASKING, "completion")
 OF_LIBRARIES = ("JAX_", "XLA_", "MPL", "OMP_")  # what variables begin with that tell libraries what to do
 
 
@@ -66,6 +49,13 @@ def test_every_verb_explains_itself(run, verb):
     assert code == 0
     assert len(out.splitlines()) > 5
     assert not [line for line in out.splitlines() if len(line) > 80 or "\\" in line]
+
+
+@pytest.mark.parametrize("verb", ASKING)
+def test_every_verb_says_what_to_name_where_nothing_is(run, verb):
+    code, out, err = run(verb)
+    assert (code, out) == (2, "")
+    assert re.search(r"Missing argument '[A-Z]+(\.\.\.)?'\. Name (one|some), such as .+\.$", err), err
 
 
 def test_init_writes_a_template_once(run, tmp_path):

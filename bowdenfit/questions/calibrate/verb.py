@@ -12,7 +12,7 @@ from bowdenfit.inference.engines.memory import refuse_too_little
 from bowdenfit.notebook import watched
 from bowdenfit.reading import Reading, read, refuse_unknown
 from bowdenfit.results.folder import REPLICATIONS
-from bowdenfit.verb import LARGEST_SEED, Argument, Option, Output, Reply, Verb, Watch
+from bowdenfit.verb import A_DATASET, LARGEST_SEED, Argument, Option, Output, Reply, Verb, Watch
 
 if TYPE_CHECKING:
     from bowdenfit.dataset import Dataset
@@ -25,7 +25,7 @@ Report = Callable[[int, int], None]
 
 
 def calibrate(
-    dataset: Annotated["str | Path | Dataset", Argument("DATASET")],
+    dataset: Annotated["str | Path | Dataset", Argument("DATASET", such_as=A_DATASET)],
     *,
     replications: Annotated[int, Option(("-n",), least=2)] = 200,
     engine: Annotated["str | Executor", Option(metavar="ENGINE")] = "local",

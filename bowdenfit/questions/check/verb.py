@@ -5,7 +5,7 @@ from typing import TYPE_CHECKING, Annotated, Unpack
 
 from bowdenfit.errors import DatasetError
 from bowdenfit.reading import Reading, read
-from bowdenfit.verb import Argument, Option, Reply, Verb, with_named_keywords
+from bowdenfit.verb import A_DATASET, Argument, Option, Reply, Verb, with_named_keywords
 
 if TYPE_CHECKING:
     from bowdenfit.dataset import Dataset
@@ -81,7 +81,7 @@ def show_priors(dataset: "Dataset", folder: str | Path, seed: int = 0) -> "Prior
 
 
 def describe(
-    dataset: Annotated[Path, Argument("DATASET")],
+    dataset: Annotated[Path, Argument("DATASET", such_as=A_DATASET)],
     *,
     prior_predictive: Annotated[Path | None, Option(metavar="FOLDER")] = None,
     **reading: Unpack[Reading],

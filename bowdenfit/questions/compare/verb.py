@@ -15,7 +15,10 @@ NAME = "comparison"
 
 
 def compare(
-    fits: Annotated["Mapping[str, Record]", Argument("RESULTS", many=True, results=True)],
+    fits: Annotated[
+        "Mapping[str, Record]",
+        Argument("RESULTS", many=True, results=True, such_as="fits/one-model fits/another, which `bowdenfit fit` writes"),
+    ],
     *,
     leave_out: Annotated[Literal["run", "load", "reading"] | None, Option(default="run, or load where runs are few")] = None,
     output: Annotated[Output, Option(("-o",))] = None,

@@ -27,7 +27,7 @@ Report = Callable[[int, int, float], None]
 
 
 def fleet(
-    folder: Annotated["str | Path", Argument("FOLDER")],
+    folder: Annotated["str | Path", Argument("FOLDER", such_as="my-fleet, with its fleet.toml and fleet.csv")],
     *,
     output: Annotated[Output, Option(("-o",), default="fits/NAME OF FOLDER")] = None,
     engine: Annotated["str | Executor", Option(metavar="ENGINE")] = "local",

@@ -22,7 +22,10 @@ _REACH, _PINS = 4.0, 21  # standard deviations on both sides that profiles cover
 
 
 def identify(
-    source: Annotated["str | Path | Dataset | Record", Argument("SOURCE")],
+    source: Annotated[
+        "str | Path | Dataset | Record",
+        Argument("SOURCE", such_as="fits/my-cable, the results of a fit, or my-cable, a data set"),
+    ],
     *,
     output: Annotated[Output, Option(("-o",))] = None,
     **reading: Unpack[Reading],

@@ -9,7 +9,9 @@ if TYPE_CHECKING:
     from bowdenfit.questions.metabolic.answer import Metabolic
 
 
-def metabolic(dataset: Annotated["str | Path", Argument("DATASET")]) -> "Metabolic":
+def metabolic(
+    dataset: Annotated["str | Path", Argument("DATASET", such_as="my-study, a folder with a metabolic.toml")],
+) -> "Metabolic":
     """What a study of metabolic cost shows: paired differences with intervals, and what of its numbers cannot be right.
 
     Args:

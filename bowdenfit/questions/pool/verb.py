@@ -19,7 +19,7 @@ _MOST_TURNS = 100
 
 
 def pool(
-    results: Annotated["str | Path", Argument("FLEET")],
+    results: Annotated["str | Path", Argument("FLEET", such_as="fits/my-fleet, which `bowdenfit fleet my-fleet` writes")],
     *,
     until: Annotated[Quantity | None, Option(metavar="EFFICIENCY", example="60%")] = None,
     wrap_angles: Annotated[Sequence[str], Option(("--wrap-angle",), metavar="COEFFICIENT=ANGLE")] = (),

@@ -11,7 +11,7 @@ if TYPE_CHECKING:
 
 
 def simulate(
-    bench: Annotated[str | Path, Argument("BENCH")],
+    bench: Annotated[str | Path, Argument("BENCH", such_as="bench.toml, a cable.toml with [truth] and [design]")],
     *,
     output: Annotated[Output, Option(("-o",), required=True)] = None,
     seed: Annotated[int | None, Option(least=0, most=LARGEST_SEED, default="drawn, and recorded")] = None,

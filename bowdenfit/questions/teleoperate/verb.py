@@ -17,7 +17,7 @@ Bends = str | tuple[Quantity, Quantity]
 
 def teleoperate(
     found: Annotated["Record", Argument("RESULTS", results=True)],
-    device: Annotated[str | Path, Argument("DEVICE")],
+    device: Annotated[str | Path, Argument("DEVICE", such_as="device.toml, which describes master, slave, hand and wall")],
     *,
     wrap_angle: Annotated[
         Bends | None, Option(metavar="FROM:TO", default="all that were measured, such as 45deg:180deg")

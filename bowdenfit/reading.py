@@ -64,7 +64,7 @@ def read(dataset: "str | Path | Dataset", **reading: Unpack[Reading]) -> "Datase
 
     Raises:
         DescriptionError, DatasetError: What is wrong, in a sentence.
-        UsageError: There is no such keyword.
+        UsageError: There is no such keyword, or it comes too late for a data set that has been read.
     """
     from bowdenfit.dataset import Dataset, is_lone_file, load_dataset, single_file_dataset
     from bowdenfit.files.apart import limits_times
@@ -74,6 +74,7 @@ def read(dataset: "str | Path | Dataset", **reading: Unpack[Reading]) -> "Datase
 
     refuse_unknown(read, reading)
     if isinstance(dataset, Dataset):
+        refuse_named(reading, f"{dataset.description.name} has been read already", "name that where it is read")
         return dataset
     refuse_special(Path(dataset))
     changes = changed_settings(reading)
@@ -94,6 +95,24 @@ def changed_settings(reading: Reading) -> list[str]:
     """
     stated = {key: reading.get(name) for name, key in _SETTINGS.items()}
     return [*reading.get("settings", ()), *(f'{key}="{value}"' for key, value in stated.items() if value is not None)]
+
+
+def refuse_named(reading: Reading, why: str, remedy: str) -> None:
+    """Refuse keywords that would change nothing any more.
+
+    Args:
+        reading: The keywords.
+        why: Why they would not.
+        remedy: What to do.
+
+    Raises:
+        UsageError: Something is named.
+    """
+    from bowdenfit.errors import UsageError
+    from bowdenfit.words import listed
+
+    if named := [name for name, value in reading.items() if value not in (None, (), [])]:
+        raise UsageError(f"{why}, and {listed(named)} would change nothing: {remedy}.")
 
 
 def refuse_unknown(verb: Callable[..., Any], reading: Reading) -> None:

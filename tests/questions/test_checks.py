@@ -339,7 +339,7 @@ def test_an_angle_misread_by_ten_sds_is_the_one_that_is_named(on_body):
     """Weights put it 3.9 to 9.5 sds from its prediction, by the seed, a fit without it 8.8 to 9.2 (eight seeds)."""
     right = bf.read(on_body, settings=QUICK)
     row = int(np.flatnonzero(right.measurements.table(AngleTable).route == 490.0)[0])
-    fit = bf.fit(changed(right, "angles", "angle", (row, 0), np.deg2rad(21.0)), seed=1, settings=QUICK)
+    fit = bf.fit(changed(right, "angles", "angle", (row, 0), np.deg2rad(21.0)), seed=1)
     found = fit.checks
     methods, n = methods_section.section(fit).context["paragraphs"][0], sum(np.sum(t.refitted) for t in found.tables)
     assert n >= 1

@@ -110,6 +110,7 @@ def test_the_command_says_the_mean_and_its_ends(quick_results, swing, run):
 def test_bad_gaits_are_refused_in_words(fit, quick_results, swing, refuse, tmp_path):
     folder = quick_results
     assert "there is no such contact" in refuse("predict", folder, "--contact", "braket edge", "--gait", swing)
+    assert "there is no such contact" in refuse("predict", folder, "--contact", "")
     assert "name one of the two" in refuse("predict", folder, "--contact", "bracket edge")
     assert "name one of the two" in refuse(
         "predict", folder, "--contact", "bracket edge", "--gait", swing, "--wrap-angle", "45deg"

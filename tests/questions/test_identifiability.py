@@ -191,6 +191,12 @@ def test_readings_of_a_plan_are_judged_with_its_curves():
     assert len(found.determined[0].weights) == 3
 
 
+def test_a_fit_is_judged_as_it_was_read(quick_results, run):
+    code, out, err = run("identify", quick_results, "--set", "friction.mu1.fixed=0.1")
+    assert (code, out) == (2, "")
+    assert "settings would change nothing: fit its data set again with that, or leave it out" in " ".join(err.split())
+
+
 def test_a_missing_source_is_refused_in_a_sentence(tmp_path, run):
     code, _, err = run("identify", tmp_path / "nothing")
     assert code == 2

@@ -117,6 +117,13 @@ def test_settings_that_lead_nowhere_are_sentences(on_body, setting):
     assert len(str(refused.value)) < 600
 
 
+@pytest.mark.parametrize("asked", [bf.fit, bf.check, bf.identify, bf.calibrate])
+def test_what_changes_the_reading_comes_too_late_for_a_data_set_that_has_been_read(on_body, asked):
+    data = bf.read(on_body)
+    with pytest.raises(bf.UsageError, match="settings and noise would change nothing: name that where it is read"):
+        asked(data, settings=["friction.mu1.fixed=0.1"], noise="student", columns=())
+
+
 @pytest.mark.parametrize(
     ("settings", "says"),
     [

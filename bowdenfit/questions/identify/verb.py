@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Annotated, Any, Unpack
 from bowdenfit.errors import DescriptionError
 from bowdenfit.inputs import read_toml_file
 from bowdenfit.questions.writing import files_of, write_answer
-from bowdenfit.reading import Reading, read, refuse_unknown
+from bowdenfit.reading import Reading, read, refuse_named, refuse_unknown
 from bowdenfit.verb import Argument, Option, Output, Reply, Verb
 
 if TYPE_CHECKING:
@@ -57,18 +57,17 @@ def identify(
 
 def _identify(source: "str | Path | Dataset | Record", reading: Reading) -> "Identifiability":
     from bowdenfit.dataset import Dataset
-    from bowdenfit.errors import UsageError
     from bowdenfit.results.record import Record
     from bowdenfit.results.store import load
 
     if isinstance(source, str | Path) and (Path(source) / "fit.json").exists():
         source = load(Path(source))
     if isinstance(source, Record):
+        refuse_named(reading, f"{source.name} is a fit", "fit its data set again with that, or leave it out")
         return _of_fit(source)
     if isinstance(source, Dataset) or not _is_plan(Path(source)):
         return _of_tables(read(source, **reading))
-    if any(reading.values()):
-        raise UsageError("a plan is judged as it stands; change the file instead of naming options.")
+    refuse_named(reading, "a plan is judged as it stands", "change the file instead")
     return _of_plan(Path(source))
 
 

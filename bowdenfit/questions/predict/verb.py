@@ -166,7 +166,7 @@ def _reply(rows: list[dict[str, Any]], _: object = None) -> Reply:
 def _kept(answers: Mapping[str, Any], asked: Mapping[str, Any]) -> Reply | None:
     """Efficiencies while pulling, at lengths that can be bought."""
     known = {length: row for length, row in answers.get("predict", ()) if None not in row.values()}
-    other = any(asked[name] for name in _ELSEWHERE)
+    other = any(asked[name] not in (None, (), []) for name in _ELSEWHERE)
     lengths = asked["lengths"] or tuple(known)
     if other or (asked["quantity"], asked["stroke"]) not in {(None, "pull"), (AT_LENGTHS[0], "pull")} or not lengths:
         return None

@@ -58,6 +58,12 @@ def test_every_verb_says_what_to_name_where_nothing_is(run, verb):
     assert re.search(r"Missing argument '[A-Z]+(\.\.\.)?'\. Name (one|some), such as .+\.$", err), err
 
 
+def test_a_sampler_is_refused_where_nothing_is_sampled(run, on_body):
+    code, out, err = run("fit", on_body, "--no-mcmc", "--sampler", "nuts")
+    assert (code, out) == (2, "")
+    assert "leave one of them out" in err
+
+
 def test_init_writes_a_template_once(run, tmp_path):
     folder = tmp_path / "my-cable"
     assert run("init", folder)[0] == 0

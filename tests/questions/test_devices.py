@@ -226,6 +226,8 @@ def test_what_cannot_be_answered_is_refused(fit, tmp_path, least_squares_of):
     bare.write_text('name = "bare"\n[rope]\nmounting_scatter = { value = 0.01, unit = "1" }\n')
     assert "inertia = { value = 0.0007" in refused(DescriptionError, device=bare, law="active")
     assert "encoder_counts" in refused(DescriptionError, device=bare, simulate=True)
+    assert "--schedule says what --simulate feeds forward" in refused(UsageError, schedule=True)
+    assert "without --law active" in refused(UsageError, schedule=True, simulate=True, law="active")
     no_sd = device(
         tmp_path,
         'damping = { value = 0.02, unit = "N*m*s/rad", sd = 0.004 }\nmounting',

@@ -128,7 +128,11 @@ def test_springs_and_dynamic_ranges_that_cannot_be_told_are_refused(fit):
     at = {"wrap_angles": [(90, "deg")]}
     for asked, words in (
         ({"quantity": "stiffness", "spring": (5, "N")}, "does not measure a stiffness"),
-        ({"quantity": "friction", "spring": (5, "N/mm")}, "--spring is asked of --quantity stiffness"),
+        ({"quantity": "friction", "spring": (5, "N/mm")}, "does not depend on --spring, which is asked of stiffness; leave"),
+        ({"quantity": "friction", "input_force": (50, "N")}, "does not depend on --input-force, which is asked of eff"),
+        ({"quantity": "preload", "stroke": "return"}, "does not depend on --stroke return, which is asked of efficiency, out"),
+        ({"quantity": "preload-window", "preload": (5, "N")}, "preload-window does not depend on --preload"),
+        ({"friction_limit": (5, "N")}, "efficiency does not depend on --friction-limit, which is asked of preload-window"),
         ({"quantity": "dynamic-range"}, "asked of pull-pull loops"),
     ):
         with pytest.raises(UsageError, match=words):

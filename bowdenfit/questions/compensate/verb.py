@@ -51,12 +51,18 @@ def compensate(
     from dataclasses import replace
 
     from bowdenfit.description.device import asked_for
+    from bowdenfit.errors import UsageError
     from bowdenfit.questions.bends.ring_down import device_for
     from bowdenfit.questions.compensate import words  # noqa: F401  (how the answer shows itself)
     from bowdenfit.questions.compensate.gain import NEEDED
     from bowdenfit.questions.compensate.ranking import compensation_of
     from bowdenfit.questions.compensate.simulation import simulated
 
+    if schedule and not (simulate and law != "active"):
+        raise UsageError(
+            "--schedule says what --simulate feeds forward; add --simulate, without --law active, or leave it out: what may be "
+            "fed forward by bend is part of every answer."
+        )
     described = None if device is None else device_for(found, Path(device))
     answer, loop = compensation_of(found, described, wrap_angle, law, _share(risk))
     if simulate:

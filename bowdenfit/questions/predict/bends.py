@@ -3,7 +3,7 @@
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from types import MappingProxyType
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -13,11 +13,14 @@ from bowdenfit.questions.bends.answer import elastic_answers, friction_arm
 from bowdenfit.questions.predict.outside import bends_note, measured, pulled
 from bowdenfit.results.record import Record
 from bowdenfit.units import conversion_factor
+from bowdenfit.words import listed
 
 Row = dict[str, Any]
 Stated = tuple[float, str] | None  # a number and its unit
 
 _STROKES = {"pull": 1, "return": -1}
+_FORCE, _STROKE, _PRELOAD = "--input-force", "--stroke return", "--preload"
+_LIMIT, _SPRING = "--friction-limit", "--spring"
 
 
 @dataclass(frozen=True)
@@ -101,13 +104,26 @@ def predict_at_bends(fit: Record, quantity: str, asked: Question) -> list[Row]:
         UsageError: There is no posterior, no wrap angle, or the cable has not what is asked for.
     """
     fit.draws()
-    if asked.spring is not None and quantity != "stiffness":
-        raise UsageError("--spring is asked of --quantity stiffness, which springs in series lower; leave it out.")
+    _refuse_what_changes_nothing(quantity, asked)
     if not len(asked.wrap_angles):
         raise UsageError(
             "nothing was measured at a wrap angle of its own; name those to predict at, as --wrap-angle 90deg."
         )
-    return QUANTITIES[quantity](fit, asked)
+    return QUANTITIES[quantity].rows(fit, asked)
+
+
+def _refuse_what_changes_nothing(quantity: str, asked: Question) -> None:
+    """Refuse what a quantity does not depend on, since who states it expects otherwise."""
+    stated = {
+        _FORCE: asked.stated_force, _STROKE: asked.stroke < 0, _PRELOAD: asked.preload is not None,
+        _LIMIT: asked.friction is not None, _SPRING: asked.spring is not None,
+    }  # fmt: skip
+    for option, is_stated in stated.items():
+        if is_stated and option not in QUANTITIES[quantity].depends_on:
+            others = [name for name, predicted in QUANTITIES.items() if option in predicted.depends_on]
+            raise UsageError(
+                f"--quantity {quantity} does not depend on {option}, which is asked of {listed(others)}; leave it out."
+            )
 
 
 def _rows(fit: Record, asked: Question, columns: Mapping[str, np.ndarray], words: Sequence[str] = ()) -> list[Row]:
@@ -218,17 +234,29 @@ def _quantiles(what: str, known: Interval, unit: str) -> Row:
     return {f"{what}_{name}_{unit}": getattr(known, name) for name in ("median", "q05", "q95")}
 
 
-QUANTITIES: Mapping[str, Callable[[Record, Question], list[Row]]] = MappingProxyType(
+class _Predicted(NamedTuple):
+    """A quantity.
+
+    Args:
+        rows: Of the table.
+        depends_on: What may be stated, besides the output force that an input force is asked for.
+    """
+
+    rows: Callable[[Record, Question], list[Row]]
+    depends_on: tuple[str, ...]
+
+
+QUANTITIES: Mapping[str, _Predicted] = MappingProxyType(
     {
-        "efficiency": _efficiency,
-        "output-force": _output_force,
-        "input-force": _input_force,
-        "preload": _preload,
-        "friction": _friction,
-        "slack-load": _slack_load,
-        "position": _position,
-        "stiffness": _stiffness,
-        "dynamic-range": _dynamic_range,
-        "preload-window": _window,
+        "efficiency": _Predicted(_efficiency, (_FORCE, _STROKE, _PRELOAD)),
+        "output-force": _Predicted(_output_force, (_FORCE, _STROKE, _PRELOAD)),
+        "input-force": _Predicted(_input_force, (_STROKE, _PRELOAD)),
+        "preload": _Predicted(_preload, (_PRELOAD,)),
+        "friction": _Predicted(_friction, (_PRELOAD,)),
+        "slack-load": _Predicted(_slack_load, (_PRELOAD,)),
+        "position": _Predicted(_position, (_FORCE, _PRELOAD)),
+        "stiffness": _Predicted(_stiffness, (_FORCE, _PRELOAD, _SPRING)),
+        "dynamic-range": _Predicted(_dynamic_range, (_FORCE, _PRELOAD)),
+        "preload-window": _Predicted(_window, (_FORCE, _LIMIT)),
     }
 )

@@ -5,6 +5,7 @@ from inspect import signature
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any, Literal, TypedDict, Unpack
 
+from bowdenfit.given import with_checked_keywords
 from bowdenfit.verb import Option, Quantity, with_named_keywords
 
 if TYPE_CHECKING:
@@ -55,6 +56,7 @@ _SETTINGS = {  # keywords that stand for a setting of cable.toml
 
 
 @with_named_keywords
+@with_checked_keywords
 def read(dataset: "str | Path | Dataset", **reading: Unpack[Reading]) -> "Dataset":
     """Read and check a data set, without fitting anything.
 

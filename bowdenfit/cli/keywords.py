@@ -2,7 +2,6 @@
 
 import inspect
 import math
-import re
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -12,12 +11,9 @@ from typing import Annotated, Any, Literal, Union, Unpack, get_args, get_origin,
 import click
 
 from bowdenfit.errors import UsageError
+from bowdenfit.given import read_lengths, read_quantity
 from bowdenfit.verb import Argument, Length, Option, Quantity
 from bowdenfit.words import shown
-
-_NUMBER = r"(?P<value>[+-]?(?:\d+\.?\d*|\.\d+)(?:[eE][+-]?\d+)?)"
-_LENGTH = re.compile(_NUMBER + r"\s*(?P<unit>[^\W\d][^\s]*)?(?=\s|$)")
-_QUANTITY = re.compile(_NUMBER + r"\s*(?P<unit>(?!\.|[eE]\d)\D.*)", re.ASCII)
 
 
 @dataclass(frozen=True)
@@ -161,45 +157,6 @@ def _words(documented: Any) -> dict[str, str]:
         else:
             words[name] += f" {line.strip()}"
     return words
-
-
-def read_quantity(text: str, option: str, example: str) -> Quantity:
-    """A number with its unit, such as 180deg or "100 N".
-
-    Args:
-        text: As written.
-        option: Of which.
-        example: How it is written right.
-
-    Raises:
-        UsageError: It is something else.
-    """
-    match = _QUANTITY.fullmatch(text.strip())
-    value, unit = (float(match["value"]), match["unit"]) if match else (0.0, "")
-    if not unit or not math.isfinite(value):
-        raise UsageError(f"{option} {shown(text)} is not a number with its unit; write it as {example}.")
-    return value, unit
-
-
-def read_lengths(given: Sequence[str], name: str) -> list[Length]:
-    """Numbers, each with its unit where one stands behind it, as in 455 455mm 18 in.
-
-    Args:
-        given: As written, a unit perhaps by itself.
-        name: Of the argument.
-
-    Raises:
-        UsageError: Something is no number.
-    """
-    found, text = list[Length](), " ".join(given)
-    while text := text.strip():
-        match = _LENGTH.match(text)
-        if match is None:
-            raise UsageError(f"{name} {shown(text.split()[0])} is no number; write lengths as 455, 455mm or 18 in.")
-        value, unit = float(match["value"]), match["unit"]
-        found.append((value, unit) if unit else value)
-        text = text[match.end() :]
-    return found
 
 
 def read_named_number(text: str, option: str, example: str) -> tuple[str, float]:

@@ -7,6 +7,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any, Literal, Unpack
 from warnings import warn
 
+from bowdenfit.given import with_checked_keywords
 from bowdenfit.inference.engines.processes import settings_of_process
 from bowdenfit.questions.summary.verb import reply
 from bowdenfit.reading import Reading, read, refuse_unknown
@@ -20,6 +21,7 @@ if TYPE_CHECKING:
     from bowdenfit.inference.chain import Progress
 
 
+@with_checked_keywords
 def fit(
     dataset: Annotated["str | Path | Dataset", Argument("DATASET", such_as=A_DATASET)],
     *,

@@ -10,7 +10,7 @@ import pytest
 from sealed import sealed
 
 import bowdenfit as bf
-from bowdenfit.cli.keywords import read_quantity
+from bowdenfit.given import read_quantity
 from bowdenfit.results.kept import CHECKSUM
 
 

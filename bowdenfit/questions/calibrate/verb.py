@@ -8,6 +8,7 @@ from concurrent.futures import Executor
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any, Unpack
 
+from bowdenfit.given import with_checked_keywords
 from bowdenfit.inference.engines.memory import refuse_too_little
 from bowdenfit.notebook import watched
 from bowdenfit.reading import Reading, read, refuse_unknown
@@ -24,6 +25,7 @@ NOT_CALIBRATED = 3
 Report = Callable[[int, int], None]
 
 
+@with_checked_keywords
 def calibrate(
     dataset: Annotated["str | Path | Dataset", Argument("DATASET", such_as=A_DATASET)],
     *,

@@ -4,6 +4,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Unpack
 
 from bowdenfit.errors import DatasetError
+from bowdenfit.given import with_checked_keywords
 from bowdenfit.reading import Reading, read
 from bowdenfit.verb import A_DATASET, Argument, Option, Reply, Verb, with_named_keywords
 
@@ -16,6 +17,7 @@ FIGURE = "prior_predictive"
 
 
 @with_named_keywords
+@with_checked_keywords
 def check(dataset: "str | Path | Dataset", **reading: Unpack[Reading]) -> "Report":
     """Read a data set, and build the model where only that can tell whether the description makes sense.
 

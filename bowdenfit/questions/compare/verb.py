@@ -4,6 +4,7 @@ from collections.abc import Callable, Mapping
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any, Literal
 
+from bowdenfit.given import with_checked_keywords
 from bowdenfit.questions.writing import refuse_to_replace, write_answer
 from bowdenfit.verb import NOT_TRUSTED, Argument, Option, Output, Reply, Verb, Watch
 
@@ -14,6 +15,7 @@ if TYPE_CHECKING:
 NAME = "comparison"
 
 
+@with_checked_keywords
 def compare(
     fits: Annotated[
         "Mapping[str, Record]",

@@ -3,6 +3,7 @@
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any, Literal
 
+from bowdenfit.given import with_checked_keywords
 from bowdenfit.questions.writing import figures_of, files_of, write_answer
 from bowdenfit.verb import Argument, Option, Output, Quantity, Reply, Verb
 
@@ -18,6 +19,7 @@ ACCEPTED = _PERCENT[0] / 100
 """Probability of moving by itself that is accepted if nothing is said."""
 
 
+@with_checked_keywords
 def compensate(
     found: Annotated["Record", Argument("RESULTS", results=True)],
     device: Annotated[str | Path | None, Option(metavar="FILE")] = None,

@@ -4,6 +4,7 @@ from collections.abc import Mapping
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any, Literal
 
+from bowdenfit.given import with_checked_keywords
 from bowdenfit.verb import NOT_TRUSTED, Argument, Option, Output, Quantity, Reply, Verb
 
 if TYPE_CHECKING:
@@ -14,6 +15,7 @@ Target = Literal["c", "fmu", "mujoco", "matlab", "yaml", "csv"]
 _ENDINGS: Mapping[str, str] = {"c": ".h", "csv": ".csv", "fmu": ".fmu", "matlab": ".m", "mujoco": ".xml", "yaml": ".yaml"}
 
 
+@with_checked_keywords
 def export(
     found: Annotated["Record", Argument("RESULTS", results=True)],
     to: Annotated[Target, Option(required=True)] = "csv",

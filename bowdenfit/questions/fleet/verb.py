@@ -9,6 +9,7 @@ from datetime import timedelta
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any, Unpack
 
+from bowdenfit.given import with_checked_keywords
 from bowdenfit.inference.engines.memory import refuse_too_little
 from bowdenfit.inference.engines.processes import settings_of_process
 from bowdenfit.reading import Reading, refuse_unknown
@@ -26,6 +27,7 @@ if TYPE_CHECKING:
 Report = Callable[[int, int, float], None]
 
 
+@with_checked_keywords
 def fleet(
     folder: Annotated["str | Path", Argument("FOLDER", such_as="my-fleet, with its fleet.toml and fleet.csv")],
     *,

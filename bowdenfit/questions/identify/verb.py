@@ -6,6 +6,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any, Unpack
 
 from bowdenfit.errors import DescriptionError
+from bowdenfit.given import with_checked_keywords
 from bowdenfit.inputs import read_toml_file
 from bowdenfit.questions.writing import files_of, write_answer
 from bowdenfit.reading import Reading, read, refuse_named, refuse_unknown
@@ -21,6 +22,7 @@ NOT_IDENTIFIABLE = "not identifiable"  # what a fit is whose measurements do not
 _REACH, _PINS = 4.0, 21  # standard deviations on both sides that profiles cover, and values in them
 
 
+@with_checked_keywords
 def identify(
     source: Annotated[
         "str | Path | Dataset | Record",

@@ -3,12 +3,14 @@
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
+from bowdenfit.given import with_checked_keywords
 from bowdenfit.verb import Argument, Reply, Verb
 
 if TYPE_CHECKING:
     from bowdenfit.questions.metabolic.answer import Metabolic
 
 
+@with_checked_keywords
 def metabolic(
     dataset: Annotated["str | Path", Argument("DATASET", such_as="my-study, a folder with a metabolic.toml")],
 ) -> "Metabolic":

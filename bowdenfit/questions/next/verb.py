@@ -4,6 +4,7 @@ from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
+from bowdenfit.given import with_checked_keywords
 from bowdenfit.questions.writing import files_of, write_answer
 from bowdenfit.verb import Argument, Option, Output, Reply, Verb
 
@@ -14,6 +15,7 @@ if TYPE_CHECKING:
 NAME = "next_measurement"
 
 
+@with_checked_keywords
 def next_measurement(
     found: Annotated["Record | str | Path", Argument("RESULTS", results=True)],
     answer: Annotated[

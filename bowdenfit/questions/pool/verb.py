@@ -7,6 +7,7 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
+from bowdenfit.given import with_checked_keywords
 from bowdenfit.questions.writing import refuse_to_replace
 from bowdenfit.verb import LARGEST_SEED, NOT_TRUSTED, Argument, Option, Output, Quantity, Reply, Verb
 
@@ -18,6 +19,7 @@ _NAMED = re.compile(r"(?P<name>[^=]+)=\s*(?P<value>\d+\.?\d*|\.\d+)\s*(?P<unit>[
 _MOST_TURNS = 100
 
 
+@with_checked_keywords
 def pool(
     results: Annotated["str | Path", Argument("FLEET", such_as="fits/my-fleet, which `bowdenfit fleet my-fleet` writes")],
     *,

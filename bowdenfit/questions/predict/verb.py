@@ -5,6 +5,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any, Literal
 
 from bowdenfit.display import csv_text
+from bowdenfit.given import with_checked_keywords
 from bowdenfit.questions.predict.words import predictions_text
 from bowdenfit.verb import Argument, Length, Option, Quantity, Reply, Stroke, Verb
 
@@ -25,6 +26,7 @@ AT_LENGTHS = ("efficiency", "output-force", "input-force")  # all others are ask
 _QUANTITY = Option(metavar="QUANTITY", default="efficiency, or what --input-force and --output-force ask for")
 
 
+@with_checked_keywords
 def predict(
     found: Annotated["Record", Argument("RESULTS", results=True)],
     lengths: Annotated[Sequence[Length] | None, Argument("LENGTHS", many=True)] = None,

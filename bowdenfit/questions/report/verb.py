@@ -5,12 +5,14 @@ from pathlib import Path
 from tempfile import TemporaryDirectory
 from typing import TYPE_CHECKING, Annotated, Any
 
+from bowdenfit.given import with_checked_keywords
 from bowdenfit.verb import Argument, Option, Output, Reply, Verb
 
 if TYPE_CHECKING:
     from bowdenfit.results.record import Record
 
 
+@with_checked_keywords
 def report(
     found: Annotated["Record | str | Path", Argument("RESULTS")],
     output: Annotated[Output, Option(("-o",), metavar="FILE", default="RESULTS/report.html")] = None,

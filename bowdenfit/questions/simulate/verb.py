@@ -4,12 +4,14 @@ import secrets
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
+from bowdenfit.given import with_checked_keywords
 from bowdenfit.verb import LARGEST_SEED, Argument, Option, Output, Reply, Verb
 
 if TYPE_CHECKING:
     from bowdenfit.dataset import Dataset
 
 
+@with_checked_keywords
 def simulate(
     bench: Annotated[str | Path, Argument("BENCH", such_as="bench.toml, a cable.toml with [truth] and [design]")],
     *,

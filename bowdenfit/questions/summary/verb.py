@@ -6,6 +6,7 @@ from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
+from bowdenfit.given import with_checked_keywords
 from bowdenfit.verb import NOT_TRUSTED, Argument, Option, Output, Quantity, Reply, Verb
 
 if TYPE_CHECKING:
@@ -54,6 +55,7 @@ def reply(found: "tuple[str, Any] | Record", asked: Mapping[str, Any]) -> Reply:
     return Reply(text, lambda: summarize(found), exit_code=0 if verdict(found).trusted else NOT_TRUSTED)
 
 
+@with_checked_keywords
 def plot(
     found: Annotated["Record | str | Path", Argument("RESULTS")],
     output: Annotated[Output, Option(("-o",), default="RESULTS/figures")] = None,

@@ -3,6 +3,7 @@
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
+from bowdenfit.given import with_checked_keywords
 from bowdenfit.questions.writing import files_of, write_answer
 from bowdenfit.verb import Argument, Option, Output, Quantity, Reply, Verb
 
@@ -15,6 +16,7 @@ PROBABILITY = 0.95  # with which contact must be stable
 Bends = str | tuple[Quantity, Quantity]
 
 
+@with_checked_keywords
 def teleoperate(
     found: Annotated["Record", Argument("RESULTS", results=True)],
     device: Annotated[str | Path, Argument("DEVICE", such_as="device.toml, which describes master, slave, hand and wall")],

@@ -1,0 +1,91 @@
+"""Arguments of functions as notebooks write them: taken as they are meant, or refused with what to write."""
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+import bowdenfit as bf
+from bowdenfit.given import with_checked_keywords
+
+
+@pytest.fixture(scope="module")
+def fit(quick_results):
+    return bf.load(quick_results)
+
+
+@pytest.mark.parametrize(
+    "lengths", [470, "470", "470 mm", [470], (470,), np.array([470.0]), ["470mm"], (0.47, "m"), [(47, "cm")]]
+)
+def test_lengths_are_numbers_texts_or_arrays_of_them(fit, lengths):
+    (row,) = bf.predict(fit, lengths, input_force="50N")
+    assert row == bf.predict(fit, [470.0], input_force=(50.0, "N"))[0]
+
+
+@pytest.mark.parametrize("angles", ["90deg", (90, "deg"), ["90deg"], [(90, "deg")], [(np.pi / 2, "rad")]])
+def test_one_wrap_angle_need_not_be_a_list(loop_results, angles):
+    (row,) = bf.predict(bf.load(loop_results), wrap_angles=angles)
+    assert row["wrap_angle_deg"] == pytest.approx(90)
+
+
+def test_one_setting_need_not_be_a_list(on_body):
+    assert bf.check(on_body, settings="friction.mu1.fixed=0.1").description.friction["mu1"].fixed == 0.1
+
+
+@pytest.mark.parametrize(
+    ("asked", "words"),
+    [
+        ({"input_force": 50}, "input_force = 50 is not a number with its unit; write it as '100N', or as (100, 'N')"),
+        ({"input_force": (50, 3)}, "is not a number with its unit"),
+        ({"input_force": (float("nan"), "N")}, "is not a number with its unit"),
+        ({"input_force": "50"}, "input_force '50' is not a number with its unit; write it as 100N"),
+        ({"stroke": "push"}, "stroke = 'push' is unknown; choose one of pull, return"),
+        ({"quantity": "torque"}, "quantity = 'torque' is unknown; choose one of efficiency, "),
+        ({"wrap_angles": 90}, "wrap_angles = 90 is not a number with its unit; write it as '90deg', or as (90, 'deg')"),
+        ({"lengths": [None]}, "lengths = [None] are no lengths; write them as [455, 470]"),
+        ({"lengths": "long"}, "lengths 'long' is no number"),
+        ({"gait": 3}, "gait = 3 is neither a path nor what bowdenfit has read"),
+    ],
+)
+def test_what_is_not_clear_is_refused_with_what_to_write(fit, asked, words):
+    with pytest.raises(bf.UsageError) as refused:
+        bf.predict(fit, **asked)
+    assert words in str(refused.value)
+
+
+@pytest.mark.parametrize(
+    ("call", "words"),
+    [
+        (lambda _: bf.fit(123), "dataset = 123 is neither a path"),
+        (lambda _: bf.fit(None), "dataset = None is neither a path"),
+        (lambda on_body: bf.fit(on_body, seed="a"), "seed = 'a' is no whole number from 0 to 2147483647"),
+        (lambda on_body: bf.fit(on_body, seed=True), "seed = True is no whole number"),
+        (lambda on_body: bf.fit(on_body, seed=-1), "seed = -1 is no whole number"),
+        (lambda on_body: bf.fit(on_body, sampler="hmc"), "sampler = 'hmc' is unknown"),
+        (lambda on_body: bf.fit(on_body, settings={"a": 1}), "is no list of texts; write it as ['name=value']"),
+        (lambda on_body: bf.read(on_body, wrap_angle=180), "wrap_angle = 180 is not a number with its unit"),
+        (lambda on_body: bf.calibrate(on_body, replications=1), "replications = 1 is no whole number from 2"),
+        (lambda on_body: bf.predict(on_body), "found is the fit itself; write bowdenfit.load("),
+        (lambda _: bf.compare(["a"]), "fits are the fits by names of yours"),
+        (lambda _: bf.compare({"one": "fits/a"}), "fits['one'] is the fit itself; write bowdenfit.load('fits/a')"),
+    ],
+)
+def test_what_cannot_be_meant_is_refused_before_anything_is_done(on_body, call, words):
+    with pytest.raises(bf.UsageError) as refused:
+        call(on_body)
+    assert words in str(refused.value)
+
+
+def test_every_public_function_reads_its_arguments():
+    functions = {name for name in bf.__all__ if not isinstance(getattr(bf, name), type)}
+    assert {name for name in functions if not hasattr(getattr(bf, name), "__wrapped__")} == {"load"}
+    with pytest.raises(TypeError, match="missing a required argument"):
+        bf.predict()
+
+
+def test_arguments_by_place_and_by_name_are_read_alike():
+    @with_checked_keywords
+    def plain(dataset: Path, *, count: int = 3) -> tuple[Path, int]:
+        return dataset, count
+
+    assert plain(Path("a")) == plain(dataset=Path("a")) == (Path("a"), 3)

@@ -113,7 +113,7 @@ _WORDS: dict[type, Callable[..., str]] = {
     Checks: checks_page,
     Elastic: bends_text,
     Identifiability: identifiability_text,
-    Efficiencies: lambda found: predictions_text([row | {"note": ""} for row in found.rows]),
+    Efficiencies: lambda found: predictions_text(found.rows),
 }
 for _result, _words in _WORDS.items():
     text_of.register(_result)(_words)

@@ -37,6 +37,11 @@ class Route(Frozen):
         """Name and unit for an axis or a heading."""
         return f"{self.variable.replace('_', ' ').capitalize()} ({self.unit})"
 
+    def outside(self, value: float) -> str:
+        """That the angle curves do not hold at a value, in words; empty where they do."""
+        low, high = self.range
+        return "" if low <= value <= high else f"outside the curves, {low:g} to {high:g} {self.unit}"
+
 
 class WrapAngle(Frozen):
     """Where a contact's wrap angle comes from: a curve through the angle table, each row, or a constant."""

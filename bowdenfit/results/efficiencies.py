@@ -19,16 +19,23 @@ class Efficiencies(Display, list[Interval]):
 
     def __init__(self, found: Iterable[Interval], route: Route | None, lengths: Iterable[float]) -> None:
         super().__init__(found)
-        self._at = [{} if route is None else {f"{route.variable}_{route.unit}": float(length)} for length in lengths]
+        at = [float(length) for length in lengths]
+        self._at = [{} if route is None else {f"{route.variable}_{route.unit}": length} for length in at]
+        self._outside = ["" if route is None else route.outside(length) for length in at]
 
     @property
     def rows(self) -> list[dict[str, Any]]:
         """As `predict` gives them."""
         return [
-            at | {"efficiency": each.median} | {k: v for k, v in vars(each).items() if k != "median"}
-            for at, each in zip(self._at, self, strict=True)
+            at
+            | {"efficiency": each.median}
+            | {k: v for k, v in vars(each).items() if k != "median"}
+            | ({"in_range": not outside} if at else {})
+            | {"note": outside}
+            for at, each, outside in zip(self._at, self, self._outside, strict=True)
         ]
 
     def _table(self) -> Rows:
         rows = self.rows
-        return rows, {name: name.rpartition("_")[2] if name in self._at[0] else "1" for row in rows[:1] for name in row}
+        numbers = [name for row in rows[:1] for name, value in row.items() if isinstance(value, float)]
+        return rows, {name: name.rpartition("_")[2] if name in self._at[0] else "1" for name in numbers}

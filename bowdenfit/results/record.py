@@ -22,7 +22,7 @@ from bowdenfit.model import Model, build_model
 from bowdenfit.results.efficiencies import Efficiencies
 from bowdenfit.results.length import OptimalLength
 from bowdenfit.results.route_draws import RouteDraws, best_length, compile_along_route, new_mounting, route_draws
-from bowdenfit.words import few
+from bowdenfit.words import few, shown
 
 OPTIMAL_LENGTH, OPTIMAL_EFFICIENCY = "optimal_length", "optimal_efficiency"
 Answer = TypeVar("Answer")
@@ -177,7 +177,7 @@ class Record(Display):
             lengths: Route values; the description's choices if omitted.
 
         Raises:
-            UsageError: There is no posterior.
+            UsageError: There is no posterior, or a length is no number.
         """
         at = self._lengths(lengths)
         return Efficiencies(map(Interval.of, self.efficiency_draws(at).T), self.dataset.description.route, at)
@@ -190,7 +190,13 @@ class Record(Display):
     def _lengths(self, lengths: float | Iterable[float] | None) -> np.ndarray:
         route = self.dataset.description.route
         stated = (route.choices if route else 0.0) if lengths is None else lengths
-        return np.atleast_1d(np.asarray(stated, dtype=float))
+        try:
+            at = np.atleast_1d(np.asarray(stated, dtype=float))
+        except (TypeError, ValueError):
+            at = np.array([np.nan])
+        if not np.isfinite(at).all():
+            raise UsageError(f"lengths = {shown(stated)} are no numbers; name them in the unit of the route, as [455, 470].")
+        return at
 
     def optimal_length(self) -> OptimalLength:
         """The design answer: which length is best, how sure that is, and what the choices cost.

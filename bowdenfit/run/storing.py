@@ -106,12 +106,14 @@ def _why(error: Exception) -> str:
     return shorten(" ".join(str(error).split()) or type(error).__name__, 200)
 
 
-def with_sampler(data: Dataset, method: str | None) -> Dataset:
+def with_sampler(data: Dataset, method: str | None, mcmc: bool) -> Dataset:
     """The same data set, to be sampled by another method than its description says; the description's if None.
 
     Raises:
-        UsageError: There is no such sampler, or it cannot reach what is asked of it.
+        UsageError: Nothing is sampled, or the sampler cannot reach what is asked of it.
     """
+    if method is not None and not mcmc:
+        raise UsageError("--no-mcmc leaves out what --sampler would do; leave one of them out.")
     asked = _with_method(data, method)
     _refuse_out_of_reach(asked.description.sampler)
     return asked

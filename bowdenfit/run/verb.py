@@ -58,20 +58,17 @@ def fit(
     Raises:
         BowdenfitError: What is wrong, in a sentence; nothing is written then.
     """
-    from bowdenfit.errors import UsageError
     from bowdenfit.notebook import watched
     from bowdenfit.results.folder import reserved
     from bowdenfit.run.helpers import assistant, light_processes
     from bowdenfit.run.storing import choose_seed, start_checkpointing, with_sampler, write_results
 
     refuse_unknown(fit, reading)
-    if sampler is not None and not mcmc:
-        raise UsageError("--no-mcmc leaves out what --sampler would do; leave one of them out.")
     folder = Path(output) if output is not None else None
     drawing, settings = figures and folder is not None, settings_of_process(remember_compilations)
     with ExitStack() as held:
         light = held.enter_context(light_processes(in_background, drawing, mcmc))
-        data = with_sampler(read(dataset, **reading), sampler)
+        data = with_sampler(read(dataset, **reading), sampler, mcmc)
         held.enter_context(reserved(folder))
         seed = choose_seed(folder, data, mcmc, seed, resume, force)
         helper = held.enter_context(assistant(light, in_background and (mcmc or drawing), settings, drawing, mcmc))

@@ -226,6 +226,15 @@ def test_all_that_can_be_reached_from_a_result_is_short(fit, answers):
     assert list(answers["compare"].predictions["a"].to_frame()["field"])[:2] == ["elpd", "pareto_k"]
 
 
+def test_efficiencies_say_where_the_curves_do_not_hold(fit):
+    found = fit.efficiency([470, 600])
+    assert [row["in_range"] for row in found.rows] == [True, False]
+    assert "inside the curves" in str(found) and "600 mm: outside the curves, 430 to 530 mm." in str(found)
+    for nothing in ([np.nan], "455mm", [None], ["a"]):
+        with pytest.raises(bf.UsageError, match=r"are no numbers; name them in the unit of the route, as \[455, 470\]"):
+            fit.efficiency(nothing)
+
+
 def test_tables_have_the_units_of_what_stands_in_them(fit, answers):
     assert fit.optimal_length().to_frame().attrs["units"]["cable_length"] == "mm"
     drawn = fit.posterior.to_frame()

@@ -163,8 +163,8 @@ def predict_over_gait(
         load = None if name == "efficiency" else float(np.median(drawn["mean"][:, i])) if output_force else force
         notes = [words[i], gait.words, *limits.notes(None if route is None else float(length), load)]
         if route is not None:
-            row["in_range"] = bool(route.range[0] <= length <= route.range[1])
-            notes += [] if row["in_range"] else [f"outside the curves, {route.range[0]:g} to {route.range[1]:g} {route.unit}"]
+            notes.append(outside := route.outside(length))
+            row["in_range"] = not outside
         rows.append(row | {"note": "; ".join(note for note in notes if note)})
     return rows
 

@@ -68,12 +68,8 @@ def predict_at_lengths(
         load = interval.median if inverse else asked
         notes = [words[i], *limits.notes(None if route is None else float(length), load)]
         if route is not None:
-            row["in_range"] = bool(route.range[0] <= length <= route.range[1])
-            notes += (
-                []
-                if row["in_range"]
-                else [f"outside the curves, {route.range[0]:g} to {route.range[1]:g} {route.unit}"]
-            )
+            notes.append(outside := route.outside(length))
+            row["in_range"] = not outside
         row["note"] = "; ".join(note for note in notes if note)
         rows.append(row)
     return rows

@@ -116,15 +116,19 @@ def _lengths(name: str, given: Any) -> list[Length]:
             found.append(float(each))
         else:
             raise UsageError(f"{name} = {shown(given)} are no lengths; write them as [455, 470], or ['18 in'].")
+    if not found:
+        raise UsageError(f"{name} = {shown(given)} names no length; name some, or leave it out where all are meant.")
     return found
 
 
 def _texts(name: str, given: Any) -> Sequence[str]:
     if isinstance(given, str):
         return (given,)
-    if isinstance(given, Mapping) or not all(isinstance(each, str) for each in given):
-        raise UsageError(f"{name} = {shown(given)} is no list of texts; write it as ['name=value'].")
-    return tuple(given)
+    if isinstance(given, Iterable) and not isinstance(given, Mapping):
+        several = tuple(given)
+        if all(isinstance(each, str) for each in several):
+            return several
+    raise UsageError(f"{name} = {shown(given)} is no list of texts; write it as ['name=value'].")
 
 
 def _whole_number(name: str, mark: Option, given: Any) -> int:

@@ -67,7 +67,7 @@ class Keyword:
         if given is None:
             return given
         if isinstance(self.mark, Argument):
-            return read_lengths(given, self.mark.name) if self._is(Sequence[Length]) else given
+            return read_lengths(given, self.mark.name) or None if self._is(Sequence[Length]) else given
         one = self._reader(self.mark)
         if one is None:
             return given

@@ -28,8 +28,10 @@ def test_one_wrap_angle_need_not_be_a_list(loop_results, angles):
     assert row["wrap_angle_deg"] == pytest.approx(90)
 
 
-def test_one_setting_need_not_be_a_list(on_body):
-    assert bf.check(on_body, settings="friction.mu1.fixed=0.1").description.friction["mu1"].fixed == 0.1
+@pytest.mark.parametrize("make", [str, lambda text: [text], lambda text: iter([text])])
+def test_one_setting_need_not_be_a_list(on_body, make):
+    found = bf.check(on_body, settings=make("friction.mu1.fixed=0.1"))
+    assert found.description.friction["mu1"].fixed == 0.1
 
 
 @pytest.mark.parametrize(
@@ -44,6 +46,7 @@ def test_one_setting_need_not_be_a_list(on_body):
         ({"wrap_angles": 90}, "wrap_angles = 90 is not a number with its unit; write it as '90deg', or as (90, 'deg')"),
         ({"lengths": [None]}, "lengths = [None] are no lengths; write them as [455, 470]"),
         ({"lengths": "long"}, "lengths 'long' is no number"),
+        ({"lengths": []}, "lengths = [] names no length; name some, or leave it out"),
         ({"gait": 3}, "gait = 3 is neither a path nor what bowdenfit has read"),
     ],
 )
@@ -63,6 +66,7 @@ def test_what_is_not_clear_is_refused_with_what_to_write(fit, asked, words):
         (lambda on_body: bf.fit(on_body, seed=-1), "seed = -1 is no whole number"),
         (lambda on_body: bf.fit(on_body, sampler="hmc"), "sampler = 'hmc' is unknown"),
         (lambda on_body: bf.fit(on_body, settings={"a": 1}), "is no list of texts; write it as ['name=value']"),
+        (lambda on_body: bf.fit(on_body, settings=3), "settings = 3 is no list of texts"),
         (lambda on_body: bf.read(on_body, wrap_angle=180), "wrap_angle = 180 is not a number with its unit"),
         (lambda on_body: bf.calibrate(on_body, replications=1), "replications = 1 is no whole number from 2"),
         (lambda on_body: bf.predict(on_body), "found is the fit itself; write bowdenfit.load("),

@@ -241,7 +241,7 @@ def pulls_only():
     )
     design = design_of(runs=(400.0,) * 8, input_forces=(20.0, 40.0, 60.0), strokes=("pull",))
     dataset, values = measured(description, 4, design=design)
-    return bf.fit(dataset, seed=2, settings=QUICK), values
+    return bf.fit(dataset, seed=2), values
 
 
 def test_a_gain_error_and_a_constant_angle_are_said_to_be_confounded_with_what_is_known_of_them(pulls_only):

@@ -198,5 +198,5 @@ def test_nothing_but_files_is_replaced_by_a_file(tmp_path):
 
 def test_a_calibration_is_refused_where_something_else_is_being_written(tmp_path):
     with reserved(tmp_path / "cal"), pytest.raises(bf.StoreError, match="another fit or calibration is being written"):
-        bf.calibrate(YARN, replications=1, workers=1, output=tmp_path / "cal", seed=3)
+        bf.calibrate(YARN, replications=2, workers=1, output=tmp_path / "cal", seed=3)
     assert not (tmp_path / "cal").exists()

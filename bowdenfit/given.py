@@ -12,11 +12,11 @@ from inspect import Parameter, signature
 from numbers import Integral, Number, Real
 from os import PathLike
 from pathlib import Path
-from types import NoneType, UnionType
-from typing import Annotated, Any, Literal, TypeVar, Union, Unpack, cast, get_args, get_origin, get_type_hints
+from types import NoneType
+from typing import Annotated, Any, Literal, TypeVar, Unpack, cast, get_args, get_origin, get_type_hints
 
 from bowdenfit.errors import UsageError
-from bowdenfit.verb import Argument, Length, Option, Quantity
+from bowdenfit.verb import Argument, Length, Option, Quantity, kinds_of
 from bowdenfit.words import shown
 
 _NUMBER = r"(?P<value>[+-]?(?:\d+\.?\d*|\.\d+)(?:[eE][+-]?\d+)?)"
@@ -63,8 +63,8 @@ def _reader(name: str, annotation: Any, choices: bool) -> Iterator[tuple[str, Re
     if get_origin(annotation) is not Annotated:
         return
     kind, mark = annotation.__origin__, annotation.__metadata__[0]
-    kinds = get_args(kind) if get_origin(kind) in {Union, UnionType} else (kind,)
-    if isinstance(mark, Argument) and mark.results:
+    kinds = kinds_of(kind)
+    if isinstance(mark, Argument) and mark.results and "Path" not in str(kind):  # a fit alone
         yield name, partial(_fits if mark.many else _fit, name)
     elif Sequence[Length] in kinds:
         yield name, partial(_lengths, name)

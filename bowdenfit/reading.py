@@ -6,7 +6,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any, Literal, TypedDict, Unpack
 
 from bowdenfit.given import with_checked_keywords
-from bowdenfit.verb import Option, Quantity, with_named_keywords
+from bowdenfit.verb import A_DATASET, Argument, Option, Quantity, with_named_keywords
 
 if TYPE_CHECKING:
     from bowdenfit.dataset import Dataset
@@ -57,7 +57,9 @@ _SETTINGS = {  # keywords that stand for a setting of cable.toml
 
 @with_named_keywords
 @with_checked_keywords
-def read(dataset: "str | Path | Dataset", **reading: Unpack[Reading]) -> "Dataset":
+def read(
+    dataset: Annotated["str | Path | Dataset", Argument("DATASET", such_as=A_DATASET)], **reading: Unpack[Reading]
+) -> "Dataset":
     """Read and check a data set, without fitting anything.
 
     Args:

@@ -8,7 +8,8 @@ from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass, field
 from inspect import Parameter, signature
 from pathlib import Path
-from typing import Annotated, Any, ForwardRef, Literal, TypeAlias, TypeVar, get_args, get_origin
+from types import UnionType
+from typing import Annotated, Any, ForwardRef, Literal, TypeAlias, TypeVar, Union, get_args, get_origin
 
 Quantity: TypeAlias = tuple[float, str]  # a number and its unit
 Length: TypeAlias = float | Quantity  # a number of the route's unit, or with its own
@@ -130,6 +131,11 @@ class Verb:
 
     def __post_init__(self) -> None:
         with_named_keywords(self.function)
+
+
+def kinds_of(kind: Any) -> tuple[Any, ...]:
+    """What a value may be: the types of a union, or the only one."""
+    return get_args(kind) if get_origin(kind) in {Union, UnionType} else (kind,)
 
 
 def with_named_keywords(function: Function) -> Function:

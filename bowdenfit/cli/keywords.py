@@ -5,14 +5,13 @@ import math
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from types import UnionType
-from typing import Annotated, Any, Literal, Union, Unpack, get_args, get_origin, get_type_hints
+from typing import Annotated, Any, Literal, Unpack, get_args, get_origin, get_type_hints
 
 import click
 
 from bowdenfit.errors import UsageError
 from bowdenfit.given import read_lengths, read_quantity
-from bowdenfit.verb import Argument, Length, Option, Quantity
+from bowdenfit.verb import Argument, Length, Option, Quantity, kinds_of
 from bowdenfit.words import shown
 
 
@@ -85,8 +84,7 @@ class Keyword:
         return None
 
     def _is(self, *kinds: Any) -> bool:
-        stated = get_args(self.kind) if get_origin(self.kind) in {Union, UnionType} else (self.kind,)
-        return any(kind in stated for kind in kinds)
+        return any(kind in kinds_of(self.kind) for kind in kinds)
 
     @property
     def _is_many(self) -> bool:
@@ -99,7 +97,7 @@ class Keyword:
         return [both, *(flag for flag in mark.flags if flag != long), self.name]
 
     def _type(self, mark: Option) -> Any:
-        for kind in get_args(self.kind) if get_origin(self.kind) in {Union, UnionType} else (self.kind,):
+        for kind in kinds_of(self.kind):
             if get_origin(kind) is Literal:
                 return click.Choice(get_args(kind))
             if kind is int:

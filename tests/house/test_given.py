@@ -61,6 +61,8 @@ def test_what_is_not_clear_is_refused_with_what_to_write(fit, asked, words):
     [
         (lambda _: bf.fit(123), "dataset = 123 is neither a path"),
         (lambda _: bf.fit(None), "dataset = None is neither a path"),
+        (lambda _: bf.read(123), "dataset = 123 is neither a path"),
+        (lambda _: bf.check([]), "dataset = [] is neither a path"),
         (lambda on_body: bf.fit(on_body, seed="a"), "seed = 'a' is no whole number from 0 to 2147483647"),
         (lambda on_body: bf.fit(on_body, seed=True), "seed = True is no whole number"),
         (lambda on_body: bf.fit(on_body, seed=-1), "seed = -1 is no whole number"),
@@ -78,6 +80,11 @@ def test_what_cannot_be_meant_is_refused_before_anything_is_done(on_body, call, 
     with pytest.raises(bf.UsageError) as refused:
         call(on_body)
     assert words in str(refused.value)
+
+
+def test_where_a_folder_may_stand_for_its_fit_it_is_taken(quick_results, fit):
+    named = {str(bf.next_measurement(found)) for found in (fit, quick_results, str(quick_results))}
+    assert len(named) == 1
 
 
 def test_every_public_function_reads_its_arguments():

@@ -18,7 +18,9 @@ FIGURE = "prior_predictive"
 
 @with_named_keywords
 @with_checked_keywords
-def check(dataset: "str | Path | Dataset", **reading: Unpack[Reading]) -> "Report":
+def check(
+    dataset: Annotated["str | Path | Dataset", Argument("DATASET", such_as=A_DATASET)], **reading: Unpack[Reading]
+) -> "Report":
     """Read a data set, and build the model where only that can tell whether the description makes sense.
 
     Loading JAX takes longer than everything else here, so the model is built only for names and priors that the

@@ -1,12 +1,12 @@
-"""The program `bowdenfit`, or `python -m bowdenfit`: from its first moment on an interrupt is one line, and no traceback."""
+"""The program `bowdenfit`, or `python -m bowdenfit`: an interrupt while it loads is one line, and no traceback."""
 
-import _signal as signal  # what the module `signal` is of, without what that loads: until then an interrupt is a traceback
 import os
+import signal
 
-_INTERRUPTED = 130
+_INTERRUPTED = 130  # exit code, as shells have it
 
 
-def _interrupted(*_: object) -> None:
+def _end(*_: object) -> None:
     os.write(2, b"\nInterrupted.\n" if os.isatty(2) else b"Interrupted.\n")  # a terminal shows ^C before it
     os._exit(_INTERRUPTED)
 
@@ -14,7 +14,7 @@ def _interrupted(*_: object) -> None:
 def start() -> None:
     """Load the command line, which takes a moment, and run it."""
     if signal.getsignal(signal.SIGINT) is signal.default_int_handler:  # a shell may have made this deaf to interrupts
-        signal.signal(signal.SIGINT, _interrupted)  # until the command line listens, and once it no longer does
+        signal.signal(signal.SIGINT, _end)  # until a command runs, and once it has ended
     from bowdenfit.cli import start as run
 
     run()

@@ -5,7 +5,7 @@ says of it, are the option's. A keyword without belongs to programs alone. Loads
 """
 
 from collections.abc import Callable, Iterator, Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from inspect import Parameter, signature
 from pathlib import Path
 from types import UnionType
@@ -108,7 +108,6 @@ class Verb:
         csv: What `--csv` prints, in words; empty without that option.
         results: Folder in which results go unless `output` names another.
         watch: How it is interrupted; None if it is quick.
-        behind: Keywords that the command line adds.
         warns: Whether a fit that is not to be trusted is said beside the answer, which then ends with `NOT_TRUSTED`.
         explains: A trouble of a fit that the answer is about, so that it is right in spite of it.
         kept: The reply by what a fit has answered before, and the keywords; None where they ask for something else. A
@@ -124,7 +123,6 @@ class Verb:
     csv: str = ""
     results: str = ""
     watch: Watch | None = None
-    behind: Mapping[str, Any] = field(default_factory=dict)
     warns: bool = False
     explains: str = ""
     kept: Callable[[Mapping[str, Any], Mapping[str, Any]], Reply | None] | None = None

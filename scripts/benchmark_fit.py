@@ -22,7 +22,7 @@ one more (FEW), and the rest is reckoned as if each took as long. "1000 cables":
 
 To 1000 effective draws (bulk, the worst of all 11 parameters) of the joint posterior of the on-body data, by the programs
 in scripts/baselines, which draw and write nothing: from the start of the process to the first look at the draws that finds
-as many. bowdenfit, as a library that may start other processes, samples on until R-hat, the tails, l* and eta* are settled
+as many. bowdenfit, as a library, samples on until R-hat, the tails, l* and eta* are settled
 too, while the plain programs stop at 1000. Their pairs are with bowdenfit's own run of the same turn, so that a ratio below
 1 means that bowdenfit is quicker. Means of the friction coefficients must agree, or a warning is printed. "cold fit beside"
 compares the whole command, with figures and files, to a plain program that only draws.

@@ -1,6 +1,5 @@
 """The command line: arguments in, exit code out."""
 
-import gc
 import os
 import re
 import sys
@@ -12,11 +11,8 @@ from typing import Any, NoReturn
 import click
 
 from bowdenfit.cli.commands import command
-from bowdenfit.cli.deadline import INTERRUPTED, answered_in_time
-from bowdenfit.cli.interrupts import listening, was_asked
-from bowdenfit.cli.lean_matplotlib import load_without_manual
+from bowdenfit.cli.interrupts import INTERRUPTED, requested, run_interruptibly
 from bowdenfit.cli.starting import completion, init
-from bowdenfit.cli.supervised import is_limited, supervise
 from bowdenfit.cli.terminal import NoReaderError, say, say_interrupted
 from bowdenfit.errors import BowdenfitError, system_error
 from bowdenfit.verbs import VERBS
@@ -26,25 +22,20 @@ _NEW_LINE = re.compile(r"[\r\n](?!- )")  # in the name of a file: our own senten
 _NO_READER = 141  # exit code, as shells have it of a process whose output nobody reads on
 _OF_LIBRARIES = ("JAX_", "XLA_", "MPL", "OMP_")  # what the variables begin with that tell them what to do
 _HARMLESS = {("JAX_PLATFORMS", "cpu"), ("OMP_NUM_THREADS", "1")}
-_MADE = 500_000  # objects made before Python looks for garbage: most of them stay, and a look goes through all of them
 
 
 def start() -> None:
-    """The program: `main`, and an end at once; to take apart what was loaded takes Python 0.3 s."""
-    gc.set_threshold(_MADE)
+    """Run the program: `main`, in surroundings that suit a command."""
     os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")  # it takes 32 MiB a thread when loaded, and waits for ever if it may not
     os.environ.setdefault("JAX_PLATFORMS", "cpu")  # a GPU takes 1.5 to 1.9 times as long for a fit, and most of its memory
     os.environ.setdefault("TF_CPP_MIN_LOG_LEVEL", "3")  # XLA says on stderr where a busy machine compiles slowly
-    load_without_manual()
     if not (sys.warnoptions or os.environ.get("BOWDENFIT_DEBUG")):
         warnings.simplefilter("ignore")  # of libraries, in words of their own; what matters is said in ours
     _open_what_is_closed()
     for name in ("stdout", "stderr"):
         if getattr(sys, name) is None:  # closed by whoever started this
             setattr(sys, name, Path(os.devnull).open("w", encoding="utf-8"))  # noqa: SIM115  (for as long as this runs)
-    if is_limited():
-        supervise(_run)
-    _run()
+    main()
 
 
 def _open_what_is_closed() -> None:
@@ -56,25 +47,10 @@ def _open_what_is_closed() -> None:
             os.open(os.devnull, os.O_RDWR)  # which takes the first number that is free
 
 
-def _run() -> None:
-    """`main`, and the end of this process."""
-    try:
-        main()
-    except SystemExit as stop:
-        for stream in (sys.stdout, sys.stderr):
-            with suppress(OSError):  # whoever read them has ended
-                stream.flush()
-        os._exit(stop.code if isinstance(stop.code, int) else 0 if stop.code is None else 1)
-
-
 def main() -> None:
     """Run the command line; every error the user can cause is a sentence and an exit code."""
     try:
-        with listening(), answered_in_time():
-            code = bowdenfit.main(standalone_mode=False) or 0
-            if was_asked():  # while the last was loaded
-                raise KeyboardInterrupt
-        sys.exit(code)
+        sys.exit(run_interruptibly(lambda: bowdenfit.main(standalone_mode=False)) or 0)
     except click.exceptions.Exit as stop:
         sys.exit(stop.exit_code)
     except click.ClickException as error:
@@ -83,13 +59,15 @@ def main() -> None:
     except BowdenfitError as error:
         _complain(f"Error: {_NEW_LINE.sub('?', str(error))}")
         sys.exit(error.exit_code)
-    except (click.Abort, KeyboardInterrupt):
+    except click.Abort:
         _end_interrupted()
+    except KeyboardInterrupt as stop:
+        _end_interrupted(*stop.args)
     except NoReaderError:
         os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
         sys.exit(_NO_READER)
     except Exception as error:
-        if was_asked():  # whatever came of it is that interrupt
+        if requested.is_set():  # whatever came of it is that interrupt
             _end_interrupted()
         if os.environ.get("BOWDENFIT_DEBUG"):
             raise
@@ -120,9 +98,9 @@ def _complain(text: str) -> None:
         say(text, err=True)
 
 
-def _end_interrupted() -> NoReturn:
+def _end_interrupted(how_to_go_on: str = "") -> NoReturn:
     with suppress(OSError):
-        say_interrupted()
+        say_interrupted(how_to_go_on)
     sys.exit(INTERRUPTED)
 
 

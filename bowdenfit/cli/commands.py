@@ -11,7 +11,6 @@ from typing import TYPE_CHECKING, Any
 import click
 
 from bowdenfit.cli.explained import Explained
-from bowdenfit.cli.interrupts import was_asked
 from bowdenfit.cli.keywords import Keyword, keywords_of
 from bowdenfit.cli.progress import watch_verb
 from bowdenfit.cli.terminal import say
@@ -54,8 +53,6 @@ def _run(verb: Verb, keywords: tuple[Keyword, ...], given: dict[str, Any], form:
     if verb.warns and isinstance(source, Path):
         troubles = answers["troubles"] if "troubles" in answers else _troubles(asked[keywords[0].name], source)
         reply = _with_warning(reply, [trouble for trouble in troubles if trouble != verb.explains], source)
-    if was_asked():  # while the last was loaded
-        raise KeyboardInterrupt
     say(_page(reply) if form == "json" else reply.csv() if form == "csv" and reply.csv else reply.text, nl=False)
     for note in reply.notes:
         say(note, err=True)
@@ -88,14 +85,13 @@ def _answer(verb: Verb, keywords: tuple[Keyword, ...], given: dict[str, Any], as
         from bowdenfit.results.folder import refuse_unwritable
 
         refuse_unwritable(asked["output"])
-    behind = dict(verb.behind)
     if "report" in inspect.signature(verb.function).parameters:
-        behind["report"] = lambda sentence: say(sentence, err=True)
+        asked["report"] = lambda sentence: say(sentence, err=True)
     if verb.watch is None:
-        answer = verb.function(**asked, **behind)
+        answer = verb.function(**asked)
     else:
         with watch_verb(asked["output"], verb.watch) as progress:
-            answer = verb.function(**asked, **behind, progress=progress)
+            answer = verb.function(**asked, progress=progress)
     return verb.reply(answer, asked)
 
 

@@ -5,7 +5,6 @@ from typing import TypeVar
 
 import click
 
-from bowdenfit.cli.interrupts import line_of
 from bowdenfit.cli.terminal import say
 from bowdenfit.errors import BowdenfitError
 from bowdenfit.questions.start.question import Question
@@ -49,11 +48,7 @@ def _typed(prompt: str) -> str:
     """What is typed behind a prompt."""
     say(prompt, nl=False)
     sys.stdout.flush()
-    try:
-        line = line_of(sys.stdin)
-    except KeyboardInterrupt:
-        click.echo()
-        raise
+    line = sys.stdin.readline()
     if not line:
         click.echo()
         raise click.Abort

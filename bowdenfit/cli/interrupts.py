@@ -1,106 +1,106 @@
-"""Interrupts that are not lost: one that somebody swallowed is raised again until it is heard.
+"""Ctrl-C and SIGTERM: one flag, which loops look at.
 
-Python prints and forgets an interrupt that arrives inside a callback of the garbage collector or of a compiled library, and
-some libraries turn it into an error of their own. While a compiled library is loaded, an exception that it did not expect ends
-the process as a crash does, so an interrupt waits for the end of that.
+Signals are handled between two steps of Python in the main thread, and compiled code may take seconds for one step. So a
+command runs in a thread of its own while the main thread waits. A signal sets the flag; loops that keep what they have done
+(see `bowdenfit.cli.progress`) look at it and end. Whatever has not ended soon after is ended with the process: files are
+written whole under their names or not at all, and a checkpoint only grows.
 """
 
 import os
-import select
 import signal
-import sys
-import time
+import threading
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
-from types import FrameType, TracebackType
-from typing import TextIO, TypeAlias
+from contextvars import copy_context
+from typing import Any
 
-_SOON, _AGAIN, _PATIENCE = 0.05, 0.3, 3.0  # s
-_LOADER = "<frozen importlib"  # what Python's own loader is in tracebacks
-Handler: TypeAlias = Callable[[int, FrameType | None], None]
-_asked: list[bool] = []
-_since: list[float] = []  # when interrupts were looked at
+from bowdenfit.cli.terminal import say_interrupted
+
+INTERRUPTED = 130  # exit code, as shells have it
+_PATIENCE = 0.5  # s, in which a command may end by itself
+_LOOK = 0.2  # s between two looks at the thread; some systems do not wake the main thread for a signal
+
+requested = threading.Event()
+"""Set where the user or the system stops the program."""
+
+_how_to_go_on: list[Callable[[], str]] = []
 
 
 @contextmanager
-def listening() -> Iterator[None]:
-    """Meanwhile an interrupt raises `KeyboardInterrupt` again and again until that leaves this context."""
-    _asked.clear()
-    _since.clear()
-    printed, shown, before = sys.unraisablehook, sys.excepthook, signal.getsignal(signal.SIGINT)
+def keeping(how_to_go_on: Callable[[], str]) -> Iterator[None]:
+    """Announce that an interrupted command may leave something to go on from.
 
-    def lost(what: "sys.UnraisableHookArgs") -> None:
-        if not issubclass(what.exc_type, KeyboardInterrupt):
-            printed(what)
-
-    def refused(kind: type[BaseException], error: BaseException, trace: TracebackType | None) -> None:
-        if not issubclass(kind, KeyboardInterrupt):  # which compiled code prints before it goes on
-            shown(kind, error, trace)
-
-    sys.unraisablehook, sys.excepthook = lost, refused
-    if callable(before):  # a shell may have made this deaf to interrupts
-        signal.signal(signal.SIGINT, _interrupt)
+    Args:
+        how_to_go_on: Returns what is kept and how to go on, in words; empty where nothing is kept.
+    """
+    _how_to_go_on.append(how_to_go_on)
     try:
         yield
     finally:
-        if _asked and hasattr(signal, "setitimer"):
-            signal.signal(signal.SIGALRM, signal.SIG_IGN)
-            signal.setitimer(signal.ITIMER_REAL, 0.0)
-        if callable(before):
-            signal.signal(signal.SIGINT, before)
-        sys.unraisablehook, sys.excepthook = printed, shown
+        _how_to_go_on.remove(how_to_go_on)
 
 
-def line_of(terminal: TextIO) -> str:
-    """The next line that is typed; empty where the input has ended.
-
-    An interrupt that arrives after Python has looked for one, and before the system waits for the terminal, would otherwise be
-    heard no sooner than the next key. It writes into a pipe, and the system waits for both.
-    """
-    reader, writer = os.pipe()
-    both: list[TextIO | int] = [terminal, reader]
-    os.set_blocking(writer, False)
-    before = signal.set_wakeup_fd(writer, warn_on_full_buffer=False)
-    try:
-        while terminal not in select.select(both, [], [])[0]:
-            os.read(reader, 1)
-        return terminal.readline()
-    finally:
-        signal.set_wakeup_fd(before)
-        os.close(reader)
-        os.close(writer)
+def refuse_interrupted() -> None:
+    """Raise `KeyboardInterrupt` where the program is to stop; loops call this between two steps."""
+    if requested.is_set():
+        raise KeyboardInterrupt
 
 
-def _interrupt(_: int, frame: FrameType | None) -> None:
-    _asked.append(True)
-    if is_loading(frame):
-        call_soon(_interrupt)
-        return
-    call_soon(_interrupt, _AGAIN)
-    raise KeyboardInterrupt
-
-
-def call_soon(handler: Handler, seconds: float = _SOON) -> None:
-    """Call a handler of signals in a moment, where the system can."""
-    if hasattr(signal, "setitimer"):
-        signal.signal(signal.SIGALRM, handler)
-        signal.setitimer(signal.ITIMER_REAL, seconds)
-
-
-def is_loading(frame: FrameType | None) -> bool:
-    """Whether what was interrupted is the loading of a module, which nothing should be raised in, and may be waited for still.
+def run_interruptibly(command: Callable[[], Any]) -> Any:
+    """Run a command in a thread while this one, the main one, waits for signals.
 
     Args:
-        frame: What was running.
+        command: What to do.
+
+    Returns:
+        What the command returns.
+
+    Raises:
+        KeyboardInterrupt: The program is to stop, and the command has ended.
+        Exception: Whatever the command raises.
     """
-    _since.append(time.monotonic())
-    if not hasattr(signal, "setitimer") or _since[-1] - _since[0] > _PATIENCE:
-        return False
-    while frame is not None and not frame.f_code.co_filename.startswith(_LOADER):
-        frame = frame.f_back
-    return frame is not None
+    results: list[Any] = []
+    errors: list[BaseException] = []
+
+    def run() -> None:
+        try:
+            results.append(command())
+        except BaseException as error:
+            errors.append(error)
+
+    requested.clear()
+    worker = threading.Thread(target=copy_context().run, args=(run,), daemon=True)
+    with _signals_set_the_flag():
+        worker.start()
+        while worker.is_alive() and not requested.is_set():
+            worker.join(_LOOK)
+        worker.join(_PATIENCE if requested.is_set() else None)
+        if worker.is_alive():
+            _end_process()
+    if errors:
+        raise errors[0]
+    refuse_interrupted()
+    return results[0]
 
 
-def was_asked() -> bool:
-    """Whether there was an interrupt."""
-    return bool(_asked)
+@contextmanager
+def _signals_set_the_flag() -> Iterator[None]:
+    """Have SIGINT and SIGTERM set the flag, where this is the main thread; a signal that is ignored stays so."""
+    before: dict[signal.Signals, Any] = {}
+    if threading.current_thread() is threading.main_thread():
+        for number in (signal.SIGINT, signal.SIGTERM):
+            if signal.getsignal(number) is not signal.SIG_IGN:  # a shell may have made this program deaf to interrupts
+                before[number] = signal.signal(number, lambda *_: requested.set())
+    try:
+        yield
+    finally:
+        for number, handler in before.items():
+            signal.signal(number, handler)
+
+
+def _end_process() -> None:
+    """Say that the program was interrupted, and end it whatever still runs."""
+    try:
+        say_interrupted(next(filter(None, (how_to_go_on() for how_to_go_on in _how_to_go_on)), ""))
+    finally:  # whether or not anybody reads it
+        os._exit(INTERRUPTED)

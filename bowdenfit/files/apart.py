@@ -8,19 +8,17 @@ import atexit
 import json
 import os
 import pickle
-import select
 import struct
 import subprocess
 import sys
 import threading
-import time
 from collections.abc import Iterator
 from contextlib import contextmanager, suppress
 from contextvars import ContextVar
 from dataclasses import dataclass, replace
 from importlib import import_module
 from pathlib import Path
-from typing import IO, Any
+from typing import Any
 
 from bowdenfit.errors import DatasetError
 from bowdenfit.files.channels import ChannelFile
@@ -111,12 +109,12 @@ def _ask(path: Path, limits: Limits, name: str, arguments: tuple[Any, ...]) -> t
         try:
             reader.stdin.write(request)
             reader.stdin.flush()
-            content = _answer(reader.stdout, time.monotonic() + _WALL * limits.seconds)
+            content, too_late = _answer(reader, _WALL * limits.seconds)
         except BrokenPipeError:
-            content = b""
+            content, too_late = b"", False
         if content:
             return None, content
-        if (ended := _end(reader)) != 0 or content is None:
+        if (ended := _end(reader)) != 0 or too_late:
             return ended, None
     return 0, None
 
@@ -159,26 +157,25 @@ def _end(reader: "subprocess.Popen[bytes]") -> int:
     return reader.wait()
 
 
-def _answer(stream: IO[bytes], until: float) -> bytes | None:
-    """What comes; empty if the other end is closed before it is whole, None if it takes too long."""
-    content, length, number = bytearray(), _LENGTH.size, stream.fileno()
-    while len(content) < length:
-        ready, _, _ = select.select([number], [], [], max(until - time.monotonic(), 0.0))
-        if not ready:
-            return None
-        piece = os.read(number, 1 << 20)
-        if not piece:
-            return b""
-        content += piece
-        if length == _LENGTH.size and len(content) >= length:
-            length += _LENGTH.unpack_from(content)[0]
-    return bytes(content[_LENGTH.size :])
+def _answer(reader: "subprocess.Popen[bytes]", seconds: float) -> tuple[bytes, bool]:
+    """Return what a reader answers, empty if it ends before that is whole, and whether it was ended for taking too long."""
+    assert reader.stdout is not None  # a pipe
+    killer = threading.Timer(seconds, reader.kill)
+    killer.daemon = True
+    killer.start()
+    try:
+        head = reader.stdout.read(_LENGTH.size)
+        (length,) = _LENGTH.unpack(head) if len(head) == _LENGTH.size else (0,)
+        content = reader.stdout.read(length)
+        return content if len(content) == length else b"", killer.finished.is_set()
+    finally:
+        killer.cancel()
 
 
 def _broken(path: Path, limits: Limits, ended: int | None) -> str:
     import signal
 
-    if ended in {-signal.SIGXCPU, -signal.SIGKILL}:
+    if ended in {-getattr(signal, name) for name in ("SIGXCPU", "SIGKILL") if hasattr(signal, name)}:
         return _too_much(path, limits, "time")
     return (
         f"{path.name} cannot be read: the library that reads such files crashed on it; copy the file again from the "
@@ -201,7 +198,14 @@ def serve() -> None:
     signal.signal(signal.SIGINT, signal.SIG_IGN)  # for the process that asks to handle
     answers = os.fdopen(os.dup(1), "wb")
     os.dup2(2, 1)  # what libraries print
-    while select.select([0], [], [], _IDLE)[0] and (line := sys.stdin.buffer.readline()):
+    while True:
+        idle = threading.Timer(_IDLE, os._exit, (0,))
+        idle.daemon = True
+        idle.start()
+        line = sys.stdin.buffer.readline()
+        idle.cancel()
+        if not line:
+            break
         path, memory, seconds, name, arguments = json.loads(line)
         _limit(memory, seconds)
         content = pickle.dumps(_read(name, Path(path), arguments), protocol=5)

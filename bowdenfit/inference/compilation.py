@@ -8,7 +8,7 @@ from typing import Any
 import jax
 import jax.numpy as jnp
 
-from bowdenfit.inference.engines.memory import refuse_shortage, take_buffers
+from bowdenfit.inference.engines.memory import refuse_shortage
 
 # Measured on two cores: whole vectors of 512 bits run in 0.85 to 1 of the time and compile no longer. XLA's newer fusion
 # emitters take twice as long to compile the small elementwise functions here, which then run in 0.65 to 1 of the time. YNNPACK,
@@ -43,7 +43,6 @@ def compile_program(
     """
     refuse_shortage()
     lowered = jax.jit(function).lower(*shapes)
-    take_buffers(loaded=run_once)
     options = (_RUN_ONCE if run_once else _RUN_OFTEN if run_often else _OPTIONS) if jax.default_backend() == "cpu" else {}
     if beside is None:
         return _compiled(lowered, options)

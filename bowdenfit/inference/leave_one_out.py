@@ -124,7 +124,6 @@ class LeavingOut:
         each: Log likelihood of every reading at every draw, (draw, reading).
         share: Effective draws a draw.
         seed: Seed of the refits.
-        call: Calls functions of draws, such as what judges them, with their arguments.
     """
 
     readings: ReadingsToLeaveOut
@@ -132,7 +131,6 @@ class LeavingOut:
     each: np.ndarray
     share: float
     seed: int
-    call: Callable[..., Any] = field(default=lambda function, *arguments: function(*arguments))
 
     def without(self, reading: int, limit: float) -> tuple[float, float, How]:
         """Expected log density of a reading whose importance weights fail, its Monte Carlo error, and how it was found.
@@ -176,11 +174,10 @@ class LeavingOut:
         from bowdenfit.inference.ensemble import sample
 
         readings = self.readings
-        weights = np.exp(self.call(smooth_weights, -self.each[:, reading], self.share)[0])
+        weights = np.exp(smooth_weights(-self.each[:, reading], self.share)[0])
         start = MaximumPosterior(weights @ self.z, np.atleast_2d(np.cov(self.z.T)))
         own_seed = int(np.random.SeedSequence([self.seed, reading]).generate_state(1)[0])
-        diagnose = partial(_without_drift, self.call)
-        asked = Sampling(readings.posterior, start, readings.refits, own_seed, quantities, diagnose=diagnose)
+        asked = Sampling(readings.posterior, start, readings.refits, own_seed, quantities, diagnose=_without_drift)
         return sample(asked, readings.programs, readings.without(reading))
 
 
@@ -223,8 +220,6 @@ def leave_one_out(
     return Prediction(elpd, quick.pareto_k, error, tuple(readings.names[i] for i in chosen), tuple(how))
 
 
-def _without_drift(
-    call: Callable[..., Any], draws: Mapping[str, np.ndarray], n_ensembles: int
-) -> dict[str, Diagnostics]:
+def _without_drift(draws: Mapping[str, np.ndarray], n_ensembles: int) -> dict[str, Diagnostics]:
     """Diagnostics without drift, which cannot be told from chance with as few effective draws as a refit needs."""
-    return {name: replace(found, drift=0.0) for name, found in call(diagnose_all, draws, n_ensembles).items()}
+    return {name: replace(found, drift=0.0) for name, found in diagnose_all(draws, n_ensembles).items()}

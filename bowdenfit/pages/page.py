@@ -4,38 +4,55 @@ from __future__ import annotations
 
 import base64
 import hashlib
+import struct
 from collections.abc import Mapping
+from html import escape
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from bowdenfit.pages.drawing import inline
 from bowdenfit.pages.section import Page, Picture
 from bowdenfit.words import printable, unbroken
 
 if TYPE_CHECKING:
     from jinja2 import Environment
 
-MOST_BYTES = 1_450_000  # of a page, so that it can be mailed
+MOST_BYTES = 8_000_000  # of a page, so that it can be mailed
 TOO_LARGE = "<p>This figure would make the page too large; it lies in the folder of figures.</p>"
+_PNG = b"\x89PNG\r\n\x1a\n"  # its first bytes; width and height follow in the first block
+_CSS_PIXELS = 0.6  # of a page for one of a figure: 96 in an inch for 160
+_COLUMN = 576  # px of a page, 6 in: wider figures take both columns of a printed page
 _HERE, _MARK = Path(__file__).parent, "\0"  # which no text on a page has
 
 
-def render(page: Page, drawings: Mapping[str, str]) -> str:
+def render(page: Page, drawings: Mapping[str, bytes]) -> str:
     """A page as HTML.
 
     Args:
         page: What is on it.
-        drawings: Drawings of its figures as SVG, by name; a figure without one is left out, and one for which there is no
-            room is said to be.
+        drawings: Its figures as PNG, by name; a figure without one is left out, and one for which there is no room is said to
+            be.
+
+    Raises:
+        ValueError: A drawing is no PNG.
     """
     drawn = Page(page.title, page.subtitle, tuple(s.with_pictures(drawings) for s in page.sections))
     pieces = _assembled(drawn).split(_MARK)
     room = MOST_BYTES - sum(len(piece.encode()) for piece in pieces)
     for i, picture in enumerate(drawn.pictures):
-        found = inline(drawings[picture.name], f"d{i}-", picture.title)
-        room -= len(found)
-        pieces[2 * i + 1] = found if room > 0 else TOO_LARGE
+        image = _image(drawings[picture.name], picture.title)
+        room -= len(image)
+        pieces[2 * i + 1] = image if room > 0 else TOO_LARGE
     return "".join(pieces)
+
+
+def _image(png: bytes, words: str) -> str:
+    """Return a PNG as an element that holds it, in the size in which it was drawn."""
+    if not png.startswith(_PNG):
+        raise ValueError("a figure is damaged: its file is no PNG")
+    width, height = (round(pixels * _CSS_PIXELS) for pixels in struct.unpack_from(">2I", png, len(_PNG) + 8))
+    kind = "wide" if width > _COLUMN else "narrow"
+    data, alt = base64.b64encode(png).decode(), escape(printable(words))
+    return f'<img class="{kind}" width="{width}" height="{height}" alt="{alt}" src="data:image/png;base64,{data}">'
 
 
 def _assembled(page: Page) -> str:

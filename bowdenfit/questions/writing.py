@@ -115,17 +115,17 @@ def write_answer(
 
 
 def write_page(page: "Page", drawn: Path, path: Path) -> Path:
-    """Write a page whole, with the drawings that lie in a folder; loads no model.
+    """Write a page whole, with the figures that lie in a folder; loads no model.
 
     Args:
         page: The page.
-        drawn: Where its figures are, as SVG.
+        drawn: Where its figures are, as PNG.
         path: The file.
     """
     from bowdenfit.pages.page import render
-    from bowdenfit.results.folder import read_text, write_text
+    from bowdenfit.results.folder import write_text
 
-    files = {picture.name: drawn / f"{picture.name}.svg" for picture in page.pictures}
-    drawings = {name: read_text(file) for name, file in files.items() if file.exists()}
+    files = {picture.name: drawn / f"{picture.name}.png" for picture in page.pictures}
+    drawings = {name: file.read_bytes() for name, file in files.items() if file.is_file()}
     write_text(path, render(page, drawings))
     return path

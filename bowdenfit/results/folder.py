@@ -9,18 +9,15 @@ import os
 import shutil
 import tempfile
 from collections.abc import Collection, Iterable, Iterator, Mapping
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from pathlib import Path
 from typing import Any
+
+from filelock import FileLock, Timeout
 
 from bowdenfit.errors import StoreError, disk_error
 from bowdenfit.inputs import refuse_special
 from bowdenfit.verb import LARGEST_SEED
-
-try:
-    import fcntl
-except ImportError:  # not on Windows, where folders cannot be locked
-    fcntl = None  # type: ignore[assignment]
 
 FIT, SUMMARY = "fit.json", "summary.json"
 SUMMARY_TEXT, DETAILS_TEXT = "summary.txt", "details.txt"  # one page, and everything
@@ -28,6 +25,7 @@ REPORT = "report.html"
 POSTERIOR, CHAIN, FIGURES = "posterior.nc", "chain.checkpoint", "figures"
 ANSWERS, FIGURE_DATA = "answers.json", "figures.npz"
 REPLICATIONS = "replications.jsonl"  # of a calibration
+_LOCK = ".lock"  # there while something is being written
 _PARTIAL = ".partial"  # ends the names of what is being written
 _LARGEST = 400e6  # bytes of a text
 _WRITTEN = (FIT, ANSWERS, SUMMARY, SUMMARY_TEXT, DETAILS_TEXT, REPORT, FIGURE_DATA, POSTERIOR, CHAIN)
@@ -86,7 +84,7 @@ def filled_when_whole(folder: Path, last: str = "") -> Iterator[Path]:
 
 def is_empty(folder: Path) -> bool:
     """Whether nothing lies in a folder, or nothing but what is left of writing that was ended."""
-    return all(_is_partial(path) for path in folder.iterdir())
+    return all(_is_partial(path) for path in _contents(folder))
 
 
 def is_left_of(folder: Path, names: Collection[str]) -> bool:
@@ -96,7 +94,7 @@ def is_left_of(folder: Path, names: Collection[str]) -> bool:
         folder: The folder, which may be missing.
         names: Of the files and folders that such a run writes.
     """
-    inside = folder.iterdir() if folder.is_dir() else ()
+    inside = _contents(folder) if folder.is_dir() else ()
     return all(path.name in names or path.suffix == ".md" or _is_partial(path) for path in inside)
 
 
@@ -242,7 +240,7 @@ def refuse_to_overwrite(folder: Path, force: bool) -> None:
         return
     elif not folder.is_dir() or not is_left_of(folder, {*_WRITTEN, FIGURES}):
         raise StoreError(f"{folder} exists and is no results folder; name another with --output.")
-    elif any(path.suffix != ".md" for path in folder.iterdir()):
+    elif any(path.suffix != ".md" for path in _contents(folder)):
         there = "holds what is left of a fit that was ended; add --force to replace it, or name another with --output."
     else:
         return
@@ -264,26 +262,27 @@ def reserved(folder: Path | None) -> Iterator[None]:
         yield
         return
     new = not folder.exists()
+    lock = FileLock(folder / _LOCK, timeout=0)
     with folder_to_write(folder):
-        held = os.open(folder, os.O_RDONLY) if fcntl is not None else None
+        try:
+            lock.acquire()
+        except Timeout:
+            raise StoreError(
+                f"another fit or calibration is being written into {folder}; wait for it, or name another folder with --output."
+            ) from None
     try:
-        if held is not None:
-            _lock(held, folder)
         yield
     finally:
-        if held is not None:
-            os.close(held)
+        with suppress(OSError):  # while it is held, so that nobody else's goes; Windows removes it by itself
+            (folder / _LOCK).unlink()
+        lock.release()
         if new and not any(folder.iterdir()):
             folder.rmdir()
 
 
-def _lock(held: int, folder: Path) -> None:
-    try:
-        fcntl.flock(held, fcntl.LOCK_EX | fcntl.LOCK_NB)
-    except BlockingIOError:
-        raise StoreError(
-            f"another fit or calibration is being written into {folder}; wait for it, or name another folder with --output."
-        ) from None
+def _contents(folder: Path) -> list[Path]:
+    """Return what lies in a folder, without the lock of whoever is writing into it."""
+    return [path for path in folder.iterdir() if path.name != _LOCK]
 
 
 def clear(folder: Path) -> None:

@@ -1,10 +1,10 @@
 """The record of a fit: what was fitted to what, the draws, and what follows from them without asking a question."""
 
 from collections.abc import Callable, Iterable
-from concurrent.futures import Future
 from dataclasses import dataclass, field, replace
 from functools import cached_property, wraps
-from typing import Any, TypeVar
+from typing import TypeVar
+from weakref import WeakKeyDictionary
 
 import jax
 import numpy as np
@@ -113,7 +113,22 @@ class Provenance(Display):
         return [{"stage": stage, "time": seconds} for stage, seconds in self.stage_times.items()], {"time": "s"}
 
 
-@dataclass(frozen=True, repr=False)
+@dataclass(frozen=True)
+class DrawPrograms:
+    """Functions of many z (rows) that were compiled for sampling, handed on so that no question compiles them again.
+
+    Args:
+        values: Named values in shown units.
+        implied: What z implies for every reading; see `replicator`.
+        along_route: See `compile_along_route`; None without a route.
+    """
+
+    values: OfDraws
+    implied: OfDraws
+    along_route: OfDraws | None
+
+
+@dataclass(frozen=True, repr=False, eq=False)
 class Record(Display):
     """What was found for one data set; every question is asked of this.
 
@@ -124,6 +139,7 @@ class Record(Display):
         converged: Whether the sampler (or, without it, least squares) converged.
         reasons: Why not.
         provenance: Seed, versions, times.
+        programs: What sampling compiled; None of a fit that was read back, or made without MCMC.
     """
 
     dataset: Dataset
@@ -132,7 +148,7 @@ class Record(Display):
     converged: bool
     reasons: tuple[str, ...]
     provenance: Provenance
-    _answers: dict[Callable[..., Any], Any] = field(default_factory=dict, init=False, repr=False, compare=False)
+    programs: DrawPrograms | None = None
 
     @cached_property
     def model(self) -> Model:
@@ -250,16 +266,14 @@ class Record(Display):
 
 
 def once(question: Callable[[Record], Answer]) -> Callable[[Record], Answer]:
-    """A question that is worked out once for each record, which keeps the answer, or the promise of one from elsewhere."""
+    """Decorate a question so that it is worked out once for each record, and its answer kept as long as that record."""
+    answers: WeakKeyDictionary[Record, Answer] = WeakKeyDictionary()
 
     @wraps(question)
     def answer(fit: Record) -> Answer:
-        if answer not in fit._answers:
-            fit._answers[answer] = question(fit)
-        elif isinstance(promised := fit._answers[answer], Future):  # a process that was ended keeps none
-            fit._answers[answer] = question(fit) if promised.exception() else promised.result()
-        found: Answer = fit._answers[answer]
-        return found
+        if fit not in answers:
+            answers[fit] = question(fit)
+        return answers[fit]
 
     return answer
 
@@ -287,4 +301,4 @@ def some_values(fit: Record, n: int) -> dict[str, np.ndarray]:
 @once
 def along_route_program(fit: Record) -> OfDraws:
     """See `compile_along_route`."""
-    return compile_along_route(fit.model)
+    return fit.programs.along_route if fit.programs and fit.programs.along_route else compile_along_route(fit.model)

@@ -1,8 +1,10 @@
 """Sampling within a fit: which sampler, its compiled programs, and a posterior made of its draws."""
 
-from collections.abc import Callable, Mapping
+import time
+from collections.abc import Callable, Iterator, Mapping
 from concurrent.futures import Executor
-from dataclasses import dataclass, replace
+from contextlib import contextmanager
+from dataclasses import dataclass, field, replace
 from importlib import import_module
 from typing import Any
 
@@ -11,42 +13,53 @@ import numpy as np
 
 from bowdenfit.inference.chain import Chain, Sampling
 from bowdenfit.inference.draws import for_each_draw, replicator
-from bowdenfit.inference.log_density import LogDensity as Density
+from bowdenfit.inference.log_density import LogDensity
 from bowdenfit.inference.samplers import NAMES, Drawn, compare_samplers
 from bowdenfit.inference.walkers import walker_programs
 from bowdenfit.model import Model
-from bowdenfit.questions.check.suspects import implied_program
-from bowdenfit.questions.identify.judgment import values_program
 from bowdenfit.results.optimum import optimum_of
-from bowdenfit.results.record import OPTIMAL_EFFICIENCY, OPTIMAL_LENGTH, Draws, along_route_program
+from bowdenfit.results.record import OPTIMAL_EFFICIENCY, OPTIMAL_LENGTH, DrawPrograms, Draws
 from bowdenfit.results.route_draws import compile_along_route
-from bowdenfit.run.stopwatch import Stopwatch
 
 PRIOR_DRAWS = 4096
 LIBRARIES = {"emcee": "emcee", "nuts": "blackjax"}
 _MODULES = {"emcee": "bowdenfit.inference.ensemble", "nuts": "bowdenfit.inference.nuts"}
 
 
-def samplers(method: str) -> tuple[str, ...]:
-    """The samplers that a method runs, in their order; the draws of the first are the result."""
+def samplers_of(method: str) -> tuple[str, ...]:
+    """Return the samplers that a method runs, in their order; the draws of the first are the result."""
     return ("emcee", "nuts") if method == "both" else (method,)
+
+
+@dataclass
+class Stopwatch:
+    """Seconds spent in each stage of a fit."""
+
+    seconds: dict[str, float] = field(default_factory=dict)
+
+    @contextmanager
+    def stage(self, name: str) -> Iterator[None]:
+        """Time what runs inside."""
+        start = time.perf_counter()
+        try:
+            yield
+        finally:
+            self.seconds[name] = self.seconds.get(name, 0.0) + time.perf_counter() - start
 
 
 @dataclass(frozen=True)
 class Programs:
-    """Compiled for sampling and what follows it, while least squares is.
+    """What was compiled for sampling and what follows it.
 
     Args:
         samplers: What each sampler runs, by its name.
         optimum: Optimal length and efficiency of many z; None without a route.
-        implied: What each of many z implies for every reading.
-        asked: What questions asked `once` will need, by question.
+        of_draws: What the draws will be asked.
     """
 
     samplers: dict[str, Any]
     optimum: Callable[[np.ndarray], Any] | None
-    implied: Callable[[np.ndarray], Any]
-    asked: dict[Callable[..., Any], Any]
+    of_draws: DrawPrograms
 
     def quantities(self, z: np.ndarray) -> Mapping[str, np.ndarray]:
         """What must converge besides the parameters, by name, of many z."""
@@ -55,32 +68,30 @@ class Programs:
         return dict(zip((OPTIMAL_LENGTH, OPTIMAL_EFFICIENCY), self.optimum(z), strict=True))
 
 
-def sampling_programs(density: Density, seed: int, beside: Executor) -> Programs:
-    """The programs that sampling needs, compiled; and those that its draws will need, compiled beside it."""
+def compile_programs(density: LogDensity, seed: int, beside: Executor) -> Programs:
+    """Compile the programs that sampling needs and, in an executor beside it, those that its draws will need."""
     model, settings, programs = density.model, density.model.description.sampler, dict[str, Any]()
-    for name in samplers(settings.method):
+    for name in samplers_of(settings.method):
         if name == "emcee":
             programs[name] = walker_programs(density, settings, beside=beside)
         else:
             programs[name] = import_module(_MODULES[name]).make_program(density, settings)
     optimum = for_each_draw(optimum_of(model), model.space.size, beside=beside) if model.description.route else None
     implied = replicator(density, seed, beside)
-    asked: dict[Callable[..., Any], Any] = {values_program: lambda z: implied(z)["values"], implied_program: implied}
-    if model.description.route is not None:
-        asked[along_route_program] = compile_along_route(model, beside)
-    return Programs(programs, optimum, implied, asked)
+    along_route = compile_along_route(model, beside) if model.description.route is not None else None
+    return Programs(programs, optimum, DrawPrograms(lambda z: implied(z)["values"], implied, along_route))
 
 
-def draws_of(programs: Programs, asked: Sampling, watch: Stopwatch) -> tuple[Draws, tuple[str, ...]]:
-    """The posterior by each of the samplers, and why it should not be trusted."""
-    model, chains = asked.posterior.model, list[Chain]()
+def draw_posterior(programs: Programs, request: Sampling, watch: Stopwatch) -> tuple[Draws, tuple[str, ...]]:
+    """Sample the posterior by each of the samplers; return the draws, and why they should not be trusted."""
+    model, chains = request.posterior.model, list[Chain]()
     for name, program in programs.samplers.items():
         with watch.stage(f"import {LIBRARIES[name]}"):
             sampler = import_module(_MODULES[name])
         with watch.stage(f"sample with {NAMES[name]}" if chains else "sample"):
-            chains.append(sampler.sample(asked, program))
+            chains.append(sampler.sample(request, program))
     with watch.stage("replicate"):
-        posterior = _posterior(model, chains[0], programs.implied, asked.seed)
+        posterior = _posterior(model, chains[0], programs.of_draws.implied, request.seed)
     if len(chains) == 1:
         return posterior, chains[0].reasons
     with watch.stage("compare samplers"):

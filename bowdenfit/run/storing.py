@@ -1,109 +1,16 @@
-"""The results folder of a fit: whether it may be written, the checkpoint, and all files once the fit is done."""
+"""The results folder of a fit before it is fitted: whether it may be written, the seed, and the checkpoint."""
 
 import secrets
 from dataclasses import replace
 from pathlib import Path
-from textwrap import shorten
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 from bowdenfit.dataset import Dataset
 from bowdenfit.description import SamplerSettings
-from bowdenfit.errors import DescriptionError, DiskError, StoreError, UsageError, system_error
+from bowdenfit.errors import DescriptionError, StoreError, UsageError
 from bowdenfit.kinds.settings import parse_description
 from bowdenfit.results.folder import CHAIN, clear, read_checkpoint, refuse_to_overwrite, start_checkpoint
-from bowdenfit.run.helpers import Assistant
 from bowdenfit.verb import LARGEST_SEED
-from bowdenfit.words import few, listed, printable
-
-if TYPE_CHECKING:
-    from bowdenfit.front_desk import Fit
-
-
-def write_results(found: "Fit", folder: Path, figures: bool, helper: Assistant) -> tuple[str, ...]:
-    """All files of the results folder, as far as possible at the same time; fit.json comes last of the fit's own.
-
-    Args:
-        found: The fit.
-        folder: Its results folder.
-        figures: Whether to draw them.
-        helper: Who draws them.
-
-    Returns:
-        What is missing, in sentences; a fit whose figures or report fail is kept all the same.
-
-    Raises:
-        StoreError: The fit itself, or for want of room what belongs to it, could not be written.
-    """
-    from bowdenfit.questions.figures import FIGURES as FIGURE_NAMES
-    from bowdenfit.questions.figures import captions_of
-    from bowdenfit.questions.kept import answers_of
-    from bowdenfit.questions.report.sections import report_page
-    from bowdenfit.questions.summary.brief_words import summary_text
-    from bowdenfit.questions.summary.words import full_text
-    from bowdenfit.questions.writing import write_page
-    from bowdenfit.results.captions import write_captions
-    from bowdenfit.results.drawn import keep_drawn
-    from bowdenfit.results.folder import DETAILS_TEXT, FIGURES, REPORT, SUMMARY_TEXT, write_text
-    from bowdenfit.results.store import save
-    from bowdenfit.run.drawing import Drawing
-
-    if found.sampled is None:
-        clear(folder)
-    drawing, failed = Drawing(found, folder / FIGURES, helper), dict[str, Exception]()
-    if figures:
-        drawing.begin()
-    data = drawing.data
-    save(found, found.summary(), folder, True, answers_of(found), data)
-    for name, words in ((SUMMARY_TEXT, summary_text), (DETAILS_TEXT, full_text)):
-        try:
-            write_text(folder / name, printable(words(found)))
-        except Exception as error:
-            failed[name] = error
-    try:
-        page = report_page(found, data)
-        failed |= drawing.failed()
-        helper.submit(write_page, page, folder / FIGURES, folder / REPORT).result()  # behind the figures, whose files it takes
-    except Exception as error:
-        failed |= drawing.failed() | {REPORT: error}
-    try:
-        if data:
-            captions = captions_of({name: data[name] for name in data.keys() - failed}, found.name, drawing.mark)
-            write_captions(captions, folder / FIGURES)
-            if failed.keys().isdisjoint(FIGURE_NAMES):
-                keep_drawn(folder, captions)
-    except Exception as error:
-        failed["captions"] = error
-    return _what_is_missing(folder, failed)
-
-
-def _what_is_missing(folder: Path, failed: dict[str, Exception]) -> tuple[str, ...]:
-    """That some figures, texts or the report are missing, in a sentence each.
-
-    Raises:
-        DiskError: The same, where it is for want of room.
-    """
-    from bowdenfit.results.folder import DETAILS_TEXT, REPORT, SUMMARY_TEXT
-
-    texts = [name for name in (SUMMARY_TEXT, DETAILS_TEXT) if name in failed]
-    figures = [name for name in failed if name not in {REPORT, *texts}]
-    some = f"its figures {few(figures)}" if len(figures) > 1 else f"its figure {few(figures)}"
-    parts = (
-        (figures, some, "drawn", f"draw them later with bowdenfit plot {folder}"),
-        (texts, listed(texts), "written", f"bowdenfit summary {folder} prints it"),
-        ([REPORT] if REPORT in failed else [], "its report", "written", f"write it later with bowdenfit report {folder}"),
-    )
-    sentences = tuple(
-        f"{folder} holds the whole fit, but {part} could not be {done} ({_why(failed[names[0]])}); {remedy}."
-        for names, part, done, remedy in parts
-        if names
-    )
-    if any(isinstance(system_error(error) or error, DiskError) for error in failed.values()):
-        raise DiskError(" ".join(sentences))
-    return sentences
-
-
-def _why(error: Exception) -> str:
-    return shorten(" ".join(str(error).split()) or type(error).__name__, 200)
 
 
 def with_sampler(data: Dataset, method: str | None, mcmc: bool) -> Dataset:

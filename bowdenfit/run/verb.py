@@ -1,14 +1,14 @@
 """Fitting a data set."""
 
 from collections.abc import Callable
-from contextlib import ExitStack
 from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any, Literal, Unpack
 from warnings import warn
 
 from bowdenfit.given import with_checked_keywords
-from bowdenfit.inference.engines.processes import settings_of_process
+from bowdenfit.inference.engines.memory import refuse_too_little
+from bowdenfit.inference.engines.processes import keep_compiled_programs
 from bowdenfit.questions.summary.verb import reply
 from bowdenfit.reading import Reading, read, refuse_unknown
 from bowdenfit.results.folder import CHAIN
@@ -32,8 +32,6 @@ def fit(
     seed: Annotated[int | None, Option(least=0, most=LARGEST_SEED, default="drawn, and recorded")] = None,
     resume: Annotated[bool, Option()] = False,
     force: Annotated[bool, Option()] = False,
-    in_background: bool = False,
-    remember_compilations: bool = False,
     progress: "Callable[[Progress], None] | None" = None,
     report: Callable[[str], None] = warn,
     **reading: Unpack[Reading],
@@ -49,8 +47,6 @@ def fit(
         seed: Seed of everything random.
         resume: Go on with an interrupted or unconverged fit; refuses changed inputs.
         force: Replace an earlier fit in the results folder.
-        in_background: Start other processes, which is quicker; programs then begin with `if __name__ == "__main__"`.
-        remember_compilations: Whether JAX may keep compiled programs in the user's cache folder; a setting of the process.
         progress: Called while sampling; a notebook shows a bar if omitted.
         report: Called with a sentence where the fit is whole but its figures could not be drawn; a warning if omitted.
         reading: Keywords of `bowdenfit.read`.
@@ -60,28 +56,30 @@ def fit(
     """
     from bowdenfit.notebook import watched
     from bowdenfit.results.folder import reserved
-    from bowdenfit.run.helpers import assistant, light_processes
-    from bowdenfit.run.storing import choose_seed, start_checkpointing, with_sampler, write_results
+    from bowdenfit.run.storing import choose_seed, start_checkpointing, with_sampler
 
     refuse_unknown(fit, reading)
+    refuse_too_little()
     folder = Path(output) if output is not None else None
-    drawing, settings = figures and folder is not None, settings_of_process(remember_compilations)
-    with ExitStack() as held:
-        light = held.enter_context(light_processes(in_background, drawing, mcmc))
-        data = with_sampler(read(dataset, **reading), sampler, mcmc)
-        held.enter_context(reserved(folder))
+    data = with_sampler(read(dataset, **reading), sampler, mcmc)
+    with reserved(folder):
         seed = choose_seed(folder, data, mcmc, seed, resume, force)
-        helper = held.enter_context(assistant(light, in_background and (mcmc or drawing), settings, drawing, mcmc))
-        show = held.enter_context(watched(WATCH, progress)) if mcmc else None
         import jax
 
-        from bowdenfit.run.fitting import run
+        from bowdenfit.run.fitting import fit_classically, fit_posterior
+        from bowdenfit.run.writing import write_results
 
+        keep_compiled_programs()
         with jax.enable_x64(True):
-            found = run(data, partial(start_checkpointing, folder, data, seed, resume), mcmc, seed, resume, show, helper)
-            for sentence in write_results(found, folder, figures, helper) if folder is not None else ():
+            if mcmc:
+                with watched(WATCH, progress) as show:
+                    checkpoint = partial(start_checkpointing, folder, data, seed, resume)
+                    result = fit_posterior(data, seed, checkpoint, resume, show)
+            else:
+                result = fit_classically(data, seed)
+            for sentence in write_results(result, folder, figures) if folder is not None else ():
                 report(sentence)
-    return found
+    return result
 
 
 def _reply(found: "Fit", asked: dict[str, Any]) -> Reply:
@@ -113,5 +111,4 @@ VERB = Verb(
     json="Print summary.json instead of the summary for people.",
     results="fits",
     watch=WATCH,
-    behind={"in_background": True, "remember_compilations": True},
 )

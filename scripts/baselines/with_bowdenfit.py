@@ -11,7 +11,7 @@ import bowdenfit as bf
 
 def main() -> None:
     """Fit with the seed that the command line names."""
-    fit = bf.fit(onbody.DATASET, seed=int(sys.argv[1]), figures=False, in_background=True, remember_compilations=True)
+    fit = bf.fit(onbody.DATASET, seed=int(sys.argv[1]), figures=False)
     ready_at = time.monotonic()
     draws = np.stack([fit.posterior.values[name] for name in onbody.NAMES], axis=-1)
     onbody.show(ready_at, draws, fit.provenance.stage_times["sample"], draws)

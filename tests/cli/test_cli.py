@@ -192,7 +192,7 @@ def test_plot_draws_the_figures_again(run, results, tmp_path):
     code, out, _ = run("plot", results, "--output", tmp_path / "figures")
     assert code == 0
     names = {Path(line).name for line in out.split()}
-    assert {"efficiency.png", "efficiency.svg", "wrap_angles.png", "coefficients.png"} <= names
+    assert {"efficiency.png", "wrap_angles.png", "coefficients.png"} <= names
     assert names == {p.name for p in (tmp_path / "figures").iterdir()}
 
 
@@ -369,7 +369,7 @@ def test_a_whole_fit_in_a_process_of_its_own_and_an_interrupt(on_body, tmp_path)
     names = {p.name for p in (tmp_path / "fit").iterdir()}
     known = {"fit.json", "summary.json", "summary.txt", "details.txt", "report.html", "answers.json", "figures.npz"}
     assert names == known | {"posterior.nc", "chain.checkpoint", "figures"}
-    assert len(list((tmp_path / "fit" / "figures").iterdir())) == 22  # seven as PNG, SVG and PDF, and their captions
+    assert len(list((tmp_path / "fit" / "figures").iterdir())) == 8  # seven, and their captions
 
 
 @pytest.mark.parametrize(

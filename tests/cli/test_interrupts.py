@@ -9,7 +9,8 @@ import time
 
 import pytest
 
-from bowdenfit.cli.interrupts import line_of
+from bowdenfit.cli import interrupts
+from bowdenfit.cli.interrupts import refuse_interrupted, run_interruptibly
 
 INTERRUPT_WHILE_LOADING = """
 import os, signal, sys
@@ -42,13 +43,6 @@ def test_an_interrupt_while_something_is_loaded_is_one_line(module, on_body):
 def test_without_the_first_moments_an_interrupt_is_raised_while_something_is_loaded(on_body):
     """So the test above can fail."""
     assert _interrupted("bowdenfit.cli", "click", str(on_body)).returncode == 77
-
-
-def test_nothing_is_loaded_before_the_program_hears_an_interrupt():
-    """Until then one is a traceback of Python's, as it is while Python itself starts."""
-    code = "import sys; before = {*sys.modules}; import bowdenfit.__main__; print(*sorted({*sys.modules} - before))"
-    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True, timeout=60)
-    assert {*done.stdout.split()} <= {"bowdenfit", "bowdenfit.__main__", "_signal"}
 
 
 INTERRUPT_IN_A_LIBRARY = """
@@ -106,28 +100,51 @@ def test_an_interrupt_that_a_library_swallows_is_heard_all_the_same(library, on_
     assert time.monotonic() - begun < 25
 
 
-def test_an_interrupt_just_before_the_terminal_is_read_is_heard_without_another_key():
-    """Another thread takes the signal here, so that nothing wakes the system where it waits for a key."""
-    keyboard, screen = os.openpty()
-    before = signal.signal(signal.SIGINT, signal.default_int_handler)
-    late = threading.Timer(20, os.write, (keyboard, b"a key\n"))
-    threading.Timer(0.2, lambda: signal.pthread_kill(threading.get_ident(), signal.SIGINT)).start()
-    late.start()
+def test_a_command_runs_in_the_surroundings_of_whoever_calls_it_and_gives_back_what_it_returns_or_raises():
+    assert run_interruptibly(lambda: 3) == 3
+    with pytest.raises(LookupError, match="what went wrong"):
+        run_interruptibly(lambda: {}["what went wrong"])
+
+
+def test_a_loop_that_looks_at_the_flag_ends_by_itself():
+    ended = []
+
+    def loop():
+        threading.Timer(0.1, os.kill, (os.getpid(), signal.SIGINT)).start()
+        try:
+            while True:
+                refuse_interrupted()
+                time.sleep(0.01)
+        finally:
+            ended.append(True)
+
+    before = signal.getsignal(signal.SIGINT)
+    signal.signal(signal.SIGINT, signal.default_int_handler)
     try:
-        with os.fdopen(screen) as terminal, pytest.raises(KeyboardInterrupt):
-            line_of(terminal)
-        assert late.is_alive(), "no sooner than the next key"
+        with pytest.raises(KeyboardInterrupt):
+            run_interruptibly(loop)
     finally:
-        late.cancel()
-        os.close(keyboard)
         signal.signal(signal.SIGINT, before)
+        interrupts.requested.clear()
+    assert ended
 
 
-def test_a_line_is_read_as_it_is_typed_and_an_ended_input_is_empty():
+AT_A_PROMPT = """
+import sys
+from bowdenfit.cli.interrupts import run_interruptibly
+run_interruptibly(sys.stdin.readline)
+"""
+
+
+def test_an_interrupt_at_a_prompt_needs_no_further_key():
     keyboard, screen = os.openpty()
-    with os.fdopen(screen) as terminal:
-        os.write(keyboard, "Größe 1\nanother\n".encode())
-        assert [line_of(terminal), line_of(terminal)] == ["Größe 1\n", "another\n"]
-        os.write(keyboard, b"\x04")
-        assert line_of(terminal) == ""
+    with subprocess.Popen(
+        [sys.executable, "-c", "import signal; signal.signal(signal.SIGINT, signal.default_int_handler)" + AT_A_PROMPT],
+        stdin=screen, stderr=subprocess.PIPE, text=True,
+    ) as process:  # fmt: skip
+        time.sleep(1.0)
+        process.send_signal(signal.SIGINT)
+        _, said = process.communicate(timeout=20)
     os.close(keyboard)
+    os.close(screen)
+    assert (process.returncode, said) == (130, "Interrupted.\n")

@@ -489,7 +489,7 @@ def test_the_page_of_a_calibration_opens_without_a_fault(tmp_path):
     path = write_page(calibration_page(found), tmp_path, tmp_path / "report.html")
     with browser() as chromium, opened(chromium, path, width=390) as reader:
         assert reader.faults() == []
-        assert reader.page.locator("main svg").count() == 3
+        assert reader.page.locator("main img").count() == 3
         assert "CALIBRATED: for this description and these tables" in reader.page.locator("main").inner_text()
         (mu,) = found.quantities
         cells = reader.page.locator("details tbody td").all_text_contents()

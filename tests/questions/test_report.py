@@ -60,7 +60,7 @@ def assert_sound(chromium, path):
     for settings in ({"width": 1200, "color_scheme": "light"}, {"width": 390, "color_scheme": "dark"}):
         with opened(chromium, path, **settings) as reader:
             assert reader.faults() == []
-            assert reader.page.locator("main svg").count() >= 1
+            assert reader.page.locator("main img").count() >= 1
             assert reader.sheets() <= SHEETS
 
 
@@ -156,7 +156,7 @@ def shown(chart):
 
 
 def test_without_scripts_and_on_paper_the_drawing_stands_in_place_of_the_chart(chromium, routed):
-    drawing = "#figure-efficiency .drawing svg"
+    drawing = "#figure-efficiency .drawing img"
     with opened(chromium, routed / REPORT) as reader:
         assert reader.page.locator(CHART.format("efficiency")).is_visible()
         assert not reader.page.locator(drawing).is_visible()

@@ -23,11 +23,11 @@
   }
 
   const named = element => element.getAttribute("aria-label") || element.getAttribute("aria-labelledby");
-  const unnamed = all("svg, [role=region], [role=application], button, select, nav, section")
-    .filter(e => e.tagName === "svg" ? !named(e) || e.getAttribute("role") !== "img" : !named(e) && !e.textContent.trim());
+  const unnamed = all("img, [role=region], [role=application], button, select, nav, section")
+    .filter(e => e.tagName === "IMG" ? !e.alt : !named(e) && !e.textContent.trim());
   const ids = all("[id]").map(element => element.id);
   const acting = all("*").filter(e => e.getAttributeNames().some(name => name.startsWith("on"))
-    || ["IMG", "IFRAME", "OBJECT", "EMBED", "FORM"].includes(e.tagName));
+    || ["IFRAME", "OBJECT", "EMBED", "FORM"].includes(e.tagName) || (e.tagName === "IMG" && !e.src.startsWith("data:")));
   const levels = all("h1, h2, h3, h4").map(element => Number(element.tagName[1]));
   const wide = document.documentElement.scrollWidth - document.documentElement.clientWidth;
   return [

@@ -10,8 +10,8 @@ from pathlib import Path
 from typing import Any
 
 from bowdenfit.errors import UsageError
-from bowdenfit.inference.engines.engine import Engine, EngineError, HereOrInProcesses, in_threads
-from bowdenfit.inference.engines.processes import cores, nothing, start_worker
+from bowdenfit.inference.engines.engine import Engine, EngineError, InThisProcess, in_threads
+from bowdenfit.inference.engines.processes import cores, start_worker
 from bowdenfit.inputs import refuse_special
 from bowdenfit.words import shown
 
@@ -28,8 +28,7 @@ def open_engine(
     engine: str | Executor,
     workers: int | None = None,
     folder: Path | None = None,
-    may_start_processes: bool = False,
-    prepare: Callable[[], None] = nothing,
+    processes: int = 1,
 ) -> Iterator[Engine[Any, Any]]:
     """An engine, which ends with what is done inside.
 
@@ -37,8 +36,8 @@ def open_engine(
         engine: Its name, or an executor of one's own, which is left open.
         workers: Processes here, or jobs at a time.
         folder: Where Slurm's jobs write; asked for by that alone.
-        may_start_processes: Whether this program guards its start, as the command line does.
-        prepare: Called first in every process that is started here.
+        processes: Processes of this machine that "local" uses; with more than one, programs begin with
+            `if __name__ == "__main__"`, as with everything that starts processes.
 
     Raises:
         UsageError: There is no such engine, or it is not installed.
@@ -49,7 +48,7 @@ def open_engine(
         return
     found: Engine[Any, Any]
     if engine == "local":
-        found = _local((workers or cores()) if may_start_processes else 1, prepare)
+        found = InThisProcess() if processes == 1 else Engine(partial(_processes, processes), processes, "this machine")
     elif engine.startswith("dask://"):
         address = engine.removeprefix("dask://")
         with _dask_client(address) as (client, count):
@@ -70,11 +69,8 @@ def open_engine(
         found.close()
 
 
-def _local(workers: int, prepare: Callable[[], None]) -> Engine[Any, Any]:
-    def processes() -> Executor:
-        return ProcessPoolExecutor(workers, get_context("spawn"), start_worker, (prepare,))
-
-    return HereOrInProcesses(processes, workers)
+def _processes(count: int) -> Executor:
+    return ProcessPoolExecutor(count, get_context("spawn"), start_worker)
 
 
 @contextmanager

@@ -3,7 +3,6 @@
 What a piece gives may depend on itself alone, never on the engine, so that any engine gives the same.
 """
 
-import time
 import traceback
 from collections.abc import Callable, Iterator, Sequence
 from concurrent.futures import (
@@ -16,7 +15,7 @@ from concurrent.futures import (
     wait,
 )
 from dataclasses import dataclass, field
-from typing import Any, Generic, NamedTuple, TypeAlias, TypeVar
+from typing import Any, Generic, TypeAlias, TypeVar
 
 from bowdenfit.errors import BowdenfitError
 
@@ -26,9 +25,6 @@ Outcome: TypeAlias = tuple[Exception | None, Any]
 _AHEAD = 2  # pieces that a worker is given at once, so that it need not wait for the next
 _PATIENCE = 30.0  # seconds without a piece done, until is looked whether anybody is left
 _TIMES = 3  # that a piece is tried when workers die of it
-_WORTH_PROCESSES = 2.0  # times what it takes to begin them that more processes must save, before they are begun
-_SEEN = 3  # pieces by which that is decided: the first compiles, and the second may compile what the first did not need
-_LOADING = 2.0  # seconds until a new process has loaded what it computes with
 
 
 class EngineError(BowdenfitError):
@@ -143,59 +139,15 @@ def attempt(function: Callable[[Any], Any], piece: Any) -> Outcome:
         return error, None
 
 
-class Taken(NamedTuple):
-    """What a piece took.
+class InThisProcess(Engine[Work, Result]):
+    """One piece after the other, here."""
 
-    Args:
-        seconds: Of the clock.
-        computed: Of all cores together.
-    """
-
-    seconds: float
-    computed: float
-
-
-def processes_pay(taken: Sequence[Taken], left: int, workers: int) -> bool:
-    """Whether more processes save clearly more time than it takes to begin them.
-
-    Every new process loads and compiles all over again, and the threads of one process use several cores already: what more
-    processes can save is what cores are idle meanwhile. The quickest piece shows what one takes, the others what was compiled.
-
-    Args:
-        taken: What the first pieces took.
-        left: Pieces to do.
-        workers: Processes there would be, each with a core.
-    """
-    quickest = min(taken)
-    if quickest.seconds <= 0.0:
-        return False
-    beginning = sum(piece.seconds - quickest.seconds for piece in taken) + _LOADING
-    idle = max(1.0 - quickest.computed / (quickest.seconds * workers), 0.0)
-    return left * quickest.seconds * idle > _WORTH_PROCESSES * beginning
-
-
-class HereOrInProcesses(Engine[Work, Result]):
-    """One process, until it is seen that more of them are quicker.
-
-    Args:
-        executor: Makes the executor of several processes.
-        workers: How many; 1 if none may be started.
-    """
-
-    def __init__(self, executor: Callable[[], Executor], workers: int) -> None:
-        super().__init__(executor, workers, "this machine")
+    def __init__(self) -> None:
+        super().__init__(lambda: ThreadPoolExecutor(1), 1, "this process")
 
     def results(self, function: Callable[[Work], Result], pieces: Sequence[Work]) -> Iterator[Result]:
         """See `Engine`."""
-        taken = list[Taken]()
-        for number, piece in enumerate(pieces):
-            if self.workers > 1 and len(taken) == _SEEN and processes_pay(taken, len(pieces) - number, self.workers):
-                yield from super().results(function, pieces[number:])
-                return
-            begin, computed = time.perf_counter(), time.process_time()
-            result = function(piece)
-            taken.append(Taken(time.perf_counter() - begin, time.process_time() - computed))
-            yield result
+        return map(function, pieces)
 
 
 def in_threads(submit: Callable[..., Any], most: int) -> Executor:

@@ -1,7 +1,7 @@
 """Answers about stretch, preload and loops at wrap angles, with intervals: what `bowdenfit predict --quantity` prints."""
 
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import Any
 
@@ -321,8 +321,8 @@ class Elastic(Display):
 
 @once
 def elastic_answers(fit: Record) -> Elastic:
-    """The elastic answers of a fit."""
-    return Elastic(fit)
+    """Return the elastic answers of a fit; of a copy, so that what is kept for a record does not keep the record itself."""
+    return Elastic(replace(fit))
 
 
 def has_elastic_answers(fit: Record) -> bool:

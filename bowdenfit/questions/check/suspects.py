@@ -4,9 +4,8 @@ Importance weights cannot take out what such a reading did to the draws: how far
 fit takes seconds, so that only those that look suspicious by their weights are left out in this way.
 """
 
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import replace
-from typing import Any
 
 import jax
 import numpy as np
@@ -39,22 +38,16 @@ def refit_suspects(fit: Record, tables: Sequence[TableChecks]) -> tuple[TableChe
         density, drawn, z = LogDensity(fit.model), fit.posterior, fit.posterior.flat_z
         each = np.concatenate([drawn.log_likelihood[term.name] for term in fit.model.terms], axis=-1).reshape(len(z), -1)
         share = min(drawn.n_effective / len(z), 1.0)
-        leaving_out = LeavingOut(ReadingsToLeaveOut(density), z, each, share, fit.provenance.seed, caller_of(fit))
+        leaving_out = LeavingOut(ReadingsToLeaveOut(density), z, each, share, fit.provenance.seed)
         for at, place in suspects:
             found[at] = _refitted(leaving_out, implied_program(fit), found[at], place)
     return tuple(found)
 
 
 @once
-def caller_of(_: Record) -> Callable[..., Any]:
-    """What calls functions of draws; while a fit is written, in a process that has loaded what these take."""
-    return lambda function, *arguments: function(*arguments)
-
-
-@once
 def implied_program(fit: Record) -> OfDraws:
     """What many z imply for every reading; a fit that samples has it already."""
-    return replicator(LogDensity(fit.model), fit.provenance.seed)
+    return fit.programs.implied if fit.programs else replicator(LogDensity(fit.model), fit.provenance.seed)
 
 
 def suspects_of(tables: Sequence[TableChecks]) -> list[tuple[int, int]]:

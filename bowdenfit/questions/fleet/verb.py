@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Annotated, Any, Unpack
 
 from bowdenfit.given import with_checked_keywords
 from bowdenfit.inference.engines.memory import refuse_too_little
-from bowdenfit.inference.engines.processes import settings_of_process
+from bowdenfit.inference.engines.processes import keep_compiled_programs
 from bowdenfit.reading import Reading, refuse_unknown
 from bowdenfit.verb import LARGEST_SEED, NOT_TRUSTED, Argument, Option, Output, Reply, Verb, Watch
 
@@ -33,12 +33,10 @@ def fleet(
     *,
     output: Annotated[Output, Option(("-o",), default="fits/NAME OF FOLDER")] = None,
     engine: Annotated["str | Executor", Option(metavar="ENGINE")] = "local",
-    workers: Annotated[int | None, Option(("-j",), least=1, default="all cores; 16 jobs of Slurm")] = None,
+    workers: Annotated[int | None, Option(("-j",), least=1, default="this process, with threads; 16 jobs of Slurm")] = None,
     seed: Annotated[int | None, Option(least=0, most=LARGEST_SEED, default="drawn, and recorded")] = None,
     resume: Annotated[bool, Option()] = False,
     force: Annotated[bool, Option()] = False,
-    in_background: bool = False,
-    remember_compilations: bool = False,
     progress: Report | None = None,
     **reading: Unpack[Reading],
 ) -> "Fleet":
@@ -48,13 +46,11 @@ def fleet(
         folder: With fleet.csv (cable, cycles, temperature_degC, lubricated, file) and fleet.toml, which describes the cables
             as a cable.toml does; or with a folder that has a cable.toml for each cable, or for its inspections by cycles.
         output: Results folder.
-        engine: local (this process, or more where quicker), dask://HOST:PORT or slurm; or any `concurrent.futures.Executor`.
-        workers: Processes here, or jobs at a time.
+        engine: local (this machine), dask://HOST:PORT or slurm; or any `concurrent.futures.Executor`.
+        workers: Processes here, each of which loads and compiles all over again, or jobs at a time.
         seed: Seed of everything random.
         resume: Go on with an interrupted fleet, or add cables and inspections.
         force: Replace an earlier fleet in the results folder.
-        in_background: Start other processes where that is quicker; programs then begin with `if __name__ == "__main__"`.
-        remember_compilations: Whether JAX may keep compiled programs in the user's cache folder; a setting of the process.
         progress: Called after every piece of work with inspections done, of how many, and seconds so far.
         reading: Keywords of `bowdenfit.read`.
 
@@ -68,7 +64,7 @@ def fleet(
 
     refuse_unknown(fleet, reading)
     refuse_too_little()
-    place, prepare = Path(output) if output is not None else None, settings_of_process(remember_compilations)
+    place = Path(output) if output is not None else None
     inspections = read_inspections(Path(folder))
     with reserved(place), watched(WATCH, progress) as show:
         import jax
@@ -77,10 +73,10 @@ def fleet(
         from bowdenfit.questions.fleet.fitting import gathered
 
         store, seed = _store(place, seed, resume)
-        prepare()
+        keep_compiled_programs()
         with jax.enable_x64(True):
             cases, broken = _read(Path(folder), inspections, reading)
-            with open_engine(engine, workers, place and place / JOBS, in_background, prepare) as opened:
+            with open_engine(engine, workers, place and place / JOBS, workers or 1) as opened:
                 fits = store.open(resume, force) if store else {}
                 _fit(opened, cases, seed, store, fits, show)
             answer, drawn = gathered(Path(folder).resolve().name, cases, fits, broken, seed)
@@ -191,5 +187,4 @@ VERB = Verb(
     csv="Print medians and intervals of all inspections as CSV, one a row.",
     results="fits",
     watch=WATCH,
-    behind={"in_background": True, "remember_compilations": True},
 )

@@ -73,7 +73,7 @@ def _with_tails(model: Model, covariance: np.ndarray) -> np.ndarray:
 @once
 def values_program(fit: Record) -> OfDraws:
     """Named values of many z, in shown units; a fit that samples has one already."""
-    return _compile_values(fit.model)
+    return fit.programs.values if fit.programs else _compile_values(fit.model)
 
 
 def _compile_values(model: Model) -> OfDraws:

@@ -34,6 +34,7 @@ def report(
         StoreError: The results folder is missing or damaged, or the file cannot be written.
     """
     from bowdenfit.errors import UsageError
+    from bowdenfit.plots.write import PNG
     from bowdenfit.questions.figures import draw_figure, figures_of, kept_figures, mark_of
     from bowdenfit.questions.next.ranking import next_measurement
     from bowdenfit.questions.report.sections import report_page
@@ -53,7 +54,7 @@ def report(
     path = path / REPORT if path.is_dir() else path
     with file_to_write(path) as temporary, TemporaryDirectory() as drawn:
         for name, data in figures.items():
-            draw_figure(name, data, Path(drawn), ("svg",), found.name, mark=mark)
+            draw_figure(name, data, Path(drawn), (PNG,), found.name, mark=mark)
         write_page(report_page(found, figures, ranking), Path(drawn), temporary)
     return path
 

@@ -62,8 +62,7 @@ def plot(
     *,
     figures: Annotated[Sequence[str], Option(("--figure",), metavar="NAME")] = (),
     width: Annotated[Quantity | None, Option(example="3.5in", metavar="LENGTH")] = None,
-    formats: Annotated[Sequence[str], Option(("--format",), metavar="ENDING", default="png, svg and pdf")] = (),
-    in_background: bool = False,
+    formats: Annotated[Sequence[str], Option(("--format",), metavar="ENDING", default="png")] = (),
 ) -> "Files":
     """Draw the figures of a fit into a folder, and write what each shows, in words, to captions.txt beside them.
 
@@ -72,8 +71,7 @@ def plot(
         output: Folder for the figures.
         figures: Draw only this figure, such as efficiency; may be repeated.
         width: Width of the page, such as 3.5in or 88mm for a column of a paper; words keep their size.
-        formats: Write this format alone: png, svg or pdf; may be repeated.
-        in_background: Write PDFs in another process where that is quicker.
+        formats: Write this format, png, svg or pdf, instead of png; may be repeated.
 
     Returns:
         The files written.
@@ -94,7 +92,7 @@ def plot(
         raise UsageError("a fit by itself has no folder; name one for the figures.")
     endings = _formats(formats)
     there = _there(Path(found), figures, endings) if isinstance(found, str | Path) and width is None else None
-    captions, order, bring = there or _anew(found, figures, width, in_background)
+    captions, order, bring = there or _anew(found, figures, width)
     with filled_when_whole(Path(output)) as place:
         bring_captions(Path(output), place)
         bring(place, endings)
@@ -121,50 +119,31 @@ def _copy(there: Path, names: Sequence[str], place: Path, endings: Sequence[str]
             shutil.copyfile(there / f"{name}.{ending}", place / f"{name}.{ending}")
 
 
-def _anew(
-    found: "Record | str | Path", names: Sequence[str], width: Quantity | None, in_background: bool
-) -> "_Asked":
+def _anew(found: "Record | str | Path", names: Sequence[str], width: Quantity | None) -> "_Asked":
     """Figures to be drawn."""
     from bowdenfit.questions.figures import FIGURES, captions_of, page_width
 
     page = page_width(width)
     shown, cable, mark = _shown(found, names)
-    return captions_of(shown, cable, mark), tuple(FIGURES), partial(_draw, shown, (cable, page, mark), in_background)
+    return captions_of(shown, cable, mark), tuple(FIGURES), partial(_draw, shown, (cable, page, mark))
 
 
-def _draw(
-    shown: Mapping[str, Any],
-    look: tuple[str, float | None, str],
-    in_background: bool,
-    place: Path,
-    endings: Sequence[str],
-) -> None:
-    from bowdenfit.inference.engines.processes import has_room_beside, meanwhile
-    from bowdenfit.plots.style import load_matplotlib
+def _draw(shown: Mapping[str, Any], look: tuple[str, float | None, str], place: Path, endings: Sequence[str]) -> None:
     from bowdenfit.questions.figures import draw_figure
 
-    def draw(chosen: Sequence[str]) -> None:
-        for name, data in shown.items():
-            draw_figure(name, data, place, chosen, *look)
-
-    others = [ending for ending in endings if ending != "pdf"]
-    if in_background and others and len(others) < len(endings) and has_room_beside():
-        load_matplotlib()  # once for both
-        with meanwhile(partial(draw, ["pdf"])):
-            draw(others)
-    else:
-        draw(endings)
+    for name, data in shown.items():
+        draw_figure(name, data, place, endings, *look)
 
 
 def _formats(named: Sequence[str]) -> Sequence[str]:
-    """Endings of the files; all where none is named."""
+    """Return the endings of the files; PNG where none is named."""
     from bowdenfit.errors import UsageError, nearest
-    from bowdenfit.plots.write import FORMATS
+    from bowdenfit.plots.write import FORMATS, PNG
 
     for name in named:
         if name not in FORMATS:
             raise UsageError(f"there is no format {name!r} for figures{nearest(name, list(FORMATS))}")
-    return tuple(dict.fromkeys(named)) or FORMATS
+    return tuple(dict.fromkeys(named)) or (PNG,)
 
 
 def _shown(found: "Record | str | Path", names: Sequence[str]) -> tuple[dict[str, Any], str, str]:
@@ -206,6 +185,5 @@ PLOT_VERB = Verb(
     "Draw the figures of a fit again.",
     "Draw the figures of a finished fit again, for the page of a paper too: --width 3.5in --format pdf.",
     json="",
-    behind={"in_background": True},
     warns=True,
 )

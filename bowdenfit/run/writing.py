@@ -1,0 +1,107 @@
+"""What a finished fit writes into its results folder: the fit itself, figures, texts and the report."""
+
+from collections.abc import Callable
+from pathlib import Path
+from textwrap import shorten
+from typing import Any
+
+from bowdenfit.errors import DiskError, system_error
+from bowdenfit.front_desk import Fit
+from bowdenfit.plots.write import PNG
+from bowdenfit.questions.figures import FIGURES as FIGURE_NAMES
+from bowdenfit.questions.figures import captions_of, draw_figure, figures_of, mark_of
+from bowdenfit.questions.kept import answers_of
+from bowdenfit.questions.report.sections import report_page
+from bowdenfit.questions.summary.brief_words import summary_text
+from bowdenfit.questions.summary.verdict import verdict
+from bowdenfit.questions.summary.words import full_text
+from bowdenfit.questions.writing import write_page
+from bowdenfit.results.captions import write_captions
+from bowdenfit.results.drawn import keep_drawn
+from bowdenfit.results.folder import DETAILS_TEXT, FIGURES, REPORT, SUMMARY_TEXT, clear, write_text
+from bowdenfit.results.store import save
+from bowdenfit.words import few, listed, printable
+
+
+def write_results(fit: Fit, folder: Path, figures: bool) -> tuple[str, ...]:
+    """Write all files of the results folder; fit.json comes last of the fit's own, before figures and texts.
+
+    Args:
+        fit: The fit.
+        folder: Its results folder.
+        figures: Whether to draw them.
+
+    Returns:
+        What is missing, in sentences; a fit whose figures or report fail is kept all the same.
+
+    Raises:
+        StoreError: The fit itself, or for want of room what belongs to it, could not be written.
+    """
+    if fit.sampled is None:
+        clear(folder)
+    failed: dict[str, Exception] = {}
+
+    def attempt(name: str, step: Callable[..., Any], *arguments: Any) -> None:
+        try:
+            step(*arguments)
+        except Exception as error:
+            failed[name] = error
+
+    data = _figure_data(fit, failed) if figures else {}
+    save(fit, fit.summary(), folder, True, answers_of(fit), data)
+    attempt(SUMMARY_TEXT, lambda: write_text(folder / SUMMARY_TEXT, printable(summary_text(fit))))
+    attempt(DETAILS_TEXT, lambda: write_text(folder / DETAILS_TEXT, printable(full_text(fit))))
+    mark = mark_of(verdict(fit).troubles)
+    for name, shown in data.items():
+        attempt(name, draw_figure, name, shown, folder / FIGURES, (PNG,), fit.name, None, mark)
+    attempt(REPORT, lambda: write_page(report_page(fit, data), folder / FIGURES, folder / REPORT))
+    drawn = {name: shown for name, shown in data.items() if name not in failed}
+    if data:
+        attempt("captions", _write_captions, folder, captions_of(drawn, fit.name, mark), len(drawn) == len(data))
+    return _what_is_missing(folder, failed)
+
+
+def _figure_data(fit: Fit, failed: dict[str, Exception]) -> dict[str, Any]:
+    """Return what each figure shows, by its name, and note those for which that cannot be worked out."""
+    data: dict[str, Any] = {}
+    for name in FIGURE_NAMES:
+        try:
+            data |= dict(figures_of(fit, [name]))
+        except Exception as error:
+            failed[name] = error
+    return data
+
+
+def _write_captions(folder: Path, captions: dict[str, str], is_complete: bool) -> None:
+
+    write_captions(captions, folder / FIGURES)
+    if is_complete:
+        keep_drawn(folder, captions)
+
+
+def _what_is_missing(folder: Path, failed: dict[str, Exception]) -> tuple[str, ...]:
+    """That some figures, texts or the report are missing, in a sentence each.
+
+    Raises:
+        DiskError: The same, where it is for want of room.
+    """
+    texts = [name for name in (SUMMARY_TEXT, DETAILS_TEXT) if name in failed]
+    figures = [name for name in failed if name not in {REPORT, *texts}]
+    some = f"its figures {few(figures)}" if len(figures) > 1 else f"its figure {few(figures)}"
+    parts = (
+        (figures, some, "drawn", f"draw them later with bowdenfit plot {folder}"),
+        (texts, listed(texts), "written", f"bowdenfit summary {folder} prints it"),
+        ([REPORT] if REPORT in failed else [], "its report", "written", f"write it later with bowdenfit report {folder}"),
+    )
+    sentences = tuple(
+        f"{folder} holds the whole fit, but {part} could not be {done} ({_why(failed[names[0]])}); {remedy}."
+        for names, part, done, remedy in parts
+        if names
+    )
+    if any(isinstance(system_error(error) or error, DiskError) for error in failed.values()):
+        raise DiskError(" ".join(sentences))
+    return sentences
+
+
+def _why(error: Exception) -> str:
+    return shorten(" ".join(str(error).split()) or type(error).__name__, 200)

@@ -17,7 +17,7 @@ from typing import Any
 from bowdenfit.cli.terminal import say_interrupted
 
 INTERRUPTED = 130  # exit code, as shells have it
-_PATIENCE = 0.5  # s, in which a command may end by itself
+_PATIENCE = 1.0  # s, in which a command may end by itself
 _LOOK = 0.2  # s between two looks at the thread; some systems do not wake the main thread for a signal
 
 requested = threading.Event()

@@ -14,13 +14,11 @@ import numpy as np
 import pytest
 from drawn_once import DrawnOnce
 from figure_words import assert_readable, check_words, words
-from fontTools import subset
 from fontTools.ttLib import TTFont
 from kept_data import assert_kept
 from matplotlib.collections import PolyCollection
 
 from bowdenfit.inference.interval import Interval
-from bowdenfit.plots import fonts
 from bowdenfit.plots.bands import BAND_QUANTILES, NEW_RUN, Band
 from bowdenfit.plots.densities import BINS, bin_numbers, density, enclosed_share
 from bowdenfit.plots.sheet import NUMBER_SPACE, Panel, PanelSheet, ticks
@@ -529,7 +527,7 @@ def test_the_same_data_give_the_same_bytes_with_words_as_text(tmp_path):
     assert "Wrap angle (deg)</text>" in (tmp_path / "first" / "wrap_angles.svg").read_text(encoding="utf-8")
 
 
-def test_a_pdf_has_letters_that_can_be_searched_and_nothing_for_typesetting(tmp_path, capfd):
+def test_a_pdf_has_letters_that_can_be_searched(tmp_path):
     name = "Łódź λ <b> $x (50 %)"
     for folder in (tmp_path / "first", tmp_path / "second"):
         draw_figure("coefficients", paper_data()["coefficients"], folder, ("pdf",), name)
@@ -539,36 +537,7 @@ def test_a_pdf_has_letters_that_can_be_searched_and_nothing_for_typesetting(tmp_
     streams = [zlib.decompress(part) for part in re.findall(rb"stream\r?\n(.*?)\r?\nendstream", page, re.DOTALL)]
     fonts = [TTFont(io.BytesIO(stream)) for stream in streams if stream[:4] == b"\x00\x01\x00\x00"]
     assert fonts
-    needed = {"head", "hhea", "loca", "maxp", "glyf", "hmtx"}  # ISO 32000-1, table 126
-    assert all(needed <= set(font.keys()) <= needed | {"cvt ", "prep", "fpgm", "GlyphOrder"} for font in fonts)
     assert any(b"beginbfchar" in stream or b"beginbfrange" in stream for stream in streams)  # from glyphs to letters
-
-
-@pytest.mark.parametrize("figures", [["wrap_angles", "coefficients"], pytest.param(ALL, marks=pytest.mark.slow)])
-def test_a_pdf_is_the_same_whatever_letters_were_written_before(tmp_path, monkeypatch, figures):
-    shown = [(name, data) for name, data in paper_data().items() if name in figures]
-    named = [(data, name) for data in shown for name in ("plain", "Łódź λ é ∑ ﬁ")]
-
-    def pages(folder):
-        for i, ((figure, data), name) in enumerate(named):
-            draw_figure(figure, data, tmp_path / folder / str(i), ("pdf",), name)
-        return [path.read_bytes() for path in sorted((tmp_path / folder).rglob("*.pdf"))]
-
-    opened, load = [], subset.load_font
-    monkeypatch.setattr(subset, "load_font", lambda file, *rest, **more: opened.append(file) or load(file, *rest, **more))
-    monkeypatch.setattr(fonts, "_taken_apart", {})
-    from_few, of_files = pages("few"), [file for file in opened if isinstance(file, str)]
-    assert len(of_files) <= 2 * len(set(of_files))  # once, and once more for the odd letters
-    monkeypatch.setattr(fonts, "_of_few", lambda usual, file, glyphs: usual(file, glyphs))
-    assert from_few == pages("whole")
-
-
-def test_a_matplotlib_that_is_not_known_writes_pdfs_in_its_own_way(tmp_path, monkeypatch):
-    monkeypatch.setattr(mpl, "__version_info__", (3, 99))
-    monkeypatch.setattr(fonts, "_of_few", None)
-    monkeypatch.setattr(fonts, "_take_apart", None)
-    fonts.take_fonts_apart()
-    assert draw_figure("coefficients", paper_data()["coefficients"], tmp_path, ("pdf",))
 
 
 def test_a_failed_write_leaves_the_old_file_and_no_temporary_one(tmp_path):

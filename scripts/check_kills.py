@@ -15,7 +15,7 @@ Then the same command is given again, with --resume where a checkpoint is said t
 anything else is left; where nothing at all is left, the run that nothing ended has shown already what it does. It must end as
 usual, with the same draws (or replications) as one that nothing ended; no process of the first may be left; one that was asked
 to end must have ended with 130 and a sentence, or have finished; one that ends with 0 or 3 must have finished; and nobody may
-have read anything but our own words.
+have read anything but our own words; a library that aborts for want of memory may say so in its own.
 
 Prints each kill and how many struck what and when, and ends with 1 if a promise was broken.
 """

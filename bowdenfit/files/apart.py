@@ -119,36 +119,34 @@ def _ask(path: Path, limits: Limits, name: str, arguments: tuple[Any, ...]) -> t
     return 0, None
 
 
-_readers: list["subprocess.Popen[bytes]"] = []  # one at most, of this process alone
+_readers: dict[int, "subprocess.Popen[bytes]"] = {}  # by process: a copy of this one starts its own, or answers would mix
 _asking = threading.Lock()
-if hasattr(os, "register_at_fork"):  # a copy of this process starts its own: answers to two would mix
-    os.register_at_fork(before=_asking.acquire, after_in_parent=_asking.release, after_in_child=_asking.release)
-    os.register_at_fork(after_in_child=_readers.clear)
 
 
 def _reader() -> "subprocess.Popen[bytes]":
     """The process that reads, started if there is none."""
-    if _readers and _readers[0].poll() is not None:
-        _end(_readers[0])
-    if not _readers:
+    own = os.getpid()
+    if own in _readers and _readers[own].poll() is not None:
+        _end(_readers[own])
+    if own not in _readers:
         command = [sys.executable, "-c", "from bowdenfit.files.apart import serve; serve()"]
         pipes: dict[str, Any] = dict.fromkeys(("stdin", "stdout"), subprocess.PIPE) | {"stderr": subprocess.DEVNULL}
         place = str(Path(__file__).resolve().parents[2])
         paths = os.pathsep.join(filter(None, [place, os.environ.get("PYTHONPATH", "")]))
         environment = {**os.environ, "PYTHONPATH": paths}
-        _readers.append(subprocess.Popen(command, **pipes, env=environment))  # noqa: S603  (our own)
-    return _readers[0]
+        _readers[own] = subprocess.Popen(command, **pipes, env=environment)  # noqa: S603  (our own)
+    return _readers[own]
 
 
 @atexit.register
 def _end_all() -> None:
-    for reader in [*_readers]:
-        _end(reader)
+    if os.getpid() in _readers:
+        _end(_readers[os.getpid()])
 
 
 def _end(reader: "subprocess.Popen[bytes]") -> int:
     """End a reader; its exit code, or the signal that it was ended by."""
-    _readers.remove(reader)
+    del _readers[os.getpid()]
     reader.kill()
     for stream in (reader.stdin, reader.stdout):
         assert stream is not None  # both are pipes

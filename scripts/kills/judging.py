@@ -28,6 +28,8 @@ def broken(blow: Blow, code: int, err: str, finished: bool, session: int, folder
         return f"exit code {code}, but {blow.job.done} is missing"
     if asked and blow.struck is not None and not finished and code != 130 and not early:
         return f"exit code {code}"
+    if blow.starved and code < 0:  # a compiled library that gets no memory aborts, in words of its own
+        return ""
     if blow.starved and not finished and (code != 1 or not err.startswith("Error: ") or len(lines) > 1):
         return f"exit code {code}, and said {err[:300]!r}"
     if not early and not all(OURS.match(line) for line in lines if line):

@@ -52,7 +52,7 @@ def frames_of(posterior: LogDensity) -> Frames:
         posterior: The posterior.
     """
     conditional, without = Conditional(posterior), frames_without_ridge(posterior.model.space)
-    if not conditional.is_told:
+    if not conditional.has_coefficients:
         return without
     return *((frame, share / 2) for frame, share in without), (in_ridge(conditional), 0.5)
 

@@ -13,7 +13,6 @@ import numpy as np
 from jax import Array
 
 from bowdenfit.inference.compilation import compile_program
-from bowdenfit.parameters.places import put, taken
 from bowdenfit.parameters.space import ParameterSpace
 
 NODES = np.linspace(-6.0, 6.0, 241)
@@ -61,14 +60,14 @@ class Chart:
             given: Z or coordinates, (walker, parameter).
             is_z: Whether it is z.
         """
-        own = taken(given, self.which)
+        own = given[:, self.which]
         search = jax.vmap(partial(jnp.searchsorted, side="right", method="scan"), in_axes=1, out_axes=1)
         along = (own - NODES[0]) / _WIDTH
         node = jnp.where(is_z, jnp.clip(along, 0, len(NODES) - 2).astype(int), search(jnp.asarray(self.values[1:-1]), own))
         value, rise, log_slope = self._between(node)
         found = jnp.where(is_z, value + (along - node) * rise, own)
         z = jnp.where(is_z, own, NODES[0] + _WIDTH * (node + (own - value) / rise))
-        return put(given, self.which, found), put(given, self.which, z), -log_slope.sum(axis=1)
+        return given.at[:, self.which].set(found), given.at[:, self.which].set(z), -log_slope.sum(axis=1)
 
 
 @lru_cache(maxsize=8)

@@ -5,15 +5,12 @@ from dataclasses import dataclass, fields
 from functools import cached_property
 from typing import Any, Literal
 
-import jax
 import jax.numpy as jnp
 import numpy as np
 from jax import Array
 from jaxtyping import Float
 
-from bowdenfit.display import Part, Several
 from bowdenfit.errors import DescriptionError
-from bowdenfit.parameters.places import taken
 from bowdenfit.parameters.priors import Prior
 
 Role = Literal["friction", "friction_model", "curve", "angle", "noise", "sensor", "elastic"]
@@ -64,14 +61,13 @@ class Parameter:
         return stated or self.prior.text(self.unit, self.shown_scale, 3 if self.scaled_by else 6)
 
 
-@dataclass(frozen=True, repr=False)
-class ParameterSpace(Part):
+@dataclass(frozen=True)
+class ParameterSpace:
     """All parameters of a model, and the map from z (free parameters, standard normal) to named values."""
 
     parameters: tuple[Parameter, ...]
 
     def __post_init__(self) -> None:
-        super().__post_init__()
         names = [p.name for p in self.parameters]
         for name in names:
             if names.count(name) > 1:
@@ -83,7 +79,7 @@ class ParameterSpace(Part):
     @cached_property
     def free(self) -> tuple[Parameter, ...]:
         """The parameters that are inferred, in the order of z."""
-        return Several(p for p in self.parameters if p.fixed is None)
+        return tuple(p for p in self.parameters if p.fixed is None)
 
     @cached_property
     def fixed(self) -> tuple[Parameter, ...]:
@@ -119,16 +115,13 @@ class ParameterSpace(Part):
         """Values of the free parameters [internal units] at z."""
         if not self._groups:
             return z
-        by_group = jnp.concatenate([prior.constrain(taken(z, where)) for where, prior in self._groups])
-        # Without a barrier XLA works a quantile out again wherever a value is used, and compiles it as often.
-        values: Array = jax.lax.optimization_barrier(taken(by_group, self._order))
-        return values
+        return jnp.concatenate([prior.constrain(z[where]) for where, prior in self._groups])[self._order]
 
     def z_of(self, vector: Float[Array, " free"]) -> Float[Array, " free"]:
         """Z at values of the free parameters [internal units], the inverse of `vector`; NaN at what one cannot be."""
         if not self._groups:
             return vector
-        return taken(jnp.concatenate([prior.unconstrain(taken(vector, where)) for where, prior in self._groups]), self._order)
+        return jnp.concatenate([prior.unconstrain(vector[where]) for where, prior in self._groups])[self._order]
 
     def constrain(self, z: Float[Array, " free"]) -> dict[str, Array]:
         """Named values of all parameters, fixed ones included [internal units], at z."""

@@ -180,7 +180,7 @@ def lasting(steps):
 
 
 def test_what_has_no_ridge_is_not_compiled_again(surprised, monkeypatch):
-    monkeypatch.setattr(Conditional, "is_told", False)
+    monkeypatch.setattr(Conditional, "has_coefficients", False)
     assert surprised.later.__wrapped__().sweep is surprised.sweep  # not the one that is kept for the tests below
 
 

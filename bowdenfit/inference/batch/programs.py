@@ -85,7 +85,7 @@ class BatchPrograms:
     def places(self) -> Callable[..., Any]:
         """`Places` of a block of points of one data set, of each of which it is said whether it is a z."""
         conditional, posterior = Conditional(self.posterior), self.posterior
-        straight = conditional.at if conditional.is_told else z_alone
+        straight = conditional.at if conditional.has_coefficients else z_alone
 
         def places(given: Array, is_z: Array, data: Any) -> Places:
             w, z, log_volume = straight(given, is_z, data)

@@ -17,6 +17,7 @@ from typing import Any
 import jax.numpy as jnp
 import numpy as np
 from jax import Array
+from jax.scipy.linalg import solve_triangular
 from jaxtyping import Float
 
 from bowdenfit.inference.population.readings import Readings
@@ -196,16 +197,10 @@ class PopulationDensity:
         inner = z[len(self.names) : self._of_fleet].reshape(self.cables, self.each)
         weight = found["spread"] ** -2
         toward = data["toward"] - data["by_effect"] @ found["effects"] + weight * found["mean"]
-        rows = _cholesky([[data["precision"][:, i, j] + (weight[i] if i == j else 0.0) for j in range(i + 1)]
-                          for i in range(self.each)])  # fmt: skip
-        forward: list[Array] = []
-        for i, row in enumerate(rows):
-            forward.append((toward[:, i] - sum(row[j] * forward[j] for j in range(i))) / row[i])
-        values: list[Any] = [None] * self.each
-        for i in reversed(range(self.each)):
-            behind = sum(rows[j][i] * values[j] for j in range(i + 1, self.each))
-            values[i] = (forward[i] + inner[:, i] - behind) / rows[i][i]
-        return jnp.stack(values, axis=1), -sum(jnp.log(rows[i][i]) for i in range(self.each))  # type: ignore[return-value]
+        root = jnp.linalg.cholesky(data["precision"] + jnp.diag(weight))
+        forward = solve_triangular(root, toward[..., None], lower=True)
+        values = solve_triangular(root, forward + inner[..., None], trans="T", lower=True)[..., 0]
+        return values, -jnp.sum(jnp.log(jnp.diagonal(root, axis1=1, axis2=2)), axis=1)
 
     def log_density(self, z: Float[Array, " size"], data: dict[str, Any]) -> Float[Array, ""]:
         """Log posterior density in z, up to a constant."""
@@ -238,15 +233,3 @@ def log_likelihood(
     """Of log coefficients at every inspection, up to a constant; 0 where there is no inspection."""
     away = jnp.einsum("ijkl,ijl->ijk", data["root"], at - data["center"])
     return -(data["freedom"] + data["counts"]) / 2 * jnp.log1p(jnp.sum(away**2, axis=2) / data["freedom"])
-
-
-def _cholesky(lower: list[list[Any]]) -> list[list[Any]]:
-    """Lower Cholesky factors of many small matrices at once, entry by entry: much quicker than one after the other."""
-    rows: list[list[Any]] = []
-    for i, given in enumerate(lower):
-        row: list[Any] = []
-        for j in range(i):
-            row.append((given[j] - sum(row[m] * rows[j][m] for m in range(j))) / rows[j][j])
-        row.append(jnp.sqrt(given[i] - sum(entry**2 for entry in row)))
-        rows.append(row)
-    return rows

@@ -1,6 +1,7 @@
 """Some steps of an ensemble of walkers in one program: moves, densities, what is accepted. Random numbers come from outside."""
 
 from collections.abc import Callable
+from functools import partial
 from typing import Any, NamedTuple
 
 import jax
@@ -8,7 +9,7 @@ import jax.numpy as jnp
 import numpy as np
 from jax import Array
 
-from bowdenfit.inference.coordinates import Frames
+from bowdenfit.inference.coordinates import Frame, Frames
 from bowdenfit.inference.moves import Moves, Numbers, numbers_at, numbers_of_move
 
 
@@ -24,6 +25,22 @@ class Chosen(NamedTuple):
     frame: Array | np.ndarray
     kinds: Array | np.ndarray
     bits: Array | np.ndarray
+
+
+class Walkers(NamedTuple):
+    """Walkers on their way.
+
+    Args:
+        w, z: Where they are in the coordinates that they move in, and in z, (walker, parameter).
+        value_in_w, value: Log densities there, in either.
+        accepted: How many of their proposals were accepted.
+    """
+
+    w: Array
+    z: Array
+    value_in_w: Array
+    value: Array
+    accepted: Array
 
 
 def numbers_of_walker(size: int) -> int:
@@ -42,44 +59,40 @@ def walker_sweep(log_density: Callable[[Array, Any], Array], moves: Moves, frame
         moves: What the walkers do.
         frames: In which coordinates.
     """
-    proposals, coordinates = [move for move, _ in moves], [frame for frame, _ in frames]
+    proposals = [move for move, _ in moves]
 
     def sweep(chosen: Chosen, z: Array, data: Any) -> tuple[Array, Array, Array]:
-        n_walkers, size = z.shape
-        # Of a walker: where it is in the coordinates that it moves in, and in z; its log density in those, and in z; and how
-        # often it moved. In one array, since each operation takes its time to compile.
-        where_w, where_z, rest = slice(size), slice(size, 2 * size), slice(2 * size, None)
+        def place(given: Array, is_z: bool) -> Walkers:
+            ways = [partial(_through, frame, is_z) for frame, _ in frames]
+            w, z, volume = jax.lax.switch(chosen.frame, ways, given, data)
+            value = jax.vmap(lambda one: log_density(one, data))(z)
+            value, known = jnp.where(jnp.isnan(value), -jnp.inf, value), jnp.isfinite(volume)
+            # Where coordinates do not reach: nothing is proposed there, and a walker that is there already stays.
+            beyond = jnp.where(is_z & (value > -jnp.inf), jnp.inf, -jnp.inf)
+            value_in_w = jnp.where(known, value + jnp.where(known, volume, 0.0), beyond)
+            return Walkers(w, z, value_in_w, value, jnp.zeros_like(value))
 
-        def walkers_at(given: Array, is_z: Array) -> Array:
-            w, z, volume = jax.lax.switch(chosen.frame, coordinates, given, is_z, data)
-            values = jax.vmap(lambda one: log_density(one, data))(z)
-            values, known = jnp.where(jnp.isnan(values), -jnp.inf, values), jnp.isfinite(volume)
-            # Out of reach of the coordinates is nothing to go to, and who is there already stays.
-            out_of_reach = jnp.where(is_z & (values > -jnp.inf), jnp.inf, -jnp.inf)
-            value_in_w = jnp.where(known, values + jnp.where(known, volume, 0.0), out_of_reach)
-            numbers = jnp.stack([value_in_w, values, jnp.zeros_like(values)], axis=1)
-            return jnp.concatenate([w, z, numbers], axis=1)
+        def half_step(halves: tuple[Walkers, Walkers], turn: tuple[Array, Array, Numbers]) -> Any:
+            (moving, resting), (kind, chance, numbers) = halves, turn
+            w, factors = jax.lax.switch(kind, proposals, numbers, moving.w, resting.w)
+            proposed = place(w, is_z=False)._replace(accepted=moving.accepted + 1)
+            better = factors + proposed.value_in_w - moving.value_in_w > jnp.log(chance)
+            moved = jax.tree.map(lambda new, old: jax.vmap(jnp.where)(better, new, old), proposed, moving)
+            return (resting, moved), None
 
-        def half_step(carried: tuple[Array, Array], turn: tuple[Array, Array, Array, Numbers]) -> Any:
-            (moving, resting), (is_begin, kind, chance, numbers) = carried, turn
-            w, factors = jax.lax.switch(kind, proposals, numbers, moving[:, where_w], resting[:, where_w])
-            there = walkers_at(jnp.where(is_begin, moving[:, where_z], w), is_begin)
-            better = factors + there[:, -3] - moving[:, -3] > jnp.log(chance)
-            moved = jnp.where(better[:, None], there.at[:, -1].set(moving[:, -1] + 1), moving)
-            return (resting, jnp.where(is_begin, there, moved)), None
-
-        # In its first two turns each half finds its own places, with nothing known of them but z.
-        begin = jnp.concatenate([z, z, jnp.zeros((n_walkers, 3))], axis=1)
-        halves = begin[: n_walkers // 2], begin[n_walkers // 2 :]
+        begin, half = place(z, is_z=True), len(z) // 2
+        halves = jax.tree.map(lambda rows: rows[:half], begin), jax.tree.map(lambda rows: rows[half:], begin)
         uniform = to_uniform(chosen.bits).reshape(-1, *chosen.bits.shape[2:])
-        is_begin, uniform = jnp.arange(2 + len(uniform)) < 2, jnp.concatenate([uniform[:2], uniform])
-        kinds = jnp.repeat(jnp.pad(chosen.kinds, (1, 0)), 2)
-        turns = is_begin, kinds, uniform[..., 0], numbers_at(uniform[..., 1:])
-        ended = jnp.concatenate(jax.lax.scan(half_step, halves, turns)[0])
-        _, values, accepted = ended[:, rest].T
-        return ended[:, where_z], values, accepted
+        turns = jnp.repeat(chosen.kinds, 2), uniform[..., 0], numbers_at(uniform[..., 1:])
+        ended = jax.tree.map(lambda *rows: jnp.concatenate(rows), *jax.lax.scan(half_step, halves, turns)[0])
+        return ended.z, ended.value, ended.accepted
 
     return sweep
+
+
+def _through(frame: Frame, is_z: bool, given: Array, data: Any) -> tuple[Array, Array, Array]:
+    """W, z and log volume of walkers, of either of the first two."""
+    return frame(given, jnp.asarray(is_z), data)
 
 
 def to_uniform(bits: Array | np.ndarray) -> Array:

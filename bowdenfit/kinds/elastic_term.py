@@ -1,8 +1,8 @@
 """Readings around what the elastic side of a cable says, of stretch or of preload."""
 
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass
-from typing import Any
+from dataclasses import dataclass, field
+from typing import Any, ClassVar
 
 import jax
 import jax.numpy as jnp
@@ -12,14 +12,13 @@ from jaxtyping import Float
 
 from bowdenfit.cable.cable import Cable
 from bowdenfit.cable.noise import noise_law, scatter
-from bowdenfit.display import Inner
 from bowdenfit.kinds.bounds import first_less, joined, last_less
 
 Expected = Callable[[Cable, Mapping[str, Array], Mapping[str, Any]], Array]
 
 
-@dataclass(frozen=True, repr=False)
-class ElasticTerm(Inner):
+@dataclass(frozen=True)
+class ElasticTerm:
     r"""Likelihood of a table of stretch, or of preload.
 
     .. math:: \Delta L_i \sim \text{Normal}(e(\bar T_i) + g \theta_i - \Delta L_0,\ \sigma_L), \qquad
@@ -39,14 +38,15 @@ class ElasticTerm(Inner):
         lowest: Lowest reading that there can be; None without one.
     """
 
-    cable: Cable
-    data: dict[str, Any]
-    labels: tuple[str, ...]
+    cable: Cable = field(repr=False)
+    data: dict[str, Any] = field(repr=False)
+    labels: tuple[str, ...] = field(repr=False)
     name: str
     unit: str
     noise: str
     law: Expected
     lowest: float | None = None
+    depends_on_conditions: ClassVar[bool] = False  # see `Term`
 
     @property
     def residual_blocks(self) -> tuple[tuple[int, int], ...]:

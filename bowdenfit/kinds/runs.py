@@ -1,7 +1,7 @@
 """Readings of runs: all samples of one mounting share what the mounting did, which integrates out in closed form."""
 
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import Any
 
 import jax
@@ -13,7 +13,6 @@ from jaxtyping import Float
 from bowdenfit.cable.cable import Cable
 from bowdenfit.cable.load_cells import FORCE_NOISE, OUTPUT_OFFSET, RUN_SCATTER, LoadCells
 from bowdenfit.cable.noise import noise_law, scatter
-from bowdenfit.display import Inner
 from bowdenfit.kinds.inside_runs import InsideRuns, inside_runs
 from bowdenfit.kinds.padding import rounded_up
 from bowdenfit.kinds.resolve_angles import resolve_angles
@@ -29,8 +28,8 @@ _LEAST_SHARE = 1e-3  # of the variance of a mounting, that of the noise of a rea
 _ALIKE = 0.05  # speeds that differ by less than this fraction are one
 
 
-@dataclass(frozen=True, repr=False)
-class RunsTerm(Inner):
+@dataclass(frozen=True)
+class RunsTerm:
     r"""Likelihood of sliding readings, one value a run.
 
     With the log ratio :math:`r = s \log(F_\text{in}/F_\text{out})`, s = +1 pulling and -1 return,
@@ -60,14 +59,19 @@ class RunsTerm(Inner):
         rows: The readings that the arrays sum up; None where nobody asks for them one by one.
     """
 
-    cable: Cable
-    data: dict[str, Any]
-    labels: tuple[str, ...]
+    cable: Cable = field(repr=False)
+    data: dict[str, Any] = field(repr=False)
+    labels: tuple[str, ...] = field(repr=False)
     name: str = "run_efficiency"
     reading_noise: str = FORCE_NOISE
     unit: str = "1"
     noise: str = RUN_SCATTER
-    rows: SlidingRows | None = None
+    rows: SlidingRows | None = field(default=None, repr=False)
+
+    @property
+    def depends_on_conditions(self) -> bool:
+        """See `Term`: the capstan equation without offsets knows ratios of forces alone."""
+        return bool(self.cable.friction.options) or self.cable.description.fits_offsets
 
     @property
     def residual_blocks(self) -> tuple[tuple[int, int], ...]:

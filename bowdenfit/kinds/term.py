@@ -19,7 +19,11 @@ from bowdenfit.parameters.space import Parameter, ParameterSpace
 
 @runtime_checkable
 class Term(Protocol):
-    """One table against one cable: what inference, predictions and reports need of it."""
+    """One table against one cable: what inference, predictions and reports need of it.
+
+    It may also have `depends_on_conditions`: whether its functions depend on `cable.friction.conditions`. Where it is False,
+    one compiled program serves data sets that were measured at different loads and speeds; without it they have one each.
+    """
 
     @property
     def cable(self) -> Cable:

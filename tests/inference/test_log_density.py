@@ -1,5 +1,8 @@
 """The density of a whole model: one with its residuals, its gradient right, and finite however far out."""
 
+from dataclasses import replace
+from pathlib import Path
+
 import jax
 import jax.numpy as jnp
 import numpy as np
@@ -120,3 +123,43 @@ def test_ten_thousand_draws_of_the_prior_give_finite_densities_and_plausible_eff
     assert np.mean(drawn.max(axis=1) > 0.05) > 0.96
     assert np.mean(drawn[:, 10] > 0.05) > 0.84  # in the middle of the range
     assert np.mean(drawn[:, [0, -1]] > 0.05) > 0.5  # at its ends
+
+
+DATA = Path(__file__).parents[2] / "datasets"
+DATA_SETS = sorted(path.parent.name for path in DATA.glob("*/cable.toml"))
+
+
+def _measured_elsewhere(model: Model) -> Model:
+    """The same terms with a cable that was measured at other loads and speeds."""
+    friction, at = model.cable.friction, model.cable.friction.conditions
+    load, (slow, fast) = at.median_load, at.speeds
+    elsewhere = replace(
+        at, reference_force=1.4 * at.reference_force, reference_speed=1.4 * at.reference_speed, speeds=(slow / 2, 2 * fast),
+        median_load=None if load is None else 1.4 * load,
+    )  # fmt: skip
+    cable = replace(model.cable, friction=replace(friction, conditions=elsewhere))
+    return Model(cable, model.space, tuple(replace(term, cable=cable) for term in model.terms))
+
+
+def _here_and_elsewhere(name: str, *settings: str) -> tuple[Model, dict[str, np.ndarray], dict[str, np.ndarray]]:
+    """A model, and the log likelihoods of its terms for cables measured at its own and at other loads and speeds."""
+    model = build_model(load_dataset(DATA / name, settings))
+    z, posterior, elsewhere = draws(model, 5, 7), LogDensity(model), LogDensity(_measured_elsewhere(model))
+    return model, *(over_rows(each.log_likelihoods, z, each.data) for each in (posterior, elsewhere))
+
+
+@pytest.mark.parametrize("name", DATA_SETS)
+def test_terms_that_do_not_depend_on_conditions_are_the_same_elsewhere(name):
+    """So that one compiled program may serve them all."""
+    model, here, there = _here_and_elsewhere(name)
+    for term in model.terms:
+        if not getattr(term, "depends_on_conditions", True):
+            np.testing.assert_array_equal(here[term.name], there[term.name])
+
+
+@pytest.mark.parametrize("setting", ["friction_model=load-dependent", 'sensors.offset_sd={value=1,unit="N"}'])
+def test_runs_depend_on_conditions_where_friction_or_load_cells_do(setting):
+    model, here, there = _here_and_elsewhere("synthetic-bench", setting)
+    runs = next(term for term in model.terms if term.name == "run_efficiency")
+    assert runs.depends_on_conditions
+    assert not np.array_equal(here[runs.name], there[runs.name])

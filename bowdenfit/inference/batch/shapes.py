@@ -5,14 +5,11 @@ Here they are those of a unit scale, and the scale is one more array of the data
 """
 
 import hashlib
-import re
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, fields, replace
-from functools import lru_cache
 from typing import Any
 
 import jax
-import jax.numpy as jnp
 import numpy as np
 from jax import Array
 
@@ -25,9 +22,7 @@ from bowdenfit.parameters.priors import HalfCauchy, HalfNormal, LogNormal, Norma
 from bowdenfit.parameters.space import Parameter, ParameterSpace
 
 _ABOUT = {"name", "source", "license", "file", "files"}  # keys of a description that no fit depends on
-_ELSEWHERE = 1.37  # factor on loads and speeds by which it is seen whether a program depends on them
 _OF_TABLE = ("cable", "data", "labels", "rows")  # of a term: what is data, or named in the key by itself
-_ADDRESS = re.compile(r"0x[0-9a-f]+")
 
 
 @dataclass(frozen=True)
@@ -117,9 +112,13 @@ def _key(posterior: ScaledDensity) -> str:
     terms = [_about(term) for term in posterior.model.terms]
     said = _said(posterior.model.description.to_json())
     cable = posterior.model.cable
-    cheap = f"{shapes} {posterior.model.space.parameters} {said} {terms} {dict(cable.nominal)}"
-    matters = _depends(_Lazily(posterior, cheap))
-    return _digest(f"{cheap} {cable.friction.conditions}" if matters else cheap)
+    key = f"{shapes} {posterior.model.space.parameters} {said} {terms} {dict(cable.nominal)}"
+    return _digest(f"{key} {cable.friction.conditions}" if _conditions_matter(posterior.model) else key)
+
+
+def _conditions_matter(model: Model) -> bool:
+    """Whether the density depends on the loads and speeds measured at; it does unless every term says that it does not."""
+    return any(getattr(term, "depends_on_conditions", True) for term in model.terms)
 
 
 def input_hash(dataset: Dataset) -> str:
@@ -155,43 +154,3 @@ def _leaf(leaf: Any) -> str:
 
 def _digest(text: str) -> str:
     return hashlib.sha256(text.encode()).hexdigest()[:32]
-
-
-@dataclass(frozen=True)
-class _Lazily:
-    """A posterior that is looked at once for all of the same cheap key."""
-
-    posterior: ScaledDensity
-
-    cheap: str
-
-    def __hash__(self) -> int:
-        return hash(self.cheap)
-
-    def __eq__(self, other: object) -> bool:
-        return isinstance(other, _Lazily) and self.cheap == other.cheap
-
-
-@lru_cache(maxsize=256)
-def _depends(asked: _Lazily) -> bool:
-    """Whether a program depends on the loads and speeds that were measured at."""
-    model = asked.posterior.model
-    at, friction = model.cable.friction.conditions, model.cable.friction
-    numbers: dict[str, Any] = {
-        each.name: value * _ELSEWHERE
-        for each in fields(at)
-        if isinstance(value := getattr(at, each.name), float) and np.isfinite(value)
-    }
-    elsewhere = replace(at, **numbers, speeds=(at.speeds[0] * _ELSEWHERE, at.speeds[1] * _ELSEWHERE))
-    cable = replace(model.cable, friction=replace(friction, conditions=elsewhere))
-    other = _of(cable, model.space, model.terms)
-    return _program(asked.posterior) != _program(replace(asked.posterior, model=other))
-
-
-def _program(posterior: ScaledDensity) -> str:
-    """The density and the residuals as JAX traces them, with all constants."""
-    z, text = jnp.zeros(posterior.model.space.size), ""
-    for function in (posterior.log_density, posterior.residuals):
-        traced = jax.make_jaxpr(function)(z, posterior.data)
-        text += f"{traced.jaxpr} {[np.asarray(const).tolist() for const in traced.consts]}"
-    return _ADDRESS.sub("", text)

@@ -1,8 +1,8 @@
 """Angle tables: each reading against its curve; what was too small to detect enters as exactly that."""
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
-from typing import Any
+from dataclasses import dataclass, field
+from typing import Any, ClassVar
 
 import jax.numpy as jnp
 import numpy as np
@@ -11,7 +11,6 @@ from jaxtyping import Float
 
 from bowdenfit.cable.cable import ANGLE_NOISE, Cable
 from bowdenfit.cable.noise import noise_law, scatter
-from bowdenfit.display import Inner
 from bowdenfit.kinds.angles.bench import detection_limit, drawn_angles
 from bowdenfit.kinds.angles.table import AngleSettings, AngleTable
 from bowdenfit.kinds.angles.undetected import EVENTS, count
@@ -23,8 +22,8 @@ from bowdenfit.parameters.priors import HalfCauchy
 from bowdenfit.parameters.space import Parameter
 
 
-@dataclass(frozen=True, repr=False)
-class AnglesTerm(Inner):
+@dataclass(frozen=True)
+class AnglesTerm:
     r"""Likelihood of an angle table.
 
     Detected angles are :math:`\text{Normal}(\theta(l), \sigma_\theta)`; one below the detection limit L contributes
@@ -38,12 +37,13 @@ class AnglesTerm(Inner):
         labels: Each reading in words, detected ones first.
     """
 
-    cable: Cable
-    data: dict[str, Any]
-    labels: tuple[str, ...]
+    cable: Cable = field(repr=False)
+    data: dict[str, Any] = field(repr=False)
+    labels: tuple[str, ...] = field(repr=False)
     name: str = "wrap_angle"
     unit: str = "deg"
     noise: str = ANGLE_NOISE
+    depends_on_conditions: ClassVar[bool] = False  # see `Term`
 
     @property
     def residual_blocks(self) -> tuple[tuple[int, int], ...]:

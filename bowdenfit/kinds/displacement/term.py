@@ -1,8 +1,8 @@
 """Force at the motor against displacement in the likelihood: the far end, the rope, and the mounting of each run."""
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
-from typing import Any
+from dataclasses import dataclass, field
+from typing import Any, ClassVar
 
 import jax
 import jax.numpy as jnp
@@ -14,7 +14,6 @@ from bowdenfit.cable.cable import Cable
 from bowdenfit.cable.elasticity import BEDDING_LOAD, BEDDING_STRETCH, STIFFNESS
 from bowdenfit.cable.load_cells import FORCE_NOISE, RUN_SCATTER, LoadCells
 from bowdenfit.cable.noise import noise_law, scatter
-from bowdenfit.display import Inner
 from bowdenfit.kinds.angles.table import AngleTable
 from bowdenfit.kinds.bench import Remeasurement, Truth
 from bowdenfit.kinds.displacement.arrays import angles_of_runs, order_of, readings, turns_by_depth, zero_names
@@ -38,8 +37,8 @@ Values = Mapping[str, Array]
 Data = Mapping[str, Any]
 
 
-@dataclass(frozen=True, repr=False)
-class DisplacementTerm(Inner):
+@dataclass(frozen=True)
+class DisplacementTerm:
     r"""Likelihood of the force at the motor against displacement, reading by reading.
 
     .. math:: F_{ij} = f(x_{ij}, \Lambda_i + m_i) + e_{ij}, \quad m_i \sim \text{Normal}(0, \tau), \quad
@@ -59,15 +58,16 @@ class DisplacementTerm(Inner):
         reading_noise: Noise scale of the second block of residuals, that of runs.
     """
 
-    cable: Cable
-    data: dict[str, Any]
-    labels: tuple[str, ...]
+    cable: Cable = field(repr=False)
+    data: dict[str, Any] = field(repr=False)
+    labels: tuple[str, ...] = field(repr=False)
     zeros: tuple[str, ...]
     stop: bool
     name: str = MOTOR_FORCE
     unit: str = "N"
     noise: str = FORCE_NOISE
     reading_noise: str = RUN_SCATTER
+    depends_on_conditions: ClassVar[bool] = False  # see `Term`
 
     @property
     def residual_blocks(self) -> tuple[tuple[int, int], ...]:

@@ -1,7 +1,7 @@
 """Efficiency tables: the logarithm of each measured efficiency against the friction exponent at its length."""
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from typing import Any
 
 import jax
@@ -14,7 +14,6 @@ from bowdenfit.cable.cable import Cable
 from bowdenfit.cable.load_cells import RUN_SCATTER, LoadCells
 from bowdenfit.cable.noise import noise_law, scatter
 from bowdenfit.description import Description
-from bowdenfit.display import Inner
 from bowdenfit.errors import DescriptionError
 from bowdenfit.kinds.angles.table import AngleTable
 from bowdenfit.kinds.bench import Remeasurement, drawn_by_term
@@ -28,8 +27,8 @@ from bowdenfit.parameters.space import ParameterSpace
 from bowdenfit.physics.friction import transmission_efficiency
 
 
-@dataclass(frozen=True, repr=False)
-class EfficienciesTerm(Inner):
+@dataclass(frozen=True)
+class EfficienciesTerm:
     r"""Likelihood of an efficiency table.
 
     .. math:: -\log\eta_i \sim \text{Normal}\left(-\log\eta(\Lambda_i) + g,\ \sqrt{\tau^2 + (s_i/\eta_i)^2
@@ -46,12 +45,17 @@ class EfficienciesTerm(Inner):
         labels: Each row in words.
     """
 
-    cable: Cable
-    data: dict[str, Any]
-    labels: tuple[str, ...]
+    cable: Cable = field(repr=False)
+    data: dict[str, Any] = field(repr=False)
+    labels: tuple[str, ...] = field(repr=False)
     name: str = "efficiency"
     unit: str = "1"
     noise: str = RUN_SCATTER
+
+    @property
+    def depends_on_conditions(self) -> bool:
+        """See `Term`: rows are taken to hold at the reference force and speed."""
+        return bool(self.cable.friction.options)
 
     @property
     def residual_blocks(self) -> tuple[tuple[int, int], ...]:

@@ -1,8 +1,8 @@
 """Tables of forces at both ends of a pull-pull loop while it moves."""
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, replace
-from typing import Any
+from dataclasses import dataclass, field, replace
+from typing import Any, ClassVar
 
 import jax
 import jax.numpy as jnp
@@ -15,7 +15,6 @@ from bowdenfit.cable.elasticity import PRELOAD as REFERENCE_PRELOAD
 from bowdenfit.cable.elasticity import spread_matrix
 from bowdenfit.cable.load_cells import FORCE_NOISE, RUN_SCATTER, LoadCells
 from bowdenfit.cable.noise import noise_law, scatter
-from bowdenfit.display import Inner
 from bowdenfit.kinds.angles.table import AngleTable
 from bowdenfit.kinds.bench import Remeasurement, Truth
 from bowdenfit.kinds.candidate import Candidate, CandidateKind, Simulation, Situation, one_reading_each, some_loads
@@ -32,8 +31,8 @@ LOOP_FORCE = "loop_output_force"
 LOOP_MOUNTING = "loop_mounting"
 
 
-@dataclass(frozen=True, repr=False)
-class LoopTerm(Inner):
+@dataclass(frozen=True)
+class LoopTerm:
     r"""Likelihood of a loop table.
 
     .. math:: F_{\text{out},i} \sim \text{Normal}\left(f(F_{\text{in},i}),\ \sqrt{\sigma_F^2 (1 + f'^2)
@@ -51,12 +50,13 @@ class LoopTerm(Inner):
         labels: Each row in words.
     """
 
-    cable: Cable
-    data: dict[str, Any]
-    labels: tuple[str, ...]
+    cable: Cable = field(repr=False)
+    data: dict[str, Any] = field(repr=False)
+    labels: tuple[str, ...] = field(repr=False)
     name: str = LOOP_FORCE
     unit: str = "N"
     noise: str = FORCE_NOISE
+    depends_on_conditions: ClassVar[bool] = False  # see `Term`
 
     @property
     def residual_blocks(self) -> tuple[tuple[int, int], ...]:

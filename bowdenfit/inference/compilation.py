@@ -2,26 +2,17 @@
 
 from collections.abc import Callable
 from concurrent.futures import Executor
-from functools import cache
 from typing import Any
 
 import jax
-import jax.numpy as jnp
 
 from bowdenfit.inference.engines.memory import refuse_shortage
 
-# Measured on two cores: whole vectors of 512 bits run in 0.85 to 1 of the time and compile no longer. XLA's newer fusion
-# emitters take twice as long to compile the small elementwise functions here, which then run in 0.65 to 1 of the time. YNNPACK,
-# which it hands products and sums to, takes longer to call than these small ones to work out: without it walkers move in 0.73
-# to 1 of the time.
-_OPTIONS: dict[str, Any] = {
-    "xla_cpu_use_fusion_emitters": False,
-    "xla_cpu_parallel_codegen_split_count": 2,
-    "xla_cpu_prefer_vector_width": 512,
-    "xla_cpu_experimental_ynn_fusion_type": "",
-}
+# Without XLA's newer fusion emitters the walkers of the on-body cable compile in 0.65 of the time (3.3 s instead of 5.0 s, with
+# jaxlib 0.10); with them programs run in 0.65 to 1 of the time, which pays where running costs far more.
+_OPTIONS: dict[str, Any] = {"xla_cpu_use_fusion_emitters": False}
 _RUN_ONCE: dict[str, Any] = _OPTIONS | {"xla_backend_optimization_level": 0}
-_RUN_OFTEN: dict[str, Any] = _OPTIONS | {"xla_cpu_use_fusion_emitters": True}
+_RUN_OFTEN: dict[str, Any] = {"xla_cpu_use_fusion_emitters": True}
 
 
 def compile_program(
@@ -53,15 +44,5 @@ def compile_program(
 def _compiled(lowered: Any, options: dict[str, Any]) -> Callable[..., Any]:
     try:
         return lowered.compile(compiler_options=options)
-    except jax.errors.JaxRuntimeError:  # perhaps of an option that this XLA does not have
-        return lowered.compile(compiler_options={name: value for name, value in options.items() if _known(name, value)})
-
-
-@cache
-def _known(name: str, value: Any) -> bool:
-    """Whether the installed XLA has an option; they come and go from one version to the next."""
-    try:
-        jax.jit(lambda x: x).lower(jnp.zeros(())).compile(compiler_options={name: value})
-    except jax.errors.JaxRuntimeError:
-        return False
-    return True
+    except jax.errors.JaxRuntimeError:  # options come and go from one version of XLA to the next
+        return lowered.compile()

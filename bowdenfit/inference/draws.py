@@ -81,11 +81,10 @@ def replicator(posterior: LogDensity, seed: int, beside: Executor | None = None)
     readings: named values, log likelihood of every reading, expected readings, and readings drawn anew.
     """
     model = posterior.model
-    bits = key_bits(seed)  # an argument, so that the program is the same for every seed
+    key = jax.random.key(seed)  # an argument, so that the program is the same for every seed
 
-    def implied(z_and_number: Float[Array, " free_and_one"], data: Any, bits: Array) -> dict[str, Mapping[str, Array]]:
+    def implied(z_and_number: Float[Array, " free_and_one"], data: Any, key: Array) -> dict[str, Mapping[str, Array]]:
         number = z_and_number[-1].astype(jnp.uint32)
-        key = jax.random.wrap_key_data(bits, impl="threefry2x32")
         keys = jax.random.split(jax.random.fold_in(key, number), max(len(model.terms), 1))
         values = model.space.constrain(z_and_number[:-1])
         terms = list(zip(model.terms, data, keys, strict=False))
@@ -97,13 +96,8 @@ def replicator(posterior: LogDensity, seed: int, beside: Executor | None = None)
         }
 
     small = sum(np.size(array) for array in jax.tree.leaves(posterior.data)) < _SMALL
-    program = for_each_draw(implied, model.space.size + 1, posterior.data, bits, run_once=small, beside=beside)
+    program = for_each_draw(implied, model.space.size + 1, posterior.data, key, run_once=small, beside=beside)
     return lambda z: program(np.column_stack([z, np.arange(len(z), dtype=float)]))
-
-
-def key_bits(seed: int) -> np.ndarray:
-    """What `jax.random.key` makes of a seed, without a program of its own."""
-    return np.array([seed >> 32, seed & 0xFFFFFFFF], dtype=np.uint32)
 
 
 def curves_of(model: Model, route: np.ndarray) -> Callable[[Float[Array, " free"]], dict[str, Array]]:

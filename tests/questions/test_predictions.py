@@ -11,12 +11,11 @@ from scipy import stats
 
 from bowdenfit.dataset import load_dataset
 from bowdenfit.inference import draws
-from bowdenfit.inference.draws import efficiency_at, for_each_draw, for_each_value, key_bits, named_values, replicator
+from bowdenfit.inference.draws import efficiency_at, for_each_draw, for_each_value, named_values, replicator
 from bowdenfit.inference.log_density import LogDensity
 from bowdenfit.model import Model, build_model
 from bowdenfit.results.choices import at_edge, best_window, rank_choices
 from bowdenfit.results.optimum import optimum_of, route_grid
-from bowdenfit.verb import LARGEST_SEED
 
 FINE = 20_001
 
@@ -197,11 +196,6 @@ def test_functions_of_values_are_those_of_every_draw_by_itself(n):
     first, second = np.random.default_rng(n).standard_normal((2, n))
     found = for_each_value(lambda of, by: of["first"] * by - of["second"], {"first": first, "second": second}, np.array(3.0))
     np.testing.assert_allclose(found, 3 * first - second, rtol=1e-13, atol=1e-15)
-
-
-@pytest.mark.parametrize("seed", [0, 1, LARGEST_SEED, 2**40 + 7])
-def test_readings_are_drawn_with_the_key_that_a_seed_gives(seed):
-    np.testing.assert_array_equal(key_bits(seed), jax.random.key_data(jax.random.key(seed)))
 
 
 def test_efficiency_falls_off_with_the_friction_exponent_at_each_length(on_body_model):

@@ -81,13 +81,6 @@ class Part(Display):
         return [{"field": name, "value": in_short(value)} for name, value in _public(self).items()], {}
 
 
-class Inner:
-    """Something that computes inside a result: its fields in short."""
-
-    def __repr__(self) -> str:
-        return shortened(filled(f"{type(self).__name__}: {_fields(self)}."))
-
-
 class Several(Display, tuple[Item, ...]):
     """Several of a kind, a row each."""
 
@@ -139,10 +132,6 @@ def _public(value: Any) -> dict[str, Any]:
     if isinstance(value, Sequence) or not hasattr(value, "__dict__"):
         return {"value": value}
     return {name: each for name, each in vars(value).items() if not name.startswith("_")}
-
-
-def _fields(value: Any) -> str:
-    return ", ".join(f"{name} {in_short(each)}".strip() for name, each in _public(value).items())
 
 
 def _alike(rows: list[dict[str, Any]]) -> list[dict[str, Any]]:

@@ -1,7 +1,7 @@
 """The cable itself: its contacts in series, their wrap angles, and the friction exponent at any length."""
 
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from functools import cached_property
 
 import jax.numpy as jnp
@@ -16,7 +16,6 @@ from bowdenfit.cable.groups import coefficient_of
 from bowdenfit.cable.laws import Capstan, ContactLaw, parameter_of
 from bowdenfit.cable.registry import CONTACT_LAWS, CURVES, check_names, class_at
 from bowdenfit.description import Contact, Description, PriorDefaults
-from bowdenfit.display import Inner
 from bowdenfit.errors import DescriptionError
 from bowdenfit.parameters.space import Parameter
 from bowdenfit.physics.loop import loop_input_force, loop_output_force
@@ -24,8 +23,8 @@ from bowdenfit.physics.loop import loop_input_force, loop_output_force
 ANGLE_NOISE = "sigma_theta"
 
 
-@dataclass(frozen=True, repr=False)
-class Cable(Inner):
+@dataclass(frozen=True)
+class Cable:
     """Contacts in series along one route.
 
     Args:
@@ -34,7 +33,7 @@ class Cable(Inner):
         friction: How friction depends on load and speed.
     """
 
-    description: Description
+    description: Description = field(repr=False)
     nominal: Mapping[str, float]
     friction: FrictionModel
 

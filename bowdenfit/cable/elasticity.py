@@ -1,7 +1,7 @@
 """The elastic side of a cable: how its rope stretches, and what preload it has at a wrap angle."""
 
 from collections.abc import Mapping
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 
 import jax.numpy as jnp
 import numpy as np
@@ -10,7 +10,6 @@ from jaxtyping import Float
 
 from bowdenfit.cable.laws import ContactLaw
 from bowdenfit.description import Description, PriorDefaults
-from bowdenfit.display import Inner
 from bowdenfit.parameters.priors import HalfCauchy, HalfNormal, LogNormal, TruncatedNormal
 from bowdenfit.parameters.scale import Scale
 from bowdenfit.parameters.space import Parameter
@@ -30,8 +29,8 @@ LENGTHENING, PRELOAD, STRETCH_ZERO, STRETCH_FRICTION = "lengthening", "preload",
 Values = Mapping[str, Array]
 
 
-@dataclass(frozen=True, repr=False)
-class Elasticity(Inner):
+@dataclass(frozen=True)
+class Elasticity:
     """Stretch and preload of one cable; every function takes the values of its parameters [internal units].
 
     Args:
@@ -39,7 +38,7 @@ class Elasticity(Inner):
         law: Law of the contact that the rope as a whole is while it is stretched.
     """
 
-    description: Description
+    description: Description = field(repr=False)
     law: ContactLaw
 
     @property

@@ -6,7 +6,6 @@ from typing import Any, Literal
 
 import numpy as np
 
-from bowdenfit.display import Part
 from bowdenfit.inference.psis import RELIABLE_K, weighted_elpd
 
 SMALL = 100  # readings below which the standard error of a difference is too small more often than not
@@ -17,8 +16,8 @@ How = Literal["importance sampling", "moment matching", "refit", "rough"]
 Verdict = Literal["clear", "leaning", "open"]
 
 
-@dataclass(frozen=True, repr=False)
-class Prediction(Part):
+@dataclass(frozen=True)
+class Prediction:
     """Of one model, reading by reading; a run of forces, whose samples belong together, counts as one.
 
     Args:

@@ -16,7 +16,6 @@ from typing import ClassVar
 
 import numpy as np
 
-from bowdenfit.display import Part
 from bowdenfit.words import significant
 
 OWN = 0.25  # share of the prior variance below which a parameter may be known by itself: half the prior's sd
@@ -95,8 +94,8 @@ class Combination:
         return " ".join([lead, *(f"{'-' if self.weights[n] < 0 else '+'} {factors[n]}{n}" for n in others)])
 
 
-@dataclass(frozen=True, repr=False)
-class Knowledge(Part):
+@dataclass(frozen=True)
+class Knowledge:
     """What is known of several parameters together.
 
     Args:

@@ -15,7 +15,6 @@ from dataclasses import dataclass, fields
 
 import numpy as np
 
-from bowdenfit.display import Part
 from bowdenfit.inference.psis import smooth_weights
 
 _TAIL = 0.02  # share of the weight on either side that a Pareto distribution is fitted to
@@ -26,8 +25,8 @@ _FARTHEST = 1e100  # as which a reading counts that a wandering walker puts beyo
 _SIMULATIONS = 1000  # of the band that a distribution of uniform numbers stays in
 
 
-@dataclass(frozen=True, repr=False)
-class LeftOut(Part):
+@dataclass(frozen=True)
+class LeftOut:
     """Predictions of readings from everything but the reading itself, and where the reading lies in each.
 
     Args:
@@ -141,8 +140,8 @@ def place_at_random(found: LeftOut, generator: np.random.Generator) -> np.ndarra
     return np.clip(generator.uniform(found.below, np.maximum(found.up_to, found.below)), 0.0, 1.0)
 
 
-@dataclass(frozen=True, repr=False)
-class Uniformity(Part):
+@dataclass(frozen=True)
+class Uniformity:
     """Whether numbers are uniform between 0 and 1, by their distribution function.
 
     Args:

@@ -16,7 +16,6 @@ from typing import TYPE_CHECKING, ClassVar
 
 import numpy as np
 
-from bowdenfit.display import Part
 from bowdenfit.inference.psis import RELIABLE_K, power_weights, smooth_weights
 
 if TYPE_CHECKING:  # another process works this out, without JAX
@@ -55,8 +54,8 @@ class Width:
         return float(np.exp(max(known))) if known else float("nan")
 
 
-@dataclass(frozen=True, repr=False)
-class Sensitivity(Part):
+@dataclass(frozen=True)
+class Sensitivity:
     """How much a quantity depends on the priors and on the readings.
 
     Args:

@@ -23,7 +23,6 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
-from bowdenfit.display import Part
 from bowdenfit.inference.linearized import blocks, linearize
 from bowdenfit.inference.log_density import LogDensity
 from bowdenfit.inference.objective import Objective, Problem, Solution, may_end, total
@@ -43,8 +42,8 @@ _FAR = 1.0  # step of another parameter that is not foretold [z]
 _LOWER = 0.01  # the same by which another minimum is a lower one
 
 
-@dataclass(frozen=True, repr=False)
-class Profile(Part):
+@dataclass(frozen=True)
+class Profile:
     """How the sum of squares rises on both sides of the minimum.
 
     Args:

@@ -6,7 +6,6 @@ from dataclasses import dataclass
 import numpy as np
 from jaxtyping import Float
 
-from bowdenfit.display import Inner
 from bowdenfit.kinds.sliding_rows import SlidingRows
 from bowdenfit.kinds.term import LOAD, WRAP_ANGLE
 from bowdenfit.types import Labels, Vector
@@ -15,8 +14,8 @@ STROKE, SPEED, ORDER, ZERO = "Stroke", "Speed", "Order", "Zero"
 _MOST = 4000  # readings of a table that are looked at one by one; of more, so many neighbors are taken together
 
 
-@dataclass(frozen=True, repr=False)
-class InsideRuns(Inner):
+@dataclass(frozen=True)
+class InsideRuns:
     """Readings of runs, of which the likelihood takes several for one cell.
 
     Args:

@@ -5,14 +5,13 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from bowdenfit.display import Inner
 from bowdenfit.types import Labels, Vector
 
 ROW_ARRAYS = ("route", "own", "is_own", "known_variance", "noisy", "group")
 
 
-@dataclass(frozen=True, repr=False)
-class SlidingRows(Inner):
+@dataclass(frozen=True)
+class SlidingRows:
     """Readings taken while the rope slides, in the order of the table.
 
     Args:

@@ -1,7 +1,7 @@
 """Forces read while nothing slides, as intervals."""
 
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import Any
 
 import jax
@@ -13,12 +13,11 @@ from jaxtyping import Float
 from bowdenfit.cable.cable import Cable
 from bowdenfit.cable.load_cells import FORCE_NOISE, RUN_SCATTER, LoadCells
 from bowdenfit.cable.noise import noise_law, scatter
-from bowdenfit.display import Inner
 from bowdenfit.kinds.resolve_angles import resolve_angles
 
 
-@dataclass(frozen=True, repr=False)
-class HeldForcesTerm(Inner):
+@dataclass(frozen=True)
+class HeldForcesTerm:
     r"""Likelihood of forces read while nothing slides: inside the friction band, nothing more.
 
     .. math:: \log\left[\Phi\left(\frac{\Lambda - r}{s}\right) - \Phi\left(\frac{-\Lambda - r}{s}\right)\right],
@@ -39,9 +38,9 @@ class HeldForcesTerm(Inner):
         labels: Each row in words.
     """
 
-    cable: Cable
-    data: dict[str, Any]
-    labels: tuple[str, ...]
+    cable: Cable = field(repr=False)
+    data: dict[str, Any] = field(repr=False)
+    labels: tuple[str, ...] = field(repr=False)
     name: str = "held_ratio"
     unit: str = "1"
     noise: str = RUN_SCATTER

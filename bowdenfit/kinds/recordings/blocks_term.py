@@ -6,7 +6,7 @@ the operator is linearized, and for the reading of a run in results.
 
 from abc import ABC, abstractmethod
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import Any
 
 import jax
@@ -19,7 +19,6 @@ from bowdenfit.cable.cable import Cable
 from bowdenfit.cable.drive import Each, Loop, Recorded, Rope, drive_of
 from bowdenfit.cable.load_cells import BLOCK_NOISE, RUN_SCATTER, LoadCells
 from bowdenfit.cable.noise import noise_law
-from bowdenfit.display import Inner
 from bowdenfit.kinds.padding import rounded_up
 from bowdenfit.kinds.recordings.side_by_side import WITHOUT_WEIGHT
 from bowdenfit.kinds.resolve_angles import resolve_angles
@@ -50,8 +49,8 @@ class Mounted:
     total: Array
 
 
-@dataclass(frozen=True, repr=False)
-class BlocksTerm(Inner, ABC):
+@dataclass(frozen=True)
+class BlocksTerm(ABC):
     r"""Likelihood of every block of whole recordings, one value a run.
 
     The output is linear in the mounting effect m ~ Normal(0, tau) of a run but for changes of contact (and, of a loop, while
@@ -65,9 +64,9 @@ class BlocksTerm(Inner, ABC):
         labels: Each run in words.
     """
 
-    cable: Cable
-    data: dict[str, Any]
-    labels: tuple[str, ...]
+    cable: Cable = field(repr=False)
+    data: dict[str, Any] = field(repr=False)
+    labels: tuple[str, ...] = field(repr=False)
     noise: str = RUN_SCATTER
     reading_noise: str = BLOCK_NOISE
 

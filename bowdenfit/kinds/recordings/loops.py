@@ -26,7 +26,7 @@ _LARGEST_EXPONENT = 3.0  # that a recording's own loss is taken to mean, however
 _REACH = 0.5  # of the friction exponent, that its first guess is corrected by
 
 
-@dataclass(frozen=True, repr=False)
+@dataclass(frozen=True)
 class LoopRecordingsTerm(BlocksTerm):
     r"""Likelihood of every block of a loop's recordings, one value a run.
 

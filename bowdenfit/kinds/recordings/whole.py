@@ -20,7 +20,7 @@ from bowdenfit.recordings.recording import Recording, Recordings
 _REACH = 0.5  # of a recording's own friction exponent, that the first guess of its mounting effect is corrected by
 
 
-@dataclass(frozen=True, repr=False)
+@dataclass(frozen=True)
 class WholeRecordingsTerm(BlocksTerm):
     r"""Likelihood of every block of whole recordings of a single rope, one value a run.
 

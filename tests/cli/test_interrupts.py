@@ -12,6 +12,8 @@ import pytest
 from bowdenfit.cli import interrupts
 from bowdenfit.cli.interrupts import refuse_interrupted, run_interruptibly
 
+pytestmark = pytest.mark.extended
+
 INTERRUPT_WHILE_LOADING = """
 import os, signal, sys
 signal.signal(signal.SIGINT, signal.default_int_handler)  # whoever runs the tests may have made this deaf

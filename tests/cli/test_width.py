@@ -8,6 +8,8 @@ from pathlib import Path
 import pytest
 from one_page import faults, jargon
 
+pytestmark = pytest.mark.extended
+
 ROOT = Path(__file__).parents[2]
 DATA_SETS = sorted(path.parent for path in (ROOT / "datasets").glob("*/cable.toml"))
 CORPUS = [path for path in sorted((ROOT / "tests" / "files" / "corpus").glob("*.*")) if path.suffix != ".toml"]

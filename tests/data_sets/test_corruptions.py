@@ -9,6 +9,8 @@ from endings import HARMLESS, NOT_TRUSTED, REFUSED, WRONG, answers, end_of
 
 import bowdenfit as bf
 
+pytestmark = pytest.mark.extended
+
 DATASETS = Path(__file__).parents[2] / "datasets"
 ON_BODY, BENCH, CATHETER, LOOP, RECORDINGS, YARN = sorted(path.parent.name for path in DATASETS.glob("*/cable.toml"))
 MISTAKES = {

@@ -5,6 +5,8 @@ from investigations import ending, fault, held
 from laboratories import LABORATORIES
 from scipy.stats import binomtest
 
+pytestmark = pytest.mark.extended
+
 QUICK = (
     ("threads on weights of 0.5 to 3 N", "capstan"),
     ("a winch of 20 kN, mounted once", "capstan"),

@@ -14,6 +14,8 @@ from bowdenfit.device.motion import Hand, simulate, swinging
 from bowdenfit.device.plant import Motion, Plant
 from bowdenfit.device.transmission import Transmission
 
+pytestmark = pytest.mark.extended
+
 T_F, F_M, B, DEAD_ZONE, COUNT = 0.14, 0.01, 0.001, 0.8, 2 * np.pi / 2000
 HAND, EXPONENT = Hand(200.0, 2.0), 0.2
 

@@ -8,6 +8,8 @@ import pytest
 from bowdenfit.device.plant import Motion, Plant, advance, rope_torques, settle
 from bowdenfit.device.transmission import Transmission
 
+pytestmark = pytest.mark.extended
+
 mujoco = pytest.importorskip("mujoco", reason="the independent check needs MuJoCo, of bowdenfit[test]")
 STIFFNESS, T_F, F_M, HAND = 20.0, 0.14, 0.01, (5.0, 0.05)
 J_M, J_J, B_M, B_J, B_C = 7e-4, 1.5e-3, 1e-3, 2e-3, 0.02

@@ -12,6 +12,8 @@ from bowdenfit.device.plant import Plant
 from bowdenfit.device.teleoperation import Sampled, Slave, teleoperated
 from bowdenfit.device.transmission import Transmission
 
+pytestmark = pytest.mark.extended
+
 STIFFNESS, T_F, F_M, F_S, EXPONENT, WALL = 9.5, 0.14, 0.01, 0.05, 0.05, 100.0
 HAND = Hand(5.0, 0.05)
 FOUR = Gains(5.0, 0.03, 5.0, 0.03, 1.0, 1.0)

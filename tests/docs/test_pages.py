@@ -13,6 +13,8 @@ from urllib.parse import unquote, urlsplit
 import pytest
 from conftest import ROOT
 
+pytestmark = pytest.mark.extended
+
 LINKS = {
     "https://docs.dask.org": "",  # distributed names another page there
     "https://github.com/pradyunsg/furo": "furo",

@@ -18,6 +18,8 @@ from conftest import ROOT
 import bowdenfit
 from bowdenfit.reading import Reading
 
+pytestmark = pytest.mark.extended
+
 MOST_TEXT = 2000  # characters of one output
 PAGES = sorted([ROOT / "README.md", *(ROOT / "docs").glob("*.md"), *(ROOT / "docs" / "notebooks").glob("*.md")])
 CELL = re.compile(r"^```(?:python|\{code-cell\}[^\n]*)\n(.*?)^```", re.MULTILINE | re.DOTALL)

@@ -26,6 +26,8 @@ from bowdenfit.questions.fleet.inspections import read_inspections
 from bowdenfit.questions.metabolic.study import read_study
 from bowdenfit.reading import Reading
 
+pytestmark = pytest.mark.extended
+
 QUICK = [f"--set=sampler.{key}" for key in ("n_walkers=64", "max_steps=400", "target_ess=100", "target_r_hat=1.2")]
 TAKES_LONG = {"fit", "fleet", "calibrate", "identify", "next"}
 CLUSTER = {"scheduler": dask_scheduler.main, "worker": dask_worker.main}

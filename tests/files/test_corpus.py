@@ -14,6 +14,8 @@ from bowdenfit.files.tables import read_table
 from bowdenfit.kinds.efficiencies.table import EfficiencyTable
 from bowdenfit.kinds.forces.table import ForceTable
 
+pytestmark = pytest.mark.extended
+
 CORPUS = Path(__file__).parent / "corpus"
 UNDERSTOOD = tomllib.loads((CORPUS / "understood.toml").read_text(encoding="utf-8"))
 FITTED = ("excel_german.csv", "t1_t2_wrap.csv", "tendon_strokes.csv", "wirkungsgrad.csv")

@@ -20,6 +20,8 @@ from bowdenfit.errors import DatasetError
 from bowdenfit.files import outcome, read_channels, read_here
 from bowdenfit.files.channels import Channel, ChannelFile
 
+pytestmark = pytest.mark.extended
+
 RATE = 1000.0
 RANDOM = np.random.default_rng(7)
 FORCE_IN, FORCE_OUT = RANDOM.normal(20.0, 3.0, 2000), RANDOM.normal(15.0, 3.0, 2000)

@@ -9,6 +9,8 @@ from bowdenfit.files import spellings
 from bowdenfit.files.spellings import spelled
 from bowdenfit.kinds.forces.table import ForceTable
 
+pytestmark = pytest.mark.extended
+
 FORCE_IN, FORCE_OUT = np.array([20.5, 40.25, 61.0, 80.5]), np.array([15.25, 30.5, 45.25, 61.0])
 SPELLINGS = [  # of the force at the motor and of that at the load
     ("input_force_N", "output_force_N"),

@@ -12,6 +12,8 @@ from three_columns import INPUT, OUTPUT, TIME, check
 from bowdenfit.errors import DatasetError
 from bowdenfit.files import excel, outcome, parquet
 
+pytestmark = pytest.mark.extended
+
 
 def workbook(folder, sheets):
     book = openpyxl.Workbook()

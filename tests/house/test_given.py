@@ -8,6 +8,8 @@ import pytest
 import bowdenfit as bf
 from bowdenfit.given import with_checked_keywords
 
+pytestmark = pytest.mark.extended
+
 
 @pytest.fixture(scope="module")
 def fit(quick_results):

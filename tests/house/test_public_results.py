@@ -21,6 +21,8 @@ from bowdenfit.questions.figure_methods import FigureMethods
 from bowdenfit.questions.summary.verdict import CONTRADICTORY, NOT_CONVERGED, Verdict
 from bowdenfit.verbs import VERBS
 
+pytestmark = pytest.mark.extended
+
 MOST_LINES, MOST_BYTES, MOST_IN_A_NOTEBOOK = 10, 1000, 2000
 PLAIN_ROOMS = ("bowdenfit.inference", "bowdenfit.parameters", "bowdenfit.cable", "bowdenfit.kinds")
 PLAIN = {np.ndarray, str, bool, NoneType, Path, FigureMethods}  # what needs no page of its own

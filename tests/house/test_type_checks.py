@@ -5,6 +5,8 @@ import pytest
 from jaxtyping import Float, TypeCheckError, jaxtyped
 from type_checks import check
 
+pytestmark = pytest.mark.extended
+
 
 @jaxtyped(typechecker=check)
 def scaled(force: Float[np.ndarray, " rows"], factor: float, drop: int = 0) -> Float[np.ndarray, " rows"]:

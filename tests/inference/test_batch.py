@@ -18,6 +18,8 @@ from bowdenfit.inference.log_density import LogDensity
 from bowdenfit.model import build_model
 from bowdenfit.questions.calibrate.refit import RANKS
 
+pytestmark = pytest.mark.extended
+
 DATA = Path(__file__).parents[2] / "datasets"
 DATA_SETS = sorted(path.parent.name for path in DATA.glob("*/cable.toml"))
 RIDGE = np.deg2rad([(200.0, 30.0, 20.0), (60.0, 90.0, 30.0), (90.0, 30.0, 60.0)])  # angles of rows and contacts

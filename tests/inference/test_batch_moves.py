@@ -28,6 +28,8 @@ from bowdenfit.inference.log_density import LogDensity
 from bowdenfit.inference.moves import independent
 from bowdenfit.model import build_model
 
+pytestmark = pytest.mark.extended
+
 DATA = Path(__file__).parents[2] / "datasets"
 ENSEMBLES, WALKERS = 16, 64
 

@@ -15,6 +15,8 @@ from bowdenfit.inference.log_density import LogDensity
 from bowdenfit.model import build_model
 from bowdenfit.questions.calibrate.refit import Laboratory, with_parameters_of
 
+pytestmark = pytest.mark.extended
+
 LABORATORIES = {  # load [N], mountings of each group, loads in units of it, what is said of the runs
     "trials": (1.0, 30, None, ', run = "each row"'),
     "runs": (10_000.0, 6, (0.5, 1.0, 2.0), ""),

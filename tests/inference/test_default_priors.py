@@ -11,6 +11,8 @@ from scipy.special import log_ndtr
 
 from bowdenfit.description import PriorDefaults
 
+pytestmark = pytest.mark.extended
+
 DEFAULTS = PriorDefaults()
 LIMIT = np.deg2rad(10.0)
 LENGTHS = np.linspace(-1.0, 1.0, 11)  # in half ranges

@@ -12,6 +12,8 @@ from scipy import stats
 import bowdenfit as bf
 from bowdenfit.questions.summary.verdict import NOT_DESCRIBED, NOT_IDENTIFIABLE
 
+pytestmark = pytest.mark.extended
+
 MOUNTINGS = 0.025
 PULL = np.linspace(2.0, 30.0, 25)
 DESCRIPTION = """name = "catheter"

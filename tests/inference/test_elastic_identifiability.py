@@ -17,6 +17,8 @@ from bowdenfit.questions.bends.overview import products_with_preload
 from bowdenfit.questions.check.data_set_words import warnings_of
 from bowdenfit.questions.summary.words import full_text
 
+pytestmark = pytest.mark.extended
+
 ANGLES = (0.0, 45.0, 90.0, 135.0, 180.0)
 LOADS = (1.0, 3.0, 6.0, 10.0, 15.0, 20.0, 30.0, 40.0, 60.0, 80.0, 100.0)
 TRUTH = {

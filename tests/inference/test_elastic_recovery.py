@@ -33,6 +33,8 @@ from bowdenfit.kinds.stretch.table import StretchTable
 from bowdenfit.model import build_model
 from bowdenfit.questions.simulate.simulation import empty_tables, simulate, true_values
 
+pytestmark = pytest.mark.extended
+
 QUICK = SamplerSettings(n_ensembles=4, n_walkers=32, max_steps=1000, target_ess=500, target_r_hat=1.03)
 ROPE = ("stiffness", "bedding_stretch", "bedding_load", "lengthening", "stretch_zero", "sigma_L")
 SHORT = changed(

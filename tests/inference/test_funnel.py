@@ -27,6 +27,8 @@ from bowdenfit.parameters.priors import LogNormal, Normal
 from bowdenfit.parameters.space import Parameter, ParameterSpace
 from bowdenfit.results.folder import start_checkpoint
 
+pytestmark = pytest.mark.extended
+
 COUNT, MEDIAN, LOG_SD = 3, 0.03, 1.5
 GRID = np.linspace(-6.0, 6.0, 4001)
 ENSEMBLES, WALKERS = 16, 64

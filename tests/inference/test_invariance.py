@@ -11,6 +11,8 @@ import bowdenfit as bf
 from bowdenfit.kinds.angles.table import AngleTable
 from bowdenfit.kinds.forces.table import ForceTable
 
+pytestmark = pytest.mark.extended
+
 ANGLES = [
     (430, 58, None),
     (440, 45, None),

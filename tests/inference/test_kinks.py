@@ -15,6 +15,8 @@ from bowdenfit.inference.solver import QUICK
 from bowdenfit.model import build_model
 from bowdenfit.questions.summary.words import full_text
 
+pytestmark = pytest.mark.extended
+
 ALONE, WITH_PRELOAD = ("loop",), ("preload", "loop")
 
 

@@ -24,6 +24,8 @@ from bowdenfit.kinds.stretch.table import StretchTable
 from bowdenfit.kinds.term import LOAD, WRAP_ANGLE
 from bowdenfit.model import build_model
 
+pytestmark = pytest.mark.extended
+
 LOADS = (20, 40, 60, 80, 100, 120)
 BENDS = (135.0, 45.0, 180.0, 90.0, 45.0, 180.0, 90.0, 135.0, 90.0, 180.0, 45.0, 135.0)  # deg, of mountings in no order
 LIMIT = "detection_limit = { value = 5, unit = \"deg\" } }"

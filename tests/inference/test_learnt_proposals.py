@@ -17,6 +17,8 @@ from bowdenfit.inference.log_density import LogDensity
 from bowdenfit.model import build_model
 from bowdenfit.questions.calibrate.refit import RANKS, _kind
 
+pytestmark = pytest.mark.extended
+
 ANGLES = np.deg2rad([(200.0, 30.0), (60.0, 90.0), (90.0, 30.0), (150.0, 60.0)])
 CENTERS = np.array([[0.0, 0.0, 0.0], [2.0, -1.0, 0.5]])
 ROOTS = np.array([np.eye(3), [[0.5, 0.0, 0.0], [0.2, 0.3, 0.0], [0.0, 0.1, 0.4]]])

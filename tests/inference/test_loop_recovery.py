@@ -8,6 +8,8 @@ from loop_benches import MU, PRELOAD, folder_of, recorded, several_in
 
 import bowdenfit as bf
 
+pytestmark = pytest.mark.extended
+
 
 @pytest.fixture(scope="module")
 def several(tmp_path_factory):

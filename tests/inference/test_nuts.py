@@ -22,6 +22,8 @@ from bowdenfit.parameters.priors import Normal
 from bowdenfit.parameters.space import Parameter
 from bowdenfit.questions.summary.words import full_text
 
+pytestmark = pytest.mark.extended
+
 DATA = Path(__file__).parents[2] / "datasets"
 YARN = DATA / "yarn-on-cylinder"
 QUICK = ("sampler.n_chains=8", "sampler.max_steps=300", "sampler.target_ess=100", "sampler.target_r_hat=1.2")

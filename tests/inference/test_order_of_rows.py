@@ -14,6 +14,8 @@ import bowdenfit as bf
 from bowdenfit.inference.log_density import LogDensity
 from bowdenfit.model import build_model
 
+pytestmark = pytest.mark.extended
+
 DATASETS = Path(__file__).parents[2] / "datasets"
 POINTS = 0.7 * np.random.default_rng(0).standard_normal((4, 40))
 CASES = {

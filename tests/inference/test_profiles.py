@@ -20,6 +20,8 @@ from bowdenfit.inference.profiles import freedom_of, profile
 from bowdenfit.inference.solver import minimize, orthogonal
 from bowdenfit.model import build_model
 
+pytestmark = pytest.mark.extended
+
 
 def fitted(dataset: Dataset) -> tuple[LogDensity, Objective, LeastSquares]:
     posterior = LogDensity(build_model(dataset))

@@ -40,6 +40,8 @@ from bowdenfit.questions.simulate.bench import (
 )
 from bowdenfit.recordings.recording import RawRecording, Recordings
 
+pytestmark = pytest.mark.extended
+
 SAMPLER = SamplerSettings(n_ensembles=2, n_walkers=32, max_steps=1200, target_ess=400, target_r_hat=1.03)
 PROBABILITY = 0.9
 EDGE, NOMINAL = np.deg2rad(90.0), np.deg2rad(60.0)

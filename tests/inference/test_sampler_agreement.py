@@ -15,6 +15,8 @@ from bowdenfit.inference.samplers import FALSE_ALARM, Drawn, SamplerAgreement, c
 from bowdenfit.questions.figures import figures_of
 from bowdenfit.questions.summary.words import full_text
 
+pytestmark = pytest.mark.extended
+
 DATA = Path(__file__).parents[2] / "datasets"
 YARN = DATA / "yarn-on-cylinder"
 

@@ -13,6 +13,8 @@ import bowdenfit as bf
 from bowdenfit.dataset import load_dataset
 from bowdenfit.model import build_model
 
+pytestmark = pytest.mark.extended
+
 LOADS, TAU, MU = (4.0, 8.0, 16.0, 32.0, 64.0), 0.03, 0.15
 
 

@@ -11,6 +11,8 @@ from bowdenfit.inference.batch.programs import BatchSettings
 from bowdenfit.inference.log_density import LogDensity
 from bowdenfit.model import build_model
 
+pytestmark = pytest.mark.extended
+
 ANGLES = np.deg2rad([
     (200.0, 30.0, 20.0), (150.0, 80.0, 20.0), (90.0, 30.0, 60.0), (240.0, 60.0, 90.0), (60.0, 90.0, 30.0), (120.0, 20.0, 80.0),
 ])  # fmt: skip

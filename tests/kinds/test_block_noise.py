@@ -20,6 +20,8 @@ from bowdenfit.recordings.preparation.likely_input import likely_input
 from bowdenfit.recordings.preparation.play import play
 from bowdenfit.recordings.recording import Recordings
 
+pytestmark = pytest.mark.extended
+
 TIMES = 8
 GRID = np.exp(np.linspace(-0.6, 0.6, 61))
 

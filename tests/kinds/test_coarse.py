@@ -9,6 +9,8 @@ from bowdenfit.questions.summary.brief_words import summary_text
 from bowdenfit.questions.summary.verdict import COARSE
 from bowdenfit.questions.summary.words import full_text
 
+pytestmark = pytest.mark.extended
+
 QUICK = ("sampler.n_walkers=64", "sampler.target_ess=200", "sampler.target_r_hat=1.05", "sampler.max_steps=2000")
 CABLE = """
 schema = 1

@@ -14,6 +14,8 @@ from bowdenfit.questions.check.data_set_words import check_text
 from bowdenfit.questions.summary.brief_words import summary_text
 from bowdenfit.questions.summary.verdict import COPIED
 
+pytestmark = pytest.mark.extended
+
 DATASETS = Path(__file__).parents[2] / "datasets"
 LOADS = (10.0, 20.0, 40.0, 60.0, 80.0)
 TABLES = (

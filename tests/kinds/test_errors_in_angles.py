@@ -22,6 +22,8 @@ from bowdenfit.inference.objective import make_objective
 from bowdenfit.kinds.forces.table import ForceTable
 from bowdenfit.model import build_model
 
+pytestmark = pytest.mark.extended
+
 MU, TAU = 0.14, 0.01
 
 

@@ -11,6 +11,8 @@ from bowdenfit.kinds.forces.following import check_following
 from bowdenfit.kinds.forces.table import ForceTable
 from bowdenfit.kinds.rows import OwnAngles, RowOrigin
 
+pytestmark = pytest.mark.extended
+
 LOADS = (20.0, 40.0, 60.0, 80.0, 100.0, 120.0)
 
 

@@ -14,6 +14,8 @@ from bowdenfit.kinds.forces.table import ForceTable
 from bowdenfit.kinds.rows import OwnAngles, RowOrigin
 from bowdenfit.kinds.settings import parse_description
 
+pytestmark = pytest.mark.extended
+
 ANGLES = (90.0, 180.0, 270.0)
 LOSS = tuple(0.1 * np.deg2rad(ANGLES))
 LOADS = (10.0, 20.0, 40.0, 60.0)

@@ -16,6 +16,8 @@ from bowdenfit.kinds.recordings.loops import LoopRecordingsTerm
 from bowdenfit.model import build_model
 from bowdenfit.recordings.loop_strokes import loop_limits
 
+pytestmark = pytest.mark.extended
+
 VALUES = {"mu": MU, "preload": PRELOAD, "tau": 0.02, "sigma_block": 0.1}
 
 

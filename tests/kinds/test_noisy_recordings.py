@@ -9,6 +9,8 @@ from loop_benches import MU, PRELOAD, folder_of, recorded, write
 
 import bowdenfit as bf
 
+pytestmark = pytest.mark.extended
+
 NOISE, DRAG = 2.0, 3.0  # N; the forces change by 0.3 N and less from sample to sample
 SAMPLES = "prepare = { block = 'none', delay = { value = 0, unit = 'ms' } }"
 

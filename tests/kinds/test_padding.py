@@ -15,6 +15,8 @@ from bowdenfit.kinds.padding import rounded_up
 from bowdenfit.model import build_model
 from bowdenfit.questions.simulate.simulation import simulated_again
 
+pytestmark = pytest.mark.extended
+
 WHOLE = "tables.recordings.likelihood=whole"
 CASES = {
     "angles too small to detect": ("on-body-exoskeleton", {}),

@@ -17,6 +17,8 @@ from bowdenfit.model import build_model
 from bowdenfit.recordings.preparation.likely_input import likely_input
 from bowdenfit.recordings.recording import Recordings
 
+pytestmark = pytest.mark.extended
+
 TIMES = 12
 
 

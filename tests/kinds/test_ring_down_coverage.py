@@ -16,6 +16,8 @@ from bowdenfit.inference.objective import make_objective
 from bowdenfit.model import Model, build_model
 from bowdenfit.questions.calibrate.refit import RANKS
 
+pytestmark = pytest.mark.extended
+
 NAMES = ("ring_inertia", "ring_stiffness", "rope_damping", "ring_friction")
 NOISE, ROWS, RATE, STEP = 1e-3, 250, 1000.0, 1e-5
 SWINGS = 60  # that the model follows, for all alike

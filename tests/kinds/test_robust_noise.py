@@ -26,6 +26,8 @@ from bowdenfit.kinds.rows import OwnAngles, RowOrigin
 from bowdenfit.model import Model, build_model
 from bowdenfit.physics.student import log_student_cdf, log_student_density, student_bound_residual, student_residual
 
+pytestmark = pytest.mark.extended
+
 MU_NAMES = ("mu1", "mu2", "mu3")
 ROOT = Path(__file__).parents[2]
 FREEDOMS = pytest.mark.parametrize("freedom", [2, 4, 10, 100])

@@ -16,6 +16,8 @@ from bowdenfit.questions.simulate.recordings.making import make_recordings
 from bowdenfit.questions.simulate.recordings.plan import parse_recordings_plan, read_recordings_plan
 from bowdenfit.questions.simulate.recordings.writing import write_recordings
 
+pytestmark = pytest.mark.extended
+
 PLAN = ROOT / "datasets" / "synthetic-recordings" / "bench.toml"
 EXPONENT = 0.25
 PROFILE = MotorProfile(speed=2.0, lead_in=0.5, cycles=2)

@@ -49,6 +49,8 @@ from bowdenfit.questions.simulate.simulation import empty_tables, simulated_agai
 from bowdenfit.questions.writing import write_page
 from bowdenfit.recordings.recording import Recordings
 
+pytestmark = pytest.mark.extended
+
 DATA_SETS = (
     "on-body-exoskeleton",
     "synthetic-bench",

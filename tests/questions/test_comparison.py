@@ -29,6 +29,8 @@ from bowdenfit.questions.compare.words import comparison_text
 from bowdenfit.questions.summary.verdict import NOT_CONVERGED, NOT_DESCRIBED
 from bowdenfit.questions.writing import write_answer
 
+pytestmark = pytest.mark.extended
+
 QUICK = ("sampler.n_walkers=64", "sampler.target_ess=200", "sampler.target_r_hat=1.05", "sampler.max_steps=3000")
 EDGE = {"name": "edge", "friction": "mu_edge", "wrap_angle": {"value": 45, "unit": "deg"}}
 GRID = np.linspace(-4.5, 4.5, 301)

@@ -12,6 +12,8 @@ from bowdenfit.kinds.ringdown.table import RingDownTable
 from bowdenfit.questions.bends import ring_down
 from bowdenfit.questions.bends.ring_down import device_for
 
+pytestmark = pytest.mark.extended
+
 DEVICE = Path(__file__).parents[2] / "datasets" / "haptic-teleoperation" / "device.toml"
 STATED = 'damping = { value = 0.02, unit = "N*m*s/rad", sd = 0.004 }\nmounting'
 TOTAL = 0.015 + 0.001 * np.random.default_rng(3).standard_normal((4, 1500))

@@ -22,6 +22,8 @@ from bowdenfit.questions.teleoperate.contact import bounces
 from bowdenfit.questions.teleoperate.stability import hardest_wall
 from bowdenfit.questions.teleoperate.words import teleoperation_text
 
+pytestmark = pytest.mark.extended
+
 DATA = Path(__file__).parents[2] / "datasets"
 DEVICE = DATA / "haptic-teleoperation" / "device.toml"
 RANGE = "45deg:180deg"

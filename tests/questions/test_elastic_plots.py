@@ -17,6 +17,8 @@ from bowdenfit.questions.bends.preload_window_figure import PreloadWindow
 from bowdenfit.questions.bends.stretch_figure import StretchCurve
 from bowdenfit.questions.figures import FIGURES, draw_figure
 
+pytestmark = pytest.mark.extended
+
 NAMES = ("stretch", "preload", "bending_loss", "loops", "preload_window")
 QUANTILES = (0.05, 0.5, 0.95)
 STIFFNESS, BEDDING_STRETCH, BEDDING_LOAD = 28.0, 0.9, 12.0  # N/mm, mm, N

@@ -31,6 +31,8 @@ from bowdenfit.questions.summary.brief_words import summary_text
 from bowdenfit.questions.summary.words import full_text
 from bowdenfit.results.optimum import optimum_of
 
+pytestmark = pytest.mark.extended
+
 FOLDER = Path(__file__).parents[2] / "datasets" / "synthetic-haptic-loop"
 TRUTH = json.loads((FOLDER / "truth.json").read_text())["truth"]
 

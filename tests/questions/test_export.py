@@ -14,6 +14,8 @@ from bowdenfit.questions.export.tables import transmission
 from bowdenfit.questions.export.transmission import LEVELS
 from bowdenfit.questions.export.words import plain
 
+pytestmark = pytest.mark.extended
+
 QUICK = ("sampler.n_walkers=64", "sampler.target_ess=100", "sampler.target_r_hat=1.1", "sampler.max_steps=1000")
 
 

@@ -12,6 +12,8 @@ from exported import CASES, HOSTILE, cable, followed, motion, of_equations, poin
 from bowdenfit.questions.export.c import header
 from bowdenfit.questions.export.transmission import LEVELS
 
+pytestmark = pytest.mark.extended
+
 STRICT = ("-std=c99", "-Wall", "-Wextra", "-pedantic", "-Werror")
 DRIVER = r"""
 #include <stdio.h>

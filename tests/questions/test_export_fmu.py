@@ -17,6 +17,7 @@ from bowdenfit.questions.export.fmu import unit
 fmpy = pytest.importorskip("fmpy")
 validation = pytest.importorskip("fmpy.validation")
 pytestmark = [
+    pytest.mark.extended,
     pytest.mark.skipif(not any(map(shutil.which, ("cc", "gcc", "clang"))), reason="no C compiler is installed"),
     pytest.mark.skipif(sys.platform != "linux", reason="made for Linux"),
     pytest.mark.filterwarnings("default"),  # of libraries that fmpy loads

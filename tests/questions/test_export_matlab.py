@@ -13,6 +13,8 @@ from bowdenfit.errors import UsageError
 from bowdenfit.questions.export.matlab import function, function_name
 from bowdenfit.questions.export.transmission import LEVELS
 
+pytestmark = pytest.mark.extended
+
 OCTAVE = shutil.which("octave-cli")
 needs_octave = pytest.mark.skipif(OCTAVE is None, reason="Octave is not installed")
 ON_LEAVING = "error: ignoring const execution_exception& while preparing to exit"  # of some builds of Octave, whatever is run

@@ -15,6 +15,8 @@ from bowdenfit.device.transmission import Transmission as Loop
 from bowdenfit.errors import UsageError
 from bowdenfit.questions.export.mujoco import model
 
+pytestmark = pytest.mark.extended
+
 mujoco = pytest.importorskip("mujoco")
 STEP, SECONDS = 1e-3, 4.0
 MAIN = """<mujoco><option timestep="{step}" gravity="0 0 0" integrator="{integrator}"/>{include}

@@ -10,6 +10,8 @@ from exported import CASES, HOSTILE, cable
 from bowdenfit.questions.export.parameters import lines, parameters
 from bowdenfit.questions.export.transmission import LEVELS
 
+pytestmark = pytest.mark.extended
+
 
 def read(text):
     return yaml.safe_load(text)["/**"]["ros__parameters"]["bowden"]

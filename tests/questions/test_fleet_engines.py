@@ -15,6 +15,8 @@ from bowdenfit.questions.fleet.store import KEPT
 from bowdenfit.questions.simulate.fleet import read_fleet_plan, simulate_fleet, write_fleet
 from bowdenfit.results.fleet_folder import FLEET_DRAWS
 
+pytestmark = pytest.mark.extended
+
 BENCH = Path(__file__).parents[2] / "datasets" / "synthetic-fleet" / "bench.toml"
 SEED = 7
 MORE = {  # a contact that hardly any run tells from the others

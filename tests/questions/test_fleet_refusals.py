@@ -16,6 +16,8 @@ from bowdenfit.questions.fleet.inspections import read_inspections
 from bowdenfit.questions.fleet.store import KEPT, FleetStore
 from bowdenfit.results.fleet_folder import FLEET_DRAWS, FLEET_TABLE
 
+pytestmark = pytest.mark.extended
+
 FLEET = Path(__file__).parents[2] / "datasets" / "synthetic-fleet"
 HEADING, *ROWS = (FLEET / FLEET_TABLE).read_text().splitlines()
 

@@ -6,6 +6,8 @@ import pytest
 import bowdenfit as bf
 from bowdenfit.errors import UsageError
 
+pytestmark = pytest.mark.extended
+
 
 @pytest.fixture(scope="module")
 def fit(quick_fit):

@@ -9,6 +9,8 @@ from one_page import faults
 
 import bowdenfit as bf
 
+pytestmark = pytest.mark.extended
+
 QUICK = ("sampler.n_walkers=64", "sampler.target_ess=300", "sampler.target_r_hat=1.05", "sampler.max_steps=4000")
 TRUE = {"new": 0.1, "old": 0.14}
 

@@ -12,6 +12,8 @@ from bowdenfit.kinds.designs import design_of
 from bowdenfit.kinds.settings import parse_description
 from bowdenfit.questions.identify.verb import identify
 
+pytestmark = pytest.mark.extended
+
 PRIOR_SD = 0.7
 QUICK = ("sampler.n_walkers=64", "sampler.target_ess=300", "sampler.target_r_hat=1.05", "sampler.max_steps=3000")
 SET = [f"--set={setting}" for setting in QUICK]

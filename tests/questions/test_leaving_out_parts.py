@@ -21,6 +21,8 @@ from bowdenfit.kinds.runs import run_sums
 from bowdenfit.model import build_model
 from bowdenfit.questions.compare.words import comparison_text
 
+pytestmark = pytest.mark.extended
+
 LOADS = (20, 40, 60, 80, 100, 120)
 
 

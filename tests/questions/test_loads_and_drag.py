@@ -11,6 +11,8 @@ from bowdenfit.questions.length.efficiency_figure import data, draw
 from bowdenfit.questions.predict.outside import Measured, pulled
 from bowdenfit.questions.recorded.lost_force import lost_force
 
+pytestmark = pytest.mark.extended
+
 LOSS = -np.log(0.75)
 HIDDEN = 2.2
 LOADS = (5.0, 10.0, 20.0, 40.0)

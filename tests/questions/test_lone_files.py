@@ -11,6 +11,8 @@ from bowdenfit.kinds.forces.table import ForceTable
 from bowdenfit.kinds.single_file import file_kind
 from bowdenfit.recordings.recording import Recordings
 
+pytestmark = pytest.mark.extended
+
 GENERATOR = np.random.default_rng(3)
 LOADS = np.repeat([10.0, 20.0, 40.0, 60.0, 80.0, 100.0], 10)
 

@@ -10,6 +10,8 @@ import bowdenfit as bf
 from bowdenfit.plots.layout import EDGE, empty_page, title_above
 from bowdenfit.questions.figures import mark_of
 
+pytestmark = pytest.mark.extended
+
 MARK = "Do not use: this fit is not"
 
 

@@ -11,6 +11,8 @@ from bowdenfit.questions.next.candidates import name_of, words_of
 from bowdenfit.questions.next.ranking import next_measurement
 from bowdenfit.questions.next.words import next_measurement_text
 
+pytestmark = pytest.mark.extended
+
 QUICK = ("sampler.n_walkers=64", "sampler.target_ess=300", "sampler.target_r_hat=1.05", "sampler.max_steps=4000")
 
 

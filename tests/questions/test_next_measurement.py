@@ -41,6 +41,8 @@ from bowdenfit.results.optimum import optimum_of
 from bowdenfit.results.record import Draws
 from bowdenfit.results.record import Provenance as Origin
 
+pytestmark = pytest.mark.extended
+
 N = 12_800
 LIMIT = 10.0  # deg, below which the on-body paper detects no angle
 

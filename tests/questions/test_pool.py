@@ -30,6 +30,8 @@ from bowdenfit.questions.pool.words import pool_text
 from bowdenfit.results.fleet_folder import CHECKSUM, FLEET_DRAWS, FLEET_PAGE, write_fleet_draws
 from bowdenfit.results.kept import checksum
 
+pytestmark = pytest.mark.extended
+
 ASKED = Asked(0.6, {"mu_0": np.pi, "mu_1": 0.3}, 100_000.0)
 
 

@@ -14,6 +14,8 @@ from bowdenfit.inference.population.sampling import draw_population
 from bowdenfit.inference.population.summaries import Summaries, summarized
 from bowdenfit.questions.pool import unlike
 
+pytestmark = pytest.mark.extended
+
 COUNT, MEAN, SD = 2, np.full(2, np.log(0.12)), np.full(2, 0.7)
 TURNED = np.linalg.cholesky(np.array([[1.0, -0.4], [-0.4, 1.0]]))  # coefficients of one inspection are told together
 

@@ -27,6 +27,8 @@ from bowdenfit.questions.pool.inspected import given
 from bowdenfit.questions.simulate.fleet import read_fleet_plan, simulate_fleet, write_fleet
 from bowdenfit.results.fleet_folder import read_fleet_draws
 
+pytestmark = pytest.mark.extended
+
 PRIOR_MEAN, PRIOR_SD, FREEDOM = np.log(0.12), 0.7, 5.0
 ANGLES = np.array([2.0, 0.5])  # rad
 PLAN = "datasets/synthetic-fleet/bench.toml"

@@ -16,6 +16,8 @@ from bowdenfit.questions.pool.inspected import given
 from bowdenfit.questions.pool.worth import readings_of, worth
 from bowdenfit.results.fleet_folder import FLEET_TABLE, read_fleet_draws
 
+pytestmark = pytest.mark.extended
+
 FLEET = Path(__file__).parents[2] / "datasets" / "synthetic-fleet"
 ANGLES = (("180", "60", "120", "240"), ("20", "90", "45", "20"))  # deg
 

@@ -10,6 +10,8 @@ from test_pool_alarms import MEAN, SD, like_cables
 from bowdenfit.inference.population.sampling import PopulationDraws
 from bowdenfit.inference.population.unpooled import unpooled
 
+pytestmark = pytest.mark.extended
+
 ODD = 1.8  # log coefficients of an odd cable above the others'; nine spreads
 
 

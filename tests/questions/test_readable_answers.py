@@ -27,6 +27,8 @@ from bowdenfit.questions.next.candidates import can_be_ranked
 from bowdenfit.questions.next.target import Answer
 from bowdenfit.results.captions import CAPTIONS
 
+pytestmark = pytest.mark.extended
+
 ROOT = Path(__file__).parents[2]
 SETS = sorted(path.parent for path in (ROOT / "datasets").glob("*/cable.toml"))
 FILES = {

@@ -15,6 +15,8 @@ from bowdenfit.plots.layout import text_width
 from bowdenfit.plots.panels import short_title
 from bowdenfit.questions.figures import caption_of, figures_of
 
+pytestmark = pytest.mark.extended
+
 QUICK = ("sampler.n_walkers=64", "sampler.target_ess=200", "sampler.target_r_hat=1.1", "sampler.max_steps=2000")
 LONG = "cotton yarn, waxed and run in for a week, batch {}"
 HEAD = "run,group,wrap_angle_deg,stroke,input_force_N,output_force_N,velocity [mm/s]"

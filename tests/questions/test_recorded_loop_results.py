@@ -17,6 +17,8 @@ from bowdenfit.questions.recorded.traces import traces
 from bowdenfit.recordings.recording import Recordings
 from bowdenfit.results.store import _measurements, _measurements_page
 
+pytestmark = pytest.mark.extended
+
 
 @pytest.fixture(scope="module")
 def several(tmp_path_factory):

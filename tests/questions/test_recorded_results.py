@@ -27,6 +27,8 @@ from bowdenfit.questions.summary.brief_words import summary_text
 from bowdenfit.questions.summary.words import full_text
 from bowdenfit.recordings.recording import Recordings
 
+pytestmark = pytest.mark.extended
+
 QUICK = ("sampler.n_walkers=64", "sampler.target_ess=200", "sampler.target_r_hat=1.05", "sampler.max_steps=2000")
 SHORT = ("sampler.n_walkers=64", "sampler.target_ess=100", "sampler.target_r_hat=1.01", "sampler.max_steps=600")
 

@@ -19,6 +19,8 @@ from bowdenfit.questions.recorded.recordings_figure import POINTS, OverTime, beg
 from bowdenfit.questions.recorded.sample_efficiency_figure import Samples, sample_efficiencies
 from bowdenfit.questions.summary.residuals_figure import Residuals
 
+pytestmark = pytest.mark.extended
+
 PER_BLOCK = ("time", "input_force", "output_force", "stroke", "saturated", "predicted", "fitted")
 NAMES = ("recordings", "hysteresis", "sample_efficiency", "autocorrelation", "dependence")
 EXPONENT, NOISE, BLOCKS = 0.24, 0.15, 1000

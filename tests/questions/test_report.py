@@ -13,6 +13,8 @@ from bowdenfit.questions.report.sections import report_page
 from bowdenfit.questions.writing import write_page
 from bowdenfit.results.folder import REPORT
 
+pytestmark = pytest.mark.extended
+
 DATASETS = Path(__file__).parents[2] / "datasets"
 QUICK = ("sampler.n_walkers=64", "sampler.target_ess=200", "sampler.target_r_hat=1.05", "sampler.max_steps=4000")
 SHEETS = 6

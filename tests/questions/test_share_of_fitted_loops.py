@@ -15,6 +15,8 @@ from bowdenfit.device.plant import Motion, Plant
 from bowdenfit.device.transmission import Transmission
 from bowdenfit.questions.compensate.ranking import compensation_of
 
+pytestmark = pytest.mark.extended
+
 MOTOR, DAMPING, DEAD_ZONE = 0.01, 1e-3, 0.8
 DEVICE = """
 name = "known"

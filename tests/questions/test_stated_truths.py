@@ -19,6 +19,8 @@ from bowdenfit.questions.calibrate.words import calibration_text
 from bowdenfit.questions.calibrate.workbench import Plan, Workbench
 from bowdenfit.questions.simulate.simulation import empty_tables
 
+pytestmark = pytest.mark.extended
+
 
 def bench(**friction: object) -> Dataset:
     """Three runs over a known angle, and priors that do not look at them."""

@@ -1,8 +1,11 @@
 """A delay that sliding wants far from where it is put, and what becomes of the verdict."""
 
+import pytest
 from recorded_benches import RecordedBench, write
 
 import bowdenfit as bf
+
+pytestmark = pytest.mark.extended
 
 BENCH = RecordedBench(rate=100, length=40, wave="sine", noise=0.002)
 

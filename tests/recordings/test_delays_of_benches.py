@@ -6,6 +6,8 @@ from recorded_benches import RecordedBench, channels
 
 from bowdenfit.recordings.preparation.delay import estimate_delay
 
+pytestmark = pytest.mark.extended
+
 BENCHES = (
     {"noise": 0.02},
     {"noise": 0.05},

@@ -11,6 +11,8 @@ import bowdenfit as bf
 from bowdenfit.inference.departure import FALSE_ALARM, MOVED
 from bowdenfit.kinds.inside_runs import ZERO
 
+pytestmark = pytest.mark.extended
+
 SHORT = {"length": 22.0, "period": 22 / 3, "wave": "random", "drag": 0.05, "mountings": 3, "scatter": 0.002}
 DRIFT = 0.01  # of the load, 100 N
 

@@ -20,6 +20,8 @@ from bowdenfit.recordings.preparation.clock import spread
 from bowdenfit.recordings.recording import RawRecording
 from bowdenfit.recordings.strokes import find_strokes
 
+pytestmark = pytest.mark.extended
+
 EXPONENT = 0.24
 
 

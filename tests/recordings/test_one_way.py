@@ -3,6 +3,8 @@
 import numpy as np
 import pytest
 
+pytestmark = pytest.mark.extended
+
 TIME = np.arange(0.0, 20.0, 0.01)
 RISING = 5.0 + 3.0 * TIME
 EXPONENT = 0.4

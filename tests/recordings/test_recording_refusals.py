@@ -19,6 +19,8 @@ from bowdenfit.kinds.recordings.angles import check_angles
 from bowdenfit.questions.simulate.bench import BenchFriction, BenchSettings, Faults, MotorProfile, simulate_recording
 from bowdenfit.recordings.recording import PULL, RETURN, Recordings
 
+pytestmark = pytest.mark.extended
+
 NEWTONS_PER_POUND = 4.4482216152605
 SWAP = ["--channel input_force=OUTPUT_CHANNEL --channel output_force=INPUT_CHANNEL", "swapped"]
 TOML = """schema = 1

@@ -8,6 +8,8 @@ from bowdenfit.recordings import loop_strokes, rope_strokes
 from bowdenfit.recordings.preparation.likely_input import likely_input
 from bowdenfit.recordings.preparation.robust import robust_cost, robust_minimum
 
+pytestmark = pytest.mark.extended
+
 FREE = np.array([[-np.inf, -np.inf], [np.inf, np.inf]])
 
 

@@ -3,8 +3,12 @@
 import shutil
 from pathlib import Path
 
+import pytest
+
 import bowdenfit as bf
 from bowdenfit.recordings.recording import Recordings
+
+pytestmark = pytest.mark.extended
 
 SOURCE = Path(__file__).resolve().parents[2] / "datasets" / "synthetic-recordings"
 

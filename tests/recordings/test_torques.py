@@ -9,6 +9,8 @@ from bowdenfit.errors import DatasetError
 from bowdenfit.recordings.named_channels import parse_channels
 from bowdenfit.recordings.recording import Recordings
 
+pytestmark = pytest.mark.extended
+
 IN_RADIUS = 'input_pulley_radius = { value = 15, unit = "mm" }'
 OUT_RADIUS = 'output_pulley_radius = { value = 1.2, unit = "cm" }'
 

@@ -7,6 +7,8 @@ import pytest
 from attempts import Attempts
 from slow_cases import some_slow
 
+pytestmark = pytest.mark.extended
+
 SECONDS, MEMORY = 10.0, 400 << 20
 TABLE = "time (s),input force (N),output force (N)\n" + "".join(f"{i / 100},{40 + i % 9},{30 + i % 9}\n" for i in range(200))
 

@@ -19,6 +19,8 @@ import bowdenfit as bf
 from bowdenfit.files import read_channels
 from bowdenfit.files.apart import Limits, limits_times
 
+pytestmark = pytest.mark.extended
+
 MATLAB = b"MATLAB 5.0 MAT-file".ljust(124) + struct.pack("<H2s", 0x0100, b"IM")
 
 

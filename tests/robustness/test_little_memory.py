@@ -11,6 +11,8 @@ import bowdenfit as bf
 from bowdenfit.errors import MemoryShortageError
 from bowdenfit.inference.engines import memory
 
+pytestmark = pytest.mark.extended
+
 LIMITED = (
     "import os, resource as r, sys; r.setrlimit(getattr(r, sys.argv[1]), (int(sys.argv[2]) << 20,) * 2); "
     "os.execv(sys.executable, [sys.executable, *sys.argv[3:]])"

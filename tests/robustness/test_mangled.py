@@ -11,6 +11,8 @@ from fuzzing import DATASETS, read_mangled_data_set, read_mangled_file, run_mang
 from fuzzing_folders import FOLDERS, read_mangled_folder
 from recorded_files import WRITERS
 
+pytestmark = pytest.mark.extended
+
 OF_TABLES = {"synthetic-recordings": 6, "synthetic-bench": 30, "synthetic-haptic-loop": 30}
 MOST_MEMORY = 600 << 20  # bytes by which all of them may raise what the process holds
 

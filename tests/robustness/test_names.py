@@ -20,6 +20,8 @@ from bowdenfit.plots.write import write_all
 from bowdenfit.results.netcdf import read_groups, write_groups
 from bowdenfit.words import printable
 
+pytestmark = pytest.mark.extended
+
 QUICK = ("sampler.n_walkers=32", "sampler.max_steps=200", "sampler.target_ess=100")
 ODD = [
     "a/b",

@@ -11,6 +11,8 @@ from recorded_files import FORCES, N, db3_folder
 import bowdenfit as bf
 from bowdenfit.files import read_channels
 
+pytestmark = pytest.mark.extended
+
 ANGLE = (180, "deg")
 
 

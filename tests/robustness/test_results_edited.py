@@ -13,6 +13,8 @@ import bowdenfit as bf
 from bowdenfit.given import read_quantity
 from bowdenfit.results.kept import CHECKSUM
 
+pytestmark = pytest.mark.extended
+
 
 @pytest.fixture(scope="module")
 def whole(quick_fit, tmp_path_factory):

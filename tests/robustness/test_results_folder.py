@@ -16,6 +16,8 @@ from bowdenfit.questions.fleet.store import FleetStore
 from bowdenfit.results import store
 from bowdenfit.results.folder import folder_to_write, refuse_unwritable, reserved, write_text
 
+pytestmark = pytest.mark.extended
+
 YARN = Path(__file__).resolve().parents[2] / "datasets" / "yarn-on-cylinder"
 SHAPES = {"z": (5, 2), "place": ()}
 QUICK = ("sampler.n_walkers=32", "sampler.max_steps=200", "sampler.target_ess=100")

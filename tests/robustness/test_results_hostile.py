@@ -19,6 +19,8 @@ from bowdenfit.results.arrays import read_arrays
 from bowdenfit.results.fleet_folder import CHECKSUM, FLEET_DRAWS, FLEET_PAGE, read_fleet_draws
 from bowdenfit.results.netcdf import read_groups, write_groups
 
+pytestmark = pytest.mark.extended
+
 MOST = 200 << 20  # bytes by which one of them may raise what this process holds
 
 

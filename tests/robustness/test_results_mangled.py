@@ -19,6 +19,8 @@ from fuzzing_results import (
 
 import bowdenfit as bf
 
+pytestmark = pytest.mark.extended
+
 YARN = Path(__file__).resolve().parents[2] / "datasets" / "yarn-on-cylinder"
 FLEET = {"kept/*.npz": 25, "kept/begun.json": 20}
 MANY = 1000

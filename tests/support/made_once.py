@@ -1,12 +1,12 @@
 """Fits that many files of tests look at and none changes: made once in a run, whichever of its processes asks first."""
 
-import fcntl
 import os
 from collections.abc import Callable
 from functools import cache
 from pathlib import Path
 
 import pytest
+from filelock import FileLock
 
 import bowdenfit as bf
 
@@ -26,8 +26,7 @@ def made_once(place: Path, make: Callable[[Path], object]) -> Path:
         place: The folder.
         make: Makes a fit there.
     """
-    with place.with_suffix(".lock").open("w") as lock:
-        fcntl.flock(lock, fcntl.LOCK_EX)
+    with FileLock(place.with_suffix(".lock")):
         if not (place / "fit.json").exists():
             make(place)
     return place

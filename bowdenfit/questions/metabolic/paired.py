@@ -8,8 +8,8 @@ References:
 import math
 
 import numpy as np
+from scipy import stats
 from scipy.optimize import brentq
-from scipy.special import nctdtr, stdtr, stdtrit
 
 _OXYGEN, _CARBON_DIOXIDE, _NITROGEN = 16.58, 4.51, 5.90  # kJ/l, kJ/l and kJ/g
 LEVEL, POWER = 0.05, 0.8
@@ -33,7 +33,7 @@ def t_of(differences: np.ndarray) -> tuple[float, float]:
     Args:
         differences: A number for each person.
     """
-    return float(np.mean(differences)), float(np.std(differences, ddof=1) / math.sqrt(len(differences)))
+    return float(np.mean(differences)), float(stats.sem(differences))
 
 
 def two_sided(t: float, persons: int) -> float:
@@ -43,12 +43,12 @@ def two_sided(t: float, persons: int) -> float:
         t: Mean difference over its standard error.
         persons: How many.
     """
-    return float(2 * stdtr(persons - 1, -abs(t)))
+    return float(2 * stats.t.sf(abs(t), persons - 1))
 
 
 def t_of_p(p: float, persons: float) -> float:
     """The t, without its sign, that has a two-sided probability."""
-    return float(-stdtrit(persons - 1, p / 2))
+    return float(stats.t.isf(p / 2, persons - 1))
 
 
 def half_width(error: float, persons: int, level: float = 1 - LEVEL) -> float:
@@ -59,7 +59,7 @@ def half_width(error: float, persons: int, level: float = 1 - LEVEL) -> float:
         persons: How many.
         level: The share of studies.
     """
-    return float(stdtrit(persons - 1, (1 + level) / 2)) * error
+    return float(stats.t.ppf((1 + level) / 2, persons - 1)) * error
 
 
 def probability_below(mean: float, error: float, persons: int, before: float = math.inf) -> float:
@@ -71,7 +71,7 @@ def probability_below(mean: float, error: float, persons: int, before: float = m
         before: Standard deviation of what differences were expected before, about 0; infinite where nothing was.
     """
     if math.isinf(before):
-        return float(stdtr(persons - 1, -mean / error))
+        return float(stats.t.cdf(-mean / error, persons - 1))
     at = np.linspace(-12, 12, 200_001) * before
     weight = np.exp(-((at / before) ** 2) / 2) * (1 + ((at - mean) / error) ** 2 / (persons - 1)) ** (-persons / 2)
     return float((weight[at < 0].sum() + weight[at == 0].sum() / 2) / weight.sum())
@@ -86,8 +86,8 @@ def power(effect: float, persons: float, level: float = LEVEL) -> float:
         level: Of the two-sided test.
     """
     limit, shift = t_of_p(level, persons), abs(effect) * math.sqrt(persons)
-    below = float(nctdtr(persons - 1, shift, -limit))
-    return 1 - float(nctdtr(persons - 1, shift, limit)) + (0.0 if math.isnan(below) else below)
+    other_way = float(stats.nct.cdf(-limit, persons - 1, shift))  # NaN where it is too small to be computed
+    return float(stats.nct.sf(limit, persons - 1, shift)) + (0.0 if math.isnan(other_way) else other_way)
 
 
 def persons_needed(effect: float, share: float = POWER) -> int | None:

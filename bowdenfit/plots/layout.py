@@ -68,11 +68,11 @@ def axes_at(figure: Figure, left: float, bottom: float, width: float, height: fl
     return figure.add_axes((left / page, bottom / total, width / page, height / total), **sharing)
 
 
-def place_labels(figure: Figure, axes: Axes) -> None:
-    """Put the axis labels at a fixed distance, so that those of neighbors line up."""
+def place_labels(figure: Figure, axes: Axes, left: float = LABEL_LEFT, below: float = LABEL_BELOW) -> None:
+    """Put the axis labels at fixed distances [in], so that those of neighbors line up."""
     page, box = figure.get_size_inches(), axes.get_position()
-    axes.yaxis.set_label_coords(-LABEL_LEFT / (box.width * page[0]), 0.5)
-    axes.xaxis.set_label_coords(0.5, -LABEL_BELOW / (box.height * page[1]))
+    axes.yaxis.set_label_coords(-left / (box.width * page[0]), 0.5)
+    axes.xaxis.set_label_coords(0.5, -below / (box.height * page[1]))
 
 
 def number_width(axes: Axes) -> float:
@@ -145,6 +145,20 @@ def wrapped(words: str, room: float, size: float = SMALL, weight: str = "normal"
         if lines and text_width("\n".join(lines), size, weight) <= room:
             return "\n".join(lines)
     return words
+
+
+def line_entry(words: str, linestyle: Any = "", **style: Any) -> Artist:
+    """Return an entry of a legend for lines in a style, or for words alone."""
+    from matplotlib.lines import Line2D
+
+    return Line2D([], [], label=words, linestyle=linestyle, **style)
+
+
+def area_entry(words: str, color: str) -> Artist:
+    """Return an entry of a legend for areas of a color."""
+    from matplotlib.patches import Patch
+
+    return Patch(facecolor=color, label=words)
 
 
 def legend_above(figure: Figure, axes: Iterable[Axes], columns: int) -> None:

@@ -15,7 +15,7 @@ from bowdenfit.errors import StoreError
 from bowdenfit.inputs import refuse_special
 from bowdenfit.results.folder import ANSWERS, FIGURE_DATA, FIT, POSTERIOR, read_page, write_text
 
-SCHEMA = 5  # counted up with every change of what one of the questions answers, and of how figures look
+SCHEMA = 6  # counted up with every change of what one of the questions answers, and of how figures look
 CHECKSUM = "crc32"  # of a page, in itself
 _PIECE = 1 << 22  # bytes of a file read at once
 

@@ -7,8 +7,8 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from bowdenfit.plots.layout import empty_page, text_width, wrapped
-from bowdenfit.plots.sheet import ticks
 from bowdenfit.plots.style import BLUE, GRAY, LEAST, LIGHT, SMALL, WIDE, in_paper_style
+from bowdenfit.plots.ticks import ticks
 from bowdenfit.words import counted
 
 if TYPE_CHECKING:

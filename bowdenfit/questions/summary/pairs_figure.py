@@ -3,20 +3,18 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from itertools import combinations
 from typing import TYPE_CHECKING
 
 import numpy as np
 
 from bowdenfit.plots.captions import symbol_words
-from bowdenfit.plots.densities import BINS, bin_numbers, enclosed_share
-from bowdenfit.plots.layout import EDGE, wrapped
-from bowdenfit.plots.sheet import Panel, PanelSheet
+from bowdenfit.plots.layout import EDGE, area_entry, axes_at, empty_page, line_entry, place_labels, wrapped
 from bowdenfit.plots.style import BLUE, SMALL, WIDE, in_paper_style
+from bowdenfit.plots.ticks import number_below, number_left
 from bowdenfit.questions.summary.quantities import SampledQuantity, optimum, sampled_quantities
 
 if TYPE_CHECKING:
-    from bowdenfit.plots.layout import Figure
+    from bowdenfit.plots.layout import Axes, Figure
     from bowdenfit.results.record import Record
 
 HEADING = "Which unknowns hang together"
@@ -24,8 +22,11 @@ MOST = 8
 SHARE = 0.996  # of the draws, within the axes
 ROLES = ("friction", "elastic", "friction_model", "angle", "sensor", "noise")
 FILLS = {0.68: "#5E9FCB", 0.95: "#C3DCEE"}
-MARGIN, GAP, LARGEST, SMALLEST = 0.62, 0.09, 1.45, 0.66  # in
-KEY_ROW = 0.135  # in
+LEFT, BOTTOM, GAP = 0.62, 0.62, 0.09  # in, margins, and between panels
+LARGEST, SMALLEST = 1.45, 0.66  # in, of a panel with its gap
+MARK = 0.26  # in, of a color in the key, with the gap to its words
+BINS = 32  # of each axis, in two dimensions
+SMOOTHING = 6.5  # bins, of one draw; less of n by the rate of the best kernel in two dimensions, n to the power of -1/6
 
 
 @dataclass(frozen=True)
@@ -60,102 +61,96 @@ def caption(data: Pairs) -> str:
 
 @in_paper_style
 def draw(data: Pairs, width: float | None = None) -> Figure:
-    """Joint and marginal posterior of coefficients, noise and optimum."""
-    quantities = _with_room(data, int(((width or WIDE) - MARGIN - GAP) / SMALLEST))
-    size = ((width or WIDE) - MARGIN - GAP) / len(quantities)
+    """Return the corner plot of coefficients, noise and optimum."""
+    page = width or WIDE
+    quantities = _with_room(data, int((page - LEFT - GAP) / SMALLEST))
+    n = len(quantities)
+    size = (page - LEFT - GAP) / n
     size = size if width else min(LARGEST, size)
-    sheet = PanelSheet(MARGIN + GAP + size * len(quantities), MARGIN + 2 * GAP + size * len(quantities))
-    panels = _panels(quantities, size)
-    _marginals(sheet, quantities, panels)
-    _regions(sheet, quantities, panels)
-    _axes(sheet, quantities, panels)
-    _words(sheet, data, panels, len(quantities))
-    return sheet.finished()
+    figure = empty_page(LEFT + GAP + size * n, BOTTOM + GAP + size * n)
+    panels = {}
+    for row, column in np.argwhere(np.tri(n)).tolist():
+        axes = panels[row, column] = axes_at(
+            figure, LEFT + size * column, BOTTOM + size * (n - 1 - row), size - GAP, size - GAP
+        )
+        axes.set_xlim(quantities[column].limits(SHARE))
+        axes.grid(visible=False)
+        axes.xaxis.set_visible(row == n - 1)
+        axes.yaxis.set_visible(row > column == 0)
+        if row == column:
+            _marginal(axes, quantities[row])
+        else:
+            axes.set_ylim(quantities[row].limits(SHARE))
+            _regions(axes, quantities[column], quantities[row])
+    for i, quantity in enumerate(quantities):
+        _label(figure, panels[n - 1, i], panels[i, 0] if i else None, quantity.label, size)
+    _key(panels[0, 0], _remarks(data, n), figure.get_size_inches()[0] - LEFT - size - GAP - MARK - EDGE)
+    return figure
+
+
+def _marginal(axes: Axes, quantity: SampledQuantity) -> None:
+    """Draw the histogram of a quantity, with its median and 90 % interval."""
+    n_bins = round(2 * quantity.draws.size ** (1 / 3))  # Rice's rule
+    axes.hist(
+        quantity.draws.ravel(), n_bins, range=axes.get_xlim(), histtype="stepfilled", facecolor=FILLS[0.95], edgecolor=BLUE
+    )
+    for value in np.quantile(quantity.draws, (0.05, 0.5, 0.95)):
+        axes.axvline(value, color=BLUE, linewidth=0.7, linestyle="--")
+
+
+def _regions(axes: Axes, across: SampledQuantity, up: SampledQuantity) -> None:
+    """Fill the smallest areas that hold 68 % and 95 % of the draws of two quantities."""
+    from corner import hist2d
+
+    hist2d(
+        across.draws.ravel(),
+        up.draws.ravel(),
+        BINS,
+        (across.limits(SHARE), up.limits(SHARE)),
+        levels=tuple(FILLS),
+        smooth=SMOOTHING * across.draws.size ** (-1 / 6),
+        ax=axes,
+        color=BLUE,
+        quiet=True,
+        plot_datapoints=False,
+        plot_density=False,
+        fill_contours=True,
+        no_fill_contours=True,  # under those that are filled
+        contour_kwargs={"linewidths": 0.6},
+        contourf_kwargs={"colors": ["white", *reversed(FILLS.values())]},
+    )
+
+
+def _label(figure: Figure, below: Axes, left: Axes | None, label: str, size: float) -> None:
+    """Write numbers and a name below a column of panels, and left of a row."""
+    label = wrapped(label, size - 0.2 * GAP, most=2)
+    number_below(below)
+    below.set_xlabel(label, fontsize=SMALL, va="top")
+    if left:
+        number_left(left)
+        left.set_ylabel(label, fontsize=SMALL, va="center")
+        place_labels(figure, left, LEFT - 0.16, 0.2)
+    place_labels(figure, below, LEFT - 0.16, 0.2)
+
+
+def _remarks(data: Pairs, shown: int) -> list[str]:
+    """Return what the key says beside the colors."""
+    remarks = ["Dashed: median and 90 % interval"]
+    if data.best:
+        remarks.append(f"Optimum: best {data.best}")
+    if shown < len(data.quantities):
+        remarks.append(f"{shown} of {len(data.quantities)} unknowns shown")
+    return remarks
+
+
+def _key(first: Axes, remarks: list[str], room: float) -> None:
+    """Write the key into the empty corner right of the first panel."""
+    entries = [area_entry(f"{100 * share:.0f} % probability", color) for share, color in FILLS.items()]
+    entries += [line_entry(wrapped(remark, room)) for remark in remarks]
+    first.legend(handles=entries, loc="upper left", bbox_to_anchor=(1.1, 1.0), borderaxespad=0, labelspacing=0.25)
 
 
 def _with_room(data: Pairs, most: int) -> list[SampledQuantity]:
     """So many quantities at most, the optimum among them."""
     every, last = data.quantities, 2 if data.best and most > 2 else 0
     return every if len(every) <= most else every[: most - last] + every[len(every) - last :]
-
-
-def _panels(quantities: list[SampledQuantity], size: float) -> dict[tuple[int, int], Panel]:
-    """The lower triangle, by row and column."""
-    shown, last = [q.limits(SHARE) for q in quantities], len(quantities) - 1
-    return {
-        (row, column): Panel(
-            MARGIN + column * size, MARGIN + (last - row) * size, size - GAP, size - GAP,
-            shown[column], shown[row] if row != column else (0.0, 1.12),
-        )
-        for row in range(len(quantities)) for column in range(row + 1)
-    }  # fmt: skip
-
-
-def _marginals(sheet: PanelSheet, quantities: list[SampledQuantity], panels: dict[tuple[int, int], Panel]) -> None:
-    """Density of each quantity alone, with its median and 90 % interval."""
-    outlines, curves, middles = [], [], []
-    for i, quantity in enumerate(quantities):
-        panel = panels[i, i]
-        grid = np.linspace(*panel.x_limits, 2 * BINS)
-        height = quantity.density(grid)
-        outlines.append(panel.path(np.r_[grid[0], grid, grid[-1]], np.r_[0.0, height, 0.0]))
-        curves.append(panel.path(grid, height))
-        middles += [
-            panel.path(np.full(2, q), np.array([0.0, np.interp(q, grid, height)]))
-            for q in np.quantile(quantity.draws, (0.05, 0.5, 0.95))
-        ]
-    sheet.areas(outlines, facecolor=FILLS[0.95])
-    sheet.lines(middles, color=BLUE, linewidth=0.7, linestyle=(0, (2.5, 1.5)))
-    sheet.lines(curves, color=BLUE, linewidth=1.0)
-
-
-def _regions(sheet: PanelSheet, quantities: list[SampledQuantity], panels: dict[tuple[int, int], Panel]) -> None:
-    """The smallest areas that hold 68 % and 95 % of the draws, of all pairs in one go."""
-    if len(quantities) < 2:
-        return
-    numbers = [bin_numbers(q.draws, panels[i, i].x_limits) for i, q in enumerate(quantities)]
-    share = np.full((len(quantities) * (BINS + 1),) * 2, np.nan)
-    for column, row in combinations(range(len(quantities)), 2):
-        y, x = (slice(place * (BINS + 1), place * (BINS + 1) + BINS) for place in (row, column))
-        share[y, x] = enclosed_share(numbers[column], numbers[row])
-    last = len(quantities) - 1
-    places = (np.arange(BINS + 1) + 0.5) / BINS
-    across = np.concatenate([panels[last, i].left + panels[last, i].width * places for i in range(last + 1)])
-    up = np.concatenate([panels[i, 0].bottom + panels[i, 0].height * places for i in range(last + 1)])
-    share = np.ma.masked_invalid(share)
-    sheet.axes.contourf(across, up, share, [0.0, *FILLS], colors=list(FILLS.values()), zorder=1)
-    sheet.axes.contour(across, up, share, list(FILLS), colors=[BLUE], linewidths=0.6, zorder=1.1)
-
-
-def _axes(sheet: PanelSheet, quantities: list[SampledQuantity], panels: dict[tuple[int, int], Panel]) -> None:
-    last = len(quantities) - 1
-    sheet.frames(panels.values())
-    for i, quantity in enumerate(quantities):
-        below, left = panels[last, i], panels[i, 0]
-        sheet.ticks_below(below)
-        label = wrapped(quantity.label, below.width + 0.8 * GAP, most=2)
-        sheet.text(below.left + below.width / 2, MARGIN - 0.2, label, ha="center", va="top", fontsize=SMALL)
-        if i > 0:
-            sheet.ticks_left(left)
-            middle = left.bottom + left.height / 2
-            sheet.text(0.16, middle, label, ha="center", va="center", rotation=90, fontsize=SMALL)
-
-
-def _words(sheet: PanelSheet, data: Pairs, panels: dict[tuple[int, int], Panel], shown: int) -> None:
-    """The key, in the empty corner right of the first panel."""
-    first = panels[0, 0]
-    room = sheet.figure.get_size_inches()[0] - first.left - first.width - 2.5 * GAP - EDGE
-    x, y = first.left + first.width + 2.5 * GAP, first.bottom + first.height
-    entries = [(FILLS[share], f"{100 * share:.0f} % probability") for share in FILLS]
-    for i, (color, words) in enumerate(entries):
-        top = y - KEY_ROW * i
-        sheet.areas([np.array([(x, top), (x + 0.2, top), (x + 0.2, top - 0.1), (x, top - 0.1)])], facecolor=color)
-        sheet.text(x + 0.26, top - 0.05, words, va="center_baseline", fontsize=SMALL)
-    lines = ["Dashed: median and 90 % interval"]
-    if data.best:
-        lines.append(f"Optimum: best {data.best}")
-    if shown < len(data.quantities):
-        lines.append(f"{shown} of {len(data.quantities)} unknowns shown")
-    lines = [line for words in lines for line in wrapped(words, room).split("\n")]
-    for i, words in enumerate(lines, start=len(entries)):
-        sheet.text(x, y - KEY_ROW * i - 0.05, words, va="center_baseline", fontsize=SMALL)

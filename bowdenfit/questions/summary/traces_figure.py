@@ -3,18 +3,18 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from bowdenfit.plots.captions import symbol_words
-from bowdenfit.plots.layout import EDGE, wrapped
-from bowdenfit.plots.sheet import Panel, PanelSheet
+from bowdenfit.plots.layout import EDGE, axes_at, empty_page, line_entry, place_labels, wrapped
 from bowdenfit.plots.style import SERIES_COLORS, SERIES_LINES, SMALL, WIDE, WIDE_INTERVAL, in_paper_style
+from bowdenfit.plots.ticks import number_below, number_left
 from bowdenfit.questions.summary.quantities import SampledQuantity, optimum, sampled_quantities
 
 if TYPE_CHECKING:
-    from bowdenfit.plots.layout import Figure
+    from bowdenfit.plots.layout import Axes, Figure
     from bowdenfit.results.record import Record
 
 HEADING = "Paths of the sampler"
@@ -55,7 +55,7 @@ def caption(data: Paths) -> str:
 
 @in_paper_style
 def draw(data: Paths, width: float | None = None) -> Figure:
-    """Median and 90 % of the walkers of each ensemble against the draw, and the marginal of each ensemble.
+    """Return trace plots: median and 90 % of the walkers of each ensemble against the draw, and its marginal.
 
     A chain that has no other walkers is summarized over stretches of its path.
     """
@@ -64,37 +64,38 @@ def draw(data: Paths, width: float | None = None) -> Figure:
     rows = -(-len(quantities) // columns)
     chains = len(quantities[0].draws) == data.n_ensembles
     key = wrapped(_key(chains), page - 2 * EDGE)
-    sheet = PanelSheet(page, TOP + KEY_ROW * key.count("\n") + BOTTOM + rows * ROW - (ROW - PANEL))
-    panels = [_panel(q, page / columns, i // rows, rows - 1 - i % rows) for i, q in enumerate(quantities)]
-    for number in range(data.n_ensembles):
-        _ensemble(sheet, number, panels, quantities, data.n_ensembles)
-    _axes(sheet, quantities, panels, rows, "Step of the sampling")
-    _legend(sheet, data.n_ensembles, key)
-    return sheet.finished()
+    figure = empty_page(page, TOP + KEY_ROW * key.count("\n") + BOTTOM + rows * ROW - (ROW - PANEL))
+    for i, quantity in enumerate(quantities):
+        column, row = divmod(i, rows)
+        left, bottom = LEFT + column * page / columns, BOTTOM + (rows - 1 - row) * ROW
+        inner = page / columns - LEFT - RIGHT - MARGINAL
+        trace = axes_at(figure, left, bottom, inner, PANEL)
+        trace.set(xlim=(1.0, quantity.draws.shape[1]), ylim=quantity.limits(SHARE))
+        marginal = axes_at(figure, left + inner + 0.04, bottom, MARGINAL - 0.06, PANEL, sharey=trace)
+        marginal.set_axis_off()
+        for number, draws in enumerate(np.split(quantity.draws, data.n_ensembles)):
+            _ensemble(trace, marginal, quantity, draws, number)
+        _label(figure, trace, quantity.label, last=row == rows - 1 or i == len(quantities) - 1)
+    _legend(figure, data.n_ensembles, key)
+    return figure
 
 
-def _panel(quantity: SampledQuantity, room: float, column: int, row: int) -> Panel:
-    """The panel in a column of so much room."""
-    inner, draws = room - LEFT - RIGHT - MARGINAL, quantity.draws.shape[1]
-    return Panel(LEFT + column * room, BOTTOM + row * ROW, inner, PANEL, (1.0, float(draws)), quantity.limits(SHARE))
+def _ensemble(trace: Axes, marginal: Axes, quantity: SampledQuantity, draws: np.ndarray, number: int) -> None:
+    """Draw one ensemble in the panel of a quantity, and the density of its draws beside it."""
+    style = _style(number)
+    at, together = _together(draws)
+    low, median, high = np.quantile(together, (0.05, 0.5, 0.95), axis=0)
+    trace.fill_between(at, low, high, facecolor=style["color"], alpha=0.07 if len(draws) > 1 else 0.03, linewidth=0)
+    if len(draws) > 1:
+        trace.plot(at, low, at, high, linewidth=0.5, **style)
+    trace.plot(at, median, linewidth=1.0, **style)
+    grid = np.linspace(*trace.get_ylim(), GRID)
+    marginal.plot(quantity.density(grid, draws), grid, linewidth=1.0, **style)
 
 
-def _ensemble(sheet: PanelSheet, number: int, panels: list[Panel], quantities: list[SampledQuantity], n_ensembles: int) -> None:
-    """One ensemble in all panels."""
-    color, line = SERIES_COLORS[number % len(SERIES_COLORS)], SERIES_LINES[number % len(SERIES_LINES)]
-    medians, bands, edges = [], [], []
-    for panel, quantity in zip(panels, quantities, strict=True):
-        draws = np.split(quantity.draws, n_ensembles)[number]
-        at, together = _together(draws)
-        low, median, high = (panel.path(at, q) for q in np.quantile(together, (0.05, 0.5, 0.95), axis=0))
-        medians += [median, _marginal(panel, quantity, draws)]
-        if len(draws) > 1:
-            edges += [low, high]
-        bands.append(np.concatenate([low, high[::-1]]))
-    sheet.areas(bands, facecolor=color, alpha=0.07 if edges else 0.03)
-    if edges:
-        sheet.lines(edges, color=color, linestyle=line, linewidth=0.5)
-    sheet.lines(medians, color=color, linestyle=line, linewidth=1.0)
+def _style(number: int) -> dict[str, Any]:
+    """Return color and line of an ensemble."""
+    return {"color": SERIES_COLORS[number % len(SERIES_COLORS)], "linestyle": SERIES_LINES[number % len(SERIES_LINES)]}
 
 
 def _together(draws: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
@@ -108,25 +109,17 @@ def _together(draws: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     return 1.0 + length * (np.arange(STRETCHES) + 0.5), stretches.T
 
 
-def _marginal(panel: Panel, quantity: SampledQuantity, draws: np.ndarray) -> np.ndarray:
-    """Density of one ensemble's draws, lying on its side right of the panel."""
-    grid = np.linspace(*panel.y_limits, GRID)
-    start = panel.left + panel.width + 0.04
-    return np.column_stack([start + (MARGINAL - 0.06) * quantity.density(grid, draws), panel.y(grid)])
-
-
-def _axes(sheet: PanelSheet, quantities: list[SampledQuantity], panels: list[Panel], rows: int, across: str) -> None:
-    sheet.frames(panels)
-    for i, (quantity, panel) in enumerate(zip(quantities, panels, strict=True)):
-        last = i % rows == rows - 1 or i == len(quantities) - 1
-        sheet.ticks_left(panel)
-        sheet.ticks_below(panel, numbers=last, whole=True)
-        middle = panel.bottom + PANEL / 2
-        label = _in_two_lines(quantity.label)
-        sheet.text(panel.left - 0.5, middle, label, ha="center", va="center", rotation=90, fontsize=SMALL)
-        if last:
-            middle = panel.left + panel.width / 2
-            sheet.text(middle, panel.bottom - 0.27, across, ha="center", va="center", fontsize=SMALL)
+def _label(figure: Figure, trace: Axes, label: str, last: bool) -> None:
+    """Write numbers and the name of a quantity left of its panel, and below it where no panel follows."""
+    trace.grid(visible=False)
+    number_left(trace)
+    number_below(trace, whole=True)
+    trace.set_ylabel(_in_two_lines(label), fontsize=SMALL, va="center")
+    if last:
+        trace.set_xlabel("Step of the sampling", fontsize=SMALL, va="center")
+    else:
+        trace.tick_params(labelbottom=False)
+    place_labels(figure, trace, 0.5, 0.27)
 
 
 def _in_two_lines(label: str) -> str:
@@ -143,17 +136,14 @@ def _key(chains: bool) -> str:
     return f"Thick: median of the values at a step; thin: their {WIDE_INTERVAL}; right of each panel: density"
 
 
-def _legend(sheet: PanelSheet, n_ensembles: int, key: str) -> None:
-    """One entry a start, and what line and band are."""
-    width, height = sheet.figure.get_size_inches()
-    most = min(MOST_NAMES, int((width - EDGE) / NAME))
-    shown = n_ensembles if n_ensembles <= most else most - 1
-    more, step = n_ensembles - shown, min(1.0, (width - EDGE) / most)
-    for number in range(shown):
-        x, y = width / 2 + step * (number - (shown + bool(more)) / 2), height - 0.14
-        color, line = SERIES_COLORS[number], SERIES_LINES[number % len(SERIES_LINES)]
-        sheet.lines([np.array([(x, y), (x + 0.25, y)])], color=color, linestyle=line, linewidth=1.2)
-        sheet.text(x + 0.3, y, f"Start {number + 1}", va="center_baseline", fontsize=SMALL)
-    if more:
-        sheet.text(width / 2 + step * (shown - 1) / 2, height - 0.14, f"and {more} more", va="center_baseline", fontsize=SMALL)
-    sheet.text(width / 2, height - 0.24, key, ha="center", va="top", fontsize=SMALL, linespacing=1.25)
+def _legend(figure: Figure, n_ensembles: int, key: str) -> None:
+    """Write what lines and bands are, and one entry a start."""
+    most = min(MOST_NAMES, int((figure.get_size_inches()[0] - EDGE) / NAME))
+    named = n_ensembles if n_ensembles <= most else most - 1
+    entries = [line_entry(f"Start {number + 1}", linewidth=1.2, **_style(number)) for number in range(named)]
+    if named < n_ensembles:
+        entries.append(line_entry(f"and {n_ensembles - named} more"))
+    figure.legend(
+        handles=entries, title=key, title_fontsize=SMALL, loc="upper center", ncols=len(entries), borderaxespad=0.3,
+        bbox_to_anchor=(0.5, 1.0),
+    )  # fmt: skip

@@ -20,8 +20,7 @@ from bowdenfit.kinds.fit_commands import WRAP_ANGLE, has_own_angles, only_kind
 from bowdenfit.kinds.kind import Source
 from bowdenfit.kinds.measured_groups import measured_groups
 from bowdenfit.kinds.measurements import Measurements
-from bowdenfit.kinds.named_columns import with_columns
-from bowdenfit.kinds.settings import load_description, parse_description
+from bowdenfit.kinds.settings import load_description, parse_description, with_columns
 from bowdenfit.units import ColumnSource
 from bowdenfit.words import printable
 
@@ -155,11 +154,11 @@ def read_dataset(
         if settings is None:
             continue
         with faults.noted():
-            found = kind.read(Source(kind.name, settings, description, folder, channels or {}))
-            remarks = (*(said for each in found.accounts for said in each.remarks), *found.remarks)
-            measurements = Measurements((*measurements.tables, found.table), (*measurements.remarks, *remarks))
-            accounts += found.accounts
-            checksums |= {name: _sha256(path) for name, path in found.files.items()}
+            read = kind.read(Source(kind.name, settings, description, folder, channels or {}))
+            remarks = (*(remark for account in read.accounts for remark in account.remarks), *read.remarks)
+            measurements = Measurements((*measurements.tables, read.table), (*measurements.remarks, *remarks))
+            accounts += read.accounts
+            checksums |= {name: _sha256(path) for name, path in read.files.items()}
     faults.refuse()
     if channels and not any(kind.takes_channels for kind, _ in each_table(measurements)):
         raise DescriptionError(

@@ -1,5 +1,6 @@
 """One reading, or one run, that could be taken next: what a kind of measurement offers, and how it would be read."""
 
+from abc import ABC, abstractmethod
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any, Literal
@@ -122,74 +123,94 @@ class Simulation:
     lowest: float = float("-inf")
 
 
-@dataclass(frozen=True)
-class CandidateKind:
-    """A measurement that can be made next.
+class CandidateKind(ABC):
+    """A measurement that can be made next; what a subclass must give is abstract here.
 
-    Args:
-        name: As users write it before the @.
-        order: Place among the kinds where none is named.
-        needs: Parameters without which such readings cannot be simulated.
-        unknown: Why they then cannot, in a sentence.
-        offered: Those that the tables of the description can hold.
-        simulation: How candidates would be read.
-        possible: Whether the cable is one that has such readings.
-        noun: What one is called, if not by its name.
-        words: What is measured, if not "the" with its noun.
-        title: Heading in figures, if not its noun.
+    A candidate of the kind is named by its place: a value of the route where the cable has one and `along_route` holds, else
+    wrap angles; then by a load where it is `loaded`, or by one of the loads and strokes of `designs`.
+
+    Attributes:
         along_route: Whether it is made at a value of the route, where there is one.
-        tells_curves: Whether it is of the wrap angles themselves, so that no measured angle can stand in.
-        angles: Which wrap angles name it where there is no route: none, those measured row by row, or the total one.
+        angles: Which wrap angles name it elsewhere: none, those measured row by row, or the total one.
         loaded: Whether it is made under a load.
-        designs: Loads [N] and strokes at which all its readings could be taken, where a candidate leaves them open; NaN and
-            0 as in those made so far.
-        usual: Loads and strokes of those made so far, in words.
+        tells_curves: Whether it is of the wrap angles themselves, so that no measured angle can stand in.
         mounted_anew: Whether each means mounting the cable anew.
     """
 
-    name: str
-    order: int
-    needs: tuple[str, ...]
-    unknown: str
-    offered: Callable[[Situation], list[Candidate]]
-    simulation: Callable[[Situation, Sequence[Candidate]], Simulation]
-    possible: Callable[[Situation], bool] = lambda _: True
-    noun: str = ""
-    words: Callable[[Cable], str] | None = None
-    title: str = ""
     along_route: bool = False
-    tells_curves: bool = False
     angles: Literal["none", "columns", "total"] = "columns"
     loaded: bool = False
-    designs: Callable[[Situation], list[tuple[float, int]]] = lambda _: []
-    usual: Callable[[Situation], str] = lambda _: ""
+    tells_curves: bool = False
     mounted_anew: bool = False
 
     @property
-    def called(self) -> str:
-        """Its noun."""
-        return self.noun or self.name
+    @abstractmethod
+    def name(self) -> str:
+        """Name as users write it before the @."""
+
+    @property
+    @abstractmethod
+    def order(self) -> int:
+        """Place among the kinds where none is named."""
+
+    @property
+    @abstractmethod
+    def needs(self) -> tuple[str, ...]:
+        """Parameters without which such readings cannot be simulated."""
+
+    @property
+    @abstractmethod
+    def unknown(self) -> str:
+        """Why they then cannot, in a sentence."""
+
+    @abstractmethod
+    def candidates(self, at: Situation) -> list[Candidate]:
+        """Return those that the tables of the description can hold."""
+
+    @abstractmethod
+    def simulation(self, at: Situation, candidates: Sequence[Candidate]) -> Simulation:
+        """Return how candidates would be read."""
+
+    def is_possible(self, at: Situation) -> bool:
+        """Return whether the cable is one that has such readings."""
+        return True
+
+    def designs(self, at: Situation) -> list[tuple[float, int]]:
+        """Return loads [N] and strokes at which all its readings could be taken, where a candidate leaves them open.
+
+        NaN and 0 stand for those of the runs made so far.
+        """
+        return []
+
+    def describe_usual(self, at: Situation) -> str:
+        """Return loads and strokes of those made so far, in words; asked for where there are `designs`."""
+        return ""
+
+    @property
+    def noun(self) -> str:
+        """What one is called, such as "force run"."""
+        return self.name
 
     @property
     def phrase(self) -> str:
         """One of them in a sentence, such as "a stretch"."""
-        return f"{'an' if self.called[0] in 'aeiou' else 'a'} {self.called}"
+        return f"{'an' if self.noun[0] in 'aeiou' else 'a'} {self.noun}"
 
     @property
     def heading(self) -> str:
-        """What figures say of it."""
-        return self.title or self.called[0].upper() + self.called[1:]
+        """What figures call them."""
+        return self.noun[0].upper() + self.noun[1:]
 
     def measured(self, cable: Cable) -> str:
-        """What is measured, such as "the stretch"."""
-        return self.words(cable) if self.words is not None else f"the {self.called}"
+        """Return what is measured, such as "the stretch"."""
+        return f"the {self.noun}"
 
     def why_unknown(self, at: Situation) -> str:
-        """Why such readings cannot be simulated; empty where they can."""
-        return "" if set(self.needs) <= at.parameters and self.possible(at) else self.unknown
+        """Return why such readings cannot be simulated; empty where they can."""
+        return "" if set(self.needs) <= at.parameters and self.is_possible(at) else self.unknown
 
     def example(self, at: Situation) -> Candidate:
-        """One that makes sense of this cable as far as its place goes: halfway along the route, or at right angles."""
+        """Return one that makes sense of this cable as far as its place goes: halfway along the route, or at right angles."""
         lengths = at.lengths if self.along_route else []
         n = {"none": 0, "columns": len(at.columns_without_curve), "total": 1}[self.angles] if not lengths else 0
         route = lengths[len(lengths) // 2] if lengths else float("nan")

@@ -12,6 +12,7 @@ from bowdenfit.description.wrong_keys import wrong_keys
 from bowdenfit.errors import DescriptionError
 from bowdenfit.kinds import KINDS
 from bowdenfit.kinds.design import Design
+from bowdenfit.kinds.kind import PlannedKind
 
 
 def read_design(page: Mapping[str, Any], description: Description, file: str) -> Design:
@@ -26,9 +27,9 @@ def read_design(page: Mapping[str, Any], description: Description, file: str) ->
         DescriptionError: A key or a value is wrong, or this cable cannot have what is asked for.
     """
     design = _parsed(page, file)
-    for kind in KINDS.values():
-        if said := kind.design.contradiction(design, description):
-            raise DescriptionError(f"{file}, design.{said}")
+    for kind in _planned_kinds():
+        if why := kind.design_contradiction(design, description):
+            raise DescriptionError(f"{file}, design.{why}")
     return design
 
 
@@ -37,8 +38,12 @@ def design_of(**measured: Any) -> Design:
     return _parsed(measured, "the design")
 
 
+def _planned_kinds() -> list[PlannedKind[Any]]:
+    return [kind for kind in KINDS.values() if isinstance(kind, PlannedKind)]
+
+
 def _parsed(page: Mapping[str, Any], file: str) -> Design:
-    model = _page(tuple(kind.design for kind in KINDS.values() if kind.design is not Design))
+    model = _page(tuple(kind.design for kind in _planned_kinds()))
     raw = {"design": dict(page)}
     try:
         return model.model_validate(raw).design  # type: ignore[attr-defined]

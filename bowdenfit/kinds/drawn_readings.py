@@ -29,7 +29,7 @@ def drawn_readings(
         scale: Factor on all noise.
     """
     truth = Truth(cable, tables.table(AngleTable), values, key, scale)
-    return {kind.name: kind.bench.draw(table, truth) for kind, table in measured_kinds(tables)}
+    return {kind.name: kind.draw(table, truth) for kind, table in measured_kinds(tables)}
 
 
 def slipped(readings: Mapping[str, Mapping[str, jax.Array]]) -> bool:
@@ -58,4 +58,4 @@ def drawn_tables(
     """
     for kind, table in measured_kinds(tables):
         drawn = {field: np.asarray(array) for field, array in readings[kind.name].items()}
-        yield kind.bench.table(description, table, drawn)
+        yield kind.with_readings(description, table, drawn)

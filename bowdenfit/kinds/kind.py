@@ -1,7 +1,35 @@
-"""What a kind of measurement declares of itself, as far as NumPy goes; its term in the likelihood is declared beside it."""
+"""What a kind of measurement gives of its tables, in NumPy. Its half in the likelihood is a `TermKind` (`kinds/term.py`).
+
+A kind is one class, `kinds/<kind>/kind.py`, and one line in `KINDS`. It must give five things; Python and mypy both refuse a
+class without them:
+
+============  ====================================================================
+`name`        what a table is called under [tables] in cable.toml, and in fit.json
+`table`       the class of its tables: arrays in N, mm, rad and s
+`readings`    what its readings are called in sentences, tables and figures
+`read`        a table from its files
+`describe`    what was understood of a table, for `bowdenfit check`
+============  ====================================================================
+
+What else `Kind` has is optional, and has a plain default: nothing to add, nothing to refuse. Three groups belong together; a
+kind that has one of them derives from its class too:
+
+==================  ============================================================================================
+`FrictionKind`      its readings show friction: at which lengths, wrap angles, forces and speeds, of which groups
+`RopeKind`          its readings show the rope: at which bends, under which tensions
+`PlannedKind`       `bowdenfit simulate` can make such a table from the [design] of a plan
+==================  ============================================================================================
+
+(`FrictionTableKind`, in `kinds/friction_table.py`, is a `FrictionKind` whose rows carry their own lengths and wrap angles.)
+
+The class of a kind says the short things itself. What is longer than a page stands in modules beside it: `table.py` with the
+class of its tables and its reader, and whatever else has a name of its own. Nothing here or there may import JAX, because
+reading a table must not wait for it.
+"""
 
 import os
-from collections.abc import Callable, Mapping
+from abc import ABC, abstractmethod
+from collections.abc import Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any, Generic, TypeVar
@@ -13,9 +41,9 @@ from bowdenfit.description.file import Stated
 from bowdenfit.errors import DatasetError
 from bowdenfit.files.row_account import RowAccount
 from bowdenfit.inputs import matching
-from bowdenfit.kinds.asked import Asked
 from bowdenfit.kinds.coarse import Coarse
 from bowdenfit.kinds.design import Design
+from bowdenfit.kinds.init_questions import InitQuestions
 from bowdenfit.kinds.measurements import Measurements
 from bowdenfit.kinds.pages import Page
 from bowdenfit.kinds.readings import Readings
@@ -87,14 +115,14 @@ class Source:
 
 
 @dataclass(frozen=True)
-class Found(Generic[AnyTable]):
-    """A table that was read.
+class TableFromFiles(Generic[AnyTable]):
+    """A table and where it came from.
 
     Args:
         table: The table.
         files: The files it was read from, by name.
         remarks: What had to be assumed, in sentences.
-        accounts: Where the rows of each file went.
+        accounts: How many rows of each file were read, and why the others were not.
     """
 
     table: AnyTable
@@ -103,81 +131,165 @@ class Found(Generic[AnyTable]):
     accounts: tuple[RowAccount, ...] = ()
 
 
-@dataclass(frozen=True)
-class Kind(Generic[AnyTable]):
-    """A kind of measurement.
+class Kind(ABC, Generic[AnyTable]):
+    """A kind of measurement; what a subclass must give is abstract here.
 
-    Args:
-        name: What it is called under [tables] in cable.toml, and in fit.json.
-        table: The class of its tables; no two kinds share one.
-        readings: What its readings are called, by the names that its terms give them.
-        read: Reads its files.
+    Attributes:
         settings: What may stand under its name in [tables].
-        contradiction: What a description says that cannot be, in a sentence without its full stop; its settings are None
-            where there is no such table.
-        quantities: Quantities in the settings, which must have the right dimensions.
-        describe: What was understood of a table, for `check`, line by line.
-        alone: What a file is that holds such a table alone, in words with an article.
-        heading: Over these lines, where they are a section of their own.
-        warnings: What a table will not be able to tell, as far as counting shows.
-        check: Refuses a table that does not fit the description or the other tables.
-        copies: Which readings were copied from others, in sentences without a first capital or remedy.
-        coarse: What is known of a table whose repeated readings are all alike to the last digit; None of any other.
-        count: How many readings were fitted, in words; empty where its term counts them.
-        method: How its readings are described, in a sentence of a paper.
-        implausible: Why no bench would hand in simulated readings in place of the measured ones, in a few words; empty if
-            one might.
-        page: Its table as the headings and rows of a file; None where it is written otherwise.
-        design: What it reads of [design] in a plan.
-        empty: A table of such a design with unremarkable readings, as of a file of some name; None where plans are otherwise.
-        bends: Total wrap angles at which the rope itself was measured [rad]; None if it was not.
-        conditions: Where and at which wrap angles friction was measured; None if it was not.
-        forces: Forces that friction acted on [N].
-        tensions: Tensions of the rope where nobody asked what friction did [N].
-        speeds: Speeds of sliding [mm/s or rad/s].
-        typical_speeds: Of its recordings or runs, in the same unit.
-        velocity_unit: Which of the two; empty without velocities.
-        groups: Group of each row; empty without groups.
-        takes_channels: Whether channels can be named on the command line.
-        asked: What is asked of its files where there is no description; None if it is never offered.
+        heading: Heading over the lines of `describe`, where they are a section of their own.
+        methods_sentence: How its readings are modeled, in a sentence of a paper.
+        takes_channels: Whether its files are recordings, whose channels can be named on the command line.
+        init_questions: How `bowdenfit init` recognizes its files, and what it asks about them; None if it never offers it.
     """
 
-    name: str
-    table: type[AnyTable]
-    readings: tuple[Readings, ...]
-    read: Callable[[Source], Found[AnyTable]]
-    describe: Callable[[AnyTable, Description], list[str]]
-    alone: Callable[[AnyTable], str] = lambda _: "a table"
     settings: type[TableSettings] = Table
-    contradiction: Callable[[Any, Description], str] = lambda *_: ""
-    quantities: Callable[[Any, Description], list[Stated]] = lambda *_: []
     heading: str = ""
-    warnings: Callable[[AnyTable, Description, Measurements], list[str]] = lambda *_: []
-    check: Callable[[AnyTable, Description, Measurements], None] = lambda *_: None
-    copies: Callable[[AnyTable], list[str]] = lambda _: []
-    coarse: Callable[[AnyTable], Coarse | None] = lambda _: None
-    count: Callable[[AnyTable], str] = lambda _: ""
-    method: str = ""
-    implausible: Callable[[AnyTable, AnyTable], str] = lambda *_: ""
-    page: Callable[[AnyTable, Description], Page] | None = None
-    design: type[Design] = Design
-    empty: Callable[[Any, Description, str], AnyTable] | None = None
-    bends: Callable[[AnyTable], Vector] | None = None
-    conditions: Callable[[AnyTable], ForceRows] | None = None
-    forces: Callable[[AnyTable], Vector] = lambda _: np.zeros(0)
-    tensions: Callable[[AnyTable], Vector] = lambda _: np.zeros(0)
-    speeds: Callable[[AnyTable], Vector] = lambda _: np.zeros(0)
-    typical_speeds: Callable[[AnyTable], list[float]] = lambda _: []
-    velocity_unit: Callable[[AnyTable], str] = lambda _: ""
-    groups: Callable[[AnyTable], tuple[str, ...]] = lambda _: ()
+    methods_sentence: str = ""
     takes_channels: bool = False
-    asked: Asked | None = None
+    init_questions: InitQuestions | None = None
+
+    @property
+    @abstractmethod
+    def name(self) -> str:
+        """Name under [tables] in cable.toml, and in fit.json."""
+
+    @property
+    @abstractmethod
+    def table(self) -> type[AnyTable]:
+        """Class of its tables; no two kinds share one."""
+
+    @property
+    @abstractmethod
+    def readings(self) -> tuple[Readings, ...]:
+        """Names and units of its readings, one entry for each name that its terms give them."""
+
+    @abstractmethod
+    def read(self, source: Source) -> TableFromFiles[AnyTable]:
+        """Read the files of a table.
+
+        Raises:
+            DatasetError: Says what is wrong, the usual cause and what to do.
+        """
+
+    @abstractmethod
+    def describe(self, table: AnyTable, description: Description) -> list[str]:
+        """Return what was understood of a table, line by line."""
+
+    def describe_single_file(self, table: AnyTable) -> str:
+        """Return what a file is that holds such a table alone, in words with an article."""
+        return "a table"
+
+    def count_readings(self, table: AnyTable) -> str:
+        """Return how many readings were fitted, in words; empty where `TermKind.count_readings` says it."""
+        return ""
+
+    def file_rows(self, table: AnyTable, description: Description) -> Page | None:
+        """Return the headings and rows of a file that holds the table; None if such files are not made of rows."""
+        return None
 
     def file_name(self, settings: Any) -> str:
-        """The file that a table is written to: as stated, or by the name of its kind."""
+        """Return the file that a table is written to: as stated, or by the name of its kind."""
         return getattr(settings, "file", None) or f"{self.name}.csv"
 
+    def contradiction(self, settings: Any, description: Description) -> str:
+        """Return what a description says that cannot be, in a sentence without its full stop; empty if it can.
 
-def itself(table: AnyTable) -> AnyTable:
-    """The conditions of a table whose rows carry them."""
-    return table
+        Args:
+            settings: What stands under [tables]; None where there is no such table.
+            description: The whole description.
+        """
+        return ""
+
+    def quantities(self, settings: Any, description: Description) -> list[Stated]:
+        """Return the quantities in the settings, whose units are then checked."""
+        return []
+
+    def check(self, table: AnyTable, description: Description, measurements: Measurements) -> None:
+        """Refuse a table that does not fit the description or the other tables.
+
+        Raises:
+            DatasetError: Says what does not fit, and what to do.
+        """
+
+    def warnings(self, table: AnyTable, description: Description, measurements: Measurements) -> list[str]:
+        """Return what a table will not be able to tell, as far as counting shows."""
+        return []
+
+    def copied_readings(self, table: AnyTable) -> list[str]:
+        """Return which readings were copied from others, in sentences without a first capital or remedy."""
+        return []
+
+    def coarse_readings(self, table: AnyTable) -> Coarse | None:
+        """Return what is known of a table whose repeated readings are equal to the last digit; None for any other."""
+        return None
+
+    def why_implausible(self, measured: AnyTable, simulated: AnyTable) -> str:
+        """Return why no bench would hand in the simulated table, in a few words; empty if one might."""
+        return ""
+
+
+class FrictionKind(Kind[AnyTable]):
+    """A kind whose readings show friction."""
+
+    @abstractmethod
+    def conditions(self, table: AnyTable) -> ForceRows:
+        """Return the lengths and wrap angles at which friction was measured."""
+
+    def forces(self, table: AnyTable) -> Vector:
+        """Return the forces that friction acted on [N]."""
+        return np.zeros(0)
+
+    def speeds(self, table: AnyTable) -> Vector:
+        """Return the speeds of sliding [`velocity_unit`]."""
+        return np.zeros(0)
+
+    def typical_speeds(self, table: AnyTable) -> list[float]:
+        """Return the few speeds that stand for all [`velocity_unit`]."""
+        return []
+
+    def velocity_unit(self, table: AnyTable) -> str:
+        """Return "mm/s" for speeds of the rope and "rad/s" for those of the motor; empty without velocities."""
+        return ""
+
+    def groups(self, table: AnyTable) -> tuple[str, ...]:
+        """Return the group of each row, such as "new rope"; empty without groups."""
+        return ()
+
+
+class RopeKind(Kind[AnyTable]):
+    """A kind whose readings show the rope itself: how it stretches, or how it is preloaded."""
+
+    @abstractmethod
+    def bends(self, table: AnyTable) -> Vector:
+        """Return the total wrap angles of the cable [rad]."""
+
+    def tensions(self, table: AnyTable) -> Vector:
+        """Return tensions of the rope that are not `FrictionKind.forces` [N]."""
+        return np.zeros(0)
+
+
+class PlannedKind(Kind[AnyTable]):
+    """A kind that a plan can ask for: `bowdenfit simulate` makes its tables from [design]."""
+
+    @property
+    @abstractmethod
+    def design(self) -> type[Design]:
+        """What it reads of [design]."""
+
+    @abstractmethod
+    def empty_table(self, design: Any, description: Description, file: str) -> AnyTable:
+        """Return a table of a design's shape with unremarkable readings.
+
+        Args:
+            design: The whole design, which has what `design` declares.
+            description: The cable.
+            file: Name of the file that it will be written to.
+        """
+
+    @abstractmethod
+    def file_rows(self, table: AnyTable, description: Description) -> Page:
+        """Return the headings and rows of the file that is written."""
+
+    def design_contradiction(self, design: Any, description: Description) -> str:
+        """Return what of a design this cable cannot have, in a sentence; empty if it can have all."""
+        return ""

@@ -3,6 +3,7 @@
 from bowdenfit.description import BY_GROUP, Description
 from bowdenfit.errors import DescriptionError, nearest
 from bowdenfit.kinds import each_table
+from bowdenfit.kinds.kind import FrictionKind
 from bowdenfit.kinds.measurements import Measurements
 from bowdenfit.words import listed
 
@@ -14,7 +15,7 @@ def measured_groups(description: Description, measurements: Measurements) -> tup
         DescriptionError: Groups are to have coefficients of their own, and a table says nothing of groups, or there is one
             group only; or the one that predictions are for is not there.
     """
-    tables = [(kind, kind.groups(table)) for kind, table in each_table(measurements) if kind.conditions is not None]
+    tables = [(kind, kind.groups(table)) for kind, table in each_table(measurements) if isinstance(kind, FrictionKind)]
     names = list(dict.fromkeys(name for _, groups in tables for name in groups))
     without = [kind.name for kind, groups in tables if not groups]
     if description.by_group and without:

@@ -8,6 +8,7 @@ import jax
 import jax.numpy as jnp
 import numpy as np
 from jax import Array
+from typing_extensions import override
 
 from bowdenfit.cable.cable import Cable
 from bowdenfit.cable.load_cells import BLOCK_NOISE, FORCE_NOISE, RUN_SCATTER, LoadCells
@@ -27,7 +28,7 @@ from bowdenfit.kinds.recordings.angles import recorded_angles
 from bowdenfit.kinds.recordings.blocks import positive, worth_of
 from bowdenfit.kinds.resolve_angles import resolve_angles
 from bowdenfit.kinds.row_angles import row_angles
-from bowdenfit.kinds.rows import OwnAngles
+from bowdenfit.kinds.rows import RowConditions
 from bowdenfit.recordings.recording import Recordings
 from bowdenfit.types import Vector
 from bowdenfit.words import significant
@@ -161,82 +162,77 @@ def _straight_line(cable: Cable, design: RunDesign) -> np.ndarray:
     return np.asarray(np.linalg.pinv(lines * weight[:, None]) * weight).T
 
 
-def _offered(at: Situation) -> list[Candidate]:
-    """Runs at the lengths, or at the wrap angles of the runs made so far."""
-    forces, recordings = at.measurements.table(ForceTable), at.measurements.table(Recordings)
-    if typical_run(at.measurements) is None:
-        return []
-    own = forces.own if forces is not None else recorded_angles(recordings).own if recordings is not None else None
-    return at.along_cable("force", own)
+class ForceRunCandidates(CandidateKind):
+    """A run of forces: as many readings in one mounting as those made so far have."""
 
+    name = "force"
+    noun = "force run"
+    order = 1
+    needs = (RUN_SCATTER,)
+    unknown = f"{UNKNOWN_SCATTER}; name an efficiency instead, or fit with a table of forces."
+    along_route = True
+    mounted_anew = True
 
-def _designs(at: Situation) -> list[tuple[float, int]]:
-    """The lowest, a middle and the highest load of the runs made so far, and each of their strokes and both."""
-    run = typical_run(at.measurements)
-    if run is None:
-        return []
-    loads = some_loads(run.input_force, _LOADS)
-    strokes = [0, *sorted({int(stroke) for stroke in run.stroke}, reverse=True)]
-    return [(load, stroke) for load in loads for stroke in (strokes if len(strokes) > 2 else (0,))]
+    @override
+    def is_possible(self, at: Situation) -> bool:
+        return typical_run(at.measurements) is not None
 
+    @override
+    def measured(self, cable: Cable) -> str:
+        return f"a force run{f' of the group {cable.friction.groups[0]}' if cable.friction.groups else ''}"
 
-def _usual(at: Situation) -> str:
-    """'24 readings at 20 to 60 N, pulling and returning'"""
-    run = typical_run(at.measurements)
-    assert run is not None
-    low, high = run.input_force.min(), run.input_force.max()
-    near = significant(float(np.mean(run.input_force)))
-    loads = f"{significant(low)} to {significant(high)} N" if high > _SPREAD * low else f"{near} N"
-    ways = " and ".join(STROKE_WORDS[way] for way in (1, -1) if np.any(run.stroke == way))
-    count = round(float(np.sum(run.worth)))
-    return f"{count:,} {'reading' if count == 1 else 'readings'} at {loads}, {ways}"
+    @override
+    def candidates(self, at: Situation) -> list[Candidate]:
+        """Return runs at the lengths, or at the wrap angles of the runs made so far."""
+        forces, recordings = at.measurements.table(ForceTable), at.measurements.table(Recordings)
+        if typical_run(at.measurements) is None:
+            return []
+        own = forces.own if forces is not None else recorded_angles(recordings).own if recordings is not None else None
+        return at.along_cable(self.name, own)
 
+    @override
+    def designs(self, at: Situation) -> list[tuple[float, int]]:
+        """Return the lowest, a middle and the highest load of the runs made so far, and each of their strokes and both."""
+        run = typical_run(at.measurements)
+        if run is None:
+            return []
+        loads = some_loads(run.input_force, _LOADS)
+        strokes = [0, *sorted({int(stroke) for stroke in run.stroke}, reverse=True)]
+        return [(load, stroke) for load in loads for stroke in (strokes if len(strokes) > 2 else (0,))]
 
-def _simulation(at: Situation, wanted: Sequence[Candidate]) -> Simulation:
-    typical = typical_run(at.measurements)
-    assert typical is not None
-    groups: dict[tuple[str, int], list[int]] = {}
-    for i, candidate in enumerate(wanted):
-        groups.setdefault((f"{candidate.load:g}", candidate.stroke), []).append(i)
-    parts: list[tuple[Callable[..., Array], Any]] = []
-    columns: list[tuple[int, ...]] = [()] * len(wanted)
-    start = 0
-    for members in groups.values():
-        mine = [wanted[i] for i in members]
-        route, own, _ = at.rows(mine)
-        simulate, width = run_readings(at.cable, chosen_run(typical, mine[0].load, mine[0].stroke))
-        parts.append((simulate, row_angles(at.cable.description, _Rows(route, own), at.angles).data))
-        for i in members:
-            columns[i] = tuple(range(start, start + width))
-            start += width
+    @override
+    def describe_usual(self, at: Situation) -> str:
+        """Return '24 readings at 20 to 60 N, pulling and returning'."""
+        run = typical_run(at.measurements)
+        assert run is not None
+        low, high = run.input_force.min(), run.input_force.max()
+        near = significant(float(np.mean(run.input_force)))
+        loads = f"{significant(low)} to {significant(high)} N" if high > _SPREAD * low else f"{near} N"
+        ways = " and ".join(STROKE_WORDS[way] for way in (1, -1) if np.any(run.stroke == way))
+        count = round(float(np.sum(run.worth)))
+        return f"{count:,} {'reading' if count == 1 else 'readings'} at {loads}, {ways}"
 
-    def readings(values: Mapping[str, Array], data: Sequence[Any], key: Array) -> Array:
-        keys = jax.random.split(key, len(parts)) if len(parts) > 1 else [key]
-        return jnp.concatenate([part[0](values, own, k) for part, own, k in zip(parts, data, keys, strict=True)])
+    @override
+    def simulation(self, at: Situation, candidates: Sequence[Candidate]) -> Simulation:
+        typical = typical_run(at.measurements)
+        assert typical is not None
+        groups: dict[tuple[str, int], list[int]] = {}
+        for i, candidate in enumerate(candidates):
+            groups.setdefault((f"{candidate.load:g}", candidate.stroke), []).append(i)
+        parts: list[tuple[Callable[..., Array], Any]] = []
+        columns: list[tuple[int, ...]] = [()] * len(candidates)
+        start = 0
+        for members in groups.values():
+            alike = [candidates[i] for i in members]
+            route, own, _ = at.rows(alike)
+            simulate, width = run_readings(at.cable, chosen_run(typical, alike[0].load, alike[0].stroke))
+            parts.append((simulate, row_angles(at.cable.description, RowConditions(route, own), at.angles).data))
+            for i in members:
+                columns[i] = tuple(range(start, start + width))
+                start += width
 
-    return Simulation(readings, [data for _, data in parts], columns)
+        def readings(values: Mapping[str, Array], data: Sequence[Any], key: Array) -> Array:
+            keys = jax.random.split(key, len(parts)) if len(parts) > 1 else [key]
+            return jnp.concatenate([part[0](values, own, k) for part, own, k in zip(parts, data, keys, strict=True)])
 
-
-@dataclass(frozen=True)
-class _Rows:
-    """Where runs are made."""
-
-    route: np.ndarray
-    own: OwnAngles
-
-
-FORCE_RUN = CandidateKind(
-    name="force",
-    noun="force run",
-    words=lambda cable: f"a force run{f' of the group {cable.friction.groups[0]}' if cable.friction.groups else ''}",
-    order=1,
-    needs=(RUN_SCATTER,),
-    possible=lambda at: typical_run(at.measurements) is not None,
-    unknown=f"{UNKNOWN_SCATTER}; name an efficiency instead, or fit with a table of forces.",
-    offered=_offered,
-    simulation=_simulation,
-    along_route=True,
-    designs=_designs,
-    usual=_usual,
-    mounted_anew=True,
-)
+        return Simulation(readings, [data for _, data in parts], columns)

@@ -63,9 +63,9 @@ def _of_kind(measurements: Measurements, term: Term) -> tuple[Mapping[str, np.nd
     table = measurements.table(kind.table) if kind is not None else None
     if table is None:
         return {}, np.zeros(len(term.labels), dtype=bool)
-    declared = term_kind(term.name)
-    nowhere = np.zeros(len(term.labels), dtype=bool)
-    return declared.where(table, term), nowhere if declared.back is None else declared.back(table)
+    terms = term_kind(term.name)
+    back = terms.on_way_back(table)
+    return terms.places(table, term), np.zeros(len(term.labels), dtype=bool) if back is None else back
 
 
 def _bends(term: Term) -> np.ndarray | None:

@@ -15,7 +15,7 @@ from bowdenfit.files.cells import Cell
 from bowdenfit.files.columns import Column, Quantity, require
 from bowdenfit.files.csv_table import RawTable
 from bowdenfit.files.spellings import without_accents
-from bowdenfit.kinds.asked import Wanted
+from bowdenfit.kinds.init_questions import WantedColumn
 from bowdenfit.types import Labels, Matrix, Vector
 from bowdenfit.words import shown
 
@@ -97,6 +97,14 @@ class ForceRows(Protocol):
         ...
 
 
+@dataclass(frozen=True)
+class RowConditions:
+    """Where and at which wrap angles something was measured, row by row; see `ForceRows`."""
+
+    route: Vector
+    own: OwnAngles
+
+
 @runtime_checkable
 class Rows(ForceRows, Protocol):
     """The same of a table, whose rows can be named."""
@@ -148,8 +156,10 @@ def _stroke(cell: Cell, held: str) -> int:
     return _STROKES[text]
 
 
-RUN = Wanted(Quantity("run", "text"), "which mounting of the cable a row belongs to", optional=True)
-STROKE = Wanted(Quantity("stroke", "text"), "whether a row was read while pulling or returning", optional=True, numbers=(-1, 1))
+RUN = WantedColumn(Quantity("run", "text"), "which mounting of the cable a row belongs to", optional=True)
+STROKE = WantedColumn(
+    Quantity("stroke", "text"), "whether a row was read while pulling or returning", optional=True, numbers=(-1, 1)
+)
 
 
 def shared_columns(route: Route | None, contacts: Sequence[str]) -> tuple[Quantity, ...]:

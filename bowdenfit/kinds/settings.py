@@ -1,4 +1,4 @@
-"""Descriptions of cables with a field under [tables] for every kind of measurement."""
+"""Descriptions of cables: a field under [tables] for every kind of measurement, and columns that the command line names."""
 
 from collections.abc import Mapping, Sequence
 from functools import lru_cache
@@ -7,14 +7,14 @@ from typing import Any
 
 from pydantic import create_model
 
-from bowdenfit.description import Description, Tables
+from bowdenfit.description import Description, Table, Tables
 from bowdenfit.description.file import check_quantities, read_toml, validate
 from bowdenfit.description.placeholders import Place, placeholders_in
 from bowdenfit.errors import DescriptionError, Faults
 from bowdenfit.kinds import KINDS
 from bowdenfit.kinds.kind import Kind
-from bowdenfit.kinds.named_columns import with_columns
 from bowdenfit.units import ColumnSource
+from bowdenfit.words import listed
 
 _ASKED_BY_TABLES = {"schema", "friction_model", "group", "cable", "route", "contact", "tables", "recording", "design"}
 """Keys without which tables cannot be read."""
@@ -78,12 +78,44 @@ def parse_description(raw: Mapping[str, Any], file: str = "cable.toml") -> Descr
     for kind in kinds:
         settings = description.tables.stated.get(kind.name)
         with faults.noted(place=("tables",)):
-            if said := kind.contradiction(settings, description):
-                raise DescriptionError(f"{file}: {said}.")
+            if why := kind.contradiction(settings, description):
+                raise DescriptionError(f"{file}: {why}.")
             if settings is not None:
                 check_quantities(kind.quantities(settings, description), file)
     faults.refuse()
     return description
+
+
+def with_columns(raw: dict[str, Any], columns: Mapping[str, ColumnSource]) -> dict[str, Any]:
+    """Plain data of a description whose table has the named columns.
+
+    Args:
+        raw: The data; changed in place.
+        columns: By quantity, such as input_force; of several tables with the table before it, as forces.input_force.
+
+    Raises:
+        DescriptionError: There is no such table, or it is not clear which is meant.
+    """
+    stated = raw.get("tables")
+    tables = [name for name in stated if _has_columns(name, stated[name])] if isinstance(stated, dict) else []
+    for named, source in columns.items():
+        table, _, quantity = named.rpartition(".")
+        if not table and len(tables) > 1:
+            raise DescriptionError(
+                f"--column {named}=... does not say of which table, and the data set has several; write the table before it, "
+                f"such as --column {tables[0]}.{named}=..., of {listed(tables)}."
+            )
+        if (table and table not in tables) or not tables:
+            what = f"no table {table!r}" if table else "no table"
+            hint = f"it has {listed(tables)}" if tables else "channels of recordings are named by --channel"
+            raise DescriptionError(f"--column {named}=...: the data set has {what} with columns; {hint}.")
+        settings = raw["tables"][table or tables[0]]
+        settings["columns"] = {**settings.get("columns", {}), quantity: source.model_dump(exclude_none=True)}
+    return raw
+
+
+def _has_columns(name: str, settings: Any) -> bool:
+    return name in KINDS and issubclass(KINDS[name].settings, Table) and isinstance(settings, dict)
 
 
 @lru_cache

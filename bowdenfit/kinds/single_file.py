@@ -18,7 +18,7 @@ from bowdenfit.files.sheets import stated_rate
 from bowdenfit.files.spellings import spelled
 from bowdenfit.files.tables import WORKBOOKS, read_table
 from bowdenfit.files.text_file import first_bytes, first_lines
-from bowdenfit.kinds.forces.loads import levels
+from bowdenfit.kinds.forces.table import count_loads
 from bowdenfit.units import conversion_factor, dimension_of, is_unit
 from bowdenfit.words import shown
 
@@ -203,6 +203,6 @@ def _is_smooth(table: RawTable) -> bool:
         values = np.array(numbers_in(table, i))
         values = values[np.isfinite(values)]
         spread = float(np.var(values)) if len(values) > _LONG else 0.0
-        spreads = len(set(values.tolist())) > len(values) / 4 and (values.min() <= 0 or levels(values) is None)
+        spreads = len(set(values.tolist())) > len(values) / 4 and (values.min() <= 0 or count_loads(values) is None)
         return spread > 0 and spreads and float(np.mean(np.diff(values) ** 2)) < 2 * _SMOOTH * spread
     return False

@@ -1,8 +1,21 @@
-"""A kind's half in the likelihood: what a term is, and what a kind declares of its terms."""
+"""A kind's half in the likelihood, in JAX: what a `Term` is, and what a kind gives of its terms.
 
-from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass, field
-from typing import Any, Protocol, runtime_checkable
+Beside its `Kind` (`kinds/kind.py`, NumPy) every kind has a `TermKind`, `kinds/<kind>/term.py`, and one line in `TERMS`
+(`kinds/terms.py`). It must give four things:
+
+- `name`: that of the kind;
+- `terms`: the terms of a table against a cable; mostly one;
+- `parameters`: the parameters that they need;
+- `draw`: the same table measured again on the computer.
+
+What else `TermKind` has is optional. A kind whose next reading can be ranked by `bowdenfit next` gives a `CandidateKind` too
+(`kinds/candidate.py`).
+"""
+
+from abc import ABC, abstractmethod
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field, replace
+from typing import Any, Generic, Protocol, TypeVar, runtime_checkable
 
 import numpy as np
 from jax import Array
@@ -11,10 +24,12 @@ from bowdenfit.cable.cable import Cable
 from bowdenfit.cable.noise import NoiseLaw, noise_law
 from bowdenfit.description import Description, PriorDefaults
 from bowdenfit.kinds.angles.table import AngleTable
-from bowdenfit.kinds.bench import Remeasurement
+from bowdenfit.kinds.bench import Truth
 from bowdenfit.kinds.candidate import CandidateKind
 from bowdenfit.kinds.measurements import Measurements
 from bowdenfit.parameters.space import Parameter, ParameterSpace
+
+AnyTable = TypeVar("AnyTable")
 
 
 @runtime_checkable
@@ -111,62 +126,87 @@ class Circumstances:
 LOAD, WRAP_ANGLE, GROUP = "Load (N)", "Wrap angle (deg)", "Group"  # labels of places
 
 
-def what_was_read(term: Term, description: Description) -> np.ndarray:
-    """The readings, and of how many samples each was made."""
-    del description
-    return np.column_stack([term.observed(), term.data["n"]] if "n" in term.data else [term.observed()])
+class TermKind(ABC, Generic[AnyTable]):
+    """What a kind of measurement adds to the likelihood; what a subclass must give is abstract here.
 
-
-def why_not_alike(name: str, descriptions: Mapping[str, Description]) -> str:
-    """That other readings are missing somewhere."""
-    del name, descriptions
-    return "the others are not in all fits"
-
-
-@dataclass(frozen=True)
-class Events:
-    """Which events readings are: models can be compared only by how well they predict the same ones.
-
-    Args:
-        said: Of each reading of a term, numbers that are the same wherever it is the same event; NaN where it is a limit
-            alone.
-        why_not_alike: Why readings of a name are not the same events under several descriptions, by the names of the fits.
-        choice: What sets a description apart from others of the same files; empty where it is as usual.
-        chosen: Whether descriptions choose which rows are readings.
-    """
-
-    said: Callable[[Term, Description], np.ndarray] = what_was_read
-    why_not_alike: Callable[[str, Mapping[str, Description]], str] = why_not_alike
-    choice: Callable[[Description], str] = lambda _: ""
-    chosen: bool = False
-
-
-@dataclass(frozen=True)
-class TermKind:
-    """What a kind of measurement adds to the likelihood.
-
-    Args:
-        name: What it is called in KINDS.
-        terms: Terms of a table against a cable; wrap angles that were measured hold outside the range of the curves.
-        parameters: The parameters that they need, those that other kinds share included.
-        bench: How such a table is measured again on the computer.
+    Attributes:
         candidate: The measurement that could be made next for such a table; None where another kind offers it.
         tells_mountings: Whether its readings tell how mountings scatter.
-        check: Whether parameters that the user fixed leave the table a model.
-        count: How many readings of a term entered, in words; empty where they are those that were read.
-        where: Loads and wrap angles of a term's readings, by axis label.
-        back: Which rows were read on the way back, or while unloading; None where none was.
-        events: Which events they are.
+        chooses_rows: Whether descriptions choose which rows are readings.
     """
 
-    name: str
-    terms: Callable[[Cable, Any, AngleTable | None], Sequence[Term]]
-    parameters: Callable[[Any, Circumstances], list[Parameter]]
-    bench: Remeasurement
     candidate: CandidateKind | None = None
     tells_mountings: bool = False
-    check: Callable[[Any, ParameterSpace], None] = lambda *_: None
-    count: Callable[[Term, Description], str] = lambda *_: ""
-    where: Callable[[Any, Term], Mapping[str, np.ndarray]] = lambda *_: {}
-    back: Callable[[Any], np.ndarray] | None = None
-    events: Events = field(default_factory=Events)
+    chooses_rows: bool = False
+
+    @property
+    @abstractmethod
+    def name(self) -> str:
+        """Name of the kind in KINDS."""
+
+    @abstractmethod
+    def terms(self, cable: Cable, table: AnyTable, angles: AngleTable | None) -> Sequence[Term]:
+        """Return the terms of a table.
+
+        Args:
+            cable: The cable.
+            table: The table.
+            angles: Measured wrap angles, which hold outside the range of the curves.
+        """
+
+    @abstractmethod
+    def parameters(self, table: AnyTable, at: Circumstances) -> list[Parameter]:
+        """Return the parameters that the terms need, those that other kinds share included."""
+
+    @abstractmethod
+    def draw(self, table: AnyTable, truth: Truth) -> dict[str, Array]:
+        """Draw new readings by name, as the likelihood takes readings to scatter; JAX compiles this function.
+
+        An array called "slipped" says which readings a bench could not have taken as it says it did.
+        """
+
+    def with_readings(self, description: Description, table: AnyTable, drawn: Mapping[str, np.ndarray]) -> AnyTable:
+        """Return the table with the readings that `draw` gave; here they have the names of the table's fields."""
+        changed: AnyTable = replace(table, **drawn)  # type: ignore[type-var]
+        return changed
+
+    def check_drawable(self, description: Description, table: AnyTable) -> None:
+        """Refuse a table that cannot be measured again.
+
+        Raises:
+            DatasetError: Says why.
+        """
+
+    def check(self, table: AnyTable, space: ParameterSpace) -> None:
+        """Refuse parameters that the user fixed so that the table has no model.
+
+        Raises:
+            DescriptionError: Says which, and what to do.
+        """
+
+    def count_readings(self, term: Term, description: Description) -> str:
+        """Return how many readings of a term entered, in words; empty where `Kind.count_readings` says it."""
+        return ""
+
+    def places(self, table: AnyTable, term: Term) -> Mapping[str, np.ndarray]:
+        """Return loads, wrap angles and the like of a term's readings, by axis label."""
+        return {}
+
+    def on_way_back(self, table: AnyTable) -> np.ndarray | None:
+        """Return which readings were taken on the way back, or while unloading; None where none was."""
+        return None
+
+    def events(self, term: Term, description: Description) -> np.ndarray:
+        """Return numbers for each reading that are equal wherever it is the same event; NaN where it is a limit alone.
+
+        Models can be compared only by how well they predict the same events.
+        """
+        return np.column_stack([term.observed(), term.data["n"]] if "n" in term.data else [term.observed()])
+
+    def why_events_differ(self, readings: str, descriptions: Mapping[str, Description]) -> str:
+        """Return why readings of a name are not the same events under several descriptions, by the names of the fits."""
+        return "the others are not in all fits"
+
+    def describe_choice(self, description: Description) -> str:
+        """Return what sets a description apart from others of the same files; empty where it is as usual."""
+        return ""

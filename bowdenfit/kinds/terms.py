@@ -23,24 +23,34 @@ from bowdenfit.cable.load_cells import (
     RUN_SCATTER,
 )
 from bowdenfit.kinds import each_table, kind_of
-from bowdenfit.kinds.angles.term import ANGLES
+from bowdenfit.kinds.angles.term import AngleTerms
 from bowdenfit.kinds.candidate import CandidateKind
-from bowdenfit.kinds.displacement.term import DISPLACEMENT
-from bowdenfit.kinds.efficiencies.term import EFFICIENCIES
-from bowdenfit.kinds.forces.term import FORCES
-from bowdenfit.kinds.loop.term import LOOP, LOOP_MOUNTING
+from bowdenfit.kinds.displacement.term import DisplacementTerms
+from bowdenfit.kinds.efficiencies.term import EfficiencyTerms
+from bowdenfit.kinds.forces.term import ForceTerms
+from bowdenfit.kinds.loop.term import LOOP_MOUNTING, LoopTerms
 from bowdenfit.kinds.measurements import Measurements
-from bowdenfit.kinds.preload.term import PRELOAD, PRELOAD_NOISE
-from bowdenfit.kinds.recordings.term import RECORDINGS
-from bowdenfit.kinds.ringdown.term import RINGDOWN
+from bowdenfit.kinds.preload.term import PRELOAD_NOISE, PreloadTerms
+from bowdenfit.kinds.recordings.term import RecordingTerms
+from bowdenfit.kinds.ringdown.term import RingDownTerms
 from bowdenfit.kinds.shared_parameters import gain_error
-from bowdenfit.kinds.stretch.term import STRETCH, STRETCH_NOISE
+from bowdenfit.kinds.stretch.term import STRETCH_NOISE, StretchTerms
 from bowdenfit.kinds.term import Circumstances, TermKind
 from bowdenfit.parameters.space import Parameter
 
-TERMS: dict[str, TermKind] = {
-    kind.name: kind for kind in (ANGLES, EFFICIENCIES, FORCES, RECORDINGS, STRETCH, PRELOAD, LOOP, DISPLACEMENT, RINGDOWN)
-}
+_ALL: tuple[TermKind[Any], ...] = (
+    AngleTerms(),
+    EfficiencyTerms(),
+    ForceTerms(),
+    RecordingTerms(),
+    StretchTerms(),
+    PreloadTerms(),
+    LoopTerms(),
+    DisplacementTerms(),
+    RingDownTerms(),
+)
+
+TERMS: dict[str, TermKind[Any]] = {kind.name: kind for kind in _ALL}
 """What each kind adds to the likelihood."""
 
 _ORDER = (
@@ -50,7 +60,7 @@ _ORDER = (
 )  # in z, which what a seed draws depends on; those of other kinds come after these
 
 
-def measured_kinds(measurements: Measurements) -> Iterator[tuple[TermKind, Any]]:
+def measured_kinds(measurements: Measurements) -> Iterator[tuple[TermKind[Any], Any]]:
     """Every table with what its kind adds to the likelihood, in the order of the kinds."""
     for kind, table in each_table(measurements):
         yield TERMS[kind.name], table
@@ -60,18 +70,18 @@ def parameters_asked_for(cable: Cable, measurements: Measurements) -> list[Param
     """The parameters that the kinds of a data set ask for, each declared once."""
     kinds = list(measured_kinds(measurements))
     circumstances = Circumstances(cable, measurements, any(kind.tells_mountings for kind, _ in kinds))
-    asked = {p.name: p for kind, table in kinds for p in kind.parameters(table, circumstances)}
-    asked |= {p.name: p for p in gain_error(cable.description)}
-    return sorted(asked.values(), key=lambda p: _ORDER.index(p.name) if p.name in _ORDER else len(_ORDER))
+    needed = {p.name: p for kind, table in kinds for p in kind.parameters(table, circumstances)}
+    needed |= {p.name: p for p in gain_error(cable.description)}
+    return sorted(needed.values(), key=lambda p: _ORDER.index(p.name) if p.name in _ORDER else len(_ORDER))
 
 
 def candidate_kinds() -> dict[str, CandidateKind]:
     """What can be measured next, by its name."""
-    offered = (kind.candidate for kind in TERMS.values() if kind.candidate is not None)
-    return {candidate.name: candidate for candidate in sorted(offered, key=lambda candidate: candidate.order)}
+    kinds = (kind.candidate for kind in TERMS.values() if kind.candidate is not None)
+    return {candidate.name: candidate for candidate in sorted(kinds, key=lambda candidate: candidate.order)}
 
 
-def term_kind(readings: str) -> TermKind:
+def term_kind(readings: str) -> TermKind[Any]:
     """The kind whose readings have a name in results.
 
     Raises:

@@ -10,8 +10,8 @@ from click.testing import CliRunner
 from conftest import ROOT
 from scratch import curve, law, option, shares
 from scratch import format as bars
-from scratch.losses import LOSSES
-from scratch.losses import term as losses_term
+from scratch.losses.kind import LossKind
+from scratch.losses.term import LossTerms
 
 import bowdenfit as bf
 from bowdenfit.cable.friction import FRICTION_OPTIONS
@@ -74,8 +74,8 @@ def forces(data_set, exponent, says="", hidden=0.0):
 
 
 def test_a_new_kind_of_table_is_a_folder_and_two_lines(data_set, monkeypatch, tmp_path):
-    monkeypatch.setitem(KINDS, "losses", LOSSES)
-    monkeypatch.setitem(TERMS, "losses", losses_term.LOSSES)
+    monkeypatch.setitem(KINDS, "losses", LossKind())
+    monkeypatch.setitem(TERMS, "losses", LossTerms())
     force = np.linspace(10.0, 80.0, 15)
     loss = force * -np.expm1(-MU * ANGLE) + 0.2 * np.random.default_rng(2).standard_normal(15)
     folder = data_set("losses", "input_force_N,loss_N", (force, loss))

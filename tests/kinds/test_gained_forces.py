@@ -8,7 +8,7 @@ from hand_bench import Readings, pull, write
 
 from bowdenfit.description import Sensors
 from bowdenfit.errors import DatasetError
-from bowdenfit.kinds.forces.gained import check_gains
+from bowdenfit.kinds.forces.impossible import check_gains
 from bowdenfit.kinds.forces.reading_noise import FALSE_ALARM
 from bowdenfit.kinds.forces.table import ForceTable
 from bowdenfit.kinds.rows import OwnAngles, RowOrigin

@@ -7,7 +7,7 @@ from figure_words import faults
 import bowdenfit as bf
 from bowdenfit.dataset import load_dataset
 from bowdenfit.errors import DatasetError
-from bowdenfit.kinds.ringdown import RINGDOWN
+from bowdenfit.kinds import KINDS
 from bowdenfit.kinds.ringdown.table import RingDownTable
 from bowdenfit.physics.ring_down import ring_down
 from bowdenfit.questions.bends import ring_down_figure
@@ -125,6 +125,6 @@ def test_a_released_joint_is_drawn_as_it_was_read_and_fitted(tmp_path):
 
 
 def test_files_of_a_released_joint_are_offered_where_no_description_says_what_they_hold():
-    asked = RINGDOWN.asked
-    assert [each.quantity.name for each in asked.required] == ["time", "angle"]
-    assert not asked.is_guessed, "time and angle are in many a file"
+    questions = KINDS["ringdown"].init_questions
+    assert [each.quantity.name for each in questions.required] == ["time", "angle"]
+    assert not questions.is_guessed, "time and angle are in many a file"

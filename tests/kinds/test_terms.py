@@ -6,6 +6,9 @@ import pytest
 
 from bowdenfit.dataset import load_dataset
 from bowdenfit.kinds import KINDS, each_table, readings_called
+from bowdenfit.kinds.candidate import CandidateKind
+from bowdenfit.kinds.kind import FrictionKind, Kind, PlannedKind, RopeKind
+from bowdenfit.kinds.term import TermKind
 from bowdenfit.kinds.terms import TERMS
 from bowdenfit.model import build_model
 
@@ -14,6 +17,23 @@ READINGS = [(name, readings) for name, kind in KINDS.items() for readings in kin
 
 def test_every_kind_of_table_has_a_term_of_the_same_name():
     assert list(TERMS) == list(KINDS)
+
+
+@pytest.mark.parametrize(
+    ("base", "needed"),
+    [
+        (Kind, "describe, name, read, readings, table"),
+        (FrictionKind, "conditions"),
+        (RopeKind, "bends"),
+        (PlannedKind, "design, empty_table, file_rows"),
+        (TermKind, "draw, name, parameters, terms"),
+        (CandidateKind, "candidates, name, needs, order, simulation, unknown"),
+    ],
+)
+def test_a_kind_that_lacks_what_it_must_give_is_refused_by_python_itself(base, needed):
+    bare = type("Bare", (base,), {name: None for name in Kind.__abstractmethods__ - {*needed.split(", ")}})
+    with pytest.raises(TypeError, match=f"abstract methods? {needed}"):
+        bare()
 
 
 def test_no_two_kinds_call_their_readings_alike():

@@ -193,11 +193,11 @@ def test_a_table_of_several_detection_limits_is_refused_unless_one_is_stated(on_
 def test_recordings_with_clipped_readings_are_refused():
     dataset = data_set("synthetic-recordings")
     description, recordings = dataset.description, dataset.measurements.table(Recordings)
-    refuse_saturated(description, recordings)
+    refuse_saturated(recordings)
     first = recordings.each[0]
     clipped = replace(first, blocks=replace(first.blocks, saturated=first.blocks.input_force > 100))
     with pytest.raises(DatasetError, match="end of a load cell's range"):
-        refuse_saturated(description, replace(recordings, each=(clipped, *recordings.each[1:])))
+        refuse_saturated(replace(recordings, each=(clipped, *recordings.each[1:])))
 
 
 # What no bench would hand in ---------------------------------------------------------------------------------------

@@ -30,7 +30,6 @@ from bowdenfit.inference.prior_sensitivity import (
 from bowdenfit.kinds import KINDS
 from bowdenfit.kinds.angles.table import AngleTable
 from bowdenfit.kinds.stretch.table import StretchTable
-from bowdenfit.kinds.stretch.words import warnings_of as stretch_warnings
 from bowdenfit.model import build_model
 from bowdenfit.parameters.priors import HalfCauchy, HalfNormal, LogNormal, Normal, TruncatedNormal, Uniform
 from bowdenfit.parameters.space import Parameter
@@ -469,7 +468,7 @@ def test_stretch_in_the_wrong_unit_is_seen_before_the_fit(on_body):
     table = right.measurements.table(StretchTable)
     wrong = changed(right, "stretch", "stretch", slice(None), 999 * table.stretch)
     of_wrong, of_right = (
-        stretch_warnings(d.measurements.table(StretchTable), d.description, d.measurements) for d in (wrong, right)
+        KINDS["stretch"].warnings(d.measurements.table(StretchTable), d.description, d.measurements) for d in (wrong, right)
     )
     (said,) = set(of_wrong) - set(of_right)
     assert "gives 4030 mm under 99 N more" in said

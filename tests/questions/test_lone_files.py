@@ -6,8 +6,7 @@ import numpy as np
 import pytest
 
 import bowdenfit as bf
-from bowdenfit.kinds.forces.loads import levels
-from bowdenfit.kinds.forces.table import ForceTable
+from bowdenfit.kinds.forces.table import ForceTable, count_loads
 from bowdenfit.kinds.single_file import file_kind
 from bowdenfit.recordings.recording import Recordings
 
@@ -180,7 +179,7 @@ def test_forces_that_no_heading_tells_apart_are_proposed_by_their_size(tmp_path,
     ],
 )
 def test_loads_are_counted_where_readings_fall_together(forces, count):
-    assert levels(np.array(forces)) == count
+    assert count_loads(np.array(forces)) == count
 
 
 def test_what_the_user_has_named_is_kept_and_the_other_end_found(tmp_path, run):

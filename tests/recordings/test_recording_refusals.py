@@ -15,7 +15,7 @@ from spoiling import replaced
 from bowdenfit.dataset import load_dataset
 from bowdenfit.errors import DatasetError
 from bowdenfit.files import columns_csv
-from bowdenfit.kinds.recordings.angles import check_angles
+from bowdenfit.kinds import KINDS
 from bowdenfit.questions.simulate.bench import BenchFriction, BenchSettings, Faults, MotorProfile, simulate_recording
 from bowdenfit.recordings.recording import PULL, RETURN, Recordings
 
@@ -439,10 +439,10 @@ def test_a_recording_outside_the_curves_needs_a_row_of_angles(columns, tmp_path,
     moved = replace(data.measurements.table(Recordings).each[0], route=float(at))
     recordings = replace(data.measurements.table(Recordings), each=(moved,))
     if not refused:
-        check_angles(recordings, data.description, data.measurements)
+        KINDS["recordings"].check(recordings, data.description, data.measurements)
         return
     with pytest.raises(DatasetError, match=r"'run' was made at 640 mm, outside the range 430 to 530 mm"):
-        check_angles(recordings, data.description, data.measurements)
+        KINDS["recordings"].check(recordings, data.description, data.measurements)
 
 
 SINGLE = {

@@ -4,20 +4,22 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import Any, ClassVar
 
+import jax
 import jax.numpy as jnp
 import numpy as np
 from jax import Array
 from jaxtyping import Float
+from typing_extensions import override
 
 from bowdenfit.cable.cable import ANGLE_NOISE, Cable
 from bowdenfit.cable.noise import noise_law, scatter
-from bowdenfit.kinds.angles.bench import detection_limit, drawn_angles
+from bowdenfit.description import Description
+from bowdenfit.errors import DatasetError
 from bowdenfit.kinds.angles.table import AngleSettings, AngleTable
-from bowdenfit.kinds.angles.undetected import EVENTS, count
-from bowdenfit.kinds.bench import Remeasurement
+from bowdenfit.kinds.bench import Truth
 from bowdenfit.kinds.bounds import first_less, joined, last_less
 from bowdenfit.kinds.candidate import Candidate, CandidateKind, Simulation, Situation
-from bowdenfit.kinds.term import Circumstances, TermKind
+from bowdenfit.kinds.term import Circumstances, Term, TermKind
 from bowdenfit.parameters.priors import HalfCauchy
 from bowdenfit.parameters.space import Parameter
 
@@ -128,57 +130,160 @@ def angles_term(cable: Cable, table: AngleTable) -> AnglesTerm:
     return AnglesTerm(cable, data, tuple(readings[i][2] for i in order))
 
 
-def _parameters(table: AngleTable, at: Circumstances) -> list[Parameter]:
-    """Those of every curve, with priors by the angles inside its range, and how angles scatter."""
-    route, degree, sd = at.description.route, float(np.rad2deg(1.0)), at.defaults.angle_noise_degrees
-    assert route is not None  # an angle table is read only with one
-    inside = (table.route >= route.range[0]) & (table.route <= route.range[1])
-    read = {column: table.column(column)[0] for column in at.cable.curves}
-    curves = [
-        parameter
-        for column, curve in at.cable.curves.items()
-        for parameter in curve.parameters(read[column][np.isfinite(read[column]) & inside], at.defaults)
-    ]
-    noise = Parameter(
-        ANGLE_NOISE, r"$\sigma_\theta$", at.noise.meaning("standard deviation of an angle reading"), "noise",
-        HalfCauchy(sd / degree), "deg", degree,
-    )  # fmt: skip
-    return [*curves, noise]
+def drawn_angles(table: AngleTable, truth: Truth, everywhere: bool = False) -> dict[str, Array]:
+    """Draw wrap angles and detection limits of an angle table [rad].
+
+    Args:
+        table: The table.
+        truth: What it is measured with.
+        everywhere: Whether rows outside the range of the curves are drawn too; else they are kept.
+    """
+    cable, key, route = truth.cable, jax.random.split(truth.key, 3)[0], jnp.asarray(table.route)
+    theta = jnp.stack([curve.wrap_angle(truth.values, route) for curve in cable.curves.values()], axis=-1)
+    reading = theta + truth.scale * truth.values[ANGLE_NOISE] * truth.scatter(key, theta.shape)
+    limit = detection_limit(cable.description, table)
+    low, high = cable.description.route.range if cable.description.route else (-np.inf, np.inf)
+    kept = np.zeros(len(table.route), dtype=bool) if everywhere else (table.route < low) | (table.route > high)
+    undetected = reading < limit
+    angle = jnp.where(undetected, jnp.nan, jnp.maximum(reading, 0.0))
+    return {
+        "angle": jnp.where(kept[:, None], table.angle, angle),
+        "limit": jnp.where(kept[:, None], table.limit, jnp.where(undetected, limit, jnp.nan)),
+    }
 
 
-def _simulation(at: Situation, wanted: Sequence[Candidate]) -> Simulation:
-    """Angles of all curved contacts; what is read below the detection limit is not detected."""
-    columns, settings = tuple(at.cable.curves), at.cable.description.table(AngleSettings)
-    route, _, origin = at.rows(wanted)
-    shape = (len(wanted), len(columns))
-    table = AngleTable(route, columns, np.full(shape, np.deg2rad(30)), np.full(shape, np.nan), origin)
-    term = angles_term(at.cable, table)
-    # Every row is detected, so readings are curve by curve; a curve may hold over a part of the range only.
-    read_at = np.concatenate([term.data["route"][column] for column in columns])
-    limit = settings.detection_limit.to("angle") if settings and settings.detection_limit else 0.0
-    found = [tuple(int(k) for k in np.flatnonzero(read_at == length)) for length in route]
-    return Simulation(term.simulate, term.data, found, float(np.rad2deg(limit)))
+def detection_limit(description: Description, table: AngleTable) -> float:
+    """Return the angle below which nothing is detected [rad]: that of the description, or the one in the table's cells.
+
+    Raises:
+        DatasetError: The cells name several, so that it is not known which one holds where an angle was detected.
+    """
+    settings = description.table(AngleSettings)
+    if settings is not None and settings.detection_limit is not None:
+        return settings.detection_limit.to("angle")
+    limits = np.unique(table.limit[np.isfinite(table.limit)])
+    if len(limits) > 1:
+        shown = " and ".join(f"<{limit:.3g}" for limit in np.rad2deg(limits[:2]))
+        raise DatasetError(
+            f"{table.origin.files[0]} has cells with different detection limits ({shown} deg), so that it is not known what "
+            "would be detected in the other cells; state detection_limit for the table in cable.toml."
+        )
+    return float(limits[0]) if len(limits) else -np.inf
 
 
-ANGLES = TermKind(
-    "angles",
-    lambda cable, table, _: (angles_term(cable, table),),
-    _parameters,
-    Remeasurement(drawn_angles, check=detection_limit),
-    CandidateKind(
-        name="angle",
-        title="Wrap angles",
-        words=lambda cable: "the wrap angles" if len(cable.curves) > 1 else "the wrap angle",
-        order=0,
-        needs=(ANGLE_NOISE,),
-        possible=lambda at: bool(at.cable.curves),
-        unknown="no contact of this cable has a curve that an angle could tell of.",
-        offered=lambda at: [Candidate("angle", length) for length in at.lengths] if at.angles is not None else [],
-        simulation=_simulation,
-        along_route=True,
-        tells_curves=True,
-        angles="none",
-    ),
-    count=count,
-    events=EVENTS,
-)
+def _undetected(description: Description) -> str:
+    """Return how angles too small to detect enter: "censored", "zero" or "dropped"."""
+    settings = description.table(AngleSettings)
+    if description.geometry == "published":
+        return "zero"
+    return settings.undetected if settings is not None else "censored"
+
+
+class AngleCandidates(CandidateKind):
+    """The wrap angles of all curved contacts at a length."""
+
+    name = "angle"
+    order = 0
+    needs = (ANGLE_NOISE,)
+    unknown = "no contact of this cable has a curve that an angle could tell of."
+    along_route = True
+    angles = "none"
+    tells_curves = True
+    heading = "Wrap angles"
+
+    @override
+    def is_possible(self, at: Situation) -> bool:
+        return bool(at.cable.curves)
+
+    @override
+    def measured(self, cable: Cable) -> str:
+        return "the wrap angles" if len(cable.curves) > 1 else "the wrap angle"
+
+    @override
+    def candidates(self, at: Situation) -> list[Candidate]:
+        return [Candidate(self.name, length) for length in at.lengths] if at.angles is not None else []
+
+    @override
+    def simulation(self, at: Situation, candidates: Sequence[Candidate]) -> Simulation:
+        """Return how they would be read; what is below the detection limit is not detected."""
+        columns, settings = tuple(at.cable.curves), at.cable.description.table(AngleSettings)
+        route, _, origin = at.rows(candidates)
+        shape = (len(candidates), len(columns))
+        table = AngleTable(route, columns, np.full(shape, np.deg2rad(30)), np.full(shape, np.nan), origin)
+        term = angles_term(at.cable, table)
+        # Every row is detected, so readings are curve by curve; a curve may hold over a part of the range only.
+        read_at = np.concatenate([term.data["route"][column] for column in columns])
+        limit = settings.detection_limit.to("angle") if settings and settings.detection_limit else 0.0
+        readings = [tuple(int(k) for k in np.flatnonzero(read_at == length)) for length in route]
+        return Simulation(term.simulate, term.data, readings, float(np.rad2deg(limit)))
+
+
+class AngleTerms(TermKind[AngleTable]):
+    """Angle tables in the likelihood."""
+
+    name = "angles"
+    candidate = AngleCandidates()
+    chooses_rows = True
+
+    @override
+    def terms(self, cable: Cable, table: AngleTable, angles: AngleTable | None) -> tuple[AnglesTerm]:
+        return (angles_term(cable, table),)
+
+    @override
+    def parameters(self, table: AngleTable, at: Circumstances) -> list[Parameter]:
+        """Return those of every curve, with priors by the angles inside its range, and how angles scatter."""
+        route, degree, sd = at.description.route, float(np.rad2deg(1.0)), at.defaults.angle_noise_degrees
+        assert route is not None  # an angle table is read only with one
+        inside = (table.route >= route.range[0]) & (table.route <= route.range[1])
+        read = {column: table.column(column)[0] for column in at.cable.curves}
+        curves = [
+            parameter
+            for column, curve in at.cable.curves.items()
+            for parameter in curve.parameters(read[column][np.isfinite(read[column]) & inside], at.defaults)
+        ]
+        noise = Parameter(
+            ANGLE_NOISE, r"$\sigma_\theta$", at.noise.meaning("standard deviation of an angle reading"), "noise",
+            HalfCauchy(sd / degree), "deg", degree,
+        )  # fmt: skip
+        return [*curves, noise]
+
+    @override
+    def draw(self, table: AngleTable, truth: Truth) -> dict[str, Array]:
+        return drawn_angles(table, truth)
+
+    @override
+    def check_drawable(self, description: Description, table: AngleTable) -> None:
+        """Refuse cells with several detection limits; see `detection_limit`."""
+        detection_limit(description, table)
+
+    @override
+    def count_readings(self, term: Term, description: Description) -> str:
+        """Return how many readings the curves were fitted to, and how those too small to detect entered."""
+        entered, censored = len(term.data["angle"]), len(term.data["limit"])
+        how = {
+            "censored": "",
+            "zero": ", those too small to detect taken as 0",
+            "dropped": ", those too small to detect left out",
+        }
+        if censored:
+            return f"{entered} wrap angles and {censored} too small to detect (known to be below the limit)"
+        return f"{entered} wrap angles{how[_undetected(description)]}"
+
+    @override
+    def why_events_differ(self, readings: str, descriptions: Mapping[str, Description]) -> str:
+        how = {"censored": "below the limit", "zero": "zeros", "dropped": "dropped"}
+        ways = [
+            f"{name}: {'zeros, in the published regions' if one.geometry == 'published' else how[_undetected(one)]}"
+            for name, one in descriptions.items()
+        ]
+        return (
+            "angles too small to detect, and angles where a curve does not hold, are not the same readings in all fits "
+            f"({', '.join(ways)})"
+        )
+
+    @override
+    def describe_choice(self, description: Description) -> str:
+        if description.geometry == "published":
+            return ""
+        words = {"censored": "", "zero": "undetected angles as zeros", "dropped": "undetected angles dropped"}
+        return words[_undetected(description)]

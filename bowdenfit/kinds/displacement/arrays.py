@@ -1,6 +1,5 @@
 """Force at the motor against displacement as arrays that compiled functions take: readings by run, turns by depth."""
 
-from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
@@ -10,16 +9,7 @@ from bowdenfit.kinds.angles.table import AngleTable
 from bowdenfit.kinds.displacement.table import ZERO, DisplacementTable
 from bowdenfit.kinds.displacement.turns import Turns
 from bowdenfit.kinds.row_angles import row_angles
-from bowdenfit.kinds.rows import OwnAngles
-from bowdenfit.types import Vector
-
-
-@dataclass(frozen=True)
-class _Bends:
-    """Where the cable lies in each run."""
-
-    route: Vector
-    own: OwnAngles
+from bowdenfit.kinds.rows import OwnAngles, RowConditions
 
 
 def order_of(table: DisplacementTable) -> np.ndarray:
@@ -54,7 +44,7 @@ def angles_of_runs(cable: Cable, table: DisplacementTable, angles: AngleTable | 
     """Wrap angles of every run, which are those of its first row."""
     first = np.array([np.flatnonzero(table.run == run)[0] for run in range(len(table.run_names))])
     own = OwnAngles(table.own.names, table.own.angle[first], table.own.sd[first])
-    return row_angles(cable.description, _Bends(table.route[first], own), angles).data
+    return row_angles(cable.description, RowConditions(table.route[first], own), angles).data
 
 
 def places_of(turns: Turns) -> np.ndarray:

@@ -1,16 +1,24 @@
-"""Reading force against displacement: columns, runs and strokes, and whether a rope with a spring or a stop has such forces."""
+r"""Reading force against displacement: columns, runs and strokes, which rows are used, and whether a rope has such forces.
+
+Rows that depend on how the rope lay before, and rows before a stop, are not used. Nobody knows how the rope lay before the
+motor first moved. It may have been pulled or let out; from its let-out state, where the force is F_t, all of it slides once the
+force is :math:`F_t e^{2\Lambda}`, whatever the spring and the rope. At one displacement the pull is over the return by at
+least :math:`e^\Lambda` (`bowdenfit.physics.tendon`), whose square is enough; the last quarter of the stroke is used all the
+same, lest a loop have no pull.
+"""
 
 from collections.abc import Mapping
+from dataclasses import replace
+from typing import Any
 
 import numpy as np
 
 from bowdenfit.errors import DatasetError, together
 from bowdenfit.files.columns import Column, Quantity, find_columns, require
 from bowdenfit.files.csv_table import RawTable, read_csv
-from bowdenfit.kinds.displacement.chosen import chosen
 from bowdenfit.kinds.displacement.table import ZERO, DisplacementTable
 from bowdenfit.kinds.displacement.turns import in_order, sliding
-from bowdenfit.kinds.kind import Found, Source
+from bowdenfit.kinds.kind import Source, TableFromFiles
 from bowdenfit.kinds.rows import (
     OwnAngles,
     check_spelling,
@@ -20,9 +28,12 @@ from bowdenfit.kinds.rows import (
     read_strokes,
     shared_columns,
 )
-from bowdenfit.types import Labels, Vector
+from bowdenfit.types import Flags, Labels, Vector
 from bowdenfit.words import few, listed
 
+_LEAST_SHARE = 0.01  # of the largest force, which a rope's may be taken for none
+_MOST_ROWS = 600  # rows that are used, of longer tables
+_PLACES = 9  # displacements at which pull and return are compared
 _UNUSED = ("time", "velocity")  # columns that such a table may have and that nothing reads
 _NAMES = {"force": ("force", "input_force"), "displacement": ("displacement", "position")}
 _NEGATIVE = 0.05  # of the largest force, that noise about 0 may be below it
@@ -31,7 +42,7 @@ _GAINS = 1.1  # return over pull, that noise does not make of a cable without fr
 _FEWEST = 4  # readings from which that can be said
 
 
-def read_displacement(source: Source) -> Found[DisplacementTable]:
+def read_displacement(source: Source) -> TableFromFiles[DisplacementTable]:
     """Read a table of the force at the motor against its displacement.
 
     Args:
@@ -73,9 +84,9 @@ def read_displacement(source: Source) -> Found[DisplacementTable]:
     rows = DisplacementTable(at, force, displacement, motion, run, names, every, own, origin, how == "sliding")
     if not any(name.startswith(ZERO) for name in source.description.prior):
         _check_runs(rows)
-    rows, remarks = chosen(rows, settings, "stroke" in found)
+    rows, remarks = _choose_rows(rows, settings, "stroke" in found)
     _check_force(rows)
-    return Found(rows, {path.name: path}, tuple(remarks), (table.account,))
+    return TableFromFiles(rows, {path.name: path}, tuple(remarks), (table.account,))
 
 
 def _one_of(table: RawTable, found: Mapping[str, Column], name: str, unit: str) -> Column:
@@ -167,3 +178,91 @@ def _mean_between(low: float, high: float, x: Vector, force: Vector) -> float:
     """Mean force between two displacements [N]."""
     order = np.argsort(x, kind="stable")
     return float(np.mean(np.interp(np.linspace(low, high, 9), x[order], force[order])))
+
+
+def _choose_rows(table: DisplacementTable, settings: Any, has_strokes: bool) -> tuple[DisplacementTable, list[str]]:
+    """Return the table with the rows that are used, and remarks on the others.
+
+    Args:
+        table: All rows.
+        settings: What stands under the table in cable.toml.
+        has_strokes: Whether it has a column stroke.
+
+    Raises:
+        DatasetError: A stop is never reached.
+    """
+    file, x, used, remarks = table.origin.files[0], table.displacement, table.used.copy(), []
+    if table.sliding:
+        remarks.append(
+            f"{file} has a stroke column: every row is taken as read while all of the rope slides. If rows were taken in order "
+            'through the turns of the motor, write rows = "in order" beside the file in cable.toml.'
+        )
+    else:
+        ignored = " Its stroke column is not needed." if has_strokes else ""
+        unknown = early(table)
+        used &= ~unknown
+        remarks.append(
+            f"{file}: rows are taken in the order in which they stand, and turns of the motor as the displacement shows them."
+            f"{ignored} {int(unknown.sum())} of {len(x)} rows, at the start of each run, are not used, because there the force "
+            "depends on how the rope lay before, which nobody knows."
+        )
+    if "end" not in settings.model_fields_set:
+        remarks.append(
+            f"{file}: the far end is taken for a spring whose stiffness is fitted; if the rope pulls against a stop, write "
+            'end = "stop" beside the file in cable.toml, or --set tables.displacement.end=stop.'
+        )
+    if settings.stop is not None:
+        at = settings.stop.to("length")
+        if not np.any(x > at):
+            raise DatasetError(
+                f"{file}: the stop at {settings.stop.value:g} {settings.stop.unit} is never reached, the displacements end at "
+                f"{x.max():.4g} mm; pull on to the stop, correct where it is, or leave it out if a spring is at the far end."
+            )
+        before = used & (x <= at)
+        used &= ~before
+        remarks.append(f"{file}: {int(before.sum())} rows lie before the stop, and are not used.")
+    n = int(used.sum())
+    if n > _MOST_ROWS:
+        step = -(-n // _MOST_ROWS)
+        used[np.flatnonzero(used)[np.arange(n) % step != 0]] = False
+        remarks.append(
+            f"{file}: of the {n} rows that are left one in {step} is used, {int(used.sum())} in all; those between them say "
+            "hardly more, and the turns of the motor are those of all rows."
+        )
+    return replace(table, used=used), remarks
+
+
+def early(table: DisplacementTable) -> Flags:
+    """Rows of the first stroke of each run in which the force may depend on what was before it."""
+    unknown = np.zeros(len(table.run), dtype=bool)
+    for run in range(len(table.run_names)):
+        rows = np.flatnonzero((table.run == run) & table.motion.first)
+        back = np.flatnonzero((table.run == run) & (table.motion.stroke == -table.motion.stroke[rows[0]]))
+        may = _before_half(table, rows) if len(back) < 2 else _before_all_slides(table, rows, back)
+        last = np.flatnonzero(may)
+        unknown[rows[: last[-1] + 1 if len(last) else 0]] = True
+    return unknown
+
+
+def _before_half(table: DisplacementTable, rows: np.ndarray) -> Flags:
+    """Rows of a stroke before its middle, where no other stroke tells more."""
+    x = table.displacement[rows]
+    return np.asarray(table.motion.stroke[rows[0]] * (x - (x[0] + x[-1]) / 2) < 0)
+
+
+def _before_all_slides(table: DisplacementTable, rows: np.ndarray, back: np.ndarray) -> Flags:
+    """Rows of a stroke before all of the rope is known to slide, by the way back."""
+    way, x, force = int(table.motion.stroke[rows[0]]), table.displacement, table.force
+    order = back[np.argsort(x[back], kind="stable")]
+    first, low, high = x[rows[0]], x[order[0]], x[order[-1]]
+    beyond = first < low - 0.05 * (high - low) if way > 0 else first > high + 0.05 * (high - low)
+    turned = np.sort(x[rows])
+    shared = np.linspace(max(low, turned[0]), min(high, turned[-1]), _PLACES)[_PLACES // 2 : -1]
+    there, here = (np.interp(shared, x[these], force[these]) for these in (rows[np.argsort(x[rows], kind="stable")], order))
+    ratios = (there / np.maximum(here, 1e-12 * force.max())) ** way
+    if beyond or shared[0] >= shared[-1] or not np.median(ratios) > 1:
+        return _before_half(table, rows)
+    most, turned_at = np.median(ratios) ** 2, float(np.interp(first, x[order], force[order]))
+    turned_at = max(turned_at, _LEAST_SHARE * force.max())
+    depends = force[rows] < turned_at * most if way > 0 else force[rows] > turned_at / most
+    return np.asarray(depends & (way * (x[rows] - (x[rows[0]] + 3 * x[rows[-1]]) / 4) < 0))

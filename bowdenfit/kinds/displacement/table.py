@@ -3,13 +3,10 @@
 from dataclasses import dataclass
 from typing import Literal
 
-from bowdenfit.description import Description, QuantityValue, Table
+from bowdenfit.description import QuantityValue, Table
 from bowdenfit.display import Part
 from bowdenfit.kinds.displacement.turns import Motion
-from bowdenfit.kinds.rows import (
-    OwnAngles,
-    RowOrigin,
-)
+from bowdenfit.kinds.rows import OwnAngles, RowOrigin
 from bowdenfit.types import Flags, Labels, Vector
 
 ZERO = "displacement_zero"  # parameter: where the displacement of a run begins
@@ -66,16 +63,3 @@ class DisplacementTable(Part):
         if not (self.pulls.any() and back.any()):
             return 0.0, -1.0
         return max(x[self.pulls].min(), x[back].min()), min(x[self.pulls].max(), x[back].max())
-
-
-def contradiction(settings: DisplacementSettings | None, description: Description) -> str:
-    """A loop, a friction model whose equations these are not, or a stop that is a spring."""
-    if settings is None:
-        return ""
-    if description.cable.kind == "loop":
-        return "the table displacement is of a single rope, and a loop has two; leave it out, or describe one rope alone"
-    if description.friction_model != "capstan":
-        return 'the equations of the table displacement hold for friction_model = "capstan" only; leave it out'
-    if settings.stop is not None and settings.end != "stop":
-        return 'tables.displacement says where a stop is, but not end = "stop"; write that beside it, or leave the stop out'
-    return ""

@@ -1,6 +1,6 @@
 """Force at the motor against displacement in the likelihood: the far end, the rope, and the mounting of each run."""
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from dataclasses import dataclass, field
 from typing import Any, ClassVar
 
@@ -9,26 +9,26 @@ import jax.numpy as jnp
 import numpy as np
 from jax import Array
 from jaxtyping import Float
+from typing_extensions import override
 
 from bowdenfit.cable.cable import Cable
 from bowdenfit.cable.elasticity import BEDDING_LOAD, BEDDING_STRETCH, STIFFNESS
-from bowdenfit.cable.load_cells import FORCE_NOISE, RUN_SCATTER, LoadCells
+from bowdenfit.cable.load_cells import FORCE_NOISE, INPUT_OFFSET, RUN_SCATTER, LoadCells
 from bowdenfit.cable.noise import noise_law, scatter
 from bowdenfit.kinds.angles.table import AngleTable
-from bowdenfit.kinds.bench import Remeasurement, Truth
+from bowdenfit.kinds.bench import Truth
 from bowdenfit.kinds.displacement.arrays import angles_of_runs, order_of, readings, turns_by_depth, zero_names
-from bowdenfit.kinds.displacement.parameters import (
-    DISPLACEMENT_NOISE,
-    END_SPRING,
-    ROPE_GIVE,
-    ROPE_STIFFNESS,
-    parameters,
-)
 from bowdenfit.kinds.displacement.table import DisplacementSettings, DisplacementTable
 from bowdenfit.kinds.resolve_angles import resolve_angles
-from bowdenfit.kinds.term import WRAP_ANGLE, TermKind
+from bowdenfit.kinds.shared_parameters import force_noise, offsets, rope, run_scatter
+from bowdenfit.kinds.stretch.table import StretchTable
+from bowdenfit.kinds.term import WRAP_ANGLE, Circumstances, Term, TermKind
+from bowdenfit.parameters.priors import HalfCauchy, LogNormal, Normal
+from bowdenfit.parameters.scale import Scale
+from bowdenfit.parameters.space import Parameter
 from bowdenfit.physics.tendon import RopeStretch, Tendon, Turn
 
+END_SPRING, ROPE_STIFFNESS, ROPE_GIVE, DISPLACEMENT_NOISE = "end_spring", "rope_stiffness", "rope_give", "sigma_x"
 MOTOR_FORCE, AT, SINCE_TURN = "motor_force", "Displacement (mm)", "Distance from the turn (mm)"
 _LEAST_GIVE = 1e-9  # of the spring's, below which a rope is as good as one that does not give
 LEAST_EXPONENT = 1e-9  # below which friction would push, with whatever the mounting does to it
@@ -224,39 +224,112 @@ def displacement_term(cable: Cable, table: DisplacementTable, angles: AngleTable
     return DisplacementTerm(cable, data, tuple(table.origin.place(int(i)) for i in rows), zero_names(table), stop)
 
 
-def _draw(table: DisplacementTable, truth: Truth) -> dict[str, Array]:
-    """Forces of every row with noise in the cell and in the displacement; those of a run share its mounting and angles."""
-    of_run, of_force, of_x = jax.random.split(jax.random.fold_in(truth.key, 7), 3)
-    term, values, scale = displacement_term(truth.cable, table, truth.angles), truth.values, truth.scale
-    data = jax.tree.map(jnp.asarray, term.data | readings(table, np.arange(len(table.run))))
-    exponent, angle_variance = term.exponents(values, data)
-    mounting = jnp.sqrt(values[RUN_SCATTER] ** 2 + angle_variance) * truth.scatter(of_run, exponent.shape)
-    shape = table.force.shape
-    beside = scale * values.get(DISPLACEMENT_NOISE, 0.0) * jax.random.normal(of_x, shape)
-    force = term.shown(values, data, exponent + scale * mounting, beside)
-    return {"force": force + scale * values[FORCE_NOISE] * truth.scatter(of_force, shape)}
+def _level(table: DisplacementTable) -> Scale:
+    """Range of forces over that of displacements."""
+    force, x = table.force[table.used], table.displacement[table.used]
+    ranges = [float(np.ptp(values)) if len(values) else 0.0 for values in (force, x)]
+    together = ranges[0] / ranges[1] if min(ranges) > 0 else 1.0
+    return Scale(together, "range of forces over that of displacements", "N/mm")
 
 
-def _where(table: DisplacementTable, term: Any) -> Mapping[str, np.ndarray]:
-    """Displacement, how far the motor has moved since its turn, and wrap angle of each reading."""
-    del term
-    rows = order_of(table)
-    angles = np.rad2deg(np.nansum(table.own.angle[rows], axis=1))
-    turns, after = table.motion.turns.at, table.motion.after[rows]
-    moved = np.where(table.motion.slides[rows], np.ptp(table.displacement), np.abs(table.displacement[rows] - turns[after]))
-    return {AT: table.displacement[rows], SINCE_TURN: moved, WRAP_ANGLE: angles}
+def _zeros(table: DisplacementTable, at: Circumstances) -> list[Parameter]:
+    """Where each run has no force."""
+    share, found = at.defaults.displacement_zero_ranges, []
+    for run, name in enumerate(zero_names(table)):
+        x = table.displacement[table.run == run]
+        span = Scale(float(np.ptp(x)) or float(np.ptp(table.displacement)) or 1.0, "range of displacements", "mm")
+        of_run = f", run {table.run_names[run]}" if len(table.run_names) > 1 else ""
+        prior, symbol = Normal(float(x.min()), share * span.value), f"$x_{{0{run + 1 if of_run else ''}}}$"
+        meaning = f"displacement without force{of_run}"
+        found.append(Parameter(name, symbol, meaning, "elastic", prior, "mm", scaled_by=span.share(share)))
+    return found
 
 
-def _terms(cable: Cable, table: DisplacementTable, angles: AngleTable | None) -> Sequence[DisplacementTerm]:
-    return (displacement_term(cable, table, angles),)
+def _stiffness(table: DisplacementTable, at: Circumstances) -> list[Parameter]:
+    """Spring and rope; of a rope that nothing is said of how it gives beside the spring, which may be next to nothing."""
+    by, settings = _level(table), at.description.table(DisplacementSettings)
+    prior, rests = LogNormal(by.value, at.defaults.end_stiffness_log_sd), str(by)
+    spring = Parameter(
+        END_SPRING, r"$K$", "stiffness of the spring at the far end", "elastic", prior, "N/mm", scaled_by=rests
+    )
+    linear = Parameter(
+        ROPE_STIFFNESS, "$k$ rope", "stiffness of rope and sheath together", "elastic", prior, "N/mm",
+        scaled_by=rests,
+    )  # fmt: skip
+    give = Parameter(
+        ROPE_GIVE, "$K/k$ rope", "give of rope and sheath over that of the spring at the far end", "elastic",
+        HalfCauchy(at.defaults.rope_give),
+    )  # fmt: skip
+    at_stop = settings is not None and settings.end == "stop"
+    if at.measurements.table(StretchTable) is not None:
+        return [*rope(at), *([] if at_stop else [spring])]
+    if at_stop:
+        return [linear]
+    return [spring, linear if ROPE_STIFFNESS in at.description.prior else give]
 
 
-DISPLACEMENT = TermKind(
-    "displacement",
-    _terms,
-    parameters,
-    Remeasurement(_draw),
-    tells_mountings=True,
-    where=_where,
-    back=lambda table: table.motion.stroke[order_of(table)] < 0,
-)
+def _offset(table: DisplacementTable, at: Circumstances) -> Parameter:
+    """What the cell shows of no force: a force that is off by little looks like friction, and the loop tells it."""
+    stated = [p for p in offsets(at) if p.name == INPUT_OFFSET]
+    if stated:
+        return stated[0]
+    part = at.defaults.motor_offset_share
+    by = Scale(float(np.ptp(table.force)) or 1.0, "range of forces", "N")
+    prior = Normal(0.0, part * by.value)
+    meaning = "offset of the load cell at the motor"
+    return Parameter(INPUT_OFFSET, "$b$ input", meaning, "sensor", prior, "N", scaled_by=by.share(part))
+
+
+class DisplacementTerms(TermKind[DisplacementTable]):
+    """Force against displacement in the likelihood."""
+
+    name = "displacement"
+    tells_mountings = True
+
+    @override
+    def terms(self, cable: Cable, table: DisplacementTable, angles: AngleTable | None) -> tuple[DisplacementTerm]:
+        return (displacement_term(cable, table, angles),)
+
+    @override
+    def parameters(self, table: DisplacementTable, at: Circumstances) -> list[Parameter]:
+        """Return spring, rope and zero; how readings and mountings scatter; the zero of the cell where that is fitted."""
+        range_x = Scale(float(np.ptp(table.displacement)) or 1.0, "range of displacements", "mm")
+        part = at.defaults.displacement_noise_share
+        jitter = Parameter(
+            DISPLACEMENT_NOISE, r"$\sigma_x$", at.noise.meaning("standard deviation of a displacement"), "noise",
+            HalfCauchy(part * range_x.value), "mm", scaled_by=range_x.share(part),
+        )  # fmt: skip
+        return [
+            *_stiffness(table, at),
+            *_zeros(table, at),
+            run_scatter(at),
+            force_noise(at, at.noise.meaning("standard deviation of a force reading")),
+            *([] if table.sliding else [jitter]),
+            _offset(table, at),
+        ]
+
+    @override
+    def draw(self, table: DisplacementTable, truth: Truth) -> dict[str, Array]:
+        """Draw forces of every row with noise in cell and displacement; those of a run share its mounting and angles."""
+        of_run, of_force, of_x = jax.random.split(jax.random.fold_in(truth.key, 7), 3)
+        term, values, scale = displacement_term(truth.cable, table, truth.angles), truth.values, truth.scale
+        data = jax.tree.map(jnp.asarray, term.data | readings(table, np.arange(len(table.run))))
+        exponent, angle_variance = term.exponents(values, data)
+        mounting = jnp.sqrt(values[RUN_SCATTER] ** 2 + angle_variance) * truth.scatter(of_run, exponent.shape)
+        shape = table.force.shape
+        beside = scale * values.get(DISPLACEMENT_NOISE, 0.0) * jax.random.normal(of_x, shape)
+        force = term.shown(values, data, exponent + scale * mounting, beside)
+        return {"force": force + scale * values[FORCE_NOISE] * truth.scatter(of_force, shape)}
+
+    @override
+    def places(self, table: DisplacementTable, term: Term) -> Mapping[str, np.ndarray]:
+        """Return displacement, how far the motor has moved since its turn, and wrap angle of each reading."""
+        rows = order_of(table)
+        angles = np.rad2deg(np.nansum(table.own.angle[rows], axis=1))
+        turns, after = table.motion.turns.at, table.motion.after[rows]
+        moved = np.where(table.motion.slides[rows], np.ptp(table.displacement), np.abs(table.displacement[rows] - turns[after]))
+        return {AT: table.displacement[rows], SINCE_TURN: moved, WRAP_ANGLE: angles}
+
+    @override
+    def on_way_back(self, table: DisplacementTable) -> np.ndarray:
+        return table.motion.stroke[order_of(table)] < 0

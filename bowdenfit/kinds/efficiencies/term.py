@@ -9,6 +9,7 @@ import jax.numpy as jnp
 import numpy as np
 from jax import Array
 from jaxtyping import Float
+from typing_extensions import override
 
 from bowdenfit.cable.cable import Cable
 from bowdenfit.cable.load_cells import RUN_SCATTER, LoadCells
@@ -16,14 +17,14 @@ from bowdenfit.cable.noise import noise_law, scatter
 from bowdenfit.description import Description
 from bowdenfit.errors import DescriptionError
 from bowdenfit.kinds.angles.table import AngleTable
-from bowdenfit.kinds.bench import Remeasurement, drawn_by_term
+from bowdenfit.kinds.bench import Truth
 from bowdenfit.kinds.candidate import UNKNOWN_SCATTER, Candidate, CandidateKind, Simulation, Situation, one_reading_each
 from bowdenfit.kinds.efficiencies.table import EfficiencyTable
 from bowdenfit.kinds.resolve_angles import resolve_angles
 from bowdenfit.kinds.row_angles import row_angles
 from bowdenfit.kinds.shared_parameters import run_scatter
-from bowdenfit.kinds.term import TermKind
-from bowdenfit.parameters.space import ParameterSpace
+from bowdenfit.kinds.term import Circumstances, TermKind
+from bowdenfit.parameters.space import Parameter, ParameterSpace
 from bowdenfit.physics.friction import transmission_efficiency
 
 
@@ -109,49 +110,63 @@ def efficiencies_term(cable: Cable, table: EfficiencyTable, angles: AngleTable |
     return EfficienciesTerm(cable, data, labels)
 
 
-def _check_run_scatter(table: EfficiencyTable, space: ParameterSpace) -> None:
-    """Mountings may be said to be all alike only where something else makes every row scatter."""
-    if any(p.name == RUN_SCATTER and p.fixed == 0 for p in space.fixed) and not np.all(table.sd > 0):
-        place = table.origin.place(int(np.argmin(table.sd > 0)))
-        raise DescriptionError(
-            f"cable.toml: {RUN_SCATTER} is fixed at 0, but {place} has no standard deviation of its own, so that "
-            "nothing would make it scatter and no model could be right; state the sd of every efficiency, or leave "
-            f"{RUN_SCATTER} free."
-        )
+class EfficiencyCandidates(CandidateKind):
+    """An efficiency at a length, or at the wrap angles of a mounting."""
+
+    name = "efficiency"
+    order = 2
+    needs = (RUN_SCATTER,)
+    unknown = f"{UNKNOWN_SCATTER}; fit with a table of efficiencies or forces."
+    along_route = True
+    mounted_anew = True
+
+    @override
+    def candidates(self, at: Situation) -> list[Candidate]:
+        table = at.measurements.table(EfficiencyTable)
+        return at.along_cable(self.name, table.own) if table is not None else []
+
+    @override
+    def simulation(self, at: Situation, candidates: Sequence[Candidate]) -> Simulation:
+        route, own, origin = at.rows(candidates)
+        table = EfficiencyTable(route, np.full(len(candidates), 0.8), np.zeros(len(candidates)), own, origin)
+        return one_reading_each(efficiencies_term(at.cable, table, at.angles))
 
 
-def _drawn_table(_: Description, table: EfficiencyTable, drawn: Mapping[str, np.ndarray]) -> EfficiencyTable:
-    """A stated standard deviation is taken to be in proportion to the efficiency."""
-    efficiency = drawn["efficiency"]
-    return replace(table, efficiency=efficiency, sd=table.sd / table.efficiency * efficiency)
+class EfficiencyTerms(TermKind[EfficiencyTable]):
+    """Efficiency tables in the likelihood."""
 
+    name = "efficiencies"
+    candidate = EfficiencyCandidates()
+    tells_mountings = True
 
-def _offered(at: Situation) -> list[Candidate]:
-    table = at.measurements.table(EfficiencyTable)
-    return at.along_cable("efficiency", table.own) if table is not None else []
+    @override
+    def terms(self, cable: Cable, table: EfficiencyTable, angles: AngleTable | None) -> tuple[EfficienciesTerm]:
+        return (efficiencies_term(cable, table, angles),)
 
+    @override
+    def parameters(self, table: EfficiencyTable, at: Circumstances) -> list[Parameter]:
+        return [run_scatter(at)]
 
-def _simulation(at: Situation, wanted: Sequence[Candidate]) -> Simulation:
-    route, own, origin = at.rows(wanted)
-    table = EfficiencyTable(route, np.full(len(wanted), 0.8), np.zeros(len(wanted)), own, origin)
-    return one_reading_each(efficiencies_term(at.cable, table, at.angles))
+    @override
+    def draw(self, table: EfficiencyTable, truth: Truth) -> dict[str, Array]:
+        term = efficiencies_term(truth.cable, table, truth.angles)
+        return {"efficiency": truth.simulate(term, jax.random.split(truth.key, 3)[1])}
 
+    @override
+    def with_readings(
+        self, description: Description, table: EfficiencyTable, drawn: Mapping[str, np.ndarray]
+    ) -> EfficiencyTable:
+        """Return the table with them; a stated standard deviation is taken to be in proportion to the efficiency."""
+        efficiency = drawn["efficiency"]
+        return replace(table, efficiency=efficiency, sd=table.sd / table.efficiency * efficiency)
 
-EFFICIENCIES = TermKind(
-    "efficiencies",
-    lambda cable, table, angles: (efficiencies_term(cable, table, angles),),
-    lambda _, at: [run_scatter(at)],
-    Remeasurement(drawn_by_term(efficiencies_term, "efficiency", lambda key: jax.random.split(key, 3)[1]), _drawn_table),
-    CandidateKind(
-        name="efficiency",
-        order=2,
-        needs=(RUN_SCATTER,),
-        unknown=f"{UNKNOWN_SCATTER}; fit with a table of efficiencies or forces.",
-        offered=_offered,
-        simulation=_simulation,
-        along_route=True,
-        mounted_anew=True,
-    ),
-    tells_mountings=True,
-    check=_check_run_scatter,
-)
+    @override
+    def check(self, table: EfficiencyTable, space: ParameterSpace) -> None:
+        """Refuse mountings that are all alike where nothing else makes a row scatter."""
+        if any(p.name == RUN_SCATTER and p.fixed == 0 for p in space.fixed) and not np.all(table.sd > 0):
+            place = table.origin.place(int(np.argmin(table.sd > 0)))
+            raise DescriptionError(
+                f"cable.toml: {RUN_SCATTER} is fixed at 0, but {place} has no standard deviation of its own, so that "
+                "nothing would make it scatter and no model could be right; state the sd of every efficiency, or leave "
+                f"{RUN_SCATTER} free."
+            )

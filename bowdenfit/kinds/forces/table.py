@@ -18,7 +18,7 @@ from bowdenfit.files.tables import read_table
 from bowdenfit.kinds.ends import ENDS, end_column, forces_of
 from bowdenfit.kinds.forces.mountings import each_row_apart, mountings, numbered_anew
 from bowdenfit.kinds.groups import GROUP, NO_GROUP, read_groups
-from bowdenfit.kinds.kind import Found, Source
+from bowdenfit.kinds.kind import Source, TableFromFiles
 from bowdenfit.kinds.rows import (
     OwnAngles,
     RowOrigin,
@@ -31,6 +31,10 @@ from bowdenfit.kinds.rows import (
 from bowdenfit.types import Labels, Vector
 from bowdenfit.units import INTERNAL_UNITS, speed_dimension
 
+_MOST_LOADS = 25  # loads that are counted
+_APART = 3.0  # smallest gap between loads over the largest within one
+_SAME = 0.002  # relative difference of readings that is none
+_ONE_LOAD = 0.03  # relative width of readings that are at one load
 _UNUSED = ("time", "position")  # columns that a force table may have and that nothing reads
 
 
@@ -65,7 +69,7 @@ class ForceTable(Part):
     group: tuple[str, ...] = ()
 
 
-def read_forces(source: Source) -> Found[ForceTable]:
+def read_forces(source: Source) -> TableFromFiles[ForceTable]:
     """Read force tables, one or several files, into one table.
 
     A run is one mounting of the cable. It is what the `run` column says, file by file, at one length and bend (see
@@ -112,7 +116,7 @@ def read_forces(source: Source) -> Found[ForceTable]:
     )
     remarks = dict.fromkeys(remark for _, said, _ in parts for remark in said)
     accounts = tuple(account for *_, account in parts)
-    return Found(merged, {source.name_of(path): path for path in paths}, tuple(remarks), accounts)
+    return TableFromFiles(merged, {source.name_of(path): path for path in paths}, tuple(remarks), accounts)
 
 
 def _groups(tables: Sequence[ForceTable]) -> tuple[str, ...]:
@@ -216,3 +220,20 @@ def _force(column: Column, cell: Cell) -> float:
             "reading before tension was on: write tension as positive and leave slack readings out."
         )
     return value
+
+
+def count_loads(forces: Vector) -> int | None:
+    """Return the number of loads that readings fall together at; None where they spread.
+
+    Args:
+        forces: All positive [N].
+    """
+    logs = np.sort(np.log(forces))
+    if logs[-1] - logs[0] < _ONE_LOAD:
+        return 1
+    gaps = np.sort(np.diff(logs))[::-1]
+    most = min(_MOST_LOADS, (len(forces) + 1) // 2)
+    ratios = gaps[: most - 1] / np.maximum(gaps[1:most], _SAME) if most > 1 else np.zeros(0)
+    if not len(ratios) or ratios.max() < _APART:
+        return None
+    return int(np.argmax(ratios)) + 2

@@ -7,17 +7,18 @@ import jax
 import jax.numpy as jnp
 import numpy as np
 from jax import Array
+from typing_extensions import override
 
 from bowdenfit.cable.cable import Cable
 from bowdenfit.cable.load_cells import FORCE_NOISE, RUN_SCATTER, LoadCells
 from bowdenfit.description import Description
 from bowdenfit.kinds.angles.table import AngleTable
-from bowdenfit.kinds.bench import Remeasurement, Truth
+from bowdenfit.kinds.bench import Truth
 from bowdenfit.kinds.expected_forces import ExpectedForces, expected_forces
 from bowdenfit.kinds.forces.held import HeldForcesTerm
 from bowdenfit.kinds.forces.table import ForceTable
 from bowdenfit.kinds.groups import group_numbers
-from bowdenfit.kinds.next_run import FORCE_RUN
+from bowdenfit.kinds.next_run import ForceRunCandidates
 from bowdenfit.kinds.row_angles import row_angles
 from bowdenfit.kinds.runs import RunsTerm, run_sums
 from bowdenfit.kinds.shared_parameters import force_noise, offsets, run_scatter
@@ -27,24 +28,6 @@ from bowdenfit.parameters.space import Parameter
 from bowdenfit.types import Labels, Vector
 
 _ONE_LOAD = 1.05  # highest over lowest load of a run that counts as made at one
-
-
-def force_terms(cable: Cable, table: ForceTable, angles: AngleTable | None) -> tuple[RunsTerm | HeldForcesTerm, ...]:
-    """The terms of a force table: sliding rows by run, held rows one by one."""
-    rows = row_angles(cable.description, table, angles).data | {"group": _group(cable, table)}
-    terms: list[RunsTerm | HeldForcesTerm] = []
-    sliding, held = np.flatnonzero(table.stroke != 0), np.flatnonzero(table.stroke == 0)
-    if len(sliding):
-        readings = sliding_rows(cable.description, table, rows, sliding)
-        labels = tuple(_run_label(cable, table, int(run)) for run in np.unique(readings.run))
-        terms.append(RunsTerm(cable, run_sums(cable, readings), labels, rows=readings))
-    if len(held):
-        data = {name: rows[name][held] for name in ROW_ARRAYS} | {
-            "input_force": table.input_force[held],
-            "output_force": table.output_force[held],
-        }
-        terms.append(HeldForcesTerm(cable, data, tuple(table.origin.place(int(i)) for i in held)))
-    return tuple(terms)
 
 
 def _group(cable: Cable, table: ForceTable) -> Labels:
@@ -124,74 +107,92 @@ def _run_label(cable: Cable, table: ForceTable, run: int) -> str:
     return name if name.startswith(where) or name.endswith(f"({where})") else f"{name} ({where})"
 
 
-def _parameters(_: ForceTable, at: Circumstances) -> list[Parameter]:
-    """Inside a run readings are normal, whatever the noise of mountings."""
-    return [run_scatter(at), force_noise(at), *offsets(at)]
+class ForceTerms(TermKind[ForceTable]):
+    """Force tables in the likelihood."""
 
+    name = "forces"
+    candidate = ForceRunCandidates()
+    tells_mountings = True
 
-def _draw(table: ForceTable, truth: Truth) -> dict[str, Array]:
-    """Forces of sliding rows with noise in both cells around true ones; all rows of a run share its mounting and angles."""
-    cable, values, scale, key = truth.cable, truth.values, truth.scale, jax.random.split(truth.key, 3)[2]
-    of_run, of_input, of_output = jax.random.split(key, 3)
-    runs, run = len(table.run_names), jnp.asarray(table.run)
-    bends, variance = truth.wrap_angles(table)
-    of_angles = jax.random.normal(jax.random.fold_in(key, 3), (runs, bends.shape[1]))
-    bends = bends + scale * jnp.sqrt(variance) * of_angles[run]
-    mounting = scale * values[RUN_SCATTER] * truth.scatter(of_run, (runs,))
-    friction = cable.friction_exponent(values, bends, jnp.asarray(_group(cable, table)))
-    exponent = friction * cable.friction.rate(values, jnp.asarray(table.velocity))
-    stroke, force = jnp.asarray(table.stroke, dtype=float), jnp.asarray(table.input_force)
-    output = cable.friction.output_force(values, force, exponent + mounting[run], stroke)
-    cells, noise, slides = LoadCells.of(values), scale * values[FORCE_NOISE], table.stroke != 0
-    of_weight = noise * cable.description.sensors.noise_ratio
-    read = cells.shown_input(force) + of_weight * jax.random.normal(of_input, force.shape)
-    return {
-        "input_force": jnp.where(slides, read, force),
-        "output_force": jnp.where(
-            slides,
-            cells.shown_output(output) + noise * jax.random.normal(of_output, force.shape),
-            table.output_force,
-        ),
-        "slipped": _slipped(table, truth, jax.random.fold_in(truth.key, 5)),
-    }
+    @override
+    def terms(
+        self, cable: Cable, table: ForceTable, angles: AngleTable | None
+    ) -> tuple[RunsTerm | HeldForcesTerm, ...]:
+        """Return a term of the sliding rows by run, and one of the held rows one by one."""
+        rows = row_angles(cable.description, table, angles).data | {"group": _group(cable, table)}
+        terms: list[RunsTerm | HeldForcesTerm] = []
+        sliding, held = np.flatnonzero(table.stroke != 0), np.flatnonzero(table.stroke == 0)
+        if len(sliding):
+            readings = sliding_rows(cable.description, table, rows, sliding)
+            labels = tuple(_run_label(cable, table, int(run)) for run in np.unique(readings.run))
+            terms.append(RunsTerm(cable, run_sums(cable, readings), labels, rows=readings))
+        if len(held):
+            data = {name: rows[name][held] for name in ROW_ARRAYS} | {
+                "input_force": table.input_force[held],
+                "output_force": table.output_force[held],
+            }
+            terms.append(HeldForcesTerm(cable, data, tuple(table.origin.place(int(i)) for i in held)))
+        return tuple(terms)
 
+    @override
+    def parameters(self, table: ForceTable, at: Circumstances) -> list[Parameter]:
+        """Return scatter, noise and offsets; inside a run readings are normal, whatever the noise of mountings."""
+        return [run_scatter(at), force_noise(at), *offsets(at)]
 
-def _slipped(table: ForceTable, truth: Truth, key: Array) -> Array:
-    """Which held readings would have slipped: their likelihood is the probability that friction holds their forces."""
-    held = [t for t in force_terms(truth.cable, table, truth.angles) if isinstance(t, HeldForcesTerm)]
-    log_probability = [term.log_likelihood(truth.values, jax.tree.map(jnp.asarray, term.data)) for term in held]
-    slipped = [jnp.log(jax.random.uniform(key, p.shape)) > p for p in log_probability]
-    return jnp.concatenate([*slipped, jnp.zeros(0, dtype=bool)])
+    @override
+    def draw(self, table: ForceTable, truth: Truth) -> dict[str, Array]:
+        """Draw forces of sliding rows with noise in both cells; all rows of a run share its mounting and angles."""
+        cable, values, scale, key = truth.cable, truth.values, truth.scale, jax.random.split(truth.key, 3)[2]
+        of_run, of_input, of_output = jax.random.split(key, 3)
+        runs, run = len(table.run_names), jnp.asarray(table.run)
+        bends, variance = truth.wrap_angles(table)
+        of_angles = jax.random.normal(jax.random.fold_in(key, 3), (runs, bends.shape[1]))
+        bends = bends + scale * jnp.sqrt(variance) * of_angles[run]
+        mounting = scale * values[RUN_SCATTER] * truth.scatter(of_run, (runs,))
+        friction = cable.friction_exponent(values, bends, jnp.asarray(_group(cable, table)))
+        exponent = friction * cable.friction.rate(values, jnp.asarray(table.velocity))
+        stroke, force = jnp.asarray(table.stroke, dtype=float), jnp.asarray(table.input_force)
+        output = cable.friction.output_force(values, force, exponent + mounting[run], stroke)
+        cells, noise, slides = LoadCells.of(values), scale * values[FORCE_NOISE], table.stroke != 0
+        of_weight = noise * cable.description.sensors.noise_ratio
+        read = cells.shown_input(force) + of_weight * jax.random.normal(of_input, force.shape)
+        return {
+            "input_force": jnp.where(slides, read, force),
+            "output_force": jnp.where(
+                slides,
+                cells.shown_output(output) + noise * jax.random.normal(of_output, force.shape),
+                table.output_force,
+            ),
+            "slipped": self._slipped(table, truth, jax.random.fold_in(truth.key, 5)),
+        }
 
+    def _slipped(self, table: ForceTable, truth: Truth, key: Array) -> Array:
+        """Draw which held readings would have slipped: their likelihood is the probability that friction holds them."""
+        held = [t for t in self.terms(truth.cable, table, truth.angles) if isinstance(t, HeldForcesTerm)]
+        log_probability = [term.log_likelihood(truth.values, jax.tree.map(jnp.asarray, term.data)) for term in held]
+        slipped = [jnp.log(jax.random.uniform(key, p.shape)) > p for p in log_probability]
+        return jnp.concatenate([*slipped, jnp.zeros(0, dtype=bool)])
 
-def _drawn_table(_: Description, table: ForceTable, drawn: Mapping[str, np.ndarray]) -> ForceTable:
-    return replace(table, input_force=drawn["input_force"], output_force=drawn["output_force"])
+    @override
+    def with_readings(
+        self, description: Description, table: ForceTable, drawn: Mapping[str, np.ndarray]
+    ) -> ForceTable:
+        return replace(table, input_force=drawn["input_force"], output_force=drawn["output_force"])
 
-
-def _where(table: ForceTable, term: Term) -> Mapping[str, np.ndarray]:
-    """Load of each run, where each was made at one and not all at the same; number of its group, from 1."""
-    if not isinstance(term, RunsTerm) or term.rows is None:
-        return {}
-    runs, run = np.unique(term.rows.run, return_inverse=True)
-    load, found = term.rows.input_force, dict[str, np.ndarray]()
-    low, high = np.full(len(runs), np.inf), np.zeros(len(runs))
-    np.minimum.at(low, run, load)
-    np.maximum.at(high, run, load)
-    if np.all(high <= _ONE_LOAD * low) and high.max() > _ONE_LOAD**2 * low.min():
-        found[LOAD] = (low + high) / 2
-    if table.group:
-        names = term.cable.friction.conditions.groups
-        of_run = [table.group[int(np.argmax((table.run == number) & (table.stroke != 0)))] for number in runs]
-        found[GROUP] = np.array([1.0 + names.index(name) for name in of_run])
-    return found
-
-
-FORCES = TermKind(
-    "forces",
-    force_terms,
-    _parameters,
-    Remeasurement(_draw, _drawn_table),
-    FORCE_RUN,
-    tells_mountings=True,
-    where=_where,
-)
+    @override
+    def places(self, table: ForceTable, term: Term) -> Mapping[str, np.ndarray]:
+        """Return the load of each run, where each was made at one and not all at the same; number of its group, from 1."""
+        if not isinstance(term, RunsTerm) or term.rows is None:
+            return {}
+        runs, run = np.unique(term.rows.run, return_inverse=True)
+        load, places = term.rows.input_force, dict[str, np.ndarray]()
+        low, high = np.full(len(runs), np.inf), np.zeros(len(runs))
+        np.minimum.at(low, run, load)
+        np.maximum.at(high, run, load)
+        if np.all(high <= _ONE_LOAD * low) and high.max() > _ONE_LOAD**2 * low.min():
+            places[LOAD] = (low + high) / 2
+        if table.group:
+            names = term.cable.friction.conditions.groups
+            of_run = [table.group[int(np.argmax((table.run == number) & (table.stroke != 0)))] for number in runs]
+            places[GROUP] = np.array([1.0 + names.index(name) for name in of_run])
+        return places

@@ -9,6 +9,7 @@ import jax.numpy as jnp
 import numpy as np
 from jax import Array
 from jaxtyping import Float
+from typing_extensions import override
 
 from bowdenfit.cable.cable import Cable
 from bowdenfit.cable.elasticity import PRELOAD as REFERENCE_PRELOAD
@@ -16,13 +17,13 @@ from bowdenfit.cable.elasticity import spread_matrix
 from bowdenfit.cable.load_cells import FORCE_NOISE, RUN_SCATTER, LoadCells
 from bowdenfit.cable.noise import noise_law, scatter
 from bowdenfit.kinds.angles.table import AngleTable
-from bowdenfit.kinds.bench import Remeasurement, Truth
+from bowdenfit.kinds.bench import Truth
 from bowdenfit.kinds.candidate import Candidate, CandidateKind, Simulation, Situation, one_reading_each, some_loads
 from bowdenfit.kinds.loop.table import LoopTable
 from bowdenfit.kinds.resolve_angles import resolve_angles
 from bowdenfit.kinds.row_angles import row_angles
 from bowdenfit.kinds.shared_parameters import force_noise, offsets, preload
-from bowdenfit.kinds.term import LOAD, WRAP_ANGLE, Circumstances, TermKind
+from bowdenfit.kinds.term import LOAD, WRAP_ANGLE, Circumstances, Term, TermKind
 from bowdenfit.parameters.priors import Normal
 from bowdenfit.parameters.space import Parameter
 from bowdenfit.physics.loop import free_motion_loss, loop_output_force, loop_response, loop_response_from
@@ -133,71 +134,86 @@ def loop_term(cable: Cable, table: LoopTable, angles: AngleTable | None) -> Loop
     return LoopTerm(cable, data, tuple(table.origin.place(i) for i in range(len(table.stroke))))
 
 
-def _parameters(_: LoopTable, at: Circumstances) -> list[Parameter]:
-    """Preload, noise and offsets; and what its one mounting did, where other readings tell how mountings scatter."""
-    meaning = "effect of the loop's mounting on the friction exponent, in units of tau"
-    mounting = Parameter(LOOP_MOUNTING, "$m$", meaning, "sensor", Normal(0.0, 1.0))
-    noise = force_noise(at, at.noise.meaning("standard deviation of a force reading"))
-    return [*preload(at), *([mounting] if at.mountings_scatter else []), noise, *offsets(at)]
+class LoopCandidates(CandidateKind):
+    """An output force of a loop under load."""
+
+    name = "loop"
+    noun = "loop under load"
+    order = 5
+    needs = (FORCE_NOISE, REFERENCE_PRELOAD)
+    unknown = "only a pull-pull loop with a table of its forces, and a preload of its own, has such readings."
+    along_route = True
+    loaded = True
+
+    @override
+    def is_possible(self, at: Situation) -> bool:
+        return at.cable.is_loop
+
+    @override
+    def measured(self, cable: Cable) -> str:
+        return "the loop's output force"
+
+    @override
+    def candidates(self, at: Situation) -> list[Candidate]:
+        """Return every input force along the cable."""
+        table = at.measurements.table(LoopTable)
+        if table is None:
+            return []
+        loads = some_loads(np.abs(table.input_force))
+        return [replace(case, load=load) for case in at.along_cable(self.name, table.own) for load in loads]
+
+    @override
+    def simulation(self, at: Situation, candidates: Sequence[Candidate]) -> Simulation:
+        (route, own, origin), load = at.rows(candidates), np.array([c.load for c in candidates])
+        forward, nothing = np.ones(len(candidates), dtype=int), np.full(len(candidates), np.nan)
+        table = LoopTable(route, load, 0.8 * load, forward, nothing, own, origin)
+        return one_reading_each(loop_term(at.cable, table, at.angles))
 
 
-def _draw(table: LoopTable, truth: Truth) -> dict[str, Array]:
-    """Forces of a loop with noise in both cells; rows without an input force are of free motion."""
-    cable, values, scale = truth.cable, truth.values, truth.scale
-    key = jax.random.split(jax.random.fold_in(truth.key, 3), 3)[2]
-    of_input, of_output = jax.random.split(key)
-    bends, variance = truth.wrap_angles(table)
-    own = cable.elasticity.preload(values, jnp.sum(bends, axis=-1))[0]
-    preload = jnp.where(jnp.isnan(table.preload), own, jnp.nan_to_num(table.preload))
-    bends = bends + scale * jnp.sqrt(variance) * jax.random.normal(jax.random.fold_in(key, 2), bends.shape)
-    mounting = values[RUN_SCATTER] * values[LOOP_MOUNTING] if LOOP_MOUNTING in values else 0.0
-    exponent, stroke = cable.friction_exponent(values, bends) + mounting, jnp.asarray(table.stroke, dtype=float)
-    free = stroke * free_motion_loss(preload, exponent)
-    force = jnp.where(jnp.isnan(table.input_force), free, jnp.nan_to_num(table.input_force))
-    output = loop_output_force(force, preload, exponent, stroke)
-    cells, noise = LoadCells.of(values), scale * values[FORCE_NOISE]
-    of_input_cell = noise * cable.description.sensors.noise_ratio
-    return {
-        "input_force": cells.shown_input(force) + of_input_cell * jax.random.normal(of_input, force.shape),
-        "output_force": cells.shown_output(output) + noise * truth.scatter(of_output, force.shape),
-    }
+class LoopTerms(TermKind[LoopTable]):
+    """Loop tables in the likelihood."""
 
+    name = "loop"
+    candidate = LoopCandidates()
 
-def _offered(at: Situation) -> list[Candidate]:
-    """Every input force along the cable."""
-    table = at.measurements.table(LoopTable)
-    if table is None:
-        return []
-    loads = some_loads(np.abs(table.input_force))
-    return [replace(case, load=load) for case in at.along_cable("loop", table.own) for load in loads]
+    @override
+    def terms(self, cable: Cable, table: LoopTable, angles: AngleTable | None) -> tuple[LoopTerm]:
+        return (loop_term(cable, table, angles),)
 
+    @override
+    def parameters(self, table: LoopTable, at: Circumstances) -> list[Parameter]:
+        """Return preload, noise and offsets; and what its one mounting did, if other readings tell how mountings scatter."""
+        meaning = "effect of the loop's mounting on the friction exponent, in units of tau"
+        mounting = Parameter(LOOP_MOUNTING, "$m$", meaning, "sensor", Normal(0.0, 1.0))
+        noise = force_noise(at, at.noise.meaning("standard deviation of a force reading"))
+        return [*preload(at), *([mounting] if at.mountings_scatter else []), noise, *offsets(at)]
 
-def _simulation(at: Situation, wanted: Sequence[Candidate]) -> Simulation:
-    (route, own, origin), load = at.rows(wanted), np.array([c.load for c in wanted])
-    forward, nothing = np.ones(len(wanted), dtype=int), np.full(len(wanted), np.nan)
-    return one_reading_each(
-        loop_term(at.cable, LoopTable(route, load, 0.8 * load, forward, nothing, own, origin), at.angles)
-    )
+    @override
+    def draw(self, table: LoopTable, truth: Truth) -> dict[str, Array]:
+        """Draw forces with noise in both cells; rows without an input force are of free motion."""
+        cable, values, scale = truth.cable, truth.values, truth.scale
+        key = jax.random.split(jax.random.fold_in(truth.key, 3), 3)[2]
+        of_input, of_output = jax.random.split(key)
+        bends, variance = truth.wrap_angles(table)
+        own = cable.elasticity.preload(values, jnp.sum(bends, axis=-1))[0]
+        preload = jnp.where(jnp.isnan(table.preload), own, jnp.nan_to_num(table.preload))
+        bends = bends + scale * jnp.sqrt(variance) * jax.random.normal(jax.random.fold_in(key, 2), bends.shape)
+        mounting = values[RUN_SCATTER] * values[LOOP_MOUNTING] if LOOP_MOUNTING in values else 0.0
+        exponent, stroke = cable.friction_exponent(values, bends) + mounting, jnp.asarray(table.stroke, dtype=float)
+        free = stroke * free_motion_loss(preload, exponent)
+        force = jnp.where(jnp.isnan(table.input_force), free, jnp.nan_to_num(table.input_force))
+        output = loop_output_force(force, preload, exponent, stroke)
+        cells, noise = LoadCells.of(values), scale * values[FORCE_NOISE]
+        of_input_cell = noise * cable.description.sensors.noise_ratio
+        return {
+            "input_force": cells.shown_input(force) + of_input_cell * jax.random.normal(of_input, force.shape),
+            "output_force": cells.shown_output(output) + noise * truth.scatter(of_output, force.shape),
+        }
 
+    @override
+    def places(self, table: LoopTable, term: Term) -> Mapping[str, np.ndarray]:
+        return {LOAD: table.input_force, WRAP_ANGLE: np.rad2deg(np.nansum(table.own.angle, axis=1))}
 
-LOOP = TermKind(
-    "loop",
-    lambda cable, table, angles: (loop_term(cable, table, angles),),
-    _parameters,
-    Remeasurement(_draw),
-    CandidateKind(
-        name="loop",
-        noun="loop under load",
-        words=lambda _: "the loop's output force",
-        order=5,
-        needs=(FORCE_NOISE, REFERENCE_PRELOAD),
-        possible=lambda at: at.cable.is_loop,
-        unknown="only a pull-pull loop with a table of its forces, and a preload of its own, has such readings.",
-        offered=_offered,
-        simulation=_simulation,
-        along_route=True,
-        loaded=True,
-    ),
-    where=lambda table, _: {LOAD: table.input_force, WRAP_ANGLE: np.rad2deg(np.nansum(table.own.angle, axis=1))},
-    back=lambda table: table.stroke < 0,
-)
+    @override
+    def on_way_back(self, table: LoopTable) -> np.ndarray:
+        return table.stroke < 0

@@ -5,13 +5,17 @@ from dataclasses import replace
 from typing import Any
 
 import jax
+import jax.numpy as jnp
 import numpy as np
 from jax import Array
 from jaxtyping import Float
+from typing_extensions import override
 
 from bowdenfit.cable.cable import Cable
+from bowdenfit.cable.noise import noise_law
 from bowdenfit.kinds.angles.table import AngleTable
-from bowdenfit.kinds.bench import Remeasurement, drawn_by_term
+from bowdenfit.kinds.bench import Truth
+from bowdenfit.kinds.bounds import first_less, joined, last_less
 from bowdenfit.kinds.candidate import (
     UNKNOWN_SCATTER,
     Candidate,
@@ -21,10 +25,10 @@ from bowdenfit.kinds.candidate import (
     one_reading_each,
     some_bends,
 )
-from bowdenfit.kinds.elastic_term import ElasticTerm
+from bowdenfit.kinds.independent_readings import IndependentReadings
 from bowdenfit.kinds.preload.table import PreloadTable
 from bowdenfit.kinds.shared_parameters import preload, preload_scale
-from bowdenfit.kinds.term import WRAP_ANGLE, Circumstances, TermKind
+from bowdenfit.kinds.term import WRAP_ANGLE, Circumstances, Term, TermKind
 from bowdenfit.parameters.priors import HalfCauchy
 from bowdenfit.parameters.space import Parameter
 
@@ -32,57 +36,125 @@ MEASURED_PRELOAD = "measured_preload"  # not the name of the parameter
 PRELOAD_NOISE = "sigma_P"
 
 
-def preload_term(cable: Cable, table: PreloadTable) -> ElasticTerm:
+class PreloadTerm(IndependentReadings):
+    r"""Likelihood of a table of preload.
+
+    .. math:: P_i \sim \text{Normal}(P(\theta_i),\ \sigma_P)
+
+    A preload of 0 is what a load cell says of a slack rope whatever its noise: such a row is known to be at most 0, and
+    contributes :math:`\Phi(-P(\theta)/\sigma_P)`. These rows come last; "at_most" of the data holds their zeros.
+    """
+
+    name = MEASURED_PRELOAD
+    unit = "N"
+    noise = PRELOAD_NOISE
+    depends_on_conditions = False  # see `Term`
+
+    @property
+    def residual_blocks(self) -> tuple[tuple[int, int], ...]:
+        """All readings scatter alike; a bound has no scatter."""
+        read = len(self.data["reading"])
+        return ((read, read), (len(self.labels) - read, 0))
+
+    @property
+    def padded(self) -> dict[str, Any]:
+        """See `LogDensity.padded`: every row as one that was read and as one that is known to be at most 0."""
+        none_read, none_bound = (np.full(len(self.data[name]), np.nan) for name in ("at_most", "reading"))
+        reading, at_most = [self.data["reading"], none_read], [none_bound, self.data["at_most"]]
+        return self.data | {"reading": np.concatenate(reading), "at_most": np.concatenate(at_most)}
+
+    @override
+    def expected(self, values: Mapping[str, Array], data: Mapping[str, Any]) -> Float[Array, " rows"]:
+        return self.cable.elasticity.preload(values, data["wrap_angle"])[0]
+
+    def _deviations(
+        self, values: Mapping[str, Array], data: Mapping[str, Any], noise: Array
+    ) -> tuple[Float[Array, " read"], Float[Array, " at_most"]]:
+        """Standardized deviations: of the readings, and of those that are only known to be at most 0."""
+        expected = self.expected(values, data)
+        return first_less(data["reading"], expected) / noise, last_less(data["at_most"], expected) / noise
+
+    @override
+    def log_likelihood(self, values: Mapping[str, Array], data: Mapping[str, Any]) -> Float[Array, " rows"]:
+        deviation, u = self._deviations(values, data, values[self.noise])
+        law = noise_law(self.cable.description)
+        read = law.log_density(deviation) - jnp.log(values[self.noise])
+        return joined((data["reading"], read), (data["at_most"], law.log_cdf(u)))
+
+    @override
+    def residuals(self, values: Mapping[str, Array], data: Mapping[str, Any]) -> Float[Array, " rows"]:
+        """Standardized residuals; sqrt(-2 log likelihood) for rows known to be at most 0."""
+        deviation, u = self._deviations(values, data, jax.lax.stop_gradient(values[self.noise]))
+        law = noise_law(self.cable.description)
+        return joined((data["reading"], law.residual(deviation)), (data["at_most"], law.bound_residual(u)))
+
+    @override
+    def simulate(
+        self, values: Mapping[str, Array], data: Mapping[str, Any], key: Array, scale: float = 1.0
+    ) -> Float[Array, " rows"]:
+        return jnp.maximum(super().simulate(values, data, key, scale), 0.0)
+
+    @override
+    def observed(self) -> np.ndarray:
+        return np.concatenate([self.data["reading"], self.data["at_most"]])
+
+
+def preload_term(cable: Cable, table: PreloadTable) -> PreloadTerm:
     """The term of a table of preload; rows that read 0 come last."""
     slack = table.preload == 0
     angles = np.concatenate([table.wrap_angle[~slack], table.wrap_angle[slack]])
     data = {"reading": table.preload[~slack], "at_most": table.preload[slack], "wrap_angle": angles}
     labels = tuple(f"{np.rad2deg(angle):.4g} deg" for angle in angles)
-    return ElasticTerm(cable, data, labels, MEASURED_PRELOAD, "N", PRELOAD_NOISE, _preload, 0.0)
+    return PreloadTerm(cable, data, labels)
 
 
-def _preload(cable: Cable, values: Mapping[str, Array], data: Mapping[str, Any]) -> Float[Array, " rows"]:
-    return cable.elasticity.preload(values, data["wrap_angle"])[0]
+class PreloadCandidates(CandidateKind):
+    """A reading of preload at a total wrap angle."""
+
+    name = "preload"
+    order = 4
+    needs = (PRELOAD_NOISE,)
+    unknown = f"{UNKNOWN_SCATTER}; fit with a table of preload."
+    angles = "total"
+
+    @override
+    def candidates(self, at: Situation) -> list[Candidate]:
+        table = at.measurements.table(PreloadTable)
+        return [Candidate(self.name, angles=(bend,)) for bend in some_bends(table.wrap_angle)] if table is not None else []
+
+    @override
+    def simulation(self, at: Situation, candidates: Sequence[Candidate]) -> Simulation:
+        bend, (_, _, origin) = np.array([sum(c.angles) for c in candidates]), at.rows(candidates)
+        return one_reading_each(preload_term(at.cable, PreloadTable(bend, np.full(len(candidates), 20.0), origin)))
 
 
-def _parameters(_: PreloadTable, at: Circumstances) -> list[Parameter]:
-    """The preload, and how readings scatter."""
-    part, by = at.defaults.preload_noise_share, preload_scale(at)
-    noise = Parameter(
-        PRELOAD_NOISE, r"$\sigma_P$", at.noise.meaning("standard deviation of a preload reading"), "noise",
-        HalfCauchy(part * by.value), "N", scaled_by=by.share(part),
-    )  # fmt: skip
-    return [*preload(at), noise]
+class PreloadTerms(TermKind[PreloadTable]):
+    """Preload tables in the likelihood."""
 
+    name = "preload"
+    candidate = PreloadCandidates()
 
-def _unread(cable: Cable, table: PreloadTable, _: AngleTable | None) -> ElasticTerm:
-    """The term of a table yet to be read, of which nobody knows which rows will be slack."""
-    return preload_term(cable, replace(table, preload=np.ones(len(table.preload))))
+    @override
+    def terms(self, cable: Cable, table: PreloadTable, angles: AngleTable | None) -> tuple[PreloadTerm]:
+        return (preload_term(cable, table),)
 
+    @override
+    def parameters(self, table: PreloadTable, at: Circumstances) -> list[Parameter]:
+        """Return the preload, and how readings scatter."""
+        part, by = at.defaults.preload_noise_share, preload_scale(at)
+        noise = Parameter(
+            PRELOAD_NOISE, r"$\sigma_P$", at.noise.meaning("standard deviation of a preload reading"), "noise",
+            HalfCauchy(part * by.value), "N", scaled_by=by.share(part),
+        )  # fmt: skip
+        return [*preload(at), noise]
 
-def _offered(at: Situation) -> list[Candidate]:
-    table = at.measurements.table(PreloadTable)
-    return [Candidate("preload", angles=(bend,)) for bend in some_bends(table.wrap_angle)] if table is not None else []
+    @override
+    def draw(self, table: PreloadTable, truth: Truth) -> dict[str, Array]:
+        """Draw readings of a table of which nobody knows yet which rows will be slack."""
+        taut = replace(table, preload=np.ones(len(table.preload)))
+        own_key = jax.random.split(jax.random.fold_in(truth.key, 3), 3)[1]
+        return {"preload": truth.simulate(preload_term(truth.cable, taut), own_key)}
 
-
-def _simulation(at: Situation, wanted: Sequence[Candidate]) -> Simulation:
-    bend, (_, _, origin) = np.array([sum(c.angles) for c in wanted]), at.rows(wanted)
-    return one_reading_each(preload_term(at.cable, PreloadTable(bend, np.full(len(wanted), 20.0), origin)))
-
-
-PRELOAD = TermKind(
-    "preload",
-    lambda cable, table, _: (preload_term(cable, table),),
-    _parameters,
-    Remeasurement(drawn_by_term(_unread, "preload", lambda key: jax.random.split(jax.random.fold_in(key, 3), 3)[1])),
-    CandidateKind(
-        name="preload",
-        order=4,
-        needs=(PRELOAD_NOISE,),
-        unknown=f"{UNKNOWN_SCATTER}; fit with a table of preload.",
-        offered=_offered,
-        simulation=_simulation,
-        angles="total",
-    ),
-    where=lambda _, term: {WRAP_ANGLE: np.rad2deg(term.data["wrap_angle"])},
-)
+    @override
+    def places(self, table: PreloadTable, term: Term) -> Mapping[str, np.ndarray]:
+        return {WRAP_ANGLE: np.rad2deg(term.data["wrap_angle"])}

@@ -1,18 +1,56 @@
-"""Recordings whose files say themselves at which wrap angle or length they were made, in a channel that stays the same."""
+"""Where a recording was made, as the name of its file says by a pattern, or a channel that stays the same."""
 
 from collections.abc import Mapping
+from pathlib import Path
 
 import numpy as np
 
 from bowdenfit.description import Description, QuantityValue, RecordingFile, Route
-from bowdenfit.errors import DatasetError
+from bowdenfit.errors import DatasetError, DescriptionError, nearest
 from bowdenfit.files.channels import ChannelFile
 from bowdenfit.files.matching import Quantity
+from bowdenfit.recordings.name_patterns import match_name, pattern_fields
 from bowdenfit.recordings.named_channels import steady_value
-from bowdenfit.units import ColumnSource, conversion_factor, route_conversion_factor
+from bowdenfit.units import ColumnSource, conversion_factor, route_conversion_factor, speed_dimension
 
 _SAME_BEND = float(np.deg2rad(2.0))  # by which a wrap angle may change during a recording
 _SAME_LENGTH = 0.005  # of the range of the route, by which a length may
+
+
+def entry_from_name(description: Description, pattern: str | None, path: Path, file: str) -> RecordingFile:
+    """Return what the name of a file says, by the table's pattern."""
+    if pattern is None:
+        return RecordingFile(file=file)
+    _check_pattern(description, pattern)
+    values = match_name(pattern, path)
+    angles = {
+        name: QuantityValue(value=float(text), unit=unit or "deg")
+        for name, (text, unit) in values.items()
+        if name in description.angle_columns
+    }
+    velocity = values.get("velocity")
+    return RecordingFile(
+        file=file,
+        run=values["run"][0] if "run" in values else None,
+        at=float(values["at"][0]) if "at" in values else None,
+        velocity=QuantityValue(value=float(velocity[0]), unit=velocity[1] or "mm/s") if velocity else None,
+        wrap_angles=angles,
+    )
+
+
+def _check_pattern(description: Description, pattern: str) -> None:
+    """Refuse a pattern that names what a recording does not have, or a unit of the wrong kind."""
+    known = ["at", "run", "velocity", *description.angle_columns]
+    place = "cable.toml, tables.recordings.pattern"
+    for name, unit in pattern_fields(pattern):
+        if name not in known:
+            raise DescriptionError(f"{place}: {name!r} is unknown{nearest(name, known)}")
+        if unit and name != "at" and name != "run":
+            dimension = speed_dimension(unit) if name == "velocity" else "angle"
+            try:
+                conversion_factor(unit, dimension)
+            except DatasetError as error:
+                raise DescriptionError(f"{place}, {{{name}:{unit}}}: {error}.") from None
 
 
 def place_names(description: Description) -> tuple[str, ...]:

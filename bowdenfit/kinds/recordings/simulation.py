@@ -131,7 +131,7 @@ def _strokes(description: Description, recording: Recording, blocks: Blocks) -> 
     return replace(found, correlation=recording.strokes.correlation)
 
 
-def refuse_saturated(_: Description, recordings: Recordings) -> None:
+def refuse_saturated(recordings: Recordings) -> None:
     """Refuse recordings with readings at the end of a load cell's range.
 
     Raises:

@@ -11,10 +11,9 @@ from bowdenfit.description import Description, Preparation, QuantityValue, Recor
 from bowdenfit.errors import DatasetError, DescriptionError, Faults, nearest
 from bowdenfit.files import read_channels
 from bowdenfit.files.row_account import RowAccount
-from bowdenfit.kinds.kind import Found, Source
+from bowdenfit.kinds.kind import Source, TableFromFiles
 from bowdenfit.kinds.recordings.angles import check_placed
-from bowdenfit.kinds.recordings.names import said_by_name
-from bowdenfit.kinds.recordings.placing import place_names, placed_by_channels
+from bowdenfit.kinds.recordings.placing import entry_from_name, place_names, placed_by_channels
 from bowdenfit.kinds.recordings.settings import RecordingsTable
 from bowdenfit.recordings.forces import to_recording
 from bowdenfit.recordings.named_channels import TORQUES, WANTED, rows_where
@@ -26,7 +25,7 @@ from bowdenfit.types import Vector
 from bowdenfit.units import INTERNAL_UNITS, ColumnSource, speed_dimension
 
 
-def read_recordings(source: Source) -> Found[Recordings]:
+def read_recordings(source: Source) -> TableFromFiles[Recordings]:
     """Read all recordings of a description.
 
     Args:
@@ -55,7 +54,7 @@ def read_recordings(source: Source) -> Found[Recordings]:
     check_placed(recordings, description)
     remarks = [remark for r in each for remark in (*r.account.remarks, *r.strokes.remarks)]
     accounts = dict.fromkeys(f.account for f in files if f.account is not None)  # a file may hold several recordings
-    return Found(recordings, {entry.file: path for path, entry in entries}, tuple(remarks), tuple(accounts))
+    return TableFromFiles(recordings, {entry.file: path for path, entry in entries}, tuple(remarks), tuple(accounts))
 
 
 @dataclass(frozen=True)
@@ -115,7 +114,7 @@ def _entries(source: Source) -> list[tuple[Path, RecordingFile]]:
     named = {path.resolve() for path, _ in entries}
     for path in source.files:
         if path.resolve() not in named:
-            entries.append((path, said_by_name(description, source.settings.pattern, path, source.name_of(path))))
+            entries.append((path, entry_from_name(description, source.settings.pattern, path, source.name_of(path))))
     runs = Counter(entry.run for _, entry in entries if not entry.name)
     return [(path, _named(path, entry) if runs[entry.run] > 1 else entry) for path, entry in entries]
 

@@ -7,12 +7,15 @@ it only up to what the mounting did to this run.
 from collections.abc import Mapping
 
 import numpy as np
+from jax import Array
+from typing_extensions import override
 
 from bowdenfit.cable.cable import Cable
 from bowdenfit.cable.load_cells import BLOCK_NOISE, DELAY_ERROR
+from bowdenfit.description import Description
 from bowdenfit.errors import DatasetError
 from bowdenfit.kinds.angles.table import AngleTable
-from bowdenfit.kinds.bench import Remeasurement
+from bowdenfit.kinds.bench import Truth
 from bowdenfit.kinds.recordings.angles import recorded_angles
 from bowdenfit.kinds.recordings.blocks import (
     RECORDED,
@@ -25,7 +28,6 @@ from bowdenfit.kinds.recordings.blocks import (
     standing_share,
     worth_of,
 )
-from bowdenfit.kinds.recordings.events import EVENTS
 from bowdenfit.kinds.recordings.loops import LoopRecordingsTerm, loop_recordings_term
 from bowdenfit.kinds.recordings.settings import RecordingsTable
 from bowdenfit.kinds.recordings.simulation import drawn_recordings, recorded_again, refuse_saturated
@@ -35,7 +37,7 @@ from bowdenfit.kinds.row_angles import row_angles
 from bowdenfit.kinds.runs import RunsTerm, run_sums
 from bowdenfit.kinds.shared_parameters import noise_of_forces, offsets, preload, run_scatter
 from bowdenfit.kinds.sliding_rows import ROW_ARRAYS, SlidingRows
-from bowdenfit.kinds.term import Circumstances, TermKind
+from bowdenfit.kinds.term import Circumstances, Term, TermKind
 from bowdenfit.parameters.priors import Normal
 from bowdenfit.parameters.space import Parameter
 from bowdenfit.recordings.preparation.play import clear_of_turns, last_contact, play
@@ -178,23 +180,58 @@ def _rows(recordings: Recordings, parts: list[BlocksUsed], angles: Mapping[str, 
     )
 
 
-def _parameters(recordings: Recordings, at: Circumstances) -> list[Parameter]:
-    """Scatter of mountings and blocks, what the load cells add, and of a loop its preload."""
-    late = recordings.delay_sd
-    block_noise = noise_of_forces(at, BLOCK_NOISE, r"$\sigma_B$", "standard deviation of a block's mean force")
-    delay = Parameter(
-        DELAY_ERROR, r"$\delta$", "error of the estimated delay between the load cells' channels", "sensor",
-        Normal(0.0, late), "ms", 1000.0, prior_words=f"Normal(0, {1000 * late:.3g} ms)",
-    )  # fmt: skip
-    of_loop = preload(at) if at.cable.is_loop else []
-    return [*of_loop, run_scatter(at), block_noise, *offsets(at), *([delay] if late > 0 else [])]
+class RecordingTerms(TermKind[Recordings]):
+    """Recordings in the likelihood."""
 
+    name = "recordings"
+    tells_mountings = True
 
-RECORDINGS = TermKind(
-    "recordings",
-    lambda cable, recordings, angles: (recordings_term(cable, recordings, angles),),
-    _parameters,
-    Remeasurement(drawn_recordings, recorded_again, refuse_saturated),
-    tells_mountings=True,
-    events=EVENTS,
-)
+    @override
+    def terms(self, cable: Cable, table: Recordings, angles: AngleTable | None) -> tuple[Term]:
+        return (recordings_term(cable, table, angles),)
+
+    @override
+    def parameters(self, table: Recordings, at: Circumstances) -> list[Parameter]:
+        """Return scatter of mountings and blocks, what the load cells add, and of a loop its preload."""
+        late = table.delay_sd
+        block_noise = noise_of_forces(at, BLOCK_NOISE, r"$\sigma_B$", "standard deviation of a block's mean force")
+        delay = Parameter(
+            DELAY_ERROR, r"$\delta$", "error of the estimated delay between the load cells' channels", "sensor",
+            Normal(0.0, late), "ms", 1000.0, prior_words=f"Normal(0, {1000 * late:.3g} ms)",
+        )  # fmt: skip
+        of_loop = preload(at) if at.cable.is_loop else []
+        return [*of_loop, run_scatter(at), block_noise, *offsets(at), *([delay] if late > 0 else [])]
+
+    @override
+    def draw(self, table: Recordings, truth: Truth) -> dict[str, Array]:
+        return drawn_recordings(table, truth)
+
+    @override
+    def with_readings(
+        self, description: Description, table: Recordings, drawn: Mapping[str, np.ndarray]
+    ) -> Recordings:
+        return recorded_again(description, table, drawn)
+
+    @override
+    def check_drawable(self, description: Description, table: Recordings) -> None:
+        refuse_saturated(table)
+
+    @override
+    def events(self, term: Term, description: Description) -> np.ndarray:
+        """Return how many blocks each run has and how they were chosen: a run is the likelihood of all its blocks."""
+        if term.name != RECORDED:
+            return super().events(term, description)
+        settings = description.table(RecordingsTable)
+        whole = float(settings is not None and settings.likelihood == "whole")
+        return np.column_stack([term.data["n"], np.full(len(term.labels), whole)])
+
+    @override
+    def why_events_differ(self, readings: str, descriptions: Mapping[str, Description]) -> str:
+        if readings != RECORDED:
+            return super().why_events_differ(readings, descriptions)
+        if len({table.likelihood for d in descriptions.values() if (table := d.table(RecordingsTable))}) > 1:
+            return "some fits take the sliding blocks of runs and others whole recordings, which are not the same readings"
+        return (
+            "the fits do not count the same blocks of them, because they prepare them differently, or because friction that "
+            'depends on load or speed takes another way through whole recordings; likelihood = "runs" counts them alike'
+        )

@@ -1,15 +1,13 @@
-"""Recordings in words and one table: where the samples went, what was done to them, which phases were found."""
+"""Where the samples of recordings went, what was done to them, which phases were found: as plain data, and in words."""
 
 from typing import Any
 
 import numpy as np
 
-from bowdenfit.kinds.plausibility import FACTOR, SCATTER, beyond
-from bowdenfit.kinds.recordings.accounts import preparation_pages
-from bowdenfit.recordings.recording import PULL, RETURN, Recordings
-from bowdenfit.words import counted, filled, listed, narrow_table
+from bowdenfit.recordings.recording import PULL, RETURN, SWITCH, Recording, Recordings
+from bowdenfit.words import filled, listed, narrow_table
 
-_FEWEST_BLOCKS = 10  # of each stroke of a plausible recording
+_PHASES = (("pulling", PULL), ("returning", RETURN), ("switching", SWITCH))
 _SAMPLES = ("recording", "samples", "used", "left out", "block")
 _HEADS = (*_SAMPLES, "pulling", "switching", "returning", "sliding", "exponent")
 _LOOP_HEADS = (*_SAMPLES, "forward", "between", "back", "moving", "loss", "exponent")
@@ -24,6 +22,36 @@ _LOOP_NOTE = (
     "the force that is lost while both sides are taut, 2 x preload x exponent, and the exponent is that of one side, both by "
     "the recording itself; a dash where it does not tell them."
 )
+
+
+def preparation_pages(recordings: Recordings) -> list[dict[str, Any]]:
+    """Return a dictionary for each recording: its samples, its preparation and its phases, in s, N and Hz."""
+    return [_preparation(recording) for recording in recordings.each]
+
+
+def _preparation(recording: Recording) -> dict[str, Any]:
+    account, strokes = recording.account, recording.strokes
+    phases = {word: int(np.sum(strokes.stroke == sign)) for word, sign in _PHASES}
+    return {
+        "name": recording.name,
+        "file": recording.file,
+        "run": recording.run,
+        "at": recording.route,
+        "samples": account.samples,
+        "counts": dict(account.counts),
+        "rate": account.rate,
+        "bandwidth": account.bandwidth,
+        "block": account.block,
+        "tare": list(account.tare),
+        "delay": account.delay,
+        "delay_sd": account.delay_sd,
+        "noise": list(account.noise),
+        "blocks": phases | {"sliding": int(strokes.used_sliding.sum())},
+        "phases_by_hand": strokes.by_hand,
+        "correlation_time": strokes.correlation * max(account.block, 1 / account.rate),
+        "exponent": strokes.exponent,
+        "center": strokes.center,
+    }
 
 
 def recordings_text(recordings: Recordings) -> list[str]:
@@ -85,30 +113,3 @@ def _tare(pages: list[dict[str, Any]]) -> list[str]:
 def _by_hand(pages: list[dict[str, Any]]) -> list[str]:
     names = [p["name"] for p in pages if p["phases_by_hand"]]
     return [f"Phases set by hand in cable.toml: {listed(names)}."] if names else []
-
-
-def alone(recordings: Recordings) -> str:
-    """How long a lone recording is."""
-    length = sum(float(np.ptp(r.blocks.time)) for r in recordings.each if len(r.blocks.time))
-    return f"a recording of {length:.3g} s"
-
-
-def count(recordings: Recordings) -> str:
-    """How many samples of how many recordings, in how many runs."""
-    blocks = sum(int(r.strokes.used_sliding.sum()) for r in recordings.each)
-    samples, runs = sum(r.account.samples for r in recordings.each), len(recordings.runs)
-    of = f"{counted(len(recordings.each), 'recording')} in {counted(runs, 'run')}"
-    return f"{counted(samples, 'sample')} of {of} ({counted(blocks, 'sliding block')})"
-
-
-def implausible(real: Recordings, made: Recordings) -> str:
-    """Recordings that hardly slide, are nothing but noise, or of an efficiency that no bench reads."""
-    for one, other in zip(real.each, made.each, strict=True):
-        for stroke in (PULL, RETURN):
-            before, after = (int(np.sum(r.strokes.used_sliding & (r.strokes.stroke == stroke))) for r in (one, other))
-            if after < min(before, _FEWEST_BLOCKS):
-                return "a recording hardly slides"
-        if other.strokes.noise > max(FACTOR * one.strokes.noise, SCATTER if not real.loop else 0.0):
-            return "a recording is nothing but noise"
-    exponents = np.array([r.strokes.exponent for r in made.each])
-    return beyond(exponents[np.isfinite(exponents)], "the efficiency of a recording")

@@ -13,7 +13,7 @@ from bowdenfit.errors import DatasetError
 from bowdenfit.files.columns import Column, Quantity, find_columns, require
 from bowdenfit.files.csv_table import RawTable
 from bowdenfit.files.tables import read_table
-from bowdenfit.kinds.kind import Found, Source
+from bowdenfit.kinds.kind import Source, TableFromFiles
 from bowdenfit.kinds.rows import RowOrigin, provenance_of
 from bowdenfit.types import Labels, Vector
 
@@ -68,7 +68,7 @@ class RingDownTable(Part):
         return len(turned), float(np.polyfit(np.arange(len(first)), first, 1)[0])
 
 
-def read_ring_down(source: Source) -> Found[RingDownTable]:
+def read_ring_down(source: Source) -> TableFromFiles[RingDownTable]:
     """Read a table of one ring-down, or of several by the column `run`; the first row of each is its release.
 
     Args:
@@ -104,7 +104,7 @@ def read_ring_down(source: Source) -> Found[RingDownTable]:
     made = RingDownTable(since, reading, is_torque, run, more, inertia, sd, provenance_of(table))
     for i, name in enumerate(names):
         _check_swings(table, name, made, i)
-    return Found(made, {path.name: path}, accounts=(table.account,))
+    return TableFromFiles(made, {path.name: path}, accounts=(table.account,))
 
 
 def _runs(found: Mapping[str, Column], n: int) -> tuple[Labels, tuple[str, ...]]:

@@ -9,14 +9,14 @@ import jax.numpy as jnp
 import numpy as np
 from jax import Array
 from jaxtyping import Float
+from typing_extensions import override
 
 from bowdenfit.cable.cable import Cable
 from bowdenfit.kinds.angles.table import AngleTable
-from bowdenfit.kinds.bench import Remeasurement, drawn_by_term
-from bowdenfit.kinds.elastic_term import ElasticTerm
+from bowdenfit.kinds.bench import Truth
+from bowdenfit.kinds.independent_readings import IndependentReadings
 from bowdenfit.kinds.ringdown.table import RingDownTable
-from bowdenfit.kinds.ringdown.turns import decay as decay_of_turns
-from bowdenfit.kinds.term import Circumstances, TermKind
+from bowdenfit.kinds.term import Circumstances, Term, TermKind
 from bowdenfit.parameters.priors import HalfCauchy, HalfNormal, LogNormal, Normal, TruncatedNormal
 from bowdenfit.parameters.space import Parameter
 from bowdenfit.physics.ring_down import ring_down
@@ -28,6 +28,8 @@ _TIMES = 1.5  # what damping, or friction, would be if it alone stopped the join
 _NOISE_SHARE, _REST_SHARE = 0.005, 0.1  # of the first deflection: as of an encoder of 2000 counts a turn; zero of a sensor
 _STARTS = (-1.5, 0.0, 1.5)  # z: how many half swings friction leaves is a whole number, and each has a best fit of its own
 _LEAST = 1e-9  # of a first look, which a positive prior must hold
+_LARGE = 0.15  # of the first swing, above which one counts; smaller ones are more and more noise
+_LEAST_DECAY, _MOST_DECAY = 0.05, 0.999  # decay of a half swing
 _MORE_SWINGS = 3  # times those that are seen
 
 
@@ -36,90 +38,50 @@ def of_run(name: str, run: int) -> str:
     return f"ring_{name}_{run + 1}"
 
 
-def ring_down_term(cable: Cable, table: RingDownTable, angles: AngleTable | None = None) -> ElasticTerm:
+class RingDownTerm(IndependentReadings):
+    r"""Likelihood of a table of ring-downs: angles [rad], or torques :math:`K x + b_c \dot x` in the rope [N m].
+
+    To each of them what is read at rest is added.
+    """
+
+    name = "ringdown"
+    noise = NOISE
+    depends_on_conditions = False  # see `Term`
+
+    @property
+    def unit(self) -> str:
+        """Of angles or of torques."""
+        return "N m" if np.any(self.data["torque"] > 0) else "rad"
+
+    @override
+    def expected(self, values: Mapping[str, Array], data: Mapping[str, Any]) -> Float[Array, " rows"]:
+        run, n = data["run"], len(data["added"])
+        amplitude, rest, release = (
+            jnp.stack([values[of_run(name, i)] for i in range(n)]) for name in ("amplitude", "rest", "release")
+        )
+        stiffness, damping = values[STIFFNESS], values[DAMPING]
+        angle, speed = ring_down(
+            data["time"] - release[run], run, amplitude, values[INERTIA] + data["added"], stiffness, damping,
+            values[FRICTION], len(data["swings"]),
+        )  # fmt: skip
+        return rest[run] + jnp.where(data["torque"][run] > 0, stiffness * angle + damping * speed, angle)
+
+
+def ring_down_term(cable: Cable, table: RingDownTable) -> RingDownTerm:
     """The term of a table of ring-downs."""
-    del angles
     swings = _sampling(table)[1]
     data = {
-        "reading": table.reading, "at_most": np.zeros(0), "time": table.time, "run": table.run, "added": table.added,
+        "reading": table.reading, "time": table.time, "run": table.run, "added": table.added,
         "torque": np.full(len(table.added), float(table.is_torque)), "swings": np.zeros(swings),
     }  # fmt: skip
     labels = tuple(f"{1000 * time:.4g} ms" for time in table.time)
-    return ElasticTerm(cable, data, labels, "ringdown", "N m" if table.is_torque else "rad", NOISE, _reading)
+    return RingDownTerm(cable, data, labels)
 
 
 def _sampling(table: RingDownTable) -> tuple[float, int]:
     """Interval between rows [s], and how many half swings are followed."""
     seen = max(table.half_swings(run)[0] for run in range(len(table.added)))
     return float(np.median(np.diff(table.time[table.run == 0]))), _MORE_SWINGS * seen + 5
-
-
-def _reading(_: Cable, values: Mapping[str, Array], data: Mapping[str, Any]) -> Float[Array, " rows"]:
-    r"""Angle [rad], or torque :math:`K x + b_c \dot x` in the rope [N m], each with what is read at rest."""
-    run, n = data["run"], len(data["added"])
-    amplitude, rest, release = (
-        jnp.stack([values[of_run(name, i)] for i in range(n)]) for name in ("amplitude", "rest", "release")
-    )
-    stiffness, damping = values[STIFFNESS], values[DAMPING]
-    angle, speed = ring_down(
-        data["time"] - release[run], run, amplitude, values[INERTIA] + data["added"], stiffness, damping, values[FRICTION],
-        len(data["swings"]),
-    )  # fmt: skip
-    return rest[run] + jnp.where(data["torque"][run] > 0, stiffness * angle + damping * speed, angle)
-
-
-def _parameters(table: RingDownTable, at: Circumstances) -> list[Parameter]:
-    """Inertia, stiffness, damping and friction, and how each run was released and read."""
-    inertia = table.inertia if np.isfinite(table.inertia) else float(np.max(table.added))
-    first = int(np.argmin(table.added))
-    seen, half = table.half_swings(first)
-    omega = np.pi / half
-    stiffness = (inertia + table.added[first]) * omega**2
-    runs = [table.reading[table.run == run] for run in range(len(table.added))]
-    away = [float(reading[0] - np.median(reading[-max(len(reading) // 10, 3) :])) for reading in runs]
-    size = float(np.max(np.abs(away))) or 1.0
-    angle = size / stiffness if table.is_torque else size
-    step, unit = _sampling(table)[0], "N*m" if table.is_torque else "rad"
-    decay = 2 * np.sqrt(stiffness * (inertia + table.added[first])) * np.log(10) / (np.pi * seen)  # to a tenth
-    damping, friction = HalfNormal(_TIMES * decay), HalfNormal(_TIMES * 0.45 * stiffness * angle / seen)
-    looks = _first_looks(table, first, stiffness * (inertia + table.added[first]), stiffness * angle / size)
-    by = f"the period, {2000 * np.pi / omega:.3g} ms, and an inertia of {inertia:.3g} kg m^2"
-    found = [
-        _inertia(table, inertia),
-        Parameter(
-            STIFFNESS, "$K$", "stiffness against which the released joint swings", "elastic",
-            LogNormal(stiffness, 2 * _LOG_SD), "N*m/rad", scaled_by=by, starts=(), first_look=stiffness,
-        ),
-        Parameter(
-            DAMPING, "$b_c$", "viscous damping of rope and joint", "elastic",
-            damping, "N*m*s/rad", scaled_by=by, starts=_STARTS, first_look=looks[0],
-        ),
-        Parameter(
-            FRICTION, "$F_r$", "dry friction of the released joint", "elastic",
-            friction, "N*m",
-            scaled_by=f"the first deflection, {size:.3g} {unit}, over {seen} half swings", starts=_STARTS,
-            first_look=looks[1],
-        ),
-        Parameter(
-            NOISE, r"$\sigma_r$", at.noise.meaning("standard deviation of a reading of the ring-down"), "noise",
-            HalfCauchy(_NOISE_SHARE * size), unit, scaled_by=f"the first deflection, {size:.3g} {unit}",
-        ),
-    ]  # fmt: skip
-    for run, begun in enumerate(away):
-        start, called = begun / stiffness if table.is_torque else begun, f"of ring-down {run + 1}"
-        found += [
-            Parameter(
-                of_run("amplitude", run), f"$x_{{{run + 1}}}$", f"deflection {called}", "sensor", Normal(start, angle), "rad"
-            ),
-            Parameter(
-                of_run("rest", run), f"$q_{{{run + 1}}}$", f"reading without a load {called}", "sensor",
-                Normal(float(np.median(runs[run][-max(len(runs[run]) // 10, 3) :])), _REST_SHARE * size), unit,
-            ),
-            Parameter(
-                of_run("release", run), f"$t_{{{run + 1}}}$", f"time of release {called}", "sensor", Normal(0.0, step), "s"
-            ),
-        ]  # fmt: skip
-    return found
 
 
 def _first_looks(table: RingDownTable, run: int, product: float, stiffness: float) -> tuple[float, float]:
@@ -150,10 +112,104 @@ def _inertia(table: RingDownTable, size: float) -> Parameter:
     return replace(free, prior=TruncatedNormal(table.inertia, table.inertia_sd), scaled_by="")
 
 
-RINGDOWN = TermKind(
-    "ringdown",
-    lambda cable, table, _: (ring_down_term(cable, table),),
-    _parameters,
-    Remeasurement(drawn_by_term(ring_down_term, "reading", lambda key: jax.random.fold_in(key, 11))),
-    where=lambda _, term: {"Time (s)": np.asarray(term.data["time"])},
-)
+def decay_of_turns(table: RingDownTable, run: int) -> tuple[float, float]:
+    r"""Return the decay rho of a half swing by damping, and how far f friction can hold the bar, in units of the reading.
+
+    From the way D from one turn to the next, which needs no place of rest:
+
+    .. math:: D_{n + 1} = \rho D_n - 2 (1 + \rho) f
+
+    Args:
+        table: The table.
+        run: Number of the run.
+    """
+    reading = table.reading[table.run == run]
+    away = reading - np.median(reading[-max(len(reading) // 10, 3) :])
+    turned = np.flatnonzero(np.diff(np.sign(away)) != 0) + 1
+    swings = [part for part in np.split(away, turned) if len(part)]
+    peaks = np.array([part[np.argmax(np.abs(part))] for part in swings])
+    ways = np.abs(np.diff(peaks))
+    last = np.argmax(ways < _LARGE * ways[0]) if np.any(ways < _LARGE * ways[0]) else len(ways)
+    ways = ways[: max(last, 2)]
+    if len(ways) < 3:  # damping and friction share alike
+        ratio = float(np.clip(ways[-1] / ways[0], _LEAST_DECAY, _MOST_DECAY))
+        rho = np.sqrt(ratio)
+        return float(rho), float((rho - ratio) * ways[0] / (2 * (1 + rho)))
+    slope, shift = np.polyfit(ways[:-1], ways[1:], 1)
+    rho = float(np.clip(slope, _LEAST_DECAY, _MOST_DECAY))
+    shift = float(np.mean(ways[1:] - rho * ways[:-1])) if rho != slope else shift
+    return rho, max(float(-shift) / (2 * (1 + rho)), 0.0)
+
+
+class RingDownTerms(TermKind[RingDownTable]):
+    """Ring-downs in the likelihood."""
+
+    name = "ringdown"
+
+    @override
+    def terms(self, cable: Cable, table: RingDownTable, angles: AngleTable | None) -> tuple[RingDownTerm]:
+        return (ring_down_term(cable, table),)
+
+    @override
+    def parameters(self, table: RingDownTable, at: Circumstances) -> list[Parameter]:
+        """Return inertia, stiffness, damping and friction, and how each run was released and read."""
+        inertia = table.inertia if np.isfinite(table.inertia) else float(np.max(table.added))
+        first = int(np.argmin(table.added))
+        seen, half = table.half_swings(first)
+        omega = np.pi / half
+        stiffness = (inertia + table.added[first]) * omega**2
+        runs = [table.reading[table.run == run] for run in range(len(table.added))]
+        away = [float(reading[0] - np.median(reading[-max(len(reading) // 10, 3) :])) for reading in runs]
+        size = float(np.max(np.abs(away))) or 1.0
+        angle = size / stiffness if table.is_torque else size
+        step, unit = _sampling(table)[0], "N*m" if table.is_torque else "rad"
+        decay = 2 * np.sqrt(stiffness * (inertia + table.added[first])) * np.log(10) / (np.pi * seen)  # to a tenth
+        damping, friction = HalfNormal(_TIMES * decay), HalfNormal(_TIMES * 0.45 * stiffness * angle / seen)
+        looks = _first_looks(table, first, stiffness * (inertia + table.added[first]), stiffness * angle / size)
+        by = f"the period, {2000 * np.pi / omega:.3g} ms, and an inertia of {inertia:.3g} kg m^2"
+        found = [
+            _inertia(table, inertia),
+            Parameter(
+                STIFFNESS, "$K$", "stiffness against which the released joint swings", "elastic",
+                LogNormal(stiffness, 2 * _LOG_SD), "N*m/rad", scaled_by=by, starts=(), first_look=stiffness,
+            ),
+            Parameter(
+                DAMPING, "$b_c$", "viscous damping of rope and joint", "elastic",
+                damping, "N*m*s/rad", scaled_by=by, starts=_STARTS, first_look=looks[0],
+            ),
+            Parameter(
+                FRICTION, "$F_r$", "dry friction of the released joint", "elastic",
+                friction, "N*m",
+                scaled_by=f"the first deflection, {size:.3g} {unit}, over {seen} half swings", starts=_STARTS,
+                first_look=looks[1],
+            ),
+            Parameter(
+                NOISE, r"$\sigma_r$", at.noise.meaning("standard deviation of a reading of the ring-down"), "noise",
+                HalfCauchy(_NOISE_SHARE * size), unit, scaled_by=f"the first deflection, {size:.3g} {unit}",
+            ),
+        ]  # fmt: skip
+        for run, begun in enumerate(away):
+            start, called = begun / stiffness if table.is_torque else begun, f"of ring-down {run + 1}"
+            found += [
+                Parameter(
+                    of_run("amplitude", run), f"$x_{{{run + 1}}}$", f"deflection {called}", "sensor",
+                    Normal(start, angle), "rad",
+                ),
+                Parameter(
+                    of_run("rest", run), f"$q_{{{run + 1}}}$", f"reading without a load {called}", "sensor",
+                    Normal(float(np.median(runs[run][-max(len(runs[run]) // 10, 3) :])), _REST_SHARE * size), unit,
+                ),
+                Parameter(
+                    of_run("release", run), f"$t_{{{run + 1}}}$", f"time of release {called}", "sensor", Normal(0.0, step), "s"
+                ),
+            ]  # fmt: skip
+        return found
+
+    @override
+    def draw(self, table: RingDownTable, truth: Truth) -> dict[str, Array]:
+        term = ring_down_term(truth.cable, table)
+        return {"reading": truth.simulate(term, jax.random.fold_in(truth.key, 11))}
+
+    @override
+    def places(self, table: RingDownTable, term: Term) -> Mapping[str, np.ndarray]:
+        return {"Time (s)": np.asarray(term.data["time"])}

@@ -11,7 +11,7 @@ from bowdenfit.files.cells import Cell
 from bowdenfit.files.columns import Column, Quantity, find_columns, require
 from bowdenfit.files.csv_table import RawTable
 from bowdenfit.files.tables import read_table
-from bowdenfit.kinds.kind import Found, Source
+from bowdenfit.kinds.kind import Source, TableFromFiles
 from bowdenfit.kinds.rows import RowOrigin, check_spelling, provenance_of, read_angle, read_tension
 from bowdenfit.types import Flags, Labels, Vector
 
@@ -49,7 +49,7 @@ class StretchTable(Part):
     origin: RowOrigin
 
 
-def read_stretch(source: Source) -> Found[StretchTable]:
+def read_stretch(source: Source) -> TableFromFiles[StretchTable]:
     """Read a table of stretch under load, at one or several wrap angles.
 
     Rows of one `cycle` (all at one wrap angle without such a column) belong to one loading and unloading; `branch` says
@@ -81,7 +81,7 @@ def read_stretch(source: Source) -> Found[StretchTable]:
     made = StretchTable(load, wrap_angle, np.asarray(stretch), unloading, peak, cycle, names, provenance_of(table))
     _check_rising(stretches, made)
     remarks = tuple(_branch_remarks(table, made, "branch" in found))
-    return Found(made, {path.name: path}, remarks, (table.account,))
+    return TableFromFiles(made, {path.name: path}, remarks, (table.account,))
 
 
 def _branch_remarks(table: RawTable, made: StretchTable, stated: bool) -> list[str]:

@@ -7,11 +7,12 @@ import jax
 import numpy as np
 from jax import Array
 from jaxtyping import Float
+from typing_extensions import override
 
 from bowdenfit.cable.cable import Cable
 from bowdenfit.cable.elasticity import STRETCH_FRICTION, STRETCH_ZERO, spread_matrix
 from bowdenfit.kinds.angles.table import AngleTable
-from bowdenfit.kinds.bench import Remeasurement, drawn_by_term
+from bowdenfit.kinds.bench import Truth
 from bowdenfit.kinds.candidate import (
     UNKNOWN_SCATTER,
     Candidate,
@@ -22,10 +23,10 @@ from bowdenfit.kinds.candidate import (
     some_bends,
     some_loads,
 )
-from bowdenfit.kinds.elastic_term import ElasticTerm
+from bowdenfit.kinds.independent_readings import IndependentReadings
 from bowdenfit.kinds.shared_parameters import rope
 from bowdenfit.kinds.stretch.table import StretchTable
-from bowdenfit.kinds.term import LOAD, WRAP_ANGLE, Circumstances, TermKind
+from bowdenfit.kinds.term import LOAD, WRAP_ANGLE, Circumstances, Term, TermKind
 from bowdenfit.parameters.priors import HalfCauchy, LogNormal, Normal
 from bowdenfit.parameters.scale import Scale
 from bowdenfit.parameters.space import Parameter
@@ -34,7 +35,23 @@ from bowdenfit.words import significant
 STRETCH_NOISE = "sigma_L"
 
 
-def stretch_term(cable: Cable, table: StretchTable, _: AngleTable | None = None) -> ElasticTerm:
+class StretchTerm(IndependentReadings):
+    r"""Likelihood of a table of stretch.
+
+    .. math:: \Delta L_i \sim \text{Normal}(e(\bar T_i) + g \theta_i - \Delta L_0,\ \sigma_L)
+    """
+
+    name = "stretch"
+    unit = "mm"
+    noise = STRETCH_NOISE
+    depends_on_conditions = False  # see `Term`
+
+    @override
+    def expected(self, values: Mapping[str, Array], data: Mapping[str, Any]) -> Float[Array, " rows"]:
+        return self.cable.elasticity.stretch_of_rows(values, data)
+
+
+def stretch_term(cable: Cable, table: StretchTable) -> StretchTerm:
     """The term of a table of stretch."""
     angles, at = np.unique(table.wrap_angle, return_inverse=True)
     data = {
@@ -43,7 +60,6 @@ def stretch_term(cable: Cable, table: StretchTable, _: AngleTable | None = None)
         "wrap_angles": angles,
         "spread": spread_matrix(at),
         # A row read while the load grew comes down from no larger one: the two branches meet there.
-        "at_most": np.zeros(0),
         "peak": np.where(table.unloading, table.peak, table.load),
     }
     branch = np.where(table.unloading, ", unloading", "")
@@ -51,68 +67,79 @@ def stretch_term(cable: Cable, table: StretchTable, _: AngleTable | None = None)
         f"{significant(load, 4)} N at {np.rad2deg(angle):.4g} deg{way}"
         for load, angle, way in zip(table.load, table.wrap_angle, branch, strict=True)
     )
-    return ElasticTerm(cable, data, labels, "stretch", "mm", STRETCH_NOISE, _stretch)
+    return StretchTerm(cable, data, labels)
 
 
-def _stretch(cable: Cable, values: Mapping[str, Array], data: Mapping[str, Any]) -> Float[Array, " rows"]:
-    return cable.elasticity.stretch_of_rows(values, data)
+class StretchCandidates(CandidateKind):
+    """A reading of stretch under a load, at a total wrap angle."""
+
+    name = "stretch"
+    order = 3
+    needs = (STRETCH_NOISE,)
+    unknown = f"{UNKNOWN_SCATTER}; fit with a table of stretch."
+    angles = "total"
+    loaded = True
+
+    @override
+    def candidates(self, at: Situation) -> list[Candidate]:
+        """Return every load at every wrap angle."""
+        table = at.measurements.table(StretchTable)
+        if table is None:
+            return []
+        bends, loads = some_bends(table.wrap_angle), some_loads(table.load)
+        return [Candidate(self.name, angles=(bend,), load=load) for bend in bends for load in loads]
+
+    @override
+    def simulation(self, at: Situation, candidates: Sequence[Candidate]) -> Simulation:
+        load, bend = (np.array(v) for v in ([c.load for c in candidates], [sum(c.angles) for c in candidates]))
+        up, alone, (_, _, origin) = np.zeros(len(candidates), dtype=bool), np.arange(len(candidates)), at.rows(candidates)
+        table = StretchTable(load, bend, 0.01 * load, up, load, alone, tuple(str(i) for i in alone), origin)
+        return one_reading_each(stretch_term(at.cable, table))
 
 
-def _parameters(table: StretchTable, at: Circumstances) -> list[Parameter]:
-    """The rope, what the reading calls zero, how readings scatter, and the friction of stretching if it is not a contact's."""
-    zero, noise, prior = at.defaults.stretch_zero_share, at.defaults.stretch_noise_share, at.defaults.friction
-    usual = at.defaults.stretch_mm_without_data
-    largest = Scale(float(np.max(np.abs(table.stretch))) or usual, "largest stretch", "mm")
-    spread = Scale(float(np.ptp(table.stretch)) or usual, "range of stretch", "mm")
-    own_friction = Parameter(
-        STRETCH_FRICTION, r"$\mu$ stretch", "friction coefficient while the rope is stretched", "friction",
-        LogNormal(prior.median, prior.log_sd),
-    )  # fmt: skip
-    return [
-        *rope(at),
-        Parameter(
-            STRETCH_ZERO, r"$\Delta L_0$", "stretch that the reading calls zero", "elastic",
-            Normal(0.0, zero * largest.value), "mm", scaled_by=largest.share(zero),
-        ),
-        *([own_friction] if at.description.stretch.friction is None else []),
-        Parameter(
-            STRETCH_NOISE, r"$\sigma_L$", at.noise.meaning("standard deviation of a stretch reading"), "noise",
-            HalfCauchy(noise * spread.value), "mm", scaled_by=spread.share(noise),
-        ),
-    ]  # fmt: skip
+class StretchTerms(TermKind[StretchTable]):
+    """Stretch tables in the likelihood."""
 
+    name = "stretch"
+    candidate = StretchCandidates()
 
-def _offered(at: Situation) -> list[Candidate]:
-    """Every load at every wrap angle."""
-    table = at.measurements.table(StretchTable)
-    if table is None:
-        return []
-    bends, loads = some_bends(table.wrap_angle), some_loads(table.load)
-    return [Candidate("stretch", angles=(bend,), load=load) for bend in bends for load in loads]
+    @override
+    def terms(self, cable: Cable, table: StretchTable, angles: AngleTable | None) -> tuple[StretchTerm]:
+        return (stretch_term(cable, table),)
 
+    @override
+    def parameters(self, table: StretchTable, at: Circumstances) -> list[Parameter]:
+        """Return the rope, what the reading calls zero, how readings scatter, and friction if it is not a contact's."""
+        zero, noise, prior = at.defaults.stretch_zero_share, at.defaults.stretch_noise_share, at.defaults.friction
+        usual = at.defaults.stretch_mm_without_data
+        largest = Scale(float(np.max(np.abs(table.stretch))) or usual, "largest stretch", "mm")
+        spread = Scale(float(np.ptp(table.stretch)) or usual, "range of stretch", "mm")
+        own_friction = Parameter(
+            STRETCH_FRICTION, r"$\mu$ stretch", "friction coefficient while the rope is stretched", "friction",
+            LogNormal(prior.median, prior.log_sd),
+        )  # fmt: skip
+        return [
+            *rope(at),
+            Parameter(
+                STRETCH_ZERO, r"$\Delta L_0$", "stretch that the reading calls zero", "elastic",
+                Normal(0.0, zero * largest.value), "mm", scaled_by=largest.share(zero),
+            ),
+            *([own_friction] if at.description.stretch.friction is None else []),
+            Parameter(
+                STRETCH_NOISE, r"$\sigma_L$", at.noise.meaning("standard deviation of a stretch reading"), "noise",
+                HalfCauchy(noise * spread.value), "mm", scaled_by=spread.share(noise),
+            ),
+        ]  # fmt: skip
 
-def _simulation(at: Situation, wanted: Sequence[Candidate]) -> Simulation:
-    load, bend = (np.array(v) for v in ([c.load for c in wanted], [sum(c.angles) for c in wanted]))
-    up, alone, (_, _, origin) = np.zeros(len(wanted), dtype=bool), np.arange(len(wanted)), at.rows(wanted)
-    table = StretchTable(load, bend, 0.01 * load, up, load, alone, tuple(str(i) for i in alone), origin)
-    return one_reading_each(stretch_term(at.cable, table))
+    @override
+    def draw(self, table: StretchTable, truth: Truth) -> dict[str, Array]:
+        own_key = jax.random.split(jax.random.fold_in(truth.key, 3), 3)[0]
+        return {"stretch": truth.simulate(stretch_term(truth.cable, table), own_key)}
 
+    @override
+    def places(self, table: StretchTable, term: Term) -> Mapping[str, np.ndarray]:
+        return {LOAD: table.load, WRAP_ANGLE: np.rad2deg(table.wrap_angle)}
 
-STRETCH = TermKind(
-    "stretch",
-    lambda *of: (stretch_term(*of),),
-    _parameters,
-    Remeasurement(drawn_by_term(stretch_term, "stretch", lambda key: jax.random.split(jax.random.fold_in(key, 3), 3)[0])),
-    CandidateKind(
-        name="stretch",
-        order=3,
-        needs=(STRETCH_NOISE,),
-        unknown=f"{UNKNOWN_SCATTER}; fit with a table of stretch.",
-        offered=_offered,
-        simulation=_simulation,
-        angles="total",
-        loaded=True,
-    ),
-    where=lambda table, _: {LOAD: table.load, WRAP_ANGLE: np.rad2deg(table.wrap_angle)},
-    back=lambda table: table.unloading,
-)
+    @override
+    def on_way_back(self, table: StretchTable) -> np.ndarray:
+        return table.unloading

@@ -16,6 +16,7 @@ from bowdenfit.inference.draws import for_each_value
 from bowdenfit.inference.interval import Interval
 from bowdenfit.inference.prior_numbers import value_at
 from bowdenfit.kinds import each_table
+from bowdenfit.kinds.kind import FrictionKind, RopeKind
 from bowdenfit.physics.loop import dynamic_range
 from bowdenfit.physics.stretch import with_springs
 from bowdenfit.questions.bends.equations import Bent, bending_contact, knows_preload, knows_stretch
@@ -79,9 +80,9 @@ class Elastic(Display):
         contact = self.fit.dataset.description.contact[self.contact]
         column, found = contact.wrap_angle.column, []
         for kind, table in each_table(self.fit.dataset.measurements):
-            if kind.conditions is not None:
+            if isinstance(kind, FrictionKind):
                 found += [] if column is None else [kind.conditions(table).own.column(column)[0]]
-            elif kind.bends is not None:
+            elif isinstance(kind, RopeKind):
                 found.append(kind.bends(table))
         if contact.wrap_angle.constant is not None:
             found.append(np.array([contact.wrap_angle.constant.to("angle")]))

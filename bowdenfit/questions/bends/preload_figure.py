@@ -72,8 +72,9 @@ def data(fit: Record) -> PreloadCurve | None:
 def _bends(fit: Record) -> tuple[float, float]:
     """Smallest and largest total wrap angle of any reading [rad]; from 0 where all are the same, to pi without one."""
     from bowdenfit.kinds import each_table
+    from bowdenfit.kinds.kind import RopeKind
 
-    found = [kind.bends(table) for kind, table in each_table(fit.dataset.measurements) if kind.bends is not None]
+    found = [kind.bends(table) for kind, table in each_table(fit.dataset.measurements) if isinstance(kind, RopeKind)]
     every = np.concatenate([np.zeros(0), *found])
     low, high = (float(every.min()), float(every.max())) if len(every) else (0.0, np.pi)
     return (low, high) if low < high else (0.0, high or np.pi)

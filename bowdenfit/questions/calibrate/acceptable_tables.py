@@ -23,7 +23,7 @@ def refusal(measured: Dataset, drawn: Dataset) -> str:
         drawn: What was simulated in its place.
     """
     reasons = (
-        kind.implausible(measured.measurements.table(kind.table), table)
+        kind.why_implausible(measured.measurements.table(kind.table), table)
         for kind, table in each_table(drawn.measurements)
     )
     return next((reason for reason in reasons if reason), "")

@@ -18,7 +18,7 @@ def quantities_of(plan: Plan) -> dict[str, Quantity]:
     """
     stated, assumed = plan.stated.description, plan.assumed.description
     for kind, table in measured_kinds(plan.stated.measurements):
-        kind.bench.check(stated, table)
+        kind.check_drawable(stated, table)
     if stated.angle_columns != assumed.angle_columns or _kinds(plan.stated) != _kinds(plan.assumed):
         raise DescriptionError(
             "--assume changes which tables or columns the data set has; the fits must read what is simulated, so change "

@@ -3,8 +3,8 @@
 import numpy as np
 
 from bowdenfit.files.channels import Channel, ChannelFile
+from bowdenfit.kinds import KINDS
 from bowdenfit.kinds.fit_commands import FitCommand
-from bowdenfit.kinds.recordings import RECORDINGS
 from bowdenfit.kinds.recordings.words import recordings_text
 from bowdenfit.questions.check.file_words import command_words
 from bowdenfit.questions.check.row_words import account_words
@@ -35,7 +35,7 @@ def channels_text(
         why_not: What keeps it from being one, in a sentence.
         usable: Whether the command can fit it as it stands.
     """
-    what = RECORDINGS.alone(recordings) if recordings is not None else "a recording"
+    what = KINDS["recordings"].describe_single_file(recordings) if recordings is not None else "a recording"
     n = len(file.channels)
     title = f"{file.path.name}: {what}, because {why} ({file.kind}, {n} channel{'s' if n != 1 else ''})."
     rows = [_row(channel) for channel in file.channels[:_LISTED]]

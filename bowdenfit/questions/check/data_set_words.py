@@ -5,6 +5,7 @@ import numpy as np
 from bowdenfit.dataset import Dataset
 from bowdenfit.description import Contact, Description, FrictionSetting
 from bowdenfit.kinds import each_table
+from bowdenfit.kinds.kind import FrictionKind
 from bowdenfit.kinds.measured_groups import measured_groups
 from bowdenfit.kinds.measurements import Measurements
 from bowdenfit.kinds.stretch.table import StretchTable
@@ -95,7 +96,7 @@ def _conditions(measurements: Measurements) -> int:
     """Number of different wrap-angle conditions under which force was measured."""
     rows = []
     for kind, table in each_table(measurements):
-        if kind.conditions is not None:
+        if isinstance(kind, FrictionKind):
             at = kind.conditions(table)
             rows += [tuple(np.nan_to_num(row, nan=-1.0)) for row in np.column_stack([at.route, at.own.angle])]
     return len(set(rows))

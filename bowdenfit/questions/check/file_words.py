@@ -80,7 +80,7 @@ def on_lines(command: str) -> str:
 
 def _what(raw: RawTable, data: Dataset | None) -> str:
     for kind, found in each_table(data.measurements) if data else ():
-        return kind.alone(found)
+        return kind.describe_single_file(found)
     return f"a table of {counted(len(raw.rows), 'row')}"
 
 

@@ -31,9 +31,10 @@ def first_and_last(data: Dataset) -> list[str]:
     """The first and the last row of each table as understood."""
     lines = []
     for kind, found in each_table(data.measurements):
-        if kind.page is None:
+        page = kind.file_rows(found, data.description)
+        if page is None:
             continue
-        heads, rows = kind.page(found, data.description)
+        heads, rows = page
         for which, i in (("First", 0), ("Last", -1)):
             cells = ", ".join(f"{head} {cell}" for head, cell in zip(heads, rows[i], strict=True) if cell)
             lines.append(filled(f"{which} row, {found.origin.place(i)}: {cells}."))

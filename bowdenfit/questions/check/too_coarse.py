@@ -22,7 +22,7 @@ def too_coarse(fit: Record) -> tuple[str, ...]:
     coefficients = sum(p.role == "friction" for p in fit.model.space.free)
     told = []
     for kind, table in each_table(fit.dataset.measurements):
-        found = kind.coarse(table)
+        found = kind.coarse_readings(table)
         terms = [term for term in fit.model.terms if kind_of(term.name) is kind and term.name in fit.posterior.expected]
         if found is None or not terms:
             continue

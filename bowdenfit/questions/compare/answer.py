@@ -250,7 +250,7 @@ def _common(fits: Mapping[str, Record], parts: Mapping[str, Mapping[str, RunPart
 def _inputs(fit: Record) -> tuple[list[tuple[str, str]], list[tuple[str, tuple[str, ...]]]]:
     """Files that were read, description aside, with their checksums; and the readings that they leave no choice of."""
     files = sorted((file, digest) for file, digest in fit.dataset.sha256.items() if not file.endswith(".toml"))
-    return files, [(term.name, term.labels) for term in fit.model.terms if not term_kind(term.name).events.chosen]
+    return files, [(term.name, term.labels) for term in fit.model.terms if not term_kind(term.name).chooses_rows]
 
 
 def _leave_out_each(
@@ -289,7 +289,7 @@ def _describe(fit: Record) -> str:
         parts.append(f"{description.geometry} geometry")
     parts += [description.noise_in_words] if description.noise != "normal" else []
     parts += [
-        choice for kind, _ in measured_kinds(fit.dataset.measurements) if (choice := kind.events.choice(description))
+        choice for kind, _ in measured_kinds(fit.dataset.measurements) if (choice := kind.describe_choice(description))
     ]
     without_runs = [p for p in fit.model.space.fixed if p.name == RUN_SCATTER and p.fixed == 0.0]
     fixed = [p.name for p in fit.model.space.fixed if p not in without_runs]

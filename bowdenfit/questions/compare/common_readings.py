@@ -80,7 +80,7 @@ def common_readings(fits: Mapping[str, Record], parts: Mapping[str, Mapping[str,
         tuple((table, label) for table, label, _ in shared),
         {name: tuple(places[name][key] for key in shared) for name in events},
         tuple(
-            Omitted(table, some, most, term_kind(table).events.why_not_alike(table, descriptions))
+            Omitted(table, some, most, term_kind(table).why_events_differ(table, descriptions))
             for table, (some, most) in counts.items()
             if some < most
         ),
@@ -96,7 +96,7 @@ def _events(fit: Record, parts: Mapping[str, RunParts]) -> dict[Key, np.ndarray]
     found: dict[Key, np.ndarray] = {}
     for term in fit.model.terms:
         of_runs = parts.get(term.name)
-        said = of_runs.said if of_runs else term_kind(term.name).events.said(term, fit.dataset.description)
+        said = of_runs.said if of_runs else term_kind(term.name).events(term, fit.dataset.description)
         for label, event in zip((of_runs or term).labels, said, strict=True):
             earlier = sum(key[:2] == (term.name, label) for key in found)
             found[term.name, label, earlier] = event

@@ -56,7 +56,7 @@ def can_be_ranked(fit: Record) -> bool:
 
 def _offered(fit: Record) -> tuple[Candidate, ...]:
     at = situation_of(fit.model, fit.dataset.measurements)
-    return tuple(c for kind in candidate_kinds().values() for c in kind.offered(at) if not why_not(fit, c))
+    return tuple(c for kind in candidate_kinds().values() for c in kind.candidates(at) if not why_not(fit, c))
 
 
 def why_not(fit: Record, candidate: Candidate) -> str:

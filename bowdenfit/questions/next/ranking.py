@@ -125,7 +125,7 @@ def _within(fit: Record, answer: Answer, best: Candidate) -> Within | None:
         return None
     chosen = [best, *(replace(best, load=load, stroke=stroke) for load, stroke in designs)]
     found = [explained_share(reading[:, 0], answer.draws) for reading in _readings(fit, chosen, 1)]
-    return Within(kind.usual(at), _ranked(fit, answer, chosen, found, None))
+    return Within(kind.describe_usual(at), _ranked(fit, answer, chosen, found, None))
 
 
 def _repeats(fit: Record, answer: Answer, candidate: Candidate) -> Repeats:

@@ -6,6 +6,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from bowdenfit.kinds import each_table
+from bowdenfit.kinds.kind import FrictionKind
 from bowdenfit.questions.bends.answer import elastic_answers
 from bowdenfit.results.record import Record
 from bowdenfit.words import percent
@@ -46,8 +47,10 @@ def measured(fit: Record) -> Measured:
     """What the tables of a fit were measured at."""
     measurements, route = fit.dataset.measurements, fit.dataset.description.route
     tables = list(each_table(measurements))
-    lengths = [np.ravel(getattr(kind.conditions(table) if kind.conditions else table, "route", ())) for kind, table in tables]
-    loads = [np.abs(np.ravel(kind.forces(table))) for kind, table in tables]
+    friction = [(kind, table) for kind, table in tables if isinstance(kind, FrictionKind)]
+    lengths = [np.ravel(getattr(table, "route", ())) for kind, table in tables if not isinstance(kind, FrictionKind)]
+    lengths += [kind.conditions(table).route for kind, table in friction]
+    loads = [np.abs(kind.forces(table)) for kind, table in friction]
     return Measured(_span(lengths), _span(loads), route.unit if route else "")
 
 

@@ -17,11 +17,12 @@ from bowdenfit.description import Description
 from bowdenfit.errors import UsageError
 from bowdenfit.inference.compilation import compile_program
 from bowdenfit.kinds import KINDS
-from bowdenfit.kinds.angles.bench import drawn_angles
 from bowdenfit.kinds.angles.table import AngleTable
+from bowdenfit.kinds.angles.term import drawn_angles
 from bowdenfit.kinds.bench import Truth
 from bowdenfit.kinds.design import Design
 from bowdenfit.kinds.drawn_readings import Readings, drawn_readings, with_drawn_readings
+from bowdenfit.kinds.kind import PlannedKind
 from bowdenfit.kinds.measurements import Measurements
 from bowdenfit.model import build_model
 
@@ -31,9 +32,9 @@ def empty_tables(description: Description, design: Design) -> Measurements:
     stated = description.tables.stated
     return Measurements(
         tuple(
-            kind.empty(design, description, kind.file_name(stated[kind.name]))
+            kind.empty_table(design, description, kind.file_name(stated[kind.name]))
             for kind in KINDS.values()
-            if kind.name in stated and kind.empty is not None
+            if kind.name in stated and isinstance(kind, PlannedKind)
         )
     )
 

@@ -120,8 +120,8 @@ def table_texts(description: Description, measured: Measurements) -> dict[str, s
     texts = {}
     for kind, table in each_table(measured):
         settings = description.tables.stated.get(kind.name)
-        if settings and kind.page:
-            heads, rows = kind.page(table, description)
+        if settings and (page := kind.file_rows(table, description)):
+            heads, rows = page
             texts[kind.file_name(settings)] = "\n".join(",".join(map(_cell, row)) for row in [heads, *rows]) + "\n"
     return texts
 

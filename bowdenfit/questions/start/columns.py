@@ -4,7 +4,7 @@ from collections.abc import Sequence
 
 from bowdenfit.errors import DatasetError
 from bowdenfit.files.matching import Quantity
-from bowdenfit.kinds.asked import Wanted
+from bowdenfit.kinds.init_questions import WantedColumn
 from bowdenfit.questions.start.question import Asker, agree, choose, number, unit
 from bowdenfit.questions.start.sheet import SeenColumn, Sheet
 from bowdenfit.units import ColumnSource
@@ -23,8 +23,8 @@ def name_columns(sheet: Sheet, ask: Asker) -> None:
     Raises:
         DatasetError: It has no column that could be one of those needed.
     """
-    assert sheet.kind is not None and sheet.kind.asked is not None  # only files whose kind is known come here
-    for each in sheet.kind.asked.columns:
+    assert sheet.kind is not None and sheet.kind.init_questions is not None  # only files whose kind is known come here
+    for each in sheet.kind.init_questions.columns:
         quantity = next((one for one in (each.quantity, *each.also) if sheet.can_be(one)), each.quantity)
         options = sheet.can_be(quantity)
         if len(options) == 1:
@@ -37,9 +37,9 @@ def name_columns(sheet: Sheet, ask: Asker) -> None:
         else:
             column = _required(sheet, each, options, ask)
         take(sheet, quantity, column, ask)
-    for switch in sheet.kind.asked.switches:
-        if switch.unless not in sheet.taken and ask.ask(agree(switch.words.format(sheet.file), False)):
-            sheet.settings[switch.key] = switch.value
+    for question in sheet.kind.init_questions.yes_no:
+        if question.unless not in sheet.taken and ask.ask(agree(question.words.format(sheet.file), False)):
+            sheet.settings[question.key] = question.value
 
 
 def take(sheet: Sheet, quantity: Quantity, column: SeenColumn, ask: Asker) -> None:
@@ -60,7 +60,7 @@ def with_unit(sheet: Sheet, dimension: str, column: SeenColumn, ask: Asker) -> S
     return sheet.with_unit(column, ask.ask(unit(f"In which unit is {what}?", of_route, why)))
 
 
-def _required(sheet: Sheet, wanted: Wanted, options: Sequence[SeenColumn], ask: Asker) -> SeenColumn:
+def _required(sheet: Sheet, wanted: WantedColumn, options: Sequence[SeenColumn], ask: Asker) -> SeenColumn:
     """The column that must be there."""
     dimension = wanted.quantity.dimension
     options = options or of_dimension(sheet, dimension)
@@ -78,7 +78,7 @@ def _required(sheet: Sheet, wanted: Wanted, options: Sequence[SeenColumn], ask: 
     return ask.ask(choose(f"Which column of {sheet.file} is {wanted.words}?", listed, proposed, why))
 
 
-def _optional(sheet: Sheet, wanted: Wanted, ask: Asker) -> SeenColumn | None:
+def _optional(sheet: Sheet, wanted: WantedColumn, ask: Asker) -> SeenColumn | None:
     """A column of labels that may be there."""
     rows = max((each.values for each in sheet.columns), default=0)
     options = [
@@ -93,7 +93,7 @@ def _optional(sheet: Sheet, wanted: Wanted, ask: Asker) -> SeenColumn | None:
     return ask.ask(choose(question, [*listed, ("none of them", None)], len(listed) + 1))
 
 
-def _are_labels(column: SeenColumn, wanted: Wanted) -> bool:
+def _are_labels(column: SeenColumn, wanted: WantedColumn) -> bool:
     """Whether words, or whole numbers where these can be labels, stand in a column."""
     low, high = wanted.numbers
     return not column.numbers or (low <= column.low == int(column.low) and column.high <= high)

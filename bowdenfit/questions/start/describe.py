@@ -54,8 +54,8 @@ def description_of(paths: Sequence[Path], called: str, ask: Asker) -> str:
     ask.settle()
     page: dict[str, Any] = {"schema": SCHEMA, "name": name} | ({} if source == "-" else {"source": source})
     for sheet in sheets:
-        assert sheet.kind is not None and sheet.kind.asked is not None  # asked for above
-        page |= sheet.kind.asked.description
+        assert sheet.kind is not None and sheet.kind.init_questions is not None  # asked for above
+        page |= sheet.kind.init_questions.description
     page |= {"route": places.route} if places.route else {}
     page |= {"contact": places.contacts, "tables": _tables(sheets)}
     return toml_text(page | ({"recording": recordings} if recordings else {}), _REMARKS)
@@ -69,16 +69,17 @@ def _sheets(paths: Sequence[Path], ask: Asker) -> list[Sheet]:
             sheet = look(path)
             if sheet.kind is None:
                 sheet = _asked(sheet, ask)
-            assert sheet.kind is not None and sheet.kind.asked is not None
-            ask.say(f"{sheet.file} holds {sheet.kind.asked.holds}.")
+            assert sheet.kind is not None and sheet.kind.init_questions is not None
+            ask.say(f"{sheet.file} holds {sheet.kind.init_questions.holds}.")
             sheets.append(sheet)
     ask.settle()
     for kind in {sheet.kind.name: sheet.kind for sheet in sheets if sheet.kind}.values():
         files = [sheet.file for sheet in sheets if sheet.kind is kind]
         with faults.noted():
-            if len(files) > 1 and kind.asked is not None and not kind.asked.several:
+            questions = kind.init_questions
+            if len(files) > 1 and questions is not None and not questions.several:
                 raise DatasetError(
-                    f"{listed(files)} both hold {kind.asked.holds}; put them into one file, below one line of headings."
+                    f"{listed(files)} both hold {questions.holds}; put them into one file, below one line of headings."
                 )
     faults.refuse()
     return sheets
@@ -86,9 +87,10 @@ def _sheets(paths: Sequence[Path], ask: Asker) -> list[Sheet]:
 
 def _asked(sheet: Sheet, ask: Asker) -> Sheet:
     """A file of which a person has said what it holds."""
-    kinds = [kind for kind in KINDS.values() if kind.asked is not None]
-    options: list[tuple[str, Kind]] = [(kind.asked.holds, kind) for kind in kinds if kind.asked]
-    default = kinds.index(sheet.likely) + 1 if sheet.likely else None
+    options: list[tuple[str, Kind[Any]]] = [
+        (kind.init_questions.holds, kind) for kind in KINDS.values() if kind.init_questions is not None
+    ]
+    default = [kind for _, kind in options].index(sheet.likely) + 1 if sheet.likely else None
     columns = listed([each.words for each in sheet.columns])
     why = (
         f"{sheet.file} does not say what it holds; name its columns for it, such as input_force_N and output_force_N, "

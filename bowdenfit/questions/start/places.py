@@ -60,9 +60,13 @@ def find_places(sheets: Sequence[Sheet], ask: Asker) -> Places:
     """
     places = Places()
     for sheet in sheets:
-        if sheet.kind and sheet.kind.asked and sheet.kind.asked.by_length:
+        if sheet.kind and sheet.kind.init_questions and sheet.kind.init_questions.by_length:
             _along_route(sheet, places, ask)
-    rows = [sheet for sheet in sheets if sheet.kind and sheet.kind.asked and sheet.kind.asked.has_own_angles]
+    rows = [
+        sheet
+        for sheet in sheets
+        if sheet.kind and sheet.kind.init_questions and sheet.kind.init_questions.has_own_angles
+    ]
     if places.route:
         for sheet in rows:
             _length_of_rows(sheet, places, ask)

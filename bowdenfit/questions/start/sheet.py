@@ -4,6 +4,7 @@ import re
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 
@@ -14,7 +15,7 @@ from bowdenfit.files.matching import Quantity, candidates, plain_name
 from bowdenfit.files.spellings import spelled
 from bowdenfit.files.tables import read_table
 from bowdenfit.kinds import KINDS
-from bowdenfit.kinds.asked import Wanted
+from bowdenfit.kinds.init_questions import WantedColumn
 from bowdenfit.kinds.kind import Kind
 from bowdenfit.kinds.single_file import FORCES, FileKind, file_kind
 from bowdenfit.kinds.unnamed_ends import columns_of
@@ -88,9 +89,9 @@ class Sheet:
 
     path: Path
     columns: tuple[SeenColumn, ...]
-    kind: Kind | None
+    kind: Kind[Any] | None
     why: str
-    likely: Kind | None = None
+    likely: Kind[Any] | None = None
     sources: dict[str, ColumnSource] = field(default_factory=dict)
     taken: dict[str, str] = field(default_factory=dict)
     settings: dict[str, object] = field(default_factory=dict)
@@ -192,22 +193,23 @@ def _table_sheet(path: Path, found: FileKind) -> Sheet:
     return sheet
 
 
-def _kinds_that_fit(sheet: Sheet) -> list[Kind]:
+def _kinds_that_fit(sheet: Sheet) -> list[Kind[Any]]:
     """The kinds whose columns a table has by its headings; of these those with most columns."""
-    fits: dict[int, list[Kind]] = {}
+    fits: dict[int, list[Kind[Any]]] = {}
     for kind in KINDS.values():
-        if kind.asked is None or not kind.asked.is_guessed:
+        questions = kind.init_questions
+        if questions is None or not questions.is_guessed:
             continue
-        if kind.asked.by_length:
+        if questions.by_length:
             if _has(sheet, "angle") and _has(sheet, "length") and not _has(sheet, "force") and not _has(sheet, "ratio"):
                 fits.setdefault(1, []).append(kind)
             continue
-        if _has_columns(sheet, kind.asked.required):
-            fits.setdefault(len(kind.asked.required), []).append(kind)
+        if _has_columns(sheet, questions.required):
+            fits.setdefault(len(questions.required), []).append(kind)
     return fits[max(fits)] if fits else []
 
 
-def _has_columns(sheet: Sheet, wanted: Sequence[Wanted]) -> bool:
+def _has_columns(sheet: Sheet, wanted: Sequence[WantedColumn]) -> bool:
     """Whether headings say all that is wanted."""
     ways = [(each.quantity, *each.also) for each in wanted]
     return bool(wanted) and all(any(len(sheet.can_be(one)) == 1 for one in way) for way in ways)
@@ -217,13 +219,14 @@ def _has(sheet: Sheet, dimension: str) -> list[SeenColumn]:
     return [each for each in sheet.columns if each.dimension == dimension]
 
 
-def _likely(sheet: Sheet) -> Kind | None:
+def _likely(sheet: Sheet) -> Kind[Any] | None:
     """The kind whose required columns there may be, by their units alone, the most of them."""
     dimensions = [each.dimension for each in sheet.columns]
-    best: Mapping[int, Kind] = {}
+    best: Mapping[int, Kind[Any]] = {}
     for kind in KINDS.values():
-        if kind.asked is not None and kind.asked.is_guessed and kind.asked.required:
-            needed = [each.quantity.dimension for each in kind.asked.required]
+        questions = kind.init_questions
+        if questions is not None and questions.is_guessed and questions.required:
+            needed = [each.quantity.dimension for each in questions.required]
             if all(dimensions.count(each) >= needed.count(each) for each in needed):
                 best = {len(needed): kind, **best}
     return best[max(best)] if best else None

@@ -66,7 +66,7 @@ def _model(fit: Record) -> str:
         + (f" (friction model {description.friction_model})" if description.friction_model != "capstan" else "")
         + (f"; {description.geometry} geometry" if description.curved else "")
         + ".",
-        *(kind.method for kind, _ in each_table(fit.dataset.measurements)),
+        *(kind.methods_sentence for kind, _ in each_table(fit.dataset.measurements)),
         f"Readings scattered with {description.noise_in_words}.",
     ]
     return " ".join(dict.fromkeys(filter(None, said)))

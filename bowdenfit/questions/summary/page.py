@@ -10,7 +10,7 @@ from bowdenfit.inference.diagnostics import shortfalls
 from bowdenfit.inference.interval import Interval
 from bowdenfit.inference.samplers import recommendation
 from bowdenfit.kinds import readings_called
-from bowdenfit.kinds.recordings.accounts import preparation_pages
+from bowdenfit.kinds.recordings.words import preparation_pages
 from bowdenfit.kinds.term import Term
 from bowdenfit.questions.bends.overview import elastic_overview
 from bowdenfit.questions.check.answer import checks_of

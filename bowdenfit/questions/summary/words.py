@@ -70,8 +70,9 @@ def full_text(fit: Record) -> str:
 def counts_in_words(fit: Record) -> str:
     """What was fitted to: '17 wrap angles and 4 efficiencies'."""
     description, tables = fit.dataset.description, fit.dataset.measurements
-    entered = [term_kind(term.name).count(term, description) for term in fit.model.terms]
-    return listed([count for count in (*entered, *(kind.count(table) for kind, table in each_table(tables))) if count])
+    entered = [term_kind(term.name).count_readings(term, description) for term in fit.model.terms]
+    read = [kind.count_readings(table) for kind, table in each_table(tables)]
+    return listed([count for count in (*entered, *read) if count])
 
 
 def fitted_to(fit: Record) -> str:

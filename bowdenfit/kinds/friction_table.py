@@ -1,26 +1,40 @@
-"""Does every row of a table have a wrap angle in every contact?"""
+"""Kinds of tables whose rows say themselves where friction was measured: a length, wrap angles, or both."""
+
+from typing import TypeVar
 
 import numpy as np
+from typing_extensions import override
 
 from bowdenfit.description import Contact, Description
 from bowdenfit.errors import DatasetError, Faults
 from bowdenfit.kinds.angles.table import AngleTable
+from bowdenfit.kinds.kind import FrictionKind
 from bowdenfit.kinds.measurements import Measurements
 from bowdenfit.kinds.rows import Rows
 
+AnyRows = TypeVar("AnyRows", bound=Rows)
 
-def check_rows(table: Rows, description: Description, measurements: Measurements) -> None:
-    """Every row can be given a wrap angle in every contact.
 
-    Raises:
-        DatasetError: One cannot; says which, and what to do.
-    """
-    faults, angles = Faults(), measurements.table(AngleTable)
-    for contact in description.contact:
-        with faults.noted():
-            if contact.wrap_angle.constant is None:
-                _check_contact(description, angles, contact, table)
-    faults.refuse()
+class FrictionTableKind(FrictionKind[AnyRows]):
+    """A kind of table that has `route`, `own` wrap angles and `origin` row by row."""
+
+    @override
+    def conditions(self, table: AnyRows) -> AnyRows:
+        return table
+
+    @override
+    def check(self, table: AnyRows, description: Description, measurements: Measurements) -> None:
+        """Refuse a row that cannot be given a wrap angle in every contact.
+
+        Raises:
+            DatasetError: Says which rows, and what to do.
+        """
+        faults, angles = Faults(), measurements.table(AngleTable)
+        for contact in description.contact:
+            with faults.noted():
+                if contact.wrap_angle.constant is None:
+                    _check_contact(description, angles, contact, table)
+        faults.refuse()
 
 
 def _check_contact(description: Description, angles: AngleTable | None, contact: Contact, table: Rows) -> None:
@@ -49,7 +63,7 @@ def _check_contact(description: Description, angles: AngleTable | None, contact:
 
 
 def _in_row(table: Rows, i: int, column: str, what: str, value: str = "") -> DatasetError:
-    """What is wrong with a column in a row of a table, behind the value that stands there."""
+    """Return what is wrong with a column in a row of a table, behind the value that stands there."""
     error = DatasetError(f"{table.origin.place(i)}, column {column!r}: {value}{what}")
     error.alike, error.row = (table.origin.files[table.origin.file[i]], column, what), int(table.origin.row[i])
     return error

@@ -1,4 +1,4 @@
-"""What is asked of a file that is to hold a kind of measurement, where no description says it yet."""
+"""How `bowdenfit init` recognizes the files of a kind of measurement, and what it asks about them."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field
@@ -9,7 +9,7 @@ from bowdenfit.files.matching import Quantity
 
 
 @dataclass(frozen=True)
-class Wanted:
+class WantedColumn:
     """A column of a table.
 
     Args:
@@ -17,7 +17,7 @@ class Wanted:
         words: The same for people, such as "the force at the motor".
         also: Quantities that do instead.
         optional: Whether a table can be without it.
-        numbers: The lowest and the highest that may stand for words.
+        numbers: The lowest and the highest number that may stand for words.
     """
 
     quantity: Quantity
@@ -28,13 +28,13 @@ class Wanted:
 
 
 @dataclass(frozen=True)
-class Switch:
-    """What a person says with yes or no where no column says it.
+class YesNoQuestion:
+    """A question whose yes writes a setting beside the file.
 
     Args:
-        unless: Name of the column that would.
-        words: The question.
-        key, value: What a yes writes beside the file.
+        unless: Name of the column that answers it; it is asked only where there is none.
+        words: The question, with braces for the name of the file.
+        key, value: The setting.
     """
 
     unless: str
@@ -44,13 +44,13 @@ class Switch:
 
 
 @dataclass(frozen=True)
-class Asked:
-    """How files of a kind are told, and what is asked of them.
+class InitQuestions:
+    """How files of a kind are recognized, and what is asked about them.
 
     Args:
         holds: What such a file holds, for people.
         columns: Its columns but for lengths and wrap angles of contacts.
-        switches: What is asked beside them.
+        yes_no: Questions beside those for its columns.
         by_length: Whether its columns are the wrap angles of contacts at several lengths.
         has_own_angles: Whether its rows may have a length, and wrap angles of contacts.
         several: Whether it may be several files.
@@ -59,8 +59,8 @@ class Asked:
     """
 
     holds: str
-    columns: tuple[Wanted, ...] = ()
-    switches: tuple[Switch, ...] = ()
+    columns: tuple[WantedColumn, ...] = ()
+    yes_no: tuple[YesNoQuestion, ...] = ()
     by_length: bool = False
     has_own_angles: bool = False
     several: bool = False
@@ -68,6 +68,6 @@ class Asked:
     description: Mapping[str, Any] = field(default_factory=dict, hash=False)
 
     @property
-    def required(self) -> tuple[Wanted, ...]:
+    def required(self) -> tuple[WantedColumn, ...]:
         """The columns that a table cannot be without."""
-        return tuple(each for each in self.columns if not each.optional)
+        return tuple(column for column in self.columns if not column.optional)

@@ -1,0 +1,172 @@
+"""Transmission efficiencies: how they are read, checked and described."""
+
+import numpy as np
+from typing_extensions import override
+
+from bowdenfit.description import Description, Finite
+from bowdenfit.files.cells import Cell
+from bowdenfit.files.columns import Column, Quantity, find_columns, require
+from bowdenfit.files.tables import read_table
+from bowdenfit.kinds.coarse import Coarse, coarse
+from bowdenfit.kinds.copies import copies, places_along, without_runs
+from bowdenfit.kinds.design import Design
+from bowdenfit.kinds.efficiencies.table import EfficiencyTable
+from bowdenfit.kinds.friction_table import FrictionTableKind
+from bowdenfit.kinds.init_questions import InitQuestions, WantedColumn
+from bowdenfit.kinds.kind import PlannedKind, Source, TableFromFiles
+from bowdenfit.kinds.pages import Page, route_cells, route_heading
+from bowdenfit.kinds.plausibility import GAIN_ERROR, beyond
+from bowdenfit.kinds.readings import efficiencies
+from bowdenfit.kinds.rows import OwnAngles, RowOrigin, provenance_of, read_own_angles, read_route, shared_columns
+from bowdenfit.words import counted, listed, percent
+
+_FRACTION = 0.01  # as a percentage it is as likely a fraction
+_SDS = 4.5  # stated standard deviations above 1, which one healthy row of 300,000 exceeds
+
+
+class EfficiencyDesign(Design):
+    """[design]: route values at which an efficiency is measured."""
+
+    efficiencies: tuple[Finite, ...] = ()
+
+
+class EfficiencyKind(FrictionTableKind[EfficiencyTable], PlannedKind[EfficiencyTable]):
+    """Efficiencies that somebody worked out already, one a row."""
+
+    name = "efficiencies"
+    table = EfficiencyTable
+    readings = (efficiencies("efficiency", "efficiencies", "efficiencies", "efficiency at {}"),)
+    methods_sentence = (
+        "The logarithm of a measured efficiency was that of the model, give or take the scatter between mountings."
+    )
+    init_questions = InitQuestions(
+        "efficiencies: output force over input force while pulling",
+        (WantedColumn(Quantity("efficiency", "ratio"), "the efficiency"),),
+        has_own_angles=True,
+    )
+    design = EfficiencyDesign
+
+    @override
+    def read(self, source: Source) -> TableFromFiles[EfficiencyTable]:
+        """Read a table of transmission efficiencies, 0 to 1 or in percent where the heading or the cell says so.
+
+        Raises:
+            DatasetError: See `read_table` and `find_columns`; or an efficiency is not positive, or above 1 beyond its error.
+        """
+        path, route, contacts = source.file, source.description.route, source.description.angle_columns
+        table = read_table(path)
+        names = (Quantity("efficiency", "ratio"), Quantity("efficiency_sd", "ratio"))
+        found = find_columns(table, (*names, *shared_columns(route, contacts)), source.columns)
+        column = require(table, found, "efficiency", "efficiency (0 to 1) or efficiency_percent")
+        sd, spread = [0.0] * len(table.rows), found.get("efficiency_sd")
+        if spread is not None:
+            beside = {cell.row: cell for cell in column.cells}
+            sd = spread.each(lambda c: 0.0 if c.blank else _efficiency_sd(c, spread, beside[c.row], column), 0.0)
+        errors = dict(zip((cell.row for cell in column.cells), sd, strict=True))
+        efficiency = column.each(lambda cell: _efficiency(cell, column, errors[cell.row]), np.nan)
+        rows = EfficiencyTable(
+            read_route(table, found, route),
+            np.array(efficiency),
+            np.array(sd),
+            read_own_angles(table, found, contacts),
+            provenance_of(table),
+        )
+        return TableFromFiles(rows, {path.name: path}, _remark_fractions(column, rows), (table.account,))
+
+    @override
+    def describe(self, table: EfficiencyTable, description: Description) -> list[str]:
+        """Return how many there are, and how large."""
+        low, high = table.efficiency.min(), table.efficiency.max()
+        return [f"{table.origin.files[0]}: {self.count_readings(table)}, {percent(low)} to {percent(high)}"]
+
+    @override
+    def describe_single_file(self, table: EfficiencyTable) -> str:
+        return f"a table of {self.count_readings(table)}"
+
+    @override
+    def count_readings(self, table: EfficiencyTable) -> str:
+        return counted(len(table.efficiency), "efficiency", "efficiencies")
+
+    @override
+    def copied_readings(self, table: EfficiencyTable) -> list[str]:
+        places = np.column_stack([table.route, table.own.angle])
+        return copies(without_runs(table.origin, places, table.efficiency, places_along(table)))
+
+    @override
+    def coarse_readings(self, table: EfficiencyTable) -> Coarse | None:
+        """Look at tables where no scatter is stated."""
+        if np.any(table.sd > 0):
+            return None
+        places = np.column_stack([table.route, table.own.angle])
+        return coarse(listed(table.origin.files), places, table.efficiency)
+
+    @override
+    def why_implausible(self, measured: EfficiencyTable, simulated: EfficiencyTable) -> str:
+        return beyond(-np.log(simulated.efficiency), "an efficiency")
+
+    @override
+    def file_rows(self, table: EfficiencyTable, description: Description) -> Page:
+        values = zip(table.route, table.efficiency, strict=True)
+        rows = [[*route_cells(length, description), f"{eta:.5f}"] for length, eta in values]
+        return [*route_heading(description), "efficiency"], rows
+
+    @override
+    def empty_table(self, design: EfficiencyDesign, description: Description, file: str) -> EfficiencyTable:
+        n = len(design.efficiencies)
+        own, origin = OwnAngles.none(description.angle_columns, n), RowOrigin.below_heading(file, n)
+        return EfficiencyTable(np.array(design.efficiencies), np.full(n, 0.8), np.zeros(n), own, origin)
+
+
+def _remark_fractions(column: Column, table: EfficiencyTable) -> tuple[str, ...]:
+    """Return a remark on efficiencies in percent that look like fractions; a fit's verdict says it later and without names."""
+    small = np.flatnonzero(table.efficiency <= _FRACTION)
+    if not len(small) or not any(_in_percent(cell, column) for cell in column.cells):
+        return ()
+    first = int(small[0])
+    few = counted(len(small), "efficiency is", "efficiencies are")
+    which = "every efficiency is" if len(small) == len(table.efficiency) else few
+    return (
+        f"{table.origin.place(first)}: {which} at most 1 %; the usual cause is a fraction under a heading that says "
+        "percent: call the column efficiency, or write percentages.",
+    )
+
+
+def _ratio(cell: Cell, column: Column) -> float:
+    """Return a number, or a percentage where the heading or the cell says so [1]."""
+    percentage = cell.percentage()
+    return column.value(cell) if percentage is None else percentage
+
+
+def _in_percent(cell: Cell, column: Column) -> bool:
+    return column.factor != 1 or cell.percentage() is not None
+
+
+def _efficiency(cell: Cell, column: Column, sd: float) -> float:
+    """Return an efficiency; noise may show one above 1, as it may show more force out than in."""
+    value = _ratio(cell, column)
+    if value <= 0:
+        raise cell.refuse(f"an efficiency of {cell.shown} is not possible; it is output force over input force.")
+    if value > 1 + GAIN_ERROR + _SDS * sd:
+        usual = (
+            "the usual cause is that input and output force were swapped"
+            if _in_percent(cell, column)
+            else "if it is in percent, name the column efficiency_percent"
+        )
+        noise = "" if sd else ", or state its standard deviation in efficiency_sd if noise did that"
+        raise cell.refuse(f"an efficiency of {cell.shown} is above 1; {usual}{noise}.")
+    return value
+
+
+def _efficiency_sd(cell: Cell, column: Column, efficiency: Cell, efficiency_column: Column) -> float:
+    """Return the standard deviation of an efficiency [1]."""
+    value = _ratio(cell, column)
+    if not 0 < value <= 1:
+        raise cell.refuse(
+            f"a standard deviation of {cell.shown} is not possible for an efficiency; write one up to 1 (100 %)."
+        )
+    if _in_percent(efficiency, efficiency_column) and not _in_percent(cell, column):
+        raise cell.refuse(
+            f"{cell.shown} does not say whether it is in percent as the efficiency beside it is; name the column "
+            "efficiency_sd_percent, or write 1 % for 0.01."
+        )
+    return value

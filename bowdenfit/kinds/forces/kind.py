@@ -1,0 +1,258 @@
+"""Forces read at both ends of a cable: how they are checked and described."""
+
+from collections import Counter
+
+import numpy as np
+from pydantic import Field, model_validator
+from typing_extensions import override
+
+from bowdenfit.description import Description, Finite
+from bowdenfit.errors import nearest
+from bowdenfit.files.columns import Quantity
+from bowdenfit.kinds.coarse import Coarse, coarse
+from bowdenfit.kinds.copies import Compared, copies, places_along, without_runs
+from bowdenfit.kinds.design import Design, Stroke, radians, signs
+from bowdenfit.kinds.forces.impossible import check_following, check_gains
+from bowdenfit.kinds.forces.mountings import ForceSettings
+from bowdenfit.kinds.forces.table import ForceTable, count_loads, read_forces
+from bowdenfit.kinds.friction_table import FrictionTableKind
+from bowdenfit.kinds.init_questions import InitQuestions, WantedColumn, YesNoQuestion
+from bowdenfit.kinds.kind import PlannedKind, Source, TableFromFiles
+from bowdenfit.kinds.measurements import Measurements
+from bowdenfit.kinds.pages import STROKE_NAMES, Page, fixed, route_cells, route_heading
+from bowdenfit.kinds.plausibility import SCATTER, beyond, parts
+from bowdenfit.kinds.readings import Readings, efficiencies
+from bowdenfit.kinds.rows import RUN, STROKE, OwnAngles, RowOrigin
+from bowdenfit.types import Vector
+from bowdenfit.words import counted, listed, percent, significant
+
+_SEEN_LOSS = 0.01  # mean log ratio above which an error of the gains is said as a share of the coefficients
+
+
+class ForceDesign(Design):
+    """[design]: route value of each run, and the input forces [N] of every stroke of a run.
+
+    Args:
+        runs: Route values; any number for each run of a cable without a route.
+        input_forces: Input forces [N].
+        strokes: Strokes, in order.
+        own_angles: Wrap angle of each run [deg], by column of a contact without a curve.
+    """
+
+    runs: tuple[Finite, ...] = ()
+    input_forces: tuple[Finite, ...] = ()
+    strokes: tuple[Stroke, ...] = ("pull", "return")
+    own_angles: dict[str, tuple[Finite, ...]] = Field(default_factory=dict)
+
+    @model_validator(mode="after")
+    def _every_run_has_forces_and_angles(self) -> "ForceDesign":
+        if self.runs and not self.input_forces:
+            raise ValueError("runs need input_forces, such as [20, 40, 60] (in N)")
+        for column, angles in self.own_angles.items():
+            if len(angles) != len(self.runs):
+                raise ValueError(
+                    f"own_angles.{column} has {len(angles)} angles for {len(self.runs)} runs; write one each"
+                )
+        return self
+
+
+class ForceKind(FrictionTableKind[ForceTable], PlannedKind[ForceTable]):
+    """Pairs of forces at both ends, in runs: one run is one mounting of the cable."""
+
+    name = "forces"
+    table = ForceTable
+    settings = ForceSettings
+    readings = (
+        efficiencies("run_efficiency", "forces", "force runs", "run {}", are_runs=True),
+        Readings("held_ratio", "held forces", "held forces", "{}", "Input over output force"),
+    )
+    methods_sentence = "All readings of one mounting of the cable shared its error, which was integrated out."
+    init_questions = InitQuestions(
+        "forces at both ends of the cable, a row a pair of readings",
+        (
+            WantedColumn(
+                Quantity("input_force", "force"), "the force at the motor", (Quantity("input_torque", "torque"),)
+            ),
+            WantedColumn(
+                Quantity("output_force", "force"), "the force at the load", (Quantity("output_torque", "torque"),)
+            ),
+            RUN,
+            STROKE,
+        ),
+        (YesNoQuestion("run", "Was the cable mounted anew for every row of {}?", "run", "each row"),),
+        has_own_angles=True,
+        several=True,
+    )
+    design = ForceDesign
+
+    @override
+    def read(self, source: Source) -> TableFromFiles[ForceTable]:
+        return read_forces(source)
+
+    @override
+    def describe(self, table: ForceTable, description: Description) -> list[str]:
+        """Return how many readings of each stroke there are, and how large."""
+        files = table.origin.files[0] if len(table.origin.files) == 1 else f"{len(table.origin.files)} files"
+        counts = ", ".join(
+            f"{(table.stroke == stroke).sum()} {name}"
+            for stroke, name in ((1, "pulling"), (-1, "returning"), (0, "held"))
+            if (table.stroke == stroke).any()
+        )
+        low, high = (significant(end, 4) for end in (table.input_force.min(), table.input_force.max()))
+        loads = f"{low} to {high} N" if low != high else f"{high} N"
+        weights = ", of hung weights without noise" if description.sensors.noise_ratio == 0 else ""
+        return [f"{files}: {self.count_readings(table)} ({counts}), input {loads}{weights}"]
+
+    @override
+    def describe_single_file(self, table: ForceTable) -> str:
+        """Return how many readings it has, and at how many loads, counted at the end where they fall together."""
+        n = len(table.input_force)
+        counts = [count for count in map(count_loads, (table.input_force, table.output_force)) if count]
+        at = f" at {min(counts)} load{'s' if min(counts) > 1 else ''}" if counts else ""
+        return f"a table of {n} reading{'s' if n > 1 else ''}{at}"
+
+    @override
+    def count_readings(self, table: ForceTable) -> str:
+        return f"{counted(len(table.run), 'force reading')} in {counted(len(table.run_names), 'run')}"
+
+    @override
+    def forces(self, table: ForceTable) -> Vector:
+        return np.concatenate([table.input_force, table.output_force])
+
+    @override
+    def speeds(self, table: ForceTable) -> Vector:
+        return np.abs(table.velocity)
+
+    @override
+    def typical_speeds(self, table: ForceTable) -> list[float]:
+        """Return the lowest and the highest speed."""
+        known = np.abs(table.velocity[np.isfinite(table.velocity)])
+        return [float(known.min()), float(known.max())] if len(known) else []
+
+    @override
+    def velocity_unit(self, table: ForceTable) -> str:
+        return table.velocity_unit
+
+    @override
+    def groups(self, table: ForceTable) -> tuple[str, ...]:
+        return table.group
+
+    @override
+    def check(self, table: ForceTable, description: Description, measurements: Measurements) -> None:
+        """Refuse rows without wrap angles, an output that does not follow the input, and rows that gain force."""
+        super().check(table, description, measurements)
+        check_following(table)
+        check_gains(table, description)
+
+    @override
+    def warnings(self, table: ForceTable, description: Description, measurements: Measurements) -> list[str]:
+        """Return what cannot be told from friction: gains of the load cells, and the mounting of a group that has one."""
+        return _warn_of_gains(table, description) + _warn_of_single_mountings(table, description)
+
+    @override
+    def copied_readings(self, table: ForceTable) -> list[str]:
+        """Compare runs wherever they are said to be read, since a run that is copied is often given another place.
+
+        Runs of one reading are compared by how their losses scatter along the bend, as one table.
+        """
+        forces = np.column_stack([table.input_force, table.output_force])
+        stroke, curve = table.stroke[:, None].astype(float), 3 * table.run + table.stroke
+        different = np.unique(np.column_stack([curve, forces]), axis=0)
+        if len(different) == len(np.unique(curve)) and np.all(forces > 0):
+            settings, loss = np.column_stack([stroke, forces]), np.log(table.input_force / table.output_force)
+            return copies(without_runs(table.origin, settings, loss, places_along(table), table.stroke))
+        names = tuple(f"run {name}" for name in table.run_names)
+        return copies(Compared(listed(table.origin.files), table.run, names, stroke, forces, table.input_force, curve))
+
+    @override
+    def coarse_readings(self, table: ForceTable) -> Coarse | None:
+        """Look at the output force; the input force may be set."""
+        stroke = table.stroke.astype(float)
+        settings = np.column_stack([table.route, table.own.angle, stroke, table.input_force])
+        return coarse(listed(table.origin.files), settings, table.output_force, "N")
+
+    @override
+    def why_implausible(self, measured: ForceTable, simulated: ForceTable) -> str:
+        """Look at runs; and readings of one run and stroke must not scatter more than errors of forces may."""
+        if np.any(simulated.input_force <= 0) or np.any(simulated.output_force <= 0):
+            return "a force is not positive"
+        slides = simulated.stroke != 0
+        if not slides.any():
+            return ""
+        ratio = (simulated.stroke * np.log(simulated.input_force / simulated.output_force))[slides]
+        strokes = parts(2 * simulated.run[slides] + (simulated.stroke[slides] > 0), ratio)
+        if any(np.std(part) > SCATTER for part in strokes):
+            return "forces scatter by more than a tenth"
+        of_runs = np.array([part.mean() for part in parts(simulated.run[slides], ratio)])
+        return beyond(of_runs, "the efficiency of a run")
+
+    @override
+    def file_rows(self, table: ForceTable, description: Description) -> Page:
+        measured = np.isfinite(table.own.angle).any(axis=0)
+        angles = np.rad2deg(table.own.angle[:, measured])
+        inputs, outputs = fixed(table.input_force, 3), fixed(table.output_force, 3)
+        rows = [
+            [
+                *route_cells(table.route[i], description),
+                *("" if np.isnan(angle) else f"{angle:.6g}" for angle in angles[i]),
+                table.run_names[table.run[i]],
+                STROKE_NAMES[int(table.stroke[i])],
+                inputs[i],
+                outputs[i],
+            ]
+            for i in range(len(table.run))
+        ]
+        names = [f"{name}_deg" for name, there in zip(table.own.names, measured, strict=True) if there]
+        return [*route_heading(description), *names, "run", "stroke", "input_force_N", "output_force_N"], rows
+
+    @override
+    def design_contradiction(self, design: ForceDesign, description: Description) -> str:
+        """Return that wrap angles are of a column that no contact has."""
+        known = description.angle_columns
+        unknown = next((name for name in design.own_angles if name not in known), None)
+        return f"own_angles.{unknown}: no contact has that column{nearest(unknown, known or ['none'])}" if unknown else ""
+
+    @override
+    def empty_table(self, design: ForceDesign, description: Description, file: str) -> ForceTable:
+        n_runs, n_forces, names = len(design.runs), len(design.input_forces), description.angle_columns
+        run = np.repeat(np.arange(n_runs), len(design.strokes) * n_forces)
+        stroke = np.tile(np.repeat(signs(design.strokes), n_forces), n_runs)
+        force = np.tile(design.input_forces, n_runs * len(design.strokes))
+        own = OwnAngles.none(names, len(run))
+        for name in set(design.own_angles).intersection(names):
+            own.angle[:, names.index(name)] = radians(design.own_angles[name])[run]
+        route = np.asarray(design.runs, dtype=float)[run]
+        labels = tuple(str(i + 1) for i in range(n_runs))
+        origin, velocity = RowOrigin.below_heading(file, len(run)), np.full(len(run), np.nan)
+        return ForceTable(route, force, 0.8 * force, run, labels, stroke.astype(int), own, origin, velocity)
+
+
+def _warn_of_gains(table: ForceTable, description: Description) -> list[str]:
+    """Warn where one stroke was read and nothing is said of the gains; both strokes tell them from friction."""
+    strokes = np.unique(table.stroke[table.stroke != 0])
+    if len(strokes) != 1 or description.sensors.gain_sd is not None:
+        return []
+    slides = (table.stroke != 0) & (table.input_force > 0) & (table.output_force > 0)
+    loss = abs(float(np.mean(np.log(table.input_force[slides] / table.output_force[slides])))) if slides.any() else 0.0
+    wrong = f", coefficients are wrong by {percent(0.01 / loss, 0)}" if loss > _SEEN_LOSS else ", that counts as friction"
+    read = "pulls" if strokes[0] > 0 else "returns"
+    return [
+        f"only {read} were read, in which load cells that differ in gain look like friction: where they differ by 1 %{wrong}, "
+        "and no interval says so. State input_gain_error_sd and output_gain_error_sd under [sensors] (0 where one cell read "
+        "both ends), or read the other stroke too."
+    ]
+
+
+def _warn_of_single_mountings(table: ForceTable, description: Description) -> list[str]:
+    """Warn of groups with one mounting, whose effect cannot be told from that of the group."""
+    if not description.by_group:
+        return []
+    mounted = Counter(name for name, _ in set(zip(table.group, table.run.tolist(), strict=True)))
+    once = [name for name in dict.fromkeys(table.group) if mounted[name] == 1]
+    if not once:
+        return []
+    return [
+        f"{listed(once)}: measured in one mounting of the cable{' each' if len(once) > 1 else ''}, so what that mounting did "
+        "cannot be told from what the group does, and intervals rest on the scatter of other mountings, or on its prior; mount "
+        "the cable anew a few times in each group."
+    ]

@@ -1,0 +1,136 @@
+"""Preload between fixed ends: how it is read, checked and described."""
+
+import numpy as np
+from typing_extensions import override
+
+from bowdenfit.description import Description, Finite
+from bowdenfit.description.values import Frozen
+from bowdenfit.files.columns import Quantity, find_columns, require
+from bowdenfit.files.tables import read_table
+from bowdenfit.kinds.design import Design, radians
+from bowdenfit.kinds.init_questions import InitQuestions, WantedColumn
+from bowdenfit.kinds.kind import PlannedKind, RopeKind, Source, TableFromFiles
+from bowdenfit.kinds.measurements import Measurements
+from bowdenfit.kinds.pages import Page, fixed, in_words
+from bowdenfit.kinds.plausibility import within_factor
+from bowdenfit.kinds.preload.table import PreloadTable, PreloadTableSettings
+from bowdenfit.kinds.readings import Readings
+from bowdenfit.kinds.rows import RowOrigin, provenance_of, read_angle, read_tension
+from bowdenfit.kinds.stretch.kind import one_angle_warning
+from bowdenfit.kinds.stretch.table import StretchTable
+from bowdenfit.types import Vector
+from bowdenfit.words import counted
+
+_UNUSED = ("time", "position", "run")  # columns that such a table may have and that nothing reads
+_FEWEST_TAUT = 3  # readings above 0 that a plausible table has
+
+
+class _PreloadRows(Frozen):
+    """[design.preload]: wrap angles [deg]."""
+
+    wrap_angles: tuple[Finite, ...]
+
+
+class PreloadDesign(Design):
+    """[design]: where the preload is read."""
+
+    preload: _PreloadRows = _PreloadRows(wrap_angles=())
+
+
+class PreloadKind(RopeKind[PreloadTable], PlannedKind[PreloadTable]):
+    """Tension of the rope between fixed ends, at several wrap angles."""
+
+    name = "preload"
+    table = PreloadTable
+    settings = PreloadTableSettings
+    readings = (Readings("measured_preload", "preload", "preload", "preload at {}", "Preload (N)"),)
+    methods_sentence = "The preload between fixed ends was that of the model at each wrap angle."
+    init_questions = InitQuestions(
+        "preload between fixed ends at several wrap angles",
+        (
+            WantedColumn(Quantity("preload", "force"), "the preload"),
+            WantedColumn(Quantity("wrap_angle", "angle"), "the wrap angle of the cable"),
+        ),
+    )
+    design = PreloadDesign
+
+    @override
+    def read(self, source: Source) -> TableFromFiles[PreloadTable]:
+        """Read a table of preload against wrap angle, measured between fixed ends; 0 where the rope is slack.
+
+        Raises:
+            DatasetError: See `read_table` and `find_columns`; or a preload is negative.
+        """
+        path = source.file
+        table = read_table(path)
+        wanted = (Quantity("preload", "force"), Quantity("wrap_angle", "angle"))
+        found = find_columns(table, wanted, source.columns, _UNUSED)
+        angles = require(table, found, "wrap_angle", "wrap_angle_deg")
+        preloads = require(table, found, "preload", "preload_N")
+        rows = PreloadTable(
+            np.array(angles.each(lambda cell: read_angle(cell, angles), np.nan)),
+            np.array(preloads.each(lambda cell: read_tension(cell, preloads, "a preload"), np.nan)),
+            provenance_of(table),
+        )
+        return TableFromFiles(rows, {path.name: path}, accounts=(table.account,))
+
+    @override
+    def describe(self, table: PreloadTable, description: Description) -> list[str]:
+        """Return how many readings there are, how large and at which wrap angles."""
+        slack = int(np.sum(table.preload == 0))
+        none = f" ({slack} of them 0, which says at most 0)" if slack else ""
+        angles = in_words(np.rad2deg(table.wrap_angle), "deg")
+        file, n = table.origin.files[0], self.count_readings(table)
+        return [f"{file}: {n}{none}, {in_words(table.preload, 'N')}, at {angles}"]
+
+    @override
+    def count_readings(self, table: PreloadTable) -> str:
+        return counted(len(table.preload), "preload")
+
+    @override
+    def bends(self, table: PreloadTable) -> Vector:
+        return table.wrap_angle
+
+    @override
+    def tensions(self, table: PreloadTable) -> Vector:
+        return table.preload
+
+    @override
+    def warnings(self, table: PreloadTable, description: Description, measurements: Measurements) -> list[str]:
+        alone = measurements.table(StretchTable) is None
+        file, warnings = table.origin.files[0], one_angle_warning(measurements) if alone else []
+        if not description.preload_follows_stretch:
+            return warnings
+        if not table.preload.any():
+            warnings.append(
+                f"every preload in {file} reads 0, which says only that the rope is slack; read it where it is taut."
+            )
+        elif np.ptp(table.wrap_angle) > 0 and np.corrcoef(table.wrap_angle, table.preload)[0, 1] < 0:
+            warnings.append(
+                f"the preload in {file} falls with the wrap angle, which bending alone cannot do; check the columns, or write "
+                'model = "constant" under [preload] if springs hold it.'
+            )
+        if alone:
+            warnings.append(
+                "without a table of stretch, preloads tell only how lengthening compares with the give of the rope; stiffness, "
+                "bedding-in and lengthening by themselves will rest on their priors."
+            )
+        return warnings
+
+    @override
+    def why_implausible(self, measured: PreloadTable, simulated: PreloadTable) -> str:
+        """Return that the rope is slack nearly everywhere, or the preload of another size than the measured."""
+        if np.sum(simulated.preload > 0) < min(int(np.sum(measured.preload > 0)), _FEWEST_TAUT):
+            return "the rope is slack at nearly every angle"
+        close = within_factor(measured.preload.max(), simulated.preload.max())
+        return "" if close else "the preload is far from the measured one"
+
+    @override
+    def file_rows(self, table: PreloadTable, description: Description) -> Page:
+        columns = zip(np.rad2deg(table.wrap_angle), fixed(table.preload, 3), strict=True)
+        return ["wrap_angle_deg", "preload_N"], [[f"{angle:.6g}", preload] for angle, preload in columns]
+
+    @override
+    def empty_table(self, design: PreloadDesign, description: Description, file: str) -> PreloadTable:
+        angles = radians(design.preload.wrap_angles)
+        return PreloadTable(angles, np.full(len(angles), 20.0), RowOrigin.below_heading(file, len(angles)))

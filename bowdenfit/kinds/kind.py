@@ -1,30 +1,25 @@
 """What a kind of measurement gives of its tables, in NumPy. Its half in the likelihood is a `TermKind` (`kinds/term.py`).
 
-A kind is one class, `kinds/<kind>/kind.py`, and one line in `KINDS`. It must give five things; Python and mypy both refuse a
-class without them:
+A kind is one class, `kinds/<kind>/kind.py`, and one line in `KINDS`. It must give five things, and Python and mypy refuse a
+class that lacks one:
 
-============  ====================================================================
-`name`        what a table is called under [tables] in cable.toml, and in fit.json
-`table`       the class of its tables: arrays in N, mm, rad and s
-`readings`    what its readings are called in sentences, tables and figures
-`read`        a table from its files
-`describe`    what was understood of a table, for `bowdenfit check`
-============  ====================================================================
+- `name`: what a table is called under [tables] in cable.toml, and in fit.json;
+- `table`: the class of its tables, which hold arrays in N, mm, rad and s;
+- `readings`: what its readings are called in sentences, tables and figures;
+- `read`: a table from its files;
+- `describe`: what was understood of a table, for `bowdenfit check`.
 
-What else `Kind` has is optional, and has a plain default: nothing to add, nothing to refuse. Three groups belong together; a
-kind that has one of them derives from its class too:
+What else `Kind` has is optional; its plain default adds nothing and refuses nothing. Some things belong together, and a kind
+that has them derives from their class too:
 
-==================  ============================================================================================
-`FrictionKind`      its readings show friction: at which lengths, wrap angles, forces and speeds, of which groups
-`RopeKind`          its readings show the rope: at which bends, under which tensions
-`PlannedKind`       `bowdenfit simulate` can make such a table from the [design] of a plan
-==================  ============================================================================================
+- `FrictionKind`: its readings show friction, at some lengths, wrap angles, forces and speeds, and of some groups
+  (`FrictionTableKind` in `kinds/friction_table.py` is one whose rows carry their own lengths and wrap angles);
+- `RopeKind`: its readings show the rope itself, at some bends and under some tensions;
+- `PlannedKind`: `bowdenfit simulate` can make such a table from the [design] of a plan.
 
-(`FrictionTableKind`, in `kinds/friction_table.py`, is a `FrictionKind` whose rows carry their own lengths and wrap angles.)
-
-The class of a kind says the short things itself. What is longer than a page stands in modules beside it: `table.py` with the
-class of its tables and its reader, and whatever else has a name of its own. Nothing here or there may import JAX, because
-reading a table must not wait for it.
+The class says the short things itself. What is longer than a page stands in modules beside it: `table.py` with the class of
+its tables where several modules import it, its reader, and whatever else has a name of its own. Nothing here or there may
+import JAX, because reading a table must not wait for it.
 """
 
 import os

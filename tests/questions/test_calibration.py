@@ -192,7 +192,7 @@ def test_a_table_of_several_detection_limits_is_refused_unless_one_is_stated(on_
 
 def test_recordings_with_clipped_readings_are_refused():
     dataset = data_set("synthetic-recordings")
-    description, recordings = dataset.description, dataset.measurements.table(Recordings)
+    recordings = dataset.measurements.table(Recordings)
     refuse_saturated(recordings)
     first = recordings.each[0]
     clipped = replace(first, blocks=replace(first.blocks, saturated=first.blocks.input_force > 100))

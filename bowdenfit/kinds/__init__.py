@@ -7,11 +7,10 @@ from bowdenfit.kinds.angles.kind import AngleKind
 from bowdenfit.kinds.displacement.kind import DisplacementKind
 from bowdenfit.kinds.efficiencies.kind import EfficiencyKind
 from bowdenfit.kinds.forces.kind import ForceKind
-from bowdenfit.kinds.kind import Kind
+from bowdenfit.kinds.kind import Kind, Readings
 from bowdenfit.kinds.loop.kind import LoopKind
 from bowdenfit.kinds.measurements import Measurements
 from bowdenfit.kinds.preload.kind import PreloadKind
-from bowdenfit.kinds.readings import Readings
 from bowdenfit.kinds.recordings.kind import RecordingKind
 from bowdenfit.kinds.ringdown.kind import RingDownKind
 from bowdenfit.kinds.stretch.kind import StretchKind

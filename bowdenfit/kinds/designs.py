@@ -11,8 +11,7 @@ from bowdenfit.description.values import Frozen
 from bowdenfit.description.wrong_keys import wrong_keys
 from bowdenfit.errors import DescriptionError
 from bowdenfit.kinds import KINDS
-from bowdenfit.kinds.design import Design
-from bowdenfit.kinds.kind import PlannedKind
+from bowdenfit.kinds.kind import Design, PlannedKind
 
 
 def read_design(page: Mapping[str, Any], description: Description, file: str) -> Design:

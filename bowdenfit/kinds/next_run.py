@@ -24,8 +24,8 @@ from bowdenfit.kinds.candidate import (
 )
 from bowdenfit.kinds.forces.table import ForceTable
 from bowdenfit.kinds.measurements import Measurements
-from bowdenfit.kinds.recordings.angles import recorded_angles
 from bowdenfit.kinds.recordings.blocks import positive, worth_of
+from bowdenfit.kinds.recordings.table import recorded_angles
 from bowdenfit.kinds.resolve_angles import resolve_angles
 from bowdenfit.kinds.row_angles import row_angles
 from bowdenfit.kinds.rows import RowConditions

@@ -1,11 +1,13 @@
-"""Tables on the way out: as the headings and rows of a file, and as a range in words."""
+"""Tables as people write them: headings and cells of a file, strokes and angles of a design, and ranges in words."""
 
 import math
-from collections.abc import Iterable
+from collections.abc import Iterable, Sequence
+from typing import Literal
 
 import numpy as np
 
 from bowdenfit.description import Description
+from bowdenfit.types import Vector
 from bowdenfit.words import significant
 
 Page = tuple[list[str], list[list[str]]]
@@ -13,6 +15,8 @@ Page = tuple[list[str], list[list[str]]]
 
 _DIGITS = 5
 STROKE_NAMES = {1: "pull", -1: "return"}
+Stroke = Literal["pull", "return"]
+_SIGNS = {name: sign for sign, name in STROKE_NAMES.items()}
 
 
 def route_heading(description: Description) -> list[str]:
@@ -38,3 +42,13 @@ def in_words(values: np.ndarray, unit: str) -> str:
     low, high = float(values.min()), float(values.max())
     least, most = significant(low, 4), significant(high, 4)
     return f"{least} {unit}" if low == high else f"{least} to {most} {unit}"
+
+
+def signs(strokes: Sequence[Stroke]) -> list[int]:
+    """+1 for each pull, -1 for each return."""
+    return [_SIGNS[stroke] for stroke in strokes]
+
+
+def radians(degrees: Sequence[float]) -> Vector:
+    """Wrap angles as tables have them."""
+    return np.deg2rad(np.array(degrees, dtype=float))

@@ -5,8 +5,8 @@ from typing import Any
 
 from bowdenfit.description import Description
 from bowdenfit.errors import DescriptionError
-from bowdenfit.kinds.design import Design
 from bowdenfit.kinds.designs import design_of
+from bowdenfit.kinds.kind import Design
 from bowdenfit.kinds.settings import parse_description
 
 _FITTED_FRICTION = ("friction_model", "reference_force", "reference_velocity")

@@ -1,4 +1,4 @@
-"""Nobody outside kinds/ knows which kinds of measurement there are: what is said of one is a field of that kind."""
+"""Nobody outside kinds/ knows which kinds of measurement there are: what is said of one is a method of that kind."""
 
 import ast
 from pathlib import Path

@@ -26,8 +26,7 @@ from bowdenfit.dataset import Dataset
 from bowdenfit.description import Description, SamplerSettings
 from bowdenfit.inference.log_density import LogDensity
 from bowdenfit.kinds.measurements import Measurements
-from bowdenfit.kinds.recordings.settings import RecordingsTable
-from bowdenfit.kinds.recordings.table import _File, _prepared, _recording
+from bowdenfit.kinds.recordings.table import RecordingsTable, _File, _prepared, _recording
 from bowdenfit.kinds.settings import parse_description
 from bowdenfit.model import build_model
 from bowdenfit.questions.simulate.bench import (

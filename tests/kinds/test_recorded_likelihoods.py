@@ -19,8 +19,8 @@ from bowdenfit.inference.objective import make_objective
 from bowdenfit.kinds import runs as runs_of_model
 from bowdenfit.kinds.measured_cable import measured_cable
 from bowdenfit.kinds.measurements import Measurements
-from bowdenfit.kinds.recordings.angles import recorded_angles
 from bowdenfit.kinds.recordings.side_by_side import first_of_groups
+from bowdenfit.kinds.recordings.table import recorded_angles
 from bowdenfit.kinds.recordings.whole import WholeRecordingsTerm, pad_recordings
 from bowdenfit.kinds.row_angles import row_angles
 from bowdenfit.kinds.runs import RunsTerm, run_sums

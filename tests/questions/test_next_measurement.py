@@ -23,9 +23,9 @@ from bowdenfit.inference.draws import curves_of, for_each_draw, named_values
 from bowdenfit.inference.log_density import LogDensity as Density
 from bowdenfit.kinds.angles.table import AngleTable
 from bowdenfit.kinds.candidate import Candidate
-from bowdenfit.kinds.design import Design
 from bowdenfit.kinds.designs import design_of
 from bowdenfit.kinds.efficiencies.table import EfficiencyTable
+from bowdenfit.kinds.kind import Design
 from bowdenfit.kinds.next_run import typical_run
 from bowdenfit.kinds.rows import OwnAngles, RowOrigin
 from bowdenfit.model import Model, build_model

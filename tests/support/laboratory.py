@@ -17,7 +17,7 @@ from bowdenfit.inference.least_squares import LeastSquares, least_squares, maxim
 from bowdenfit.inference.log_density import LogDensity
 from bowdenfit.inference.objective import make_objective
 from bowdenfit.inference.walkers import walker_programs
-from bowdenfit.kinds.design import Design
+from bowdenfit.kinds.kind import Design
 from bowdenfit.model import build_model
 from bowdenfit.questions.calibrate.refit import Laboratory as Fits
 from bowdenfit.questions.calibrate.workbench import Plan, Workbench

@@ -14,12 +14,10 @@ from bowdenfit.files.columns import Column, Quantity, find_columns, require
 from bowdenfit.files.tables import read_table
 from bowdenfit.kinds.angles.table import AngleSettings, AngleTable
 from bowdenfit.kinds.copies import copies, without_runs
-from bowdenfit.kinds.design import Design
 from bowdenfit.kinds.init_questions import InitQuestions
-from bowdenfit.kinds.kind import PlannedKind, Source, TableFromFiles
+from bowdenfit.kinds.kind import Design, PlannedKind, Readings, Source, TableFromFiles
 from bowdenfit.kinds.measurements import Measurements
 from bowdenfit.kinds.pages import Page, route_heading
-from bowdenfit.kinds.readings import Readings
 from bowdenfit.kinds.rows import LARGEST_ANGLE, RowOrigin, provenance_of, read_angle, rounded, route_column
 
 _FEWEST = 3  # detected angles that a plausible table has of each curve

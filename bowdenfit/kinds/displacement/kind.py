@@ -13,17 +13,15 @@ from bowdenfit.description.file import Stated
 from bowdenfit.description.values import Frozen
 from bowdenfit.files.columns import Quantity
 from bowdenfit.kinds.copies import Compared, copies
-from bowdenfit.kinds.design import Design, radians
 from bowdenfit.kinds.displacement.reader import early, read_displacement
 from bowdenfit.kinds.displacement.table import DisplacementSettings, DisplacementTable
 from bowdenfit.kinds.displacement.turns import in_order
 from bowdenfit.kinds.friction_table import FrictionTableKind
 from bowdenfit.kinds.init_questions import InitQuestions, WantedColumn
-from bowdenfit.kinds.kind import PlannedKind, RopeKind, Source, TableFromFiles
+from bowdenfit.kinds.kind import Design, PlannedKind, Readings, RopeKind, Source, TableFromFiles
 from bowdenfit.kinds.measurements import Measurements
-from bowdenfit.kinds.pages import Page, fixed, in_words, route_cells, route_heading
+from bowdenfit.kinds.pages import Page, fixed, in_words, radians, route_cells, route_heading
 from bowdenfit.kinds.plausibility import within_factor
-from bowdenfit.kinds.readings import Readings
 from bowdenfit.kinds.rows import RUN, STROKE, OwnAngles, RowOrigin
 from bowdenfit.types import Vector
 from bowdenfit.words import listed

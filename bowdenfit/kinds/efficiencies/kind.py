@@ -9,14 +9,12 @@ from bowdenfit.files.columns import Column, Quantity, find_columns, require
 from bowdenfit.files.tables import read_table
 from bowdenfit.kinds.coarse import Coarse, coarse
 from bowdenfit.kinds.copies import copies, places_along, without_runs
-from bowdenfit.kinds.design import Design
 from bowdenfit.kinds.efficiencies.table import EfficiencyTable
 from bowdenfit.kinds.friction_table import FrictionTableKind
 from bowdenfit.kinds.init_questions import InitQuestions, WantedColumn
-from bowdenfit.kinds.kind import PlannedKind, Source, TableFromFiles
+from bowdenfit.kinds.kind import Design, PlannedKind, Source, TableFromFiles, efficiencies
 from bowdenfit.kinds.pages import Page, route_cells, route_heading
 from bowdenfit.kinds.plausibility import GAIN_ERROR, beyond
-from bowdenfit.kinds.readings import efficiencies
 from bowdenfit.kinds.rows import OwnAngles, RowOrigin, provenance_of, read_own_angles, read_route, shared_columns
 from bowdenfit.words import counted, listed, percent
 

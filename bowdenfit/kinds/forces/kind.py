@@ -11,17 +11,15 @@ from bowdenfit.errors import nearest
 from bowdenfit.files.columns import Quantity
 from bowdenfit.kinds.coarse import Coarse, coarse
 from bowdenfit.kinds.copies import Compared, copies, places_along, without_runs
-from bowdenfit.kinds.design import Design, Stroke, radians, signs
 from bowdenfit.kinds.forces.impossible import check_following, check_gains
 from bowdenfit.kinds.forces.mountings import ForceSettings
 from bowdenfit.kinds.forces.table import ForceTable, count_loads, read_forces
 from bowdenfit.kinds.friction_table import FrictionTableKind
 from bowdenfit.kinds.init_questions import InitQuestions, WantedColumn, YesNoQuestion
-from bowdenfit.kinds.kind import PlannedKind, Source, TableFromFiles
+from bowdenfit.kinds.kind import Design, PlannedKind, Readings, Source, TableFromFiles, efficiencies
 from bowdenfit.kinds.measurements import Measurements
-from bowdenfit.kinds.pages import STROKE_NAMES, Page, fixed, route_cells, route_heading
+from bowdenfit.kinds.pages import STROKE_NAMES, Page, Stroke, fixed, radians, route_cells, route_heading, signs
 from bowdenfit.kinds.plausibility import SCATTER, beyond, parts
-from bowdenfit.kinds.readings import Readings, efficiencies
 from bowdenfit.kinds.rows import RUN, STROKE, OwnAngles, RowOrigin
 from bowdenfit.types import Vector
 from bowdenfit.words import counted, listed, percent, significant

@@ -16,17 +16,15 @@ from bowdenfit.files.csv_table import RawTable
 from bowdenfit.files.matching import meanings
 from bowdenfit.files.tables import read_table
 from bowdenfit.kinds.copies import copies, without_runs
-from bowdenfit.kinds.design import Design, Stroke, radians, signs
 from bowdenfit.kinds.ends import ENDS, end_column, forces_of
 from bowdenfit.kinds.friction_table import FrictionTableKind
 from bowdenfit.kinds.init_questions import InitQuestions, WantedColumn
-from bowdenfit.kinds.kind import PlannedKind, RopeKind, Source, TableFromFiles
+from bowdenfit.kinds.kind import Design, PlannedKind, Readings, RopeKind, Source, TableFromFiles
 from bowdenfit.kinds.loop.table import LoopTable
 from bowdenfit.kinds.measurements import Measurements
-from bowdenfit.kinds.pages import STROKE_NAMES, Page, fixed, in_words
+from bowdenfit.kinds.pages import STROKE_NAMES, Page, Stroke, fixed, in_words, radians, signs
 from bowdenfit.kinds.plausibility import HIGHEST, LOWEST
 from bowdenfit.kinds.preload.table import PreloadTable
-from bowdenfit.kinds.readings import Readings
 from bowdenfit.kinds.rows import (
     STROKE,
     OwnAngles,

@@ -7,14 +7,12 @@ from bowdenfit.description import Description, Finite
 from bowdenfit.description.values import Frozen
 from bowdenfit.files.columns import Quantity, find_columns, require
 from bowdenfit.files.tables import read_table
-from bowdenfit.kinds.design import Design, radians
 from bowdenfit.kinds.init_questions import InitQuestions, WantedColumn
-from bowdenfit.kinds.kind import PlannedKind, RopeKind, Source, TableFromFiles
+from bowdenfit.kinds.kind import Design, PlannedKind, Readings, RopeKind, Source, TableFromFiles
 from bowdenfit.kinds.measurements import Measurements
-from bowdenfit.kinds.pages import Page, fixed, in_words
+from bowdenfit.kinds.pages import Page, fixed, in_words, radians
 from bowdenfit.kinds.plausibility import within_factor
 from bowdenfit.kinds.preload.table import PreloadTable, PreloadTableSettings
-from bowdenfit.kinds.readings import Readings
 from bowdenfit.kinds.rows import RowOrigin, provenance_of, read_angle, read_tension
 from bowdenfit.kinds.stretch.kind import one_angle_warning
 from bowdenfit.kinds.stretch.table import StretchTable

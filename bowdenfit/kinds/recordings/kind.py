@@ -10,13 +10,10 @@ from bowdenfit.files.matching import Quantity
 from bowdenfit.kinds.angles.table import AngleTable
 from bowdenfit.kinds.copies import NO_NOISE
 from bowdenfit.kinds.init_questions import InitQuestions, WantedColumn
-from bowdenfit.kinds.kind import FrictionKind, Source, TableFromFiles
+from bowdenfit.kinds.kind import FrictionKind, Readings, Source, TableFromFiles, efficiencies
 from bowdenfit.kinds.measurements import Measurements
 from bowdenfit.kinds.plausibility import FACTOR, SCATTER, beyond
-from bowdenfit.kinds.readings import Readings, efficiencies
-from bowdenfit.kinds.recordings.angles import recorded_angles
-from bowdenfit.kinds.recordings.settings import RecordingsTable
-from bowdenfit.kinds.recordings.table import read_recordings
+from bowdenfit.kinds.recordings.table import RecordingsTable, read_recordings, recorded_angles
 from bowdenfit.kinds.recordings.words import recordings_text
 from bowdenfit.kinds.rows import RowConditions
 from bowdenfit.recordings.recording import PULL, RETURN, Recordings

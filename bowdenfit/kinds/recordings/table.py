@@ -4,17 +4,18 @@ from collections import Counter
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
+from typing import Literal
 
 import numpy as np
+from pydantic import Field
 
-from bowdenfit.description import Description, Preparation, QuantityValue, RecordingFile
+from bowdenfit.description import Description, Preparation, QuantityValue, RecordingFile, TableSettings
 from bowdenfit.errors import DatasetError, DescriptionError, Faults, nearest
 from bowdenfit.files import read_channels
 from bowdenfit.files.row_account import RowAccount
 from bowdenfit.kinds.kind import Source, TableFromFiles
-from bowdenfit.kinds.recordings.angles import check_placed
 from bowdenfit.kinds.recordings.placing import entry_from_name, place_names, placed_by_channels
-from bowdenfit.kinds.recordings.settings import RecordingsTable
+from bowdenfit.kinds.rows import OwnAngles, RowConditions
 from bowdenfit.recordings.forces import to_recording
 from bowdenfit.recordings.named_channels import TORQUES, WANTED, rows_where
 from bowdenfit.recordings.preparation import NO_DELAY_OF_LOOPS, average_recording, inspect_recording
@@ -22,7 +23,32 @@ from bowdenfit.recordings.preparation.delay import COMMON_ERROR
 from bowdenfit.recordings.recording import Account, Blocks, RawRecording, Recording, Recordings
 from bowdenfit.recordings.strokes import cable_of, find_strokes
 from bowdenfit.types import Vector
-from bowdenfit.units import INTERNAL_UNITS, ColumnSource, speed_dimension
+from bowdenfit.units import INTERNAL_UNITS, ChannelSource, ColumnSource, speed_dimension
+
+
+class RecordingsTable(TableSettings):
+    """Recordings that share their channels' names and their preparation.
+
+    `pattern` reads what a file was recorded at from its name, such as "{at}mm_{velocity:r/min}rpm".
+    """
+
+    files: str | tuple[str, ...] | None = None
+    pattern: str | None = None
+    channels: dict[str, ChannelSource] = Field(default_factory=dict)
+    likelihood: Literal["runs", "whole"] = "runs"
+    prepare: Preparation = Preparation()
+
+    @property
+    def fits_offsets(self) -> bool:
+        """Whether the load cells are tared by the fit."""
+        return self.prepare.tare == "fitted"
+
+
+def recorded_angles(recordings: Recordings) -> RowConditions:
+    """Route values and own angles, one row a recording."""
+    shape = (len(recordings.each), len(recordings.columns))
+    angle, sd = (np.array([getattr(r, n) for r in recordings.each]).reshape(shape) for n in ("own_angle", "own_sd"))
+    return RowConditions(np.array([r.route for r in recordings.each]), OwnAngles(recordings.columns, angle, sd))
 
 
 def read_recordings(source: Source) -> TableFromFiles[Recordings]:
@@ -51,7 +77,7 @@ def read_recordings(source: Source) -> TableFromFiles[Recordings]:
     each = tuple(_recording(description, f, *parts) for f, parts in zip(files, _said_once(prepared), strict=True))
     unit, loop = next(iter(units), ""), description.cable.kind == "loop"
     recordings = Recordings(description.angle_columns, each, unit, delay_sd, loop)
-    check_placed(recordings, description)
+    _check_placed(recordings, description)
     remarks = [remark for r in each for remark in (*r.account.remarks, *r.strokes.remarks)]
     accounts = dict.fromkeys(f.account for f in files if f.account is not None)  # a file may hold several recordings
     return TableFromFiles(recordings, {entry.file: path for path, entry in entries}, tuple(remarks), tuple(accounts))
@@ -191,3 +217,24 @@ def _own_angles(description: Description, entry: RecordingFile) -> tuple[np.ndar
     angles = [float("nan") if q is None else q.to("angle") for q in stated]
     sds = [float("nan") if q is None or q.sd is None else q.sd_to("angle") for q in stated]
     return np.array(angles, dtype=float), np.array(sds, dtype=float)
+
+
+def _check_placed(recordings: Recordings, description: Description) -> None:
+    """Refuse a recording that cannot be given a wrap angle in every contact."""
+    route = description.route
+    for recording in recordings.each:
+        for contact in description.contact:
+            column = contact.wrap_angle.column
+            if column is None or np.isfinite(recording.own_angle[recordings.columns.index(column)]):
+                continue
+            if not contact.wrap_angle.curve:
+                raise DatasetError(
+                    f"the recording {recording.name!r} has no wrap angle for the contact {contact.name!r}; add it to its "
+                    f'[[recording]]: wrap_angles = {{ {column} = {{ value = 90, unit = "deg" }} }}.'
+                )
+            if np.isnan(recording.route):
+                at = f"at = 470   # {route.variable}, in {route.unit}" if route else "at = 470"
+                raise DatasetError(
+                    f"the recording {recording.name!r} does not say at which {route.variable if route else 'length'} it was "
+                    f'made; add that to its [[recording]] ({at}), or read it from the file names: pattern = "{{at}}mm*".'
+                )

@@ -16,7 +16,6 @@ from bowdenfit.description import Description
 from bowdenfit.errors import DatasetError
 from bowdenfit.kinds.angles.table import AngleTable
 from bowdenfit.kinds.bench import Truth
-from bowdenfit.kinds.recordings.angles import recorded_angles
 from bowdenfit.kinds.recordings.blocks import (
     RECORDED,
     drift_of,
@@ -29,9 +28,9 @@ from bowdenfit.kinds.recordings.blocks import (
     worth_of,
 )
 from bowdenfit.kinds.recordings.loops import LoopRecordingsTerm, loop_recordings_term
-from bowdenfit.kinds.recordings.settings import RecordingsTable
 from bowdenfit.kinds.recordings.simulation import drawn_recordings, recorded_again, refuse_saturated
 from bowdenfit.kinds.recordings.sliding import BlocksUsed, sliding_blocks
+from bowdenfit.kinds.recordings.table import RecordingsTable, recorded_angles
 from bowdenfit.kinds.recordings.whole import WholeRecordingsTerm, pad_recordings
 from bowdenfit.kinds.row_angles import row_angles
 from bowdenfit.kinds.runs import RunsTerm, run_sums

@@ -10,10 +10,9 @@ from bowdenfit.description.file import Stated
 from bowdenfit.errors import DatasetError
 from bowdenfit.files.columns import Quantity
 from bowdenfit.kinds.init_questions import InitQuestions, WantedColumn
-from bowdenfit.kinds.kind import Kind, Source, TableFromFiles
+from bowdenfit.kinds.kind import Kind, Readings, Source, TableFromFiles
 from bowdenfit.kinds.measurements import Measurements
 from bowdenfit.kinds.pages import Page
-from bowdenfit.kinds.readings import Readings
 from bowdenfit.kinds.ringdown.table import RingDownSettings, RingDownTable, read_ring_down
 from bowdenfit.kinds.rows import RUN
 from bowdenfit.words import counted

@@ -9,14 +9,12 @@ from bowdenfit.description import Description, Finite
 from bowdenfit.description.values import Frozen
 from bowdenfit.files.columns import Quantity
 from bowdenfit.kinds.copies import Compared, copies
-from bowdenfit.kinds.design import Design, radians
 from bowdenfit.kinds.init_questions import InitQuestions, WantedColumn
-from bowdenfit.kinds.kind import PlannedKind, RopeKind, Source, TableFromFiles
+from bowdenfit.kinds.kind import Design, PlannedKind, Readings, RopeKind, Source, TableFromFiles
 from bowdenfit.kinds.measurements import Measurements
-from bowdenfit.kinds.pages import Page, fixed, in_words
+from bowdenfit.kinds.pages import Page, fixed, in_words, radians
 from bowdenfit.kinds.plausibility import parts, within_factor
 from bowdenfit.kinds.preload.table import PreloadTable
-from bowdenfit.kinds.readings import Readings
 from bowdenfit.kinds.rows import RowOrigin
 from bowdenfit.kinds.stretch.table import StretchTable, read_stretch
 from bowdenfit.types import Vector

@@ -13,8 +13,8 @@ from bowdenfit.cable.drive import Loop, Rope, drive_of
 from bowdenfit.cable.load_cells import LoadCells
 from bowdenfit.inference.compilation import compile_program
 from bowdenfit.kinds.angles.table import AngleTable
-from bowdenfit.kinds.recordings.angles import recorded_angles
 from bowdenfit.kinds.recordings.side_by_side import beside
+from bowdenfit.kinds.recordings.table import recorded_angles
 from bowdenfit.kinds.resolve_angles import resolve_angles
 from bowdenfit.kinds.row_angles import row_angles
 from bowdenfit.model import Model

@@ -8,7 +8,7 @@ import numpy as np
 
 from bowdenfit.inference.draws import for_each_value
 from bowdenfit.kinds.angles.table import AngleTable
-from bowdenfit.kinds.recordings.angles import recorded_angles
+from bowdenfit.kinds.recordings.table import recorded_angles
 from bowdenfit.kinds.resolve_angles import resolve_angles
 from bowdenfit.kinds.row_angles import row_angles
 from bowdenfit.questions.recorded.equations import blocks_shown

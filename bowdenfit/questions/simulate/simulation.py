@@ -20,9 +20,8 @@ from bowdenfit.kinds import KINDS
 from bowdenfit.kinds.angles.table import AngleTable
 from bowdenfit.kinds.angles.term import drawn_angles
 from bowdenfit.kinds.bench import Truth
-from bowdenfit.kinds.design import Design
 from bowdenfit.kinds.drawn_readings import Readings, drawn_readings, with_drawn_readings
-from bowdenfit.kinds.kind import PlannedKind
+from bowdenfit.kinds.kind import Design, PlannedKind
 from bowdenfit.kinds.measurements import Measurements
 from bowdenfit.model import build_model
 

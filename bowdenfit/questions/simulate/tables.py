@@ -14,8 +14,8 @@ from bowdenfit.description import Description
 from bowdenfit.errors import DescriptionError
 from bowdenfit.inputs import read_toml_file
 from bowdenfit.kinds import each_table
-from bowdenfit.kinds.design import Design
 from bowdenfit.kinds.designs import read_design
+from bowdenfit.kinds.kind import Design
 from bowdenfit.kinds.measurements import Measurements
 from bowdenfit.kinds.settings import parse_description
 from bowdenfit.questions.simulate.simulation import empty_tables, simulate, true_values

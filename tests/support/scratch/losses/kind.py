@@ -6,8 +6,7 @@ import numpy as np
 
 from bowdenfit.files.columns import Quantity, find_columns, require
 from bowdenfit.files.csv_table import read_csv
-from bowdenfit.kinds.kind import Kind, TableFromFiles
-from bowdenfit.kinds.readings import Readings
+from bowdenfit.kinds.kind import Kind, Readings, TableFromFiles
 from bowdenfit.types import Vector
 
 

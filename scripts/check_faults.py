@@ -1,4 +1,4 @@
-"""Would the default tests notice? Six faults in likelihood, sampler and prediction, put into a copy of the package one at a time.
+"""Would the default tests notice? Six faults in likelihood, sampler and prediction, put into a copy of the package.
 
     python scripts/check_faults.py
 

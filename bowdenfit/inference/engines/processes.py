@@ -40,7 +40,7 @@ def keep_compiled_programs() -> None:
     from platformdirs import user_cache_dir
 
     settings: Any = jax.config
-    if settings.jax_compilation_cache_dir is not None or not settings.jax_enable_compilation_cache:
+    if settings.jax_compilation_cache_dir or not settings.jax_enable_compilation_cache:
         return
     jax.config.update("jax_compilation_cache_dir", user_cache_dir("bowdenfit"))
     jax.config.update("jax_persistent_cache_min_compile_time_secs", 0.1)

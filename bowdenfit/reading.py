@@ -1,12 +1,12 @@
 """Reading a data set with changes to its description: the keywords that every verb on measurements takes."""
 
-from collections.abc import Callable, Sequence
-from inspect import signature
+from collections.abc import Sequence
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any, Literal, TypedDict, Unpack
+from typing import TYPE_CHECKING, Annotated, Literal, TypedDict, Unpack
 
-from bowdenfit.given import with_checked_keywords
-from bowdenfit.verb import A_DATASET, Argument, Option, Quantity, with_named_keywords
+from cyclopts import Parameter
+
+from bowdenfit.arguments import DATASET, PLACE, TEXTS, Quantity, checked, measured, number_with_unit, whole_number
 
 if TYPE_CHECKING:
     from bowdenfit.dataset import Dataset
@@ -34,17 +34,19 @@ class Reading(TypedDict, total=False):
         reading_limit: So many times the memory and time that are usual for a binary file of its size may be taken to read it.
     """
 
-    settings: Annotated[Sequence[str], Option(("--set",), metavar="KEY=VALUE")]
-    channels: Annotated[Sequence[str], Option(("--channel",), metavar="QUANTITY=CHANNEL:UNIT")]
-    columns: Annotated[Sequence[str], Option(("--column",), metavar="QUANTITY=COLUMN:UNIT")]
-    noise: Annotated[Literal["normal", "student"] | None, Option(default="as in cable.toml, else normal")]
-    friction: Annotated[str | None, Option(metavar="MODEL", default="as in cable.toml, else capstan")]
-    geometry: Annotated[Literal["continuous", "published"] | None, Option(default="as in cable.toml, else continuous")]
-    undetected: Annotated[
-        Literal["censored", "zero", "dropped"] | None, Option(default="as in cable.toml, else censored")
+    settings: Annotated[Sequence[str], Parameter("--set", metavar="KEY=VALUE"), TEXTS]
+    channels: Annotated[Sequence[str], Parameter("--channel", metavar="QUANTITY=CHANNEL:UNIT"), TEXTS]
+    columns: Annotated[Sequence[str], Parameter("--column", metavar="QUANTITY=COLUMN:UNIT"), TEXTS]
+    noise: Annotated[Literal["normal", "student"] | None, Parameter(show_default="as in cable.toml, else normal")]
+    friction: Annotated[str | None, Parameter(metavar="MODEL", show_default="as in cable.toml, else capstan")]
+    geometry: Annotated[
+        Literal["continuous", "published"] | None, Parameter(show_default="as in cable.toml, else continuous")
     ]
-    wrap_angle: Annotated[Quantity | None, Option(metavar="ANGLE", example="180deg")]
-    reading_limit: Annotated[int | None, Option(metavar="TIMES", least=1, most=1000, default="1")]
+    undetected: Annotated[
+        Literal["censored", "zero", "dropped"] | None, Parameter(show_default="as in cable.toml, else censored")
+    ]
+    wrap_angle: Annotated[Quantity | None, Parameter(metavar="ANGLE"), number_with_unit("180deg")]
+    reading_limit: Annotated[int | None, Parameter(metavar="TIMES", show_default="1"), whole_number(1, 1000)]
 
 
 _SETTINGS = {  # keywords that stand for a setting of cable.toml
@@ -55,11 +57,8 @@ _SETTINGS = {  # keywords that stand for a setting of cable.toml
 }
 
 
-@with_named_keywords
-@with_checked_keywords
-def read(
-    dataset: Annotated["str | Path | Dataset", Argument("DATASET", such_as=A_DATASET)], **reading: Unpack[Reading]
-) -> "Dataset":
+@checked
+def read(dataset: Annotated["str | Path | Dataset", DATASET, PLACE], **reading: Unpack[Reading]) -> "Dataset":
     """Read and check a data set, without fitting anything.
 
     Args:
@@ -76,7 +75,6 @@ def read(
     from bowdenfit.inputs import refuse_special
     from bowdenfit.recordings.named_channels import parse_channels
 
-    refuse_unknown(read, reading)
     if isinstance(dataset, Dataset):
         refuse_named(reading, f"{dataset.description.name} has been read already", "name that where it is read")
         return dataset
@@ -84,7 +82,7 @@ def read(
     changes = changed_settings(reading)
     sources = parse_channels(reading.get("channels", ()))
     columns = parse_sources(reading.get("columns", ()), "--column")
-    wrap_angle = reading.get("wrap_angle")
+    wrap_angle = measured(reading.get("wrap_angle"))
     with limits_times(reading.get("reading_limit") or 1):
         if wrap_angle is not None or is_lone_file(Path(dataset)):
             return single_file_dataset(Path(dataset), wrap_angle, changes, sources, columns)
@@ -117,20 +115,3 @@ def refuse_named(reading: Reading, why: str, remedy: str) -> None:
 
     if named := [name for name, value in reading.items() if value not in (None, (), [])]:
         raise UsageError(f"{why}, and {listed(named)} would change nothing: {remedy}.")
-
-
-def refuse_unknown(verb: Callable[..., Any], reading: Reading) -> None:
-    """Refuse a keyword that neither a verb nor the reading of a data set has.
-
-    Args:
-        verb: What was called.
-        reading: The keywords that it hands on.
-
-    Raises:
-        UsageError: There is no such keyword; names the nearest.
-    """
-    from bowdenfit.errors import UsageError, nearest
-
-    for name in reading:
-        if name not in Reading.__annotations__:
-            raise UsageError(f"there is no keyword {name!r}{nearest(name, list(signature(verb).parameters))}")

@@ -6,16 +6,15 @@ import sys
 import warnings
 from contextlib import suppress
 from pathlib import Path
-from typing import Any, NoReturn
+from typing import NoReturn
 
-import click
+from cyclopts import CycloptsError
 
-from bowdenfit.cli.commands import command
+from bowdenfit.cli.commands import refusal
 from bowdenfit.cli.interrupts import INTERRUPTED, requested, run_interruptibly
-from bowdenfit.cli.starting import completion, init
+from bowdenfit.cli.program import bowdenfit
 from bowdenfit.cli.terminal import NoReaderError, say, say_interrupted
-from bowdenfit.errors import BowdenfitError, system_error
-from bowdenfit.verbs import VERBS
+from bowdenfit.errors import BowdenfitError, UsageError, system_error
 from bowdenfit.words import few
 
 _NEW_LINE = re.compile(r"[\r\n](?!- )")  # in the name of a file: our own sentences have new lines before "- " alone
@@ -50,17 +49,14 @@ def _open_what_is_closed() -> None:
 def main() -> None:
     """Run the command line; every error the user can cause is a sentence and an exit code."""
     try:
-        sys.exit(run_interruptibly(lambda: bowdenfit.main(standalone_mode=False)) or 0)
-    except click.exceptions.Exit as stop:
-        sys.exit(stop.exit_code)
-    except click.ClickException as error:
-        error.show()
-        sys.exit(error.exit_code)
+        code = run_interruptibly(lambda: bowdenfit(sys.argv[1:])) or (0 if sys.argv[1:] else UsageError.exit_code)
+        sys.exit(code)
+    except CycloptsError as error:
+        _complain(f"Error: {refusal(error)}")
+        sys.exit(UsageError.exit_code)
     except BowdenfitError as error:
         _complain(f"Error: {_NEW_LINE.sub('?', str(error))}")
         sys.exit(error.exit_code)
-    except click.Abort:
-        _end_interrupted()
     except KeyboardInterrupt as stop:
         _end_interrupted(*stop.args)
     except NoReaderError:
@@ -102,30 +98,3 @@ def _end_interrupted(how_to_go_on: str = "") -> NoReturn:
     with suppress(OSError):
         say_interrupted(how_to_go_on)
     sys.exit(INTERRUPTED)
-
-
-class _Program(click.Group):
-    """All verbs; of an interrupt click says nothing, which would be an empty line before ours."""
-
-    def invoke(self, ctx: click.Context) -> Any:
-        try:
-            return super().invoke(ctx)
-        except KeyboardInterrupt:
-            raise click.Abort from None
-
-
-@click.group(cls=_Program, context_settings={"help_option_names": ["-h", "--help"], "max_content_width": 110})
-@click.version_option(package_name="bowdenfit", prog_name="bowdenfit")
-def bowdenfit() -> None:
-    """Friction coefficients of a Bowden cable from bench measurements, with honest uncertainty, and the cable length that
-    transmits force best.
-
-    Start with `bowdenfit init FOLDER`, fill in the files, `bowdenfit check FOLDER`, then `bowdenfit fit FOLDER`.
-
-    Exit codes: 0 done (a fit has converged); 1 failure; 2 bad usage or bad input; 3 the fit finished but must not be
-    trusted; 130 interrupted, with the checkpoint kept.
-    """
-
-
-for each in (init, *map(command, VERBS), completion):
-    bowdenfit.add_command(each)

@@ -3,8 +3,6 @@
 import sys
 from typing import TypeVar
 
-import click
-
 from bowdenfit.cli.terminal import say
 from bowdenfit.errors import BowdenfitError
 from bowdenfit.questions.start.question import Question
@@ -18,7 +16,7 @@ class Terminal:
 
     def ask(self, question: Question[Answer]) -> Answer:
         """The answer to a question, asked until there is one."""
-        click.echo()
+        say("")
         say(filled(question.words))
         for i, option in enumerate(question.options, start=1):
             say(filled(f"{i}  {option}", "  "))
@@ -50,8 +48,8 @@ def _typed(prompt: str) -> str:
     sys.stdout.flush()
     line = sys.stdin.readline()
     if not line:
-        click.echo()
-        raise click.Abort
+        say("")
+        raise KeyboardInterrupt
     return line.rstrip("\n")
 
 

@@ -3,8 +3,6 @@
 import os
 import sys
 
-import click
-
 from bowdenfit.words import in_ascii, printable
 
 
@@ -26,8 +24,9 @@ def say(text: str, err: bool = False, nl: bool = True) -> None:
     stream = sys.stderr if err else sys.stdout
     said = printable(text)
     try:
-        click.echo(said if shows(said, getattr(stream, "encoding", None)) else in_ascii(said), nl=nl, err=err)
-    except BrokenPipeError:  # of which click makes a failure
+        stream.write((said if shows(said, getattr(stream, "encoding", None)) else in_ascii(said)) + "\n" * nl)
+        stream.flush()
+    except BrokenPipeError:
         raise NoReaderError from None
 
 

@@ -4,11 +4,11 @@ from collections.abc import Callable
 from functools import partial
 from typing import TYPE_CHECKING, Any
 
+from bowdenfit.arguments import NumberWithUnit
 from bowdenfit.errors import UsageError, nearest
 from bowdenfit.questions.figures import FIGURES, figure_of, figures_of, mark_of, page_width
 from bowdenfit.questions.summary.verdict import verdict
 from bowdenfit.results.record import Record
-from bowdenfit.verb import Quantity
 from bowdenfit.words import listed
 
 if TYPE_CHECKING:
@@ -32,7 +32,7 @@ class FigureMethods:
         self._fit = fit
         self._data: dict[str, Any] = {}  # of the figures asked for; None where there is nothing to show
 
-    def __call__(self, name: str, width: Quantity | None = None) -> "Figure":
+    def __call__(self, name: str, width: NumberWithUnit | None = None) -> "Figure":
         """One of the figures.
 
         Args:

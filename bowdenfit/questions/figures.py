@@ -9,6 +9,7 @@ from collections.abc import Collection, Iterable, Iterator, Mapping, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, get_type_hints
 
+from bowdenfit.arguments import NumberWithUnit
 from bowdenfit.plots.layout import title_above
 from bowdenfit.plots.style import in_paper_style
 from bowdenfit.plots.write import FORMATS, write_all
@@ -41,7 +42,6 @@ from bowdenfit.questions.summary import (
 from bowdenfit.results.arrays import read_arrays
 from bowdenfit.results.folder import FIGURE_DATA
 from bowdenfit.results.kept import kept
-from bowdenfit.verb import Quantity
 from bowdenfit.words import listed
 
 if TYPE_CHECKING:
@@ -132,7 +132,7 @@ def mark_of(troubles: Iterable[str]) -> str:
     return f"Do not use: this fit is {listed(wrong)}." if wrong else ""
 
 
-def page_width(width: Quantity | None) -> float | None:
+def page_width(width: NumberWithUnit | None) -> float | None:
     """Width of the page [in]; None for what suits each figure.
 
     Args:

@@ -15,9 +15,9 @@ from typing import Any
 
 from filelock import FileLock, Timeout
 
+from bowdenfit.arguments import LARGEST_SEED
 from bowdenfit.errors import StoreError, disk_error
 from bowdenfit.inputs import refuse_special
-from bowdenfit.verb import LARGEST_SEED
 
 FIT, SUMMARY = "fit.json", "summary.json"
 SUMMARY_TEXT, DETAILS_TEXT = "summary.txt", "details.txt"  # one page, and everything

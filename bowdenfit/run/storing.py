@@ -5,12 +5,12 @@ from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
+from bowdenfit.arguments import LARGEST_SEED
 from bowdenfit.dataset import Dataset
 from bowdenfit.description import SamplerSettings
 from bowdenfit.errors import DescriptionError, StoreError, UsageError
 from bowdenfit.kinds.settings import parse_description
 from bowdenfit.results.folder import CHAIN, clear, read_checkpoint, refuse_to_overwrite, start_checkpoint
-from bowdenfit.verb import LARGEST_SEED
 
 
 def with_sampler(data: Dataset, method: str | None, mcmc: bool) -> Dataset:

@@ -6,13 +6,15 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any, Literal, Unpack
 from warnings import warn
 
-from bowdenfit.given import with_checked_keywords
+from cyclopts import Parameter
+
+from bowdenfit.arguments import DATASET, HIDDEN, PLACE, Output, Seed, checked
 from bowdenfit.inference.engines.memory import refuse_too_little
 from bowdenfit.inference.engines.processes import keep_compiled_programs
 from bowdenfit.questions.summary.verb import reply
-from bowdenfit.reading import Reading, read, refuse_unknown
+from bowdenfit.reading import Reading, read
 from bowdenfit.results.folder import CHAIN
-from bowdenfit.verb import A_DATASET, LARGEST_SEED, NOT_TRUSTED, Argument, Option, Output, Reply, Verb, Watch
+from bowdenfit.verb import NOT_TRUSTED, Reply, Verb, Watch
 from bowdenfit.words import percent
 
 if TYPE_CHECKING:
@@ -20,20 +22,22 @@ if TYPE_CHECKING:
     from bowdenfit.front_desk import Fit
     from bowdenfit.inference.chain import Progress
 
+Sampler = Literal["emcee", "nuts", "both"]
 
-@with_checked_keywords
+
+@checked
 def fit(
-    dataset: Annotated["str | Path | Dataset", Argument("DATASET", such_as=A_DATASET)],
+    dataset: Annotated["str | Path | Dataset", DATASET, PLACE],
     *,
-    output: Annotated[Output, Option(("-o",), default="fits/NAME OF DATASET")] = None,
-    mcmc: Annotated[bool, Option()] = True,
-    sampler: Annotated[Literal["emcee", "nuts", "both"] | None, Option(default="as in cable.toml, else emcee")] = None,
-    figures: Annotated[bool, Option()] = True,
-    seed: Annotated[int | None, Option(least=0, most=LARGEST_SEED, default="drawn, and recorded")] = None,
-    resume: Annotated[bool, Option()] = False,
-    force: Annotated[bool, Option()] = False,
-    progress: "Callable[[Progress], None] | None" = None,
-    report: Callable[[str], None] = warn,
+    output: Annotated[Output, Parameter(show_default="fits/NAME OF DATASET")] = None,
+    mcmc: Annotated[bool, Parameter(negative="--no-mcmc")] = True,
+    sampler: Annotated[Sampler | None, Parameter(show_default="as in cable.toml, else emcee")] = None,
+    figures: Annotated[bool, Parameter(negative="--no-figures")] = True,
+    seed: Annotated[Seed, Parameter(show_default="drawn, and recorded")] = None,
+    resume: bool = False,
+    force: bool = False,
+    progress: Annotated["Callable[[Progress], None] | None", HIDDEN] = None,
+    report: Annotated[Callable[[str], None], HIDDEN] = warn,
     **reading: Unpack[Reading],
 ) -> "Fit":
     """Fit a data set: least squares, then the posterior, then the design answer. Nothing is written unless `output` says where.
@@ -58,7 +62,6 @@ def fit(
     from bowdenfit.results.folder import reserved
     from bowdenfit.run.storing import choose_seed, start_checkpointing, with_sampler
 
-    refuse_unknown(fit, reading)
     refuse_too_little()
     folder = Path(output) if output is not None else None
     data = with_sampler(read(dataset, **reading), sampler, mcmc)
@@ -103,10 +106,11 @@ WATCH = Watch(CHAIN, "the checkpoint is kept in", _BAR, _show)
 VERB = Verb(
     fit,
     _reply,
-    "Fit a data set: coefficients, uncertainty, design answer, figures.",
-    """Fit DATASET: least squares, posterior, design answer, figures, all written to a results folder.
+    """Fit a data set: coefficients, uncertainty, best length, figures.
 
-    DATASET is a folder with cable.toml and tables, or one table or recording with --wrap-angle.
+    Least squares, the posterior, the design answer and figures are written to a
+    results folder. DATASET is a folder with cable.toml and tables, or one table or
+    recording with --wrap-angle.
     """,
     json="Print summary.json instead of the summary for people.",
     results="fits",

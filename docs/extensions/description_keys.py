@@ -15,6 +15,7 @@ from collections.abc import Sequence
 from importlib import import_module
 from typing import Annotated, Any, Literal, Union, get_args, get_origin, get_type_hints, is_typeddict
 
+from docstring_parser.google import parse
 from docutils import nodes
 from docutils.parsers.rst import directives
 from docutils.statemachine import StringList
@@ -24,7 +25,7 @@ from sphinx.application import Sphinx
 from sphinx.util.docutils import SphinxDirective
 from sphinx.util.logging import getLogger
 
-from bowdenfit.verb import Quantity
+from bowdenfit.arguments import NumberWithUnit
 
 _LOG = getLogger(__name__)
 _PLAIN = {str: "text", float: "number", int: "whole number", bool: "`true` or `false`"}
@@ -80,9 +81,8 @@ def keys_of(model: Any) -> dict[str, tuple[Any, str]]:
 
 def keywords_in(documented: Any) -> dict[str, str]:
     """What a docstring says of each of its arguments, and of two that it names together."""
-    from bowdenfit.cli.keywords import _words as said
-
-    return {key.strip(): words for keys, words in said(documented).items() for key in keys.split(",")}
+    said = parse(documented.__doc__ or "").params
+    return {key.strip(): " ".join((each.description or "").split()) for each in said for key in each.arg_name.split(",")}
 
 
 def _words(content: StringList) -> dict[str, str]:
@@ -107,7 +107,7 @@ def written(annotation: Any) -> str:
         return " or ".join(dict.fromkeys(written(each) for each in arguments if each is not type(None)))
     if origin is Literal:
         return ", ".join(f'`"{each}"`' for each in arguments)
-    if annotation == Quantity:
+    if annotation == NumberWithUnit:
         return '`(number, "unit")`'
     if origin is tuple:
         fixed = f"`[{', '.join('…' for _ in arguments)}]`"

@@ -1,7 +1,10 @@
 """The directive `verb-help`: what every verb of the command line says with --help."""
 
-import click
+import io
+from contextlib import redirect_stdout
+
 from docutils import nodes
+from rich.console import Console
 from sphinx.application import Sphinx
 from sphinx.util.docutils import SphinxDirective
 
@@ -13,18 +16,18 @@ class VerbHelp(SphinxDirective):
 
     def run(self) -> list[nodes.Node]:
         """All sections."""
-        from bowdenfit.cli import bowdenfit
+        from bowdenfit.cli.program import COMMANDS
 
-        verbs = bowdenfit.list_commands(click.Context(bowdenfit))
-        return [_section(bowdenfit, "bowdenfit", None), *(_section(bowdenfit.commands[v], f"bowdenfit {v}", v) for v in verbs)]
+        return [_section("bowdenfit"), *(_section("bowdenfit", verb.name[0]) for verb in COMMANDS)]
 
 
-def _section(command: click.Command, path: str, verb: str | None) -> nodes.section:
+def _section(*words: str) -> nodes.section:
     """Heading, and the help as it is printed 80 columns wide."""
-    parent = click.Context(click.Group("bowdenfit"), info_name="bowdenfit", terminal_width=WIDTH) if verb else None
-    context = click.Context(command, parent, info_name=verb or path, terminal_width=WIDTH)
-    context.help_option_names = ["-h", "--help"]
-    text = command.get_help(context)
+    from bowdenfit.cli import bowdenfit
+
+    with redirect_stdout(io.StringIO()) as printed:
+        bowdenfit.help_print(list(words[1:]), console=Console(width=WIDTH))
+    path, text = " ".join(words), "\n".join(line.rstrip() for line in printed.getvalue().splitlines())
     section = nodes.section(ids=[nodes.make_id(path)], names=[path])
     section += [nodes.title(path, path), nodes.literal_block(text, text, language="text")]
     return section

@@ -37,7 +37,7 @@ def test_help_names_every_verb_and_the_exit_codes(run):
     code, out, _ = run("--help")
     assert code == 0
     for verb in VERBS:
-        assert re.search(rf"^  {verb} ", out, re.M), verb
+        assert re.search(rf"^ +{verb} ", out, re.M), verb
     assert "130" in out
 
 
@@ -47,6 +47,36 @@ def test_every_verb_explains_itself(run, verb):
     assert code == 0
     assert len(out.splitlines()) > 5
     assert not [line for line in out.splitlines() if len(line) > 80 or "\\" in line]
+
+
+def test_the_program_alone_shows_its_help_and_that_something_is_missing(run):
+    code, out, err = run()
+    assert (code, err) == (2, "")
+    assert out == run("--help")[1]
+
+
+@pytest.mark.parametrize(
+    ("arguments", "words"),
+    [
+        (("fit", "x", "--seet", "1"), "Unknown option: --seet. Did you mean --set? See bowdenfit fit --help."),
+        (("fti",), 'Unknown command "fti". Did you mean "fit"?'),
+        (("fit", "x", "y"), "There is no place for y. See bowdenfit fit --help."),
+        (("fit", "x", "--noise", "none"), '"none" for --noise. Choose from: "normal", "student".'),
+        (("fit", "x", "--seed", "1.5"), "--seed = '1.5' is no whole number from 0 to 2147483647; write one."),
+        (("next", "x", "--top", "0"), "--top = '0' is no whole number from 1; write one."),
+        (("next", "x", "--cost", "angle"), "--cost 'angle' is not a kind and a number; write it as angle=0.5."),
+        (("export", "x"), "--to requires an argument"),
+    ],
+)
+def test_what_cannot_be_meant_is_refused_with_the_nearest_or_what_to_write(run, arguments, words):
+    code, out, err = run(*arguments)
+    assert (code, out, err.count("\n")) == (2, "", 1)
+    assert err.startswith("Error: ") and words in err
+
+
+def test_options_stand_anywhere_and_the_last_of_one_counts(run, results):
+    asked = ("--json", "455", "--stroke", "return", "18", "in", "--stroke=pull", "--", "470")
+    assert run("predict", results, *asked) == run("predict", results, "455", "18in", "470", "--json")
 
 
 @pytest.mark.parametrize("verb", ASKING)
@@ -212,7 +242,29 @@ def test_simulate_records_its_truth_and_its_seed(run, bench, tmp_path):
 def test_completion_is_printed_for(run, shell):
     code, out, _ = run("completion", shell)
     assert code == 0
-    assert "_BOWDENFIT_COMPLETE" in out
+    assert "__complete" in out  # how the shell asks for what only the program knows, such as names of examples
+    assert all(word in out for word in (*VERBS, "friction-limit", "karnopp"))
+
+
+@pytest.mark.parametrize(
+    ("words", "completed"),
+    [
+        (["ide"], {"identify"}),
+        (["fit", "--sam"], {"--sampler"}),
+        (["fit", "--sampler", ""], {"emcee", "nuts", "both"}),
+        (["init", "--example", "on-body"], {"on-body-exoskeleton", "on-body-metabolic"}),
+        (["check", "READ"], {"README.md"}),
+    ],
+    ids=lambda value: " ".join(value) if isinstance(value, list) else "",
+)
+def test_bash_completes_verbs_options_choices_examples_and_files(run, words, completed, tmp_path):
+    (tmp_path / "completion").write_text(run("completion", "bash")[1])
+    typed = " ".join(f"'{word}'" for word in words)
+    script = f"""source {tmp_path / "completion"}
+        bowdenfit() {{ {sys.executable} -m bowdenfit "$@"; }}
+        COMP_WORDS=(bowdenfit {typed}); COMP_CWORD={len(words)}; _bowdenfit; printf '%s\n' "${{COMPREPLY[@]}}" """
+    done = subprocess.run(["bash", "-c", script], cwd=ROOT, capture_output=True, text=True, check=True, timeout=60)
+    assert set(done.stdout.split()) == completed, done.stderr
 
 
 def test_a_fit_that_has_not_converged_exits_with_3_and_says_why(run, on_body, tmp_path):

@@ -36,7 +36,7 @@ def _interrupted(program: str, module: str, folder: str) -> subprocess.Completed
     return subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=False, timeout=60)
 
 
-@pytest.mark.parametrize("module", ["click", "bowdenfit.words", "bowdenfit.verbs", "bowdenfit.dataset", "numpy"])
+@pytest.mark.parametrize("module", ["cyclopts", "bowdenfit.words", "bowdenfit.verbs", "bowdenfit.dataset", "numpy"])
 def test_an_interrupt_while_something_is_loaded_is_one_line(module, on_body):
     done = _interrupted("bowdenfit.__main__", module, str(on_body))
     assert (done.returncode, done.stderr.strip()) == (130, "Interrupted.")
@@ -44,7 +44,7 @@ def test_an_interrupt_while_something_is_loaded_is_one_line(module, on_body):
 
 def test_without_the_first_moments_an_interrupt_is_raised_while_something_is_loaded(on_body):
     """So the test above can fail."""
-    assert _interrupted("bowdenfit.cli", "click", str(on_body)).returncode == 77
+    assert _interrupted("bowdenfit.cli", "cyclopts", str(on_body)).returncode == 77
 
 
 INTERRUPT_IN_A_LIBRARY = """

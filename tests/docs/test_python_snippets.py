@@ -133,7 +133,7 @@ def test_help_shows_every_keyword_by_name_and_none_of_its_options():
     assert set(functions) >= {"fit", "read", "check", "predict", "calibrate"}
     for name, function in functions.items():
         said = pydoc.plain(pydoc.render_doc(function))
-        assert "Option(" not in said and "Annotated" not in said and "**reading" not in said, name
+        assert "Parameter(" not in said and "Reader(" not in said and "Annotated" not in said and "**reading" not in said, name
     for name in ("fit", "read", "check", "identify", "calibrate"):
         assert set(Reading.__annotations__) < set(inspect.signature(functions[name]).parameters)
     assert "seed: int | None = None" in pydoc.plain(pydoc.render_doc(bowdenfit.fit))

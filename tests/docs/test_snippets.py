@@ -8,8 +8,8 @@ import shutil
 import subprocess
 import time
 import tomllib
+from pathlib import Path
 
-import click
 import nptdms
 import numpy as np
 import pytest
@@ -19,7 +19,6 @@ from snippets import FIRST, PAGES, PUBLISHED, as_shown, blocks, masked
 
 import bowdenfit as bf
 from bowdenfit.cli import bowdenfit as program
-from bowdenfit.cli.keywords import keywords_of
 from bowdenfit.kinds.settings import parse_description
 from bowdenfit.questions.calibrate.truths import read_truths
 from bowdenfit.questions.fleet.inspections import read_inspections
@@ -68,10 +67,9 @@ def reader(place, monkeypatch):
 
 
 def understood(words):
-    """The command of a line and its parameters, as the program reads them; refuses what it does not know."""
-    name, *options = words[1:]
-    verb = program.commands[name]
-    return verb, verb.make_context(name, list(options), parent=click.Context(program)).params
+    """The arguments and options of a command, as the program reads them; refuses what it does not know."""
+    _, bound, _ = program.parse_args(words[1:])
+    return bound.args, bound.kwargs
 
 
 def test_every_page_has_its_blocks_found():
@@ -103,19 +101,19 @@ def stands_in_for(words):
 
 def tried(words, run):
     """Run a command where that is quick, else read what it would work on."""
-    verb, given = understood(words)
-    asked = [given[each.name] for each in verb.params if isinstance(each, click.Argument) and isinstance(each.type, click.Path)]
-    paths = [path for each in asked for path in (each if isinstance(each, tuple) else (each,))]
-    if verb.name == "init":
-        shutil.rmtree(given["folder"] or given["example"], ignore_errors=True)
+    verb, (arguments, options) = words[1], understood(words)
+    named = [one for each in arguments for one in (each if isinstance(each, list) else [each])]
+    paths = [one for one in named if isinstance(one, Path)]
+    if verb == "init":
+        shutil.rmtree(next(iter(paths or options["example"])), ignore_errors=True)
     elif not all(path.exists() for path in paths):
         return  # fits that another command of the page makes; the slow test makes them
-    if verb.name == "fleet":
+    if verb == "fleet":
         assert read_inspections(paths[0])
-    elif verb.name in TAKES_LONG:
-        keywords = [each for each in keywords_of(bf.fit) if each.name in Reading.__annotations__ and given.get(each.name)]
+    elif verb in TAKES_LONG:
+        keywords = {name: value for name, value in options.items() if name in Reading.__annotations__}
         if paths[0].parts[0] != "fits" and paths[0].name != "bench.toml":
-            bf.check(paths[0], **{each.name: each.value(given[each.name]) for each in keywords})
+            bf.check(paths[0], **keywords)
     else:
         code, out, err = run(*words[1:])
         assert code == 0, (words, out, err)
@@ -202,7 +200,7 @@ def test_every_command_of_a_page_runs_one_after_the_other(page, place, others, t
             if words[0] != "bowdenfit" or len(words) < 2 or words[1].startswith("-"):
                 continue
             if words[1] == "init":
-                shutil.rmtree(understood(words)[1]["folder"] or FIRST, ignore_errors=True)
+                shutil.rmtree(next(iter(understood(words)[0]), FIRST), ignore_errors=True)
             quick = {"fit": [*QUICK, "--no-figures", "--force"], "calibrate": ["-n", "2", *QUICK, "--force"]}.get(words[1], [])
             code, out, err = run(*words[1:], *quick)
             assert code in (0, 3 if quick else 0), (words, out, err)

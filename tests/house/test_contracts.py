@@ -18,6 +18,9 @@ ROOT = Path(__file__).parents[2]
 ROUTE = Route(variable="cable_length", unit="mm", range=(400.0, 600.0))
 LENGTHS = jnp.linspace(400.0, 600.0, 21)
 DEFAULTS = PriorDefaults()
+HELP = "import contextlib, sys\nfrom bowdenfit.cli import bowdenfit\nwith contextlib.redirect_stdout(sys.stderr):\n" + (
+    "    for verb in bowdenfit: bowdenfit([verb, '--help'])"
+)
 
 
 def test_layers_import_only_downward():
@@ -34,6 +37,7 @@ def test_layers_import_only_downward():
 @pytest.mark.parametrize(
     ("code", "heavy"),
     [
+        (HELP, {"jax", "emcee", "matplotlib", "pint", "pydantic", "numpy"}),
         ("import bowdenfit", {"jax", "emcee", "matplotlib", "pint", "pydantic", "arviz_base", "scipy"}),
         ("import bowdenfit.cli", {"jax", "emcee", "matplotlib", "pint", "pydantic", "numpy"}),
         ("import bowdenfit as bf; bf.read('datasets/on-body-exoskeleton')", {"jax", "emcee", "matplotlib"}),

@@ -6,7 +6,6 @@ from functools import partial
 
 import numpy as np
 import pytest
-from click.testing import CliRunner
 from conftest import ROOT
 from scratch import curve, law, option, shares
 from scratch import format as bars
@@ -141,13 +140,13 @@ def test_a_new_file_format_is_a_module_and_a_line(monkeypatch, tmp_path):
     )
 
 
-def test_a_new_question_and_its_figure_are_a_file_and_a_line_each(data_set, monkeypatch, tmp_path):
+def test_a_new_question_and_its_figure_are_a_file_and_a_line_each(data_set, monkeypatch, tmp_path, capsys):
     monkeypatch.setitem(FIGURES, "shares", sys.modules[shares.__name__])
     found = bf.fit(forces(data_set, MU * ANGLE), output=tmp_path / "fit", seed=1, settings=QUICK)
     assert (tmp_path / "fit" / "figures" / "shares.png").exists()
     assert [each.contact for each in shares.shares(found)] == ["sheath"]
-    asked = CliRunner().invoke(command(shares.VERB), [str(tmp_path / "fit")])
-    assert asked.output == "sheath: 100% of the loss\n"
-    assert json.loads(CliRunner().invoke(command(shares.VERB), [str(tmp_path / "fit"), "--json"]).output) == {
-        "sheath": 1.0
-    }
+    capsys.readouterr()
+    assert command(shares.VERB)([str(tmp_path / "fit")]) == 0
+    assert capsys.readouterr().out == "sheath: 100% of the loss\n"
+    assert command(shares.VERB)([str(tmp_path / "fit"), "--json"]) == 0
+    assert json.loads(capsys.readouterr().out) == {"sheath": 1.0}

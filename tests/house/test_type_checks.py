@@ -1,4 +1,9 @@
-"""The checks of types and shapes that the other tests run under see what they are there for."""
+"""The checks of types and shapes that the other tests run under see what they are there for, and calls of users have types."""
+
+import re
+import subprocess
+import sys
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -34,3 +39,17 @@ def test_what_comes_back_is_checked_against_what_was_given():
         scaled(np.ones(3), 2.0, drop=1)
     with pytest.raises(TypeCheckError, match="whilst checking the return value"):
         label(0)
+
+
+ROOT = Path(__file__).parents[2]
+CALLS = ROOT / "tests" / "support" / "typed_calls.py"
+MYPY = ("mypy", "--no-error-summary", "--hide-error-context")
+
+
+@pytest.mark.parametrize("checker", [MYPY, ("basedpyright", "--level", "error")], ids=lambda command: command[0])
+def test_type_checkers_accept_calls_as_users_write_them_and_refuse_what_does_not_run(checker):
+    refused = [i for i, line in enumerate(CALLS.read_text(encoding="utf-8").splitlines(), 1) if line.endswith("# refused")]
+    command = [sys.executable, "-m", *checker, str(CALLS)]
+    done = subprocess.run(command, cwd=ROOT, capture_output=True, text=True, check=False, timeout=300)
+    found = re.findall(r"typed_calls\.py:(\d+)(?::\d+)?(?::| -) error", done.stdout)
+    assert sorted(set(map(int, found))) == refused and len(refused) == 7, done.stdout + done.stderr

@@ -10,7 +10,6 @@ from figure_words import assert_readable
 from one_page import faults
 
 import bowdenfit as bf
-from bowdenfit.cli import bowdenfit as command
 from bowdenfit.errors import UsageError
 from bowdenfit.inference.comparison import Difference, Prediction, differences
 from bowdenfit.inference.interval import Interval
@@ -179,17 +178,15 @@ def test_the_sentence_on_speed_says_no_more_than_the_interval(q05, q95, probabil
 
 
 @pytest.mark.slow
-def test_compare_answers_whether_speed_matters_on_the_command_line(plain, with_rate, tmp_path):
-    from click.testing import CliRunner
-
+def test_compare_answers_whether_speed_matters_on_the_command_line(plain, with_rate, tmp_path, run):
     where = tmp_path / "comparison"
-    found = CliRunner().invoke(command, ["compare", "--json", "-o", str(where), str(plain[1]), str(with_rate[1])])
-    assert found.exit_code == 0, found.output
+    code, out, err = run("compare", "--json", "-o", where, plain[1], with_rate[1])
+    assert code == 0, err
     words = " ".join((where / "comparison.txt").read_text().split())
     assert "The data cannot tell" in words
     assert "Letting friction depend on speed (rate) predicts no better than not (plain)." in words
     assert "viscous" in words
-    page = json.loads(found.stdout)
+    page = json.loads(out)
     assert {row["name"] for row in page["fits"]} == {"plain", "rate"}
     assert page["fits"][0]["elpd_difference"] == 0.0
 
@@ -303,16 +300,13 @@ def test_a_short_table_with_a_clock_and_no_runs_is_a_recording_and_one_with_stro
     assert len(found.table(ForceTable).run) == 5
 
 
-def test_check_of_a_file_alone_lists_channels_and_what_it_is_as_a_recording(recorded):
-    from click.testing import CliRunner
-
-    found = CliRunner().invoke(command, ["check", str(recorded / "recordings" / "440mm_20rpm.csv")])
-    words = " ".join(found.output.split())
-    assert found.exit_code == 0
+def test_check_of_a_file_alone_lists_channels_and_what_it_is_as_a_recording(recorded, run):
+    code, out, _ = run("check", recorded / "recordings" / "440mm_20rpm.csv")
+    words = " ".join(out.split())
+    assert code == 0
     assert "input_force_N N 1200 100 Hz 11.99 s 14.18 134.6 time_s" in words
     assert "440mm_20rpm 1200" in words
-    csv = str(recorded.parent / "yarn-on-cylinder" / "forces.csv")
-    words = " ".join(CliRunner().invoke(command, ["check", csv]).output.split())
+    words = " ".join(run("check", recorded.parent / "yarn-on-cylinder" / "forces.csv")[1].split())
     assert "a table of 21 readings at 1 load" in words
 
 

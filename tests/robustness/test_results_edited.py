@@ -10,7 +10,7 @@ import pytest
 from sealed import sealed
 
 import bowdenfit as bf
-from bowdenfit.given import read_quantity
+from bowdenfit.arguments import read_quantity
 from bowdenfit.results.kept import CHECKSUM
 
 pytestmark = pytest.mark.extended

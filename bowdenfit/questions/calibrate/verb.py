@@ -8,12 +8,14 @@ from concurrent.futures import Executor
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any, Unpack
 
-from bowdenfit.given import with_checked_keywords
+from cyclopts import Parameter
+
+from bowdenfit.arguments import DATASET, HIDDEN, LARGEST_SEED, PLACE, TEXTS, Output, Seed, checked, whole_number
 from bowdenfit.inference.engines.memory import refuse_too_little
 from bowdenfit.notebook import watched
-from bowdenfit.reading import Reading, read, refuse_unknown
+from bowdenfit.reading import Reading, read
 from bowdenfit.results.folder import REPLICATIONS
-from bowdenfit.verb import A_DATASET, LARGEST_SEED, Argument, Option, Output, Reply, Verb, Watch
+from bowdenfit.verb import Reply, Verb, Watch
 
 if TYPE_CHECKING:
     from bowdenfit.dataset import Dataset
@@ -23,22 +25,23 @@ if TYPE_CHECKING:
 
 NOT_CALIBRATED = 3
 Report = Callable[[int, int], None]
+_WORKERS = "four at most of the cores; 16 jobs of Slurm"
 
 
-@with_checked_keywords
+@checked
 def calibrate(
-    dataset: Annotated["str | Path | Dataset", Argument("DATASET", such_as=A_DATASET)],
+    dataset: Annotated["str | Path | Dataset", DATASET, PLACE],
     *,
-    replications: Annotated[int, Option(("-n",), least=2)] = 200,
-    engine: Annotated["str | Executor", Option(metavar="ENGINE")] = "local",
-    workers: Annotated[int | None, Option(("-j",), least=1, default="four at most of the cores; 16 jobs of Slurm")] = None,
-    output: Annotated[Output, Option(("-o",), default="fits/calibration/NAME OF DATASET")] = None,
-    assume: Annotated[Sequence[str], Option(metavar="KEY=VALUE")] = (),
-    truth: Annotated[str | Path | None, Option(metavar="FILE")] = None,
-    seed: Annotated[int | None, Option(least=0, most=LARGEST_SEED, default="drawn, and recorded")] = None,
-    resume: Annotated[bool, Option()] = False,
-    force: Annotated[bool, Option()] = False,
-    progress: Report | None = None,
+    replications: Annotated[int, Parameter(alias="-n", metavar="NUMBER"), whole_number(2)] = 200,
+    engine: Annotated["str | Executor", Parameter(metavar="ENGINE")] = "local",
+    workers: Annotated[int | None, Parameter(alias="-j", metavar="NUMBER", show_default=_WORKERS), whole_number(1)] = None,
+    output: Annotated[Output, Parameter(show_default="fits/calibration/NAME OF DATASET")] = None,
+    assume: Annotated[Sequence[str], Parameter(metavar="KEY=VALUE"), TEXTS] = (),
+    truth: Annotated[str | Path | None, Parameter(metavar="FILE"), PLACE] = None,
+    seed: Annotated[Seed, Parameter(show_default="drawn, and recorded")] = None,
+    resume: bool = False,
+    force: bool = False,
+    progress: Annotated[Report | None, HIDDEN] = None,
     **reading: Unpack[Reading],
 ) -> "Calibration":
     """Simulation-based calibration: whether intervals of this description hold the truth as often as they claim.
@@ -67,7 +70,6 @@ def calibrate(
     Raises:
         BowdenfitError: What is wrong, in a sentence; a data set that cannot be replicated is refused.
     """
-    refuse_unknown(calibrate, reading)
     refuse_too_little()
     folder = _folder(output, resume)
     plan = _plan(_stated_and_assumed(dataset, reading, assume), _seed(folder, seed, resume), truth)
@@ -229,16 +231,20 @@ WATCH = Watch(REPLICATIONS, "what is done is kept in", {"unit": "replication", "
 VERB = Verb(
     calibrate,
     _reply,
-    "Show that a description's intervals hold the truth as often as they say.",
-    """Simulation-based calibration of DATASET: of this very description, for tables like these.
+    """Test whether intervals hold the truth as often as they say.
 
-    Again and again, true values are drawn from the priors, tables like the measured ones (the same lengths, runs, loads and
-    wrap angles) are simulated with them and fitted. Then intervals must hold the truth as often as they claim, for every
-    parameter, the optimal length and the efficiency there. What was measured enters only by the design.
+    This is simulation-based calibration of DATASET, of this very description and
+    for tables like these. Again and again, true values are drawn from the priors,
+    tables like the measured ones (the same lengths, runs, loads and wrap angles)
+    are simulated with them and fitted. Then intervals must hold the truth as often
+    as they claim, for every parameter, the optimal length and the efficiency there.
+    What was measured enters only by the design.
 
-    With --truth FILE the true values are those of a file, not of the priors: whether a default prior suits cables like that.
+    With --truth FILE the true values are those of a file, not of the priors:
+    whether a default prior suits cables like that.
 
-    Takes a fraction of a second a replication; recordings some. Exit code 3: not calibrated.
+    It takes a fraction of a second a replication; recordings take some seconds.
+    Exit code 3: not calibrated.
     """,
     json="Print calibration.json instead of the summary for people.",
     csv="Print the quantities as CSV, one a row.",

@@ -3,10 +3,12 @@
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Unpack
 
+from cyclopts import Parameter
+
+from bowdenfit.arguments import DATASET, PLACE, checked
 from bowdenfit.errors import DatasetError
-from bowdenfit.given import with_checked_keywords
 from bowdenfit.reading import Reading, read
-from bowdenfit.verb import A_DATASET, Argument, Option, Reply, Verb, with_named_keywords
+from bowdenfit.verb import Reply, Verb
 
 if TYPE_CHECKING:
     from bowdenfit.dataset import Dataset
@@ -16,11 +18,8 @@ if TYPE_CHECKING:
 FIGURE = "prior_predictive"
 
 
-@with_named_keywords
-@with_checked_keywords
-def check(
-    dataset: Annotated["str | Path | Dataset", Argument("DATASET", such_as=A_DATASET)], **reading: Unpack[Reading]
-) -> "Report":
+@checked
+def check(dataset: Annotated["str | Path | Dataset", DATASET, PLACE], **reading: Unpack[Reading]) -> "Report":
     """Read a data set, and build the model where only that can tell whether the description makes sense.
 
     Loading JAX takes longer than everything else here, so the model is built only for names and priors that the
@@ -84,10 +83,11 @@ def show_priors(dataset: "Dataset", folder: str | Path, seed: int = 0) -> "Prior
     return found
 
 
+@checked
 def describe(
-    dataset: Annotated[Path, Argument("DATASET", such_as=A_DATASET)],
+    dataset: Annotated[Path, DATASET, PLACE],
     *,
-    prior_predictive: Annotated[Path | None, Option(metavar="FOLDER")] = None,
+    prior_predictive: Annotated[Path | None, Parameter(metavar="FOLDER"), PLACE] = None,
     **reading: Unpack[Reading],
 ) -> Reply:
     """What was understood of a data set; of a file alone, what it is and the command that fits it.
@@ -123,11 +123,12 @@ def describe(
 VERB = Verb(
     describe,
     lambda reply, _: reply,
-    "Say what was understood of a data set and what is wrong.",
-    """Read everything in DATASET, say what was understood and what is wrong; fit nothing.
+    """Say what was understood of a data set, and what is wrong.
 
-    DATASET is a folder with cable.toml and tables, or one table or recording with --wrap-angle. Of a file alone it is said
-    whether it is a table or a recording and why, what its columns or channels and its rows are, and the command that fits it.
+    Nothing is fitted. DATASET is a folder with cable.toml and tables, or one table
+    or recording with --wrap-angle. Of a file alone it is said whether it is a table
+    or a recording and why, what its columns or channels and its rows are, and the
+    command that fits it.
     """,
     name="check",
     json="",

@@ -4,9 +4,11 @@ from collections.abc import Callable, Mapping
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any, Literal
 
-from bowdenfit.given import with_checked_keywords
+from cyclopts import Parameter
+
+from bowdenfit.arguments import FITS, HIDDEN, Output, checked
 from bowdenfit.questions.writing import refuse_to_replace, write_answer
-from bowdenfit.verb import NOT_TRUSTED, Argument, Option, Output, Reply, Verb, Watch
+from bowdenfit.verb import NOT_TRUSTED, Reply, Verb, Watch
 
 if TYPE_CHECKING:
     from bowdenfit.questions.compare.answer import Comparison
@@ -15,17 +17,20 @@ if TYPE_CHECKING:
 NAME = "comparison"
 
 
-@with_checked_keywords
+@checked
 def compare(
     fits: Annotated[
         "Mapping[str, Record]",
-        Argument("RESULTS", many=True, results=True, such_as="fits/one-model fits/another, which `bowdenfit fit` writes"),
+        Parameter("RESULTS", help="Such as fits/one-model fits/another, which `bowdenfit fit` writes."),
+        FITS,
     ],
     *,
-    leave_out: Annotated[Literal["run", "load", "reading"] | None, Option(default="run, or load where runs are few")] = None,
-    output: Annotated[Output, Option(("-o",))] = None,
-    force: Annotated[bool, Option()] = False,
-    progress: Callable[[str], None] | None = None,
+    leave_out: Annotated[
+        Literal["run", "load", "reading"] | None, Parameter(show_default="run, or load where runs are few")
+    ] = None,
+    output: Output = None,
+    force: bool = False,
+    progress: Annotated[Callable[[str], None] | None, HIDDEN] = None,
 ) -> "Comparison":
     """Compare fits of the same measurements.
 
@@ -76,20 +81,26 @@ WATCH = Watch("", "", {"desc": "comparing", "bar_format": "{desc} {elapsed}"}, _
 VERB = Verb(
     compare,
     _reply,
-    "Compare fits of the same measurements.",
-    """Compare fits of the same measurements: which model predicts readings left out best, and what changes between them.
+    """Compare fits of the same measurements.
 
-    RESULTS are results folders, such as of the same data set fitted with and without --friction rate-dependent; then the
-    comparison says whether efficiency depends on speed. Likewise --geometry published against the continuous one, --noise
-    student, --set prior.tau.fixed=0 for a cable whose mountings are all alike, or --set contact.0.wrap_angle.curve=logistic
-    (the first contact) for a route whose wrap angle is no bell.
+    The answer says which model predicts readings left out best, and what changes
+    between the fits.
 
-    A run is one mounting, and what predicts a new mounting is the other runs. With fewer than five runs a run is left out in
-    parts instead, its readings at one load at a time: then the comparison says which model describes the cable as it was
-    mounted, not how well it foretells the next mounting.
+    RESULTS are results folders, such as of the same data set fitted with and
+    without --friction rate-dependent; then the comparison says whether efficiency
+    depends on speed. Likewise --geometry published against the continuous one,
+    --noise student, --set prior.tau.fixed=0 for a cable whose mountings are all
+    alike, or --set contact.0.wrap_angle.curve=logistic (the first contact) for a
+    route whose wrap angle is no bell.
 
-    Readings that would move the posterior take longer: it is fitted again without them. The score is the expected log
-    predictive density of leave-one-out (elpd in the JSON).
+    A run is one mounting, and what predicts a new mounting is the other runs. With
+    fewer than five runs a run is left out in parts instead, its readings at one
+    load at a time: then the comparison says which model describes the cable as it
+    was mounted, not how well it foretells the next mounting.
+
+    Readings that would move the posterior take longer: it is fitted again without
+    them. The score is the expected log predictive density of leave-one-out (elpd
+    in the JSON).
     """,
     csv="Print the fits as CSV, the best first.",
     watch=WATCH,

@@ -3,9 +3,11 @@
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any, Literal
 
-from bowdenfit.given import with_checked_keywords
+from cyclopts import Parameter
+
+from bowdenfit.arguments import FIT, PLACE, RESULTS, Bends, Output, Quantity, checked, measured, number_with_unit
 from bowdenfit.questions.writing import figures_of, files_of, write_answer
-from bowdenfit.verb import Argument, Option, Output, Quantity, Reply, Verb
+from bowdenfit.verb import Reply, Verb
 
 if TYPE_CHECKING:
     from bowdenfit.questions.compensate.answer import Compensation
@@ -13,25 +15,22 @@ if TYPE_CHECKING:
 
 NAME, TRACES = "compensation", "compensation_traces"
 Law = Literal["karnopp", "active"]
-Bends = str | tuple[Quantity, Quantity]
 _PERCENT = (5.0, "%")
 ACCEPTED = _PERCENT[0] / 100
 """Probability of moving by itself that is accepted if nothing is said."""
 
 
-@with_checked_keywords
+@checked
 def compensate(
-    found: Annotated["Record", Argument("RESULTS", results=True)],
-    device: Annotated[str | Path | None, Option(metavar="FILE")] = None,
+    found: Annotated["Record", RESULTS, FIT],
+    device: Annotated[str | Path | None, Parameter(metavar="FILE"), PLACE] = None,
     *,
-    wrap_angle: Annotated[
-        Bends | None, Option(metavar="FROM:TO", default="all that were measured, such as 45deg:180deg")
-    ] = None,
-    law: Annotated[Law | None, Option(default="both")] = None,
-    schedule: Annotated[bool, Option()] = False,
-    simulate: Annotated[bool, Option()] = False,
-    risk: Annotated[Quantity | None, Option(example="5%", metavar="PERCENT", default="5%")] = None,
-    output: Annotated[Output, Option(("-o",))] = None,
+    wrap_angle: Bends = None,
+    law: Annotated[Law | None, Parameter(show_default="both")] = None,
+    schedule: bool = False,
+    simulate: bool = False,
+    risk: Annotated[Quantity | None, Parameter(metavar="PERCENT", show_default="5%"), number_with_unit("5%")] = None,
+    output: Output = None,
 ) -> "Compensation":
     """How much of a loop's friction a controller may hide before the device moves by itself, and what is left to feel.
 
@@ -85,7 +84,7 @@ def _share(risk: Quantity | None) -> float:
     from bowdenfit.errors import DatasetError, UsageError
     from bowdenfit.units import conversion_factor
 
-    value, unit = risk or _PERCENT
+    value, unit = measured(risk) or _PERCENT
     try:
         share = value * conversion_factor(unit, "ratio")
     except DatasetError as error:
@@ -118,16 +117,17 @@ def _reply(found: "Compensation", asked: dict[str, Any]) -> Reply:
 VERB = Verb(
     compensate,
     _reply,
-    "How much friction a controller may hide.",
-    """How much of a loop's friction a controller may hide before the device moves by itself, over all that the fit leaves open
-    and over mountings, and what is left to feel.
+    """Say how much friction a controller may hide.
 
-    \b
-    karnopp   a torque in the direction of motion, fed forward outside a dead zone
-    active    the torque measured at the joint, fed back
+    More than that, and the device moves by itself. The answer holds over all that
+    the fit leaves open and over mountings, and says what is left to feel.
 
-    One torque for all bends must suit the bend with the least friction; by bend it may be more. What the fit does not tell
-    is asked for by name in device.toml; datasets/haptic-teleoperation has one.
+      karnopp  a torque in the direction of motion, fed forward outside a dead zone
+      active   the torque measured at the joint, fed back
+
+    One torque for all bends must suit the bend with the least friction; by bend it
+    may be more. What the fit does not tell is asked for by name in device.toml;
+    datasets/haptic-teleoperation has one.
     """,
     json="Print as JSON.",
     csv="Print all bends as CSV.",

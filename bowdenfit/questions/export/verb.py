@@ -4,28 +4,32 @@ from collections.abc import Mapping
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any, Literal
 
-from bowdenfit.given import with_checked_keywords
-from bowdenfit.verb import NOT_TRUSTED, Argument, Option, Output, Quantity, Reply, Verb
+from cyclopts import Parameter
+
+from bowdenfit.arguments import FIT, PLACE, RESULTS, Output, Quantity, checked, measured, number_with_unit, whole_number
+from bowdenfit.verb import NOT_TRUSTED, Reply, Verb
 
 if TYPE_CHECKING:
     from bowdenfit.questions.export.answer import Exported
     from bowdenfit.results.record import Record
 
+_FILE = "the name of the cable, in this folder"
+_PLACE = Parameter(metavar="PLACE", show_default="the middle of the range")
 Target = Literal["c", "fmu", "mujoco", "matlab", "yaml", "csv"]
 _ENDINGS: Mapping[str, str] = {"c": ".h", "csv": ".csv", "fmu": ".fmu", "matlab": ".m", "mujoco": ".xml", "yaml": ".yaml"}
 
 
-@with_checked_keywords
+@checked
 def export(
-    found: Annotated["Record", Argument("RESULTS", results=True)],
-    to: Annotated[Target, Option(required=True)] = "csv",
-    output: Annotated[Output, Option(("-o",), metavar="FILE", default="the name of the cable, in this folder")] = None,
+    found: Annotated["Record", RESULTS, FIT],
+    to: Annotated[Target, Parameter(required=True)] = "csv",
+    output: Annotated[Output, Parameter(metavar="FILE", show_default=_FILE)] = None,
     *,
-    points: Annotated[int, Option(least=2, most=2001)] = 101,
-    draws: Annotated[int, Option(least=0, most=10_000)] = 0,
-    at: Annotated[Quantity | None, Option(example="90deg", metavar="PLACE", default="the middle of the range")] = None,
-    device: Annotated[str | Path | None, Option(metavar="FILE")] = None,
-    force: Annotated[bool, Option()] = False,
+    points: Annotated[int, Parameter(metavar="NUMBER"), whole_number(2, 2001)] = 101,
+    draws: Annotated[int, Parameter(metavar="NUMBER"), whole_number(0, 10_000)] = 0,
+    at: Annotated[Quantity | None, _PLACE, number_with_unit("90deg")] = None,
+    device: Annotated[str | Path | None, Parameter(metavar="FILE"), PLACE] = None,
+    force: bool = False,
 ) -> "Exported":
     """Write a fitted cable as another program reads it, with quantiles, and draws where some are asked for.
 
@@ -62,7 +66,7 @@ def export(
     compensation = None if device is None else _compensation(found, to, Path(device))
     judged = verdict(found)
     tables = transmission(found, points, draws, " and ".join(judged.troubles))
-    written = WRITERS[to](Asked(found, tables, path, place_of(found, tables.places, to, at), compensation))
+    written = WRITERS[to](Asked(found, tables, path, place_of(found, tables.places, to, measured(at)), compensation))
     with file_to_write(path) as temporary:
         temporary.write_bytes(written.content)
     return Exported(path, to, tuple(tables.sentences), judged.trusted, written.remarks)
@@ -86,21 +90,27 @@ def _reply(answer: "Exported", _: Mapping[str, Any]) -> Reply:
 VERB = Verb(
     export,
     _reply,
-    "Write a fitted cable for C, MuJoCo, FMI, MATLAB, ROS or a table.",
-    """Write a fitted cable as another program reads it: friction over lengths or wrap angles, with quantiles of the cable's
-    mean and of any one mounting.
+    """Write a fitted cable for C, MuJoCo, FMI, MATLAB, ROS or as CSV.
 
-    \b
-    c       a header (C99): output force, input force, friction while moving to and fro, compensation
-    mujoco  a loop that stays taut as MJCF (cable.xml), or any cable whose stretch is known as a callback (--output cable.py)
-    matlab  a function of MATLAB and Octave that says the same
-    fmu     a functional mock-up unit (FMI 2.0, co-simulation) of that header, compiled here, with its sources
-    yaml    parameters of a controller, as ROS 2 reads them: friction by place, and what may be fed forward; with --device
-            the largest safe share and gain, too
-    csv     a lookup table that says what bowdenfit predict says; with --draws, cables drawn from the posterior
+    The file says friction over lengths or wrap angles, with quantiles of the
+    cable's mean and of any one mounting.
 
-    Every file says which fit it was written from, with which seed and version, and over which range it holds. Outside that
-    range the nearest end counts, and a flag tells.
+      c       a header (C99): output force, input force, friction while moving to
+              and fro, compensation
+      mujoco  a loop that stays taut as MJCF (cable.xml), or any cable whose stretch
+              is known as a callback (--output cable.py)
+      matlab  a function of MATLAB and Octave that says the same
+      fmu     a functional mock-up unit (FMI 2.0, co-simulation) of that header,
+              compiled here, with its sources
+      yaml    parameters of a controller, as ROS 2 reads them: friction by place,
+              and what may be fed forward; with --device the largest safe share
+              and gain, too
+      csv     a lookup table that says what bowdenfit predict says; with --draws,
+              cables drawn from the posterior
+
+    Every file says which fit it was written from, with which seed and version, and
+    over which range it holds. Outside that range the nearest end counts, and a flag
+    tells.
     """,
     warns=True,
 )

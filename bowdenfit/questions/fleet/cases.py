@@ -7,6 +7,7 @@ from glob import escape
 from pathlib import Path
 from typing import Any
 
+from bowdenfit.arguments import LARGEST_SEED
 from bowdenfit.dataset import DESCRIPTION_FILE, Dataset, read_dataset
 from bowdenfit.description import Description
 from bowdenfit.errors import DatasetError, DescriptionError, StoreError
@@ -18,7 +19,6 @@ from bowdenfit.questions.fleet.answer import Broken
 from bowdenfit.questions.fleet.inspections import Inspection
 from bowdenfit.reading import Reading, changed_settings, read
 from bowdenfit.results.fleet_folder import FLEET_DESCRIPTION
-from bowdenfit.verb import LARGEST_SEED
 
 
 @dataclass(frozen=True)

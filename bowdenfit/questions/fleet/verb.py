@@ -9,11 +9,13 @@ from datetime import timedelta
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any, Unpack
 
-from bowdenfit.given import with_checked_keywords
+from cyclopts import Parameter
+
+from bowdenfit.arguments import HIDDEN, LARGEST_SEED, PLACE, Output, Seed, checked, whole_number
 from bowdenfit.inference.engines.memory import refuse_too_little
 from bowdenfit.inference.engines.processes import keep_compiled_programs
-from bowdenfit.reading import Reading, refuse_unknown
-from bowdenfit.verb import LARGEST_SEED, NOT_TRUSTED, Argument, Option, Output, Reply, Verb, Watch
+from bowdenfit.reading import Reading
+from bowdenfit.verb import NOT_TRUSTED, Reply, Verb, Watch
 
 if TYPE_CHECKING:
     from bowdenfit.inference.batch.pieces import PieceFit
@@ -24,20 +26,22 @@ if TYPE_CHECKING:
     from bowdenfit.questions.fleet.store import FleetStore
     from bowdenfit.results.fleet_folder import FleetDraws
 
+FOLDER = Parameter("FOLDER", help="Such as my-fleet, with its fleet.toml and fleet.csv.")
 Report = Callable[[int, int, float], None]
+_WORKERS = "this process, with threads; 16 jobs of Slurm"
 
 
-@with_checked_keywords
+@checked
 def fleet(
-    folder: Annotated["str | Path", Argument("FOLDER", such_as="my-fleet, with its fleet.toml and fleet.csv")],
+    folder: Annotated["str | Path", FOLDER, PLACE],
     *,
-    output: Annotated[Output, Option(("-o",), default="fits/NAME OF FOLDER")] = None,
-    engine: Annotated["str | Executor", Option(metavar="ENGINE")] = "local",
-    workers: Annotated[int | None, Option(("-j",), least=1, default="this process, with threads; 16 jobs of Slurm")] = None,
-    seed: Annotated[int | None, Option(least=0, most=LARGEST_SEED, default="drawn, and recorded")] = None,
-    resume: Annotated[bool, Option()] = False,
-    force: Annotated[bool, Option()] = False,
-    progress: Report | None = None,
+    output: Annotated[Output, Parameter(show_default="fits/NAME OF FOLDER")] = None,
+    engine: Annotated["str | Executor", Parameter(metavar="ENGINE")] = "local",
+    workers: Annotated[int | None, Parameter(alias="-j", metavar="NUMBER", show_default=_WORKERS), whole_number(1)] = None,
+    seed: Annotated[Seed, Parameter(show_default="drawn, and recorded")] = None,
+    resume: bool = False,
+    force: bool = False,
+    progress: Annotated[Report | None, HIDDEN] = None,
     **reading: Unpack[Reading],
 ) -> "Fleet":
     """Fit every inspection of every cable by itself, many in one program; nothing depends on engine, workers or order.
@@ -62,7 +66,6 @@ def fleet(
     from bowdenfit.questions.fleet.inspections import read_inspections
     from bowdenfit.results.folder import reserved
 
-    refuse_unknown(fleet, reading)
     refuse_too_little()
     place = Path(output) if output is not None else None
     inspections = read_inspections(Path(folder))
@@ -173,15 +176,19 @@ WATCH = Watch("kept", "what is done is kept in", _BAR, _show)
 VERB = Verb(
     fleet,
     _reply,
-    "Fit many cables, inspected again and again, on one machine or a cluster.",
-    """Fit every inspection of every cable in FOLDER by itself, many in one program, into one fleet.nc.
+    """Fit many cables, inspected again and again.
 
-    FOLDER has fleet.csv, a row an inspection with the columns cable, cycles, temperature_degC, lubricated and file, and
-    fleet.toml, which says of all of them what cable.toml says of one; or a folder for each cable with a cable.toml of its own,
-    or CABLE/CYCLES/cable.toml. datasets/synthetic-fleet is one.
+    Every inspection of every cable in FOLDER is fitted by itself, many in one
+    program, on one machine or a cluster, into one fleet.nc.
 
-    What is done is kept piece by piece; --resume goes on, with cables that were added too. Broken inspections are named, and
-    the others are fitted. Exit code 3: some could not be fitted, or must not be trusted.
+    FOLDER has fleet.csv, a row an inspection with the columns cable, cycles,
+    temperature_degC, lubricated and file, and fleet.toml, which says of all of them
+    what cable.toml says of one; or a folder for each cable with a cable.toml of its
+    own, or CABLE/CYCLES/cable.toml. datasets/synthetic-fleet is one.
+
+    What is done is kept piece by piece; --resume goes on, with cables that were
+    added too. Broken inspections are named, and the others are fitted. Exit code 3:
+    some could not be fitted, or must not be trusted.
     """,
     json="Print fleet.json instead of the summary for people.",
     csv="Print medians and intervals of all inspections as CSV, one a row.",

@@ -5,12 +5,14 @@ from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any, Unpack
 
+from cyclopts import Parameter
+
+from bowdenfit.arguments import PLACE, Output, checked
 from bowdenfit.errors import DescriptionError
-from bowdenfit.given import with_checked_keywords
 from bowdenfit.inputs import read_toml_file
 from bowdenfit.questions.writing import files_of, write_answer
-from bowdenfit.reading import Reading, read, refuse_named, refuse_unknown
-from bowdenfit.verb import Argument, Option, Output, Reply, Verb
+from bowdenfit.reading import Reading, read, refuse_named
+from bowdenfit.verb import Reply, Verb
 
 if TYPE_CHECKING:
     from bowdenfit.dataset import Dataset
@@ -22,14 +24,15 @@ NOT_IDENTIFIABLE = "not identifiable"  # what a fit is whose measurements do not
 _REACH, _PINS = 4.0, 21  # standard deviations on both sides that profiles cover, and values in them
 
 
-@with_checked_keywords
+@checked
 def identify(
     source: Annotated[
         "str | Path | Dataset | Record",
-        Argument("SOURCE", such_as="fits/my-cable, the results of a fit, or my-cable, a data set"),
+        Parameter("SOURCE", help="Such as fits/my-cable, the results of a fit, or my-cable, a data set."),
+        PLACE,
     ],
     *,
-    output: Annotated[Output, Option(("-o",))] = None,
+    output: Output = None,
     **reading: Unpack[Reading],
 ) -> "Identifiability":
     """What measurements determine of a cable's parameters, and what rests on the priors.
@@ -47,7 +50,6 @@ def identify(
 
     from bowdenfit.questions.identify.words import identifiability_text
 
-    refuse_unknown(identify, reading)
     with jax.enable_x64(True):
         found = _identify(source, reading)
     if output is not None:
@@ -175,11 +177,13 @@ def _kept(answers: Mapping[str, Any], asked: Mapping[str, Any]) -> Reply | None:
 VERB = Verb(
     identify,
     _reply,
-    "Which coefficients the measurements determine, and which rest on the prior.",
-    """Say which friction coefficients, or which sums of them, SOURCE determines and how well, and which rest on the prior.
+    """Say which coefficients the measurements determine.
 
-    SOURCE is a plan, before anything is measured (a cable.toml with [design], the lengths and forces that you intend to
-    measure at, such as datasets/synthetic-bench/bench.toml); a data set; or the results folder of a fit.
+    SOURCE is a plan, before anything is measured (a cable.toml with [design], the
+    lengths and forces that you intend to measure at, such as
+    datasets/synthetic-bench/bench.toml); a data set; or the results folder of a
+    fit. The answer says which friction coefficients, or which sums of them, SOURCE
+    determines, how well, and which rest on the prior.
     """,
     csv="Print the parameters as CSV, one a row.",
     warns=True,

@@ -3,14 +3,16 @@
 from collections.abc import Mapping
 from typing import TYPE_CHECKING, Annotated, Any
 
-from bowdenfit.verb import Argument, Reply, Verb
+from bowdenfit.arguments import FIT, RESULTS, checked
+from bowdenfit.verb import Reply, Verb
 
 if TYPE_CHECKING:
     from bowdenfit.results.length import OptimalLength
     from bowdenfit.results.record import Record
 
 
-def length(found: Annotated["Record", Argument("RESULTS", results=True)]) -> "OptimalLength":
+@checked
+def length(found: Annotated["Record", RESULTS, FIT]) -> "OptimalLength":
     """The design answer: which length is best, how sure that is, and what the lengths that can be bought cost.
 
     Args:
@@ -38,8 +40,11 @@ def _kept(answers: Mapping[str, Any], asked: Mapping[str, Any]) -> Reply | None:
 VERB = Verb(
     length,
     _reply,
-    "The design answer: which length is best.",
-    "The design answer: which length is best, how sure that is, and what the lengths that can be bought cost.",
+    """Say which length is best.
+
+    This is the design answer: which length is best, how sure that is, and what the
+    lengths that can be bought cost.
+    """,
     csv="Print the lengths that can be bought as CSV; where none are named, the best length and the efficiency there.",
     warns=True,
     kept=_kept,

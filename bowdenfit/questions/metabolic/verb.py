@@ -3,16 +3,20 @@
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
-from bowdenfit.given import with_checked_keywords
-from bowdenfit.verb import Argument, Reply, Verb
+from cyclopts import Parameter
+
+from bowdenfit.arguments import PLACE, checked
+from bowdenfit.verb import Reply, Verb
 
 if TYPE_CHECKING:
     from bowdenfit.questions.metabolic.answer import Metabolic
 
 
-@with_checked_keywords
+@checked
 def metabolic(
-    dataset: Annotated["str | Path", Argument("DATASET", such_as="my-study, a folder with a metabolic.toml")],
+    dataset: Annotated[
+        str | Path, Parameter("DATASET", help="Such as my-study, a folder with a metabolic.toml."), PLACE
+    ],
 ) -> "Metabolic":
     """What a study of metabolic cost shows: paired differences with intervals, and what of its numbers cannot be right.
 
@@ -38,13 +42,17 @@ def _reply(found: "Metabolic", _: dict[str, Any]) -> Reply:
 VERB = Verb(
     metabolic,
     _reply,
-    "Look at a study of what walking costs with and without a device.",
-    """Look again at a study of metabolic cost: DATASET has metabolic.toml, and either a table of persons (net_W_per_kg, or
-    oxygen and carbon dioxide, from which Brockway's equation gives the rate) or what was printed of it.
+    """Look at a study of what walking costs with a device.
 
-    Says for each pair of conditions the difference with its interval, whether it is shown with all pairs looked at together,
-    with what probability one is lower, and how many persons it would take; and which printed numbers cannot all be right.
-    datasets/on-body-metabolic is one.
+    The study compares walking with and without a device. DATASET has
+    metabolic.toml, and either a table of persons (net_W_per_kg, or
+    oxygen and carbon dioxide, from which Brockway's equation gives the rate) or
+    what was printed of it. datasets/on-body-metabolic is one.
+
+    The answer says for each pair of conditions the difference with its interval,
+    whether it is shown with all pairs looked at together, with what probability
+    one is lower, and how many persons it would take; and which printed numbers
+    cannot all be right.
     """,
     csv="Print the comparisons as CSV, one a row.",
 )

@@ -4,9 +4,11 @@ from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
-from bowdenfit.given import with_checked_keywords
+from cyclopts import Parameter
+
+from bowdenfit.arguments import PLACE, RESULTS, TEXTS, Output, checked, numbers_by_name, whole_number
 from bowdenfit.questions.writing import files_of, write_answer
-from bowdenfit.verb import Argument, Option, Output, Reply, Verb
+from bowdenfit.verb import Reply, Verb
 
 if TYPE_CHECKING:
     from bowdenfit.questions.next.answer import NextMeasurement
@@ -15,21 +17,24 @@ if TYPE_CHECKING:
 NAME = "next_measurement"
 
 
-@with_checked_keywords
+@checked
 def next_measurement(
-    found: Annotated["Record | str | Path", Argument("RESULTS", results=True)],
+    found: Annotated["Record | str | Path", RESULTS, PLACE],
     answer: Annotated[
         str | None,
-        Option(("--for",), metavar="ANSWER", default="optimal-length; without a route the friction coefficient"),
+        Parameter("--for", metavar="ANSWER", show_default="optimal-length; without a route the friction coefficient"),
     ] = None,
     candidates: Annotated[
         Sequence[str],
-        Option(("--candidate",), metavar="KIND@WHERE", default="all that the data set's tables can hold"),
+        Parameter("--candidate", metavar="KIND@WHERE", show_default="all that the data set's tables can hold"),
+        TEXTS,
     ] = (),
-    costs: Annotated[Mapping[str, float] | None, Option(("--cost",), "angle=0.5", "KIND=NUMBER")] = None,
+    costs: Annotated[
+        Mapping[str, float] | None, Parameter("--cost", metavar="KIND=NUMBER"), numbers_by_name("angle=0.5")
+    ] = None,
     *,
-    top: Annotated[int, Option(least=1)] = 10,
-    output: Annotated[Output, Option(("-o",))] = None,
+    top: Annotated[int, Parameter(metavar="NUMBER"), whole_number(1)] = 10,
+    output: Output = None,
 ) -> "NextMeasurement":
     """Rank what could be measured next by how far it would narrow an answer, on average.
 
@@ -70,17 +75,18 @@ def _reply(found: "NextMeasurement", asked: dict[str, Any]) -> Reply:
 VERB = Verb(
     next_measurement,
     _reply,
-    "What to measure next.",
-    """What to measure next: candidates ranked by how far each would narrow the answer, on average over what it may read.
+    """Rank what to measure next.
 
-    \b
-    KIND        a reading of
-    angle       the wrap angles of all curved contacts at a length
-    force       forces at both ends, a run like those made so far, mounted anew
-    efficiency  the efficiency at a length, mounted anew
-    stretch     the rope's stretch at a wrap angle and load
-    preload     the preload at a wrap angle
-    loop        the output force of a pull-pull loop at a wrap angle and input force
+    Candidates are ranked by how far each would narrow the answer, on average over
+    what it may read.
+
+      KIND        a reading of
+      angle       the wrap angles of all curved contacts at a length
+      force       forces at both ends, a run like those made so far, mounted anew
+      efficiency  the efficiency at a length, mounted anew
+      stretch     the rope's stretch at a wrap angle and load
+      preload     the preload at a wrap angle
+      loop        the output force of a loop at a wrap angle and input force
 
     A number without a unit is a value of the route, such as the cable length.
     """,

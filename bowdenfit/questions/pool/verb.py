@@ -7,29 +7,43 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
-from bowdenfit.given import with_checked_keywords
+from cyclopts import Parameter
+
+from bowdenfit.arguments import (
+    PLACE,
+    TEXTS,
+    NumberWithUnit,
+    Output,
+    Quantity,
+    Seed,
+    checked,
+    measured,
+    number_with_unit,
+    whole_number,
+)
 from bowdenfit.questions.writing import refuse_to_replace
-from bowdenfit.verb import LARGEST_SEED, NOT_TRUSTED, Argument, Option, Output, Quantity, Reply, Verb
+from bowdenfit.verb import NOT_TRUSTED, Reply, Verb
 
 if TYPE_CHECKING:
     from bowdenfit.questions.pool.answer import Asked, Pool
 
 NAME = "pool"
+FLEET = Parameter("FLEET", help="Such as fits/my-fleet, which `bowdenfit fleet my-fleet` writes.")
 _NAMED = re.compile(r"(?P<name>[^=]+)=\s*(?P<value>\d+\.?\d*|\.\d+)\s*(?P<unit>[A-Za-z°][\w°]*)")
 _MOST_TURNS = 100
 
 
-@with_checked_keywords
+@checked
 def pool(
-    results: Annotated["str | Path", Argument("FLEET", such_as="fits/my-fleet, which `bowdenfit fleet my-fleet` writes")],
+    results: Annotated[str | Path, FLEET, PLACE],
     *,
-    until: Annotated[Quantity | None, Option(metavar="EFFICIENCY", example="60%")] = None,
-    wrap_angles: Annotated[Sequence[str], Option(("--wrap-angle",), metavar="COEFFICIENT=ANGLE")] = (),
-    cycles: Annotated[int | None, Option(least=1)] = None,
-    measurements: Annotated["str | Path | None", Option(metavar="FOLDER")] = None,
-    seed: Annotated[int | None, Option(least=0, most=LARGEST_SEED, default="that of the fleet")] = None,
-    output: Annotated[Output, Option(("-o",))] = None,
-    force: Annotated[bool, Option()] = False,
+    until: Annotated[Quantity | None, Parameter(metavar="EFFICIENCY"), number_with_unit("60%")] = None,
+    wrap_angles: Annotated[Sequence[str], Parameter("--wrap-angle", metavar="COEFFICIENT=ANGLE"), TEXTS] = (),
+    cycles: Annotated[int | None, Parameter(metavar="NUMBER"), whole_number(1)] = None,
+    measurements: Annotated[str | Path | None, Parameter(metavar="FOLDER"), PLACE] = None,
+    seed: Annotated[Seed, Parameter(show_default="that of the fleet")] = None,
+    output: Output = None,
+    force: bool = False,
 ) -> "Pool":
     """Look at the cables of a fleet together: what they have in common, how they wear, and how long each lasts.
 
@@ -62,7 +76,8 @@ def pool(
     drawn = read_fleet_draws(Path(results))
     if measurements is not None:
         read_inspections(Path(measurements))  # so that a wrong name is said before anything is drawn
-    asked = asked_of(until, wrap_angles, cycles, [n for n, a in drawn.attributes.items() if a.get("role") == "friction"])
+    coefficients = [name for name, about in drawn.attributes.items() if about.get("role") == "friction"]
+    asked = asked_of(measured(until), wrap_angles, cycles, coefficients)
     seed = int(drawn.about.get("seed", 0)) if seed is None else seed
     with jax.enable_x64(True):
         found = pooled(drawn, asked, seed, None if measurements is None else Path(measurements))
@@ -92,7 +107,7 @@ def _write(found: "Pool", folder: Path) -> None:
 
 
 def asked_of(
-    until: Quantity | None, wrap_angles: Sequence[str], cycles: int | None, coefficients: Sequence[str]
+    until: NumberWithUnit | None, wrap_angles: Sequence[str], cycles: int | None, coefficients: Sequence[str]
 ) -> "Asked | None":
     """What life is until; None where it is not asked for.
 
@@ -151,16 +166,19 @@ def _reply(found: "Pool", asked: dict[str, Any]) -> Reply:
 VERB = Verb(
     pool,
     _reply,
-    "Look at the cables of a fleet together: wear, life, and which is unlike the rest.",
-    """Look at the cables of FLEET together, a results folder that `bowdenfit fleet` wrote.
+    """Look at the cables of a fleet together: wear and life.
 
-    Says how friction grows with cycles, what lubrication and temperature do, how much cables differ, and what a new one will be
-    like; each cable is drawn toward the others as far as its own inspections leave it open. Names cables that are unlike the
+    FLEET is a results folder that `bowdenfit fleet` wrote. The answer says how
+    friction grows with cycles, what lubrication and temperature do, how much cables
+    differ, and what a new one will be like; each cable is drawn toward the others
+    as far as its own inspections leave it open. It names cables that are unlike the
     rest, which are shown by their own inspections alone, and what to inspect next.
 
-    With --until and a --wrap-angle for each coefficient: how many cycles each cable and a new one last, and with --cycles the
-    probability of failing before. With --measurements, the folder that was fitted, cables of which single fits tell too little
-    are pooled by their readings; without it they are named. Exit code 3: must not be trusted.
+    With --until and a --wrap-angle for each coefficient: how many cycles each cable
+    and a new one last, and with --cycles the probability of failing before. With
+    --measurements, the folder that was fitted, cables of which single fits tell too
+    little are pooled by their readings; without it they are named. Exit code 3:
+    must not be trusted.
     """,
     csv="Print cables as CSV, a row a quantity.",
 )

@@ -6,6 +6,7 @@ from typing import Any
 import jax
 import numpy as np
 
+from bowdenfit.arguments import NumberWithUnit
 from bowdenfit.description import Route
 from bowdenfit.errors import DatasetError, UsageError
 from bowdenfit.inference.draws import output_force_at
@@ -13,7 +14,6 @@ from bowdenfit.inference.interval import Interval
 from bowdenfit.questions.predict.outside import measured, pulled
 from bowdenfit.results.record import Record
 from bowdenfit.units import conversion_factor, route_conversion_factor
-from bowdenfit.verb import Length
 
 _STROKES = {"pull": 1, "return": -1}
 
@@ -75,7 +75,7 @@ def predict_at_lengths(
     return rows
 
 
-def in_unit_of(route: Route | None, lengths: Sequence[Length] | None) -> list[float]:
+def in_unit_of(route: Route | None, lengths: Sequence[float | NumberWithUnit] | None) -> list[float]:
     """Route values in the unit of the route.
 
     Args:

@@ -1,13 +1,28 @@
 """Predicting what a cable does at lengths or wrap angles."""
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any, Literal
+from typing import TYPE_CHECKING, Annotated, Any, Literal, TypeAlias, cast
 
+from cyclopts import Parameter
+
+from bowdenfit.arguments import (
+    FIT,
+    LENGTHS,
+    PLACE,
+    RESULTS,
+    Length,
+    NumberWithUnit,
+    Quantity,
+    Stroke,
+    checked,
+    measured,
+    number_with_unit,
+    numbers_with_units,
+)  # fmt: skip
 from bowdenfit.display import csv_text
-from bowdenfit.given import with_checked_keywords
 from bowdenfit.questions.predict.words import predictions_text
-from bowdenfit.verb import Argument, Length, Option, Quantity, Reply, Stroke, Verb
+from bowdenfit.verb import Reply, Verb
 
 if TYPE_CHECKING:
     import numpy as np
@@ -23,25 +38,29 @@ _ELSEWHERE = (  # what is not kept
     "input_force", "output_force", "wrap_angles", "preload", "friction_limit", "spring", "contact", "gait", "gait_column",
 )  # fmt: skip
 AT_LENGTHS = ("efficiency", "output-force", "input-force")  # all others are asked at wrap angles
-_QUANTITY = Option(metavar="QUANTITY", default="efficiency, or what --input-force and --output-force ask for")
+Force: TypeAlias = Annotated[Quantity | None, Parameter(metavar="FORCE"), number_with_unit("100N")]
+Angles: TypeAlias = Annotated[
+    Quantity | Sequence[Quantity], Parameter("--wrap-angle", metavar="ANGLE"), numbers_with_units("90deg")
+]
+_QUANTITY = Parameter(metavar="QUANTITY", show_default="efficiency, or what --input-force and --output-force ask for")
 
 
-@with_checked_keywords
+@checked
 def predict(
-    found: Annotated["Record", Argument("RESULTS", results=True)],
-    lengths: Annotated[Sequence[Length] | None, Argument("LENGTHS", many=True)] = None,
-    input_force: Annotated[Quantity | None, Option(metavar="FORCE", example="100N")] = None,
-    stroke: Annotated[Stroke, Option()] = "pull",
-    output_force: Annotated[Quantity | None, Option(metavar="FORCE", example="100N")] = None,
+    found: Annotated["Record", RESULTS, FIT],
+    lengths: Annotated[Length | Iterable[Length] | None, Parameter("LENGTHS"), LENGTHS] = None,
+    input_force: Force = None,
+    stroke: Stroke = "pull",
+    output_force: Force = None,
     *,
     quantity: Annotated[Asked | None, _QUANTITY] = None,
-    wrap_angles: Annotated[Sequence[Quantity], Option(("--wrap-angle",), "90deg", "ANGLE")] = (),
-    preload: Annotated[Quantity | None, Option(metavar="FORCE", example="20N")] = None,
-    friction_limit: Annotated[Quantity | None, Option(metavar="TORQUE", example="50N*mm")] = None,
-    spring: Annotated[Quantity | None, Option(metavar="STIFFNESS", example="5N/mm")] = None,
-    contact: Annotated[str | None, Option(metavar="NAME")] = None,
-    gait: Annotated[str | Path | None, Option(metavar="FILE")] = None,
-    gait_column: Annotated[str | None, Option(metavar="HEADING")] = None,
+    wrap_angles: Angles = (),
+    preload: Annotated[Quantity | None, Parameter(metavar="FORCE"), number_with_unit("20N")] = None,
+    friction_limit: Annotated[Quantity | None, Parameter(metavar="TORQUE"), number_with_unit("50N*mm")] = None,
+    spring: Annotated[Quantity | None, Parameter(metavar="STIFFNESS"), number_with_unit("5N/mm")] = None,
+    contact: Annotated[str | None, Parameter(metavar="NAME")] = None,
+    gait: Annotated[str | Path | None, Parameter(metavar="FILE"), PLACE] = None,
+    gait_column: Annotated[str | None, Parameter(metavar="HEADING")] = None,
 ) -> "Predictions":
     """Efficiency, a force, or what stretch and preload do, with intervals; one row a route value or wrap angle.
 
@@ -66,30 +85,29 @@ def predict(
         UsageError: There is nothing to predict at, no posterior, or the cable has not what is asked for.
     """
     from bowdenfit.questions.predict.answer import Predictions
+    from bowdenfit.questions.predict.bends import predict_at_bends, question
+    from bowdenfit.questions.predict.gait import gait_of, predict_over_gait
+    from bowdenfit.questions.predict.lengths import predict_at_lengths
 
+    applied, wanted, angles = measured(input_force), measured(output_force), cast("list[NumberWithUnit]", wrap_angles)
     quantity = _quantity(quantity, input_force, output_force)
     over_gait = any(each is not None for each in (contact, gait, gait_column))
     without_route = found.dataset.description.route is None and found.model.cable.is_loop
     if not over_gait and (wrap_angles or quantity not in AT_LENGTHS or without_route):
-        from bowdenfit.questions.predict.bends import predict_at_bends, question
-
         _refuse_both(lengths)
         found.draws()
-        asked = question(found, wrap_angles, input_force, output_force, preload, friction_limit, stroke, spring)
+        limit, stiffness = measured(friction_limit), measured(spring)
+        asked = question(found, angles, applied, wanted, measured(preload), limit, stroke, stiffness)
         return Predictions(predict_at_bends(found, quantity, asked))
     _refuse_of_bends(quantity, over_gait, preload or spring, friction_limit, input_force)
-    wanted = _lengths(found, lengths)
+    route = _lengths(found, cast("list[float | NumberWithUnit] | None", lengths))
     if over_gait:
-        from bowdenfit.questions.predict.gait import gait_of, predict_over_gait
-
-        bent = gait_of(found, contact, wrap_angles, gait, gait_column)
-        return Predictions(predict_over_gait(found, wanted, bent, input_force, stroke, output_force))
-    from bowdenfit.questions.predict.lengths import predict_at_lengths
-
-    return Predictions(predict_at_lengths(found, wanted, input_force, stroke, output_force))
+        bent = gait_of(found, contact, angles, gait, gait_column)
+        return Predictions(predict_over_gait(found, route, bent, applied, stroke, wanted))
+    return Predictions(predict_at_lengths(found, route, applied, stroke, wanted))
 
 
-def _refuse_both(lengths: Sequence[Length] | None) -> None:
+def _refuse_both(lengths: object) -> None:
     """Refuse lengths where wrap angles are asked for."""
     from bowdenfit.errors import UsageError
 
@@ -120,7 +138,7 @@ def _refuse_of_bends(
         )
 
 
-def _lengths(found: "Record", lengths: Sequence[Length] | None) -> "np.ndarray":
+def _lengths(found: "Record", lengths: Sequence[float | NumberWithUnit] | None) -> "np.ndarray":
     """Route values to predict at, by default those of the description; any one number without a route.
 
     Raises:
@@ -180,30 +198,38 @@ def _kept(answers: Mapping[str, Any], asked: Mapping[str, Any]) -> Reply | None:
 VERB = Verb(
     predict,
     _reply,
-    "Predict efficiency, forces, preload, position or stiffness.",
-    """Predict the efficiency, the output force for an input force, or the input force for a wanted output force, at LENGTHS
-    (default: the lengths that can be bought) or at wrap angles; or what stretch and preload do at wrap angles.
+    """Predict efficiency, forces, preload, position or stiffness.
 
-    \b
-    efficiency      output over input force
-    output-force    force at the load side, of --input-force
-    input-force     force at the motor that gives --output-force
-    preload         tension at rest, and slack where there is none
-    friction        what moving the unloaded cable takes
-    slack-load      input force at which a loop's return side goes slack
-    position        error and lost motion at the load side, by stretch, slack and backlash
-    stiffness       seen at the load side, motor locked; with --spring, of springs in series too
-    dynamic-range   of a loop: the largest force, --input-force, over that of moving it unloaded
-    preload-window  lowest preload without slack over these bends, highest for --friction-limit, and the best
+    Efficiency, the output force for an input force, or the input force for a wanted
+    output force are predicted at LENGTHS (default: the lengths that can be bought)
+    or at wrap angles; what stretch and preload do, at wrap angles.
+
+      efficiency      output over input force
+      output-force    force at the load side, of --input-force
+      input-force     force at the motor that gives --output-force
+      preload         tension at rest, and slack where there is none
+      friction        what moving the unloaded cable takes
+      slack-load      input force at which a loop's return side goes slack
+      position        error and lost motion at the load side, by stretch, slack and
+                      backlash
+      stiffness       seen at the load side, motor locked; with --spring, of springs
+                      in series too
+      dynamic-range   of a loop: the largest force, --input-force, over that of
+                      moving it unloaded
+      preload-window  lowest preload without slack over these bends, highest for
+                      --friction-limit, and the best
 
     LENGTHS are in the unit of the route, or have their own: 455, 455mm, 18 in.
 
-    --contact NAME with several --wrap-angle, or --gait FILE, gives the mean while this contact bends, such as over a stride;
-    with moment arms in that file (moment_arm_mm) and --input-force, the torque at the joint too.
+    --contact NAME with several --wrap-angle, or --gait FILE, gives the mean while
+    this contact bends, such as over a stride; with moment arms in that file
+    (moment_arm_mm) and --input-force, the torque at the joint too.
 
-    The 90 % interval is that of the cable's mean (q05 to q95 with --csv and --json); that of any one mounting also holds
-    the scatter from one mounting of the cable to the next. A note marks what lies outside the
-    lengths, wrap angles and loads measured, and where nothing of the force is left: a rope pulls or is slack, at 0 N.
+    The 90 % interval is that of the cable's mean (q05 to q95 with --csv and
+    --json); that of any one mounting also holds the scatter from one mounting of
+    the cable to the next. A note marks what lies outside the lengths, wrap angles
+    and loads measured, and where nothing of the force is left: a rope pulls or is
+    slack, at 0 N.
     """,
     csv="Print as CSV, with mean, sd and quantiles.",
     warns=True,

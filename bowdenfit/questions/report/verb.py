@@ -5,19 +5,21 @@ from pathlib import Path
 from tempfile import TemporaryDirectory
 from typing import TYPE_CHECKING, Annotated, Any
 
-from bowdenfit.given import with_checked_keywords
-from bowdenfit.verb import Argument, Option, Output, Reply, Verb
+from cyclopts import Parameter
+
+from bowdenfit.arguments import PLACE, RESULTS, Output, checked
+from bowdenfit.verb import Reply, Verb
 
 if TYPE_CHECKING:
     from bowdenfit.results.record import Record
 
 
-@with_checked_keywords
+@checked
 def report(
-    found: Annotated["Record | str | Path", Argument("RESULTS")],
-    output: Annotated[Output, Option(("-o",), metavar="FILE", default="RESULTS/report.html")] = None,
+    found: Annotated["Record | str | Path", RESULTS, PLACE],
+    output: Annotated[Output, Parameter(metavar="FILE", show_default="RESULTS/report.html")] = None,
     *,
-    ranked: Annotated[bool, Option(("--next",))] = False,
+    ranked: Annotated[bool, Parameter("--next")] = False,
 ) -> Path:
     """Write everything that a fit found on one page: a file that stands alone, to read in a browser, print and hand on.
 
@@ -66,11 +68,12 @@ def _reply(path: Path, _: Mapping[str, Any]) -> Reply:
 VERB = Verb(
     report,
     _reply,
-    "Write everything that a fit found on one page.",
-    """Write the report of a finished fit: one HTML file with the answer, whether to trust it, figures, checks, a paragraph on
-    methods with citations, and where the numbers come from.
+    """Write the report of a fit: everything on one page.
 
-    It asks no other computer for anything, and can be mailed, printed and read in light and dark.
+    The report of a finished fit is one HTML file with the answer, whether to trust
+    it, figures, checks, a paragraph on methods with citations, and where the
+    numbers come from. It asks no other computer for anything, and can be mailed,
+    printed and read in light and dark.
     """,
     json="",
     warns=True,

@@ -4,22 +4,26 @@ import secrets
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
-from bowdenfit.given import with_checked_keywords
-from bowdenfit.verb import LARGEST_SEED, Argument, Option, Output, Reply, Verb
+from cyclopts import Parameter
+
+from bowdenfit.arguments import LARGEST_SEED, PLACE, Output, Seed, checked
+from bowdenfit.verb import Reply, Verb
 
 if TYPE_CHECKING:
     from bowdenfit.dataset import Dataset
 
+BENCH = Parameter("BENCH", help="Such as bench.toml, a cable.toml with [truth] and [design].")
 
-@with_checked_keywords
+
+@checked
 def simulate(
-    bench: Annotated[str | Path, Argument("BENCH", such_as="bench.toml, a cable.toml with [truth] and [design]")],
+    bench: Annotated[str | Path, BENCH, PLACE],
     *,
-    output: Annotated[Output, Option(("-o",), required=True)] = None,
-    seed: Annotated[int | None, Option(least=0, most=LARGEST_SEED, default="drawn, and recorded")] = None,
-    noise: Annotated[bool, Option()] = True,
-    recordings: Annotated[bool, Option()] = False,
-    fleet: Annotated[bool, Option()] = False,
+    output: Annotated[Output, Parameter(required=True)] = None,
+    seed: Annotated[Seed, Parameter(show_default="drawn, and recorded")] = None,
+    noise: Annotated[bool, Parameter(negative="--no-noise")] = True,
+    recordings: bool = False,
+    fleet: bool = False,
 ) -> "Dataset":
     """Make a data set from known truth. Only recordings need an `output`; tables without one are not written.
 
@@ -95,14 +99,17 @@ def _reply(_: "Dataset", asked: dict[str, Any]) -> Reply:
 VERB = Verb(
     simulate,
     _reply,
-    "Make a data set from known truth.",
     """Make a data set from known truth.
 
-    BENCH is a cable.toml with two more tables: [truth] with the value of each parameter (what is missing is drawn from its
-    prior), and [design] with the lengths and forces to measure at; datasets/synthetic-bench/bench.toml is one. With
-    --recordings it has [recordings] in place of [design]: what the motor does, what the bench is like, and what its load
-    cells get wrong; datasets/synthetic-recordings/bench.toml is one. With --fleet it has [fleet] besides: how many cables there
-    are, and how they wear; datasets/synthetic-fleet/bench.toml is one. The truth and the seed are written beside the tables.
+    BENCH is a cable.toml with two more tables: [truth] with the value of each
+    parameter (what is missing is drawn from its prior), and [design] with the
+    lengths and forces to measure at; datasets/synthetic-bench/bench.toml is one.
+    With --recordings it has [recordings] in place of [design]: what the motor does,
+    what the bench is like, and what its load cells get wrong;
+    datasets/synthetic-recordings/bench.toml is one. With --fleet it has [fleet]
+    besides: how many cables there are, and how they wear;
+    datasets/synthetic-fleet/bench.toml is one. The truth and the seed are written
+    beside the tables.
     """,
     json="",
 )

@@ -6,8 +6,10 @@ from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
-from bowdenfit.given import with_checked_keywords
-from bowdenfit.verb import NOT_TRUSTED, Argument, Option, Output, Quantity, Reply, Verb
+from cyclopts import Parameter
+
+from bowdenfit.arguments import PLACE, RESULTS, TEXTS, Output, Quantity, checked, measured, number_with_unit
+from bowdenfit.verb import NOT_TRUSTED, Reply, Verb
 
 if TYPE_CHECKING:
     from bowdenfit.questions.writing import Files
@@ -17,9 +19,8 @@ if TYPE_CHECKING:
 _Asked = tuple[dict[str, str], Sequence[str], Callable[[Path, Sequence[str]], None]]
 
 
-def summary(
-    results: Annotated[Path, Argument("RESULTS")], *, full: Annotated[bool, Option()] = False
-) -> "tuple[str, Any] | Record":
+@checked
+def summary(results: Annotated[str | Path, RESULTS, PLACE], *, full: bool = False) -> "tuple[str, Any] | Record":
     """The summary of a finished fit, for people and as JSON; or the fit, where they were not written.
 
     Args:
@@ -55,14 +56,14 @@ def reply(found: "tuple[str, Any] | Record", asked: Mapping[str, Any]) -> Reply:
     return Reply(text, lambda: summarize(found), exit_code=0 if verdict(found).trusted else NOT_TRUSTED)
 
 
-@with_checked_keywords
+@checked
 def plot(
-    found: Annotated["Record | str | Path", Argument("RESULTS")],
-    output: Annotated[Output, Option(("-o",), default="RESULTS/figures")] = None,
+    found: Annotated["Record | str | Path", RESULTS, PLACE],
+    output: Annotated[Output, Parameter(show_default="RESULTS/figures")] = None,
     *,
-    figures: Annotated[Sequence[str], Option(("--figure",), metavar="NAME")] = (),
-    width: Annotated[Quantity | None, Option(example="3.5in", metavar="LENGTH")] = None,
-    formats: Annotated[Sequence[str], Option(("--format",), metavar="ENDING", default="png")] = (),
+    figures: Annotated[Sequence[str], Parameter("--figure", metavar="NAME"), TEXTS] = (),
+    width: Annotated[Quantity | None, Parameter(metavar="LENGTH"), number_with_unit("3.5in")] = None,
+    formats: Annotated[Sequence[str], Parameter("--format", metavar="ENDING", show_default="png"), TEXTS] = (),
 ) -> "Files":
     """Draw the figures of a fit into a folder, and write what each shows, in words, to captions.txt beside them.
 
@@ -123,7 +124,7 @@ def _anew(found: "Record | str | Path", names: Sequence[str], width: Quantity | 
     """Figures to be drawn."""
     from bowdenfit.questions.figures import FIGURES, captions_of, page_width
 
-    page = page_width(width)
+    page = page_width(measured(width))
     shown, cable, mark = _shown(found, names)
     return captions_of(shown, cable, mark), tuple(FIGURES), partial(_draw, shown, (cable, page, mark))
 
@@ -175,15 +176,19 @@ def _shown(found: "Record | str | Path", names: Sequence[str]) -> tuple[dict[str
 SUMMARY_VERB = Verb(
     summary,
     reply,
-    "Print the summary of a fit.",
-    "Print the summary of a finished fit on one page: the answer, whether to trust it, and what to do next.",
+    """Print the summary of a fit.
+
+    The summary is one page: the answer, whether to trust it, and what to do next.
+    """,
     json="Print summary.json instead of the summary for people.",
 )
 PLOT_VERB = Verb(
     plot,
     lambda files, _: Reply("".join(f"{path}\n" for path in files)),
-    "Draw the figures of a fit again.",
-    "Draw the figures of a finished fit again, for the page of a paper too: --width 3.5in --format pdf.",
+    """Draw the figures of a fit again.
+
+    For a column of a paper: --width 3.5in --format pdf.
+    """,
     json="",
     warns=True,
 )

@@ -3,9 +3,11 @@
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
-from bowdenfit.given import with_checked_keywords
+from cyclopts import Parameter
+
+from bowdenfit.arguments import FIT, PLACE, RESULTS, Bends, Output, checked
 from bowdenfit.questions.writing import files_of, write_answer
-from bowdenfit.verb import Argument, Option, Output, Quantity, Reply, Verb
+from bowdenfit.verb import Reply, Verb
 
 if TYPE_CHECKING:
     from bowdenfit.questions.teleoperate.answer import Teleoperation
@@ -13,18 +15,16 @@ if TYPE_CHECKING:
 
 NAME = "teleoperation"
 PROBABILITY = 0.95  # with which contact must be stable
-Bends = str | tuple[Quantity, Quantity]
+DEVICE = Parameter("DEVICE", help="Such as device.toml, which describes master, slave, hand and wall.")
 
 
-@with_checked_keywords
+@checked
 def teleoperate(
-    found: Annotated["Record", Argument("RESULTS", results=True)],
-    device: Annotated[str | Path, Argument("DEVICE", such_as="device.toml, which describes master, slave, hand and wall")],
+    found: Annotated["Record", RESULTS, FIT],
+    device: Annotated[str | Path, DEVICE, PLACE],
     *,
-    wrap_angle: Annotated[
-        Bends | None, Option(metavar="FROM:TO", default="all that were measured, such as 45deg:180deg")
-    ] = None,
-    output: Annotated[Output, Option(("-o",))] = None,
+    wrap_angle: Bends = None,
+    output: Output = None,
 ) -> "Teleoperation":
     """What a hand feels through a loop of a slave and its wall, and which walls are touched without bouncing.
 
@@ -60,12 +60,15 @@ def _reply(found: "Teleoperation", asked: dict[str, Any]) -> Reply:
 VERB = Verb(
     teleoperate,
     _reply,
-    "What a hand feels of a remote wall through a cable.",
-    """What a hand feels through a loop of a slave and its wall, over all that the fit leaves open: torque in free motion,
-    stiffness in contact, and which walls are touched without bouncing, with four channels between master and slave, with
-    two, and with feedback of the master's own torque.
+    """Say what a hand feels of a remote wall through a cable.
 
-    DEVICE is a device.toml; datasets/haptic-teleoperation has one, whose README says what is printed and what assumed.
+    For a loop of a slave and its wall, over all that the fit leaves open: torque in
+    free motion, stiffness in contact, and which walls are touched without bouncing,
+    with four channels between master and slave, with two, and with feedback of the
+    master's own torque.
+
+    DEVICE is a device.toml; datasets/haptic-teleoperation has one, whose README
+    says what is printed and what assumed.
     """,
     json="Print as JSON.",
     csv="Print probabilities by wall as CSV.",

@@ -5,8 +5,9 @@ from typing import Annotated, Any
 
 import numpy as np
 
+from bowdenfit.arguments import FIT, RESULTS
 from bowdenfit.inference.interval import Interval
-from bowdenfit.verb import Argument, Reply, Verb
+from bowdenfit.verb import Reply, Verb
 
 
 @dataclass(frozen=True)
@@ -17,7 +18,7 @@ class Share:
     share: Interval
 
 
-def shares(found: Annotated[Any, Argument("RESULTS", results=True)]) -> tuple[Share, ...]:
+def shares(found: Annotated[Any, RESULTS, FIT]) -> tuple[Share, ...]:
     """Shares of all contacts with a constant wrap angle."""
     contacts = found.dataset.description.contact
     parts = [found.draws().values[c.friction] * c.wrap_angle.constant.to("angle") for c in contacts]
@@ -31,7 +32,7 @@ def words(answer, _):
     return Reply("\n".join(lines) + "\n", lambda: {each.contact: each.share.median for each in answer})
 
 
-VERB = Verb(shares, words, "Shares of the loss.", "Which contact takes what share of the loss?")
+VERB = Verb(shares, words, "Say which contact takes what share of the loss.")
 
 
 HEADING = "Who takes what"

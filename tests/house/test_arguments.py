@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 import bowdenfit as bf
-from bowdenfit.given import with_checked_keywords
+from bowdenfit.arguments import checked
 
 pytestmark = pytest.mark.extended
 
@@ -97,7 +97,7 @@ def test_every_public_function_reads_its_arguments():
 
 
 def test_arguments_by_place_and_by_name_are_read_alike():
-    @with_checked_keywords
+    @checked
     def plain(dataset: Path, *, count: int = 3) -> tuple[Path, int]:
         return dataset, count
 

@@ -146,6 +146,7 @@ def test_a_logistic_curve_is_recovered_exactly_without_noise_and_within_its_erro
         assert abs(estimate.value - value) < 3 * estimate.standard_error < 1.5 * max(abs(value), 0.5)
 
 
+@pytest.mark.extended
 def test_a_line_is_recovered_where_half_of_its_angles_are_too_small_to_detect(laboratory):
     """Each of them says that the line lies below 30 deg there; taken as zeros they would bend it far down."""
     readings = read_off("line", line(56.0, 4.0), scatter=3.0, least=30.0)
@@ -158,12 +159,14 @@ def test_a_line_is_recovered_where_half_of_its_angles_are_too_small_to_detect(la
     assert bent.at_bound
 
 
+@pytest.mark.extended
 def test_a_line_that_ends_at_zero_is_at_its_bound_and_its_interval_is_short(laboratory):
     end = laboratory.least_squares(read_off("line", line(60.0, 0.0), scatter=1.0)).estimates["sheath_angle_end"]
     assert end.at_bound
     assert 0.0 < end.upper < 2.0
 
 
+@pytest.mark.extended
 def test_the_interval_of_a_plateau_that_angles_do_not_reach_follows_the_valley_of_the_minimum(on_body):
     """The printed angles of the squeezed sheath: with 5 % of the plateau reached the sum of squares is as good as at 0 %."""
     data = bf.read(on_body, settings=["contact.1.wrap_angle.curve=logistic"])
@@ -211,6 +214,7 @@ def fits(tmp_path_factory) -> dict[str, bf.Fit]:
     }
 
 
+@pytest.mark.extended
 @pytest.mark.parametrize(
     ("name", "heading", "rows"),
     [
@@ -226,6 +230,7 @@ def test_the_summary_heads_a_family_s_table_with_its_own_name(fits, name, headin
     assert sum("median (90 % interval):" in line for line in lines) == 1
 
 
+@pytest.mark.extended
 def test_comparing_the_families_finds_the_shape_of_the_route(fits):
     found = bf.compare(fits)
     assert found.best == "gaussian"

@@ -76,6 +76,7 @@ def test_coefficient_and_unintended_wrap_angle_are_recovered_exactly_without_noi
     assert found.estimates["wobble_contact_1"].value == pytest.approx(35.0, rel=1e-7)
 
 
+@pytest.mark.extended
 def test_with_noise_both_are_recovered_within_their_errors_while_the_capstan_equation_alone_is_wrong():
     laboratory = Laboratory()
     found, plain = (laboratory.least_squares(lawful(law)) for law in ("wobble", "capstan"))
@@ -86,6 +87,7 @@ def test_with_noise_both_are_recovered_within_their_errors_while_the_capstan_equ
     assert plain.estimates["mu1"].value > 1.1 * MU  # what the sheath wanders goes into the coefficient
 
 
+@pytest.mark.extended
 def test_the_posterior_holds_the_truth_of_a_law_s_parameter(fitted):
     low, high = np.quantile(fitted.draws().values["wobble_sheath"], (0.005, 0.995))
     assert low < 35.0 < high
@@ -103,6 +105,7 @@ def test_errors_of_wrap_angles_enter_by_the_law_s_slope():
 # The stretch of the rope ------------------------------------------------------------------------------------------
 
 
+@pytest.mark.extended
 def test_the_stretch_of_the_rope_asks_the_law_of_its_contact():
     """Against the formulas written out: e(T) of the mean tension F (1 - exp(-Lambda))/Lambda, by the wobbling exponent."""
     truth = TRUTH | {"wobble_housing": 35.0}
@@ -118,6 +121,7 @@ def test_the_stretch_of_the_rope_asks_the_law_of_its_contact():
     np.testing.assert_allclose(rows.stretch[loading], stretch[loading], rtol=1e-10)
 
 
+@pytest.mark.extended
 def test_the_law_s_parameter_is_recovered_from_stretch_alone():
     description = elastic_cable(("stretch",), kind="single", contact=[HOUSING | {"law": "wobble"}])
     dataset, values = bench(description, TRUTH | {"wobble_housing": 35.0}, noise=False)
@@ -179,6 +183,7 @@ def test_a_law_s_parameter_is_fixed_measured_or_given_a_prior_like_any_other(set
         assert parameter.fixed == pytest.approx(np.deg2rad(20.0))
 
 
+@pytest.mark.extended
 def test_a_simulation_s_truth_may_state_a_law_s_parameter_in_its_unit():
     dataset = lawful()
     values = true_values(dataset.description, dataset.measurements, {"wobble_contact_1": 20.0}, jax.random.key(0))

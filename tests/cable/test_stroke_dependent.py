@@ -42,6 +42,7 @@ def test_a_followed_rope_slides_with_each_strokes_own_coefficient(friction):
     assert float(slope[59, 0]) == pytest.approx(1 - DIFFERENCE / 2)
 
 
+@pytest.mark.extended
 def test_the_difference_is_found_and_without_it_the_model_is_said_not_to_describe(tmp_path):
     """A bench that pulls with a tenth more than the mean and returns with a tenth less, noise of 0.3 N."""
     generator, loads = np.random.default_rng(4), np.repeat([20.0, 50.0, 80.0], 6)

@@ -224,6 +224,7 @@ def test_plot_draws_the_figures_again(run, results, tmp_path):
     assert names == {p.name for p in (tmp_path / "figures").iterdir()}
 
 
+@pytest.mark.extended
 def test_simulate_records_its_truth_and_its_seed(run, bench, tmp_path):
     assert run("simulate", bench, "--output", tmp_path / "a", "--seed", 5)[0] == 0
     assert run("simulate", bench, "--output", tmp_path / "b", "--seed", 5)[0] == 0
@@ -267,6 +268,7 @@ def test_bash_completes_verbs_options_choices_examples_and_files(run, words, com
     assert set(done.stdout.split()) == completed, done.stderr
 
 
+@pytest.mark.extended
 def test_a_fit_that_has_not_converged_exits_with_3_and_says_why(run, on_body, tmp_path):
     few = ("max_steps=200", "n_ensembles=2", "n_walkers=32", "target_ess=300")
     settings = [option for key in few for option in ("--set", f"sampler.{key}")]
@@ -291,6 +293,7 @@ def test_a_missing_results_folder_is_a_sentence(run, tmp_path):
         assert "does not exist" in err
 
 
+@pytest.mark.extended
 def test_least_squares_alone_have_no_design_answer(run, on_body, tmp_path):
     code, out, _ = run("fit", on_body, "--no-mcmc", "--output", tmp_path / "fit", "--no-figures", "--json")
     assert code == 0
@@ -302,6 +305,7 @@ def test_least_squares_alone_have_no_design_answer(run, on_body, tmp_path):
     assert "--no-mcmc" in err
 
 
+@pytest.mark.extended
 def test_set_and_geometry_change_the_model(on_body):
     fixed = bf.fit(on_body, mcmc=False, settings=["friction.mu1.fixed=0.1"], geometry="published")
     assert fixed.summary()["parameters"]["mu1"]["fixed"] == 0.1
@@ -333,6 +337,7 @@ def test_an_internal_error_is_a_sentence_with_a_request(run, monkeypatch, on_bod
     assert "Traceback" not in err
 
 
+@pytest.mark.extended
 @pytest.mark.parametrize(("setting", "value"), [("JAX_PLATFORMS", "abacus"), ("JAX_DISABLE_JIT", "1")])
 def test_a_setting_of_a_library_that_it_cannot_work_with_is_named(bench, setting, value):
     command = [sys.executable, "-m", "bowdenfit", "identify", str(bench)]
@@ -355,6 +360,7 @@ def test_a_watched_loop_that_is_interrupted_says_how_to_go_on(tmp_path, monkeypa
             report(Progress(400, 4000, None, None))
 
 
+@pytest.mark.extended
 def test_a_whole_fit_in_a_process_of_its_own_and_an_interrupt(on_body, tmp_path):
     """The real thing once: a spawned command line that is interrupted, resumed, and finishes with figures."""
     command = [

@@ -235,6 +235,7 @@ def test_a_coefficient_is_not_called_what_check_would_refuse(typed, said):
         coefficient_name("What is it called?", "mu1", ("knie",)).read(typed)
 
 
+@pytest.mark.extended
 def test_a_coefficient_may_be_called_what_check_accepts_and_never_what_a_fit_calls_something_else():
     question = coefficient_name("What is it called?", "mu1", ())
     kept = ("mu1", " µ  edge ", "knie_mu", "friction")
@@ -286,6 +287,7 @@ class Console:
         return self.child.exitstatus
 
 
+@pytest.mark.extended
 @in_a_terminal
 def test_in_a_terminal_three_foreign_files_become_a_fit_without_an_editor(foreign):
     console = Console("init")
@@ -320,6 +322,7 @@ def test_in_a_terminal_three_foreign_files_become_a_fit_without_an_editor(foreig
     assert fit.end() in {0, 3}
 
 
+@pytest.mark.extended
 @in_a_terminal
 @pytest.mark.parametrize("key", ["c", "d"])
 def test_ctrl_c_and_ctrl_d_end_a_dialog_without_a_trace(foreign, key):

@@ -47,6 +47,7 @@ def fit() -> Fit:
     return bowdenfit.fit(FOLDER, seed=1, settings=SHORT_CHAIN)
 
 
+@pytest.mark.extended
 def test_the_summary_is_one_page_that_says_whether_a_trial_is_off(fit):
     """The first trial at 225 deg is at the border of it, by a short chain on this side or that."""
     page = summary_text(fit)
@@ -55,6 +56,7 @@ def test_the_summary_is_one_page_that_says_whether_a_trial_is_off(fit):
     assert ("Next: look at how run 225 deg trial 1 was measured" in page) == bool(fit.checks.outliers)
 
 
+@pytest.mark.extended
 def test_its_figures_can_be_read(fit):
     shown = dict(figures_of(fit))
     assert {"forces", "residuals", "coefficients", "pairs", "traces", "checks"} <= set(shown)
@@ -137,6 +139,7 @@ def test_501_samples_a_trial_taken_as_independent_claim_the_printed_error(trials
     assert claimed == pytest.approx(0.0001, abs=5e-6) and "taken as independent | 0.1808 +- 0.0001 |" in readme
 
 
+@pytest.mark.extended
 def test_fitted_as_independent_49_samples_a_trial_make_the_error_seven_times_smaller(fit):
     """The negative control of the run effect, in the package. Seeded, so it never fails by chance."""
     claimed = bowdenfit.fit(with_samples(fit.dataset, 49, independent=True), mcmc=False, seed=1)
@@ -207,6 +210,7 @@ def held_posterior(trials: dict[str, np.ndarray]) -> np.ndarray:
     return np.interp([0.05, 0.5, 0.95], below / below[-1], mu[:, 0])
 
 
+@pytest.mark.extended
 def test_taken_as_held_the_readings_only_bound_the_coefficient_from_below(fit, trials, readme):
     low, median, high = held_posterior(trials)
     assert f"the posterior is {median:.2f} ({low:.3f} to {high:.2f})" in readme

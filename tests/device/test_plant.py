@@ -116,6 +116,7 @@ def test_a_mass_on_a_spring_with_dry_friction_loses_twice_f_over_k_a_half_swing(
     assert abs(float(at[-1])) <= friction / stiffness, "it comes to rest where friction holds it"
 
 
+@pytest.mark.extended
 def test_halving_the_step_halves_the_error():
     start = replace(Motion.at_rest(jnp.zeros(())), joint=jnp.asarray(0.08))
     plant = replace(PLANT, rope_damping=jnp.asarray(0.005))

@@ -55,6 +55,7 @@ def test_imports_load_nothing_heavy(code, heavy):
     assert not heavy & set(found.stdout.split())
 
 
+@pytest.mark.extended
 @pytest.mark.parametrize(
     "code",
     [

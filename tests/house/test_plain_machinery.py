@@ -57,6 +57,7 @@ print("codes", *codes)
 FEW = "--set,sampler.n_walkers=32,--set,sampler.target_ess=100,--set,sampler.target_r_hat=1.1"
 
 
+@pytest.mark.extended
 def test_check_fit_resume_report_and_plot_need_nothing_that_only_posix_has(tmp_path):
     data, fit, recorded = PACKAGE.parent / "datasets" / "yarn-on-cylinder", tmp_path / "fit", tmp_path / "table.xlsx"
     make_workbook(recorded)

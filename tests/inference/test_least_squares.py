@@ -55,6 +55,7 @@ def test_data_without_noise_return_the_truth_to_six_digits(n_contacts, tables):
     assert found.sum_of_squares < 1e-12
 
 
+@pytest.mark.extended
 def test_scipy_s_trust_region_with_a_jax_jacobian_finds_the_same_minimum():
     posterior, _, found = plain()
     size = posterior.model.space.size
@@ -131,6 +132,7 @@ def _check_standard_errors(tables: tuple[str, ...], n: int, low: float, high: fl
         assert abs(np.mean(values[name][identified]) - TRUTH[name]) < (4.5 / np.sqrt(n) + 0.1) * scatter, name
 
 
+@pytest.mark.extended
 @pytest.mark.parametrize(
     "tables",
     [("angles", "efficiencies"), pytest.param(("angles", "forces"), marks=pytest.mark.slow)],
@@ -148,6 +150,7 @@ def test_standard_errors_are_what_many_experiments_scatter_by_to_a_tenth(tables)
     _check_standard_errors(tables, 1000, 0.9, 1.2)
 
 
+@pytest.mark.extended
 def test_readings_and_scatter_are_those_of_the_fit():
     """The scatter of an efficiency table is that of its log efficiencies; of an angle table, that of its angles."""
     dataset, _ = measured(cable(2, ("angles", "efficiencies")), seed=1, once=True)
@@ -169,6 +172,7 @@ def _constant(name: str, friction: str, angle: float) -> dict:
     return {"name": name, "friction": friction, "wrap_angle": {"value": angle, "unit": "deg"}}
 
 
+@pytest.mark.extended
 def test_two_coefficients_at_constant_angles_are_not_told_apart():
     contacts = [CONTACTS[0], _constant("one edge", "mu_edge", 45), _constant("other edge", "mu_clamp", 70)]
     _, found = fitted(measured(cable(3, contact=contacts), seed=1, once=True)[0])
@@ -180,6 +184,7 @@ def test_two_coefficients_at_constant_angles_are_not_told_apart():
     assert found.condition_number == np.inf
 
 
+@pytest.mark.extended
 def test_one_coefficient_at_two_constant_angles_is_identified():
     contacts = [CONTACTS[0], _constant("one edge", "mu_edge", 45), _constant("other edge", "mu_edge", 70)]
     _, found = fitted(measured(cable(3, contact=contacts), seed=1, once=True)[0])
@@ -187,6 +192,7 @@ def test_one_coefficient_at_two_constant_angles_is_identified():
     assert np.isfinite(found.condition_number)
 
 
+@pytest.mark.extended
 def test_a_gain_error_is_not_told_from_a_constant_angle_by_pulling_alone_but_is_by_both_strokes():
     sensors = {"sensors": {"input_gain_error_sd": 0, "output_gain_error_sd": 0.02}}
     description = cable(3, **sensors)
@@ -197,6 +203,7 @@ def test_a_gain_error_is_not_told_from_a_constant_angle_by_pulling_alone_but_is_
         assert both.estimates[name].identified
 
 
+@pytest.mark.extended
 def test_a_contact_without_wrap_says_nothing_of_its_coefficient():
     contacts = [CONTACTS[0], CONTACTS[1], _constant("straight", "mu_edge", 0.0)]
     _, found = fitted(measured(cable(3, contact=contacts), seed=1, once=True)[0])
@@ -220,6 +227,7 @@ def test_a_coefficient_that_would_be_negative_is_not_given_a_number():
     assert estimate.at_bound and "runs to its lower end" in estimate.remark
 
 
+@pytest.mark.extended
 def test_fixed_parameters_keep_their_value_and_have_no_error():
     description = cable(3, friction={"mu_edge": {"fixed": 0.17}}, prior={"sigma_theta": {"fixed": 2.0}})
     posterior, found = fitted(measured(description, seed=1, once=True)[0])
@@ -231,6 +239,7 @@ def test_fixed_parameters_keep_their_value_and_have_no_error():
     assert found.estimates["mu_free"].standard_error < free.estimates["mu_free"].standard_error
 
 
+@pytest.mark.extended
 def test_a_prior_moves_the_maximum_of_the_posterior_and_not_the_classical_estimate():
     """Least squares is without priors: another one changes the coordinates and nothing else."""
     _, _, without = plain()

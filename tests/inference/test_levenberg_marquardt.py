@@ -46,6 +46,7 @@ def test_of_three_decays_from_afar_the_solver_finds_the_certified_minimum_with_n
     assert sum(np.array_equal(x, given.starts[0]) for x in calls) == 1
 
 
+@pytest.mark.extended
 @pytest.mark.parametrize("name", ["mgh17", "hahn1", "misra1a"])
 def test_stepped_from_outside_it_takes_the_steps_of_optimistix_s_own_loop(name, monkeypatch):
     given = problem(name)
@@ -64,6 +65,7 @@ def test_without_enough_steps_it_does_not_claim_an_end():
     assert _of_itself(given, given.starts[0], 20).result != optx.RESULTS.successful
 
 
+@pytest.mark.extended
 def test_a_fit_whose_solver_did_not_end_says_so(monkeypatch):
     posterior = LogDensity(build_model(measured(cable(2, ("angles", "efficiencies")), seed=1)[0]))
     objective, start = make_objective(posterior), np.zeros(posterior.model.space.size)

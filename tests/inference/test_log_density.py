@@ -84,6 +84,7 @@ def test_gradients_agree_with_finite_differences_also_far_out(models, name):
     assert np.all(np.abs(difference - along) <= 1e-6 * np.abs(along) + 100 * rounding + 1e-8)
 
 
+@pytest.mark.extended
 @MODELS
 def test_residuals_and_their_derivatives_are_finite_far_out(models, name):
     posterior = LogDensity(models[name])
@@ -148,6 +149,7 @@ def _here_and_elsewhere(name: str, *settings: str) -> tuple[Model, dict[str, np.
     return model, *(over_rows(each.log_likelihoods, z, each.data) for each in (posterior, elsewhere))
 
 
+@pytest.mark.extended
 @pytest.mark.parametrize("name", DATA_SETS)
 def test_terms_that_do_not_depend_on_conditions_are_the_same_elsewhere(name):
     """So that one compiled program may serve them all."""
@@ -157,6 +159,7 @@ def test_terms_that_do_not_depend_on_conditions_are_the_same_elsewhere(name):
             np.testing.assert_array_equal(here[term.name], there[term.name])
 
 
+@pytest.mark.extended
 @pytest.mark.parametrize("setting", ["friction_model=load-dependent", 'sensors.offset_sd={value=1,unit="N"}'])
 def test_runs_depend_on_conditions_where_friction_or_load_cells_do(setting):
     model, here, there = _here_and_elsewhere("synthetic-bench", setting)

@@ -35,6 +35,7 @@ def as_in_a_notebook(monkeypatch) -> Iterator[None]:
         yield
 
 
+@pytest.mark.extended
 def test_while_walkers_move(on_body):
     seen = set()
     bf.fit(on_body, seed=1, settings=FEW, progress=lambda *_: seen.update(threads()))
@@ -42,6 +43,7 @@ def test_while_walkers_move(on_body):
     assert threads() == {2}
 
 
+@pytest.mark.extended
 def test_while_a_batch_is_fitted():
     seen = set()
 
@@ -67,6 +69,7 @@ def test_while_any_of_several_is_at_it():
     assert threads() == {2}
 
 
+@pytest.mark.extended
 def test_whichever_library_is_loaded_by_then():
     """The one that compiled programs call is loaded late."""
     code = (

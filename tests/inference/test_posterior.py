@@ -173,6 +173,7 @@ def test_the_joint_posterior_agrees_with_nuts_on_the_same_density(by_bowdenfit, 
     assert disagreements(by_bowdenfit, by_nuts) == []
 
 
+@pytest.mark.extended
 def test_the_shortest_path_that_is_trusted_agrees_with_nuts(bench, by_nuts):
     """Four fits that stop at the first look, together: what is left of their common, over-dispersed start would show.
 
@@ -199,6 +200,7 @@ def by_default(on_body) -> bf.Fit:
     return bf.fit(on_body, seed=1)
 
 
+@pytest.mark.extended
 def test_the_default_priors_give_the_stated_moments(by_default):
     """As above; 1000 effective draws know a mean to 0.03 sd and the sd of a heavy tail to 7 %, so 0.15 sd and 25 %."""
     drawn = by_default.posterior.values | by_default.posterior.optimum
@@ -237,6 +239,7 @@ def test_the_comparison_fails_when_the_snooker_move_is_put_in(bench, by_nuts):
     assert chain.diagnostics["mu1"].r_hat < 1.05
 
 
+@pytest.mark.extended
 def test_one_seed_gives_the_same_draws_and_another_seed_others(bench):
     settings = SamplerSettings(max_steps=200)
     first, again, other = (bench.sample(settings, seed).z for seed in (1, 1, 2))

@@ -74,6 +74,7 @@ def _term(folder):
     return model, model.terms[0]
 
 
+@pytest.mark.extended
 def test_a_hung_weight_has_no_noise_in_the_likelihood_nor_in_what_is_simulated(tmp_path, accept):
     sd = 0.5
     rows = pull(

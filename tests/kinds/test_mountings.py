@@ -28,6 +28,7 @@ def _folder(path, labels, along="lengths", more=""):
     return folder
 
 
+@pytest.mark.extended
 @pytest.mark.parametrize("along", ALONG)
 def test_labels_that_come_back_elsewhere_equal_labels_of_their_own(tmp_path, accept, along):
     again = _folder(tmp_path / "again", ["1", "2", "3"] * 6, along)

@@ -159,6 +159,7 @@ def test_a_run_says_what_its_readings_say_with_the_mounting_integrated_out(name,
     assert abs(exact - found[0]) < (1e-8 if name in {"gain error", "delay"} else 0.05)
 
 
+@pytest.mark.extended
 def test_on_a_realistic_run_the_first_order_in_the_mounting_effect_is_enough():
     """40 readings good to 0.05 N, drag and offsets, tau = 0.02: second order adds up to 0.07 within tau, 0.32 at twice that."""
     values = VALUES | {"drag": 4.0, "input_offset": 0.5, "output_offset": -0.3, "sigma_F": 0.05}
@@ -210,6 +211,7 @@ def binned_and_alone(request):
     return _at_each(binned, points), _at_each(alone, points)
 
 
+@pytest.mark.extended
 def test_bins_of_the_load_leave_the_load_dependence_where_each_reading_by_itself_puts_it(binned_and_alone):
     """The top of the parabola through three points, in units of the 5 % between them."""
     tops = [(low - high) / (2 * (low - 2 * middle + high)) for low, middle, high in binned_and_alone]
@@ -318,6 +320,7 @@ def gradients():
     return found
 
 
+@pytest.mark.extended
 @pytest.mark.parametrize("name", FULL)
 def test_gradients_of_whole_recordings_agree_with_finite_differences_in_every_parameter(gradients, name):
     slope, difference = gradients[name]
@@ -372,6 +375,7 @@ def test_a_saturated_block_speaks_against_whatever_would_have_shown_less():
     assert of_censored[0] > -1.0 and of_censored[-1] < -100.0  # left out they say nothing; censored they do
 
 
+@pytest.mark.extended
 @pytest.mark.parametrize(("likelihood", "model"), [("runs", "capstan"), ("whole", "capstan"), ("whole", "drag")])
 @pytest.mark.parametrize("cell", ["output", "input"])
 def test_saturated_blocks_that_are_left_out_do_not_pull_the_coefficient(cell, likelihood, model):
@@ -403,6 +407,7 @@ TRUTHS = {
 }
 
 
+@pytest.mark.extended
 @pytest.mark.parametrize(
     ("options", "likelihood"),
     [
@@ -443,6 +448,7 @@ def test_joining_the_blocks_of_a_long_recording_keeps_the_ends_of_its_phases():
     np.testing.assert_array_equal(first_of_groups(state, len(state)), np.arange(len(state)))
 
 
+@pytest.mark.extended
 def test_a_joined_recording_gives_the_same_coefficient(monkeypatch):
     recordings = [_recorded(angle, faults=NOISY) for angle in (1.0, 2.0, 3.0)]
     whole = _fitted(_model(recordings, "whole", friction_model="drag")).estimates["mu"]

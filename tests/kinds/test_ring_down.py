@@ -112,6 +112,7 @@ def test_torque_tells_the_same_as_angle(tmp_path):
         assert abs(found.mean - truth) < 4 * found.sd and found.sd < 0.1 * truth, name
 
 
+@pytest.mark.extended
 def test_a_released_joint_is_drawn_as_it_was_read_and_fitted(tmp_path):
     stated = INERTIA.replace("sd = 2e-5, ", "")
     fit = bf.fit(folder_of(tmp_path, [(0.0, swung(noise=2e-4)), (1e-3, swung(1e-3, noise=2e-4, seed=1))], stated), seed=1,

@@ -3,6 +3,7 @@
 import jax
 import jax.numpy as jnp
 import numpy as np
+import pytest
 
 from bowdenfit.physics.ring_down import peaks, ring_down
 
@@ -58,6 +59,7 @@ def test_it_is_what_small_steps_give():
         np.testing.assert_allclose(found, expected, atol=1e-3 * 0.2)
 
 
+@pytest.mark.extended
 def test_nothing_moves_before_the_release_and_derivatives_are_finite():
     angle, speed = swung(np.linspace(-1, 0, 5))
     assert np.all(angle == 0.2) and np.all(speed == 0)

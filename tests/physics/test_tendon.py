@@ -44,6 +44,7 @@ def forces_by_turns(catheter, displacements):
     return np.array(found)
 
 
+@pytest.mark.extended
 @pytest.mark.parametrize("motion", MOTIONS)
 @pytest.mark.parametrize("name", CATHETERS)
 def test_forces_after_any_turns_are_those_of_friction_at_every_place_of_the_rope(name, motion):

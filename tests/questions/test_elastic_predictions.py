@@ -112,6 +112,7 @@ def test_efficiency_falls_faster_with_the_wrap_angle_than_the_capstan_equation_w
     np.testing.assert_allclose(follows.efficiency(bends, taut)[0], 1 - 2 * preload * MU * bends / taut, rtol=1e-13)
 
 
+@pytest.mark.extended
 def test_answers_do_not_depend_on_the_setting_of_float_size_where_they_are_asked():
     """A notebook has JAX's own setting, 32 bits."""
     elastic = known(elastic_cable()).elastic
@@ -141,6 +142,7 @@ def returning(preload: np.ndarray, bends: np.ndarray, force: float) -> np.ndarra
     return 2 * preload - a * (2 * preload + b * force) / (a + b)
 
 
+@pytest.mark.extended
 @pytest.mark.parametrize("force", [0.0, 20.0, 60.0])
 @pytest.mark.parametrize("ends", [(0.0, 180.0), (45.0, 135.0), (100.0, 200.0)])
 def test_the_lowest_preload_is_the_smallest_of_all_tried_at_which_no_side_is_slack(ends, force):
@@ -153,6 +155,7 @@ def test_the_lowest_preload_is_the_smallest_of_all_tried_at_which_no_side_is_sla
     assert FINE[first] - 0.002 <= found <= FINE[first] + 1e-6
 
 
+@pytest.mark.extended
 @pytest.mark.parametrize("limit", [2.0, 5.0, 12.0])
 def test_the_highest_preload_is_the_largest_of_all_tried_that_is_felt_as_no_more_than_the_limit(limit):
     elastic, bends = known(elastic_cable()).elastic, np.linspace(0.3, 2.0, 25)
@@ -163,6 +166,7 @@ def test_the_highest_preload_is_the_largest_of_all_tried_that_is_felt_as_no_more
     assert FINE[last] - 1e-6 <= found.median <= FINE[last] + 0.002
 
 
+@pytest.mark.extended
 def test_a_limit_that_no_preload_meets_is_said_to_be_impossible():
     """At the far bend bending alone tightens the slackest loop to more than may be felt."""
     bends = np.linspace(REFERENCE, 3.0, 25)
@@ -173,12 +177,14 @@ def test_a_limit_that_no_preload_meets_is_said_to_be_impossible():
     assert window.possible == 0.0
 
 
+@pytest.mark.extended
 def test_a_load_does_not_slacken_a_rope_that_has_no_other_side():
     elastic = known(elastic_cable(("stretch", "preload"), kind="single")).elastic
     lowest = [elastic.preload_window((0.0, np.pi), force).lowest.median for force in (0.0, 60.0)]
     assert lowest[0] == lowest[1] > 1
 
 
+@pytest.mark.extended
 @pytest.mark.parametrize(("force", "limit"), [(0.0, 8.0), (30.0, 18.0)])
 def test_the_best_preload_keeps_the_cable_taut_in_95_of_100_draws(force, limit):
     fit = known(elastic_cable(), spread=0.1, n=400)
@@ -297,6 +303,7 @@ def test_a_rope_of_which_only_the_preload_was_read_still_has_its_answers():
 # Sharp bends ---------------------------------------------------------------------------------------------------------
 
 
+@pytest.mark.extended
 @pytest.mark.parametrize(
     ("diameter", "radius", "sharp"),
     [

@@ -35,6 +35,7 @@ def test_a_figure_is_matplotlibs_and_shows_itself(fit):
     assert dict(mpl.rcParams) == before
 
 
+@pytest.mark.extended
 def test_a_figure_goes_when_nobody_holds_it(fit):
     held = weakref.ref(fit.plot.efficiency())
     gc.collect()
@@ -54,6 +55,7 @@ def test_a_figure_that_a_fit_has_not_is_refused_with_those_it_has(fit):
     assert np.all([callable(getattr(fit.plot, name)) for name in dir(fit.plot)])
 
 
+@pytest.mark.extended
 def test_a_figure_chooses_no_backend_and_loads_no_pyplot(on_body):
     code = (
         f"import sys, bowdenfit as bf; fit = bf.fit({str(on_body)!r}, seed=1, mcmc=False); fit.plot.efficiency()._repr_png_(); "

@@ -57,6 +57,7 @@ def test_every_inspection_finds_its_truth(fitted):
             assert abs(logs.mean() - start - more) < 4.5 * logs.std()
 
 
+@pytest.mark.extended
 def test_the_draws_are_those_of_single_fits(fitted):
     """Means to 0.1 and standard deviations to 15 %: what both know them to; one data set, one seed."""
     _, results = fitted
@@ -81,6 +82,7 @@ def test_draws_depend_neither_on_order_nor_on_what_else_is_fitted(fitted, tmp_pa
         np.testing.assert_array_equal(draws[0], together.values[name][where])
 
 
+@pytest.mark.extended
 def test_a_process_that_is_started_anew_writes_the_same_file(fitted, tmp_path):
     """To the last bit; clusters are in test_fleet_engines.py."""
     _, results = fitted
@@ -90,6 +92,7 @@ def test_a_process_that_is_started_anew_writes_the_same_file(fitted, tmp_path):
     assert (tmp_path / "results" / FLEET_DRAWS).read_bytes() == (results / FLEET_DRAWS).read_bytes()
 
 
+@pytest.mark.extended
 def test_a_fleet_can_be_continued_with_new_inspections_and_comes_out_the_same(fitted, tmp_path):
     _, results = fitted
     folder = some(tmp_path / "fleet", range(3))

@@ -80,6 +80,7 @@ def drag(tmp_path_factory):
     return {model: dict(figures_of(fit, ["forces"]))["forces"] for model, fit in fits.items()}
 
 
+@pytest.mark.extended
 def test_the_law_goes_through_the_readings_only_where_it_is_theirs(drag):
     right, wrong = drag["drag"], drag["capstan"]
     assert right.trusted and not wrong.trusted and right.logarithmic
@@ -104,6 +105,7 @@ def test_apparent_friction_is_the_log_ratio_over_the_bend_and_falls_with_the_loa
     assert np.ptp(level) < 1e-6 and level[0, 0] == pytest.approx(here.capstan, rel=0.2)
 
 
+@pytest.mark.extended
 def test_held_readings_have_no_residual_and_of_many_some_are_shown(tmp_path):
     rows = pull(np.random.default_rng(1), [180.0] * 4, [0.4] * 4, (20, 40, 60), repeats=60, noise=(0.1, 0.1), scatter=0.01)
     stroke = np.where(np.arange(len(rows.stroke)) % 5 == 0, 0, rows.stroke)

@@ -65,6 +65,7 @@ def test_the_input_force_of_a_loop_gives_the_output_force_back(output, preload, 
     assert float(back) == pytest.approx(output, rel=1e-9, abs=1e-9)
 
 
+@pytest.mark.extended
 def test_predict_says_what_a_wanted_force_takes(fit):
     (row,) = bf.predict(fit, output_force=(70.0, "N"))
     (efficiency,) = bf.predict(fit)

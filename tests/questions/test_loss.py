@@ -46,6 +46,7 @@ def test_the_answer_says_where_to_work_on_the_cable(fit):
     assert loss_text(fit).startswith("Where the force is lost, at 4")
 
 
+@pytest.mark.extended
 def test_one_contact_has_no_shares(tmp_path):
     table = tmp_path / "bench.csv"
     table.write_text("wrap_angle_deg,input_force_N,output_force_N\n90,50,43\n180,50,36.5\n270,50,31.1\n90,80,68.7\n")

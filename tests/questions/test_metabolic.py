@@ -62,6 +62,7 @@ def test_brockways_equation_is_the_literatures():
     assert brockway(60.0, 0.0, 0.01) == pytest.approx(16.58 - 5.90 * 0.01 * 1000 / 60)
 
 
+@pytest.mark.extended
 @pytest.mark.parametrize(("studies", "least", "most"), [(400, 362, 395), pytest.param(1000, 922, 976, marks=pytest.mark.slow)])
 def test_intervals_hold_the_truth_in_ninety_five_of_a_hundred_studies(studies, least, most):
     """Of so many studies of five persons; outside these by chance once in ten thousand runs."""

@@ -16,6 +16,7 @@ def shown(least_squares_of):
         return data(least_squares_of("synthetic-catheter"))
 
 
+@pytest.mark.extended
 def test_the_loop_of_every_run_goes_through_its_readings(shown):
     assert [run.label for run in shown] == ["180 deg", "360 deg", "540 deg"]
     for run in shown:

@@ -222,6 +222,7 @@ def fit(quick_fit):
     return quick_fit
 
 
+@pytest.mark.extended
 def test_only_figures_that_apply_are_drawn(fit, least_squares_of):
     shown = dict(figures_of(fit))
     assert list(shown) == [*ALL, "checks"]
@@ -251,6 +252,7 @@ def test_another_process_reads_what_figures_show_without_a_model_or_matplotlib(f
     assert done.stdout.strip() == b"set()"
 
 
+@pytest.mark.extended
 @pytest.mark.parametrize("case", CASES)
 def test_no_words_overlap_or_leave_the_page(case):
     for name in ONCE.data(case):

@@ -241,6 +241,7 @@ def test_readings_drawn_anew_are_distributed_as_the_likelihood_says():
     assert min(p) * len(p) > 0.001
 
 
+@pytest.mark.extended
 def test_readings_by_another_seed_need_no_other_program(on_body_model, monkeypatch):
     compiled = []
 

@@ -185,6 +185,7 @@ def test_a_fit_shows_itself_in_a_notebook(fit):
     assert "You can trust this" in repr(fit)
 
 
+@pytest.mark.extended
 def test_a_coefficient_that_no_measurement_informs_is_said_to_rest_on_its_prior(tmp_path, on_body):
     for path in on_body.iterdir():
         (tmp_path / path.name).write_text(path.read_text())
@@ -202,6 +203,7 @@ def test_interval_of_one_parameter_by_name(fit):
         fit.parameter("mu9")
 
 
+@pytest.mark.extended
 def test_without_a_route_there_is_no_length_to_choose(tmp_path):
     table = tmp_path / "forces.csv"
     force = np.tile(np.arange(20.0, 60.0, 5.0), 3)

@@ -60,6 +60,7 @@ def _told(fit) -> str:
         return " ".join(full_text(fit).split())
 
 
+@pytest.mark.extended
 @pytest.mark.parametrize("mcmc", [True, False])
 @pytest.mark.parametrize("runs", [1, 5])
 def test_efficiencies_above_1_are_no_fit_to_trust(tmp_path, runs, mcmc):

@@ -13,8 +13,6 @@ from contextlib import contextmanager, suppress
 from pathlib import Path
 from typing import Any
 
-from filelock import FileLock, Timeout
-
 from bowdenfit.arguments import LARGEST_SEED
 from bowdenfit.errors import StoreError, disk_error
 from bowdenfit.inputs import refuse_special
@@ -258,6 +256,8 @@ def reserved(folder: Path | None) -> Iterator[None]:
     Raises:
         StoreError: Another process does, or the folder cannot be made.
     """
+    from filelock import FileLock, Timeout  # only what writes needs it
+
     if folder is None or (folder.exists() and not folder.is_dir()):
         yield
         return

@@ -25,15 +25,18 @@ def number_below(axes: Axes, whole: bool = False) -> None:
         axes: The panel, with its limits and in its place.
         whole: Whether only whole numbers make sense.
     """
+    from matplotlib.transforms import ScaledTranslation
+
     width = _size(axes)[0]
     low, high = axes.get_xlim()
     most = width / NUMBER_SPACE
     values, texts = ticks((low, high), lambda texts: most / max(map(len, texts)), whole, TICK / width)
     axes.set_xticks(values, texts)
-    for label, value in zip(axes.get_xticklabels(), values, strict=True):
-        reach = (LETTER * len(label.get_text()) / 2 - TICK) / width * (high - low)  # of the text, either way
-        label.set_horizontalalignment("left" if value - low < reach else "right" if high - value < reach else "center")
     axes.tick_params(axis="x", length=72 * TICK, pad=72 * 0.8 * TICK, width=0.6, labelsize=LEAST, labelrotation=0)
+    for label, value in zip(axes.get_xticklabels(), values, strict=True):  # at the ends they are moved inwards
+        half, place = LETTER * len(label.get_text()) / 2, width * (value - low) / (high - low)
+        inwards = float(np.clip(place, half - TICK, max(width - half + TICK, half - TICK))) - place
+        label.set_transform(label.get_transform() + ScaledTranslation(inwards, 0.0, axes.figure.dpi_scale_trans))
 
 
 def number_left(axes: Axes) -> None:
@@ -70,22 +73,27 @@ def ticks(
         every = np.asarray(MaxNLocator(most, steps=[1, 2, 4, 5, 10], min_n_ticks=1, integer=whole).tick_values(low, high))
         return every[(every >= low) & (every <= high)], float(every[1] - every[0])
 
+    def apart(values: np.ndarray, texts: list[str]) -> bool:
+        """Whether numbers keep apart that are moved inwards at the ends of the axis."""
+        share = LEAST_SPACE / room(texts)  # of the axis that a number takes
+        places = np.clip((values - low) / (high - low), share / 2 - over, 1 - share / 2 + over)
+        return bool(np.all(np.diff(places) >= share))
+
     for most in (4, 3, 2, 1):
         values, step = round_values(most)
         texts = _texts(values, step)
         if texts and (high - low) / step <= room(texts):
-            if len(texts) > 1:
+            if len(texts) == 1:
+                break
+            if apart(values, texts):
                 return values, texts
-            break
     for most in (2, 3, 4, 6, 8):  # one number is no scale: the outermost two of a finer step
         finer, step = round_values(most)
         if len(finer) < 2:
             continue
         outer = finer[[0, -1]]
         words = _texts(outer, step)
-        share = LEAST_SPACE / room(words)  # of the axis that a number takes
-        first, last = np.clip((outer - low) / (high - low), share / 2 - over, 1 - share / 2 + over)
-        if last - first >= share:
+        if apart(outer, words):
             return outer, words
     return values, texts
 

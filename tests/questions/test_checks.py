@@ -39,7 +39,7 @@ from bowdenfit.questions.check.answer import Checks, checks_of
 from bowdenfit.questions.check.checks_figure import CheckedTable, checked_tables
 from bowdenfit.questions.check.prior_predictive import prior_predictive
 from bowdenfit.questions.check.sensitivity_words import assumed_widths, priors_text
-from bowdenfit.questions.check.suspects import caller_of, suspects_of
+from bowdenfit.questions.check.suspects import suspects_of
 from bowdenfit.questions.check.words import checks_text
 from bowdenfit.questions.summary import methods_section
 from bowdenfit.questions.summary.trust_words import next_step
@@ -351,18 +351,6 @@ def test_an_angle_misread_by_ten_sds_is_the_one_that_is_named(on_body):
     figure = checks_figure.draw(checked_tables(found))
     check_words(figure, "an outlier")
     assert "free_sheath_angle at 490 mm" in {text.get_text() for axes in figure.axes for text in axes.texts}
-    other = dataclasses.replace(fit)
-    other._answers[caller_of] = _call_elsewhere
-    with pytest.raises(_CalledElsewhere, match="smooth_weights"):  # where the fit without it begins
-        checks_of(other)
-
-
-class _CalledElsewhere(Exception):
-    """Stands for another process."""
-
-
-def _call_elsewhere(function, *_):
-    raise _CalledElsewhere(function.__name__)
 
 
 @pytest.mark.parametrize("scale", [0.05, 200.0], ids=["1 to 2.5 N", "4 to 10 kN"])

@@ -15,7 +15,7 @@ from bowdenfit.plots.style import rounded_texts
 from bowdenfit.questions.summary import brief_words
 from bowdenfit.questions.summary.answer import Quantity
 from bowdenfit.questions.summary.brief_words import summary_text
-from bowdenfit.questions.summary.verdict import CONTRADICTORY, Verdict, verdict
+from bowdenfit.questions.summary.verdict import CONTRADICTORY, Verdict
 from bowdenfit.questions.summary.words import full_text
 
 GOLDEN = Path(__file__).parent / "golden"
@@ -99,10 +99,12 @@ def test_the_page_of_a_fit_that_has_not_settled_begins_with_that(fit):
     assert "--resume" in page
 
 
-def test_the_page_of_a_name_and_reasons_without_end_is_still_a_page(fit):
+def test_the_page_of_a_name_and_reasons_without_end_is_still_a_page(fit, monkeypatch):
     description = fit.dataset.description.model_copy(update={"name": "long " * 60})
     long = replace(fit, dataset=replace(fit.dataset, description=description))
-    long._answers[verdict] = Verdict({CONTRADICTORY: tuple(f"Reason {i}: {'word ' * 60}" for i in range(9))})
+    refused = Verdict({CONTRADICTORY: tuple(f"Reason {i}: {'word ' * 60}" for i in range(9))})
+    for module in ("brief_words", "trust_words", "answer"):
+        monkeypatch.setattr(f"bowdenfit.questions.summary.{module}.verdict", lambda _: refused, raising=False)
     page = summary_text(long)
     assert faults(page) == []
     assert "the measurements contradict each other" in " ".join(page.splitlines()[:3])

@@ -240,6 +240,7 @@ def test_comparing_the_families_finds_the_shape_of_the_route(fits):
     assert "The data prefer gaussian over" in comparison_text(found)
 
 
+@pytest.mark.extended
 def test_the_curves_of_every_draw_have_the_shape_of_their_family(fits):
     for name, fit in fits.items():
         angle = fit.along_route.curves["sheath_angle"]

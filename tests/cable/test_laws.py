@@ -142,6 +142,7 @@ def test_a_rope_stretched_by_the_friction_of_several_contacts_with_such_a_law_is
 # What users say and read ------------------------------------------------------------------------------------------
 
 
+@pytest.mark.extended
 def test_the_parameter_of_a_law_stands_in_the_summary_with_its_prior_and_unit(fitted):
     page = fitted.summary()["parameters"]["wobble_sheath"]
     assert (page["prior"], page["unit"]) == ("HalfNormal(30 deg)", "deg")

@@ -74,6 +74,7 @@ def test_what_cannot_be_meant_is_refused_with_the_nearest_or_what_to_write(run, 
     assert err.startswith("Error: ") and words in err
 
 
+@pytest.mark.extended
 def test_options_stand_anywhere_and_the_last_of_one_counts(run, results):
     asked = ("--json", "455", "--stroke", "return", "18", "in", "--stroke=pull", "--", "470")
     assert run("predict", results, *asked) == run("predict", results, "455", "18in", "470", "--json")

@@ -118,6 +118,7 @@ def test_a_unit_that_a_person_says_of_efficiencies_is_kept_whatever_they_are_cal
     assert table.efficiency.tolist() == pytest.approx([0.78, 0.76, 0.73])
 
 
+@pytest.mark.extended
 @pytest.mark.parametrize("path", sorted(CORPUS.glob("*.*")), ids=lambda path: path.name)
 def test_whatever_laboratories_write_becomes_a_data_set_that_check_accepts(path, tmp_path):
     if path.suffix == ".toml":

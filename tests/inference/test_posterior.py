@@ -209,6 +209,7 @@ def test_the_default_priors_give_the_stated_moments(by_default):
         assert abs(np.std(drawn[name]) / sd - 1) < 0.25, name
 
 
+@pytest.mark.extended
 def test_others_find_the_draws_in_the_file_converged_and_count_effective_ones_as_we_do(by_default):
     """By split R-hat and ESS of the chains in posterior.nc, which is what `az.summary` prints."""
     groups, *_ = posterior_page(by_default)

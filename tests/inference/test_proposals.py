@@ -246,6 +246,7 @@ EMCEE_MOVES = {
 }
 
 
+@pytest.mark.extended
 @pytest.mark.parametrize("move", EMCEE_MOVES)
 def test_side_by_side_with_one_ensemble_is_distributed_as_emcee_s_own_sampler(move):
     """8 runs of each with one move; p < 0.001 of a t-test (times the number of quantiles) once in a thousand seeds."""

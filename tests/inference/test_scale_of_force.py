@@ -130,6 +130,7 @@ def density_and_values(density: LogDensity, z, data):
     return density.log_density(z, data), density.model.space.vector(z)
 
 
+@pytest.mark.extended
 @pytest.mark.parametrize("case", [c if c in USUAL else pytest.param(c, marks=pytest.mark.slow) for c in CASES])
 def test_every_force_times_a_factor_changes_the_log_density_by_a_constant(case, tmp_path):
     name, settings = CASES[case]
@@ -165,6 +166,7 @@ def spoiled(folder: Path, fault, factor: float) -> Path:
     return folder
 
 
+@pytest.mark.extended
 @pytest.mark.parametrize("name", some_slow(FAULTS, [name for name in FAULTS if "rougher" not in name]))
 def test_the_verdict_does_not_depend_on_how_strong_a_bench_is(name, tmp_path):
     """What is wrong, which sentences say it (but for their numbers), and the coefficients; by least squares."""

@@ -78,6 +78,7 @@ def test_predict_says_what_a_wanted_force_takes(fit):
     assert there["output_force_N"] == pytest.approx(70.0, rel=1e-4)
 
 
+@pytest.mark.extended
 def test_a_force_that_takes_more_than_was_measured_says_so(fit):
     (row,) = bf.predict(fit, output_force=(700.0, "N"))
     assert "outside the loads measured" in row["note"]

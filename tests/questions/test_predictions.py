@@ -39,6 +39,7 @@ def on_body_model(on_body) -> Model:
 # The best length --------------------------------------------------------------------------------------------------
 
 
+@pytest.mark.extended
 @pytest.mark.parametrize("geometry", ["continuous", "published"])
 def test_the_optimum_is_that_of_a_fine_grid(on_body, geometry):
     model = build_model(load_dataset(on_body, [f'geometry="{geometry}"']))

@@ -78,6 +78,7 @@ def test_efficiencies_above_1_are_no_fit_to_trust(tmp_path, runs, mcmc):
         assert "hold 0 of 5" not in said or NOT_DESCRIBED in fit.verdict().troubles
 
 
+@pytest.mark.extended
 @pytest.mark.parametrize("runs", [1, pytest.param(2, marks=pytest.mark.slow), 5])
 def test_a_healthy_bench_is_trusted(tmp_path, runs):
     fit = bf.fit(_bench(tmp_path, runs, seed=runs), seed=1)
@@ -102,6 +103,7 @@ def test_friction_that_no_sheath_has_is_no_fit_to_trust(tmp_path, degrees, shown
     assert _bends_of(tmp_path, degrees, degrees).verdict().trusted
 
 
+@pytest.mark.extended
 def test_a_reading_far_out_is_a_trouble_unless_the_noise_may_have_such(on_body, tmp_path):
     """An angle of 28 deg written as 82: with normal noise the verdict names it, with Student noise it hardly counts."""
     slipped = tmp_path / "slipped"

@@ -299,6 +299,7 @@ def test_the_delay_is_found_within_its_error(seed, profile, delay):
     assert abs(account.delay - delay) < 3 * account.delay_sd
 
 
+@pytest.mark.extended
 @pytest.mark.parametrize(
     ("noise", "preload", "pause", "speed"), [(0.5, 60, 1.0, 2), (0.5, 20, 1.0, 1), (1, 20, 0.3, 2)]
 )

@@ -24,7 +24,7 @@ MOST_TEXT = 2000  # characters of one output
 PAGES = sorted([ROOT / "README.md", *(ROOT / "docs").glob("*.md"), *(ROOT / "docs" / "notebooks").glob("*.md")])
 CELL = re.compile(r"^```(?:python|\{code-cell\}[^\n]*)\n(.*?)^```", re.MULTILINE | re.DOTALL)
 IN_A_KERNEL = (ROOT / "README.md", ROOT / "docs" / "library.md")
-PROGRAMS = {ROOT / "docs" / "fleets.md": "cable-01", ROOT / "docs" / "library.md": "You can trust this"}  # and what they print
+PROGRAMS = {ROOT / "docs" / "fleets.md": "cable-01"}  # and what they print
 CALIBRATING = """
 from bowdenfit.notebook import watched
 from bowdenfit.questions.calibrate.verb import WATCH

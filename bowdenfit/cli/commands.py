@@ -87,6 +87,8 @@ def _written(declared: Declared, words: str | None) -> Stated:
     if default is not Stated.empty and not isinstance(default, bool):
         about += [] if default in (None, ()) else [Parameter(show_default=str(default))]
         type_, default = type_ | None, None
+    if not by_place and type_ is not bool:
+        about.append(Parameter(allow_leading_hyphen=True))  # -5N is a value, if a wrong one
     return Stated(declared.plain.name, kind, default=default, annotation=Annotated[type_, *about, declared.option])
 
 

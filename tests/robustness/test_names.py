@@ -135,13 +135,13 @@ def test_nothing_that_is_printed_steers_a_terminal():
 
 def test_a_fit_whose_figures_find_no_room_is_kept_and_ends_as_a_failure_of_the_disk(on_body, tmp_path, monkeypatch):
     from bowdenfit.questions.figures import FIGURES
-    from bowdenfit.run import storing
+    from bowdenfit.run import writing
 
     def full(*_):
         raise OSError(28, "No space left on device")
 
     monkeypatch.setattr(FIGURES["wrap_angles"], "draw", full)
-    monkeypatch.setattr(storing, "printable", full)
+    monkeypatch.setattr(writing, "printable", full)
     with pytest.raises(DiskError, match=r"whole fit, but summary\.txt and details\.txt could not be written") as said:
         bf.fit(on_body, output=tmp_path / "fit", seed=3, mcmc=False)
     assert "its figure wrap_angles could not be drawn" in str(said.value) and said.value.exit_code == 1

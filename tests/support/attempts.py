@@ -85,6 +85,10 @@ def attempt(arguments: list[str], folder: Path, user: int | None, place: Path) -
     if not child:
         try:
             begin(arguments, folder, user, place)
+        except SystemExit as stop:
+            sys.stdout.flush()
+            sys.stderr.flush()
+            os._exit(stop.code or 0)
         finally:
             os._exit(99)
     until = time.monotonic() + 5 * SECONDS

@@ -24,7 +24,7 @@ from bowdenfit.inputs import read_toml_file
 from bowdenfit.parameters.space import Parameter, ParameterSpace
 from bowdenfit.words import shown
 
-_ENDLESS = 1e300  # where the last quantile of a half-Cauchy, worked out by its logarithm, ends before it overflows
+_ENDLESS = 1e60  # beyond which a range has no end: half-Cauchy priors stay at 1e88 of their scale
 
 
 @dataclass(frozen=True)

@@ -250,6 +250,7 @@ def test_the_curves_of_every_draw_have_the_shape_of_their_family(fits):
         assert np.all(np.all(rises, axis=1) | np.all(~rises, axis=1)) == (name != "gaussian")
 
 
+@pytest.mark.extended
 def test_the_figure_of_wrap_angles_draws_the_curve_of_each_family(fits):
     readings = [shown.curves[0].angle for fit in fits.values() if (shown := data(fit)) is not None]
     assert len(readings) == len(CURVES)

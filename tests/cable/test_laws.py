@@ -158,6 +158,7 @@ def test_summary_and_check_name_the_law(tmp_path, run):
     assert [line for line in out.splitlines() if line.startswith("wobble_sheath") and " deg " in line]
 
 
+@pytest.mark.extended
 def test_figures_show_the_parameter_of_a_law(fitted):
     assert [p.symbol for p in coefficients_figure.data(fitted)] == [r"$\mu$", "$w$ sheath"]
     assert any("$w$ sheath" in quantity.label and "deg" in quantity.label for quantity in pairs_figure.data(fitted).quantities)

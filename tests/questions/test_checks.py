@@ -353,6 +353,7 @@ def test_an_angle_misread_by_ten_sds_is_the_one_that_is_named(on_body):
     assert "free_sheath_angle at 490 mm" in {text.get_text() for axes in figure.axes for text in axes.texts}
 
 
+@pytest.mark.extended
 @pytest.mark.parametrize("scale", [0.05, 200.0], ids=["1 to 2.5 N", "4 to 10 kN"])
 def test_a_run_read_a_quarter_too_low_among_four_is_an_outlier(scale, tmp_path):
     """Of so few, weights put it 2.3 or 2.9 sds low, at a chance of 1 in 100, and the fit ended as if all were well."""
@@ -396,6 +397,7 @@ def forces(tmp_path_factory):
     return path
 
 
+@pytest.mark.extended
 @pytest.mark.parametrize(("prior", "conflict"), [("value=0.15, sd=0.01", True), ("value=0.12, sd=0.01", False)])
 def test_a_prior_that_is_wrong_and_narrow_is_reported_as_a_conflict(forces, prior, conflict):
     fit = bf.fit(forces, wrap_angle=(180.0, "deg"), seed=2, settings=(*QUICK, f"friction.mu.measured={{{prior}}}"))

@@ -61,6 +61,7 @@ def share(exponent: float) -> float:
 # What the capstan equation says is what remains without preload -----------------------------------------------------
 
 
+@pytest.mark.extended
 @pytest.mark.parametrize("kind", ["loop", "single"])
 def test_without_preload_and_lengthening_every_prediction_is_that_of_the_capstan_equation(kind):
     """To machine precision: efficiency, forces both ways, friction, slack, and the stretch of the one side that pulls."""

@@ -38,6 +38,7 @@ def fit(table):
     return bf.fit(table, seed=1, settings=QUICK)
 
 
+@pytest.mark.extended
 @pytest.mark.parametrize(
     ("friction", "stroke"),
     some_slow(

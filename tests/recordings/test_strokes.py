@@ -271,6 +271,7 @@ def random_recording(seed: int) -> RawRecording:
     return to_raw(simulate_recording(exponent, friction, profile, bench, faults, g), "run", "run.csv")
 
 
+@pytest.mark.extended
 @pytest.mark.parametrize(("velocity", "n"), [("recorded", 10), ("absent", 40), ("turned around", 10)])
 def test_swapped_channels_are_told_from_good_ones(velocity, n):
     for seed in range(n):

@@ -113,6 +113,7 @@ def test_a_figure_is_drawn_again_without_a_model(results, undrawn, tmp_path):
     assert (tmp_path / "efficiency.png").read_bytes() == (results / "figures" / "efficiency.png").read_bytes()
 
 
+@pytest.mark.extended
 def test_the_program_draws_the_figures_that_the_library_does(results, undrawn, tmp_path):
     command = [sys.executable, "-m", "bowdenfit", "plot", undrawn, "-o", tmp_path]
     done = subprocess.run(command, capture_output=True, text=True, check=True)
@@ -124,6 +125,7 @@ def test_the_program_draws_the_figures_that_the_library_does(results, undrawn, t
         assert (tmp_path / name).read_bytes() == (results / "figures" / name).read_bytes(), name
 
 
+@pytest.mark.extended
 @pytest.mark.parametrize("chosen", [(), ("--figure", "pairs", "--figure", "wrap_angles", "--format", "png")])
 def test_figures_that_the_fit_drew_are_copied(results, undrawn, run, tmp_path, chosen):
     done = without(HEAVY | {"numpy"}, "plot", results, "-o", tmp_path / "copied", *chosen)
@@ -286,6 +288,7 @@ def test_nothing_is_read_back_of_a_folder_that_was_changed(results, tmp_path, ch
     assert kept(copy) == {}
 
 
+@pytest.mark.extended
 @pytest.mark.parametrize("verb", ["length", "predict", "identify"])
 def test_an_answer_that_was_kept_in_another_shape_is_worked_out(results, tmp_path, run, verb):
     copy = shutil.copytree(results, tmp_path / "copy")
@@ -311,6 +314,7 @@ def test_a_changed_fit_is_answered_anew(results, tmp_path, run):
     assert err.startswith("Warning: this fit is not converged")
 
 
+@pytest.mark.extended
 def test_a_fit_that_is_not_to_be_trusted_says_so_beside_what_is_read_back(on_body, tmp_path, run):
     few = ("sampler.n_walkers=32", "sampler.max_steps=200")
     bf.fit(on_body, output=tmp_path / "fit", seed=1, settings=few, figures=False)

@@ -173,6 +173,7 @@ def test_a_resumed_fit_equals_one_that_was_never_interrupted(saved, on_body, tmp
     assert resumed.provenance.seed == 3
 
 
+@pytest.mark.extended
 def test_a_checkpoint_from_before_a_setting_existed_is_resumed(saved, on_body, tmp_path):
     """Settings that have come since stand at their defaults."""
     fit, folder = saved
@@ -186,6 +187,7 @@ def test_a_checkpoint_from_before_a_setting_existed_is_resumed(saved, on_body, t
     np.testing.assert_array_equal(again.posterior.z, fit.posterior.z)
 
 
+@pytest.mark.extended
 def test_resume_tops_up_a_finished_fit(saved, on_body, tmp_path):
     fit, folder = saved
     copy = shutil.copytree(folder, tmp_path / "copy")

@@ -141,6 +141,7 @@ def test_targets_that_no_sampling_can_reach_are_refused_at_the_start(on_body, tm
     assert not (tmp_path / "fit").exists()
 
 
+@pytest.mark.extended
 @pytest.mark.parametrize(
     ("output", "code", "said"), [("| true", 141, ""), (">&-", 0, ""), ("2>&- >&-", 0, ""), ("2>/dev/full", 0, "On-body")]
 )

@@ -18,6 +18,7 @@ bf.fit(sys.argv[1], seed=11, settings=sys.argv[3:], output=sys.argv[2], figures=
 """
 
 
+@pytest.mark.extended
 def test_a_program_that_guards_nothing_gets_the_same_fit_as_the_command_line(on_body, quick_results, tmp_path):
     command = [sys.executable, "-c", IN_A_PROGRAM, str(on_body), str(tmp_path / "fit"), *QUICK]
     done = subprocess.run(command, capture_output=True, text=True, check=False, timeout=120)

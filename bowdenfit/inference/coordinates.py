@@ -12,7 +12,7 @@ from jax import Array
 
 from bowdenfit.inference.conditional import Conditional
 from bowdenfit.inference.log_density import LogDensity
-from bowdenfit.inference.value_chart import Chart, chart_values
+from bowdenfit.inference.prior_grid import Chart, chart_values
 from bowdenfit.parameters.space import ParameterSpace
 
 # W and z of walkers (rows), and log of the volume in z of a unit of w there: of either of them, of which it is said whether it

@@ -22,7 +22,7 @@ from typing import Any
 import numpy as np
 
 from bowdenfit.inference.linearized import scatter_about
-from bowdenfit.inference.prior_numbers import value_at
+from bowdenfit.inference.scalar_priors import value_at
 from bowdenfit.kinds.term import Term
 from bowdenfit.parameters.space import Parameter
 

@@ -20,9 +20,9 @@ import numpy as np
 
 from bowdenfit.inference.departure import FALSE_ALARM, Departure, FarReading
 from bowdenfit.inference.objective import Solution
-from bowdenfit.inference.prior_numbers import near_z
 from bowdenfit.inference.profiles import Basin
-from bowdenfit.inference.testable_readings import Readings, System, readings_to_test
+from bowdenfit.inference.residual_groups import Readings, System, readings_to_test
+from bowdenfit.inference.scalar_priors import near_z
 from bowdenfit.kinds.inside_runs import ORDER, SPEED, STROKE, ZERO
 from bowdenfit.kinds.term import GROUP, LOAD, WRAP_ANGLE
 from bowdenfit.model import Model

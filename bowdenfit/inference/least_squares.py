@@ -22,8 +22,8 @@ from bowdenfit.inference.log_density import LogDensity
 from bowdenfit.inference.minimum import FoundMinimum, lowest_minimum
 from bowdenfit.inference.objective import Objective, Problem, Solution, sum_of_squares, total
 from bowdenfit.inference.other_minima import PINS, fitting_as_well, range_of_minima
-from bowdenfit.inference.prior_numbers import near_z
 from bowdenfit.inference.profiles import UNKNOWN, Limits
+from bowdenfit.inference.scalar_priors import near_z
 from bowdenfit.inference.solver import ROUGH
 from bowdenfit.parameters.priors import LogNormal
 from bowdenfit.parameters.space import Parameter

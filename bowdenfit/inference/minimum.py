@@ -11,8 +11,8 @@ import numpy as np
 from bowdenfit.inference.interval import NORMAL_90
 from bowdenfit.inference.linearized import Linearized, linearize, scatter_about
 from bowdenfit.inference.objective import LOWER_END, Problem, may_end, sum_of_squares, total
-from bowdenfit.inference.prior_numbers import near_z
 from bowdenfit.inference.profiles import Basin, Limits, is_stuck, limits
+from bowdenfit.inference.scalar_priors import near_z
 from bowdenfit.parameters.priors import HalfCauchy, Uniform
 from bowdenfit.parameters.space import Parameter
 

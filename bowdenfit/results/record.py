@@ -17,7 +17,7 @@ from bowdenfit.inference.diagnostics import Diagnostics, Trajectories
 from bowdenfit.inference.draws import OfDraws, derived_units, efficiency_at
 from bowdenfit.inference.interval import Interval
 from bowdenfit.inference.least_squares import LeastSquares
-from bowdenfit.inference.samplers import SamplerAgreement
+from bowdenfit.inference.sampler_agreement import SamplerAgreement
 from bowdenfit.model import Model, build_model
 from bowdenfit.results.efficiencies import Efficiencies
 from bowdenfit.results.length import OptimalLength

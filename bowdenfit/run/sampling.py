@@ -14,7 +14,7 @@ import numpy as np
 from bowdenfit.inference.chain import Chain, Sampling
 from bowdenfit.inference.draws import for_each_draw, replicator
 from bowdenfit.inference.log_density import LogDensity
-from bowdenfit.inference.samplers import NAMES, Drawn, compare_samplers
+from bowdenfit.inference.sampler_agreement import NAMES, Drawn, compare_samplers
 from bowdenfit.inference.walkers import walker_programs
 from bowdenfit.model import Model
 from bowdenfit.results.optimum import optimum_of

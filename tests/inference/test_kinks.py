@@ -10,7 +10,7 @@ from bowdenfit.inference.least_squares import KINKED, least_squares, maximum_pos
 from bowdenfit.inference.log_density import LogDensity
 from bowdenfit.inference.minimum import lowest_minimum
 from bowdenfit.inference.objective import Problem, make_objective, sum_of_squares
-from bowdenfit.inference.prior_numbers import z_at
+from bowdenfit.inference.scalar_priors import z_at
 from bowdenfit.inference.solver import QUICK
 from bowdenfit.model import build_model
 from bowdenfit.questions.summary.words import full_text

@@ -23,7 +23,7 @@ from bowdenfit.inference.moves import (
     numbers_of_move,
     stretch,
 )
-from bowdenfit.inference.value_chart import NODES, Chart
+from bowdenfit.inference.prior_grid import NODES, Chart
 from bowdenfit.inference.walkers import compiled_walkers
 
 DEGREES_OF_FREEDOM, DIMENSIONS = 4, 5

@@ -11,7 +11,7 @@ from scipy import stats
 
 import bowdenfit as bf
 from bowdenfit.inference import nuts
-from bowdenfit.inference.samplers import FALSE_ALARM, Drawn, SamplerAgreement, compare_samplers, recommendation
+from bowdenfit.inference.sampler_agreement import FALSE_ALARM, Drawn, SamplerAgreement, compare_samplers, recommendation
 from bowdenfit.questions.figures import figures_of
 from bowdenfit.questions.summary.words import full_text
 

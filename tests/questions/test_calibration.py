@@ -19,7 +19,6 @@ from spoiling import copied
 from bowdenfit.dataset import Dataset, load_dataset
 from bowdenfit.description import Description, SamplerSettings
 from bowdenfit.errors import DatasetError, StoreError
-from bowdenfit.holm import holm
 from bowdenfit.inference.batch.programs import BatchSettings
 from bowdenfit.inference.compilation import compile_program
 from bowdenfit.kinds import KINDS
@@ -32,6 +31,7 @@ from bowdenfit.kinds.forces.term import HeldForcesTerm
 from bowdenfit.kinds.kind import Design
 from bowdenfit.kinds.recordings.simulation import refuse_saturated
 from bowdenfit.model import build_model
+from bowdenfit.multiple_testing import adjust_p_values
 from bowdenfit.questions.calibrate import coverage_figure, ranks_figure, sharpness_figure
 from bowdenfit.questions.calibrate.acceptable_tables import refusal
 from bowdenfit.questions.calibrate.answer import Calibration, Quantity
@@ -265,8 +265,8 @@ def test_ranks_heaped_in_the_middle_or_at_an_end_are_not_uniform():
 
 
 def test_holm_s_correction_is_the_textbook_s():
-    assert holm([0.01, 0.04, 0.03, 0.005]) == pytest.approx([0.03, 0.06, 0.06, 0.02])
-    assert holm([0.6, 0.9]).tolist() == [1.0, 1.0]
+    assert adjust_p_values([0.01, 0.04, 0.03, 0.005]) == pytest.approx([0.03, 0.06, 0.06, 0.02])
+    assert adjust_p_values([0.6, 0.9]).tolist() == [1.0, 1.0]
 
 
 def replications(n: int, sd: float = 1.0, shift: float = 0.0, seed: int = 0, bad: int = 0) -> list[Replication]:

@@ -14,7 +14,7 @@ from bowdenfit.display import Display, Rows
 from bowdenfit.errors import UsageError
 from bowdenfit.inference.draws import for_each_value
 from bowdenfit.inference.interval import Interval
-from bowdenfit.inference.prior_numbers import value_at
+from bowdenfit.inference.scalar_priors import value_at
 from bowdenfit.kinds import each_table
 from bowdenfit.kinds.kind import FrictionKind, RopeKind
 from bowdenfit.physics.loop import dynamic_range

@@ -6,7 +6,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from bowdenfit.holm import holm
+from bowdenfit.multiple_testing import adjust_p_values
 from bowdenfit.questions.calibrate.answer import INTERVALS, LEVEL, Calibration, Checked, Coverage, Quantity
 from bowdenfit.questions.calibrate.power import power_of
 from bowdenfit.questions.calibrate.replication import Replication
@@ -63,7 +63,7 @@ def _check_all(
     p_values = [UniformRanks(len(ranked)).p_value(r) for r in ranks]
     return tuple(
         replace(_check_quantity(q, known[q].symbol, r, (p, c), n_judged, judged_by[q], ranked), meaning=known[q].meaning)
-        for q, r, p, c in zip(known, ranks, p_values, holm(p_values).tolist(), strict=True)
+        for q, r, p, c in zip(known, ranks, p_values, adjust_p_values(p_values).tolist(), strict=True)
     )
 
 

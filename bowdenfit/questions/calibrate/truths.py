@@ -19,7 +19,7 @@ from typing import Any
 import numpy as np
 
 from bowdenfit.errors import DescriptionError, UsageError, nearest
-from bowdenfit.inference.prior_numbers import value_at, z_at
+from bowdenfit.inference.scalar_priors import value_at, z_at
 from bowdenfit.inputs import read_toml_file
 from bowdenfit.parameters.space import Parameter, ParameterSpace
 from bowdenfit.words import shown

@@ -16,7 +16,7 @@ from bowdenfit.inference.batch.stages import BatchFit
 from bowdenfit.inference.compilation import compile_program
 from bowdenfit.inference.draws import for_each_draw
 from bowdenfit.inference.log_density import LogDensity
-from bowdenfit.inference.prior_numbers import z_at
+from bowdenfit.inference.scalar_priors import z_at
 from bowdenfit.kinds.drawn_readings import Readings, drawn_readings, drawn_tables, slipped
 from bowdenfit.kinds.measurements import Measurements
 from bowdenfit.model import Model, build_model

@@ -6,8 +6,8 @@ import numpy as np
 from bowdenfit.inference.draws import OfDraws, for_each_draw, named_values
 from bowdenfit.inference.identifiability import RESTS_ON_PRIOR, Combination, Knowledge, knowledge
 from bowdenfit.inference.least_squares import UNDETERMINED, MaximumPosterior
-from bowdenfit.inference.prior_numbers import value_at
 from bowdenfit.inference.profiles import Profile
+from bowdenfit.inference.scalar_priors import value_at
 from bowdenfit.model import Model
 from bowdenfit.questions.identify.answer import GROUPS, Identifiability, how_well
 from bowdenfit.results.record import Record, once

@@ -132,7 +132,7 @@ def _of_plan(path: Path) -> "Identifiability":
     from bowdenfit.inference.compilation import compile_program
     from bowdenfit.inference.information import information_at
     from bowdenfit.inference.log_density import LogDensity
-    from bowdenfit.inference.prior_numbers import value_at
+    from bowdenfit.inference.scalar_priors import value_at
     from bowdenfit.model import build_model
     from bowdenfit.questions.identify.judgment import of_maximum
     from bowdenfit.questions.simulate.simulation import empty_tables, simulate, true_values

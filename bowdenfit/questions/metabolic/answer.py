@@ -9,7 +9,7 @@ import numpy as np
 
 from bowdenfit.display import Display, Part, Rows
 from bowdenfit.errors import DatasetError
-from bowdenfit.holm import holm
+from bowdenfit.multiple_testing import adjust_p_values
 from bowdenfit.questions.metabolic.contradictions import contradictions
 from bowdenfit.questions.metabolic.paired import (
     LEVEL,
@@ -105,7 +105,7 @@ def answered(study: Study, costs: Costs | None) -> Metabolic:
     pairs = list(_of_persons(costs)) if costs is not None else list(_of_printed(study))
     if not pairs:
         raise DatasetError("no two conditions can be compared; a pair needs two persons, or means and a p that were printed.")
-    adjusted = holm([two_sided(mean / error, n) for _, _, n, mean, error, _ in pairs])
+    adjusted = adjust_p_values([two_sided(mean / error, n) for _, _, n, mean, error, _ in pairs])
     found = tuple(_compared(*pair, p) for pair, p in zip(pairs, adjusted.tolist(), strict=True))
     return Metabolic(study.name, study.source, found, tuple(contradictions(study)), study.order, costs is not None)
 

@@ -23,10 +23,10 @@ from collections.abc import Callable, Collection
 import numpy as np
 from scipy.special import chdtrc, gammaln, log_ndtr, ndtr
 
-from bowdenfit.holm import holm
 from bowdenfit.inference.population.model import Inspected
 from bowdenfit.inference.population.sampling import PopulationDraws
 from bowdenfit.inference.psis import smooth_weights
+from bowdenfit.multiple_testing import adjust_p_values
 
 FALSE_ALARM, OF_KINDS = 0.05, 0.01  # of fleets in which all cables are alike: of naming any, and of seeing two kinds
 _POPULATIONS = 1000  # draws of the population
@@ -73,12 +73,12 @@ def judged(
         draw: Draws the population without some cables.
         seed: Of everything random.
     """
-    core, adjusted = drawn, holm(chances(inspected, drawn, seed))
+    core, adjusted = drawn, adjust_p_values(chances(inspected, drawn, seed))
     without = _suspects(adjusted, far_off(inspected, drawn))
     taken_in: dict[int, float] = {}
     while without:
         core = draw(without)
-        found = holm(chances(inspected, core, seed, without))
+        found = adjust_p_values(chances(inspected, core, seed, without))
         taken_in |= {i: float(found[i]) for i in without if found[i] >= FALSE_ALARM}
         others = np.where(np.isin(np.arange(len(found)), list(taken_in)), 1.0, found)
         left = _suspects(others, tuple(i for i in without if i not in taken_in))
@@ -246,7 +246,7 @@ def mixed(
         standardized = (estimate - drawn.mean[:, k].mean()) / np.sqrt(variance)
         if known.sum() >= _FEWEST:
             found[name] = anderson_darling(standardized)
-    adjusted = holm(np.array(list(found.values())))
+    adjusted = adjust_p_values(np.array(list(found.values())))
     return {name: float(p) for name, p in zip(found, adjusted, strict=True) if p < OF_KINDS}
 
 

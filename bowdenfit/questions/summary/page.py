@@ -8,7 +8,7 @@ import numpy as np
 from bowdenfit.display import Display, Rows
 from bowdenfit.inference.diagnostics import shortfalls
 from bowdenfit.inference.interval import Interval
-from bowdenfit.inference.samplers import recommendation
+from bowdenfit.inference.sampler_agreement import recommendation
 from bowdenfit.kinds import readings_called
 from bowdenfit.kinds.recordings.words import preparation_pages
 from bowdenfit.kinds.term import Term

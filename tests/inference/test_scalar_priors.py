@@ -2,7 +2,7 @@
 
 import pytest
 
-from bowdenfit.inference.prior_numbers import value_at, z_at
+from bowdenfit.inference.scalar_priors import value_at, z_at
 from bowdenfit.parameters.priors import HalfCauchy, HalfNormal, LogNormal, Normal, TruncatedNormal, Uniform
 
 PRIORS = (

@@ -5,7 +5,7 @@ import jax.numpy as jnp
 import numpy as np
 
 from bowdenfit.dataset import load_dataset
-from bowdenfit.inference.value_chart import NODES, Chart, chart_values
+from bowdenfit.inference.prior_grid import NODES, Chart, chart_values
 from bowdenfit.model import build_model
 
 DIMENSIONS = 5
